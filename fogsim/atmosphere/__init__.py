@@ -1,0 +1,1 @@
+"""Pure physics of light in fog: extinction, optical depth, airlight."""

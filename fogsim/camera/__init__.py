@@ -1,0 +1,1 @@
+"""Pixels to rays and back, exposure, noise, response and quantisation."""

@@ -1,0 +1,1 @@
+"""Many estimates over time to one belief."""

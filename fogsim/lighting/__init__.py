@@ -1,0 +1,1 @@
+"""Belief and traffic to lamp states."""

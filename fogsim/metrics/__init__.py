@@ -1,0 +1,1 @@
+"""Surrogate safety, comfort and estimator error."""

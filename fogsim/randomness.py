@@ -1,0 +1,47 @@
+"""Random numbers: one seed, spawned into named streams, so that one part's draws never shift another's."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, slots=True)
+class Streams:
+    """Independent random generators, one for each part of a run.
+
+    Attributes
+    ----------
+    traffic_seed : int
+        Seed handed to the traffic simulation, in 0 … 2³¹ − 1.
+    fog, camera, sensors, driver : numpy.random.Generator
+        Generators for fog fields, camera noise, the vehicle's other sensors and drivers.
+    """
+
+    traffic_seed: int
+    fog: np.random.Generator
+    camera: np.random.Generator
+    sensors: np.random.Generator
+    driver: np.random.Generator
+
+
+def spawn_streams(seed: int) -> Streams:
+    """Spawn the named streams of one run from its seed.
+
+    Parameters
+    ----------
+    seed : int
+        Any non-negative integer; the same seed gives the same run, bit for bit.
+
+    Raises
+    ------
+    ValueError
+        If the seed is negative.
+    """
+    traffic, fog, camera, sensors, driver = np.random.SeedSequence(seed).spawn(5)
+    return Streams(
+        traffic_seed=int(traffic.generate_state(1, np.uint32)[0] >> 1),
+        fog=np.random.default_rng(fog),
+        camera=np.random.default_rng(camera),
+        sensors=np.random.default_rng(sensors),
+        driver=np.random.default_rng(driver),
+    )

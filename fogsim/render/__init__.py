@@ -1,0 +1,1 @@
+"""Geometry to linear radiance, distance along the ray and instance ids."""

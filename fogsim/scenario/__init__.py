@@ -1,0 +1,1 @@
+"""Scenario files: schema, loading, catalogue, and building the stages from a scenario."""

@@ -1,0 +1,1 @@
+"""Road, markings, signs, vehicles and roadside as plain geometry and materials."""

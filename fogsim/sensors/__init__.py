@@ -1,0 +1,1 @@
+"""What a vehicle measures beside its camera."""

@@ -1,0 +1,1 @@
+"""Where every vehicle is, how it moves and how it obeys advice."""

@@ -1,0 +1,61 @@
+"""Physical constants and the conversions that are made at the edges of FogSim, each written once."""
+
+import math
+
+CONTRAST_THRESHOLD = 0.05
+"""Contrast at which a black target is just visible [-] (CIE e-ILV 772 and WMO, "meteorological optical range")."""
+
+OPTICAL_DEPTH_AT_VISIBILITY = -math.log(CONTRAST_THRESHOLD)
+"""k · V_met = ln 20 = 2.9957 [-]."""
+
+KMH_PER_MPS = 3.6
+"""Kilometres an hour in one metre a second."""
+
+GRAVITY = 9.80665
+"""Standard acceleration of free fall [m/s²]."""
+
+
+def extinction_from_visibility(visibility: float) -> float:
+    """Extinction coefficient of fog with a given meteorological visibility (Koschmieder; CIE 5 % contrast).
+
+    Parameters
+    ----------
+    visibility : float
+        Meteorological visibility V_met [m], positive; ``inf`` is clear air.
+
+    Returns
+    -------
+    float
+        Extinction coefficient k = ln 20 / V_met [1/m]; exactly 0 for ``inf``.
+
+    Raises
+    ------
+    ValueError
+        If the visibility is not positive (NaN included).
+    """
+    if not visibility > 0:
+        raise ValueError(f"meteorological visibility must be a positive length in metres, got {visibility!r}")
+    return OPTICAL_DEPTH_AT_VISIBILITY / visibility
+
+
+def visibility_from_extinction(extinction: float) -> float:
+    """Meteorological visibility of fog with a given extinction coefficient, the inverse of the above.
+
+    Parameters
+    ----------
+    extinction : float
+        Extinction coefficient k [1/m], not negative.
+
+    Returns
+    -------
+    float
+        V_met = ln 20 / k [m]; ``inf`` for k = 0.
+
+    Raises
+    ------
+    ValueError
+        If the extinction coefficient is negative or NaN.
+    """
+    if not extinction >= 0:
+        raise ValueError(f"an extinction coefficient must not be negative, got {extinction!r}")
+    return math.inf if extinction == 0 else OPTICAL_DEPTH_AT_VISIBILITY / extinction

@@ -1,0 +1,49 @@
+"""The plain frozen values that the stages of FogSim hand to one another."""
+
+from fogsim.values.belief import Belief
+from fogsim.values.camera import Camera, CameraPose, Response
+from fogsim.values.command import Command, SpeedAdvice
+from fogsim.values.estimate import Estimate, FogCategory, fog_category
+from fogsim.values.fog import FogBank, FogField
+from fogsim.values.image import Frame, View
+from fogsim.values.lamps import Lamp
+from fogsim.values.observation import LeadMeasurement, Observation, SignSighting
+from fogsim.values.road import Lane, LaneMarking, RoadNetwork, Sign, SignMap
+from fogsim.values.scene import Batch, Mesh, Scene, Surface
+from fogsim.values.step import Collision, Ending, Leader, Step, Truth
+from fogsim.values.traffic import TrafficState
+
+__all__ = [
+    "Batch",
+    "Belief",
+    "Camera",
+    "CameraPose",
+    "Collision",
+    "Command",
+    "Ending",
+    "Estimate",
+    "FogBank",
+    "FogCategory",
+    "FogField",
+    "Frame",
+    "Lamp",
+    "Lane",
+    "LaneMarking",
+    "Leader",
+    "LeadMeasurement",
+    "Mesh",
+    "Observation",
+    "Response",
+    "RoadNetwork",
+    "Scene",
+    "Sign",
+    "SignMap",
+    "SignSighting",
+    "SpeedAdvice",
+    "Step",
+    "Surface",
+    "TrafficState",
+    "Truth",
+    "View",
+    "fog_category",
+]

@@ -1,0 +1,47 @@
+"""What is believed about the fog after many estimates."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
+
+
+@dataclass(frozen=True, slots=True)
+class Belief:
+    """A distribution over the logarithm of the extinction coefficient.
+
+    Attributes
+    ----------
+    log_extinction : (n,) float64
+        Centres of the cells, ln k with k in 1/m, evenly spaced and ascending.
+    probability : (n,) float64
+        Probability of each cell; sums to 1.
+    """
+
+    log_extinction: NDArray[np.float64]
+    probability: NDArray[np.float64]
+
+    def visibility_quantile(self, share: float) -> float:
+        """Visibility below which the truth lies with a given probability [m].
+
+        Parameters
+        ----------
+        share : float
+            Probability in 0 … 1; 0.05 is a cautious visibility, 0.5 the median.
+        """
+        cumulative = np.cumsum(self.probability) - 0.5 * self.probability
+        log_extinction = np.interp(1.0 - share, cumulative, self.log_extinction)
+        return float(OPTICAL_DEPTH_AT_VISIBILITY / np.exp(log_extinction))
+
+    @property
+    def visibility(self) -> float:
+        """Median visibility [m]."""
+        return self.visibility_quantile(0.5)
+
+    @property
+    def log_standard_deviation(self) -> float:
+        """Standard deviation of ln k [-]."""
+        mean = float(self.probability @ self.log_extinction)
+        return float(np.sqrt(self.probability @ (self.log_extinction - mean) ** 2))

@@ -1,0 +1,101 @@
+"""The calibration of a camera and where it is."""
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+from fogsim.errors import InputError
+
+
+class Response(StrEnum):
+    """How a camera turns exposure into pixel values: proportional, power 1/2.2, or IEC 61966-2-1."""
+
+    LINEAR = "linear"
+    GAMMA = "gamma"
+    SRGB = "srgb"
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """A pinhole camera on a vehicle, looking along the vehicle's axis.
+
+    Pixel (row v, column u) has its centre at integer coordinates; v grows downward.
+
+    Attributes
+    ----------
+    width, height : int
+        Size of the image [px].
+    focal_length : float
+        Focal length α = f / pixel pitch [px].
+    principal_point : tuple of float
+        (u0, v0) [px].
+    mount_height : float
+        Height of the optical centre above the road [m].
+    pitch : float
+        Angle of the optical axis below the horizontal [rad]; positive looks down.
+    roll : float
+        Rotation about the optical axis [rad]; positive turns the image's right side down.
+    response : Response
+        Curve from exposure to pixel value.
+    """
+
+    width: int
+    height: int
+    focal_length: float
+    principal_point: tuple[float, float]
+    mount_height: float
+    pitch: float = 0.0
+    roll: float = 0.0
+    response: Response = Response.LINEAR
+
+    def __post_init__(self) -> None:
+        """Refuse a calibration that no camera can have.
+
+        Raises
+        ------
+        InputError
+            If a size, length or angle is out of range or not finite.
+        """
+        object.__setattr__(self, "response", Response(self.response))
+        object.__setattr__(self, "principal_point", (float(self.principal_point[0]), float(self.principal_point[1])))
+        for name in ("width", "height"):
+            if int(getattr(self, name)) != getattr(self, name) or getattr(self, name) < 1:
+                raise InputError(f"camera {name} must be a whole number of pixels ≥ 1, got {getattr(self, name)!r}")
+        for name in ("focal_length", "mount_height"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
+                raise InputError(f"camera {name} must be positive and finite, got {getattr(self, name)!r}")
+        if not all(math.isfinite(value) for value in self.principal_point):
+            raise InputError(f"camera principal_point must be finite, got {self.principal_point!r}")
+        if not abs(self.pitch) < math.pi / 2:
+            raise InputError(f"camera pitch must lie within ±π/2 rad, got {self.pitch!r}")
+        if not abs(self.roll) <= math.pi:
+            raise InputError(f"camera roll must lie within ±π rad, got {self.roll!r}")
+
+    @property
+    def horizon_row(self) -> float:
+        """Row of the horizon at the principal column, v_h = v0 − α tan θ [px] (negru2013 eq. 6)."""
+        return self.principal_point[1] - self.focal_length * math.tan(self.pitch)
+
+    @property
+    def row_distance(self) -> float:
+        """λ = α H / cos θ [px·m], so that a road point on row v lies λ / (v − v_h) ahead (negru2013 eq. 11)."""
+        return self.focal_length * self.mount_height / math.cos(self.pitch)
+
+
+@dataclass(frozen=True, slots=True)
+class CameraPose:
+    """Where a camera is in the world and where its vehicle heads.
+
+    Attributes
+    ----------
+    position : tuple of float
+        (x, y, z) of the optical centre [m]: east, north, up.
+    heading : float
+        Direction of travel, counterclockwise from east [rad].
+    grade : float
+        Upward inclination of the vehicle [rad], added to the camera's own pitch.
+    """
+
+    position: tuple[float, float, float]
+    heading: float
+    grade: float = 0.0

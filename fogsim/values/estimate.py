@@ -1,0 +1,89 @@
+"""What one estimator says about the fog in one frame."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from fogsim.units import visibility_from_extinction
+
+NORMAL_90_PERCENT = 1.6448536269514722
+"""Half-width of the central 90 % interval of a normal distribution in standard deviations [-]."""
+
+
+class FogCategory(StrEnum):
+    """Fog classes of negru2013, table I."""
+
+    NONE = "none"
+    LOW = "low"
+    MODERATE = "moderate"
+    DENSE = "dense"
+    VERY_DENSE = "very dense"
+
+
+def fog_category(visibility: float) -> FogCategory:
+    """Class of a meteorological visibility (negru2013, table I: 50, 100, 300 and 1000 m).
+
+    Parameters
+    ----------
+    visibility : float
+        Meteorological visibility [m].
+    """
+    if visibility < 50:
+        return FogCategory.VERY_DENSE
+    if visibility < 100:
+        return FogCategory.DENSE
+    if visibility < 300:
+        return FogCategory.MODERATE
+    return FogCategory.LOW if visibility < 1000 else FogCategory.NONE
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """An estimate of the extinction coefficient, or the statement that there is none.
+
+    Attributes
+    ----------
+    method : str
+        Name of the estimator in the registry.
+    extinction : float
+        Extinction coefficient k [1/m], ≥ 0; 0 with a finite deviation means "no fog that this method could see".
+    standard_deviation : float
+        Standard deviation of k [1/m]; ``inf`` if not valid.
+    valid : bool
+        False if the method cannot tell from this frame; the numbers then say nothing.
+    diagnostics : mapping
+        What the method found on the way (rows, bands, reasons), for overlays and debugging.
+    """
+
+    method: str
+    extinction: float
+    standard_deviation: float
+    valid: bool = True
+    diagnostics: Mapping[str, object] = field(default_factory=dict)
+
+    @classmethod
+    def invalid(cls, method: str, reason: str, **diagnostics: object) -> "Estimate":
+        """Build the statement that a method cannot tell, with the reason in the diagnostics."""
+        return cls(method, 0.0, math.inf, valid=False, diagnostics={"reason": reason, **diagnostics})
+
+    @property
+    def visibility(self) -> float:
+        """Meteorological visibility ln 20 / k [m]; ``inf`` for k = 0."""
+        return visibility_from_extinction(self.extinction)
+
+    @property
+    def visibility_interval(self) -> tuple[float, float]:
+        """Central 90 % interval of the meteorological visibility [m]; (0, inf) if not valid."""
+        if not self.valid:
+            return (0.0, math.inf)
+        half_width = NORMAL_90_PERCENT * self.standard_deviation
+        return (
+            visibility_from_extinction(self.extinction + half_width),
+            visibility_from_extinction(max(self.extinction - half_width, 0.0)),
+        )
+
+    @property
+    def category(self) -> FogCategory:
+        """Fog class of the estimate."""
+        return fog_category(self.visibility)

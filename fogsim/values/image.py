@@ -1,0 +1,46 @@
+"""What a camera could see, and what it did."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.values.camera import Camera
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """A drawn scene before the air and the camera have touched it.
+
+    Attributes
+    ----------
+    radiance : (rows, cols, 3) float32
+        Linear radiance, weighted as luminance per channel [cd/m²].
+    distance : (rows, cols) float32
+        Distance along the ray from the optical centre [m]; ``inf`` for the sky.
+    instance : (rows, cols) int32
+        What is seen: 0 sky, 1 terrain, 2 road, 3 roadside, 4 sign, 16 + i the vehicle in row i of the traffic state.
+    """
+
+    radiance: NDArray[np.float32]
+    distance: NDArray[np.float32]
+    instance: NDArray[np.int32]
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """An image and the calibration that its vehicle believes in.
+
+    Attributes
+    ----------
+    time : float
+        Instant of the exposure [s].
+    image : (rows, cols, 3) or (rows, cols) uint8
+        Pixel values, red first.
+    camera : Camera
+        The calibration as the vehicle was told it, which may differ from the true one.
+    """
+
+    time: float
+    image: NDArray[np.uint8]
+    camera: Camera

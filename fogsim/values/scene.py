@@ -1,0 +1,103 @@
+"""The world as triangles and materials, without any graphics library."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Surface(IntEnum):
+    """How a vertex's surface gets its radiance.
+
+    MATT is lit by the sky; PAINT likewise, with the vehicle's paint in place of its own colour; ROAD has asphalt
+    grain and painted lines; TERRAIN has grass grain; lamps add light of their own while lit.
+    """
+
+    MATT = 0
+    PAINT = 1
+    ROAD = 2
+    TERRAIN = 3
+    LAMP_POSITION_REAR = 4
+    LAMP_STOP = 5
+    LAMP_REAR_FOG = 6
+    LAMP_INDICATOR_LEFT = 7
+    LAMP_INDICATOR_RIGHT = 8
+    LAMP_HEAD = 9
+
+
+@dataclass(frozen=True, slots=True)
+class Mesh:
+    """Triangles.
+
+    Attributes
+    ----------
+    positions : (n, 3) float32
+        Vertices [m].
+    normals : (n, 3) float32
+        Unit normals.
+    reflectance : (n, 3) float32
+        Linear diffuse reflectance, 0 … 1.
+    surface : (n,) int32
+        `Surface` of each vertex, the same for the three of a triangle.
+    road : (n, 4) float32
+        On a ROAD surface: distance along the lane [m], offset to the left of its middle [m], half its width [m], and
+        its lines as 3 · left + right with 0 none, 1 solid, 2 dashed. Elsewhere unused (zero).
+    instance : (n,) int32
+        Instance id drawn for a mesh that stands still; unused for the shape of a batch.
+    faces : (m, 3) uint32
+        Vertices of each triangle.
+    """
+
+    positions: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    reflectance: NDArray[np.float32]
+    surface: NDArray[np.int32]
+    road: NDArray[np.float32]
+    instance: NDArray[np.int32]
+    faces: NDArray[np.uint32]
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """Copies of one shape, each at its own place.
+
+    Attributes
+    ----------
+    shape : str
+        Name of the shape among the scene's shapes.
+    transforms : (n, 4, 4) float32
+        From the shape's coordinates to the world.
+    paint : (n, 3) float32
+        Linear reflectance of PAINT surfaces.
+    lamps : (n,) int32
+        Lit lamps, bits of `Lamp`.
+    instance : (n,) int32
+        Instance id of each copy.
+    """
+
+    shape: str
+    transforms: NDArray[np.float32]
+    paint: NDArray[np.float32]
+    lamps: NDArray[np.int32]
+    instance: NDArray[np.int32]
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """Everything that stands still, and the shapes of what moves.
+
+    Attributes
+    ----------
+    ground : Mesh
+        Roads and signs and all that is near the ground and drawn once, merged.
+    shapes : mapping from str to Mesh
+        Shapes that batches refer to.
+    scenery : tuple of Batch
+        Copies that stand still (trees, posts).
+    """
+
+    ground: Mesh
+    shapes: Mapping[str, Mesh]
+    scenery: tuple[Batch, ...]

@@ -1,0 +1,142 @@
+"""One finished instant of the closed loop: what metrics and recorders get."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from fogsim.units import visibility_from_extinction
+from fogsim.values.belief import Belief
+from fogsim.values.command import Command
+from fogsim.values.estimate import Estimate
+from fogsim.values.image import View
+from fogsim.values.observation import Observation
+from fogsim.values.traffic import TrafficState
+
+
+class Ending(StrEnum):
+    """Why a run is over."""
+
+    ARRIVED = "arrived"
+    COLLISION = "collision"
+    TIME = "time"
+    LEFT_NETWORK = "left the network"
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """What no estimator and no agent may see.
+
+    Attributes
+    ----------
+    extinction : float
+        Extinction coefficient at the ego's camera [1/m].
+    extinction_ahead : float
+        Mean extinction coefficient from the camera to one visibility length ahead along the heading [1/m]: what a
+        camera that looks ahead can at best report where the fog varies.
+    """
+
+    extinction: float
+    extinction_ahead: float
+
+    @property
+    def visibility(self) -> float:
+        """Meteorological visibility at the camera [m]."""
+        return visibility_from_extinction(self.extinction)
+
+    @property
+    def visibility_ahead(self) -> float:
+        """Meteorological visibility of the fog ahead [m]."""
+        return visibility_from_extinction(self.extinction_ahead)
+
+
+@dataclass(frozen=True, slots=True)
+class Leader:
+    """The vehicle ahead of the ego, as it truly is.
+
+    Attributes
+    ----------
+    vehicle_id : str
+        Its id.
+    gap : float
+        Distance from the ego's front bumper to its rear bumper [m].
+    speed : float
+        Its speed [m/s].
+    """
+
+    vehicle_id: str
+    gap: float
+    speed: float
+
+
+@dataclass(frozen=True, slots=True)
+class Collision:
+    """Two vehicles that have hit each other.
+
+    Attributes
+    ----------
+    time : float
+        Instant [s].
+    collider, victim : str
+        Their ids.
+    impact_speed : float
+        Difference of their speeds [m/s].
+    """
+
+    time: float
+    collider: str
+    victim: str
+    impact_speed: float
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One finished instant.
+
+    Attributes
+    ----------
+    index : int
+        Number of the camera period, from 0.
+    time : float
+        Simulated time [s].
+    traffic : TrafficState
+        Every vehicle.
+    ego : int
+        Row of the ego vehicle in `traffic`.
+    route_position : float
+        How far the ego has driven along its route [m].
+    speed_limit : float
+        Speed limit where the ego is [m/s].
+    leader : Leader or None
+        The vehicle ahead.
+    collisions : tuple of Collision
+        Collisions that were new in this period.
+    truth : Truth
+        The fog as it is.
+    view : View
+        The drawn scene before fog and camera.
+    observation : Observation
+        What the ego knows: camera frame and sensors.
+    estimates : tuple of Estimate
+        What the estimators make of it.
+    belief : Belief
+        What is believed after this step.
+    command : Command
+        What was in force while the traffic moved to this instant.
+    ending : Ending or None
+        Why the run is over, None while it goes on.
+    """
+
+    index: int
+    time: float
+    traffic: TrafficState
+    ego: int
+    route_position: float
+    speed_limit: float
+    leader: Leader | None
+    collisions: tuple[Collision, ...]
+    truth: Truth
+    view: View
+    observation: Observation
+    estimates: tuple[Estimate, ...]
+    belief: Belief
+    command: Command
+    ending: Ending | None

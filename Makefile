@@ -1,0 +1,45 @@
+# FogSim: `make demo` and `make test` need nothing but Python ≥ 3.11 and the system libraries that `make check` names.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+
+.DEFAULT_GOAL := help
+.PHONY: help check demo test lint types contracts ci clean
+
+help: ## Show what can be made
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
+
+check: ## Say in one line what the system lacks, if anything
+	@command -v $(PYTHON) >/dev/null || { echo "FogSim needs Python 3.11 or newer: sudo apt-get install python3 python3-venv"; exit 1; }
+	@$(PYTHON) tools/check_system.py
+
+$(VENV)/.installed: pyproject.toml | check
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@echo "Installing FogSim into $(VENV) (once, a minute or two) …"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@touch $@
+
+$(VENV)/.installed-test: $(VENV)/.installed
+	@echo "Installing the test tools into $(VENV) …"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
+	@touch $@
+
+demo: $(VENV)/.installed ## Run the demo scenario; results go to runs/demo/
+	@$(BIN)/fogsim run motorway_fog_bank --seed 1 --out runs/demo --overwrite
+
+test: $(VENV)/.installed-test ## Run the whole test suite
+	@$(BIN)/python -m pytest
+
+lint: $(VENV)/.installed-test ## Check style
+	@$(BIN)/ruff check . && $(BIN)/ruff format --check .
+
+types: $(VENV)/.installed-test ## Check types
+	@$(BIN)/mypy
+
+contracts: $(VENV)/.installed-test ## Check which stage may import which
+	@$(BIN)/lint-imports
+
+ci: lint types contracts test ## Everything that .ci/run checks
+
+clean: ## Remove the environment, results and caches
+	rm -rf $(VENV) runs dist build .mypy_cache .ruff_cache .pytest_cache

@@ -1,0 +1,43 @@
+"""Say in one line what FogSim needs from the operating system and does not find; exit 1 if anything is missing.
+
+Runs before anything is installed, so it uses the standard library alone.
+"""
+
+import ctypes
+import importlib.util
+import sys
+
+MINIMUM = (3, 11)
+LIBRARIES = {
+    "libEGL.so.1": "libegl1 libegl-mesa0 libgl1-mesa-dri",
+    "libGL.so.1": "libgl1",
+}
+
+
+def missing_packages() -> list[str]:
+    """Debian/Ubuntu packages that would provide what is not found."""
+    packages = []
+    if importlib.util.find_spec("ensurepip") is None:
+        packages.append(f"python{sys.version_info.major}.{sys.version_info.minor}-venv")
+    for library, provided_by in LIBRARIES.items():
+        try:
+            ctypes.CDLL(library)
+        except OSError:
+            packages += provided_by.split()
+    return packages
+
+
+def main() -> int:
+    """Check and report."""
+    if sys.version_info < MINIMUM:
+        print(f"FogSim needs Python {MINIMUM[0]}.{MINIMUM[1]} or newer, this is {sys.version.split()[0]}.")  # noqa: T201 - the line is the result
+        return 1
+    packages = missing_packages()
+    if packages:
+        print(f"FogSim lacks system libraries; install them with: sudo apt-get install {' '.join(packages)}")  # noqa: T201 - the line is the result
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

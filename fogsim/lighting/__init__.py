@@ -1,1 +1,13 @@
-"""Belief and traffic to lamp states."""
+"""Belief to lamp states."""
+
+from collections.abc import Callable
+
+from fogsim.lighting.protocol import LightingPolicy
+from fogsim.lighting.rules import FogLampRules, LowBeamOnly
+from fogsim.registry import Registry
+
+LIGHTING_POLICIES: Registry[Callable[..., LightingPolicy]] = Registry(
+    "lighting policy", {"fog_lamp_rules": FogLampRules, "low_beam": LowBeamOnly}
+)
+
+__all__ = ["LIGHTING_POLICIES", "FogLampRules", "LightingPolicy", "LowBeamOnly"]

@@ -10,8 +10,8 @@ from fogsim.values.lamps import Lamp
 from fogsim.values.observation import LeadMeasurement, Observation, SignSighting
 from fogsim.values.road import Lane, LaneMarking, RoadNetwork, Sign, SignMap
 from fogsim.values.scene import Batch, Mesh, Scene, Surface
-from fogsim.values.step import Collision, Ending, Leader, Step, Truth
-from fogsim.values.traffic import TrafficState
+from fogsim.values.step import Ending, Step, Truth
+from fogsim.values.traffic import Collision, Leader, TrafficSnapshot, TrafficState
 
 __all__ = [
     "Batch",
@@ -42,6 +42,7 @@ __all__ = [
     "SpeedAdvice",
     "Step",
     "Surface",
+    "TrafficSnapshot",
     "TrafficState",
     "Truth",
     "View",

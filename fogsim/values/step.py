@@ -9,7 +9,7 @@ from fogsim.values.command import Command
 from fogsim.values.estimate import Estimate
 from fogsim.values.image import View
 from fogsim.values.observation import Observation
-from fogsim.values.traffic import TrafficState
+from fogsim.values.traffic import Collision, Leader, TrafficState
 
 
 class Ending(StrEnum):
@@ -46,45 +46,6 @@ class Truth:
     def visibility_ahead(self) -> float:
         """Meteorological visibility of the fog ahead [m]."""
         return visibility_from_extinction(self.extinction_ahead)
-
-
-@dataclass(frozen=True, slots=True)
-class Leader:
-    """The vehicle ahead of the ego, as it truly is.
-
-    Attributes
-    ----------
-    vehicle_id : str
-        Its id.
-    gap : float
-        Distance from the ego's front bumper to its rear bumper [m].
-    speed : float
-        Its speed [m/s].
-    """
-
-    vehicle_id: str
-    gap: float
-    speed: float
-
-
-@dataclass(frozen=True, slots=True)
-class Collision:
-    """Two vehicles that have hit each other.
-
-    Attributes
-    ----------
-    time : float
-        Instant [s].
-    collider, victim : str
-        Their ids.
-    impact_speed : float
-        Difference of their speeds [m/s].
-    """
-
-    time: float
-    collider: str
-    victim: str
-    impact_speed: float
 
 
 @dataclass(frozen=True, slots=True)

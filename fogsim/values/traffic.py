@@ -56,3 +56,73 @@ class TrafficState:
             return self.ids.index(vehicle_id)
         except ValueError:
             return None
+
+
+@dataclass(frozen=True, slots=True)
+class Leader:
+    """The vehicle ahead of the ego, as it truly is.
+
+    Attributes
+    ----------
+    vehicle_id : str
+        Its id.
+    gap : float
+        Distance from the ego's front bumper to its rear bumper [m].
+    speed : float
+        Its speed [m/s].
+    """
+
+    vehicle_id: str
+    gap: float
+    speed: float
+
+
+@dataclass(frozen=True, slots=True)
+class Collision:
+    """Two vehicles that have hit each other.
+
+    Attributes
+    ----------
+    time : float
+        Instant [s].
+    collider, victim : str
+        Their ids.
+    impact_speed : float
+        Difference of their speeds [m/s].
+    """
+
+    time: float
+    collider: str
+    victim: str
+    impact_speed: float
+
+
+@dataclass(frozen=True, slots=True)
+class TrafficSnapshot:
+    """The traffic at one instant as the ego's loop needs it.
+
+    Attributes
+    ----------
+    state : TrafficState
+        The vehicles near the ego, itself included.
+    ego : int
+        Row of the ego.
+    route_position : float
+        How far along its route the ego's front bumper is [m].
+    route_length : float
+        Length of the route [m].
+    speed_limit : float
+        Speed limit where the ego is [m/s].
+    leader : Leader or None
+        The vehicle ahead in its lane.
+    collisions : tuple of Collision
+        Collisions of any vehicles since the last snapshot, each pair once.
+    """
+
+    state: TrafficState
+    ego: int
+    route_position: float
+    route_length: float
+    speed_limit: float
+    leader: Leader | None
+    collisions: tuple[Collision, ...]

@@ -1,0 +1,107 @@
+"""Stopping within the distance that can be seen."""
+
+import math
+from dataclasses import dataclass
+
+from fogsim.units import GRAVITY, KMH_PER_MPS
+from fogsim.values import Belief, SpeedAdvice
+
+
+def stopping_sight_distance(
+    speed: float, reaction_time: float, deceleration: float, grade: float = 0.0
+) -> float:
+    """Distance to react and stop, v t + v² / 2(a + g G) [m] (AASHTO Green Book with t = 2.5 s, a = 3.4 m/s²).
+
+    Parameters
+    ----------
+    speed : float
+        Speed v [m/s].
+    reaction_time : float
+        Perception and reaction time t [s].
+    deceleration : float
+        Deceleration a [m/s²], positive.
+    grade : float
+        Slope of the road G [-], positive uphill.
+    """
+    return speed * reaction_time + speed**2 / (2 * (deceleration + GRAVITY * grade))
+
+
+def safe_speed(distance: float, reaction_time: float, deceleration: float, grade: float = 0.0) -> float:
+    """Largest speed from which one stops within a distance, the inverse of `stopping_sight_distance` [m/s].
+
+    Parameters
+    ----------
+    distance : float
+        Sight distance [m], not negative; ``inf`` gives ``inf``.
+    reaction_time, deceleration, grade : float
+        As in `stopping_sight_distance`.
+    """
+    if math.isinf(distance):
+        return math.inf
+    braking = deceleration + GRAVITY * grade
+    return braking * (math.sqrt(reaction_time**2 + 2 * distance / braking) - reaction_time)
+
+
+@dataclass(frozen=True, slots=True)
+class StoppingSightDistance:
+    """Advise the speed from which a driver can stop within what is visible.
+
+    A lower speed is advised at once; a higher one only after it has been justified for `hold` seconds without a break.
+
+    Attributes
+    ----------
+    reaction_time : float
+        Perception and reaction time [s].
+    deceleration : float
+        Deceleration while stopping [m/s²].
+    quantile : float
+        Which quantile of the believed visibility counts as sight distance, 0 … 1; 0.5 is the median, less is careful.
+    sight_share : float
+        Share of the visibility that may be needed to stop [-]; 1 for an obstacle ahead, 0.5 for narrow roads
+        where others come the other way (German StVO § 3).
+    rounding : float
+        The advice is rounded down to a multiple of this [m/s].
+    minimum : float
+        Lowest speed that is ever advised [m/s].
+    hold : float
+        Time before the advice rises [s].
+    """
+
+    reaction_time: float = 2.5
+    deceleration: float = 3.4
+    quantile: float = 0.25
+    sight_share: float = 1.0
+    rounding: float = 10.0 / KMH_PER_MPS
+    minimum: float = 20.0 / KMH_PER_MPS
+    hold: float = 3.0
+
+    def advise(self, belief: Belief, speed_limit: float, time: float, previous: SpeedAdvice) -> SpeedAdvice:
+        """Advise a speed; see `Adviser.advise`. No advice (``inf``) where the limit itself is safe."""
+        sight = self.sight_share * belief.visibility_quantile(self.quantile)
+        safe = safe_speed(sight, self.reaction_time, self.deceleration)
+        target = math.inf if safe >= speed_limit else self._rounded(safe)
+        if target <= previous.speed:
+            return SpeedAdvice(target)
+        since = time if previous.raise_since is None else previous.raise_since
+        if time - since >= self.hold:
+            return SpeedAdvice(target)
+        return SpeedAdvice(previous.speed, raise_since=since)
+
+    def _rounded(self, speed: float) -> float:
+        # A hair of tolerance keeps exact multiples from being rounded down a whole step.
+        return max(self.minimum, math.floor(speed / self.rounding + 1e-9) * self.rounding)
+
+
+@dataclass(frozen=True, slots=True)
+class NoAdvice:
+    """Advise nothing: what happens when drivers are left alone."""
+
+    def advise(
+        self,
+        belief: Belief,  # noqa: ARG002 - the protocol's parameters
+        speed_limit: float,  # noqa: ARG002 - the protocol's parameters
+        time: float,  # noqa: ARG002 - the protocol's parameters
+        previous: SpeedAdvice,  # noqa: ARG002 - the protocol's parameters
+    ) -> SpeedAdvice:
+        """Advise nothing; see `Adviser.advise`."""
+        return SpeedAdvice()

@@ -1,0 +1,49 @@
+"""Lamps by the rules of the road."""
+
+from dataclasses import dataclass
+
+from fogsim.values import Belief, Lamp
+
+BY_DAY = Lamp.POSITION | Lamp.LOW_BEAM
+
+
+@dataclass(frozen=True, slots=True)
+class FogLampRules:
+    """Fog lamps by visibility, with hysteresis.
+
+    Rear fog lamps below 50 m (German StVO § 17(3)); front fog lamps where visibility is seriously reduced, below
+    100 m (UK Highway Code rule 226).
+
+    Attributes
+    ----------
+    rear_fog_below, front_fog_below : float
+        Visibility below which the lamps go on [m].
+    hysteresis : float
+        They go off when visibility exceeds the threshold by this share [-].
+    """
+
+    rear_fog_below: float = 50.0
+    front_fog_below: float = 100.0
+    hysteresis: float = 0.2
+
+    def lamps(self, belief: Belief, previous: Lamp) -> Lamp:
+        """Choose the lamps to light; see `LightingPolicy.lamps`."""
+        lit = BY_DAY
+        for lamp, threshold in ((Lamp.REAR_FOG, self.rear_fog_below), (Lamp.FRONT_FOG, self.front_fog_below)):
+            margin = 1.0 + self.hysteresis if lamp in previous else 1.0
+            if belief.visibility < threshold * margin:
+                lit |= lamp
+        return lit
+
+
+@dataclass(frozen=True, slots=True)
+class LowBeamOnly:
+    """Dipped headlamps and nothing else, whatever the fog."""
+
+    def lamps(
+        self,
+        belief: Belief,  # noqa: ARG002 - the protocol's parameters
+        previous: Lamp,  # noqa: ARG002 - the protocol's parameters
+    ) -> Lamp:
+        """Choose the lamps to light; see `LightingPolicy.lamps`."""
+        return BY_DAY

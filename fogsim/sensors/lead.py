@@ -1,0 +1,58 @@
+"""A radar-like sensor that tracks the vehicle ahead; radar waves pass through fog."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fogsim.values import Leader, LeadMeasurement
+
+
+@dataclass(frozen=True, slots=True)
+class LeadSensor:
+    """A long-range automotive radar.
+
+    Attributes
+    ----------
+    reach : float
+        Largest distance at which it tracks a vehicle [m].
+    distance_deviation : float
+        Standard deviation of the distance [m].
+    speed_deviation : float
+        Standard deviation of the relative speed [m/s].
+    """
+
+    reach: float = 200.0
+    distance_deviation: float = 0.25
+    speed_deviation: float = 0.1
+
+
+def measure_lead(
+    leader: Leader | None, own_speed: float, sensor: LeadSensor, rng: np.random.Generator
+) -> LeadMeasurement | None:
+    """Measure the vehicle ahead.
+
+    Two numbers are drawn in every call, with a leader or without, so that what comes later never depends on it.
+
+    Parameters
+    ----------
+    leader : Leader or None
+        The vehicle ahead as it truly is.
+    own_speed : float
+        The ego's speed [m/s].
+    sensor : LeadSensor
+        Reach and noise.
+    rng : numpy.random.Generator
+        Source of the noise.
+
+    Returns
+    -------
+    LeadMeasurement or None
+        None if nothing is within reach.
+    """
+    distance_noise, speed_noise = rng.normal(size=2)
+    if leader is None or leader.gap > sensor.reach:
+        return None
+    return LeadMeasurement(
+        distance=max(leader.gap + sensor.distance_deviation * float(distance_noise), 0.0),
+        relative_speed=leader.speed - own_speed + sensor.speed_deviation * float(speed_noise),
+    )

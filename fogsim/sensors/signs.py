@@ -1,0 +1,47 @@
+"""Signs that the map says lie ahead."""
+
+import math
+
+from numpy.typing import NDArray
+
+import numpy as np
+
+from fogsim.values import SignMap, SignSighting
+
+FACING = math.cos(math.radians(60.0))
+"""A sign speaks to those who drive within 60° of its direction."""
+
+
+def signs_ahead(
+    signs: SignMap, position: NDArray[np.float64], heading: float, reach: float, corridor: float = 25.0
+) -> tuple[SignSighting, ...]:
+    """Signs ahead of a vehicle by the map, nearest first.
+
+    Parameters
+    ----------
+    signs : SignMap
+        The map.
+    position : (3,) float64
+        Middle of the front bumper [m].
+    heading : float
+        Direction of travel, counterclockwise from east [rad].
+    reach : float
+        Largest distance ahead [m].
+    corridor : float
+        Largest lateral offset [m].
+
+    Returns
+    -------
+    tuple of SignSighting
+        Signs that face the vehicle.
+    """
+    forward = (math.cos(heading), math.sin(heading))
+    seen = []
+    for sign in signs.signs:
+        dx, dy = sign.position[0] - float(position[0]), sign.position[1] - float(position[1])
+        distance = dx * forward[0] + dy * forward[1]
+        lateral = dy * forward[0] - dx * forward[1]
+        faces = math.cos(sign.heading - heading) > FACING
+        if faces and 0.0 < distance <= reach and abs(lateral) <= corridor:
+            seen.append(SignSighting(sign.sign_id, sign.kind, sign.value, distance, lateral, sign.diameter))
+    return tuple(sorted(seen, key=lambda s: s.distance))

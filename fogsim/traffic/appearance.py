@@ -1,0 +1,70 @@
+"""Body kinds, paints and lamps of SUMO's vehicles."""
+
+import zlib
+
+from fogsim.values import Lamp
+
+BODY_KINDS = {
+    "delivery": "van",
+    "truck": "truck",
+    "trailer": "truck",
+    "bus": "bus",
+    "coach": "bus",
+    "motorcycle": "motorcycle",
+    "moped": "motorcycle",
+}
+"""Body kind of a SUMO vehicle class; every other class is a car."""
+
+SUMO_DEFAULT_COLOUR = (255, 255, 0)
+
+PAINTS = (
+    (0.62, 0.63, 0.64),
+    (0.35, 0.36, 0.38),
+    (0.03, 0.03, 0.035),
+    (0.10, 0.105, 0.115),
+    (0.80, 0.80, 0.79),
+    (0.05, 0.09, 0.25),
+    (0.30, 0.03, 0.03),
+    (0.12, 0.16, 0.10),
+    (0.30, 0.26, 0.20),
+)
+"""Linear reflectances of common car paints: silver, grey, black, anthracite, white, blue, red, green, beige."""
+
+_SIGNALS = (
+    (1 << 0, Lamp.INDICATOR_RIGHT),
+    (1 << 1, Lamp.INDICATOR_LEFT),
+    (1 << 3, Lamp.STOP),
+    (1 << 4, Lamp.LOW_BEAM | Lamp.POSITION),
+    (1 << 5, Lamp.REAR_FOG),
+    (1 << 6, Lamp.HIGH_BEAM),
+)
+
+
+def body_kind(vehicle_class: str) -> str:
+    """Body kind of a SUMO vehicle class."""
+    return BODY_KINDS.get(vehicle_class, "car")
+
+
+def paint(vehicle_id: str, colour: tuple[int, ...]) -> tuple[float, float, float]:
+    """Linear reflectance of a vehicle's paint, 0 … 1.
+
+    Parameters
+    ----------
+    vehicle_id : str
+        Its id, which picks a common paint where the simulation gives no colour.
+    colour : tuple of int
+        SUMO's colour, 0 … 255; its default yellow counts as none.
+    """
+    if tuple(colour[:3]) == SUMO_DEFAULT_COLOUR:
+        return PAINTS[zlib.crc32(vehicle_id.encode()) % len(PAINTS)]
+    red, green, blue = ((c / 255.0) ** 2.2 for c in colour[:3])
+    return (red, green, blue)
+
+
+def lamps_from_signals(signals: int) -> int:
+    """Lamps, as bits of `Lamp`, that SUMO's vehicle signals stand for."""
+    lamps = Lamp.NONE
+    for bit, lamp in _SIGNALS:
+        if signals & bit:
+            lamps |= lamp
+    return int(lamps)

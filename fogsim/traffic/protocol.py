@@ -1,0 +1,35 @@
+"""What the loop asks of a traffic simulation, whatever runs it."""
+
+from typing import Protocol
+
+from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot
+
+
+class Traffic(Protocol):
+    """A running traffic simulation with one ego vehicle."""
+
+    def start(self, seed: int) -> None:
+        """Begin, or begin anew, and run until the ego is on the road.
+
+        Parameters
+        ----------
+        seed : int
+            Seed of the simulation's own random numbers; the same seed replays exactly.
+
+        Raises
+        ------
+        SimulationError
+            If the simulation cannot start or the ego does not appear in time.
+        """
+
+    def network(self) -> tuple[RoadNetwork, SignMap]:
+        """Roads and signs; after `start`."""
+
+    def advance(self, command: Command) -> None:
+        """Move by one traffic step with a command in force."""
+
+    def observe(self) -> TrafficSnapshot | None:
+        """Tell where everybody is and what has happened since the last call; None once the ego has left."""
+
+    def close(self) -> None:
+        """End the simulation; closing twice is allowed."""

@@ -1,0 +1,67 @@
+"""What a traffic simulation needs to know before it starts."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True)
+class BrakeEvent:
+    """A scripted braking manoeuvre.
+
+    Attributes
+    ----------
+    vehicle : str
+        Id of the vehicle that brakes.
+    at_position : float
+        Distance driven since it departed, at which it starts to brake [m].
+    to_speed : float
+        Speed that it brakes to [m/s]; 0 is a standstill.
+    deceleration : float
+        Deceleration while braking [m/s²], positive; the vehicle's own limit applies too.
+    hold : float
+        Time at the lower speed before it drives on [s].
+    """
+
+    vehicle: str
+    at_position: float
+    to_speed: float
+    deceleration: float
+    hold: float
+
+
+@dataclass(frozen=True, slots=True)
+class TrafficSetup:
+    """A SUMO simulation and who the ego is.
+
+    Attributes
+    ----------
+    net : Path
+        SUMO network.
+    routes, additional : tuple of Path
+        SUMO route and additional files.
+    ego : str
+        Id of the ego vehicle.
+    step_length : float
+        SUMO's step [s].
+    keep_lane : tuple of str
+        Vehicles that never change lane.
+    warm_up_limit : float
+        Simulated time within which the ego must appear [s].
+    advice_deceleration : float
+        Deceleration with which an advised vehicle slows down to the advice [m/s²].
+    reading_radius : float
+        Vehicles farther from the ego than this are not read [m].
+    events : tuple of BrakeEvent
+        What is scripted.
+    """
+
+    net: Path
+    routes: tuple[Path, ...]
+    additional: tuple[Path, ...]
+    ego: str
+    step_length: float
+    keep_lane: tuple[str, ...]
+    warm_up_limit: float
+    advice_deceleration: float
+    reading_radius: float
+    events: tuple[BrakeEvent, ...]

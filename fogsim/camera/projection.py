@@ -58,4 +58,4 @@ def ray_map(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
     u0, v0 = camera.principal_point
     f = camera.focal_length
     inverse = np.array([[1 / f, 0.0, -u0 / f], [0.0, 1 / f, -v0 / f], [0.0, 0.0, 1.0]])
-    return rotation(camera, pose) @ inverse
+    return np.asarray(rotation(camera, pose) @ inverse)

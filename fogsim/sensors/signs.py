@@ -2,9 +2,8 @@
 
 import math
 
-from numpy.typing import NDArray
-
 import numpy as np
+from numpy.typing import NDArray
 
 from fogsim.values import SignMap, SignSighting
 

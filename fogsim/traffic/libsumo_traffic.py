@@ -94,10 +94,7 @@ class LibsumoTraffic:
     def _warm_up(self) -> None:
         sumo, ego = self._library, self._setup.ego
         while ego not in sumo.vehicle.getIDList():
-            if (
-                sumo.simulation.getTime() > self._setup.warm_up_limit
-                or sumo.simulation.getMinExpectedNumber() == 0
-            ):
+            if sumo.simulation.getTime() > self._setup.warm_up_limit or sumo.simulation.getMinExpectedNumber() == 0:
                 raise SimulationError(
                     f"the ego {ego!r} did not appear within {sumo.simulation.getTime():g} s of simulated time "
                     f"(traffic.warm_up_limit_s is {self._setup.warm_up_limit:g}); "
@@ -233,9 +230,7 @@ class _Static:
 
     __slots__ = ("kind", "paint", "size")
 
-    def __init__(
-        self, kind: str, size: tuple[float, float, float], paint: tuple[float, float, float]
-    ) -> None:
+    def __init__(self, kind: str, size: tuple[float, float, float], paint: tuple[float, float, float]) -> None:
         self.kind = kind
         self.size = size
         self.paint = paint

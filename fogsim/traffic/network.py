@@ -25,7 +25,7 @@ SIGN_DIAMETER = 0.9
 """Diameter of a round sign outside towns [m]; 0.75–0.9 m for speeds above 80 km/h (German VzKat size 3)."""
 
 
-def read_net(path: Path) -> Any:  # noqa: ANN401 - sumolib ships no types
+def read_net(path: Path) -> Any:
     """Read a SUMO network file.
 
     Raises
@@ -42,7 +42,7 @@ def read_net(path: Path) -> Any:  # noqa: ANN401 - sumolib ships no types
     return net
 
 
-def road_network(net: Any, route: Sequence[str]) -> RoadNetwork:  # noqa: ANN401 - sumolib ships no types
+def road_network(net: Any, route: Sequence[str]) -> RoadNetwork:
     """Every lane of a network, and the axis of a route.
 
     Parameters
@@ -56,7 +56,7 @@ def road_network(net: Any, route: Sequence[str]) -> RoadNetwork:  # noqa: ANN401
     return RoadNetwork(lanes=lanes, route=_route_axis(net, route))
 
 
-def _lane(lane: Any) -> Lane:  # noqa: ANN401 - sumolib ships no types
+def _lane(lane: Any) -> Lane:
     edge = lane.getEdge()
     last = edge.getLaneNumber() - 1
     inside_junction = edge.getFunction() == "internal"
@@ -78,7 +78,7 @@ def _lane(lane: Any) -> Lane:  # noqa: ANN401 - sumolib ships no types
     )
 
 
-def _route_axis(net: Any, route: Sequence[str]) -> NDArray[np.float64]:  # noqa: ANN401 - sumolib ships no types
+def _route_axis(net: Any, route: Sequence[str]) -> NDArray[np.float64]:
     """Middle lanes of a route's edges, end to end, without repeated points."""
     parts = []
     for edge_id in route:
@@ -89,7 +89,7 @@ def _route_axis(net: Any, route: Sequence[str]) -> NDArray[np.float64]:  # noqa:
     return points[np.concatenate(([True], moved))]
 
 
-def sign_map(net: Any, additional: Iterable[Path]) -> SignMap:  # noqa: ANN401 - sumolib ships no types
+def sign_map(net: Any, additional: Iterable[Path]) -> SignMap:
     """Signs of a network: where the speed limit changes, and POIs of the documented kind.
 
     Parameters
@@ -110,7 +110,7 @@ def sign_map(net: Any, additional: Iterable[Path]) -> SignMap:  # noqa: ANN401 -
     return SignMap(tuple(signs))
 
 
-def _limit_sign(edge: Any) -> Sign | None:  # noqa: ANN401 - sumolib ships no types
+def _limit_sign(edge: Any) -> Sign | None:
     """Sign at the start of an edge whose limit differs from that of every edge leading to it."""
     limit = edge.getSpeed()
     if any(abs(incoming.getSpeed() - limit) < 0.1 for incoming in edge.getIncoming()):
@@ -144,7 +144,7 @@ def _poi_signs(path: Path) -> list[Sign]:
     return signs
 
 
-def _poi_sign(path: Path, poi: Any, kind: str, parameters: dict[str, str]) -> Sign:  # noqa: ANN401 - sumolib ships no types
+def _poi_sign(path: Path, poi: Any, kind: str, parameters: dict[str, str]) -> Sign:
     where = f"{path}: poi {poi.id!r}"
     try:
         value = float(parameters["value"])

@@ -1,0 +1,173 @@
+"""From a scenario to the parts of the loop; here the units of scenario files become SI and radians, once."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.advice import ADVISERS, Adviser
+from fogsim.atmosphere import airlight_from_illuminance
+from fogsim.camera import Sensor
+from fogsim.estimators import ESTIMATORS, Estimator
+from fogsim.fusion import FUSIONS, Fusion
+from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy
+from fogsim.scenario.schema import Bank, Scenario
+from fogsim.sensors import LeadSensor
+from fogsim.traffic import BrakeEvent, TrafficSetup
+from fogsim.units import KMH_PER_MPS, extinction_from_visibility
+from fogsim.values import Camera, FogBank, FogField
+
+AIRLIGHT_EXPOSURE = 0.6
+"""Share of saturation at which the fixed exposure puts the airlight: bright fog, yet room for lamps above it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Periods:
+    """The clocks as whole numbers.
+
+    Attributes
+    ----------
+    camera_period : float
+        Time between frames [s].
+    traffic_steps : int
+        Traffic steps in one camera period.
+    decision_frames : int
+        Camera periods in one decision period.
+    frames : int
+        Most camera periods that a run may last.
+    """
+
+    camera_period: float
+    traffic_steps: int
+    decision_frames: int
+    frames: int
+
+
+def periods(scenario: Scenario) -> Periods:
+    """Clocks of a scenario."""
+    clocks = scenario.clocks
+    return Periods(
+        camera_period=clocks.camera_period_s,
+        traffic_steps=round(clocks.camera_period_s / clocks.traffic_step_s),
+        decision_frames=round(clocks.decision_period_s / clocks.camera_period_s),
+        frames=max(1, round(scenario.duration_s / clocks.camera_period_s)),
+    )
+
+
+def traffic_setup(scenario: Scenario) -> TrafficSetup:
+    """What the traffic stage needs to know."""
+    traffic, folder = scenario.traffic, scenario.directory
+    return TrafficSetup(
+        net=folder / traffic.net,
+        routes=tuple(folder / path for path in traffic.routes),
+        additional=tuple(folder / path for path in traffic.additional),
+        ego=traffic.ego,
+        step_length=scenario.clocks.traffic_step_s,
+        keep_lane=traffic.keep_lane,
+        warm_up_limit=traffic.warm_up_limit_s,
+        advice_deceleration=traffic.advice_deceleration_mps2,
+        reading_radius=traffic.reading_radius_m,
+        events=tuple(
+            BrakeEvent(e.vehicle, e.at_position_m, e.to_speed_kmh / KMH_PER_MPS, e.deceleration_mps2, e.hold_s)
+            for e in traffic.events
+        ),
+    )
+
+
+def camera(scenario: Scenario) -> Camera:
+    """Calibration of the ego's camera."""
+    section = scenario.camera
+    by_view = 0.5 * section.width / math.tan(0.5 * math.radians(section.field_of_view_deg))
+    return Camera(
+        width=section.width,
+        height=section.height,
+        focal_length=section.focal_length_px or by_view,
+        principal_point=section.principal_point_px or (section.width / 2, section.height / 2),
+        mount_height=section.mount_height_m,
+        pitch=math.radians(section.pitch_deg),
+        roll=math.radians(section.roll_deg),
+        response=section.response,
+    )
+
+
+def sensor(scenario: Scenario) -> Sensor:
+    """Image sensor of the ego's camera; where no exposure is given, one that suits the scenario's light."""
+    section = scenario.camera
+    airlight = max(airlight_from_illuminance(scenario.light.illuminance_lx))
+    return Sensor(
+        saturation_luminance=section.saturation_luminance_cdpm2 or airlight / AIRLIGHT_EXPOSURE,
+        full_well=section.full_well_e,
+        read_noise=section.read_noise_e,
+    )
+
+
+def lead_sensor(scenario: Scenario) -> LeadSensor:
+    """Radar of the ego."""
+    lead = scenario.sensors.lead
+    return LeadSensor(lead.reach_m, lead.distance_deviation_m, lead.speed_deviation_mps)
+
+
+def fog_field(scenario: Scenario, route: NDArray[np.float64]) -> FogField:
+    """Fog of a scenario, laid along the ego's route.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    route : (n, 3) float64
+        Polyline along the route [m].
+    """
+    fog = scenario.fog
+    visibility = fog.visibility_m if fog.visibility_m is not None else fog.outside_visibility_m
+    outside = extinction_from_visibility(math.inf if visibility is None else visibility)
+    return FogField(
+        extinction=outside,
+        airlight=airlight_from_illuminance(scenario.light.illuminance_lx),
+        banks=tuple(_bank(bank, outside, route) for bank in fog.banks),
+        top=fog.top_m,
+    )
+
+
+def _bank(bank: Bank, outside: float, route: NDArray[np.float64]) -> FogBank:
+    """A bank between two places of the route: a slab across the straight line that joins them."""
+    station = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(route[:, :2], axis=0), axis=1))))
+
+    def place(at: float) -> NDArray[np.float64]:
+        inside = np.array([np.interp(at, station, route[:, axis]) for axis in (0, 1)])
+        # Before the start and beyond the end of the route, go straight on.
+        first, last = route[1, :2] - route[0, :2], route[-1, :2] - route[-2, :2]
+        before, beyond = min(at, 0.0), max(at - station[-1], 0.0)
+        return np.asarray(inside + before * first / np.linalg.norm(first) + beyond * last / np.linalg.norm(last))
+
+    start, end = place(bank.start_m), place(bank.end_m)
+    chord = float(np.linalg.norm(end - start))
+    axis = (end - start) / chord
+    return FogBank(
+        origin=(float(start[0]), float(start[1])),
+        axis=(float(axis[0]), float(axis[1])),
+        start=0.0,
+        end=chord,
+        edge=min(bank.edge_m, chord),
+        extra_extinction=extinction_from_visibility(bank.visibility_m) - outside,
+    )
+
+
+def estimators(scenario: Scenario, told: Camera) -> tuple[Estimator, ...]:
+    """Estimators of a scenario, with the calibration that the vehicle is told."""
+    return tuple(ESTIMATORS[e.method](told, **e.parameters) for e in scenario.estimators)
+
+
+def fusion(scenario: Scenario) -> Fusion:
+    """Fusion of a scenario."""
+    return FUSIONS[scenario.fusion.method](**scenario.fusion.parameters)
+
+
+def adviser(scenario: Scenario) -> Adviser:
+    """Speed adviser of a scenario."""
+    return ADVISERS[scenario.advice.method](**scenario.advice.parameters)
+
+
+def lighting_policy(scenario: Scenario) -> LightingPolicy:
+    """Lighting policy of a scenario."""
+    return LIGHTING_POLICIES[scenario.lighting.method](**scenario.lighting.parameters)

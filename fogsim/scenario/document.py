@@ -1,0 +1,85 @@
+"""A YAML file as plain data that remembers on which line each key stands."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from fogsim.errors import InputError
+
+KeyPath = tuple[str | int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """Plain data from a file.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    data : dict
+        Its content.
+    lines : mapping from key path to int
+        Line of each key, from 1.
+    """
+
+    path: Path
+    data: dict[str, Any]
+    lines: Mapping[KeyPath, int]
+
+    def where(self, key_path: KeyPath) -> str:
+        """``file:line`` of a key, or of the nearest block around it that the file has."""
+        for length in range(len(key_path), 0, -1):
+            line = self.lines.get(key_path[:length])
+            if line is not None:
+                return f"{self.path}:{line}"
+        return str(self.path)
+
+
+def read_document(path: Path) -> Document:
+    """Read a YAML file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, is no YAML, has a key twice, or is no mapping.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+        root = yaml.compose(text, Loader=yaml.SafeLoader)
+        data = yaml.safe_load(text)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not valid YAML: {' '.join(str(error).split())}") from error
+    if not isinstance(data, dict) or root is None:
+        raise InputError(f"{path}: expected a mapping of keys to values, got {type(data).__name__}")
+    lines: dict[KeyPath, int] = {}
+    _collect_lines(path, root, (), lines)
+    return Document(path, data, lines)
+
+
+def _collect_lines(path: Path, node: yaml.Node, at: KeyPath, lines: dict[KeyPath, int]) -> None:
+    if isinstance(node, yaml.MappingNode):
+        for key, value in node.value:
+            here = (*at, str(key.value))
+            if here in lines:
+                raise InputError(
+                    f"{path}:{key.start_mark.line + 1}: {dotted(here)}: this key stands twice, "
+                    f"first on line {lines[here]}"
+                )
+            lines[here] = key.start_mark.line + 1
+            _collect_lines(path, value, here, lines)
+    elif isinstance(node, yaml.SequenceNode):
+        for index, value in enumerate(node.value):
+            here = (*at, index)
+            lines[here] = value.start_mark.line + 1
+            _collect_lines(path, value, here, lines)
+
+
+def dotted(key_path: Sequence[str | int]) -> str:
+    """Key path as it is written after ``--set``."""
+    return ".".join(map(str, key_path))

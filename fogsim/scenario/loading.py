@@ -1,0 +1,91 @@
+"""From a scenario file to a checked `Scenario`; a mistake is told with file, line, key, value and what is allowed."""
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from fogsim.errors import InputError, suggest
+from fogsim.scenario.catalogue import scenario_file
+from fogsim.scenario.document import Document, KeyPath, dotted, read_document
+from fogsim.scenario.overrides import apply_overrides
+from fogsim.scenario.schema import Scenario
+
+
+def load_scenario(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Scenario:
+    """Load and check a scenario.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        A name in the catalogue, a scenario file, or a folder that holds ``scenario.yaml``.
+    overrides : iterable of str
+        ``key.path=value`` each, put in place of the file's values.
+
+    Returns
+    -------
+    Scenario
+        The scenario, with the folder that its file names are relative to.
+
+    Raises
+    ------
+    InputError
+        If anything does not fit; one line for each mistake, with file, line, key path, value and what is allowed.
+    """
+    path = scenario_file(name_or_path)
+    document = read_document(path)
+    data = apply_overrides(document.data, overrides)
+    try:
+        scenario = Scenario.model_validate({**data, "directory": path.parent})
+    except ValidationError as error:
+        raise InputError("\n".join(_told(document, detail) for detail in error.errors())) from None
+    _check_files(document, scenario)
+    return scenario
+
+
+def _told(document: Document, detail: ErrorDetails) -> str:
+    """One mistake in one line."""
+    key_path: KeyPath = tuple(detail["loc"])
+    where = f"{document.where(key_path)}: {dotted(key_path) or 'scenario'}"
+    if detail["type"] == "extra_forbidden":
+        return f"{where}: unknown key; {suggest(str(key_path[-1]), _known_keys(key_path[:-1]))}"
+    if detail["type"] == "missing":
+        return f"{where}: this key is missing; it is required"
+    message = detail["msg"].removeprefix("Value error, ")
+    value = detail["input"]
+    # A message about a whole block names the values that it is about itself.
+    shown = "" if isinstance(value, dict | BaseModel) else f"; got {value!r}"
+    return f"{where}: {message[0].lower()}{message[1:]}{shown}"
+
+
+def _known_keys(key_path: Sequence[str | int]) -> list[str]:
+    """Keys that the schema allows below a key path."""
+    model: Any = Scenario
+    for key in key_path:
+        if isinstance(key, int):
+            continue
+        model = _model_in(model.model_fields[key].annotation)
+    return [name for name, field in model.model_fields.items() if not field.exclude]
+
+
+def _model_in(annotation: object) -> Any:
+    """First model class inside an annotation such as ``tuple[Bank, ...]``."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next((model for part in get_args(annotation) if (model := _model_in(part)) is not None), None)
+
+
+def _check_files(document: Document, scenario: Scenario) -> None:
+    traffic = scenario.traffic
+    named: list[tuple[KeyPath, Path]] = [(("traffic", "net"), traffic.net)]
+    named += [(("traffic", "routes", i), p) for i, p in enumerate(traffic.routes)]
+    named += [(("traffic", "additional", i), p) for i, p in enumerate(traffic.additional)]
+    for key_path, path in named:
+        if not (scenario.directory / path).is_file():
+            there = sorted(p.name for p in (scenario.directory / path).parent.glob("*.xml"))
+            raise InputError(
+                f"{document.where(key_path)}: {dotted(key_path)}: there is no file {str(path)!r} in "
+                f"{scenario.directory}; {suggest(path.name, there)}"
+            )

@@ -1,0 +1,201 @@
+"""The schema of a scenario file. Lengths in m, times in s, speeds in km/h, angles in degrees: the units of its readers.
+
+Everything inside FogSim is SI and radians; `fogsim.scenario.build` converts, once.
+"""
+
+import itertools
+import math
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_validator, model_validator
+
+from fogsim.advice import ADVISERS
+from fogsim.errors import UnknownNameError
+from fogsim.estimators import ESTIMATORS
+from fogsim.fusion import FUSIONS
+from fogsim.lighting import LIGHTING_POLICIES
+from fogsim.render import RENDERERS
+from fogsim.scenario.methods import Method, method_of
+from fogsim.values import Response
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+
+def _visibility(value: object) -> object:
+    """Let a visibility be written as .inf, inf or infinity."""
+    return math.inf if isinstance(value, str) and value.strip().lower() in {"inf", "infinity", ".inf"} else value
+
+
+Visibility = Annotated[float, BeforeValidator(_visibility), Field(gt=0, allow_inf_nan=True)]
+
+
+class Section(BaseModel):
+    """A block of a scenario file: unknown keys are errors, values never change."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Clocks(Section):
+    """The three clocks; each is a whole multiple of the one before."""
+
+    traffic_step_s: Positive = 0.1
+    camera_period_s: Positive = 0.1
+    decision_period_s: Positive = 0.5
+
+    @model_validator(mode="after")
+    def _multiples(self) -> Self:
+        for faster, slower in (("traffic_step_s", "camera_period_s"), ("camera_period_s", "decision_period_s")):
+            ratio = getattr(self, slower) / getattr(self, faster)
+            if round(ratio) < 1 or abs(ratio - round(ratio)) > 1e-6:
+                raise ValueError(
+                    f"{slower} must be a whole multiple of {faster}, "
+                    f"got {getattr(self, slower):g} s and {getattr(self, faster):g} s"
+                )
+        return self
+
+
+class Brake(Section):
+    """A vehicle brakes at a place, holds, and drives on."""
+
+    kind: Literal["brake"]
+    vehicle: str
+    at_position_m: NotNegative
+    to_speed_kmh: NotNegative = 0.0
+    deceleration_mps2: Positive = 4.0
+    hold_s: NotNegative = 30.0
+
+
+class Traffic(Section):
+    """A SUMO simulation and its ego."""
+
+    net: Path
+    routes: tuple[Path, ...] = Field(min_length=1)
+    additional: tuple[Path, ...] = ()
+    ego: str = "ego"
+    keep_lane: tuple[str, ...] = ()
+    warm_up_limit_s: Positive = 600.0
+    advice_deceleration_mps2: Positive = 2.0
+    reading_radius_m: Positive = 1000.0
+    events: tuple[Brake, ...] = ()
+    stop_before_end_m: NotNegative = 60.0
+
+
+class Bank(Section):
+    """A fog bank along the ego's route; start and end are where it is half as dense as inside."""
+
+    start_m: float
+    end_m: float
+    visibility_m: Visibility
+    edge_m: Positive = 100.0
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if not self.start_m < self.end_m:
+            raise ValueError(f"start_m must be less than end_m, got {self.start_m:g} and {self.end_m:g}")
+        if self.edge_m > self.end_m - self.start_m:
+            raise ValueError(
+                f"edge_m must not be longer than the bank ({self.end_m - self.start_m:g} m), got {self.edge_m:g}"
+            )
+        return self
+
+
+class Fog(Section):
+    """Either homogeneous (visibility_m), or banks with another visibility outside them."""
+
+    visibility_m: Visibility | None = None
+    outside_visibility_m: Visibility | None = None
+    banks: tuple[Bank, ...] = ()
+    top_m: Annotated[float, BeforeValidator(_visibility), Field(gt=0)] = 250.0
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        homogeneous = self.visibility_m is not None
+        heterogeneous = self.outside_visibility_m is not None or bool(self.banks)
+        if homogeneous and heterogeneous:
+            raise ValueError("give either visibility_m (homogeneous fog) or outside_visibility_m with banks, not both")
+        if not homogeneous and self.outside_visibility_m is None:
+            raise ValueError("visibility_m (homogeneous fog), or outside_visibility_m with banks, is missing")
+        ordered = sorted(self.banks, key=lambda b: b.start_m)
+        for one, other in itertools.pairwise(ordered):
+            if one.end_m + 0.5 * one.edge_m > other.start_m - 0.5 * other.edge_m:
+                raise ValueError(f"banks overlap: one ends at {one.end_m:g} m, another starts at {other.start_m:g} m")
+        return self
+
+
+class Light(Section):
+    """Daylight."""
+
+    illuminance_lx: Positive = 10_000.0
+
+
+class CameraSection(Section):
+    """The ego's camera."""
+
+    width: int = Field(default=640, ge=16, le=8192)
+    height: int = Field(default=480, ge=16, le=8192)
+    field_of_view_deg: float = Field(default=58.0, gt=1, lt=170)
+    focal_length_px: Positive | None = None
+    principal_point_px: tuple[float, float] | None = None
+    mount_height_m: Positive = 1.38
+    setback_m: NotNegative = 1.7
+    pitch_deg: float = Field(default=2.0, gt=-45, lt=45)
+    roll_deg: float = Field(default=0.0, gt=-45, lt=45)
+    response: Response = Response.SRGB
+    saturation_luminance_cdpm2: Positive | None = None
+    full_well_e: Positive = 10_000.0
+    read_noise_e: NotNegative = 5.0
+
+
+class Lead(Section):
+    """The radar that tracks the vehicle ahead."""
+
+    reach_m: Positive = 200.0
+    distance_deviation_m: NotNegative = 0.25
+    speed_deviation_mps: NotNegative = 0.1
+
+
+class Sensors(Section):
+    """Sensors beside the camera."""
+
+    lead: Lead = Lead()
+    sign_reach_m: Positive = 250.0
+
+
+class Scenario(Section):
+    """A whole scenario."""
+
+    name: str = Field(pattern=r"^[A-Za-z0-9_.-]+$")
+    description: str = ""
+    duration_s: Positive = 120.0
+    end_on_collision: bool = True
+    clocks: Clocks = Clocks()
+    traffic: Traffic
+    fog: Fog
+    light: Light = Light()
+    camera: CameraSection = CameraSection()
+    renderer: Annotated[str, Field(default="auto")]
+    scenery_seed: int = Field(default=0, ge=0)
+    sensors: Sensors = Sensors()
+    estimators: tuple[Annotated[Method, method_of(ESTIMATORS)], ...] = Field(
+        default=(Method(method="negru2013"),), min_length=1
+    )
+    fusion: Annotated[Method, method_of(FUSIONS)] = Method(method="grid_filter")
+    advice: Annotated[Method, method_of(ADVISERS)] = Method(method="stopping_sight_distance")
+    lighting: Annotated[Method, method_of(LIGHTING_POLICIES)] = Method(method="fog_lamp_rules")
+    directory: Path = Field(default=Path(), exclude=True)
+
+    @field_validator("renderer")
+    @classmethod
+    def _known_renderer(cls, value: str) -> str:
+        if value != "auto" and value not in RENDERERS:
+            raise ValueError(str(UnknownNameError("renderer", value, ["auto", *RENDERERS])))
+        return value
+
+    @model_validator(mode="after")
+    def _distinct_estimators(self) -> Self:
+        names = [e.method for e in self.estimators]
+        if len(set(names)) < len(names):
+            raise ValueError(f"estimators must differ, got {', '.join(names)}")
+        return self

@@ -20,6 +20,10 @@ class SimulationError(FogSimError, RuntimeError):
     """The traffic simulation refused, ended or was lost."""
 
 
+class SimulationRunningError(SimulationError):
+    """A simulation runs in this process already, and only one can."""
+
+
 class UnknownNameError(InputError):
     """A name that a registry does not know; the message lists the known ones and the nearest."""
 

@@ -170,7 +170,7 @@ class ClosedLoop:
         Returns
         -------
         Step
-            The finished instant. If the ego left the network on the way, the last one once more with its ending.
+            The finished instant. If the ego left the network on the way, what was last seen of it, with its ending.
 
         Raises
         ------
@@ -183,7 +183,9 @@ class ClosedLoop:
             self._traffic.advance(command)
         snapshot = self._traffic.observe()
         if snapshot is None:
-            self._step = dataclasses.replace(self._step, ending=Ending.LEFT_NETWORK)
+            index = self._step.index + 1
+            time = index * self._periods.camera_period
+            self._step = dataclasses.replace(self._step, index=index, time=time, ending=Ending.LEFT_NETWORK)
         else:
             self._step = self._finish(snapshot, self._world, command)
         return self._step

@@ -1,5 +1,6 @@
 """From a scenario file to a checked `Scenario`; a mistake is told with file, line, key, value and what is allowed."""
 
+import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, get_args
@@ -8,7 +9,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from fogsim.errors import InputError, suggest
-from fogsim.scenario.catalogue import scenario_file
+from fogsim.scenario.catalogue import SCENARIO_FILE, scenario_file
 from fogsim.scenario.document import Document, KeyPath, dotted, read_document
 from fogsim.scenario.overrides import apply_overrides
 from fogsim.scenario.schema import Scenario
@@ -35,10 +36,46 @@ def load_scenario(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Sc
         If anything does not fit; one line for each mistake, with file, line, key path, value and what is allowed.
     """
     path = scenario_file(name_or_path)
-    document = read_document(path)
+    return _checked(read_document(path), overrides, path.parent)
+
+
+def override(scenario: Scenario, overrides: Iterable[str]) -> Scenario:
+    """Copy of a scenario with single keys changed.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    overrides : iterable of str
+        ``key.path=value`` each.
+
+    Raises
+    ------
+    InputError
+        If the changed scenario does not fit.
+    """
+    document = Document(scenario.directory / SCENARIO_FILE, resolved(scenario), {})
+    return _checked(document, overrides, scenario.directory)
+
+
+def resolved(scenario: Scenario) -> dict[str, Any]:
+    """A scenario as plain data with every default filled in, fit for JSON; endless visibility is written "inf"."""
+    data: dict[str, Any] = _without_infinities(scenario.model_dump(mode="json", exclude_none=True))
+    return data
+
+
+def _without_infinities(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_infinities(v) for key, v in value.items()}
+    if isinstance(value, list):
+        return [_without_infinities(v) for v in value]
+    return "inf" if value == math.inf else value
+
+
+def _checked(document: Document, overrides: Iterable[str], folder: Path) -> Scenario:
     data = apply_overrides(document.data, overrides)
     try:
-        scenario = Scenario.model_validate({**data, "directory": path.parent})
+        scenario = Scenario.model_validate({**data, "directory": folder})
     except ValidationError as error:
         raise InputError("\n".join(_told(document, detail) for detail in error.errors())) from None
     _check_files(document, scenario)

@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Iterator
 from types import ModuleType
 
-from fogsim.errors import MissingDependencyError, SimulationError
+from fogsim.errors import MissingDependencyError, SimulationError, SimulationRunningError
 
 
 def load_libsumo() -> ModuleType:
@@ -46,11 +46,13 @@ def start_simulation(libsumo: ModuleType, arguments: list[str], running_here: bo
 
     Raises
     ------
+    SimulationRunningError
+        If another simulation runs in this process.
     SimulationError
-        If another simulation runs in this process, or SUMO refuses its input; the message holds SUMO's own words.
+        If SUMO refuses its input; the message holds SUMO's own words.
     """
     if libsumo.isLoaded() and not running_here:
-        raise SimulationError(
+        raise SimulationRunningError(
             "another SUMO simulation runs in this process, and libsumo can hold only one: close the other one first, "
             "or run this one in its own process (gymnasium.make_vec and AsyncVectorEnv do that for environments)"
         )

@@ -1,0 +1,85 @@
+"""What an agent is rewarded for: named terms, so that users can weigh them anew."""
+
+from dataclasses import dataclass
+
+from fogsim.kinematics import stopping_sight_distance
+from fogsim.values import Lamp, Step
+
+TTC_THRESHOLD = 3.0
+"""Times to collision below this count as conflicts [s] (SUMO's SSM device, Minderhoud & Bovy 2001)."""
+
+COMFORTABLE_DECELERATION = 2.0
+"""Decelerations up to this are comfortable [m/s²] (ISO 15622: 2–3.5)."""
+
+REAR_FOG_LAMP_VISIBILITY = 50.0
+"""Rear fog lamps are lit below this visibility and not above [m] (German StVO § 17(3))."""
+
+
+@dataclass(frozen=True, slots=True)
+class RewardWeights:
+    """Weights of the reward's terms; each term is about 1 where it matters.
+
+    Attributes
+    ----------
+    progress : float
+        For driving at the speed limit.
+    visibility_margin : float
+        Against driving so fast that one cannot stop within the visibility.
+    conflict : float
+        Against times to collision below 3 s.
+    discomfort : float
+        Against decelerations above 2 m/s².
+    collision : float
+        Against a collision, once.
+    lamps : float
+        Against a rear fog lamp that blinds others in clear air or is dark in dense fog.
+    """
+
+    progress: float = 1.0
+    visibility_margin: float = 2.0
+    conflict: float = 2.0
+    discomfort: float = 0.3
+    collision: float = 50.0
+    lamps: float = 0.2
+
+
+def reward_terms(before: Step, after: Step, weights: RewardWeights) -> dict[str, float]:
+    """Weighted terms of the reward for one decision period.
+
+    Parameters
+    ----------
+    before, after : Step
+        First and last step of the period.
+    weights : RewardWeights
+        The weights.
+
+    Returns
+    -------
+    dict of str to float
+        Terms by name; the reward is their sum.
+    """
+    ego = after.traffic.ids[after.ego]
+    speed = float(after.traffic.speed[after.ego])
+    driven = after.route_position - before.route_position
+    duration = max(after.time - before.time, 1e-9)
+    sight = after.truth.visibility_ahead
+    needed = stopping_sight_distance(speed, reaction_time=2.0, deceleration=3.4)
+    rear_fog = Lamp.REAR_FOG in after.command.lamps
+    hit = any(ego in (c.collider, c.victim) for c in after.collisions)
+    return {
+        "progress": weights.progress * driven / (after.speed_limit * duration),
+        "visibility_margin": -weights.visibility_margin * max(0.0, 1.0 - sight / needed) if needed > 0 else 0.0,
+        "conflict": -weights.conflict * _conflict(after, speed),
+        "discomfort": -weights.discomfort
+        * max(0.0, -float(after.traffic.acceleration[after.ego]) - COMFORTABLE_DECELERATION),
+        "collision": -weights.collision * float(hit),
+        "lamps": -weights.lamps * float(rear_fog != (after.truth.visibility < REAR_FOG_LAMP_VISIBILITY)),
+    }
+
+
+def _conflict(step: Step, speed: float) -> float:
+    """How far the time to collision is below its threshold, 0 … 1."""
+    if step.leader is None or speed <= step.leader.speed:
+        return 0.0
+    time_to_collision = max(step.leader.gap, 0.0) / (speed - step.leader.speed)
+    return max(0.0, 1.0 - time_to_collision / TTC_THRESHOLD)

@@ -1,0 +1,124 @@
+"""What agents see and what they may do: spaces, and the way from steps to observations and from actions to commands."""
+
+import math
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from fogsim.units import KMH_PER_MPS
+from fogsim.values import Camera, Command, Lamp, SpeedAdvice, Step
+
+SIGN_SLOTS = 8
+SIGN_FEATURES = ("distance", "lateral", "value", "diameter")
+SIGN_SCALE = np.array([250.0, 25.0, 50.0, 2.0], dtype=np.float32)
+"""What the features of a sign are divided by [m, m, m/s, m]."""
+
+STATE_FEATURES = (
+    "speed",
+    "lead_present",
+    "lead_distance",
+    "lead_relative_speed",
+    "estimate_valid",
+    "estimate_visibility",
+    "estimate_deviation",
+    "belief_visibility",
+    "belief_deviation",
+    "advised_speed",
+    "fog_lamps",
+)
+"""Meaning of the entries of ``state``; docs/environments.md and the class docstring give their scales."""
+
+SPEED_SCALE = 50.0
+LEAD_SCALE = 200.0
+LOG_VISIBILITY_SCALE = math.log(10_000.0)
+
+ADVISED_SPEEDS = tuple(kmh / KMH_PER_MPS for kmh in range(20, 140, 10))
+"""Advised speed of each level [m/s]; one more level means "no advice"."""
+
+LAMP_MODES = (
+    Lamp.POSITION | Lamp.LOW_BEAM,
+    Lamp.POSITION | Lamp.LOW_BEAM | Lamp.FRONT_FOG,
+    Lamp.POSITION | Lamp.LOW_BEAM | Lamp.FRONT_FOG | Lamp.REAR_FOG,
+)
+"""Lamps of each mode."""
+
+
+def observation_space(camera: Camera) -> spaces.Dict:
+    """Space of observations with images of a camera's size."""
+    return spaces.Dict(
+        {
+            "camera": spaces.Box(0, 255, (camera.height, camera.width, 3), np.uint8),
+            "signs": spaces.Box(-1.0, 1.0, (SIGN_SLOTS, len(SIGN_FEATURES)), np.float32),
+            "signs_mask": spaces.MultiBinary(SIGN_SLOTS),
+            "state": spaces.Box(-1.0, 1.0, (len(STATE_FEATURES),), np.float32),
+        }
+    )
+
+
+def action_space(continuous: bool) -> spaces.Space[Any]:
+    """Space of actions: a speed level and a lamp mode, or both as numbers in −1 … 1."""
+    if continuous:
+        return spaces.Box(-1.0, 1.0, (2,), np.float32)
+    return spaces.MultiDiscrete([len(ADVISED_SPEEDS) + 1, len(LAMP_MODES)])
+
+
+def observe(step: Step) -> dict[str, NDArray[Any]]:
+    """Observation of a step: only what the vehicle itself has. Every array is the caller's own."""
+    signs, mask = _signs(step)
+    return {"camera": step.observation.image.copy(), "signs": signs, "signs_mask": mask, "state": _state(step)}
+
+
+def _signs(step: Step) -> tuple[NDArray[np.float32], NDArray[np.int8]]:
+    features = np.zeros((SIGN_SLOTS, len(SIGN_FEATURES)), dtype=np.float32)
+    mask = np.zeros(SIGN_SLOTS, dtype=np.int8)
+    for slot, sign in enumerate(step.observation.signs[:SIGN_SLOTS]):
+        features[slot] = (sign.distance, sign.lateral, sign.value, sign.diameter)
+        mask[slot] = 1
+    return np.clip(features / SIGN_SCALE, -1.0, 1.0), mask
+
+
+def _state(step: Step) -> NDArray[np.float32]:
+    lead, estimate, advice = step.observation.lead, step.estimates[0], step.command.advice.speed
+    measured = estimate.valid and estimate.extinction > 0
+    values = (
+        step.observation.speed / SPEED_SCALE,
+        float(lead is not None),
+        lead.distance / LEAD_SCALE if lead else 1.0,
+        lead.relative_speed / SPEED_SCALE if lead else 0.0,
+        float(estimate.valid),
+        _visibility(estimate.visibility) if estimate.valid else 1.0,
+        estimate.standard_deviation / estimate.extinction if measured else 1.0,
+        _visibility(step.belief.visibility),
+        step.belief.log_standard_deviation,
+        advice / SPEED_SCALE if math.isfinite(advice) else 1.0,
+        float(Lamp.FRONT_FOG in step.command.lamps or Lamp.REAR_FOG in step.command.lamps),
+    )
+    return np.clip(np.array(values, dtype=np.float32), -1.0, 1.0)
+
+
+def _visibility(visibility: float) -> float:
+    """Visibility on a logarithmic scale, 1 m … 10 km to 0 … 1."""
+    return min(math.log(max(visibility, 1.0)) / LOG_VISIBILITY_SCALE, 1.0)
+
+
+def command_of(action: Any, continuous: bool) -> Command:
+    """Command that an action stands for.
+
+    Parameters
+    ----------
+    action : array_like of two numbers
+        A member of `action_space`.
+    continuous : bool
+        Which of the two action spaces it comes from.
+    """
+    if continuous:
+        speed_share, lamp_share = (float(np.clip((a + 1) / 2, 0.0, 1.0)) for a in np.asarray(action, dtype=float))
+        lowest, highest = ADVISED_SPEEDS[0], ADVISED_SPEEDS[-1]
+        speed = math.inf if speed_share == 1.0 else lowest + speed_share * (highest - lowest)
+        mode = min(int(lamp_share * len(LAMP_MODES)), len(LAMP_MODES) - 1)
+    else:
+        level, mode = (int(a) for a in action)
+        speed = math.inf if level == len(ADVISED_SPEEDS) else ADVISED_SPEEDS[level]
+    return Command(advice=SpeedAdvice(speed), lamps=LAMP_MODES[mode])

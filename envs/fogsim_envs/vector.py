@@ -1,0 +1,24 @@
+"""Many environments at once, each in a process of its own."""
+
+import functools
+import sys
+from typing import Any
+
+import gymnasium
+from gymnasium.vector import AsyncVectorEnv
+
+
+def make_vector(num_envs: int = 1, **kwargs: Any) -> AsyncVectorEnv:
+    """Make a vector environment for `gymnasium.make_vec`, which by itself would put all of them into one process.
+
+    Parameters
+    ----------
+    num_envs : int
+        How many.
+    **kwargs
+        Arguments of each environment.
+    """
+    make = functools.partial(gymnasium.make, "fogsim_envs:fogsim/FogAdvisory-v0", **kwargs)
+    # A GL context does not survive a fork: where one may exist, workers start from a clean server process.
+    context = "forkserver" if "OpenGL" in sys.modules else None
+    return AsyncVectorEnv([make] * num_envs, context=context)

@@ -1,0 +1,191 @@
+"""``fogsim …``: arguments, progress and exit codes, nothing else."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+
+from fogsim import __version__
+from fogsim.errors import FogSimError
+from fogsim.values import Step
+
+BAD_INPUT = 2
+INTERRUPTED = 130
+
+app = typer.Typer(
+    name="fogsim",
+    help="Driving in fog, closed loop: SUMO traffic, physically exact camera frames, visibility estimators, advice.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+_out = Console(highlight=False)
+_err = Console(stderr=True, highlight=False)
+
+
+def main() -> None:
+    """Run the command line; errors that a user can mend end in one message and exit code 2."""
+    try:
+        app()
+    except FogSimError as error:
+        _err.print(f"[bold red]error:[/] {escape(str(error))}", soft_wrap=True)
+        sys.exit(BAD_INPUT)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        _out.print(f"fogsim {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def common(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Take the options that stand before a command."""
+
+
+@app.command("run")
+def run_command(
+    scenario: Annotated[str, typer.Argument(help="A scenario of the catalogue (fogsim list), a file or a folder.")],
+    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same run, bit for bit.")] = 0,
+    out: Annotated[Path | None, typer.Option(help="Directory for the results. [runs/SCENARIO-seedN]")] = None,
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY.PATH=VALUE", help="Put a value in place of the file's.")
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace results that are there already.")] = False,
+    video: Annotated[bool, typer.Option(help="Write video.mp4.")] = True,
+    report: Annotated[bool, typer.Option(help="Write report.html.")] = True,
+) -> None:
+    """Run a scenario and write manifest.json, steps.parquet, metrics.json, video.mp4 and report.html."""
+    from fogsim.recording import record_run  # noqa: PLC0415 - heavy; --help must be quick
+    from fogsim.scenario import load_scenario  # noqa: PLC0415 - heavy; --help must be quick
+
+    loaded = load_scenario(scenario, settings or ())
+    recorders = ["table", *(["video"] if video else []), *(["report"] if report else [])]
+    directory = out or Path("runs", f"{loaded.name}-seed{seed}")
+    with _SimulationProgress(loaded.name, loaded.duration_s) as progress:
+        result = record_run(
+            loaded,
+            seed,
+            directory,
+            overwrite=overwrite,
+            recorders=recorders,
+            command_line=["fogsim", *sys.argv[1:]],
+            watch=progress.show,
+        )
+    _print_result(result.summary.values, result.summary.meanings)
+    ended = result.ending.value if result.ending else f"{result.status.value}; the results are partial and say so"
+    _out.print(f"\nThe run ended: [bold]{ended}[/].")
+    _out.print("Results:")
+    for name in result.files:
+        _out.print(f"  {escape(str(result.directory / name))}", soft_wrap=True)
+    if result.ending is None:
+        raise typer.Exit(INTERRUPTED)
+
+
+def _print_result(values: object, meanings: object) -> None:
+    """Summary of the metrics as a table; the per-method blocks are in metrics.json and the report."""
+    if not (isinstance(values, dict) and isinstance(meanings, dict)):
+        return
+    table = Table(title="Summary", title_justify="left", box=None, pad_edge=False)
+    for heading, justify in (("metric", "left"), ("value", "right"), ("meaning", "left")):
+        table.add_column(heading, justify=justify)  # type: ignore[arg-type]  # rich's literal type
+    for key, value in values.items():
+        if isinstance(value, dict | list):
+            continue
+        shown = "-" if value is None else f"{value:.3g}" if isinstance(value, float) else str(value)
+        table.add_row(key, shown, meanings.get(key, ""))
+    _out.print(table)
+
+
+class _SimulationProgress:
+    """A bar over simulated time with how fast it passes."""
+
+    def __init__(self, name: str, duration: float) -> None:
+        self._progress = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TaskProgressColumn(),
+            TextColumn("{task.fields[state]}"),
+            TimeElapsedColumn(),
+            TextColumn("left at most"),
+            TimeRemainingColumn(),
+            console=_err,
+        )
+        self._task = self._progress.add_task(name, total=duration, state="starting (the first run compiles kernels)")
+
+    def show(self, step: Step) -> None:
+        task = self._progress.tasks[self._task]
+        speed = step.time / task.elapsed if task.elapsed else 0.0
+        sight = step.belief.visibility
+        state = f"t = {step.time:5.1f} s, {speed:.1f}× real time, believed visibility {sight:.0f} m"
+        self._progress.update(self._task, completed=step.time, state=state)
+
+    def __enter__(self) -> "_SimulationProgress":
+        self._progress.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._progress.stop()
+
+
+@app.command("list")
+def list_command() -> None:
+    """List scenarios and the methods that a scenario can name."""
+    from fogsim.advice import ADVISERS  # noqa: PLC0415 - heavy; --help must be quick
+    from fogsim.estimators import ESTIMATORS  # noqa: PLC0415 - heavy; --help must be quick
+    from fogsim.fusion import FUSIONS  # noqa: PLC0415 - heavy; --help must be quick
+    from fogsim.lighting import LIGHTING_POLICIES  # noqa: PLC0415 - heavy; --help must be quick
+    from fogsim.render import RENDERERS  # noqa: PLC0415 - heavy; --help must be quick
+    from fogsim.scenario import catalogue, load_scenario  # noqa: PLC0415 - heavy; --help must be quick
+
+    table = Table(title="Scenarios", title_justify="left", box=None, pad_edge=False)
+    table.add_column("name", style="bold", no_wrap=True)
+    table.add_column("description")
+    for name in catalogue():
+        table.add_row(name, load_scenario(name).description)
+    _out.print(table)
+    _out.print()
+    for registry in (ESTIMATORS, FUSIONS, ADVISERS, LIGHTING_POLICIES, RENDERERS):
+        _out.print(f"[bold]{registry.kind}[/]: {', '.join(registry)}")
+
+
+@app.command("validate")
+def validate_command(files: Annotated[list[str], typer.Argument(help="Scenario files, folders or names.")]) -> None:
+    """Check scenario files; every mistake is named with file, line, key, value and what is allowed."""
+    from fogsim.scenario import load_scenario  # noqa: PLC0415 - heavy; --help must be quick
+
+    bad = 0
+    for file in files:
+        try:
+            scenario = load_scenario(file)
+        except FogSimError as error:
+            bad += 1
+            _err.print(f"[bold red]error:[/] {escape(str(error))}", soft_wrap=True)
+        else:
+            _out.print(f"[green]fine:[/] {escape(file)} ({escape(scenario.name)})", soft_wrap=True)
+    if bad:
+        raise typer.Exit(BAD_INPUT)
+
+
+@app.command("doctor")
+def doctor_command() -> None:
+    """Say what works on this machine, what is missing, and how to get it."""
+    from fogsim.doctor import examine  # noqa: PLC0415 - heavy; --help must be quick
+
+    findings = examine()
+    table = Table(box=None, show_header=False, pad_edge=False)
+    for finding in findings:
+        table.add_row("[green]fine[/]" if finding.works else "[red]missing[/]", finding.subject, escape(finding.detail))
+    _out.print(table)
+    if not all(finding.works for finding in findings):
+        raise typer.Exit(1)

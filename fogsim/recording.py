@@ -1,0 +1,141 @@
+"""A run whose results are written down, and stay readable if it is interrupted."""
+
+import dataclasses
+from collections.abc import Callable, Iterable, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+
+from fogsim.loop import run
+from fogsim.metrics import RunMetrics, RunSummary, step_metrics
+from fogsim.recorders import (
+    RECORDERS,
+    Manifest,
+    Recorder,
+    RunDirectory,
+    RunInformation,
+    Status,
+    write_json,
+    write_manifest,
+)
+from fogsim.scenario import Scenario, resolved
+from fogsim.values import Ending, Step
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class RecordedRun:
+    """What came of a recorded run.
+
+    Attributes
+    ----------
+    status : Status
+        Complete or interrupted.
+    ending : Ending or None
+        Why the simulated run was over, None if it was interrupted.
+    summary : RunSummary
+        Its metrics.
+    directory : Path
+        Where the results are.
+    files : tuple of str
+        Their names.
+    """
+
+    status: Status
+    ending: Ending | None
+    summary: RunSummary
+    directory: Path
+    files: tuple[str, ...]
+
+
+def record_run(
+    scenario: Scenario,
+    seed: int,
+    out: Path,
+    *,
+    overwrite: bool = False,
+    recorders: Iterable[str] = RECORDERS,
+    command_line: Sequence[str] = (),
+    watch: Callable[[Step], None] = lambda _: None,
+) -> RecordedRun:
+    """Run a scenario and write its results.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    seed : int
+        Its seed.
+    out : Path
+        Directory for the results.
+    overwrite : bool
+        True to replace results that are there.
+    recorders : iterable of str
+        Which of `RECORDERS` write.
+    command_line : sequence of str
+        How it was started, for the manifest.
+    watch : callable
+        Called with each finished step, for a progress bar.
+
+    Returns
+    -------
+    RecordedRun
+        Interrupted (KeyboardInterrupt, as from Ctrl-C) or complete; in both cases every file is readable and says
+        which it is.
+
+    Raises
+    ------
+    InputError
+        If the directory holds results already and must not be overwritten.
+    FogSimError
+        If a part of the loop cannot start or fails; the manifest then says so.
+    """
+    directory = RunDirectory(out, overwrite)
+    metrics = RunMetrics()
+    manifest = Manifest(Status.RUNNING, seed, resolved(scenario), datetime.now(UTC), command_line=command_line)
+    write_manifest(directory.manifest, manifest)
+    opened = _open(recorders, scenario, seed, directory, metrics)
+    status, ending, message = Status.FAILED, None, ""
+    try:
+        for step in run(scenario, seed):
+            metrics.update(step)
+            derived = step_metrics(step)
+            for recorder in opened:
+                recorder.record(step, derived)
+            watch(step)
+            ending = step.ending
+        status = Status.COMPLETE
+    except KeyboardInterrupt:
+        status = Status.INTERRUPTED
+    except Exception as error:
+        message = f"{type(error).__name__}: {error}"
+        raise
+    finally:
+        complete = status is Status.COMPLETE
+        for recorder in opened:
+            recorder.close(complete)
+        write_json(directory.metrics, {"complete": complete, **metrics.summary().to_json()})
+        ended = dataclasses.replace(
+            manifest,
+            status=status,
+            ended=datetime.now(UTC),
+            ending=ending,
+            files=directory.files(),
+            message=message,
+        )
+        write_manifest(directory.manifest, ended)
+    return RecordedRun(status, ending, metrics.summary(), directory.path, tuple(directory.files()))
+
+
+def _open(
+    recorders: Iterable[str], scenario: Scenario, seed: int, directory: RunDirectory, metrics: RunMetrics
+) -> list[Recorder]:
+    information = RunInformation(
+        directory=directory,
+        title=scenario.name,
+        description=scenario.description,
+        seed=seed,
+        methods=tuple(e.method for e in scenario.estimators),
+        frame_period=scenario.clocks.camera_period_s,
+        summary=lambda: metrics.summary().values,
+        meanings=metrics.summary().meanings,
+    )
+    return [RECORDERS[name](information) for name in recorders]

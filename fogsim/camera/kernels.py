@@ -41,7 +41,7 @@ def develop(
                 mixed = (state ^ (state >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
                 mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
                 normal = normals[mixed >> np.uint64(64 - NORMAL_TABLE_BITS)]
-                exposure = min(max(radiance[v, u, c] * gain, 0.0), 1.0)
+                exposure = max(radiance[v, u, c] * gain, 0.0)
                 exposure += normal * math.sqrt(shot_variance * exposure + read_variance)
                 index = int(min(max(exposure, 0.0), 1.0) * top + 0.5)
                 out[v, u, c] = response[index]

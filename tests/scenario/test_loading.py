@@ -1,0 +1,179 @@
+import math
+import shutil
+from pathlib import Path
+
+import pytest
+
+from fogsim.errors import InputError, UnknownNameError
+from fogsim.scenario import catalogue, load_scenario, override, resolved
+from fogsim.scenario.overrides import apply_overrides, parse_override
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A copy of the motorway scenario that a test may spoil."""
+    return Path(shutil.copytree(catalogue()["motorway_fog_bank"].parent, tmp_path / "mine"))
+
+
+def spoil(folder: Path, old: str, new: str) -> Path:
+    file = folder / "scenario.yaml"
+    text = file.read_text(encoding="utf-8")
+    assert old in text
+    file.write_text(text.replace(old, new, 1), encoding="utf-8")
+    return file
+
+
+@pytest.mark.parametrize("name", catalogue())
+def test_every_scenario_of_the_catalogue_loads(name: str) -> None:
+    scenario = load_scenario(name)
+    assert scenario.name == name
+    assert scenario.description
+
+
+def test_by_name_file_and_folder(folder: Path) -> None:
+    by_file, by_folder = load_scenario(folder / "scenario.yaml"), load_scenario(folder)
+    assert by_file == by_folder
+    assert resolved(by_file) == resolved(load_scenario("motorway_fog_bank"))
+
+
+def test_an_unknown_key_names_file_line_key_and_the_nearest(folder: Path) -> None:
+    file = spoil(folder, "pitch_deg:", "pich_deg:")
+    line = 1 + file.read_text(encoding="utf-8").splitlines().index("  pich_deg: 2")
+    with pytest.raises(InputError) as error:
+        load_scenario(file)
+    assert str(error.value).startswith(f"{file}:{line}: camera.pich_deg: unknown key; did you mean 'pitch_deg'?")
+
+
+def test_an_unknown_key_inside_a_list(folder: Path) -> None:
+    file = spoil(folder, "edge_m:", "edges_m:")
+    with pytest.raises(InputError, match=r"fog\.banks\.0\.edges_m: unknown key; did you mean 'edge_m'\?"):
+        load_scenario(file)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("width: 640", "width: many", r"camera\.width: input should be a valid integer.*got 'many'"),
+        ("width: 640", "width: 0", r"camera\.width: input should be greater than or equal to 16; got 0"),
+        ("duration_s: 240", "duration_s: -1", r"duration_s: input should be greater than 0; got -1"),
+        ("duration_s: 240", "duration_s: .nan", r"duration_s: .*got nan"),
+        ("response: srgb", "response: log", r"camera\.response: .*'linear', 'gamma' or 'srgb'; got 'log'"),
+        ("end_m: 2500", "end_m: 1000", r"fog\.banks\.0: start_m must be less than end_m, got 1300 and 1000"),
+        ("edge_m: 300", "edge_m: 3000", r"fog\.banks\.0: edge_m must not be longer than the bank"),
+        ("visibility_m: 60", "visibility_m: 0", r"fog\.banks\.0\.visibility_m: input should be greater than 0; got 0"),
+        ("outside_visibility_m: 2000", "visibility_m: 2000", r"fog: give either visibility_m .* not both"),
+        ("[negru2013]", "[negru2014]", r"estimators\.0: unknown estimator 'negru2014'; did you mean 'negru2013'\?"),
+        ("fusion: grid_filter", "fusion: kalman", r"fusion: unknown fusion 'kalman'; known: grid_filter"),
+        ("reaction_time: 2.0", "reaction: 2.0", r"advice\.reaction: unknown parameter.*reaction_time"),
+        ("reaction_time: 2.0", "reaction_time: fast", r"advice\.reaction_time: .*valid number.*got 'fast'"),
+        (
+            "camera_period_s: 0.1",
+            "camera_period_s: 0.25",
+            r"clocks: camera_period_s must be a whole multiple .*0\.25 s",
+        ),
+        ("kind: brake", "kind: jump", r"traffic\.events\.0\.kind: input should be 'brake'; got 'jump'"),
+        (
+            "illuminance_lx: 10000",
+            "illuminance_lx: -5",
+            r"light\.illuminance_lx: input should be greater than 0; got -5",
+        ),
+        ("net: motorway.net.xml", "other: 3", r"traffic\.net: this key is missing"),
+    ],
+)
+def test_mistakes_are_told_with_key_value_and_what_is_allowed(folder: Path, old: str, new: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        load_scenario(spoil(folder, old, new))
+
+
+def test_a_missing_file_names_what_is_there(folder: Path) -> None:
+    file = spoil(folder, "net: motorway.net.xml", "net: motorvay.net.xml")
+    with pytest.raises(
+        InputError, match=r"scenario\.yaml:\d+: traffic\.net: there is no file 'motorvay\.net\.xml'"
+    ) as e:
+        load_scenario(file)
+    assert "did you mean 'motorway.net.xml'?" in str(e.value)
+
+
+def test_every_mistake_is_told_at_once(folder: Path) -> None:
+    spoil(folder, "pitch_deg:", "pich_deg:")
+    file = spoil(folder, "duration_s: 240", "duration_s: -1")
+    with pytest.raises(InputError) as error:
+        load_scenario(file)
+    assert len(str(error.value).splitlines()) == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a: [1, 2", "not valid YAML"),
+        ("just words", "expected a mapping of keys to values, got str"),
+        ("", "expected a mapping of keys to values, got NoneType"),
+        ("name: a\nname: b\n", "name: this key stands twice, first on line 1"),
+    ],
+)
+def test_what_is_no_scenario_at_all(tmp_path: Path, text: str, message: str) -> None:
+    file = tmp_path / "scenario.yaml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=message):
+        load_scenario(file)
+
+
+def test_a_file_that_is_not_text(tmp_path: Path) -> None:
+    file = tmp_path / "scenario.yaml"
+    file.write_bytes(b"\xff\xfe\x00\x80")
+    with pytest.raises(InputError, match="not valid YAML"):
+        load_scenario(file)
+
+
+def test_unknown_scenarios() -> None:
+    with pytest.raises(
+        UnknownNameError, match=r"unknown scenario 'motorway_fog_bnk'; did you mean 'motorway_fog_bank'"
+    ):
+        load_scenario("motorway_fog_bnk")
+    with pytest.raises(InputError, match="there is no such scenario file"):
+        load_scenario("nowhere/scenario.yaml")
+
+
+def test_homogeneous_fog_takes_the_place_of_banks() -> None:
+    scenario = load_scenario("motorway_fog_bank", ["fog.visibility_m=80"])
+    assert scenario.fog.visibility_m == 80.0
+    assert scenario.fog.banks == ()
+    back = override(scenario, ["fog.outside_visibility_m=inf"])
+    assert back.fog.visibility_m is None
+    assert back.fog.outside_visibility_m == math.inf
+
+
+def test_overrides_reach_into_lists_and_make_missing_blocks() -> None:
+    scenario = load_scenario(
+        "motorway_fog_bank", ["fog.banks.0.visibility_m=40", "sensors.lead.reach_m=120", "camera.width=320"]
+    )
+    assert scenario.fog.banks[0].visibility_m == 40.0
+    assert scenario.sensors.lead.reach_m == 120.0
+    assert scenario.camera.width == 320
+
+
+def test_an_unknown_override_is_told_like_an_unknown_key() -> None:
+    with pytest.raises(InputError, match=r"fog\.visibilty_m: unknown key; did you mean 'visibility_m'\?"):
+        load_scenario("motorway_fog_bank", ["fog.visibilty_m=80"])
+
+
+@pytest.mark.parametrize("text", ["fog.visibility_m", "=3", "fog..x=1", "a=[1"])
+def test_overrides_that_are_none(text: str) -> None:
+    with pytest.raises(InputError, match="--set"):
+        parse_override(text)
+
+
+def test_overrides_that_lead_nowhere() -> None:
+    data = {"name": "x", "list": [1, 2]}
+    with pytest.raises(InputError, match="list is a list of 2"):
+        apply_overrides(data, ["list.5=3"])
+    with pytest.raises(InputError, match="single value"):
+        apply_overrides(data, ["name.first.second=3"])
+    assert apply_overrides(data, ["list.1=7"]) == {"name": "x", "list": [1, 7]}
+    assert data == {"name": "x", "list": [1, 2]}
+
+
+def test_a_resolved_scenario_loads_again(folder: Path) -> None:
+    scenario = load_scenario("motorway_fog_bank", ["fog.visibility_m=inf"])
+    assert override(scenario, []) == scenario
+    assert resolved(scenario)["fog"]["visibility_m"] == "inf"

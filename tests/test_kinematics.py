@@ -1,0 +1,26 @@
+import math
+
+import pytest
+
+from fogsim.kinematics import safe_speed, stopping_sight_distance
+
+
+@pytest.mark.parametrize(("kmh", "metres"), [(50, 63.1), (90, 154.4), (100, 182.9), (110, 213.7), (130, 282.0)])
+def test_aashto_stopping_sight_distances(kmh: float, metres: float) -> None:
+    """AASHTO t = 2.5 s, a = 3.4 m/s²; the book rounds to 65/160/185/220/285 m."""
+    assert stopping_sight_distance(kmh / 3.6, 2.5, 3.4) == pytest.approx(metres, abs=0.05)
+
+
+@pytest.mark.parametrize(("metres", "kmh"), [(50, 42.5), (100, 68.1), (200, 105.6), (300, 134.9)])
+def test_safe_speeds(metres: float, kmh: float) -> None:
+    assert safe_speed(metres, 2.5, 3.4) * 3.6 == pytest.approx(kmh, abs=0.05)
+
+
+def test_round_trip_and_limits() -> None:
+    for distance in (0.0, 1.0, 60.0, 500.0):
+        assert stopping_sight_distance(safe_speed(distance, 1.5, 5.0, 0.03), 1.5, 5.0, 0.03) == pytest.approx(distance)
+    assert safe_speed(math.inf, 2.5, 3.4) == math.inf
+
+
+def test_uphill_stops_sooner() -> None:
+    assert stopping_sight_distance(30.0, 2.5, 3.4, 0.05) < stopping_sight_distance(30.0, 2.5, 3.4)

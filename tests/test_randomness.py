@@ -1,0 +1,25 @@
+import numpy as np
+import pytest
+
+from fogsim.randomness import spawn_streams
+
+
+def test_the_same_seed_gives_the_same_streams() -> None:
+    one, other = spawn_streams(7), spawn_streams(7)
+    assert one.traffic_seed == other.traffic_seed
+    assert np.array_equal(one.camera.random(5), other.camera.random(5))
+
+
+def test_streams_and_seeds_differ() -> None:
+    streams = spawn_streams(7)
+    assert not np.array_equal(streams.camera.random(5), streams.sensors.random(5))
+    assert streams.traffic_seed != spawn_streams(8).traffic_seed
+
+
+def test_sumo_takes_the_traffic_seed() -> None:
+    assert all(0 <= spawn_streams(seed).traffic_seed < 2**31 for seed in range(50))
+
+
+def test_a_negative_seed_is_refused() -> None:
+    with pytest.raises(ValueError, match="non-negative"):
+        spawn_streams(-1)

@@ -1,0 +1,31 @@
+import math
+
+import pytest
+
+from fogsim.units import extinction_from_visibility, visibility_from_extinction
+
+
+def test_a_hundred_metres_of_visibility() -> None:
+    assert extinction_from_visibility(100.0) == pytest.approx(0.0299573, abs=5e-8)  # CIE 5 %: ln 20 / V
+
+
+def test_round_trip() -> None:
+    for visibility in (1.0, 30.0, 1000.0, 1e6):
+        assert visibility_from_extinction(extinction_from_visibility(visibility)) == pytest.approx(visibility)
+
+
+def test_clear_air_is_exactly_clear() -> None:
+    assert extinction_from_visibility(math.inf) == 0.0
+    assert visibility_from_extinction(0.0) == math.inf
+
+
+@pytest.mark.parametrize("visibility", [0.0, -1.0, math.nan])
+def test_impossible_visibility_is_refused(visibility: float) -> None:
+    with pytest.raises(ValueError, match="positive"):
+        extinction_from_visibility(visibility)
+
+
+@pytest.mark.parametrize("extinction", [-1e-9, math.nan])
+def test_impossible_extinction_is_refused(extinction: float) -> None:
+    with pytest.raises(ValueError, match="negative"):
+        visibility_from_extinction(extinction)

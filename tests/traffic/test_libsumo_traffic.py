@@ -1,0 +1,170 @@
+"""SUMO in process: reading, obeying, scripting, replaying, refusing."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fogsim.errors import SimulationError, SimulationRunningError
+from fogsim.traffic import BrakeEvent, TrafficSetup
+from fogsim.traffic.libsumo_traffic import LibsumoTraffic
+from fogsim.values import Command, Lamp, SpeedAdvice, TrafficSnapshot
+
+FOLDER = Path(__file__).resolve().parents[2] / "scenarios" / "motorway_fog_bank"
+SETUP = TrafficSetup(
+    net=FOLDER / "motorway.net.xml",
+    routes=(FOLDER / "motorway.rou.xml",),
+    additional=(FOLDER / "signs.add.xml",),
+    ego="ego",
+    step_length=0.1,
+    keep_lane=("ego", "lead"),
+    warm_up_limit=600.0,
+    advice_deceleration=2.0,
+    reading_radius=800.0,
+    events=(),
+)
+
+
+@pytest.fixture
+def traffic() -> Iterator[LibsumoTraffic]:
+    simulation = LibsumoTraffic(SETUP)
+    simulation.start(1)
+    yield simulation
+    simulation.close()
+
+
+def seen(traffic: LibsumoTraffic) -> TrafficSnapshot:
+    snapshot = traffic.observe()
+    assert snapshot is not None
+    return snapshot
+
+
+def drive(traffic: LibsumoTraffic, command: Command, steps: int) -> TrafficSnapshot:
+    for _ in range(steps):
+        traffic.advance(command)
+    return seen(traffic)
+
+
+def test_state_in_metres_and_radians(traffic: LibsumoTraffic) -> None:
+    before = seen(traffic)
+    after = drive(traffic, Command(), 10)
+    state, ego = after.state, after.ego
+    moved = state.position[ego] - before.state.position[before.ego]
+    assert state.ids[ego] == "ego"
+    assert np.linalg.norm(moved) == pytest.approx(after.route_position - before.route_position, rel=0.01)
+    assert math.atan2(moved[1], moved[0]) == pytest.approx(state.heading[ego], abs=0.01)
+    assert state.speed[ego] == pytest.approx(np.linalg.norm(moved), rel=0.1)
+    assert after.speed_limit == pytest.approx(130 / 3.6, abs=0.1)
+    assert (state.length[ego], state.width[ego], state.height[ego]) == (4.7, 1.85, 1.48)
+    assert 5400 < after.route_length < 5600
+
+
+def test_every_array_has_a_row_for_each_vehicle_near_the_ego(traffic: LibsumoTraffic) -> None:
+    state = seen(traffic).state
+    n = len(state.ids)
+    assert n > 10
+    for name in ("heading", "speed", "acceleration", "length", "width", "height", "lamps"):
+        assert getattr(state, name).shape == (n,)
+    assert state.position.shape == state.paint.shape == (n, 3)
+    assert len(state.types) == len(state.lane) == n
+    assert set(state.types) <= {"car", "van", "truck", "bus"}
+    distance = np.linalg.norm(state.position - state.position[state.row("ego")], axis=1)
+    assert distance.max() <= SETUP.reading_radius
+
+
+def test_the_gap_is_from_bumper_to_bumper(traffic: LibsumoTraffic) -> None:
+    snapshot = drive(traffic, Command(), 5)
+    leader = snapshot.leader
+    assert leader is not None
+    row = snapshot.state.row(leader.vehicle_id)
+    assert row is not None
+    distance = np.linalg.norm(snapshot.state.position[row] - snapshot.state.position[snapshot.ego])
+    assert leader.gap == pytest.approx(distance - snapshot.state.length[row], abs=0.05)
+
+
+def test_the_ego_comes_down_to_an_advised_speed_and_is_freed_again(traffic: LibsumoTraffic) -> None:
+    start = seen(traffic).state
+    target = 12.0
+    advised = Command(SpeedAdvice(target))
+    after_two_seconds = drive(traffic, advised, 20)
+    speed = after_two_seconds.state.speed[after_two_seconds.ego]
+    assert speed == pytest.approx(start.speed[start.row("ego")] - 2.0 * SETUP.advice_deceleration, abs=0.3)
+    settled = drive(traffic, advised, 100)
+    assert settled.state.speed[settled.ego] == pytest.approx(target, abs=0.05)
+    freed = drive(traffic, Command(), 100)
+    assert freed.state.speed[freed.ego] > target + 5
+
+
+def test_lamps_of_the_command_are_the_egos(traffic: LibsumoTraffic) -> None:
+    lit = drive(traffic, Command(lamps=Lamp.LOW_BEAM | Lamp.REAR_FOG), 1)
+    assert Lamp(int(lit.state.lamps[lit.ego])) & ~Lamp.STOP == Lamp.LOW_BEAM | Lamp.REAR_FOG
+
+
+def test_a_scripted_vehicle_brakes_holds_and_drives_on() -> None:
+    event = BrakeEvent("lead", at_position=300.0, to_speed=0.0, deceleration=5.0, hold=15.0)
+    traffic = LibsumoTraffic(replace(SETUP, events=(event,)))
+    try:
+        traffic.start(1)
+        speeds = []
+        for _ in range(350):
+            traffic.advance(Command(SpeedAdvice(20.0)))
+            state = seen(traffic).state
+            row = state.row("lead")
+            speeds.append(math.nan if row is None else float(state.speed[row]))
+    finally:
+        traffic.close()
+    assert min(speeds) == pytest.approx(0.0, abs=0.01)
+    assert speeds[-1] > 5.0
+    assert np.nanmin(np.diff(speeds)) >= -0.5 - 0.01
+
+
+def test_the_same_seed_replays_exactly(traffic: LibsumoTraffic) -> None:
+    def positions() -> list[bytes]:
+        return [drive(traffic, Command(SpeedAdvice(20.0)), 10).state.position.tobytes() for _ in range(10)]
+
+    traffic.start(3)
+    first = positions()
+    traffic.start(3)
+    assert positions() == first
+    traffic.start(4)
+    assert positions() != first
+
+
+def test_a_second_simulation_in_one_process_is_refused(traffic: LibsumoTraffic) -> None:
+    with pytest.raises(SimulationRunningError, match="run this one in its own process"):
+        LibsumoTraffic(SETUP).start(1)
+    assert seen(traffic)  # the first goes on
+
+
+def test_an_ego_that_does_not_exist_ends_the_simulation_with_its_name() -> None:
+    traffic = LibsumoTraffic(replace(SETUP, ego="nobody", warm_up_limit=5.0))
+    with pytest.raises(SimulationError, match=r"the ego 'nobody' did not appear within 5"):
+        traffic.start(1)
+    other = LibsumoTraffic(SETUP)
+    other.start(1)  # nothing is left running
+    other.close()
+
+
+def test_what_sumo_refuses_is_told_in_its_own_words(tmp_path: Path) -> None:
+    routes = tmp_path / "broken.rou.xml"
+    routes.write_text('<routes><vehicle id="ego" depart="0" route="nowhere"/></routes>', encoding="utf-8")
+    with pytest.raises(SimulationError, match="nowhere"):
+        LibsumoTraffic(replace(SETUP, routes=(routes,))).start(1)
+
+
+def test_the_ego_arrives_and_is_seen_no_more(traffic: LibsumoTraffic) -> None:
+    for _ in range(3000):
+        traffic.advance(Command())
+        if traffic.observe() is None:
+            return
+    pytest.fail("the ego never arrived")
+
+
+def test_closing_twice_is_allowed_and_a_closed_simulation_says_so(traffic: LibsumoTraffic) -> None:
+    traffic.close()
+    traffic.close()
+    with pytest.raises(SimulationError, match="not been started, or is closed"):
+        traffic.observe()

@@ -1,0 +1,31 @@
+import math
+
+import pytest
+
+from fogsim.traffic.appearance import PAINTS, body_kind, lamps_from_signals, paint
+from fogsim.traffic.governor import governed_speed
+from fogsim.values import Lamp
+
+
+def test_governed_speed_brakes_no_harder_than_told() -> None:
+    assert governed_speed(30.0, 10.0, 2.0, 0.1) == pytest.approx(29.8)
+    assert governed_speed(10.1, 10.0, 2.0, 0.1) == 10.0
+    assert governed_speed(5.0, 10.0, 2.0, 0.1) == 10.0
+    assert governed_speed(30.0, math.inf, 2.0, 0.1) == math.inf
+
+
+def test_body_kinds() -> None:
+    assert [body_kind(c) for c in ("passenger", "delivery", "trailer", "coach")] == ["car", "van", "truck", "bus"]
+
+
+def test_paint_is_sumos_colour_or_one_of_the_common_ones() -> None:
+    assert paint("a", (255, 255, 0, 255)) in PAINTS
+    assert paint("a", (255, 255, 0, 255)) == paint("a", (255, 255, 0, 255))
+    assert paint("a", (255, 0, 0, 255)) == (1.0, 0.0, 0.0)
+
+
+def test_signals_to_lamps() -> None:
+    """SUMO's signal bits: 0 blinker right, 1 left, 3 brake, 4 front, 5 fog, 6 high beam."""
+    assert Lamp(lamps_from_signals(0b1010)) == Lamp.STOP | Lamp.INDICATOR_LEFT
+    assert Lamp(lamps_from_signals(1 << 5)) == Lamp.REAR_FOG
+    assert lamps_from_signals(0) == 0

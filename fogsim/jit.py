@@ -35,6 +35,4 @@ def is_cached(*modules: str) -> bool:
     folders = [Path(m).parent / "__pycache__" for m in modules]
     if os.environ.get("NUMBA_CACHE_DIR"):
         folders = [Path(os.environ["NUMBA_CACHE_DIR"])]
-    return all(
-        any(folder.rglob(f"{Path(m).stem}.*.nbi")) for m, folder in zip(modules, folders, strict=False)
-    )
+    return all(any(folder.rglob(f"{Path(m).stem}.*.nbi")) for m, folder in zip(modules, folders, strict=False))

@@ -1,1 +1,35 @@
 """Surrogate safety, comfort and estimator error."""
+
+from fogsim.kinematics import stopping_sight_distance
+from fogsim.metrics.accumulate import METRICS, MetricFactory, RunMetrics, RunSummary
+from fogsim.metrics.metric import JsonValue, Metric, Sample
+from fogsim.metrics.step_metrics import DEFAULT_STANDARD, step_metrics
+from fogsim.metrics.surrogate import (
+    SafetyStandard,
+    deceleration_rate_to_avoid_crash,
+    modified_deceleration_rate_to_avoid_crash,
+    time_exposed_time_to_collision,
+    time_headway,
+    time_integrated_time_to_collision,
+    time_to_collision,
+)
+
+__all__ = [
+    "DEFAULT_STANDARD",
+    "METRICS",
+    "JsonValue",
+    "Metric",
+    "MetricFactory",
+    "RunMetrics",
+    "RunSummary",
+    "SafetyStandard",
+    "Sample",
+    "deceleration_rate_to_avoid_crash",
+    "modified_deceleration_rate_to_avoid_crash",
+    "step_metrics",
+    "stopping_sight_distance",
+    "time_exposed_time_to_collision",
+    "time_headway",
+    "time_integrated_time_to_collision",
+    "time_to_collision",
+]

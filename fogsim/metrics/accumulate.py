@@ -1,0 +1,104 @@
+"""All metrics of one run, from its steps one at a time."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+from fogsim.errors import SimulationError
+from fogsim.metrics.estimation import BeliefError, EstimatorErrors
+from fogsim.metrics.metric import JsonValue, Metric, Sample
+from fogsim.metrics.motion import Comfort, Compliance, Motion
+from fogsim.metrics.safety import Collisions, Conflict, Sight
+from fogsim.metrics.step_metrics import DEFAULT_STANDARD, step_metrics
+from fogsim.metrics.surrogate import SafetyStandard
+from fogsim.registry import Registry
+from fogsim.values import Step
+
+MetricFactory = Callable[[SafetyStandard], Metric]
+"""Makes a metric that has seen nothing yet."""
+
+METRICS: Registry[MetricFactory] = Registry(
+    "metric",
+    {
+        "motion": lambda _: Motion(),
+        "collisions": lambda _: Collisions(),
+        "conflict": lambda standard: Conflict(standard.time_to_collision),
+        "sight": lambda _: Sight(),
+        "compliance": lambda standard: Compliance(standard.advice_tolerance),
+        "comfort": lambda _: Comfort(),
+        "belief": lambda _: BeliefError(),
+        "estimators": lambda _: EstimatorErrors(),
+    },
+)
+"""Every metric by name, in the order of the summary."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunSummary:
+    """What a run amounts to.
+
+    Attributes
+    ----------
+    values : mapping from str to JSON value
+        Every metric by its key, which ends in the unit; None where it is undefined.
+    meanings : mapping from str to str
+        One line on each key.
+    """
+
+    values: Mapping[str, JsonValue]
+    meanings: Mapping[str, str]
+
+    def to_json(self) -> dict[str, JsonValue]:
+        """Give the values as a dict that JSON can hold without NaN or infinity."""
+        return dict(self.values)
+
+
+class RunMetrics:
+    """Watches the steps of one run.
+
+    Parameters
+    ----------
+    standard : SafetyStandard
+        What the measures are judged by.
+    names : iterable of str
+        Metrics from `METRICS`; all of them by default.
+
+    Raises
+    ------
+    UnknownNameError
+        If a name is not in `METRICS`.
+    """
+
+    def __init__(self, standard: SafetyStandard = DEFAULT_STANDARD, names: Iterable[str] = METRICS) -> None:
+        self._standard = standard
+        self._metrics = [METRICS[name](standard) for name in names]
+        self._last: Step | None = None
+
+    def update(self, step: Step) -> None:
+        """Take in one finished step; the time since the one before is read from their times.
+
+        When the ego leaves the network, the last step comes once more with its ending; only that is taken from it.
+
+        Raises
+        ------
+        SimulationError
+            If the step is not later than the one before.
+        """
+        last, self._last = self._last, step
+        if last is not None and last.index == step.index:
+            return
+        elapsed = 0.0 if last is None else step.time - last.time
+        if last is not None and not elapsed > 0:
+            raise SimulationError(f"steps must follow in time, got {step.time!r} s after {last.time!r} s")
+        sample = Sample(step, elapsed, step_metrics(step, self._standard))
+        for metric in self._metrics:
+            metric.update(sample)
+
+    def summary(self) -> RunSummary:
+        """Say what the steps so far amount to."""
+        ending = None if self._last is None else self._last.ending
+        values: dict[str, JsonValue] = {"ending": None if ending is None else ending.value}
+        meanings = {"ending": "why the run was over; none if it was cut short"}
+        for metric in self._metrics:
+            values.update(metric.result())
+            meanings.update(metric.meanings)
+        return RunSummary(values, meanings)

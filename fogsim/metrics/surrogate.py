@@ -1,0 +1,167 @@
+"""Surrogate safety measures: how near a collision was, from gaps and speeds alone.
+
+Every function takes scalars or arrays that broadcast, and gives float64 of their common shape.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+@dataclass(frozen=True, slots=True)
+class SafetyStandard:
+    """What the measures of a run are judged by.
+
+    Attributes
+    ----------
+    reaction_time : float
+        Perception and reaction time in the stopping sight distance [s]; 2.5 s is AASHTO's design value.
+    deceleration : float
+        Deceleration in the stopping sight distance [m/s²]; 3.4 m/s² is AASHTO's design value.
+    time_to_collision : float
+        Time to collision below which a driver counts as exposed [s]; 3 s is the default of SUMO's SSM device.
+    advice_tolerance : float
+        Speed above the advice that still counts as following it [m/s]; 1 km/h, what a speedometer can show.
+    """
+
+    reaction_time: float = 2.5
+    deceleration: float = 3.4
+    time_to_collision: float = 3.0
+    advice_tolerance: float = 1.0 / 3.6
+
+
+def time_to_collision(gap: ArrayLike, speed: ArrayLike, leader_speed: ArrayLike) -> NDArray[np.float64]:
+    """Time until the follower reaches its leader at constant speeds, gap / (v_F − v_L) (Hayward 1972).
+
+    Parameters
+    ----------
+    gap : array_like
+        Distance from the follower's front bumper to the leader's rear bumper [m].
+    speed, leader_speed : array_like
+        Speeds of follower and leader [m/s].
+
+    Returns
+    -------
+    ndarray
+        Time to collision [s], ≥ 0; 0 where the gap is used up, ``inf`` where the follower does not approach.
+    """
+    gap, approach = np.maximum(gap, 0.0), np.subtract(speed, leader_speed)
+    return _quotient_where(approach > 0, gap, approach, np.inf)
+
+
+def deceleration_rate_to_avoid_crash(gap: ArrayLike, speed: ArrayLike, leader_speed: ArrayLike) -> NDArray[np.float64]:
+    """Deceleration that takes away the difference of speed within the gap, Δv² / (2 gap) (DRAC).
+
+    Parameters
+    ----------
+    gap : array_like
+        Distance from the follower's front bumper to the leader's rear bumper [m].
+    speed, leader_speed : array_like
+        Speeds of follower and leader [m/s].
+
+    Returns
+    -------
+    ndarray
+        Deceleration [m/s²], ≥ 0; 0 where the follower does not approach, ``inf`` where it does without a gap.
+    """
+    approach = np.maximum(np.subtract(speed, leader_speed), 0.0)
+    needed = _quotient_where(np.greater(gap, 0), 0.5 * approach**2, gap, np.inf)
+    return np.where(approach > 0, needed, 0.0)[()]
+
+
+def modified_deceleration_rate_to_avoid_crash(
+    gap: ArrayLike, speed: ArrayLike, leader_speed: ArrayLike, reaction_time: float = 1.0
+) -> NDArray[np.float64]:
+    """Deceleration to avoid a crash when it begins only after a reaction time, MDRAC = Δv / (2 (TTC − PRT)).
+
+    Parameters
+    ----------
+    gap : array_like
+        Distance from the follower's front bumper to the leader's rear bumper [m].
+    speed, leader_speed : array_like
+        Speeds of follower and leader [m/s].
+    reaction_time : float
+        Perception and reaction time PRT [s]; 1 s is SUMO's default (SSM device), as is the formula.
+
+    Returns
+    -------
+    ndarray
+        Deceleration [m/s²], ≥ 0; 0 where the follower does not approach, ``inf`` where TTC ≤ PRT.
+    """
+    approach = np.maximum(np.subtract(speed, leader_speed), 0.0)
+    remaining = time_to_collision(gap, speed, leader_speed) - reaction_time
+    return _quotient_where(remaining > 0, 0.5 * approach, remaining, np.inf)
+
+
+def time_headway(gap: ArrayLike, speed: ArrayLike) -> NDArray[np.float64]:
+    """Time in which the follower drives the gap to its leader, gap / v_F.
+
+    Parameters
+    ----------
+    gap : array_like
+        Distance from the follower's front bumper to the leader's rear bumper [m].
+    speed : array_like
+        Speed of the follower [m/s].
+
+    Returns
+    -------
+    ndarray
+        Time headway between bumpers [s], ≥ 0; ``inf`` for a follower at rest.
+    """
+    return _quotient_where(np.greater(speed, 0), np.maximum(gap, 0.0), speed, np.inf)
+
+
+def time_exposed_time_to_collision(
+    times_to_collision: ArrayLike, durations: ArrayLike, threshold: float = 3.0
+) -> float:
+    """Time spent below a time to collision, Σ [0 ≤ TTC ≤ TTC*] τ (TET, Minderhoud & Bovy 2001).
+
+    Parameters
+    ----------
+    times_to_collision : (n,) array_like
+        Time to collision in each interval [s]; ``inf`` where there is none.
+    durations : (n,) or scalar array_like
+        Length τ of each interval [s].
+    threshold : float
+        TTC* [s].
+
+    Returns
+    -------
+    float
+        Exposed time [s].
+    """
+    exposed = np.less_equal(times_to_collision, threshold) & np.greater_equal(times_to_collision, 0.0)
+    return float(np.sum(exposed * np.asarray(durations, dtype=np.float64)))
+
+
+def time_integrated_time_to_collision(
+    times_to_collision: ArrayLike, durations: ArrayLike, threshold: float = 3.0
+) -> float:
+    """Time to collision missing below a threshold, Σ (TTC* − TTC)⁺ τ (TIT, Minderhoud & Bovy 2001).
+
+    Parameters
+    ----------
+    times_to_collision : (n,) array_like
+        Time to collision in each interval [s]; ``inf`` where there is none.
+    durations : (n,) or scalar array_like
+        Length τ of each interval [s].
+    threshold : float
+        TTC* [s].
+
+    Returns
+    -------
+    float
+        Integrated time to collision [s²].
+    """
+    missing = np.maximum(threshold - np.asarray(times_to_collision, dtype=np.float64), 0.0)
+    return float(np.sum(missing * np.asarray(durations, dtype=np.float64)))
+
+
+def _quotient_where(
+    defined: ArrayLike, numerator: ArrayLike, denominator: ArrayLike, elsewhere: float
+) -> NDArray[np.float64]:
+    """Divide only where the quotient is defined, so that no division by zero is ever made."""
+    shape = np.broadcast_shapes(np.shape(defined), np.shape(numerator), np.shape(denominator))
+    result = np.full(shape, elsewhere, dtype=np.float64)
+    return np.divide(numerator, denominator, out=result, where=np.asarray(defined, dtype=bool))[()]

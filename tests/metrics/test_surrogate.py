@@ -1,0 +1,76 @@
+"""Check values: SUMO's SSM device documentation (gap 20 m, Δv 5 m/s), hand calculations and limits."""
+
+import numpy as np
+import pytest
+
+from fogsim.metrics import (
+    deceleration_rate_to_avoid_crash,
+    modified_deceleration_rate_to_avoid_crash,
+    time_exposed_time_to_collision,
+    time_headway,
+    time_integrated_time_to_collision,
+    time_to_collision,
+)
+
+
+def test_conflict_measures_of_a_gap_of_20_m_closing_at_5_mps() -> None:
+    assert float(time_to_collision(20.0, 25.0, 20.0)) == pytest.approx(4.0)
+    assert float(deceleration_rate_to_avoid_crash(20.0, 25.0, 20.0)) == pytest.approx(0.625)
+    assert float(modified_deceleration_rate_to_avoid_crash(20.0, 25.0, 20.0)) == pytest.approx(0.83333, abs=1e-5)
+
+
+def test_nothing_threatens_who_does_not_approach() -> None:
+    for leader_speed in (20.0, 30.0):
+        assert float(time_to_collision(10.0, 20.0, leader_speed)) == np.inf
+        assert float(deceleration_rate_to_avoid_crash(10.0, 20.0, leader_speed)) == 0.0
+        assert float(modified_deceleration_rate_to_avoid_crash(10.0, 20.0, leader_speed)) == 0.0
+
+
+@pytest.mark.parametrize("gap", [0.0, -1.5])
+def test_a_used_up_gap_is_a_collision(gap: float) -> None:
+    assert float(time_to_collision(gap, 20.0, 10.0)) == 0.0
+    assert float(deceleration_rate_to_avoid_crash(gap, 20.0, 10.0)) == np.inf
+    assert float(deceleration_rate_to_avoid_crash(gap, 10.0, 20.0)) == 0.0
+    assert float(modified_deceleration_rate_to_avoid_crash(gap, 20.0, 10.0)) == np.inf
+
+
+def test_braking_with_the_drac_ends_at_the_leaders_bumper_with_its_speed() -> None:
+    gap, approach = 33.0, 7.0
+    deceleration = float(deceleration_rate_to_avoid_crash(gap, 20.0 + approach, 20.0))
+    time = approach / deceleration
+    assert approach * time - 0.5 * deceleration * time**2 == pytest.approx(gap)
+
+
+def test_mdrac_is_drac_after_the_reaction_and_infinite_when_there_is_no_time_left() -> None:
+    gap, speed, leader_speed, reaction = 40.0, 30.0, 20.0, 1.0
+    left = gap - (speed - leader_speed) * reaction
+    assert float(modified_deceleration_rate_to_avoid_crash(gap, speed, leader_speed, reaction)) == pytest.approx(
+        float(deceleration_rate_to_avoid_crash(left, speed, leader_speed))
+    )
+    assert float(modified_deceleration_rate_to_avoid_crash(10.0, 30.0, 20.0, 1.0)) == np.inf
+
+
+def test_arrays_broadcast() -> None:
+    gaps = np.array([10.0, 20.0, 40.0])
+    np.testing.assert_allclose(time_to_collision(gaps, 25.0, np.array([20.0, 20.0, 30.0])), [2.0, 4.0, np.inf])
+    np.testing.assert_allclose(deceleration_rate_to_avoid_crash(gaps, 25.0, 20.0), [1.25, 0.625, 0.3125])
+
+
+def test_time_headway() -> None:
+    assert float(time_headway(50.0, 25.0)) == pytest.approx(2.0)
+    assert float(time_headway(-1.0, 25.0)) == 0.0
+    assert float(time_headway(50.0, 0.0)) == np.inf
+
+
+def test_exposed_and_integrated_time_by_hand() -> None:
+    times = [4.0, 2.5, 1.0, 3.0, np.inf]
+    assert time_exposed_time_to_collision(times, 0.5, 3.0) == pytest.approx(1.5)
+    assert time_integrated_time_to_collision(times, 0.5, 3.0) == pytest.approx(0.5 * (0.5 + 2.0))
+    assert time_exposed_time_to_collision(times, [1.0, 0.1, 0.2, 0.0, 1.0], 3.0) == pytest.approx(0.3)
+
+
+def test_integrated_time_of_an_even_approach_tends_to_the_triangle_under_the_threshold() -> None:
+    step = 1e-3
+    times = np.arange(5.0, 0.0, -step)
+    assert time_exposed_time_to_collision(times, step, 3.0) == pytest.approx(3.0, abs=2 * step)
+    assert time_integrated_time_to_collision(times, step, 3.0) == pytest.approx(4.5, rel=1e-3)

@@ -1,1 +1,46 @@
 """Results to files: parquet, video, report."""
+
+from collections.abc import Callable
+
+from fogsim.recorders.files import write_json
+from fogsim.recorders.frame_panel import FramePanel
+from fogsim.recorders.manifest import Manifest, Status, versions, write_manifest
+from fogsim.recorders.protocol import DERIVED_QUANTITIES, Derived, Recorder, RunInformation
+from fogsim.recorders.report import ReportRecorder
+from fogsim.recorders.run_directory import RunDirectory
+from fogsim.recorders.table import TableRecorder
+from fogsim.recorders.video import VideoRecorder, encoder_report
+from fogsim.registry import Registry
+
+RecorderFactory = Callable[[RunInformation], Recorder]
+"""Makes a recorder for one run."""
+
+RECORDERS: Registry[RecorderFactory] = Registry(
+    "recorder",
+    {
+        "table": lambda run: TableRecorder(run.directory.table, run.methods),
+        "video": lambda run: VideoRecorder(run.directory.video, run.frame_period),
+        "report": ReportRecorder,
+    },
+)
+"""Every recorder by name."""
+
+__all__ = [
+    "DERIVED_QUANTITIES",
+    "RECORDERS",
+    "Derived",
+    "FramePanel",
+    "Manifest",
+    "Recorder",
+    "RecorderFactory",
+    "ReportRecorder",
+    "RunDirectory",
+    "RunInformation",
+    "Status",
+    "TableRecorder",
+    "VideoRecorder",
+    "encoder_report",
+    "versions",
+    "write_json",
+    "write_manifest",
+]

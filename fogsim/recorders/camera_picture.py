@@ -1,0 +1,74 @@
+"""The camera's image as it stands in the video: scaled, with what the estimators found at its border."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
+
+from fogsim.recorders.style import AMBER, BELIEF, GROUND, Colour, font
+from fogsim.values import Estimate, Step
+
+WIDTH, HEIGHT = 640, 480
+_ROWS: dict[str, tuple[str, Colour]] = {
+    "horizon_row": ("horizon", BELIEF),
+    "inflection_row": ("inflection", AMBER),
+}
+"""Rows in the diagnostics of an estimate that are marked, with label and colour."""
+
+
+def draw_camera_picture(step: Step) -> Image.Image:
+    """Draw the camera's image into 640 × 480 pixels, its aspect kept, with marks at the rows that were found."""
+    pixels = step.observation.image
+    picture = Image.new("RGB", (WIDTH, HEIGHT), GROUND)
+    scaled = scale_image(pixels, WIDTH, HEIGHT)
+    left, top = (WIDTH - scaled.width) // 2, (HEIGHT - scaled.height) // 2
+    picture.paste(scaled, (left, top))
+    scale = scaled.height / pixels.shape[0]
+    draw = ImageDraw.Draw(picture)
+    for key, (label, colour) in _ROWS.items():
+        row = _first_row(step.estimates, key)
+        if row is not None and 0 <= row <= pixels.shape[0] - 1:
+            # A pixel's centre has an integer coordinate, so the image begins half a pixel before row 0.
+            _mark(draw, (left, left + scaled.width), top + (row + 0.5) * scale, label, colour)
+    return picture
+
+
+def scale_image(pixels: NDArray[np.uint8], width: int, height: int) -> Image.Image:
+    """Scale an image into a box, its aspect kept.
+
+    Parameters
+    ----------
+    pixels : (rows, cols[, 3]) uint8
+        The image.
+    width, height : int
+        The box [px].
+    """
+    image = Image.fromarray(pixels).convert("RGB")
+    factor = min(width / image.width, height / image.height)
+    if factor == 1:
+        return image
+    size = (max(round(image.width * factor), 1), max(round(image.height * factor), 1))
+    # Whole factors show the pixels as the estimators got them, at a tenth of the cost of an interpolation.
+    whole = factor > 1 and factor == int(factor)
+    return image.resize(size, Image.Resampling.NEAREST if whole else Image.Resampling.BILINEAR)
+
+
+def _first_row(estimates: Sequence[Estimate], key: str) -> float | None:
+    for estimate in estimates:
+        row = estimate.diagnostics.get(key)
+        if estimate.valid and isinstance(row, int | float) and math.isfinite(row):
+            return float(row)
+    return None
+
+
+def _mark(draw: ImageDraw.ImageDraw, sides: tuple[int, int], y: float, label: str, colour: Colour) -> None:
+    for start, end in ((sides[0], sides[0] + 22), (sides[1] - 22, sides[1])):
+        draw.line([(start, y), (end - 1, y)], fill=GROUND, width=4)
+        draw.line([(start, y), (end - 1, y)], fill=colour, width=2)
+    above = label == "horizon"
+    place = (sides[1] - 5, y - 4 if above else y + 5)
+    draw.text(
+        place, label, fill=colour, font=font(10), anchor="rs" if above else "rt", stroke_width=2, stroke_fill=GROUND
+    )

@@ -1,0 +1,234 @@
+"""One frame of the video: the camera's image, and beside it what is true, believed, advised and lit."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
+
+from fogsim.recorders import camera_picture
+from fogsim.recorders.camera_picture import draw_camera_picture
+from fogsim.recorders.protocol import Derived
+from fogsim.recorders.strip_chart import Axis, Curve, StripChart
+from fogsim.recorders.style import (
+    ADVICE,
+    ALARM,
+    AMBER,
+    BELIEF,
+    BELIEF_BAND,
+    GROUND,
+    LINE,
+    MUTED,
+    TEXT,
+    TRUTH,
+    UNLIT,
+    WELL,
+    Colour,
+    font,
+    method_colour,
+)
+from fogsim.units import KMH_PER_MPS
+from fogsim.values import Collision, Estimate, Lamp, Step
+
+PANEL_WIDTH = 384
+FRAME_WIDTH = camera_picture.WIDTH + PANEL_WIDTH
+FRAME_HEIGHT = camera_picture.HEIGHT
+
+_LEFT, _RIGHT = camera_picture.WIDTH + 16, FRAME_WIDTH - 16
+_SPEED_X, _ADVICE_X, _LIMIT_X = _LEFT, _LEFT + 148, _RIGHT - 27
+_BANNER_TIME = 3.0
+"""How long a collision stays on the picture [s]."""
+
+_MOST_METHODS = 4
+"""Estimators for which there is a line."""
+
+_LAMPS: Sequence[tuple[Lamp, str, int, Colour]] = (
+    (Lamp.DAYTIME, "DAY", 38, TEXT),
+    (Lamp.POSITION, "POS", 38, ADVICE),
+    (Lamp.LOW_BEAM, "LOW", 38, ADVICE),
+    (Lamp.HIGH_BEAM, "HIGH", 40, BELIEF),
+    (Lamp.FRONT_FOG, "F FOG", 45, ADVICE),
+    (Lamp.REAR_FOG, "R FOG", 45, AMBER),
+    (Lamp.STOP, "STOP", 40, ALARM),
+    (Lamp.INDICATOR_LEFT, "◀", 18, AMBER),
+    (Lamp.INDICATOR_RIGHT, "▶", 18, AMBER),
+)
+"""Lamp, label, width of its field [px] and colour when lit."""
+
+_VISIBILITY_AXIS = Axis(20.0, 2000.0, (50.0, 100.0, 300.0, 1000.0), logarithmic=True)
+_SPEED_AXIS = Axis(0.0, 160.0, (50.0, 100.0))
+
+
+class FramePanel:
+    """Draws frames one after another; it remembers the last minute for its charts, and the last collision."""
+
+    def __init__(self) -> None:
+        width = _RIGHT - _LEFT
+        self._visibility = StripChart(
+            (width, 92),
+            _VISIBILITY_AXIS,
+            (Curve(BELIEF_BAND, (1, 2)), Curve(BELIEF, (0,)), Curve(TRUTH, (3,), dashed=True)),
+            "visibility, last 60 s [m]",
+        )
+        self._speed = StripChart(
+            (width, 70), _SPEED_AXIS, (Curve(ADVICE, (1,)), Curve(TEXT, (0,))), "speed and advice [km/h]"
+        )
+        self._collision: Collision | None = None
+        self._background = _draw_background()
+
+    def draw(self, step: Step, derived: Derived) -> NDArray[np.uint8]:
+        """Draw the frame of a step.
+
+        Parameters
+        ----------
+        step : Step
+            The step.
+        derived : mapping from str to float or None
+            What was derived from it.
+
+        Returns
+        -------
+        (480, 1024, 3) uint8 array
+            The frame, red first.
+        """
+        frame = self._background.copy()
+        picture = draw_camera_picture(step)
+        self._draw_banners(ImageDraw.Draw(picture), step)
+        frame.paste(picture, (0, 0))
+        draw = ImageDraw.Draw(frame)
+        _draw_speeds(draw, step)
+        _draw_visibilities(draw, step)
+        _draw_lead(draw, step, derived["time_to_collision_s"])
+        _draw_lamps(draw, Lamp(int(step.traffic.lamps[step.ego])))
+        self._draw_charts(frame, step)
+        return np.asarray(frame)
+
+    def _draw_charts(self, frame: Image.Image, step: Step) -> None:
+        low, middle, high = (step.belief.visibility_quantile(share) for share in (0.05, 0.5, 0.95))
+        self._visibility.add(step.time, (middle, low, high, step.truth.visibility_ahead))
+        advised = step.command.advice.speed
+        self._speed.add(step.time, (_kmh(_speed(step)), _kmh(advised) if math.isfinite(advised) else None))
+        frame.paste(self._visibility.draw(), (_LEFT, 300))
+        frame.paste(self._speed.draw(), (_LEFT, 398))
+
+    def _draw_banners(self, draw: ImageDraw.ImageDraw, step: Step) -> None:
+        if step.collisions:
+            self._collision = step.collisions[-1]
+        if self._collision is not None and step.time - self._collision.time <= _BANNER_TIME:
+            hit = self._collision
+            own = step.traffic.ids[step.ego] in {hit.collider, hit.victim}
+            text = f"COLLISION   {hit.collider} → {hit.victim}   {_kmh(hit.impact_speed):.0f} km/h"
+            _draw_banner(draw, 0, text, ALARM if own else AMBER)
+        if step.ending is not None:
+            _draw_banner(draw, FRAME_HEIGHT - 34, f"end of the run: {step.ending.value}", WELL)
+
+
+def _kmh(speed: float) -> float:
+    return speed * KMH_PER_MPS
+
+
+def _speed(step: Step) -> float:
+    return float(step.traffic.speed[step.ego])
+
+
+def _metres(visibility: float) -> str:
+    """Visibility as a driver would say it: clear beyond ten kilometres, three figures elsewhere."""
+    if visibility >= 10_000:
+        return "clear"
+    return f"{visibility:.0f} m" if visibility < 1000 else f"{visibility / 1000:.1f} km"
+
+
+def _draw_background() -> Image.Image:
+    """Draw everything that never changes."""
+    image = Image.new("RGB", (FRAME_WIDTH, FRAME_HEIGHT), GROUND)
+    draw = ImageDraw.Draw(image)
+    for x, label in ((_SPEED_X, "speed"), (_ADVICE_X, "advised")):
+        draw.text((x, 46), label, fill=MUTED, font=font(11), anchor="ls")
+    draw.text((_LIMIT_X, 46), "limit", fill=MUTED, font=font(11), anchor="ms")
+    for y in (112, 232):
+        draw.line([(_LEFT, y), (_RIGHT, y)], fill=LINE)
+    draw.text((_LEFT, 130), "visibility", fill=MUTED, font=font(11), anchor="ls")
+    draw.text((_RIGHT, 130), "90 % interval", fill=MUTED, font=font(11), anchor="rs")
+    return image
+
+
+def _draw_banner(draw: ImageDraw.ImageDraw, top: int, text: str, colour: Colour) -> None:
+    draw.rectangle([(0, top), (camera_picture.WIDTH, top + 34)], fill=colour)
+    draw.text((camera_picture.WIDTH / 2, top + 17), text, fill=TEXT, font=font(15, bold=True), anchor="mm")
+
+
+def _draw_speeds(draw: ImageDraw.ImageDraw, step: Step) -> None:
+    advised, speed = step.command.advice.speed, _speed(step)
+    draw.text((_LEFT, 24), f"t = {step.time:.1f} s", fill=TEXT, font=font(13), anchor="ls")
+    draw.text((_RIGHT, 24), f"{step.route_position / 1000:.2f} km", fill=MUTED, font=font(13), anchor="rs")
+    too_fast = speed > advised + 1.0 / KMH_PER_MPS
+    _draw_number(draw, _SPEED_X, f"{_kmh(speed):.0f}", AMBER if too_fast else TEXT)
+    if math.isfinite(advised):
+        _draw_number(draw, _ADVICE_X, f"{_kmh(advised):.0f}", ADVICE)
+    else:
+        draw.text((_ADVICE_X, 92), "none", fill=MUTED, font=font(26), anchor="ls")
+    _draw_limit(draw, _kmh(step.speed_limit))
+
+
+def _draw_number(draw: ImageDraw.ImageDraw, x: int, number: str, colour: Colour) -> None:
+    large = font(44, bold=True)
+    draw.text((x - 2, 92), number, fill=colour, font=large, anchor="ls")
+    draw.text((x + large.getlength(number) + 4, 92), "km/h", fill=MUTED, font=font(11), anchor="ls")
+
+
+def _draw_limit(draw: ImageDraw.ImageDraw, limit: float) -> None:
+    draw.ellipse([(_LIMIT_X - 24, 53), (_LIMIT_X + 24, 101)], fill=ALARM)
+    draw.ellipse([(_LIMIT_X - 19, 58), (_LIMIT_X + 19, 96)], fill=(240, 240, 236))
+    draw.text((_LIMIT_X, 78), f"{limit:.0f}", fill=GROUND, font=font(17, bold=True), anchor="mm")
+
+
+def _draw_visibilities(draw: ImageDraw.ImageDraw, step: Step) -> None:
+    low, middle, high = (step.belief.visibility_quantile(share) for share in (0.05, 0.5, 0.95))
+    _draw_visibility(draw, 150, "belief", BELIEF, (_metres(middle), f"{_metres(low)} – {_metres(high)}"), 15)
+    y = 168
+    shown = step.estimates if len(step.estimates) <= _MOST_METHODS else step.estimates[: _MOST_METHODS - 1]
+    for index, estimate in enumerate(shown):
+        _draw_visibility(draw, y, estimate.method, method_colour(index), _say_estimate(estimate), 12)
+        y += 14
+    if len(shown) < len(step.estimates):
+        draw.text((_LEFT, y), f"and {len(step.estimates) - len(shown)} more", fill=MUTED, font=font(11), anchor="ls")
+    _draw_visibility(
+        draw, 224, "truth ahead", TRUTH, (_metres(step.truth.visibility_ahead), "not seen by any method"), 12
+    )
+
+
+def _say_estimate(estimate: Estimate) -> tuple[str, str]:
+    if not estimate.valid:
+        return "—", "cannot tell"
+    low, high = estimate.visibility_interval
+    return _metres(estimate.visibility), f"{_metres(low)} – {_metres(high)}"
+
+
+def _draw_visibility(
+    draw: ImageDraw.ImageDraw, y: int, label: str, colour: Colour, values: tuple[str, str], size: int
+) -> None:
+    draw.text((_LEFT, y), label, fill=colour, font=font(12), anchor="ls")
+    draw.text((_LEFT + 196, y), values[0], fill=colour, font=font(size, bold=size > 12), anchor="rs")
+    draw.text((_RIGHT, y), values[1], fill=MUTED, font=font(11), anchor="rs")
+
+
+def _draw_lead(draw: ImageDraw.ImageDraw, step: Step, time_to_collision: float | None) -> None:
+    if step.leader is None:
+        draw.text((_LEFT, 254), "no vehicle ahead", fill=MUTED, font=font(13), anchor="ls")
+        return
+    gap = f"gap {step.leader.gap:.0f} m to a lead at {_kmh(step.leader.speed):.0f} km/h"
+    draw.text((_LEFT, 254), gap, fill=TEXT, font=font(13), anchor="ls")
+    if time_to_collision is not None and time_to_collision < 100:
+        colour = ALARM if time_to_collision < 3 else TEXT
+        draw.text((_RIGHT, 254), f"TTC {time_to_collision:.1f} s", fill=colour, font=font(13, bold=True), anchor="rs")
+
+
+def _draw_lamps(draw: ImageDraw.ImageDraw, lit: Lamp) -> None:
+    x = _LEFT
+    for lamp, label, width, colour in _LAMPS:
+        on = bool(lit & lamp)
+        box = [(x, 268), (x + width, 286)]
+        draw.rounded_rectangle(box, radius=4, fill=colour if on else None, outline=colour if on else LINE)
+        draw.text((x + width / 2, 277), label, fill=GROUND if on else UNLIT, font=font(10, bold=True), anchor="mm")
+        x += width + 4

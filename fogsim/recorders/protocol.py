@@ -1,0 +1,79 @@
+"""What a recorder is, and what it is told about the run it records."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from fogsim.recorders.run_directory import RunDirectory
+from fogsim.values import Step
+
+Derived = Mapping[str, float | None]
+"""What was derived from a step; the keys are `DERIVED_QUANTITIES`, None where a quantity is undefined."""
+
+DERIVED_QUANTITIES: Mapping[str, str] = {
+    "time_to_collision_s": "time to collision with the leader; none if it is not approached",
+    "drac_mps2": "deceleration rate to avoid a crash with the leader",
+    "stopping_sight_distance_m": "distance in which the ego could stop after a reaction time",
+    "visibility_margin_m": "true visibility ahead minus stopping sight distance; none in clear air",
+}
+"""Quantities that every recorder is handed with each step, and what they mean."""
+
+
+class Recorder(Protocol):
+    """Writes what happens to a file; under its final name a file is always whole."""
+
+    def record(self, step: Step, derived: Derived) -> None:
+        """Take in one finished step.
+
+        Parameters
+        ----------
+        step : Step
+            The step.
+        derived : mapping from str to float or None
+            `DERIVED_QUANTITIES` of the step.
+        """
+
+    def close(self, complete: bool) -> None:
+        """Finish the file and give it its final name; closing twice does nothing.
+
+        Parameters
+        ----------
+        complete : bool
+            False if the run was cut short: the file then says so.
+        """
+
+
+def _no_summary() -> Mapping[str, object]:
+    return {}
+
+
+@dataclass(frozen=True, slots=True)
+class RunInformation:
+    """What a recorder may want to know before the first step.
+
+    Attributes
+    ----------
+    directory : RunDirectory
+        Where the files go.
+    title, description : str
+        Name and description of the scenario.
+    seed : int
+        Seed of the run.
+    methods : tuple of str
+        Estimators, in the order in which they are to be shown.
+    frame_period : float
+        Time between two steps [s].
+    summary : callable
+        Gives the metrics of the run by key when the run is over; a key ends in its unit.
+    meanings : mapping from str to str
+        One line on each of those keys.
+    """
+
+    directory: RunDirectory
+    title: str
+    description: str
+    seed: int
+    methods: tuple[str, ...]
+    frame_period: float
+    summary: Callable[[], Mapping[str, object]] = _no_summary
+    meanings: Mapping[str, str] = field(default_factory=dict)

@@ -1,0 +1,135 @@
+"""What the report remembers of a run: curves over time, and a few pictures spread over it."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.recorders.protocol import Derived
+from fogsim.values import Step
+
+MOST_PICTURES = 8
+"""Pictures in a report."""
+
+
+@dataclass(slots=True)
+class Curves:
+    """Quantities over time, one entry a step; None where a quantity is undefined or without limit.
+
+    Attributes
+    ----------
+    time, speed, limit, advice, gap, time_to_collision, margin, truth, low, belief, high : list
+        In s, m/s and m as their names say; the last four are visibilities, `low` and `high` the ends of the belief's
+        90 % interval.
+    estimates : dict from str to list of tuple
+        By method, (time [s], visibility [m]) of each valid estimate of fog.
+    collisions : list of float
+        Instants of collisions [s].
+    """
+
+    time: list[float] = field(default_factory=list)
+    speed: list[float] = field(default_factory=list)
+    limit: list[float] = field(default_factory=list)
+    advice: list[float | None] = field(default_factory=list)
+    gap: list[float | None] = field(default_factory=list)
+    time_to_collision: list[float | None] = field(default_factory=list)
+    margin: list[float | None] = field(default_factory=list)
+    truth: list[float | None] = field(default_factory=list)
+    low: list[float] = field(default_factory=list)
+    belief: list[float] = field(default_factory=list)
+    high: list[float] = field(default_factory=list)
+    estimates: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
+    collisions: list[float] = field(default_factory=list)
+
+    def add(self, step: Step, derived: Derived) -> None:
+        """Take in one step."""
+        self.time.append(step.time)
+        self.speed.append(float(step.traffic.speed[step.ego]))
+        self.limit.append(step.speed_limit)
+        self.advice.append(_finite(step.command.advice.speed))
+        self.gap.append(None if step.leader is None else step.leader.gap)
+        self.time_to_collision.append(derived["time_to_collision_s"])
+        self.margin.append(derived["visibility_margin_m"])
+        self.truth.append(_finite(step.truth.visibility_ahead))
+        for quantiles, share in ((self.low, 0.05), (self.belief, 0.5), (self.high, 0.95)):
+            quantiles.append(step.belief.visibility_quantile(share))
+        self.collisions.extend(hit.time for hit in step.collisions)
+        self._add_estimates(step)
+
+    def _add_estimates(self, step: Step) -> None:
+        for estimate in step.estimates:
+            points = self.estimates.setdefault(estimate.method, [])
+            if estimate.valid and math.isfinite(estimate.visibility):
+                points.append((step.time, estimate.visibility))
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """One camera image and what was known when it was taken.
+
+    Attributes
+    ----------
+    time, route_position : float
+        When [s] and where [m].
+    truth : float or None
+        True visibility ahead [m]; None in clear air.
+    low, belief, high : float
+        Believed visibility with its 90 % interval [m].
+    image : (rows, cols[, 3]) uint8
+        The image.
+    """
+
+    time: float
+    route_position: float
+    truth: float | None
+    low: float
+    belief: float
+    high: float
+    image: NDArray[np.uint8]
+
+    @classmethod
+    def of(cls, step: Step) -> "Picture":
+        """Take the picture of a step; the image is copied, since a camera may use its memory again."""
+        low, middle, high = (step.belief.visibility_quantile(share) for share in (0.05, 0.5, 0.95))
+        truth = _finite(step.truth.visibility_ahead)
+        return cls(step.time, step.route_position, truth, low, middle, high, step.observation.image.copy())
+
+
+class Album:
+    """Pictures spread evenly over a run whose length is not known before its end.
+
+    Every second picture is dropped, and half as many are taken from then on, whenever twice as many are held as the
+    report shows.
+    """
+
+    def __init__(self) -> None:
+        self._stride = 1
+        self._count = 0
+        self._pictures: list[Picture] = []
+        self._last: Step | None = None
+
+    def add(self, step: Step) -> None:
+        """Take in one step."""
+        if self._count % self._stride == 0:
+            if len(self._pictures) == 2 * MOST_PICTURES:
+                self._pictures = self._pictures[::2]
+                self._stride *= 2
+            self._pictures.append(Picture.of(step))
+        self._count += 1
+        self._last = step
+
+    def chosen(self) -> list[Picture]:
+        """Choose the pictures to show: the first, the last and what lies evenly between them."""
+        if self._last is None:
+            return []
+        pictures = list(self._pictures)
+        if pictures[-1].time != self._last.time:
+            pictures.append(Picture.of(self._last))
+        count = min(MOST_PICTURES, len(pictures))
+        places = np.linspace(0, len(pictures) - 1, count).round().astype(int)
+        return [pictures[place] for place in places]
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

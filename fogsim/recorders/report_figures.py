@@ -1,0 +1,160 @@
+"""Figures of the report, drawn without any of matplotlib's global state."""
+
+import io
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+from numpy.typing import NDArray
+
+from fogsim.recorders.report_data import Curves
+from fogsim.units import KMH_PER_MPS
+
+_TRUTH, _BELIEF, _ADVICE, _ALARM, _SPEED = "#c28a00", "#1f6fd0", "#1f9d61", "#cf3a34", "#1c2733"
+_MUTED = "#7b8794"
+_METHODS = ("#9b4fc4", "#0f9aa5", "#dd6b3d", "#7d9b1e", "#d0488f")
+_VISIBILITY_TICKS = (20, 50, 100, 200, 500, 1000, 2000)
+_MOST_MARGIN = 300.0
+"""Safety margins beyond this are drawn at it, so that the dangerous part can be read [m]."""
+
+
+def draw_figures(curves: Curves, time_to_collision_threshold: float = 3.0) -> list[tuple[str, bytes]]:
+    """Draw every figure of the report.
+
+    Parameters
+    ----------
+    curves : Curves
+        The run, of at least one step.
+    time_to_collision_threshold : float
+        Time to collision at which a line is drawn [s].
+
+    Returns
+    -------
+    list of (str, bytes)
+        Caption and PNG of each figure.
+    """
+
+    def conflict(axes: Sequence[Axes], curves: Curves) -> None:
+        _draw_conflict(axes, curves, time_to_collision_threshold)
+
+    return [
+        (
+            "Meteorological visibility: what was true ahead of the camera, what each method said frame by frame, "
+            "and what was believed with its 90 % interval.",
+            _figure(curves, (3.4,), lambda axes, curves: _draw_visibility(axes[0], curves)),
+        ),
+        (
+            "Speed of the ego, the advice in force and the speed limit.",
+            _figure(curves, (2.5,), lambda axes, curves: _draw_speed(axes[0], curves)),
+        ),
+        (
+            "Gap to the vehicle ahead, and time to collision while it is approached.",
+            _figure(curves, (1.9, 1.7), conflict),
+        ),
+        (
+            "Safety margin: true visibility ahead minus the distance in which the ego could stop. "
+            "Where it is negative, something standing on the road could not have been avoided.",
+            _figure(curves, (2.5,), lambda axes, curves: _draw_margin(axes[0], curves)),
+        ),
+    ]
+
+
+def _figure(curves: Curves, heights: Sequence[float], draw: Callable[[Sequence[Axes], Curves], None]) -> bytes:
+    figure = Figure(figsize=(9.2, sum(heights)), dpi=144)
+    # The same margins in every figure, in inches, so that all time axes stand under one another.
+    height = sum(heights)
+    figure.subplots_adjust(left=0.08, right=0.985, bottom=0.45 / height, top=1 - 0.3 / height, hspace=0.12)
+    grid = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=list(heights))
+    axes = [row[0] for row in grid]
+    draw(axes, curves)
+    for axis in axes:
+        _dress(axis, curves, legend=axis is axes[0])
+    axes[-1].set_xlabel("time [s]", fontsize=9)
+    buffer = io.BytesIO()
+    FigureCanvasAgg(figure)
+    figure.savefig(buffer, format="png")
+    return buffer.getvalue()
+
+
+def _dress(axis: Axes, curves: Curves, *, legend: bool) -> None:
+    """Give an axis the look of the report, and mark the collisions."""
+    for number, instant in enumerate(curves.collisions):
+        label = "collision" if number == 0 else None
+        axis.axvline(instant, color=_ALARM, linewidth=1.2, linestyle=(0, (4, 2)), zorder=5, label=label)
+    axis.set_xlim(curves.time[0], max(curves.time[-1], curves.time[0] + 1e-3))
+    axis.yaxis.set_label_coords(-0.052, 0.5)
+    axis.grid(visible=True, color="#e3e8ed", linewidth=0.7)
+    axis.set_axisbelow(True)
+    axis.spines[["top", "right"]].set_visible(False)
+    axis.spines[["left", "bottom"]].set_color("#aab4be")
+    axis.tick_params(colors="#44505c", labelsize=8)
+    handles, _ = axis.get_legend_handles_labels()
+    if handles and legend:
+        axis.legend(
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.0),
+            borderaxespad=0.2,
+            ncols=len(handles),
+            frameon=False,
+            fontsize=8,
+            markerscale=2.0,
+            columnspacing=1.4,
+            handlelength=2.4,
+        )
+
+
+def _draw_visibility(axis: Axes, curves: Curves) -> None:
+    low, high = (np.clip(_array(values), *_ends()) for values in (curves.low, curves.high))
+    axis.fill_between(curves.time, low, high, color=_BELIEF, alpha=0.18, linewidth=0, label="90 % interval")
+    axis.plot(curves.time, curves.belief, color=_BELIEF, linewidth=1.6, label="belief")
+    for index, (method, points) in enumerate(curves.estimates.items()):
+        colour = _METHODS[index % len(_METHODS)]
+        times, values = np.array(points, dtype=np.float64).reshape(-1, 2).T
+        axis.scatter(times, values, s=5, color=colour, linewidths=0, alpha=0.7, label=method)
+    truth = np.where(np.isfinite(_array(curves.truth)), _array(curves.truth), _ends()[1])
+    axis.plot(curves.time, truth, color=_TRUTH, linewidth=1.8, linestyle=(0, (5, 1.5)), label="truth ahead")
+    axis.set_yscale("log")
+    axis.set_ylim(*_ends())
+    axis.yaxis.set_major_locator(FixedLocator(_VISIBILITY_TICKS))
+    axis.yaxis.set_minor_locator(NullLocator())
+    axis.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.0f}"))
+    axis.set_ylabel("visibility [m]", fontsize=9)
+
+
+def _draw_speed(axis: Axes, curves: Curves) -> None:
+    axis.plot(curves.time, _array(curves.limit) * KMH_PER_MPS, color=_MUTED, linewidth=1.0, label="speed limit")
+    advice = _array(curves.advice) * KMH_PER_MPS
+    axis.plot(curves.time, advice, color=_ADVICE, linewidth=1.6, drawstyle="steps-post", label="advice")
+    axis.plot(curves.time, _array(curves.speed) * KMH_PER_MPS, color=_SPEED, linewidth=1.6, label="speed")
+    axis.set_ylim(bottom=0)
+    axis.set_ylabel("speed [km/h]", fontsize=9)
+
+
+def _draw_conflict(axes: Sequence[Axes], curves: Curves, threshold: float) -> None:
+    axes[0].plot(curves.time, _array(curves.gap), color=_SPEED, linewidth=1.6)
+    axes[0].set_ylim(bottom=min(0.0, *(gap for gap in curves.gap if gap is not None), 0.0))
+    axes[0].set_ylabel("gap [m]", fontsize=9)
+    axes[1].axhspan(0, threshold, color=_ALARM, alpha=0.10, linewidth=0)
+    axes[1].plot(curves.time, _array(curves.time_to_collision), color=_SPEED, linewidth=1.6)
+    axes[1].set_ylim(0, 20)
+    axes[1].set_ylabel("time to\ncollision [s]", fontsize=9)
+
+
+def _draw_margin(axis: Axes, curves: Curves) -> None:
+    margin = np.minimum(np.nan_to_num(_array(curves.margin), nan=_MOST_MARGIN), _MOST_MARGIN)
+    axis.fill_between(curves.time, margin, 0, where=margin < 0, color=_ALARM, alpha=0.25, linewidth=0, interpolate=True)
+    axis.axhline(0, color=_MUTED, linewidth=1.0)
+    axis.plot(curves.time, margin, color=_SPEED, linewidth=1.6)
+    axis.set_ylabel("margin [m]", fontsize=9)
+
+
+def _ends() -> tuple[float, float]:
+    return float(_VISIBILITY_TICKS[0]), float(_VISIBILITY_TICKS[-1])
+
+
+def _array(values: Sequence[float | None]) -> NDArray[np.float64]:
+    """Make an array to plot; matplotlib leaves a gap where a value is missing."""
+    return np.array(values, dtype=np.float64)

@@ -1,0 +1,152 @@
+"""The run as a video."""
+
+import subprocess
+import tempfile
+from fractions import Fraction
+from pathlib import Path
+
+import imageio_ffmpeg
+
+from fogsim.errors import FogSimError, MissingDependencyError
+from fogsim.recorders.files import partial_path, publish
+from fogsim.recorders.frame_panel import FRAME_HEIGHT, FRAME_WIDTH, FramePanel
+from fogsim.recorders.protocol import Derived
+from fogsim.values import Step
+
+
+class VideoRecorder:
+    """Writes ``video.mp4`` (H.264, yuv420p): the camera's image with a panel of what is known and done.
+
+    A run without steps leaves no video.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    frame_period : float
+        Time between two steps [s]; the video plays at real speed.
+
+    Raises
+    ------
+    MissingDependencyError
+        If there is no ffmpeg.
+    """
+
+    def __init__(self, path: Path, frame_period: float) -> None:
+        self._path = path
+        self._panel = FramePanel()
+        self._command = encoder_command(partial_path(path), frame_period)
+        self._encoder: Encoder | None = None
+
+    def record(self, step: Step, derived: Derived) -> None:
+        """Add a frame."""
+        frame = self._panel.draw(step, derived).tobytes()
+        if self._encoder is None:
+            self._encoder = Encoder(self._command)
+        self._encoder.write(frame)
+
+    def close(self, complete: bool) -> None:  # noqa: ARG002 - a video ends where the run ended, and needs no mark
+        """Finish the video; after an interruption it holds what was recorded until then."""
+        encoder, self._encoder = self._encoder, None
+        if encoder is not None:
+            encoder.finish()
+            publish(self._path)
+
+
+class Encoder:
+    """An ffmpeg process that eats raw frames.
+
+    Parameters
+    ----------
+    command : list of str
+        Its command line.
+    """
+
+    def __init__(self, command: list[str]) -> None:
+        # Its complaints go to a file, since nobody reads a pipe while frames are written.
+        self._complaints = tempfile.TemporaryFile()  # noqa: SIM115 - closed in `finish`
+        # A process group of its own: Ctrl-C in a terminal reaches the whole group of FogSim, and would end the
+        # encoder before it has written the index without which the video cannot be played.
+        self._process = subprocess.Popen(  # noqa: S603 - imageio's own ffmpeg with arguments made here
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=self._complaints,
+            process_group=0,
+        )
+
+    def write(self, frame: bytes) -> None:
+        """Hand over one frame.
+
+        Raises
+        ------
+        FogSimError
+            If the encoder has ended, with what it said.
+        """
+        assert self._process.stdin is not None  # noqa: S101 - it was opened as a pipe
+        try:
+            self._process.stdin.write(frame)
+        except OSError as error:
+            raise FogSimError(f"the video encoder has ended: {self._said()}") from error
+
+    def finish(self) -> None:
+        """Let the encoder write what it has and wait for its end.
+
+        Raises
+        ------
+        FogSimError
+            If it failed, with what it said.
+        """
+        _, _ = self._process.communicate()
+        said = self._said()
+        self._complaints.close()
+        if self._process.returncode != 0:
+            raise FogSimError(f"the video could not be written: {said}")
+
+    def _said(self) -> str:
+        self._complaints.seek(0)
+        return self._complaints.read().decode(errors="replace").strip() or "no message"
+
+
+def encoder_command(path: Path, frame_period: float) -> list[str]:
+    """Command line of an encoder that takes frames of the panel and writes an mp4 file that browsers can play.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    frame_period : float
+        Time between two frames [s].
+
+    Raises
+    ------
+    MissingDependencyError
+        If there is no ffmpeg.
+    """
+    rate = Fraction(1.0 / frame_period).limit_denominator(1000)
+    size = f"{FRAME_WIDTH}x{FRAME_HEIGHT}"
+    source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", str(rate), "-i", "-"]
+    coding = ["-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-pix_fmt", "yuv420p"]
+    sink = ["-movflags", "+faststart", "-f", "mp4", str(path)]
+    return [_ffmpeg(), "-y", "-loglevel", "error", *source, *coding, *sink]
+
+
+def encoder_report() -> str:
+    """Say in a few words which video encoder is there.
+
+    Raises
+    ------
+    MissingDependencyError
+        If there is none.
+    """
+    path = _ffmpeg()
+    return f"ffmpeg {imageio_ffmpeg.get_ffmpeg_version()} at {path}"
+
+
+def _ffmpeg() -> str:
+    try:
+        return str(imageio_ffmpeg.get_ffmpeg_exe())
+    except RuntimeError as error:
+        raise MissingDependencyError(
+            "videos need ffmpeg, which comes with the Python package imageio-ffmpeg: pip install imageio-ffmpeg"
+        ) from error

@@ -1,0 +1,66 @@
+import json
+import math
+import platform
+from datetime import UTC, datetime, timedelta, timezone
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fogsim.errors import InputError
+from fogsim.recorders import Manifest, Status, versions, write_json, write_manifest
+from fogsim.values import Ending
+
+STARTED = datetime(2024, 11, 5, 7, 30, tzinfo=timezone(timedelta(hours=1)))
+
+
+def test_a_manifest_says_what_was_run_and_how_it_ended(tmp_path: Path) -> None:
+    manifest = Manifest(
+        status=Status.COMPLETE,
+        seed=3,
+        scenario={"name": "motorway_fog_bank", "camera": {"width": 640}},
+        started=STARTED,
+        ended=STARTED + timedelta(seconds=90),
+        ending=Ending.ARRIVED,
+        command_line=("fogsim", "run", "motorway_fog_bank"),
+        files=("steps.parquet",),
+    )
+    write_manifest(tmp_path / "manifest.json", manifest)
+    content = json.loads((tmp_path / "manifest.json").read_text(encoding="utf-8"))
+    assert content["versions"] == versions()
+    del content["versions"]
+    assert content == {
+        "status": "complete",
+        "message": "",
+        "ending": "arrived",
+        "seed": 3,
+        "started": "2024-11-05T06:30:00+00:00",
+        "ended": "2024-11-05T06:31:30+00:00",
+        "command_line": ["fogsim", "run", "motorway_fog_bank"],
+        "files": ["steps.parquet"],
+        "scenario": {"name": "motorway_fog_bank", "camera": {"width": 640}},
+    }
+
+
+def test_the_manifest_of_a_running_run_has_no_end_and_is_replaced_later(tmp_path: Path) -> None:
+    path = tmp_path / "manifest.json"
+    write_manifest(path, Manifest(Status.RUNNING, 0, {}, datetime.now(UTC)))
+    running = json.loads(path.read_text(encoding="utf-8"))
+    assert (running["status"], running["ended"], running["ending"]) == ("running", None, None)
+    write_manifest(path, Manifest(Status.INTERRUPTED, 0, {}, STARTED, STARTED))
+    assert json.loads(path.read_text(encoding="utf-8"))["status"] == "interrupted"
+    assert [file.name for file in tmp_path.iterdir()] == ["manifest.json"]
+
+
+def test_versions_come_from_what_is_installed() -> None:
+    found = versions()
+    assert found["numpy"] == np.__version__
+    assert found["python"] == platform.python_version()
+    assert set(found) >= {"fogsim", "libsumo", "pyrender", "opencv-python-headless", "gymnasium", "platform"}
+
+
+@pytest.mark.parametrize("value", [math.inf, math.nan, object()])
+def test_what_json_cannot_hold_is_refused_and_leaves_no_file(tmp_path: Path, value: object) -> None:
+    with pytest.raises(InputError, match="finite numbers"):
+        write_json(tmp_path / "metrics.json", {"value": value})
+    assert list(tmp_path.iterdir()) == []

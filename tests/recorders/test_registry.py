@@ -1,0 +1,17 @@
+from pathlib import Path
+
+from fogsim.metrics import step_metrics
+from fogsim.recorders import RECORDERS, RunDirectory, RunInformation
+from tests.recorders.synthetic import METHODS, drive
+
+
+def test_every_registered_recorder_writes_its_file(tmp_path: Path) -> None:
+    directory = RunDirectory(tmp_path)
+    information = RunInformation(directory, "Bank", "", 0, METHODS, 0.2)
+    recorders = [make(information) for make in RECORDERS.values()]
+    for step in drive(10):
+        for recorder in recorders:
+            recorder.record(step, step_metrics(step))
+    for recorder in recorders:
+        recorder.close(complete=True)
+    assert directory.files() == ["report.html", "steps.parquet", "video.mp4"]

@@ -1,0 +1,135 @@
+import base64
+import io
+import itertools
+import math
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from fogsim.metrics import RunMetrics, step_metrics
+from fogsim.recorders import ReportRecorder, RunDirectory, RunInformation, versions
+from fogsim.recorders.report_data import MOST_PICTURES, Album
+from fogsim.values import Step
+from tests.recorders.synthetic import METHODS, drive, make_step
+
+
+class Page(HTMLParser):
+    """Tags, attributes and text of a page; it must be well-formed."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.images: list[str] = []
+        self.tags: set[str] = set()
+        self.links: list[str] = []
+        self.text = ""
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.add(tag)
+        if tag not in {"meta", "img", "br"}:
+            self.open.append(tag)
+        for name, value in attrs:
+            if name == "src":
+                self.images.append(value or "")
+            elif name in {"href", "action", "data"}:
+                self.links.append(value or "")
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+def report(path: Path, steps: list[Step], *, complete: bool = True, title: str = "Bank", description: str = "") -> str:
+    metrics = RunMetrics()
+    summary = metrics.summary
+    directory = RunDirectory(path)
+    information = RunInformation(
+        directory, title, description, 11, METHODS, 0.2, lambda: summary().to_json(), summary().meanings
+    )
+    recorder = ReportRecorder(information)
+    for step in steps:
+        metrics.update(step)
+        recorder.record(step, step_metrics(step))
+    recorder.close(complete)
+    assert directory.files() == ["report.html"]
+    return directory.report.read_text(encoding="utf-8")
+
+
+def test_a_report_is_whole_and_loads_nothing(tmp_path: Path) -> None:
+    text = report(tmp_path, list(drive(50)))
+    page = Page(text)
+    assert "PARTIAL" not in text
+    assert "script" not in page.tags
+    assert "link" not in page.tags
+    assert page.links == []
+    assert re.search(r"https?://|url\(|@import", text) is None
+    assert len(page.images) == 4 + MOST_PICTURES
+    for source in page.images:
+        kind, data = source.split(",", 1)
+        assert kind == "data:image/png;base64"
+        assert Image.open(io.BytesIO(base64.b64decode(data, validate=True))).width > 100
+
+
+def test_it_shows_metrics_with_units_methods_seed_and_versions(tmp_path: Path) -> None:
+    text = Page(report(tmp_path, list(drive(50)))).text
+    assert "minimum time to collision" in text
+    assert "km/h)" in text
+    for method in METHODS:
+        assert method in text
+    assert "seed 11" in text
+    assert f"numpy {versions()['numpy']}" in text
+
+
+def test_pictures_say_where_and_what_was_true_and_believed(tmp_path: Path) -> None:
+    step = make_step(3, time=12.0, route_position=1500.0, visibility_ahead=80.0)
+    text = Page(report(tmp_path, [step])).text
+    assert "t = 12.0 s at 1.50 km" in text
+    assert "true 80 m" in text
+    assert "believed 100 m" in text
+
+
+def test_an_interrupted_run_says_when(tmp_path: Path) -> None:
+    text = report(tmp_path, list(itertools.islice(drive(), 10)), complete=False)
+    assert "PARTIAL: interrupted at t = 2.0 s" in Page(text).text
+
+
+def test_a_run_without_steps_is_still_a_page(tmp_path: Path) -> None:
+    page = Page(report(tmp_path, [], complete=False))
+    assert "No step was recorded" in page.text
+    assert "PARTIAL" in page.text
+
+
+def test_user_text_is_escaped(tmp_path: Path) -> None:
+    text = report(tmp_path, [make_step()], title='<script>alert("1")</script>', description="a < b & c")
+    page = Page(text)
+    assert "script" not in page.tags
+    assert '<script>alert("1")</script>' in page.text
+    assert "a < b & c" in page.text
+
+
+def test_clear_air_without_leader_can_be_drawn(tmp_path: Path) -> None:
+    steps = [make_step(i, time=0.1 * i, visibility=math.inf) for i in range(5)]
+    assert "true clear" in Page(report(tmp_path, steps)).text
+
+
+@pytest.mark.parametrize("count", [1, 5, MOST_PICTURES, 17, 1000])
+def test_pictures_are_spread_evenly_from_the_first_to_the_last_step(count: int) -> None:
+    album = Album()
+    for index in range(count):
+        album.add(make_step(index, time=float(index)))
+    times = [picture.time for picture in album.chosen()]
+    assert len(times) == min(count, MOST_PICTURES)
+    assert times[0] == 0.0
+    assert times[-1] == count - 1
+    gaps = [later - earlier for earlier, later in itertools.pairwise(times)]
+    assert all(gap > 0 for gap in gaps)
+    if count == 1000:
+        assert max(gaps) < 3 * min(gaps)

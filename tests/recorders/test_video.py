@@ -1,0 +1,148 @@
+import dataclasses
+import itertools
+import os
+import signal
+import subprocess
+import sys
+from collections import deque
+from pathlib import Path
+
+import cv2
+import imageio_ffmpeg
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from fogsim.errors import FogSimError, MissingDependencyError
+from fogsim.metrics import step_metrics
+from fogsim.recorders import VideoRecorder, encoder_report
+from fogsim.recorders.video import Encoder, encoder_command
+from tests.recorders.synthetic import drive, make_step
+
+ROOT = Path(__file__).parents[2]
+
+
+def read_video(path: Path) -> list[NDArray[np.uint8]]:
+    """Frames, red first."""
+    video = cv2.VideoCapture(str(path))
+    frames = []
+    while (read := video.read())[0]:
+        frames.append(np.asarray(read[1], np.uint8)[:, :, ::-1])
+    video.release()
+    return frames
+
+
+def four_letters(video: cv2.VideoCapture, what: int) -> str:
+    return int(video.get(what)).to_bytes(4, "little").decode().lower()
+
+
+def test_every_step_is_a_frame_at_real_speed(tmp_path: Path) -> None:
+    path = tmp_path / "video.mp4"
+    recorder = VideoRecorder(path, frame_period=0.2)
+    for step in itertools.islice(drive(), 12):
+        recorder.record(step, step_metrics(step))
+    assert not path.exists()
+    recorder.close(complete=True)
+    recorder.close(complete=True)
+    frames = read_video(path)
+    assert len(frames) == 12
+    assert frames[0].shape == (480, 1024, 3)
+    video = cv2.VideoCapture(str(path))
+    assert video.get(cv2.CAP_PROP_FPS) == pytest.approx(5.0)
+    assert four_letters(video, cv2.CAP_PROP_FOURCC) in {"h264", "avc1"}
+    assert four_letters(video, cv2.CAP_PROP_CODEC_PIXEL_FORMAT) == "i420"  # yuv420p: what browsers play
+    video.release()
+    assert [file.name for file in tmp_path.iterdir()] == ["video.mp4"]
+
+
+def test_the_camera_image_is_in_the_frame(tmp_path: Path) -> None:
+    path = tmp_path / "video.mp4"
+    image = np.zeros((120, 160, 3), np.uint8)
+    image[:, :80], image[:, 80:] = (200, 40, 40), (40, 40, 200)
+    recorder = VideoRecorder(path, frame_period=0.1)
+    recorder.record(make_step(image=image), step_metrics(make_step()))
+    recorder.close(complete=False)
+    frames = read_video(path)
+    np.testing.assert_allclose(frames[0][240, 160], (200, 40, 40), atol=12)
+    np.testing.assert_allclose(frames[0][240, 480], (40, 40, 200), atol=12)
+
+
+def test_a_run_without_steps_leaves_nothing(tmp_path: Path) -> None:
+    VideoRecorder(tmp_path / "video.mp4", frame_period=0.1).close(complete=False)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_frame_that_was_cut_off_does_not_spoil_the_others(tmp_path: Path) -> None:
+    path = tmp_path / "video.mp4"
+    encoder = Encoder(encoder_command(path, 0.1))
+    frame = bytes(1024 * 480 * 3)
+    for piece in (frame, frame, frame[: len(frame) // 3]):
+        encoder.write(piece)
+    encoder.finish()
+    assert len(read_video(path)) == 2
+
+
+def test_an_encoder_that_cannot_write_says_why(tmp_path: Path) -> None:
+    encoder = Encoder(encoder_command(tmp_path / "missing" / "video.mp4", 0.1))
+    frames = (bytes(1024 * 480 * 3) for _ in range(100))
+    with pytest.raises(FogSimError, match=r"missing.*No such file"):
+        deque(map(encoder.write, frames))
+    with pytest.raises(FogSimError, match=r"missing.*No such file"):
+        encoder.finish()
+
+
+CHILD = """
+import itertools, sys
+from pathlib import Path
+from fogsim.metrics import step_metrics
+from fogsim.recorders import VideoRecorder, encoder_report
+from tests.recorders.synthetic import make_step
+
+recorder = VideoRecorder(Path(sys.argv[1]), 0.1)
+try:
+    for index in itertools.count():
+        step = make_step(index, time=0.1 * index)
+        recorder.record(step, step_metrics(step))
+        if index == 7:
+            print("running", flush=True)
+except KeyboardInterrupt:
+    recorder.close(complete=False)
+    print("closed", flush=True)
+"""
+
+
+def test_ctrl_c_leaves_a_video_of_what_was_recorded(tmp_path: Path) -> None:
+    path = tmp_path / "video.mp4"
+    child = subprocess.Popen(
+        [sys.executable, "-c", CHILD, str(path)], cwd=ROOT, stdout=subprocess.PIPE, text=True, start_new_session=True
+    )
+    assert child.stdout is not None
+    assert child.stdout.readline() == "running\n"
+    os.killpg(child.pid, signal.SIGINT)
+    output, _ = child.communicate(timeout=60)
+    assert output == "closed\n"
+    assert child.returncode == 0
+    assert len(read_video(path)) >= 8
+
+
+def test_the_last_step_once_more_is_one_more_frame(tmp_path: Path) -> None:
+    path = tmp_path / "video.mp4"
+    recorder = VideoRecorder(path, frame_period=0.1)
+    step = make_step()
+    for one in (step, dataclasses.replace(step)):
+        recorder.record(one, step_metrics(one))
+    recorder.close(complete=True)
+    assert len(read_video(path)) == 2
+
+
+def test_the_encoder_is_reported_or_its_absence_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert encoder_report().startswith("ffmpeg ")
+
+    def missing() -> str:
+        raise RuntimeError("No ffmpeg exe could be found")
+
+    monkeypatch.setattr(imageio_ffmpeg, "get_ffmpeg_exe", missing)
+    with pytest.raises(MissingDependencyError, match="pip install imageio-ffmpeg"):
+        encoder_report()
+    with pytest.raises(MissingDependencyError, match="pip install imageio-ffmpeg"):
+        VideoRecorder(Path("video.mp4"), 0.1)

@@ -38,7 +38,7 @@ td.value, th.value { text-align: right; white-space: nowrap; font-variant-numeri
 td.meaning { color: #5d6975; }
 figure { margin: 1.2rem 0 0; break-inside: avoid; }
 figure img { width: 100%; height: auto; display: block; }
-figcaption { font-size: .85rem; color: #5d6975; margin-top: .25rem; }
+figcaption, p.note { font-size: .85rem; color: #5d6975; margin-top: .25rem; }
 .pictures { display: grid; grid-template-columns: repeat(auto-fill, minmax(19rem, 1fr)); gap: 1rem; }
 .pictures figure { margin: 0; }
 .pictures img { border-radius: .3rem; background: #11151b; }
@@ -137,7 +137,8 @@ def _method_rows(name: str, methods: Mapping[str, Mapping[str, object]], meaning
         for method, values in methods.items()
     ]
     table = f"<table><tr><th>method</th>{head}</tr>\n" + "\n".join(rows) + "\n</table>"
-    return f"<h2>{escape(_label(name).capitalize())}</h2>\n{table}\n<figcaption>{escape(meaning)}</figcaption>"
+    heading = f"<h2>{escape(_label(name).capitalize())}</h2>"
+    return f'{heading}\n{table}\n<p class="note">{escape(meaning)}</p>'
 
 
 def _figures(figures: Sequence[tuple[str, bytes]]) -> str:

@@ -1,5 +1,6 @@
 """Every step as a row of a parquet table."""
 
+import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -40,9 +41,10 @@ class Column:
 
 
 class TableRecorder:
-    """Writes ``steps.parquet``: one row a step, columns with units in their names and meanings in their metadata.
+    """Writes ``steps.parquet``: one row a step, columns with units in their names.
 
-    The file's metadata says ``fogsim.complete`` = ``true`` or ``false``. Equal steps give equal bytes.
+    The metadata of its schema says ``fogsim.complete`` (``true`` or ``false``), ``fogsim.methods`` (comma-separated)
+    and ``fogsim.columns`` (JSON, one line on each column). Equal steps give equal bytes.
 
     Parameters
     ----------
@@ -55,11 +57,11 @@ class TableRecorder:
     def __init__(self, path: Path, methods: Sequence[str]) -> None:
         self._path = path
         self._columns = table_columns(methods)
-        self._schema = pa.schema(
-            [pa.field(c.name, c.kind, metadata={"description": c.meaning}) for c in self._columns],
-            metadata={"fogsim.methods": ",".join(methods)},
-        )
-        self._writer = pq.ParquetWriter(partial_path(path), self._schema, compression="zstd")
+        self._methods = tuple(methods)
+        self._schema = pa.schema([(column.name, column.kind) for column in self._columns])
+        # Without a stored copy of the schema readers take its metadata from the end of the file, which is written
+        # when it is known whether the run was complete.
+        self._writer = pq.ParquetWriter(partial_path(path), self._schema, compression="zstd", store_schema=False)
         self._rows: list[list[object]] = []
         self._last_index: int | None = None
         self._open = True
@@ -88,7 +90,13 @@ class TableRecorder:
         self._open = False
         if self._rows:
             self._flush()
-        self._writer.add_key_value_metadata({"fogsim.complete": "true" if complete else "false"})
+        self._writer.add_key_value_metadata(
+            {
+                "fogsim.complete": "true" if complete else "false",
+                "fogsim.methods": ",".join(self._methods),
+                "fogsim.columns": json.dumps({column.name: column.meaning for column in self._columns}),
+            }
+        )
         self._writer.close()
         publish(self._path)
 

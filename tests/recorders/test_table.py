@@ -1,5 +1,6 @@
 import dataclasses
 import itertools
+import json
 import math
 from pathlib import Path
 
@@ -117,13 +118,16 @@ def test_a_step_that_comes_once_more_replaces_its_row(tmp_path: Path, before: in
 @pytest.mark.parametrize(("complete", "mark"), [(True, b"true"), (False, b"false")])
 def test_the_file_says_whether_the_run_was_complete(tmp_path: Path, complete: bool, mark: bytes) -> None:
     path = write(tmp_path / "steps.parquet", list(itertools.islice(drive(), 3)), complete=complete)
-    assert pq.read_metadata(path).metadata[b"fogsim.complete"] == mark
+    assert pq.read_schema(path).metadata[b"fogsim.complete"] == mark
     assert pq.read_table(path).num_rows == 3
 
 
 def test_every_column_has_a_description(tmp_path: Path) -> None:
-    for field in pq.read_schema(write(tmp_path / "steps.parquet", [make_step()])):
-        assert field.metadata[b"description"]
+    schema = pq.read_schema(write(tmp_path / "steps.parquet", [make_step()]))
+    meanings = json.loads(schema.metadata[b"fogsim.columns"])
+    assert list(meanings) == schema.names
+    assert all(meanings.values())
+    assert schema.metadata[b"fogsim.methods"] == b"joint_road,negru2013"
 
 
 def test_until_it_is_closed_there_is_no_file_under_the_final_name(tmp_path: Path) -> None:
@@ -134,7 +138,7 @@ def test_until_it_is_closed_there_is_no_file_under_the_final_name(tmp_path: Path
     recorder.close(complete=True)
     recorder.close(complete=False)
     assert [file.name for file in tmp_path.iterdir()] == ["steps.parquet"]
-    assert pq.read_metadata(path).metadata[b"fogsim.complete"] == b"true"
+    assert pq.read_schema(path).metadata[b"fogsim.complete"] == b"true"
 
 
 def test_equal_steps_give_equal_bytes(tmp_path: Path) -> None:

@@ -4,9 +4,9 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
 
-from fogsim.errors import UnknownNameError
+from fogsim.errors import UnknownNameError, suggest
 from fogsim.registry import Registry
 
 GIVEN_BY_THE_LOOP = frozenset({"camera"})
@@ -37,10 +37,25 @@ def method_of(registry: Registry[Callable[..., Any]]) -> BeforeValidator:
             except UnknownNameError as error:
                 # Only a plain ValueError is a message to pydantic's user.
                 raise ValueError(str(error)) from None
-            parameters_model(factory).model_validate(written.get("parameters") or {})
+            _check_parameters(factory, written.get("parameters") or {})
         return written
 
     return BeforeValidator(check)
+
+
+def _check_parameters(factory: Callable[..., Any], parameters: object) -> None:
+    model = parameters_model(factory)
+    try:
+        model.model_validate(parameters)
+    except ValidationError as error:
+        told = []
+        for detail in error.errors():
+            name = ".".join(map(str, detail["loc"]))
+            if detail["type"] == "extra_forbidden":
+                told.append(f"unknown parameter {name!r}; {suggest(name, model.model_fields)}")
+            else:
+                told.append(f"parameter {name!r}: {detail['msg']}; got {detail['input']!r}")
+        raise ValueError("; ".join(told)) from None
 
 
 def parameters_model(factory: Callable[..., Any]) -> type[BaseModel]:

@@ -28,7 +28,7 @@ def _visibility(value: object) -> object:
     return math.inf if isinstance(value, str) and value.strip().lower() in {"inf", "infinity", ".inf"} else value
 
 
-Visibility = Annotated[float, BeforeValidator(_visibility), Field(gt=0, allow_inf_nan=True)]
+Visibility = Annotated[float, Field(gt=0), BeforeValidator(_visibility)]
 
 
 class Section(BaseModel):
@@ -107,7 +107,7 @@ class Fog(Section):
     visibility_m: Visibility | None = None
     outside_visibility_m: Visibility | None = None
     banks: tuple[Bank, ...] = ()
-    top_m: Annotated[float, BeforeValidator(_visibility), Field(gt=0)] = 250.0
+    top_m: Visibility = 250.0
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:

@@ -1,0 +1,141 @@
+"""Speed of the closed loop: environment steps and camera frames a second, and each stage's share of the time.
+
+The environment runs the motorway scenario in its fog bank, with a camera frame rendered, fogged, exposed and read by
+the estimator every camera period (0.1 s) and a decision every 0.5 s. Shares come from a profile of a second run.
+With --peer, highway-env's highway-fast-v0 (which draws no camera) is measured alternately in the same process.
+
+    python benchmarks/loop.py [--json] [--peer] [--size 160x120 --size 640x480] [--steps 60] [--repeat 3]
+"""
+
+import argparse
+import cProfile
+import json
+import pstats
+import statistics
+import time
+from collections.abc import Callable
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+import fogsim_envs  # noqa: F401 - registers the environments
+
+ENV_ID = "fogsim/FogAdvisory-v0"
+PEER_ID = "highway-fast-v0"
+
+STAGES = {
+    "traffic": (("libsumo_traffic.py", "advance"), ("libsumo_traffic.py", "observe")),
+    "scene": (("vehicles.py", "vehicle_batches"),),
+    "render": (("renderer.py", "render"),),
+    "atmosphere": (("koschmieder.py", "fogged_radiance"), ("loop.py", "fog_truth")),
+    "camera": (("exposure.py", "expose"),),
+    "sensors": (("lead.py", "measure_lead"), ("signs.py", "signs_ahead")),
+    "estimators": (("negru2013.py", "update"),),
+    "fusion": (("grid_filter.py", "update"),),
+}
+"""Functions of each stage: their cumulative time in the profile is the stage's share."""
+
+
+def make_env(size: str) -> gymnasium.Env[Any, Any]:
+    """The environment with a camera of a given size, started in thick traffic and fog."""
+    width, height = map(int, size.split("x"))
+    return gymnasium.make(ENV_ID, image_size=(width, height), overrides=["fog.visibility_m=100"])
+
+
+def steps_per_second(env: gymnasium.Env[Any, Any], steps: int, action: Callable[[], Any]) -> float:
+    """Steps a second over a run of fixed length, resets not counted."""
+    env.reset(seed=1)
+    spent = 0.0
+    for _ in range(steps):
+        started = time.perf_counter()
+        *_, terminated, truncated, _ = env.step(action())
+        spent += time.perf_counter() - started
+        if terminated or truncated:
+            env.reset()
+    return steps / spent
+
+
+def stage_shares(env: gymnasium.Env[Any, Any], steps: int, action: Callable[[], Any]) -> dict[str, float]:
+    """Share of the wall time in each stage, from a profile."""
+    env.reset(seed=1)
+    profile = cProfile.Profile()
+    profile.enable()
+    for _ in range(steps):
+        env.step(action())
+    profile.disable()
+    stats: dict[Any, Any] = pstats.Stats(profile).stats  # type: ignore[attr-defined]  # typeshed lacks it
+    total = sum(entry[2] for entry in stats.values())
+    shares = {}
+    for stage, functions in STAGES.items():
+        spent = [
+            entry[3]
+            for (path, _, name), entry in stats.items()
+            if any(path.endswith("/" + file) and name == function for file, function in functions)
+        ]
+        shares[stage] = round(sum(spent) / total, 3)
+    shares["other"] = round(1.0 - sum(shares.values()), 3)
+    return shares
+
+
+def measure(size: str, steps: int, repeat: int, peer: gymnasium.Env[Any, Any] | None) -> dict[str, Any]:
+    """One record for one camera size."""
+    env = make_env(size)
+    cruise = np.array([7, 1])
+    own, other = [], []
+    for _ in range(repeat):
+        own.append(steps_per_second(env, steps, lambda: cruise))
+        if peer is not None:
+            other.append(steps_per_second(peer, steps, peer.action_space.sample))
+    frames = env.unwrapped._frames  # type: ignore[attr-defined]  # noqa: SLF001 - a benchmark may look inside
+    record = {
+        "env": ENV_ID,
+        "camera": size,
+        "vehicles": len(env.unwrapped._step.traffic.ids),  # type: ignore[attr-defined]  # noqa: SLF001 - as above
+        "steps_per_s": round(statistics.median(own), 2),
+        "steps_per_s_min": round(min(own), 2),
+        "steps_per_s_max": round(max(own), 2),
+        "frames_per_s": round(statistics.median(own) * frames, 1),
+        "share": stage_shares(env, steps, lambda: cruise),
+    }
+    if other:
+        record |= {
+            "peer": PEER_ID,
+            "peer_steps_per_s": round(statistics.median(other), 2),
+            "ratio": round(statistics.median(a / b for a, b in zip(own, other, strict=True)), 3),
+        }
+    env.close()
+    return record
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", action="store_true", help="print a list of flat records")
+    parser.add_argument("--peer", action="store_true", help=f"also measure {PEER_ID}, alternately")
+    parser.add_argument("--size", action="append", help="camera WIDTHxHEIGHT (default 160x120 and 640x480)")
+    parser.add_argument("--steps", type=int, default=60, help="environment steps a repetition")
+    parser.add_argument("--repeat", type=int, default=3, help="repetitions")
+    arguments = parser.parse_args()
+    peer = None
+    if arguments.peer:
+        import highway_env  # noqa: F401, PLC0415 - registers the peer
+
+        peer = gymnasium.make(PEER_ID)
+    sizes = arguments.size or ["160x120", "640x480"]
+    records = [measure(size, arguments.steps, arguments.repeat, peer) for size in sizes]
+    if arguments.json:
+        flat = [
+            {k: v for k, v in r.items() if k != "share"} | {f"share_{k}": v for k, v in r["share"].items()}
+            for r in records
+        ]
+        print(json.dumps(flat, indent=2))
+        return
+    for record in records:
+        for key, value in record.items():
+            print(f"{key:16} {value}")
+        print()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,5 @@
+"""``python -m fogsim`` is the command line."""
+
+from fogsim.cli import main
+
+main()

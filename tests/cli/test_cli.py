@@ -1,0 +1,153 @@
+"""The command line, in processes of its own."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import imageio.v3 as imageio
+import pyarrow.parquet as parquet
+import pytest
+
+from fogsim.scenario import catalogue
+
+FOGSIM = (sys.executable, "-m", "fogsim")
+SMALL = ("--set", "camera.width=160", "--set", "camera.height=120", "--set", "duration_s=3")
+FILES = {"manifest.json", "metrics.json", "steps.parquet", "video.mp4", "report.html"}
+
+
+def fogsim(*arguments: str, **options: object) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "COLUMNS": "200", "NO_COLOR": "1"}
+    return subprocess.run(
+        [*FOGSIM, *arguments], capture_output=True, text=True, timeout=240, env=environment, check=False, **options
+    )  # type: ignore[call-overload]  # options are subprocess.run's own
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("run") / "out"
+    done = fogsim("run", "motorway_fog_bank", "--seed", "3", "--out", str(out), *SMALL)
+    assert done.returncode == 0, done.stderr
+    assert "ended: time" in done.stdout
+    return out
+
+
+def test_a_run_writes_everything(finished: Path) -> None:
+    assert {p.name for p in finished.iterdir()} == FILES
+    manifest = json.loads((finished / "manifest.json").read_text(encoding="utf-8"))
+    assert (manifest["status"], manifest["seed"], manifest["ending"]) == ("complete", 3, "time")
+    assert manifest["scenario"]["camera"]["width"] == 160
+    assert {"fogsim", "libsumo", "numpy", "python"} <= set(manifest["versions"])
+    assert str(Path.home()) not in json.dumps(manifest["scenario"])
+    metrics = json.loads((finished / "metrics.json").read_text(encoding="utf-8"))
+    assert metrics["complete"] is True
+
+
+def test_steps_and_video_have_a_row_and_a_frame_for_each_camera_period(finished: Path) -> None:
+    table = parquet.read_table(finished / "steps.parquet")
+    assert table.num_rows == 31
+    assert table.column("time_s").to_pylist() == pytest.approx([0.1 * i for i in range(31)])
+    video = imageio.improps(finished / "video.mp4", plugin="FFMPEG")
+    assert video.shape[1:] == imageio.imread(finished / "video.mp4", plugin="FFMPEG", index=0).shape
+    metadata = imageio.immeta(finished / "video.mp4", plugin="FFMPEG")
+    assert metadata["fps"] == pytest.approx(10.0)
+    assert metadata["duration"] == pytest.approx(3.1, abs=0.11)
+
+
+def test_the_same_seed_writes_the_same_bytes_in_a_fresh_process(finished: Path, tmp_path: Path) -> None:
+    done = fogsim("run", "motorway_fog_bank", "--seed", "3", "--out", str(tmp_path / "b"), *SMALL)
+    assert done.returncode == 0, done.stderr
+    for name in ("steps.parquet", "metrics.json", "video.mp4"):
+        assert (finished / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
+
+
+def test_results_are_not_overwritten_unasked(finished: Path) -> None:
+    refused = fogsim("run", "motorway_fog_bank", "--out", str(finished), *SMALL)
+    assert refused.returncode == 2
+    assert "--overwrite" in refused.stderr
+    assert "Traceback" not in refused.stderr
+
+
+def test_an_interrupted_run_leaves_readable_results_that_say_they_are_partial(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    size = ("--set", "camera.width=160", "--set", "camera.height=120")
+    process = subprocess.Popen(
+        [*FOGSIM, "run", "motorway_fog_bank", "--out", str(out), *size],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    partial = out / "video.mp4.part"
+    deadline = time.monotonic() + 120
+    while not (partial.exists() and partial.stat().st_size > 0) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    time.sleep(3.0)
+    os.killpg(process.pid, signal.SIGINT)  # as Ctrl-C does: every process of the terminal's group
+    stdout, stderr = process.communicate(timeout=60)
+    assert process.returncode == 130, stderr
+    assert "Traceback" not in stderr
+    assert "partial" in stdout
+    assert {p.name for p in out.iterdir()} == FILES
+    manifest = json.loads((out / "manifest.json").read_text(encoding="utf-8"))
+    assert manifest["status"] == "interrupted"
+    assert json.loads((out / "metrics.json").read_text(encoding="utf-8"))["complete"] is False
+    table = parquet.read_table(out / "steps.parquet")
+    assert 0 < table.num_rows < 2401
+    assert table.schema.metadata[b"fogsim.complete"] == b"false"
+    assert imageio.imread(out / "video.mp4", plugin="FFMPEG", index=0).ndim == 3
+    assert "PARTIAL" in (out / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run", "motorway_fog_bnk"], "did you mean 'motorway_fog_bank'?"),
+        (["run", "motorway_fog_bank", "--set", "fog.visibilty_m=80"], "fog.visibilty_m: unknown key"),
+        (["run", "motorway_fog_bank", "--set", "fog.visibility_m=-80"], "greater than 0; got -80"),
+        (["run", "motorway_fog_bank", "--set", "traffic.net=none.net.xml"], "there is no file 'none.net.xml'"),
+        (["run", "motorway_fog_bank", "--set", "nonsense"], "expected key.path=value"),
+        (["run", "nowhere/scenario.yaml"], "there is no such scenario file"),
+        (["validate", "nowhere.yaml"], "there is no such scenario file"),
+    ],
+)
+def test_bad_input_ends_in_one_message_and_writes_nothing(arguments: list[str], message: str, tmp_path: Path) -> None:
+    done = fogsim(*arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_validate_tells_the_good_from_the_bad(tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(catalogue()["motorway_fog_bank"].parent, tmp_path / "mine"))
+    assert fogsim("validate", str(folder), "motorway_fog_bank").returncode == 0
+    bad = folder / "scenario.yaml"
+    bad.write_text(bad.read_text(encoding="utf-8").replace("lux", "").replace("width: 640", "width: -1"), "utf-8")
+    done = fogsim("validate", str(folder), "motorway_fog_bank")
+    assert done.returncode == 2
+    assert "camera.width" in done.stderr
+    assert "fine: motorway_fog_bank" in done.stdout
+
+
+def test_list_names_scenarios_and_methods() -> None:
+    done = fogsim("list")
+    assert done.returncode == 0
+    for name in ("motorway_fog_bank", "negru2013", "grid_filter", "stopping_sight_distance", "fog_lamp_rules"):
+        assert name in done.stdout
+
+
+def test_doctor_finds_everything_here() -> None:
+    done = fogsim("doctor")
+    assert done.returncode == 0, done.stdout
+    assert "OpenGL (EGL)" in done.stdout
+    assert "missing" not in done.stdout
+
+
+def test_version_and_help() -> None:
+    assert fogsim("--version").stdout.startswith("fogsim ")
+    assert "KEY.PATH=VALUE" in fogsim("run", "--help").stdout

@@ -1,0 +1,158 @@
+"""The environments as Gymnasium and its users see them."""
+
+import math
+import warnings
+from collections.abc import Iterator
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import fogsim
+import fogsim_envs  # noqa: F401 - registers the environments
+from fogsim.errors import InputError
+from fogsim_envs.spaces import ADVISED_SPEEDS, LAMP_MODES, command_of
+
+ID = "fogsim/FogAdvisory-v0"
+SMALL = {"image_size": (64, 48), "overrides": ("clocks.camera_period_s=0.5",)}
+
+
+@pytest.fixture
+def env() -> Iterator[gymnasium.Env[Any, Any]]:
+    made = gymnasium.make(ID, **SMALL)
+    yield made
+    made.close()
+
+
+@pytest.mark.parametrize("continuous", [False, True])
+def test_gymnasiums_checker_finds_nothing(continuous: bool, caplog: pytest.LogCaptureFixture) -> None:
+    env = gymnasium.make(ID, continuous=continuous, render_mode="rgb_array", **SMALL)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env.unwrapped)
+    env.close()
+    env.close()
+    assert not caplog.records
+
+
+def test_an_episode_and_its_info(env: gymnasium.Env[Any, Any]) -> None:
+    observation, info = env.reset(seed=5)
+    assert env.observation_space.contains(observation)
+    assert info["truth"]["visibility_m"] == pytest.approx(2000.0, rel=0.01)
+    observation, reward, terminated, truncated, info = env.step(np.array([3, 1]))
+    assert env.observation_space.contains(observation)
+    assert reward == pytest.approx(sum(info["reward_terms"].values()))
+    assert set(info["reward_terms"]) == {
+        "progress", "visibility_margin", "conflict", "discomfort", "collision", "lamps",
+    }  # fmt: skip
+    assert not terminated
+    assert not truncated
+    assert info["time_s"] == pytest.approx(0.5)
+
+
+def test_the_action_reaches_the_road(env: gymnasium.Env[Any, Any]) -> None:
+    def speed_after(level: int) -> float:
+        env.reset(seed=5)
+        for _ in range(12):
+            *_, info = env.step(np.array([level, 0]))
+        return float(info["speed_mps"])
+
+    slow, free = speed_after(2), speed_after(len(ADVISED_SPEEDS))
+    assert slow < 20.0 < free
+
+
+def test_truth_is_not_in_the_observation(env: gymnasium.Env[Any, Any]) -> None:
+    """The same frame and sensors under another truth give the same observation."""
+    from dataclasses import replace
+
+    from fogsim.values import Truth
+    from fogsim_envs.spaces import observe
+
+    env.reset(seed=5)
+    step = env.unwrapped._step  # type: ignore[attr-defined]
+    lie = replace(step, truth=Truth(0.3, 0.4), view=None, traffic=None, leader=None, collisions=())
+    for key, value in observe(step).items():
+        assert np.array_equal(value, observe(lie)[key])
+
+
+def test_two_environments_in_one_process_do_not_disturb_each_other() -> None:
+    one, other = (gymnasium.make(ID, **SMALL) for _ in range(2))
+    try:
+        alone = [one.reset(seed=9)[0], *(one.step(np.array([6, 0]))[0] for _ in range(3))]
+        first = one.reset(seed=9)[0]
+        second = other.reset(seed=9)[0]
+        together = [first, *(one.step(np.array([6, 0]))[0] for _ in range(3))]
+        hosted = [second, *(other.step(np.array([6, 0]))[0] for _ in range(3))]
+    finally:
+        one.close()
+        other.close()
+    for a, b, c in zip(alone, together, hosted, strict=True):
+        assert all(np.array_equal(a[k], b[k]) and np.array_equal(a[k], c[k]) for k in a)
+
+
+def test_overrides_for_one_episode(env: gymnasium.Env[Any, Any]) -> None:
+    info = env.reset(seed=1, options={"overrides": ["fog.visibility_m=80"]})[1]
+    assert info["truth"]["visibility_m"] == pytest.approx(80.0)
+    assert env.reset(seed=1)[1]["truth"]["visibility_m"] == pytest.approx(2000.0, rel=0.01)
+    with pytest.raises(InputError, match="must not change the camera"):
+        env.reset(options={"overrides": ["camera.width=128"]})
+
+
+def test_time_truncates() -> None:
+    env = gymnasium.make(ID, image_size=(64, 48), overrides=("duration_s=2", "clocks.camera_period_s=0.5"))
+    env.reset(seed=1)
+    ends = [env.step(np.array([12, 0]))[2:4] for _ in range(4)]
+    env.close()
+    assert ends == [(False, False)] * 3 + [(False, True)]
+
+
+def test_rendering_shows_the_frame_beside_a_panel() -> None:
+    env = gymnasium.make(ID, render_mode="rgb_array", **SMALL)
+    env.reset(seed=1)
+    picture = env.render()
+    env.close()
+    assert isinstance(picture, np.ndarray)
+    assert picture.dtype == np.uint8
+    assert picture.shape[1] > 640
+
+
+def test_steps_need_a_reset(env: gymnasium.Env[Any, Any]) -> None:
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.unwrapped.step(np.array([0, 0]))
+
+
+def test_bad_arguments() -> None:
+    with pytest.raises(InputError, match="did you mean 'motorway_fog_bank'"):
+        gymnasium.make(ID, scenario="motorway_fog_bnk")
+    with pytest.raises(InputError, match="unknown key"):
+        gymnasium.make(ID, overrides=["fog.visibilty_m=80"])
+
+
+def test_a_loaded_scenario_serves_as_well() -> None:
+    scenario = fogsim.load_scenario("motorway_fog_bank", ["fog.visibility_m=120"])
+    env = gymnasium.make(ID, scenario=scenario, **SMALL)
+    assert env.reset(seed=1)[1]["truth"]["visibility_m"] == pytest.approx(120.0)
+    env.close()
+
+
+def test_vector_environments_run_in_processes_of_their_own() -> None:
+    envs = gymnasium.make_vec(ID, num_envs=2, **SMALL)
+    try:
+        observation, _ = envs.reset(seed=[3, 3])
+        assert observation["camera"].shape == (2, 48, 64, 3)
+        assert np.array_equal(observation["camera"][0], observation["camera"][1])
+        observation, rewards, *_ = envs.step(np.array([[2, 0], [12, 0]]))
+        assert rewards.shape == (2,)
+    finally:
+        envs.close()
+
+
+def test_actions() -> None:
+    assert command_of((0, 2), continuous=False).advice.speed == pytest.approx(20 / 3.6)
+    assert command_of((12, 0), continuous=False).advice.speed == math.inf
+    assert command_of((0, 2), continuous=False).lamps == LAMP_MODES[2]
+    assert command_of((-1.0, -1.0), continuous=True).advice.speed == pytest.approx(20 / 3.6)
+    assert command_of((1.0, 1.0), continuous=True).advice.speed == math.inf
+    assert command_of((0.0, 0.0), continuous=True).lamps == LAMP_MODES[1]

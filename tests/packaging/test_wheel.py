@@ -1,0 +1,49 @@
+"""The built wheel, installed into a fresh environment, runs the demo from outside the checkout."""
+
+import json
+import os
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+import pytest
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+
+
+def call(*command: str | Path, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    inherited = {k: v for k, v in os.environ.items() if k not in {"PYTHONPATH", "VIRTUAL_ENV"}}
+    done = subprocess.run(
+        list(map(str, command)),
+        cwd=cwd,
+        env=inherited | environment,
+        capture_output=True,
+        text=True,
+        timeout=600,
+        check=False,
+    )
+    assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
+    return done
+
+
+@pytest.mark.packaging
+@pytest.mark.timeout(900)
+def test_the_wheel_runs_the_demo_outside_the_checkout(tmp_path: Path) -> None:
+    call(sys.executable, "-m", "build", "--wheel", "--outdir", tmp_path / "dist", CHECKOUT, cwd=tmp_path)
+    (wheel,) = (tmp_path / "dist").glob("fogsim-*.whl")
+    venv.create(tmp_path / "venv", with_pip=True)
+    python = tmp_path / "venv" / "bin" / "python"
+    call(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", wheel, cwd=tmp_path)
+    home = tmp_path / "home"
+    home.mkdir()
+    fogsim = tmp_path / "venv" / "bin" / "fogsim"
+    short = ("--set", "duration_s=2", "--set", "camera.width=160", "--set", "camera.height=120")
+    done = call(fogsim, "run", "motorway_fog_bank", "--out", "demo", *short, cwd=tmp_path, HOME=str(home))
+    assert "ended: time" in done.stdout
+    manifest = json.loads((tmp_path / "demo" / "manifest.json").read_text(encoding="utf-8"))
+    assert manifest["status"] == "complete"
+    code = "import gymnasium, fogsim_envs; e = gymnasium.make('fogsim/FogAdvisory-v0'); e.reset(seed=1); e.close()"
+    call(python, "-W", "error", "-c", code, cwd=tmp_path, HOME=str(home))
+    where = call(python, "-c", "import fogsim; print(fogsim.__file__)", cwd=tmp_path).stdout
+    assert str(tmp_path) in where

@@ -1,0 +1,117 @@
+"""The closed loop on real parts."""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fogsim
+from fogsim.errors import SimulationError
+from fogsim.scenario import Scenario
+from fogsim.values import Command, Ending, Step
+
+SMALL = ("camera.width=160", "camera.height=120", "duration_s=4")
+
+
+def small(*overrides: str) -> Scenario:
+    return fogsim.load_scenario("motorway_fog_bank", [*SMALL, *overrides])
+
+
+def test_steps_follow_the_clocks_and_end_in_time() -> None:
+    steps = list(fogsim.run(small(), seed=1))
+    assert [s.index for s in steps] == list(range(41))
+    assert steps[-1].time == pytest.approx(4.0)
+    assert [s.ending for s in steps[:-1]] == [None] * 40
+    assert steps[-1].ending is Ending.TIME
+
+
+def test_a_command_is_decided_once_a_decision_period() -> None:
+    steps = list(fogsim.run(small("fog.visibility_m=80"), seed=1))
+    changes = [s.index for a, s in zip(steps, steps[1:], strict=False) if s.command is not a.command]
+    assert changes == list(range(1, 41, 5))
+
+
+def test_the_camera_period_may_be_longer_than_the_traffic_step() -> None:
+    steps = list(fogsim.run(small("clocks.camera_period_s=0.5"), seed=1))
+    assert len(steps) == 9
+    moved = np.diff([s.route_position for s in steps])
+    assert np.all(moved > 10.0)  # half a second at more than 20 m/s
+
+
+@pytest.mark.parametrize("visibility", [50.0, 100.0, 200.0])
+def test_in_homogeneous_fog_the_belief_follows_the_truth_and_advice_follows_the_belief(visibility: float) -> None:
+    scenario = fogsim.load_scenario(
+        "motorway_fog_bank", ["camera.width=320", "camera.height=240", "duration_s=8", f"fog.visibility_m={visibility}"]
+    )
+    last = list(fogsim.run(scenario, seed=2))[-1]
+    assert last.truth.visibility == pytest.approx(visibility)
+    assert last.truth.visibility_ahead == pytest.approx(visibility, rel=1e-3)
+    assert last.belief.visibility == pytest.approx(visibility, rel=0.35)
+    assert last.command.advice.speed < 110 / 3.6
+
+
+def test_estimators_never_see_the_truth(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Deleting the truth from every step changes no estimate, belief or command."""
+    honest = list(fogsim.run(small("fog.visibility_m=80"), seed=1))
+    monkeypatch.setattr("fogsim.loop.fog_truth", lambda *_: None)
+    blind = list(fogsim.run(small("fog.visibility_m=80"), seed=1))
+    for a, b in zip(honest, blind, strict=True):
+        assert b.truth is None
+        assert [e.extinction for e in a.estimates] == [e.extinction for e in b.estimates]
+        assert np.array_equal(a.belief.probability, b.belief.probability)
+        assert a.command == b.command
+
+
+def fingerprint(steps: Iterator[Step]) -> list[bytes]:
+    return [
+        s.observation.image.tobytes() + s.traffic.position.tobytes() + s.belief.probability.tobytes() for s in steps
+    ]
+
+
+def test_the_same_seed_gives_the_same_run_bit_for_bit() -> None:
+    first = fingerprint(fogsim.run(small(), seed=7))
+    assert fingerprint(fogsim.run(small(), seed=7)) == first
+    assert fingerprint(fogsim.run(small(), seed=8)) != first
+
+
+def test_a_restarted_loop_replays_a_fresh_one() -> None:
+    def drive(loop: fogsim.ClosedLoop) -> list[bytes]:
+        def steps() -> Iterator[Step]:
+            yield loop.start(5)
+            for _ in range(10):
+                yield loop.advance(Command())
+
+        return fingerprint(steps())
+
+    with fogsim.ClosedLoop(small()) as loop:
+        first = drive(loop)
+        assert drive(loop) == first
+
+
+def test_a_run_that_is_over_does_not_go_on() -> None:
+    with fogsim.ClosedLoop(small("duration_s=0.1")) as loop:
+        with pytest.raises(SimulationError, match="not been started"):
+            loop.advance(Command())
+        loop.start(1)
+        assert loop.advance(Command()).ending is Ending.TIME
+        with pytest.raises(SimulationError, match="is over"):
+            loop.advance(Command())
+
+
+def test_importing_starts_no_sumo_and_no_gl() -> None:
+    code = (
+        "import sys, fogsim, fogsim_envs, fogsim.loop; "
+        "assert not {'libsumo', 'OpenGL', 'pyrender'} & set(sys.modules), sorted(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
+
+
+def test_public_names_are_there() -> None:
+    for name in fogsim.__all__:
+        assert getattr(fogsim, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
+        _ = fogsim.nonsense
+    assert Path(fogsim.__file__).with_name("py.typed").is_file()

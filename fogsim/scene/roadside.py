@@ -1,0 +1,166 @@
+"""What stands beside the road and is drawn many times: trees, posts of guard rails, delineators."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.scene.polyline import LaneIndex, arc_length, at_distance, left_normals
+from fogsim.scene.solids import ROADSIDE, Material, box, merge
+from fogsim.values.scene import Batch, Mesh
+
+TREE_CLEARANCE = 9.0
+"""Least distance of a tree's trunk from the edge of any lane [m]."""
+
+Points = NDArray[np.float64]
+
+
+def post_shapes() -> dict[str, Mesh]:
+    """Posts in metres, standing on the origin, their backs to −x: of a guard rail and a delineator."""
+    zinc = Material((0.26, 0.265, 0.27))
+    white = Material((0.60, 0.60, 0.58))
+    black = Material((0.02, 0.02, 0.02))
+    reflector = Material((0.75, 0.72, 0.62))
+    delineator = (
+        _tube(0.0, 0.76, 0.05, 0.06, white),
+        _tube(0.76, 0.96, 0.05, 0.06, black),
+        _tube(0.78, 0.94, 0.055, 0.025, reflector),
+        box((-0.05, -0.06, 0.96), (0.05, 0.06, 1.05), white),
+    )
+    return {
+        "rail_post": _tube(-0.1, 0.74, 0.03, 0.06, zinc),
+        "delineator": merge(delineator),
+    }
+
+
+def _tube(bottom: float, top: float, half_depth: float, half_width: float, material: Material) -> Mesh:
+    """Four upright sides; the ends do not show."""
+    upright = box((-half_depth, -half_width, bottom), (half_depth, half_width, top), material)
+    level = np.abs(upright.normals[upright.faces[:, 0], 2]) > 0.5
+    return replace(upright, faces=upright.faces[~level])
+
+
+def stations(line: Points, spacing: float, left: float) -> tuple[Points, NDArray[np.float64]]:
+    """Places (n, 3) at regular distances along a parallel of a line, and the directions [rad] of the line there.
+
+    Parameters
+    ----------
+    line : (n, 3) float64
+        The line [m].
+    spacing : float
+        Distance between places along the line [m].
+    left : float
+        How far to the left of it they lie [m].
+    """
+    length = arc_length(line)
+    distance = np.arange(0.5 * spacing, length[-1], spacing)
+    here, normals = at_distance(line, distance), left_normals(line)
+    normal = np.stack([np.interp(distance, length, normals[:, axis]) for axis in range(2)], axis=1)
+    places = here + np.column_stack((left * normal, np.zeros(len(here))))
+    return places, np.arctan2(-normal[:, 0], normal[:, 1])
+
+
+def placed(shape: str, places: Points, heading: NDArray[np.float64], size: NDArray[np.float64] | float = 1.0) -> Batch:
+    """Batch of copies standing at places, turned by headings [rad], scaled by sizes ((n, 3) or one number)."""
+    count = len(places)
+    scale = np.broadcast_to(np.asarray(size, np.float64), (count, 3))
+    transforms = np.zeros((count, 4, 4), np.float32)
+    cosine, sine = np.cos(heading), np.sin(heading)
+    transforms[:, 0, 0], transforms[:, 0, 1] = cosine * scale[:, 0], -sine * scale[:, 1]
+    transforms[:, 1, 0], transforms[:, 1, 1] = sine * scale[:, 0], cosine * scale[:, 1]
+    transforms[:, 2, 2], transforms[:, 3, 3] = scale[:, 2], 1.0
+    transforms[:, :3, 3] = places
+    return Batch(
+        shape=shape,
+        transforms=transforms,
+        paint=np.zeros((count, 3), np.float32),
+        lamps=np.zeros(count, np.int32),
+        instance=np.full(count, ROADSIDE, np.int32),
+    )
+
+
+def trees(
+    stretches: Sequence[tuple[int, Points]],
+    index: LaneIndex,
+    shapes: Mapping[str, Mesh],
+    ground: float,
+    rng: np.random.Generator,
+) -> list[Batch]:
+    """Trees near the road and woods behind them, clear of every lane.
+
+    Parameters
+    ----------
+    stretches : sequence of tuple of int and (n, 3) float64
+        Side (1 left, −1 right) and centreline of the lanes' free sides.
+    index : LaneIndex
+        The lanes.
+    shapes : mapping from str to Mesh
+        Among others the shapes of the trees.
+    ground : float
+        Height of the terrain [m].
+    rng : numpy Generator
+        What scatters them.
+    """
+    near = _scatter(stretches, rng, spacing=10.0, nearest=13.0, reach=38.0, clumps=90.0)
+    near = near[index.clearance(near) > TREE_CLEARANCE]
+    conifers = _clumps(near[:, :2], 160.0, rng) + 0.35 * rng.normal(size=len(near)) > 0.1
+    batches = []
+    for name, members in (("conifer", conifers), ("broad_leaved", ~conifers)):
+        kinds = sorted(shape for shape in shapes if shape.startswith(name) and ":" not in shape)
+        batches += _planted(near[members], kinds, ground, rng, height=(6.0, 15.0), slender=1.0)
+    far = _scatter(stretches, rng, spacing=60.0, nearest=75.0, reach=170.0, clumps=400.0)
+    far = far[index.clearance(far) > 25.0]
+    kinds = sorted(shape for shape in shapes if shape.startswith("woodland") and ":" not in shape)
+    return batches + _planted(far, kinds, ground, rng, height=(9.0, 16.0), slender=5.0)
+
+
+def _scatter(
+    stretches: Sequence[tuple[int, Points]],
+    rng: np.random.Generator,
+    *,
+    spacing: float,
+    nearest: float,
+    reach: float,
+    clumps: float,
+) -> Points:
+    """Random places beside the stretches, where a slowly changing density lets them stand."""
+    groups = [np.zeros((0, 3))]
+    for side, line in stretches:
+        count = rng.poisson(arc_length(line)[-1] / spacing)
+        here = at_distance(line, rng.uniform(0.0, arc_length(line)[-1], count))
+        direction = np.arctan2(*(line[-1, 1::-1] - line[0, 1::-1])) + side * np.pi / 2
+        away = nearest + reach * rng.beta(1.0, 1.8, count)
+        groups.append(here + np.column_stack((away * np.cos(direction), away * np.sin(direction), np.zeros(count))))
+    places = np.concatenate(groups)
+    return places[_clumps(places[:, :2], clumps, rng) > -0.35]
+
+
+def _clumps(places: NDArray[np.float64], wavelength: float, rng: np.random.Generator) -> NDArray[np.float64]:
+    """Slowly changing random value −1 … 1 at places (n, 2): a sum of plane waves."""
+    angle, phase = rng.uniform(0, 2 * np.pi, (2, 6))
+    number = 2 * np.pi / (wavelength * rng.uniform(0.6, 1.8, 6))
+    waves = np.stack((np.cos(angle), np.sin(angle))) * number
+    return np.asarray(np.sin(places @ waves + phase).mean(axis=1) * 1.8, np.float64)
+
+
+def _planted(
+    places: Points,
+    kinds: Sequence[str],
+    ground: float,
+    rng: np.random.Generator,
+    *,
+    height: tuple[float, float],
+    slender: float,
+) -> list[Batch]:
+    standing = np.column_stack((places[:, :2], np.full(len(places), ground)))
+    kind = rng.integers(len(kinds), size=len(places))
+    tall = rng.uniform(*height, len(places))
+    wide = tall * slender * rng.uniform(0.85, 1.2, len(places))
+    size = np.column_stack((wide, np.minimum(wide, 1.5 * tall), tall))
+    turn = rng.uniform(0, 2 * np.pi, len(places))
+    return [
+        placed(name, standing[kind == i], turn[kind == i], size[kind == i])
+        for i, name in enumerate(kinds)
+        if np.any(kind == i)
+    ]

@@ -1,0 +1,236 @@
+"""Small meshes to build with: patches, polygons, boxes, cylinders, blobs, and how to put them together."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import trimesh
+from numpy.typing import ArrayLike, NDArray
+
+from fogsim.values.scene import Mesh, Surface
+
+ROADSIDE = 3
+"""Instance id of what stands beside the road (see `View.instance`)."""
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """What a surface is made of.
+
+    Attributes
+    ----------
+    reflectance : tuple of float
+        Linear diffuse reflectance, red, green, blue, 0 … 1.
+    surface : Surface
+        How it gets its radiance.
+    """
+
+    reflectance: Vector
+    surface: Surface = Surface.MATT
+
+
+PAINT = Material((0.5, 0.5, 0.5), Surface.PAINT)
+GLASS = Material((0.035, 0.045, 0.055))
+TYRE = Material((0.025, 0.025, 0.027))
+BLACK_PLASTIC = Material((0.03, 0.03, 0.032))
+UNDERBODY = Material((0.012, 0.012, 0.013))
+STEEL = Material((0.33, 0.34, 0.35))
+WHITE = Material((0.62, 0.62, 0.60))
+CHROME = Material((0.40, 0.41, 0.42))
+
+
+def mesh(
+    positions: ArrayLike,
+    faces: ArrayLike,
+    normals: ArrayLike,
+    material: Material,
+    *,
+    reflectance: ArrayLike | None = None,
+    road: ArrayLike | None = None,
+    instance: int = ROADSIDE,
+) -> Mesh:
+    """Mesh of one material.
+
+    Parameters
+    ----------
+    positions, normals : (n, 3)
+        Vertices [m] and their directions, of any length.
+    faces : (m, 3)
+        Vertices of each triangle.
+    material : Material
+        Surface and reflectance of all vertices.
+    reflectance : (n, 3), optional
+        Reflectance of each vertex in place of the material's.
+    road : (n, 4), optional
+        Road attributes (see `Mesh`); zero if not given.
+    instance : int
+        Instance id.
+    """
+    points = np.asarray(positions, np.float32).reshape(-1, 3)
+    count = len(points)
+    directions = np.asarray(normals, np.float64).reshape(-1, 3)
+    length = np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-12)
+    colour = material.reflectance if reflectance is None else reflectance
+    return Mesh(
+        positions=points,
+        normals=(directions / length).astype(np.float32),
+        reflectance=np.array(np.broadcast_to(np.asarray(colour, np.float32), (count, 3))),
+        surface=np.full(count, int(material.surface), np.int32),
+        road=np.zeros((count, 4), np.float32) if road is None else np.asarray(road, np.float32).reshape(-1, 4),
+        instance=np.full(count, instance, np.int32),
+        faces=np.asarray(faces, np.uint32).reshape(-1, 3),
+    )
+
+
+def grid_faces(rows: int, columns: int) -> NDArray[np.int64]:
+    """Two triangles for each cell of a grid of vertices numbered row by row."""
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    lower = np.stack((corner, corner + 1, corner + columns), axis=1)
+    upper = np.stack((corner + 1, corner + columns + 1, corner + columns), axis=1)
+    return np.concatenate((lower, upper))
+
+
+def grid_normals(points: NDArray[np.float64], toward: ArrayLike) -> NDArray[np.float64]:
+    """Normals of a grid of points (n, m, 3) from differences of neighbours, all turned to the side of `toward`."""
+    along = np.gradient(points, axis=0)
+    across = np.gradient(points, axis=1)
+    normals = np.cross(along, across)
+    sign = 1.0 if normals.sum(axis=(0, 1)) @ np.asarray(toward, float) >= 0 else -1.0
+    return sign * normals
+
+
+def grid(
+    points: ArrayLike,
+    material: Material,
+    toward: ArrayLike,
+    *,
+    reflectance: ArrayLike | None = None,
+    road: ArrayLike | None = None,
+    instance: int = ROADSIDE,
+) -> Mesh:
+    """Smooth patch through a grid of points.
+
+    Parameters
+    ----------
+    points : (n, m, 3)
+        Its points [m], n and m at least 2.
+    material : Material
+        Its material.
+    toward : (3,)
+        Direction to whose side the normals are turned.
+    reflectance, road, instance
+        As in `mesh`, one row per point in row-major order.
+    """
+    array = np.asarray(points, np.float64)
+    rows, columns = array.shape[:2]
+    normals = grid_normals(array, toward)
+    return mesh(
+        array,
+        grid_faces(rows, columns),
+        normals,
+        material,
+        reflectance=reflectance,
+        road=road,
+        instance=instance,
+    )
+
+
+def quad(corners: ArrayLike, material: Material, toward: ArrayLike, instance: int = ROADSIDE) -> Mesh:
+    """Rectangle (or any flat convex quadrilateral) through four corners in order around it."""
+    a, b, c, d = np.asarray(corners, np.float64)
+    return grid([[a, b], [d, c]], material, toward, instance=instance)
+
+
+def polygon(corners: ArrayLike, material: Material, toward: ArrayLike, instance: int = ROADSIDE) -> Mesh:
+    """Flat convex polygon through corners (n, 3) in order around it."""
+    points = np.asarray(corners, np.float64)
+    index = np.arange(1, len(points) - 1)
+    faces = np.stack((np.zeros_like(index), index, index + 1), axis=1)
+    normals = np.broadcast_to(np.asarray(toward, np.float64), points.shape)
+    return mesh(points, faces, normals, material, instance=instance)
+
+
+def from_trimesh(solid: trimesh.Trimesh, material: Material, instance: int = ROADSIDE) -> Mesh:
+    """Facetted mesh of a trimesh solid: every triangle has its own normal."""
+    corners = np.asarray(solid.triangles, np.float64).reshape(-1, 3)
+    normals = np.repeat(np.asarray(solid.face_normals, np.float64), 3, axis=0)
+    return mesh(corners, np.arange(len(corners)).reshape(-1, 3), normals, material, instance=instance)
+
+
+def box(low: ArrayLike, high: ArrayLike, material: Material, instance: int = ROADSIDE) -> Mesh:
+    """Box between two opposite corners, facetted."""
+    corners = np.stack((np.asarray(low, float), np.asarray(high, float)))
+    return from_trimesh(trimesh.creation.box(bounds=np.sort(corners, axis=0)), material, instance)
+
+
+def cylinder(start: ArrayLike, end: ArrayLike, radius: float, material: Material, *, sides: int = 12) -> Mesh:
+    """Closed facetted cylinder between the middles of its two ends."""
+    segment = np.stack((np.asarray(start, float), np.asarray(end, float)))
+    return from_trimesh(trimesh.creation.cylinder(radius, segment=segment, sections=sides), material)
+
+
+def disc(
+    centre: ArrayLike,
+    radius: float,
+    right: ArrayLike,
+    up: ArrayLike,
+    material: Material,
+    *,
+    sides: int = 24,
+    hole: float = 0.0,
+    instance: int = ROADSIDE,
+) -> Mesh:
+    """Disc or ring.
+
+    Parameters
+    ----------
+    centre : (3,)
+        Its middle [m].
+    radius, hole : float
+        Outer and inner radius [m].
+    right, up : (3,)
+        Unit vectors in its plane, as its viewer sees them: it faces right × up.
+    material, sides, instance
+        Material, number of sides and instance id.
+    """
+    angle = np.linspace(0.0, 2 * np.pi, sides + 1)
+    rim = np.cos(angle)[:, None] * np.asarray(right, float) + np.sin(angle)[:, None] * np.asarray(up, float)
+    rings = np.asarray(centre, float) + np.stack((hole * rim, radius * rim), axis=1)
+    faces = grid_faces(sides + 1, 2)
+    normal = np.broadcast_to(np.cross(np.asarray(right, float), np.asarray(up, float)), (2 * (sides + 1), 3))
+    return mesh(rings, faces if hole else faces[sides:], normal, material, instance=instance)
+
+
+def merge(parts: Sequence[Mesh]) -> Mesh:
+    """One mesh of many."""
+    offsets = np.cumsum([0, *(len(part.positions) for part in parts)])
+    names = ("positions", "normals", "reflectance", "surface", "road", "instance")
+    if not parts:
+        return mesh(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), PAINT)
+    arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    faces = [part.faces + np.uint32(offset) for part, offset in zip(parts, offsets, strict=False)]
+    return Mesh(**arrays, faces=np.concatenate(faces))
+
+
+def mirrored(part: Mesh) -> Mesh:
+    """Mirror image on the other side of the plane y = 0."""
+    flip = np.array([1, -1, 1], np.float32)
+    return replace(part, positions=part.positions * flip, normals=part.normals * flip, faces=part.faces[:, ::-1].copy())
+
+
+def both_sides(part: Mesh) -> Mesh:
+    """Join a part with its mirror image."""
+    return merge((part, mirrored(part)))
+
+
+def moved(part: Mesh, matrix: NDArray[np.float64]) -> Mesh:
+    """Place a part by a rigid transform (4, 4)."""
+    rotation = matrix[:3, :3]
+    positions = part.positions @ rotation.T + matrix[:3, 3]
+    return replace(
+        part,
+        positions=positions.astype(np.float32),
+        normals=(part.normals @ rotation.T).astype(np.float32),
+    )

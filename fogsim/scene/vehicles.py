@@ -1,0 +1,52 @@
+"""Vehicles as batches of the bodies' shapes."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.scene.bodies import BODIES
+from fogsim.values.scene import Batch
+from fogsim.values.traffic import TrafficState
+
+FIRST_VEHICLE = 16
+"""Instance id of the vehicle in row 0 (see `View.instance`)."""
+
+
+def vehicle_batches(state: TrafficState, skip: int | None) -> tuple[Batch, ...]:
+    """Build one batch for each kind of body that is on the road.
+
+    Parameters
+    ----------
+    state : TrafficState
+        Every vehicle; a body kind without a shape is drawn as a car.
+    skip : int or None
+        Row that is left out, as a rule the vehicle that carries the camera.
+
+    Returns
+    -------
+    tuple of Batch
+        Shapes fill a unit box, so the transforms scale them to length, width and height.
+    """
+    kinds = np.array([kind if kind in BODIES else "car" for kind in state.types], dtype=np.str_)
+    drawn = np.arange(len(state.ids)) != (-1 if skip is None else skip)
+    transforms = _transforms(state)
+    return tuple(
+        Batch(
+            shape=kind,
+            transforms=transforms[rows],
+            paint=state.paint[rows].astype(np.float32),
+            lamps=state.lamps[rows].astype(np.int32),
+            instance=(FIRST_VEHICLE + rows).astype(np.int32),
+        )
+        for kind in BODIES
+        if len(rows := np.flatnonzero(drawn & (kinds == kind)))
+    )
+
+
+def _transforms(state: TrafficState) -> NDArray[np.float32]:
+    transforms = np.zeros((len(state.ids), 4, 4), np.float32)
+    cosine, sine = np.cos(state.heading), np.sin(state.heading)
+    transforms[:, 0, 0], transforms[:, 0, 1] = cosine * state.length, -sine * state.width
+    transforms[:, 1, 0], transforms[:, 1, 1] = sine * state.length, cosine * state.width
+    transforms[:, 2, 2], transforms[:, 3, 3] = state.height, 1.0
+    transforms[:, :3, 3] = state.position
+    return transforms

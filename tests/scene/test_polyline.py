@@ -1,0 +1,67 @@
+import numpy as np
+import pytest
+
+from fogsim.scene.chainage import Chainage
+from fogsim.scene.polyline import LaneIndex, arc_length, at_distance, cleaned, parallel, project, refined
+from fogsim.values import Lane, LaneMarking, RoadNetwork
+
+
+def circle(radius: float, count: int = 400) -> np.ndarray:
+    angle = np.linspace(0.0, np.pi / 2, count)
+    return np.column_stack((radius * np.sin(angle), radius * (1 - np.cos(angle)), np.zeros(count)))
+
+
+def test_a_parallel_of_a_circle_is_a_circle() -> None:
+    left = parallel(circle(100.0), 10.0)  # the circle turns left around (0, 100)
+    assert np.hypot(left[:, 0], left[:, 1] - 100.0) == pytest.approx(90.0, abs=1e-3)
+
+
+def test_refining_keeps_vertices_and_length() -> None:
+    line = np.array([[0.0, 0, 0], [7, 0, 1], [7, 20, 1]])
+    fine = refined(line, 3.0)
+    assert np.diff(arc_length(fine)).max() <= 3.0
+    assert arc_length(fine)[-1] == pytest.approx(27.0)
+    assert any(np.allclose(point, line[1]) for point in fine)
+
+
+def test_doubled_points_are_cleaned_away() -> None:
+    assert len(cleaned(np.array([[0.0, 0, 0], [0, 0, 0], [5, 0, 0], [5, 0.001, 0]]))) == 2
+
+
+def test_projection_inverts_the_place_at_a_distance() -> None:
+    line = circle(80.0)
+    distance = np.array([0.0, 11.0, 77.7])
+    beside = at_distance(line, distance) + np.array([0.0, 0.0, 3.0])
+    assert project(beside, line) == pytest.approx(distance, abs=1e-6)
+
+
+def test_clearance_is_the_distance_to_the_lanes_edge(motorway: RoadNetwork) -> None:
+    index = LaneIndex(motorway.lanes)
+    points = np.array([[300.0, -5.0, 0.0], [300.0, 0.5, 0.0], [-10.0, 0.0, 0.0], [300.0, -500.0, 0.0]])
+    assert index.clearance(points)[:3] == pytest.approx([3.25, -1.25, 8.25])
+    assert index.clearance(points)[3] >= 30.0
+
+
+def test_clearance_on_one_level_passes_under_a_bridge(motorway: RoadNetwork) -> None:
+    index = LaneIndex(motorway.lanes)
+    assert index.clearance(np.array([[300.0, 0.0, 6.0]]), same_level=2.5)[0] > 0
+
+
+def lane(edge: str, index: int, line: np.ndarray) -> Lane:
+    return Lane(f"{edge}_{index}", edge, line, 3.5, 30.0, LaneMarking.DASHED, LaneMarking.DASHED, index == 0)
+
+
+def test_neighbours_on_a_curve_share_distances_and_edges_count_on() -> None:
+    outer, inner = circle(100.0), parallel(circle(100.0), 3.5)
+    onward = outer[-1] + np.array([[0.0, 0, 0], [0, 50.0, 0]])
+    lanes = [lane("curve", 0, outer), lane("curve", 1, inner), lane("straight", 0, onward)]
+    chainage = Chainage(lanes)
+    assert chainage.along(lanes[1], inner) == pytest.approx(chainage.along(lanes[0], outer), abs=0.02)
+    assert chainage.along(lanes[2], onward)[0] == pytest.approx(arc_length(outer)[-1])
+
+
+def test_a_ring_of_edges_has_distances() -> None:
+    corners = np.array([[0.0, 0, 0], [50, 0, 0], [50, 50, 0], [0, 50, 0], [0, 0, 0]])
+    lanes = [lane(str(i), 0, corners[i : i + 2]) for i in range(4)]
+    chainage = Chainage(lanes)
+    assert all(np.isfinite(chainage.along(each, each.centreline)).all() for each in lanes)

@@ -1,1 +1,60 @@
 """Geometry to linear radiance, distance along the ray and instance ids."""
+
+from collections.abc import Callable
+
+from fogsim.errors import InputError
+from fogsim.registry import Registry
+from fogsim.render.protocol import Renderer, RenderError
+from fogsim.values.scene import Scene
+
+__all__ = ["RENDERERS", "RenderError", "Renderer", "gl_report", "make_renderer"]
+
+
+def _pyrender(scene: Scene, illuminance: float) -> Renderer:
+    # OpenGL is loaded by the process that draws, when it first draws: not by every one that imports FogSim.
+    from fogsim.render.gl.renderer import GLRenderer  # noqa: PLC0415
+
+    return GLRenderer(scene, illuminance)
+
+
+RENDERERS: Registry[Callable[[Scene, float], Renderer]] = Registry("renderer", {"pyrender": _pyrender})
+"""Factories of renderers by name, each called with the scene and the horizontal illuminance [lx]."""
+
+
+def make_renderer(name: str, scene: Scene, illuminance: float) -> Renderer:
+    """Make a renderer.
+
+    Parameters
+    ----------
+    name : str
+        Name in `RENDERERS`, or "auto" for the best one that works here.
+    scene : Scene
+        What stands still.
+    illuminance : float
+        Horizontal illuminance of the daylight E [lx], not negative.
+
+    Raises
+    ------
+    UnknownNameError
+        If no renderer has that name.
+    InputError
+        If the illuminance is negative or not finite.
+    MissingDependencyError
+        If the renderer needs a library that is not there.
+    """
+    if not 0.0 <= illuminance < float("inf"):
+        raise InputError(f"illuminance must be a finite number of lux ≥ 0, got {illuminance!r}")
+    return RENDERERS["pyrender" if name == "auto" else name](scene, illuminance)
+
+
+def gl_report() -> str:
+    """Say which OpenGL draws here.
+
+    Raises
+    ------
+    MissingDependencyError
+        If OpenGL or EGL is not there or does not work.
+    """
+    from fogsim.render.gl.context import context  # noqa: PLC0415 - OpenGL is loaded only where it is used
+
+    return context().description

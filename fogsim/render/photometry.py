@@ -1,0 +1,67 @@
+"""How bright things are: overcast daylight and lamps.
+
+Radiance is given per colour channel in cd/m², scaled so that a grey surface has its luminance in every channel; the
+luminance of a coloured light is 0.2126 R + 0.7152 G + 0.0722 B (ITU-R BT.709).
+"""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.values.lamps import Lamp
+from fogsim.values.scene import Surface
+
+LUMINANCE_WEIGHTS = (0.2126, 0.7152, 0.0722)
+"""Share of each linear channel in luminance [-] (ITU-R BT.709)."""
+
+SKY_TINT = (0.988, 1.0, 1.035)
+"""Colour of the overcast sky, of luminance 1."""
+
+_RED, _AMBER, _WHITE = (1.0, 0.03, 0.015), (1.0, 0.36, 0.015), (1.0, 0.97, 0.90)
+_BEAMS = Lamp.LOW_BEAM | Lamp.HIGH_BEAM | Lamp.DAYTIME
+
+LAMPS: Mapping[Surface, tuple[Lamp, float, tuple[float, float, float]]] = {
+    Surface.LAMP_POSITION_REAR: (Lamp.POSITION, 1300.0, _RED),
+    Surface.LAMP_STOP: (Lamp.STOP, 17e3, _RED),
+    Surface.LAMP_REAR_FOG: (Lamp.REAR_FOG, 20e3, _RED),
+    Surface.LAMP_INDICATOR_LEFT: (Lamp.INDICATOR_LEFT, 15e3, _AMBER),
+    Surface.LAMP_INDICATOR_RIGHT: (Lamp.INDICATOR_RIGHT, 15e3, _AMBER),
+    Surface.LAMP_HEAD: (_BEAMS, 30e3, _WHITE),
+}
+"""Lamps that light a surface, its luminance then [cd/m²] and its colour.
+
+Luminous intensity over area: a tail lamp of 8 cd and 60 cm², a stop lamp of 100 cd and 60 cm², a rear fog lamp of
+200 cd and 100 cm², a head lamp seen beside its beam with 500 cd and 150 cm².
+"""
+
+
+def zenith_luminance(illuminance: float) -> float:
+    """Luminance of the zenith of the CIE standard overcast sky, 9 E / (7 π) [cd/m²].
+
+    Parameters
+    ----------
+    illuminance : float
+        Horizontal illuminance E [lx].
+    """
+    return 9.0 * illuminance / (7.0 * math.pi)
+
+
+def lamp_radiance(surface: Surface) -> NDArray[np.float64]:
+    """Radiance of a lit lamp's surface per channel [cd/m²]; zero for what is no lamp.
+
+    Parameters
+    ----------
+    surface : Surface
+        The surface.
+    """
+    if surface not in LAMPS:
+        return np.zeros(3)
+    _, luminance, colour = LAMPS[surface]
+    return luminance * np.array(colour) / float(np.dot(colour, LUMINANCE_WEIGHTS))
+
+
+def lamp_mask(surface: Surface) -> Lamp:
+    """Lamps any of which lights a surface."""
+    return LAMPS[surface][0] if surface in LAMPS else Lamp.NONE

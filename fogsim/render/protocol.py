@@ -1,0 +1,45 @@
+"""What every renderer does, whatever it draws with."""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from fogsim.errors import FogSimError
+from fogsim.values.camera import Camera, CameraPose
+from fogsim.values.image import View
+from fogsim.values.scene import Batch
+
+
+class RenderError(FogSimError, RuntimeError):
+    """A renderer cannot be used here or any more; the message says why and what to do."""
+
+
+class Renderer(Protocol):
+    """Draws one scene for any camera; made for one scene and one daylight."""
+
+    def render(self, vehicles: Sequence[Batch], camera: Camera, pose: CameraPose) -> View:
+        """Draw the scene and the vehicles as they are now.
+
+        Parameters
+        ----------
+        vehicles : sequence of Batch
+            What moves.
+        camera : Camera
+            The pinhole.
+        pose : CameraPose
+            Where it is.
+
+        Returns
+        -------
+        View
+            Arrays of its own that later frames do not touch.
+
+        Raises
+        ------
+        RenderError
+            If the renderer is closed or belongs to another process.
+        """
+        ...
+
+    def close(self) -> None:
+        """Give back what the renderer holds; a second call does nothing."""
+        ...

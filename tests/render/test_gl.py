@@ -1,0 +1,343 @@
+import math
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from fogsim.errors import InputError, MissingDependencyError, UnknownNameError
+from fogsim.render import Renderer, RenderError, gl_report, make_renderer
+from fogsim.scene import build_scene, vehicle_batches
+from fogsim.values import (
+    Camera,
+    CameraPose,
+    Lamp,
+    Lane,
+    LaneMarking,
+    RoadNetwork,
+    Scene,
+    SignMap,
+    TrafficState,
+    View,
+)
+
+CAMERA = Camera(640, 480, 577.0, (320.0, 240.0), 1.38, pitch=math.radians(2.0))
+SMALL = Camera(160, 120, 144.25, (80.0, 60.0), 1.38, pitch=math.radians(2.0))
+AHEAD = CameraPose((0.0, 0.0, 1.38), heading=0.0)
+
+Maker = Callable[[Scene], Renderer]
+ILLUMINANCE = 18e3
+
+
+@pytest.fixture(scope="session")
+def make() -> Iterator[Maker]:
+    try:
+        gl_report()
+    except MissingDependencyError as error:
+        pytest.skip(str(error))
+    made: list[Renderer] = []
+
+    def renderer(scene: Scene) -> Renderer:
+        made.append(make_renderer("pyrender", scene, ILLUMINANCE))
+        return made[-1]
+
+    yield renderer
+    for one in made:
+        one.close()
+
+
+@pytest.fixture(scope="session")
+def scene() -> Scene:
+    """A straight road along x, three lanes of 3.5 m, the middle one on y = 0, 1500 m long."""
+    lines = [np.array([[-100.0, y, 0.0], [1400.0, y, 0.0]]) for y in (-3.5, 0.0, 3.5)]
+    dashed, solid = LaneMarking.DASHED, LaneMarking.SOLID
+    lanes = tuple(
+        Lane(f"e_{i}", "e", line, 3.5, 36.0, solid if i == 2 else dashed, dashed if i else solid, i == 0)
+        for i, line in enumerate(lines)
+    )
+    return build_scene(RoadNetwork(lanes, lines[1]), SignMap(), np.random.default_rng(1))
+
+
+@pytest.fixture(scope="session")
+def renderer(make: Maker, scene: Scene) -> Renderer:
+    return make(scene)
+
+
+def one_vehicle(
+    kind: str, gap: float, lamps: int = 0, size: tuple[float, float, float] = (16.5, 2.5, 4.0)
+) -> TrafficState:
+    """A vehicle on y = 0 whose rear is `gap` metres ahead of the origin."""
+    length, width, height = size
+    return TrafficState(
+        time=0.0,
+        ids=("lead",),
+        types=(kind,),
+        position=np.array([[gap + length, 0.0, 0.0]]),
+        heading=np.zeros(1),
+        speed=np.zeros(1),
+        acceleration=np.zeros(1),
+        length=np.array([length]),
+        width=np.array([width]),
+        height=np.array([height]),
+        lane=("",),
+        lamps=np.array([lamps], np.int32),
+        paint=np.full((1, 3), 0.3),
+    )
+
+
+def rays(camera: Camera, pose: CameraPose) -> np.ndarray:
+    """Unit rays (rows, cols, 3) of all pixels, worked out with angles rather than with matrices of the renderer's."""
+    u, v = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
+    x = (u - camera.principal_point[0]) / camera.focal_length
+    y = (v - camera.principal_point[1]) / camera.focal_length
+    # Undo the roll, then pitch about the right axis, then turn to the heading.
+    x, y = x * math.cos(camera.roll) + y * math.sin(camera.roll), y * math.cos(camera.roll) - x * math.sin(camera.roll)
+    pitch = camera.pitch - pose.grade
+    ahead, up = math.cos(pitch) - y * math.sin(pitch), -math.sin(pitch) - y * math.cos(pitch)
+    east = ahead * math.cos(pose.heading) + x * math.sin(pose.heading)
+    north = ahead * math.sin(pose.heading) - x * math.cos(pose.heading)
+    ray = np.stack((east, north, up), axis=-1)
+    return ray / np.linalg.norm(ray, axis=-1, keepdims=True)
+
+
+def test_the_road_lies_where_the_pinhole_puts_it(renderer: Renderer) -> None:
+    view = renderer.render((), CAMERA, AHEAD)
+    road = view.instance == 2
+    exact = CAMERA.mount_height / -rays(CAMERA, AHEAD)[..., 2]
+    lane = road & (np.abs((rays(CAMERA, AHEAD) * exact[..., None])[..., 1]) < 5.2)
+    for low, high, tolerance in ((3, 10, 1e-4), (10, 300, 1e-4), (300, 1000, 1e-3)):
+        chosen = lane & (exact > low) & (exact < high)
+        assert chosen.sum() > 10
+        assert view.distance[chosen] == pytest.approx(exact[chosen], rel=tolerance)
+
+
+def test_a_row_of_the_road_lies_at_the_distance_of_the_papers(renderer: Renderer) -> None:
+    view = renderer.render((), CAMERA, AHEAD)
+    row = 300
+    distance = CAMERA.row_distance / (row - CAMERA.horizon_row)
+    ahead = view.distance[row, 320] * math.cos(math.asin(CAMERA.mount_height / view.distance[row, 320]))
+    # negru2013 eq. 11 measures along the road with the camera's axis tilted little.
+    assert ahead == pytest.approx(distance, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("camera", "pose"),
+    [
+        (Camera(320, 240, 300.0, (150.0, 130.0), 2.0, 0.1, 0.15), CameraPose((50.0, 1.0, 2.0), 0.3)),
+        (Camera(320, 240, 300.0, (150.0, 130.0), 2.0, -0.02, -0.1), CameraPose((50.0, 1.0, 2.0), 2.8, 0.05)),
+    ],
+)
+def test_terrain_and_sky_part_at_the_horizon_for_any_attitude(
+    make: Maker, scene: Scene, camera: Camera, pose: CameraPose
+) -> None:
+    bare = Scene(ground=scene.ground, shapes=scene.shapes, scenery=())
+    view = make(bare).render((), camera, pose)
+    up = rays(camera, pose)[..., 2]
+    terrain = (view.instance == 1) & (view.distance < 5e3)
+    assert terrain.sum() > 1000
+    assert view.distance[terrain] == pytest.approx((pose.position[2] + 0.1) / -up[terrain], rel=2e-4)
+    assert (view.instance[up > 0.02] == 0).mean() > 0.97  # the guard rails reach above the horizon at places
+    assert not np.any(view.instance[up < -1e-3] == 0)
+    road = view.instance == 2
+    if road.any():
+        high = np.abs(view.distance[road] * -up[road] - pose.position[2])
+        assert high.max() < 0.09  # shoulders and verges lie a little lower
+
+
+def test_the_sky_is_at_infinity_and_a_cie_overcast_one(renderer: Renderer) -> None:
+    steep = Camera(64, 64, 40.0, (32.0, 32.0), 1.38, pitch=-0.9)
+    view = renderer.render((), steep, AHEAD)
+    sky = view.instance == 0
+    assert sky.mean() > 0.9
+    assert np.isposinf(view.distance[sky]).all()
+    assert np.isfinite(view.distance[~sky]).all()
+    sine = rays(steep, AHEAD)[..., 2][sky]
+    zenith = 9 * ILLUMINANCE / (7 * math.pi)
+    assert view.radiance[sky][:, 1] == pytest.approx(zenith * (1 + 2 * sine) / 3, rel=1e-4)
+
+
+def test_asphalt_and_paint_have_the_radiance_of_their_reflectance(renderer: Renderer) -> None:
+    view = renderer.render((), CAMERA, AHEAD)
+    asphalt = view.radiance[400:470, 300:340, 1] * math.pi / ILLUMINANCE
+    assert asphalt.mean() == pytest.approx(0.088, rel=0.05)
+    assert 0.005 < asphalt.std() / asphalt.mean() < 0.12
+    assert view.radiance[..., 1][view.instance == 2].max() * math.pi / ILLUMINANCE == pytest.approx(0.6, rel=0.1)
+
+
+def line_width(view: View, row: int) -> float:
+    """Width of the solid line right of the right lane [m], from the paint in one row."""
+    reflectance = view.radiance[row, 330:, 1].astype(float) * math.pi / ILLUMINANCE
+    rays_row = rays(CAMERA, AHEAD)[row, 330:]
+    across = -rays_row[:, 1] * 1.38 / -rays_row[:, 2]
+    near = (np.abs(across - 5.25) < 0.45) & (view.instance[row, 330:] == 2)
+    share = (reflectance[near] - 0.09) / (0.6 - 0.09)
+    return float(np.sum(share) * np.median(np.diff(across)))
+
+
+def test_an_edge_line_is_as_wide_near_as_far(renderer: Renderer) -> None:
+    view = renderer.render((), CAMERA, AHEAD)
+    rows = [285, 270, 255, 245, 238]  # 12 … 44 m
+    assert [line_width(view, row) for row in rows] == pytest.approx([0.2] * len(rows), abs=0.02)
+
+
+def test_dashes_fade_to_their_share_with_distance(renderer: Renderer) -> None:
+    # A row at 300 m covers 113 m of road: six periods, a third of them painted.
+    view = renderer.render((), CAMERA, AHEAD)
+    direction = rays(CAMERA, AHEAD)
+    place = direction * (1.38 / -direction[..., 2:])
+    far = (np.abs(place[..., 1] - 1.75) < 0.35) & (place[..., 0] > 180) & (place[..., 0] < 400)
+    values = view.radiance[far][:, 1] * math.pi / ILLUMINANCE
+    assert values.max() < 0.30
+    assert values.max() > 0.10
+
+
+@pytest.mark.parametrize("gap", [12.0, 50.0, 90.0, 150.0, 300.0])
+def test_a_vehicle_is_as_far_and_as_large_as_it_is(renderer: Renderer, gap: float) -> None:
+    view = renderer.render(vehicle_batches(one_vehicle("truck", gap), None), CAMERA, AHEAD)
+    seen = view.instance == 16
+    direction = rays(CAMERA, AHEAD)
+    distance = np.where(seen, view.distance, 0.0)
+    ahead = distance * direction[..., 0]
+    rear = seen & (np.abs(distance * direction[..., 2] + 1.38 - 2.5) < 1.0)
+    assert rear.sum() > 10
+    # The doors lie up to 0.15 m before the rear bar that ends the vehicle.
+    assert np.median(ahead[rear]) == pytest.approx(gap + 0.08, abs=0.1)
+    columns = np.flatnonzero(seen.any(axis=0))
+    assert (len(columns)) == pytest.approx(2.5 * 577 / gap, abs=2.0)
+
+
+def test_every_vehicle_carries_its_own_id(renderer: Renderer) -> None:
+    (batch,) = vehicle_batches(one_vehicle("car", 20.0, size=(4.5, 1.8, 1.5)), None)
+    second = type(batch)(
+        batch.shape,
+        batch.transforms + np.eye(4, k=3, dtype=np.float32) * 0,
+        batch.paint,
+        batch.lamps,
+        batch.instance + 4,
+    )
+    second.transforms[0, 1, 3] = 3.5
+    ids = set(np.unique(renderer.render((batch, second), CAMERA, AHEAD).instance))
+    assert {0, 1, 2, 3, 16, 20} <= ids
+    assert ids <= {0, 1, 2, 3, 16, 20}
+
+
+@pytest.mark.parametrize(
+    ("lamp", "luminance"),
+    [(Lamp.POSITION, 1300), (Lamp.STOP, 17e3), (Lamp.REAR_FOG, 20e3), (Lamp.INDICATOR_LEFT, 15e3)],
+)
+@pytest.mark.parametrize("camera", [CAMERA, SMALL], ids=["large", "small"])
+def test_a_lit_lamp_adds_its_luminance(renderer: Renderer, camera: Camera, lamp: Lamp, luminance: float) -> None:
+    def draw(lamps: Lamp) -> np.ndarray:
+        state = one_vehicle("van", 6.0, int(lamps), (5.9, 2.0, 2.6))
+        return renderer.render(vehicle_batches(state, None), camera, AHEAD).radiance.astype(float)
+
+    added = (draw(lamp) - draw(Lamp.NONE)) @ (0.2126, 0.7152, 0.0722)
+    assert added.max() == pytest.approx(luminance, rel=1e-3)
+    assert 4 <= np.count_nonzero(added > 1) < 0.05 * added.size
+
+
+def test_two_renders_agree_to_the_bit_and_share_nothing(renderer: Renderer) -> None:
+    vehicles = vehicle_batches(one_vehicle("bus", 30.0), None)
+    first = renderer.render(vehicles, CAMERA, AHEAD)
+    kept = first.radiance.copy()
+    renderer.render((), SMALL, CameraPose((5.0, 0.0, 1.38), 0.1))
+    second = renderer.render(vehicles, CAMERA, AHEAD)
+    assert np.array_equal(first.radiance, kept)
+    for name in ("radiance", "distance", "instance"):
+        one, other = getattr(first, name), getattr(second, name)
+        assert np.array_equal(one, other)
+        assert not np.shares_memory(one, other)
+        assert one.flags.c_contiguous
+    assert (first.radiance.dtype, first.distance.dtype, first.instance.dtype) == (np.float32, np.float32, np.int32)
+
+
+def test_far_from_the_origin_the_picture_is_the_same(make: Maker, scene: Scene) -> None:
+    bare = Scene(ground=scene.ground, shapes=scene.shapes, scenery=())
+    pose = CameraPose((1000.0, 0.0, 1.38), 0.0)
+    view = make(bare).render((), CAMERA, pose)
+    exact = 1.38 / -rays(CAMERA, pose)[400, 320, 2]
+    assert view.distance[400, 320] == pytest.approx(exact, rel=1e-4)
+
+
+def test_closing_one_renderer_leaves_the_other_working(make: Maker, scene: Scene, renderer: Renderer) -> None:
+    before = renderer.render((), SMALL, AHEAD)
+    other = make(scene)
+    other.render((), SMALL, AHEAD)
+    other.close()
+    other.close()
+    with pytest.raises(RenderError, match="closed"):
+        other.render((), SMALL, AHEAD)
+    assert np.array_equal(renderer.render((), SMALL, AHEAD).radiance, before.radiance)
+
+
+def test_renderers_give_back_what_they_hold(scene: Scene, renderer: Renderer) -> None:
+    from OpenGL import GL
+
+    kinds = (GL.glIsBuffer, GL.glIsVertexArray, GL.glIsFramebuffer, GL.glIsRenderbuffer, GL.glIsProgram, GL.glIsShader)
+
+    def held() -> list[int]:
+        return [sum(bool(kind(name)) for name in range(1, 1000)) for kind in kinds]
+
+    before = held()
+    assert min(before[:5]) > 0
+    for _ in range(30):
+        one = make_renderer("auto", scene, ILLUMINANCE)
+        one.render((), SMALL, AHEAD)
+        one.render((), CAMERA, AHEAD)
+        one.close()
+    assert held() == before
+
+
+def test_nothing_is_drawn_for_a_shape_that_is_not_there(renderer: Renderer) -> None:
+    (batch,) = vehicle_batches(one_vehicle("car", 20.0), None)
+    unknown = type(batch)("sledge", batch.transforms, batch.paint, batch.lamps, batch.instance)
+    with pytest.raises(InputError, match="sledge"):
+        renderer.render((unknown,), SMALL, AHEAD)
+
+
+def test_unknown_renderers_and_light_are_refused(scene: Scene) -> None:
+    with pytest.raises(UnknownNameError, match="pyrender"):
+        make_renderer("pyrendr", scene, ILLUMINANCE)
+    with pytest.raises(InputError, match="illuminance"):
+        make_renderer("pyrender", scene, -1.0)
+
+
+def test_the_report_names_the_version(renderer: Renderer) -> None:
+    assert "OpenGL 4" in gl_report()
+
+
+def run(code: str) -> str:
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
+    return done.stdout + done.stderr
+
+
+def test_importing_the_stage_loads_no_opengl() -> None:
+    code = "import sys, fogsim.render, fogsim.scene; print([m for m in sys.modules if m in ('OpenGL', 'pyrender')])"
+    assert run(code).strip() == "[]"
+
+
+def test_a_context_from_before_a_fork_is_refused_in_the_child(renderer: Renderer) -> None:
+    code = (
+        "import os\nfrom fogsim.render import gl_report\ngl_report()\n"
+        "if os.fork() == 0:\n"
+        "    try:\n        gl_report()\n"
+        "    except Exception as error:\n        print(type(error).__name__, error, flush=True)\n"
+        "    os._exit(0)\n"
+        "os.wait()\nprint('parent', gl_report())\n"
+    )
+    said = run(code)
+    assert "RenderError" in said
+    assert "does not survive a fork" in said
+    assert "parent" in said
+
+
+def test_a_missing_egl_names_the_packages() -> None:
+    code = (
+        "import ctypes.util, sys\nsys.modules['pyrender.platforms'] = None\n"
+        "from fogsim.render import gl_report\n"
+        "try:\n    gl_report()\nexcept Exception as error:\n    print(type(error).__name__, error)\n"
+    )
+    said = run(code)
+    assert said.startswith("MissingDependencyError")
+    assert "sudo apt-get install libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri" in said

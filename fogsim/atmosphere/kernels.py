@@ -7,17 +7,31 @@ from numpy.typing import NDArray
 
 from fogsim.jit import kernel
 
+ENDLESS = 1e7
+"""Length that stands for an endless ray [m]."""
+
 
 @kernel
-def _window_integral(station: float, middle: float, edge: float) -> float:
+def _ramp(station: float, middle: float, edge: float) -> float:
+    t = min(max((station - middle) / edge + 0.5, 0.0), 1.0)
+    return t * t * (3.0 - 2.0 * t)
+
+
+@kernel
+def _ramp_integral(station: float, middle: float, edge: float) -> float:
     t = min(max((station - middle) / edge + 0.5, 0.0), 1.0)
     return edge * t * t * t * (1.0 - 0.5 * t) + max(station - (middle + 0.5 * edge), 0.0)
 
 
 @kernel
-def _window(station: float, middle: float, edge: float) -> float:
-    t = min(max((station - middle) / edge + 0.5, 0.0), 1.0)
-    return t * t * (3.0 - 2.0 * t)
+def _bank_share(bank: NDArray[np.float64], integral_here: float, rate: float, length: float) -> float:
+    """Mean of a bank's profile along a ray, 0 … 1; `rate` is the change of the station with distance."""
+    here, start, end, edge = bank[0], bank[3], bank[4], bank[5]
+    span = rate * length
+    if abs(span) < 1e-3:
+        return _ramp(here, start, edge) - _ramp(here, end, edge)
+    there = here + span
+    return (_ramp_integral(there, start, edge) - _ramp_integral(there, end, edge) - integral_here) / span
 
 
 @kernel
@@ -38,34 +52,25 @@ def fog_pixels(
     station of the eye, the axis (x, y), start, end, edge and extra extinction.
     """
     rows, columns = distance.shape
+    integral_here = np.empty(banks.shape[0])
+    for b in range(banks.shape[0]):
+        here, edge = banks[b, 0], banks[b, 5]
+        integral_here[b] = _ramp_integral(here, banks[b, 3], edge) - _ramp_integral(here, banks[b, 4], edge)
     for v in range(rows):
         for u in range(columns):
             x = ray_map[0, 0] * u + ray_map[0, 1] * v + ray_map[0, 2]
             y = ray_map[1, 0] * u + ray_map[1, 1] * v + ray_map[1, 2]
             z = ray_map[2, 0] * u + ray_map[2, 1] * v + ray_map[2, 2]
             norm = 1.0 / math.sqrt(x * x + y * y + z * z)
-            length = float(distance[v, u])
+            # An endless path through fog shows nothing but airlight; through clear air, everything.
+            length = min(float(distance[v, u]), ENDLESS)
             if z > 0.0 and eye_height + length * z * norm > top:
                 length = (top - eye_height) / (z * norm)
-            if math.isinf(length):
-                # An endless path through fog shows nothing but airlight; through clear air, everything.
-                length = 1e7
-            depth = base_extinction * length
+            extinction = base_extinction
             for b in range(banks.shape[0]):
                 rate = (x * banks[b, 1] + y * banks[b, 2]) * norm
-                start, end, edge = banks[b, 3], banks[b, 4], banks[b, 5]
-                near = banks[b, 0]
-                far = near + rate * length
-                if abs(far - near) < 1e-3:
-                    share = _window(near, start, edge) - _window(near, end, edge)
-                else:
-                    share = (
-                        _window_integral(far, start, edge)
-                        - _window_integral(near, start, edge)
-                        - _window_integral(far, end, edge)
-                        + _window_integral(near, end, edge)
-                    ) / (far - near)
-                depth += banks[b, 6] * share * length
-            transmission = math.exp(-depth)
+                extinction += banks[b, 6] * _bank_share(banks[b], integral_here[b], rate, length)
+            transmission = math.exp(-extinction * length)
             for c in range(3):
-                out[v, u, c] = radiance[v, u, c] * transmission + airlight[c] * (1.0 - transmission)
+                light = airlight[c]
+                out[v, u, c] = light + (radiance[v, u, c] - light) * transmission

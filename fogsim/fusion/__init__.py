@@ -1,1 +1,39 @@
 """Many estimates over time to one belief."""
+
+import inspect
+from collections.abc import Callable
+
+from fogsim.errors import InputError, suggest
+from fogsim.fusion.grid_filter import GridFilter
+from fogsim.fusion.protocol import Fusion
+from fogsim.registry import Registry
+
+FUSIONS: Registry[Callable[..., Fusion]] = Registry("fusion", {"grid_filter": GridFilter})
+"""Every fusion by name: called with keyword parameters it gives a `Fusion`."""
+
+
+def make(name: str, **options: object) -> Fusion:
+    """Build a fusion.
+
+    Parameters
+    ----------
+    name : str
+        Name in `FUSIONS`.
+    **options : object
+        Parameters of the fusion.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no fusion of that name.
+    InputError
+        If the fusion has no such parameter.
+    """
+    allowed = list(inspect.signature(FUSIONS[name]).parameters)
+    for option in options:
+        if option not in allowed:
+            raise InputError(f"fusion {name!r} has no parameter {option!r}; {suggest(option, allowed)}")
+    return FUSIONS[name](**options)
+
+
+__all__ = ["FUSIONS", "Fusion", "make"]

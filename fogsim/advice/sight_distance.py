@@ -31,6 +31,9 @@ class StoppingSightDistance:
         Lowest speed that is ever advised [m/s].
     hold : float
         Time before the advice rises [s].
+    widest_belief : float
+        Standard deviation of ln k above which a belief says too little to change the advice [-]: at the start, or
+        while nothing but the rear of a truck is to be seen.
     """
 
     reaction_time: float = 2.5
@@ -40,9 +43,12 @@ class StoppingSightDistance:
     rounding: float = 10.0 / KMH_PER_MPS
     minimum: float = 20.0 / KMH_PER_MPS
     hold: float = 3.0
+    widest_belief: float = 0.7
 
     def advise(self, belief: Belief, speed_limit: float, time: float, previous: SpeedAdvice) -> SpeedAdvice:
         """Advise a speed; see `Adviser.advise`. No advice (``inf``) where the limit itself is safe."""
+        if belief.log_standard_deviation > self.widest_belief:
+            return SpeedAdvice(previous.speed)
         sight = self.sight_share * belief.visibility_quantile(self.quantile)
         safe = safe_speed(sight, self.reaction_time, self.deceleration)
         target = math.inf if safe >= speed_limit else self._rounded(safe)

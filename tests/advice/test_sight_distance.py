@@ -47,6 +47,13 @@ def test_advice_falls_at_once_and_rises_after_the_hold() -> None:
     assert broken.raise_since is None
 
 
+def test_a_belief_that_says_nothing_changes_no_advice() -> None:
+    cells = np.linspace(math.log(3e-4), math.log(0.3), 241)
+    ignorant = Belief(cells, np.full(241, 1 / 241))
+    for speed in (50 / 3.6, math.inf):
+        assert StoppingSightDistance().advise(ignorant, LIMIT, 0.0, SpeedAdvice(speed)).speed == speed
+
+
 def test_never_below_the_minimum() -> None:
     speed = StoppingSightDistance().advise(believe(12.0), LIMIT, 0.0, SpeedAdvice()).speed
     assert speed * 3.6 == pytest.approx(20.0)

@@ -71,7 +71,7 @@ def test_deviation_of_the_fit_matches_its_scatter():
 
 
 def test_sensitivity_to_the_horizon_is_that_of_a_refit():
-    curve, shift = road_curve(0.03), 0.5
+    curve, shift = road_curve(0.03, noise=1.0), 0.2
     below = curve.below_horizon - shift
     moved = RoadCurve(below, curve.luminance, path_lengths(below, LAMBDA, np.ones(below.size)), curve.weight, LAMBDA)
     model, other = fit_curve(curve), fit_curve(moved)

@@ -56,4 +56,4 @@ def motorcycle(*, detail: bool = True) -> Mesh:
         cylinder((0.31, 0.11, 0.31), (0.6, 0.11, 0.9), 0.03, STEEL, sides=6),
         cylinder((1.2, -0.18, 0.35), (2.0, -0.2, 0.5), 0.06, STEEL, sides=8),
     )
-    return finished([*rolling, hull(np.array(fairing)), *rider, *lamps, *frame], 2.17, 0.35)
+    return finished([*rolling, hull(np.array(fairing)), *rider, *lamps, *frame], 2.17, 0.2)

@@ -1,0 +1,71 @@
+"""Where the horizon is in the image, and how surely."""
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.values.camera import Camera
+
+PITCH_DEVIATION = math.radians(0.1)
+"""Standard deviation of a vehicle's pitch about its calibration [rad]: load, suspension, uneven road."""
+
+
+@dataclass(frozen=True, slots=True)
+class Horizon:
+    """The horizon as a straight line in the image.
+
+    Attributes
+    ----------
+    row : float
+        Its row at the principal column [px]; not necessarily inside the image.
+    standard_deviation : float
+        Standard deviation of that row [px].
+    """
+
+    row: float
+    standard_deviation: float
+
+
+def calibrated_horizon(camera: Camera, pitch_deviation: float = PITCH_DEVIATION) -> Horizon:
+    """Horizon from the calibrated pitch: v_h = v0 − α tan θ (negru2013 eq. 6).
+
+    Parameters
+    ----------
+    camera : Camera
+        The told calibration.
+    pitch_deviation : float
+        Standard deviation of the true pitch about the told one [rad].
+
+    Returns
+    -------
+    Horizon
+        Row and its standard deviation, α / cos² θ times that of the pitch.
+    """
+    deviation = camera.focal_length / math.cos(camera.pitch) ** 2 * pitch_deviation
+    return Horizon(row=camera.horizon_row, standard_deviation=deviation)
+
+
+def levelled(image: NDArray[np.uint8], camera: Camera) -> NDArray[np.uint8]:
+    """Turn an image about the principal point such that its horizon is level.
+
+    Parameters
+    ----------
+    image : (rows, cols) or (rows, cols, 3) uint8
+        An image of the camera.
+    camera : Camera
+        The told calibration; its roll is what is undone.
+
+    Returns
+    -------
+    (rows, cols) or (rows, cols, 3) uint8
+        The image itself if the camera has no roll; else corners that it does not cover repeat its border.
+    """
+    if camera.roll == 0.0:
+        return image
+    # Positive roll turns the right side down, and OpenCV counts angles counterclockwise: the same angle undoes it.
+    turn = cv2.getRotationMatrix2D(camera.principal_point, math.degrees(camera.roll), 1.0)
+    size = (camera.width, camera.height)
+    return np.asarray(cv2.warpAffine(image, turn, size, borderMode=cv2.BORDER_REPLICATE), np.uint8)

@@ -1,0 +1,225 @@
+"""Fog from the luminance of the road in a single daytime image (Negru & Nedevschi, ICCP 2013)."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.estimators.image_check import checked_image
+from fogsim.values.camera import Camera
+from fogsim.values.estimate import Estimate
+from fogsim.values.observation import Observation
+from fogsim.vision.curve_fit import fit_curve
+from fogsim.vision.edges import edge_map, smoothed
+from fogsim.vision.horizon import PITCH_DEVIATION, Horizon, calibrated_horizon, levelled
+from fogsim.vision.inflection import FogModel, best_inflection, steepest_slope
+from fogsim.vision.luminance import linear_luminance
+from fogsim.vision.profile import RoadCurve, band_profile, path_lengths
+from fogsim.vision.region import Band, crossing_band, grow_region
+
+MIN_COLS, MIN_ROWS = 32, 16  # [px] a road narrower than this, or lower below its horizon, shows no curve
+MIN_AIRLIGHT = 6.0  # [linear grey levels] darker than this above the horizon is no day
+MIN_CONTRAST = 6.0  # [linear grey levels] between road and airlight; below it quantisation hides the curve
+SATURATED = 250.0  # [linear grey levels] clipped, or so near that noise is
+SIMILARITY = 0.25  # [-] steepest fog, in contrasts of road to airlight a row; a silhouette takes at least 0.34
+NEAR_HORIZON = 4.0  # [px] a region that ends this close below the horizon has seen the whole road
+MAX_RESIDUAL = 0.12  # [-] of the fitted contrast: more is no curve of Koschmieder's
+
+
+class _CannotTell(Exception):  # noqa: N818 - no error: the honest answer to some images, turned into an Estimate
+    """Why this frame says nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class _RoadImage:
+    """The part of an image from a little above the horizon to its bottom row.
+
+    Attributes
+    ----------
+    luminance : (rows, cols) float32
+        Linear grey levels.
+    first_row : int
+        Row of the whole image that is row 0 here.
+    horizon : Horizon
+        In rows of the whole image.
+    airlight, road : float
+        First guesses: the bright part of what lies above the horizon, and the median of the bottom row.
+    """
+
+    luminance: NDArray[np.float32]
+    first_row: int
+    horizon: Horizon
+    airlight: float
+    road: float
+
+    @property
+    def contrast(self) -> float:
+        return self.airlight - self.road
+
+
+class Negru2013:
+    """Inflection point of the road's luminance curve (Negru & Nedevschi 2013, section IV).
+
+    Edges, a region grown upward from the road, the widest vertical band that crosses it, the median of each of its
+    rows, the row of steepest change whose model fits best: the extinction is k = 2 (v_i − v_h) / λ.
+
+    It departs from the paper thus: the horizon comes from the calibration (the paper's own alternative to vanishing
+    points); luminance is linear, because Koschmieder's law is; eqs. 17 and 18 have their signs set right; the fog's
+    own gradient draws no edges; the band is of limited width and near the vanishing point, where the road is; and k,
+    R and A are those of least squares over the whole curve, instead of those that one row gives. The paper's choice
+    of the best of the last N frames is left out: fusion does that job, with the uncertainties.
+
+    A region that reaches the horizon without an inflection gives k = 0 with the detection limit as its deviation;
+    whatever else stands in the way gives an invalid estimate with the reason in its diagnostics. Daytime only, flat
+    road, road darker than the airlight.
+
+    Parameters
+    ----------
+    camera : Camera
+        The calibration as the vehicle was told it.
+    as_published : bool
+        Read k off the inflection's row alone, as the paper does.
+    pitch_deviation : float
+        Standard deviation of the true pitch about the told one [rad], for the uncertainty.
+    """
+
+    method = "negru2013"
+
+    def __init__(self, camera: Camera, *, as_published: bool = False, pitch_deviation: float = PITCH_DEVIATION) -> None:
+        self._camera = camera
+        self._pitch_deviation = pitch_deviation
+        self._model = best_inflection if as_published else fit_curve
+
+    def reset(self) -> None:
+        """Forget nothing: every frame stands alone."""
+
+    def update(self, observation: Observation) -> Estimate:
+        """Estimate the fog from one image.
+
+        Parameters
+        ----------
+        observation : Observation
+            Its image is all that is used.
+
+        Returns
+        -------
+        Estimate
+            Diagnostics: ``horizon_row`` and ``inflection_row`` [px], ``band`` (left, right, top, bottom) [px],
+            ``airlight`` and ``road`` [linear grey levels, 0 … 255], ``profile`` (n,) of the band's rows; or ``reason``.
+
+        Raises
+        ------
+        InputError
+            If the image is not uint8, not grey or colour, or not of the told camera's size.
+        """
+        image = checked_image(observation.image, self._camera)
+        diagnostics: dict[str, object] = {"horizon_row": self._camera.horizon_row}
+        try:
+            road = self._road_image(image)
+            band = _band(road, self._camera.principal_point[0])
+            diagnostics["band"] = (band.left, band.right, band.top + road.first_row, band.bottom + road.first_row)
+            curve = self._curve(road, band)
+            diagnostics["profile"] = curve.luminance
+            model = self._fog(curve, road)
+        except _CannotTell as reason:
+            return Estimate.invalid(self.method, str(reason), **diagnostics)
+        if model is None:
+            return self._no_fog(curve, road.horizon, diagnostics)
+        return self._fog_estimate(model, road.horizon, diagnostics)
+
+    def _road_image(self, image: NDArray[np.uint8]) -> _RoadImage:
+        horizon = calibrated_horizon(self._camera, self._pitch_deviation)
+        rows, cols = image.shape[:2]
+        if not 1.0 <= horizon.row <= rows - 1:
+            raise _CannotTell(f"the horizon (row {horizon.row:.1f}) is outside the image")
+        if rows - 1 - horizon.row < MIN_ROWS or cols < MIN_COLS:
+            raise _CannotTell("the image is too small to show a curve")
+        sky_rows = math.ceil(horizon.row)
+        first = max(0, sky_rows - 4 - rows // 20)
+        luminance = linear_luminance(levelled(image, self._camera)[first:], self._camera.response)
+        airlight = float(np.percentile(luminance[: sky_rows - first, ::4], 90))
+        return _checked(_RoadImage(luminance, first, horizon, airlight, float(np.median(luminance[-1]))))
+
+    def _curve(self, road: _RoadImage, band: Band) -> RoadCurve:
+        camera = self._camera
+        rows = np.arange(band.top, band.bottom + 1, dtype=np.float64) + road.first_row
+        below = rows - road.horizon.row
+        u0, v0 = camera.principal_point
+        across = (0.5 * (band.left + band.right) - u0) / camera.focal_length
+        slant = np.sqrt(1.0 + across**2 + ((rows - v0) / camera.focal_length) ** 2)
+        luminance = band_profile(road.luminance, band)
+        weight = (luminance < SATURATED).astype(np.float64)
+        return RoadCurve(below, luminance, path_lengths(below, camera.row_distance, slant), weight, camera.row_distance)
+
+    def _fog(self, curve: RoadCurve, road: _RoadImage) -> FogModel | None:
+        """Model of the fog, or None if the whole road is seen without an inflection."""
+        model = _credible(self._inflection(curve), curve, road)
+        if model is None and curve.below_horizon[0] > NEAR_HORIZON:
+            raise _CannotTell("the road's region ends below the horizon, and no inflection lies in it")
+        if model is None and float(np.median(curve.luminance[:3])) > road.road + 0.5 * road.contrast:
+            raise _CannotTell("the road fades into the airlight, but not as Koschmieder's law has it")
+        return model
+
+    def _inflection(self, curve: RoadCurve) -> FogModel | None:
+        if curve.weight.sum() < MIN_ROWS // 2:
+            return None
+        return self._model(curve)
+
+    def _no_fog(self, curve: RoadCurve, horizon: Horizon, diagnostics: dict[str, object]) -> Estimate:
+        # An inflection needs a row on either side: the topmost that could have been seen is the second.
+        rows = max(float(curve.below_horizon[0]), 1.0) + 1.0
+        limit = 2.0 / self._camera.row_distance * math.hypot(rows, horizon.standard_deviation)
+        return Estimate(self.method, 0.0, limit, diagnostics=diagnostics)
+
+    def _fog_estimate(self, model: FogModel, horizon: Horizon, diagnostics: dict[str, object]) -> Estimate:
+        deviation = math.hypot(model.standard_deviation, model.horizon_sensitivity * horizon.standard_deviation)
+        inflection = horizon.row + 0.5 * model.extinction * self._camera.row_distance
+        found = {"inflection_row": inflection, "airlight": model.airlight, "road": model.road}
+        return Estimate(self.method, model.extinction, deviation, diagnostics={**diagnostics, **found})
+
+
+def _checked(road: _RoadImage) -> _RoadImage:
+    if road.airlight < MIN_AIRLIGHT:
+        raise _CannotTell("too dark above the horizon: this is a daytime method")
+    if road.road >= SATURATED:
+        raise _CannotTell("the road is saturated")
+    if road.contrast < max(MIN_CONTRAST, 0.05 * road.airlight):
+        raise _CannotTell("the road is nearly as bright as the airlight, or brighter")
+    return road
+
+
+def _band(road: _RoadImage, centre: float) -> Band:
+    blurred = smoothed(road.luminance)
+    below_horizon = np.arange(blurred.shape[0], dtype=np.float64) + (road.first_row - road.horizon.row)
+    fog_slope = np.minimum(steepest_slope(below_horizon, road.airlight), SIMILARITY * road.contrast)
+    edges = edge_map(blurred, fog_slope.astype(np.float32))
+    if edges.threshold > road.contrast:
+        raise _CannotTell("noise or texture drowns the contrast of road and airlight")
+    steps = (fog_slope + edges.threshold).astype(np.float32)
+    region = grow_region(blurred, edges.pixels, steps, SIMILARITY * road.contrast + edges.threshold)
+    cols = region.shape[1]
+    band = crossing_band(
+        region, centre, min_width=max(3, cols // 80), max_width=max(5, cols // 24), hole=max(2, cols // 128)
+    )
+    if band is None or band.bottom - band.top < MIN_ROWS // 2:
+        raise _CannotTell("no vertical band crosses the road's region")
+    return band
+
+
+def _credible(model: FogModel | None, curve: RoadCurve, road: _RoadImage) -> FogModel | None:
+    """Pass a model only if it is one of fog over this road and its inflection was seen.
+
+    The airlight is what is seen at the horizon: where that is much brighter than the model says, the model has fitted
+    a road that brightens with distance, and no fog.
+    """
+    if model is None or not 0.0 < model.extinction < math.inf:
+        return None
+    drop = model.airlight - model.road
+    inflection = 0.5 * model.extinction * curve.row_distance
+    seen = curve.below_horizon[0] + 1.0 <= inflection <= curve.below_horizon[-1]
+    contrast = drop >= MIN_CONTRAST and model.residual <= MAX_RESIDUAL * drop
+    # A saturated sky is at least as bright as it looks.
+    excess = model.airlight - road.airlight
+    airlight = excess >= -0.3 * road.contrast and (excess <= 0.3 * road.contrast or road.airlight >= SATURATED)
+    return model if seen and contrast and airlight else None

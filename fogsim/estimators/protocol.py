@@ -1,0 +1,32 @@
+"""What every estimator is to the loop."""
+
+from typing import Protocol
+
+from fogsim.values.estimate import Estimate
+from fogsim.values.observation import Observation
+
+
+class Estimator(Protocol):
+    """Turns what a vehicle has at one instant into an estimate of the extinction coefficient.
+
+    An estimator is built from the camera as the vehicle was told it and from keyword parameters of its own.
+    """
+
+    @property
+    def method(self) -> str:
+        """Name in the registry."""
+        ...
+
+    def update(self, observation: Observation) -> Estimate:
+        """Estimate the fog from one observation.
+
+        Raises
+        ------
+        InputError
+            If the image is not one of the told camera.
+        """
+        ...
+
+    def reset(self) -> None:
+        """Forget all earlier observations."""
+        ...

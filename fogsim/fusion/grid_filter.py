@@ -1,0 +1,164 @@
+"""Bayesian filter on a grid over the logarithm of the extinction coefficient."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.errors import InputError
+from fogsim.units import extinction_from_visibility
+from fogsim.values.belief import Belief
+from fogsim.values.estimate import Estimate
+
+Floats = NDArray[np.float64]
+
+CELLS = 240
+NEAREST, FARTHEST = 10.0, 10_000.0  # [m] visibilities at the ends of the grid
+LOG_LOW, LOG_HIGH = (math.log(extinction_from_visibility(v)) for v in (FARTHEST, NEAREST))
+LOG_RANGE = LOG_HIGH - LOG_LOW
+
+
+class GridFilter:
+    """Bayes' rule over 240 cells of ln k between 10 km and 10 m of visibility.
+
+    Between two instants ln k walks at random, and now and then leaps: the edge of a fog bank is driven through in a
+    second. An estimate k̂ ± σ has the likelihood N(k̂; k, σ) in k, so that "no fog seen", k̂ = 0, pushes toward thin
+    fog without claiming any particular visibility; a share of estimates is taken for outliers that could be anything.
+    Neighbouring frames share their errors (road texture, pitch), so an estimate counts only for the share of
+    `correlation_time` that has passed since the one before: the likelihood is raised to that power. Invalid estimates
+    change nothing; time alone widens the belief. Before the first estimate every ln k on the grid is equally likely.
+
+    Parameters
+    ----------
+    drift : float
+        Standard deviation of the random walk of ln k over one second [1/√s].
+    leap_rate : float
+        Expected leaps a second [1/s].
+    leap_scale : float
+        Mean size of a leap in ln k, exponentially distributed either way [-].
+    relative_floor : float
+        Smallest standard deviation of an estimate relative to k that is believed [-].
+    outlier_share : float
+        Share of estimates that say nothing, above 0 and below 1 [-].
+    correlation_time : float
+        Time after which the errors of an estimator are new ones [s].
+
+    Raises
+    ------
+    InputError
+        If a parameter is out of range.
+    """
+
+    def __init__(
+        self,
+        drift: float = 0.05,
+        leap_rate: float = 0.05,
+        leap_scale: float = 1.0,
+        relative_floor: float = 0.05,
+        outlier_share: float = 0.07,
+        correlation_time: float = 0.5,
+    ) -> None:
+        _check(drift=drift, leap_scale=leap_scale, relative_floor=relative_floor, correlation_time=correlation_time)
+        if not (math.isfinite(leap_rate) and leap_rate >= 0.0):
+            raise InputError(f"grid_filter leap_rate must be finite and ≥ 0, got {leap_rate!r}")
+        if not 0.0 < outlier_share < 1.0:
+            raise InputError(f"grid_filter outlier_share must lie between 0 and 1, got {outlier_share!r}")
+        self._drift, self._leap_rate, self._leap_scale = drift, leap_rate, leap_scale
+        self._relative_floor, self._outlier_share = relative_floor, outlier_share
+        self._correlation_time = correlation_time
+        self._log_extinction = np.linspace(LOG_LOW, LOG_HIGH, CELLS)
+        self._log_extinction.flags.writeable = False
+        self._extinction = np.exp(self._log_extinction)
+        self._offset = (self._log_extinction[1] - self._log_extinction[0]) * np.arange(-(CELLS - 1), CELLS)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything: all visibilities are equally likely again."""
+        self._probability = np.full(CELLS, 1.0 / CELLS)
+        self._time: float | None = None
+        self._weight = 1.0
+
+    def update(self, estimates: Sequence[Estimate], time: float) -> Belief:
+        """Take in the estimates of one instant.
+
+        Parameters
+        ----------
+        estimates : sequence of Estimate
+            From any estimators; invalid ones and such with numbers that are not finite are left out.
+        time : float
+            The instant [s], not before that of the last call. Estimates of the same instant in two calls count as in
+            one.
+
+        Returns
+        -------
+        Belief
+            240 cells of ln k, its arrays its own.
+
+        Raises
+        ------
+        InputError
+            If the time is not finite or goes backward.
+        """
+        self._advance(time)
+        log_likelihood = np.zeros(CELLS)
+        for estimate in estimates:
+            if estimate.valid and math.isfinite(estimate.extinction) and math.isfinite(estimate.standard_deviation):
+                log_likelihood += self._weight * self._log_likelihood(estimate)
+        # The largest exponent is zero: no product of densities can overflow, and the sum cannot vanish.
+        posterior = self._probability * np.exp(log_likelihood - log_likelihood.max())
+        self._probability = posterior / posterior.sum()
+        return Belief(self._log_extinction, self._probability.copy())
+
+    def _advance(self, time: float) -> None:
+        if not math.isfinite(time):
+            raise InputError(f"grid_filter: the time of an update must be finite, got {time!r}")
+        if self._time is not None and time < self._time:
+            raise InputError(f"grid_filter: time went back from {self._time!r} to {time!r} s; reset() starts anew")
+        if self._time is not None and time > self._time:
+            elapsed = time - self._time
+            self._weight = min(1.0, elapsed / self._correlation_time)
+            self._probability = self._diffused(elapsed)
+        self._time = time
+
+    def _diffused(self, elapsed: float) -> Floats:
+        """Spread the probability over what may have happened in between, folding back at both ends of the grid."""
+        walk = self._walk(self._drift * math.sqrt(elapsed))
+        leap = np.exp(-np.abs(self._offset) / self._leap_scale)
+        leaps = -math.expm1(-self._leap_rate * elapsed)
+        step = (1.0 - leaps) * walk + leaps * leap / leap.sum()
+        spread = np.convolve(self._probability, step)
+        inside = spread[CELLS - 1 : 2 * CELLS - 1].copy()
+        inside[: CELLS - 1] += spread[CELLS - 2 :: -1]
+        inside[1:] += spread[: 2 * CELLS - 2 : -1]
+        return np.asarray(inside / inside.sum())
+
+    def _walk(self, deviation: float) -> Floats:
+        """Distribution over offsets in cells after a random walk of a given standard deviation in ln k."""
+        cell = float(self._offset[CELLS] - self._offset[CELLS - 1])
+        if deviation >= cell:
+            walk = np.exp(-0.5 * (self._offset / deviation) ** 2)
+            return np.asarray(walk / walk.sum())
+        # Finer than the grid, a sampled bell would stand still: three cells of the same variance do not.
+        walk = np.zeros(2 * CELLS - 1)
+        aside = 0.5 * (deviation / cell) ** 2
+        walk[CELLS - 2 : CELLS + 1] = aside, 1.0 - 2.0 * aside, aside
+        return walk
+
+    def _log_likelihood(self, estimate: Estimate) -> Floats:
+        """Logarithm of the likelihood of each cell, relative to that of an outlier."""
+        measured = min(max(estimate.extinction, 0.0), float(self._extinction[-1]))
+        floor = self._relative_floor * max(measured, float(self._extinction[0]))
+        # A deviation far beyond the grid says as little as one a bit beyond it, and squares to no infinity.
+        deviation = math.hypot(min(max(estimate.standard_deviation, 0.0), 10.0), floor)
+        exponent = -0.5 * ((measured - self._extinction) / deviation) ** 2
+        density = np.exp(exponent) / (math.sqrt(2.0 * math.pi) * deviation)
+        # An outlier is any ln k on the grid: 1 / (k LOG_RANGE) in k, and no more than that at k̂ = 0.
+        outlier = 1.0 / (LOG_RANGE * max(measured, deviation))
+        return np.asarray(np.log1p((1.0 - self._outlier_share) / self._outlier_share * density / outlier))
+
+
+def _check(**parameters: float) -> None:
+    for name, value in parameters.items():
+        if not (math.isfinite(value) and value > 0.0):
+            raise InputError(f"grid_filter {name} must be finite and positive, got {value!r}")

@@ -10,8 +10,11 @@ from fogsim.errors import InputError
 from fogsim.values.camera import Camera
 from fogsim.values.scene import Batch, Mesh
 
-STAND_INS = ((":far", 26.0), (":tiny", 7.0))
-"""Endings of the names of shapes that stand in for the one without, and the radius in the picture below which [px]."""
+STAND_INS = ((":far", 12.0), (":tiny", 3.5))
+"""Endings of the names of shapes that stand in for the one without.
+
+Each goes with half the breadth in the picture below which it does [px].
+"""
 
 RECORD = np.dtype([("transform", "<f4", (3, 4)), ("paint", "<f4", (3,)), ("lamps", "<i4"), ("instance", "<i4")])
 """What is drawn of one copy: the upper rows of its transform, paint, lit lamps and instance id."""
@@ -29,16 +32,16 @@ class ShapeTable:
     numbers : mapping from str to int
         Number of each shape.
     centre : (n, 3) float64
-        Middle of each shape's bounding sphere.
-    radius : (n,) float64
-        Its radius.
+        Middle of each shape's bounding box.
+    half_extent : (n, 3) float64
+        Half of each shape's extents along its axes.
     stand_in : (levels, n) int64
         Shapes that are drawn instead where it is small, by the levels of `STAND_INS`.
     """
 
     numbers: Mapping[str, int]
     centre: NDArray[np.float64]
-    radius: NDArray[np.float64]
+    half_extent: NDArray[np.float64]
     stand_in: NDArray[np.int64]
 
     @classmethod
@@ -50,7 +53,7 @@ class ShapeTable:
         return cls(
             numbers=numbers,
             centre=0.5 * (low + high),
-            radius=0.5 * np.linalg.norm(high - low, axis=1),
+            half_extent=0.5 * (high - low),
             stand_in=_stand_ins(numbers),
         )
 
@@ -76,6 +79,8 @@ class Copies:
         Middle of each copy's bounding sphere in the world [m].
     radius : (n,) float64
         Its radius [m].
+    breadth : (n,) float64
+        Half of the second largest of its three extents [m], which says how much of it there is to see.
     record : (n,) `RECORD`
         What is drawn.
     """
@@ -83,6 +88,7 @@ class Copies:
     shape: NDArray[np.int64]
     centre: NDArray[np.float64]
     radius: NDArray[np.float64]
+    breadth: NDArray[np.float64]
     record: NDArray[np.void]
 
 
@@ -108,8 +114,8 @@ def flattened(batches: Sequence[Batch], table: ShapeTable) -> Copies:
         record["instance"] = np.concatenate([batch.instance for batch in batches])
     transform = record["transform"].astype(np.float64)
     centre = np.einsum("nij,nj->ni", transform[:, :, :3], table.centre[shape]) + transform[:, :, 3]
-    stretch = np.sqrt(np.max(np.sum(transform[:, :, :3] ** 2, axis=1), axis=1, initial=0.0))
-    return Copies(shape, centre, table.radius[shape] * stretch, record)
+    extent = table.half_extent[shape] * np.sqrt(np.sum(transform[:, :, :3] ** 2, axis=1))
+    return Copies(shape, centre, np.linalg.norm(extent, axis=1), np.sort(extent, axis=1)[:, 1], record)
 
 
 def visible(
@@ -142,12 +148,16 @@ def visible(
     offset = copies.centre - eye
     reach = offset @ (_frustum(camera) @ axes).T + copies.radius[:, None]
     depth = offset @ axes[2]
-    nearness = camera.focal_length * copies.radius
-    seen = np.all(reach > 0, axis=1) & (depth < _FARTHEST + copies.radius) & (nearness > _SMALLEST * depth)
+    seen = (
+        np.all(reach > 0, axis=1)
+        & (depth < _FARTHEST + copies.radius)
+        & (camera.focal_length * copies.radius > _SMALLEST * depth)
+    )
     chosen = np.flatnonzero(seen)
     shape = copies.shape[chosen]
-    for (_, radius), stand_in in zip(STAND_INS, table.stand_in, strict=True):
-        shape = np.where(nearness[chosen] < radius * depth[chosen], stand_in[copies.shape[chosen]], shape)
+    drawn_breadth = camera.focal_length * copies.breadth[chosen]
+    for (_, limit), stand_in in zip(STAND_INS, table.stand_in, strict=True):
+        shape = np.where(drawn_breadth < limit * depth[chosen], stand_in[copies.shape[chosen]], shape)
     record = copies.record[chosen]
     record["transform"][:, :, 3] = record["transform"][:, :, 3].astype(np.float64) - eye
     return shape, record

@@ -142,7 +142,7 @@ def woodland(rng: np.random.Generator, level: int = 0) -> Mesh:
     level : int
         0 in full, 1 for the distance, 2 a speck.
     """
-    columns = (40, 20, 8)[level]
+    columns = (30, 16, 7)[level]
     green = np.array([0.040, 0.057, 0.027]) * rng.uniform(0.8, 1.2)
     parts = []
     for depth, tall, bright in ((0.08, 1.0, 0.7), (-0.06, 0.72, 1.0))[: 1 if level else 2]:

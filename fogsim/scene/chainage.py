@@ -1,6 +1,7 @@
 """Distances along lanes that neighbours share, so that a line painted half in each of two lanes meets itself."""
 
 from collections.abc import Mapping, Sequence
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,12 +9,16 @@ from numpy.typing import NDArray
 from fogsim.scene.polyline import arc_length, cleaned, project
 from fogsim.values.road import Lane
 
+_BESIDE = 9.0  # ends of the two directions of a road lie nearer to each other than this [m]
+_DASH = 6.0  # length of a dash; dashes start at multiples of their period [m]
+
 
 class Chainage:
     """Distance along the carriageway of any point of a lane.
 
     All lanes of an edge are measured along the same one of them, and an edge goes on counting where the edge that
-    leads into it has ended.
+    leads into it has ended. Where an edge runs beside one in the other direction, both are measured so that dashes of
+    the line between them coincide.
 
     Parameters
     ----------
@@ -44,17 +49,47 @@ def _predecessors(lanes: Sequence[Lane], reference: Mapping[str, NDArray[np.floa
     return {edge: before for edge, before in found.items() if before is not None and before != edge}
 
 
+def _opposites(reference: Mapping[str, NDArray[np.float64]]) -> dict[str, str]:
+    """Edges that run the other way beside an edge: its end near the edge's start, and its start near the edge's end."""
+    ends: dict[tuple[int, int], list[str]] = {}
+    for edge, line in reference.items():
+        column, row = np.floor(line[-1, :2] / _BESIDE).astype(int).tolist()
+        for cell in product((column - 1, column, column + 1), (row - 1, row, row + 1)):
+            ends.setdefault(cell, []).append(edge)
+    found = {}
+    for edge, line in reference.items():
+        column, row = np.floor(line[0, :2] / _BESIDE).astype(int).tolist()
+        for other in ends.get((column, row), ()):
+            gaps = np.linalg.norm(reference[other][[-1, 0]] - line[[0, -1]], axis=1)
+            if other != edge and gaps.max() < _BESIDE:
+                found[edge] = other
+    return found
+
+
 def _offsets(reference: Mapping[str, NDArray[np.float64]], before: Mapping[str, str]) -> dict[str, float]:
     offsets: dict[str, float] = {}
+    opposites = _opposites(reference)
     for edge in reference:
         chain = [edge]
         while chain[-1] not in offsets and before.get(chain[-1]) not in (None, *chain):
             chain.append(before[chain[-1]])
         for member in reversed(chain):
-            previous = before.get(member)
             if member not in offsets:
-                known = previous is not None and previous in offsets
-                offsets[member] = (
-                    offsets[previous] + float(arc_length(reference[previous])[-1]) if known and previous else 0.0
-                )
+                offsets[member] = _offset(member, reference, offsets, opposites.get(member), before.get(member))
     return offsets
+
+
+def _offset(
+    edge: str,
+    reference: Mapping[str, NDArray[np.float64]],
+    offsets: Mapping[str, float],
+    opposite: str | None,
+    before: str | None,
+) -> float:
+    if opposite in offsets and opposite is not None:
+        # Distances of both directions then add up to the length of a dash, so that their dashes coincide.
+        start = float(project(reference[edge][:1], reference[opposite])[0])
+        return _DASH - offsets[opposite] - start
+    if before in offsets and before is not None:
+        return offsets[before] + float(arc_length(reference[before])[-1])
+    return 0.0

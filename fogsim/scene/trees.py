@@ -79,14 +79,14 @@ def broad_leaved(rng: np.random.Generator, level: int = 0) -> Mesh:
     middle, size = np.array([0.0, 0.0, 0.60]), np.array([1.15 * width, 1.15 * width, 0.33])
     parts = [_trunk(0.4, 0.022)] if level < 2 else []
     # A core that no light shines through, and around it what gives the crown its outline.
-    parts += _blob(rng, middle, size, colour, (50, 0, 0)[level])
+    parts += _blob(rng, middle, size, colour, (80, 0, 0)[level])
     turn = rng.uniform(0, 2 * np.pi)
     for place in range((8, 3, 0)[level]):
         # The golden angle spreads any number of blobs evenly around the crown.
         angle, rise = turn + 2.4 * place, rng.uniform(-0.75, 0.8)
         out = np.array([np.cos(angle), np.sin(angle), 0.0]) * np.sqrt(1 - rise**2) + np.array([0, 0, rise])
         blob = rng.uniform(0.40, 0.58) * size * (1.0, 1.0, 0.8)
-        parts += _blob(rng, middle + 0.8 * size * out, blob, colour, (26, 0, 0)[level])
+        parts += _blob(rng, middle + 0.8 * size * out, blob, colour, (50, 0, 0)[level])
     whole = merge(parts)
     return replace(whole, positions=whole.positions / whole.positions[:, 2].max())
 
@@ -121,7 +121,7 @@ def _leaf_clusters(
     direction = rng.normal(size=(count, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     middle = centre + direction * size * rng.uniform(0.85, 1.15, (count, 1))
-    corners = middle[:, None, :] + rng.normal(size=(count, 3, 3)) * 0.034
+    corners = middle[:, None, :] + rng.normal(size=(count, 3, 3)) * 0.026
     light = _crown_light(direction, middle) * rng.uniform(0.8, 1.45, count)
     return mesh(
         corners,

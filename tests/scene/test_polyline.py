@@ -65,3 +65,15 @@ def test_a_ring_of_edges_has_distances() -> None:
     lanes = [lane(str(i), 0, corners[i : i + 2]) for i in range(4)]
     chainage = Chainage(lanes)
     assert all(np.isfinite(chainage.along(each, each.centreline)).all() for each in lanes)
+
+
+def test_both_directions_of_a_road_put_the_dashes_of_their_common_line_at_the_same_places() -> None:
+    pieces = [np.array([[0.0, 0, 0], [100, 0, 0]]), np.array([[100.0, 0, 0], [231, 0, 0]])]
+    there = [lane(f"there{i}", 0, piece) for i, piece in enumerate(pieces)]
+    back = [lane(f"back{i}", 0, piece[::-1] + np.array([0, 3.5, 0])) for i, piece in enumerate(pieces)]
+    chainage = Chainage([*there, *back])
+    for one, other in zip(there, back, strict=True):
+        points = at_distance(one.centreline, np.linspace(1.0, 99.0, 50))
+        painted = [np.mod(chainage.along(each, points), 18.0) < 6.0 for each in (one, other)]
+        assert np.mean(painted[0] == painted[1]) > 0.95
+        assert 0.2 < np.mean(painted[0]) < 0.5

@@ -11,6 +11,8 @@ MINIMUM = (3, 11)
 LIBRARIES = {
     "libEGL.so.1": "libegl1 libegl-mesa0 libgl1-mesa-dri",
     "libGL.so.1": "libgl1",
+    "libXrender.so.1": "libxrender1",
+    "libatomic.so.1": "libatomic1",
 }
 
 

@@ -26,7 +26,7 @@ def load_libsumo() -> ModuleType:
     except ImportError as error:
         raise MissingDependencyError(
             f"libsumo cannot be loaded ({error}); install it with: pip install libsumo, "
-            "and on Debian/Ubuntu: sudo apt-get install libgl1 libxext6 libxrender1"
+            "and on Debian/Ubuntu: sudo apt-get install libgl1 libxrender1 libatomic1"
         ) from error
     module: ModuleType = libsumo
     return module

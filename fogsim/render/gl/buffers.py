@@ -78,10 +78,13 @@ class MeshStore:
         _upload(GL.GL_DRAW_INDIRECT_BUFFER, self._command_buffer, commands, GL.GL_STREAM_DRAW)
         GL.glMultiDrawElementsIndirect(GL.GL_TRIANGLES, GL.GL_UNSIGNED_INT, ctypes.c_void_p(0), len(commands), 0)
 
-    def draw_background(self) -> None:
-        """Draw three vertices without attributes."""
+    def draw_background(self, *, below_horizon: bool) -> None:
+        """Draw one triangle without attributes, on request only what its shader keeps below the horizon."""
         GL.glBindVertexArray(self._array)
+        if below_horizon:
+            GL.glEnable(GL.GL_CLIP_DISTANCE0)
         GL.glDrawArrays(GL.GL_TRIANGLES, 0, 3)
+        GL.glDisable(GL.GL_CLIP_DISTANCE0)
 
     def delete(self) -> None:
         """Free the buffers."""

@@ -17,19 +17,17 @@ class Program:
 
     Parameters
     ----------
-    name : str
-        Stem of the files in ``shaders/``.
+    vertex, fragment : str
+        Stems of the files in ``shaders/``.
     """
 
-    def __init__(self, name: str) -> None:
-        self._name = name
+    def __init__(self, vertex: str, fragment: str) -> None:
+        self._name = fragment
         # Linking validates, and in a core profile that needs some vertex array to be bound.
         vertex_array = GL.glGenVertexArrays(1)
         GL.glBindVertexArray(vertex_array)
-        stages = ((GL.GL_VERTEX_SHADER, "vert"), (GL.GL_FRAGMENT_SHADER, "frag"))
-        self._program = shaders.compileProgram(
-            *(shaders.compileShader(_source(f"{name}.{ending}"), stage) for stage, ending in stages)
-        )
+        stages = ((GL.GL_VERTEX_SHADER, f"{vertex}.vert"), (GL.GL_FRAGMENT_SHADER, f"{fragment}.frag"))
+        self._program = shaders.compileProgram(*(shaders.compileShader(_source(name), stage) for stage, name in stages))
         GL.glBindVertexArray(0)
         GL.glDeleteVertexArrays(1, [vertex_array])
         self._locations: dict[str, int] = {}

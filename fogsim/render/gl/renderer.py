@@ -1,12 +1,12 @@
 """The renderer that draws with OpenGL."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.render.copies import RECORD, Copies, ShapeTable, flattened, pieces, visible
+from fogsim.render.copies import ShapeTable, flattened, pieces, visible
 from fogsim.render.gl.context import context
 from fogsim.render.photometry import SKY_TINT, lamp_mask, lamp_radiance, zenith_luminance
 from fogsim.render.projection import camera_axes, clip_from_offset, ray_from_pixel
@@ -50,14 +50,17 @@ class GLRenderer:
         from fogsim.render.gl.buffers import MeshStore, Target, target_for  # noqa: PLC0415
         from fogsim.render.gl.programs import Program  # noqa: PLC0415
 
-        self._terrain, ground = _split_terrain(scene.ground)
+        self._terrain, road, ground = _split(scene.ground)
         parts = {f"ground {number}": part for number, part in enumerate(pieces(ground, _GROUND_SQUARE))}
-        shapes = {**scene.shapes, **parts}
+        paved = {f"road {number}": part for number, part in enumerate(pieces(road, _GROUND_SQUARE))}
+        shapes = {**scene.shapes, **parts, **paved}
+        self._first_paved = len(shapes) - len(paved)
         self._table = ShapeTable.of(shapes)
-        self._still = flattened([*scene.scenery, *map(_standing, parts)], self._table)
+        self._still = flattened([*scene.scenery, *map(_standing, (*parts, *paved))], self._table)
         self._illuminance = illuminance
         self._store = MeshStore(list(shapes.values()))
-        self._mesh_program, self._background_program = Program("mesh"), Program("background")
+        self._objects, self._road = Program("mesh", "object"), Program("mesh", "road")
+        self._grass, self._sky = Program("background", "terrain"), Program("background", "sky")
         self._target: Target | None = None
         self._target_for = target_for
         self._closed = False
@@ -83,59 +86,67 @@ class GLRenderer:
         self._context.activate()
         if self._target is not None:
             self._target.delete()
-        for part in (self._store, self._mesh_program, self._background_program):
+        for part in (self._store, self._objects, self._road, self._grass, self._sky):
             part.delete()
 
     def _set_constants(self) -> None:
         masks = np.zeros(12, np.int32)
         masks[: len(Surface)] = [int(lamp_mask(surface)) for surface in Surface]
-        self._mesh_program.use()
-        self._mesh_program.set("lamp_masks", masks.reshape(3, 4))
-        self._mesh_program.set("lamp_radiance", np.array([lamp_radiance(surface) for surface in Surface]))
-        self._mesh_program.set("illuminance", float(self._illuminance))
-        self._background_program.use()
-        self._background_program.set("illuminance", float(self._illuminance))
-        self._background_program.set("zenith", zenith_luminance(self._illuminance) * np.array(SKY_TINT))
-        self._background_program.set("terrain_reflectance", self._terrain.reflectance)
+        for program in (self._objects, self._road):
+            program.use()
+            program.set("lamp_masks", masks.reshape(3, 4))
+            program.set("lamp_radiance", np.array([lamp_radiance(surface) for surface in Surface]))
+            program.set("illuminance", float(self._illuminance))
+        self._grass.use()
+        self._grass.set("illuminance", float(self._illuminance))
+        self._grass.set("terrain_reflectance", self._terrain.reflectance)
+        self._sky.use()
+        self._sky.set("zenith", zenith_luminance(self._illuminance) * np.array(SKY_TINT))
 
     def _draw_meshes(
         self, vehicles: Sequence[Batch], camera: Camera, pose: CameraPose, eye: NDArray[np.float64]
     ) -> None:
-        axes = camera_axes(camera, pose)
-        groups = [
-            visible(copies, self._table, camera, axes, eye)
-            for copies in (flattened(vehicles, self._table), self._still)
-        ]
-        self._mesh_program.use()
-        self._mesh_program.set("clip_from_offset", clip_from_offset(camera, pose))
-        self._mesh_program.set("eye", eye)
-        self._store.draw(np.concatenate([group[0] for group in groups]), np.concatenate([group[1] for group in groups]))
+        axes, projection = camera_axes(camera, pose), clip_from_offset(camera, pose)
+        copies = (flattened(vehicles, self._table), self._still)
+        groups = [visible(group, self._table, camera, axes, eye) for group in copies]
+        shape, record = (np.concatenate(parts) for parts in zip(*groups, strict=True))
+        paved = shape >= self._first_paved
+        self._objects.use()
+        self._objects.set("clip_from_offset", projection)
+        self._store.draw(shape[~paved], record[~paved])
+        self._road.use()
+        self._road.set("clip_from_offset", projection)
+        self._road.set("eye", eye)
+        self._store.draw(shape[paved], record[paved])
 
     def _draw_background(self, camera: Camera, pose: CameraPose, eye: NDArray[np.float64]) -> None:
-        self._background_program.use()
-        self._background_program.set("ray_from_pixel", ray_from_pixel(camera, pose))
-        self._background_program.set("eye", eye)
-        self._background_program.set("focal_length", float(camera.focal_length))
-        self._background_program.set("terrain_height", float(max(eye[2] - self._terrain.height, 0.0)))
-        self._store.draw_background()
+        """Fill what nothing covers yet with sky, and below the horizon with grass."""
+        rays = ray_from_pixel(camera, pose)
+        self._sky.use()
+        self._sky.set("ray_from_pixel", rays)
+        self._store.draw_background(below_horizon=False)
+        height = float(eye[2] - self._terrain.height)
+        if height <= 0.0:
+            return
+        self._grass.use()
+        self._grass.set("ray_from_pixel", rays)
+        self._grass.set("picture", np.array([camera.width, camera.height, 1.0]))
+        self._grass.set("eye", eye)
+        self._grass.set("focal_length", float(camera.focal_length))
+        self._grass.set("terrain_height", height)
+        self._store.draw_background(below_horizon=True)
 
 
-def _split_terrain(ground: Mesh) -> tuple[_Terrain, Mesh]:
-    """Take the plane of the terrain out of the ground; without one it lies at minus infinity."""
-    flat = ground.surface == int(Surface.TERRAIN)
-    rest = Mesh(
-        positions=ground.positions,
-        normals=ground.normals,
-        reflectance=ground.reflectance,
-        surface=ground.surface,
-        road=ground.road,
-        instance=ground.instance,
-        faces=ground.faces[~flat[ground.faces].any(axis=1)],
-    )
+def _split(ground: Mesh) -> tuple[_Terrain, Mesh, Mesh]:
+    """Take the plane of the terrain, the road and the rest apart; without terrain its plane is infinitely high."""
+    surface = ground.surface[ground.faces[:, 0]]
+    flat, paved = surface == int(Surface.TERRAIN), surface == int(Surface.ROAD)
+    road, rest = replace(ground, faces=ground.faces[paved]), replace(ground, faces=ground.faces[~flat & ~paved])
     if not flat.any():
-        return _Terrain(float("inf"), np.zeros(3)), rest
-    height = float(ground.positions[flat, 2].mean())
-    return _Terrain(height, ground.reflectance[flat].mean(axis=0).astype(np.float64)), rest
+        return _Terrain(float("inf"), np.zeros(3)), road, rest
+    vertices = ground.faces[flat].ravel()
+    height = float(ground.positions[vertices, 2].mean())
+    return _Terrain(height, ground.reflectance[vertices].mean(axis=0).astype(np.float64)), road, rest
 
 
 def _standing(shape: str) -> Batch:
@@ -147,6 +158,3 @@ def _standing(shape: str) -> Batch:
         lamps=np.zeros(1, np.int32),
         instance=np.zeros(1, np.int32),
     )
-
-
-__all__ = ["RECORD", "Copies", "GLRenderer"]

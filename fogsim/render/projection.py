@@ -63,3 +63,12 @@ def ray_from_pixel(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
     focal = camera.focal_length
     plane = np.array([[1 / focal, 0.0, -u0 / focal], [0.0, 1 / focal, -v0 / focal], [0.0, 0.0, 1.0]])
     return np.asarray(camera_axes(camera, pose).T @ plane, np.float64)
+
+
+def highest_terrain_row(camera: Camera, pose: CameraPose) -> int:
+    """First row of the picture [px] in which any ray points below the horizon; the picture's height if none does."""
+    up = ray_from_pixel(camera, pose)[2]
+    ends = np.array([-0.5, camera.width - 0.5])
+    rows = np.arange(camera.height)[:, None]
+    below = np.any(up[0] * ends + up[1] * rows + up[2] < 0.0, axis=1)
+    return int(np.argmax(below)) if below.any() else camera.height

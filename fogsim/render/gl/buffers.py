@@ -78,13 +78,10 @@ class MeshStore:
         _upload(GL.GL_DRAW_INDIRECT_BUFFER, self._command_buffer, commands, GL.GL_STREAM_DRAW)
         GL.glMultiDrawElementsIndirect(GL.GL_TRIANGLES, GL.GL_UNSIGNED_INT, ctypes.c_void_p(0), len(commands), 0)
 
-    def draw_background(self, *, below_horizon: bool) -> None:
-        """Draw one triangle without attributes, on request only what its shader keeps below the horizon."""
+    def draw_background(self) -> None:
+        """Draw one triangle without attributes."""
         GL.glBindVertexArray(self._array)
-        if below_horizon:
-            GL.glEnable(GL.GL_CLIP_DISTANCE0)
         GL.glDrawArrays(GL.GL_TRIANGLES, 0, 3)
-        GL.glDisable(GL.GL_CLIP_DISTANCE0)
 
     def delete(self) -> None:
         """Free the buffers."""
@@ -153,9 +150,15 @@ class Target:
         """Draw into this from now on; the background will cover what nothing else does, so only depth is cleared."""
         GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self._framebuffer)
         GL.glViewport(0, 0, *self.size)
+        GL.glDisable(GL.GL_SCISSOR_TEST)
         GL.glEnable(GL.GL_DEPTH_TEST)
         GL.glDepthFunc(GL.GL_LEQUAL)
         GL.glClear(GL.GL_DEPTH_BUFFER_BIT)
+
+    def restrict(self, first_row: int) -> None:
+        """Draw only into rows from this one on, until the next picture begins."""
+        GL.glEnable(GL.GL_SCISSOR_TEST)
+        GL.glScissor(0, first_row, self.size[0], self.size[1] - first_row)
 
     def read(self) -> View:
         """Copy the finished picture to arrays of its own; its first row is the first that was drawn."""

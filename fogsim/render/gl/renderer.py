@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fogsim.render.copies import ShapeTable, flattened, pieces, visible
 from fogsim.render.gl.context import context
 from fogsim.render.photometry import SKY_TINT, lamp_mask, lamp_radiance, zenith_luminance
-from fogsim.render.projection import camera_axes, clip_from_offset, ray_from_pixel
+from fogsim.render.projection import camera_axes, clip_from_offset, highest_terrain_row, ray_from_pixel
 from fogsim.render.protocol import RenderError
 from fogsim.values.camera import Camera, CameraPose
 from fogsim.values.image import View
@@ -124,17 +124,18 @@ class GLRenderer:
         rays = ray_from_pixel(camera, pose)
         self._sky.use()
         self._sky.set("ray_from_pixel", rays)
-        self._store.draw_background(below_horizon=False)
+        self._store.draw_background()
+        first_row = highest_terrain_row(camera, pose)
         height = float(eye[2] - self._terrain.height)
-        if height <= 0.0:
+        if height <= 0.0 or first_row >= camera.height or self._target is None:
             return
+        self._target.restrict(first_row)
         self._grass.use()
         self._grass.set("ray_from_pixel", rays)
-        self._grass.set("picture", np.array([camera.width, camera.height, 1.0]))
         self._grass.set("eye", eye)
         self._grass.set("focal_length", float(camera.focal_length))
         self._grass.set("terrain_height", height)
-        self._store.draw_background(below_horizon=True)
+        self._store.draw_background()
 
 
 def _split(ground: Mesh) -> tuple[_Terrain, Mesh, Mesh]:

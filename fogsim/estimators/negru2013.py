@@ -23,6 +23,12 @@ MIN_AIRLIGHT = 6.0  # [linear grey levels] darker than this above the horizon is
 MIN_CONTRAST = 6.0  # [linear grey levels] between road and airlight; below it quantisation hides the curve
 SATURATED = 250.0  # [linear grey levels] clipped, or so near that noise is
 SIMILARITY = 0.25  # [-] steepest fog, in contrasts of road to airlight a row; a silhouette takes at least 0.34
+MAX_ASIDE = 0.1
+"""Share of the image's width by which a clear road may lie beside the vanishing column [-]."""
+
+MAX_ABOVE = 0.05
+"""Share of the image's height that a clear road's region may reach above the told horizon [-]."""
+
 NEAR_HORIZON = 4.0  # [px] a region that ends this close below the horizon has seen the whole road
 MAX_RESIDUAL = 0.12  # [-] of the fitted contrast: more is no curve of Koschmieder's
 
@@ -122,6 +128,8 @@ class Negru2013:
             curve = self._curve(road, band)
             diagnostics["profile"] = curve.luminance
             model = self._fog(curve, road)
+            if model is None:
+                self._check_clear_view(curve, band)
         except _CannotTell as reason:
             return Estimate.invalid(self.method, str(reason), **diagnostics)
         if model is None:
@@ -160,6 +168,17 @@ class Negru2013:
         if model is None and float(np.median(curve.luminance[:3])) > road.road + 0.5 * road.contrast:
             raise _CannotTell("the road fades into the airlight, but not as Koschmieder's law has it")
         return model
+
+    def _check_clear_view(self, curve: RoadCurve, band: Band) -> None:
+        """Refuse to say "no fog" of anything but the road itself, seen up to the horizon where it vanishes.
+
+        Beside a vehicle close ahead, a dark flank or verge can look like a road without fog.
+        """
+        aside = abs(0.5 * (band.left + band.right) - self._camera.principal_point[0])
+        if aside > MAX_ASIDE * self._camera.width:
+            raise _CannotTell("the road ahead is hidden: a dark surface is seen only beside it")
+        if -float(curve.below_horizon[0]) > MAX_ABOVE * self._camera.height:
+            raise _CannotTell("what is seen of the road goes on above the horizon: it is no road")
 
     def _inflection(self, curve: RoadCurve) -> FogModel | None:
         if curve.weight.sum() < MIN_ROWS // 2:

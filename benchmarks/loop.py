@@ -87,11 +87,11 @@ def measure(size: str, steps: int, repeat: int, peer: gymnasium.Env[Any, Any] | 
         own.append(steps_per_second(env, steps, lambda: cruise))
         if peer is not None:
             other.append(steps_per_second(peer, steps, peer.action_space.sample))
-    frames = env.unwrapped._frames  # type: ignore[attr-defined]  # noqa: SLF001 - a benchmark may look inside
+    frames = env.unwrapped._frames  # type: ignore[attr-defined]
     record = {
         "env": ENV_ID,
         "camera": size,
-        "vehicles": len(env.unwrapped._step.traffic.ids),  # type: ignore[attr-defined]  # noqa: SLF001 - as above
+        "vehicles": len(env.unwrapped._step.traffic.ids),  # type: ignore[attr-defined]
         "steps_per_s": round(statistics.median(own), 2),
         "steps_per_s_min": round(min(own), 2),
         "steps_per_s_max": round(max(own), 2),

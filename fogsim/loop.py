@@ -141,8 +141,9 @@ class ClosedLoop:
         self._traffic.start(self._streams.traffic_seed)
         if self._world is None:
             self._world = self._build_world()
-        for part in (*self._estimators, self._fusion):
-            part.reset()
+        for estimator in self._estimators:
+            estimator.reset()
+        self._fusion.reset()
         self._step = None
         snapshot = self._traffic.observe()
         if snapshot is None:

@@ -1,5 +1,6 @@
 """The closed loop on real parts."""
 
+import itertools
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -30,7 +31,7 @@ def test_steps_follow_the_clocks_and_end_in_time() -> None:
 
 def test_a_command_is_decided_once_a_decision_period() -> None:
     steps = list(fogsim.run(small("fog.visibility_m=80"), seed=1))
-    changes = [s.index for a, s in zip(steps, steps[1:], strict=False) if s.command is not a.command]
+    changes = [s.index for a, s in itertools.pairwise(steps) if s.command is not a.command]
     assert changes == list(range(1, 41, 5))
 
 

@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, cast
 
 import gymnasium
 import numpy as np
+from gymnasium import spaces
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
@@ -68,7 +69,7 @@ class FogAdvisoryEnv(gymnasium.Env[Observation, NDArray[Any]]):
     * v0: first version
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 2}
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 2}  # noqa: RUF012 - Gymnasium's own way
 
     def __init__(
         self,
@@ -95,7 +96,7 @@ class FogAdvisoryEnv(gymnasium.Env[Observation, NDArray[Any]]):
         self._panel = FramePanel()
         self.render_mode = render_mode
         self.metadata = {**self.metadata, "render_fps": 1 / self._scenario.clocks.decision_period_s}
-        self.observation_space = observation_space(build.camera(self._scenario))
+        self.observation_space = cast("spaces.Space[Observation]", observation_space(build.camera(self._scenario)))
         self.action_space = action_space(continuous)
 
     def _load(self, more: Sequence[str]) -> Scenario:
@@ -139,7 +140,7 @@ class FogAdvisoryEnv(gymnasium.Env[Observation, NDArray[Any]]):
         info = {**_info(after), "reward_terms": terms}
         return observe(after), float(sum(terms.values())), terminated, truncated, info
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]  # gymnasium's own type is a free type variable
+    def render(self) -> NDArray[np.uint8] | None:
         """Draw the latest camera frame and its panel."""
         if self.render_mode is None:
             gymnasium.logger.warn("render() was called, but no render_mode was given to gymnasium.make()")

@@ -6,6 +6,7 @@ from typing import Any
 
 from fogsim.errors import FogSimError, SimulationError
 from fogsim.loop import ClosedLoop
+from fogsim.values import Step
 
 
 def serve(connection: "Connection[Any, Any]") -> None:
@@ -17,6 +18,7 @@ def serve(connection: "Connection[Any, Any]") -> None:
         The pipe to the parent; its end ends the simulation.
     """
     loop: ClosedLoop | None = None
+    answer: Step | FogSimError | None
     try:
         while True:
             verb, argument = connection.recv()

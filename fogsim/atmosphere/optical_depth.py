@@ -55,9 +55,7 @@ def optical_depth(field: FogField, start: ArrayLike, end: ArrayLike) -> NDArray[
     length = np.linalg.norm(to - from_, axis=-1)
     depth = field.extinction * length
     for bank in field.banks:
-        depth = depth + bank.extra_extinction * length * _mean_profile(
-            bank, _station(bank, from_), _station(bank, to)
-        )
+        depth = depth + bank.extra_extinction * length * _mean_profile(bank, _station(bank, from_), _station(bank, to))
     return np.asarray(depth)
 
 
@@ -104,9 +102,7 @@ def _profile(bank: FogBank, station: NDArray[np.float64]) -> NDArray[np.float64]
 
 
 def _profile_integral(bank: FogBank, station: NDArray[np.float64]) -> NDArray[np.float64]:
-    return _smoothstep_integral(station, bank.start, bank.edge) - _smoothstep_integral(
-        station, bank.end, bank.edge
-    )
+    return _smoothstep_integral(station, bank.start, bank.edge) - _smoothstep_integral(station, bank.end, bank.edge)
 
 
 def _mean_profile(bank: FogBank, start: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.float64]:

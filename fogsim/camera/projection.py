@@ -8,9 +8,7 @@ from numpy.typing import NDArray
 from fogsim.values import Camera, CameraPose
 
 
-def mounted_pose(
-    camera: Camera, front_bumper: NDArray[np.float64], heading: float, setback: float
-) -> CameraPose:
+def mounted_pose(camera: Camera, front_bumper: NDArray[np.float64], heading: float, setback: float) -> CameraPose:
     """Pose of a camera that is mounted behind a vehicle's front bumper, on its axis.
 
     Parameters

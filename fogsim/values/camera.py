@@ -57,14 +57,10 @@ class Camera:
             If a size, length or angle is out of range or not finite.
         """
         object.__setattr__(self, "response", Response(self.response))
-        object.__setattr__(
-            self, "principal_point", (float(self.principal_point[0]), float(self.principal_point[1]))
-        )
+        object.__setattr__(self, "principal_point", (float(self.principal_point[0]), float(self.principal_point[1])))
         for name in ("width", "height"):
             if int(getattr(self, name)) != getattr(self, name) or getattr(self, name) < 1:
-                raise InputError(
-                    f"camera {name} must be a whole number of pixels ≥ 1, got {getattr(self, name)!r}"
-                )
+                raise InputError(f"camera {name} must be a whole number of pixels ≥ 1, got {getattr(self, name)!r}")
         for name in ("focal_length", "mount_height"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise InputError(f"camera {name} must be positive and finite, got {getattr(self, name)!r}")

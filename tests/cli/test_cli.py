@@ -10,8 +10,8 @@ import time
 from pathlib import Path
 
 import imageio.v3 as imageio
-import pyarrow.parquet as parquet
 import pytest
+from pyarrow import parquet
 
 from fogsim.scenario import catalogue
 

@@ -64,7 +64,11 @@ def test_an_unknown_key_inside_a_list(folder: Path) -> None:
         ("outside_visibility_m: 2000", "visibility_m: 2000", r"fog: give either visibility_m .* not both"),
         ("[negru2013]", "[negru2014]", r"estimators\.0: unknown estimator 'negru2014'; did you mean 'negru2013'\?"),
         ("fusion: grid_filter", "fusion: kalman", r"fusion: unknown fusion 'kalman'; known: grid_filter"),
-        ("reaction_time: 2.0", "reaction: 2.0", r"advice: unknown parameter 'reaction'; did you mean 'reaction_time'\?"),
+        (
+            "reaction_time: 2.0",
+            "reaction: 2.0",
+            r"advice: unknown parameter 'reaction'; did you mean 'reaction_time'\?",
+        ),
         ("reaction_time: 2.0", "reaction_time: fast", r"advice: parameter 'reaction_time': .*valid number.*got 'fast'"),
         (
             "camera_period_s: 0.1",

@@ -1,6 +1,7 @@
 """``fogsim …``: arguments, progress and exit codes, nothing else."""
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -82,7 +83,7 @@ def run_command(
             command_line=["fogsim", *sys.argv[1:]],
             watch=progress.show,
         )
-    _print_result(result.summary.values, result.summary.meanings)
+    _print_summary(result.summary.values)
     ended = result.ending.value if result.ending else f"{result.status.value}; the results are partial and say so"
     _out.print(f"\nThe run ended: [bold]{ended}[/].")
     _out.print("Results:")
@@ -92,18 +93,30 @@ def run_command(
         raise typer.Exit(INTERRUPTED)
 
 
-def _print_result(values: object, meanings: object) -> None:
-    """Summary of the metrics as a table; the per-method blocks are in metrics.json and the report."""
-    if not (isinstance(values, dict) and isinstance(meanings, dict)):
-        return
-    table = Table(title="Summary", title_justify="left", box=None, pad_edge=False)
-    for heading, justify in (("metric", "left"), ("value", "right"), ("meaning", "left")):
-        table.add_column(heading, justify=justify)  # type: ignore[arg-type]  # rich's literal type
-    for key, value in values.items():
-        if isinstance(value, dict | list):
-            continue
-        shown = "-" if value is None else f"{value:.3g}" if isinstance(value, float) else str(value)
-        table.add_row(key, shown, meanings.get(key, ""))
+SHOWN = {
+    "distance_m": ("distance driven", "m"),
+    "mean_speed_mps": ("mean speed", "m/s"),
+    "collisions": ("collisions of all vehicles", ""),
+    "ego_collisions": ("collisions of the ego", ""),
+    "minimum_time_to_collision_s": ("least time to collision", "s"),
+    "minimum_gap_m": ("least gap to the leader", "m"),
+    "max_deceleration_mps2": ("hardest braking", "m/s²"),
+    "minimum_visibility_m": ("least true visibility ahead", "m"),
+    "negative_margin_time_share": ("time in which the ego could not have stopped in sight", "%"),
+    "advised_time_share": ("time with a speed advice", "%"),
+    "belief_median_error_percent": ("median error of the believed visibility", "%"),
+    "belief_coverage_share": ("time in which its 90 % interval held the truth", "%"),
+}
+"""Metrics that the summary shows, with their wording and unit; metrics.json and the report have all of them."""
+
+
+def _print_summary(values: Mapping[str, object]) -> None:
+    table = Table(title="Summary", title_justify="left", box=None, show_header=False, pad_edge=False)
+    for key, (wording, unit) in SHOWN.items():
+        value = values.get(key)
+        if isinstance(value, int | float):
+            scale = 100.0 if key.endswith("_share") else 1.0
+            table.add_row(wording, f"{value * scale:.4g} {unit}".rstrip())
     _out.print(table)
 
 

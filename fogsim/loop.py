@@ -115,7 +115,8 @@ class ClosedLoop:
         self._camera = build.camera(scenario)
         self._sensor = build.sensor(scenario)
         self._lead_sensor = build.lead_sensor(scenario)
-        self._estimators = build.estimators(scenario, self._camera)
+        self._told_camera = build.told_camera(scenario)
+        self._estimators = build.estimators(scenario, self._told_camera)
         self._fusion = build.fusion(scenario)
         self._traffic = LibsumoTraffic(build.traffic_setup(scenario))
         self._world: _World | None = None
@@ -200,7 +201,7 @@ class ClosedLoop:
             self._camera, state.position[ego], float(state.heading[ego]), self._scenario.camera.setback_m
         )
         view = world.renderer.render(vehicle_batches(state, ego), self._camera, pose)
-        frame = Frame(time, self._photograph(view, world.fog, pose, self._streams), self._camera)
+        frame = Frame(time, self._photograph(view, world.fog, pose, self._streams), self._told_camera)
         observation = self._observe(frame, snapshot, world.signs, self._streams)
         estimates = tuple(estimator.update(observation) for estimator in self._estimators)
         return Step(

@@ -1,7 +1,7 @@
 """From a scenario to the parts of the loop; here the units of scenario files become SI and radians, once."""
 
+import dataclasses
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ AIRLIGHT_EXPOSURE = 0.6
 """Share of saturation at which the fixed exposure puts the airlight: bright fog, yet room for lamps above it."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclasses.dataclass(frozen=True, slots=True)
 class Periods:
     """The clocks as whole numbers.
 
@@ -88,6 +88,16 @@ def camera(scenario: Scenario) -> Camera:
         pitch=math.radians(section.pitch_deg),
         roll=math.radians(section.roll_deg),
         response=section.response,
+    )
+
+
+def told_camera(scenario: Scenario) -> Camera:
+    """Calibration that the ego's estimators are told, with the scenario's errors in it."""
+    true, told = camera(scenario), scenario.camera.told
+    return dataclasses.replace(
+        true,
+        pitch=true.pitch + math.radians(told.pitch_error_deg),
+        focal_length=true.focal_length * (1.0 + told.focal_length_error_percent / 100.0),
     )
 
 

@@ -130,6 +130,13 @@ class Light(Section):
     illuminance_lx: Positive = 10_000.0
 
 
+class Told(Section):
+    """How the calibration that the vehicle is told differs from the true one."""
+
+    pitch_error_deg: float = Field(default=0.0, gt=-10, lt=10)
+    focal_length_error_percent: float = Field(default=0.0, gt=-50, lt=50)
+
+
 class CameraSection(Section):
     """The ego's camera."""
 
@@ -146,6 +153,7 @@ class CameraSection(Section):
     saturation_luminance_cdpm2: Positive | None = None
     full_well_e: Positive = 10_000.0
     read_noise_e: NotNegative = 5.0
+    told: Told = Told()
 
 
 class Lead(Section):

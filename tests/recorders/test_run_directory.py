@@ -1,4 +1,4 @@
-import os
+import errno
 from pathlib import Path
 
 import pytest
@@ -45,8 +45,11 @@ def test_a_file_in_its_place_is_refused(tmp_path: Path) -> None:
         RunDirectory(tmp_path / "out" / "deeper")
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
-def test_a_place_that_may_not_be_written_is_refused(tmp_path: Path) -> None:
-    tmp_path.chmod(0o500)
-    with pytest.raises(InputError, match="cannot make the directory"):
+def test_a_place_that_may_not_be_written_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    # Root may write everywhere, so the system's refusal is played.
+    monkeypatch.setattr(Path, "mkdir", refuse)
+    with pytest.raises(InputError, match=r"cannot make the directory .*: Permission denied"):
         RunDirectory(tmp_path / "out")

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere import extinction, fogged_radiance, optical_depth
-from fogsim.camera import expose, mounted_pose, ray_map
+from fogsim.camera import expose, mounted_pose
 from fogsim.errors import SimulationError
+from fogsim.pinhole import ray_from_pixel
 from fogsim.randomness import Streams, spawn_streams
 from fogsim.render import Renderer, make_renderer
 from fogsim.scenario import Scenario, build
@@ -223,7 +224,7 @@ class ClosedLoop:
         )
 
     def _photograph(self, view: View, fog: FogField, pose: CameraPose, streams: Streams) -> NDArray[np.uint8]:
-        radiance = fogged_radiance(view, fog, pose.position, ray_map(self._camera, pose))
+        radiance = fogged_radiance(view, fog, pose.position, ray_from_pixel(self._camera, pose))
         return expose(radiance, self._sensor, self._camera.response, streams.camera)
 
     def _observe(self, frame: Frame, snapshot: TrafficSnapshot, signs: SignMap, streams: Streams) -> Observation:

@@ -1,9 +1,10 @@
 """A registry: one mapping from names to factories per kind; docs, command line and schema read it."""
 
-from collections.abc import Iterator, Mapping
+import inspect
+from collections.abc import Callable, Iterator, Mapping
 from typing import TypeVar
 
-from fogsim.errors import UnknownNameError
+from fogsim.errors import InputError, UnknownNameError, suggest
 
 T = TypeVar("T")
 
@@ -49,3 +50,41 @@ class Registry(Mapping[str, T]):
 
     def __contains__(self, name: object) -> bool:
         return name in self._entries
+
+
+def parameters(factory: Callable[..., object]) -> dict[str, object]:
+    """Names and defaults of the parameters that a factory may be given by keyword and need not be given."""
+    return {
+        parameter.name: parameter.default
+        for parameter in inspect.signature(factory).parameters.values()
+        if parameter.default is not parameter.empty
+    }
+
+
+def make(registry: Registry[Callable[..., T]], name: str, *arguments: object, **options: object) -> T:
+    """Call a registered factory.
+
+    Parameters
+    ----------
+    registry : Registry
+        The registry.
+    name : str
+        A name in it.
+    *arguments : object
+        What every factory of the kind is given.
+    **options : object
+        Parameters of this one.
+
+    Raises
+    ------
+    UnknownNameError
+        If the registry has no such name.
+    InputError
+        If the factory has no such parameter.
+    """
+    factory = registry[name]
+    allowed = parameters(factory)
+    for option in options:
+        if option not in allowed:
+            raise InputError(f"{registry.kind} {name!r} has no parameter {option!r}; {suggest(option, allowed)}")
+    return factory(*arguments, **options)

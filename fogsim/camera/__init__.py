@@ -1,6 +1,6 @@
-"""Pixels to rays and back, exposure, noise, response and quantisation."""
+"""Where the camera is, exposure, noise, response and quantisation."""
 
 from fogsim.camera.exposure import Sensor, expose
-from fogsim.camera.projection import mounted_pose, ray_map, rotation
+from fogsim.camera.mount import mounted_pose
 
-__all__ = ["Sensor", "expose", "mounted_pose", "ray_map", "rotation"]
+__all__ = ["Sensor", "expose", "mounted_pose"]

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.camera.kernels import NORMAL_TABLE_BITS, RESPONSE_STEPS, develop
+from fogsim.response import respond
 from fogsim.values import Response
-
-GAMMA = 2.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,21 +92,3 @@ def response_table(response: Response) -> NDArray[np.uint8]:
     table = np.round(255.0 * respond(exposure, response)).astype(np.uint8)
     table.setflags(write=False)
     return table
-
-
-def respond(exposure: NDArray[np.float64], response: Response) -> NDArray[np.float64]:
-    """Signal for a relative exposure, both 0 … 1 (sRGB: IEC 61966-2-1).
-
-    Parameters
-    ----------
-    exposure : float64 array
-        Exposure relative to saturation.
-    response : Response
-        The curve.
-    """
-    if response is Response.GAMMA:
-        return np.asarray(exposure ** (1.0 / GAMMA))
-    if response is Response.SRGB:
-        bright = 1.055 * np.maximum(exposure, 0.0031308) ** (1.0 / 2.4) - 0.055
-        return np.where(exposure <= 0.0031308, 12.92 * exposure, bright)
-    return exposure

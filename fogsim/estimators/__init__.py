@@ -1,9 +1,8 @@
 """Published visibility estimators, one method a module, in one registry."""
 
-import inspect
 from collections.abc import Callable
 
-from fogsim.errors import InputError, suggest
+from fogsim import registry
 from fogsim.estimators.negru2013 import Negru2013
 from fogsim.estimators.protocol import Estimator
 from fogsim.registry import Registry
@@ -11,22 +10,6 @@ from fogsim.values.camera import Camera
 
 ESTIMATORS: Registry[Callable[..., Estimator]] = Registry("estimator", {"negru2013": Negru2013})
 """Every estimator by name: called with a camera and keyword parameters it gives an `Estimator`."""
-
-
-def parameters(name: str) -> dict[str, object]:
-    """Names and defaults of the keyword parameters of an estimator.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no estimator of that name.
-    """
-    signature = inspect.signature(ESTIMATORS[name])
-    return {
-        parameter.name: parameter.default
-        for parameter in signature.parameters.values()
-        if parameter.kind is inspect.Parameter.KEYWORD_ONLY
-    }
 
 
 def make(name: str, camera: Camera, **options: object) -> Estimator:
@@ -39,7 +22,7 @@ def make(name: str, camera: Camera, **options: object) -> Estimator:
     camera : Camera
         The calibration as the vehicle was told it.
     **options : object
-        Parameters of the estimator; `parameters` names them.
+        Parameters of the estimator.
 
     Raises
     ------
@@ -48,11 +31,7 @@ def make(name: str, camera: Camera, **options: object) -> Estimator:
     InputError
         If the estimator has no such parameter.
     """
-    allowed = parameters(name)
-    for option in options:
-        if option not in allowed:
-            raise InputError(f"estimator {name!r} has no parameter {option!r}; {suggest(option, allowed)}")
-    return ESTIMATORS[name](camera, **options)
+    return registry.make(ESTIMATORS, name, camera, **options)
 
 
-__all__ = ["ESTIMATORS", "Estimator", "make", "parameters"]
+__all__ = ["ESTIMATORS", "Estimator", "make"]

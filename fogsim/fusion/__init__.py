@@ -1,9 +1,8 @@
 """Many estimates over time to one belief."""
 
-import inspect
 from collections.abc import Callable
 
-from fogsim.errors import InputError, suggest
+from fogsim import registry
 from fogsim.fusion.grid_filter import GridFilter
 from fogsim.fusion.protocol import Fusion
 from fogsim.registry import Registry
@@ -29,11 +28,7 @@ def make(name: str, **options: object) -> Fusion:
     InputError
         If the fusion has no such parameter.
     """
-    allowed = list(inspect.signature(FUSIONS[name]).parameters)
-    for option in options:
-        if option not in allowed:
-            raise InputError(f"fusion {name!r} has no parameter {option!r}; {suggest(option, allowed)}")
-    return FUSIONS[name](**options)
+    return registry.make(FUSIONS, name, **options)
 
 
 __all__ = ["FUSIONS", "Fusion", "make"]

@@ -1,37 +1,13 @@
-"""From the world to pixels and back for a pinhole whose pixel centres lie at integer coordinates."""
-
-import math
+"""From the world to clip coordinates for a pinhole whose pixel centres lie at integer coordinates."""
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.pinhole import camera_axes, ray_from_pixel
 from fogsim.values.camera import Camera, CameraPose
 
 NEAR = 0.4
 """Distance of the plane in front of the camera before which nothing is drawn [m]."""
-
-
-def camera_axes(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
-    """Axes of the camera in the world.
-
-    Parameters
-    ----------
-    camera, pose
-        The camera and where it is.
-
-    Returns
-    -------
-    (3, 3) float64
-        Rows: right, down and forward as unit vectors (east, north, up).
-    """
-    pitch = camera.pitch - pose.grade
-    cosine, sine = math.cos(pose.heading), math.sin(pose.heading)
-    forward = np.array([cosine * math.cos(pitch), sine * math.cos(pitch), -math.sin(pitch)])
-    level = np.array([sine, -cosine, 0.0])
-    down = np.cross(forward, level)
-    # A positive roll turns the right side of the image down, so the camera itself turns the other way.
-    right = math.cos(camera.roll) * level - math.sin(camera.roll) * down
-    return np.stack((right, np.cross(forward, right), forward))
 
 
 def clip_from_camera(camera: Camera) -> NDArray[np.float64]:
@@ -55,14 +31,6 @@ def clip_from_offset(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
     turn = np.eye(4)
     turn[:3, :3] = camera_axes(camera, pose)
     return clip_from_camera(camera) @ turn
-
-
-def ray_from_pixel(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
-    """Matrix (3, 3) from (u, v, 1) [px] to the ray of a pixel in the world, 1 long along the optical axis."""
-    u0, v0 = camera.principal_point
-    focal = camera.focal_length
-    plane = np.array([[1 / focal, 0.0, -u0 / focal], [0.0, 1 / focal, -v0 / focal], [0.0, 0.0, 1.0]])
-    return np.asarray(camera_axes(camera, pose).T @ plane, np.float64)
 
 
 def highest_terrain_row(camera: Camera, pose: CameraPose) -> int:

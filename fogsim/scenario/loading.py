@@ -9,8 +9,8 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from fogsim.errors import InputError, suggest
-from fogsim.scenario.catalogue import SCENARIO_FILE, scenario_file
 from fogsim.scenario.document import Document, KeyPath, dotted, read_document
+from fogsim.scenario.locating import SCENARIO_FILE, scenario_file
 from fogsim.scenario.overrides import apply_overrides
 from fogsim.scenario.schema import Scenario
 

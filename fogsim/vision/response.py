@@ -5,10 +5,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.response import exposure_of
 from fogsim.values.camera import Response
-
-GAMMA_EXPONENT = 2.2
-"""Exponent of `Response.GAMMA` [-]."""
 
 
 @lru_cache(maxsize=len(Response))
@@ -26,13 +24,6 @@ def linear_table(response: Response) -> NDArray[np.float32]:
         Linear grey levels 0 … 255, read-only; 0 and 255 map to themselves. sRGB: IEC 61966-2-1.
     """
     share = np.arange(256, dtype=np.float64) / 255.0
-    match response:
-        case Response.LINEAR:
-            linear = share
-        case Response.GAMMA:
-            linear = share**GAMMA_EXPONENT
-        case Response.SRGB:
-            linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
-    table: NDArray[np.float32] = (255.0 * linear).astype(np.float32)
+    table: NDArray[np.float32] = (255.0 * exposure_of(share, response)).astype(np.float32)
     table.flags.writeable = False
     return table

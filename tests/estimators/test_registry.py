@@ -1,7 +1,8 @@
 import pytest
 
 from fogsim.errors import InputError, UnknownNameError
-from fogsim.estimators import ESTIMATORS, make, parameters
+from fogsim.estimators import ESTIMATORS, make
+from fogsim.registry import parameters
 from fogsim.values import Camera
 
 CAMERA = Camera(64, 48, 60.0, (31.5, 23.5), 1.4)
@@ -25,4 +26,4 @@ def test_unknown_parameters_answer_with_the_allowed():
 
 
 def test_parameters_have_defaults():
-    assert parameters("negru2013")["as_published"] is False
+    assert parameters(ESTIMATORS["negru2013"])["as_published"] is False

@@ -3,7 +3,8 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.render.projection import camera_axes, clip_from_camera, highest_terrain_row, ray_from_pixel
+from fogsim.pinhole import camera_axes, ray_from_pixel
+from fogsim.render.projection import clip_from_camera, highest_terrain_row
 from fogsim.values import Camera, CameraPose
 
 CAMERA = Camera(640, 480, 577.0, (310.0, 250.0), 1.38, pitch=0.05, roll=0.04)

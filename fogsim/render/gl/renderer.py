@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.pinhole import camera_axes, ray_from_pixel
 from fogsim.render.copies import ShapeTable, flattened, pieces, visible
 from fogsim.render.gl.context import context
 from fogsim.render.photometry import SKY_TINT, lamp_mask, lamp_radiance, zenith_luminance
-from fogsim.render.projection import camera_axes, clip_from_offset, highest_terrain_row, ray_from_pixel
+from fogsim.render.projection import clip_from_offset, highest_terrain_row
 from fogsim.render.protocol import RenderError
 from fogsim.values.camera import Camera, CameraPose
 from fogsim.values.image import View

@@ -1,0 +1,54 @@
+"""Draw the pictures of the README and the docs anew: ``python docs/make_pictures.py`` (about a minute)."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+import fogsim
+from fogsim.metrics import step_metrics
+from fogsim.recorders import FramePanel
+
+OUT = Path(__file__).resolve().parent / "pictures"
+SHEET = (("inf", 30), ("400", 120), ("200", 120), ("100", 330), ("50", 100), ("30", 100))
+"""Visibilities [m] of the contact sheet, and the frame of the run that is shown for each."""
+
+
+def frame(visibility: str, index: int) -> NDArray[np.uint8]:
+    """One camera frame of the motorway in homogeneous fog."""
+    scenario = fogsim.load_scenario("motorway_fog_bank", [f"fog.visibility_m={visibility}"])
+    for step in fogsim.run(scenario, seed=1):
+        if step.index == index:
+            return step.observation.image
+    raise SystemExit(f"the run at {visibility} m ended before frame {index}")
+
+
+def contact_sheet() -> Image.Image:
+    """Six visibilities, 480×360 each."""
+    sheet = Image.new("RGB", (3 * 480, 2 * 360))
+    for place, (visibility, index) in enumerate(SHEET):
+        picture = Image.fromarray(frame(visibility, index)).resize((480, 360), Image.Resampling.LANCZOS)
+        sheet.paste(picture, (place % 3 * 480, place // 3 * 360))
+    return sheet
+
+
+def demo_frame(time: float) -> Image.Image:
+    """A frame of the demo's video."""
+    panel = FramePanel()
+    for step in fogsim.run(fogsim.load_scenario("motorway_fog_bank"), seed=1):
+        drawn = panel.draw(step, step_metrics(step))
+        if step.time >= time - 1e-9:
+            return Image.fromarray(drawn)
+    raise SystemExit(f"the demo ended before {time} s")
+
+
+def main() -> None:
+    """Draw and save."""
+    OUT.mkdir(exist_ok=True)
+    contact_sheet().save(OUT / "visibilities.jpg", quality=88)
+    demo_frame(91.0).save(OUT / "demo.jpg", quality=88)
+
+
+if __name__ == "__main__":
+    main()

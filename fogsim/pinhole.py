@@ -1,0 +1,40 @@
+"""The geometry of a pinhole camera whose pixel centres lie at integer coordinates: what renderer and camera share."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.values.camera import Camera, CameraPose
+
+
+def camera_axes(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
+    """Axes of a camera in the world.
+
+    Returns
+    -------
+    (3, 3) float64
+        Rows: right, down and forward as unit vectors (east, north, up).
+    """
+    pitch = camera.pitch - pose.grade
+    cosine, sine = math.cos(pose.heading), math.sin(pose.heading)
+    forward = np.array([cosine * math.cos(pitch), sine * math.cos(pitch), -math.sin(pitch)])
+    level = np.array([sine, -cosine, 0.0])
+    down = np.cross(forward, level)
+    # A positive roll turns the right side of the image down, so the camera itself turns the other way.
+    right = math.cos(camera.roll) * level - math.sin(camera.roll) * down
+    return np.stack((right, np.cross(forward, right), forward))
+
+
+def ray_from_pixel(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
+    """Matrix from a pixel (u, v, 1) [px] to its viewing ray in the world.
+
+    Returns
+    -------
+    (3, 3) float64
+        The ray is 1 long along the optical axis, so its length is distance along the ray over depth.
+    """
+    u0, v0 = camera.principal_point
+    focal = camera.focal_length
+    plane = np.array([[1 / focal, 0.0, -u0 / focal], [0.0, 1 / focal, -v0 / focal], [0.0, 0.0, 1.0]])
+    return np.asarray(camera_axes(camera, pose).T @ plane)

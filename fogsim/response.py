@@ -1,0 +1,48 @@
+"""Response curves of cameras and their inverses: what the camera and the reading of its images share."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.values.camera import Response
+
+GAMMA = 2.2
+"""Exponent of `Response.GAMMA` [-]."""
+
+
+def respond(exposure: NDArray[np.float64], response: Response) -> NDArray[np.float64]:
+    """Signal for a relative exposure, both 0 … 1 (sRGB: IEC 61966-2-1).
+
+    Parameters
+    ----------
+    exposure : float64 array
+        Exposure relative to saturation.
+    response : Response
+        The curve.
+    """
+    match response:
+        case Response.LINEAR:
+            return exposure
+        case Response.GAMMA:
+            return np.asarray(exposure ** (1.0 / GAMMA))
+        case Response.SRGB:
+            bright = 1.055 * np.maximum(exposure, 0.0031308) ** (1.0 / 2.4) - 0.055
+            return np.where(exposure <= 0.0031308, 12.92 * exposure, bright)
+
+
+def exposure_of(signal: NDArray[np.float64], response: Response) -> NDArray[np.float64]:
+    """Relative exposure behind a signal, both 0 … 1: the inverse of `respond` (sRGB: IEC 61966-2-1).
+
+    Parameters
+    ----------
+    signal : float64 array
+        Signal relative to the largest pixel value.
+    response : Response
+        The curve.
+    """
+    match response:
+        case Response.LINEAR:
+            return signal
+        case Response.GAMMA:
+            return np.asarray(signal**GAMMA)
+        case Response.SRGB:
+            return np.where(signal <= 0.04045, signal / 12.92, ((signal + 0.055) / 1.055) ** 2.4)

@@ -34,15 +34,20 @@ Visibility = Annotated[float, Field(gt=0), BeforeValidator(_visibility)]
 class Section(BaseModel):
     """A block of a scenario file: unknown keys are errors, values never change."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
 
 
 class Clocks(Section):
     """The three clocks; each is a whole multiple of the one before."""
 
     traffic_step_s: Positive = 0.1
+    """SUMO's step."""
+
     camera_period_s: Positive = 0.1
+    """Time between two frames."""
+
     decision_period_s: Positive = 0.5
+    """Time between two decisions on advice and lamps."""
 
     @model_validator(mode="after")
     def _multiples(self) -> Self:
@@ -60,35 +65,72 @@ class Brake(Section):
     """A vehicle brakes at a place, holds, and drives on."""
 
     kind: Literal["brake"]
+    """What happens."""
+
     vehicle: str
+    """Id of the vehicle."""
+
     at_position_m: NotNegative
+    """Distance that it has driven when it begins to brake."""
+
     to_speed_kmh: NotNegative = 0.0
+    """Speed that it brakes to; 0 is a standstill."""
+
     deceleration_mps2: Positive = 4.0
+    """How hard it brakes, within its vehicle type's own limit."""
+
     hold_s: NotNegative = 30.0
+    """How long it keeps that speed, from the beginning of the braking."""
 
 
 class Traffic(Section):
     """A SUMO simulation and its ego."""
 
     net: Path
+    """SUMO network, relative to the scenario's folder."""
+
     routes: tuple[Path, ...] = Field(min_length=1)
+    """SUMO route files."""
+
     additional: tuple[Path, ...] = ()
+    """SUMO additional files; POIs of type `fogsim.sign.KIND` in them are signs."""
+
     ego: str = "ego"
+    """Id of the ego vehicle in the route files."""
+
     keep_lane: tuple[str, ...] = ()
+    """Vehicles that never change lane."""
+
     warm_up_limit_s: Positive = 600.0
+    """Simulated time within which the ego must appear; the run begins when it does."""
+
     advice_deceleration_mps2: Positive = 2.0
+    """How hard an advised vehicle slows down to the advice."""
+
     reading_radius_m: Positive = 1000.0
+    """Vehicles farther from the ego than this are not read and not drawn."""
+
     events: tuple[Brake, ...] = ()
+    """What is scripted."""
+
     stop_before_end_m: NotNegative = 60.0
+    """The ego has arrived when it is this near to the end of its route."""
 
 
 class Bank(Section):
     """A fog bank along the ego's route; start and end are where it is half as dense as inside."""
 
     start_m: float
+    """Where it begins: half as dense as inside, along the ego's route."""
+
     end_m: float
+    """Where it ends, likewise."""
+
     visibility_m: Visibility
+    """Meteorological visibility inside."""
+
     edge_m: Positive = 100.0
+    """Length of each soft edge."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -105,9 +147,16 @@ class Fog(Section):
     """Either homogeneous (visibility_m), or banks with another visibility outside them."""
 
     visibility_m: Visibility | None = None
+    """Meteorological visibility of homogeneous fog; `inf` is clear air. Leaves no room for the two below."""
+
     outside_visibility_m: Visibility | None = None
+    """Meteorological visibility outside the banks."""
+
     banks: tuple[Bank, ...] = ()
+    """Fog banks along the ego's route; they must not overlap."""
+
     top_m: Visibility = 250.0
+    """Height of the fog layer."""
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
@@ -128,70 +177,141 @@ class Light(Section):
     """Daylight."""
 
     illuminance_lx: Positive = 10_000.0
+    """Horizontal illuminance of the overcast day."""
 
 
 class Told(Section):
     """How the calibration that the vehicle is told differs from the true one."""
 
     pitch_error_deg: float = Field(default=0.0, gt=-10, lt=10)
+    """Told minus true pitch."""
+
     focal_length_error_percent: float = Field(default=0.0, gt=-50, lt=50)
+    """Told over true focal length, minus 1."""
 
 
 class CameraSection(Section):
     """The ego's camera."""
 
     width: int = Field(default=640, ge=16, le=8192)
+    """Columns of the image."""
+
     height: int = Field(default=480, ge=16, le=8192)
+    """Rows of the image."""
+
     field_of_view_deg: float = Field(default=58.0, gt=1, lt=170)
+    """Horizontal field of view; sets the focal length, whatever the size of the image."""
+
     focal_length_px: Positive | None = None
+    """Focal length, in place of the field of view."""
+
     principal_point_px: tuple[float, float] | None = None
+    """Principal point [u0, v0]; the middle of the image if not given."""
+
     mount_height_m: Positive = 1.38
+    """Height of the camera above the road."""
+
     setback_m: NotNegative = 1.7
+    """Distance of the camera behind the front bumper."""
+
     pitch_deg: float = Field(default=2.0, gt=-45, lt=45)
+    """Pitch; positive looks down."""
+
     roll_deg: float = Field(default=0.0, gt=-45, lt=45)
+    """Roll; positive turns the image's right side down."""
+
     response: Response = Response.SRGB
+    """Curve from light to pixel values: `linear`, `gamma` (2.2) or `srgb`."""
+
     saturation_luminance_cdpm2: Positive | None = None
+    """Luminance that fills a pixel; if not given, the airlight fills 60 % of it."""
+
     full_well_e: Positive = 10_000.0
+    """Electrons that fill a pixel; sets the photon noise."""
+
     read_noise_e: NotNegative = 5.0
+    """Standard deviation of the read noise in electrons."""
+
     told: Told = Told()
+    """Errors of the calibration that the estimators are told."""
 
 
 class Lead(Section):
     """The radar that tracks the vehicle ahead."""
 
     reach_m: Positive = 200.0
+    """Distance up to which it tracks a vehicle."""
+
     distance_deviation_m: NotNegative = 0.25
+    """Standard deviation of its distance."""
+
     speed_deviation_mps: NotNegative = 0.1
+    """Standard deviation of its relative speed."""
 
 
 class Sensors(Section):
     """Sensors beside the camera."""
 
     lead: Lead = Lead()
+    """The radar."""
+
     sign_reach_m: Positive = 250.0
+    """Distance up to which the map tells of signs ahead."""
 
 
 class Scenario(Section):
     """A whole scenario."""
 
     name: str = Field(pattern=r"^[A-Za-z0-9_.-]+$")
+    """Name; letters, digits, `_`, `.` and `-`."""
+
     description: str = ""
+    """What it is about, for lists and reports."""
+
     duration_s: Positive = 120.0
+    """Longest simulated time."""
+
     end_on_collision: bool = True
+    """Whether a collision of the ego ends the run."""
+
     clocks: Clocks = Clocks()
+    """The clocks."""
+
     traffic: Traffic
+    """The traffic."""
+
     fog: Fog
+    """The fog."""
+
     light: Light = Light()
+    """The light."""
+
     camera: CameraSection = CameraSection()
+    """The camera."""
+
     renderer: Annotated[str, Field(default="auto")]
+    """`auto` or a renderer's name."""
+
     scenery_seed: int = Field(default=0, ge=0)
+    """Seed of trees and posts, which are the same for every seed of the run."""
+
     sensors: Sensors = Sensors()
+    """The other sensors."""
+
     estimators: tuple[Annotated[Method, method_of(ESTIMATORS)], ...] = Field(
         default=(Method(method="negru2013"),), min_length=1
     )
+    """Estimators that read every frame; the agent sees the first one's estimate."""
+
     fusion: Annotated[Method, method_of(FUSIONS)] = Method(method="grid_filter")
+    """How estimates become a belief."""
+
     advice: Annotated[Method, method_of(ADVISERS)] = Method(method="stopping_sight_distance")
+    """How the belief becomes a speed advice."""
+
     lighting: Annotated[Method, method_of(LIGHTING_POLICIES)] = Method(method="fog_lamp_rules")
+    """How the belief becomes lamps."""
+
     directory: Path = Field(default=Path(), exclude=True)
 
     @field_validator("renderer")

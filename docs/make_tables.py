@@ -1,0 +1,106 @@
+"""Write those tables of the docs that come from the code: ``python docs/make_tables.py`` (a test holds them to it)."""
+
+import sys
+from pathlib import Path
+from typing import Any, get_args
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from fogsim.metrics import RunMetrics
+from fogsim.recorders.table import table_columns
+from fogsim.scenario.methods import Method
+from fogsim.scenario.schema import Scenario
+
+HERE = Path(__file__).resolve().parent
+END = "<!-- end of table -->"
+
+
+def scenario_keys(model: type[BaseModel] = Scenario, prefix: str = "") -> list[tuple[str, ...]]:
+    """Key, default and meaning of every key of a scenario file; N stands for a place in a list."""
+    rows: list[tuple[str, ...]] = []
+    for name, field in model.model_fields.items():
+        if field.exclude:
+            continue
+        inner = _model_in(field.annotation)
+        if inner is None or inner is Method:
+            rows.append((f"`{prefix}{name}`", _default(field), field.description or ""))
+        else:
+            place = ".N" if "tuple" in str(field.annotation) else ""
+            rows += scenario_keys(inner, f"{prefix}{name}{place}.")
+    return rows
+
+
+def _default(field: FieldInfo) -> str:
+    value = field.default
+    if value is PydanticUndefined:
+        return "required"
+    if value is None:
+        return "none"
+    if isinstance(value, tuple):
+        return "`[" + ", ".join(str(getattr(v, "method", v)) for v in value) + "]`"
+    return f"`{getattr(value, 'method', value)}`"
+
+
+def _model_in(annotation: Any) -> type[BaseModel] | None:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next((m for part in get_args(annotation) if (m := _model_in(part)) is not None), None)
+
+
+def columns() -> list[tuple[str, ...]]:
+    """Columns of steps.parquet, with those of one estimator."""
+    return [(f"`{c.name}`", str(c.kind), c.meaning) for c in table_columns(["METHOD"])]
+
+
+def metrics() -> list[tuple[str, ...]]:
+    """Keys of metrics.json."""
+    return [(f"`{key}`", meaning) for key, meaning in RunMetrics().summary().meanings.items()]
+
+
+TABLES = {
+    "scenarios.md": {"keys": (("key", "default", "meaning"), scenario_keys)},
+    "results.md": {
+        "columns": (("column", "type", "meaning"), columns),
+        "metrics": (("key", "meaning"), metrics),
+    },
+}
+"""Tables by file and marker, with their headings and rows."""
+
+
+def filled(text: str, marker: str, headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    """Text with the table between a marker and the next end put in anew."""
+    begin = f"<!-- table: {marker} -->"
+    before, rest = text.split(begin, 1)
+    after = rest.split(END, 1)[1]
+    lines = [headings, tuple("---" for _ in headings), *rows]
+    table = "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
+    return f"{before}{begin}\n\n{table}\n\n{END}{after}"
+
+
+def pages() -> dict[Path, str]:
+    """Every page with its tables as they should be."""
+    result = {}
+    for name, tables in TABLES.items():
+        text = (HERE / name).read_text(encoding="utf-8")
+        for marker, (headings, rows) in tables.items():
+            text = filled(text, marker, headings, rows())
+        result[HERE / name] = text
+    return result
+
+
+def main() -> int:
+    """Write the pages, or with --check say which are not up to date."""
+    stale = [path for path, text in pages().items() if path.read_text(encoding="utf-8") != text]
+    if "--check" in sys.argv:
+        for path in stale:
+            print(f"{path.name} is not up to date: run python docs/make_tables.py")  # noqa: T201 - the line is the result
+        return int(bool(stale))
+    for path, text in pages().items():
+        path.write_text(text, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -37,6 +37,9 @@ def main() -> None:
     except FogSimError as error:
         _err.print(f"[bold red]error:[/] {escape(str(error))}", soft_wrap=True)
         sys.exit(BAD_INPUT)
+    except OSError as error:
+        _err.print(f"[bold red]error:[/] the operating system refused: {escape(str(error))}", soft_wrap=True)
+        sys.exit(BAD_INPUT)
 
 
 def _version(wanted: bool) -> None:

@@ -1,5 +1,6 @@
 """A run whose results are written down, and stay readable if it is interrupted."""
 
+import contextlib
 import dataclasses
 from collections.abc import Callable, Iterable, Sequence
 from datetime import UTC, datetime
@@ -109,20 +110,19 @@ def record_run(
         message = f"{type(error).__name__}: {error}"
         raise
     finally:
-        complete = status is Status.COMPLETE
-        for recorder in opened:
-            recorder.close(complete)
-        write_json(directory.metrics, {"complete": complete, **metrics.summary().to_json()})
-        ended = dataclasses.replace(
-            manifest,
-            status=status,
-            ended=datetime.now(UTC),
-            ending=ending,
-            files=directory.files(),
-            message=message,
-        )
-        write_manifest(directory.manifest, ended)
+        # The stack runs every step from the last to the first, also when one of them fails.
+        with contextlib.ExitStack() as finishing:
+            ended = dataclasses.replace(manifest, status=status, ending=ending, message=message)
+            finishing.callback(_write_ended, directory, ended)
+            complete = status is Status.COMPLETE
+            finishing.callback(write_json, directory.metrics, {"complete": complete, **metrics.summary().to_json()})
+            for recorder in opened:
+                finishing.callback(recorder.close, complete)
     return RecordedRun(status, ending, metrics.summary(), directory.path, tuple(directory.files()))
+
+
+def _write_ended(directory: RunDirectory, manifest: Manifest) -> None:
+    write_manifest(directory.manifest, dataclasses.replace(manifest, ended=datetime.now(UTC), files=directory.files()))
 
 
 def _open(

@@ -1,0 +1,57 @@
+"""What a recorded run leaves when something goes wrong."""
+
+import json
+from pathlib import Path
+
+import pytest
+from pyarrow import parquet
+
+import fogsim
+from fogsim.errors import SimulationError
+from fogsim.recorders import ReportRecorder
+from fogsim.recording import record_run
+from fogsim.scenario import Scenario
+from fogsim.values import Step
+
+
+def short() -> Scenario:
+    return fogsim.load_scenario("motorway_fog_bank", ["camera.width=64", "camera.height=48", "duration_s=1"])
+
+
+def status(out: Path) -> dict[str, object]:
+    manifest: dict[str, object] = json.loads((out / "manifest.json").read_text(encoding="utf-8"))
+    return manifest
+
+
+def test_a_failing_run_leaves_what_was_recorded_and_says_why(tmp_path: Path) -> None:
+    def fail(step: Step) -> None:
+        if step.index == 4:
+            raise SimulationError("the road is closed")
+
+    with pytest.raises(SimulationError, match="the road is closed"):
+        record_run(short(), 1, tmp_path / "out", watch=fail)
+    assert status(tmp_path / "out")["status"] == "failed"
+    assert status(tmp_path / "out")["message"] == "SimulationError: the road is closed"
+    assert parquet.read_table(tmp_path / "out" / "steps.parquet").num_rows == 5
+
+
+def test_one_recorder_that_cannot_finish_does_not_cost_the_others_their_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(ReportRecorder, "close", full)
+    with pytest.raises(OSError, match="No space left"):
+        record_run(short(), 1, tmp_path / "out")
+    assert parquet.read_table(tmp_path / "out" / "steps.parquet").num_rows == 11
+    assert json.loads((tmp_path / "out" / "metrics.json").read_text(encoding="utf-8"))["complete"] is True
+    assert status(tmp_path / "out")["files"] == ["manifest.json", "metrics.json", "steps.parquet", "video.mp4"]
+
+
+def test_a_scenario_that_cannot_start_leaves_a_manifest_that_says_so(tmp_path: Path) -> None:
+    scenario = fogsim.load_scenario("motorway_fog_bank", ["traffic.ego=nobody", "traffic.warm_up_limit_s=2"])
+    with pytest.raises(SimulationError, match="nobody"):
+        record_run(scenario, 1, tmp_path / "out")
+    assert status(tmp_path / "out")["status"] == "failed"
+    assert not list((tmp_path / "out").glob("*.part"))

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from fogsim import __version__
@@ -76,7 +76,7 @@ def run_command(
     loaded = load_scenario(scenario, settings or ())
     recorders = ["table", *(["video"] if video else []), *(["report"] if report else [])]
     directory = out or Path("runs", f"{loaded.name}-seed{seed}")
-    with _SimulationProgress(loaded.name, loaded.duration_s) as progress:
+    with _SimulationProgress(loaded.duration_s) as progress:
         result = record_run(
             loaded,
             seed,
@@ -108,7 +108,7 @@ SHOWN = {
     "negative_margin_time_share": ("time in which the ego could not have stopped in sight", "%"),
     "advised_time_share": ("time with a speed advice", "%"),
     "belief_median_error_percent": ("median error of the believed visibility", "%"),
-    "belief_coverage_share": ("time in which its 90 % interval held the truth", "%"),
+    "belief_coverage_share": ("time in which its 90 % interval held the true one ahead", "%"),
 }
 """Metrics that the summary shows, with their wording and unit; metrics.json and the report have all of them."""
 
@@ -124,27 +124,26 @@ def _print_summary(values: Mapping[str, object]) -> None:
 
 
 class _SimulationProgress:
-    """A bar over simulated time with how fast it passes."""
+    """A bar over simulated time, with how fast it passes and what is believed."""
 
-    def __init__(self, name: str, duration: float) -> None:
+    def __init__(self, duration: float) -> None:
+        self._duration = duration
         self._progress = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
+            BarColumn(bar_width=20),
             TaskProgressColumn(),
-            TextColumn("{task.fields[state]}"),
-            TimeElapsedColumn(),
-            TextColumn("left at most"),
+            TextColumn("{task.description}"),
             TimeRemainingColumn(),
+            TextColumn("left"),
             console=_err,
         )
-        self._task = self._progress.add_task(name, total=duration, state="starting (the first run compiles kernels)")
+        self._task = self._progress.add_task("starting; a first run compiles for some seconds", total=duration)
 
     def show(self, step: Step) -> None:
         task = self._progress.tasks[self._task]
-        speed = step.time / task.elapsed if task.elapsed else 0.0
-        sight = step.belief.visibility
-        state = f"t = {step.time:5.1f} s, {speed:.1f}× real time, believed visibility {sight:.0f} m"
-        self._progress.update(self._task, completed=step.time, state=state)
+        rate = step.time / task.elapsed if task.elapsed else 0.0
+        believed = f"V ≈ {step.belief.visibility:.0f} m"
+        told = f"{step.time:.0f} of {self._duration:.0f} s, {rate:.1f}× real time, {believed}"
+        self._progress.update(self._task, completed=step.time, description=told)
 
     def __enter__(self) -> "_SimulationProgress":
         self._progress.start()

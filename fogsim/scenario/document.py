@@ -1,7 +1,7 @@
 """A YAML file as plain data that remembers on which line each key stands."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,21 +22,35 @@ class Document:
         The file.
     data : dict
         Its content.
-    lines : mapping from key path to int
-        Line of each key, from 1.
+    origins : mapping from key path to str
+        Where each key stands: ``file:line``, or the override that set it.
     """
 
     path: Path
     data: dict[str, Any]
-    lines: Mapping[KeyPath, int]
+    origins: Mapping[KeyPath, str]
 
     def where(self, key_path: KeyPath) -> str:
-        """``file:line`` of a key, or of the nearest block around it that the file has."""
+        """Where a key stands, or the nearest block around it that has a place."""
         for length in range(len(key_path), 0, -1):
-            line = self.lines.get(key_path[:length])
-            if line is not None:
-                return f"{self.path}:{line}"
+            origin = self.origins.get(key_path[:length])
+            if origin is not None:
+                return origin
         return str(self.path)
+
+    def overridden(self, overrides: Iterable[str]) -> "Document":
+        """Copy in which the keys that overrides set stand where the overrides do.
+
+        Parameters
+        ----------
+        overrides : iterable of str
+            ``key.path=value`` each, known to be well formed.
+        """
+        set_by = {}
+        for text in overrides:
+            keys = text.partition("=")[0].strip().split(".")
+            set_by[tuple(int(key) if key.isdecimal() else key for key in keys)] = f"--set {text}"
+        return replace(self, origins={**self.origins, **set_by})
 
 
 def read_document(path: Path) -> Document:
@@ -59,7 +73,7 @@ def read_document(path: Path) -> Document:
         raise InputError(f"{path}: expected a mapping of keys to values, got {type(data).__name__}")
     lines: dict[KeyPath, int] = {}
     _collect_lines(path, root, (), lines)
-    return Document(path, data, lines)
+    return Document(path, data, {key: f"{path}:{line}" for key, line in lines.items()})
 
 
 def _collect_lines(path: Path, node: yaml.Node, at: KeyPath, lines: dict[KeyPath, int]) -> None:

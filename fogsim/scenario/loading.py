@@ -73,7 +73,9 @@ def _without_infinities(value: Any) -> Any:
 
 
 def _checked(document: Document, overrides: Iterable[str], folder: Path) -> Scenario:
+    overrides = tuple(overrides)
     data = apply_overrides(document.data, overrides)
+    document = document.overridden(overrides)
     try:
         scenario = Scenario.model_validate({**data, "directory": folder})
     except ValidationError as error:

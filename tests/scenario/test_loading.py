@@ -157,8 +157,13 @@ def test_overrides_reach_into_lists_and_make_missing_blocks() -> None:
 
 
 def test_an_unknown_override_is_told_like_an_unknown_key() -> None:
-    with pytest.raises(InputError, match=r"fog\.visibilty_m: unknown key; did you mean 'visibility_m'\?"):
+    with pytest.raises(InputError) as error:
         load_scenario("motorway_fog_bank", ["fog.visibilty_m=80"])
+    assert str(error.value).startswith(
+        "--set fog.visibilty_m=80: fog.visibilty_m: unknown key; did you mean 'visibility_m'?"
+    )
+    with pytest.raises(InputError, match=r"^--set fog\.banks\.0\.edge_m=-1: fog\.banks\.0\.edge_m: .*greater than 0"):
+        load_scenario("motorway_fog_bank", ["fog.banks.0.edge_m=-1"])
 
 
 @pytest.mark.parametrize("text", ["fog.visibility_m", "=3", "fog..x=1", "a=[1"])

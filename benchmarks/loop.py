@@ -25,7 +25,7 @@ ENV_ID = "fogsim/FogAdvisory-v0"
 PEER_ID = "highway-fast-v0"
 
 STAGES = {
-    "traffic": (("libsumo_traffic.py", "advance"), ("libsumo_traffic.py", "observe")),
+    "traffic": (("sumo_traffic.py", "advance"), ("sumo_traffic.py", "observe")),
     "scene": (("vehicles.py", "vehicle_batches"),),
     "render": (("renderer.py", "render"),),
     "atmosphere": (("koschmieder.py", "fogged_radiance"), ("loop.py", "fog_truth")),

@@ -18,7 +18,7 @@ from fogsim.render import Renderer, make_renderer
 from fogsim.scenario import Scenario, build
 from fogsim.scene import build_scene, vehicle_batches
 from fogsim.sensors import measure_lead, signs_ahead
-from fogsim.traffic.libsumo_traffic import LibsumoTraffic
+from fogsim.traffic import libsumo_traffic
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import (
     CameraPose,
@@ -119,7 +119,7 @@ class ClosedLoop:
         self._told_camera = build.told_camera(scenario)
         self._estimators = build.estimators(scenario, self._told_camera)
         self._fusion = build.fusion(scenario)
-        self._traffic = LibsumoTraffic(build.traffic_setup(scenario))
+        self._traffic = libsumo_traffic(build.traffic_setup(scenario))
         self._world: _World | None = None
         self._streams = spawn_streams(0)
         self._step: Step | None = None

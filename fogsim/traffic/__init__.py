@@ -2,5 +2,19 @@
 
 from fogsim.traffic.protocol import Traffic
 from fogsim.traffic.setup import BrakeEvent, TrafficSetup
+from fogsim.traffic.sumo_library import LibsumoLink
+from fogsim.traffic.sumo_traffic import SumoTraffic
 
-__all__ = ["BrakeEvent", "Traffic", "TrafficSetup"]
+
+def libsumo_traffic(setup: TrafficSetup) -> Traffic:
+    """SUMO inside this process; one at a time.
+
+    Parameters
+    ----------
+    setup : TrafficSetup
+        The simulation and its ego.
+    """
+    return SumoTraffic(setup, LibsumoLink())
+
+
+__all__ = ["BrakeEvent", "Traffic", "TrafficSetup", "libsumo_traffic"]

@@ -5,10 +5,11 @@ import io
 import os
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from types import ModuleType
 
 from fogsim.errors import MissingDependencyError, SimulationError, SimulationRunningError
+from fogsim.traffic.link import Api
 
 
 def load_libsumo() -> ModuleType:
@@ -32,44 +33,55 @@ def load_libsumo() -> ModuleType:
     return module
 
 
-def start_simulation(libsumo: ModuleType, arguments: list[str], running_here: bool) -> None:
-    """Start SUMO in this process, or load it anew if this caller runs it already.
+class LibsumoLink:
+    """SUMO inside this process, through libsumo; one at a time."""
 
-    Parameters
-    ----------
-    libsumo : module
-        The library.
-    arguments : list of str
-        SUMO's command line without the program's name.
-    running_here : bool
-        True if the simulation that runs in this process is the caller's own.
+    def __init__(self) -> None:
+        self._sumo: ModuleType | None = None
 
-    Raises
-    ------
-    SimulationRunningError
-        If another simulation runs in this process.
-    SimulationError
-        If SUMO refuses its input; the message holds SUMO's own words.
-    """
-    if libsumo.isLoaded() and not running_here:
-        raise SimulationRunningError(
-            "another SUMO simulation runs in this process, and libsumo can hold only one: close the other one first, "
-            "or run this one in its own process (gymnasium.make_vec and AsyncVectorEnv do that for environments)"
-        )
-    with captured_stderr() as words:
-        try:
-            if running_here:
-                libsumo.load(arguments)
+    def begin(self, arguments: Sequence[str]) -> Api:
+        """Start SUMO here, or load it anew; see `SumoLink.begin`.
+
+        Raises
+        ------
+        SimulationRunningError
+            If another simulation runs in this process.
+        SimulationError
+            If SUMO refuses its input; the message holds SUMO's own words.
+        """
+        sumo = load_libsumo()
+        if sumo.isLoaded() and self._sumo is None:
+            raise SimulationRunningError(
+                "another SUMO simulation runs in this process, and libsumo can hold only one: close the other one "
+                "first, or run this one in its own process (gymnasium.make_vec and AsyncVectorEnv do that for "
+                "environments)"
+            )
+        with captured_stderr() as words:
+            try:
+                if self._sumo is None:
+                    sumo.start(["sumo", *arguments])
+                else:
+                    sumo.load(list(arguments))
+            except sumo.TraCIException as error:
+                failure = error
             else:
-                libsumo.start(["sumo", *arguments])
-        except libsumo.TraCIException as error:
-            failure = error
-        else:
-            return
-    if libsumo.isLoaded():
-        libsumo.close()
-    said = " ".join(line.strip() for line in words if line.strip()) or str(failure)
-    raise SimulationError(f"SUMO cannot load the scenario: {said}")
+                self._sumo = sumo
+                return sumo
+        self._sumo = sumo
+        self.end()
+        said = " ".join(line.strip() for line in words if line.strip()) or str(failure)
+        raise SimulationError(f"SUMO cannot load the scenario: {said}")
+
+    def step(self) -> None:
+        """Move the simulation by one step; see `SumoLink.step`."""
+        if self._sumo is not None:
+            self._sumo.simulationStep()
+
+    def end(self) -> None:
+        """End the simulation; see `SumoLink.end`."""
+        if self._sumo is not None and self._sumo.isLoaded():
+            self._sumo.close()
+        self._sumo = None
 
 
 @contextlib.contextmanager

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from fogsim.errors import SimulationError, SimulationRunningError
-from fogsim.traffic import BrakeEvent, TrafficSetup
-from fogsim.traffic.libsumo_traffic import LibsumoTraffic
+from fogsim.traffic import BrakeEvent, Traffic, TrafficSetup, libsumo_traffic
 from fogsim.values import Command, Lamp, SpeedAdvice, TrafficSnapshot
 
 FOLDER = Path(__file__).resolve().parents[2] / "scenarios" / "motorway_fog_bank"
@@ -29,26 +28,26 @@ SETUP = TrafficSetup(
 
 
 @pytest.fixture
-def traffic() -> Iterator[LibsumoTraffic]:
-    simulation = LibsumoTraffic(SETUP)
+def traffic() -> Iterator[Traffic]:
+    simulation = libsumo_traffic(SETUP)
     simulation.start(1)
     yield simulation
     simulation.close()
 
 
-def seen(traffic: LibsumoTraffic) -> TrafficSnapshot:
+def seen(traffic: Traffic) -> TrafficSnapshot:
     snapshot = traffic.observe()
     assert snapshot is not None
     return snapshot
 
 
-def drive(traffic: LibsumoTraffic, command: Command, steps: int) -> TrafficSnapshot:
+def drive(traffic: Traffic, command: Command, steps: int) -> TrafficSnapshot:
     for _ in range(steps):
         traffic.advance(command)
     return seen(traffic)
 
 
-def test_state_in_metres_and_radians(traffic: LibsumoTraffic) -> None:
+def test_state_in_metres_and_radians(traffic: Traffic) -> None:
     before = seen(traffic)
     after = drive(traffic, Command(), 10)
     state, ego = after.state, after.ego
@@ -62,7 +61,7 @@ def test_state_in_metres_and_radians(traffic: LibsumoTraffic) -> None:
     assert 5400 < after.route_length < 5600
 
 
-def test_every_array_has_a_row_for_each_vehicle_near_the_ego(traffic: LibsumoTraffic) -> None:
+def test_every_array_has_a_row_for_each_vehicle_near_the_ego(traffic: Traffic) -> None:
     state = seen(traffic).state
     n = len(state.ids)
     assert n > 10
@@ -75,7 +74,7 @@ def test_every_array_has_a_row_for_each_vehicle_near_the_ego(traffic: LibsumoTra
     assert distance.max() <= SETUP.reading_radius
 
 
-def test_the_gap_is_from_bumper_to_bumper(traffic: LibsumoTraffic) -> None:
+def test_the_gap_is_from_bumper_to_bumper(traffic: Traffic) -> None:
     snapshot = drive(traffic, Command(), 5)
     leader = snapshot.leader
     assert leader is not None
@@ -85,7 +84,7 @@ def test_the_gap_is_from_bumper_to_bumper(traffic: LibsumoTraffic) -> None:
     assert leader.gap == pytest.approx(distance - snapshot.state.length[row], abs=0.05)
 
 
-def test_the_ego_comes_down_to_an_advised_speed_and_is_freed_again(traffic: LibsumoTraffic) -> None:
+def test_the_ego_comes_down_to_an_advised_speed_and_is_freed_again(traffic: Traffic) -> None:
     start = seen(traffic).state
     target = 12.0
     advised = Command(SpeedAdvice(target))
@@ -98,14 +97,14 @@ def test_the_ego_comes_down_to_an_advised_speed_and_is_freed_again(traffic: Libs
     assert freed.state.speed[freed.ego] > target + 5
 
 
-def test_lamps_of_the_command_are_the_egos(traffic: LibsumoTraffic) -> None:
+def test_lamps_of_the_command_are_the_egos(traffic: Traffic) -> None:
     lit = drive(traffic, Command(lamps=Lamp.LOW_BEAM | Lamp.REAR_FOG), 1)
     assert Lamp(int(lit.state.lamps[lit.ego])) & ~Lamp.STOP == Lamp.LOW_BEAM | Lamp.REAR_FOG
 
 
 def test_a_scripted_vehicle_brakes_holds_and_drives_on() -> None:
     event = BrakeEvent("lead", at_position=300.0, to_speed=0.0, deceleration=5.0, hold=15.0)
-    traffic = LibsumoTraffic(replace(SETUP, events=(event,)))
+    traffic = libsumo_traffic(replace(SETUP, events=(event,)))
     try:
         traffic.start(1)
         speeds = []
@@ -121,7 +120,7 @@ def test_a_scripted_vehicle_brakes_holds_and_drives_on() -> None:
     assert np.nanmin(np.diff(speeds)) >= -0.5 - 0.01
 
 
-def test_the_same_seed_replays_exactly(traffic: LibsumoTraffic) -> None:
+def test_the_same_seed_replays_exactly(traffic: Traffic) -> None:
     def positions() -> list[bytes]:
         return [drive(traffic, Command(SpeedAdvice(20.0)), 10).state.position.tobytes() for _ in range(10)]
 
@@ -133,17 +132,17 @@ def test_the_same_seed_replays_exactly(traffic: LibsumoTraffic) -> None:
     assert positions() != first
 
 
-def test_a_second_simulation_in_one_process_is_refused(traffic: LibsumoTraffic) -> None:
+def test_a_second_simulation_in_one_process_is_refused(traffic: Traffic) -> None:
     with pytest.raises(SimulationRunningError, match="run this one in its own process"):
-        LibsumoTraffic(SETUP).start(1)
+        libsumo_traffic(SETUP).start(1)
     assert seen(traffic)  # the first goes on
 
 
 def test_an_ego_that_does_not_exist_ends_the_simulation_with_its_name() -> None:
-    traffic = LibsumoTraffic(replace(SETUP, ego="nobody", warm_up_limit=5.0))
+    traffic = libsumo_traffic(replace(SETUP, ego="nobody", warm_up_limit=5.0))
     with pytest.raises(SimulationError, match=r"the ego 'nobody' did not appear within 5"):
         traffic.start(1)
-    other = LibsumoTraffic(SETUP)
+    other = libsumo_traffic(SETUP)
     other.start(1)  # nothing is left running
     other.close()
 
@@ -152,10 +151,10 @@ def test_what_sumo_refuses_is_told_in_its_own_words(tmp_path: Path) -> None:
     routes = tmp_path / "broken.rou.xml"
     routes.write_text('<routes><vehicle id="ego" depart="0" route="nowhere"/></routes>', encoding="utf-8")
     with pytest.raises(SimulationError, match="nowhere"):
-        LibsumoTraffic(replace(SETUP, routes=(routes,))).start(1)
+        libsumo_traffic(replace(SETUP, routes=(routes,))).start(1)
 
 
-def test_the_ego_arrives_and_is_seen_no_more(traffic: LibsumoTraffic) -> None:
+def test_the_ego_arrives_and_is_seen_no_more(traffic: Traffic) -> None:
     for _ in range(3000):
         traffic.advance(Command())
         if traffic.observe() is None:
@@ -163,7 +162,7 @@ def test_the_ego_arrives_and_is_seen_no_more(traffic: LibsumoTraffic) -> None:
     pytest.fail("the ego never arrived")
 
 
-def test_closing_twice_is_allowed_and_a_closed_simulation_says_so(traffic: LibsumoTraffic) -> None:
+def test_closing_twice_is_allowed_and_a_closed_simulation_says_so(traffic: Traffic) -> None:
     traffic.close()
     traffic.close()
     with pytest.raises(SimulationError, match="not been started, or is closed"):

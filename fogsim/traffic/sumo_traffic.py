@@ -1,0 +1,153 @@
+"""Traffic by SUMO, wherever it runs."""
+
+from dataclasses import dataclass
+
+from fogsim.errors import SimulationError
+from fogsim.traffic.collisions import CollisionWatch
+from fogsim.traffic.control import Order, SpeedControl
+from fogsim.traffic.events import Script
+from fogsim.traffic.link import Api, SumoLink
+from fogsim.traffic.network import read_net, road_network, sign_map
+from fogsim.traffic.reading import VehicleReader
+from fogsim.traffic.setup import TrafficSetup
+from fogsim.values import Command, Lamp, RoadNetwork, SignMap, TrafficSnapshot
+
+_NO_LANE_CHANGES = 0
+
+
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """The parts that live as long as one run."""
+
+    api: Api
+    reader: VehicleReader
+    control: SpeedControl
+    collisions: CollisionWatch
+    script: Script
+
+
+class SumoTraffic:
+    """A SUMO simulation with one ego vehicle.
+
+    Parameters
+    ----------
+    setup : TrafficSetup
+        The simulation and its ego.
+    link : SumoLink
+        How it is reached.
+    """
+
+    def __init__(self, setup: TrafficSetup, link: SumoLink) -> None:
+        self._setup = setup
+        self._link = link
+        self._run: _Run | None = None
+        self._ego_lamps = Lamp.NONE
+        self._route_offset = 0.0
+        self._route_length = 0.0
+
+    @property
+    def _running(self) -> _Run:
+        if self._run is None:
+            raise SimulationError("the traffic simulation has not been started, or is closed")
+        return self._run
+
+    def start(self, seed: int) -> None:
+        """Begin, or begin anew, and run until the ego is on the road; see `Traffic.start`."""
+        setup = self._setup
+        api = self._link.begin(command_line(setup, seed))
+        self._run = _Run(
+            api=api,
+            reader=VehicleReader(api, setup.ego, setup.reading_radius),
+            control=SpeedControl(api, setup.step_length),
+            collisions=CollisionWatch(api),
+            script=Script(setup.events),
+        )
+        self._ego_lamps = Lamp.NONE
+        try:
+            self._warm_up(self._run)
+        except SimulationError:
+            self.close()
+            raise
+
+    def _warm_up(self, run: _Run) -> None:
+        simulation, vehicle, ego = run.api.simulation, run.api.vehicle, self._setup.ego
+        while ego not in vehicle.getIDList():
+            if simulation.getTime() > self._setup.warm_up_limit or simulation.getMinExpectedNumber() == 0:
+                raise SimulationError(
+                    f"the ego {ego!r} did not appear within {simulation.getTime():g} s of simulated time "
+                    f"(traffic.warm_up_limit_s is {self._setup.warm_up_limit:g}); "
+                    "is there a vehicle of that id in the route files?"
+                )
+            self._step(run)
+        run.collisions.tell()
+        self._route_offset = vehicle.getLanePosition(ego) - vehicle.getDistance(ego)
+        self._route_length = sum(run.api.lane.getLength(f"{edge}_0") for edge in vehicle.getRoute(ego))
+
+    def network(self) -> tuple[RoadNetwork, SignMap]:
+        """Roads and signs; see `Traffic.network`."""
+        net = read_net(self._setup.net)
+        route = self._running.api.vehicle.getRoute(self._setup.ego)
+        return road_network(net, route), sign_map(net, self._setup.additional)
+
+    def advance(self, command: Command) -> None:
+        """Move by one traffic step; see `Traffic.advance`."""
+        run = self._running
+        self._ego_lamps = command.lamps
+        run.control.carry_out(self._orders(run, command))
+        self._step(run)
+
+    def _orders(self, run: _Run, command: Command) -> dict[str, Order]:
+        present = set(run.api.vehicle.getIDList())
+        targets = {**command.advised_speeds, self._setup.ego: command.advice.speed}
+        braking = self._setup.advice_deceleration
+        orders = {vehicle: (target, braking) for vehicle, target in targets.items() if vehicle in present}
+        # What is scripted comes last, so that it overrides advice.
+        scripted = run.script.orders(run.api.simulation.getTime(), present, run.api.vehicle.getDistance)
+        return orders | scripted
+
+    def _step(self, run: _Run) -> None:
+        self._link.step()
+        run.collisions.look()
+        for vehicle in set(self._setup.keep_lane).intersection(run.api.simulation.getDepartedIDList()):
+            run.api.vehicle.setLaneChangeMode(vehicle, _NO_LANE_CHANGES)
+
+    def observe(self) -> TrafficSnapshot | None:
+        """Tell where everybody near the ego is; see `Traffic.observe`."""
+        run, ego = self._running, self._setup.ego
+        if ego not in run.api.vehicle.getIDList():
+            return None
+        state = run.reader.state(self._ego_lamps)
+        return TrafficSnapshot(
+            state=state,
+            ego=state.ids.index(ego),
+            route_position=self._route_offset + run.api.vehicle.getDistance(ego),
+            route_length=self._route_length,
+            speed_limit=run.api.lane.getMaxSpeed(run.api.vehicle.getLaneID(ego)),
+            leader=run.reader.leader(),
+            collisions=run.collisions.tell(),
+        )
+
+    def close(self) -> None:
+        """End the simulation; see `Traffic.close`."""
+        self._link.end()
+        self._run = None
+
+
+def command_line(setup: TrafficSetup, seed: int) -> list[str]:
+    """SUMO's command line, without the program's name.
+
+    Parameters
+    ----------
+    setup : TrafficSetup
+        The simulation.
+    seed : int
+        Its seed.
+    """
+    arguments = ["--net-file", str(setup.net), "--step-length", repr(setup.step_length), "--seed", str(seed)]
+    for option, paths in (("--route-files", setup.routes), ("--additional-files", setup.additional)):
+        if paths:
+            arguments += [option, ",".join(map(str, paths))]
+    quiet = ["--no-step-log", "true", "--duration-log.disable", "true", "--no-warnings", "true"]
+    # Nobody is beamed away: collisions stay where they happen and are counted.
+    physical = ["--time-to-teleport", "-1", "--collision.action", "warn"]
+    return arguments + quiet + physical

@@ -1,0 +1,1 @@
+"""Ride along in a simulation whose steps somebody else commands."""

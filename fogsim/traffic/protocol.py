@@ -2,6 +2,7 @@
 
 from typing import Protocol
 
+from fogsim.traffic.sight import FogAccess
 from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot
 
 
@@ -21,6 +22,9 @@ class Traffic(Protocol):
         SimulationError
             If the simulation cannot start or the ego does not appear in time.
         """
+
+    def enter_fog(self, fog: FogAccess) -> None:
+        """Let drivers see, from the next `start` on, only what this fog lets them see."""
 
     def network(self) -> tuple[RoadNetwork, SignMap]:
         """Roads and signs; after `start`."""

@@ -1,7 +1,21 @@
 """What a traffic simulation needs to know before it starts."""
 
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
+
+from fogsim.traffic.drivers import DriverSetup
+from fogsim.traffic.sight import DriverSight
+
+UNTOUCHED = DriverSetup(speed_choice="unaffected", spread=0.0)
+"""Drivers as the user's own simulation has them."""
+
+
+class AfterCollision(StrEnum):
+    """What becomes of vehicles that have collided: they stand and block the lane, or they vanish."""
+
+    STOP = "stop"
+    REMOVE = "remove"
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +67,12 @@ class TrafficSetup:
         Vehicles farther from the ego than this are not read [m].
     events : tuple of BrakeEvent
         What is scripted.
+    sight : DriverSight or None
+        Eyes of the drivers; None lets them see through the fog, as SUMO's do by themselves.
+    drivers : DriverSetup
+        How drivers choose their speed in fog and follow advice.
+    after_collision : AfterCollision
+        What becomes of vehicles that have collided.
     """
 
     net: Path
@@ -64,4 +84,7 @@ class TrafficSetup:
     warm_up_limit: float
     advice_deceleration: float
     reading_radius: float
-    events: tuple[BrakeEvent, ...]
+    events: tuple[BrakeEvent, ...] = ()
+    sight: DriverSight | None = None
+    drivers: DriverSetup = UNTOUCHED
+    after_collision: AfterCollision = AfterCollision.STOP

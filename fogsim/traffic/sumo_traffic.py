@@ -1,18 +1,26 @@
 """Traffic by SUMO, wherever it runs."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from fogsim.errors import SimulationError
 from fogsim.traffic.collisions import CollisionWatch
 from fogsim.traffic.control import Order, SpeedControl
+from fogsim.traffic.drivers import Drivers
 from fogsim.traffic.events import Script
 from fogsim.traffic.link import Api, SumoLink
-from fogsim.traffic.network import read_net, road_network, sign_map
+from fogsim.traffic.network import read_net, road_network
+from fogsim.traffic.opendrive import is_opendrive
+from fogsim.traffic.perception import Perception
 from fogsim.traffic.reading import VehicleReader
-from fogsim.traffic.setup import TrafficSetup
+from fogsim.traffic.setup import AfterCollision, TrafficSetup
+from fogsim.traffic.sight import FogAccess
+from fogsim.traffic.signs import sign_map
 from fogsim.values import Command, Lamp, RoadNetwork, SignMap, TrafficSnapshot
 
 _NO_LANE_CHANGES = 0
+_NOBODY: Mapping[str, float] = {}
+_FOR_EVER = "1e6"
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +32,8 @@ class _Run:
     control: SpeedControl
     collisions: CollisionWatch
     script: Script
+    perception: Perception | None
+    drivers: Drivers | None
 
 
 class SumoTraffic:
@@ -41,6 +51,7 @@ class SumoTraffic:
         self._setup = setup
         self._link = link
         self._run: _Run | None = None
+        self._fog: FogAccess | None = None
         self._ego_lamps = Lamp.NONE
         self._route_offset = 0.0
         self._route_length = 0.0
@@ -53,7 +64,7 @@ class SumoTraffic:
 
     def start(self, seed: int) -> None:
         """Begin, or begin anew, and run until the ego is on the road; see `Traffic.start`."""
-        setup = self._setup
+        setup, fog = self._setup, self._fog
         api = self._link.begin(command_line(setup, seed))
         self._run = _Run(
             api=api,
@@ -61,6 +72,8 @@ class SumoTraffic:
             control=SpeedControl(api, setup.step_length),
             collisions=CollisionWatch(api),
             script=Script(setup.events),
+            perception=None if fog is None or setup.sight is None else Perception(api, fog, setup.sight),
+            drivers=None if fog is None else Drivers(api, setup.drivers, fog, setup.ego, seed),
         )
         self._ego_lamps = Lamp.NONE
         try:
@@ -83,6 +96,10 @@ class SumoTraffic:
         self._route_offset = vehicle.getLanePosition(ego) - vehicle.getDistance(ego)
         self._route_length = sum(run.api.lane.getLength(f"{edge}_0") for edge in vehicle.getRoute(ego))
 
+    def enter_fog(self, fog: FogAccess) -> None:
+        """Let drivers see only what this fog lets them see; see `Traffic.enter_fog`."""
+        self._fog = fog
+
     def network(self) -> tuple[RoadNetwork, SignMap]:
         """Roads and signs; see `Traffic.network`."""
         net = read_net(self._setup.net)
@@ -94,18 +111,21 @@ class SumoTraffic:
         run = self._running
         self._ego_lamps = command.lamps
         run.control.carry_out(self._orders(run, command))
-        self._step(run)
+        self._step(run, command.advised_speeds)
 
     def _orders(self, run: _Run, command: Command) -> dict[str, Order]:
         present = set(run.api.vehicle.getIDList())
-        targets = {**command.advised_speeds, self._setup.ego: command.advice.speed}
-        braking = self._setup.advice_deceleration
-        orders = {vehicle: (target, braking) for vehicle, target in targets.items() if vehicle in present}
+        ego = self._setup.ego
+        orders = {ego: (command.advice.speed, self._setup.advice_deceleration)} if ego in present else {}
         # What is scripted comes last, so that it overrides advice.
         scripted = run.script.orders(run.api.simulation.getTime(), present, run.api.vehicle.getDistance)
         return orders | scripted
 
-    def _step(self, run: _Run) -> None:
+    def _step(self, run: _Run, advised: Mapping[str, float] = _NOBODY) -> None:
+        if run.perception is not None:
+            run.perception.update(self._setup.ego, self._ego_lamps)
+        if run.drivers is not None:
+            run.drivers.update(advised)
         self._link.step()
         run.collisions.look()
         for vehicle in set(self._setup.keep_lane).intersection(run.api.simulation.getDepartedIDList()):
@@ -144,10 +164,14 @@ def command_line(setup: TrafficSetup, seed: int) -> list[str]:
         Its seed.
     """
     arguments = ["--net-file", str(setup.net), "--step-length", repr(setup.step_length), "--seed", str(seed)]
-    for option, paths in (("--route-files", setup.routes), ("--additional-files", setup.additional)):
+    # OpenDRIVE files among them are the sign map's; SUMO cannot read them here.
+    additional = tuple(path for path in setup.additional if not is_opendrive(path))
+    for option, paths in (("--route-files", setup.routes), ("--additional-files", additional)):
         if paths:
             arguments += [option, ",".join(map(str, paths))]
     quiet = ["--no-step-log", "true", "--duration-log.disable", "true", "--no-warnings", "true"]
     # Nobody is beamed away: collisions stay where they happen and are counted.
-    physical = ["--time-to-teleport", "-1", "--collision.action", "warn"]
-    return arguments + quiet + physical
+    physical = ["--time-to-teleport", "-1", "--collision.action"]
+    if setup.after_collision is AfterCollision.STOP:
+        return arguments + quiet + physical + ["warn", "--collision.stoptime", _FOR_EVER]
+    return arguments + quiet + physical + ["remove"]

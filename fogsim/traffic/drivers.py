@@ -1,0 +1,184 @@
+"""How fast drivers drive in fog by themselves, and how they follow advice.
+
+Field and simulator studies agree that drivers slow down in fog, but not enough to stop within what they see, and not at
+all above some 200 m of visibility (Hogema & van der Horst 1994; Kang, Ni & Andersen 2008); and that advice alone moves
+few: on a fog-warned motorway drivers advised 30 mph drove 61 mph.
+"""
+
+import math
+import zlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.kinematics import safe_speed
+from fogsim.registry import Registry
+from fogsim.traffic.link import Api
+from fogsim.traffic.sight import FogAccess
+from fogsim.units import visibility_from_extinction
+
+REACTION_TIME, DECELERATION = 2.5, 3.4
+"""Of the speed from which one can stop within what is visible (AASHTO) [s], [m/s²]."""
+
+UNAFFECTED_ABOVE = 200.0
+"""Visibility above which drivers do not slow down [m]."""
+
+CHOICE_PERIOD = 0.5
+"""Time between two choices of speed [s]."""
+
+Choice = Callable[[float], float]
+"""From visibility [m] to the speed that a driver will not exceed [m/s]; ``inf`` if fog does not matter."""
+
+
+def unaffected(visibility: float) -> float:  # noqa: ARG001 - every choice is asked with the visibility
+    """Drive as in clear air, whatever the fog: the worst case."""
+    return math.inf
+
+
+def within_sight(visibility: float) -> float:
+    """Drive so that one can stop within the visibility: the careful case."""
+    return safe_speed(visibility, REACTION_TIME, DECELERATION)
+
+
+def too_fast(visibility: float) -> float:
+    """Slow down below 200 m, but to 1.4 times what would be safe (between the 1.3 and 1.5 that studies suggest)."""
+    return math.inf if visibility >= UNAFFECTED_ABOVE else 1.4 * within_sight(visibility)
+
+
+SPEED_CHOICES: Registry[Choice] = Registry(
+    "speed choice", {"unaffected": unaffected, "too_fast": too_fast, "within_sight": within_sight}
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Compliance:
+    """Who follows an advised speed, and how far.
+
+    Attributes
+    ----------
+    reached_share : float
+        Share of drivers whom the advice reaches (a sign that they pass, a device on board), 0 … 1.
+    rate : float
+        Share of those who follow it, 0 … 1.
+    strength : float
+        How far they go from their own speed towards the advised one, 0 … 1.
+    delay : float
+        Time before they do [s].
+    """
+
+    reached_share: float = 1.0
+    rate: float = 1.0
+    strength: float = 1.0
+    delay: float = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class DriverSetup:
+    """What drivers are like.
+
+    Attributes
+    ----------
+    speed_choice : str
+        Name in `SPEED_CHOICES`.
+    spread : float
+        Standard deviation of the logarithm of a driver's own factor on the chosen speed [-].
+    compliance : Compliance
+        How they follow advice.
+    """
+
+    speed_choice: str = "too_fast"
+    spread: float = 0.1
+    compliance: Compliance = Compliance()
+
+
+@dataclass(frozen=True, slots=True)
+class _Driver:
+    """One driver: factor on the chosen speed, whether advice moves them, top speed of the vehicle [m/s]."""
+
+    factor: float
+    follows: bool
+    top_speed: float
+
+
+class Drivers:
+    """Sets the top speed of every vehicle but the ego by what its driver chooses and is told.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    setup : DriverSetup
+        What they are like.
+    fog : FogAccess
+        The fog.
+    ego : str
+        The ego, which others govern.
+    seed : int
+        With a vehicle's id it gives its driver's nature, so that it depends on nothing else.
+    """
+
+    def __init__(self, api: Api, setup: DriverSetup, fog: FogAccess, ego: str, seed: int) -> None:
+        self._api = api
+        self._setup = setup
+        self._choice = SPEED_CHOICES[setup.speed_choice]
+        self._fog = fog
+        self._ego = ego
+        self._seed = seed
+        self._known: dict[str, _Driver] = {}
+        self._advised_since: dict[str, float] = {}
+        self._set: dict[str, float] = {}
+        self._next = 0.0
+
+    def update(self, advised: Mapping[str, float]) -> None:
+        """Let every driver choose a speed, if it is time to think again.
+
+        Parameters
+        ----------
+        advised : mapping from vehicle id to float
+            Advised speeds [m/s].
+        """
+        time = self._api.simulation.getTime()
+        if time < self._next:
+            return
+        self._next = time + CHOICE_PERIOD
+        vehicles = self._api.vehicle
+        ids = [v for v in vehicles.getIDList() if v != self._ego]
+        if not ids:
+            return
+        extinction = self._fog.extinction(np.array([vehicles.getPosition3D(v) for v in ids]))
+        self._advised_since = {v: self._advised_since.get(v, time) for v in advised}
+        for vehicle, speed in zip(ids, self._chosen(ids, extinction), strict=True):
+            target = min(self._advised(vehicle, speed, advised, time), self._driver(vehicle).top_speed)
+            # Setting it costs a call: a change that nobody would notice is left out.
+            if abs(target - self._set.get(vehicle, self._driver(vehicle).top_speed)) > 0.3:
+                vehicles.setMaxSpeed(vehicle, target)
+                self._set[vehicle] = target
+
+    def _chosen(self, ids: list[str], extinction: NDArray[np.float64]) -> list[float]:
+        return [
+            self._driver(v).factor * self._choice(visibility_from_extinction(float(k)))
+            for v, k in zip(ids, extinction, strict=True)
+        ]
+
+    def _advised(self, vehicle: str, own: float, advised: Mapping[str, float], time: float) -> float:
+        compliance = self._setup.compliance
+        if vehicle not in advised or not self._driver(vehicle).follows:
+            return own
+        if time - self._advised_since[vehicle] < compliance.delay:
+            return own
+        own = min(own, self._api.vehicle.getAllowedSpeed(vehicle), self._driver(vehicle).top_speed)
+        return own + compliance.strength * min(0.0, advised[vehicle] - own)
+
+    def _driver(self, vehicle: str) -> _Driver:
+        known = self._known.get(vehicle)
+        if known is None:
+            rng = np.random.default_rng([self._seed, zlib.crc32(vehicle.encode())])
+            compliance = self._setup.compliance
+            known = self._known[vehicle] = _Driver(
+                factor=float(np.exp(self._setup.spread * rng.standard_normal())),
+                follows=bool(rng.random() < compliance.reached_share) and bool(rng.random() < compliance.rate),
+                top_speed=float(self._api.vehicle.getMaxSpeed(vehicle)),
+            )
+        return known

@@ -1,0 +1,137 @@
+"""What a driver can see of the vehicle ahead: its body against the fog by day, its lamps at any time.
+
+Sources: Koschmieder's law with the 5 % contrast threshold (CIE); Allard's law for lamps; lamp intensities of UNECE R148
+and thresholds of illuminance at the eye as gathered in physics references (2·10⁻⁷ lx in darkness, 10⁻⁶ … 10⁻⁵ lx on a
+road at night, 10⁻³ lx by day).
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fogsim.units import CONTRAST_THRESHOLD
+from fogsim.values import Lamp
+
+REAR_LAMPS = ((Lamp.REAR_FOG, 200.0), (Lamp.STOP, 100.0), (Lamp.POSITION, 8.0))
+"""Luminous intensity of one rear lamp, brightest first [cd]: within UNECE's 150–300, 60–185 and 4–12."""
+
+NIGHT, DAY = 1.0, 1000.0
+"""Horizontal illuminance up to which the eye is adapted to night, and from which to day [lx]."""
+
+NIGHT_EYE_THRESHOLD, DAY_EYE_THRESHOLD = 1e-5, 1e-3
+"""Illuminance at the eye at which a lamp is noticed on a road, by night and by day [lx]."""
+
+DAYLIGHT = 10.0
+"""Horizontal illuminance from which a body is seen against the fog [lx]."""
+
+AIRLIGHT_REFLECTANCE = 0.95
+"""Reflectance of a white horizontal surface that would be as bright as the airlight [-]."""
+
+VERTICAL_ILLUMINANCE = 0.5
+"""Illuminance of a vertical surface under an overcast sky over that of a horizontal one [-]."""
+
+
+class FogAccess(Protocol):
+    """The fog as the traffic stage needs it; handed in by whoever knows the atmosphere."""
+
+    def extinction(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Extinction coefficient at points (..., 3) [1/m]."""
+
+    def optical_depth(self, start: ArrayLike, end: ArrayLike) -> NDArray[np.float64]:
+        """Optical depth between points (..., 3) [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class DriverSight:
+    """Eyes and headlamps of a driver.
+
+    Attributes
+    ----------
+    illuminance : float
+        Horizontal illuminance of the scene [lx].
+    headlamp_reach : float
+        Distance at which an unlit vehicle is seen in the own headlamps at night in clear air [m].
+    reaction_time : float
+        Time from the first sight of a leader that was not to be seen before to the first reaction [s]; for surprised
+        drivers 1 s and more.
+    contrast_threshold : float
+        Smallest contrast that is noticed [-].
+    """
+
+    illuminance: float
+    headlamp_reach: float = 55.0
+    reaction_time: float = 1.0
+    contrast_threshold: float = CONTRAST_THRESHOLD
+
+    @property
+    def eye_threshold(self) -> float:
+        """Illuminance at the eye at which a lamp is noticed [lx], between night and day on a double log scale."""
+        share = math.log(max(self.illuminance, NIGHT) / NIGHT) / math.log(DAY / NIGHT)
+        ratio = DAY_EYE_THRESHOLD / NIGHT_EYE_THRESHOLD
+        return float(NIGHT_EYE_THRESHOLD * ratio ** min(share, 1.0))
+
+    def sees_body(self, distance: ArrayLike, depth: ArrayLike, inherent_contrast: ArrayLike) -> NDArray[np.bool_]:
+        """Tell whether bodies are seen.
+
+        Parameters
+        ----------
+        distance : (n,) array_like
+            Distances [m].
+        depth : (n,) array_like
+            Optical depths of the lines of sight [-].
+        inherent_contrast : (n,) array_like
+            Contrasts to the airlight without fog between, 0 … 1.
+
+        Returns
+        -------
+        (n,) bool
+            By day where C₀ e^(−τ) reaches the threshold; at night within the reach of the headlamps, whose light goes
+            through the fog twice.
+        """
+        transmission = np.exp(-np.asarray(depth))
+        if self.illuminance >= DAYLIGHT:
+            return np.asarray(inherent_contrast * transmission >= self.contrast_threshold)
+        reach = self.headlamp_reach
+        # Retro-reflectors and plates return light as I e^(−2τ) / d²; in clear air they are seen up to the reach.
+        return np.asarray(transmission**2 * reach**2 >= np.square(distance))
+
+    def sees_lamp(self, distance: ArrayLike, depth: ArrayLike, intensity: ArrayLike) -> NDArray[np.bool_]:
+        """Tell whether lamps are seen, E = I e^(−τ) / d² ≥ E_threshold (Allard).
+
+        Parameters
+        ----------
+        distance, depth : (n,) array_like
+            Distances [m] and optical depths [-].
+        intensity : (n,) array_like
+            Luminous intensities [cd]; 0 for an unlit lamp.
+        """
+        illuminance = np.asarray(intensity) * np.exp(-np.asarray(depth)) / np.square(np.maximum(distance, 0.1))
+        return np.asarray(illuminance >= self.eye_threshold)
+
+
+def rear_intensity(lamps: int) -> float:
+    """Luminous intensity of the brightest rear lamp that is lit [cd].
+
+    Parameters
+    ----------
+    lamps : int
+        Bits of `Lamp`.
+    """
+    return next((intensity for lamp, intensity in REAR_LAMPS if lamps & lamp), 0.0)
+
+
+def inherent_contrast(paint: tuple[float, float, float]) -> float:
+    """Contrast of a vehicle's rear to the airlight, 0 … 1.
+
+    A third of the rear is dark glass, tyres and shadow; the rest is paint under half of the sky.
+
+    Parameters
+    ----------
+    paint : tuple of float
+        Linear reflectance, 0 … 1.
+    """
+    reflectance = (0.2126 * paint[0] + 0.7152 * paint[1] + 0.0722 * paint[2]) * 2.0 / 3.0
+    return max(0.0, 1.0 - VERTICAL_ILLUMINANCE * reflectance / AIRLIGHT_REFLECTANCE)

@@ -1,0 +1,140 @@
+"""Reference lines of OpenDRIVE roads: straight lines, arcs and spirals end to end."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+SPIRAL_NODES, SPIRAL_WEIGHTS = np.polynomial.legendre.leggauss(24)
+"""Gauss-Legendre rule on −1 … 1; on a spiral that turns by π it is exact to far below a millimetre."""
+
+Place = tuple[float, float, float]
+"""x, y [m] and heading, counterclockwise from east [rad]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A stretch of a reference line whose curvature is linear in its length.
+
+    Attributes
+    ----------
+    s, length : float
+        Where it begins along the road, and how long it is [m].
+    x, y, heading : float
+        Its first point [m] and the direction there [rad].
+    curvature, curvature_rate : float
+        Curvature at its start [1/m], positive to the left, and its change along the piece [1/m²]; both 0 for a line,
+        the latter 0 for an arc.
+    """
+
+    s: float
+    length: float
+    x: float
+    y: float
+    heading: float
+    curvature: float
+    curvature_rate: float
+
+    def at(self, distance: float) -> Place:
+        """Point at a distance from its start [m]."""
+        turned = self._turned(distance)
+        if self.curvature_rate:
+            along = 0.5 * distance * (SPIRAL_NODES + 1.0)
+            angles = self.heading + self.curvature * along + 0.5 * self.curvature_rate * along**2
+            dx = 0.5 * distance * float(SPIRAL_WEIGHTS @ np.cos(angles))
+            dy = 0.5 * distance * float(SPIRAL_WEIGHTS @ np.sin(angles))
+        else:
+            # A chord of an arc: its length is that of the arc times sin(a) / a, its direction the middle one.
+            half = 0.5 * turned
+            chord = distance * (math.sin(half) / half if half else 1.0)
+            dx, dy = chord * math.cos(self.heading + half), chord * math.sin(self.heading + half)
+        return self.x + dx, self.y + dy, self.heading + turned
+
+    def _turned(self, distance: float) -> float:
+        return distance * (self.curvature + 0.5 * self.curvature_rate * distance)
+
+
+@dataclass(frozen=True, slots=True)
+class PlanView:
+    """A road's reference line.
+
+    Attributes
+    ----------
+    pieces : tuple of Piece or str
+        Its pieces in order of s; for a shape that is not known, its place and name.
+    """
+
+    pieces: tuple["Piece | UnknownPiece", ...]
+
+    def at(self, s: float) -> Place:
+        """Point at a distance along the road.
+
+        Raises
+        ------
+        ValueError
+            If s is not on the road, or on a stretch of unknown shape.
+        """
+        end = self.pieces[-1].s + self.pieces[-1].length
+        # Files round s; a centimetre beyond an end is that end.
+        if not -0.01 <= s <= end + 0.01:
+            raise ValueError(f"expected s on the road, 0 … {end:g} m, got {s:g}")
+        piece = next((p for p in reversed(self.pieces) if p.s <= s), self.pieces[0])
+        return piece.at(s - piece.s)
+
+
+@dataclass(frozen=True, slots=True)
+class UnknownPiece:
+    """A stretch of another shape, on which nothing can be placed."""
+
+    s: float
+    length: float
+    shape: str
+
+    def at(self, distance: float) -> Place:
+        """Raise what a user can make something of."""
+        where = self.s + distance
+        raise ValueError(f"s = {where:g} m is on a {self.shape}; places on line, arc and spiral are known")
+
+
+def plan_view(geometries: Iterable[Element]) -> PlanView:
+    """Reference line of a road from its ``<geometry>`` elements.
+
+    Parameters
+    ----------
+    geometries : iterable of Element
+        They, with ``s``, ``x``, ``y``, ``hdg`` and ``length``, each holding ``<line>``, ``<arc>`` or ``<spiral>``.
+
+    Raises
+    ------
+    ValueError
+        If there is none, or a number is missing.
+    """
+    pieces = tuple(sorted((_piece(g) for g in geometries), key=lambda p: p.s))
+    if not pieces:
+        raise ValueError("the road has no geometry")
+    return PlanView(pieces)
+
+
+def _piece(geometry: Element) -> Piece | UnknownPiece:
+    s, x, y, heading, length = _numbers(geometry, "s", "x", "y", "hdg", "length")
+    shape = next(iter(geometry), None)
+    tag = "geometry without a shape" if shape is None else shape.tag
+    if shape is None or tag not in ("line", "arc", "spiral") or length <= 0:
+        return UnknownPiece(s, length, tag)
+    start = end = 0.0
+    if tag == "arc":
+        start = end = _numbers(shape, "curvature")[0]
+    elif tag == "spiral":
+        start, end = _numbers(shape, "curvStart", "curvEnd")
+    return Piece(s, length, x, y, heading, start, (end - start) / length)
+
+
+def _numbers(element: Element, *keys: str) -> list[float]:
+    try:
+        return [float(element.attrib[key]) for key in keys]
+    except KeyError as error:
+        raise ValueError(f"<{element.tag}> needs the attribute {error}") from None
+    except ValueError as error:
+        raise ValueError(f"<{element.tag}> needs numbers for {', '.join(keys)}: {error}") from None

@@ -1,0 +1,145 @@
+"""Signs of a SUMO network: where limits change, marked places in additional files, OpenDRIVE signals."""
+
+import math
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import sumolib
+
+from fogsim.errors import InputError
+from fogsim.traffic.opendrive import is_opendrive, opendrive_signs
+from fogsim.units import KMH_PER_MPS
+from fogsim.values import Sign, SignMap
+
+SIGN_TYPE = "fogsim.sign."
+"""POIs and polygons of type ``fogsim.sign.KIND`` in an additional file are signs."""
+
+SPEED_LIMIT = "speed_limit"
+SIGN_CLEARANCE = 3.9
+"""Lateral distance from the edge of the outermost lane to the middle of a sign [m]: behind shoulder and rail."""
+SIGN_HEIGHT = 2.6
+"""Height of the middle of a sign's face above the road [m]."""
+SIGN_DIAMETER = 0.9
+"""Diameter of a round sign outside towns [m]; 0.75–0.9 m for speeds above 80 km/h (German VzKat size 3)."""
+
+LonLat = tuple[float, float]
+
+
+def sign_map(net: Any, additional: Iterable[Path]) -> SignMap:
+    """Signs of a network; none at all make an empty map.
+
+    Parameters
+    ----------
+    net : sumolib.net.Net
+        The network.
+    additional : iterable of Path
+        SUMO additional files, and OpenDRIVE files (``.xodr``) that the network was made from.
+
+    Raises
+    ------
+    InputError
+        If a sign cannot be placed or has no usable value.
+    """
+    signs = [sign for edge in net.getEdges(withInternal=False) if (sign := _limit_sign(edge)) is not None]
+    for path in additional:
+        signs += opendrive_signs(path, _net_offset(net)) if is_opendrive(path) else _marked_signs(path)
+    return SignMap(tuple(signs))
+
+
+def geographic_position(net: Any) -> Callable[[float, float], LonLat] | None:
+    """Conversion of a network's x, y [m] to longitude and latitude [deg].
+
+    Parameters
+    ----------
+    net : sumolib.net.Net
+        The network.
+
+    Returns
+    -------
+    callable or None
+        None where the network has no projection or pyproj is not installed.
+    """
+    try:
+        projection = net.getGeoProj()
+    except (KeyError, RuntimeError):
+        return None
+    x_offset, y_offset = _net_offset(net)
+
+    def convert(x: float, y: float) -> LonLat:
+        longitude, latitude = projection(x - x_offset, y - y_offset, inverse=True)
+        return float(longitude), float(latitude)
+
+    return convert
+
+
+def _net_offset(net: Any) -> tuple[float, float]:
+    """What was added to the source's coordinates to get the network's [m]."""
+    try:
+        x, y = net.getLocationOffset()
+    except KeyError:  # a network written by hand says nothing about where it is
+        return 0.0, 0.0
+    return x, y
+
+
+def _limit_sign(edge: Any) -> Sign | None:
+    """Sign at the start of an edge whose limit differs from that of every edge leading to it."""
+    limit = edge.getSpeed()
+    if any(abs(incoming.getSpeed() - limit) < 0.1 for incoming in edge.getIncoming()):
+        return None
+    lane = edge.getLanes()[0]
+    points = np.array(lane.getShape3D(), dtype=np.float64)
+    along = points[1] - points[0]
+    heading = math.atan2(along[1], along[0])
+    offset = lane.getWidth() / 2 + SIGN_CLEARANCE
+    # Ten metres into the edge, so that the sign stands on the stretch that it speaks for.
+    x, y, z = points[0] + along / np.linalg.norm(along) * min(10.0, 0.5 * lane.getLength())
+    x, y = float(x) + offset * math.sin(heading), float(y) - offset * math.cos(heading)
+    return Sign(
+        f"limit.{edge.getID()}",
+        SPEED_LIMIT,
+        float(limit),
+        (x, y, float(z) + SIGN_HEIGHT),
+        heading,
+        SIGN_DIAMETER,
+    )
+
+
+def _marked_signs(path: Path) -> list[Sign]:
+    """Signs that POIs and polygons of an additional file stand for."""
+    try:
+        shapes = list(sumolib.xml.parse(str(path), ["poi", "poly"]))
+    except Exception as error:  # whatever its parser makes of a file that is none
+        raise InputError(f"{path}: not a SUMO additional file: {error}") from error
+    return [_marked_sign(path, s) for s in shapes if str(s.getAttributeSecure("type", "")).startswith(SIGN_TYPE)]
+
+
+def _marked_sign(path: Path, shape: Any) -> Sign:
+    where = f"{path}: {shape.name} {shape.id!r}"
+    kind = str(shape.type).removeprefix(SIGN_TYPE)
+    parameters = {p.key: p.value for p in (shape.param or [])}
+    try:
+        value = float(parameters["value"])
+        heading = math.radians(90.0 - float(shape.getAttributeSecure("angle", "")))
+        x, y = _middle(shape)
+        diameter = float(parameters.get("diameter", SIGN_DIAMETER))
+    except KeyError:
+        raise InputError(f'{where}: a sign needs <param key="value" value="…"/>') from None
+    except (TypeError, ValueError) as error:
+        place = "shape" if shape.name == "poly" else "x, y"
+        raise InputError(f"{where}: a sign needs numbers for {place}, angle and its value: {error}") from None
+    if kind == SPEED_LIMIT:
+        value /= KMH_PER_MPS
+    return Sign(str(shape.id), kind, value, (x, y, SIGN_HEIGHT), heading, diameter)
+
+
+def _middle(shape: Any) -> tuple[float, float]:
+    """Where a POI is, or the middle of a polygon's bounding box [m]."""
+    if shape.name == "poi":
+        return float(shape.getAttributeSecure("x", "")), float(shape.getAttributeSecure("y", ""))
+    corners = np.array([[float(v) for v in corner.split(",")[:2]] for corner in str(shape.shape).split()])
+    if not len(corners):
+        raise ValueError("the shape has no corners")
+    x, y = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+    return float(x), float(y)

@@ -5,12 +5,13 @@ from collections.abc import Iterator
 from types import TracebackType
 from typing import Self
 
+from fogsim.atmosphere import FieldAccess
 from fogsim.errors import SimulationError
 from fogsim.onboard import OnBoard
 from fogsim.randomness import spawn_streams
 from fogsim.scenario import Scenario, build
 from fogsim.traffic import Traffic, libsumo_traffic
-from fogsim.values import Command, Ending, Step, TrafficSnapshot
+from fogsim.values import Command, Ending, FogField, Step, TrafficSnapshot
 
 
 def run(scenario: Scenario, seed: int = 0) -> Iterator[Step]:
@@ -82,7 +83,9 @@ class ClosedLoop:
         self._scenario = scenario
         self._periods = build.periods(scenario)
         self._traffic = traffic or libsumo_traffic(build.traffic_setup(scenario))
+        self._replays = traffic is None
         self._onboard = OnBoard(scenario)
+        self._in_fog = False
         self._step: Step | None = None
 
     def start(self, seed: int) -> Step:
@@ -103,12 +106,22 @@ class ClosedLoop:
         streams = spawn_streams(seed)
         self._step = None
         self._traffic.start(streams.traffic_seed)
-        self._onboard.begin(streams, self._traffic.network)
+        fog = self._onboard.begin(streams, self._traffic.network).fog
+        if not self._in_fog and (fog.extinction > 0 or fog.banks):
+            self._enter_fog(fog, streams.traffic_seed)
         snapshot = self._traffic.observe()
         if snapshot is None:
             raise SimulationError("the ego left the road as soon as it had appeared")
         self._step = self._finish(0, snapshot, Command())
         return self._step
+
+    def _enter_fog(self, fog: FogField, seed: int) -> None:
+        """Tell the traffic of the fog, whose place is known only when the ego's route is."""
+        self._traffic.enter_fog(FieldAccess(fog))
+        self._in_fog = True
+        if self._replays:
+            # Drivers must have had the fog about them while the road filled: begin once more, with it.
+            self._traffic.start(seed)
 
     def advance(self, command: Command) -> Step:
         """Move by one camera period with a command in force.

@@ -14,7 +14,7 @@ from fogsim.fusion import FUSIONS, Fusion
 from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy
 from fogsim.scenario.schema import Bank, Scenario
 from fogsim.sensors import LeadSensor
-from fogsim.traffic import BrakeEvent, TrafficSetup
+from fogsim.traffic import BrakeEvent, Compliance, DriverSetup, DriverSight, TrafficSetup
 from fogsim.units import KMH_PER_MPS, extinction_from_visibility
 from fogsim.values import Camera, FogBank, FogField
 
@@ -72,7 +72,30 @@ def traffic_setup(scenario: Scenario) -> TrafficSetup:
             BrakeEvent(e.vehicle, e.at_position_m, e.to_speed_kmh / KMH_PER_MPS, e.deceleration_mps2, e.hold_s)
             for e in traffic.events
         ),
+        sight=driver_sight(scenario),
+        drivers=driver_setup(scenario),
+        after_collision=traffic.after_collision,
     )
+
+
+def driver_sight(scenario: Scenario) -> DriverSight | None:
+    """Eyes of the drivers; None if they see through the fog."""
+    drivers = scenario.drivers
+    if drivers.see_through_fog:
+        return None
+    return DriverSight(scenario.light.illuminance_lx, drivers.headlamp_reach_m, drivers.reaction_time_s)
+
+
+def driver_setup(scenario: Scenario) -> DriverSetup:
+    """How drivers choose their speed and follow advice."""
+    drivers = scenario.drivers
+    compliance = Compliance(
+        drivers.compliance.reached_share,
+        drivers.compliance.rate,
+        drivers.compliance.strength,
+        drivers.compliance.delay_s,
+    )
+    return DriverSetup(drivers.speed_choice, drivers.speed_spread, compliance)
 
 
 def camera(scenario: Scenario) -> Camera:

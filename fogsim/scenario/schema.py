@@ -17,8 +17,10 @@ from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.render import RENDERERS
 from fogsim.scenario.methods import Method, method_of
+from fogsim.traffic import SPEED_CHOICES, AfterCollision
 from fogsim.values import Response
 
+Share = Annotated[float, Field(ge=0, le=1)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
@@ -113,8 +115,59 @@ class Traffic(Section):
     events: tuple[Brake, ...] = ()
     """What is scripted."""
 
+    after_collision: AfterCollision = AfterCollision.STOP
+    """What becomes of vehicles that have collided: `stop` (they stand and block the lane) or `remove`."""
+
     stop_before_end_m: NotNegative = 60.0
     """The ego has arrived when it is this near to the end of its route."""
+
+
+class ComplianceSection(Section):
+    """Who follows advice, and how far."""
+
+    reached_share: Share = 1.0
+    """Share of drivers whom advice reaches."""
+
+    rate: Share = 1.0
+    """Share of those who follow it."""
+
+    strength: Share = 1.0
+    """How far they go from their own speed towards the advised one."""
+
+    delay_s: NotNegative = 2.0
+    """Time before they do."""
+
+
+class DriversSection(Section):
+    """The drivers of all vehicles but, for speed, the ego."""
+
+    see_through_fog: bool = False
+    """True for SUMO's own drivers, who see their leader through any fog."""
+
+    reaction_time_s: NotNegative = 1.0
+    """Time from the first sight of a leader that was hidden to the first reaction."""
+
+    headlamp_reach_m: Positive = 55.0
+    """Distance at which an unlit vehicle is seen in the headlamps at night in clear air."""
+
+    speed_choice: str = "too_fast"
+    """How fast they drive in fog by themselves."""
+
+    speed_spread: NotNegative = 0.1
+    """Standard deviation of the logarithm of a driver's own factor on that speed."""
+
+    compliance: ComplianceSection = ComplianceSection()
+    """How they follow advice."""
+
+    advised: Literal["ego", "all"] = "ego"
+    """Whether the advice goes to the ego alone, or to every vehicle near it as well."""
+
+    @field_validator("speed_choice")
+    @classmethod
+    def _known_choice(cls, value: str) -> str:
+        if value not in SPEED_CHOICES:
+            raise ValueError(str(UnknownNameError("speed choice", value, SPEED_CHOICES)))
+        return value
 
 
 class Bank(Section):
@@ -279,6 +332,9 @@ class Scenario(Section):
 
     traffic: Traffic
     """The traffic."""
+
+    drivers: DriversSection = DriversSection()
+    """The drivers."""
 
     fog: Fog
     """The fog."""

@@ -24,7 +24,7 @@ class Traffic(Protocol):
         """
 
     def enter_fog(self, fog: FogAccess) -> None:
-        """Let drivers see, from the next `start` on, only what this fog lets them see."""
+        """Let drivers see only what this fog lets them see, from now on and in every later run."""
 
     def network(self) -> tuple[RoadNetwork, SignMap]:
         """Roads and signs; after `start`."""

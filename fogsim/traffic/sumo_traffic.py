@@ -1,7 +1,7 @@
 """Traffic by SUMO, wherever it runs."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fogsim.errors import SimulationError
 from fogsim.traffic.collisions import CollisionWatch
@@ -32,8 +32,8 @@ class _Run:
     control: SpeedControl
     collisions: CollisionWatch
     script: Script
-    perception: Perception | None
-    drivers: Drivers | None
+    perception: Perception | None = None
+    drivers: Drivers | None = None
 
 
 class SumoTraffic:
@@ -52,6 +52,7 @@ class SumoTraffic:
         self._link = link
         self._run: _Run | None = None
         self._fog: FogAccess | None = None
+        self._seed = 0
         self._ego_lamps = Lamp.NONE
         self._route_offset = 0.0
         self._route_length = 0.0
@@ -64,7 +65,7 @@ class SumoTraffic:
 
     def start(self, seed: int) -> None:
         """Begin, or begin anew, and run until the ego is on the road; see `Traffic.start`."""
-        setup, fog = self._setup, self._fog
+        setup = self._setup
         api = self._link.begin(command_line(setup, seed))
         self._run = _Run(
             api=api,
@@ -72,12 +73,13 @@ class SumoTraffic:
             control=SpeedControl(api, setup.step_length),
             collisions=CollisionWatch(api),
             script=Script(setup.events),
-            perception=None if fog is None or setup.sight is None else Perception(api, fog, setup.sight),
-            drivers=None if fog is None else Drivers(api, setup.drivers, fog, setup.ego, seed),
         )
+        self._seed = seed
+        if self._fog is not None:
+            self.enter_fog(self._fog)
         self._ego_lamps = Lamp.NONE
         try:
-            self._warm_up(self._run)
+            self._warm_up(self._running)
         except SimulationError:
             self.close()
             raise
@@ -99,6 +101,13 @@ class SumoTraffic:
     def enter_fog(self, fog: FogAccess) -> None:
         """Let drivers see only what this fog lets them see; see `Traffic.enter_fog`."""
         self._fog = fog
+        if self._run is not None:
+            setup, api = self._setup, self._run.api
+            self._run = replace(
+                self._run,
+                perception=None if setup.sight is None else Perception(api, fog, setup.sight),
+                drivers=Drivers(api, setup.drivers, fog, setup.ego, self._seed),
+            )
 
     def network(self) -> tuple[RoadNetwork, SignMap]:
         """Roads and signs; see `Traffic.network`."""

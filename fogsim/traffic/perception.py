@@ -42,6 +42,7 @@ class Perception:
         self._ignored: dict[str, str] = {}
         self._emerging: dict[tuple[str, str], float] = {}
         self._contrast: dict[str, float] = {}
+        self._minimum_gap: dict[str, float] = {}
 
     def update(self, ego: str, ego_lamps: Lamp) -> None:
         """Look once: tell SUMO's drivers which leader they do not see.
@@ -80,8 +81,8 @@ class Perception:
         followers, leaders, spacings = zip(*found, strict=True)
         eyes, rears = self._lines(followers, leaders)
         towards = rears - eyes
-        # SUMO's gap leaves out the follower's minimum gap, some 2.5 m: for sight the difference is nothing.
-        distance = np.maximum(np.array(spacings), 0.1)
+        # SUMO's gap leaves out the follower's minimum gap.
+        distance = np.maximum(np.array(spacings) + [self._minimum_gap_of(v) for v in followers], 0.1)
         depth = self._fog.optical_depth(eyes, eyes + towards * (distance / np.linalg.norm(towards, axis=1))[:, None])
         contrast = np.array([self._contrast_of(v) for v in leaders])
         seen = self._sight.sees_body(distance, depth, contrast)
@@ -101,6 +102,12 @@ class Perception:
         known = {v: position(v) for v in {*followers, *leaders}}
         lift = np.array([0.0, 0.0, EYE_HEIGHT])
         return np.array([known[v] for v in followers]) + lift, np.array([known[v] for v in leaders]) + lift
+
+    def _minimum_gap_of(self, vehicle: str) -> float:
+        known = self._minimum_gap.get(vehicle)
+        if known is None:
+            known = self._minimum_gap[vehicle] = float(self._api.vehicle.getMinGap(vehicle))
+        return known
 
     def _contrast_of(self, vehicle: str) -> float:
         known = self._contrast.get(vehicle)

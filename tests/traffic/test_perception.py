@@ -1,0 +1,163 @@
+"""Drivers in a real SUMO: who sees late hits, who sees early stops."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike, NDArray
+
+from fogsim.traffic import Compliance, DriverSetup, DriverSight, Traffic, TrafficSetup, libsumo_traffic
+from fogsim.traffic.drivers import SPEED_CHOICES, too_fast, unaffected, within_sight
+from fogsim.values import Collision, Command
+
+NET = Path(__file__).resolve().parents[2] / "scenarios" / "motorway_fog_bank" / "motorway.net.xml"
+EMERGENCY_DECELERATION = 9.0  # SUMO's default of a passenger car
+ROUTES = """<routes>
+  <vType id="c" vClass="passenger" sigma="0" speedDev="0" length="4.6" maxSpeed="33.8" collisionMinGapFactor="0"/>
+  <route id="r" edges="approach bank exit"/>
+  <vehicle id="wreck" type="c" route="r" depart="0" departPos="800" departSpeed="0" departLane="1" color="0,0,0">
+    <stop lane="approach_1" startPos="790" endPos="801" duration="10000"/>
+  </vehicle>
+  <vehicle id="ego" type="c" route="r" depart="0" departPos="100" departSpeed="33.8" departLane="1"/>
+</routes>"""
+
+
+@dataclass(frozen=True)
+class Fog:
+    """Homogeneous fog."""
+
+    k: float
+
+    def extinction(self, points: ArrayLike) -> NDArray[np.float64]:
+        return np.full(np.shape(points)[:-1], self.k)
+
+    def optical_depth(self, start: ArrayLike, end: ArrayLike) -> NDArray[np.float64]:
+        return self.k * np.linalg.norm(np.subtract(end, start), axis=-1)
+
+
+@dataclass(frozen=True)
+class SeesFrom:
+    """Eyes that see everything from a fixed distance on, whatever the fog."""
+
+    distance: float
+    reaction_time: float = 0.0
+
+    def sees_body(self, distance: ArrayLike, *_: ArrayLike) -> NDArray[np.bool_]:
+        return np.asarray(distance) <= self.distance
+
+    def sees_lamp(self, distance: ArrayLike, *_: ArrayLike) -> NDArray[np.bool_]:
+        return np.zeros(np.shape(distance), dtype=bool)
+
+
+@pytest.fixture
+def setup(tmp_path: Path) -> TrafficSetup:
+    routes = tmp_path / "wreck.rou.xml"
+    routes.write_text(ROUTES, encoding="utf-8")
+    return TrafficSetup(
+        net=NET,
+        routes=(routes,),
+        additional=(),
+        ego="ego",
+        step_length=0.05,
+        keep_lane=("ego", "wreck"),
+        warm_up_limit=10.0,
+        advice_deceleration=2.0,
+        reading_radius=2000.0,
+    )
+
+
+def collisions(setup: TrafficSetup, k: float = 0.05, steps: int = 800) -> tuple[list[Collision], float]:
+    """Collisions of a drive towards the wreck, and the ego's speed at the end [m/s]."""
+    traffic = libsumo_traffic(setup)
+    traffic.enter_fog(Fog(k))
+    hits: list[Collision] = []
+    try:
+        traffic.start(1)
+        for _ in range(steps):
+            traffic.advance(Command())
+            snapshot = traffic.observe()
+            assert snapshot is not None
+            hits += snapshot.collisions
+            speed = float(snapshot.state.speed[snapshot.ego])
+    finally:
+        traffic.close()
+    return hits, speed
+
+
+@pytest.mark.parametrize(("sight", "reaction"), [(50.0, 0.0), (40.0, 0.0), (80.0, 1.0)])
+def test_who_sees_too_late_hits_at_the_speed_that_physics_gives(
+    setup: TrafficSetup, sight: float, reaction: float
+) -> None:
+    """v² = v₀² − 2 a (d − v₀ t), with SUMO's emergency deceleration."""
+    ((hit,), _) = collisions(replace(setup, sight=SeesFrom(sight, reaction)), steps=800)
+    expected = np.sqrt(33.8**2 - 2 * EMERGENCY_DECELERATION * (sight - 33.8 * reaction))
+    assert hit.impact_speed == pytest.approx(expected, abs=1.0)
+    assert {hit.collider, hit.victim} == {"ego", "wreck"}
+
+
+def test_who_sees_in_time_stops(setup: TrafficSetup) -> None:
+    hits, speed = collisions(replace(setup, sight=SeesFrom(100.0)))
+    assert hits == []
+    assert speed == pytest.approx(0.0, abs=0.01)
+
+
+def test_stock_drivers_see_through_any_fog(setup: TrafficSetup) -> None:
+    hits, speed = collisions(setup, k=0.3)
+    assert hits == []
+    assert speed == pytest.approx(0.0, abs=0.01)
+
+
+def test_real_eyes_in_dense_fog_hit_and_in_thin_fog_stop(setup: TrafficSetup) -> None:
+    eyes = replace(setup, sight=DriverSight(illuminance=10_000.0))
+    assert len(collisions(eyes, k=3.0 / 30.0)[0]) == 1
+    assert collisions(eyes, k=3.0 / 400.0)[0] == []
+
+
+def test_after_a_collision_both_stand_and_block_the_lane_or_vanish(setup: TrafficSetup) -> None:
+    blind = replace(setup, sight=SeesFrom(20.0))
+    hits, speed = collisions(blind)
+    assert len(hits) == 1
+    assert speed == pytest.approx(0.0, abs=0.01)
+
+
+@pytest.fixture
+def crowd(setup: TrafficSetup) -> Iterator[Traffic]:
+    """The motorway's own traffic in fog of 60 m, drivers as the test sets them."""
+    folder = NET.parent
+    busy = replace(
+        setup,
+        routes=(folder / "motorway.rou.xml",),
+        warm_up_limit=600.0,
+        drivers=DriverSetup("within_sight", spread=0.0, compliance=Compliance(rate=0.5)),
+    )
+    traffic = libsumo_traffic(busy)
+    traffic.enter_fog(Fog(3.0 / 60.0))
+    yield traffic
+    traffic.close()
+
+
+def test_drivers_choose_a_speed_in_fog_and_only_those_who_comply_follow_advice(crowd: Traffic) -> None:
+    crowd.start(1)
+    snapshot = crowd.observe()
+    assert snapshot is not None
+    others = [v for v in snapshot.state.ids if v != "ego"]
+    chosen = within_sight(60.0)
+    speeds = snapshot.state.speed[[snapshot.state.row(v) for v in others]]
+    assert np.median(speeds) == pytest.approx(chosen, abs=1.0)
+    for _ in range(600):
+        crowd.advance(Command(advised_speeds=dict.fromkeys(others, 7.0)))
+    after = crowd.observe()
+    assert after is not None
+    rows = [row for v in others if (row := after.state.row(v)) is not None]
+    slow = float(np.mean(after.state.speed[rows] < 8.0))
+    assert 0.25 < slow < 0.95  # half comply, and some of the others are held up behind them
+
+
+def test_speed_choices() -> None:
+    assert unaffected(30.0) == np.inf
+    assert within_sight(50.0) * 3.6 == pytest.approx(42.5, abs=0.05)
+    assert too_fast(200.0) == np.inf
+    assert too_fast(100.0) == pytest.approx(1.4 * within_sight(100.0))
+    assert {"unaffected", "too_fast", "within_sight"} <= set(SPEED_CHOICES)

@@ -192,6 +192,22 @@ def validate_command(files: Annotated[list[str], typer.Argument(help="Scenario f
         raise typer.Exit(BAD_INPUT)
 
 
+@app.command("signs")
+def signs_command(
+    scenario: Annotated[str, typer.Argument(help="A scenario of the catalogue (fogsim list), a file or a folder.")],
+    out: Annotated[Path, typer.Option(help="GeoJSON file.")] = Path("signs.geojson"),
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY.PATH=VALUE", help="Put a value in place of the file's.")
+    ] = None,
+) -> None:
+    """Write the signs of a scenario's road network, additional files and OpenDRIVE signals as GeoJSON."""
+    from fogsim.recording import record_signs  # noqa: PLC0415 - heavy; --help must be quick
+    from fogsim.scenario import load_scenario  # noqa: PLC0415 - heavy; --help must be quick
+
+    signs = record_signs(load_scenario(scenario, settings or ()), out).signs
+    _out.print(f"{len(signs)} sign{'' if len(signs) == 1 else 's'}: {escape(str(out))}", soft_wrap=True)
+
+
 @app.command("doctor")
 def doctor_command() -> None:
     """Say what works on this machine, what is missing, and how to get it."""

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
+from fogsim.errors import InputError
 from fogsim.loop import run
 from fogsim.metrics import RunMetrics, RunSummary, step_metrics
 from fogsim.recorders import (
@@ -17,9 +18,13 @@ from fogsim.recorders import (
     Status,
     write_json,
     write_manifest,
+    write_sign_map,
 )
-from fogsim.scenario import Scenario, resolved
-from fogsim.values import Ending, Step
+from fogsim.scenario import Scenario, build, resolved
+from fogsim.traffic.configuration import configured_files
+from fogsim.traffic.network import read_net
+from fogsim.traffic.signs import geographic_position, sign_map
+from fogsim.values import Ending, SignMap, Step
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -139,3 +144,31 @@ def _open(
         meanings=metrics.summary().meanings,
     )
     return [RECORDERS[name](information) for name in recorders]
+
+
+def record_signs(scenario: Scenario, out: Path) -> SignMap:
+    """Write the sign map of a scenario as GeoJSON; no simulation is started.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    out : Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If the network, or a sign of the additional files, cannot be read.
+    """
+    setup = build.traffic_setup(scenario)
+    net_file, additional = setup.net, setup.additional
+    if net_file is None and setup.config is not None:
+        net_file, additional = configured_files(setup.config)
+    if net_file is None:
+        raise InputError(f"{scenario.name}: the scenario names neither a SUMO network nor a SUMO configuration")
+    net = read_net(net_file)
+    signs = sign_map(net, additional)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    write_sign_map(out, signs, scenario.name, geographic_position(net))
+    return signs

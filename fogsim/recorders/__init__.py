@@ -8,6 +8,7 @@ from fogsim.recorders.manifest import Manifest, Status, versions, write_manifest
 from fogsim.recorders.protocol import DERIVED_QUANTITIES, Derived, Recorder, RunInformation
 from fogsim.recorders.report import ReportRecorder
 from fogsim.recorders.run_directory import RunDirectory
+from fogsim.recorders.sign_map import write_sign_map
 from fogsim.recorders.table import TableRecorder
 from fogsim.recorders.video import VideoRecorder, encoder_report
 from fogsim.registry import Registry
@@ -43,4 +44,5 @@ __all__ = [
     "versions",
     "write_json",
     "write_manifest",
+    "write_sign_map",
 ]

@@ -141,6 +141,16 @@ def test_list_names_scenarios_and_methods() -> None:
         assert name in done.stdout
 
 
+def test_signs_are_written_as_geojson(tmp_path: Path) -> None:
+    out = tmp_path / "new" / "signs.geojson"
+    done = fogsim("signs", "motorway_fog_bank", "--out", str(out))
+    assert done.returncode == 0, done.stderr
+    assert "9 signs" in done.stdout
+    content = json.loads(out.read_text(encoding="utf-8"))
+    assert [f["properties"]["kind"] for f in content["features"]] == ["speed_limit"] * 9
+    assert 110 in [round(f["properties"]["speed_limit_kmh"]) for f in content["features"]]
+
+
 def test_doctor_finds_everything_here() -> None:
     done = fogsim("doctor")
     assert done.returncode == 0, done.stdout

@@ -98,7 +98,8 @@ def test_whom_a_signal_speaks_to(tmp_path: Path, t: str, orientation: str, headi
 )
 def test_what_a_signal_says(tmp_path: Path, attributes: str, kind: str, value: float) -> None:
     (sign,) = opendrive_signs(file(tmp_path, f'<signal id="s" s="40" t="-6" {attributes}/>'))
-    assert (sign.kind, sign.value) == (kind, pytest.approx(value))
+    assert sign.kind == kind
+    assert sign.value == pytest.approx(value)
 
 
 def test_lights_that_change_are_no_signs(tmp_path: Path) -> None:

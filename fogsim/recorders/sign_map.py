@@ -1,0 +1,67 @@
+"""Sign maps as GeoJSON, which every GIS reads."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+from fogsim.recorders.files import write_json
+from fogsim.units import KMH_PER_MPS
+from fogsim.values import Sign, SignMap
+
+GEOGRAPHIC = "longitude and latitude [deg], WGS 84"
+NET = "x and y of the SUMO network [m], not longitude and latitude: the network tells no usable projection"
+
+LonLat = tuple[float, float]
+
+
+def write_sign_map(
+    path: Path, signs: SignMap, name: str, geographic: Callable[[float, float], LonLat] | None = None
+) -> None:
+    """Write a sign map as a GeoJSON FeatureCollection of points.
+
+    Parameters
+    ----------
+    path : Path
+        The file, written whole or not at all.
+    signs : SignMap
+        The map.
+    name : str
+        Name of the collection.
+    geographic : callable, optional
+        From the network's x, y [m] to longitude and latitude [deg]. Without it the points are x, y; the member
+        ``coordinates`` of the collection says which of the two it is.
+    """
+    place = geographic or _as_they_are
+    write_json(
+        path,
+        {
+            "type": "FeatureCollection",
+            "name": name,
+            "coordinates": GEOGRAPHIC if geographic else NET,
+            "features": [_feature(sign, place) for sign in signs.signs],
+        },
+    )
+
+
+def _as_they_are(x: float, y: float) -> LonLat:
+    return x, y
+
+
+def _feature(sign: Sign, place: Callable[[float, float], LonLat]) -> dict[str, object]:
+    x, y, z = sign.position
+    is_limit = sign.kind == "speed_limit"
+    return {
+        "type": "Feature",
+        "id": sign.sign_id,
+        "geometry": {"type": "Point", "coordinates": list(place(x, y))},
+        "properties": {
+            "kind": sign.kind,
+            **({"speed_limit_kmh": sign.value * KMH_PER_MPS} if is_limit else {"value": sign.value}),
+            "x_m": x,
+            "y_m": y,
+            "z_m": z,
+            # Clockwise from north, as compasses and GIS count.
+            "heading_deg": (90.0 - math.degrees(sign.heading)) % 360.0,
+            "diameter_m": sign.diameter,
+        },
+    }

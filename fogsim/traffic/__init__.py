@@ -6,6 +6,7 @@ from fogsim.traffic.setup import AfterCollision, BrakeEvent, TrafficSetup
 from fogsim.traffic.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo_library import LibsumoLink
 from fogsim.traffic.sumo_traffic import SumoTraffic
+from fogsim.traffic.traci_link import TraciLink
 
 
 def libsumo_traffic(setup: TrafficSetup) -> Traffic:
@@ -19,6 +20,19 @@ def libsumo_traffic(setup: TrafficSetup) -> Traffic:
     return SumoTraffic(setup, LibsumoLink())
 
 
+def traci_traffic(setup: TrafficSetup, link: TraciLink) -> Traffic:
+    """SUMO in another process, which the user has started.
+
+    Parameters
+    ----------
+    setup : TrafficSetup
+        The simulation and its ego.
+    link : TraciLink
+        Where it listens.
+    """
+    return SumoTraffic(setup, link)
+
+
 __all__ = [
     "SPEED_CHOICES",
     "AfterCollision",
@@ -28,6 +42,8 @@ __all__ = [
     "DriverSight",
     "FogAccess",
     "Traffic",
+    "TraciLink",
     "TrafficSetup",
     "libsumo_traffic",
+    "traci_traffic",
 ]

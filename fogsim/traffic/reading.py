@@ -1,6 +1,8 @@
 """Reading SUMO's vehicles into arrays: what changes for those near the ego, what never changes once."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +27,45 @@ class _Body:
     paint: tuple[float, float, float]
 
 
+@dataclass(frozen=True, slots=True)
+class Moving:
+    """What changes about vehicles, in SUMO's units; entry i of each belongs to ``ids[i]``.
+
+    Attributes
+    ----------
+    ids : sequence of str
+        Vehicle ids.
+    position : (n, 3) float64
+        Middle of the front bumper [m].
+    angle : sequence of float
+        Heading, clockwise from north [°].
+    speed, acceleration : sequence of float
+        Speed [m/s] and acceleration [m/s²].
+    lane : sequence of str
+        Lane ids.
+    signals : sequence of int
+        SUMO's signal bits.
+    """
+
+    ids: Sequence[str]
+    position: NDArray[np.float64]
+    angle: Sequence[float]
+    speed: Sequence[float]
+    acceleration: Sequence[float]
+    lane: Sequence[str]
+    signals: Sequence[int]
+
+
+class Reader(Protocol):
+    """Reads the vehicles near an ego that is on the road."""
+
+    def state(self, ego_lamps: Lamp) -> TrafficState:
+        """Vehicles near the ego; its lamps are those of the command, and the stop lamps that it lights itself."""
+
+    def leader(self) -> Leader | None:
+        """The vehicle ahead of the ego in its lane."""
+
+
 class VehicleReader:
     """Reads vehicles by SUMO's plain getters, which inside the process beat subscriptions.
 
@@ -45,36 +86,48 @@ class VehicleReader:
         self._bodies: dict[str, _Body] = {}
 
     def state(self, ego_lamps: Lamp) -> TrafficState:
-        """Vehicles near the ego; its lamps are those of the command, and the stop lamps that it lights itself."""
-        get = self._api.vehicle
-        ids, position = self._near()
-        bodies = [self._body(v) for v in ids]
-        lamps = np.array([int(OTHERS_LAMPS) | lamps_from_signals(get.getSignals(v)) for v in ids], dtype=np.int32)
-        ego = ids.index(self._ego)
+        """Vehicles near the ego; see `Reader.state`."""
+        now = self._moving()
+        bodies = [self._body(v) for v in now.ids]
+        lamps = np.array([int(OTHERS_LAMPS) | lamps_from_signals(s) for s in now.signals], dtype=np.int32)
+        ego = now.ids.index(self._ego)
         lamps[ego] = int(ego_lamps) | (int(lamps[ego]) & int(Lamp.STOP))
         size = np.array([b.size for b in bodies])
         return TrafficState(
             time=self._api.simulation.getTime(),
-            ids=ids,
+            ids=tuple(now.ids),
             types=tuple(b.kind for b in bodies),
-            position=position,
-            heading=np.radians(90.0 - np.array([get.getAngle(v) for v in ids])),
-            speed=np.array([get.getSpeed(v) for v in ids]),
-            acceleration=np.array([get.getAcceleration(v) for v in ids]),
+            position=now.position,
+            heading=np.radians(90.0 - np.array(now.angle)),
+            speed=np.array(now.speed),
+            acceleration=np.array(now.acceleration),
             length=size[:, 0],
             width=size[:, 1],
             height=size[:, 2],
-            lane=tuple(get.getLaneID(v) for v in ids),
+            lane=tuple(now.lane),
             lamps=lamps,
             paint=np.array([b.paint for b in bodies]),
         )
 
-    def _near(self) -> tuple[tuple[str, ...], NDArray[np.float64]]:
-        ids = tuple(self._api.vehicle.getIDList())
-        position = np.array([self._api.vehicle.getPosition3D(v) for v in ids])
+    def _moving(self) -> Moving:
+        get = self._api.vehicle
+        everybody = tuple(get.getIDList())
+        position = np.array([get.getPosition3D(v) for v in everybody])
+        near = self._is_near(everybody, position)
+        ids = [v for v, is_near in zip(everybody, near, strict=True) if is_near]
+        return Moving(
+            ids=ids,
+            position=position[near],
+            angle=[get.getAngle(v) for v in ids],
+            speed=[get.getSpeed(v) for v in ids],
+            acceleration=[get.getAcceleration(v) for v in ids],
+            lane=[get.getLaneID(v) for v in ids],
+            signals=[get.getSignals(v) for v in ids],
+        )
+
+    def _is_near(self, ids: Sequence[str], position: NDArray[np.float64]) -> NDArray[np.bool_]:
         offset = position - position[ids.index(self._ego)]
-        near = np.hypot(offset[:, 0], offset[:, 1]) <= self._radius
-        return tuple(v for v, is_near in zip(ids, near, strict=True) if is_near), position[near]
+        return np.asarray(np.hypot(offset[:, 0], offset[:, 1]) <= self._radius)
 
     def _body(self, vehicle: str) -> _Body:
         known = self._bodies.get(vehicle)
@@ -88,7 +141,7 @@ class VehicleReader:
         return known
 
     def leader(self) -> Leader | None:
-        """The vehicle ahead of the ego in its lane."""
+        """The vehicle ahead of the ego; see `Reader.leader`."""
         get = self._api.vehicle
         found = get.getLeader(self._ego, LEADER_RANGE)
         if found is None or not found[0]:

@@ -49,8 +49,8 @@ class TrafficSetup:
 
     Attributes
     ----------
-    net : Path
-        SUMO network.
+    net : Path or None
+        SUMO network; None for the one that the simulation says it has loaded.
     routes, additional : tuple of Path
         SUMO route and additional files.
     ego : str
@@ -73,9 +73,11 @@ class TrafficSetup:
         How drivers choose their speed in fog and follow advice.
     after_collision : AfterCollision
         What becomes of vehicles that have collided.
+    config : Path or None
+        SUMO configuration, in place of net, routes and additional files.
     """
 
-    net: Path
+    net: Path | None
     routes: tuple[Path, ...]
     additional: tuple[Path, ...]
     ego: str
@@ -88,3 +90,4 @@ class TrafficSetup:
     sight: DriverSight | None = None
     drivers: DriverSetup = UNTOUCHED
     after_collision: AfterCollision = AfterCollision.STOP
+    config: Path | None = None

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from types import ModuleType
 
 from fogsim.errors import MissingDependencyError, SimulationError, SimulationRunningError
-from fogsim.traffic.link import Api
+from fogsim.traffic.link import Api, told_errors
 
 
 def load_libsumo() -> ModuleType:
@@ -35,6 +35,8 @@ def load_libsumo() -> ModuleType:
 
 class LibsumoLink:
     """SUMO inside this process, through libsumo; one at a time."""
+
+    distant = False
 
     def __init__(self) -> None:
         self._sumo: ModuleType | None = None
@@ -82,6 +84,10 @@ class LibsumoLink:
         if self._sumo is not None and self._sumo.isLoaded():
             self._sumo.close()
         self._sumo = None
+
+    def watched(self) -> contextlib.AbstractContextManager[None]:
+        """Turn what libsumo refuses into an error of ours; see `SumoLink.watched`."""
+        return told_errors(load_libsumo(), "in this process")
 
 
 @contextlib.contextmanager

@@ -1,7 +1,9 @@
 """Traffic by SUMO, wherever it runs."""
 
-from collections.abc import Mapping
+import functools
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Concatenate, ParamSpec, TypeVar
 
 from fogsim.errors import SimulationError
 from fogsim.traffic.collisions import CollisionWatch
@@ -12,15 +14,20 @@ from fogsim.traffic.link import Api, SumoLink
 from fogsim.traffic.network import read_net, road_network
 from fogsim.traffic.opendrive import is_opendrive
 from fogsim.traffic.perception import Perception
-from fogsim.traffic.reading import VehicleReader
+from fogsim.traffic.reading import Reader, VehicleReader
+from fogsim.traffic.route import RouteProgress
+from fogsim.traffic.running import check_step_length, loaded_additional, loaded_net, those_seen
 from fogsim.traffic.setup import AfterCollision, TrafficSetup
 from fogsim.traffic.sight import FogAccess
 from fogsim.traffic.signs import sign_map
+from fogsim.traffic.subscribed_reading import SubscribedReader
 from fogsim.values import Command, Lamp, RoadNetwork, SignMap, TrafficSnapshot
 
 _NO_LANE_CHANGES = 0
 _NOBODY: Mapping[str, float] = {}
 _FOR_EVER = "1e6"
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,12 +35,25 @@ class _Run:
     """The parts that live as long as one run."""
 
     api: Api
-    reader: VehicleReader
+    reader: Reader
     control: SpeedControl
     collisions: CollisionWatch
     script: Script
     perception: Perception | None = None
     drivers: Drivers | None = None
+
+
+def _watched(
+    method: Callable[Concatenate["SumoTraffic", _P], _R],
+) -> Callable[Concatenate["SumoTraffic", _P], _R]:
+    """Let a lost simulation end a method with an error of ours."""
+
+    @functools.wraps(method)
+    def watched(self: "SumoTraffic", /, *arguments: _P.args, **named: _P.kwargs) -> _R:
+        with self._link.watched():
+            return method(self, *arguments, **named)
+
+    return watched
 
 
 class SumoTraffic:
@@ -54,8 +74,8 @@ class SumoTraffic:
         self._fog: FogAccess | None = None
         self._seed = 0
         self._ego_lamps = Lamp.NONE
-        self._route_offset = 0.0
-        self._route_length = 0.0
+        self._route: RouteProgress | None = None
+        self._teleported = False
 
     @property
     def _running(self) -> _Run:
@@ -63,13 +83,14 @@ class SumoTraffic:
             raise SimulationError("the traffic simulation has not been started, or is closed")
         return self._run
 
+    @_watched
     def start(self, seed: int) -> None:
         """Begin, or begin anew, and run until the ego is on the road; see `Traffic.start`."""
         setup = self._setup
         api = self._link.begin(command_line(setup, seed))
         self._run = _Run(
             api=api,
-            reader=VehicleReader(api, setup.ego, setup.reading_radius),
+            reader=(SubscribedReader if self._link.distant else VehicleReader)(api, setup.ego, setup.reading_radius),
             control=SpeedControl(api, setup.step_length),
             collisions=CollisionWatch(api),
             script=Script(setup.events),
@@ -78,25 +99,27 @@ class SumoTraffic:
         if self._fog is not None:
             self.enter_fog(self._fog)
         self._ego_lamps = Lamp.NONE
+        self._route, self._teleported = None, False
         try:
+            check_step_length(api, setup.step_length)
             self._warm_up(self._running)
-        except SimulationError:
+        except Exception:
             self.close()
             raise
 
     def _warm_up(self, run: _Run) -> None:
         simulation, vehicle, ego = run.api.simulation, run.api.vehicle, self._setup.ego
+        begun, seen = simulation.getTime(), set(vehicle.getIDList())
         while ego not in vehicle.getIDList():
-            if simulation.getTime() > self._setup.warm_up_limit or simulation.getMinExpectedNumber() == 0:
+            waited = simulation.getTime() - begun
+            if waited > self._setup.warm_up_limit or simulation.getMinExpectedNumber() == 0:
                 raise SimulationError(
-                    f"the ego {ego!r} did not appear within {simulation.getTime():g} s of simulated time "
-                    f"(traffic.warm_up_limit_s is {self._setup.warm_up_limit:g}); "
-                    "is there a vehicle of that id in the route files?"
+                    f"the ego {ego!r} did not appear within {waited:g} s of simulated time (traffic.warm_up_limit_s "
+                    f"is {self._setup.warm_up_limit:g}); {those_seen(ego, seen)}"
                 )
             self._step(run)
+            seen.update(simulation.getDepartedIDList())
         run.collisions.tell()
-        self._route_offset = vehicle.getLanePosition(ego) - vehicle.getDistance(ego)
-        self._route_length = sum(run.api.lane.getLength(f"{edge}_0") for edge in vehicle.getRoute(ego))
 
     def enter_fog(self, fog: FogAccess) -> None:
         """Let drivers see only what this fog lets them see; see `Traffic.enter_fog`."""
@@ -109,18 +132,31 @@ class SumoTraffic:
                 drivers=Drivers(api, setup.drivers, fog, setup.ego, self._seed),
             )
 
+    @_watched
     def network(self) -> tuple[RoadNetwork, SignMap]:
         """Roads and signs; see `Traffic.network`."""
-        net = read_net(self._setup.net)
-        route = self._running.api.vehicle.getRoute(self._setup.ego)
-        return road_network(net, route), sign_map(net, self._setup.additional)
+        api = self._running.api
+        net = read_net(self._setup.net or loaded_net(api))
+        route = api.vehicle.getRoute(self._setup.ego)
+        return road_network(net, route), sign_map(net, self._setup.additional or loaded_additional(api))
 
+    @_watched
     def advance(self, command: Command) -> None:
         """Move by one traffic step; see `Traffic.advance`."""
+        self.obey(command)
+        self._link.step()
+        self.look()
+
+    def obey(self, command: Command) -> None:
+        """Put a command in force for the next step of a simulation that somebody else steps."""
         run = self._running
         self._ego_lamps = command.lamps
         run.control.carry_out(self._orders(run, command))
-        self._step(run, command.advised_speeds)
+        self._prepare(run, command.advised_speeds)
+
+    def look(self) -> None:
+        """Take in what the last step has brought, in a simulation that somebody else steps."""
+        self._take_in(self._running)
 
     def _orders(self, run: _Run, command: Command) -> dict[str, Order]:
         present = set(run.api.vehicle.getIDList())
@@ -130,27 +166,41 @@ class SumoTraffic:
         scripted = run.script.orders(run.api.simulation.getTime(), present, run.api.vehicle.getDistance)
         return orders | scripted
 
-    def _step(self, run: _Run, advised: Mapping[str, float] = _NOBODY) -> None:
+    def _step(self, run: _Run) -> None:
+        self._prepare(run, _NOBODY)
+        self._link.step()
+        self._take_in(run)
+
+    def _prepare(self, run: _Run, advised: Mapping[str, float]) -> None:
         if run.perception is not None:
             run.perception.update(self._setup.ego, self._ego_lamps)
         if run.drivers is not None:
             run.drivers.update(advised)
-        self._link.step()
-        run.collisions.look()
-        for vehicle in set(self._setup.keep_lane).intersection(run.api.simulation.getDepartedIDList()):
-            run.api.vehicle.setLaneChangeMode(vehicle, _NO_LANE_CHANGES)
 
+    def _take_in(self, run: _Run) -> None:
+        run.collisions.look()
+        self._teleported |= self._setup.ego in run.api.simulation.getStartingTeleportIDList()
+        if self._setup.keep_lane:
+            for vehicle in set(self._setup.keep_lane).intersection(run.api.simulation.getDepartedIDList()):
+                run.api.vehicle.setLaneChangeMode(vehicle, _NO_LANE_CHANGES)
+
+    @_watched
     def observe(self) -> TrafficSnapshot | None:
         """Tell where everybody near the ego is; see `Traffic.observe`."""
         run, ego = self._running, self._setup.ego
-        if ego not in run.api.vehicle.getIDList():
+        teleported, self._teleported = self._teleported, False
+        if teleported or ego not in run.api.vehicle.getIDList():
+            # Where it comes back, if it does, has nothing to do with where it was.
+            self._route = None
             return None
+        self._route = self._route or RouteProgress(run.api, ego)
+        route_position, route_length = self._route.now()
         state = run.reader.state(self._ego_lamps)
         return TrafficSnapshot(
             state=state,
             ego=state.ids.index(ego),
-            route_position=self._route_offset + run.api.vehicle.getDistance(ego),
-            route_length=self._route_length,
+            route_position=route_position,
+            route_length=route_length,
             speed_limit=run.api.lane.getMaxSpeed(run.api.vehicle.getLaneID(ego)),
             leader=run.reader.leader(),
             collisions=run.collisions.tell(),
@@ -172,15 +222,18 @@ def command_line(setup: TrafficSetup, seed: int) -> list[str]:
     seed : int
         Its seed.
     """
-    arguments = ["--net-file", str(setup.net), "--step-length", repr(setup.step_length), "--seed", str(seed)]
+    source = ["--net-file", str(setup.net)] if setup.config is None else ["--configuration-file", str(setup.config)]
+    arguments = [*source, "--step-length", repr(setup.step_length), "--seed", str(seed)]
     # OpenDRIVE files among them are the sign map's; SUMO cannot read them here.
     additional = tuple(path for path in setup.additional if not is_opendrive(path))
     for option, paths in (("--route-files", setup.routes), ("--additional-files", additional)):
         if paths:
             arguments += [option, ",".join(map(str, paths))]
     quiet = ["--no-step-log", "true", "--duration-log.disable", "true", "--no-warnings", "true"]
-    # Nobody is beamed away: collisions stay where they happen and are counted.
-    physical = ["--time-to-teleport", "-1", "--collision.action"]
+    # Nobody is beamed away: collisions stay where they happen and are counted. How jams dissolve in a simulation of the
+    # user's own is left to its configuration.
+    patient = ["--time-to-teleport", "-1"] if setup.config is None else []
+    physical = [*patient, "--collision.action"]
     if setup.after_collision is AfterCollision.STOP:
         return arguments + quiet + physical + ["warn", "--collision.stoptime", _FOR_EVER]
     return arguments + quiet + physical + ["remove"]

@@ -1,0 +1,45 @@
+"""What tests of several folders use."""
+
+import contextlib
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import pytest
+import sumo
+
+SumoProcess = Callable[..., contextlib.AbstractContextManager[tuple[int, "subprocess.Popen[bytes]"]]]
+
+
+@pytest.fixture(scope="session")
+def free_port() -> Callable[[], int]:
+    """Ports that the operating system chooses."""
+
+    def choose() -> int:
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            return int(probe.getsockname()[1])
+
+    return choose
+
+
+@pytest.fixture(scope="session")
+def sumo_process(free_port: Callable[[], int]) -> SumoProcess:
+    """Start a real SUMO on loopback: gives its port and process; killed at the end if it still runs."""
+    # The program itself: the one on the path is a script that starts it, and would leave it behind when killed.
+    program = Path(sumo.SUMO_HOME, "bin", "sumo.exe" if sys.platform == "win32" else "sumo")
+
+    @contextlib.contextmanager
+    def start(arguments: Sequence[str], clients: int = 1) -> Iterator[tuple[int, "subprocess.Popen[bytes]"]]:
+        port = free_port()
+        options = ["--remote-port", str(port), "--num-clients", str(clients)]
+        command = [program, *arguments, *options]
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+            try:
+                yield port, process
+            finally:
+                process.kill()
+
+    return start

@@ -1,0 +1,171 @@
+"""SUMO in another process: the same traffic as in process, several clients, beginning anew, losing the connection."""
+
+import contextlib
+import dataclasses
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fogsim.errors import SimulationError
+from fogsim.traffic import TraciLink, Traffic, TrafficSetup, libsumo_traffic, traci_traffic
+from fogsim.traffic.link import Api, SumoLink
+from fogsim.traffic.reading import Reader, VehicleReader
+from fogsim.traffic.subscribed_reading import SubscribedReader
+from fogsim.traffic.sumo_library import LibsumoLink
+from fogsim.traffic.sumo_traffic import command_line
+from fogsim.values import Command, Lamp, SpeedAdvice, TrafficSnapshot, TrafficState
+
+FOLDER = Path(__file__).resolve().parents[2] / "scenarios" / "motorway_fog_bank"
+SETUP = TrafficSetup(
+    net=FOLDER / "motorway.net.xml",
+    routes=(FOLDER / "motorway.rou.xml",),
+    additional=(FOLDER / "signs.add.xml",),
+    ego="ego",
+    step_length=0.1,
+    keep_lane=("ego", "lead"),
+    warm_up_limit=600.0,
+    advice_deceleration=2.0,
+    reading_radius=800.0,
+    events=(),
+)
+HOST = "127.0.0.1"
+
+
+def equal(one: TrafficState, other: TrafficState) -> bool:
+    """True if every field is the same to the last bit."""
+    fields = [f.name for f in dataclasses.fields(TrafficState)]
+    return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in fields)
+
+
+def drive(traffic: Traffic, seed: int, steps: int = 40) -> list[TrafficSnapshot]:
+    traffic.start(seed)
+    seen = []
+    for step in range(steps):
+        traffic.advance(Command(SpeedAdvice(18.0 if step > 10 else 25.0), Lamp.REAR_FOG))
+        snapshot = traffic.observe()
+        assert snapshot is not None
+        seen.append(snapshot)
+    return seen
+
+
+@pytest.fixture(scope="module")
+def in_process() -> list[TrafficSnapshot]:
+    traffic = libsumo_traffic(SETUP)
+    try:
+        return drive(traffic, 1)
+    finally:
+        traffic.close()
+
+
+@pytest.fixture
+def link(sumo_process: Callable) -> Iterator[TraciLink]:
+    with sumo_process(command_line(SETUP, 1)) as (port, _):
+        link = TraciLink(HOST, port)
+        yield link
+        link.end()
+
+
+def test_the_traffic_is_the_same_as_in_process(link: TraciLink, in_process: list[TrafficSnapshot]) -> None:
+    distant = drive(traci_traffic(SETUP, link), 1)
+    for here, there in zip(in_process, distant, strict=True):
+        assert equal(here.state, there.state)
+        assert (here.leader, here.route_position, here.speed_limit) == (
+            there.leader,
+            there.route_position,
+            there.speed_limit,
+        )
+    assert len(in_process[-1].state.ids) > 10
+
+
+def test_beginning_anew_loads_the_scenario_with_the_seed(link: TraciLink, in_process: list[TrafficSnapshot]) -> None:
+    traffic = traci_traffic(SETUP, link)
+    drive(traffic, 1, steps=5)
+    other = drive(traffic, 2)
+    again = drive(traffic, 1)
+    assert not equal(other[-1].state, in_process[-1].state)
+    assert equal(again[-1].state, in_process[-1].state)
+
+
+def readers_agree(link: SumoLink, api: Api) -> None:
+    while "ego" not in api.vehicle.getIDList():
+        link.step()
+    readers: list[Reader] = [kind(api, "ego", 300.0) for kind in (VehicleReader, SubscribedReader)]
+    for _ in range(30):
+        plain, subscribed = (reader.state(Lamp.REAR_FOG) for reader in readers)
+        assert equal(plain, subscribed)
+        assert readers[0].leader() == readers[1].leader()
+        link.step()
+
+
+def test_getters_and_subscriptions_read_the_same_over_a_connection(link: TraciLink) -> None:
+    readers_agree(link, link.begin(()))
+
+
+def test_getters_and_subscriptions_read_the_same_in_process() -> None:
+    link = LibsumoLink()
+    try:
+        readers_agree(link, link.begin(command_line(SETUP, 1)))
+    finally:
+        link.end()
+
+
+def test_one_of_two_clients_in_their_order(sumo_process: Callable, in_process: list[TrafficSnapshot]) -> None:
+    """The other client only steps; each step waits for both."""
+    with sumo_process(command_line(SETUP, 1), clients=2) as (port, _):
+        other = TraciLink(HOST, port, order=2)
+        done = threading.Event()
+
+        def keep_stepping() -> None:
+            other.begin(())
+            # The last step may wait for a client that has left.
+            with contextlib.suppress(SimulationError), other.watched():
+                while not done.is_set():
+                    other.step()
+            other.end()
+
+        thread = threading.Thread(target=keep_stepping, daemon=True)
+        thread.start()
+        traffic = traci_traffic(SETUP, TraciLink(HOST, port, order=1))
+        try:
+            seen = drive(traffic, 1)
+            with pytest.raises(SimulationError, match=r"has 2 clients.*start SUMO again"):
+                traffic.start(2)
+        finally:
+            done.set()
+            traffic.close()
+            thread.join(10)
+    assert not thread.is_alive()
+    for here, there in zip(in_process, seen, strict=True):
+        assert equal(here.state, there.state)
+
+
+def test_a_sumo_that_ends_on_the_way_is_told(sumo_process: Callable) -> None:
+    with sumo_process(command_line(SETUP, 1)) as (port, process):
+        traffic = traci_traffic(SETUP, TraciLink(HOST, port))
+        drive(traffic, 1, steps=2)
+        process.kill()
+        process.wait(10)
+        with pytest.raises(SimulationError, match=rf"SUMO at {HOST}:{port} is lost"):
+            traffic.advance(Command())
+        traffic.close()
+        traffic.close()
+
+
+def test_no_sumo_at_all_is_told_with_what_to_do(free_port: Callable[[], int]) -> None:
+    port = free_port()
+    with pytest.raises(SimulationError, match=rf"no SUMO answers at {HOST}:{port} .*--remote-port {port}"):
+        traci_traffic(SETUP, TraciLink(HOST, port, retries=1)).start(1)
+
+
+def test_another_step_length_is_told(link: TraciLink) -> None:
+    with pytest.raises(SimulationError, match=r"steps of 0\.1 s, but clocks\.traffic_step_s is 0\.5"):
+        traci_traffic(replace(SETUP, step_length=0.5), link).start(1)
+
+
+def test_nothing_is_printed(link: TraciLink, capfd: pytest.CaptureFixture[str]) -> None:
+    drive(traci_traffic(SETUP, link), 1, steps=1)
+    assert capfd.readouterr() == ("", "")

@@ -31,12 +31,12 @@ PAINTS = (
 """Linear reflectances of common car paints: silver, grey, black, anthracite, white, blue, red, green, beige."""
 
 _SIGNALS = (
-    (1 << 0, Lamp.INDICATOR_RIGHT),
-    (1 << 1, Lamp.INDICATOR_LEFT),
-    (1 << 3, Lamp.STOP),
-    (1 << 4, Lamp.LOW_BEAM | Lamp.POSITION),
-    (1 << 5, Lamp.REAR_FOG),
-    (1 << 6, Lamp.HIGH_BEAM),
+    (1 << 0, int(Lamp.INDICATOR_RIGHT)),
+    (1 << 1, int(Lamp.INDICATOR_LEFT)),
+    (1 << 3, int(Lamp.STOP)),
+    (1 << 4, int(Lamp.LOW_BEAM | Lamp.POSITION)),
+    (1 << 5, int(Lamp.REAR_FOG)),
+    (1 << 6, int(Lamp.HIGH_BEAM)),
 )
 
 
@@ -63,8 +63,8 @@ def paint(vehicle_id: str, colour: tuple[int, ...]) -> tuple[float, float, float
 
 def lamps_from_signals(signals: int) -> int:
     """Lamps, as bits of `Lamp`, that SUMO's vehicle signals stand for."""
-    lamps = Lamp.NONE
+    lamps = 0
     for bit, lamp in _SIGNALS:
         if signals & bit:
             lamps |= lamp
-    return int(lamps)
+    return lamps

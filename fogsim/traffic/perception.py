@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fogsim.traffic.appearance import lamps_from_signals, paint
 from fogsim.traffic.link import Api
 from fogsim.traffic.reading import OTHERS_LAMPS
-from fogsim.traffic.sight import DriverSight, FogAccess, inherent_contrast, rear_intensity
+from fogsim.traffic.sight import BRIGHTEST, DriverSight, FogAccess, inherent_contrast, rear_intensity
 from fogsim.values import Lamp
 
 REACH = 300.0
@@ -86,13 +86,15 @@ class Perception:
         depth = self._fog.optical_depth(eyes, eyes + towards * (distance / np.linalg.norm(towards, axis=1))[:, None])
         contrast = np.array([self._contrast_of(v) for v in leaders])
         seen = self._sight.sees_body(distance, depth, contrast)
-        # Lamps are asked for only where the body is not seen: that saves most of the questions.
-        for i in np.flatnonzero(~seen):
-            leader = leaders[i]
-            own = ego_lamps if leader == ego else OTHERS_LAMPS
-            lamps = int(own) | lamps_from_signals(vehicles.getSignals(leader))
-            seen[i] = self._sight.sees_lamp(distance[i], depth[i], rear_intensity(lamps))
+        # Lamps are asked for only where no body is seen and the brightest of all lamps would be: that saves most calls.
+        asked = np.flatnonzero(~seen & self._sight.sees_lamp(distance, depth, np.full(len(found), BRIGHTEST)))
+        intensity = np.array([self._rear_intensity(leaders[i], ego, ego_lamps) for i in asked])
+        seen[asked] = self._sight.sees_lamp(distance[asked], depth[asked], intensity)
         return {followers[i]: leaders[i] for i in np.flatnonzero(~seen)}
+
+    def _rear_intensity(self, vehicle: str, ego: str, ego_lamps: Lamp) -> float:
+        own = ego_lamps if vehicle == ego else OTHERS_LAMPS
+        return rear_intensity(int(own) | lamps_from_signals(self._api.vehicle.getSignals(vehicle)))
 
     def _lines(
         self, followers: tuple[str, ...], leaders: tuple[str, ...]

@@ -15,8 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 from fogsim.units import CONTRAST_THRESHOLD
 from fogsim.values import Lamp
 
-REAR_LAMPS = ((Lamp.REAR_FOG, 200.0), (Lamp.STOP, 100.0), (Lamp.POSITION, 8.0))
+REAR_LAMPS = ((int(Lamp.REAR_FOG), 200.0), (int(Lamp.STOP), 100.0), (int(Lamp.POSITION), 8.0))
 """Luminous intensity of one rear lamp, brightest first [cd]: within UNECE's 150–300, 60–185 and 4–12."""
+
+BRIGHTEST = REAR_LAMPS[0][1]
+"""Luminous intensity of the brightest rear lamp [cd]."""
 
 NIGHT, DAY = 1.0, 1000.0
 """Horizontal illuminance up to which the eye is adapted to night, and from which to day [lx]."""

@@ -21,6 +21,11 @@ class FieldAccess:
 
     field: FogField
 
+    @property
+    def maximum_extinction(self) -> float:
+        """Extinction coefficient that is exceeded nowhere [1/m]; banks do not overlap."""
+        return self.field.extinction + max((0.0, *(bank.extra_extinction for bank in self.field.banks)))
+
     def extinction(self, points: ArrayLike) -> NDArray[np.float64]:
         """Extinction coefficient at points (..., 3) [1/m]; see `fogsim.atmosphere.extinction`."""
         return extinction(self.field, points)

@@ -19,6 +19,9 @@ REACH = 300.0
 EYE_HEIGHT = 1.2
 """Height of a driver's eyes and of the middle of a rear above the road [m]."""
 
+LARGEST_MINIMUM_GAP = 5.0
+"""No driver's minimum gap is larger than this [m]."""
+
 _IGNORE = "carFollowModel.ignoreIDs"
 
 
@@ -43,6 +46,8 @@ class Perception:
         self._emerging: dict[tuple[str, str], float] = {}
         self._contrast: dict[str, float] = {}
         self._minimum_gap: dict[str, float] = {}
+        # Nobody nearer than this is hidden, wherever the fog is densest: for them nothing need be computed.
+        self._surely_seen = sight.sure_distance(fog.maximum_extinction) - LARGEST_MINIMUM_GAP
 
     def update(self, ego: str, ego_lamps: Lamp) -> None:
         """Look once: tell SUMO's drivers which leader they do not see.
@@ -55,7 +60,11 @@ class Perception:
             Its lit lamps.
         """
         vehicles = self._api.vehicle
-        found = [(v, *leader) for v in vehicles.getIDList() if (leader := vehicles.getLeader(v, REACH)) and leader[0]]
+        found = [
+            (v, *leader)
+            for v in vehicles.getIDList()
+            if (leader := vehicles.getLeader(v, REACH)) and leader[0] and leader[1] > self._surely_seen
+        ]
         unseen = self._unseen(found, ego, ego_lamps) if found else {}
         unseen |= self._not_yet_reacted(found, unseen)
         gone = self._ignored.keys() - unseen.keys()
@@ -77,7 +86,6 @@ class Perception:
         return {pair[0]: pair[1] for pair, since in emerging.items() if time - since < self._sight.reaction_time}
 
     def _unseen(self, found: list[tuple[str, str, float]], ego: str, ego_lamps: Lamp) -> dict[str, str]:
-        vehicles = self._api.vehicle
         followers, leaders, spacings = zip(*found, strict=True)
         eyes, rears = self._lines(followers, leaders)
         towards = rears - eyes

@@ -27,6 +27,9 @@ NIGHT, DAY = 1.0, 1000.0
 NIGHT_EYE_THRESHOLD, DAY_EYE_THRESHOLD = 1e-5, 1e-3
 """Illuminance at the eye at which a lamp is noticed on a road, by night and by day [lx]."""
 
+LEAST_CONTRAST = 0.5
+"""No vehicle's rear has less contrast to the airlight than this, not even a white one [-]."""
+
 DAYLIGHT = 10.0
 """Horizontal illuminance from which a body is seen against the fog [lx]."""
 
@@ -39,6 +42,10 @@ VERTICAL_ILLUMINANCE = 0.5
 
 class FogAccess(Protocol):
     """The fog as the traffic stage needs it; handed in by whoever knows the atmosphere."""
+
+    @property
+    def maximum_extinction(self) -> float:
+        """An extinction coefficient that is exceeded nowhere [1/m]."""
 
     def extinction(self, points: ArrayLike) -> NDArray[np.float64]:
         """Extinction coefficient at points (..., 3) [1/m]."""
@@ -75,6 +82,19 @@ class DriverSight:
         share = math.log(max(self.illuminance, NIGHT) / NIGHT) / math.log(DAY / NIGHT)
         ratio = DAY_EYE_THRESHOLD / NIGHT_EYE_THRESHOLD
         return float(NIGHT_EYE_THRESHOLD * ratio ** min(share, 1.0))
+
+    def sure_distance(self, maximum_extinction: float) -> float:
+        """Distance up to which every body is seen where the fog is nowhere denser than given [m].
+
+        Parameters
+        ----------
+        maximum_extinction : float
+            Extinction coefficient [1/m].
+        """
+        if self.illuminance < DAYLIGHT:
+            return 0.0
+        depth = math.log(LEAST_CONTRAST / self.contrast_threshold)
+        return math.inf if maximum_extinction == 0 else depth / maximum_extinction
 
     def sees_body(self, distance: ArrayLike, depth: ArrayLike, inherent_contrast: ArrayLike) -> NDArray[np.bool_]:
         """Tell whether bodies are seen.

@@ -30,6 +30,10 @@ class Fog:
 
     k: float
 
+    @property
+    def maximum_extinction(self) -> float:
+        return self.k
+
     def extinction(self, points: ArrayLike) -> NDArray[np.float64]:
         return np.full(np.shape(points)[:-1], self.k)
 
@@ -43,6 +47,9 @@ class SeesFrom:
 
     distance: float
     reaction_time: float = 0.0
+
+    def sure_distance(self, maximum_extinction: float) -> float:
+        return 0.0
 
     def sees_body(self, distance: ArrayLike, *_: ArrayLike) -> NDArray[np.bool_]:
         return np.asarray(distance) <= self.distance

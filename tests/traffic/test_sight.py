@@ -69,3 +69,13 @@ def test_the_eye_adapts_between_night_and_day() -> None:
     assert thresholds == sorted(thresholds)
     assert thresholds[0] == thresholds[1]
     assert math.isclose(thresholds[2], 1e-4, rel_tol=0.05)
+
+
+def test_nobody_within_the_sure_distance_is_hidden() -> None:
+    sight = DriverSight(illuminance=10_000.0)
+    white = inherent_contrast((1.0, 1.0, 1.0))
+    for k in (0.01, 0.1):
+        distance = sight.sure_distance(k)
+        assert sight.sees_body([distance], [k * distance], [white])[0]
+    assert sight.sure_distance(0.0) == math.inf
+    assert DriverSight(illuminance=0.1).sure_distance(0.01) == 0.0

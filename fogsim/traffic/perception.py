@@ -63,7 +63,9 @@ class Perception:
         found = [
             (v, *leader)
             for v in vehicles.getIDList()
-            if (leader := vehicles.getLeader(v, REACH)) and leader[0] and leader[1] > self._surely_seen
+            if (leader := vehicles.getLeader(v, REACH))
+            and leader[0]
+            and (leader[1] > self._surely_seen or v in self._ignored)
         ]
         unseen = self._unseen(found, ego, ego_lamps) if found else {}
         unseen |= self._not_yet_reacted(found, unseen)

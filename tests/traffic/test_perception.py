@@ -48,8 +48,8 @@ class SeesFrom:
     distance: float
     reaction_time: float = 0.0
 
-    def sure_distance(self, maximum_extinction: float) -> float:
-        return 0.0
+    def sure_distance(self, *_: float) -> float:
+        return self.distance - 10.0
 
     def sees_body(self, distance: ArrayLike, *_: ArrayLike) -> NDArray[np.bool_]:
         return np.asarray(distance) <= self.distance

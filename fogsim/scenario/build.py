@@ -59,7 +59,7 @@ def traffic_setup(scenario: Scenario) -> TrafficSetup:
     """What the traffic stage needs to know."""
     traffic, folder = scenario.traffic, scenario.directory
     return TrafficSetup(
-        net=folder / traffic.net,
+        net=None if traffic.net is None else folder / traffic.net,
         routes=tuple(folder / path for path in traffic.routes),
         additional=tuple(folder / path for path in traffic.additional),
         ego=traffic.ego,
@@ -75,6 +75,7 @@ def traffic_setup(scenario: Scenario) -> TrafficSetup:
         sight=driver_sight(scenario),
         drivers=driver_setup(scenario),
         after_collision=traffic.after_collision,
+        config=None if traffic.config is None else folder / traffic.config,
     )
 
 

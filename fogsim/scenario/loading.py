@@ -1,6 +1,7 @@
 """From a scenario file to a checked `Scenario`; a mistake is told with file, line, key, value and what is allowed."""
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, get_args
@@ -13,6 +14,12 @@ from fogsim.scenario.document import Document, KeyPath, dotted, read_document
 from fogsim.scenario.locating import SCENARIO_FILE, scenario_file
 from fogsim.scenario.overrides import apply_overrides
 from fogsim.scenario.schema import Scenario
+
+LONG_RUN = 600.0
+"""Longest run of a simulation that is the user's own [s]."""
+
+DAY = 86_400.0
+"""Simulated time within which the ego of a simulation of the user's own must appear [s]."""
 
 
 def load_scenario(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Scenario:
@@ -37,6 +44,50 @@ def load_scenario(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Sc
     """
     path = scenario_file(name_or_path)
     return _checked(read_document(path), overrides, path.parent)
+
+
+def scenario_from_config(config: Path, ego: str, overrides: Iterable[str] = ()) -> Scenario:
+    """Make a scenario of a SUMO configuration.
+
+    Parameters
+    ----------
+    config : Path
+        The ``.sumocfg`` file.
+    ego : str
+        Id of the vehicle that becomes the ego.
+    overrides : iterable of str
+        ``key.path=value`` each; the fog must be among them.
+
+    Raises
+    ------
+    InputError
+        If anything does not fit.
+    """
+    traffic = {"config": config.name, "ego": ego, "warm_up_limit_s": DAY}
+    return _checked(Document(config, _bare(config.stem, traffic), {}), overrides, config.parent)
+
+
+def attached_scenario(ego: str, overrides: Iterable[str]) -> Scenario:
+    """Make a scenario of a simulation that runs already, so that it names no files.
+
+    Parameters
+    ----------
+    ego : str
+        Id of the vehicle that becomes the ego.
+    overrides : iterable of str
+        ``key.path=value`` each; the fog must be among them.
+
+    Raises
+    ------
+    InputError
+        If anything does not fit.
+    """
+    document = Document(Path("attached"), _bare("attached", {"ego": ego}), {})
+    return _checked(document, overrides, Path(), named_files=False)
+
+
+def _bare(name: str, traffic: dict[str, Any]) -> dict[str, Any]:
+    return {"name": re.sub(r"[^A-Za-z0-9_.-]", "_", name), "duration_s": LONG_RUN, "traffic": traffic}
 
 
 def override(scenario: Scenario, overrides: Iterable[str]) -> Scenario:
@@ -72,16 +123,29 @@ def _without_infinities(value: Any) -> Any:
     return "inf" if value == math.inf else value
 
 
-def _checked(document: Document, overrides: Iterable[str], folder: Path) -> Scenario:
+def _checked(document: Document, overrides: Iterable[str], folder: Path, named_files: bool = True) -> Scenario:
     overrides = tuple(overrides)
     data = apply_overrides(document.data, overrides)
     document = document.overridden(overrides)
+    mistakes = _unnamed_files(document, data) if named_files else []
     try:
         scenario = Scenario.model_validate({**data, "directory": folder})
     except ValidationError as error:
-        raise InputError("\n".join(_told(document, detail) for detail in error.errors())) from None
+        mistakes = [_told(document, detail) for detail in error.errors()] + mistakes
+    if mistakes:
+        raise InputError("\n".join(mistakes))
     _check_files(document, scenario)
     return scenario
+
+
+def _unnamed_files(document: Document, data: dict[str, Any]) -> list[str]:
+    """Say which files a scenario does not name, and must; the schema knows no keys of which either one or others do."""
+    traffic = data.get("traffic")
+    if not isinstance(traffic, dict) or traffic.get("config") is not None:
+        return []
+    what = "net with routes is required, or config (a SUMO configuration) in their place"
+    where = document.where(("traffic",))
+    return [f"{where}: traffic.{key}: this key is missing; {what}" for key in ("net", "routes") if not traffic.get(key)]
 
 
 def _told(document: Document, detail: ErrorDetails) -> str:
@@ -118,12 +182,15 @@ def _model_in(annotation: object) -> Any:
 
 def _check_files(document: Document, scenario: Scenario) -> None:
     traffic = scenario.traffic
-    named: list[tuple[KeyPath, Path]] = [(("traffic", "net"), traffic.net)]
+    named: list[tuple[KeyPath, Path]] = [
+        (("traffic", key), path) for key, path in (("config", traffic.config), ("net", traffic.net)) if path is not None
+    ]
     named += [(("traffic", "routes", i), p) for i, p in enumerate(traffic.routes)]
     named += [(("traffic", "additional", i), p) for i, p in enumerate(traffic.additional)]
     for key_path, path in named:
         if not (scenario.directory / path).is_file():
-            there = sorted(p.name for p in (scenario.directory / path).parent.glob("*.xml"))
+            pattern = "*.sumocfg" if key_path[-1] == "config" else "*.xml"
+            there = sorted(p.name for p in (scenario.directory / path).parent.glob(pattern))
             raise InputError(
                 f"{document.where(key_path)}: {dotted(key_path)}: there is no file {str(path)!r} in "
                 f"{scenario.directory}; {suggest(path.name, there)}"

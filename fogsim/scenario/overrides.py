@@ -12,6 +12,8 @@ TAKES_THE_PLACE_OF = {
     ("fog", "visibility_m"): ("outside_visibility_m", "banks"),
     ("fog", "outside_visibility_m"): ("visibility_m",),
     ("fog", "banks"): ("visibility_m",),
+    ("traffic", "config"): ("net", "routes", "additional"),
+    ("traffic", "net"): ("config",),
 }
 """Setting the key on the left leaves out those beside it that exclude it: ``--set fog.visibility_m=80`` makes the fog
 homogeneous whatever kind the file has."""

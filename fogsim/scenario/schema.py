@@ -88,10 +88,13 @@ class Brake(Section):
 class Traffic(Section):
     """A SUMO simulation and its ego."""
 
-    net: Path
+    config: Path | None = None
+    """SUMO configuration (.sumocfg), relative to the scenario's folder; in place of the three below."""
+
+    net: Path | None = None
     """SUMO network, relative to the scenario's folder."""
 
-    routes: tuple[Path, ...] = Field(min_length=1)
+    routes: tuple[Path, ...] = ()
     """SUMO route files."""
 
     additional: tuple[Path, ...] = ()
@@ -120,6 +123,16 @@ class Traffic(Section):
 
     stop_before_end_m: NotNegative = 60.0
     """The ego has arrived when it is this near to the end of its route."""
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        beside = [key for key in ("net", "routes", "additional") if getattr(self, key)]
+        if self.config is not None and beside:
+            raise ValueError(
+                f"give either config (a SUMO configuration, which names its own files) or net with routes, not both: "
+                f"config is {str(self.config)!r}, and beside it there is {', '.join(beside)}"
+            )
+        return self
 
 
 class ComplianceSection(Section):

@@ -1,9 +1,9 @@
 """``fogsim …``: arguments, progress and exit codes, nothing else."""
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -12,8 +12,11 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from rich.table import Table
 
 from fogsim import __version__
-from fogsim.errors import FogSimError
+from fogsim.errors import FogSimError, InputError
 from fogsim.values import Step
+
+if TYPE_CHECKING:
+    from fogsim.scenario import Scenario
 
 BAD_INPUT = 2
 INTERRUPTED = 130
@@ -59,7 +62,14 @@ def common(
 
 @app.command("run")
 def run_command(
-    scenario: Annotated[str, typer.Argument(help="A scenario of the catalogue (fogsim list), a file or a folder.")],
+    scenario: Annotated[
+        str | None, typer.Argument(help="A scenario of the catalogue (fogsim list), a file or a folder.")
+    ] = None,
+    sumocfg: Annotated[Path | None, typer.Option(help="A SUMO configuration, in place of a scenario.")] = None,
+    ego: Annotated[str | None, typer.Option(help="Id of the vehicle that is the ego.")] = None,
+    visibility: Annotated[
+        float | None, typer.Option(help="Meteorological visibility of homogeneous fog [m].", min=1e-3)
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same run, bit for bit.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Directory for the results. [runs/SCENARIO-seedN]")] = None,
     settings: Annotated[
@@ -71,9 +81,8 @@ def run_command(
 ) -> None:
     """Run a scenario and write manifest.json, steps.parquet, metrics.json, video.mp4 and report.html."""
     from fogsim.recording import record_run  # noqa: PLC0415 - heavy; --help must be quick
-    from fogsim.scenario import load_scenario  # noqa: PLC0415 - heavy; --help must be quick
 
-    loaded = load_scenario(scenario, settings or ())
+    loaded = _scenario(scenario, sumocfg, ego, visibility, settings or ())
     recorders = ["table", *(["video"] if video else []), *(["report"] if report else [])]
     directory = out or Path("runs", f"{loaded.name}-seed{seed}")
     with _SimulationProgress(loaded.duration_s) as progress:
@@ -94,6 +103,25 @@ def run_command(
         _out.print(f"  {escape(str(result.directory / name))}", soft_wrap=True)
     if result.ending is None:
         raise typer.Exit(INTERRUPTED)
+
+
+def _scenario(
+    name: str | None, sumocfg: Path | None, ego: str | None, visibility: float | None, settings: Sequence[str]
+) -> "Scenario":
+    """Scenario of a name or of a SUMO configuration: exactly one of them."""
+    from fogsim.scenario import load_scenario, scenario_from_config  # noqa: PLC0415 - heavy; --help must be quick
+
+    fog = [] if visibility is None else [f"fog.visibility_m={visibility!r}"]
+    if sumocfg is not None and name is None:
+        if ego is None:
+            raise InputError(f"--sumocfg {sumocfg}: --ego is missing: which vehicle is the ego?")
+        if not fog and not any(setting.startswith("fog.") for setting in settings):
+            raise InputError(f"--sumocfg {sumocfg}: --visibility is missing, or a fog by --set fog.…")
+        return scenario_from_config(sumocfg, ego, [*fog, *settings])
+    if name is not None and sumocfg is None:
+        return load_scenario(name, [*fog, *([] if ego is None else [f"traffic.ego={ego}"]), *settings])
+    given = "neither" if name is None else f"both: {name} and --sumocfg {sumocfg}"
+    raise InputError(f"expected either a scenario or --sumocfg FILE, got {given}")
 
 
 SHOWN = {

@@ -1,6 +1,10 @@
 """Body kinds, paints and lamps of SUMO's vehicles."""
 
 import zlib
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
 
 from fogsim.values import Lamp
 
@@ -68,3 +72,11 @@ def lamps_from_signals(signals: int) -> int:
         if signals & bit:
             lamps |= lamp
     return lamps
+
+
+_LAMPS_OF_SIGNALS = np.array([lamps_from_signals(signals) for signals in range(_SIGNALS[-1][0] << 1)], dtype=np.int32)
+
+
+def lamps_from_many_signals(signals: Sequence[int]) -> NDArray[np.int32]:
+    """Lamps as bits of `Lamp` (n,), as `lamps_from_signals` gives them for each."""
+    return _LAMPS_OF_SIGNALS[np.asarray(signals, dtype=np.intp) & (len(_LAMPS_OF_SIGNALS) - 1)]

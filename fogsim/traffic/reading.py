@@ -7,8 +7,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.traffic.appearance import body_kind, lamps_from_signals, paint
+from fogsim.traffic.appearance import lamps_from_many_signals
+from fogsim.traffic.bodies import Bodies
+from fogsim.traffic.getters import vehicle_getter
 from fogsim.traffic.link import Api
+from fogsim.traffic.nearness import Nearness
 from fogsim.values import Lamp, Leader, TrafficState
 
 LEADER_RANGE = 500.0
@@ -17,14 +20,8 @@ LEADER_RANGE = 500.0
 OTHERS_LAMPS = Lamp.POSITION | Lamp.LOW_BEAM
 """Lamps that other drivers light in fog, as the law of most countries asks by day."""
 
-
-@dataclass(frozen=True, slots=True)
-class _Body:
-    """What never changes about a vehicle: body kind, size (length, width, height) [m] and paint."""
-
-    kind: str
-    size: tuple[float, float, float]
-    paint: tuple[float, float, float]
+_CHANGING = ("getAngle", "getSpeed", "getAcceleration", "getLaneID", "getSignals")
+"""Getters of what changes, in the order of `Moving`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,62 +80,41 @@ class VehicleReader:
         self._api = api
         self._ego = ego
         self._radius = radius
-        self._bodies: dict[str, _Body] = {}
+        self._bodies = Bodies(api)
+        self._nearness = Nearness(api, ego, radius)
+        self._getters = tuple(vehicle_getter(api, name) for name in _CHANGING)
 
     def state(self, ego_lamps: Lamp) -> TrafficState:
         """Vehicles near the ego; see `Reader.state`."""
         now = self._moving()
-        bodies = [self._body(v) for v in now.ids]
-        lamps = np.array([int(OTHERS_LAMPS) | lamps_from_signals(s) for s in now.signals], dtype=np.int32)
+        kinds, fixed = self._bodies.of(now.ids)
+        lamps = lamps_from_many_signals(now.signals) | np.int32(OTHERS_LAMPS)
         ego = now.ids.index(self._ego)
         lamps[ego] = int(ego_lamps) | (int(lamps[ego]) & int(Lamp.STOP))
-        size = np.array([b.size for b in bodies])
         return TrafficState(
             time=self._api.simulation.getTime(),
             ids=tuple(now.ids),
-            types=tuple(b.kind for b in bodies),
+            types=kinds,
             position=now.position,
             heading=np.radians(90.0 - np.array(now.angle)),
             speed=np.array(now.speed),
             acceleration=np.array(now.acceleration),
-            length=size[:, 0],
-            width=size[:, 1],
-            height=size[:, 2],
+            length=fixed[:, 0],
+            width=fixed[:, 1],
+            height=fixed[:, 2],
             lane=tuple(now.lane),
             lamps=lamps,
-            paint=np.array([b.paint for b in bodies]),
+            paint=fixed[:, 3:],
         )
 
     def _moving(self) -> Moving:
-        get = self._api.vehicle
-        everybody = tuple(get.getIDList())
-        position = np.array([get.getPosition3D(v) for v in everybody])
-        near = self._is_near(everybody, position)
-        ids = [v for v, is_near in zip(everybody, near, strict=True) if is_near]
-        return Moving(
-            ids=ids,
-            position=position[near],
-            angle=[get.getAngle(v) for v in ids],
-            speed=[get.getSpeed(v) for v in ids],
-            acceleration=[get.getAcceleration(v) for v in ids],
-            lane=[get.getLaneID(v) for v in ids],
-            signals=[get.getSignals(v) for v in ids],
-        )
+        ids, position = self._nearness.find()
+        angle, speed, acceleration, lane, signals = (list(map(getter, ids)) for getter in self._getters)
+        return Moving(ids, position, angle, speed, acceleration, lane, signals)
 
     def _is_near(self, ids: Sequence[str], position: NDArray[np.float64]) -> NDArray[np.bool_]:
         offset = position - position[ids.index(self._ego)]
         return np.asarray(np.hypot(offset[:, 0], offset[:, 1]) <= self._radius)
-
-    def _body(self, vehicle: str) -> _Body:
-        known = self._bodies.get(vehicle)
-        if known is None:
-            get = self._api.vehicle
-            known = self._bodies[vehicle] = _Body(
-                body_kind(get.getVehicleClass(vehicle)),
-                (get.getLength(vehicle), get.getWidth(vehicle), get.getHeight(vehicle)),
-                paint(vehicle, get.getColor(vehicle)),
-            )
-        return known
 
     def leader(self) -> Leader | None:
         """The vehicle ahead of the ego; see `Reader.leader`."""

@@ -23,12 +23,14 @@ def scenario_keys(model: type[BaseModel] = Scenario, prefix: str = "") -> list[t
     for name, field in model.model_fields.items():
         if field.exclude:
             continue
-        inner = _model_in(field.annotation)
-        if inner is None or inner is Method:
+        inner = [model for model in _models_in(field.annotation) if model is not Method]
+        if not inner:
             rows.append((f"`{prefix}{name}`", _default(field), field.description or ""))
-        else:
-            place = ".N" if "tuple" in str(field.annotation) else ""
-            rows += scenario_keys(inner, f"{prefix}{name}{place}.")
+        place = ".N" if "tuple" in str(field.annotation) else ""
+        for model_inside in inner:
+            more = scenario_keys(model_inside, f"{prefix}{name}{place}.")
+            # Kinds of one list share keys: each is told once.
+            rows += [row for row in more if row not in rows]
     return rows
 
 
@@ -43,10 +45,10 @@ def _default(field: FieldInfo) -> str:
     return f"`{getattr(value, 'method', value)}`"
 
 
-def _model_in(annotation: Any) -> type[BaseModel] | None:
+def _models_in(annotation: Any) -> list[type[BaseModel]]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    return next((m for part in get_args(annotation) if (m := _model_in(part)) is not None), None)
+        return [annotation]
+    return [model for part in get_args(annotation) for model in _models_in(part)]
 
 
 def columns() -> list[tuple[str, ...]]:

@@ -12,9 +12,19 @@ from fogsim.camera import Sensor
 from fogsim.estimators import ESTIMATORS, Estimator
 from fogsim.fusion import FUSIONS, Fusion
 from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy
-from fogsim.scenario.schema import Bank, Scenario
+from fogsim.scenario.schema import AnyEvent, Bank, Brake, BreakDown, ChangeLane, LampsFail, Scenario
 from fogsim.sensors import LeadSensor
-from fogsim.traffic import BrakeEvent, Compliance, DriverSetup, DriverSight, TrafficSetup
+from fogsim.traffic import (
+    BrakeEvent,
+    Compliance,
+    DriverSetup,
+    DriverSight,
+    Event,
+    LampFailureEvent,
+    LaneChangeEvent,
+    TrafficSetup,
+    Trigger,
+)
 from fogsim.units import KMH_PER_MPS, extinction_from_visibility
 from fogsim.values import Camera, FogBank, FogField
 
@@ -68,15 +78,29 @@ def traffic_setup(scenario: Scenario) -> TrafficSetup:
         warm_up_limit=traffic.warm_up_limit_s,
         advice_deceleration=traffic.advice_deceleration_mps2,
         reading_radius=traffic.reading_radius_m,
-        events=tuple(
-            BrakeEvent(e.vehicle, e.at_position_m, e.to_speed_kmh / KMH_PER_MPS, e.deceleration_mps2, e.hold_s)
-            for e in traffic.events
-        ),
+        events=tuple(event for written in traffic.events for event in events(written)),
         sight=driver_sight(scenario),
         drivers=driver_setup(scenario),
         after_collision=traffic.after_collision,
         config=None if traffic.config is None else folder / traffic.config,
     )
+
+
+def events(written: AnyEvent) -> tuple[Event, ...]:
+    """What an event of a scenario file stands for."""
+    vehicle = written.vehicle
+    trigger = Trigger(written.at_position_m, written.at_time_s, written.at_gap_to_ego_m)
+    match written:
+        case Brake():
+            speed = written.to_speed_kmh / KMH_PER_MPS
+            return (BrakeEvent(vehicle, trigger, speed, written.deceleration_mps2, written.hold_s),)
+        case BreakDown():
+            stop = BrakeEvent(vehicle, trigger, deceleration=written.deceleration_mps2)
+            return (stop,) if written.lamps else (stop, LampFailureEvent(vehicle, trigger))
+        case ChangeLane():
+            return (LaneChangeEvent(vehicle, trigger, written.lanes, written.stay_s),)
+        case LampsFail():
+            return (LampFailureEvent(vehicle, trigger),)
 
 
 def driver_sight(scenario: Scenario) -> DriverSight | None:

@@ -13,7 +13,7 @@ from fogsim.errors import InputError, suggest
 from fogsim.scenario.document import Document, KeyPath, dotted, read_document
 from fogsim.scenario.locating import SCENARIO_FILE, scenario_file
 from fogsim.scenario.overrides import apply_overrides
-from fogsim.scenario.schema import Scenario
+from fogsim.scenario.schema import AnyEvent, Scenario
 
 LONG_RUN = 600.0
 """Longest run of a simulation that is the user's own [s]."""
@@ -150,10 +150,17 @@ def _unnamed_files(document: Document, data: dict[str, Any]) -> list[str]:
 
 def _told(document: Document, detail: ErrorDetails) -> str:
     """One mistake in one line."""
-    key_path: KeyPath = tuple(detail["loc"])
+    location: KeyPath = tuple(detail["loc"])
+    key_path = _without_kinds(location)
     where = f"{document.where(key_path)}: {dotted(key_path) or 'scenario'}"
     if detail["type"] == "extra_forbidden":
-        return f"{where}: unknown key; {suggest(str(key_path[-1]), _known_keys(key_path[:-1]))}"
+        return f"{where}: unknown key; {suggest(str(key_path[-1]), _known_keys(location[:-1]))}"
+    if detail["type"] == "union_tag_invalid":
+        context = detail["ctx"]
+        allowed = [kind.strip(" '") for kind in str(context["expected_tags"]).split(",")]
+        return f"{where}.kind: unknown kind {context['tag']!r}; {suggest(str(context['tag']), allowed)}"
+    if detail["type"] == "union_tag_not_found":
+        return f"{where}.kind: this key is missing; it is required"
     if detail["type"] == "missing":
         return f"{where}: this key is missing; it is required"
     message = detail["msg"].removeprefix("Value error, ")
@@ -163,13 +170,32 @@ def _told(document: Document, detail: ErrorDetails) -> str:
     return f"{where}: {message[0].lower()}{message[1:]}{shown}"
 
 
-def _known_keys(key_path: Sequence[str | int]) -> list[str]:
-    """Keys that the schema allows below a key path."""
+def _without_kinds(location: KeyPath) -> KeyPath:
+    """Key path of a mistake: pydantic puts the kind of a list's entry behind its place, where files have no key."""
+    kinds = _kinds()
+    return tuple(
+        key
+        for key, before in zip(location, (None, *location), strict=False)
+        if not (isinstance(before, int) and key in kinds)
+    )
+
+
+def _kinds() -> dict[str, type[BaseModel]]:
+    """Models of list entries by their kind."""
+    models = (*get_args(get_args(AnyEvent)[0]),)
+    return {str(get_args(model.model_fields["kind"].annotation)[0]): model for model in models}
+
+
+def _known_keys(location: Sequence[str | int]) -> list[str]:
+    """Keys that the schema allows at a location."""
     model: Any = Scenario
-    for key in key_path:
+    for before, key in zip((None, *location), location, strict=False):
         if isinstance(key, int):
             continue
-        model = _model_in(model.model_fields[key].annotation)
+        if isinstance(before, int) and key in _kinds():
+            model = _kinds()[str(key)]
+        else:
+            model = _model_in(model.model_fields[key].annotation)
     return [name for name, field in model.model_fields.items() if not field.exclude]
 
 

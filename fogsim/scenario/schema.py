@@ -63,17 +63,33 @@ class Clocks(Section):
         return self
 
 
-class Brake(Section):
-    """A vehicle brakes at a place, holds, and drives on."""
-
-    kind: Literal["brake"]
-    """What happens."""
+class Event(Section):
+    """Something that a vehicle is made to do, once, when one of its conditions holds."""
 
     vehicle: str
     """Id of the vehicle."""
 
-    at_position_m: NotNegative
-    """Distance that it has driven when it begins to brake."""
+    at_position_m: NotNegative | None = None
+    """It begins when the vehicle has driven this far."""
+
+    at_time_s: NotNegative | None = None
+    """It begins at this time after the ego's appearance."""
+
+    at_gap_to_ego_m: Positive | None = None
+    """It begins when the vehicle is this near to the ego."""
+
+    @model_validator(mode="after")
+    def _begins(self) -> Self:
+        if self.at_position_m is None and self.at_time_s is None and self.at_gap_to_ego_m is None:
+            raise ValueError("say when it begins: at_position_m, at_time_s or at_gap_to_ego_m")
+        return self
+
+
+class Brake(Event):
+    """A vehicle brakes, holds the lower speed, and drives on."""
+
+    kind: Literal["brake"]
+    """`brake`: brake, hold the lower speed, and drive on."""
 
     to_speed_kmh: NotNegative = 0.0
     """Speed that it brakes to; 0 is a standstill."""
@@ -83,6 +99,42 @@ class Brake(Section):
 
     hold_s: NotNegative = 30.0
     """How long it keeps that speed, from the beginning of the braking."""
+
+
+class BreakDown(Event):
+    """A vehicle comes to a standstill and stays there."""
+
+    kind: Literal["break_down"]
+    """`break_down`: come to a standstill and stay there."""
+
+    deceleration_mps2: Positive = 3.0
+    """How hard it brakes."""
+
+    lamps: bool = True
+    """Whether its lamps stay lit."""
+
+
+class ChangeLane(Event):
+    """A vehicle changes lane, whoever is there."""
+
+    kind: Literal["change_lane"]
+    """`change_lane`: change lane, whoever is there (cut in)."""
+
+    lanes: int = Field(ge=-4, le=4)
+    """How many lanes to the left; negative to the right."""
+
+    stay_s: Positive = 60.0
+    """How long it stays there."""
+
+
+class LampsFail(Event):
+    """All lamps of a vehicle go dark."""
+
+    kind: Literal["lamps_fail"]
+    """`lamps_fail`: all lamps go dark."""
+
+
+AnyEvent = Annotated[Brake | BreakDown | ChangeLane | LampsFail, Field(discriminator="kind")]
 
 
 class Traffic(Section):
@@ -115,7 +167,7 @@ class Traffic(Section):
     reading_radius_m: Positive = 1000.0
     """Vehicles farther from the ego than this are not read and not drawn."""
 
-    events: tuple[Brake, ...] = ()
+    events: tuple[AnyEvent, ...] = ()
     """What is scripted."""
 
     after_collision: AfterCollision = AfterCollision.STOP

@@ -1,8 +1,10 @@
 """Where every vehicle is, how it moves and how it obeys advice."""
 
+from fogsim.traffic.attached import AttachedTraffic, step_length
 from fogsim.traffic.drivers import SPEED_CHOICES, Compliance, DriverSetup
+from fogsim.traffic.events import BrakeEvent, Event, LampFailureEvent, LaneChangeEvent, Trigger
 from fogsim.traffic.protocol import Traffic
-from fogsim.traffic.setup import AfterCollision, BrakeEvent, TrafficSetup
+from fogsim.traffic.setup import AfterCollision, TrafficSetup
 from fogsim.traffic.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo_library import LibsumoLink
 from fogsim.traffic.sumo_traffic import SumoTraffic
@@ -36,14 +38,20 @@ def traci_traffic(setup: TrafficSetup, link: TraciLink) -> Traffic:
 __all__ = [
     "SPEED_CHOICES",
     "AfterCollision",
+    "AttachedTraffic",
     "BrakeEvent",
     "Compliance",
     "DriverSetup",
     "DriverSight",
+    "Event",
     "FogAccess",
-    "Traffic",
+    "LampFailureEvent",
+    "LaneChangeEvent",
     "TraciLink",
+    "Traffic",
     "TrafficSetup",
+    "Trigger",
     "libsumo_traffic",
+    "step_length",
     "traci_traffic",
 ]

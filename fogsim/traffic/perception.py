@@ -44,12 +44,13 @@ class Perception:
         self._sight = sight
         self._ignored: dict[str, str] = {}
         self._emerging: dict[tuple[str, str], float] = {}
+        self._own_lamps: dict[str, int | None] = {}
         self._contrast: dict[str, float] = {}
         self._minimum_gap: dict[str, float] = {}
         # Nobody nearer than this is hidden, wherever the fog is densest: for them nothing need be computed.
         self._surely_seen = sight.sure_distance(fog.maximum_extinction) - LARGEST_MINIMUM_GAP
 
-    def update(self, ego: str, ego_lamps: Lamp) -> None:
+    def update(self, ego: str, ego_lamps: Lamp, dark: frozenset[str]) -> None:
         """Look once: tell SUMO's drivers which leader they do not see.
 
         Parameters
@@ -58,7 +59,10 @@ class Perception:
             Id of the ego, whose lamps are not SUMO's.
         ego_lamps : Lamp
             Its lit lamps.
+        dark : frozenset of str
+            Vehicles whose lamps have failed.
         """
+        self._own_lamps = {**dict.fromkeys(dark, None), ego: None if ego in dark else int(ego_lamps)}
         vehicles = self._api.vehicle
         found = [
             (v, *leader)
@@ -67,7 +71,7 @@ class Perception:
             and leader[0]
             and (leader[1] > self._surely_seen or v in self._ignored)
         ]
-        unseen = self._unseen(found, ego, ego_lamps) if found else {}
+        unseen = self._unseen(found) if found else {}
         unseen |= self._not_yet_reacted(found, unseen)
         gone = self._ignored.keys() - unseen.keys()
         for follower in gone.intersection(vehicles.getIDList()) if gone else ():
@@ -87,7 +91,7 @@ class Perception:
         self._emerging = emerging
         return {pair[0]: pair[1] for pair, since in emerging.items() if time - since < self._sight.reaction_time}
 
-    def _unseen(self, found: list[tuple[str, str, float]], ego: str, ego_lamps: Lamp) -> dict[str, str]:
+    def _unseen(self, found: list[tuple[str, str, float]]) -> dict[str, str]:
         followers, leaders, spacings = zip(*found, strict=True)
         eyes, rears = self._lines(followers, leaders)
         towards = rears - eyes
@@ -98,13 +102,15 @@ class Perception:
         seen = self._sight.sees_body(distance, depth, contrast)
         # Lamps are asked for only where no body is seen and the brightest of all lamps would be: that saves most calls.
         asked = np.flatnonzero(~seen & self._sight.sees_lamp(distance, depth, np.full(len(found), BRIGHTEST)))
-        intensity = np.array([self._rear_intensity(leaders[i], ego, ego_lamps) for i in asked])
+        intensity = np.array([self._rear_intensity(leaders[i]) for i in asked])
         seen[asked] = self._sight.sees_lamp(distance[asked], depth[asked], intensity)
         return {followers[i]: leaders[i] for i in np.flatnonzero(~seen)}
 
-    def _rear_intensity(self, vehicle: str, ego: str, ego_lamps: Lamp) -> float:
-        own = ego_lamps if vehicle == ego else OTHERS_LAMPS
-        return rear_intensity(int(own) | lamps_from_signals(self._api.vehicle.getSignals(vehicle)))
+    def _rear_intensity(self, vehicle: str) -> float:
+        own = self._own_lamps.get(vehicle, int(OTHERS_LAMPS))
+        if own is None:
+            return 0.0
+        return rear_intensity(own | lamps_from_signals(self._api.vehicle.getSignals(vehicle)))
 
     def _lines(
         self, followers: tuple[str, ...], leaders: tuple[str, ...]

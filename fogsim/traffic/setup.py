@@ -5,6 +5,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from fogsim.traffic.drivers import DriverSetup
+from fogsim.traffic.events import Event
 from fogsim.traffic.sight import DriverSight
 
 UNTOUCHED = DriverSetup(speed_choice="unaffected", spread=0.0)
@@ -16,31 +17,6 @@ class AfterCollision(StrEnum):
 
     STOP = "stop"
     REMOVE = "remove"
-
-
-@dataclass(frozen=True, slots=True)
-class BrakeEvent:
-    """A scripted braking manoeuvre.
-
-    Attributes
-    ----------
-    vehicle : str
-        Id of the vehicle that brakes.
-    at_position : float
-        Distance driven since it departed, at which it starts to brake [m].
-    to_speed : float
-        Speed that it brakes to [m/s]; 0 is a standstill.
-    deceleration : float
-        Deceleration while braking [m/s²], positive; the vehicle's own limit applies too.
-    hold : float
-        Time at the lower speed before it drives on [s].
-    """
-
-    vehicle: str
-    at_position: float
-    to_speed: float
-    deceleration: float
-    hold: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +41,7 @@ class TrafficSetup:
         Deceleration with which an advised vehicle slows down to the advice [m/s²].
     reading_radius : float
         Vehicles farther from the ego than this are not read [m].
-    events : tuple of BrakeEvent
+    events : tuple of Event
         What is scripted.
     sight : DriverSight or None
         Eyes of the drivers; None lets them see through the fog, as SUMO's do by themselves.
@@ -86,7 +62,7 @@ class TrafficSetup:
     warm_up_limit: float
     advice_deceleration: float
     reading_radius: float
-    events: tuple[BrakeEvent, ...] = ()
+    events: tuple[Event, ...] = ()
     sight: DriverSight | None = None
     drivers: DriverSetup = UNTOUCHED
     after_collision: AfterCollision = AfterCollision.STOP

@@ -1,15 +1,18 @@
 """Traffic by SUMO, wherever it runs."""
 
 import functools
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Concatenate, ParamSpec, TypeVar
+
+import numpy as np
 
 from fogsim.errors import SimulationError
 from fogsim.traffic.collisions import CollisionWatch
 from fogsim.traffic.control import Order, SpeedControl
 from fogsim.traffic.drivers import Drivers
-from fogsim.traffic.events import Script
+from fogsim.traffic.events import Script, Situation
 from fogsim.traffic.link import Api, SumoLink
 from fogsim.traffic.network import read_net, road_network
 from fogsim.traffic.opendrive import is_opendrive
@@ -21,7 +24,7 @@ from fogsim.traffic.setup import AfterCollision, TrafficSetup
 from fogsim.traffic.sight import FogAccess
 from fogsim.traffic.signs import sign_map
 from fogsim.traffic.subscribed_reading import SubscribedReader
-from fogsim.values import Command, Lamp, RoadNetwork, SignMap, TrafficSnapshot
+from fogsim.values import Command, Lamp, RoadNetwork, SignMap, TrafficSnapshot, TrafficState
 
 _NO_LANE_CHANGES = 0
 _NOBODY: Mapping[str, float] = {}
@@ -74,6 +77,7 @@ class SumoTraffic:
         self._fog: FogAccess | None = None
         self._seed = 0
         self._ego_lamps = Lamp.NONE
+        self._ego_since = 0.0
         self._route: RouteProgress | None = None
         self._teleported = False
 
@@ -119,6 +123,7 @@ class SumoTraffic:
                 )
             self._step(run)
             seen.update(simulation.getDepartedIDList())
+        self._ego_since = simulation.getTime()
         run.collisions.tell()
 
     def enter_fog(self, fog: FogAccess) -> None:
@@ -162,9 +167,22 @@ class SumoTraffic:
         present = set(run.api.vehicle.getIDList())
         ego = self._setup.ego
         orders = {ego: (command.advice.speed, self._setup.advice_deceleration)} if ego in present else {}
+        doings = run.script.play(self._situation(run, present))
+        for event in doings.lane_changes:
+            run.api.vehicle.changeLaneRelative(event.vehicle, event.lanes, event.stay)
         # What is scripted comes last, so that it overrides advice.
-        scripted = run.script.orders(run.api.simulation.getTime(), present, run.api.vehicle.getDistance)
-        return orders | scripted
+        return {**orders, **doings.orders}
+
+    def _situation(self, run: _Run, present: set[str]) -> Situation:
+        vehicle, ego = run.api.vehicle, self._setup.ego
+
+        def gap_to_ego(other: str) -> float:
+            if ego not in present or other not in present:
+                return math.inf
+            return math.dist(vehicle.getPosition(other), vehicle.getPosition(ego))
+
+        time = run.api.simulation.getTime() - self._ego_since
+        return Situation(time, present, vehicle.getDistance, gap_to_ego)
 
     def _step(self, run: _Run) -> None:
         self._prepare(run, _NOBODY)
@@ -173,7 +191,7 @@ class SumoTraffic:
 
     def _prepare(self, run: _Run, advised: Mapping[str, float]) -> None:
         if run.perception is not None:
-            run.perception.update(self._setup.ego, self._ego_lamps)
+            run.perception.update(self._setup.ego, self._ego_lamps, run.script.dark)
         if run.drivers is not None:
             run.drivers.update(advised)
 
@@ -195,7 +213,7 @@ class SumoTraffic:
             return None
         self._route = self._route or RouteProgress(run.api, ego)
         route_position, route_length = self._route.now()
-        state = run.reader.state(self._ego_lamps)
+        state = _with_dark(run.reader.state(self._ego_lamps), run.script.dark)
         return TrafficSnapshot(
             state=state,
             ego=state.ids.index(ego),
@@ -210,6 +228,13 @@ class SumoTraffic:
         """End the simulation; see `Traffic.close`."""
         self._link.end()
         self._run = None
+
+
+def _with_dark(state: TrafficState, dark: frozenset[str]) -> TrafficState:
+    """A state in which some vehicles' lamps have failed."""
+    if not dark:
+        return state
+    return replace(state, lamps=np.where([v in dark for v in state.ids], 0, state.lamps).astype(np.int32))
 
 
 def command_line(setup: TrafficSetup, seed: int) -> list[str]:

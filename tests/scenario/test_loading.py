@@ -75,7 +75,11 @@ def test_an_unknown_key_inside_a_list(folder: Path) -> None:
             "camera_period_s: 0.25",
             r"clocks: camera_period_s must be a whole multiple .*0\.25 s",
         ),
-        ("kind: brake", "kind: jump", r"traffic\.events\.0\.kind: input should be 'brake'; got 'jump'"),
+        ("- kind: brake", "- vehicule: x", r"traffic\.events\.0\.kind: this key is missing"),
+        ("deceleration_mps2: 6", "decelerate: 6", r"events\.0\.decelerate: unknown key; did you mean 'deceleration_"),
+        ("at_position_m: 1900", "at_position_m: -5", r"traffic\.events\.0\.at_position_m: .*; got -5"),
+        ("      at_position_m: 1900\n", "", r"traffic\.events\.0: say when it begins: at_position_m, at_time_s or"),
+        ("kind: brake", "kind: jump", r"traffic\.events\.0\.kind: unknown kind 'jump'; known: brake, break_down"),
         (
             "illuminance_lx: 10000",
             "illuminance_lx: -5",

@@ -9,7 +9,15 @@ import numpy as np
 import pytest
 
 from fogsim.errors import SimulationError, SimulationRunningError
-from fogsim.traffic import BrakeEvent, Traffic, TrafficSetup, libsumo_traffic
+from fogsim.traffic import (
+    BrakeEvent,
+    LampFailureEvent,
+    LaneChangeEvent,
+    Traffic,
+    TrafficSetup,
+    Trigger,
+    libsumo_traffic,
+)
 from fogsim.values import Command, Lamp, SpeedAdvice, TrafficSnapshot
 
 FOLDER = Path(__file__).resolve().parents[2] / "scenarios" / "motorway_fog_bank"
@@ -103,7 +111,7 @@ def test_lamps_of_the_command_are_the_egos(traffic: Traffic) -> None:
 
 
 def test_a_scripted_vehicle_brakes_holds_and_drives_on() -> None:
-    event = BrakeEvent("lead", at_position=300.0, to_speed=0.0, deceleration=5.0, hold=15.0)
+    event = BrakeEvent("lead", Trigger(at_position=300.0), to_speed=0.0, deceleration=5.0, hold=15.0)
     traffic = libsumo_traffic(replace(SETUP, events=(event,)))
     try:
         traffic.start(1)
@@ -118,6 +126,26 @@ def test_a_scripted_vehicle_brakes_holds_and_drives_on() -> None:
     assert min(speeds) == pytest.approx(0.0, abs=0.01)
     assert speeds[-1] > 5.0
     assert np.nanmin(np.diff(speeds)) >= -0.5 - 0.01
+
+
+def test_a_scripted_vehicle_cuts_in_and_its_lamps_fail_when_they_are_told_to() -> None:
+    events = (
+        LaneChangeEvent("lead", Trigger(at_time=1.0), lanes=1, stay=20.0),
+        LampFailureEvent("lead", Trigger(at_gap_to_ego=1000.0)),
+    )
+    traffic = libsumo_traffic(replace(SETUP, events=events, keep_lane=("ego",)))
+    try:
+        traffic.start(1)
+        before = drive(traffic, Command(), 5).state
+        after = drive(traffic, Command(), 60).state
+    finally:
+        traffic.close()
+    one, other = before.row("lead"), after.row("lead")
+    assert one is not None
+    assert other is not None
+    assert (before.lane[one], after.lane[other]) == ("approach_1", "approach_2")
+    assert after.lamps[other] == 0
+    assert np.count_nonzero(after.lamps) >= len(after.ids) - 2  # all others but the ego, whose lamps the command sets
 
 
 def test_the_same_seed_replays_exactly(traffic: Traffic) -> None:

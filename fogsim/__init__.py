@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from fogsim import estimators as estimators
+    from fogsim.attached import attach as attach
     from fogsim.loop import ClosedLoop as ClosedLoop
     from fogsim.loop import run as run
     from fogsim.scenario import Scenario as Scenario
@@ -19,6 +20,7 @@ __version__ = version("fogsim")
 
 _LAZY = {
     "ClosedLoop": "fogsim.loop",
+    "attach": "fogsim.attached",
     "Scenario": "fogsim.scenario",
     "catalogue": "fogsim.scenario",
     "load_scenario": "fogsim.scenario",
@@ -42,6 +44,7 @@ __all__ = [
     "SignSighting",
     "SimulationError",
     "Step",
+    "attach",
     "catalogue",
     "estimators",
     "load_scenario",

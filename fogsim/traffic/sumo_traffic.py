@@ -152,6 +152,7 @@ class SumoTraffic:
         self._link.step()
         self.look()
 
+    @_watched
     def obey(self, command: Command) -> None:
         """Put a command in force for the next step of a simulation that somebody else steps."""
         run = self._running
@@ -159,6 +160,7 @@ class SumoTraffic:
         run.control.carry_out(self._orders(run, command))
         self._prepare(run, command.advised_speeds)
 
+    @_watched
     def look(self) -> None:
         """Take in what the last step has brought, in a simulation that somebody else steps."""
         self._take_in(self._running)

@@ -1,1 +1,0 @@
-"""Ride along in a simulation whose steps somebody else commands."""

@@ -1,0 +1,191 @@
+"""Ride along in a simulation whose steps somebody else commands: read, draw, estimate and, if wanted, advise."""
+
+import contextlib
+import dataclasses
+from collections.abc import Iterable
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from fogsim.atmosphere import FieldAccess
+from fogsim.errors import InputError, SimulationError
+from fogsim.loop import AdvisedDriving
+from fogsim.onboard import OnBoard
+from fogsim.randomness import spawn_streams
+from fogsim.scenario import Scenario, attached_scenario, build, override
+from fogsim.traffic import AttachedTraffic, step_length
+from fogsim.values import Command, Step
+
+DECISION_PERIOD = 0.5
+"""Time between two decisions, as far as the simulation's step allows [s]."""
+
+
+def attach(
+    api: Any,
+    *,
+    ego: str | None = None,
+    visibility: float | None = None,
+    scenario: Scenario | None = None,
+    net: str | Path | None = None,
+    settings: Iterable[str] = (),
+    drivers: bool = True,
+    seed: int = 0,
+) -> "AttachedSession":
+    """Attach an ego with a camera to a SUMO simulation that runs already.
+
+    Parameters
+    ----------
+    api : module or traci.Connection
+        ``libsumo`` or ``traci`` after ``start``, or one connection of traci.
+    ego : str
+        Id of the ego; if not given, the scenario's.
+    visibility : float
+        Meteorological visibility of homogeneous fog [m].
+    scenario : Scenario
+        Fog, light, camera, sensors, estimators and policies, in place of the defaults; its traffic is not started.
+    net : str or Path
+        SUMO network to draw; if not given, the file that the simulation says it has loaded.
+    settings : iterable of str
+        ``key.path=value`` each, as after ``--set``.
+    drivers : bool
+        Whether the other drivers, too, see only what the fog lets them see, and choose their speeds in it; this is put
+        in force by `AttachedSession.advise`. False leaves them as they are.
+    seed : int
+        Seed of the sensors' noise and of the drivers' differences.
+
+    Returns
+    -------
+    AttachedSession
+        The session; nothing is drawn until its `observe`.
+
+    Raises
+    ------
+    InputError
+        If the ego or the fog is missing, or a setting does not fit.
+    SimulationError
+        If no simulation runs there.
+    """
+    fog = [] if visibility is None else [f"fog.visibility_m={visibility!r}"]
+    if scenario is not None:
+        scenario = override(scenario, [*fog, *settings])
+        ego = ego or scenario.traffic.ego
+    elif ego is None:
+        raise InputError("attach: ego is missing: which vehicle is the ego?")
+    else:
+        scenario = attached_scenario(ego, [*_clocks(step_length(api)), *fog, *settings])
+    setup = dataclasses.replace(
+        build.traffic_setup(scenario), ego=ego, net=None if net is None else Path(net), additional=(), config=None
+    )
+    return AttachedSession(scenario, AttachedTraffic(setup, api), drivers, seed)
+
+
+def _clocks(step: float) -> list[str]:
+    decision = step * max(1, round(DECISION_PERIOD / step))
+    return [f"clocks.{key}_s={t!r}" for key, t in zip(_CLOCKS, (step, step, decision), strict=True)]
+
+
+_CLOCKS = ("traffic_step", "camera_period", "decision_period")
+
+
+class AttachedSession:
+    """An ego in somebody else's simulation; see `attach`.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    traffic : AttachedTraffic
+        The simulation.
+    drivers : bool
+        Whether the other drivers meet the fog too.
+    seed : int
+        Seed of the sensors' noise and of the drivers' differences.
+    """
+
+    def __init__(self, scenario: Scenario, traffic: AttachedTraffic, drivers: bool, seed: int) -> None:
+        self._traffic = traffic
+        self._drivers = drivers
+        self._seed = seed
+        self._onboard = OnBoard(scenario)
+        self._policy = AdvisedDriving(scenario)
+        self._command = Command()
+        self._began: float | None = None
+        self._index = 0
+        self._closed = False
+
+    def observe(self) -> Step | None:
+        """Take in what the last simulation step has brought; to be called after each.
+
+        Returns
+        -------
+        Step or None
+            The finished instant, its time counted from the first; None while the ego is not on the road. An ego that
+            is teleported is off the road at least once.
+
+        Raises
+        ------
+        SimulationError
+            If the simulation is lost, or the session is closed.
+        MissingDependencyError
+            If no renderer works here.
+        """
+        if self._closed:
+            raise SimulationError("the session is closed")
+        if self._began is not None:
+            self._traffic.look()
+        elif self._traffic.ego_is_there():
+            self._traffic.start(self._seed)
+            fog = self._onboard.begin(spawn_streams(self._seed), self._traffic.network).fog
+            if self._drivers:
+                self._traffic.enter_fog(FieldAccess(fog))
+        else:
+            return None
+        snapshot = self._traffic.observe()
+        if snapshot is None:
+            return None
+        if self._began is None:
+            self._began = snapshot.state.time
+        step = self._onboard.finish(self._index, snapshot.state.time - self._began, snapshot, self._command, None)
+        self._index += 1
+        return step
+
+    def advise(self, step: Step, command: Command | None = None) -> Command:
+        """Put a command in force for the next simulation step; to be called before each of them.
+
+        The other drivers' sight in the fog, their choice of speed and scripted events are put in force here too.
+
+        Parameters
+        ----------
+        step : Step
+            What was observed last.
+        command : Command or None
+            Advice and lamps; None asks the scenario's own policies, which decide once a decision period.
+
+        Returns
+        -------
+        Command
+            What is in force.
+        """
+        self._command = self._policy.decide(step) if command is None else command
+        self._traffic.obey(self._command)
+        return self._command
+
+    def close(self) -> None:
+        """Let drivers drive and see by themselves again and free the renderer; the simulation goes on.
+
+        Top speeds that drivers have chosen in the fog stay as they are.
+        """
+        if not self._closed and self._began is not None:
+            # Nobody is left to be held in a simulation that has ended first.
+            with contextlib.suppress(SimulationError):
+                self._traffic.release()
+        self._closed = True
+        self._onboard.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

@@ -1,0 +1,91 @@
+"""A SUMO simulation that its owner has started, steps and ends."""
+
+import contextlib
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+from fogsim.traffic.link import Api, told_errors
+from fogsim.traffic.setup import TrafficSetup
+from fogsim.traffic.sumo_library import load_libsumo
+from fogsim.traffic.sumo_traffic import SumoTraffic
+from fogsim.traffic.traci_link import load_traci
+
+
+class AttachedLink:
+    """A simulation that runs already, and is neither stepped nor ended by this link.
+
+    Parameters
+    ----------
+    api : module or traci.Connection
+        libsumo, traci, or one connection of traci.
+    """
+
+    def __init__(self, api: Api) -> None:
+        self._api = api
+        # A connection of traci does not say what it is; both modules do.
+        inside = bool(getattr(api, "isLibsumo", bool)())
+        self.distant = not inside
+        self._library = load_libsumo() if inside else load_traci()
+
+    def begin(self, arguments: Sequence[str]) -> Api:  # noqa: ARG002 - the simulation has its own
+        """Take the simulation as it is; see `SumoLink.begin`."""
+        return self._api
+
+    def step(self) -> None:
+        """Do nothing: the simulation's owner steps it."""
+
+    def end(self) -> None:
+        """Do nothing: the simulation is its owner's."""
+
+    def watched(self) -> contextlib.AbstractContextManager[None]:
+        """Turn the loss of the simulation into an error of ours; see `SumoLink.watched`."""
+        return told_errors(self._library, "to which FogSim is attached")
+
+
+class AttachedTraffic(SumoTraffic):
+    """SUMO traffic whose steps its owner commands: `obey` before each, `look` after it.
+
+    Parameters
+    ----------
+    setup : TrafficSetup
+        The ego and how vehicles obey; of the simulation's files, only a network that is named is used.
+    api : module or traci.Connection
+        libsumo, traci, or one connection of traci, with a simulation that runs.
+
+    Raises
+    ------
+    SimulationError
+        If no simulation runs there.
+    """
+
+    def __init__(self, setup: TrafficSetup, api: Api) -> None:
+        self._attached = AttachedLink(api)
+        self._api = api
+        self._ego = setup.ego
+        super().__init__(replace(setup, step_length=step_length(api)), self._attached)
+
+    def ego_is_there(self) -> bool:
+        """True while the ego is on the road."""
+        with self._attached.watched():
+            return self._ego in self._api.vehicle.getIDList()
+
+    def release(self) -> None:
+        """Let the ego drive by itself again, and everybody see everybody."""
+        with self._attached.watched():
+            vehicles = self._api.vehicle.getIDList()
+            self._running.control.carry_out({self._ego: (math.inf, 0.0)} if self._ego in vehicles else {})
+            for vehicle in vehicles if self._running.perception is not None else ():
+                self._api.vehicle.setParameter(vehicle, "carFollowModel.ignoreIDs", "")
+
+
+def step_length(api: Api) -> float:
+    """Step of a simulation that runs [s].
+
+    Raises
+    ------
+    SimulationError
+        If none does.
+    """
+    with AttachedLink(api).watched():
+        return float(api.simulation.getDeltaT())

@@ -1,0 +1,144 @@
+"""Riding along in a loop that the user writes, with libsumo and with traci."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import traci
+
+import fogsim
+from fogsim.errors import InputError, SimulationError
+from fogsim.traffic.sumo_library import load_libsumo
+from fogsim.values import Command, SpeedAdvice, Step
+
+GRID = Path(__file__).resolve().parent / "data" / "grid"
+ARGUMENTS = ["-c", str(GRID / "grid.sumocfg"), "--step-length", "0.5", "--no-step-log", "--seed", "1"]
+SMALL = ("camera.width=96", "camera.height=72")
+EGO = "veh18"  # departs at 36 s and drives through the whole town
+
+
+@pytest.fixture
+def libsumo() -> Iterator[Any]:
+    library = load_libsumo()
+    library.start(["sumo", *ARGUMENTS])
+    yield library
+    library.close()
+
+
+@pytest.fixture
+def connection(sumo_process: Callable) -> Iterator[Any]:
+    with sumo_process(ARGUMENTS) as (port, _):
+        connection = traci.connect(port, numRetries=100, host="127.0.0.1", waitBetweenRetries=0.1)
+        yield connection
+        connection.close()
+
+
+def users_loop(api: Any, steps: int, **options: Any) -> list[Step | None]:
+    """What a user writes."""
+    seen = []
+    with fogsim.attach(api, ego=EGO, visibility=120.0, settings=SMALL, **options) as session:
+        for _ in range(steps):
+            api.simulationStep()
+            step = session.observe()
+            if step is not None:
+                session.advise(step)
+            seen.append(step)
+    return seen
+
+
+def test_steps_come_while_the_ego_is_on_the_road(libsumo: Any) -> None:
+    seen = users_loop(libsumo, 100)
+    on_the_road = [step for step in seen if step is not None]
+    assert seen[:72] == [None] * 72
+    assert [s.index for s in on_the_road] == list(range(len(on_the_road)))
+    assert on_the_road[-1].time == pytest.approx(0.5 * (len(on_the_road) - 1))
+    assert on_the_road[-1].traffic.time == pytest.approx(50.0)
+    assert on_the_road[-1].traffic.ids[on_the_road[-1].ego] == EGO
+    assert on_the_road[-1].truth.visibility == pytest.approx(120.0)
+    assert on_the_road[-1].observation.image.shape == (72, 96, 3)
+    assert libsumo.simulation.getTime() == pytest.approx(50.0)  # its owner's still
+
+
+def test_traci_shows_the_same_as_libsumo(libsumo: Any, connection: Any) -> None:
+    for one, other in zip(users_loop(libsumo, 90), users_loop(connection, 90), strict=True):
+        assert (one is None) == (other is None)
+        if one is not None and other is not None:
+            assert one.traffic.ids == other.traffic.ids
+            assert np.array_equal(one.traffic.position, other.traffic.position)
+            assert np.array_equal(one.observation.image, other.observation.image)
+            assert one.command == other.command
+
+
+def test_advice_is_the_users_own_and_the_ego_is_free_afterwards(libsumo: Any) -> None:
+    session = fogsim.attach(libsumo, ego=EGO, visibility=120.0, settings=SMALL, drivers=False)
+    speeds = []
+    for _ in range(88):
+        libsumo.simulationStep()
+        step = session.observe()
+        if step is not None:
+            speeds.append(float(step.traffic.speed[step.ego]))
+            session.advise(step, Command(SpeedAdvice(4.0)))
+    assert len(speeds) > 10
+    assert speeds[-1] <= 4.0 + 1e-6
+    session.close()
+    session.close()
+    for _ in range(10):
+        libsumo.simulationStep()
+    assert libsumo.vehicle.getSpeed(EGO) > 6.0
+    with pytest.raises(SimulationError, match="the session is closed"):
+        session.observe()
+
+
+def test_a_session_that_only_looks_changes_nothing(libsumo: Any) -> None:
+    def positions(look: bool) -> list[Any]:
+        libsumo.load(ARGUMENTS)
+        session = fogsim.attach(libsumo, ego=EGO, visibility=40.0, settings=SMALL)
+        found = []
+        for _ in range(110):
+            libsumo.simulationStep()
+            if look:
+                session.observe()
+            found.append([libsumo.vehicle.getPosition(v) for v in libsumo.vehicle.getIDList()])
+        session.close()
+        return found
+
+    assert positions(look=True) == positions(look=False)
+
+
+def test_an_ego_that_leaves_is_none_again(libsumo: Any) -> None:
+    seen = users_loop(libsumo, 300)
+    there = [step is not None for step in seen]
+    assert there.count(True) > 50
+    assert not there[0]
+    assert not there[-1]
+    assert sum(a != b for a, b in zip(there[1:], there[:-1], strict=True)) == 2
+
+
+def test_a_scenario_gives_fog_and_camera(libsumo: Any) -> None:
+    scenario = fogsim.load_scenario("motorway_fog_bank", [*SMALL, "fog.visibility_m=50"])
+    session = fogsim.attach(libsumo, ego=EGO, scenario=scenario, net=GRID / "grid.net.xml")
+    step = None
+    while step is None:
+        libsumo.simulationStep()
+        step = session.observe()
+    session.close()
+    assert step.truth.visibility == pytest.approx(50.0)
+
+
+def test_what_attach_cannot_do_without(libsumo: Any) -> None:
+    with pytest.raises(InputError, match="ego is missing"):
+        fogsim.attach(libsumo, visibility=100.0)
+    with pytest.raises(InputError, match="fog: this key is missing"):
+        fogsim.attach(libsumo, ego=EGO)
+
+
+def test_a_simulation_that_is_lost(connection: Any) -> None:
+    session = fogsim.attach(connection, ego="veh0", visibility=100.0, settings=SMALL)
+    connection.simulationStep()
+    assert session.observe() is not None
+    connection.close()
+    with pytest.raises(SimulationError, match="SUMO to which FogSim is attached is lost"):
+        session.observe()
+    session.close()

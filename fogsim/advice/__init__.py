@@ -3,11 +3,11 @@
 from collections.abc import Callable
 
 from fogsim.advice.protocol import Adviser
-from fogsim.advice.sight_distance import NoAdvice, StoppingSightDistance
+from fogsim.advice.sight_distance import FixedSpeed, NoAdvice, StoppingSightDistance
 from fogsim.registry import Registry
 
 ADVISERS: Registry[Callable[..., Adviser]] = Registry(
-    "adviser", {"stopping_sight_distance": StoppingSightDistance, "none": NoAdvice}
+    "adviser", {"stopping_sight_distance": StoppingSightDistance, "fixed_speed": FixedSpeed, "none": NoAdvice}
 )
 
-__all__ = ["ADVISERS", "Adviser", "NoAdvice", "StoppingSightDistance"]
+__all__ = ["ADVISERS", "Adviser", "FixedSpeed", "NoAdvice", "StoppingSightDistance"]

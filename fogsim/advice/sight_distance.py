@@ -77,3 +77,26 @@ class NoAdvice:
     ) -> SpeedAdvice:
         """Advise nothing; see `Adviser.advise`."""
         return SpeedAdvice()
+
+
+@dataclass(frozen=True, slots=True)
+class FixedSpeed:
+    """Advise one speed, whatever the fog: a sign, or an ego that drives at a speed of the user's.
+
+    Attributes
+    ----------
+    speed : float
+        The speed [m/s].
+    """
+
+    speed: float = 50.0 / KMH_PER_MPS
+
+    def advise(
+        self,
+        belief: Belief,  # noqa: ARG002 - the protocol's parameters
+        speed_limit: float,  # noqa: ARG002 - the protocol's parameters
+        time: float,  # noqa: ARG002 - the protocol's parameters
+        previous: SpeedAdvice,  # noqa: ARG002 - the protocol's parameters
+    ) -> SpeedAdvice:
+        """Advise the fixed speed; see `Adviser.advise`."""
+        return SpeedAdvice(self.speed)

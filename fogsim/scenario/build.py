@@ -120,7 +120,7 @@ def driver_setup(scenario: Scenario) -> DriverSetup:
         drivers.compliance.strength,
         drivers.compliance.delay_s,
     )
-    return DriverSetup(drivers.speed_choice, drivers.speed_spread, compliance)
+    return DriverSetup(drivers.speed_choice, drivers.speed_spread, compliance, drivers.distance_misjudgement)
 
 
 def camera(scenario: Scenario) -> Camera:

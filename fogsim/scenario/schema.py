@@ -221,6 +221,9 @@ class DriversSection(Section):
     speed_spread: NotNegative = 0.1
     """Standard deviation of the logarithm of a driver's own factor on that speed."""
 
+    distance_misjudgement: NotNegative = 0.0
+    """By which share they take distances for longer in dense fog, and so follow closer; 0.3 to 0.6 at night."""
+
     compliance: ComplianceSection = ComplianceSection()
     """How they follow advice."""
 

@@ -11,7 +11,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fogsim.kinematics import safe_speed
 from fogsim.registry import Registry
@@ -45,6 +44,37 @@ def within_sight(visibility: float) -> float:
 def too_fast(visibility: float) -> float:
     """Slow down below 200 m, but to 1.4 times what would be safe (between the 1.3 and 1.5 that studies suggest)."""
     return math.inf if visibility >= UNAFFECTED_ABOVE else 1.4 * within_sight(visibility)
+
+
+def complied_speed(own: float, advised: float, strength: float) -> float:
+    """Speed of a driver who goes some way from the own speed down to an advised one [m/s].
+
+    Parameters
+    ----------
+    own, advised : float
+        Speeds [m/s].
+    strength : float
+        How far, 0 (not at all) … 1 (all the way).
+    """
+    return own + strength * min(0.0, advised - own)
+
+
+FULLY_MISJUDGED, RIGHTLY_JUDGED = 30.0, 150.0
+"""Visibilities up to which distances are misjudged in full, and from which not at all [m]."""
+
+
+def perceived_distance_factor(visibility: float, misjudgement: float) -> float:
+    """Perceived over true distance in fog [-] (Cavallo, Colomb & Doré 2001; linear in between).
+
+    Parameters
+    ----------
+    visibility : float
+        Meteorological visibility [m].
+    misjudgement : float
+        Overestimate in the densest fog [-].
+    """
+    share = (RIGHTLY_JUDGED - visibility) / (RIGHTLY_JUDGED - FULLY_MISJUDGED)
+    return 1.0 + misjudgement * min(max(share, 0.0), 1.0)
 
 
 SPEED_CHOICES: Registry[Choice] = Registry(
@@ -86,20 +116,25 @@ class DriverSetup:
         Standard deviation of the logarithm of a driver's own factor on the chosen speed [-].
     compliance : Compliance
         How they follow advice.
+    misjudgement : float
+        By which share they take distances for longer than they are in dense fog [-], and so follow closer: 0.3 … 0.6 at
+        night (Cavallo, Colomb & Doré 2001); in full up to 30 m of visibility, not at all from 150 m.
     """
 
     speed_choice: str = "too_fast"
     spread: float = 0.1
     compliance: Compliance = Compliance()
+    misjudgement: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class _Driver:
-    """One driver: factor on the chosen speed, whether advice moves them, top speed of the vehicle [m/s]."""
+    """One driver: factor on the chosen speed, whether advice moves them, top speed [m/s], wanted time headway [s]."""
 
     factor: float
     follows: bool
     top_speed: float
+    headway: float
 
 
 class Drivers:
@@ -129,6 +164,7 @@ class Drivers:
         self._known: dict[str, _Driver] = {}
         self._advised_since: dict[str, float] = {}
         self._set: dict[str, float] = {}
+        self._misjudging: dict[str, float] = {}
         self._next = 0.0
 
     def update(self, advised: Mapping[str, float]) -> None:
@@ -148,19 +184,27 @@ class Drivers:
         if not ids:
             return
         extinction = self._fog.extinction(np.array([vehicles.getPosition3D(v) for v in ids]))
+        visibilities = [visibility_from_extinction(float(k)) for k in extinction]
+        if self._setup.misjudgement > 0:
+            self._follow_closer(ids, visibilities)
         self._advised_since = {v: self._advised_since.get(v, time) for v in advised}
-        for vehicle, speed in zip(ids, self._chosen(ids, extinction), strict=True):
+        for vehicle, speed in zip(ids, self._chosen(ids, visibilities), strict=True):
             target = min(self._advised(vehicle, speed, advised, time), self._driver(vehicle).top_speed)
             # Setting it costs a call: a change that nobody would notice is left out.
             if abs(target - self._set.get(vehicle, self._driver(vehicle).top_speed)) > 0.3:
                 vehicles.setMaxSpeed(vehicle, target)
                 self._set[vehicle] = target
 
-    def _chosen(self, ids: list[str], extinction: NDArray[np.float64]) -> list[float]:
-        return [
-            self._driver(v).factor * self._choice(visibility_from_extinction(float(k)))
-            for v, k in zip(ids, extinction, strict=True)
-        ]
+    def _chosen(self, ids: list[str], visibilities: list[float]) -> list[float]:
+        return [self._driver(v).factor * self._choice(sight) for v, sight in zip(ids, visibilities, strict=True)]
+
+    def _follow_closer(self, ids: list[str], visibilities: list[float]) -> None:
+        """Who takes a gap for longer than it is keeps a shorter one: the wanted time headway shrinks by that factor."""
+        for vehicle, visibility in zip(ids, visibilities, strict=True):
+            factor = perceived_distance_factor(visibility, self._setup.misjudgement)
+            if abs(factor - self._misjudging.get(vehicle, 1.0)) > 0.02:
+                self._api.vehicle.setTau(vehicle, self._driver(vehicle).headway / factor)
+                self._misjudging[vehicle] = factor
 
     def _advised(self, vehicle: str, own: float, advised: Mapping[str, float], time: float) -> float:
         compliance = self._setup.compliance
@@ -169,7 +213,7 @@ class Drivers:
         if time - self._advised_since[vehicle] < compliance.delay:
             return own
         own = min(own, self._api.vehicle.getAllowedSpeed(vehicle), self._driver(vehicle).top_speed)
-        return own + compliance.strength * min(0.0, advised[vehicle] - own)
+        return complied_speed(own, advised[vehicle], compliance.strength)
 
     def _driver(self, vehicle: str) -> _Driver:
         known = self._known.get(vehicle)
@@ -180,5 +224,6 @@ class Drivers:
                 factor=float(np.exp(self._setup.spread * rng.standard_normal())),
                 follows=bool(rng.random() < compliance.reached_share) and bool(rng.random() < compliance.rate),
                 top_speed=float(self._api.vehicle.getMaxSpeed(vehicle)),
+                headway=float(self._api.vehicle.getTau(vehicle)),
             )
         return known

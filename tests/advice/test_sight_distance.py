@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.advice import ADVISERS, NoAdvice, StoppingSightDistance
+from fogsim.advice import ADVISERS, FixedSpeed, NoAdvice, StoppingSightDistance
 from fogsim.kinematics import stopping_sight_distance
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import Belief, SpeedAdvice
@@ -67,4 +67,9 @@ def test_half_the_sight_on_narrow_roads() -> None:
 
 def test_no_advice_advises_nothing() -> None:
     assert NoAdvice().advise(believe(50.0), LIMIT, 0.0, SpeedAdvice(10.0)) == SpeedAdvice()
-    assert set(ADVISERS) == {"stopping_sight_distance", "none"}
+    assert {"stopping_sight_distance", "fixed_speed", "none"} <= set(ADVISERS)
+
+
+def test_a_fixed_speed_is_advised_in_any_fog() -> None:
+    for visibility in (20.0, 5000.0):
+        assert FixedSpeed(20.0).advise(believe(visibility), LIMIT, 0.0, SpeedAdvice(10.0)).speed == 20.0

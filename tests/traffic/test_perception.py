@@ -9,7 +9,15 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from fogsim.traffic import Compliance, DriverSetup, DriverSight, Traffic, TrafficSetup, libsumo_traffic
-from fogsim.traffic.drivers import SPEED_CHOICES, too_fast, unaffected, within_sight
+from fogsim.traffic.drivers import (
+    SPEED_CHOICES,
+    complied_speed,
+    perceived_distance_factor,
+    too_fast,
+    unaffected,
+    within_sight,
+)
+from fogsim.traffic.sumo_library import load_libsumo
 from fogsim.values import Collision, Command
 
 NET = Path(__file__).resolve().parents[2] / "scenarios" / "motorway_fog_bank" / "motorway.net.xml"
@@ -168,3 +176,40 @@ def test_speed_choices() -> None:
     assert too_fast(200.0) == np.inf
     assert too_fast(100.0) == pytest.approx(1.4 * within_sight(100.0))
     assert {"unaffected", "too_fast", "within_sight"} <= set(SPEED_CHOICES)
+
+
+def test_distances_seem_longer_in_dense_fog() -> None:
+    """Cavallo, Colomb & Doré 2001: up to 60 % at night in the densest fog."""
+    assert perceived_distance_factor(20.0, 0.6) == pytest.approx(1.6)
+    assert perceived_distance_factor(90.0, 0.6) == pytest.approx(1.3)
+    assert perceived_distance_factor(500.0, 0.6) == 1.0
+
+
+def mean_headway(setup: TrafficSetup, misjudgement: float) -> float:
+    """Mean time headway that drivers want in fog of 30 m [s]."""
+    drivers = DriverSetup("unaffected", spread=0.0, misjudgement=misjudgement)
+    routes = (NET.parent / "motorway.rou.xml",)
+    traffic = libsumo_traffic(replace(setup, routes=routes, warm_up_limit=600.0, drivers=drivers, step_length=0.1))
+    traffic.enter_fog(Fog(0.1))
+    try:
+        traffic.start(1)
+        snapshot = traffic.observe()
+        assert snapshot is not None
+        vehicles = load_libsumo().vehicle
+        return float(np.mean([vehicles.getTau(v) for v in snapshot.state.ids if v != "ego"]))
+    finally:
+        traffic.close()
+
+
+def test_who_misjudges_distances_follows_closer(setup: TrafficSetup) -> None:
+    assert mean_headway(setup, 0.6) == pytest.approx(mean_headway(setup, 0.0) / 1.6, rel=0.02)
+
+
+def test_drivers_advised_30_mph_who_drive_61_can_be_represented() -> None:
+    """The field result: advice of 30 mph, mean speed 61 mph; with 65 mph unadvised that is a strength of 4 in 35."""
+    mph = 0.44704
+    strength = (65 - 61) / (65 - 30)
+    assert complied_speed(65 * mph, 30 * mph, strength) == pytest.approx(61 * mph)
+    assert complied_speed(65 * mph, 30 * mph, 1.0) == pytest.approx(30 * mph)
+    assert complied_speed(65 * mph, 30 * mph, 0.0) == pytest.approx(65 * mph)
+    assert complied_speed(20 * mph, 30 * mph, 1.0) == pytest.approx(20 * mph)  # nobody is advised to go faster

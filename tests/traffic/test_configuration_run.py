@@ -1,0 +1,109 @@
+"""A SUMO configuration of somebody else's: junctions, traffic lights, and what can go wrong with an ego in it."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fogsim.errors import SimulationError
+from fogsim.scenario import build, scenario_from_config
+from fogsim.traffic import Traffic, libsumo_traffic
+from fogsim.values import Command, TrafficSnapshot
+
+GRID = Path(__file__).resolve().parents[1] / "data" / "grid"
+EGO = "veh18"
+
+
+def town(config: Path = GRID / "grid.sumocfg", ego: str = EGO) -> Traffic:
+    return libsumo_traffic(build.traffic_setup(scenario_from_config(config, ego, ["fog.visibility_m=120"])))
+
+
+@pytest.fixture
+def traffic() -> Iterator[Traffic]:
+    simulation = town()
+    simulation.start(1)
+    yield simulation
+    simulation.close()
+
+
+def seen_to_the_end(traffic: Traffic) -> list[TrafficSnapshot]:
+    snapshots = []
+    for _ in range(3000):
+        traffic.advance(Command())
+        snapshot = traffic.observe()
+        if snapshot is None:
+            return snapshots
+        snapshots.append(snapshot)
+    pytest.fail("the ego never left the network")
+
+
+def test_the_route_is_as_long_as_the_way_across_its_junctions(traffic: Traffic) -> None:
+    snapshots = seen_to_the_end(traffic)
+    position = np.array([s.route_position for s in snapshots])
+    way = np.linalg.norm(np.diff([s.state.position[s.ego] for s in snapshots], axis=0), axis=1).sum()
+    assert any(s.state.lane[s.ego].startswith(":") for s in snapshots)
+    assert position[-1] - position[0] == pytest.approx(way, rel=0.02)
+    # The last step is within one step's way of the end; lanes of a curve differ by some metres.
+    assert position[-1] == pytest.approx(snapshots[-1].route_length, abs=5.0)
+
+
+def test_vehicles_without_a_type_have_sumos_dimensions(traffic: Traffic) -> None:
+    snapshot = traffic.observe()
+    assert snapshot is not None
+    assert set(snapshot.state.length) == {5.0}
+    assert set(snapshot.state.width) == {1.8}
+    assert set(snapshot.state.height) == {1.5}
+    assert set(snapshot.state.types) == {"car"}
+
+
+def test_the_net_of_the_configuration_is_drawn(traffic: Traffic) -> None:
+    network, _ = traffic.network()
+    lanes = {lane.lane_id for lane in network.lanes}
+    assert {"C0B0_0", "C0B0_1"} <= lanes
+    assert np.linalg.norm(np.diff(network.route, axis=0), axis=1).sum() == pytest.approx(590, abs=30)
+
+
+def test_an_ego_that_does_not_exist_is_told_with_those_that_do() -> None:
+    with pytest.raises(SimulationError, match=r"'vehicle18' did not appear within .*those that did: veh18, .* more"):
+        town(ego="vehicle18").start(1)
+
+
+def configuration(folder: Path, *options: str, routes: Path = GRID / "grid.trips.xml") -> Path:
+    file = folder / "mine.sumocfg"
+    files = f'<net-file value="{GRID / "grid.net.xml"}"/><route-files value="{routes}"/>'
+    file.write_text(f"<configuration>{files}{''.join(options)}</configuration>", encoding="utf-8")
+    return file
+
+
+def test_a_configuration_without_vehicles_is_told(tmp_path: Path) -> None:
+    routes = tmp_path / "empty.rou.xml"
+    routes.write_text("<routes/>", encoding="utf-8")
+    with pytest.raises(SimulationError, match="no vehicle at all did"):
+        town(configuration(tmp_path, routes=routes)).start(1)
+
+
+def test_a_teleport_takes_the_ego_off_the_road(tmp_path: Path) -> None:
+    """It waits at a red light, longer than this configuration lets anybody wait."""
+    impatient = town(configuration(tmp_path, '<time-to-teleport value="3"/>'))
+    impatient.start(1)
+    try:
+        last = seen_to_the_end(impatient)[-1]
+    finally:
+        impatient.close()
+    assert last.state.speed[last.ego] == pytest.approx(0.0, abs=0.1)
+    assert last.route_position < last.route_length - 100.0
+
+
+def test_the_ego_may_appear_late_in_a_simulation_that_begins_late(tmp_path: Path) -> None:
+    """The time that is waited for it counts from the beginning, not from SUMO's zero."""
+    routes = tmp_path / "late.rou.xml"
+    routes.write_text('<routes><trip id="veh" depart="90010" from="C0B0" to="B0A0"/></routes>', encoding="utf-8")
+    late = town(configuration(tmp_path, '<begin value="90000"/>', routes=routes), "veh")
+    late.start(1)
+    try:
+        snapshot = late.observe()
+    finally:
+        late.close()
+    assert snapshot is not None
+    assert snapshot.state.time == pytest.approx(90010, abs=0.2)

@@ -1,6 +1,7 @@
 """The closed loop: traffic → scene → render → atmosphere → camera → estimators → fusion → advice → traffic."""
 
 import dataclasses
+import math
 from collections.abc import Iterator
 from types import TracebackType
 from typing import Self
@@ -56,15 +57,19 @@ class AdvisedDriving:
         self._adviser = build.adviser(scenario)
         self._lighting = build.lighting_policy(scenario)
         self._frames = build.periods(scenario).decision_frames
+        self._to_all = scenario.drivers.advised == "all"
 
     def decide(self, step: Step) -> Command:
         """Command for the next camera period; the one in force between decisions."""
         if step.index % self._frames:
             return step.command
         previous = step.command
+        advice = self._adviser.advise(step.belief, step.speed_limit, step.time, previous.advice)
+        others = step.traffic.ids if self._to_all and math.isfinite(advice.speed) else ()
         return Command(
-            advice=self._adviser.advise(step.belief, step.speed_limit, step.time, previous.advice),
+            advice=advice,
             lamps=self._lighting.lamps(step.belief, previous.lamps),
+            advised_speeds=dict.fromkeys(others, advice.speed),
         )
 
 

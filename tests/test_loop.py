@@ -35,6 +35,15 @@ def test_a_command_is_decided_once_a_decision_period() -> None:
     assert changes == list(range(1, 41, 5))
 
 
+def test_advice_may_go_to_every_vehicle_near_the_ego() -> None:
+    steps = list(fogsim.run(small("fog.visibility_m=60", "drivers.advised=all"), seed=1))
+    advised = steps[-1].command.advised_speeds
+    assert len(advised) > 10
+    assert set(advised.values()) == {steps[-1].command.advice.speed}
+    alone = list(fogsim.run(small("fog.visibility_m=60"), seed=1))
+    assert not alone[-1].command.advised_speeds
+
+
 def test_the_camera_period_may_be_longer_than_the_traffic_step() -> None:
     steps = list(fogsim.run(small("clocks.camera_period_s=0.5"), seed=1))
     assert len(steps) == 9

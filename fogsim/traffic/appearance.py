@@ -79,4 +79,5 @@ _LAMPS_OF_SIGNALS = np.array([lamps_from_signals(signals) for signals in range(_
 
 def lamps_from_many_signals(signals: Sequence[int]) -> NDArray[np.int32]:
     """Lamps as bits of `Lamp` (n,), as `lamps_from_signals` gives them for each."""
-    return _LAMPS_OF_SIGNALS[np.asarray(signals, dtype=np.intp) & (len(_LAMPS_OF_SIGNALS) - 1)]
+    known = len(_LAMPS_OF_SIGNALS) - 1
+    return np.asarray(_LAMPS_OF_SIGNALS[np.asarray(signals, dtype=np.intp) & known])

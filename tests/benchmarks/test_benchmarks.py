@@ -1,0 +1,51 @@
+"""Every benchmark runs and prints the records that it promises; what it times is not judged here."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
+
+
+def records(name: str, *arguments: str) -> list[dict[str, Any]]:
+    done = subprocess.run(
+        [sys.executable, str(FOLDER / name), "--json", *arguments],
+        capture_output=True,
+        text=True,
+        timeout=280,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    result: list[dict[str, Any]] = json.loads(done.stdout)
+    return result
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "keys"),
+    [
+        ("loop.py", ("--size", "64x48", "--steps", "3", "--repeat", "1"), {"env", "camera", "vehicles", "steps_per_s"}),
+        ("resets.py", ("--resets", "5"), {"ms_median", "growth_kib_per_reset"}),
+        (
+            "estimator_accuracy.py",
+            ("--size", "160x120", "--seconds", "1", "--seeds", "1"),
+            {"method", "visibility", "median_pct", "p95_pct", "valid_share", "ms"},
+        ),
+    ],
+)
+def test_records(name: str, arguments: tuple[str, ...], keys: set[str]) -> None:
+    for record in records(name, *arguments):
+        assert keys <= set(record)
+
+
+def test_fog_costs_lives_and_an_oracle_saves_some() -> None:
+    """The scenario that the closing figures come from, with few seeds; the full study is the benchmark itself."""
+    dense = records("collisions.py", "--seeds", "3", "--visibility", "60")
+    none, oracle = (next(r for r in dense if r["policy"] == p) for p in ("none", "oracle"))
+    assert none["collisions_mean"] > 0
+    assert oracle["collisions_mean"] < none["collisions_mean"]
+    thin = records("collisions.py", "--seeds", "2", "--visibility", "1000")
+    assert all(r["collisions_mean"] == 0 for r in thin)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from fogsim import estimators as estimators
     from fogsim.attached import attach as attach
+    from fogsim.attached import connect as connect
     from fogsim.loop import ClosedLoop as ClosedLoop
     from fogsim.loop import run as run
     from fogsim.scenario import Scenario as Scenario
@@ -21,6 +22,7 @@ __version__ = version("fogsim")
 _LAZY = {
     "ClosedLoop": "fogsim.loop",
     "attach": "fogsim.attached",
+    "connect": "fogsim.attached",
     "Scenario": "fogsim.scenario",
     "catalogue": "fogsim.scenario",
     "load_scenario": "fogsim.scenario",
@@ -46,6 +48,7 @@ __all__ = [
     "Step",
     "attach",
     "catalogue",
+    "connect",
     "estimators",
     "load_scenario",
     "run",

@@ -1,4 +1,4 @@
-"""Ride along in a simulation whose steps somebody else commands: read, draw, estimate and, if wanted, advise."""
+"""FogSim in simulations that the user has started: over a connection, or in a loop of the user's own."""
 
 import contextlib
 import dataclasses
@@ -13,11 +13,42 @@ from fogsim.loop import AdvisedDriving
 from fogsim.onboard import OnBoard
 from fogsim.randomness import spawn_streams
 from fogsim.scenario import Scenario, attached_scenario, build, override
-from fogsim.traffic import AttachedTraffic, step_length
+from fogsim.traffic import AttachedTraffic, TraciLink, Traffic, step_length, traci_traffic
 from fogsim.values import Command, Step
 
 DECISION_PERIOD = 0.5
 """Time between two decisions, as far as the simulation's step allows [s]."""
+
+
+def connect(
+    scenario: Scenario, host: str = "localhost", port: int = 8813, order: int | None = None, retries: int = 40
+) -> Traffic:
+    """Reach a SUMO or sumo-gui that the user has started with ``--remote-port``.
+
+    The simulation is taken as it is, whatever files and seed it was started with; only to begin a second run, the
+    scenario's own files are loaded.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The ego, the clocks (SUMO's ``--step-length`` must be the scenario's) and how vehicles obey.
+    host : str
+        Where SUMO runs.
+    port : int
+        Its ``--remote-port``.
+    order : int or None
+        FogSim's place among several clients (SUMO's ``--num-clients``).
+    retries : int
+        How often to try again, every 0.25 s, while SUMO does not listen yet.
+
+    Returns
+    -------
+    Traffic
+        For `run` or `ClosedLoop`; nothing is connected before they start.
+    """
+    # SUMO may run in another folder.
+    here = scenario.model_copy(update={"directory": scenario.directory.resolve()})
+    return traci_traffic(build.traffic_setup(here), TraciLink(host, port, order, retries))
 
 
 def attach(

@@ -1,5 +1,6 @@
 """``fogsim …``: arguments, progress and exit codes, nothing else."""
 
+import json
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -119,7 +120,7 @@ def _scenario(
             raise InputError(f"--sumocfg {sumocfg}: --visibility is missing, or a fog by --set fog.…")
         return scenario_from_config(sumocfg, ego, [*fog, *settings])
     if name is not None and sumocfg is None:
-        return load_scenario(name, [*fog, *([] if ego is None else [f"traffic.ego={ego}"]), *settings])
+        return load_scenario(name, [*fog, *([] if ego is None else [f"traffic.ego={json.dumps(ego)}"]), *settings])
     given = "neither" if name is None else f"both: {name} and --sumocfg {sumocfg}"
     raise InputError(f"expected either a scenario or --sumocfg FILE, got {given}")
 

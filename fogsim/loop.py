@@ -15,7 +15,7 @@ from fogsim.traffic import Traffic, libsumo_traffic
 from fogsim.values import Command, Ending, FogField, Step, TrafficSnapshot
 
 
-def run(scenario: Scenario, seed: int = 0) -> Iterator[Step]:
+def run(scenario: Scenario, seed: int = 0, traffic: Traffic | None = None) -> Iterator[Step]:
     """Run a scenario with its own advice and lighting policy.
 
     Parameters
@@ -24,6 +24,8 @@ def run(scenario: Scenario, seed: int = 0) -> Iterator[Step]:
         From `load_scenario`.
     seed : int
         The same seed gives the same run, bit for bit.
+    traffic : Traffic or None
+        The traffic simulation; None for SUMO in this process, as the scenario describes it.
 
     Yields
     ------
@@ -36,7 +38,7 @@ def run(scenario: Scenario, seed: int = 0) -> Iterator[Step]:
         If a part of the loop cannot start; see `ClosedLoop.start`.
     """
     policy = AdvisedDriving(scenario)
-    with ClosedLoop(scenario) as loop:
+    with ClosedLoop(scenario, traffic) as loop:
         step = loop.start(seed)
         yield step
         while step.ending is None:

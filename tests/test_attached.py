@@ -1,4 +1,4 @@
-"""Riding along in a loop that the user writes, with libsumo and with traci."""
+"""In a simulation that the user has started: over a connection, and in a loop that the user writes."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -10,7 +10,10 @@ import traci
 
 import fogsim
 from fogsim.errors import InputError, SimulationError
+from fogsim.randomness import spawn_streams
+from fogsim.scenario import build
 from fogsim.traffic.sumo_library import load_libsumo
+from fogsim.traffic.sumo_traffic import command_line
 from fogsim.values import Command, SpeedAdvice, Step
 
 GRID = Path(__file__).resolve().parent / "data" / "grid"
@@ -142,3 +145,27 @@ def test_a_simulation_that_is_lost(connection: Any) -> None:
     with pytest.raises(SimulationError, match="SUMO to which FogSim is attached is lost"):
         session.observe()
     session.close()
+
+
+def test_a_run_over_a_connection_is_the_run_in_process(sumo_process: Callable) -> None:
+    scenario = fogsim.load_scenario("motorway_fog_bank", [*SMALL, "fog.visibility_m=inf", "duration_s=1"])
+    here = list(fogsim.run(scenario, seed=3))
+    arguments = command_line(build.traffic_setup(scenario), spawn_streams(3).traffic_seed)
+    with sumo_process(arguments) as (port, _):
+        there = list(fogsim.run(scenario, 3, fogsim.connect(scenario, "127.0.0.1", port)))
+    assert len(there) == 11
+    for one, other in zip(here, there, strict=True):
+        assert np.array_equal(one.observation.image, other.observation.image)
+        assert np.array_equal(one.traffic.position, other.traffic.position)
+
+
+def test_a_connection_that_is_lost_on_the_way_is_one_error(sumo_process: Callable) -> None:
+    scenario = fogsim.load_scenario("motorway_fog_bank", [*SMALL, "fog.visibility_m=80"])
+    arguments = command_line(build.traffic_setup(scenario), 1)
+    with sumo_process(arguments) as (port, process):
+        steps = fogsim.run(scenario, 3, fogsim.connect(scenario, "127.0.0.1", port))
+        next(steps)
+        process.kill()
+        process.wait(10)
+        with pytest.raises(SimulationError, match=rf"SUMO at 127\.0\.0\.1:{port} is lost"):
+            next(steps)

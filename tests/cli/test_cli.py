@@ -17,6 +17,7 @@ from fogsim.scenario import catalogue
 
 FOGSIM = (sys.executable, "-m", "fogsim")
 SMALL = ("--set", "camera.width=160", "--set", "camera.height=120", "--set", "duration_s=3")
+TOWN = str(Path(__file__).resolve().parents[1] / "data" / "grid" / "grid.sumocfg")
 FILES = {"manifest.json", "metrics.json", "steps.parquet", "video.mp4", "report.html"}
 
 
@@ -113,6 +114,11 @@ def test_an_interrupted_run_leaves_readable_results_that_say_they_are_partial(tm
         (["run", "motorway_fog_bank", "--set", "nonsense"], "expected key.path=value"),
         (["run", "nowhere/scenario.yaml"], "there is no such scenario file"),
         (["validate", "nowhere.yaml"], "there is no such scenario file"),
+        (["run"], "expected either a scenario or --sumocfg FILE, got neither"),
+        (["run", "motorway_fog_bank", "--sumocfg", TOWN], "got both"),
+        (["run", "--sumocfg", TOWN, "--visibility", "120"], "--ego is missing"),
+        (["run", "--sumocfg", TOWN, "--ego", "veh18"], "--visibility is missing"),
+        (["run", "--sumocfg", "no.sumocfg", "--ego", "a", "--visibility", "80"], "there is no file 'no.sumocfg'"),
     ],
 )
 def test_bad_input_ends_in_one_message_and_writes_nothing(arguments: list[str], message: str, tmp_path: Path) -> None:
@@ -132,6 +138,26 @@ def test_validate_tells_the_good_from_the_bad(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert "camera.width" in done.stderr
     assert "fine: motorway_fog_bank" in done.stdout
+
+
+def test_any_sumo_configuration_runs_with_a_chosen_ego(tmp_path: Path) -> None:
+    chosen = ("--sumocfg", TOWN, "--ego", "veh18", "--visibility", "120", "--out", str(tmp_path / "out"))
+    done = fogsim("run", *chosen, *SMALL[:4], "--set", "duration_s=600", "--no-video", "--no-report")
+    assert done.returncode == 0, done.stderr
+    assert "ended: arrived" in done.stdout
+    manifest = json.loads((tmp_path / "out" / "manifest.json").read_text(encoding="utf-8"))
+    assert manifest["scenario"]["traffic"]["config"] == "grid.sumocfg"
+    speed = parquet.read_table(tmp_path / "out" / "steps.parquet").column("speed_mps").to_numpy()
+    assert speed.min() < 0.1  # red lights
+    assert speed.max() > 10.0
+
+
+def test_an_ego_that_a_configuration_does_not_have_is_told(tmp_path: Path) -> None:
+    done = fogsim("run", "--sumocfg", TOWN, "--ego", "18", "--visibility", "120", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "the ego '18' did not appear" in done.stderr
+    assert "veh18" in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 def test_list_names_scenarios_and_methods() -> None:

@@ -92,7 +92,7 @@ def attach(
     Raises
     ------
     InputError
-        If the ego or the fog is missing, or a setting does not fit.
+        If the ego or the fog is missing, a setting does not fit, or `api` is something else.
     SimulationError
         If no simulation runs there.
     """
@@ -140,8 +140,9 @@ class AttachedSession:
         self._onboard = OnBoard(scenario)
         self._policy = AdvisedDriving(scenario)
         self._command = Command()
-        self._began: float | None = None
+        self._times: tuple[float, float] | None = None
         self._index = 0
+        self._started = False
         self._closed = False
 
     def observe(self) -> Step | None:
@@ -162,10 +163,11 @@ class AttachedSession:
         """
         if self._closed:
             raise SimulationError("the session is closed")
-        if self._began is not None:
+        if self._started:
             self._traffic.look()
         elif self._traffic.ego_is_there():
             self._traffic.start(self._seed)
+            self._started = True
             fog = self._onboard.begin(spawn_streams(self._seed), self._traffic.network).fog
             if self._drivers:
                 self._traffic.enter_fog(FieldAccess(fog))
@@ -174,11 +176,18 @@ class AttachedSession:
         snapshot = self._traffic.observe()
         if snapshot is None:
             return None
-        if self._began is None:
-            self._began = snapshot.state.time
-        step = self._onboard.finish(self._index, snapshot.state.time - self._began, snapshot, self._command, None)
+        step = self._onboard.finish(self._index, self._elapsed(snapshot.state.time), snapshot, self._command, None)
         self._index += 1
         return step
+
+    def _elapsed(self, now: float) -> float:
+        began, last = (now, now) if self._times is None else self._times
+        if now < last:
+            raise SimulationError(
+                f"the simulation's time went back from {last:g} s to {now:g} s: attach again after loading it anew"
+            )
+        self._times = (began, now)
+        return now - began
 
     def advise(self, step: Step, command: Command | None = None) -> Command:
         """Put a command in force for the next simulation step; to be called before each of them.
@@ -206,7 +215,7 @@ class AttachedSession:
 
         Top speeds that drivers have chosen in the fog stay as they are.
         """
-        if not self._closed and self._began is not None:
+        if not self._closed and self._started:
             # Nobody is left to be held in a simulation that has ended first.
             with contextlib.suppress(SimulationError):
                 self._traffic.release()

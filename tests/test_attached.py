@@ -137,6 +137,27 @@ def test_what_attach_cannot_do_without(libsumo: Any) -> None:
         fogsim.attach(libsumo, ego=EGO)
 
 
+def test_what_is_no_simulation() -> None:
+    with pytest.raises(SimulationError, match=r"call libsumo\.start first"):
+        fogsim.attach(load_libsumo(), ego=EGO, visibility=100.0)
+    with pytest.raises(SimulationError, match="Not connected"):
+        fogsim.attach(traci, ego=EGO, visibility=100.0)
+    with pytest.raises(InputError, match="expected libsumo, traci or a connection of traci, got 'sumo'"):
+        fogsim.attach("sumo", ego=EGO, visibility=100.0)
+
+
+def test_a_simulation_that_is_loaded_anew_is_another(libsumo: Any) -> None:
+    session = fogsim.attach(libsumo, ego="veh0", visibility=100.0, settings=SMALL)
+    for _ in range(5):
+        libsumo.simulationStep()
+        session.observe()
+    libsumo.load(ARGUMENTS)
+    libsumo.simulationStep()
+    with pytest.raises(SimulationError, match=r"time went back from 2\.5 s to 0\.5 s: attach again"):
+        session.observe()
+    session.close()
+
+
 def test_a_simulation_that_is_lost(connection: Any) -> None:
     session = fogsim.attach(connection, ego="veh0", visibility=100.0, settings=SMALL)
     connection.simulationStep()

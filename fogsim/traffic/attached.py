@@ -5,6 +5,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from fogsim.errors import InputError, SimulationError
 from fogsim.traffic.link import Api, told_errors
 from fogsim.traffic.setup import TrafficSetup
 from fogsim.traffic.sumo_library import load_libsumo
@@ -19,14 +20,25 @@ class AttachedLink:
     ----------
     api : module or traci.Connection
         libsumo, traci, or one connection of traci.
+
+    Raises
+    ------
+    InputError
+        If it is something else.
+    SimulationError
+        If it is libsumo, and no simulation has been started.
     """
 
     def __init__(self, api: Api) -> None:
+        if not hasattr(api, "simulationStep"):
+            raise InputError(f"expected libsumo, traci or a connection of traci, got {api!r}")
         self._api = api
         # A connection of traci does not say what it is; both modules do.
         inside = bool(getattr(api, "isLibsumo", bool)())
         self.distant = not inside
         self._library = load_libsumo() if inside else load_traci()
+        if inside and not api.isLoaded():
+            raise SimulationError("no simulation runs in libsumo: call libsumo.start first")
 
     def begin(self, arguments: Sequence[str]) -> Api:  # noqa: ARG002 - the simulation has its own
         """Take the simulation as it is; see `SumoLink.begin`."""

@@ -1,5 +1,6 @@
 """Which vehicles are near the ego, without asking all of them where they are in every step."""
 
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -44,7 +45,8 @@ class Nearness:
         self._forget(everybody, time)
         due = self._due
         asked = [v for v in everybody if due.get(v, time) <= time] if due else list(everybody)
-        position = np.array(list(map(self._position, asked)))
+        flat = itertools.chain.from_iterable(map(self._position, asked))
+        position = np.fromiter(flat, np.float64, 3 * len(asked)).reshape(-1, 3)
         ego = asked.index(self._ego)
         distance = np.hypot(position[:, 0] - position[ego, 0], position[:, 1] - position[ego, 1])
         near = distance <= self._radius

@@ -120,6 +120,8 @@ def _scenario(
             raise InputError(f"--sumocfg {sumocfg}: --visibility is missing, or a fog by --set fog.…")
         return scenario_from_config(sumocfg, ego, [*fog, *settings])
     if name is not None and sumocfg is None:
+        if name.endswith(".sumocfg"):
+            raise InputError(f"{name} is a SUMO configuration, not a scenario: run it with --sumocfg {name} --ego ID")
         return load_scenario(name, [*fog, *([] if ego is None else [f"traffic.ego={json.dumps(ego)}"]), *settings])
     given = "neither" if name is None else f"both: {name} and --sumocfg {sumocfg}"
     raise InputError(f"expected either a scenario or --sumocfg FILE, got {given}")

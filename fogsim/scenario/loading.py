@@ -14,6 +14,7 @@ from fogsim.scenario.document import Document, KeyPath, dotted, read_document
 from fogsim.scenario.locating import SCENARIO_FILE, scenario_file
 from fogsim.scenario.overrides import apply_overrides
 from fogsim.scenario.schema import AnyEvent, Scenario
+from fogsim.traffic.configuration import configured_files
 
 LONG_RUN = 600.0
 """Longest run of a simulation that is the user's own [s]."""
@@ -221,3 +222,5 @@ def _check_files(document: Document, scenario: Scenario) -> None:
                 f"{document.where(key_path)}: {dotted(key_path)}: there is no file {str(path)!r} in "
                 f"{scenario.directory}; {suggest(path.name, there)}"
             )
+    if traffic.config is not None:
+        configured_files(scenario.directory / traffic.config)

@@ -114,6 +114,8 @@ def test_an_interrupted_run_leaves_readable_results_that_say_they_are_partial(tm
         (["run", "motorway_fog_bank", "--set", "nonsense"], "expected key.path=value"),
         (["run", "nowhere/scenario.yaml"], "there is no such scenario file"),
         (["validate", "nowhere.yaml"], "there is no such scenario file"),
+        (["run", TOWN], "is a SUMO configuration, not a scenario: run it with --sumocfg"),
+        (["run", "--sumocfg", __file__, "--ego", "a", "--visibility", "80"], "not a SUMO configuration"),
         (["run"], "expected either a scenario or --sumocfg FILE, got neither"),
         (["run", "motorway_fog_bank", "--sumocfg", TOWN], "got both"),
         (["run", "--sumocfg", TOWN, "--visibility", "120"], "--ego is missing"),

@@ -16,9 +16,10 @@ Found with libsumo 1.28 on a 2-core Linux machine, growth per reset of resident 
     traffic      1000 resets   2.1 KiB / 1.7 KiB   (counted over the last half)
     environment   600 resets   2.7 KiB / 1.6 KiB
 
-So what grows is SUMO's own ``load``, below 2 KiB each, 2 MiB in 1000 resets, the same for every seed; our stages, the
-scene, the renderer and the estimators add nothing. An earlier figure of 41 KiB was counted from the 20th reset on,
-while the allocator's pools still filled: the resident set settles only after some 50 resets.
+So what grows is SUMO's own ``load``, below 2 KiB each whether the seed changes or not, some 2 MiB in 1000 resets; in
+the allocator's figures our stages, the scene, the renderer and the estimators add nothing to it. The resident set goes
+on settling for some 50 resets (12 KiB each from the 20th to the 50th, under 2 KiB from the 50th to the 200th), so a
+short run that counts from the first ones shows more.
 """
 
 import argparse

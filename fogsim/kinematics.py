@@ -32,7 +32,5 @@ def safe_speed(distance: float, reaction_time: float, deceleration: float, grade
     reaction_time, deceleration, grade : float
         As in `stopping_sight_distance`.
     """
-    if math.isinf(distance):
-        return math.inf
     braking = deceleration + GRAVITY * grade
     return braking * (math.sqrt(reaction_time**2 + 2 * distance / braking) - reaction_time)

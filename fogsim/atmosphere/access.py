@@ -26,6 +26,11 @@ class FieldAccess:
         """Extinction coefficient that is exceeded nowhere [1/m]; banks do not overlap."""
         return self.field.extinction + max((0.0, *(bank.extra_extinction for bank in self.field.banks)))
 
+    @property
+    def minimum_extinction(self) -> float:
+        """Extinction coefficient that is reached everywhere below the fog's top [1/m]; banks do not overlap."""
+        return self.field.extinction + min((0.0, *(bank.extra_extinction for bank in self.field.banks)))
+
     def extinction(self, points: ArrayLike) -> NDArray[np.float64]:
         """Extinction coefficient at points (..., 3) [1/m]; see `fogsim.atmosphere.extinction`."""
         return extinction(self.field, points)

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fogsim.kinematics import safe_speed
 from fogsim.registry import Registry
@@ -24,7 +25,7 @@ REACTION_TIME, DECELERATION = 2.5, 3.4
 UNAFFECTED_ABOVE = 200.0
 """Visibility above which drivers do not slow down [m]."""
 
-CHOICE_PERIOD = 0.5
+CHOICE_PERIOD = 1.0
 """Time between two choices of speed [s]."""
 
 Choice = Callable[[float], float]
@@ -184,19 +185,25 @@ class Drivers:
         if not ids:
             return
         extinction = self._fog.extinction(np.array([vehicles.getPosition3D(v) for v in ids]))
-        visibilities = [visibility_from_extinction(float(k)) for k in extinction]
+        visibilities = self._visibilities(extinction)
         if self._setup.misjudgement > 0:
             self._follow_closer(ids, visibilities)
         self._advised_since = {v: self._advised_since.get(v, time) for v in advised}
-        for vehicle, speed in zip(ids, self._chosen(ids, visibilities), strict=True):
-            target = min(self._advised(vehicle, speed, advised, time), self._driver(vehicle).top_speed)
+        for vehicle, visibility in zip(ids, visibilities, strict=True):
+            driver = self._driver(vehicle)
+            target = min(driver.factor * self._choice(visibility), driver.top_speed)
+            if vehicle in advised and driver.follows:
+                target = self._advised(vehicle, target, advised[vehicle], time)
             # Setting it costs a call: a change that nobody would notice is left out.
-            if abs(target - self._set.get(vehicle, self._driver(vehicle).top_speed)) > 0.3:
+            if abs(target - self._set.get(vehicle, driver.top_speed)) > 0.3:
                 vehicles.setMaxSpeed(vehicle, target)
                 self._set[vehicle] = target
 
-    def _chosen(self, ids: list[str], visibilities: list[float]) -> list[float]:
-        return [self._driver(v).factor * self._choice(sight) for v, sight in zip(ids, visibilities, strict=True)]
+    def _visibilities(self, extinction: NDArray[np.float64]) -> list[float]:
+        """Visibility at each vehicle [m]; where the fog is one and the same, that is looked up once."""
+        if extinction.min() == extinction.max():
+            return [visibility_from_extinction(float(extinction[0]))] * len(extinction)
+        return [visibility_from_extinction(float(k)) for k in extinction]
 
     def _follow_closer(self, ids: list[str], visibilities: list[float]) -> None:
         """Who takes a gap for longer than it is keeps a shorter one: the wanted time headway shrinks by that factor."""
@@ -206,14 +213,12 @@ class Drivers:
                 self._api.vehicle.setTau(vehicle, self._driver(vehicle).headway / factor)
                 self._misjudging[vehicle] = factor
 
-    def _advised(self, vehicle: str, own: float, advised: Mapping[str, float], time: float) -> float:
-        compliance = self._setup.compliance
-        if vehicle not in advised or not self._driver(vehicle).follows:
+    def _advised(self, vehicle: str, own: float, advised: float, time: float) -> float:
+        """Top speed [m/s] of a driver who follows advice, once the delay is over."""
+        if time - self._advised_since[vehicle] < self._setup.compliance.delay:
             return own
-        if time - self._advised_since[vehicle] < compliance.delay:
-            return own
-        own = min(own, self._api.vehicle.getAllowedSpeed(vehicle), self._driver(vehicle).top_speed)
-        return complied_speed(own, advised[vehicle], compliance.strength)
+        own = min(own, float(self._api.vehicle.getAllowedSpeed(vehicle)))
+        return complied_speed(own, advised, self._setup.compliance.strength)
 
     def _driver(self, vehicle: str) -> _Driver:
         known = self._known.get(vehicle)

@@ -13,8 +13,8 @@ from fogsim.traffic.reading import OTHERS_LAMPS
 from fogsim.traffic.sight import BRIGHTEST, DriverSight, FogAccess, inherent_contrast, rear_intensity
 from fogsim.values import Lamp
 
-REACH = 300.0
-"""Leaders farther ahead than this matter to nobody [m]: from 130 km/h one stops in less."""
+REACH = 250.0
+"""Leaders farther ahead than this matter to nobody [m]: from 150 km/h one stops in less."""
 
 EYE_HEIGHT = 1.2
 """Height of a driver's eyes and of the middle of a rear above the road [m]."""
@@ -49,6 +49,8 @@ class Perception:
         self._minimum_gap: dict[str, float] = {}
         # Nobody nearer than this is hidden, wherever the fog is densest: for them nothing need be computed.
         self._surely_seen = sight.sure_distance(fog.maximum_extinction) - LARGEST_MINIMUM_GAP
+        # And nobody farther than this is seen, wherever the fog is thinnest.
+        self._surely_hidden = sight.hidden_distance(fog.minimum_extinction)
 
     def update(self, ego: str, ego_lamps: Lamp, dark: frozenset[str]) -> None:
         """Look once: tell SUMO's drivers which leader they do not see.
@@ -64,15 +66,12 @@ class Perception:
         """
         self._own_lamps = {**dict.fromkeys(dark, None), ego: None if ego in dark else int(ego_lamps)}
         vehicles = self._api.vehicle
-        found = [
-            (v, *leader)
-            for v in vehicles.getIDList()
-            if (leader := vehicles.getLeader(v, REACH))
-            and leader[0]
-            and (leader[1] > self._surely_seen or v in self._ignored)
-        ]
-        unseen = self._unseen(found) if found else {}
-        unseen |= self._not_yet_reacted(found, unseen)
+        unseen, found = self._sorted_by_gap()
+        if found:
+            unseen |= self._unseen(found)
+            unseen |= self._not_yet_reacted(found, unseen)
+        else:
+            self._emerging = {}
         gone = self._ignored.keys() - unseen.keys()
         for follower in gone.intersection(vehicles.getIDList()) if gone else ():
             vehicles.setParameter(follower, _IGNORE, "")
@@ -80,6 +79,23 @@ class Perception:
             if self._ignored.get(follower) != leader:
                 vehicles.setParameter(follower, _IGNORE, leader)
         self._ignored = unseen
+
+    def _sorted_by_gap(self) -> tuple[dict[str, str], list[tuple[str, str, float]]]:
+        """Leaders who are surely hidden, by follower, and those for whom sight must be computed, with their gaps."""
+        vehicles = self._api.vehicle
+        leader_of, ignored = vehicles.getLeader, self._ignored
+        hidden: dict[str, str] = {}
+        doubtful = []
+        for follower in vehicles.getIDList():
+            found = leader_of(follower, REACH)
+            if not found or not found[0]:
+                continue
+            leader, gap = found
+            if gap > self._surely_hidden:
+                hidden[follower] = leader
+            elif gap > self._surely_seen or follower in ignored:
+                doubtful.append((follower, leader, gap))
+        return hidden, doubtful
 
     def _not_yet_reacted(self, found: list[tuple[str, str, float]], unseen: dict[str, str]) -> dict[str, str]:
         """Leaders that have just come into view, and to whom nobody has reacted yet."""

@@ -47,6 +47,10 @@ class FogAccess(Protocol):
     def maximum_extinction(self) -> float:
         """An extinction coefficient that is exceeded nowhere [1/m]."""
 
+    @property
+    def minimum_extinction(self) -> float:
+        """An extinction coefficient that the fog reaches everywhere near the road [1/m]; 0 if there is none."""
+
     def extinction(self, points: ArrayLike) -> NDArray[np.float64]:
         """Extinction coefficient at points (..., 3) [1/m]."""
 
@@ -95,6 +99,29 @@ class DriverSight:
             return 0.0
         depth = math.log(LEAST_CONTRAST / self.contrast_threshold)
         return math.inf if maximum_extinction == 0 else depth / maximum_extinction
+
+    def hidden_distance(self, minimum_extinction: float) -> float:
+        """Distance from which nothing of a vehicle is seen where the fog is nowhere thinner than given [m].
+
+        Parameters
+        ----------
+        minimum_extinction : float
+            Extinction coefficient [1/m].
+        """
+        if minimum_extinction == 0:
+            return math.inf
+        by_day = -math.log(self.contrast_threshold) / minimum_extinction
+        body = by_day if self.illuminance >= DAYLIGHT else self.headlamp_reach
+        return max(body, self._lamp_distance(minimum_extinction))
+
+    def _lamp_distance(self, extinction: float) -> float:
+        """Distance from which even the brightest lamp is not seen, by bisection [m]."""
+        near, far = 0.1, math.sqrt(BRIGHTEST / self.eye_threshold)
+        while far - near > 0.01:
+            middle = 0.5 * (near + far)
+            seen = bool(self.sees_lamp(middle, extinction * middle, BRIGHTEST))
+            near, far = (middle, far) if seen else (near, middle)
+        return far
 
     def sees_body(self, distance: ArrayLike, depth: ArrayLike, inherent_contrast: ArrayLike) -> NDArray[np.bool_]:
         """Tell whether bodies are seen.

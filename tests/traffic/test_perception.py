@@ -42,6 +42,10 @@ class Fog:
     def maximum_extinction(self) -> float:
         return self.k
 
+    @property
+    def minimum_extinction(self) -> float:
+        return self.k
+
     def extinction(self, points: ArrayLike) -> NDArray[np.float64]:
         return np.full(np.shape(points)[:-1], self.k)
 
@@ -58,6 +62,9 @@ class SeesFrom:
 
     def sure_distance(self, *_: float) -> float:
         return self.distance - 10.0
+
+    def hidden_distance(self, *_: float) -> float:
+        return self.distance + 10.0
 
     def sees_body(self, distance: ArrayLike, *_: ArrayLike) -> NDArray[np.bool_]:
         return np.asarray(distance) <= self.distance

@@ -79,3 +79,16 @@ def test_nobody_within_the_sure_distance_is_hidden() -> None:
         assert sight.sees_body([distance], [k * distance], [white])[0]
     assert sight.sure_distance(0.0) == math.inf
     assert DriverSight(illuminance=0.1).sure_distance(0.01) == 0.0
+
+
+@pytest.mark.parametrize("illuminance", [0.1, 10_000.0])
+@pytest.mark.parametrize("k", [0.01, 0.1])
+def test_beyond_the_hidden_distance_nothing_is_seen_and_just_within_it_something_is(
+    illuminance: float, k: float
+) -> None:
+    sight = DriverSight(illuminance)
+    edge = sight.hidden_distance(k)
+    for distance, expected in ((1.01 * edge, False), (0.98 * edge, True)):
+        body = sight.sees_body([distance], [k * distance], [1.0])[0]
+        assert (body or sight.sees_lamp([distance], [k * distance], [200.0])[0]) == expected
+    assert sight.hidden_distance(0.0) == math.inf

@@ -17,9 +17,9 @@ Found with libsumo 1.28 on a 2-core Linux machine, growth per reset of resident 
     environment   600 resets   2.7 KiB / 1.6 KiB
 
 So what grows is SUMO's own ``load``, below 2 KiB each whether the seed changes or not, some 2 MiB in 1000 resets; in
-the allocator's figures our stages, the scene, the renderer and the estimators add nothing to it. The resident set goes
-on settling for some 50 resets (12 KiB each from the 20th to the 50th, under 2 KiB from the 50th to the 200th), so a
-short run that counts from the first ones shows more.
+the allocator's figures our stages, the scene, the renderer and the estimators add nothing to it. The resident set
+settles slowly (12 KiB a reset from the 20th to the 50th, 6 KiB from the 50th to the 200th, 2.7 KiB from the 150th to
+the 600th), so short runs show more.
 """
 
 import argparse

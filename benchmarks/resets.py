@@ -13,7 +13,7 @@ The soak test is ``python benchmarks/resets.py --resets 1000``.
 Found with libsumo 1.28 on a 2-core Linux machine, growth per reset of resident set / allocator:
 
     sumo         1000 resets   1.6 KiB / 1.8 KiB
-    traffic      1000 resets   2.1 KiB / 1.7 KiB   (counted over the last half)
+    traffic       750 resets   2.1 KiB / 1.7 KiB   (counted from the 250th on)
     environment   600 resets   2.7 KiB / 1.6 KiB
 
 So what grows is SUMO's own ``load``, below 2 KiB each whether the seed changes or not, some 2 MiB in 1000 resets; in

@@ -1,0 +1,18 @@
+"""highway-env as a second traffic simulation; nothing else of FogSim knows that library."""
+
+from fogsim.traffic.highway.fleet import EGO, Fleet
+from fogsim.traffic.highway.network import road_network, same_roads
+from fogsim.traffic.highway.perception import let_drivers_meet
+from fogsim.traffic.highway.reading import read_snapshot
+from fogsim.traffic.highway.running import HighwayTraffic, is_highway_environment
+
+__all__ = [
+    "EGO",
+    "Fleet",
+    "HighwayTraffic",
+    "is_highway_environment",
+    "let_drivers_meet",
+    "read_snapshot",
+    "road_network",
+    "same_roads",
+]

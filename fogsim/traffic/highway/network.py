@@ -1,0 +1,147 @@
+"""highway-env's lanes as FogSim's road network; its y axis points down, FogSim's up."""
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from highway_env.road.lane import LineType
+from highway_env.vehicle.kinematics import Vehicle
+from numpy.typing import ArrayLike, NDArray
+
+from fogsim.values import Lane, LaneMarking, RoadNetwork
+
+SAMPLING = 2.0
+"""Longest piece of a curved centreline [m]; at 10 m radius it leaves the curve by 5 cm."""
+
+_MARKINGS = {
+    LineType.STRIPED: LaneMarking.DASHED,
+    LineType.CONTINUOUS: LaneMarking.SOLID,
+    LineType.CONTINUOUS_LINE: LaneMarking.SOLID,
+}
+
+
+def upright(points: ArrayLike) -> NDArray[np.float64]:
+    """Points (..., 2) of highway-env as (..., 3) with y up, on the level road [m]."""
+    flat = np.asarray(points, dtype=np.float64)
+    return np.stack((flat[..., 0], 0.0 - flat[..., 1], np.zeros(flat.shape[:-1])), axis=-1)
+
+
+def road_network(road: Any, ego: Any) -> RoadNetwork:
+    """Lanes of a road and the route of the ego.
+
+    Parameters
+    ----------
+    road : highway_env.road.road.Road
+        The road.
+    ego : highway_env.vehicle.kinematics.Vehicle
+        The ego.
+
+    Returns
+    -------
+    RoadNetwork
+        The route leads along the planned route of the ego, or without one straight on, to the end of the last lane.
+    """
+    lanes = [
+        lane
+        for start, ends in road.network.graph.items()
+        for end, parallel in ends.items()
+        for lane in _carriageway(f"{start}>{end}", parallel)
+    ]
+    return RoadNetwork(tuple(lanes), _route(road.network, ego))
+
+
+def _carriageway(edge_id: str, parallel: Sequence[Any]) -> Iterator[Lane]:
+    """Lanes side by side, the leftmost first."""
+    marks = [[_MARKINGS.get(kind, LaneMarking.NONE) for kind in lane.line_types] for lane in parallel]
+    for index, lane in enumerate(parallel):
+        left, right = marks[index]
+        # The line between two lanes is named by one of them.
+        if index > 0 and left is LaneMarking.NONE:
+            left = marks[index - 1][1]
+        if index + 1 < len(parallel) and right is LaneMarking.NONE:
+            right = marks[index + 1][0]
+        yield Lane(
+            lane_id=f"{edge_id}_{index}",
+            edge_id=edge_id,
+            centreline=_centreline(lane),
+            width=float(lane.width_at(0.0)),
+            speed_limit=speed_limit(lane),
+            left=left,
+            right=right,
+            outermost=index + 1 == len(parallel),
+        )
+
+
+def speed_limit(lane: Any) -> float:
+    """Speed limit of a lane [m/s]; where it has none, the highest speed of highway-env's vehicles."""
+    return float(Vehicle.MAX_SPEED if lane.speed_limit is None else lane.speed_limit)
+
+
+def planned_route(vehicle: Any) -> Any:
+    """Lanes that a vehicle plans to drive; None if it has no plan, or is of a kind that makes none."""
+    return getattr(vehicle, "route", None)
+
+
+def lane_id(index: tuple[str, str, int]) -> str:
+    """Id of a lane, as in the road network."""
+    start, end, number = index
+    return f"{start}>{end}_{number}"
+
+
+def _centreline(lane: Any) -> NDArray[np.float64]:
+    stations = np.linspace(0.0, lane.length, max(2, math.ceil(lane.length / SAMPLING) + 1))
+    if np.ptp([lane.heading_at(s) for s in stations]) == 0:
+        stations = stations[[0, -1]]
+    return upright([lane.position(s, 0.0) for s in stations])
+
+
+def _route(network: Any, ego: Any) -> NDArray[np.float64]:
+    points = np.concatenate([_centreline(network.get_lane(index)) for index in _lanes_ahead(network, ego)])
+    apart = np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-6
+    return points[np.concatenate(([True], apart))]
+
+
+def _lanes_ahead(network: Any, ego: Any) -> Iterator[tuple[str, str, int]]:
+    """Lanes one after the other, from the ego's own; a way round in circles is ended."""
+    # The library takes what has been driven off the list that it is given.
+    here, plan, passed = ego.lane_index, list(planned_route(ego) or ()), set()
+    while here not in passed:
+        yield here
+        passed.add(here)
+        lane = network.get_lane(here)
+        if plan and all(step[:2] == here[:2] for step in plan):
+            return
+        here = network.next_lane(here, route=plan, position=lane.position(lane.length, 0.0))
+
+
+def same_roads(one: RoadNetwork, other: RoadNetwork) -> bool:
+    """Tell whether two networks have the same lanes, whatever the routes."""
+    return len(one.lanes) == len(other.lanes) and all(
+        np.array_equal(a.centreline, b.centreline)
+        and (a.lane_id, a.width, a.speed_limit, a.left, a.right) == (b.lane_id, b.width, b.speed_limit, b.left, b.right)
+        for a, b in zip(one.lanes, other.lanes, strict=True)
+    )
+
+
+def station_along(line: NDArray[np.float64], point: NDArray[np.float64]) -> tuple[float, float]:
+    """How far along a polyline a point is, and the polyline's length [m].
+
+    Parameters
+    ----------
+    line : (n, 3) float64
+        The polyline [m].
+    point : (3,) float64
+        The point, taken to the nearest place of the line [m].
+    """
+    best, station, driven = math.inf, 0.0, 0.0
+    for start, end in itertools.pairwise(line):
+        along = end - start
+        length = float(np.linalg.norm(along))
+        share = float(np.clip((point - start) @ along / length**2, 0.0, 1.0))
+        distance = float(np.linalg.norm(start + share * along - point))
+        if distance < best:
+            best, station = distance, driven + share * length
+        driven += length
+    return station, driven

@@ -1,0 +1,184 @@
+"""highway-env as the traffic of a closed loop."""
+
+import math
+from typing import Any
+
+from highway_env.envs.common.abstract import AbstractEnv
+from highway_env.vehicle.behavior import IDMVehicle
+
+from fogsim.errors import InputError, SimulationError
+from fogsim.traffic.highway.collisions import CollisionWatch
+from fogsim.traffic.highway.fleet import Fleet
+from fogsim.traffic.highway.network import planned_route, road_network, same_roads, speed_limit
+from fogsim.traffic.highway.perception import let_drivers_meet
+from fogsim.traffic.highway.reading import read_snapshot
+from fogsim.traffic.sight import DriverSight, FogAccess
+from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot
+
+
+def is_highway_environment(environment: object) -> bool:
+    """Tell whether something is one of highway-env's environments."""
+    return isinstance(environment, AbstractEnv)
+
+
+class HighwayTraffic:
+    """A `Traffic` of one highway-env environment, whose vehicles move by its own models.
+
+    The ego keeps its lane and follows its leader by IDM, as the others do. Of the environment, roads and vehicles are
+    used, not its rewards, its endings or what it does once a policy step (intersections let new vehicles in there).
+
+    Parameters
+    ----------
+    environment : highway_env.envs.common.abstract.AbstractEnv
+        The environment without wrappers; it is the traffic's from now on.
+    sight : DriverSight or None
+        Eyes of the drivers; None if they see through the fog.
+    reading_radius : float
+        Vehicles farther from the ego than this are not read [m].
+    advice_deceleration : float
+        How hard an advised vehicle slows down to the advice [m/s²].
+
+    Raises
+    ------
+    InputError
+        If it is no environment of highway-env.
+    """
+
+    def __init__(
+        self,
+        environment: Any,
+        sight: DriverSight | None,
+        reading_radius: float = 1000.0,
+        advice_deceleration: float = 2.0,
+    ) -> None:
+        if not is_highway_environment(environment):
+            raise InputError(f"expected an environment of highway-env without wrappers, got {environment!r}")
+        self._environment = environment
+        self._sight = sight
+        self._reading_radius = reading_radius
+        self._advice_deceleration = advice_deceleration
+        self._fog: FogAccess | None = None
+        self._fleet: Fleet | None = None
+        self._watch: CollisionWatch | None = None
+        self._network: RoadNetwork | None = None
+        self._own_speed: dict[Any, float] = {}
+
+    @property
+    def step_length(self) -> float:
+        """Length of a simulation step [s]."""
+        return float(1.0 / self._environment.config["simulation_frequency"])
+
+    def start(self, seed: int) -> None:
+        """Reset the environment.
+
+        Parameters
+        ----------
+        seed : int
+            Seed of the environment.
+
+        Raises
+        ------
+        SimulationError
+            If the environment has no vehicle to control, or has built other roads than before.
+        """
+        self._environment.reset(seed=seed)
+        if self._environment.vehicle is None:
+            raise SimulationError(f"{type(self._environment).__name__} has no controlled vehicle to become the ego")
+        self._fleet = Fleet(self._environment, _driver_for(self._environment))
+        self._watch = CollisionWatch(self._fleet)
+        self._own_speed = {}
+        network = road_network(self._environment.road, self._fleet.ego)
+        if self._network is not None and not same_roads(self._network, network):
+            raise SimulationError(
+                f"{type(self._environment).__name__} builds other roads at every reset, but they are drawn once: "
+                "set its config so that the roads stay the same"
+            )
+        self._network = network
+        self._meet_fog()
+
+    def enter_fog(self, fog: FogAccess) -> None:
+        """Let drivers see only what this fog lets them see, from now on and in every later run."""
+        self._fog = fog
+        self._meet_fog()
+
+    def _meet_fog(self) -> None:
+        if self._fleet is not None and self._fog is not None and self._sight is not None:
+            let_drivers_meet(self._fog, self._fleet, self._sight)
+
+    def network(self) -> tuple[RoadNetwork, SignMap]:
+        """Roads, and no signs: highway-env has none; after `start`."""
+        if self._network is None:
+            raise SimulationError("the traffic has not been started, or is closed")
+        return self._network, SignMap()
+
+    def advance(self, command: Command) -> None:
+        """Move by one simulation step with a command in force."""
+        fleet, watch = self._running()
+        fleet.ego_lamps = command.lamps
+        self._advise(fleet, command)
+        fleet.environment.road.act()
+        fleet.environment.road.step(self.step_length)
+        fleet.environment.steps += 1
+        fleet.environment.time += self.step_length
+        watch.look(self.step_length)
+
+    def _advise(self, fleet: Fleet, command: Command) -> None:
+        """Set the target speeds of those who are advised, and give back their own to those who no longer are."""
+        for vehicle in fleet.environment.road.vehicles:
+            # Target speeds of those who give way at a junction are the road's for that time.
+            if not isinstance(vehicle, IDMVehicle) or getattr(vehicle, "is_yielding", False):
+                continue
+            if vehicle is fleet.ego:
+                advised = command.advice.speed
+            else:
+                advised = command.advised_speeds.get(fleet.name(vehicle), math.inf)
+            if math.isfinite(advised):
+                self._own_speed.setdefault(vehicle, vehicle.target_speed)
+                vehicle.target_speed = self._eased(vehicle, advised)
+            elif vehicle in self._own_speed:
+                vehicle.target_speed = self._own_speed.pop(vehicle)
+
+    def _eased(self, vehicle: Any, speed: float) -> float:
+        """Target speed on the way to an advised one at which IDM slows down no harder than the advice asks.
+
+        On a free road IDM's acceleration is a (1 − (v / v₀)^δ), so −b follows from v₀ = v / (1 + b / a)^(1/δ).
+        """
+        ratio = 1.0 + self._advice_deceleration / vehicle.COMFORT_ACC_MAX
+        return float(max(speed, vehicle.speed / ratio ** (1.0 / vehicle.DELTA)))
+
+    def observe(self) -> TrafficSnapshot | None:
+        """Tell where everybody is and what has happened since the last call; None once the ego has left.
+
+        The impact speed of a collision is the length of the difference of both velocities.
+        """
+        fleet, watch = self._running()
+        return read_snapshot(fleet, self.network()[0].route, watch.tell(), self._reading_radius)
+
+    def _running(self) -> tuple[Fleet, CollisionWatch]:
+        if self._fleet is None or self._watch is None:
+            raise SimulationError("the traffic has not been started, or is closed")
+        return self._fleet, self._watch
+
+    def close(self) -> None:
+        """End the simulation; closing twice is allowed."""
+        self._environment.close()
+        self._fleet, self._watch, self._network = None, None, None
+
+
+def _driver_for(environment: Any) -> Any:
+    """Put a driver who keeps the lane and follows by IDM into the controlled vehicle."""
+    passive, vehicles = environment.vehicle, environment.road.vehicles
+    driver = IDMVehicle(
+        environment.road,
+        passive.position,
+        passive.heading,
+        passive.speed,
+        # Vehicles that agents steer by themselves have neither a target nor a plan.
+        target_lane_index=getattr(passive, "target_lane_index", None),
+        target_speed=getattr(passive, "target_speed", speed_limit(passive.lane)),
+        route=planned_route(passive),
+        enable_lane_change=False,
+    )
+    vehicles[vehicles.index(passive)] = driver
+    environment.controlled_vehicles[0] = driver
+    return driver

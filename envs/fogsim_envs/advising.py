@@ -1,0 +1,133 @@
+"""What environments have in common in which the agent advises the ego's speed and chooses its lamps."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, cast
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from fogsim.errors import InputError
+from fogsim.metrics import step_metrics
+from fogsim.recorders import FramePanel
+from fogsim.scenario import Scenario, build
+from fogsim.values import Ending, Step
+from fogsim_envs.hosting import Simulation
+from fogsim_envs.rewards import RewardWeights, reward_terms
+from fogsim_envs.spaces import action_space, command_of, observation_space, observe
+
+Observation = dict[str, NDArray[Any]]
+
+
+class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
+    """One step is one decision period of a scenario; see `fogsim_envs.advisory.FogAdvisoryEnv` for the spaces.
+
+    Parameters
+    ----------
+    load : callable
+        Gives the scenario with overrides (``key.path=value`` each).
+    begin : callable
+        Starts a scenario's first run with a seed; gives the simulation and its first step.
+    overrides, image_size, continuous, reward_weights, render_mode
+        As of `FogAdvisoryEnv`.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 2}  # noqa: RUF012 - Gymnasium's own way
+
+    def __init__(
+        self,
+        load: Callable[[Sequence[str]], Scenario],
+        begin: Callable[[Scenario, int], tuple[Simulation, Step]],
+        *,
+        overrides: Sequence[str],
+        image_size: tuple[int, int] | None,
+        continuous: bool,
+        reward_weights: RewardWeights | None,
+        render_mode: str | None,
+    ) -> None:
+        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+            raise InputError(f"unknown render_mode {render_mode!r}; known: None, 'rgb_array'")
+        size = () if image_size is None else (f"camera.width={image_size[0]}", f"camera.height={image_size[1]}")
+        self._load = load
+        self._begin = begin
+        self._overrides = (*size, *overrides)
+        self._scenario = load(self._overrides)
+        self._active = self._scenario
+        self._continuous = continuous
+        self._weights = reward_weights or RewardWeights()
+        self._frames = build.periods(self._scenario).decision_frames
+        self._simulation: Simulation | None = None
+        self._step: Step | None = None
+        self._panel = FramePanel()
+        self.render_mode = render_mode
+        self.metadata = {**self.metadata, "render_fps": 1 / self._scenario.clocks.decision_period_s}
+        self.observation_space = cast("spaces.Space[Observation]", observation_space(build.camera(self._scenario)))
+        self.action_space = action_space(continuous)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Begin an episode; ``options={"overrides": ["fog.visibility_m=80"]}`` changes the scenario for it."""
+        super().reset(seed=seed)
+        more = tuple((options or {}).get("overrides", ()))
+        scenario = self._load([*self._overrides, *more]) if more else self._scenario
+        if build.camera(scenario) != build.camera(self._scenario):
+            raise InputError("overrides of reset() must not change the camera: the observation space is fixed")
+        if scenario != self._active:
+            self.close()
+            self._active = scenario
+        run_seed = int(self.np_random.integers(2**31))
+        if self._simulation is None:
+            self._simulation, self._step = self._begin(scenario, run_seed)
+        else:
+            self._step = self._simulation.start(run_seed)
+        self._panel = FramePanel()
+        return observe(self._step), _info(self._step)
+
+    def step(self, action: NDArray[Any]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Let an action be in force for one decision period."""
+        if self._simulation is None or self._step is None:
+            raise gymnasium.error.ResetNeeded("call reset() before step()")
+        before, command = self._step, command_of(action, self._continuous)
+        for _ in range(self._frames):
+            self._step = self._simulation.advance(command)
+            if self._step.ending is not None:
+                break
+        after = self._step
+        terms = reward_terms(before, after, self._weights)
+        truncated = after.ending is Ending.TIME
+        terminated = after.ending is not None and not truncated
+        info = {**_info(after), "reward_terms": terms}
+        return observe(after), float(sum(terms.values())), terminated, truncated, info
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Draw the latest camera frame and its panel."""
+        if self.render_mode is None:
+            gymnasium.logger.warn("render() was called, but no render_mode was given to gymnasium.make()")
+            return None
+        if self._step is None:
+            raise gymnasium.error.ResetNeeded("call reset() before render()")
+        return self._panel.draw(self._step, step_metrics(self._step))
+
+    def close(self) -> None:
+        """End the simulation; closing twice is allowed."""
+        if self._simulation is not None:
+            self._simulation.close()
+        self._simulation, self._step = None, None
+
+
+def _info(step: Step) -> dict[str, Any]:
+    """What is told beside the observation; agents must not use ``truth``."""
+    return {
+        "time_s": step.time,
+        "route_position_m": step.route_position,
+        "speed_mps": float(step.traffic.speed[step.ego]),
+        "collisions": len(step.collisions),
+        "ending": None if step.ending is None else step.ending.value,
+        "truth": {
+            "extinction_per_m": step.truth.extinction,
+            "visibility_m": step.truth.visibility,
+            "visibility_ahead_m": step.truth.visibility_ahead,
+        },
+    }

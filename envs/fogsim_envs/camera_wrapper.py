@@ -1,0 +1,138 @@
+"""A camera in fog for any highway-env environment; the agent goes on driving by that environment's own actions."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from gymnasium.utils import RecordConstructorArgs
+
+from fogsim.atmosphere import FieldAccess
+from fogsim.errors import InputError
+from fogsim.onboard import OnBoard
+from fogsim.randomness import spawn_streams
+from fogsim.scenario import build
+from fogsim.traffic.highway import (
+    Fleet,
+    is_highway_environment,
+    let_drivers_meet,
+    read_snapshot,
+    road_network,
+    same_roads,
+)
+from fogsim.values import Command, RoadNetwork, SignMap, Step
+from fogsim_envs.highway import highway_config, highway_scenario
+from fogsim_envs.spaces import LAMP_MODES, observation_space, observe
+
+_COMMAND = Command(lamps=LAMP_MODES[0])
+
+
+class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordConstructorArgs):
+    """Add a fogged camera frame and what it tells of the fog to the observation of a highway-env environment.
+
+    The observation becomes a ``Dict``: ``camera``, the frame (rows, cols, 3) at the end of the step; ``state``, as of
+    ``fogsim/FogAdvisory-v0`` (no advice is in force); ``highway``, the environment's own observation, which knows of no
+    fog. ``info["truth"]`` holds the fog as it is. Actions, rewards, endings and rendering stay the environment's.
+
+    Parameters
+    ----------
+    env : gymnasium.Env
+        A highway-env environment with one controlled vehicle, wrapped or not; wrappers inside this one must leave
+        roads and vehicles alone.
+    visibility : float
+        Meteorological visibility of homogeneous fog [m]; ``inf`` for clear air.
+    overrides : sequence of str
+        ``key.path=value`` each, as after ``fogsim run --set``, of the camera, light, sensors, estimators, drivers.
+    image_size : tuple of int
+        Width and height of the camera [px].
+    drivers : bool
+        Whether the environment's own drivers see only what the fog lets them see.
+
+    Raises
+    ------
+    InputError
+        If it is no environment of highway-env, or a setting does not fit.
+    """
+
+    def __init__(
+        self,
+        env: gymnasium.Env[Any, Any],
+        *,
+        visibility: float = 100.0,
+        overrides: Sequence[str] = (),
+        image_size: tuple[int, int] = (160, 120),
+        drivers: bool = True,
+    ) -> None:
+        RecordConstructorArgs.__init__(
+            self, visibility=visibility, overrides=overrides, image_size=image_size, drivers=drivers
+        )
+        super().__init__(env)
+        if not is_highway_environment(env.unwrapped):
+            raise InputError(f"FogCameraWrapper: expected an environment of highway-env, got {env!r}")
+        size = (f"camera.width={image_size[0]}", f"camera.height={image_size[1]}")
+        self._scenario = highway_scenario(highway_config(env.unwrapped), visibility, [*size, *overrides])
+        self._sight = build.driver_sight(self._scenario) if drivers else None
+        self._onboard = OnBoard(self._scenario)
+        self._network: RoadNetwork | None = None
+        self._fleet: Fleet | None = None
+        self._step: Step | None = None
+        # The noise of the sensors draws on numbers of its own: the environment runs as it would without the camera.
+        self._noise = np.random.default_rng()
+        own = observation_space(build.camera(self._scenario))
+        self.observation_space = spaces.Dict(
+            {"camera": own["camera"], "state": own["state"], "highway": env.observation_space}
+        )
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Reset the environment and put the camera into its controlled vehicle."""
+        observation, info = self.env.reset(seed=seed, options=options)
+        if seed is not None:
+            self._noise = np.random.default_rng(seed)
+        environment: Any = self.env.unwrapped
+        self._fleet = Fleet(environment, environment.vehicle)
+        self._fleet.ego_lamps = _COMMAND.lamps
+        network = road_network(environment.road, environment.vehicle)
+        if self._network is not None and not same_roads(self._network, network):
+            self._onboard.close()
+            self._onboard = OnBoard(self._scenario)
+        self._network = network
+        streams = spawn_streams(int(self._noise.integers(2**31)))
+        fog = self._onboard.begin(streams, lambda: (network, SignMap())).fog
+        if self._sight is not None and fog.extinction > 0:
+            let_drivers_meet(FieldAccess(fog), self._fleet, self._sight)
+        self._step = None
+        return self._looked(observation), self._told(info)
+
+    def step(self, action: Any) -> tuple[dict[str, Any], Any, bool, bool, dict[str, Any]]:
+        """Let the environment make its step, then look."""
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        return self._looked(observation), reward, terminated, truncated, self._told(info)
+
+    def _looked(self, observation: Any) -> dict[str, Any]:
+        """Observation with the frame of now; with the last one if the vehicle is no longer there."""
+        if self._fleet is None or self._network is None:
+            raise gymnasium.error.ResetNeeded("call reset() before step()")
+        reach = self._scenario.traffic.reading_radius_m
+        snapshot = read_snapshot(self._fleet, self._network.route, (), reach)
+        if snapshot is not None:
+            index = 0 if self._step is None else self._step.index + 1
+            self._step = self._onboard.finish(index, self._fleet.time, snapshot, _COMMAND, None)
+        if self._step is None:
+            raise gymnasium.error.ResetNeeded("the controlled vehicle is not on the road: call reset()")
+        own = observe(self._step)
+        return {"camera": own["camera"], "state": own["state"], "highway": observation}
+
+    def _told(self, info: dict[str, Any]) -> dict[str, Any]:
+        truth = None if self._step is None else self._step.truth
+        if truth is None:
+            return info
+        return {**info, "truth": {"extinction_per_m": truth.extinction, "visibility_m": truth.visibility}}
+
+    def close(self) -> None:
+        """Close the environment and free the renderer; closing twice is allowed."""
+        self._onboard.close()
+        self._fleet, self._network, self._step = None, None, None
+        super().close()

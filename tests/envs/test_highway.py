@@ -1,0 +1,138 @@
+"""highway-env's environments in fog as Gymnasium and its users see them."""
+
+import math
+import warnings
+from collections.abc import Iterator
+from typing import Any
+
+import gymnasium
+import highway_env  # noqa: F401 - registers its environments
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import fogsim_envs  # noqa: F401 - registers the environments
+from fogsim.errors import InputError
+from fogsim_envs.camera_wrapper import FogCameraWrapper
+
+ID = "fogsim/FogHighway-v0"
+FEW = {"vehicles_count": 8}
+SMALL: dict[str, Any] = {"config": FEW, "image_size": (64, 48)}
+SLOW, NO_ADVICE = np.array([2, 0]), np.array([12, 0])
+
+
+@pytest.fixture
+def env() -> Iterator[gymnasium.Env[Any, Any]]:
+    made = gymnasium.make(ID, **SMALL)
+    yield made
+    made.close()
+
+
+@pytest.mark.parametrize("continuous", [False, True])
+def test_gymnasiums_checker_finds_nothing(continuous: bool, caplog: pytest.LogCaptureFixture) -> None:
+    env = gymnasium.make(ID, continuous=continuous, render_mode="rgb_array", **SMALL)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env.unwrapped)
+    env.close()
+    env.close()
+    assert not caplog.records
+
+
+def test_the_action_reaches_the_road(env: gymnasium.Env[Any, Any]) -> None:
+    def speed_after(action: Any) -> float:
+        env.reset(seed=5)
+        for _ in range(8):
+            *_, info = env.step(action)
+        return float(info["speed_mps"])
+
+    slow, free = speed_after(SLOW), speed_after(NO_ADVICE)
+    assert slow < 18.0 < free
+
+
+def test_fog_is_seen_and_told(env: gymnasium.Env[Any, Any]) -> None:
+    clear = {"overrides": ["fog.visibility_m=inf"]}
+    foggy, info = env.reset(seed=5)
+    assert info["truth"]["visibility_m"] == pytest.approx(100.0)
+    sunny, info = env.reset(seed=5, options=clear)
+    assert info["truth"]["visibility_m"] == math.inf
+    # Fog takes the contrast between the road below and the sky above.
+    contrast = [float(np.ptp(picture["camera"].mean(axis=(1, 2)))) for picture in (foggy, sunny)]
+    assert contrast[0] < 0.8 * contrast[1]
+    assert not foggy["signs_mask"].any()
+
+
+def test_episodes_replay_and_do_not_disturb_each_other() -> None:
+    one, other = (gymnasium.make(ID, **SMALL) for _ in range(2))
+    try:
+        alone = [one.reset(seed=9)[0], *(one.step(SLOW)[0] for _ in range(3))]
+        pairs = [(one.reset(seed=9)[0], other.reset(seed=9)[0])]
+        pairs += [(one.step(SLOW)[0], other.step(SLOW)[0]) for _ in range(3)]
+    finally:
+        one.close()
+        other.close()
+    for a, (b, c) in zip(alone, pairs, strict=True):
+        assert all(np.array_equal(a[k], b[k]) and np.array_equal(a[k], c[k]) for k in a)
+
+
+def test_its_duration_truncates() -> None:
+    env = gymnasium.make(ID, config={**FEW, "duration": 1.0}, image_size=(64, 48))
+    env.reset(seed=1)
+    ends = [env.step(NO_ADVICE)[2:4] for _ in range(2)]
+    env.close()
+    assert ends == [(False, False), (False, True)]
+
+
+def test_vector_environments() -> None:
+    envs = gymnasium.make_vec(ID, num_envs=2, **SMALL)
+    try:
+        observation, _ = envs.reset(seed=[3, 3])
+        assert np.array_equal(observation["camera"][0], observation["camera"][1])
+    finally:
+        envs.close()
+
+
+def test_bad_arguments() -> None:
+    with pytest.raises(InputError, match="id of highway-env"):
+        gymnasium.make(ID, environment="CartPole-v1")
+    with pytest.raises(InputError, match="visibility_m"):
+        gymnasium.make(ID, visibility=-1.0)
+    with pytest.raises(InputError, match="environment of highway-env"):
+        FogCameraWrapper(gymnasium.make("CartPole-v1"))
+
+
+@pytest.mark.parametrize(("name", "config"), [("highway-v0", FEW), ("merge-v1", {}), ("roundabout-v1", {})])
+def test_the_wrapper_adds_a_camera(name: str, config: dict[str, Any]) -> None:
+    plain = gymnasium.make(name, config=config)
+    env = FogCameraWrapper(gymnasium.make(name, config=config), image_size=(64, 48), drivers=False)
+    observation, info = env.reset(seed=4)
+    expected, _ = plain.reset(seed=4)
+    for _ in range(3):
+        assert env.observation_space.contains(observation)
+        assert np.array_equal(observation["highway"], expected)
+        assert info["truth"]["visibility_m"] == pytest.approx(100.0)
+        observation, reward, *ends, info = env.step(1)
+        expected, *same = plain.step(1)
+        assert [reward, *ends] == same[:3]
+    env.close()
+    env.close()
+    plain.close()
+
+
+def test_the_wrappers_drivers_do_not_see_through_fog() -> None:
+    def front(visibility: float) -> Any:
+        env = FogCameraWrapper(gymnasium.make("highway-v0", config=FEW), image_size=(64, 48), visibility=visibility)
+        env.reset(seed=4)
+        road: Any = env.unwrapped.road  # type: ignore[attr-defined]
+        found = [road.neighbour_vehicles(v)[0] for v in road.vehicles]
+        env.close()
+        return sum(f is not None for f in found)
+
+    assert front(15.0) < front(math.inf)
+
+
+def test_the_wrapper_needs_a_reset() -> None:
+    env = FogCameraWrapper(gymnasium.make("highway-v0", config=FEW, disable_env_checker=True), image_size=(64, 48))
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.step(1)
+    env.close()

@@ -4,6 +4,8 @@ SUMO's own car-following models are told which leader to ignore (``carFollowMode
 changes; so Krauss, IDM, EIDM and the rest stay as they are, and an unseen vehicle stays on the road.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,6 +23,12 @@ EYE_HEIGHT = 1.2
 
 LARGEST_MINIMUM_GAP = 5.0
 """No driver's minimum gap is larger than this [m]."""
+
+FASTEST_APPROACH = 70.0
+"""Faster than this no gap changes [m/s]: 250 km/h towards a standing vehicle."""
+
+LONGEST_PAUSE = 0.5
+"""Every driver looks at least this often [s], for leaders change."""
 
 _IGNORE = "carFollowModel.ignoreIDs"
 
@@ -45,6 +53,7 @@ class Perception:
         self._ignored: dict[str, str] = {}
         self._emerging: dict[tuple[str, str], float] = {}
         self._own_lamps: dict[str, int | None] = {}
+        self._due: dict[str, float] = {}
         self._contrast: dict[str, float] = {}
         self._minimum_gap: dict[str, float] = {}
         # Nobody nearer than this is hidden, wherever the fog is densest: for them nothing need be computed.
@@ -81,20 +90,33 @@ class Perception:
         self._ignored = unseen
 
     def _sorted_by_gap(self) -> tuple[dict[str, str], list[tuple[str, str, float]]]:
-        """Leaders who are surely hidden, by follower, and those for whom sight must be computed, with their gaps."""
-        vehicles = self._api.vehicle
-        leader_of, ignored = vehicles.getLeader, self._ignored
+        """Leaders who are surely hidden, by follower, and those for whom sight must be computed, with their gaps.
+
+        Who is far on either side of the doubtful gaps is asked again only when a leader could have come there.
+        """
+        leader_of, ignored, due = self._api.vehicle.getLeader, self._ignored, self._due
+        now = self._api.simulation.getTime()
         hidden: dict[str, str] = {}
         doubtful = []
-        for follower in vehicles.getIDList():
-            found = leader_of(follower, REACH)
-            if not found or not found[0]:
+        ids = self._api.vehicle.getIDList()
+        for follower in ids:
+            if now < due.get(follower, now):
+                if follower in ignored:
+                    hidden[follower] = ignored[follower]
                 continue
-            leader, gap = found
-            if gap > self._surely_hidden:
-                hidden[follower] = leader
-            elif gap > self._surely_seen or follower in ignored:
+            found = leader_of(follower, REACH)
+            leader, gap = found if found and found[0] else ("", math.inf)
+            if leader and self._surely_seen < gap <= self._surely_hidden:
                 doubtful.append((follower, leader, gap))
+            elif leader and gap > self._surely_hidden:
+                hidden[follower] = leader
+                due[follower] = now + min((gap - self._surely_hidden) / FASTEST_APPROACH, LONGEST_PAUSE)
+            elif leader and follower in ignored:
+                doubtful.append((follower, leader, gap))
+            else:
+                due[follower] = now + min(abs(self._surely_seen - gap) / FASTEST_APPROACH, LONGEST_PAUSE)
+        if len(due) > 2 * len(ids) + 100:
+            self._due = {v: due[v] for v in ids if v in due}
         return hidden, doubtful
 
     def _not_yet_reacted(self, found: list[tuple[str, str, float]], unseen: dict[str, str]) -> dict[str, str]:

@@ -87,7 +87,7 @@ class LibsumoLink:
 
     def watched(self) -> contextlib.AbstractContextManager[None]:
         """Turn what libsumo refuses into an error of ours; see `SumoLink.watched`."""
-        return told_errors(load_libsumo(), "in this process")
+        return told_errors(self._sumo or load_libsumo(), "in this process")
 
 
 @contextlib.contextmanager

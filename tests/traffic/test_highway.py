@@ -149,6 +149,25 @@ def test_in_fog_they_hit_what_they_see_too_late(visibility: float) -> None:
     assert hit.impact_speed == pytest.approx(math.sqrt(25.0**2 - 2 * 6.0 * braking), abs=1.0)
 
 
+def test_collisions_are_those_that_the_library_knows() -> None:
+    traffic, environment = traffic_on({"vehicles_count": 12, "lanes_count": 2})
+    traffic.enter_fog(fog_of(30.0))
+    traffic.start(4)
+    vehicles = environment.road.vehicles
+    for first in vehicles[-2:]:
+        first.target_speed = 0.01
+    hits: list[Collision] = []
+    for _ in range(200):
+        traffic.advance(Command())
+        hits += seen(traffic).collisions
+    names = seen(traffic).state.ids
+    traffic.close()
+    crashed = {name for name, vehicle in zip(names, vehicles, strict=True) if vehicle.crashed}
+    assert len(crashed) > 2
+    assert {name for hit in hits for name in (hit.collider, hit.victim)} == crashed
+    assert len({frozenset((hit.collider, hit.victim)) for hit in hits}) == len(hits)
+
+
 def test_the_egos_driver_is_as_blind_as_the_others() -> None:
     def ends_in_collision(visibility: float) -> bool:
         traffic, environment = traffic_on(EMPTY)

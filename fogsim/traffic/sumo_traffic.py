@@ -29,6 +29,8 @@ from fogsim.values import Command, Lamp, RoadNetwork, SignMap, TrafficSnapshot, 
 _NO_LANE_CHANGES = 0
 _NOBODY: Mapping[str, float] = {}
 _FOR_EVER = "1e6"
+_SMOOTH_LANE_CHANGES = ("--lanechange.duration", "3")
+"""A lane change takes 3 s: the camera sees no vehicle jump, without the 13 … 40-fold cost of SUMO's sublane model."""
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
@@ -259,7 +261,7 @@ def command_line(setup: TrafficSetup, seed: int) -> list[str]:
     quiet = ["--no-step-log", "true", "--duration-log.disable", "true", "--no-warnings", "true"]
     # Nobody is beamed away: collisions stay where they happen and are counted. How jams dissolve in a simulation of the
     # user's own is left to its configuration.
-    patient = ["--time-to-teleport", "-1"] if setup.config is None else []
+    patient = ["--time-to-teleport", "-1", *_SMOOTH_LANE_CHANGES] if setup.config is None else []
     physical = [*patient, "--collision.action"]
     if setup.after_collision is AfterCollision.STOP:
         return arguments + quiet + physical + ["warn", "--collision.stoptime", _FOR_EVER]

@@ -138,11 +138,21 @@ class Perception:
         depth = self._fog.optical_depth(eyes, eyes + towards * (distance / np.linalg.norm(towards, axis=1))[:, None])
         contrast = np.array([self._contrast_of(v) for v in leaders])
         seen = self._sight.sees_body(distance, depth, contrast)
+        self._pause(followers, self._sight.depth_to_spare(depth, contrast))
         # Lamps are asked for only where no body is seen and the brightest of all lamps would be: that saves most calls.
         asked = np.flatnonzero(~seen & self._sight.sees_lamp(distance, depth, np.full(len(found), BRIGHTEST)))
         intensity = np.array([self._rear_intensity(leaders[i]) for i in asked])
         seen[asked] = self._sight.sees_lamp(distance[asked], depth[asked], intensity)
         return {followers[i]: leaders[i] for i in np.flatnonzero(~seen)}
+
+    def _pause(self, followers: tuple[str, ...], spare: NDArray[np.float64]) -> None:
+        """Let those whose leader is clearly seen look again when the fog between could have grown too deep."""
+        now = self._api.simulation.getTime()
+        # Both ends of the line of sight may move into the densest fog.
+        pauses = np.minimum(spare / (2.0 * FASTEST_APPROACH * self._fog.maximum_extinction), LONGEST_PAUSE)
+        for i in np.flatnonzero(pauses > 0):
+            if followers[i] not in self._ignored:
+                self._due[followers[i]] = now + float(pauses[i])
 
     def _rear_intensity(self, vehicle: str) -> float:
         own = self._own_lamps.get(vehicle, int(OTHERS_LAMPS))

@@ -148,6 +148,19 @@ class DriverSight:
         # Retro-reflectors and plates return light as I e^(−2τ) / d²; in clear air they are seen up to the reach.
         return np.asarray(transmission**2 * reach**2 >= np.square(distance))
 
+    def depth_to_spare(self, depth: ArrayLike, inherent_contrast: ArrayLike) -> NDArray[np.float64]:
+        """How much more optical depth a body would still be seen through [-]; 0 for one that is not seen, and at night.
+
+        Parameters
+        ----------
+        depth, inherent_contrast : (n,) array_like
+            As in `sees_body`.
+        """
+        if self.illuminance < DAYLIGHT:
+            return np.zeros(np.shape(depth))
+        limit = np.log(np.maximum(inherent_contrast, 1e-9) / self.contrast_threshold)
+        return np.asarray(np.maximum(limit - np.asarray(depth), 0.0))
+
     def sees_lamp(self, distance: ArrayLike, depth: ArrayLike, intensity: ArrayLike) -> NDArray[np.bool_]:
         """Tell whether lamps are seen, E = I e^(−τ) / d² ≥ E_threshold (Allard).
 

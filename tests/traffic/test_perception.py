@@ -63,6 +63,9 @@ class SeesFrom:
     def sure_distance(self, *_: float) -> float:
         return self.distance - 10.0
 
+    def depth_to_spare(self, depth: ArrayLike, *_: ArrayLike) -> NDArray[np.float64]:
+        return np.zeros(np.shape(depth))
+
     def hidden_distance(self, *_: float) -> float:
         return self.distance + 10.0
 

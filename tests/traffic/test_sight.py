@@ -92,3 +92,13 @@ def test_beyond_the_hidden_distance_nothing_is_seen_and_just_within_it_something
         body = sight.sees_body([distance], [k * distance], [1.0])[0]
         assert (body or sight.sees_lamp([distance], [k * distance], [200.0])[0]) == expected
     assert sight.hidden_distance(0.0) == math.inf
+
+
+def test_depth_to_spare_is_what_is_left_until_the_body_is_lost() -> None:
+    sight = DriverSight(illuminance=10_000.0)
+    for depth in (0.0, 1.0, 2.5):
+        spare = float(sight.depth_to_spare([depth], [0.8])[0])
+        assert sight.sees_body([1.0], [depth + 0.999 * spare], [0.8])[0]
+        assert not sight.sees_body([1.0], [depth + 1.001 * spare + 1e-6], [0.8])[0]
+    assert sight.depth_to_spare([5.0], [0.8])[0] == 0.0
+    assert DriverSight(illuminance=0.1).depth_to_spare([0.1], [0.8])[0] == 0.0

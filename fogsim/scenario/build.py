@@ -12,7 +12,8 @@ from fogsim.camera import Sensor
 from fogsim.estimators import ESTIMATORS, Estimator
 from fogsim.fusion import FUSIONS, Fusion
 from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy
-from fogsim.scenario.schema import AnyEvent, Bank, Brake, BreakDown, ChangeLane, LampsFail, Scenario
+from fogsim.scenario.schema import Bank, Scenario
+from fogsim.scenario.traffic_schema import AnyEvent, Brake, BreakDown, ChangeLane, LampsFail
 from fogsim.sensors import LeadSensor
 from fogsim.traffic import (
     BrakeEvent,

@@ -13,7 +13,8 @@ from fogsim.errors import InputError, suggest
 from fogsim.scenario.document import Document, KeyPath, dotted, read_document
 from fogsim.scenario.locating import SCENARIO_FILE, scenario_file
 from fogsim.scenario.overrides import apply_overrides
-from fogsim.scenario.schema import AnyEvent, Scenario
+from fogsim.scenario.schema import Scenario
+from fogsim.scenario.traffic_schema import AnyEvent
 from fogsim.traffic.configuration import configured_files
 
 LONG_RUN = 600.0

@@ -4,11 +4,10 @@ Everything inside FogSim is SI and radians; `fogsim.scenario.build` converts, on
 """
 
 import itertools
-import math
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from fogsim.advice import ADVISERS
 from fogsim.errors import UnknownNameError
@@ -17,26 +16,9 @@ from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.render import RENDERERS
 from fogsim.scenario.methods import Method, method_of
-from fogsim.traffic import SPEED_CHOICES, AfterCollision
+from fogsim.scenario.section import NotNegative, Positive, Section, Visibility
+from fogsim.scenario.traffic_schema import DriversSection, Traffic
 from fogsim.values import Response
-
-Share = Annotated[float, Field(ge=0, le=1)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-
-
-def _visibility(value: object) -> object:
-    """Let a visibility be written as .inf, inf or infinity."""
-    return math.inf if isinstance(value, str) and value.strip().lower() in {"inf", "infinity", ".inf"} else value
-
-
-Visibility = Annotated[float, Field(gt=0), BeforeValidator(_visibility)]
-
-
-class Section(BaseModel):
-    """A block of a scenario file: unknown keys are errors, values never change."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
 
 
 class Clocks(Section):
@@ -61,181 +43,6 @@ class Clocks(Section):
                     f"got {getattr(self, slower):g} s and {getattr(self, faster):g} s"
                 )
         return self
-
-
-class Event(Section):
-    """Something that a vehicle is made to do, once, when one of its conditions holds."""
-
-    vehicle: str
-    """Id of the vehicle."""
-
-    at_position_m: NotNegative | None = None
-    """It begins when the vehicle has driven this far."""
-
-    at_time_s: NotNegative | None = None
-    """It begins at this time after the ego's appearance."""
-
-    at_gap_to_ego_m: Positive | None = None
-    """It begins when the vehicle is this near to the ego."""
-
-    @model_validator(mode="after")
-    def _begins(self) -> Self:
-        if self.at_position_m is None and self.at_time_s is None and self.at_gap_to_ego_m is None:
-            raise ValueError("say when it begins: at_position_m, at_time_s or at_gap_to_ego_m")
-        return self
-
-
-class Brake(Event):
-    """A vehicle brakes, holds the lower speed, and drives on."""
-
-    kind: Literal["brake"]
-    """`brake`: brake, hold the lower speed, and drive on."""
-
-    to_speed_kmh: NotNegative = 0.0
-    """Speed that it brakes to; 0 is a standstill."""
-
-    deceleration_mps2: Positive = 4.0
-    """How hard it brakes, within its vehicle type's own limit."""
-
-    hold_s: NotNegative = 30.0
-    """How long it keeps that speed, from the beginning of the braking."""
-
-
-class BreakDown(Event):
-    """A vehicle comes to a standstill and stays there."""
-
-    kind: Literal["break_down"]
-    """`break_down`: come to a standstill and stay there."""
-
-    deceleration_mps2: Positive = 3.0
-    """How hard it brakes."""
-
-    lamps: bool = True
-    """Whether its lamps stay lit."""
-
-
-class ChangeLane(Event):
-    """A vehicle changes lane, whoever is there."""
-
-    kind: Literal["change_lane"]
-    """`change_lane`: change lane, whoever is there (cut in)."""
-
-    lanes: int = Field(ge=-4, le=4)
-    """How many lanes to the left; negative to the right."""
-
-    stay_s: Positive = 60.0
-    """How long it stays there."""
-
-
-class LampsFail(Event):
-    """All lamps of a vehicle go dark."""
-
-    kind: Literal["lamps_fail"]
-    """`lamps_fail`: all lamps go dark."""
-
-
-AnyEvent = Annotated[Brake | BreakDown | ChangeLane | LampsFail, Field(discriminator="kind")]
-
-
-class Traffic(Section):
-    """A SUMO simulation and its ego."""
-
-    config: Path | None = None
-    """SUMO configuration (.sumocfg), relative to the scenario's folder; in place of the three below."""
-
-    net: Path | None = None
-    """SUMO network, relative to the scenario's folder."""
-
-    routes: tuple[Path, ...] = ()
-    """SUMO route files."""
-
-    additional: tuple[Path, ...] = ()
-    """SUMO additional files; POIs of type `fogsim.sign.KIND` in them are signs."""
-
-    ego: str = "ego"
-    """Id of the ego vehicle in the route files."""
-
-    keep_lane: tuple[str, ...] = ()
-    """Vehicles that never change lane."""
-
-    warm_up_limit_s: Positive = 600.0
-    """Simulated time within which the ego must appear; the run begins when it does."""
-
-    advice_deceleration_mps2: Positive = 2.0
-    """How hard an advised vehicle slows down to the advice."""
-
-    reading_radius_m: Positive = 1000.0
-    """Vehicles farther from the ego than this are not read and not drawn."""
-
-    events: tuple[AnyEvent, ...] = ()
-    """What is scripted."""
-
-    after_collision: AfterCollision = AfterCollision.STOP
-    """What becomes of vehicles that have collided: `stop` (they stand and block the lane) or `remove`."""
-
-    stop_before_end_m: NotNegative = 60.0
-    """The ego has arrived when it is this near to the end of its route."""
-
-    @model_validator(mode="after")
-    def _one_source(self) -> Self:
-        beside = [key for key in ("net", "routes", "additional") if getattr(self, key)]
-        if self.config is not None and beside:
-            raise ValueError(
-                f"give either config (a SUMO configuration, which names its own files) or net with routes, not both: "
-                f"config is {str(self.config)!r}, and beside it there is {', '.join(beside)}"
-            )
-        return self
-
-
-class ComplianceSection(Section):
-    """Who follows advice, and how far."""
-
-    reached_share: Share = 1.0
-    """Share of drivers whom advice reaches."""
-
-    rate: Share = 1.0
-    """Share of those who follow it."""
-
-    strength: Share = 1.0
-    """How far they go from their own speed towards the advised one."""
-
-    delay_s: NotNegative = 2.0
-    """Time before they do."""
-
-
-class DriversSection(Section):
-    """The drivers of all vehicles but, for speed, the ego."""
-
-    see_through_fog: bool = False
-    """True for SUMO's own drivers, who see their leader through any fog."""
-
-    reaction_time_s: NotNegative = 1.0
-    """Time from the first sight of a leader that was hidden to the first reaction."""
-
-    headlamp_reach_m: Positive = 55.0
-    """Distance at which an unlit vehicle is seen in the headlamps at night in clear air."""
-
-    speed_choice: str = "too_fast"
-    """How fast they drive in fog by themselves."""
-
-    speed_spread: NotNegative = 0.1
-    """Standard deviation of the logarithm of a driver's own factor on that speed."""
-
-    distance_misjudgement: NotNegative = 0.0
-    """By which share they take distances for longer in dense fog, and so follow closer; 0.3 to 0.6 at night."""
-
-    compliance: ComplianceSection = ComplianceSection()
-    """How they follow advice."""
-
-    advised: Literal["ego", "all"] = "ego"
-    """Whether the advice goes to the ego alone, or to every vehicle near it as well."""
-
-    @field_validator("speed_choice")
-    @classmethod
-    def _known_choice(cls, value: str) -> str:
-        if value not in SPEED_CHOICES:
-            raise ValueError(str(UnknownNameError("speed choice", value, SPEED_CHOICES)))
-        return value
 
 
 class Bank(Section):

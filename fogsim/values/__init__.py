@@ -7,6 +7,7 @@ from fogsim.values.estimate import Estimate, FogCategory, fog_category
 from fogsim.values.fog import FogBank, FogField
 from fogsim.values.image import Frame, View
 from fogsim.values.lamps import Lamp
+from fogsim.values.light import Beam, HeadLamp, Lights, LightSources
 from fogsim.values.observation import LeadMeasurement, Observation, SignSighting
 from fogsim.values.road import Lane, LaneMarking, RoadNetwork, Sign, SignMap
 from fogsim.values.scene import Batch, Mesh, Scene, Surface
@@ -15,6 +16,7 @@ from fogsim.values.traffic import Collision, Leader, TrafficSnapshot, TrafficSta
 
 __all__ = [
     "Batch",
+    "Beam",
     "Belief",
     "Camera",
     "CameraPose",
@@ -26,11 +28,14 @@ __all__ = [
     "FogCategory",
     "FogField",
     "Frame",
+    "HeadLamp",
     "Lamp",
     "Lane",
     "LaneMarking",
     "LeadMeasurement",
     "Leader",
+    "LightSources",
+    "Lights",
     "Mesh",
     "Observation",
     "Response",

@@ -20,11 +20,16 @@ class View:
         Distance along the ray from the optical centre [m]; ``inf`` for the sky.
     instance : (rows, cols) int32
         What is seen: 0 sky, 1 terrain, 2 road, 3 roadside, 4 sign, 16 + i the vehicle in row i of the traffic state.
+    lamp_response : (rows, cols, 3) float32 or None
+        Radiance toward the camera per illuminance that the camera's own vehicle casts, measured across the ray
+        [cd/m² per lx]: of diffuse surfaces ρ/π cos θ, of road, markings and sheeting their coefficient of
+        retroreflected luminance; zero for the sky. None where it was not asked for.
     """
 
     radiance: NDArray[np.float32]
     distance: NDArray[np.float32]
     instance: NDArray[np.int32]
+    lamp_response: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True, slots=True)

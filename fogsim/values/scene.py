@@ -12,7 +12,8 @@ class Surface(IntEnum):
     """How a vertex's surface gets its radiance.
 
     MATT is lit by the sky; PAINT likewise, with the vehicle's paint in place of its own colour; ROAD has asphalt
-    grain and painted lines; TERRAIN has grass grain; lamps add light of their own while lit.
+    grain and painted lines; TERRAIN has grass grain; lamps add light of their own while lit, LAMP_STREET always;
+    SHEETING is MATT by day and sends the light of head lamps back to where it came from.
     """
 
     MATT = 0
@@ -25,6 +26,8 @@ class Surface(IntEnum):
     LAMP_INDICATOR_LEFT = 7
     LAMP_INDICATOR_RIGHT = 8
     LAMP_HEAD = 9
+    SHEETING = 10
+    LAMP_STREET = 11
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ layout(location = 9) in ivec2 copy_lamps_and_instance;
 
 uniform mat4 clip_from_offset;
 uniform ivec4 lamp_masks[3];
-uniform vec3 lamp_radiance[10];
+uniform vec3 lamp_radiance[12];
 
 uniform float illuminance;
 

@@ -1,0 +1,92 @@
+"""Light that is not daylight: beams of head lamps, and lamps that are seen from afar."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True)
+class Beam:
+    """Luminous intensity of one lamp over direction, seen from the lamp.
+
+    Attributes
+    ----------
+    azimuth : (n,) float64
+        Ascending directions to the right of the lamp's axis [rad].
+    elevation : (m,) float64
+        Ascending directions above the horizontal through the lamp [rad].
+    intensity : (m, n) float64
+        Luminous intensity [cd], not negative.
+    """
+
+    azimuth: NDArray[np.float64]
+    elevation: NDArray[np.float64]
+    intensity: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class HeadLamp:
+    """A lit lamp of the vehicle that carries the camera.
+
+    Attributes
+    ----------
+    offset : tuple of float
+        (forward, left, up) from the camera's optical centre in the vehicle's axes [m].
+    beam : Beam
+        What it shines.
+    colour : tuple of float
+        Linear colour of luminance 1.
+    """
+
+    offset: tuple[float, float, float]
+    beam: Beam
+    colour: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class LightSources:
+    """Lit lamps that the camera may see: of other vehicles and of streets.
+
+    Attributes
+    ----------
+    position : (n, 3) float64
+        Places [m].
+    intensity : (n,) float64
+        Luminous intensity toward the camera [cd].
+    colour : (n, 3) float64
+        Linear colours of luminance 1.
+    area : (n,) float64
+        Luminous area as the camera sees it [m²].
+    """
+
+    position: NDArray[np.float64]
+    intensity: NDArray[np.float64]
+    colour: NDArray[np.float64]
+    area: NDArray[np.float64]
+
+    @classmethod
+    def none(cls) -> "LightSources":
+        """No lamp at all."""
+        return cls(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)), np.zeros(0))
+
+
+@dataclass(frozen=True, slots=True)
+class Lights:
+    """All light that is not daylight, at one instant.
+
+    Attributes
+    ----------
+    own : tuple of HeadLamp
+        Lit lamps of the vehicle that carries the camera.
+    others : LightSources
+        Everyone else's.
+    """
+
+    own: tuple[HeadLamp, ...]
+    others: LightSources
+
+    @classmethod
+    def none(cls) -> "Lights":
+        """No lamp lit."""
+        return cls((), LightSources.none())

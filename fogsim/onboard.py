@@ -5,12 +5,10 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fogsim.atmosphere import extinction, fogged_radiance, optical_depth
+from fogsim.atmosphere import Air, extinction, optical_depth
 from fogsim.camera import expose, mounted_pose
 from fogsim.errors import SimulationError
-from fogsim.pinhole import ray_from_pixel
 from fogsim.randomness import Streams
 from fogsim.render import Renderer, make_renderer
 from fogsim.scenario import Scenario, build
@@ -29,7 +27,6 @@ from fogsim.values import (
     Step,
     TrafficSnapshot,
     Truth,
-    View,
 )
 
 _SIGHT_LINE = np.geomspace(1.0, 20_000.0, 400)
@@ -136,7 +133,9 @@ class OnBoard:
             self._camera, state.position[ego], float(state.heading[ego]), self._scenario.camera.setback_m
         )
         view = world.renderer.render(vehicle_batches(state, ego), self._camera, pose)
-        frame = Frame(time, self._photograph(view, world.fog, pose, self._streams), self._told_camera)
+        radiance = Air(world.fog).radiance(view, self._camera, pose, time=time)
+        image = expose(radiance, self._sensor, self._camera.response, self._streams.camera)
+        frame = Frame(time, image, self._told_camera)
         observation = self._observe(frame, snapshot, world.signs, self._streams)
         estimates = tuple(estimator.update(observation) for estimator in self._estimators)
         return Step(
@@ -156,10 +155,6 @@ class OnBoard:
             command=command,
             ending=ending,
         )
-
-    def _photograph(self, view: View, fog: FogField, pose: CameraPose, streams: Streams) -> NDArray[np.uint8]:
-        radiance = fogged_radiance(view, fog, pose.position, ray_from_pixel(self._camera, pose))
-        return expose(radiance, self._sensor, self._camera.response, streams.camera)
 
     def _observe(self, frame: Frame, snapshot: TrafficSnapshot, signs: SignMap, streams: Streams) -> Observation:
         state, ego = snapshot.state, snapshot.ego

@@ -14,7 +14,7 @@ def _pyrender(scene: Scene, illuminance: float) -> Renderer:
     # OpenGL is loaded by the process that draws, when it first draws: not by every one that imports FogSim.
     from fogsim.render.gl.renderer import GLRenderer  # noqa: PLC0415
 
-    return GLRenderer(scene, illuminance)
+    return GLRenderer(scene, illuminance)  # type: ignore[return-value] # it draws no lamplight yet
 
 
 RENDERERS: Registry[Callable[[Scene, float], Renderer]] = Registry("renderer", {"pyrender": _pyrender})

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
+from fogsim.render.drawing import RECORD
 from fogsim.values.camera import Camera
 from fogsim.values.scene import Batch, Mesh
 
@@ -15,9 +16,6 @@ STAND_INS = ((":far", 12.0), (":tiny", 3.5))
 
 Each goes with half the breadth in the picture below which it does [px].
 """
-
-RECORD = np.dtype([("transform", "<f4", (3, 4)), ("paint", "<f4", (3,)), ("lamps", "<i4"), ("instance", "<i4")])
-"""What is drawn of one copy: the upper rows of its transform, paint, lit lamps and instance id."""
 
 _FARTHEST = 1600.0  # distance beyond which no copy is drawn [m]
 _SMALLEST = 1.0  # radius in the picture below which a copy is left out [px]

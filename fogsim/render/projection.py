@@ -4,10 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.pinhole import camera_axes, ray_from_pixel
+from fogsim.render.drawing import NEAR
 from fogsim.values.camera import Camera, CameraPose
-
-NEAR = 0.4
-"""Distance of the plane in front of the camera before which nothing is drawn [m]."""
 
 
 def clip_from_camera(camera: Camera) -> NDArray[np.float64]:

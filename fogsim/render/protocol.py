@@ -16,7 +16,7 @@ class RenderError(FogSimError, RuntimeError):
 class Renderer(Protocol):
     """Draws one scene for any camera; made for one scene and one daylight."""
 
-    def render(self, vehicles: Sequence[Batch], camera: Camera, pose: CameraPose) -> View:
+    def render(self, vehicles: Sequence[Batch], camera: Camera, pose: CameraPose, lamplight: bool = False) -> View:
         """Draw the scene and the vehicles as they are now.
 
         Parameters
@@ -27,6 +27,8 @@ class Renderer(Protocol):
             The pinhole.
         pose : CameraPose
             Where it is.
+        lamplight : bool
+            Whether `View.lamp_response` is wanted.
 
         Returns
         -------

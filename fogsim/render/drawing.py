@@ -1,0 +1,135 @@
+"""What the two ways to draw share: all triangles in one table, what a picture may show of them, and what they answer.
+
+A picture is made in three steps: choose the copies that may show (`fogsim.render.choice`), find the triangle that each
+pixel sees (a `Rasteriser`), and shade what is seen (`fogsim.render.shading`). Only the second is done twice, by numba
+and by OpenGL, so where both see the same triangle they give the same picture to the bit.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.values.camera import Camera, CameraPose
+from fogsim.values.scene import Mesh
+
+NEAR = 0.4
+"""Depth before which nothing is seen [m]."""
+
+NOTHING = -1
+"""Slot of a pixel that sees no triangle."""
+
+RECORD = np.dtype([("transform", "<f4", (3, 4)), ("paint", "<f4", (3,)), ("lamps", "<i4"), ("instance", "<i4")])
+"""One copy of a mesh: the upper rows of its transform, paint, lit lamps and instance id (0: that of the vertices)."""
+
+
+@dataclass(frozen=True, slots=True)
+class MeshTable:
+    """All meshes of a scene one after another.
+
+    Attributes
+    ----------
+    numbers : mapping from str to int
+        Number of each mesh by its name.
+    positions, normals, reflectance : (n, 3) float32
+        As in `Mesh`.
+    surface, instance : (n,) int32
+        As in `Mesh`.
+    road : (n, 4) float32
+        As in `Mesh`.
+    faces : (m, 3) int32
+        Vertices of each triangle, numbered through all meshes.
+    first_vertex, first_face : (k + 1,) int64
+        Where the vertices and triangles of each of the k meshes begin, and their numbers n and m at the end.
+    """
+
+    numbers: Mapping[str, int]
+    positions: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    reflectance: NDArray[np.float32]
+    surface: NDArray[np.int32]
+    instance: NDArray[np.int32]
+    road: NDArray[np.float32]
+    faces: NDArray[np.int32]
+    first_vertex: NDArray[np.int64]
+    first_face: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, meshes: Mapping[str, Mesh]) -> "MeshTable":
+        """Put meshes one after another and number them in their order."""
+        parts = list(meshes.values())
+        first_vertex = np.cumsum([0, *(len(part.positions) for part in parts)], dtype=np.int64)
+        faces = [part.faces.astype(np.int64) + first for part, first in zip(parts, first_vertex, strict=False)]
+        return cls(
+            numbers={name: number for number, name in enumerate(meshes)},
+            positions=_joined([part.positions for part in parts], np.float32, 3),
+            normals=_joined([part.normals for part in parts], np.float32, 3),
+            reflectance=_joined([part.reflectance for part in parts], np.float32, 3),
+            surface=_joined([part.surface for part in parts], np.int32),
+            instance=_joined([part.instance for part in parts], np.int32),
+            road=_joined([part.road for part in parts], np.float32, 4),
+            faces=_joined(faces, np.int32, 3),
+            first_vertex=first_vertex,
+            first_face=np.cumsum([0, *map(len, faces)], dtype=np.int64),
+        )
+
+
+def _joined(parts: list[NDArray[Any]], kind: type[np.generic], columns: int = 0) -> NDArray[Any]:
+    shape = (0, columns) if columns else (0,)
+    return np.ascontiguousarray(np.concatenate([np.empty(shape, kind), *parts]), kind)
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """The copies of meshes that a picture may show, the nearest first as far as that is cheap.
+
+    Attributes
+    ----------
+    mesh : (c,) int64
+        Number of each copy's mesh in the `MeshTable`.
+    record : (c,) `RECORD`
+        Each copy; its transform leads from coordinates of the mesh to offsets from the camera in world axes [m].
+    first : (c + 1,) int64
+        Slot of the first triangle of each copy, and the number of all slots at the end: triangle i of the mesh of
+        copy j has slot ``first[j] + i``.
+    """
+
+    mesh: NDArray[np.int64]
+    record: NDArray[np.void]
+    first: NDArray[np.int64]
+
+
+class Rasteriser(Protocol):
+    """Finds which triangle each pixel sees; made for one `MeshTable`."""
+
+    def slots(self, drawing: Drawing, camera: Camera, pose: CameraPose) -> NDArray[np.int32]:
+        """Find the nearest triangle for the ray through the centre of each pixel.
+
+        Both sides of a triangle are seen; nothing nearer than a depth of `NEAR` is.
+
+        Parameters
+        ----------
+        drawing : Drawing
+            What may be seen.
+        camera : Camera
+            The pinhole; pixel centres lie at integer coordinates.
+        pose : CameraPose
+            Where it is.
+
+        Returns
+        -------
+        (rows, cols) int32
+            Slot of the triangle, `NOTHING` where there is none; valid until the next call.
+
+        Raises
+        ------
+        RenderError
+            If the rasteriser cannot be used in this process any more.
+        """
+        ...
+
+    def close(self) -> None:
+        """Give back what it holds; a second call does nothing."""
+        ...

@@ -9,7 +9,7 @@ from fogsim.values.image import Frame, View
 from fogsim.values.lamps import Lamp
 from fogsim.values.light import Beam, HeadLamp, Lights, LightSources
 from fogsim.values.observation import LeadMeasurement, Observation, SignSighting
-from fogsim.values.road import Lane, LaneMarking, RoadNetwork, Sign, SignMap
+from fogsim.values.road import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea, RoadNetwork, Sign, SignMap
 from fogsim.values.scene import Batch, Mesh, Scene, Surface
 from fogsim.values.step import Ending, Step, Truth
 from fogsim.values.traffic import Collision, Leader, TrafficSnapshot, TrafficState
@@ -31,6 +31,8 @@ __all__ = [
     "HeadLamp",
     "Lamp",
     "Lane",
+    "LaneEnd",
+    "LaneKind",
     "LaneMarking",
     "LeadMeasurement",
     "Leader",
@@ -38,6 +40,7 @@ __all__ = [
     "Lights",
     "Mesh",
     "Observation",
+    "PavedArea",
     "Response",
     "RoadNetwork",
     "Scene",

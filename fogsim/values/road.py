@@ -13,6 +13,27 @@ class LaneMarking(StrEnum):
     NONE = "none"
     SOLID = "solid"
     DASHED = "dashed"
+    DOUBLE = "double"
+    """Solid, one of the pair between the two directions of a road: it lies inside the lane, its twin in the other."""
+
+
+class LaneKind(StrEnum):
+    """What a lane is for."""
+
+    CARRIAGEWAY = "carriageway"
+    JUNCTION = "junction"
+    """The way of vehicles across a junction."""
+    FOOTWAY = "footway"
+    CROSSING = "crossing"
+    """The way of pedestrians across a carriageway."""
+
+
+class LaneEnd(StrEnum):
+    """The line painted across a lane where it ends."""
+
+    OPEN = "open"
+    STOP = "stop"
+    YIELD = "yield"
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +54,10 @@ class Lane:
         Lines along its sides.
     outermost : bool
         True if no other lane of the carriageway lies to its right.
+    kind : LaneKind
+        What it is for.
+    end : LaneEnd
+        Line across its end.
     """
 
     lane_id: str
@@ -43,6 +68,27 @@ class Lane:
     left: LaneMarking
     right: LaneMarking
     outermost: bool
+    kind: LaneKind = LaneKind.CARRIAGEWAY
+    end: LaneEnd = LaneEnd.OPEN
+
+
+@dataclass(frozen=True, slots=True)
+class PavedArea:
+    """A paved area that is no strip: where roads meet, or where footways meet beside them.
+
+    Attributes
+    ----------
+    area_id : str
+        Its id in the net.
+    outline : (n, 3) float64
+        Corners in order around it [m], at least three; it may be concave.
+    kind : LaneKind
+        JUNCTION or FOOTWAY.
+    """
+
+    area_id: str
+    outline: NDArray[np.float64]
+    kind: LaneKind = LaneKind.JUNCTION
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +136,10 @@ class RoadNetwork:
         The lanes.
     route : (n, 3) float64
         Polyline along the route that the ego drives [m].
+    areas : tuple of PavedArea
+        Where roads and footways meet.
     """
 
     lanes: tuple[Lane, ...]
     route: NDArray[np.float64]
+    areas: tuple[PavedArea, ...] = ()

@@ -5,7 +5,7 @@ import pytest
 
 from fogsim.errors import InputError
 from fogsim.traffic.network import read_net, road_network
-from fogsim.values import LaneMarking
+from fogsim.values import LaneEnd, LaneKind, LaneMarking
 
 FOLDER = Path(__file__).resolve().parents[2] / "scenarios" / "motorway_fog_bank"
 NET = FOLDER / "motorway.net.xml"
@@ -40,3 +40,37 @@ def test_what_is_no_network(tmp_path: Path) -> None:
     file.write_text('<net version="1.20"></net>', encoding="utf-8")
     with pytest.raises(InputError, match="has no edges"):
         read_net(file)
+
+
+GRID = Path(__file__).resolve().parents[1] / "data" / "grid" / "grid.net.xml"
+
+
+def test_a_town_has_junctions_stop_lines_and_double_lines_between_directions() -> None:
+    network = road_network(read_net(GRID), [])
+    lanes = {lane.lane_id: lane for lane in network.lanes}
+    assert len([area for area in network.areas if area.area_id in {"A0", "B0", "C0", "A1", "B1", "C1"}]) == 6
+    right, left = lanes["A0B0_0"], lanes["A0B0_1"]
+    assert (right.right, right.left, left.left) == (LaneMarking.SOLID, LaneMarking.DASHED, LaneMarking.DOUBLE)
+    assert right.end == left.end == LaneEnd.STOP
+    away = next(lane for lane in network.lanes if lane.lane_id == "A0left0_0")
+    assert away.end is LaneEnd.OPEN
+    inside = [lane for lane in network.lanes if lane.lane_id.startswith(":")]
+    assert {lane.kind for lane in inside} == {LaneKind.JUNCTION}
+    assert {lane.left for lane in inside} == {LaneMarking.NONE}
+
+
+@pytest.mark.parametrize(("lane", "count"), [("e_0", 0), ("f_0", 1)])
+def test_a_lane_without_a_shape_is_named(tmp_path: Path, lane: str, count: int) -> None:
+    file = tmp_path / "bare.net.xml"
+    shape = {0: "", 1: ' shape="0,0"'}[count]
+    edge = lane.split("_")[0]
+    file.write_text(
+        '<net version="1.20"><location netOffset="0,0" convBoundary="0,0,1,1" origBoundary="0,0,1,1" '
+        f'projParameter="!"/><edge id="{edge}" from="a" to="b">'
+        f'<lane id="{lane}" index="0" speed="10" length="10"{shape}/></edge>'
+        '<junction id="a" type="dead_end" x="0" y="0" incLanes="" intLanes=""/>'
+        f'<junction id="b" type="dead_end" x="1" y="0" incLanes="{lane}" intLanes=""/></net>',
+        encoding="utf-8",
+    )
+    with pytest.raises(InputError, match=rf"lane '{lane}' of edge '{edge}'.*shape.*got {count}"):
+        road_network(read_net(file), [])

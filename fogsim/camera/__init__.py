@@ -1,6 +1,22 @@
-"""Where the camera is, exposure, noise, response and quantisation."""
+"""Where the camera is, its samples, exposure, noise, response and quantisation."""
 
-from fogsim.camera.exposure import Sensor, expose
-from fogsim.camera.mount import mounted_pose
+from fogsim.camera.exposure import Pixels, Sensor, expose
+from fogsim.camera.metering import AutoExposure, Metering
+from fogsim.camera.mount import BodyPitch, Suspension, mounted_pose
+from fogsim.camera.photographer import Photographer
+from fogsim.camera.sampling import averaged, middle_samples, supersampled
 
-__all__ = ["Sensor", "expose", "mounted_pose"]
+__all__ = [
+    "AutoExposure",
+    "BodyPitch",
+    "Metering",
+    "Photographer",
+    "Pixels",
+    "Sensor",
+    "Suspension",
+    "averaged",
+    "expose",
+    "middle_samples",
+    "mounted_pose",
+    "supersampled",
+]

@@ -1,4 +1,4 @@
-"""From radiance to an 8-bit image: exposure, photon and read noise, response and quantisation."""
+"""From radiance to pixel values: exposure, photon and read noise, response and quantisation."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -7,9 +7,15 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.camera.kernels import NORMAL_TABLE_BITS, RESPONSE_STEPS, develop
+from fogsim.camera.kernels import NORMAL_TABLE_BITS, develop
 from fogsim.response import respond
 from fogsim.values import Response
+
+Pixels = NDArray[np.uint8] | NDArray[np.uint16]
+"""Pixel values: of 8 bits, or of 10 or 12 in 16."""
+
+RESPONSE_STEPS = {8: 1 << 13, 10: 1 << 15, 12: 1 << 17}
+"""Resolution of the response table by bit depth: finer than a level even in the steepest part of the sRGB curve."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,25 +25,26 @@ class Sensor:
     Attributes
     ----------
     saturation_luminance : float
-        Luminance that just fills a pixel at the fixed exposure [cd/m²].
+        Luminance that just fills a pixel at its exposure [cd/m²].
     full_well : float
         Electrons that fill a pixel [e⁻]; a filled pixel's photon noise is 1 / √full_well.
     read_noise : float
         Standard deviation of the read-out noise [e⁻].
+    bits : int
+        Bit depth: 8, 10 or 12.
     """
 
     saturation_luminance: float
     full_well: float = 10_000.0
     read_noise: float = 5.0
+    bits: int = 8
 
 
-def expose(
-    radiance: NDArray[np.float32], sensor: Sensor, response: Response, rng: np.random.Generator
-) -> NDArray[np.uint8]:
+def expose(radiance: NDArray[np.float32], sensor: Sensor, response: Response, rng: np.random.Generator) -> Pixels:
     """Take an image.
 
     Photon noise is drawn as normal with the Poisson distribution's variance, which at the tens of electrons and more
-    that fog gives is the same (EMVA 1288: σ² = σ_read² + electrons).
+    that fog gives is the same (EMVA 1288: σ² = σ_read² + electrons). No draw is further than 3.7 σ from the mean.
 
     Parameters
     ----------
@@ -52,43 +59,55 @@ def expose(
 
     Returns
     -------
-    (rows, cols, 3) uint8
-        Pixel values.
+    (rows, cols, 3) uint8, or uint16 for more than 8 bits
+        Pixel values 0 … 2^bits − 1.
     """
-    out = np.empty(radiance.shape, dtype=np.uint8)
+    table = response_table(response, sensor.bits)
+    out = np.empty(radiance.shape, dtype=table.dtype)
+    key = int(rng.integers(1 << 62))
     develop(
-        np.ascontiguousarray(radiance, dtype=np.float32),
-        1.0 / sensor.saturation_luminance,
-        1.0 / sensor.full_well,
-        (sensor.read_noise / sensor.full_well) ** 2,
-        int(rng.integers(1 << 62)),
+        np.ascontiguousarray(radiance, dtype=np.float32).reshape(-1),
+        np.float32(1.0 / sensor.saturation_luminance),
+        np.float32(1.0 / sensor.full_well),
+        np.float32((sensor.read_noise / sensor.full_well) ** 2),
+        np.uint32(key & 0xFFFFFFFF),
+        np.uint32(key >> 32),
         _normal_table(),
-        response_table(response),
-        out,
+        table,
+        out.reshape(-1),
     )
     return out
 
 
 @cache
 def _normal_table() -> NDArray[np.float32]:
-    """Standard normal deviates at the middles of 2^16 equally likely classes."""
+    """Standard normal deviates at the middles of 2^12 equally likely classes, scaled to a variance of 1."""
     count = 1 << NORMAL_TABLE_BITS
     inverse = NormalDist().inv_cdf
-    table = np.array([inverse((i + 0.5) / count) for i in range(count)], dtype=np.float32)
+    deviates = np.array([inverse((i + 0.5) / count) for i in range(count)])
+    table = (deviates / deviates.std()).astype(np.float32)
     table.setflags(write=False)
     return table
 
 
 @cache
-def response_table(response: Response) -> NDArray[np.uint8]:
+def response_table(response: Response, bits: int = 8) -> Pixels:
     """Pixel value for exposure in even steps from 0 to saturation.
+
+    Parameters
+    ----------
+    response : Response
+        The curve.
+    bits : int
+        Bit depth: 8, 10 or 12.
 
     Returns
     -------
-    (2^14 + 1,) uint8
+    (RESPONSE_STEPS[bits] + 1,) uint8, or uint16 for more than 8 bits
         Read-only.
     """
-    exposure = np.linspace(0.0, 1.0, RESPONSE_STEPS + 1)
-    table = np.round(255.0 * respond(exposure, response)).astype(np.uint8)
+    exposure = np.linspace(0.0, 1.0, RESPONSE_STEPS[bits] + 1)
+    levels = np.round((2**bits - 1) * respond(exposure, response))
+    table: Pixels = levels.astype(np.uint8) if bits == 8 else levels.astype(np.uint16)
     table.setflags(write=False)
     return table

@@ -1,4 +1,4 @@
-"""The per-pixel loop of exposure, noise, response and quantisation."""
+"""The per-pixel loops of the camera: exposure with noise, response and quantisation; averaging; metering."""
 
 import math
 
@@ -7,41 +7,109 @@ from numpy.typing import NDArray
 
 from fogsim.jit import kernel
 
-NORMAL_TABLE_BITS = 16
-"""Noise is drawn from a table of 2^16 normal quantiles by a hash of seed and pixel: fast, and the same everywhere."""
+NORMAL_TABLE_BITS = 12
+"""Noise is drawn from 2^12 normal quantiles by a hash of seed and sample: a table that stays in the nearest cache."""
 
-RESPONSE_STEPS = 1 << 14
-"""Resolution of the response table: finer than one 8-bit level even in the steepest part of the sRGB curve."""
+BLOCK = 1024
+"""Samples that go through the stages together: few enough for their buffers to stay in the nearest cache."""
+
+MOST_EXPOSURE = np.float32(4.0)
+"""Exposure to which light is clipped before the noise, relative to saturation: beyond any doubt that it saturates."""
 
 
 @kernel
 def develop(
     radiance: NDArray[np.float32],
-    gain: float,
-    shot_variance: float,
-    read_variance: float,
-    seed: int,
+    gain: np.float32,
+    shot_variance: np.float32,
+    read_variance: np.float32,
+    first_key: np.uint32,
+    second_key: np.uint32,
     normals: NDArray[np.float32],
-    response: NDArray[np.uint8],
-    out: NDArray[np.uint8],
+    response: NDArray[np.uint8] | NDArray[np.uint16],
+    out: NDArray[np.uint8] | NDArray[np.uint16],
 ) -> None:
-    """Pixel values from radiance.
+    """Pixel values from radiance; both are flat.
 
     `gain` takes radiance to exposure relative to saturation. Shot noise has variance `shot_variance` · exposure and
-    read noise `read_variance`, both relative to saturation². `response` takes exposure in 2^14 steps to 8 bit.
+    read noise `read_variance`, both relative to saturation². `response` takes exposure in even steps to pixel values.
+
+    Each stage is a loop of its own, so that the compiler turns hash and arithmetic into vector instructions and only
+    the two tables are read one by one; slices, since an offset index would be checked for its sign.
     """
-    rows, columns, channels = radiance.shape
-    top = response.shape[0] - 1
-    state = np.uint64(seed)
-    for v in range(rows):
-        for u in range(columns):
-            for c in range(channels):
-                # splitmix64: a counter through a mixing function gives independent values in any order.
-                state += np.uint64(0x9E3779B97F4A7C15)
-                mixed = (state ^ (state >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-                mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-                normal = normals[mixed >> np.uint64(64 - NORMAL_TABLE_BITS)]
-                exposure = max(radiance[v, u, c] * gain, 0.0)
-                exposure += normal * math.sqrt(shot_variance * exposure + read_variance)
-                index = int(min(max(exposure, 0.0), 1.0) * top + 0.5)
-                out[v, u, c] = response[index]
+    top, half = np.float32(response.shape[0] - 1), np.float32(0.5)
+    zero, one = np.float32(0.0), np.float32(1.0)
+    index = np.empty(BLOCK, np.uint32)
+    noise = np.empty(BLOCK, np.float32)
+    for start in range(0, radiance.shape[0], BLOCK):
+        count = min(BLOCK, radiance.shape[0] - start)
+        light, pixels = radiance[start : start + count], out[start : start + count]
+        _hashed(np.uint32(start), count, first_key, second_key, index)
+        for i in range(count):
+            noise[i] = normals[index[i]]
+        for i in range(count):
+            exposure = light[i] * gain
+            # Written so that what is not a number counts as black, and never as an index into nowhere.
+            exposure = exposure if exposure > zero else zero
+            exposure = exposure if exposure < MOST_EXPOSURE else MOST_EXPOSURE
+            exposure += noise[i] * np.float32(math.sqrt(shot_variance * exposure + read_variance))
+            exposure = exposure if exposure > zero else zero
+            exposure = exposure if exposure < one else one
+            index[i] = np.uint32(np.int32(exposure * top + half))
+        for i in range(count):
+            pixels[i] = response[index[i]]
+
+
+@kernel
+def _hashed(
+    start: np.uint32, count: int, first_key: np.uint32, second_key: np.uint32, index: NDArray[np.uint32]
+) -> None:
+    """Evenly distributed indices of the normal table for the samples from `start` on.
+
+    A counter through multiply and xor-shift with full avalanche (the constants are those of Wellons' lowbias32), in 32
+    bits, which vector units multiply. The second key enters midway: with a first one alone, the noise of one frame
+    could be that of another, shifted.
+    """
+    for i in range(count):
+        mixed = np.uint32((start + np.uint32(i)) ^ first_key)
+        mixed ^= mixed >> np.uint32(16)
+        mixed = np.uint32(mixed * np.uint32(0x7FEB352D))
+        mixed ^= mixed >> np.uint32(15)
+        mixed = np.uint32(mixed + second_key)
+        mixed = np.uint32(mixed * np.uint32(0x846CA68B))
+        index[i] = mixed >> np.uint32(32 - NORMAL_TABLE_BITS)
+
+
+@kernel
+def block_means(fine: NDArray[np.float32], side: int, out: NDArray[np.float32]) -> None:
+    """Mean of each block of side × side pixels: flat rows (side · rows, side · cols · 3) to (rows, cols, 3)."""
+    rows, cols, _ = out.shape
+    share = np.float32(1.0 / (side * side))
+    total = np.empty(fine.shape[1], np.float32)
+    for row in range(rows):
+        total[:] = fine[side * row]
+        for k in range(1, side):
+            line = fine[side * row + k]
+            # A loop of its own for each line of samples, so that the compiler makes vector instructions of it.
+            for i in range(total.shape[0]):
+                total[i] += line[i]
+        for col in range(cols):
+            block, pixel = total[3 * side * col : 3 * side * (col + 1)], out[row, col]
+            for channel in range(3):
+                light = np.float32(0.0)
+                for k in range(side):
+                    light += block[3 * k + channel]
+                pixel[channel] = light * share
+
+
+@kernel
+def luminance_samples(radiance: NDArray[np.float32], stride: int, out: NDArray[np.float32]) -> None:
+    """Luminance (ITU-R BT.709) of every stride-th pixel of every stride-th row, from the middle of the first block."""
+    rows, cols = out.shape
+    for row in range(rows):
+        line = radiance[row * stride + stride // 2]
+        for col in range(cols):
+            pixel = line[col * stride + stride // 2]
+            out[row, col] = (
+                np.float32(0.2126) * pixel[0] + np.float32(0.7152) * pixel[1] + np.float32(0.0722) * pixel[2]
+            )

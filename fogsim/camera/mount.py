@@ -1,6 +1,7 @@
-"""Where a camera is mounted."""
+"""Where a camera is mounted, and how the body that it is mounted on pitches."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +9,9 @@ from numpy.typing import NDArray
 from fogsim.values import Camera, CameraPose
 
 
-def mounted_pose(camera: Camera, front_bumper: NDArray[np.float64], heading: float, setback: float) -> CameraPose:
+def mounted_pose(
+    camera: Camera, front_bumper: NDArray[np.float64], heading: float, setback: float, grade: float = 0.0
+) -> CameraPose:
     """Pose of a camera that is mounted behind a vehicle's front bumper, on its axis.
 
     Parameters
@@ -21,7 +24,60 @@ def mounted_pose(camera: Camera, front_bumper: NDArray[np.float64], heading: flo
         Direction of travel, counterclockwise from east [rad].
     setback : float
         Distance of the optical centre behind the front bumper [m].
+    grade : float
+        Upward inclination of the vehicle's body [rad]; it turns the camera, and is too small to move it.
     """
     x = float(front_bumper[0]) - setback * math.cos(heading)
     y = float(front_bumper[1]) - setback * math.sin(heading)
-    return CameraPose(position=(x, y, float(front_bumper[2]) + camera.mount_height), heading=heading)
+    return CameraPose(position=(x, y, float(front_bumper[2]) + camera.mount_height), heading=heading, grade=grade)
+
+
+@dataclass(frozen=True, slots=True)
+class Suspension:
+    """How a vehicle's body pitches when it brakes or accelerates.
+
+    Attributes
+    ----------
+    pitch_per_deceleration : float
+        Steady pitch, nose down, for each unit of deceleration [rad per m/s²].
+    time_constant : float
+        Lag of first order with which the body follows [s].
+    """
+
+    pitch_per_deceleration: float
+    time_constant: float
+
+
+class BodyPitch:
+    """The pitch of a vehicle's body through a run.
+
+    Parameters
+    ----------
+    suspension : Suspension
+        How the body pitches.
+    period : float
+        Time between two updates [s].
+    """
+
+    def __init__(self, suspension: Suspension, period: float) -> None:
+        self._suspension = suspension
+        lag = suspension.time_constant
+        self._share = -math.expm1(-period / lag) if lag > 0 else 1.0
+        self._grade: float | None = None
+
+    def reset(self) -> None:
+        """Begin a run: the first update finds the body settled."""
+        self._grade = None
+
+    def update(self, acceleration: float) -> float:
+        """Upward inclination of the body [rad]; braking makes it negative.
+
+        Parameters
+        ----------
+        acceleration : float
+            Acceleration along the heading [m/s²].
+        """
+        settled = self._suspension.pitch_per_deceleration * acceleration
+        before = settled if self._grade is None else self._grade
+        self._grade = before + self._share * (settled - before)
+        return self._grade

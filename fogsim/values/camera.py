@@ -7,6 +7,10 @@ from enum import StrEnum
 from fogsim.errors import InputError
 
 
+BIT_DEPTHS = (8, 10, 12)
+"""Bit depths that a camera can have."""
+
+
 class Response(StrEnum):
     """How a camera turns exposure into pixel values: proportional, power 1/2.2, or IEC 61966-2-1."""
 
@@ -37,6 +41,8 @@ class Camera:
         Rotation about the optical axis [rad]; positive turns the image's right side down.
     response : Response
         Curve from exposure to pixel value.
+    bits : int
+        Bit depth of the pixel values, which are 0 … 2^bits − 1: 8, 10 or 12.
     """
 
     width: int
@@ -47,6 +53,7 @@ class Camera:
     pitch: float = 0.0
     roll: float = 0.0
     response: Response = Response.LINEAR
+    bits: int = 8
 
     def __post_init__(self) -> None:
         """Refuse a calibration that no camera can have.
@@ -70,6 +77,8 @@ class Camera:
             raise InputError(f"camera pitch must lie within ±π/2 rad, got {self.pitch!r}")
         if not abs(self.roll) <= math.pi:
             raise InputError(f"camera roll must lie within ±π rad, got {self.roll!r}")
+        if self.bits not in BIT_DEPTHS:
+            raise InputError(f"camera bits must be 8, 10 or 12, got {self.bits!r}")
 
     @property
     def horizon_row(self) -> float:

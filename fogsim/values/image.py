@@ -40,12 +40,12 @@ class Frame:
     ----------
     time : float
         Instant of the exposure [s].
-    image : (rows, cols, 3) or (rows, cols) uint8
-        Pixel values, red first.
+    image : (rows, cols, 3) or (rows, cols) uint8, or uint16 of a camera of 10 or 12 bits
+        Pixel values 0 … 2^bits − 1, red first.
     camera : Camera
         The calibration as the vehicle was told it, which may differ from the true one.
     """
 
     time: float
-    image: NDArray[np.uint8]
+    image: NDArray[np.uint8] | NDArray[np.uint16]
     camera: Camera

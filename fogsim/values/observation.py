@@ -58,7 +58,7 @@ class Observation:
 
     Attributes
     ----------
-    frame : Frame or (rows, cols[, 3]) uint8
+    frame : Frame or (rows, cols[, 3]) uint8, or uint16 of a camera of 10 or 12 bits
         The camera's image; a bare array serves where the time does not matter.
     speed : float
         Own speed by the odometer [m/s].
@@ -68,14 +68,14 @@ class Observation:
         Signs ahead by the map, nearest first.
     """
 
-    frame: Frame | NDArray[np.uint8]
+    frame: Frame | NDArray[np.uint8] | NDArray[np.uint16]
     speed: float = 0.0
     lead: LeadMeasurement | None = None
     signs: tuple[SignSighting, ...] = ()
 
     @property
-    def image(self) -> NDArray[np.uint8]:
-        """(rows, cols[, 3]) uint8: the pixels."""
+    def image(self) -> NDArray[np.uint8] | NDArray[np.uint16]:
+        """(rows, cols[, 3]) uint8, or uint16 of a camera of 10 or 12 bits: the pixels."""
         return self.frame.image if isinstance(self.frame, Frame) else self.frame
 
     @property

@@ -5,8 +5,10 @@ from enum import StrEnum
 
 from fogsim.units import visibility_from_extinction
 from fogsim.values.belief import Belief
+from fogsim.values.camera import Camera, CameraPose
 from fogsim.values.command import Command
 from fogsim.values.estimate import Estimate
+from fogsim.values.fog import FogField
 from fogsim.values.image import View
 from fogsim.values.observation import Observation
 from fogsim.values.traffic import Collision, Leader, TrafficState
@@ -32,10 +34,19 @@ class Truth:
     extinction_ahead : float
         Mean extinction coefficient from the camera to one visibility length ahead along the heading [1/m]: what a
         camera that looks ahead can at best report where the fog varies.
+    camera : Camera or None
+        The true calibration of the ego's camera; None where no camera was there.
+    pose : CameraPose or None
+        Where the camera truly is, likewise.
+    fog : FogField or None
+        The fog as a field, likewise.
     """
 
     extinction: float
     extinction_ahead: float
+    camera: Camera | None = None
+    pose: CameraPose | None = None
+    fog: FogField | None = None
 
     @property
     def visibility(self) -> float:

@@ -1,0 +1,69 @@
+"""A camera that takes one picture after another."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.camera.exposure import Pixels, Sensor, expose
+from fogsim.camera.metering import AutoExposure, followed, metered_luminance, sensor_at, wanted_saturation
+from fogsim.camera.shading import lens_shading
+from fogsim.values import Camera
+
+
+class Photographer:
+    """Takes the pictures of one run; what it remembers from one to the next is the exposure.
+
+    Parameters
+    ----------
+    camera : Camera
+        The true calibration.
+    sensor : Sensor
+        The sensor; with automatic exposure its saturation luminance is not used.
+    auto : AutoExposure or None
+        How the camera sets its own exposure; None where it is fixed.
+    shading : float
+        Strength of the lens's shading; see `lens_shading`.
+    period : float
+        Time between two pictures [s].
+    """
+
+    def __init__(
+        self, camera: Camera, sensor: Sensor, auto: AutoExposure | None, shading: float, period: float
+    ) -> None:
+        self._camera = camera
+        self._sensor = sensor
+        self._auto = auto
+        self._shading = lens_shading(camera, shading)[..., None] if shading > 0 else None
+        self._period = period
+        self._saturation: float | None = None
+
+    def reset(self) -> None:
+        """Begin a run: the first picture sets the exposure, as if the camera had long looked at what it shows."""
+        self._saturation = None
+
+    def take(self, radiance: NDArray[np.float32], rng: np.random.Generator) -> Pixels:
+        """Take a picture at the exposure that the pictures before have set.
+
+        Parameters
+        ----------
+        radiance : (rows, cols, 3) float32
+            Linear radiance at the camera [cd/m²].
+        rng : numpy.random.Generator
+            Source of the noise; one draw is taken for a picture.
+
+        Returns
+        -------
+        (rows, cols, 3) uint8, or uint16 for more than 8 bits
+            Pixel values.
+        """
+        if self._shading is not None:
+            radiance = radiance * self._shading
+        return expose(radiance, self._sensor_for(radiance), self._camera.response, rng)
+
+    def _sensor_for(self, radiance: NDArray[np.float32]) -> Sensor:
+        if self._auto is None:
+            return self._sensor
+        wanted = wanted_saturation(metered_luminance(radiance, self._auto.metering), self._auto)
+        now = wanted if self._saturation is None else self._saturation
+        # What this picture shows sets the exposure of the next.
+        self._saturation = followed(now, wanted, self._auto, self._period)
+        return sensor_at(self._sensor, now, self._auto)

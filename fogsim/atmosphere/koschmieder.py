@@ -28,24 +28,27 @@ def fogged_radiance(
     (rows, cols, 3) float32
         Linear radiance at the camera [cd/m²].
     """
-    out = np.empty_like(view.radiance)
+    radiance = np.ascontiguousarray(view.radiance, dtype=np.float32)
+    if field.extinction == 0 and not field.banks:
+        return radiance.copy()
+    out = np.empty_like(radiance)
+    rows, columns = view.distance.shape
     fog_pixels(
-        np.ascontiguousarray(view.radiance, dtype=np.float32),
+        radiance.reshape(rows, 3 * columns),
         np.ascontiguousarray(view.distance, dtype=np.float32),
-        np.ascontiguousarray(ray_map, dtype=np.float64),
-        float(eye[2]),
-        field.top,
-        field.extinction,
+        np.ascontiguousarray(ray_map, dtype=np.float32),
+        np.float32(field.top - eye[2]),
+        np.float32(field.extinction),
         _bank_rows(field.banks, eye),
-        np.array(field.airlight, dtype=np.float64),
-        out,
+        np.array(field.airlight, dtype=np.float32),
+        out.reshape(rows, 3 * columns),
     )
     return out
 
 
-def _bank_rows(banks: tuple[FogBank, ...], eye: tuple[float, float, float]) -> NDArray[np.float64]:
-    rows = np.empty((len(banks), 7))
+def _bank_rows(banks: tuple[FogBank, ...], eye: tuple[float, float, float]) -> NDArray[np.float32]:
+    rows = np.empty((len(banks), 6), dtype=np.float32)
     for row, bank in zip(rows, banks, strict=True):
         station = (eye[0] - bank.origin[0]) * bank.axis[0] + (eye[1] - bank.origin[1]) * bank.axis[1]
-        row[:] = (station, *bank.axis, bank.start, bank.end, bank.edge, bank.extra_extinction)
+        row[:] = (*bank.axis, station - bank.start, station - bank.end, bank.edge, bank.extra_extinction)
     return rows

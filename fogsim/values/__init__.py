@@ -4,7 +4,7 @@ from fogsim.values.belief import Belief
 from fogsim.values.camera import Camera, CameraPose, Response
 from fogsim.values.command import Command, SpeedAdvice
 from fogsim.values.estimate import Estimate, FogCategory, fog_category
-from fogsim.values.fog import FogBank, FogField
+from fogsim.values.fog import FogBank, FogChange, FogField, FogPatches
 from fogsim.values.image import Frame, View
 from fogsim.values.lamps import Lamp
 from fogsim.values.light import Beam, HeadLamp, Lights, LightSources
@@ -26,7 +26,9 @@ __all__ = [
     "Estimate",
     "FogBank",
     "FogCategory",
+    "FogChange",
     "FogField",
+    "FogPatches",
     "Frame",
     "HeadLamp",
     "Lamp",

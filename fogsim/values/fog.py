@@ -1,6 +1,10 @@
-"""Fog as a field in space."""
+"""Fog as a field in space and time."""
 
+import itertools
+import math
 from dataclasses import dataclass
+
+from fogsim.errors import InputError
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,10 +34,89 @@ class FogBank:
     edge: float
     extra_extinction: float
 
+    def __post_init__(self) -> None:
+        """Refuse a bank that ends before it starts.
+
+        Raises
+        ------
+        InputError
+            If start, end and edge do not fit together.
+        """
+        if not self.start < self.end:
+            raise InputError(f"a fog bank must end beyond its start, got {self.start!r} to {self.end!r} m")
+        if not 0 < self.edge <= (self.end - self.start) * (1 + 1e-9):
+            raise InputError(f"a fog bank's edge must be positive and not longer than the bank, got {self.edge!r} m")
+
+
+@dataclass(frozen=True, slots=True)
+class FogPatches:
+    """Random thick and thin places: the extinction times a log-normal factor of mean 1.
+
+    The logarithm of the factor is Gaussian with the correlation e^(−(Δ/ℓ)²), Δ/ℓ being the distance in correlation
+    lengths, horizontally and vertically.
+
+    Attributes
+    ----------
+    correlation_length : float
+        Horizontal distance at which the correlation has fallen to 1/e [m], positive.
+    correlation_height : float
+        The same, vertically [m].
+    strength : float
+        Standard deviation of the logarithm of the factor [-], 0 … 2.
+    seed : int
+        The same seed gives the same patches.
+    offset : tuple of float
+        (x, y) by which they have drifted [m].
+    """
+
+    correlation_length: float
+    correlation_height: float
+    strength: float
+    seed: int = 0
+    offset: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        """Refuse patches without size or of impossible strength.
+
+        Raises
+        ------
+        InputError
+            If a number is out of range.
+        """
+        for name in ("correlation_length", "correlation_height"):
+            if not 0 < getattr(self, name) < math.inf:
+                raise InputError(f"the {name} of fog patches must be a positive length, got {getattr(self, name)!r} m")
+        if not 0 <= self.strength <= 2:
+            raise InputError(f"the strength of fog patches must lie within 0 … 2, got {self.strength!r}")
+
+
+@dataclass(frozen=True, slots=True)
+class FogChange:
+    """The fog at one time; between two of them it changes linearly, before the first and after the last not at all.
+
+    Attributes
+    ----------
+    time : float
+        Time since the run began [s].
+    density : float
+        Factor of the extinction coefficient everywhere [-], not negative.
+    base, top : float
+        Heights between which there is fog then [m].
+    """
+
+    time: float
+    density: float
+    base: float
+    top: float
+
 
 @dataclass(frozen=True, slots=True)
 class FogField:
-    """Extinction coefficient and airlight in space: a homogeneous layer with banks in it.
+    """Extinction coefficient and airlight in space and time.
+
+    The extinction coefficient is k = (`extinction` + what the banks add) · h(z) · (factor of the patches) · (density
+    of the time), where h is 1 between `base` and `top`, falls to 0 beyond them over smooth edges, and falls by e over
+    each `scale_height` above `ground`. Banks and patches drift with the wind.
 
     Attributes
     ----------
@@ -42,12 +125,61 @@ class FogField:
     banks : tuple of FogBank
         Denser (or thinner) stretches, not overlapping.
     airlight : tuple of float
-        Radiance of an infinite path through the fog by day, per colour channel [cd/m²].
+        Radiance of an infinite path through the fog near the ground by day, per colour channel [cd/m²].
     top : float
         Height above which there is no fog [m]; ``inf`` where the layer has no end.
+    top_edge : float
+        Thickness of the top's soft edge, centred on `top` [m]; 0 for a sharp one.
+    base : float
+        Height below which there is no fog [m]: that of fog which has lifted; ``-inf`` where it rests on the ground.
+    base_edge : float
+        Thickness of the base's soft edge [m].
+    scale_height : float
+        Height over which ground fog thins by e [m]; ``inf`` where it does not.
+    ground : float
+        Height from which `scale_height` counts [m]; below it the fog is as thick as there.
+    patches : FogPatches or None
+        Random thick and thin places.
+    wind : tuple of float
+        Velocity (x, y) with which banks and patches drift [m/s].
+    changes : tuple of FogChange
+        The fog over time, in order of time; empty for fog that does not change.
+    airlight_shading : float
+        How much the airlight dims with each unit of optical depth overhead [-]; 0 for airlight that is the same
+        everywhere. Two-stream theory of a conservative layer gives ¾ (1 − g), about 0.1 in fog.
     """
 
     extinction: float
     airlight: tuple[float, float, float]
     banks: tuple[FogBank, ...] = ()
-    top: float = float("inf")
+    top: float = math.inf
+    top_edge: float = 0.0
+    base: float = -math.inf
+    base_edge: float = 0.0
+    scale_height: float = math.inf
+    ground: float = 0.0
+    patches: FogPatches | None = None
+    wind: tuple[float, float] = (0.0, 0.0)
+    changes: tuple[FogChange, ...] = ()
+    airlight_shading: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse a field that cannot be.
+
+        Raises
+        ------
+        InputError
+            If a number is out of range, or the times are out of order.
+        """
+        if not 0 <= self.extinction < math.inf:
+            raise InputError(f"an extinction coefficient must be finite and not negative, got {self.extinction!r} 1/m")
+        if not all(0 <= light < math.inf for light in self.airlight):
+            raise InputError(f"airlight must be finite and not negative, got {self.airlight!r} cd/m²")
+        if not self.scale_height > 0:
+            raise InputError(f"the scale height of fog must be positive, got {self.scale_height!r} m")
+        for base, top in ((self.base, self.top), *((change.base, change.top) for change in self.changes)):
+            if not base + 0.5 * self.base_edge <= top - 0.5 * self.top_edge:
+                raise InputError(f"the top of fog must lie above its base, soft edges included, got {base} and {top} m")
+        for one, other in itertools.pairwise(self.changes):
+            if not one.time < other.time:
+                raise InputError(f"times of changing fog must increase, got {one.time!r} and then {other.time!r} s")

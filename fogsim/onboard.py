@@ -5,9 +5,10 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fogsim.atmosphere import Air, extinction, optical_depth
-from fogsim.camera import expose, mounted_pose
+from fogsim.camera import averaged, middle_samples, mounted_pose, supersampled
 from fogsim.errors import SimulationError
 from fogsim.randomness import Streams
 from fogsim.render import Renderer, make_renderer
@@ -16,6 +17,7 @@ from fogsim.scene import build_scene, vehicle_batches
 from fogsim.sensors import measure_lead, signs_ahead
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import (
+    Camera,
     CameraPose,
     Command,
     Ending,
@@ -26,7 +28,9 @@ from fogsim.values import (
     SignMap,
     Step,
     TrafficSnapshot,
+    TrafficState,
     Truth,
+    View,
 )
 
 _SIGHT_LINE = np.geomspace(1.0, 20_000.0, 400)
@@ -64,7 +68,9 @@ class OnBoard:
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
         self._camera = build.camera(scenario)
-        self._sensor = build.sensor(scenario)
+        self._drawn_camera = supersampled(self._camera, scenario.camera.samples)
+        self._photographer = build.photographer(scenario)
+        self._body = build.body_pitch(scenario)
         self._lead_sensor = build.lead_sensor(scenario)
         self._told_camera = build.told_camera(scenario)
         self._estimators = build.estimators(scenario, self._told_camera)
@@ -92,6 +98,8 @@ class OnBoard:
         for estimator in self._estimators:
             estimator.reset()
         self._fusion.reset()
+        self._photographer.reset()
+        self._body.reset()
         self._streams = streams
         return self._world
 
@@ -129,12 +137,9 @@ class OnBoard:
         if self._world is None or self._streams is None:
             raise SimulationError("the run has not been started, or is closed")
         world, state, ego = self._world, snapshot.state, snapshot.ego
-        pose = mounted_pose(
-            self._camera, state.position[ego], float(state.heading[ego]), self._scenario.camera.setback_m
-        )
-        view = world.renderer.render(vehicle_batches(state, ego), self._camera, pose)
-        radiance = Air(world.fog).radiance(view, self._camera, pose, time=time)
-        image = expose(radiance, self._sensor, self._camera.response, self._streams.camera)
+        pose = self._pose(state, ego)
+        view, radiance = self._see(world, state, ego, pose, time)
+        image = self._photographer.take(radiance, self._streams.camera)
         frame = Frame(time, image, self._told_camera)
         observation = self._observe(frame, snapshot, world.signs, self._streams)
         estimates = tuple(estimator.update(observation) for estimator in self._estimators)
@@ -147,7 +152,7 @@ class OnBoard:
             speed_limit=snapshot.speed_limit,
             leader=snapshot.leader,
             collisions=snapshot.collisions,
-            truth=fog_truth(world.fog, pose),
+            truth=fog_truth(world.fog, pose, self._camera),
             view=view,
             observation=observation,
             estimates=estimates,
@@ -155,6 +160,20 @@ class OnBoard:
             command=command,
             ending=ending,
         )
+
+    def _pose(self, state: TrafficState, ego: int) -> CameraPose:
+        grade = self._body.update(float(state.acceleration[ego]))
+        heading, setback = float(state.heading[ego]), self._scenario.camera.setback_m
+        return mounted_pose(self._camera, state.position[ego], heading, setback, grade)
+
+    def _see(
+        self, world: World, state: TrafficState, ego: int, pose: CameraPose, time: float
+    ) -> tuple[View, NDArray[np.float32]]:
+        """What is drawn without air, and the radiance that comes through the air."""
+        camera, samples = self._drawn_camera, self._scenario.camera.samples
+        view = world.renderer.render(vehicle_batches(state, ego), camera, pose)
+        radiance = Air(world.fog).radiance(view, camera, pose, time=time)
+        return middle_samples(view, samples), averaged(radiance, samples)
 
     def _observe(self, frame: Frame, snapshot: TrafficSnapshot, signs: SignMap, streams: Streams) -> Observation:
         state, ego = snapshot.state, snapshot.ego
@@ -173,7 +192,7 @@ class OnBoard:
         self._world, self._streams = None, None
 
 
-def fog_truth(fog: FogField, pose: CameraPose) -> Truth:
+def fog_truth(fog: FogField, pose: CameraPose, camera: Camera) -> Truth:
     """The fog at a camera, and as far as it sees along its heading.
 
     Parameters
@@ -182,6 +201,8 @@ def fog_truth(fog: FogField, pose: CameraPose) -> Truth:
         The fog.
     pose : CameraPose
         Where the camera is.
+    camera : Camera
+        Its true calibration.
     """
     eye = np.array(pose.position)
     direction = np.array([math.cos(pose.heading), math.sin(pose.heading), 0.0])
@@ -192,4 +213,7 @@ def fog_truth(fog: FogField, pose: CameraPose) -> Truth:
     return Truth(
         extinction=float(extinction(fog, eye)),
         extinction_ahead=OPTICAL_DEPTH_AT_VISIBILITY / sight if reached else 0.0,
+        camera=camera,
+        pose=pose,
+        fog=fog,
     )

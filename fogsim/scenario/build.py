@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fogsim.advice import ADVISERS, Adviser
 from fogsim.atmosphere import airlight_from_illuminance
-from fogsim.camera import Sensor
+from fogsim.camera import AutoExposure, BodyPitch, Metering, Photographer, Sensor, Suspension
 from fogsim.estimators import ESTIMATORS, Estimator
 from fogsim.fusion import FUSIONS, Fusion
 from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy
@@ -31,6 +31,9 @@ from fogsim.values import Camera, FogBank, FogField
 
 AIRLIGHT_EXPOSURE = 0.6
 """Share of saturation at which the fixed exposure puts the airlight: bright fog, yet room for lamps above it."""
+
+METERED_PERCENT = {Metering.HIGHLIGHTS: 65.0, Metering.LOG_AVERAGE: 18.0}
+"""Share of saturation at which automatic exposure holds what it meters, where a scenario does not say [%]."""
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -137,6 +140,7 @@ def camera(scenario: Scenario) -> Camera:
         pitch=math.radians(section.pitch_deg),
         roll=math.radians(section.roll_deg),
         response=section.response,
+        bits=section.bits,
     )
 
 
@@ -145,20 +149,52 @@ def told_camera(scenario: Scenario) -> Camera:
     true, told = camera(scenario), scenario.camera.told
     return dataclasses.replace(
         true,
+        mount_height=true.mount_height * (1.0 + told.mount_height_error_percent / 100.0),
         pitch=true.pitch + math.radians(told.pitch_error_deg),
+        roll=true.roll + math.radians(told.roll_error_deg),
         focal_length=true.focal_length * (1.0 + told.focal_length_error_percent / 100.0),
     )
 
 
+def photographer(scenario: Scenario) -> Photographer:
+    """What takes the pictures of the ego's camera."""
+    section = scenario.camera
+    auto = auto_exposure(scenario) if section.automatic else None
+    period = scenario.clocks.camera_period_s
+    return Photographer(camera(scenario), sensor(scenario), auto, section.lens_shading, period)
+
+
 def sensor(scenario: Scenario) -> Sensor:
-    """Image sensor of the ego's camera; where no exposure is given, one that suits the scenario's light."""
+    """Image sensor of the ego's camera, at the exposure that it has if it is fixed."""
     section = scenario.camera
     airlight = max(airlight_from_illuminance(scenario.light.illuminance_lx))
     return Sensor(
         saturation_luminance=section.saturation_luminance_cdpm2 or airlight / AIRLIGHT_EXPOSURE,
         full_well=section.full_well_e,
         read_noise=section.read_noise_e,
+        bits=section.bits,
     )
+
+
+def auto_exposure(scenario: Scenario) -> AutoExposure:
+    """How the ego's camera sets its own exposure."""
+    section = scenario.camera.exposure
+    percent = METERED_PERCENT[section.metering] if section.target_percent is None else section.target_percent
+    return AutoExposure(
+        metering=section.metering,
+        target=percent / 100.0,
+        time_constant=section.time_constant_s,
+        brightest=section.brightest_cdpm2,
+        ungained=section.ungained_cdpm2,
+        darkest=section.darkest_cdpm2,
+    )
+
+
+def body_pitch(scenario: Scenario) -> BodyPitch:
+    """How the ego's body pitches when it brakes."""
+    body = scenario.camera.body
+    suspension = Suspension(math.radians(body.pitch_deg_per_mps2), body.time_constant_s)
+    return BodyPitch(suspension, scenario.clocks.camera_period_s)
 
 
 def lead_sensor(scenario: Scenario) -> LeadSensor:

@@ -15,10 +15,10 @@ from fogsim.estimators import ESTIMATORS
 from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.render import RENDERERS
+from fogsim.scenario.camera_schema import CameraSection
 from fogsim.scenario.methods import Method, method_of
 from fogsim.scenario.section import NotNegative, Positive, Section, Visibility
 from fogsim.scenario.traffic_schema import DriversSection, Traffic
-from fogsim.values import Response
 
 
 class Clocks(Section):
@@ -106,62 +106,6 @@ class Light(Section):
 
     illuminance_lx: Positive = 10_000.0
     """Horizontal illuminance of the overcast day."""
-
-
-class Told(Section):
-    """How the calibration that the vehicle is told differs from the true one."""
-
-    pitch_error_deg: float = Field(default=0.0, gt=-10, lt=10)
-    """Told minus true pitch."""
-
-    focal_length_error_percent: float = Field(default=0.0, gt=-50, lt=50)
-    """Told over true focal length, minus 1."""
-
-
-class CameraSection(Section):
-    """The ego's camera."""
-
-    width: int = Field(default=640, ge=16, le=8192)
-    """Columns of the image."""
-
-    height: int = Field(default=480, ge=16, le=8192)
-    """Rows of the image."""
-
-    field_of_view_deg: float = Field(default=58.0, gt=1, lt=170)
-    """Horizontal field of view; sets the focal length, whatever the size of the image."""
-
-    focal_length_px: Positive | None = None
-    """Focal length, in place of the field of view."""
-
-    principal_point_px: tuple[float, float] | None = None
-    """Principal point [u0, v0]; the middle of the image if not given."""
-
-    mount_height_m: Positive = 1.38
-    """Height of the camera above the road."""
-
-    setback_m: NotNegative = 1.7
-    """Distance of the camera behind the front bumper."""
-
-    pitch_deg: float = Field(default=2.0, gt=-45, lt=45)
-    """Pitch; positive looks down."""
-
-    roll_deg: float = Field(default=0.0, gt=-45, lt=45)
-    """Roll; positive turns the image's right side down."""
-
-    response: Response = Response.SRGB
-    """Curve from light to pixel values: `linear`, `gamma` (2.2) or `srgb`."""
-
-    saturation_luminance_cdpm2: Positive | None = None
-    """Luminance that fills a pixel; if not given, the airlight fills 60 % of it."""
-
-    full_well_e: Positive = 10_000.0
-    """Electrons that fill a pixel; sets the photon noise."""
-
-    read_noise_e: NotNegative = 5.0
-    """Standard deviation of the read noise in electrons."""
-
-    told: Told = Told()
-    """Errors of the calibration that the estimators are told."""
 
 
 class Lead(Section):

@@ -6,7 +6,6 @@ from enum import StrEnum
 
 from fogsim.errors import InputError
 
-
 BIT_DEPTHS = (8, 10, 12)
 """Bit depths that a camera can have."""
 

@@ -1,0 +1,152 @@
+"""The block of a scenario file about the ego's camera."""
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from fogsim.camera import Metering
+from fogsim.scenario.section import NotNegative, Positive, Section, Share
+from fogsim.values import Response
+
+MOST_SAMPLES = 16_384
+"""Columns and rows of samples that every OpenGL of today can draw."""
+
+
+class Told(Section):
+    """How the calibration that the vehicle is told differs from the true one."""
+
+    pitch_error_deg: float = Field(default=0.0, gt=-10, lt=10)
+    """Told minus true pitch."""
+
+    roll_error_deg: float = Field(default=0.0, gt=-10, lt=10)
+    """Told minus true roll."""
+
+    focal_length_error_percent: float = Field(default=0.0, gt=-50, lt=50)
+    """Told over true focal length, minus 1."""
+
+    mount_height_error_percent: float = Field(default=0.0, gt=-50, lt=50)
+    """Told over true height of the mount, minus 1."""
+
+
+class Exposure(Section):
+    """How the camera sets its exposure."""
+
+    mode: Literal["auto", "fixed"] | None = None
+    """`auto`, or `fixed` at `saturation_luminance_cdpm2`; if not given, fixed where that is given, else auto."""
+
+    metering: Metering = Metering.HIGHLIGHTS
+    """What is held at the target: the 95th percentile of luminance (`highlights`) or its `log_average`."""
+
+    target_percent: float | None = Field(default=None, ge=1, le=100)
+    """Share of saturation at which it is held; if not given, 65 for highlights and 18 for the log average."""
+
+    time_constant_s: NotNegative = 0.5
+    """Time in which 63 % of a change of light is followed; 0 for the next frame."""
+
+    brightest_cdpm2: Positive = 100_000.0
+    """Luminance that fills a pixel at the shortest exposure."""
+
+    ungained_cdpm2: Positive = 100.0
+    """The same at the longest exposure; where that is too short the signal is amplified, and noisier."""
+
+    darkest_cdpm2: Positive = 4.0
+    """The same at the longest exposure with the most gain."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if not self.darkest_cdpm2 <= self.ungained_cdpm2 <= self.brightest_cdpm2:
+            raise ValueError(
+                "darkest_cdpm2, ungained_cdpm2 and brightest_cdpm2 must not decrease in this order, "
+                f"got {self.darkest_cdpm2:g}, {self.ungained_cdpm2:g} and {self.brightest_cdpm2:g}"
+            )
+        return self
+
+
+class BodySection(Section):
+    """How the vehicle's body moves the camera, of which the estimators are told nothing."""
+
+    pitch_deg_per_mps2: float = Field(default=0.0, ge=0, le=2)
+    """Pitch, nose down, for each m/s² of deceleration; cars have about 0.1 to 0.3."""
+
+    time_constant_s: NotNegative = 0.2
+    """Lag with which the body follows."""
+
+
+class CameraSection(Section):
+    """The ego's camera."""
+
+    width: int = Field(default=640, ge=16, le=8192)
+    """Columns of the image."""
+
+    height: int = Field(default=480, ge=16, le=8192)
+    """Rows of the image."""
+
+    samples: int = Field(default=1, ge=1, le=3)
+    """Samples a pixel side: 2 draws and fogs four for each pixel and averages their light, at four times the cost."""
+
+    field_of_view_deg: float = Field(default=58.0, gt=1, lt=170)
+    """Horizontal field of view; sets the focal length, whatever the size of the image."""
+
+    focal_length_px: Positive | None = None
+    """Focal length, in place of the field of view."""
+
+    principal_point_px: tuple[float, float] | None = None
+    """Principal point [u0, v0]; the middle of the image if not given."""
+
+    mount_height_m: Positive = 1.38
+    """Height of the camera above the road."""
+
+    setback_m: NotNegative = 1.7
+    """Distance of the camera behind the front bumper."""
+
+    pitch_deg: float = Field(default=2.0, gt=-45, lt=45)
+    """Pitch; positive looks down."""
+
+    roll_deg: float = Field(default=0.0, gt=-45, lt=45)
+    """Roll; positive turns the image's right side down."""
+
+    body: BodySection = BodySection()
+    """How braking pitches the camera."""
+
+    lens_shading: Share = 0.0
+    """Darkening of the corners: 1 for the cos⁴ of a thin lens, 0 for none."""
+
+    exposure: Exposure = Exposure()
+    """How the exposure is set."""
+
+    saturation_luminance_cdpm2: Positive | None = None
+    """Luminance that fills a pixel at a fixed exposure; if not given, the airlight fills 60 % of it."""
+
+    full_well_e: Positive = 10_000.0
+    """Electrons that fill a pixel; sets the photon noise."""
+
+    read_noise_e: NotNegative = 5.0
+    """Standard deviation of the read noise in electrons."""
+
+    response: Response = Response.SRGB
+    """Curve from light to pixel values: `linear`, `gamma` (2.2) or `srgb`."""
+
+    bits: Literal[8, 10, 12] = 8
+    """Bit depth; images of 10 and 12 bits are uint16."""
+
+    told: Told = Told()
+    """Errors of the calibration that the estimators are told."""
+
+    @property
+    def automatic(self) -> bool:
+        """Whether the camera sets its own exposure."""
+        mode = self.exposure.mode
+        return self.saturation_luminance_cdpm2 is None if mode is None else mode == "auto"
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.exposure.mode == "auto" and self.saturation_luminance_cdpm2 is not None:
+            raise ValueError(
+                "saturation_luminance_cdpm2 is that of a fixed exposure, but exposure.mode is auto; leave one out"
+            )
+        if max(self.width, self.height) * self.samples > MOST_SAMPLES:
+            raise ValueError(
+                f"width and height times samples must be at most {MOST_SAMPLES}, "
+                f"got {self.width} × {self.height} px with {self.samples} samples a pixel side"
+            )
+        return self

@@ -99,7 +99,9 @@ class TraciLink:
                 f"SUMO {self._where} has {clients} clients, and beginning anew would take the simulation away from the "
                 "others: start SUMO again for another run"
             )
-        self._connection.load(list(arguments))
+        # Loaded anew, a sumo-gui would wait for its button to be pressed, and forget whether to close at the end.
+        closes = self._connection.simulation.getOption("quit-on-end") == "true"
+        self._connection.load([*arguments, "--start", *(("--quit-on-end",) if closes else ())])
 
     def step(self) -> None:
         """Move by one step, when all other clients have asked for it too; see `SumoLink.step`."""

@@ -20,7 +20,9 @@ from fogsim.traffic.highway import (
     read_snapshot,
     road_network,
     same_roads,
+    take_over,
 )
+from fogsim.traffic.setup import UNTOUCHED
 from fogsim.values import Command, RoadNetwork, SignMap, Step
 from fogsim_envs.highway import highway_config, highway_scenario
 from fogsim_envs.spaces import LAMP_MODES, observation_space, observe
@@ -43,11 +45,12 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
     visibility : float
         Meteorological visibility of homogeneous fog [m]; ``inf`` for clear air.
     overrides : sequence of str
-        ``key.path=value`` each, as after ``fogsim run --set``, of the camera, light, sensors, estimators, drivers.
+        ``key.path=value`` each, as after ``fogsim run --set``, of the camera, light, sensors, estimators, drivers and
+        ``traffic.events``, which play whatever `drivers` is.
     image_size : tuple of int
         Width and height of the camera [px].
     drivers : bool
-        Whether the environment's own drivers see only what the fog lets them see.
+        Whether the environment's own drivers see only what the fog lets them see, and choose their speeds in it.
 
     Raises
     ------
@@ -72,7 +75,7 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
             raise InputError(f"FogCameraWrapper: expected an environment of highway-env, got {env!r}")
         size = (f"camera.width={image_size[0]}", f"camera.height={image_size[1]}")
         self._scenario = highway_scenario(highway_config(env.unwrapped), visibility, [*size, *overrides])
-        self._sight = build.driver_sight(self._scenario) if drivers else None
+        self._drivers = drivers
         self._onboard = OnBoard(self._scenario)
         self._network: RoadNetwork | None = None
         self._fleet: Fleet | None = None
@@ -101,10 +104,19 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
         self._network = network
         streams = spawn_streams(int(self._noise.integers(2**31)))
         fog = self._onboard.begin(streams, lambda: (network, SignMap())).fog
-        if self._sight is not None and fog.extinction > 0:
-            let_drivers_meet(FieldAccess(fog), self._fleet, self._sight)
+        self._meet(FieldAccess(fog), self._fleet, streams.traffic_seed)
         self._step = None
         return self._looked(observation), self._told(info)
+
+    def _meet(self, fog: FieldAccess, fleet: Fleet, seed: int) -> None:
+        """Let the environment's drivers meet the fog, if they shall, and play the script."""
+        setup = build.traffic_setup(self._scenario)
+        manners = setup.drivers if self._drivers else UNTOUCHED
+        conduct = take_over(fleet, manners, setup.events, seed, setup.advice_deceleration)
+        if self._drivers:
+            conduct.enter_fog(fog)
+            if setup.sight is not None:
+                let_drivers_meet(fog, fleet, setup.sight)
 
     def step(self, action: Any) -> tuple[dict[str, Any], Any, bool, bool, dict[str, Any]]:
         """Let the environment make its step, then look."""

@@ -27,7 +27,9 @@ class FogHighwayEnv(AdvisingEnv):
     Spaces, reward, ``info`` and rendering are those of ``fogsim/FogAdvisory-v0``
     (`fogsim_envs.advisory.FogAdvisoryEnv`); highway-env has no signs, so ``signs_mask`` is 0. The ego keeps its lane
     and follows its leader by IDM; advice sets its target speed. Neither it nor the other drivers react to a leader
-    that they cannot see in the fog.
+    that they cannot see in the fog; the others choose their speed in it and follow advice as the scenario's ``drivers``
+    say, and do what its ``traffic.events`` script. Vehicles are called ``ego``, ``lead`` (ahead of the ego in its lane
+    at the reset) and by kind and place in the environment's list, such as ``IDMVehicle 3``.
 
     ### Start and end
     A reset of the highway-env environment. Terminated by a collision of the ego or at the end of its road; truncated
@@ -37,8 +39,8 @@ class FogHighwayEnv(AdvisingEnv):
     environment : id of a highway-env environment
     config : its configuration
     visibility : meteorological visibility of homogeneous fog [m]; ``inf`` for clear air
-    overrides : ``key.path=value`` each, as after ``fogsim run --set`` (not those of ``traffic``);
-    ``reset(options={"overrides": [...]})`` adds to them for one episode
+    overrides : ``key.path=value`` each, as after ``fogsim run --set`` (of ``traffic`` not those that name files or the
+    ego); ``reset(options={"overrides": [...]})`` adds to them for one episode
     image_size, continuous, reward_weights, render_mode : as of ``fogsim/FogAdvisory-v0``
 
     ### Version history
@@ -111,7 +113,16 @@ def highway_scenario(config: Mapping[str, Any], visibility: float, overrides: Se
     """
     duration = [f"duration_s={float(config['duration'])!r}"] if "duration" in config else []
     fog = f"fog.visibility_m={visibility!r}"
-    return attached_scenario(EGO, [*duration, fog, f"traffic.stop_before_end_m={END_MARGIN!r}", *overrides])
+    scenario = attached_scenario(EGO, [*duration, fog, f"traffic.stop_before_end_m={END_MARGIN!r}", *overrides])
+    traffic = scenario.traffic
+    foreign = [key for key in ("config", "net", "routes", "additional") if getattr(traffic, key)]
+    if foreign or traffic.ego != EGO:
+        key = foreign[0] if foreign else "ego"
+        raise InputError(
+            f"traffic.{key}: roads and vehicles are highway-env's own here, and the ego is called {EGO!r}; "
+            f"leave this key out; got {getattr(traffic, key)!r}"
+        )
+    return scenario
 
 
 def _clocks(config: Mapping[str, Any]) -> list[str]:
@@ -123,6 +134,14 @@ def _clocks(config: Mapping[str, Any]) -> list[str]:
 
 
 def _traffic(environment: Any, scenario: Scenario) -> HighwayTraffic:
-    written = scenario.traffic
-    sight = build.driver_sight(scenario)
-    return HighwayTraffic(environment, sight, written.reading_radius_m, written.advice_deceleration_mps2)
+    setup = build.traffic_setup(scenario)
+    return HighwayTraffic(
+        environment,
+        setup.sight,
+        setup.reading_radius,
+        setup.advice_deceleration,
+        setup.drivers,
+        setup.events,
+        setup.keep_lane,
+        setup.after_collision,
+    )

@@ -1,6 +1,7 @@
 """highway-env as a second traffic simulation; nothing else of FogSim knows that library."""
 
-from fogsim.traffic.highway.fleet import EGO, Fleet
+from fogsim.traffic.highway.conduct import Conduct, take_over
+from fogsim.traffic.highway.fleet import EGO, LEAD, Fleet
 from fogsim.traffic.highway.network import road_network, same_roads
 from fogsim.traffic.highway.perception import let_drivers_meet
 from fogsim.traffic.highway.reading import read_snapshot
@@ -8,6 +9,8 @@ from fogsim.traffic.highway.running import HighwayTraffic, is_highway_environmen
 
 __all__ = [
     "EGO",
+    "LEAD",
+    "Conduct",
     "Fleet",
     "HighwayTraffic",
     "is_highway_environment",
@@ -15,4 +18,5 @@ __all__ = [
     "read_snapshot",
     "road_network",
     "same_roads",
+    "take_over",
 ]

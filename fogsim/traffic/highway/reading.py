@@ -7,7 +7,7 @@ import numpy as np
 from highway_env.vehicle.objects import Landmark
 from numpy.typing import NDArray
 
-from fogsim.traffic.highway.fleet import Fleet, acceleration
+from fogsim.traffic.highway.fleet import Fleet, acceleration, ahead
 from fogsim.traffic.highway.network import lane_id, speed_limit, station_along, upright
 from fogsim.values import Collision, Leader, TrafficSnapshot, TrafficState
 
@@ -85,9 +85,8 @@ def _state(fleet: Fleet, vehicles: list[Any]) -> TrafficState:
 
 def _leader(fleet: Fleet) -> Leader | None:
     """What is ahead of the ego in its lane, seen or not."""
-    ego, road = fleet.ego, fleet.environment.road
-    # The class's own way, as the instance's may be that of drivers in fog.
-    front, _ = type(road).neighbour_vehicles(road, ego, ego.lane_index)
+    ego = fleet.ego
+    front = ahead(fleet.environment.road, ego)
     if front is None or isinstance(front, Landmark):
         return None
     gap = float(ego.lane_distance_to(front)) - 0.5 * (ego.LENGTH + front.LENGTH)

@@ -1,17 +1,21 @@
 """highway-env as the traffic of a closed loop."""
 
-import math
+from collections.abc import Sequence
 from typing import Any
 
 from highway_env.envs.common.abstract import AbstractEnv
 from highway_env.vehicle.behavior import IDMVehicle
 
-from fogsim.errors import InputError, SimulationError
+from fogsim.errors import InputError, SimulationError, suggest
+from fogsim.traffic.drivers import DriverSetup
+from fogsim.traffic.events import Event
 from fogsim.traffic.highway.collisions import CollisionWatch
-from fogsim.traffic.highway.fleet import Fleet
+from fogsim.traffic.highway.conduct import Conduct, take_over
+from fogsim.traffic.highway.fleet import LEAD, Fleet
 from fogsim.traffic.highway.network import planned_route, road_network, same_roads, speed_limit
 from fogsim.traffic.highway.perception import let_drivers_meet
 from fogsim.traffic.highway.reading import read_snapshot
+from fogsim.traffic.setup import UNTOUCHED, AfterCollision
 from fogsim.traffic.sight import DriverSight, FogAccess
 from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot
 
@@ -36,7 +40,15 @@ class HighwayTraffic:
     reading_radius : float
         Vehicles farther from the ego than this are not read [m].
     advice_deceleration : float
-        How hard an advised vehicle slows down to the advice [m/s²].
+        How hard vehicles slow down to a speed that they are advised or choose [m/s²].
+    drivers : DriverSetup
+        How drivers choose their speed in fog and follow advice; the ego's follows its advice as it is.
+    events : sequence of Event
+        What is scripted; vehicles are named as in `Fleet.name`, the one ahead of the ego at the beginning `LEAD`.
+    keep_lane : sequence of str
+        Vehicles that never change lane.
+    after_collision : AfterCollision
+        What becomes of vehicles that have collided; the ego stays in any case.
 
     Raises
     ------
@@ -50,6 +62,10 @@ class HighwayTraffic:
         sight: DriverSight | None,
         reading_radius: float = 1000.0,
         advice_deceleration: float = 2.0,
+        drivers: DriverSetup = UNTOUCHED,
+        events: Sequence[Event] = (),
+        keep_lane: Sequence[str] = (),
+        after_collision: AfterCollision = AfterCollision.STOP,
     ) -> None:
         if not is_highway_environment(environment):
             raise InputError(f"expected an environment of highway-env without wrappers, got {environment!r}")
@@ -57,11 +73,15 @@ class HighwayTraffic:
         self._sight = sight
         self._reading_radius = reading_radius
         self._advice_deceleration = advice_deceleration
+        self._drivers = drivers
+        self._events = tuple(events)
+        self._keep_lane = tuple(keep_lane)
+        self._after_collision = after_collision
         self._fog: FogAccess | None = None
         self._fleet: Fleet | None = None
         self._watch: CollisionWatch | None = None
+        self._conduct: Conduct | None = None
         self._network: RoadNetwork | None = None
-        self._own_speed: dict[Any, float] = {}
 
     @property
     def step_length(self) -> float:
@@ -74,10 +94,12 @@ class HighwayTraffic:
         Parameters
         ----------
         seed : int
-            Seed of the environment.
+            Seed of the environment and of the drivers' differences.
 
         Raises
         ------
+        InputError
+            If the script names a vehicle that is not there.
         SimulationError
             If the environment has no vehicle to control, or has built other roads than before.
         """
@@ -86,7 +108,8 @@ class HighwayTraffic:
             raise SimulationError(f"{type(self._environment).__name__} has no controlled vehicle to become the ego")
         self._fleet = Fleet(self._environment, _driver_for(self._environment))
         self._watch = CollisionWatch(self._fleet)
-        self._own_speed = {}
+        self._conduct = take_over(self._fleet, self._drivers, self._events, seed, self._advice_deceleration)
+        self._hold_in_lane(self._fleet)
         network = road_network(self._environment.road, self._fleet.ego)
         if self._network is not None and not same_roads(self._network, network):
             raise SimulationError(
@@ -102,8 +125,19 @@ class HighwayTraffic:
         self._meet_fog()
 
     def _meet_fog(self) -> None:
-        if self._fleet is not None and self._fog is not None and self._sight is not None:
+        if self._fleet is None or self._conduct is None or self._fog is None:
+            return
+        self._conduct.enter_fog(self._fog)
+        if self._sight is not None:
             let_drivers_meet(self._fog, self._fleet, self._sight)
+
+    def _hold_in_lane(self, fleet: Fleet) -> None:
+        vehicles = fleet.present()
+        for name in self._keep_lane:
+            if name not in vehicles and name != LEAD:
+                raise InputError(f"traffic.keep_lane: there is no vehicle {name!r}; {suggest(name, vehicles)}")
+            if isinstance(vehicles.get(name), IDMVehicle):
+                vehicles[name].enable_lane_change = False
 
     def network(self) -> tuple[RoadNetwork, SignMap]:
         """Roads, and no signs: highway-env has none; after `start`."""
@@ -113,56 +147,35 @@ class HighwayTraffic:
 
     def advance(self, command: Command) -> None:
         """Move by one simulation step with a command in force."""
-        fleet, watch = self._running()
+        fleet, watch, conduct = self._running()
         fleet.ego_lamps = command.lamps
-        self._advise(fleet, command)
+        conduct.command = command
         fleet.environment.road.act()
         fleet.environment.road.step(self.step_length)
         fleet.environment.steps += 1
         fleet.environment.time += self.step_length
         watch.look(self.step_length)
-
-    def _advise(self, fleet: Fleet, command: Command) -> None:
-        """Set the target speeds of those who are advised, and give back their own to those who no longer are."""
-        for vehicle in fleet.environment.road.vehicles:
-            # Target speeds of those who give way at a junction are the road's for that time.
-            if not isinstance(vehicle, IDMVehicle) or getattr(vehicle, "is_yielding", False):
-                continue
-            if vehicle is fleet.ego:
-                advised = command.advice.speed
-            else:
-                advised = command.advised_speeds.get(fleet.name(vehicle), math.inf)
-            if math.isfinite(advised):
-                self._own_speed.setdefault(vehicle, vehicle.target_speed)
-                vehicle.target_speed = self._eased(vehicle, advised)
-            elif vehicle in self._own_speed:
-                vehicle.target_speed = self._own_speed.pop(vehicle)
-
-    def _eased(self, vehicle: Any, speed: float) -> float:
-        """Target speed on the way to an advised one at which IDM slows down no harder than the advice asks.
-
-        On a free road IDM's acceleration is a (1 − (v / v₀)^δ), so −b follows from v₀ = v / (1 + b / a)^(1/δ).
-        """
-        ratio = 1.0 + self._advice_deceleration / vehicle.COMFORT_ACC_MAX
-        return float(max(speed, vehicle.speed / ratio ** (1.0 / vehicle.DELTA)))
+        if self._after_collision is AfterCollision.REMOVE:
+            road = fleet.environment.road
+            road.vehicles = [v for v in road.vehicles if v is fleet.ego or not v.crashed]
 
     def observe(self) -> TrafficSnapshot | None:
         """Tell where everybody is and what has happened since the last call; None once the ego has left.
 
         The impact speed of a collision is the length of the difference of both velocities.
         """
-        fleet, watch = self._running()
+        fleet, watch, _ = self._running()
         return read_snapshot(fleet, self.network()[0].route, watch.tell(), self._reading_radius)
 
-    def _running(self) -> tuple[Fleet, CollisionWatch]:
-        if self._fleet is None or self._watch is None:
+    def _running(self) -> tuple[Fleet, CollisionWatch, Conduct]:
+        if self._fleet is None or self._watch is None or self._conduct is None:
             raise SimulationError("the traffic has not been started, or is closed")
-        return self._fleet, self._watch
+        return self._fleet, self._watch, self._conduct
 
     def close(self) -> None:
         """End the simulation; closing twice is allowed."""
         self._environment.close()
-        self._fleet, self._watch, self._network = None, None, None
+        self._fleet, self._watch, self._conduct, self._network = None, None, None, None
 
 
 def _driver_for(environment: Any) -> Any:

@@ -1,0 +1,115 @@
+"""The script of a scenario, acted out by highway-env's vehicles."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from highway_env.vehicle.controller import ControlledVehicle
+
+from fogsim.errors import InputError, suggest
+from fogsim.traffic.control import Order
+from fogsim.traffic.events import Event, LaneChangeEvent, Script, Situation
+from fogsim.traffic.governor import governed_speed
+from fogsim.traffic.highway.fleet import LEAD, Fleet, acceleration
+from fogsim.traffic.highway.reading import front_bumper
+
+
+class Manoeuvres:
+    """Makes vehicles do what is scripted.
+
+    Parameters
+    ----------
+    fleet : Fleet
+        The vehicles.
+    events : sequence of Event
+        What is scripted.
+
+    Raises
+    ------
+    InputError
+        If it names a vehicle that is not there. That there is nobody ahead of the ego is no mistake, only chance.
+    """
+
+    def __init__(self, fleet: Fleet, events: Sequence[Event]) -> None:
+        there = list(dict.fromkeys([*fleet.present(), LEAD]))
+        for event in events:
+            if event.vehicle not in there:
+                raise InputError(
+                    f"traffic.events: there is no vehicle {event.vehicle!r} in "
+                    f"{type(fleet.environment).__name__}; {suggest(event.vehicle, there)}"
+                )
+        self._fleet = fleet
+        self._script = Script(events)
+        self._driven: dict[str, float] = {}
+        self._keeping_lane: dict[str, tuple[float, bool]] = {}
+
+    def begin(self) -> Mapping[str, Order]:
+        """Begin what is due, before the drivers decide.
+
+        Returns
+        -------
+        mapping from vehicle id to Order
+            Speeds for this step, for `hold` once the drivers have decided.
+        """
+        vehicles = self._fleet.present()
+        self._let_change_lanes_again(vehicles)
+        doings = self._script.play(self._situation(vehicles))
+        for event in doings.lane_changes:
+            self._change_lane(vehicles[event.vehicle], event)
+        self._fleet.dark = self._script.dark
+        for name, vehicle in vehicles.items():
+            self._driven[name] = self._driven.get(name, 0.0) + max(vehicle.speed, 0.0) * self._fleet.step_length
+        return doings.orders
+
+    def hold(self, orders: Mapping[str, Order]) -> None:
+        """Slow vehicles down to the speeds of their orders, whatever their drivers have decided.
+
+        Parameters
+        ----------
+        orders : mapping from vehicle id to Order
+            From `begin`.
+        """
+        vehicles = self._fleet.present() if orders else {}
+        for name, (target, deceleration) in orders.items():
+            vehicle = vehicles[name]
+            vehicle.action["acceleration"] = _held(vehicle, target, deceleration, self._fleet.step_length)
+
+    def _situation(self, vehicles: Mapping[str, Any]) -> Situation:
+        ego = self._fleet.ego
+
+        def gap_to_ego(name: str) -> float:
+            there = ego in vehicles.values()
+            return math.dist(front_bumper(vehicles[name]), front_bumper(ego)) if there else math.inf
+
+        return Situation(self._fleet.time, set(vehicles), lambda name: self._driven.get(name, 0.0), gap_to_ego)
+
+    def _change_lane(self, vehicle: Any, event: LaneChangeEvent) -> None:
+        """Aim for another lane, as far over as there are lanes, and stay there: MOBIL would call it off."""
+        if not isinstance(vehicle, ControlledVehicle):
+            raise InputError(
+                f"traffic.events: {event.vehicle!r} cannot change lane: a {type(vehicle).__name__} steers for no lane"
+            )
+        start, end, index = vehicle.lane_index
+        lanes = len(vehicle.road.network.graph[start][end])
+        # highway-env counts lanes from the left.
+        vehicle.target_lane_index = (start, end, min(max(index - event.lanes, 0), lanes - 1))
+        if hasattr(vehicle, "enable_lane_change"):
+            _, own = self._keeping_lane.get(event.vehicle, (0.0, vehicle.enable_lane_change))
+            self._keeping_lane[event.vehicle] = (self._fleet.time + event.stay, own)
+            vehicle.enable_lane_change = False
+
+    def _let_change_lanes_again(self, vehicles: Mapping[str, Any]) -> None:
+        for name, (until, own) in list(self._keeping_lane.items()):
+            if self._fleet.time >= until:
+                del self._keeping_lane[name]
+                if name in vehicles:
+                    vehicles[name].enable_lane_change = own
+
+
+def _held(vehicle: Any, target: float, deceleration: float, step_length: float) -> float:
+    """Acceleration of a vehicle that is brought to a speed and kept there [m/s²]; it does not roll backwards."""
+    # What no driver steers is left to roll.
+    own = acceleration(vehicle) if isinstance(vehicle, ControlledVehicle) else 0.0
+    hardest = min(deceleration, getattr(vehicle, "ACC_MAX", math.inf))
+    asked = (governed_speed(vehicle.speed, target, hardest, step_length) - vehicle.speed) / step_length
+    return float(max(min(own, asked), -max(vehicle.speed, 0.0) / step_length))

@@ -83,6 +83,42 @@ def test_its_duration_truncates() -> None:
     assert ends == [(False, False), (False, True)]
 
 
+def reset_with(*overrides: str, steps: int = 0, advised: Any = NO_ADVICE, **config: Any) -> list[Any]:
+    """Vehicles of an environment after some steps."""
+    env = gymnasium.make(ID, config={**FEW, **config}, image_size=(64, 48), overrides=overrides)
+    env.reset(seed=6)
+    for _ in range(steps):
+        env.step(advised)
+    environment: Any = env.unwrapped
+    vehicles = list(environment._simulation._traffic._environment.road.vehicles)
+    env.close()
+    return vehicles
+
+
+def test_the_scenarios_drivers_drive_here_too() -> None:
+    """Within 40 m one stops from (−2.5 + √(2.5² + 2 · 40 / 3.4)) · 3.4 = 10.05 m/s."""
+    foggy = ("fog.visibility_m=40", "drivers.speed_spread=0")
+    careful = reset_with(*foggy, "drivers.speed_choice=within_sight", steps=16)
+    heedless = reset_with(*foggy, "drivers.speed_choice=unaffected", steps=16)
+    assert [v.target_speed for v in careful[1:]] == pytest.approx([10.05] * 8, abs=0.01)
+    assert min(v.target_speed for v in heedless[1:]) > 20.0
+
+
+@pytest.mark.parametrize(("rate", "obeyed"), [(0.0, 0), (1.0, 8)])
+def test_advice_to_all_reaches_those_who_comply(rate: float, obeyed: int) -> None:
+    told = ("fog.visibility_m=inf", "drivers.advised=all", f"drivers.compliance.rate={rate}")
+    vehicles = reset_with(*told, steps=24, advised=np.array([1, 0]))
+    assert sum(v.target_speed == pytest.approx(30 / 3.6) for v in vehicles[1:]) == obeyed
+    assert vehicles[0].target_speed == pytest.approx(30 / 3.6)
+
+
+def test_the_scenarios_events_happen_here_too() -> None:
+    events = "traffic.events=[{kind: break_down, vehicle: lead, at_time_s: 0.5, lamps: false}]"
+    one_lane = {"lanes_count": 1, "vehicles_count": 2}
+    assert reset_with(events, steps=20, **one_lane)[1].speed == 0.0
+    assert reset_with(steps=20, **one_lane)[1].speed > 15.0
+
+
 def test_vector_environments() -> None:
     envs = gymnasium.make_vec(ID, num_envs=2, **SMALL)
     try:
@@ -97,6 +133,12 @@ def test_bad_arguments() -> None:
         gymnasium.make(ID, environment="CartPole-v1")
     with pytest.raises(InputError, match="visibility_m"):
         gymnasium.make(ID, visibility=-1.0)
+    with pytest.raises(InputError, match=r"traffic\.ego: .*highway-env's own here.*got 'veh0'"):
+        gymnasium.make(ID, overrides=["traffic.ego=veh0"])
+    env = gymnasium.make(ID, overrides=["traffic.events=[{kind: lamps_fail, vehicle: led, at_time_s: 0}]"], **SMALL)
+    with pytest.raises(InputError, match=r"no vehicle 'led' in HighwayEnv; did you mean 'lead'"):
+        env.reset(seed=1)
+    env.close()
     with pytest.raises(InputError, match="environment of highway-env"):
         FogCameraWrapper(gymnasium.make("CartPole-v1"))
 
@@ -129,6 +171,24 @@ def test_the_wrappers_drivers_do_not_see_through_fog() -> None:
         return sum(f is not None for f in found)
 
     assert front(15.0) < front(math.inf)
+
+
+@pytest.mark.parametrize(("drivers", "slower"), [(True, True), (False, False)])
+def test_the_wrappers_drivers_choose_their_speed_and_play_the_script(drivers: bool, slower: bool) -> None:
+    settings = (
+        "drivers.speed_choice=within_sight",
+        "traffic.events=[{kind: brake, vehicle: IDMVehicle 8, at_time_s: 1, to_speed_kmh: 18}]",
+    )
+    plain = gymnasium.make("highway-v0", config=FEW)
+    env = FogCameraWrapper(plain, image_size=(64, 48), visibility=40.0, drivers=drivers, overrides=settings)
+    env.reset(seed=4)
+    road: Any = env.unwrapped.road  # type: ignore[attr-defined]
+    for _ in range(6):
+        env.step(1)
+    speeds = [v.speed for v in road.vehicles[1:]]
+    env.close()
+    assert speeds[-1] == pytest.approx(5.0)
+    assert (max(speeds[:-1]) < 16.0) == slower
 
 
 def test_the_wrapper_needs_a_reset() -> None:

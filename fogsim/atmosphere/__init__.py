@@ -3,7 +3,21 @@
 from fogsim.atmosphere.access import FieldAccess
 from fogsim.atmosphere.air import Air
 from fogsim.atmosphere.daylight import airlight_from_illuminance
+from fogsim.atmosphere.frustum import FrustumGrid, frustum_grid, radiance_through_grid
 from fogsim.atmosphere.koschmieder import fogged_radiance
-from fogsim.atmosphere.optical_depth import extinction, optical_depth
+from fogsim.atmosphere.medium import field_at
+from fogsim.atmosphere.optical_depth import extinction, optical_depth, optical_depth_along
 
-__all__ = ["Air", "FieldAccess", "airlight_from_illuminance", "extinction", "fogged_radiance", "optical_depth"]
+__all__ = [
+    "Air",
+    "FieldAccess",
+    "FrustumGrid",
+    "airlight_from_illuminance",
+    "extinction",
+    "field_at",
+    "fogged_radiance",
+    "frustum_grid",
+    "optical_depth",
+    "optical_depth_along",
+    "radiance_through_grid",
+]

@@ -3,7 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.atmosphere.frustum import frustum_grid, radiance_through_grid
 from fogsim.atmosphere.koschmieder import fogged_radiance
+from fogsim.atmosphere.medium import field_at, is_plain
+from fogsim.atmosphere.shading import airlight_source
 from fogsim.pinhole import ray_from_pixel
 from fogsim.values import Camera, CameraPose, FogField, Lights, View
 
@@ -49,5 +52,9 @@ class Air:
         (rows, cols, 3) float32
             Linear radiance at the camera [cd/m²].
         """
-        del lights, time
-        return fogged_radiance(view, self._field, pose.position, ray_from_pixel(camera, pose))
+        del lights
+        field = field_at(self._field, time)
+        if is_plain(field) and pose.position[2] <= field.top:
+            return fogged_radiance(view, field, pose.position, ray_from_pixel(camera, pose))
+        grid = frustum_grid(field, camera, pose)
+        return radiance_through_grid(view, grid, field.airlight, airlight_source(field, grid))

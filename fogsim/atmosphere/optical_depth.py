@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fogsim.atmosphere.medium import field_at, medium_of
-from fogsim.atmosphere.path_kernels import depths_along, depths_between, extinctions
+from fogsim.atmosphere.path_kernels import MOST_PIECES, depths_along, depths_between, extinctions
 from fogsim.values import FogField
 
 
@@ -57,6 +57,7 @@ def optical_depth(field: FogField, start: ArrayLike, end: ArrayLike, time: float
         np.ascontiguousarray(to.reshape(-1, 3)),
         medium_of(field_at(field, time)),
         depths.reshape(-1),
+        np.empty((2, 4 * MOST_PIECES)),
     )
     return depths
 
@@ -92,5 +93,6 @@ def optical_depth_along(
         at,
         medium_of(field_at(field, time)),
         depths,
+        np.empty((2, 4 * MOST_PIECES)),
     )
     return depths

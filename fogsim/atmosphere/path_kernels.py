@@ -21,8 +21,8 @@ FADED = 20.0
 """Scale heights above which nothing is left of ground fog."""
 
 _CELLS_IN_PIECE = 5.0
-_NODES = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970263)
-_WEIGHTS = (0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692)
+_NODES = np.array((0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970263))
+_WEIGHTS = np.array((0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692))
 
 
 @kernel
@@ -35,44 +35,70 @@ def soft_step(value: float, middle: float, edge: float) -> float:
 
 
 @kernel
-def _patch_factor(x: float, y: float, z: float, frame: NDArray[np.float64], factors: NDArray[np.float32]) -> float:
-    """Trilinear interpolation on the periodic grid, whose sizes are powers of two."""
-    east, north = x - frame[4], y - frame[5]
-    across = (east * frame[2] + north * frame[3]) * frame[0]
-    along = (north * frame[2] - east * frame[3]) * frame[0]
-    up = z * frame[1]
+def _patch_factor(across: float, along: float, up: float, factors: NDArray[np.float32]) -> float:
+    """Trilinear interpolation on the periodic grid, whose sizes are powers of two; places are in cells."""
     i, j, k = math.floor(across), math.floor(along), math.floor(up)
-    a, b, c = across - i, along - j, up - k
+    a, b, c = np.float32(across - i), np.float32(along - j), np.float32(up - k)
     most_i, most_j, most_k = factors.shape[2] - 1, factors.shape[1] - 1, factors.shape[0] - 1
     i0, j0, k0 = int(i) & most_i, int(j) & most_j, int(k) & most_k
     i1, j1, k1 = (i0 + 1) & most_i, (j0 + 1) & most_j, (k0 + 1) & most_k
-    low: float = (factors[k0, j0, i0] * (1 - a) + factors[k0, j0, i1] * a) * (1 - b)
-    low += (factors[k0, j1, i0] * (1 - a) + factors[k0, j1, i1] * a) * b
-    high: float = (factors[k1, j0, i0] * (1 - a) + factors[k1, j0, i1] * a) * (1 - b)
-    high += (factors[k1, j1, i0] * (1 - a) + factors[k1, j1, i1] * a) * b
-    return float(low * (1 - c) + high * c)
+    south, north = factors[k0, j0, i0], factors[k0, j1, i0]
+    high_south, high_north = factors[k1, j0, i0], factors[k1, j1, i0]
+    south += (factors[k0, j0, i1] - south) * a
+    north += (factors[k0, j1, i1] - north) * a
+    high_south += (factors[k1, j0, i1] - high_south) * a
+    high_north += (factors[k1, j1, i1] - high_north) * a
+    low = south + (north - south) * b
+    high = high_south + (high_north - high_south) * b
+    return float(low + (high - low) * c)
 
 
 @kernel
-def height_profile(z: float, layer: NDArray[np.float64]) -> float:
-    """Share of the extinction that is left at a height, 0 … 1."""
-    share: float = soft_step(z, layer[BASE], layer[BASE_EDGE]) - soft_step(z, layer[TOP], layer[TOP_EDGE])
-    if layer[DECAY] > 0.0 and z > layer[GROUND]:
-        share *= math.exp(-(z - layer[GROUND]) * layer[DECAY])
-    return share
+def _height_profile(z: float, base: float, base_edge: float, top: float, top_edge: float) -> float:
+    """Share of the extinction that is left at a height between base and top, 0 … 1."""
+    return soft_step(z, base, base_edge) - soft_step(z, top, top_edge)
 
 
 @kernel
-def extinction_at(x: float, y: float, z: float, medium: Medium) -> float:
-    """Extinction coefficient at a place [1/m]."""
-    k: float = medium.layer[EXTINCTION]
-    for bank in medium.banks:
-        station = (x - bank[0]) * bank[2] + (y - bank[1]) * bank[3]
-        k += bank[7] * (soft_step(station, bank[4], bank[6]) - soft_step(station, bank[5], bank[6]))
-    k *= height_profile(z, medium.layer)
-    if medium.factors.size > 1 and k > 0.0:
-        k *= _patch_factor(x, y, z, medium.frame, medium.factors)
-    return k
+def extinctions_on_ray(
+    start: NDArray[np.float64],
+    towards: NDArray[np.float64],
+    at: NDArray[np.float64],
+    medium: Medium,
+    values: NDArray[np.float64],
+) -> None:
+    """Extinction coefficient at distances along a ray [1/m].
+
+    One pass over the places for each part of the field: handing arrays to a function for every single place would take
+    longer than what is computed there.
+    """
+    layer, banks, frame, factors = medium.layer, medium.banks, medium.frame, medium.factors
+    base, base_edge, top, top_edge = layer[BASE], layer[BASE_EDGE], layer[TOP], layer[TOP_EDGE]
+    ground, decay = layer[GROUND], layer[DECAY]
+    x, y, z = start[0], start[1], start[2]
+    dx, dy, dz = towards[0], towards[1], towards[2]
+    values[:] = layer[EXTINCTION]
+    for b in range(banks.shape[0]):
+        here = (x - banks[b, 0]) * banks[b, 2] + (y - banks[b, 1]) * banks[b, 3]
+        rate = dx * banks[b, 2] + dy * banks[b, 3]
+        first, last, edge, extra = banks[b, 4], banks[b, 5], banks[b, 6], banks[b, 7]
+        for i in range(at.shape[0]):
+            station = here + rate * at[i]
+            values[i] += extra * (soft_step(station, first, edge) - soft_step(station, last, edge))
+    for i in range(at.shape[0]):
+        values[i] *= _height_profile(z + dz * at[i], base, base_edge, top, top_edge)
+    if decay > 0.0:
+        for i in range(at.shape[0]):
+            values[i] *= math.exp(-max(z + dz * at[i] - ground, 0.0) * decay)
+    if factors.size > 1:
+        level, upright, cosine, sine = frame[0], frame[1], frame[2], frame[3]
+        across = ((x - frame[4]) * cosine + (y - frame[5]) * sine) * level
+        along = ((y - frame[5]) * cosine - (x - frame[4]) * sine) * level
+        across_rate, along_rate = (dx * cosine + dy * sine) * level, (dy * cosine - dx * sine) * level
+        for i in range(at.shape[0]):
+            values[i] *= _patch_factor(
+                across + across_rate * at[i], along + along_rate * at[i], (z + dz * at[i]) * upright, factors
+            )
 
 
 @kernel
@@ -123,26 +149,27 @@ def unevenness(towards: NDArray[np.float64], medium: Medium) -> float:
 
 
 @kernel
-def piece_depth(
+def _piece_depth(
     start: NDArray[np.float64],
     towards: NDArray[np.float64],
     near: float,
     far: float,
     pieces: float,
     medium: Medium,
+    scratch: NDArray[np.float64],
 ) -> float:
-    """Optical depth of the part of a line between two edges [-]."""
-    z = start[2] + 0.5 * (near + far) * towards[2]
-    if height_profile(z, medium.layer) < 1e-9:
-        return 0.0
+    """Optical depth of the part of a line between two edges [-]; `scratch` is (2, 4 MOST_PIECES)."""
     count = int(min(max(math.ceil((far - near) * pieces), 1.0), MOST_PIECES))
-    step, depth = (far - near) / count, 0.0
+    step = (far - near) / count
+    at, values = scratch[0, : 4 * count], scratch[1, : 4 * count]
     for piece in range(count):
-        for node, weight in zip(_NODES, _WEIGHTS):  # noqa: B905 - numba knows no strict
-            at = near + (piece + node) * step
-            depth += weight * extinction_at(
-                start[0] + at * towards[0], start[1] + at * towards[1], start[2] + at * towards[2], medium
-            )
+        for n in range(4):
+            at[4 * piece + n] = near + (piece + _NODES[n]) * step
+    extinctions_on_ray(start, towards, at, medium, values)
+    depth = 0.0
+    for piece in range(count):
+        for n in range(4):
+            depth += _WEIGHTS[n] * values[4 * piece + n]
     return depth * step
 
 
@@ -153,6 +180,7 @@ def depths_along(
     distances: NDArray[np.float64],
     medium: Medium,
     depths: NDArray[np.float64],
+    scratch: NDArray[np.float64],
 ) -> None:
     """Optical depth from a point to places along one direction, at ascending distances [m]."""
     cuts = np.empty(8 + 4 * medium.banks.shape[0])
@@ -161,30 +189,36 @@ def depths_along(
     pieces = unevenness(towards, medium)
     for i in range(distances.shape[0]):
         while next_cut < count and cuts[next_cut] < distances[i]:
-            total += piece_depth(start, towards, here, cuts[next_cut], pieces, medium)
+            total += _piece_depth(start, towards, here, cuts[next_cut], pieces, medium, scratch)
             here = cuts[next_cut]
             next_cut += 1
-        total += piece_depth(start, towards, here, distances[i], pieces, medium)
+        total += _piece_depth(start, towards, here, distances[i], pieces, medium, scratch)
         here = distances[i]
         depths[i] = total
 
 
 @kernel
 def depths_between(
-    starts: NDArray[np.float64], ends: NDArray[np.float64], medium: Medium, depths: NDArray[np.float64]
+    starts: NDArray[np.float64],
+    ends: NDArray[np.float64],
+    medium: Medium,
+    depths: NDArray[np.float64],
+    scratch: NDArray[np.float64],
 ) -> None:
     """Optical depth of each of many straight lines, (n, 3) to (n, 3)."""
-    distance = np.empty(1)
+    distance, towards = np.empty(1), np.empty(3)
     for i in range(starts.shape[0]):
-        towards = ends[i] - starts[i]
-        distance[0] = math.sqrt(np.sum(towards * towards))
+        towards[:] = ends[i] - starts[i]
+        distance[0] = math.sqrt(towards[0] ** 2 + towards[1] ** 2 + towards[2] ** 2)
         depths[i] = 0.0
         if distance[0] > 0.0:
-            depths_along(starts[i], towards / distance[0], distance, medium, depths[i : i + 1])
+            towards /= distance[0]
+            depths_along(starts[i], towards, distance, medium, depths[i : i + 1], scratch)
 
 
 @kernel
 def extinctions(points: NDArray[np.float64], medium: Medium, values: NDArray[np.float64]) -> None:
     """Extinction coefficient at each of many places (n, 3)."""
+    nowhere, here = np.zeros(3), np.zeros(1)
     for i in range(points.shape[0]):
-        values[i] = extinction_at(points[i, 0], points[i, 1], points[i, 2], medium)
+        extinctions_on_ray(points[i], nowhere, here, medium, values[i : i + 1])

@@ -29,6 +29,19 @@ def respond(exposure: NDArray[np.float64], response: Response) -> NDArray[np.flo
             return np.where(exposure <= 0.0031308, 12.92 * exposure, bright)
 
 
+def eight_bit(image: NDArray[np.uint8] | NDArray[np.uint16], bits: int) -> NDArray[np.uint8]:
+    """Return an image in 8 bits, as screens show it; one that has them is returned itself.
+
+    Parameters
+    ----------
+    image : (rows, cols[, 3]) uint8, or uint16 for more than 8 bits
+        Pixel values 0 … 2^bits − 1.
+    bits : int
+        Their bit depth, at least 8.
+    """
+    return (image >> (bits - 8)).astype(np.uint8) if bits > 8 else image.astype(np.uint8, copy=False)
+
+
 def exposure_of(signal: NDArray[np.float64], response: Response) -> NDArray[np.float64]:
     """Relative exposure behind a signal, both 0 … 1: the inverse of `respond` (sRGB: IEC 61966-2-1).
 

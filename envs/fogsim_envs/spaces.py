@@ -46,10 +46,11 @@ LAMP_MODES = (
 
 
 def observation_space(camera: Camera) -> spaces.Dict:
-    """Space of observations with images of a camera's size."""
+    """Space of observations with images of a camera's size and bit depth."""
+    pixels = np.uint8 if camera.bits == 8 else np.uint16
     return spaces.Dict(
         {
-            "camera": spaces.Box(0, 255, (camera.height, camera.width, 3), np.uint8),
+            "camera": spaces.Box(0, 2**camera.bits - 1, (camera.height, camera.width, 3), pixels),
             "signs": spaces.Box(-1.0, 1.0, (SIGN_SLOTS, len(SIGN_FEATURES)), np.float32),
             "signs_mask": spaces.MultiBinary(SIGN_SLOTS),
             "state": spaces.Box(-1.0, 1.0, (len(STATE_FEATURES),), np.float32),

@@ -85,7 +85,7 @@ def _normal_table() -> NDArray[np.float32]:
     count = 1 << NORMAL_TABLE_BITS
     inverse = NormalDist().inv_cdf
     deviates = np.array([inverse((i + 0.5) / count) for i in range(count)])
-    table = (deviates / deviates.std()).astype(np.float32)
+    table: NDArray[np.float32] = (deviates / deviates.std()).astype(np.float32)
     table.setflags(write=False)
     return table
 

@@ -93,7 +93,7 @@ def followed(saturation: float, wanted: float, auto: AutoExposure, period: float
         Time between two frames [s].
     """
     share = -math.expm1(-period / auto.time_constant) if auto.time_constant > 0 else 1.0
-    return saturation * (wanted / saturation) ** share
+    return float(saturation * (wanted / saturation) ** share)
 
 
 def sensor_at(sensor: Sensor, saturation: float, auto: AutoExposure) -> Sensor:

@@ -5,6 +5,7 @@ gets no fringe, as it does where colour is averaged and fogged at one distance f
 """
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +76,8 @@ def middle_samples(view: View, side: int) -> View:
     if side == 1:
         return view
     pick = slice(side // 2, None, side)
-    layers = {field.name: getattr(view, field.name) for field in dataclasses.fields(view)}
-    kept = {name: layer if layer is None else np.ascontiguousarray(layer[pick, pick]) for name, layer in layers.items()}
+    layers: dict[str, Any] = {field.name: getattr(view, field.name) for field in dataclasses.fields(view)}
+    kept: dict[str, Any] = {
+        name: layer if layer is None else np.ascontiguousarray(layer[pick, pick]) for name, layer in layers.items()
+    }
     return dataclasses.replace(view, **kept)

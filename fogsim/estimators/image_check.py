@@ -7,12 +7,12 @@ from fogsim.errors import InputError
 from fogsim.values.camera import Camera
 
 
-def checked_image(image: object, camera: Camera) -> NDArray[np.uint8]:
+def checked_image(image: object, camera: Camera) -> NDArray[np.uint8] | NDArray[np.uint16]:
     """Return an image unchanged if it can have come from a camera.
 
     Parameters
     ----------
-    image : (rows, cols) or (rows, cols, 3) uint8
+    image : (rows, cols) or (rows, cols, 3) uint8, or uint16 of a camera of 10 or 12 bits
         The pixels.
     camera : Camera
         The told calibration.
@@ -20,12 +20,13 @@ def checked_image(image: object, camera: Camera) -> NDArray[np.uint8]:
     Raises
     ------
     InputError
-        If it is not an array of uint8 with two or three axes, or not of the camera's size.
+        If it is not an array of the camera's bit depth with two or three axes, or not of the camera's size.
     """
+    expected, most = np.dtype(np.uint8 if camera.bits == 8 else np.uint16), 2**camera.bits - 1
     if not isinstance(image, np.ndarray):
-        raise InputError(f"an image must be a numpy array of uint8, got {type(image).__name__}")
-    if image.dtype != np.uint8:
-        raise InputError(f"an image must have dtype uint8 (0 … 255), got {image.dtype}")
+        raise InputError(f"an image must be a numpy array of {expected}, got {type(image).__name__}")
+    if image.dtype != expected:
+        raise InputError(f"an image of {camera.bits} bits must have dtype {expected} (0 … {most}), got {image.dtype}")
     if not (image.ndim == 2 or (image.ndim == 3 and image.shape[2] == 3)):
         raise InputError(f"an image must have shape (rows, cols) or (rows, cols, 3), got {image.shape}")
     if image.shape[:2] != (camera.height, camera.width):
@@ -33,4 +34,6 @@ def checked_image(image: object, camera: Camera) -> NDArray[np.uint8]:
             f"the image has {image.shape[1]}×{image.shape[0]} pixels (width × height), "
             f"the camera was told as {camera.width}×{camera.height}"
         )
+    if camera.bits > 8 and image.max() > most:
+        raise InputError(f"an image of {camera.bits} bits must have values 0 … {most}, got one of {image.max()}")
     return image

@@ -117,7 +117,7 @@ class Negru2013:
         Raises
         ------
         InputError
-            If the image is not uint8, not grey or colour, or not of the told camera's size.
+            If the image is not of the camera's bit depth, not grey or colour, or not of the told camera's size.
         """
         image = checked_image(observation.image, self._camera)
         diagnostics: dict[str, object] = {"horizon_row": self._camera.horizon_row}
@@ -136,7 +136,7 @@ class Negru2013:
             return self._no_fog(curve, road.horizon, diagnostics)
         return self._fog_estimate(model, road.horizon, diagnostics)
 
-    def _road_image(self, image: NDArray[np.uint8]) -> _RoadImage:
+    def _road_image(self, image: NDArray[np.uint8] | NDArray[np.uint16]) -> _RoadImage:
         horizon = calibrated_horizon(self._camera, self._pitch_deviation)
         rows, cols = image.shape[:2]
         if not 1.0 <= horizon.row <= rows - 1:
@@ -145,7 +145,8 @@ class Negru2013:
             raise _CannotTell("the image is too small to show a curve")
         sky_rows = math.ceil(horizon.row)
         first = max(0, sky_rows - 4 - rows // 20)
-        luminance = linear_luminance(levelled(image, self._camera)[first:], self._camera.response)
+        level = levelled(image, self._camera)[first:]
+        luminance = linear_luminance(level, self._camera.response, self._camera.bits)
         airlight = float(np.percentile(luminance[: sky_rows - first, ::4], 90))
         return _checked(_RoadImage(luminance, first, horizon, airlight, float(np.median(luminance[-1]))))
 

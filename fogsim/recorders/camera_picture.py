@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from fogsim.recorders.style import AMBER, BELIEF, GROUND, Colour, font
-from fogsim.values import Estimate, Step
+from fogsim.response import eight_bit
+from fogsim.values import Estimate, Frame, Observation, Step
 
 WIDTH, HEIGHT = 640, 480
 _ROWS: dict[str, tuple[str, Colour]] = {
@@ -20,7 +21,7 @@ _ROWS: dict[str, tuple[str, Colour]] = {
 
 def draw_camera_picture(step: Step) -> Image.Image:
     """Draw the camera's image into 640 × 480 pixels, its aspect kept, with marks at the rows that were found."""
-    pixels = step.observation.image
+    pixels = shown_image(step.observation)
     picture = Image.new("RGB", (WIDTH, HEIGHT), GROUND)
     scaled = scale_image(pixels, WIDTH, HEIGHT)
     left, top = (WIDTH - scaled.width) // 2, (HEIGHT - scaled.height) // 2
@@ -33,6 +34,12 @@ def draw_camera_picture(step: Step) -> Image.Image:
             # A pixel's centre has an integer coordinate, so the image begins half a pixel before row 0.
             _mark(draw, (left, left + scaled.width), top + (row + 0.5) * scale, label, colour)
     return picture
+
+
+def shown_image(observation: Observation) -> NDArray[np.uint8]:
+    """(rows, cols[, 3]) uint8: the image in 8 bits, whatever the camera has."""
+    frame = observation.frame
+    return eight_bit(frame.image, frame.camera.bits) if isinstance(frame, Frame) else eight_bit(frame, 8)
 
 
 def scale_image(pixels: NDArray[np.uint8], width: int, height: int) -> Image.Image:

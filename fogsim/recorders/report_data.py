@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.recorders.camera_picture import shown_image
 from fogsim.recorders.protocol import Derived
 from fogsim.values import Step
 
@@ -93,7 +94,7 @@ class Picture:
         """Take the picture of a step; the image is copied, since a camera may use its memory again."""
         low, middle, high = (step.belief.visibility_quantile(share) for share in (0.05, 0.5, 0.95))
         truth = _finite(step.truth.visibility_ahead)
-        return cls(step.time, step.route_position, truth, low, middle, high, step.observation.image.copy())
+        return cls(step.time, step.route_position, truth, low, middle, high, shown_image(step.observation).copy())
 
 
 class Album:

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -48,19 +49,19 @@ def calibrated_horizon(camera: Camera, pitch_deviation: float = PITCH_DEVIATION)
     return Horizon(row=camera.horizon_row, standard_deviation=deviation)
 
 
-def levelled(image: NDArray[np.uint8], camera: Camera) -> NDArray[np.uint8]:
+def levelled(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera) -> NDArray[np.uint8] | NDArray[np.uint16]:
     """Turn an image about the principal point such that its horizon is level.
 
     Parameters
     ----------
-    image : (rows, cols) or (rows, cols, 3) uint8
+    image : (rows, cols) or (rows, cols, 3) uint8 or uint16
         An image of the camera.
     camera : Camera
         The told calibration; its roll is what is undone.
 
     Returns
     -------
-    (rows, cols) or (rows, cols, 3) uint8
+    (rows, cols) or (rows, cols, 3), of the same type
         The image itself if the camera has no roll; else corners that it does not cover repeat its border.
     """
     if camera.roll == 0.0:
@@ -68,4 +69,5 @@ def levelled(image: NDArray[np.uint8], camera: Camera) -> NDArray[np.uint8]:
     # Positive roll turns the right side down, and OpenCV counts angles counterclockwise: the same angle undoes it.
     turn = cv2.getRotationMatrix2D(camera.principal_point, math.degrees(camera.roll), 1.0)
     size = (camera.width, camera.height)
-    return np.asarray(cv2.warpAffine(image, turn, size, borderMode=cv2.BORDER_REPLICATE), np.uint8)
+    level: NDArray[Any] = cv2.warpAffine(image, turn, size, borderMode=cv2.BORDER_REPLICATE)
+    return level

@@ -8,12 +8,14 @@ from numpy.typing import NDArray
 
 from fogsim.jit import kernel
 
+Pixels = NDArray[np.uint8] | NDArray[np.uint16]
+
 RED, GREEN, BLUE = np.float32(0.2126), np.float32(0.7152), np.float32(0.0722)
 
 
 @kernel
-def grey_luminance(image: NDArray[np.uint8], table: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Look every pixel up: (rows, cols) uint8 and (256,) float32 to (rows, cols) float32."""
+def grey_luminance(image: Pixels, table: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Look every pixel up: (rows, cols) uint8 or uint16 and (2^bits,) float32 to (rows, cols) float32."""
     rows, cols = image.shape
     out = np.empty((rows, cols), np.float32)
     for row in range(rows):
@@ -23,8 +25,8 @@ def grey_luminance(image: NDArray[np.uint8], table: NDArray[np.float32]) -> NDAr
 
 
 @kernel
-def colour_luminance(image: NDArray[np.uint8], table: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Look every channel up and weigh them: (rows, cols, 3) uint8 to (rows, cols) float32."""
+def colour_luminance(image: Pixels, table: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Look every channel up and weigh them: (rows, cols, 3) uint8 or uint16 to (rows, cols) float32."""
     rows, cols, _ = image.shape
     red, green, blue = table * RED, table * GREEN, table * BLUE
     out = np.empty((rows, cols), np.float32)

@@ -9,21 +9,23 @@ from fogsim.response import exposure_of
 from fogsim.values.camera import Response
 
 
-@lru_cache(maxsize=len(Response))
-def linear_table(response: Response) -> NDArray[np.float32]:
-    """Light behind each of the 256 pixel values, in linear grey levels.
+@lru_cache(maxsize=3 * len(Response))
+def linear_table(response: Response, bits: int = 8) -> NDArray[np.float32]:
+    """Light behind each pixel value, in linear grey levels that are the same for every bit depth.
 
     Parameters
     ----------
     response : Response
         The told curve of the camera.
+    bits : int
+        Its bit depth.
 
     Returns
     -------
-    (256,) float32
-        Linear grey levels 0 … 255, read-only; 0 and 255 map to themselves. sRGB: IEC 61966-2-1.
+    (2^bits,) float32
+        Linear grey levels 0 … 255, read-only; the first is 0 and the last 255. sRGB: IEC 61966-2-1.
     """
-    share = np.arange(256, dtype=np.float64) / 255.0
+    share = np.arange(2**bits, dtype=np.float64) / (2**bits - 1)
     table: NDArray[np.float32] = (255.0 * exposure_of(share, response)).astype(np.float32)
     table.flags.writeable = False
     return table

@@ -57,6 +57,57 @@ def test_noise_is_uncorrelated_between_neighbours_channels_and_frames() -> None:
         assert abs(np.corrcoef(one.ravel(), other.ravel())[0, 1]) < 0.02  # 4 standard deviations of 200² samples
 
 
+def test_noise_is_normal() -> None:
+    """Moments of 480 000 samples and the shares beyond 1, 2 and 3 standard deviations."""
+    sensor = Sensor(5000.0, full_well=1_000.0, read_noise=0.0, bits=12)
+    values = expose(grey(2500.0, 400), sensor, Response.LINEAR, np.random.default_rng(5)).astype(float).ravel()
+    normal = (values - 2047.5) / (4095.0 * (0.5 / 1_000.0) ** 0.5)
+    assert normal.mean() == pytest.approx(0.0, abs=0.006)
+    assert (normal**3).mean() == pytest.approx(0.0, abs=0.015)
+    assert (normal**4).mean() == pytest.approx(3.0, abs=0.04)
+    beyond = [float((np.abs(normal) > k).mean()) for k in (1, 2, 3)]
+    # 4096 classes have 5.5 of them beyond 3 standard deviations on either side.
+    assert beyond[:2] == pytest.approx([0.3173, 0.0455], rel=0.03)
+    assert beyond[2] == pytest.approx(0.0027, rel=0.12)
+
+
+def test_noise_of_one_frame_is_not_that_of_another_shifted() -> None:
+    rng = np.random.default_rng(6)
+    sensor = Sensor(5000.0, full_well=1_000.0, bits=12)
+    frames = [expose(grey(2500.0, 64), sensor, Response.LINEAR, rng).astype(float).ravel() - 2047.5 for _ in range(12)]
+    spectra = [np.fft.rfft(f / f.std(), 2 * f.size) for f in frames]
+    for i in range(1, len(frames)):
+        correlation = np.fft.irfft(spectra[0] * spectra[i].conj()) / frames[0].size
+        assert np.abs(correlation).max() < 0.06  # 6 standard deviations of 12 288 samples
+
+
+@pytest.mark.parametrize(("bits", "dtype"), [(8, np.uint8), (10, np.uint16), (12, np.uint16)])
+def test_bit_depths_span_their_range(bits: int, dtype: type) -> None:
+    silent = Sensor(5000.0, full_well=1e12, read_noise=0.0, bits=bits)
+    for response in Response:
+        ramp = np.repeat(np.linspace(0, 5000, 9000, dtype=np.float32)[None, :, None], 3, axis=2)
+        image = expose(ramp, silent, response, np.random.default_rng(0))
+        assert image.dtype == dtype
+        assert (image[0, 0, 0], image[0, -1, 0]) == (0, 2**bits - 1)
+        exact = (2**bits - 1) * respond(ramp[0, :, 0].astype(float) / 5000, response)
+        # Half a level of rounding, and what the steps of the table add where the curve is steep.
+        smooth = ramp[0, :, 0] > 50
+        assert np.abs(image[0, smooth, 0] - exact[smooth]).max() < 0.75
+
+
+def test_what_is_not_a_number_is_black_and_endless_light_is_white() -> None:
+    odd = np.zeros((3, 40, 3), np.float32)
+    odd[0], odd[1], odd[2] = np.nan, np.inf, -np.inf
+    image = expose(odd, SENSOR, Response.LINEAR, np.random.default_rng(0))
+    assert (image[0].max(), image[1].min(), image[2].max()) == (0, 255, 0)
+
+
+def test_any_layout_of_the_light_gives_the_same_picture() -> None:
+    light = np.random.default_rng(0).uniform(0, 5000, (40, 60, 3)).astype(np.float32)
+    images = [expose(v, SENSOR, Response.SRGB, np.random.default_rng(3)) for v in (light, np.asfortranarray(light))]
+    assert np.array_equal(*images)
+
+
 def test_the_same_generator_state_gives_the_same_image() -> None:
     images = [expose(grey(900.0), SENSOR, Response.SRGB, np.random.default_rng(3)) for _ in range(2)]
     assert np.array_equal(*images)

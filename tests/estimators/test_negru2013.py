@@ -120,6 +120,23 @@ def test_unsaturated_gain_changes_nothing_beyond_quantisation(render, road):
     assert dark.diagnostics["airlight"] == pytest.approx(0.5 * bright.diagnostics["airlight"], rel=0.01)
 
 
+@pytest.mark.parametrize(("bits", "factor"), [(10, 4), (12, 16)])
+def test_more_bits_of_the_same_picture_change_nothing(render, road, bits, factor):
+    image = render(road)
+    deep = estimate(image.astype(np.uint16) * factor, replace(road.camera, bits=bits))
+    assert deep.extinction == pytest.approx(estimate(image, road.camera).extinction, rel=1e-3)
+
+
+def test_a_bit_depth_that_was_not_told_is_an_error(render, road):
+    image = render(road)
+    with pytest.raises(InputError, match="8 bits must have dtype uint8"):
+        estimate(image.astype(np.uint16), road.camera)
+    with pytest.raises(InputError, match="10 bits must have dtype uint16"):
+        estimate(image, replace(road.camera, bits=10))
+    with pytest.raises(InputError, match="values 0 … 1023, got one of"):
+        estimate(image.astype(np.uint16) * 16, replace(road.camera, bits=10))
+
+
 def test_visibility_scales_with_the_told_height(render, road):
     image = render(road)
     tall = replace(road.camera, mount_height=2 * road.camera.mount_height)

@@ -10,7 +10,7 @@ from fogsim.recorders import FramePanel
 from fogsim.recorders.camera_picture import draw_camera_picture, scale_image
 from fogsim.recorders.strip_chart import Axis, Curve, StripChart
 from fogsim.recorders.style import ALARM, AMBER, BELIEF, TRUTH
-from fogsim.values import Collision, Ending, Lamp, Leader, Step
+from fogsim.values import Collision, Ending, Frame, Lamp, Leader, Step
 from tests.recorders.synthetic import drive, estimate, make_step
 
 
@@ -31,6 +31,16 @@ def test_a_frame_has_its_size_and_the_camera_image_on_the_left() -> None:
     assert frame.shape == (480, 1024, 3)
     assert frame.dtype == np.uint8
     np.testing.assert_array_equal(frame[2:480:4, 2:640:4], image)
+
+
+def test_images_of_more_bits_are_shown_in_eight() -> None:
+    image = np.arange(120 * 160 * 3, dtype=np.uint8).reshape(120, 160, 3)
+    step = make_step(image=image.astype(np.uint16) * 16 + 7)
+    frame = step.observation.frame
+    assert isinstance(frame, Frame)
+    deep = dataclasses.replace(frame, camera=dataclasses.replace(frame.camera, bits=12))
+    shown = draw(dataclasses.replace(step, observation=dataclasses.replace(step.observation, frame=deep)))
+    np.testing.assert_array_equal(shown[2:480:4, 2:640:4], image)
 
 
 def test_grey_images_and_odd_shapes_keep_their_aspect() -> None:

@@ -1,6 +1,8 @@
 import numpy as np
 import pytest
 
+from fogsim.errors import InputError
+from fogsim.response import exposure_of
 from fogsim.values import Response
 from fogsim.vision.luminance import linear_luminance
 from fogsim.vision.response import linear_table
@@ -45,3 +47,16 @@ def test_colour_is_weighed_as_luminance():
 def test_views_of_any_layout_are_taken():
     grey = np.random.default_rng(2).integers(0, 256, (20, 30), dtype=np.uint8)
     assert np.array_equal(linear_luminance(grey[::-1, ::2], Response.LINEAR), grey[::-1, ::2])
+
+
+@pytest.mark.parametrize("response", list(Response))
+@pytest.mark.parametrize("bits", [10, 12])
+def test_more_bits_are_the_same_light(response, bits):
+    deep = np.linspace(0, 2**bits - 1, 300).round().astype(np.uint16).reshape(10, 30)
+    share = deep / (2**bits - 1)
+    assert linear_luminance(deep, response, bits) == pytest.approx(255 * exposure_of(share, response), rel=1e-5)
+
+
+def test_a_type_that_the_bit_depth_does_not_have_is_an_error():
+    with pytest.raises(InputError, match="12 bits must have dtype uint16, got uint8"):
+        linear_luminance(np.zeros((2, 2), np.uint8), Response.LINEAR, 12)

@@ -1,6 +1,8 @@
 """Road, markings, signs, vehicles and roadside as plain geometry and materials."""
 
 from fogsim.scene.build import build_scene
+from fogsim.scene.signs import SIGN_KINDS
+from fogsim.scene.street_lamps import street_lamp_heads
 from fogsim.scene.vehicles import vehicle_batches
 
-__all__ = ["build_scene", "vehicle_batches"]
+__all__ = ["SIGN_KINDS", "build_scene", "street_lamp_heads", "vehicle_batches"]

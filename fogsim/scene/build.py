@@ -1,17 +1,24 @@
 """The scene that stands still, from a network and its signs."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from fogsim.errors import InputError
 from fogsim.scene.bodies import body_shapes
 from fogsim.scene.chainage import Chainage
+from fogsim.scene.crosslines import cross_lines
+from fogsim.scene.edges import Edge, edge_meshes, guard_rail, lane_edge
+from fogsim.scene.junctions import Areas, area_mesh, free_borders
 from fogsim.scene.polyline import LaneIndex, cleaned, parallel
-from fogsim.scene.road import FAST, edge_meshes, free_edges, guard_rail, lane_mesh, shoulder_width, terrain
+from fogsim.scene.relief import Relief
+from fogsim.scene.road import FAST, footway_mesh, free_edges, lane_mesh, terrain
 from fogsim.scene.roadside import placed, post_shapes, stations, trees
-from fogsim.scene.signs import sign_mesh
+from fogsim.scene.signs import gantries, gantry_mesh, sign_batches, sign_shapes
 from fogsim.scene.solids import merge
+from fogsim.scene.street_lamps import lamp_posts, street_lamp_shapes
 from fogsim.scene.trees import tree_shapes
-from fogsim.values.road import Lane, RoadNetwork, SignMap
+from fogsim.values.road import Lane, LaneKind, RoadNetwork, SignMap
 from fogsim.values.scene import Batch, Mesh, Scene
 
 _RAIL_BEHIND_SHOULDER = 0.5  # [m]
@@ -19,7 +26,7 @@ _POST_SPACING = 4.0  # of guard rails [m]
 _DELINEATOR_SPACING = 50.0  # [m]
 
 
-def build_scene(network: RoadNetwork, signs: SignMap, rng: np.random.Generator) -> Scene:
+def build_scene(network: RoadNetwork, signs: SignMap, rng: np.random.Generator, *, street_lamps: bool = False) -> Scene:
     """Build road, roadside and shapes of vehicles from any network of lanes.
 
     Parameters
@@ -30,6 +37,8 @@ def build_scene(network: RoadNetwork, signs: SignMap, rng: np.random.Generator) 
         The signs.
     rng : numpy Generator
         What scatters and shapes the trees.
+    street_lamps : bool
+        Whether lamps stand along the roads (see `street_lamp_heads`).
 
     Returns
     -------
@@ -42,36 +51,78 @@ def build_scene(network: RoadNetwork, signs: SignMap, rng: np.random.Generator) 
         If no lane has a length.
     """
     lanes = [lane for lane in network.lanes if len(lane.centreline) > 1 and len(cleaned(lane.centreline)) > 1]
-    if not lanes:
+    driven = [lane for lane in lanes if lane.kind in {LaneKind.CARRIAGEWAY, LaneKind.JUNCTION}]
+    if not driven:
         raise InputError(f"a scene needs at least one lane with a length, got {len(network.lanes)} lanes without")
-    ground = min(float(lane.centreline[:, 2].min()) for lane in lanes) - 0.1
-    index, chainage = LaneIndex(lanes), Chainage(lanes)
-    parts = [terrain(lanes, ground), *(lane_mesh(lane, chainage) for lane in lanes)]
-    posts: list[Batch] = []
-    stretches = []
+    index, relief = LaneIndex(lanes), Relief(lanes)
+    borders = _borders(network, lanes, index)
+    pavement, furniture, posts = _pavement(network, lanes, driven), _Furniture(index), list[Batch]()
+    for lane, edge in borders:
+        pavement += edge_meshes(edge, relief, index)
+        if lane is not None and lane.speed_limit >= FAST:
+            rails, standing = furniture.along(edge)
+            pavement += rails
+            posts += standing
+    bridges = gantries(signs.signs, driven)
+    hanging = [sign for gantry in bridges for sign in gantry.signs]
+    land = relief.mesh()
+    parts = [terrain(lanes, relief.plain), *pavement, *(gantry_mesh(gantry, relief) for gantry in bridges)]
+    shapes = {**body_shapes(), **post_shapes(), **tree_shapes(rng), **sign_shapes(signs.signs)}
+    edges = [edge for lane, edge in borders if lane is not None]
+    if street_lamps:
+        shapes |= street_lamp_shapes()
+        posts += lamp_posts(edges)
+    growing = trees([(edge.side, edge.line) for edge in edges], index, shapes, relief, rng)
+    scenery = _joined([*posts, *sign_batches(signs.signs, hanging, relief), *growing])
+    return Scene(ground=merge(parts if land is None else [*parts, land]), shapes=shapes, scenery=scenery)
+
+
+def _pavement(network: RoadNetwork, lanes: Sequence[Lane], driven: Sequence[Lane]) -> list[Mesh]:
+    """Lanes, junctions, footways and what is painted across them."""
+    chainage, areas = Chainage(driven), Areas(network.areas)
+    # Lanes across a junction show only where its area does not reach.
+    seen = [lane for lane in driven if lane.kind is LaneKind.CARRIAGEWAY or not areas.cover(lane.centreline)]
+    footways = [lane for lane in lanes if lane.kind is LaneKind.FOOTWAY]
+    paved = [area_mesh(area) for area in network.areas]
+    return [
+        *(lane_mesh(lane, chainage) for lane in seen),
+        *(footway_mesh(cleaned(lane.centreline), (-lane.width / 2, lane.width / 2)) for lane in footways),
+        *(area for area in paved if area is not None),
+        *cross_lines(lanes),
+    ]
+
+
+def _borders(network: RoadNetwork, lanes: Sequence[Lane], index: LaneIndex) -> list[tuple[Lane | None, Edge]]:
+    """Free sides of lanes outside junctions, and those of junctions, which belong to no lane."""
+    areas = Areas(network.areas)
+    found: list[tuple[Lane | None, Edge]] = []
     for lane in lanes:
-        for side, line in free_edges(lane, index):
-            stretches.append((side, line))
-            parts += edge_meshes(lane, side, line, chainage, ground)
-            if lane.speed_limit >= FAST:
-                rails, standing = _furniture(lane, side, line, index)
-                parts += rails
-                posts += standing
-    parts += [sign_mesh(sign, ground) for sign in signs.signs]
-    shapes = {**body_shapes(), **post_shapes(), **tree_shapes(rng)}
-    scenery = _joined([*posts, *trees(stretches, index, shapes, ground, rng)])
-    return Scene(ground=merge(parts), shapes=shapes, scenery=scenery)
+        if lane.kind is LaneKind.CROSSING or (lane.kind is LaneKind.JUNCTION and areas.cover(lane.centreline)):
+            continue
+        found += [(lane, lane_edge(lane, side, line)) for side, line in free_edges(lane, index)]
+    leading = [lane for lane in lanes if lane.kind in {LaneKind.CARRIAGEWAY, LaneKind.FOOTWAY}]
+    junctions = [area for area in network.areas if area.kind is LaneKind.JUNCTION]
+    if junctions and leading:
+        outside = LaneIndex(leading)
+        found += [(None, edge) for area in junctions for edge in free_borders(area, leading, outside)]
+    return found
 
 
-def _furniture(lane: Lane, side: int, line: np.ndarray, index: LaneIndex) -> tuple[list[Mesh], list[Batch]]:
-    """Guard rail, its posts and delineators along a free side, where they stand clear of other lanes."""
-    distance = lane.width / 2 + shoulder_width(lane, side) + _RAIL_BEHIND_SHOULDER
-    if np.any(index.clearance(parallel(line, side * (distance + 0.2)), same_level=2.5) < 0.4):
-        return [], []
-    posts, heading = stations(line, _POST_SPACING, side * (distance + 0.15))
-    delineators, direction = stations(line, _DELINEATOR_SPACING, side * (distance + 0.35))
-    batches = [placed("rail_post", posts, heading), placed("delineator", delineators, direction)]
-    return [guard_rail(line, side, distance)], batches
+class _Furniture:
+    """Guard rails, their posts and delineators along free sides, where they stand clear of other lanes."""
+
+    def __init__(self, index: LaneIndex) -> None:
+        self._index = index
+
+    def along(self, edge: Edge) -> tuple[list[Mesh], list[Batch]]:
+        """What stands along one free side."""
+        line, side, distance = edge.line, edge.side, edge.inner + edge.shoulder + _RAIL_BEHIND_SHOULDER
+        if np.any(self._index.clearance(parallel(line, side * (distance + 0.2)), same_level=2.5) < 0.4):
+            return [], []
+        posts, heading = stations(line, _POST_SPACING, side * (distance + 0.15))
+        delineators, direction = stations(line, _DELINEATOR_SPACING, side * (distance + 0.35))
+        batches = [placed("rail_post", posts, heading), placed("delineator", delineators, direction)]
+        return [guard_rail(line, side, distance)], batches
 
 
 def _joined(batches: list[Batch]) -> tuple[Batch, ...]:

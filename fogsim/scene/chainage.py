@@ -31,10 +31,17 @@ class Chainage:
         for lane in lanes:
             if lane.outermost or lane.edge_id not in self._reference:
                 self._reference[lane.edge_id] = cleaned(lane.centreline)
-        self._offset = _offsets(self._reference, _predecessors(lanes, self._reference))
+        opposites = _opposites(self._reference)
+        self._offset = _offsets(self._reference, _predecessors(lanes, self._reference), opposites)
+        # Of the two directions of a road, one is measured along the other.
+        self._other = {edge: other for edge, other in opposites.items() if edge > other}
 
     def along(self, lane: Lane, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distance along the lane's carriageway of points (n, 3) on it [m]."""
+        other = self._other.get(lane.edge_id)
+        if other is not None:
+            # Distances of both directions add up to the length of a dash, so that their dashes coincide.
+            return np.asarray(_DASH - self._offset[other] - project(points, self._reference[other]))
         return self._offset[lane.edge_id] + project(points, self._reference[lane.edge_id])
 
 
@@ -66,9 +73,10 @@ def _opposites(reference: Mapping[str, NDArray[np.float64]]) -> dict[str, str]:
     return found
 
 
-def _offsets(reference: Mapping[str, NDArray[np.float64]], before: Mapping[str, str]) -> dict[str, float]:
+def _offsets(
+    reference: Mapping[str, NDArray[np.float64]], before: Mapping[str, str], opposites: Mapping[str, str]
+) -> dict[str, float]:
     offsets: dict[str, float] = {}
-    opposites = _opposites(reference)
     for edge in reference:
         chain = [edge]
         while chain[-1] not in offsets and before.get(chain[-1]) not in (None, *chain):

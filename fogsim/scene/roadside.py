@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.scene.polyline import LaneIndex, arc_length, at_distance, left_normals
+from fogsim.scene.relief import Relief
 from fogsim.scene.solids import ROADSIDE, Material, box, merge
-from fogsim.values.scene import Batch, Mesh
+from fogsim.values.scene import Batch, Mesh, Surface
 
 TREE_CLEARANCE = 9.0
 """Least distance of a tree's trunk from the edge of any lane [m]."""
@@ -21,20 +22,20 @@ def post_shapes() -> dict[str, Mesh]:
     zinc = Material((0.26, 0.265, 0.27))
     white = Material((0.60, 0.60, 0.58))
     black = Material((0.02, 0.02, 0.02))
-    reflector = Material((0.75, 0.72, 0.62))
+    reflector = Material((0.75, 0.72, 0.62), Surface.SHEETING)
     delineator = (
-        _tube(0.0, 0.76, 0.05, 0.06, white),
-        _tube(0.76, 0.96, 0.05, 0.06, black),
-        _tube(0.78, 0.94, 0.055, 0.025, reflector),
+        tube(0.0, 0.76, 0.05, 0.06, white),
+        tube(0.76, 0.96, 0.05, 0.06, black),
+        tube(0.78, 0.94, 0.055, 0.025, reflector),
         box((-0.05, -0.06, 0.96), (0.05, 0.06, 1.05), white),
     )
     return {
-        "rail_post": _tube(-0.1, 0.74, 0.03, 0.06, zinc),
+        "rail_post": tube(-0.1, 0.74, 0.03, 0.06, zinc),
         "delineator": merge(delineator),
     }
 
 
-def _tube(bottom: float, top: float, half_depth: float, half_width: float, material: Material) -> Mesh:
+def tube(bottom: float, top: float, half_depth: float, half_width: float, material: Material) -> Mesh:
     """Four upright sides; the ends do not show."""
     upright = box((-half_depth, -half_width, bottom), (half_depth, half_width, top), material)
     level = np.abs(upright.normals[upright.faces[:, 0], 2]) > 0.5
@@ -61,7 +62,14 @@ def stations(line: Points, spacing: float, left: float) -> tuple[Points, NDArray
     return places, np.arctan2(-normal[:, 0], normal[:, 1])
 
 
-def placed(shape: str, places: Points, heading: NDArray[np.float64], size: NDArray[np.float64] | float = 1.0) -> Batch:
+def placed(
+    shape: str,
+    places: Points,
+    heading: NDArray[np.float64],
+    size: NDArray[np.float64] | float = 1.0,
+    *,
+    instance: int = ROADSIDE,
+) -> Batch:
     """Batch of copies standing at places, turned by headings [rad], scaled by sizes ((n, 3) or one number)."""
     count = len(places)
     scale = np.broadcast_to(np.asarray(size, np.float64), (count, 3))
@@ -76,7 +84,7 @@ def placed(shape: str, places: Points, heading: NDArray[np.float64], size: NDArr
         transforms=transforms,
         paint=np.zeros((count, 3), np.float32),
         lamps=np.zeros(count, np.int32),
-        instance=np.full(count, ROADSIDE, np.int32),
+        instance=np.full(count, instance, np.int32),
     )
 
 
@@ -84,7 +92,7 @@ def trees(
     stretches: Sequence[tuple[int, Points]],
     index: LaneIndex,
     shapes: Mapping[str, Mesh],
-    ground: float,
+    relief: Relief,
     rng: np.random.Generator,
 ) -> list[Batch]:
     """Trees near the road and woods behind them, clear of every lane.
@@ -97,8 +105,8 @@ def trees(
         The lanes.
     shapes : mapping from str to Mesh
         Among others the shapes of the trees.
-    ground : float
-        Height of the terrain [m].
+    relief : Relief
+        The land.
     rng : numpy Generator
         What scatters them.
     """
@@ -108,11 +116,11 @@ def trees(
     batches = []
     for name, members in (("conifer", conifers), ("broad_leaved", ~conifers)):
         kinds = sorted(shape for shape in shapes if shape.startswith(name) and ":" not in shape)
-        batches += _planted(near[members], kinds, ground, rng, height=(6.0, 15.0), slender=1.0)
+        batches += _planted(near[members], kinds, relief, rng, height=(6.0, 15.0), slender=1.0)
     far = _scatter(stretches, rng, spacing=60.0, nearest=75.0, reach=170.0, clumps=400.0)
     far = far[index.clearance(far) > 25.0]
     kinds = sorted(shape for shape in shapes if shape.startswith("woodland") and ":" not in shape)
-    return batches + _planted(far, kinds, ground, rng, height=(9.0, 16.0), slender=5.0)
+    return batches + _planted(far, kinds, relief, rng, height=(9.0, 16.0), slender=5.0)
 
 
 def _scatter(
@@ -147,13 +155,13 @@ def _clumps(places: NDArray[np.float64], wavelength: float, rng: np.random.Gener
 def _planted(
     places: Points,
     kinds: Sequence[str],
-    ground: float,
+    relief: Relief,
     rng: np.random.Generator,
     *,
     height: tuple[float, float],
     slender: float,
 ) -> list[Batch]:
-    standing = np.column_stack((places[:, :2], np.full(len(places), ground)))
+    standing = np.column_stack((places[:, :2], relief.height(places) - 0.05))
     kind = rng.integers(len(kinds), size=len(places))
     tall = rng.uniform(*height, len(places))
     wide = tall * slender * rng.uniform(0.85, 1.2, len(places))

@@ -152,6 +152,38 @@ def polygon(corners: ArrayLike, material: Material, toward: ArrayLike, instance:
     return mesh(points, faces, normals, material, instance=instance)
 
 
+def concave_faces(outline: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Triangles (m, 3) of a flat polygon that may be concave, by cutting off one ear after the other.
+
+    Parameters
+    ----------
+    outline : (n, 2) float64
+        Corners, counterclockwise.
+    """
+    left, faces = list(range(len(outline))), []
+    while len(left) > 3:
+        ear = next((k for k in range(len(left)) if _is_ear(outline, left, k)), None)
+        # An outline that crosses itself has no ear left; what remains is closed as if it were convex.
+        ear = 1 if ear is None else ear
+        faces.append((left[ear - 1], left[ear], left[(ear + 1) % len(left)]))
+        del left[ear]
+    return np.array([*faces, left], np.int64)
+
+
+def _is_ear(outline: NDArray[np.float64], left: list[int], place: int) -> bool:
+    a, b, c = outline[left[place - 1]], outline[left[place]], outline[left[(place + 1) % len(left)]]
+    if _turn(a, b, c) <= 1e-12:
+        return False
+    others = outline[[k for k in left if k not in {left[place - 1], left[place], left[(place + 1) % len(left)]}]]
+    within = [(_turn(u, v, others.T) >= 0) for u, v in ((a, b), (b, c), (c, a))]
+    return not np.any(within[0] & within[1] & within[2])
+
+
+def _turn(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Twice the area of the triangle a, b, c, positive if it turns left."""
+    return np.asarray((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+
+
 def from_trimesh(solid: trimesh.Trimesh, material: Material, instance: int = ROADSIDE) -> Mesh:
     """Facetted mesh of a trimesh solid: every triangle has its own normal."""
     corners = np.asarray(solid.triangles, np.float64).reshape(-1, 3)

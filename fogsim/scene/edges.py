@@ -1,0 +1,179 @@
+"""What lies along the free sides of roads: shoulders, verges, kerbs and footways, embankments, bridges, rails."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.scene.polyline import LaneIndex, Points, arc_length, left_normals, parallel, refined
+from fogsim.scene.relief import Relief
+from fogsim.scene.road import FAST, KERB, LINE_CODE, TOWN, footway_mesh, strip
+from fogsim.scene.solids import Material, grid, mesh
+from fogsim.values.road import Lane, LaneMarking
+from fogsim.values.scene import Mesh, Surface
+
+SHOULDER = Material((0.097, 0.096, 0.094), Surface.ROAD)
+GRAVEL = Material((0.115, 0.105, 0.085))
+BANK = Material((0.062, 0.085, 0.034))
+CONCRETE = Material((0.24, 0.238, 0.23))
+
+# Shoulders lie this much lower [m], so that a lane that crosses one covers it; more would hide the line beside them.
+_SHOULDER_DROP = 0.002
+_VERGE = 0.7  # width of the gravel beside a shoulder [m]
+_FOOTWAY = 2.2  # width of a street's footway [m]
+_SPAN = 5.0  # a bridge spans this much on either side of the lanes that pass below it [m]
+_DECK = 1.0  # height of a bridge's deck as seen from the side [m]
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """One free side of a lane or of a junction.
+
+    Attributes
+    ----------
+    line : (n, 3) float64
+        Line along it in the direction of travel [m].
+    side : int
+        1 if the land lies to the left of it, −1 if to the right.
+    inner : float
+        Distance from the line to where the pavement ends [m].
+    speed_limit : float
+        Speed limit of the road [m/s].
+    marking : LaneMarking
+        Line painted where the pavement ends.
+    """
+
+    line: Points
+    side: int
+    inner: float
+    speed_limit: float
+    marking: LaneMarking = LaneMarking.NONE
+
+    @property
+    def shoulder(self) -> float:
+        """Width of the paved shoulder, or of a street's footway [m]."""
+        return shoulder_width(self.speed_limit, self.side)
+
+
+def lane_edge(lane: Lane, side: int, line: Points) -> Edge:
+    """Free side of a lane, as from `free_edges`."""
+    return Edge(line, side, lane.width / 2, lane.speed_limit, lane.left if side > 0 else lane.right)
+
+
+def shoulder_width(speed_limit: float, side: int) -> float:
+    """Width of the paved shoulder, or of a street's footway [m], on the left (side 1) or right (side −1) of a road."""
+    if speed_limit <= TOWN:
+        return _FOOTWAY
+    if speed_limit < FAST:
+        return 0.5
+    return 2.5 if side < 0 else 1.0
+
+
+def edge_meshes(edge: Edge, relief: Relief, index: LaneIndex, along: NDArray[np.float64] | None = None) -> list[Mesh]:
+    """Shoulder and gravel verge or kerb and footway, and what leads from there down to the land.
+
+    Parameters
+    ----------
+    edge : Edge
+        The free side.
+    relief : Relief
+        The land.
+    index : LaneIndex
+        All lanes: where one passes below, the road lies on a bridge.
+    along : (n,) float64, optional
+        Distance of the line's points along the road [m], if not along the line itself.
+    """
+    distance = arc_length(edge.line) if along is None else along
+    if edge.speed_limit <= TOWN:
+        border = (edge.side * edge.inner, edge.side * (edge.inner + edge.shoulder))
+        return [footway_mesh(edge.line, border), *_down(edge, edge.inner + edge.shoulder, KERB, relief, index)]
+    outer = edge.inner + edge.shoulder
+    rows = [
+        parallel(edge.line, edge.side * (outer - 0.02), -_SHOULDER_DROP - 0.001),
+        parallel(edge.line, edge.side * (outer + _VERGE), -0.06),
+    ]
+    verge = grid(np.stack(rows, axis=1), GRAVEL, (0, 0, 1))
+    return [_shoulder(edge, distance), verge, *_down(edge, outer + _VERGE, -0.06, relief, index)]
+
+
+def _shoulder(edge: Edge, along: NDArray[np.float64]) -> Mesh:
+    marking = LINE_CODE[edge.marking]
+    return strip(
+        edge.line,
+        (edge.side * (edge.inner - 0.02), edge.side * (edge.inner + edge.shoulder)),
+        -_SHOULDER_DROP,
+        edge.shoulder / 2,
+        # It shows its half of the line beside it: on its right if it lies to the left of the road.
+        marking if edge.side > 0 else 3 * marking,
+        along,
+        SHOULDER,
+        middle=edge.side * (edge.inner + edge.shoulder / 2),
+    )
+
+
+def _down(edge: Edge, distance: float, lift: float, relief: Relief, index: LaneIndex) -> list[Mesh]:
+    """Embankment from a distance beside the line down to the land, or the side of a bridge."""
+    line = edge.line
+    if np.max(line[:, 2] - relief.height(line)) > 3.0:
+        line = refined(line, 6.0)
+    top = parallel(line, edge.side * distance, lift)
+    deep = np.maximum(top[:, 2] - relief.height(top), 0.0)
+    foot = parallel(line, edge.side * (distance + 0.3 + 1.5 * deep))
+    foot[:, 2] = np.minimum(relief.height(foot), top[:, 2]) - 0.03
+    if not np.any(deep > 0.1) and lift < 0:
+        return []
+    bridge = _over_road(top, foot, deep, index)
+    parts = []
+    for start, end in _runs(~bridge, more=0):
+        parts.append(grid(np.stack((top[start:end], foot[start:end]), axis=1), BANK, (0, 0, 1)))
+    for start, end in _runs(bridge, more=1):
+        deck = np.stack((top[start:end], top[start:end] - (0.0, 0.0, _DECK)), axis=1)
+        parts.append(grid(deck, CONCRETE, np.append(foot[start, :2] - top[start, :2], 0.0)))
+    return parts
+
+
+def _over_road(top: Points, foot: Points, deep: NDArray[np.float64], index: LaneIndex) -> NDArray[np.bool_]:
+    """Where a lane passes under the embankment that would be there."""
+    if np.max(deep) < 3.0:
+        return np.zeros(len(top), np.bool_)
+    below = np.zeros(len(top), np.bool_)
+    for share in (0.0, 0.5, 1.0):
+        places = top + share * (foot - top)
+        places[:, 2] = foot[:, 2]
+        below |= index.clearance(places, same_level=2.5) < _SPAN
+    return np.asarray(below & (deep > 3.0))
+
+
+def _runs(chosen: NDArray[np.bool_], *, more: int) -> list[tuple[int, int]]:
+    """Stretches of vertices (start, end) that are chosen, each with some more on either side."""
+    changes = np.flatnonzero(np.diff(np.concatenate(([0], chosen.astype(int), [0]))))
+    widened = [(max(a - more, 0), min(b + more, len(chosen))) for a, b in changes.reshape(-1, 2).tolist()]
+    return [(a, b) for a, b in widened if b - a > 1]
+
+
+def guard_rail(line: NDArray[np.float64], side: int, distance: float) -> Mesh:
+    """W-beam along a line, facing the road.
+
+    Parameters
+    ----------
+    line : (n, 3) float64
+        Centreline of the lane [m].
+    side : int
+        1 left, −1 right of the lane.
+    distance : float
+        From the centreline to the beam's face [m].
+    """
+    # Depth behind the face and height of the folds of the beam [m].
+    profile = [(0.05, 0.76), (0.0, 0.69), (0.08, 0.60), (0.01, 0.46)]
+    # What faces down gets little light; a fold's own shade makes the beam read as a W from afar.
+    shade = np.array([1.05, 0.95, 0.6, 0.85])
+    points = np.stack([parallel(line, side * (distance + depth), height) for depth, height in profile], axis=1)
+    normals = left_normals(line) * -side
+    facing = np.column_stack((normals, np.full(len(line), 0.2)))
+    galvanised = np.array([0.34, 0.35, 0.36])
+    reflectance = np.broadcast_to(shade[None, :, None] * galvanised, points.shape).reshape(-1, 3)
+    rail = grid(points, Material((0.34, 0.35, 0.36)), facing[0], reflectance=reflectance)
+    vertical = np.repeat(facing, len(profile), axis=0)
+    return mesh(
+        points, rail.faces, vertical + 0.4 * rail.normals, Material((0.34, 0.35, 0.36)), reflectance=reflectance
+    )

@@ -1,0 +1,121 @@
+"""Paved areas where roads meet: their pavement, and which parts of their borders are free."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.scene.edges import Edge
+from fogsim.scene.polyline import LaneIndex, Points, cleaned
+from fogsim.scene.road import ASPHALT, FLAGSTONES, KERB, ROAD
+from fogsim.scene.solids import concave_faces, mesh
+from fogsim.values.road import Lane, LaneKind, PavedArea
+from fogsim.values.scene import Mesh
+
+_BELOW = 0.003  # junctions lie this far below the lanes that lead to them [m], so that lines end at full width
+_TOUCHING = 6.0  # lanes that end no farther than this from a corner lead to the junction [m]
+
+
+def area_mesh(area: PavedArea) -> Mesh | None:
+    """Pavement of an area without a hole; None where the area is too narrow to see."""
+    outline = _counterclockwise(area)
+    if len(outline) < 3 or abs(_area(outline)) < 0.05:
+        return None
+    footway = area.kind is LaneKind.FOOTWAY
+    points = outline + np.array([0.0, 0.0, KERB if footway else -_BELOW])
+    faces, up = concave_faces(outline[:, :2]), np.broadcast_to((0.0, 0.0, 1.0), outline.shape)
+    if footway:
+        return mesh(points, faces, up, FLAGSTONES)
+    road = np.zeros((len(points), 4))
+    road[:, :2] = outline[:, :2] - outline[:, :2].min(axis=0)
+    # Far from the middle of any lane, so that no wheel has worn a track.
+    road[:, 1] += 100.0
+    road[:, 2] = 1.75
+    return mesh(points, faces, up, ASPHALT, road=road, instance=ROAD)
+
+
+def _area(outline: Points) -> float:
+    x, y = outline[:, 0], outline[:, 1]
+    return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+
+
+def _counterclockwise(area: PavedArea) -> Points:
+    outline = cleaned(area.outline)
+    if len(outline) > 1 and np.hypot(*(outline[0, :2] - outline[-1, :2])) < 0.05:
+        outline = outline[:-1]
+    return outline if _area(outline) >= 0 else outline[::-1]
+
+
+def free_borders(area: PavedArea, lanes: Sequence[Lane], index: LaneIndex) -> Iterator[Edge]:
+    """Parts of a junction's border where no road leads on.
+
+    Parameters
+    ----------
+    area : PavedArea
+        The junction.
+    lanes : sequence of Lane
+        Lanes of carriageways near it.
+    index : LaneIndex
+        All lanes of carriageways and footways, those across junctions left out.
+    """
+    outline = _counterclockwise(area)
+    limits = [lane.speed_limit for lane in lanes if _touches(lane, outline)]
+    if len(outline) < 3 or not limits:
+        return
+    following = np.roll(outline, -1, axis=0)
+    step = following - outline
+    outward = np.column_stack((step[:, 1], -step[:, 0])) / np.hypot(step[:, 0], step[:, 1])[:, None]
+    beside = 0.5 * (outline + following)
+    beside[:, :2] += 0.4 * outward
+    free = index.clearance(beside, same_level=2.5) > 0.1
+    for run in _runs_around(free):
+        corners = np.concatenate((outline[run], following[run[-1:]]))
+        if np.sum(np.hypot(*np.diff(corners[:, :2], axis=0).T)) > 0.1:
+            yield Edge(corners, -1, 0.0, max(limits))
+
+
+def _touches(lane: Lane, outline: Points) -> bool:
+    ends = lane.centreline[[0, -1], :2]
+    return bool(np.min(np.linalg.norm(ends[:, None] - outline[None, :, :2], axis=2)) < _TOUCHING)
+
+
+def _runs_around(chosen: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
+    """Stretches of neighbours that are chosen on a ring; a ring that is chosen whole is one stretch."""
+    count = len(chosen)
+    if chosen.all():
+        return [np.arange(count)]
+    first = int(np.argmin(chosen))
+    order = (np.arange(count) + first) % count
+    changes = np.flatnonzero(np.diff(np.concatenate(([0], chosen[order].astype(int), [0]))))
+    return [order[a:b] for a, b in changes.reshape(-1, 2).tolist()]
+
+
+class Areas:
+    """Which places lie on a paved area.
+
+    Parameters
+    ----------
+    areas : sequence of PavedArea
+        The areas.
+    """
+
+    def __init__(self, areas: Sequence[PavedArea]) -> None:
+        self._outlines = [_counterclockwise(area)[:, :2] for area in areas]
+        self._low = np.array([outline.min(axis=0) for outline in self._outlines]).reshape(-1, 2)
+        self._high = np.array([outline.max(axis=0) for outline in self._outlines]).reshape(-1, 2)
+
+    def cover(self, points: Points) -> bool:
+        """Tell whether one area has all of some points (n, 3) inside or on its border."""
+        low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+        candidates = np.flatnonzero(np.all((self._low < low + 0.1) & (high - 0.1 < self._high), axis=1))
+        return any(_inside(points[:, :2], self._outlines[candidate]) for candidate in candidates)
+
+
+def _inside(points: NDArray[np.float64], outline: NDArray[np.float64]) -> bool:
+    start, end = outline, np.roll(outline, -1, axis=0)
+    # Points on the border, where lanes begin, count: they are moved a little towards the middle of all.
+    x, y = (points + 0.02 * (points.mean(axis=0) - points)).T[..., None]
+    above = (start[:, 1] > y) != (end[:, 1] > y)
+    rise = np.where(end[:, 1] == start[:, 1], 1.0, end[:, 1] - start[:, 1])
+    crossing = start[:, 0] + (y - start[:, 1]) / rise * (end[:, 0] - start[:, 0])
+    return bool(np.all(np.sum(above & (x < crossing), axis=1) % 2 == 1))

@@ -1,0 +1,64 @@
+"""Lamps on poles beside streets."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.scene.edges import Edge
+from fogsim.scene.polyline import Points
+from fogsim.scene.roadside import placed, stations, tube
+from fogsim.scene.solids import Material, box, merge
+from fogsim.scene.trees import FAR, TINY
+from fogsim.values.scene import Batch, Mesh, Scene, Surface
+
+STREET_LAMP = "street_lamp"
+"""Name of the shape of a lamp with its pole."""
+
+HEIGHT = 8.0
+"""Height of the luminous surface above the pole's foot [m]."""
+
+SIZE = (0.5, 0.22, 0.05)
+"""Length, width and height of the luminous surface, which bulges below the head [m]."""
+
+_ARM = 1.4  # how far the head's middle lies over the road [m]
+_SPACING = 35.0
+_BESIDE = 0.5  # of poles beyond shoulder or footway [m]
+_APART = 26.0  # lamps stand on one side of a street: none is nearer to another than this [m]
+_POLE = Material((0.20, 0.205, 0.21))
+_GLOW = Material((0.55, 0.55, 0.53), Surface.LAMP_STREET)
+
+
+def street_lamp_shapes() -> dict[str, Mesh]:
+    """Shape of a lamp whose arm reaches along y, with its stand-ins."""
+    head = box((-0.16, _ARM - 0.38, HEIGHT), (0.16, _ARM + 0.38, HEIGHT + 0.1), _POLE)
+    (length, width, depth), glow = SIZE, _GLOW
+    lamp = box((-width / 2, _ARM - length / 2, HEIGHT - depth), (width / 2, _ARM + length / 2, HEIGHT), glow)
+    arm = box((-0.04, 0.0, HEIGHT + 0.02), (0.04, _ARM - 0.3, HEIGHT + 0.1), _POLE)
+    near = merge((tube(-0.3, 1.2, 0.09, 0.09, _POLE), tube(1.2, HEIGHT + 0.1, 0.06, 0.06, _POLE), arm, head, lamp))
+    far = merge((tube(-0.3, HEIGHT, 0.06, 0.06, _POLE), head, lamp))
+    return {STREET_LAMP: near, STREET_LAMP + FAR: far, STREET_LAMP + TINY: far}
+
+
+def lamp_posts(edges: Sequence[Edge]) -> list[Batch]:
+    """Lamps about every 35 m along the right sides of roads, on one side of roads of two directions."""
+    found: list[tuple[NDArray[np.float64], float]] = []
+    for edge in edges:
+        if edge.side > 0:
+            continue
+        places, heading = stations(edge.line, _SPACING, -(edge.inner + edge.shoulder + _BESIDE))
+        for place, direction in zip(places, heading.tolist(), strict=True):
+            if all(np.hypot(*(place[:2] - other[:2])) > _APART for other, _ in found[-400:]):
+                found.append((place, direction))
+    if not found:
+        return []
+    return [placed(STREET_LAMP, np.array([place for place, _ in found]), np.array([turn for _, turn in found]))]
+
+
+def street_lamp_heads(scene: Scene) -> Points:
+    """Middles of the luminous surfaces of all street lamps of a scene (n, 3) [m]."""
+    batches = [batch.transforms for batch in scene.scenery if batch.shape == STREET_LAMP]
+    if not batches:
+        return np.zeros((0, 3))
+    head = np.array([0.0, _ARM, HEIGHT - SIZE[2] / 2, 1.0])
+    return np.asarray(np.concatenate(batches).astype(np.float64)[:, :3] @ head)

@@ -1,0 +1,245 @@
+"""Junctions, lines across lanes, streets, hills and street lamps."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from fogsim.scene import build_scene, street_lamp_heads
+from fogsim.scene.crosslines import cross_lines
+from fogsim.scene.junctions import Areas, area_mesh
+from fogsim.scene.polyline import LaneIndex
+from fogsim.scene.relief import Relief
+from fogsim.scene.road import KERB
+from fogsim.values import (
+    Lane,
+    LaneEnd,
+    LaneKind,
+    LaneMarking,
+    Mesh,
+    PavedArea,
+    RoadNetwork,
+    Scene,
+    SignMap,
+    Surface,
+)
+
+L_SHAPE = np.array([[0.0, 0, 0], [10, 0, 0], [10, 4, 0], [4, 4, 0], [4, 10, 0], [0, 10, 0]])
+
+
+def build(network: RoadNetwork, *, street_lamps: bool = False) -> Scene:
+    return build_scene(network, SignMap(), np.random.default_rng(5), street_lamps=street_lamps)
+
+
+@pytest.fixture(scope="module")
+def town() -> RoadNetwork:
+    """Two streets that cross at the origin; lanes in and out of four arms, and ways straight on and to the right."""
+    lanes = []
+    for arm, heading in enumerate(np.arange(4) * np.pi / 2):
+        turn = np.array([[np.cos(heading), np.sin(heading), 0.0], [-np.sin(heading), np.cos(heading), 0.0], [0, 0, 1]])
+        ways = {
+            "in": [[-200.0, -1.75, 0.0], [-10.0, -1.75, 0.0]],
+            "out": [[-10.0, 1.75, 0.0], [-200.0, 1.75, 0.0]],
+            "on": [[-10.0, -1.75, 0.0], [10.0, -1.75, 0.0]],
+            "right": [[-10.0, -1.75, 0.0], [-5.0, -3.2, 0.0], [-1.75, -10.0, 0.0]],
+        }
+        for name, way in ways.items():
+            inside = name in {"on", "right"}
+            none, solid, double = LaneMarking.NONE, LaneMarking.SOLID, LaneMarking.DOUBLE
+            lanes.append(
+                Lane(
+                    lane_id=f"{name}{arm}",
+                    edge_id=f"{name}{arm}",
+                    centreline=np.array(way) @ turn,
+                    width=3.5,
+                    speed_limit=13.9,
+                    left=none if inside else double,
+                    right=none if inside else solid,
+                    outermost=not inside,
+                    kind=LaneKind.JUNCTION if inside else LaneKind.CARRIAGEWAY,
+                    end=LaneEnd.STOP if name == "in" else LaneEnd.OPEN,
+                )
+            )
+    corners = [(10, 3.5), (6, 4), (4, 6), (3.5, 10), (-3.5, 10), (-4, 6), (-6, 4), (-10, 3.5)]
+    corners += [(-x, -y) for x, y in corners]
+    outline = np.array([(x, y, 0.0) for x, y in corners])
+    return RoadNetwork(tuple(lanes), lanes[0].centreline, (PavedArea("c", outline),))
+
+
+def hill(slope: float = 0.06) -> Lane:
+    x = np.linspace(0.0, 400.0, 21)
+    line = np.column_stack((x, np.zeros(21), slope * x))
+    solid = LaneMarking.SOLID
+    return Lane("h_0", "h", line, 3.5, 25.0, solid, solid, outermost=True)
+
+
+def areas_of(part: Mesh) -> np.ndarray:
+    a, b, c = (part.positions[part.faces[:, i]].astype(float) for i in range(3))
+    return 0.5 * np.cross(b - a, c - a)[:, 2]
+
+
+def road_under(mesh: Mesh, x: float, y: float, surfaces: tuple[Surface, ...] = (Surface.ROAD,)) -> list[float]:
+    """Heights of all triangles of some surfaces above or below a place."""
+    chosen = np.isin(mesh.surface[mesh.faces[:, 0]], [int(s) for s in surfaces])
+    corners = mesh.positions[mesh.faces[chosen]].astype(float)
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    double = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    double = np.where(np.abs(double) > 1e-9, double, np.inf)
+    u = ((x - a[:, 0]) * (c[:, 1] - a[:, 1]) - (y - a[:, 1]) * (c[:, 0] - a[:, 0])) / double
+    v = ((b[:, 0] - a[:, 0]) * (y - a[:, 1]) - (b[:, 1] - a[:, 1]) * (x - a[:, 0])) / double
+    inside = np.isfinite(double) & (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
+    return list((a[:, 2] + u * (b[:, 2] - a[:, 2]) + v * (c[:, 2] - a[:, 2]))[inside])
+
+
+@pytest.mark.parametrize("outline", [L_SHAPE, L_SHAPE[::-1]], ids=["counterclockwise", "clockwise"])
+def test_a_concave_junction_is_paved_once_and_without_holes(outline: np.ndarray) -> None:
+    mesh = area_mesh(PavedArea("j", outline))
+    assert mesh is not None
+    assert (areas_of(mesh) > 0).all()
+    assert areas_of(mesh).sum() == pytest.approx(64.0)
+    assert set(mesh.instance) == {2}
+
+
+def test_a_sliver_of_a_junction_is_left_out() -> None:
+    assert area_mesh(PavedArea("j", np.array([[0.0, 0, 0], [5, 0, 0], [5, 0.001, 0]]))) is None
+
+
+def test_areas_tell_what_they_cover() -> None:
+    areas = Areas([PavedArea("j", L_SHAPE)])
+    assert areas.cover(np.array([[0.0, 2, 0], [9, 2, 0]]))
+    assert not areas.cover(np.array([[2.0, 2, 0], [8, 8, 0]]))
+    assert not Areas([]).cover(np.array([[0.0, 2, 0], [9, 2, 0]]))
+
+
+def test_a_town_is_paved_wherever_vehicles_drive(town: RoadNetwork) -> None:
+    ground = build(town).ground
+    for lane in town.lanes:
+        for x, y, z in lane.centreline[[0, len(lane.centreline) // 2, -1]].tolist():
+            heights = road_under(ground, x, y)
+            assert heights, lane.lane_id
+            assert max(heights) == pytest.approx(z, abs=0.004)
+
+
+def test_lanes_within_a_junction_are_not_drawn_twice(town: RoadNetwork) -> None:
+    inside = dataclasses.replace(town, lanes=tuple(lane for lane in town.lanes if lane.kind is LaneKind.CARRIAGEWAY))
+    assert len(build(town).ground.faces) == len(build(inside).ground.faces)
+
+
+def test_stop_lines_span_their_lanes_at_the_junction(town: RoadNetwork) -> None:
+    lane = next(lane for lane in town.lanes if lane.lane_id == "in0")
+    assert lane.end is LaneEnd.STOP
+    (bar,) = cross_lines([lane])
+    end = lane.centreline[-1]
+    assert np.abs(bar.positions[:, 0] - end[0]).max() < 1.5
+    assert np.ptp(bar.positions[:, 1]) == pytest.approx(0.98 * lane.width, rel=0.01)
+    # All of the bar but its outermost sixths is within the painted line that its attributes stand for.
+    assert np.ptp(bar.positions[:, 0]) / 1.5 == pytest.approx(0.5, abs=0.01)
+    assert np.ptp(bar.road[:, 1]) / 1.5 == pytest.approx(0.2, abs=1e-6)
+    assert set(bar.road[:, 3]) == {3.0}
+
+
+def test_a_line_to_give_way_at_is_broken_and_a_crossing_is_striped() -> None:
+    line = np.array([[0.0, 0, 0], [50, 0, 0]])
+    none = LaneMarking.NONE
+    way = Lane("a", "a", line, 3.6, 14.0, none, none, outermost=True, end=LaneEnd.YIELD)
+    (teeth,) = cross_lines([way])
+    assert len(teeth.faces) == 2 * 5
+    covered = sum(np.ptp(teeth.positions[4 * i : 4 * i + 4, 1]) for i in range(5))
+    assert covered / 3.6 == pytest.approx(0.65, abs=0.03)
+    zebra = dataclasses.replace(way, centreline=line / 5, end=LaneEnd.OPEN, kind=LaneKind.CROSSING)
+    (stripes,) = cross_lines([zebra])
+    assert len(stripes.faces) == 2 * 10
+    assert cross_lines([dataclasses.replace(way, end=LaneEnd.OPEN)]) == []
+
+
+def test_a_double_line_lies_inside_its_lane() -> None:
+    line = np.array([[0.0, 0, 0], [50, 0, 0]])
+    lane = Lane("a", "a", line, 3.5, 20.0, LaneMarking.DOUBLE, LaneMarking.SOLID, outermost=True)
+    ground = build(RoadNetwork((lane,), line)).ground
+    chosen = (ground.surface == Surface.ROAD) & (ground.road[:, 3] == 4.0)
+    # Position of the painted lines: half the width on either side of the middle from which offsets are counted.
+    middle = ground.positions[chosen, 1] - ground.road[chosen, 1]
+    assert middle + ground.road[chosen, 2] == pytest.approx(1.75 - 0.16, abs=1e-5)
+    assert middle - ground.road[chosen, 2] == pytest.approx(-1.75, abs=1e-5)
+
+
+def test_streets_have_kerbs_and_roads_have_shoulders(town: RoadNetwork) -> None:
+    ground = build(town).ground
+    beside = (ground.surface == Surface.MATT) & (np.abs(ground.positions[:, 2] - KERB) < 1e-4)
+    assert beside.sum() > 100
+    fast = [dataclasses.replace(lane, speed_limit=25.0) for lane in town.lanes]
+    other = build(dataclasses.replace(town, lanes=tuple(fast))).ground
+    assert not ((other.surface == Surface.MATT) & (np.abs(other.positions[:, 2] - KERB) < 1e-4)).any()
+
+
+def test_road_roadside_and_land_follow_a_hill() -> None:
+    lane = hill()
+    scene = build(RoadNetwork((lane,), lane.centreline))
+    for x in (50.0, 200.0, 333.0):
+        heights = road_under(scene.ground, x, 0.3)
+        assert heights
+        assert heights == pytest.approx([0.06 * x] * len(heights), abs=1e-4)
+        land = max(road_under(scene.ground, x, 25.0, (Surface.MATT,)))
+        assert 0.06 * x - 4.0 < land < 0.06 * x
+    for batch in scene.scenery:
+        if batch.shape in {"rail_post", "delineator"}:
+            place = batch.transforms[:, :3, 3]
+            assert place[:, 2] == pytest.approx(0.06 * place[:, 0], abs=0.01)
+
+
+def test_the_land_lies_below_every_road_and_falls_to_the_plain() -> None:
+    high = hill(0.0)
+    high = dataclasses.replace(
+        high, lane_id="b_0", edge_id="b", centreline=high.centreline + np.array([0.0, 60.0, 8.0])
+    )
+    climbing = hill()
+    relief = Relief([climbing, high])
+    for lane in (climbing, high):
+        assert (relief.height(lane.centreline) < lane.centreline[:, 2] - 0.3).all()
+    assert relief.height(np.array([[200.0, 900.0], [-900.0, 0.0]])) == pytest.approx(relief.plain)
+    mesh = relief.mesh()
+    assert mesh is not None
+    chosen = mesh.positions[::7].astype(float)
+    assert relief.height(chosen) - 0.02 == pytest.approx(chosen[:, 2], abs=1e-4)
+
+
+def test_a_plain_has_no_land_of_its_own(motorway: RoadNetwork) -> None:
+    relief = Relief(motorway.lanes)
+    assert relief.mesh() is None
+    assert relief.height(np.zeros((3, 2))) == pytest.approx(relief.plain) == pytest.approx(-0.1)
+
+
+def test_a_road_that_passes_over_another_leaves_it_free() -> None:
+    below = hill(0.0)
+    x = np.linspace(-200.0, 200.0, 9)
+    over = np.column_stack((np.full(9, 200.0), x, np.full(9, 7.0)))
+    above = dataclasses.replace(below, lane_id="o_0", edge_id="o", centreline=over)
+    scene = build(RoadNetwork((below, above), below.centreline))
+    surfaces = (Surface.ROAD, Surface.MATT)
+    for along in (180.0, 195.0, 205.0, 220.0):
+        heights = road_under(scene.ground, along, 0.0, surfaces)
+        # Nothing between the lower road and a vehicle's roof.
+        assert not [z for z in heights if 0.01 < z < 4.5]
+
+
+def test_street_lamps_stand_on_one_side_about_every_35_m_if_asked() -> None:
+    line = np.array([[0.0, 0, 0], [400, 0, 0]])
+    solid = LaneMarking.SOLID
+    there = Lane("a", "a", line, 3.5, 13.9, solid, solid, outermost=True)
+    back = Lane("b", "b", line[::-1] + np.array([0.0, 3.5, 0.0]), 3.5, 13.9, solid, solid, outermost=True)
+    network = RoadNetwork((there, back), line)
+    assert len(street_lamp_heads(build(network))) == 0
+    scene = build(network, street_lamps=True)
+    heads = street_lamp_heads(scene)
+    assert np.diff(np.sort(heads[:, 0])) == pytest.approx(35.0, abs=0.1)
+    assert (heads[:, 1] < -1.75).all()
+    assert heads[:, 2] == pytest.approx(8.0, abs=0.1)
+    (batch,) = (b for b in scene.scenery if b.shape == "street_lamp")
+    index = LaneIndex(network.lanes)
+    assert index.clearance(batch.transforms[:, :3, 3].astype(float)).min() > 2.0
+    for ending in ("", ":far", ":tiny"):
+        shape = scene.shapes["street_lamp" + ending]
+        glow = shape.positions[shape.surface == Surface.LAMP_STREET]
+        world = glow @ batch.transforms[0, :3, :3].T + batch.transforms[0, :3, 3]
+        middle = 0.5 * (world.min(axis=0) + world.max(axis=0))
+        assert np.linalg.norm(heads - middle, axis=1).min() < 0.01

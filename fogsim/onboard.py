@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere import Air, extinction, optical_depth
+from fogsim.atmosphere import Air, extinction, field_at, optical_depth_along
 from fogsim.camera import averaged, middle_samples, mounted_pose, supersampled
 from fogsim.errors import SimulationError
 from fogsim.randomness import Streams
@@ -47,12 +47,15 @@ class World:
         The signs.
     fog : FogField
         The fog.
+    air : Air
+        The fog as a camera looks through it.
     renderer : Renderer
         Draws roads, roadside and signs, and the vehicles that it is given.
     """
 
     signs: SignMap
     fog: FogField
+    air: Air
     renderer: Renderer
 
 
@@ -105,9 +108,11 @@ class OnBoard:
 
     def _build_world(self, network: RoadNetwork, signs: SignMap) -> World:
         scene = build_scene(network, signs, np.random.default_rng(self._scenario.scenery_seed))
+        fog = build.fog_field(self._scenario, network.route)
         return World(
             signs=signs,
-            fog=build.fog_field(self._scenario, network.route),
+            fog=fog,
+            air=Air(fog),
             renderer=make_renderer(self._scenario.renderer, scene, self._scenario.light.illuminance_lx),
         )
 
@@ -152,7 +157,7 @@ class OnBoard:
             speed_limit=snapshot.speed_limit,
             leader=snapshot.leader,
             collisions=snapshot.collisions,
-            truth=fog_truth(world.fog, pose, self._camera),
+            truth=fog_truth(field_at(world.fog, time), pose, self._camera),
             view=view,
             observation=observation,
             estimates=estimates,
@@ -172,7 +177,7 @@ class OnBoard:
         """What is drawn without air, and the radiance that comes through the air."""
         camera, samples = self._drawn_camera, self._scenario.camera.samples
         view = world.renderer.render(vehicle_batches(state, ego), camera, pose)
-        radiance = Air(world.fog).radiance(view, camera, pose, time=time)
+        radiance = world.air.radiance(view, camera, pose, time=time)
         return middle_samples(view, samples), averaged(radiance, samples)
 
     def _observe(self, frame: Frame, snapshot: TrafficSnapshot, signs: SignMap, streams: Streams) -> Observation:
@@ -198,7 +203,7 @@ def fog_truth(fog: FogField, pose: CameraPose, camera: Camera) -> Truth:
     Parameters
     ----------
     fog : FogField
-        The fog.
+        The fog now.
     pose : CameraPose
         Where the camera is.
     camera : Camera
@@ -206,7 +211,7 @@ def fog_truth(fog: FogField, pose: CameraPose, camera: Camera) -> Truth:
     """
     eye = np.array(pose.position)
     direction = np.array([math.cos(pose.heading), math.sin(pose.heading), 0.0])
-    depth = optical_depth(fog, eye, eye + _SIGHT_LINE[:, None] * direction)
+    depth = optical_depth_along(fog, eye, direction, _SIGHT_LINE)
     # Optical depth grows along the line, so the distance at which it reaches ln 20 is found by interpolation.
     reached = depth[-1] >= OPTICAL_DEPTH_AT_VISIBILITY
     sight = float(np.interp(OPTICAL_DEPTH_AT_VISIBILITY, depth, _SIGHT_LINE))

@@ -12,7 +12,8 @@ from fogsim.camera import AutoExposure, BodyPitch, Metering, Photographer, Senso
 from fogsim.estimators import ESTIMATORS, Estimator
 from fogsim.fusion import FUSIONS, Fusion
 from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy
-from fogsim.scenario.schema import Bank, Scenario
+from fogsim.scenario.fog_build import fog_along
+from fogsim.scenario.schema import Scenario
 from fogsim.scenario.traffic_schema import AnyEvent, Brake, BreakDown, ChangeLane, LampsFail
 from fogsim.sensors import LeadSensor
 from fogsim.traffic import (
@@ -26,8 +27,8 @@ from fogsim.traffic import (
     TrafficSetup,
     Trigger,
 )
-from fogsim.units import KMH_PER_MPS, extinction_from_visibility
-from fogsim.values import Camera, FogBank, FogField
+from fogsim.units import KMH_PER_MPS
+from fogsim.values import Camera, FogField
 
 AIRLIGHT_EXPOSURE = 0.6
 """Share of saturation at which the fixed exposure puts the airlight: bright fog, yet room for lamps above it."""
@@ -213,39 +214,7 @@ def fog_field(scenario: Scenario, route: NDArray[np.float64]) -> FogField:
     route : (n, 3) float64
         Polyline along the route [m].
     """
-    fog = scenario.fog
-    visibility = fog.visibility_m if fog.visibility_m is not None else fog.outside_visibility_m
-    outside = extinction_from_visibility(math.inf if visibility is None else visibility)
-    return FogField(
-        extinction=outside,
-        airlight=airlight_from_illuminance(scenario.light.illuminance_lx),
-        banks=tuple(_bank(bank, outside, route) for bank in fog.banks),
-        top=fog.top_m,
-    )
-
-
-def _bank(bank: Bank, outside: float, route: NDArray[np.float64]) -> FogBank:
-    """A bank between two places of the route: a slab across the straight line that joins them."""
-    station = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(route[:, :2], axis=0), axis=1))))
-
-    def place(at: float) -> NDArray[np.float64]:
-        inside = np.array([np.interp(at, station, route[:, axis]) for axis in (0, 1)])
-        # Before the start and beyond the end of the route, go straight on.
-        first, last = route[1, :2] - route[0, :2], route[-1, :2] - route[-2, :2]
-        before, beyond = min(at, 0.0), max(at - station[-1], 0.0)
-        return np.asarray(inside + before * first / np.linalg.norm(first) + beyond * last / np.linalg.norm(last))
-
-    start, end = place(bank.start_m), place(bank.end_m)
-    chord = float(np.linalg.norm(end - start))
-    axis = (end - start) / chord
-    return FogBank(
-        origin=(float(start[0]), float(start[1])),
-        axis=(float(axis[0]), float(axis[1])),
-        start=0.0,
-        end=chord,
-        edge=min(bank.edge_m, chord),
-        extra_extinction=extinction_from_visibility(bank.visibility_m) - outside,
-    )
+    return fog_along(scenario.fog, airlight_from_illuminance(scenario.light.illuminance_lx), route)
 
 
 def estimators(scenario: Scenario, told: Camera) -> tuple[Estimator, ...]:

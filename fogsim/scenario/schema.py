@@ -3,7 +3,6 @@
 Everything inside FogSim is SI and radians; `fogsim.scenario.build` converts, once.
 """
 
-import itertools
 from pathlib import Path
 from typing import Annotated, Self
 
@@ -16,8 +15,9 @@ from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.render import RENDERERS
 from fogsim.scenario.camera_schema import CameraSection
+from fogsim.scenario.fog_schema import Fog
 from fogsim.scenario.methods import Method, method_of
-from fogsim.scenario.section import NotNegative, Positive, Section, Visibility
+from fogsim.scenario.section import NotNegative, Positive, Section
 from fogsim.scenario.traffic_schema import DriversSection, Traffic
 
 
@@ -42,62 +42,6 @@ class Clocks(Section):
                     f"{slower} must be a whole multiple of {faster}, "
                     f"got {getattr(self, slower):g} s and {getattr(self, faster):g} s"
                 )
-        return self
-
-
-class Bank(Section):
-    """A fog bank along the ego's route; start and end are where it is half as dense as inside."""
-
-    start_m: float
-    """Where it begins: half as dense as inside, along the ego's route."""
-
-    end_m: float
-    """Where it ends, likewise."""
-
-    visibility_m: Visibility
-    """Meteorological visibility inside."""
-
-    edge_m: Positive = 100.0
-    """Length of each soft edge."""
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        if not self.start_m < self.end_m:
-            raise ValueError(f"start_m must be less than end_m, got {self.start_m:g} and {self.end_m:g}")
-        if self.edge_m > self.end_m - self.start_m:
-            raise ValueError(
-                f"edge_m must not be longer than the bank ({self.end_m - self.start_m:g} m), got {self.edge_m:g}"
-            )
-        return self
-
-
-class Fog(Section):
-    """Either homogeneous (visibility_m), or banks with another visibility outside them."""
-
-    visibility_m: Visibility | None = None
-    """Meteorological visibility of homogeneous fog; `inf` is clear air. Leaves no room for the two below."""
-
-    outside_visibility_m: Visibility | None = None
-    """Meteorological visibility outside the banks."""
-
-    banks: tuple[Bank, ...] = ()
-    """Fog banks along the ego's route; they must not overlap."""
-
-    top_m: Visibility = 250.0
-    """Height of the fog layer."""
-
-    @model_validator(mode="after")
-    def _one_kind(self) -> Self:
-        homogeneous = self.visibility_m is not None
-        heterogeneous = self.outside_visibility_m is not None or bool(self.banks)
-        if homogeneous and heterogeneous:
-            raise ValueError("give either visibility_m (homogeneous fog) or outside_visibility_m with banks, not both")
-        if not homogeneous and self.outside_visibility_m is None:
-            raise ValueError("visibility_m (homogeneous fog), or outside_visibility_m with banks, is missing")
-        ordered = sorted(self.banks, key=lambda b: b.start_m)
-        for one, other in itertools.pairwise(ordered):
-            if one.end_m + 0.5 * one.edge_m > other.start_m - 0.5 * other.edge_m:
-                raise ValueError(f"banks overlap: one ends at {one.end_m:g} m, another starts at {other.start_m:g} m")
         return self
 
 

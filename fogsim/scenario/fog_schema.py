@@ -1,0 +1,158 @@
+"""The fog of a scenario file: how thick, where, and how it changes."""
+
+import itertools
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from fogsim.scenario.section import NotNegative, Positive, Section, Visibility
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class Bank(Section):
+    """A fog bank along the ego's route; start and end are where it is half as dense as inside."""
+
+    start_m: float
+    """Where it begins: half as dense as inside, along the ego's route."""
+
+    end_m: float
+    """Where it ends, likewise."""
+
+    visibility_m: Visibility
+    """Meteorological visibility inside."""
+
+    edge_m: Positive = 100.0
+    """Length of each soft edge."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if not self.start_m < self.end_m:
+            raise ValueError(f"start_m must be less than end_m, got {self.start_m:g} and {self.end_m:g}")
+        if self.edge_m > self.end_m - self.start_m:
+            raise ValueError(
+                f"edge_m must not be longer than the bank ({self.end_m - self.start_m:g} m), got {self.edge_m:g}"
+            )
+        return self
+
+
+class Patches(Section):
+    """Random thick and thin places in the fog; the extinction coefficient keeps its mean."""
+
+    correlation_length_m: Positive
+    """Distance at which thick and thin have little to do with each other any more (correlation 1/e)."""
+
+    correlation_height_m: Positive = 10.0
+    """The same, upwards."""
+
+    strength: Annotated[float, Field(ge=0, le=2)] = 0.6
+    """Standard deviation of the logarithm of the extinction coefficient; 0.6 is from half to twice as thick."""
+
+    seed: Annotated[int, Field(ge=0)] = 0
+    """Seed of the patches, which are the same for every seed of the run."""
+
+
+class Wind(Section):
+    """Wind that banks and patches drift with."""
+
+    speed_kmh: NotNegative
+    """Its speed."""
+
+    from_deg: Annotated[float, Field(ge=0, le=360)]
+    """Where it comes from: 0 is north, 90 east."""
+
+
+class Change(Section):
+    """The fog at one time; in between it changes linearly."""
+
+    at_s: Finite
+    """Time since the ego's appearance; before the first and after the last of them the fog stays the same."""
+
+    density: NotNegative = 1.0
+    """Factor of the extinction coefficient everywhere: 2 halves the visibility."""
+
+    base_m: Finite | None = None
+    """Height of the fog's base; to be given at all times or at none."""
+
+    top_m: Finite | None = None
+    """Height of the fog's top; to be given at all times or at none."""
+
+
+class Fog(Section):
+    """Either homogeneous (visibility_m), or banks with another visibility outside them."""
+
+    visibility_m: Visibility | None = None
+    """Meteorological visibility of homogeneous fog; `inf` is clear air. Leaves no room for the two below."""
+
+    outside_visibility_m: Visibility | None = None
+    """Meteorological visibility outside the banks."""
+
+    banks: tuple[Bank, ...] = ()
+    """Fog banks along the ego's route; they must not overlap."""
+
+    top_m: Visibility = 250.0
+    """Height of the fog layer; this and all heights are above the lowest point of the ego's route."""
+
+    top_edge_m: NotNegative = 0.0
+    """Thickness of its soft upper edge, centred on `top_m`."""
+
+    base_m: Finite | None = None
+    """Height below which there is no fog, for fog that has lifted; it rests on the ground if not given."""
+
+    base_edge_m: NotNegative = 0.0
+    """Thickness of its soft lower edge, centred on `base_m`."""
+
+    scale_height_m: Positive | None = None
+    """Height over which ground fog thins by a factor e; it does not if not given."""
+
+    patches: Patches | None = None
+    """Random thick and thin places."""
+
+    wind: Wind | None = None
+    """Wind that banks and patches drift with."""
+
+    changes: tuple[Change, ...] = ()
+    """How the fog thickens, thins, sinks and lifts over time."""
+
+    airlight_shading: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """Dimming of the airlight for each unit of optical depth overhead; 0.1 in real fog, 0 for an even airlight."""
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        homogeneous = self.visibility_m is not None
+        heterogeneous = self.outside_visibility_m is not None or bool(self.banks)
+        if homogeneous and heterogeneous:
+            raise ValueError("give either visibility_m (homogeneous fog) or outside_visibility_m with banks, not both")
+        if not homogeneous and self.outside_visibility_m is None:
+            raise ValueError("visibility_m (homogeneous fog), or outside_visibility_m with banks, is missing")
+        ordered = sorted(self.banks, key=lambda b: b.start_m)
+        for one, other in itertools.pairwise(ordered):
+            if one.end_m + 0.5 * one.edge_m > other.start_m - 0.5 * other.edge_m:
+                raise ValueError(f"banks overlap: one ends at {one.end_m:g} m, another starts at {other.start_m:g} m")
+        return self
+
+    @model_validator(mode="after")
+    def _times_increase(self) -> Self:
+        for one, other in itertools.pairwise(self.changes):
+            if not one.at_s < other.at_s:
+                raise ValueError(f"at_s of changes must increase, got {one.at_s:g} and then {other.at_s:g}")
+        for key in ("base_m", "top_m"):
+            given = [getattr(change, key) is not None for change in self.changes]
+            if any(given) and not all(given):
+                told = f"got it in {sum(given)} of {len(given)}"
+                raise ValueError(f"{key} must be given in all changes or in none, {told}")
+        return self
+
+    @model_validator(mode="after")
+    def _top_above_base(self) -> Self:
+        for base, top in ((self.base_m, self.top_m), *map(self.heights, self.changes)):
+            if base is not None and base + 0.5 * self.base_edge_m > top - 0.5 * self.top_edge_m:
+                raise ValueError(f"top_m must lie above base_m, soft edges included, got {top:g} and {base:g}")
+        return self
+
+    def heights(self, change: Change) -> tuple[float | None, float]:
+        """Base and top at the time of a change [m]."""
+        return (
+            self.base_m if change.base_m is None else change.base_m,
+            self.top_m if change.top_m is None else change.top_m,
+        )

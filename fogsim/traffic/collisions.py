@@ -1,5 +1,6 @@
 """Collisions, each pair of vehicles once."""
 
+from fogsim.traffic.getters import getter
 from fogsim.traffic.link import Api
 from fogsim.values import Collision
 
@@ -15,12 +16,13 @@ class CollisionWatch:
 
     def __init__(self, api: Api) -> None:
         self._simulation = api.simulation
+        self._collisions = getter(api, "simulation", "getCollisions")
         self._known: set[tuple[str, str]] = set()
         self._untold: list[Collision] = []
 
     def look(self) -> None:
         """Take in the collisions of the last simulation step."""
-        for c in self._simulation.getCollisions():
+        for c in self._collisions():
             pair = (min(c.collider, c.victim), max(c.collider, c.victim))
             if pair not in self._known:
                 self._known.add(pair)

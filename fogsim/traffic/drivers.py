@@ -6,18 +6,11 @@ few: on a fog-warned motorway drivers advised 30 mph drove 61 mph.
 """
 
 import math
-import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
 
 from fogsim.kinematics import safe_speed
 from fogsim.registry import Registry
-from fogsim.traffic.link import Api
-from fogsim.traffic.sight import FogAccess
-from fogsim.units import visibility_from_extinction
 
 REACTION_TIME, DECELERATION = 2.5, 3.4
 """Of the speed from which one can stop within what is visible (AASHTO) [s], [m/s²]."""
@@ -126,109 +119,3 @@ class DriverSetup:
     spread: float = 0.1
     compliance: Compliance = Compliance()
     misjudgement: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class _Driver:
-    """One driver: factor on the chosen speed, whether advice moves them, top speed [m/s], wanted time headway [s]."""
-
-    factor: float
-    follows: bool
-    top_speed: float
-    headway: float
-
-
-class Drivers:
-    """Sets the top speed of every vehicle but the ego by what its driver chooses and is told.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    setup : DriverSetup
-        What they are like.
-    fog : FogAccess
-        The fog.
-    ego : str
-        The ego, which others govern.
-    seed : int
-        With a vehicle's id it gives its driver's nature, so that it depends on nothing else.
-    """
-
-    def __init__(self, api: Api, setup: DriverSetup, fog: FogAccess, ego: str, seed: int) -> None:
-        self._api = api
-        self._setup = setup
-        self._choice = SPEED_CHOICES[setup.speed_choice]
-        self._fog = fog
-        self._ego = ego
-        self._seed = seed
-        self._known: dict[str, _Driver] = {}
-        self._advised_since: dict[str, float] = {}
-        self._set: dict[str, float] = {}
-        self._misjudging: dict[str, float] = {}
-        self._next = 0.0
-
-    def update(self, advised: Mapping[str, float]) -> None:
-        """Let every driver choose a speed, if it is time to think again.
-
-        Parameters
-        ----------
-        advised : mapping from vehicle id to float
-            Advised speeds [m/s].
-        """
-        time = self._api.simulation.getTime()
-        if time < self._next:
-            return
-        self._next = time + CHOICE_PERIOD
-        vehicles = self._api.vehicle
-        ids = [v for v in vehicles.getIDList() if v != self._ego]
-        if not ids:
-            return
-        extinction = self._fog.extinction(np.array([vehicles.getPosition3D(v) for v in ids]))
-        visibilities = self._visibilities(extinction)
-        if self._setup.misjudgement > 0:
-            self._follow_closer(ids, visibilities)
-        self._advised_since = {v: self._advised_since.get(v, time) for v in advised}
-        for vehicle, visibility in zip(ids, visibilities, strict=True):
-            driver = self._driver(vehicle)
-            target = min(driver.factor * self._choice(visibility), driver.top_speed)
-            if vehicle in advised and driver.follows:
-                target = self._advised(vehicle, target, advised[vehicle], time)
-            # Setting it costs a call: a change that nobody would notice is left out.
-            if abs(target - self._set.get(vehicle, driver.top_speed)) > 0.3:
-                vehicles.setMaxSpeed(vehicle, target)
-                self._set[vehicle] = target
-
-    def _visibilities(self, extinction: NDArray[np.float64]) -> list[float]:
-        """Visibility at each vehicle [m]; where the fog is one and the same, that is looked up once."""
-        if extinction.min() == extinction.max():
-            return [visibility_from_extinction(float(extinction[0]))] * len(extinction)
-        return [visibility_from_extinction(float(k)) for k in extinction]
-
-    def _follow_closer(self, ids: list[str], visibilities: list[float]) -> None:
-        """Who takes a gap for longer than it is keeps a shorter one: the wanted time headway shrinks by that factor."""
-        for vehicle, visibility in zip(ids, visibilities, strict=True):
-            factor = perceived_distance_factor(visibility, self._setup.misjudgement)
-            if abs(factor - self._misjudging.get(vehicle, 1.0)) > 0.02:
-                self._api.vehicle.setTau(vehicle, self._driver(vehicle).headway / factor)
-                self._misjudging[vehicle] = factor
-
-    def _advised(self, vehicle: str, own: float, advised: float, time: float) -> float:
-        """Top speed [m/s] of a driver who follows advice, once the delay is over."""
-        if time - self._advised_since[vehicle] < self._setup.compliance.delay:
-            return own
-        own = min(own, float(self._api.vehicle.getAllowedSpeed(vehicle)))
-        return complied_speed(own, advised, self._setup.compliance.strength)
-
-    def _driver(self, vehicle: str) -> _Driver:
-        known = self._known.get(vehicle)
-        if known is None:
-            rng = np.random.default_rng([self._seed, zlib.crc32(vehicle.encode())])
-            compliance = self._setup.compliance
-            known = self._known[vehicle] = _Driver(
-                factor=float(np.exp(self._setup.spread * rng.standard_normal())),
-                follows=bool(rng.random() < compliance.reached_share) and bool(rng.random() < compliance.rate),
-                top_speed=float(self._api.vehicle.getMaxSpeed(vehicle)),
-                headway=float(self._api.vehicle.getTau(vehicle)),
-            )
-        return known

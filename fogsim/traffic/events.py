@@ -167,6 +167,11 @@ class Script:
         """Vehicles whose lamps have failed."""
         return frozenset(self._dark)
 
+    @property
+    def is_idle(self) -> bool:
+        """True if nothing waits and nobody brakes, so that `play` would do nothing."""
+        return not (self._waiting or self._braking)
+
     def play(self, situation: Situation) -> Doings:
         """Begin what is due and go on with what has begun."""
         begun = self._begin(situation) if self._waiting else []

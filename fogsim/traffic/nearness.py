@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from fogsim.traffic.getters import vehicle_getter
 from fogsim.traffic.link import Api
+from fogsim.traffic.roster import Roster
+from fogsim.traffic.schedule import Schedule
 
 TOP_SPEED = 100.0
 """Speed that no road vehicle exceeds [m/s]."""
@@ -28,43 +30,80 @@ class Nearness:
         Id of the ego.
     radius : float
         Horizontal distance from the ego's front bumper up to which a vehicle is near [m].
+    roster : Roster or None
+        Who is on the road; None for one of its own.
     """
 
-    def __init__(self, api: Api, ego: str, radius: float) -> None:
-        self._api = api
+    def __init__(self, api: Api, ego: str, radius: float, roster: Roster | None = None) -> None:
         self._ego = ego
         self._radius = radius
         self._position = vehicle_getter(api, "getPosition3D")
-        self._due: dict[str, float] = {}
-        self._time = -math.inf
-        self._ego_at = (math.inf, math.inf)
+        self._roster = Roster(api) if roster is None else roster
+        self._far = Schedule(float(api.simulation.getDeltaT()), self._roster.time)
+        self._near: tuple[str, ...] = ()
+        self._mark = self._departures = 0
+        self._seen_at = (-math.inf, math.inf, math.inf)
 
-    def find(self) -> tuple[list[str], NDArray[np.float64]]:
-        """Ids of those near in SUMO's order, the ego among them, and their positions (n, 3) [m]."""
-        everybody, time = self._api.vehicle.getIDList(), self._api.simulation.getTime()
-        self._forget(everybody, time)
-        due = self._due
-        asked = [v for v in everybody if due.get(v, time) <= time] if due else list(everybody)
-        flat = itertools.chain.from_iterable(map(self._position, asked))
-        position = np.fromiter(flat, np.float64, 3 * len(asked)).reshape(-1, 3)
-        ego = asked.index(self._ego)
-        distance = np.hypot(position[:, 0] - position[ego, 0], position[:, 1] - position[ego, 1])
-        near = distance <= self._radius
-        if near.all():
-            return asked, position
-        waits = np.minimum((distance - self._radius) / (2.0 * TOP_SPEED), LONGEST_WAIT)
-        for i in np.flatnonzero(~near).tolist():
-            due[asked[i]] = time + float(waits[i])
-        return [asked[i] for i in np.flatnonzero(near).tolist()], position[near]
+    def find(self) -> tuple[tuple[str, ...], NDArray[np.float64]]:
+        """Ids of those near in SUMO's order, the ego among them, and their positions (n, 3) [m].
 
-    def _forget(self, everybody: Sequence[str], time: float) -> None:
-        """Leave behind what cannot be relied on: after a jump of the ego or of time, and about who has gone."""
-        elapsed, here = time - self._time, self._position(self._ego)
-        moved = math.hypot(here[0] - self._ego_at[0], here[1] - self._ego_at[1])
-        self._time, self._ego_at = time, (here[0], here[1])
-        if elapsed < 0.0 or not moved <= TOP_SPEED * elapsed + 1.0:
-            self._due.clear()
-        for vehicle in self._api.simulation.getEndingTeleportIDList():
-            self._due.pop(vehicle, None)
-        if len(self._due) > 2 * len(everybody) + 100:
-            self._due = {v: self._due[v] for v in everybody if v in self._due}
+        As long as they are the same vehicles, the ids are the same object.
+        """
+        roster = self._roster
+        roster.look()
+        here = self._position(self._ego)
+        # Nobody far can be relied on to have stayed far after a jump of the ego or of time.
+        far = self._all_others() if self._has_jumped(here) else self._due()
+        if self._departures != roster.departures:
+            self._departures = roster.departures
+            self._settle([v for v in self._near if v in roster.present])
+        come_near = self._sorted_out(far, self._distances(self._positions(far), here)) if far else ()
+        if come_near:
+            self._settle([*self._near, *come_near])
+        position = self._positions(self._near)
+        distance = self._distances(position, here)
+        if float(distance.max()) <= self._radius:
+            return self._near, position
+        self._settle(self._sorted_out(self._near, distance))
+        return self._near, position[distance <= self._radius]
+
+    def _settle(self, near: Sequence[str]) -> None:
+        self._near = tuple(sorted(near))
+
+    def _sorted_out(self, vehicles: Sequence[str], distance: NDArray[np.float64]) -> list[str]:
+        """Those near; the others wait until they could have come near."""
+        now = self._roster.time
+        waits = np.minimum((distance - self._radius) / (2.0 * TOP_SPEED), LONGEST_WAIT).tolist()
+        self._far.put([v for v, wait in zip(vehicles, waits, strict=True) if wait == LONGEST_WAIT], now + LONGEST_WAIT)
+        for vehicle, wait in zip(vehicles, waits, strict=True):
+            if 0.0 < wait < LONGEST_WAIT:
+                self._far.put((vehicle,), now + wait)
+        return [v for v, wait in zip(vehicles, waits, strict=True) if wait <= 0.0]
+
+    def _has_jumped(self, here: Sequence[float]) -> bool:
+        """True after a jump of the ego or of time, and at the first look."""
+        time, x, y = self._seen_at
+        now = self._roster.time
+        self._seen_at = (now, here[0], here[1])
+        return now < time or not math.hypot(here[0] - x, here[1] - y) <= TOP_SPEED * (now - time) + 1.0
+
+    def _all_others(self) -> list[str]:
+        self._far.clear()
+        self._far.due(self._roster.time)
+        _, self._mark = self._roster.newcomers(self._mark)
+        return sorted(self._roster.present.difference(self._near))
+
+    def _due(self) -> list[str]:
+        """Vehicles that may have come near, and those new on the road."""
+        present = self._roster.present
+        due = [v for v in self._far.due(self._roster.time) if v in present]
+        new, self._mark = self._roster.newcomers(self._mark)
+        return [*due, *(v for v in new if v in present and v not in self._far and v not in {*self._near, *due})]
+
+    @staticmethod
+    def _distances(position: NDArray[np.float64], here: Sequence[float]) -> NDArray[np.float64]:
+        return np.asarray(np.hypot(position[:, 0] - here[0], position[:, 1] - here[1]))
+
+    def _positions(self, vehicles: Sequence[str]) -> NDArray[np.float64]:
+        flat = itertools.chain.from_iterable(map(self._position, vehicles))
+        return np.fromiter(flat, np.float64, 3 * len(vehicles)).reshape(-1, 3)

@@ -1,5 +1,6 @@
 """Reading SUMO's vehicles into arrays: what changes for those near the ego, what never changes once."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -9,9 +10,10 @@ from numpy.typing import NDArray
 
 from fogsim.traffic.appearance import lamps_from_many_signals
 from fogsim.traffic.bodies import Bodies
-from fogsim.traffic.getters import vehicle_getter
+from fogsim.traffic.getters import getter, vehicle_getter
 from fogsim.traffic.link import Api
 from fogsim.traffic.nearness import Nearness
+from fogsim.traffic.roster import Roster
 from fogsim.values import Lamp, Leader, TrafficState
 
 LEADER_RANGE = 500.0
@@ -20,8 +22,8 @@ LEADER_RANGE = 500.0
 OTHERS_LAMPS = Lamp.POSITION | Lamp.LOW_BEAM
 """Lamps that other drivers light in fog, as the law of most countries asks by day."""
 
-_CHANGING = ("getAngle", "getSpeed", "getAcceleration", "getLaneID", "getSignals")
-"""Getters of what changes, in the order of `Moving`."""
+_CHANGING = ("getAngle", "getSpeed", "getAcceleration", "getSignals", "getLaneID")
+"""Getters of what changes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,9 +36,9 @@ class Moving:
         Vehicle ids.
     position : (n, 3) float64
         Middle of the front bumper [m].
-    angle : sequence of float
+    angle : (n,) float64
         Heading, clockwise from north [°].
-    speed, acceleration : sequence of float
+    speed, acceleration : (n,) float64
         Speed [m/s] and acceleration [m/s²].
     lane : sequence of str
         Lane ids.
@@ -46,11 +48,24 @@ class Moving:
 
     ids: Sequence[str]
     position: NDArray[np.float64]
-    angle: Sequence[float]
-    speed: Sequence[float]
-    acceleration: Sequence[float]
+    angle: NDArray[np.float64]
+    speed: NDArray[np.float64]
+    acceleration: NDArray[np.float64]
     lane: Sequence[str]
     signals: Sequence[int]
+
+
+@dataclass(frozen=True, slots=True)
+class _Known:
+    """What never changes about those near, and which row is the ego's."""
+
+    ids: Sequence[str]
+    ego: int
+    kinds: tuple[str, ...]
+    length: NDArray[np.float64]
+    width: NDArray[np.float64]
+    height: NDArray[np.float64]
+    paint: NDArray[np.float64]
 
 
 class Reader(Protocol):
@@ -74,43 +89,68 @@ class VehicleReader:
         Id of the ego, which is always read.
     radius : float
         Vehicles farther from the ego than this are left out [m].
+    roster : Roster or None
+        Who is on the road; None for one of its own.
     """
 
-    def __init__(self, api: Api, ego: str, radius: float) -> None:
+    def __init__(self, api: Api, ego: str, radius: float, roster: Roster | None = None) -> None:
         self._api = api
         self._ego = ego
         self._radius = radius
         self._bodies = Bodies(api)
-        self._nearness = Nearness(api, ego, radius)
+        self._nearness = Nearness(api, ego, radius, roster)
+        self._time = getter(api, "simulation", "getTime")
         self._getters = tuple(vehicle_getter(api, name) for name in _CHANGING)
+        self._leader = vehicle_getter(api, "getLeader")
+        self._speed = vehicle_getter(api, "getSpeed")
+        self._minimum_gap = vehicle_getter(api, "getMinGap")
+        self._known: _Known | None = None
+        self._signals: tuple[Sequence[int], NDArray[np.int32]] = ([], np.zeros(0, dtype=np.int32))
 
     def state(self, ego_lamps: Lamp) -> TrafficState:
         """Vehicles near the ego; see `Reader.state`."""
         now = self._moving()
-        kinds, fixed = self._bodies.of(now.ids)
-        lamps = lamps_from_many_signals(now.signals) | np.int32(OTHERS_LAMPS)
-        ego = now.ids.index(self._ego)
+        known = self._knowledge(now.ids)
+        ego = known.ego
+        lamps = self._lamps(now.signals)
         lamps[ego] = int(ego_lamps) | (int(lamps[ego]) & int(Lamp.STOP))
         return TrafficState(
-            time=self._api.simulation.getTime(),
+            time=self._time(),
             ids=tuple(now.ids),
-            types=kinds,
+            types=known.kinds,
             position=now.position,
-            heading=np.radians(90.0 - np.array(now.angle)),
-            speed=np.array(now.speed),
-            acceleration=np.array(now.acceleration),
-            length=fixed[:, 0],
-            width=fixed[:, 1],
-            height=fixed[:, 2],
+            heading=np.radians(90.0 - now.angle),
+            speed=now.speed,
+            acceleration=now.acceleration,
+            length=known.length,
+            width=known.width,
+            height=known.height,
             lane=tuple(now.lane),
             lamps=lamps,
-            paint=fixed[:, 3:],
+            paint=known.paint,
         )
+
+    def _lamps(self, signals: Sequence[int]) -> NDArray[np.int32]:
+        """Lamps of all as if nobody were told any; computed anew when a signal has changed."""
+        if signals != self._signals[0]:
+            self._signals = signals, lamps_from_many_signals(signals) | np.int32(OTHERS_LAMPS)
+        return self._signals[1].copy()
+
+    def _knowledge(self, ids: Sequence[str]) -> _Known:
+        """What never changes; looked up anew when others are near than before."""
+        if self._known is None or self._known.ids is not ids:
+            kinds, numbers = self._bodies.of(ids)
+            length, width, height = numbers[:, :3].T
+            self._known = _Known(ids, ids.index(self._ego), kinds, length, width, height, numbers[:, 3:])
+        return self._known
 
     def _moving(self) -> Moving:
         ids, position = self._nearness.find()
-        angle, speed, acceleration, lane, signals = (list(map(getter, ids)) for getter in self._getters)
-        return Moving(ids, position, angle, speed, acceleration, lane, signals)
+        angle, speed, acceleration, signals, lane = self._getters
+        # One array for all: for few vehicles making arrays costs more than asking.
+        flat = itertools.chain(map(angle, ids), map(speed, ids), map(acceleration, ids))
+        angles, speeds, accelerations = np.fromiter(flat, np.float64, 3 * len(ids)).reshape(3, -1)
+        return Moving(ids, position, angles, speeds, accelerations, list(map(lane, ids)), list(map(signals, ids)))
 
     def _is_near(self, ids: Sequence[str], position: NDArray[np.float64]) -> NDArray[np.bool_]:
         offset = position - position[ids.index(self._ego)]
@@ -118,9 +158,8 @@ class VehicleReader:
 
     def leader(self) -> Leader | None:
         """The vehicle ahead of the ego; see `Reader.leader`."""
-        get = self._api.vehicle
-        found = get.getLeader(self._ego, LEADER_RANGE)
+        found = self._leader(self._ego, LEADER_RANGE)
         if found is None or not found[0]:
             return None
         # SUMO's gap leaves out the follower's minimum gap.
-        return Leader(found[0], found[1] + get.getMinGap(self._ego), get.getSpeed(found[0]))
+        return Leader(found[0], found[1] + self._minimum_gap(self._ego), self._speed(found[0]))

@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Sequence
 
+from fogsim.traffic.getters import getter
 from fogsim.traffic.link import Api
 
 
@@ -20,6 +21,8 @@ class RouteProgress:
     def __init__(self, api: Api, vehicle: str) -> None:
         self._api = api
         self._vehicle = vehicle
+        self._current_route = getter(api, "vehicle", "getRouteID")
+        self._distance = getter(api, "vehicle", "getDistance")
         self._begin()
 
     def _begin(self) -> None:
@@ -60,6 +63,6 @@ class RouteProgress:
 
     def now(self) -> tuple[float, float]:
         """How far along the route the front bumper is, and the route's length [m]."""
-        if self._api.vehicle.getRouteID(self._vehicle) != self._route_id:
+        if self._current_route(self._vehicle) != self._route_id:
             self._begin()
-        return self._offset + self._api.vehicle.getDistance(self._vehicle), self._length
+        return self._offset + self._distance(self._vehicle), self._length

@@ -5,6 +5,7 @@ and thresholds of illuminance at the eye as gathered in physics references (2·1
 road at night, 10⁻³ lx by day).
 """
 
+import functools
 import math
 from dataclasses import dataclass
 from typing import Protocol
@@ -83,9 +84,7 @@ class DriverSight:
     @property
     def eye_threshold(self) -> float:
         """Illuminance at the eye at which a lamp is noticed [lx], between night and day on a double log scale."""
-        share = math.log(max(self.illuminance, NIGHT) / NIGHT) / math.log(DAY / NIGHT)
-        ratio = DAY_EYE_THRESHOLD / NIGHT_EYE_THRESHOLD
-        return float(NIGHT_EYE_THRESHOLD * ratio ** min(share, 1.0))
+        return _eye_threshold(self.illuminance, NIGHT_EYE_THRESHOLD, DAY_EYE_THRESHOLD)
 
     def sure_distance(self, maximum_extinction: float) -> float:
         """Distance up to which every body is seen where the fog is nowhere denser than given [m].
@@ -148,18 +147,36 @@ class DriverSight:
         # Retro-reflectors and plates return light as I e^(−2τ) / d²; in clear air they are seen up to the reach.
         return np.asarray(transmission**2 * reach**2 >= np.square(distance))
 
-    def depth_to_spare(self, depth: ArrayLike, inherent_contrast: ArrayLike) -> NDArray[np.float64]:
-        """How much more optical depth a body would still be seen through [-]; 0 for one that is not seen, and at night.
+    def body_limit(self, distance: float, inherent_contrast: float) -> float:
+        """Optical depth up to which a body is seen [-]: `sees_body`, solved for the depth.
 
         Parameters
         ----------
-        depth, inherent_contrast : (n,) array_like
-            As in `sees_body`.
+        distance : float
+            Distance [m], positive.
+        inherent_contrast : float
+            Contrast to the airlight without fog between, 0 … 1.
+
+        Returns
+        -------
+        float
+            By day at any distance; negative for a body that is not even seen without fog.
         """
-        if self.illuminance < DAYLIGHT:
-            return np.zeros(np.shape(depth))
-        limit = np.log(np.maximum(inherent_contrast, 1e-9) / self.contrast_threshold)
-        return np.asarray(np.maximum(limit - np.asarray(depth), 0.0))
+        if self.illuminance >= DAYLIGHT:
+            return math.log(max(inherent_contrast, 1e-9) / self.contrast_threshold)
+        return math.log(self.headlamp_reach / distance)
+
+    def lamp_limit(self, distance: float, intensity: float) -> float:
+        """Optical depth up to which a lamp is seen [-]: `sees_lamp`, solved for the depth.
+
+        Parameters
+        ----------
+        distance : float
+            Distance [m], positive.
+        intensity : float
+            Luminous intensity [cd]; 0 for an unlit lamp, which gives ``-inf``.
+        """
+        return math.log(intensity / (self.eye_threshold * distance**2)) if intensity > 0 else -math.inf
 
     def sees_lamp(self, distance: ArrayLike, depth: ArrayLike, intensity: ArrayLike) -> NDArray[np.bool_]:
         """Tell whether lamps are seen, E = I e^(−τ) / d² ≥ E_threshold (Allard).
@@ -173,6 +190,12 @@ class DriverSight:
         """
         illuminance = np.asarray(intensity) * np.exp(-np.asarray(depth)) / np.square(np.maximum(distance, 0.1))
         return np.asarray(illuminance >= self.eye_threshold)
+
+
+@functools.lru_cache
+def _eye_threshold(illuminance: float, at_night: float, by_day: float) -> float:
+    share = math.log(max(illuminance, NIGHT) / NIGHT) / math.log(DAY / NIGHT)
+    return float(at_night * (by_day / at_night) ** min(share, 1.0))
 
 
 def rear_intensity(lamps: int) -> float:

@@ -36,9 +36,9 @@ class SubscribedReader(VehicleReader):
         return Moving(
             ids=ids,
             position=position[near],
-            angle=[rows[v][_ANGLE] for v in ids],
-            speed=[rows[v][_SPEED] for v in ids],
-            acceleration=[rows[v][_ACCELERATION] for v in ids],
+            angle=np.array([rows[v][_ANGLE] for v in ids]),
+            speed=np.array([rows[v][_SPEED] for v in ids]),
+            acceleration=np.array([rows[v][_ACCELERATION] for v in ids]),
             lane=[rows[v][_LANE] for v in ids],
             signals=[rows[v][_SIGNALS] for v in ids],
         )

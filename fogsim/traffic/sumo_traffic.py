@@ -11,13 +11,14 @@ import numpy as np
 from fogsim.errors import SimulationError
 from fogsim.traffic.collisions import CollisionWatch
 from fogsim.traffic.control import Order, SpeedControl
-from fogsim.traffic.drivers import Drivers
+from fogsim.traffic.driving import Drivers
 from fogsim.traffic.events import Script, Situation
 from fogsim.traffic.link import Api, SumoLink
 from fogsim.traffic.network import read_net, road_network
 from fogsim.traffic.opendrive import is_opendrive
 from fogsim.traffic.perception import Perception
 from fogsim.traffic.reading import Reader, VehicleReader
+from fogsim.traffic.roster import Roster
 from fogsim.traffic.route import RouteProgress
 from fogsim.traffic.running import check_step_length, loaded_additional, loaded_net, those_seen
 from fogsim.traffic.setup import AfterCollision, TrafficSetup
@@ -40,6 +41,7 @@ class _Run:
     """The parts that live as long as one run."""
 
     api: Api
+    roster: Roster
     reader: Reader
     control: SpeedControl
     collisions: CollisionWatch
@@ -55,8 +57,12 @@ def _watched(
 
     @functools.wraps(method)
     def watched(self: "SumoTraffic", /, *arguments: _P.args, **named: _P.kwargs) -> _R:
-        with self._link.watched():
+        # A block that watches costs more than most of what is watched, so it is entered only to tell an error.
+        try:
             return method(self, *arguments, **named)
+        except Exception:
+            with self._link.watched():
+                raise
 
     return watched
 
@@ -94,9 +100,12 @@ class SumoTraffic:
         """Begin, or begin anew, and run until the ego is on the road; see `Traffic.start`."""
         setup = self._setup
         api = self._link.begin(command_line(setup, seed))
+        roster = Roster(api)
+        reader = SubscribedReader if self._link.distant else VehicleReader
         self._run = _Run(
             api=api,
-            reader=(SubscribedReader if self._link.distant else VehicleReader)(api, setup.ego, setup.reading_radius),
+            roster=roster,
+            reader=reader(api, setup.ego, setup.reading_radius, roster),
             control=SpeedControl(api, setup.step_length),
             collisions=CollisionWatch(api),
             script=Script(setup.events),
@@ -132,11 +141,11 @@ class SumoTraffic:
         """Let drivers see only what this fog lets them see; see `Traffic.enter_fog`."""
         self._fog = fog
         if self._run is not None:
-            setup, api = self._setup, self._run.api
+            setup, api, roster = self._setup, self._run.api, self._run.roster
             self._run = replace(
                 self._run,
-                perception=None if setup.sight is None else Perception(api, fog, setup.sight),
-                drivers=Drivers(api, setup.drivers, fog, setup.ego, self._seed),
+                perception=None if setup.sight is None else Perception(api, fog, setup.sight, roster),
+                drivers=Drivers(api, setup.drivers, fog, setup.ego, self._seed, roster),
             )
 
     @_watched
@@ -168,9 +177,11 @@ class SumoTraffic:
         self._take_in(self._running)
 
     def _orders(self, run: _Run, command: Command) -> dict[str, Order]:
-        present = set(run.api.vehicle.getIDList())
-        ego = self._setup.ego
+        run.roster.look()
+        present, ego = run.roster.present, self._setup.ego
         orders = {ego: (command.advice.speed, self._setup.advice_deceleration)} if ego in present else {}
+        if run.script.is_idle:
+            return orders
         doings = run.script.play(self._situation(run, present))
         for event in doings.lane_changes:
             run.api.vehicle.changeLaneRelative(event.vehicle, event.lanes, event.stay)
@@ -211,19 +222,21 @@ class SumoTraffic:
         """Tell where everybody near the ego is; see `Traffic.observe`."""
         run, ego = self._running, self._setup.ego
         teleported, self._teleported = self._teleported, False
-        if teleported or ego not in run.api.vehicle.getIDList():
+        run.roster.look()
+        if teleported or ego not in run.roster.present:
             # Where it comes back, if it does, has nothing to do with where it was.
             self._route = None
             return None
         self._route = self._route or RouteProgress(run.api, ego)
         route_position, route_length = self._route.now()
         state = _with_dark(run.reader.state(self._ego_lamps), run.script.dark)
+        row = state.ids.index(ego)
         return TrafficSnapshot(
             state=state,
-            ego=state.ids.index(ego),
+            ego=row,
             route_position=route_position,
             route_length=route_length,
-            speed_limit=run.api.lane.getMaxSpeed(run.api.vehicle.getLaneID(ego)),
+            speed_limit=run.api.lane.getMaxSpeed(state.lane[row]),
             leader=run.reader.leader(),
             collisions=run.collisions.tell(),
         )

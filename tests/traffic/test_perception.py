@@ -1,5 +1,6 @@
 """Drivers in a real SUMO: who sees late hits, who sees early stops."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -59,21 +60,19 @@ class SeesFrom:
 
     distance: float
     reaction_time: float = 0.0
+    illuminance: float = 0.0
 
     def sure_distance(self, *_: float) -> float:
         return self.distance - 10.0
 
-    def depth_to_spare(self, depth: ArrayLike, *_: ArrayLike) -> NDArray[np.float64]:
-        return np.zeros(np.shape(depth))
-
     def hidden_distance(self, *_: float) -> float:
         return self.distance + 10.0
 
-    def sees_body(self, distance: ArrayLike, *_: ArrayLike) -> NDArray[np.bool_]:
-        return np.asarray(distance) <= self.distance
+    def body_limit(self, distance: float, _: float) -> float:
+        return math.inf if distance <= self.distance else -math.inf
 
-    def sees_lamp(self, distance: ArrayLike, *_: ArrayLike) -> NDArray[np.bool_]:
-        return np.zeros(np.shape(distance), dtype=bool)
+    def lamp_limit(self, *_: float) -> float:
+        return -math.inf
 
 
 @pytest.fixture

@@ -94,11 +94,15 @@ def test_beyond_the_hidden_distance_nothing_is_seen_and_just_within_it_something
     assert sight.hidden_distance(0.0) == math.inf
 
 
-def test_depth_to_spare_is_what_is_left_until_the_body_is_lost() -> None:
-    sight = DriverSight(illuminance=10_000.0)
-    for depth in (0.0, 1.0, 2.5):
-        spare = float(sight.depth_to_spare([depth], [0.8])[0])
-        assert sight.sees_body([1.0], [depth + 0.999 * spare], [0.8])[0]
-        assert not sight.sees_body([1.0], [depth + 1.001 * spare + 1e-6], [0.8])[0]
-    assert sight.depth_to_spare([5.0], [0.8])[0] == 0.0
-    assert DriverSight(illuminance=0.1).depth_to_spare([0.1], [0.8])[0] == 0.0
+@pytest.mark.parametrize("illuminance", [0.1, 10_000.0])
+def test_limits_are_the_depths_at_which_body_and_lamps_are_lost(illuminance: float) -> None:
+    sight = DriverSight(illuminance)
+    for distance in (5.0, 30.0, 50.0):
+        for contrast in (0.5, 1.0):
+            limit = sight.body_limit(distance, contrast)
+            assert sight.sees_body([distance], [limit - 1e-6], [contrast])[0]
+            assert not sight.sees_body([distance], [limit + 1e-6], [contrast])[0]
+        limit = sight.lamp_limit(distance, 100.0)
+        assert sight.sees_lamp([distance], [limit - 1e-6], [100.0])[0]
+        assert not sight.sees_lamp([distance], [limit + 1e-6], [100.0])[0]
+    assert sight.lamp_limit(1.0, 0.0) == -math.inf

@@ -1,0 +1,82 @@
+"""What drivers are like, what their vehicles came with and what was last set: a row for each driver met."""
+
+from collections.abc import Sequence
+from enum import IntEnum, auto
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.traffic.driver_choice import nature
+from fogsim.traffic.drivers import DriverSetup
+from fogsim.traffic.getters import vehicle_getter
+from fogsim.traffic.link import Api
+
+
+class Column(IntEnum):
+    """What a row tells.
+
+    Attributes
+    ----------
+    FACTOR, FOLLOWS
+        The driver's factor on the chosen speed, and whether advice moves them, 0 or 1 [-].
+    TOP_SPEED, HEADWAY
+        Top speed [m/s] and wanted time headway [s] of the vehicle as it came.
+    SPEED_SET, SHORTENED
+        Top speed that it was given [m/s], and factor by which its headway was shortened [-].
+    EXTINCTION, CHOICE
+        Extinction coefficient where it was last [1/m], and the speed that goes with it [m/s].
+    """
+
+    FACTOR = 0
+    FOLLOWS = auto()
+    TOP_SPEED = auto()
+    HEADWAY = auto()
+    SPEED_SET = auto()
+    SHORTENED = auto()
+    EXTINCTION = auto()
+    CHOICE = auto()
+
+
+class DriverTable:
+    """The table; it grows with every driver met.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    setup : DriverSetup
+        What drivers are like.
+    seed : int
+        With a vehicle's id it gives its driver's nature, so that it depends on nothing else.
+    """
+
+    def __init__(self, api: Api, setup: DriverSetup, seed: int) -> None:
+        self._top_speed = vehicle_getter(api, "getMaxSpeed")
+        self._headway = vehicle_getter(api, "getTau")
+        self._setup = setup
+        self._seed = seed
+        self._row: dict[str, int] = {}
+        self._numbers = np.empty((64, len(Column)))
+
+    def rows(self, vehicles: Sequence[str]) -> NDArray[np.intp]:
+        """Rows of vehicles (n,); who is new gets one."""
+        known = self._row
+        return np.array([known[v] if v in known else self._meet(v) for v in vehicles], dtype=np.intp)
+
+    def get(self, column: Column, rows: NDArray[np.intp]) -> NDArray[np.float64]:
+        """One column of some rows (n,)."""
+        return np.asarray(self._numbers[rows, column])
+
+    def put(self, column: Column, rows: NDArray[np.intp] | int, values: NDArray[np.float64] | float) -> None:
+        """Write one column of some rows."""
+        self._numbers[rows, column] = values
+
+    def _meet(self, vehicle: str) -> int:
+        row = len(self._row)
+        if row == len(self._numbers):
+            self._numbers = np.concatenate((self._numbers, np.empty_like(self._numbers)))
+        driver, top_speed = nature(self._setup, vehicle, self._seed), float(self._top_speed(vehicle))
+        headway = float(self._headway(vehicle))
+        self._numbers[row] = (driver.factor, driver.follows, top_speed, headway, top_speed, 1.0, -1.0, np.inf)
+        self._row[vehicle] = row
+        return row

@@ -1,0 +1,85 @@
+"""Who is on the road, without asking for all names in every step."""
+
+from fogsim.traffic.getters import getter
+from fogsim.traffic.link import Api
+
+CHECK_PERIOD = 1.0
+"""Time after which all names are asked for even so [s], should somebody have taken a vehicle away by hand."""
+
+
+class Roster:
+    """Keeps the set of vehicles on the road by who has come and who has gone in the last step.
+
+    All names are asked for at the first look, when steps were missed, and once a second.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+
+    Attributes
+    ----------
+    present : set of str
+        Vehicles on the road at `time`; not to be changed by others.
+    time : float
+        Simulated time of the last look [s].
+    departures : int
+        How often somebody has gone: as long as it stays, nobody has.
+    """
+
+    def __init__(self, api: Api) -> None:
+        names = ("getDepartedIDList", "getEndingTeleportIDList", "getStartingTeleportIDList", "getArrivedIDList")
+        self._now = getter(api, "simulation", "getTime")
+        self._changes = tuple(getter(api, "simulation", name) for name in names)
+        self._everybody = getter(api, "vehicle", "getIDList")
+        self._step = float(api.simulation.getDeltaT())
+        self._checked = 0.0
+        self._came: list[str] = []
+        self.present: set[str] = set()
+        self.departures = 0
+        self.time = float("nan")
+        self.check()
+
+    def look(self) -> None:
+        """Take in the last step; a second look in the same step costs next to nothing."""
+        now = self._now()
+        if now == self.time:
+            return
+        # Lists of changes are of one step only: after a jump of time they do not tell all.
+        if 0.0 < now - self.time < 1.5 * self._step and now - self._checked < CHECK_PERIOD:
+            self.time = now
+            self._take_in()
+        else:
+            self.check()
+
+    def _take_in(self) -> None:
+        departed, back, off, arrived = (change() for change in self._changes)
+        if not (departed or back or off or arrived):
+            return
+        # Who is beamed away and back in one step has ended up on the road.
+        self._come(departed)
+        self._go(off)
+        self._come(back)
+        self._go(arrived)
+
+    def check(self) -> None:
+        """Ask for all names."""
+        self.time = self._checked = self._now()
+        everybody = self._everybody()
+        self._go(self.present.difference(everybody))
+        self._come(everybody)
+
+    def _come(self, vehicles: "tuple[str, ...]") -> None:
+        new = [v for v in vehicles if v not in self.present]
+        self._came += new
+        self.present.update(new)
+
+    def _go(self, vehicles: "tuple[str, ...] | set[str]") -> None:
+        if vehicles:
+            self.departures += 1
+            self.present.difference_update(vehicles)
+
+    def newcomers(self, since: int) -> tuple[list[str], int]:
+        """Who has come since an earlier call, and the mark to give to the next call; the first mark is 0."""
+        came = self._came
+        return (came[since:], len(came)) if since < len(came) else ([], since)

@@ -8,6 +8,9 @@ if TYPE_CHECKING:
     from fogsim import estimators as estimators
     from fogsim.attached import attach as attach
     from fogsim.attached import connect as connect
+    from fogsim.dataset import semantic_mask as semantic_mask
+    from fogsim.dataset import transmission as transmission
+    from fogsim.dataset import write_dataset as write_dataset
     from fogsim.loop import ClosedLoop as ClosedLoop
     from fogsim.loop import run as run
     from fogsim.scenario import Scenario as Scenario
@@ -27,6 +30,9 @@ _LAZY = {
     "catalogue": "fogsim.scenario",
     "load_scenario": "fogsim.scenario",
     "run": "fogsim.loop",
+    "semantic_mask": "fogsim.dataset",
+    "transmission": "fogsim.dataset",
+    "write_dataset": "fogsim.dataset",
 }
 """Names that draw in heavier libraries, and the modules that they come from."""
 
@@ -52,6 +58,9 @@ __all__ = [
     "estimators",
     "load_scenario",
     "run",
+    "semantic_mask",
+    "transmission",
+    "write_dataset",
 ]
 
 

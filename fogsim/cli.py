@@ -239,6 +239,47 @@ def signs_command(
     _out.print(f"{len(signs)} sign{'' if len(signs) == 1 else 's'}: {escape(str(out))}", soft_wrap=True)
 
 
+@app.command("dataset")
+def dataset_command(
+    scenario: Annotated[str, typer.Argument(help="A scenario of the catalogue (fogsim list), a file or a folder.")],
+    out: Annotated[Path, typer.Option(help="Directory; one that was interrupted is continued.")],
+    frames: Annotated[int, typer.Option(help="How many frames.")],
+    seed: Annotated[int, typer.Option(help="Seed of the first run; further runs have the next ones.")] = 0,
+    every: Annotated[int, typer.Option(help="Take one frame of so many.")] = 1,
+    visibility: Annotated[
+        float | None, typer.Option(help="Meteorological visibility of homogeneous fog [m].", min=1e-3)
+    ] = None,
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY.PATH=VALUE", help="Put a value in place of the file's.")
+    ] = None,
+) -> None:
+    """Write frames with depth, masks and true transmission, and a COCO file with boxes and all that is known."""
+    from fogsim.dataset import write_dataset  # noqa: PLC0415 - heavy; --help must be quick
+
+    loaded = _scenario(scenario, None, None, visibility, settings or ())
+    progress = Progress(
+        BarColumn(bar_width=20),
+        TaskProgressColumn(),
+        TextColumn("{task.description}"),
+        TimeRemainingColumn(),
+        console=_err,
+    )
+    with progress:
+        task = progress.add_task("starting; a first run compiles for some seconds", total=frames)
+        done = write_dataset(
+            loaded,
+            out,
+            frames,
+            seed=seed,
+            every=every,
+            watch=lambda n: progress.update(task, completed=n, description=f"{n} of {frames} frames"),
+        )
+    _out.print(f"{done.frames} frames, {done.written} of them new: {escape(str(done.directory))}", soft_wrap=True)
+    if not done.complete:
+        _out.print("Interrupted; the same command continues it.")
+        raise typer.Exit(INTERRUPTED)
+
+
 @app.command("doctor")
 def doctor_command() -> None:
     """Say what works on this machine, what is missing, and how to get it."""

@@ -1,0 +1,145 @@
+"""The directory of a data set: where its files are, whose it is, and what of it is there already."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.dataset.encoding import png
+from fogsim.errors import InputError
+from fogsim.recorders.files import PARTIAL_SUFFIX, partial_path, publish, write_json
+
+IDENTITY = "dataset.json"
+ANNOTATIONS = "annotations.json"
+LAYERS = ("frames", "depth", "instance", "semantic", "transmission")
+"""Folders of the images."""
+
+_RECORDS = "records"
+
+
+class DatasetDirectory:
+    """The directory of one data set, new or to be continued.
+
+    A frame is there when its record is, which is written after its images.
+
+    Parameters
+    ----------
+    path : Path
+        The directory; it is made with its parents if it is not there.
+    identity : mapping
+        What the data set is of; JSON values only.
+
+    Raises
+    ------
+    InputError
+        If the path is no directory, or holds something else than this data set.
+    """
+
+    def __init__(self, path: Path, identity: Mapping[str, Any]) -> None:
+        self.path = Path(path)
+        self._check(dict(identity))
+        try:
+            for folder in (*LAYERS, _RECORDS):
+                (self.path / folder).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"cannot make the directory {self.path} for the data set: {error.strerror}") from error
+        write_json(self.path / IDENTITY, identity)
+
+    def _check(self, identity: dict[str, Any]) -> None:
+        if not self.path.exists():
+            return
+        if not self.path.is_dir():
+            raise InputError(f"a data set needs a directory, but {self.path} is a file")
+        if not (self.path / IDENTITY).is_file():
+            strangers = sorted(p.name for p in self.path.iterdir() if not p.name.endswith(PARTIAL_SUFFIX))
+            # An interruption before anything was written leaves empty folders.
+            if any(name not in LAYERS and name != _RECORDS for name in strangers):
+                raise InputError(
+                    f"{self.path} holds files that are no data set of FogSim's ({strangers[0]}, …); "
+                    "choose another directory with --out"
+                )
+            return
+        try:
+            there = json.loads((self.path / IDENTITY).read_text(encoding="utf-8"))
+        except ValueError as error:
+            raise InputError(f"{self.path / IDENTITY} cannot be read: {error}") from error
+        unlike = _differences(there, json.loads(json.dumps(identity)))
+        if unlike:
+            raise InputError(
+                f"{self.path} holds another data set: {'; '.join(unlike[:4])}{' …' if len(unlike) > 4 else ''}. "
+                "Choose another directory with --out, or continue that one as it was begun"
+            )
+
+    def has(self, number: int) -> bool:
+        """Tell whether a frame is there with all its files."""
+        files = [*(self._layer(layer, number) for layer in LAYERS), self._record(number)]
+        return all(file.is_file() for file in files)
+
+    def beyond(self, frames: int) -> int:
+        """How many frames there are in all, where they are more than these; else 0."""
+        numbers = [int(p.stem) for p in (self.path / _RECORDS).glob("*.json")]
+        return len(numbers) if any(number >= frames for number in numbers) else 0
+
+    def write(
+        self, number: int, layers: Mapping[str, NDArray[np.uint8] | NDArray[np.uint16]], record: Mapping[str, Any]
+    ) -> None:
+        """Write a frame: its images, and then its record with their names.
+
+        Parameters
+        ----------
+        number : int
+            Its place in the data set, from 0.
+        layers : mapping
+            An image for each of `LAYERS`.
+        record : mapping
+            Its "image" and "annotations".
+        """
+        for layer in LAYERS:
+            path = self._layer(layer, number)
+            partial_path(path).write_bytes(png(layers[layer]))
+            publish(path)
+        names = {_key(layer): self._layer(layer, number).relative_to(self.path).as_posix() for layer in LAYERS}
+        write_json(self._record(number), {**record, "image": {**names, **record["image"]}})
+
+    def record(self, number: int) -> dict[str, Any]:
+        """Record of a frame that is there.
+
+        Raises
+        ------
+        InputError
+            If it cannot be read.
+        """
+        path = self._record(number)
+        try:
+            found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        except ValueError as error:
+            raise InputError(f"{path} cannot be read: {error}; remove it to have its frame made again") from error
+        return found
+
+    def write_annotations(self, annotations: Mapping[str, Any]) -> None:
+        """Write the COCO file, in place of one that is there."""
+        write_json(self.path / ANNOTATIONS, annotations)
+
+    def _layer(self, layer: str, number: int) -> Path:
+        return self.path / layer / f"{number:06d}.png"
+
+    def _record(self, number: int) -> Path:
+        return self.path / _RECORDS / f"{number:06d}.json"
+
+
+def _key(layer: str) -> str:
+    """Name of a layer's file in a record: COCO's own for the frame."""
+    return "file_name" if layer == "frames" else f"{layer}_file"
+
+
+def _differences(there: Any, wanted: Any, place: str = "") -> list[str]:
+    """What two plain values differ in, in words."""
+    if isinstance(there, dict) and isinstance(wanted, dict):
+        keys = sorted(there.keys() | wanted.keys())
+        return [d for key in keys for d in _differences(there.get(key), wanted.get(key), f"{place}.{key}".lstrip("."))]
+    if there == wanted:
+        return []
+    return [f"{place} is {json.dumps(there)} there, and {json.dumps(wanted)} was asked for"]

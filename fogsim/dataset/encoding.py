@@ -1,0 +1,103 @@
+"""Ground truth as PNG files: what their values mean, and how to read them back."""
+
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.errors import FogSimError, InputError
+
+DEPTH_UNIT = 0.01
+"""Distance that one step of a depth image stands for [m]."""
+
+TRANSMISSION_UNIT = 1.0 / 65_535
+"""Transmission that one step of a transmission image stands for [-]."""
+
+_MOST = 65_535
+_COMPRESSION = 3  # of 9; more takes several times as long for a few per cent
+
+
+def encoded_depth(distance: NDArray[np.float32]) -> NDArray[np.uint16]:
+    """Distance along the ray as 16-bit values in centimetres.
+
+    Parameters
+    ----------
+    distance : (rows, cols) float32
+        Distance [m]; ``inf`` for the sky.
+
+    Returns
+    -------
+    (rows, cols) uint16
+        1 … 65 534 centimetres; 0 for the sky; 65 535 for whatever is 655.35 m away or more.
+    """
+    steps = np.clip(np.rint(np.minimum(distance, 1e6) / DEPTH_UNIT), 1, _MOST)
+    return np.where(np.isinf(distance), 0, steps).astype(np.uint16)
+
+
+def decoded_depth(values: NDArray[np.uint16]) -> NDArray[np.float64]:
+    """Distance along the ray from the values of a depth image.
+
+    Returns
+    -------
+    (rows, cols) float64
+        Distance [m]; ``inf`` for the sky, and 655.35 for that and more.
+    """
+    return np.where(values == 0, np.inf, values * DEPTH_UNIT)
+
+
+def encoded_transmission(transmission: NDArray[np.float32]) -> NDArray[np.uint16]:
+    """Transmission 0 … 1 as 16-bit values 0 … 65 535."""
+    return np.rint(np.clip(transmission, 0.0, 1.0) * np.float64(_MOST)).astype(np.uint16)
+
+
+def decoded_transmission(values: NDArray[np.uint16]) -> NDArray[np.float64]:
+    """Transmission 0 … 1 from the values of a transmission image."""
+    return np.asarray(values * TRANSMISSION_UNIT)
+
+
+def png(image: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
+    """PNG file of an image.
+
+    Parameters
+    ----------
+    image : (rows, cols) or (rows, cols, 3) uint8 or uint16
+        Pixel values, red first; all their bits are kept.
+
+    Raises
+    ------
+    FogSimError
+        If it cannot be encoded.
+    """
+    # OpenCV has blue first.
+    pixels: NDArray[Any] = image if image.ndim == 2 else np.ascontiguousarray(image[..., ::-1])
+    done, data = cv2.imencode(".png", pixels, [cv2.IMWRITE_PNG_COMPRESSION, _COMPRESSION])
+    if not done:
+        raise FogSimError(f"an image of {image.shape} {image.dtype} could not be written as PNG")
+    return data.tobytes()
+
+
+def read_png(path: Path) -> NDArray[np.uint8] | NDArray[np.uint16]:
+    """Image of a PNG file, with all its bits.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    (rows, cols) or (rows, cols, 3) uint8 or uint16
+        Pixel values, red first.
+
+    Raises
+    ------
+    InputError
+        If it is no PNG file that can be read.
+    """
+    data = np.frombuffer(Path(path).read_bytes(), np.uint8)
+    image: NDArray[Any] | None = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+    if image is None:
+        raise InputError(f"{path} is no image that can be read")
+    return image if image.ndim == 2 else np.ascontiguousarray(image[..., ::-1])

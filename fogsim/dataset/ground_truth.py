@@ -1,0 +1,168 @@
+"""What is truly seen in a step's frame: how much light comes through the air, and what each pixel belongs to."""
+
+import dataclasses
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.atmosphere import Air
+from fogsim.errors import InputError
+from fogsim.pinhole import ray_from_pixel
+from fogsim.values import Step, Truth, View
+
+FIRST_VEHICLE = 16
+"""Ids in `View.instance` from which on they are vehicles: this plus the row in the traffic state."""
+
+
+class SemanticClass(IntEnum):
+    """What a pixel shows, as `semantic_mask` has it."""
+
+    SKY = 0
+    TERRAIN = 1
+    ROAD = 2
+    ROADSIDE = 3
+    SIGN = 4
+    CAR = 5
+    VAN = 6
+    TRUCK = 7
+    BUS = 8
+    MOTORCYCLE = 9
+    OTHER_VEHICLE = 10
+
+
+_OF_TYPE = {
+    kind.name.lower(): kind
+    for kind in (
+        SemanticClass.CAR,
+        SemanticClass.VAN,
+        SemanticClass.TRUCK,
+        SemanticClass.BUS,
+        SemanticClass.MOTORCYCLE,
+    )
+}
+
+
+def vehicle_class(body: str) -> SemanticClass:
+    """Class of a vehicle by its body kind in the traffic state."""
+    return _OF_TYPE.get(body, SemanticClass.OTHER_VEHICLE)
+
+
+def depth(step: Step) -> NDArray[np.float32]:
+    """Distance along the ray from the optical centre to what each pixel shows.
+
+    Parameters
+    ----------
+    step : Step
+        Of `fogsim.run` and its kin.
+
+    Returns
+    -------
+    (rows, cols) float32
+        Distance [m], not the depth along the optical axis; ``inf`` for the sky.
+    """
+    return step.view.distance
+
+
+def transmission(step: Step) -> NDArray[np.float32]:
+    """Share of the light of what each pixel shows that comes through the air, T = e^(−τ).
+
+    Parameters
+    ----------
+    step : Step
+        Of `fogsim.run` and its kin.
+
+    Returns
+    -------
+    (rows, cols) float32
+        0 … 1: 1 through clear air, 0.05 at the meteorological visibility. For the sky, that of the whole path to the
+        fog's end.
+
+    Raises
+    ------
+    InputError
+        If the step was not made by a camera in a loop.
+    """
+    truth = step.truth
+    if truth.fog is None or truth.camera is None or truth.pose is None:
+        raise InputError("the true transmission is known only of steps that a camera in a loop has made")
+    # A white scene in fog that adds no light of its own is seen as its transmission.
+    white = dataclasses.replace(step.view, radiance=np.ones_like(step.view.radiance), lamp_response=None)
+    dark = dataclasses.replace(truth.fog, airlight=(0.0, 0.0, 0.0))
+    seen = Air(dark).radiance(white, truth.camera, truth.pose)
+    return np.ascontiguousarray(seen[..., 0])
+
+
+def semantic_mask(step: Step) -> NDArray[np.uint8]:
+    """Class of what each pixel shows.
+
+    Parameters
+    ----------
+    step : Step
+        Of `fogsim.run` and its kin.
+
+    Returns
+    -------
+    (rows, cols) uint8
+        Values of `SemanticClass`.
+    """
+    table = np.full(FIRST_VEHICLE + len(step.traffic.types), SemanticClass.ROADSIDE, np.uint8)
+    table[: SemanticClass.CAR] = range(SemanticClass.CAR)
+    table[FIRST_VEHICLE:] = [vehicle_class(body) for body in step.traffic.types]
+    return np.asarray(table[step.view.instance])
+
+
+def instance_mask(step: Step) -> NDArray[np.uint16]:
+    """Object that each pixel belongs to.
+
+    Parameters
+    ----------
+    step : Step
+        Of `fogsim.run` and its kin.
+
+    Returns
+    -------
+    (rows, cols) uint16
+        0 for no object; 1 + i for the vehicle in row i of the traffic state; 1 + n + j for the face of sign j in the
+        sign map, where there are n vehicles. A sign's post belongs to no object.
+
+    Raises
+    ------
+    InputError
+        If the step was not made by a camera in a loop.
+    """
+    ids = step.view.instance
+    vehicles = len(step.traffic.ids)
+    mask = np.where(ids >= FIRST_VEHICLE, ids - (FIRST_VEHICLE - 1), 0).astype(np.uint16)
+    rows, cols = np.nonzero(ids == SemanticClass.SIGN)
+    if rows.size:
+        sign = _sign_of(_places(step.view, step.truth, rows, cols), step.truth)
+        mask[rows, cols] = np.where(sign >= 0, sign + 1 + vehicles, 0)
+    return mask
+
+
+def _places(view: View, truth: Truth, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Points in the world that pixels show (n, 3) [m]."""
+    if truth.camera is None or truth.pose is None:
+        raise InputError("signs can be told apart only in steps that a camera in a loop has made")
+    pixels = np.stack((cols, rows, np.ones(rows.shape)), axis=1)
+    rays = pixels @ ray_from_pixel(truth.camera, truth.pose).T
+    rays *= (view.distance[rows, cols] / np.linalg.norm(rays, axis=1))[:, None]
+    return np.asarray(truth.pose.position + rays)
+
+
+def _sign_of(points: NDArray[np.float64], truth: Truth) -> NDArray[np.intp]:
+    """Number of the sign whose face each point lies on; −1 for none."""
+    nearest = np.full(len(points), -1, dtype=np.intp)
+    least = np.full(len(points), np.inf)
+    low, high = points.min(axis=0), points.max(axis=0)
+    for number, sign in enumerate(() if truth.signs is None else truth.signs.signs):
+        # The corner of a square plate is 0.71 of its size away from its middle.
+        reach = 0.75 * sign.diameter
+        centre = np.array(sign.position)
+        if np.any(centre < low - reach) or np.any(centre > high + reach):
+            continue
+        apart = np.linalg.norm(points - centre, axis=1)
+        on_face = (apart <= reach) & (points[:, 2] >= centre[2] - 0.55 * sign.diameter) & (apart < least)
+        nearest[on_face], least[on_face] = number, apart[on_face]
+    return nearest

@@ -57,7 +57,7 @@ def packed(
     """
     number = len(drawing.mesh)
     words = np.empty((number, COPY.itemsize // 4), np.float32)
-    commands = np.empty((len(first_face) - 1, len(COMMAND)), np.uint32)
+    commands = np.empty((len(first_face) - 1, COMMAND.itemsize // 4), np.uint32)
     used = _pack(drawing.mesh, drawing.record["transform"], drawing.first, clip, first_face, words, commands)
     return words.view(COPY)[:, 0], commands.view(COMMAND)[:used, 0]
 

@@ -74,7 +74,9 @@ def frustum_grid(
     rows, columns = _grid_rows(camera, ray_map), _grid_columns(camera)
     directions = _directions(ray_map, rows, columns)
     if distances is None:
-        distances = node_distances(eye, directions[:: max(1, len(rows) // 8), :: max(1, len(columns) // 3)], medium)
+        # Rows are dense where the fog is seen edge-on, and so are the probes.
+        probes = directions[:: max(1, len(rows) // 14), :: max(1, (len(columns) - 1) // 2)]
+        distances = node_distances(eye, probes, medium)
     shape = (len(rows), len(columns), len(distances))
     extinction, depth = np.empty(shape, np.float32), np.empty(shape, np.float32)
     flat = (shape[0] * shape[1], shape[2])
@@ -103,7 +105,7 @@ def _grid_rows(camera: Camera, ray_map: NDArray[np.float64]) -> NDArray[np.float
     rows = [0.0]
     while rows[-1] < camera.height - 1:
         off = max(high - rows[-1] - fine, rows[-1] - low, 0.0)
-        rows.append(rows[-1] + min(max(0.35 * off, fine), coarse))
+        rows.append(rows[-1] + min(max(0.25 * off, fine), coarse))
     return np.array(rows if len(rows) > 1 else [0.0, 1.0], dtype=np.float32)
 
 

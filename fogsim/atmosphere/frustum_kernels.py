@@ -1,10 +1,12 @@
 """Optical depth on the rays of a frustum grid, and its way to the pixels between them."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere.kernels import ENDLESS, mix, three_times, transmissions
-from fogsim.atmosphere.medium import DECAY, TOP, Medium
+from fogsim.atmosphere.medium import BASE, BASE_EDGE, DECAY, TOP, TOP_EDGE, Medium
 from fogsim.atmosphere.path_kernels import extinctions_on_ray
 from fogsim.jit import kernel
 
@@ -12,6 +14,28 @@ OPAQUE = 60.0
 """Optical depth beyond which nothing is told apart [-]."""
 
 _OUT_OF_FOG = 1e-9
+
+
+@kernel
+def _split_at_sharp_edges(
+    eye: NDArray[np.float64],
+    direction: NDArray[np.float64],
+    distances: NDArray[np.float64],
+    medium: Medium,
+    pieces: NDArray[np.float64],
+) -> None:
+    """Put right the optical depths of those intervals in which a ray crosses a sharp base or top."""
+    halves, values = np.empty(2), np.empty(2)
+    for middle, edge in ((BASE, BASE_EDGE), (TOP, TOP_EDGE)):
+        rise = medium.layer[middle] - eye[2]
+        if medium.layer[edge] > 0.0 or math.isinf(rise) or rise * direction[2] <= 0.0:
+            continue
+        crossing = rise / direction[2]
+        if crossing < distances[distances.shape[0] - 2]:
+            n = np.searchsorted(distances, crossing)
+            halves[0], halves[1] = 0.5 * (distances[n - 1] + crossing), 0.5 * (crossing + distances[n])
+            extinctions_on_ray(eye, direction, halves, medium, values)
+            pieces[n] = values[0] * (crossing - distances[n - 1]) + values[1] * (distances[n] - crossing)
 
 
 @kernel
@@ -27,28 +51,29 @@ def grid_depths(
 
     The last node stands for the end of the ray, wherever that is.
     """
-    nodes = distances.shape[0]
-    at, values = np.empty(2 * nodes - 3), np.empty(2 * nodes - 3)
-    for n in range(nodes - 1):
+    last = distances.shape[0] - 1
+    at, values, pieces = np.empty(2 * last - 1), np.empty(2 * last - 1), np.zeros(last + 1)
+    for n in range(last):
         at[2 * n] = distances[n]
-        if n < nodes - 2:
+        if n < last - 1:
             at[2 * n + 1] = 0.5 * (distances[n] + distances[n + 1])
     top, decay = medium.layer[TOP], medium.layer[DECAY]
     for m in range(directions.shape[0]):
         extinctions_on_ray(eye, directions[m], at, medium, values)
-        total = 0.0
-        for n in range(nodes - 1):
-            extinction[m, n] = values[2 * n]
-            if n > 0:
-                mean = (values[2 * n - 2] + 4.0 * values[2 * n - 1] + values[2 * n]) / 6.0
-                total += mean * (distances[n] - distances[n - 1])
-            depth[m, n] = min(total, OPAQUE)
+        for n in range(1, last):
+            mean = (values[2 * n - 2] + 4.0 * values[2 * n - 1] + values[2 * n]) / 6.0
+            pieces[n] = mean * (distances[n] - distances[n - 1])
+        _split_at_sharp_edges(eye, directions[m], distances, medium, pieces)
         rise = max(directions[m, 2], _OUT_OF_FOG)
-        rest = max(top - eye[2] - distances[nodes - 2] * directions[m, 2], 0.0) / rise
+        rest = max(top - eye[2] - distances[last - 1] * directions[m, 2], 0.0) / rise
         if decay > 0.0:
             rest = min(rest, 1.0 / (decay * rise))
-        extinction[m, nodes - 1] = values[2 * nodes - 4]
-        depth[m, nodes - 1] = min(total + values[2 * nodes - 4] * min(rest, ENDLESS), OPAQUE)
+        pieces[last] = values[2 * last - 2] * min(rest, ENDLESS)
+        total = 0.0
+        for n in range(last + 1):
+            total += pieces[n]
+            extinction[m, n] = values[2 * min(n, last - 1)]
+            depth[m, n] = min(total, OPAQUE)
 
 
 @kernel

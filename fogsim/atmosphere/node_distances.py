@@ -10,7 +10,10 @@ from fogsim.atmosphere.path_kernels import extinctions_on_ray
 NODES = 32
 """Nodes along a ray, with the eye and the end of the ray."""
 
-_PROBES = np.concatenate(([0.0], np.geomspace(0.5, 20_000.0, 160)))
+FARTHEST = 20_000.0
+"""What is farther than this and not endless is taken to be here [m]."""
+
+_PROBES = np.concatenate(([0.0], np.geomspace(0.5, 0.9 * FARTHEST, 128)))
 _SEEN = 7.0
 """Optical depth behind which a thousandth of the contrast is left [-]."""
 _FOG_LEFT = 1e-3
@@ -41,7 +44,7 @@ def node_distances(
     Returns
     -------
     (count,) float64
-        Ascending from 0; the last is `ENDLESS` [m].
+        Ascending from 0; the last two are `FARTHEST` and `ENDLESS` [m].
     """
     probes = np.ascontiguousarray(directions.reshape(-1, 3))
     k = np.empty((len(probes), len(_PROBES)))
@@ -57,5 +60,5 @@ def node_distances(
     even = step[:last] / (_PROBES[1 : last + 1] + 5.0)
     weight = _EVEN_SHARE * even / even.sum() + (1.0 - _EVEN_SHARE) * uneven / max(uneven.sum(), 1e-30)
     growth = np.concatenate(([0.0], np.cumsum(weight)))
-    inner = np.interp(np.linspace(0.0, growth[-1], count - 1), growth, _PROBES[: last + 1])
-    return np.append(inner, ENDLESS)
+    inner = np.interp(np.linspace(0.0, growth[-1], count - 2), growth, _PROBES[: last + 1])
+    return np.append(inner, (FARTHEST, ENDLESS))

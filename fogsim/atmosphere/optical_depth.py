@@ -34,7 +34,7 @@ def extinction(field: FogField, points: ArrayLike, time: float = 0.0) -> NDArray
 def optical_depth(field: FogField, start: ArrayLike, end: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
     """Optical depth between points, τ = ∫ k ds [-].
 
-    Exact for banks and layers; through scale heights to 10⁻⁶, through patches to a few thousandths.
+    Exact for banks and layers; through scale heights to 10⁻⁶, through patches to a thousandth.
 
     Parameters
     ----------

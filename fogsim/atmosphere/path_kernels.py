@@ -3,7 +3,7 @@
 The extinction is a product of cubics (soft edges of banks and of the layer), an exponential (scale height) and the
 patches' factor. Between the places where a line crosses an edge the cubics are plain polynomials, of degree 6 at most
 together, which Gauss's rule with four points integrates exactly, as it does the exponential over two scale heights to
-3·10⁻⁷ and the patches over one correlation length to a few thousandths.
+3·10⁻⁷ and the patches over two cells of theirs to a thousandth.
 """
 
 import math
@@ -20,7 +20,7 @@ MOST_PIECES = 400
 FADED = 20.0
 """Scale heights above which nothing is left of ground fog."""
 
-_CELLS_IN_PIECE = 5.0
+_CELLS_IN_PIECE = 2.0
 _NODES = np.array((0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970263))
 _WEIGHTS = np.array((0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692))
 

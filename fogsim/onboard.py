@@ -157,7 +157,7 @@ class OnBoard:
             speed_limit=snapshot.speed_limit,
             leader=snapshot.leader,
             collisions=snapshot.collisions,
-            truth=fog_truth(field_at(world.fog, time), pose, self._camera),
+            truth=fog_truth(field_at(world.fog, time), pose, self._camera, world.signs),
             view=view,
             observation=observation,
             estimates=estimates,
@@ -197,7 +197,7 @@ class OnBoard:
         self._world, self._streams = None, None
 
 
-def fog_truth(fog: FogField, pose: CameraPose, camera: Camera) -> Truth:
+def fog_truth(fog: FogField, pose: CameraPose, camera: Camera, signs: SignMap) -> Truth:
     """The fog at a camera, and as far as it sees along its heading.
 
     Parameters
@@ -208,6 +208,8 @@ def fog_truth(fog: FogField, pose: CameraPose, camera: Camera) -> Truth:
         Where the camera is.
     camera : Camera
         Its true calibration.
+    signs : SignMap
+        The signs that stand in the world.
     """
     eye = np.array(pose.position)
     direction = np.array([math.cos(pose.heading), math.sin(pose.heading), 0.0])
@@ -221,4 +223,5 @@ def fog_truth(fog: FogField, pose: CameraPose, camera: Camera) -> Truth:
         camera=camera,
         pose=pose,
         fog=fog,
+        signs=signs,
     )

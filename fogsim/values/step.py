@@ -11,6 +11,7 @@ from fogsim.values.estimate import Estimate
 from fogsim.values.fog import FogField
 from fogsim.values.image import View
 from fogsim.values.observation import Observation
+from fogsim.values.road import SignMap
 from fogsim.values.traffic import Collision, Leader, TrafficState
 
 
@@ -39,7 +40,9 @@ class Truth:
     pose : CameraPose or None
         Where the camera truly is, likewise.
     fog : FogField or None
-        The fog as a field, likewise.
+        The fog at this instant as a field, likewise.
+    signs : SignMap or None
+        Every sign that stands in the world, likewise.
     """
 
     extinction: float
@@ -47,6 +50,7 @@ class Truth:
     camera: Camera | None = None
     pose: CameraPose | None = None
     fog: FogField | None = None
+    signs: SignMap | None = None
 
     @property
     def visibility(self) -> float:

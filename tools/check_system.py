@@ -5,6 +5,7 @@ Runs before anything is installed, so it uses the standard library alone.
 
 import ctypes
 import importlib.util
+import shutil
 import sys
 
 MINIMUM = (3, 11)
@@ -15,8 +16,11 @@ LIBRARIES = {
     "libatomic.so.1": "libatomic1",
 }
 
+FOR_ALL_TESTS = {"Xvfb": "xvfb"}
+"""Programs that some tests need, which are skipped without them: sumo-gui's display without a screen."""
 
-def missing_packages() -> list[str]:
+
+def missing_packages(for_all_tests: bool = False) -> list[str]:
     """Debian/Ubuntu packages that would provide what is not found."""
     packages = []
     if importlib.util.find_spec("ensurepip") is None:
@@ -26,6 +30,8 @@ def missing_packages() -> list[str]:
             ctypes.CDLL(library)
         except OSError:
             packages += provided_by.split()
+    if for_all_tests:
+        packages += [package for program, package in FOR_ALL_TESTS.items() if shutil.which(program) is None]
     return packages
 
 
@@ -34,7 +40,7 @@ def main() -> int:
     if sys.version_info < MINIMUM:
         print(f"FogSim needs Python {MINIMUM[0]}.{MINIMUM[1]} or newer, this is {sys.version.split()[0]}.")  # noqa: T201 - the line is the result
         return 1
-    packages = missing_packages()
+    packages = missing_packages(for_all_tests="--all-tests" in sys.argv[1:])
     if packages:
         print(f"FogSim lacks system libraries; install them with: sudo apt-get install {' '.join(packages)}")  # noqa: T201 - the line is the result
         return 1

@@ -2,6 +2,7 @@
 
 import contextlib
 import dataclasses
+import warnings
 from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
@@ -143,6 +144,7 @@ class AttachedSession:
         self._times: tuple[float, float] | None = None
         self._index = 0
         self._started = False
+        self._looked = False
         self._closed = False
 
     def observe(self) -> Step | None:
@@ -163,6 +165,7 @@ class AttachedSession:
         """
         if self._closed:
             raise SimulationError("the session is closed")
+        self._looked = True
         if self._started:
             self._traffic.look()
         elif self._traffic.ego_is_there():
@@ -214,7 +217,14 @@ class AttachedSession:
         """Let drivers drive and see by themselves again and free the renderer; the simulation goes on.
 
         Top speeds that drivers have chosen in the fog stay as they are.
+
+        Warns
+        -----
+        UserWarning
+            If the ego was never on the road: its id may be wrong.
         """
+        if not self._closed and not self._started and self._looked:
+            warnings.warn(self._traffic.absence(), stacklevel=2)
         if not self._closed and self._started:
             # Nobody is left to be held in a simulation that has ended first.
             with contextlib.suppress(SimulationError):

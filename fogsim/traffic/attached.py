@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from fogsim.errors import InputError, SimulationError
 from fogsim.traffic.link import Api, told_errors
+from fogsim.traffic.running import those_seen
 from fogsim.traffic.setup import TrafficSetup
 from fogsim.traffic.sumo_library import load_libsumo
 from fogsim.traffic.sumo_traffic import SumoTraffic
@@ -75,12 +76,19 @@ class AttachedTraffic(SumoTraffic):
         self._attached = AttachedLink(api)
         self._api = api
         self._ego = setup.ego
+        self._seen: set[str] = set()
         super().__init__(replace(setup, step_length=step_length(api)), self._attached)
 
     def ego_is_there(self) -> bool:
         """True while the ego is on the road."""
         with self._attached.watched():
-            return self._ego in self._api.vehicle.getIDList()
+            present = self._api.vehicle.getIDList()
+        self._seen.update(present)
+        return self._ego in present
+
+    def absence(self) -> str:
+        """Say that the ego has not been on the road so far, and who has."""
+        return f"the ego {self._ego!r} did not appear while FogSim was attached; {those_seen(self._ego, self._seen)}"
 
     def release(self) -> None:
         """Let the ego drive by itself again, and everybody see everybody."""

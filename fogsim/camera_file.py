@@ -1,0 +1,94 @@
+"""The calibration of a camera in a file, ``camera.yaml``, for images that come from disk."""
+
+import math
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, ValidationError
+from pydantic_core import ErrorDetails
+
+from fogsim.errors import InputError, suggest
+from fogsim.scenario.document import Document, KeyPath, dotted, read_document
+from fogsim.scenario.section import Positive, Section
+from fogsim.values import Camera, Response
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class CameraFile(Section):
+    """Keys of a camera file: pixels, metres and degrees, the units of its readers."""
+
+    width: Annotated[int, Field(ge=1, le=65_536)]
+    """Columns of the image."""
+
+    height: Annotated[int, Field(ge=1, le=65_536)]
+    """Rows of the image."""
+
+    focal_length_px: Positive
+    """Focal length."""
+
+    principal_point_px: tuple[Finite, Finite]
+    """Principal point [u0, v0]; pixel centres are whole numbers."""
+
+    mount_height_m: Positive
+    """Height of the camera above the road."""
+
+    pitch_deg: Annotated[float, Field(gt=-90, lt=90)]
+    """Pitch; positive looks down."""
+
+    roll_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
+    """Roll; positive turns the image's right side down."""
+
+    response: Response = Response.LINEAR
+    """Curve from light to pixel values: `linear`, `gamma` (2.2) or `srgb`."""
+
+    bits: Literal[8, 10, 12] = 8
+    """Bit depth of the pixel values; images of 16 bits without it use the whole range."""
+
+
+def load_camera(path: Path) -> Camera:
+    """Read a camera file.
+
+    Parameters
+    ----------
+    path : Path
+        A YAML file with the keys of `CameraFile`.
+
+    Returns
+    -------
+    Camera
+        The calibration, in SI units and radians.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or a key does not fit; one line for each mistake.
+    """
+    document = read_document(path)
+    try:
+        keys = CameraFile.model_validate(document.data)
+    except ValidationError as error:
+        raise InputError("\n".join(_told(document, detail) for detail in error.errors())) from error
+    return Camera(
+        width=keys.width,
+        height=keys.height,
+        focal_length=keys.focal_length_px,
+        principal_point=keys.principal_point_px,
+        mount_height=keys.mount_height_m,
+        pitch=math.radians(keys.pitch_deg),
+        roll=math.radians(keys.roll_deg),
+        response=keys.response,
+        bits=keys.bits,
+    )
+
+
+def _told(document: Document, detail: ErrorDetails) -> str:
+    """One mistake in one line."""
+    key_path: KeyPath = tuple(detail["loc"])
+    where = f"{document.where(key_path)}: {dotted(key_path)}"
+    if detail["type"] == "extra_forbidden":
+        return f"{where}: unknown key; {suggest(str(key_path[-1]), CameraFile.model_fields)}"
+    if detail["type"] == "missing":
+        return f"{where}: this key is missing; it is required"
+    message = detail["msg"]
+    return f"{where}: {message[0].lower()}{message[1:]}; got {detail['input']!r}"

@@ -1,0 +1,150 @@
+"""Images and depth maps on disk."""
+
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.errors import InputError, UnknownNameError
+from fogsim.values import Camera
+
+DEPTH_KINDS = ("planar", "range")
+"""What a depth map may hold: distance along the optical axis, or along the viewing ray."""
+
+Pixels = NDArray[np.uint8] | NDArray[np.uint16]
+
+
+def read_image(path: Path) -> Pixels:
+    """Read an image of 8 or 16 bits as it is stored, colours in OpenCV's order.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it is of another kind.
+    """
+    image = _decoded(path)
+    if image.dtype not in (np.uint8, np.uint16) or (image.ndim == 3 and image.shape[2] not in (1, 3, 4)):
+        channels = 1 if image.ndim == 2 else image.shape[2]
+        raise InputError(f"{path}: expected a grey or colour image of 8 or 16 bits, got {channels} × {image.dtype}")
+    return image.astype(np.uint8, copy=False) if image.dtype == np.uint8 else image.astype(np.uint16, copy=False)
+
+
+def _decoded(path: Path) -> NDArray[np.generic]:
+    try:
+        data = np.fromfile(path, dtype=np.uint8)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+    if image is None:
+        raise InputError(f"{path}: this is no image that can be read (PNG, TIFF, JPEG, …)")
+    return np.asarray(image)
+
+
+def read_distance(path: Path, kind: str, scale: float | None, camera: Camera) -> NDArray[np.float64]:
+    """Read a depth map as distances along the rays.
+
+    Parameters
+    ----------
+    path : Path
+        A ``.npy`` file of numbers, or an image of 16 bits.
+    kind : str
+        ``"planar"`` or ``"range"``.
+    scale : float or None
+        Metres in one unit of the file; an image must have it, a ``.npy`` file is in metres without it.
+    camera : Camera
+        The calibration.
+
+    Returns
+    -------
+    (rows, cols) float64
+        Distances [m]; ``inf`` where the file has 0 or ``inf``, the sky.
+
+    Raises
+    ------
+    InputError
+        If the file, its size or a value does not fit.
+    """
+    if kind not in DEPTH_KINDS:
+        raise UnknownNameError("depth kind", kind, DEPTH_KINDS)
+    if scale is not None and not (scale > 0 and math.isfinite(scale)):
+        raise InputError(f"--depth-scale must be a positive number of metres, got {scale!r}")
+    depth = _numbers(path) if path.suffix == ".npy" else _steps(path, scale)
+    if depth.shape != (camera.height, camera.width):
+        raise InputError(
+            f"{path}: expected a depth map of {camera.height} rows and {camera.width} columns as the camera has, "
+            f"got {' × '.join(map(str, depth.shape))}"
+        )
+    _refuse_impossible(path, depth)
+    depth = np.where(depth == 0, math.inf, depth * (scale or 1.0))
+    return depth if kind == "range" else range_from_planar(depth, camera)
+
+
+def _numbers(path: Path) -> NDArray[np.float64]:
+    try:
+        loaded = np.load(path, allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
+        reason = (getattr(error, "strerror", None) or str(error)).splitlines()[0]
+        raise InputError(f"{path}: cannot be read as an array of numbers: {reason}") from error
+    if not isinstance(loaded, np.ndarray) or loaded.dtype.kind not in "fiu":
+        raise InputError(f"{path}: expected an array of numbers, got {getattr(loaded, 'dtype', type(loaded).__name__)}")
+    return np.asarray(loaded.squeeze(), dtype=np.float64)
+
+
+def _steps(path: Path, scale: float | None) -> NDArray[np.float64]:
+    image = _decoded(path)
+    if image.dtype != np.uint16 or image.ndim != 2:
+        raise InputError(f"{path}: expected a grey image of 16 bits or a .npy file as depth map, got {image.dtype}")
+    if scale is None:
+        raise InputError(f"{path}: --depth-scale is missing: how many metres is one step of this depth map?")
+    return image.astype(np.float64)
+
+
+def _refuse_impossible(path: Path, depth: NDArray[np.float64]) -> None:
+    wrong = np.argwhere(np.isnan(depth) | (depth < 0))
+    if len(wrong):
+        row, column = wrong[0]
+        raise InputError(
+            f"{path}: depths must be positive, or 0 or inf for the sky; got {depth[row, column]} at row {row}, "
+            f"column {column}, and {len(wrong)} such in all"
+        )
+
+
+def write_image(path: Path, image: Pixels) -> None:
+    """Write an image, whole or not at all; the ending of the name says how.
+
+    Raises
+    ------
+    InputError
+        If images are not written with that ending or that bit depth, or the folder is not there.
+    """
+    ending = path.suffix.lower()
+    if not ending or not cv2.haveImageWriter(f"image{ending}"):
+        raise InputError(f"{path}: no image can be written with the ending {ending!r}; allowed: .png, .tif, .jpg, …")
+    if image.dtype == np.uint16 and ending not in {".png", ".tif", ".tiff"}:
+        raise InputError(f"{path}: an image of 16 bits is written as .png or .tif, not {ending}")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: there is no folder {path.parent}")
+    written, data = cv2.imencode(ending, image)
+    if not written:
+        raise InputError(f"{path}: this image cannot be written as {ending}")
+    partial = path.with_name(path.name + ".part")
+    partial.write_bytes(data.tobytes())
+    partial.replace(path)
+
+
+def range_from_planar(depth: NDArray[np.float64], camera: Camera) -> NDArray[np.float64]:
+    """Distance along the ray from distance along the optical axis.
+
+    Parameters
+    ----------
+    depth : (rows, cols) float64
+        Planar depth z [m].
+    camera : Camera
+        The calibration.
+    """
+    u0, v0 = camera.principal_point
+    across = (np.arange(camera.width) - u0) / camera.focal_length
+    down = (np.arange(camera.height) - v0) / camera.focal_length
+    return np.asarray(depth * np.sqrt(1.0 + across**2 + down[:, None] ** 2))

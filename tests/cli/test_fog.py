@@ -1,0 +1,69 @@
+"""``fogsim fog`` in a process of its own."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+CAMERA_YAML = """\
+width: 40
+height: 30
+focal_length_px: 60
+principal_point_px: [20, 15]
+mount_height_m: 1.4
+pitch_deg: 2
+response: linear
+"""
+
+
+def fog(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    given = ["image.png", "--depth", "depth.npy", "--camera", "camera.yaml", "--out", "out.png", *arguments]
+    environment = {**os.environ, "COLUMNS": "200", "NO_COLOR": "1"}
+    return subprocess.run(
+        [sys.executable, "-m", "fogsim", "fog", *given],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env=environment,
+        check=False,
+        cwd=folder,
+    )
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "camera.yaml").write_text(CAMERA_YAML, encoding="utf-8")
+    cv2.imwrite(str(tmp_path / "image.png"), np.zeros((30, 40, 3), np.uint8))
+    np.save(tmp_path / "depth.npy", np.full((30, 40), 80.0, np.float32))
+    return tmp_path
+
+
+def test_a_black_image_at_the_visibility_has_95_percent_of_the_airlight(folder: Path) -> None:
+    done = fog(folder, "--depth-kind", "range", "--visibility", "80", "--airlight", "240,200,100")
+    assert done.returncode == 0, done.stderr
+    assert "airlight 240, 200, 100" in done.stdout
+    seen = cv2.imread(str(folder / "out.png"), cv2.IMREAD_UNCHANGED)
+    assert np.all(seen == np.rint(0.95 * np.array([100.0, 200.0, 240.0])))  # OpenCV has blue first
+    assert sorted(path.name for path in folder.iterdir()) == ["camera.yaml", "depth.npy", "image.png", "out.png"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("--visibility", "80"), "--depth-kind is missing"),
+        (("--visibility", "80", "--depth-kind", "rnage"), "did you mean 'range'"),
+        (("--visibility", "nan", "--depth-kind", "range"), "--visibility must be"),
+        (("--visibility", "80", "--depth-kind", "range", "--airlight", "white"), "--airlight white"),
+        (("--visibility", "80", "--depth-kind", "range", "--depth", "none.npy"), "none.npy: cannot be read"),
+    ],
+)
+def test_mistakes_end_in_one_line_and_exit_code_2(folder: Path, arguments: tuple[str, ...], told: str) -> None:
+    done = fog(folder, *arguments)
+    assert done.returncode == 2
+    assert told in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert not (folder / "out.png").exists()

@@ -216,7 +216,8 @@ class AttachedSession:
     def close(self) -> None:
         """Let drivers drive and see by themselves again and free the renderer; the simulation goes on.
 
-        Top speeds that drivers have chosen in the fog stay as they are.
+        Every vehicle gets back what was changed about it: top speed, time headway, lane-change mode, the ego's own
+        speed, and sight of its leader.
 
         Warns
         -----

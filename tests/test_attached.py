@@ -94,6 +94,53 @@ def test_advice_is_the_users_own_and_the_ego_is_free_afterwards(libsumo: Any) ->
         session.observe()
 
 
+def conduct(api: Any, vehicle: str) -> tuple[Any, ...]:
+    """What FogSim may change about a vehicle."""
+    get = api.vehicle
+    return (
+        get.getMaxSpeed(vehicle),
+        get.getSpeedFactor(vehicle),
+        get.getTau(vehicle),
+        get.getSpeedMode(vehicle),
+        get.getLaneChangeMode(vehicle),
+    )
+
+
+def test_every_vehicle_gets_back_what_was_changed(libsumo: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In dense fog with careful, misjudging drivers next to none is left as it was; afterwards all are."""
+    # SUMO does not tell whom a driver ignores; so what it was told last counts.
+    ignored: dict[str, str] = {}
+    tell = libsumo.vehicle.setParameter
+
+    def told(vehicle: str, key: str, value: str) -> None:
+        assert key == "carFollowModel.ignoreIDs"
+        ignored[vehicle] = value
+        tell(vehicle, key, value)
+
+    monkeypatch.setattr(libsumo.vehicle, "setParameter", told)
+    settings = (*SMALL, "drivers.speed_choice=within_sight", "drivers.distance_misjudgement=0.5")
+    session = fogsim.attach(libsumo, ego=EGO, visibility=20.0, settings=settings)
+    before: dict[str, tuple[Any, ...]] = {}
+    changed: set[int] = set()
+    for _ in range(150):
+        libsumo.simulationStep()
+        for vehicle in libsumo.simulation.getDepartedIDList():
+            before[vehicle] = conduct(libsumo, vehicle)
+        step = session.observe()
+        if step is not None:
+            session.advise(step, Command(SpeedAdvice(4.0)))
+        present = libsumo.vehicle.getIDList()
+        for part in range(len(before[EGO]) if EGO in before else 0):
+            changed.update(part for v in present if conduct(libsumo, v)[part] != before[v][part])
+    blind = {v for v in present if ignored.get(v)}
+    assert len(blind) > 3
+    session.close()
+    assert not {v for v in present if ignored.get(v)}
+    assert {0, 2} <= changed  # top speeds and headways
+    assert EGO in present
+    assert {v: conduct(libsumo, v) for v in present} == {v: before[v] for v in present}
+
+
 def test_a_session_that_only_looks_changes_nothing(libsumo: Any) -> None:
     def positions(look: bool) -> list[Any]:
         libsumo.load(ARGUMENTS)

@@ -1,7 +1,6 @@
 """A SUMO simulation that its owner has started, steps and ends."""
 
 import contextlib
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -91,12 +90,9 @@ class AttachedTraffic(SumoTraffic):
         return f"the ego {self._ego!r} did not appear while FogSim was attached; {those_seen(self._ego, self._seen)}"
 
     def release(self) -> None:
-        """Let the ego drive by itself again, and everybody see everybody."""
+        """Give every vehicle back what was changed about it."""
         with self._attached.watched():
-            vehicles = self._api.vehicle.getIDList()
-            self._running.control.carry_out({self._ego: (math.inf, 0.0)} if self._ego in vehicles else {})
-            for vehicle in vehicles if self._running.perception is not None else ():
-                self._api.vehicle.setParameter(vehicle, "carFollowModel.ignoreIDs", "")
+            self._release()
 
 
 def step_length(api: Api) -> float:

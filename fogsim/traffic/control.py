@@ -1,15 +1,17 @@
 """Making vehicles drive at the speeds that they are told."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
 
 from fogsim.traffic.governor import governed_speed
 from fogsim.traffic.link import Api
+from fogsim.traffic.roster import Roster
 
 Order = tuple[float, float]
 """Target speed [m/s], ``inf`` to free the vehicle, and the deceleration to reach it with [m/s²]."""
 
 _SUMO_DRIVES = -1.0
+_NO_LANE_CHANGES = 0
 
 
 class SpeedControl:
@@ -37,9 +39,50 @@ class SpeedControl:
                 self._vehicles.setSpeed(vehicle, _SUMO_DRIVES)
                 self._held.discard(vehicle)
 
+    def release(self, present: Collection[str]) -> None:
+        """Free all vehicles that are held and still on the road."""
+        for vehicle in self._held.intersection(present):
+            self._vehicles.setSpeed(vehicle, _SUMO_DRIVES)
+        self._held.clear()
+
     def _hold(self, vehicle: str, target: float, deceleration: float) -> None:
         # An order is no licence to speed: what the driver would not drive by itself is not asked of it.
         allowed = min(target, self._vehicles.getAllowedSpeed(vehicle))
         speed = self._vehicles.getSpeed(vehicle)
         self._vehicles.setSpeed(vehicle, governed_speed(speed, allowed, deceleration, self._step_length))
         self._held.add(vehicle)
+
+
+class LaneKeeping:
+    """Keeps some vehicles in their lanes.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    vehicles : iterable of str
+        Which, as soon as they are on the road.
+    roster : Roster
+        Who is on the road.
+    """
+
+    def __init__(self, api: Api, vehicles: Iterable[str], roster: Roster) -> None:
+        self._vehicles = api.vehicle
+        self._wanted = frozenset(vehicles)
+        self._modes: dict[str, int] = {}
+        self._roster = roster
+        # Who is there already keeps the owner's lane changing.
+        _, self._mark = roster.newcomers(0)
+
+    def keep(self) -> None:
+        """Take charge of those who are new on the road."""
+        new, self._mark = self._roster.newcomers(self._mark)
+        for vehicle in self._wanted.intersection(new):
+            self._modes.setdefault(vehicle, self._vehicles.getLaneChangeMode(vehicle))
+            self._vehicles.setLaneChangeMode(vehicle, _NO_LANE_CHANGES)
+
+    def release(self, present: Collection[str]) -> None:
+        """Let those on the road change lanes again as they did before."""
+        for vehicle in self._modes.keys() & present:
+            self._vehicles.setLaneChangeMode(vehicle, self._modes[vehicle])
+        self._modes.clear()

@@ -1,7 +1,7 @@
 """SUMO's getters without detours."""
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from fogsim.traffic.link import Api
@@ -33,3 +33,30 @@ def getter(api: Api, domain: str, name: str) -> Getter:
 def vehicle_getter(api: Api, name: str) -> Getter:
     """Getter of the domain ``vehicle``; see `getter`."""
     return getter(api, "vehicle", name)
+
+
+def subscribed(api: Api, names: Mapping[str, int]) -> tuple[Getter, ...]:
+    """Getters of the domain ``simulation`` whose answers SUMO sends with each step, so that asking sends no message.
+
+    Parameters
+    ----------
+    api : Api
+        A connection of traci.
+    names : mapping from str to int
+        Names of getters, and the numbers of their variables in SUMO's TraCI protocol.
+    """
+    simulation = api.simulation
+    simulation.subscribe(tuple(names.values()))
+
+    def reader(name: str, variable: int) -> Getter:
+        def read() -> Any:
+            try:
+                return simulation.getSubscriptionResults()[variable]
+            except (AttributeError, KeyError):
+                # A simulation that is loaded anew has forgotten what was subscribed, and
+                # traci stumbles over a connection that was closed; its getters tell it.
+                return getattr(simulation, name)()
+
+        return read
+
+    return tuple(reader(name, variable) for name, variable in names.items())

@@ -7,15 +7,18 @@ import numpy as np
 from fogsim.traffic.appearance import lamps_from_signals, paint
 from fogsim.traffic.getters import vehicle_getter
 from fogsim.traffic.link import Api
+from fogsim.traffic.motion_bounds import MotionBounds
 from fogsim.traffic.reading import OTHERS_LAMPS
-from fogsim.traffic.sight import BRIGHTEST, DAYLIGHT, DriverSight, FogAccess, inherent_contrast, rear_intensity
+from fogsim.traffic.sight import (
+    BRIGHTEST,
+    DAYLIGHT,
+    EYE_HEIGHT,
+    DriverSight,
+    FogAccess,
+    inherent_contrast,
+    rear_intensity,
+)
 from fogsim.values import Lamp
-
-EYE_HEIGHT = 1.2
-"""Height of a driver's eyes and of the middle of a rear above the road [m]."""
-
-HARDEST_CHANGE = 20.0
-"""One vehicle's acceleration minus another's is never larger than this [m/s²]: emergency braking and driving off."""
 
 LEAST_EXTINCTION = 1e-6
 """Below this, fog hides nothing that matters [1/m]."""
@@ -41,14 +44,16 @@ class PairSight:
         The fog.
     sight : DriverSight
         The drivers' eyes.
+    motion : MotionBounds
+        How fast vehicles can move.
     """
 
-    def __init__(self, api: Api, fog: FogAccess, sight: DriverSight) -> None:
+    def __init__(self, api: Api, fog: FogAccess, sight: DriverSight, motion: MotionBounds) -> None:
+        self._motion = motion
         self._fog = fog
         self._thinnest, self._densest = fog.minimum_extinction, fog.maximum_extinction
         self._sight = sight
         self._position = vehicle_getter(api, "getPosition3D")
-        self._speed = vehicle_getter(api, "getSpeed")
         self._signals = vehicle_getter(api, "getSignals")
         self._get_colour = vehicle_getter(api, "getColor")
         self._get_minimum_gap = vehicle_getter(api, "getMinGap")
@@ -105,18 +110,13 @@ class PairSight:
         depths: list[float] = self._fog.optical_depth(eyes, eyes + towards * share[:, None]).tolist()
         return depths
 
-    def closing_speed(self, follower: str, leader: str, horizon: float) -> float:
-        """Bound on how fast a gap changes up to a horizon [m/s], by what speeds and accelerations allow."""
-        return abs(float(self._speed(leader)) - float(self._speed(follower))) + 0.5 * HARDEST_CHANGE * horizon
-
     def _rates(self, follower: str, leader: str, horizon: float) -> tuple[float, float]:
         """Bounds on how fast a gap closes [m/s] and on how fast its optical depth changes [1/s] up to a horizon."""
-        closing = self.closing_speed(follower, leader, horizon)
+        closing = self._motion.closing(follower, leader, horizon)
         if self._thinnest == self._densest:
             return closing, max(self._densest, LEAST_EXTINCTION) * closing
         # In a bank that one end has reached and the other has not, each end counts by itself; and the fog drifts.
-        ends = float(self._speed(follower)) + float(self._speed(leader)) + HARDEST_CHANGE * horizon
-        return closing, self._densest * (ends + FASTEST_DRIFT)
+        return closing, self._densest * (self._motion.travel(follower, leader, horizon) + FASTEST_DRIFT)
 
     def _intensities(self, vehicle: str, own_lamps: OwnLamps) -> tuple[float, float]:
         """Of the brightest rear lamp that is lit, and that could be lit before the next look [cd]."""

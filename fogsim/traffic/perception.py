@@ -13,14 +13,17 @@ that stays the same the decision is in every step the one that looking in every 
 import math
 from collections.abc import Iterable, Sequence
 
-from fogsim.traffic.getters import vehicle_getter
+from fogsim.traffic.getters import Getter, vehicle_getter
 from fogsim.traffic.link import Api
-from fogsim.traffic.pair_sight import EYE_HEIGHT as EYE_HEIGHT
+from fogsim.traffic.motion_bounds import MotionBounds
 from fogsim.traffic.pair_sight import OwnLamps, Pair, PairSight
 from fogsim.traffic.roster import Roster
 from fogsim.traffic.schedule import Schedule
-from fogsim.traffic.sight import DriverSight, FogAccess
+from fogsim.traffic.sight import EYE_HEIGHT, DriverSight, FogAccess
+from fogsim.traffic.subscribed_pairs import SubscribedPairs
 from fogsim.values import Lamp
+
+__all__ = ["EYE_HEIGHT", "LONGEST_PAUSE", "REACH", "Perception"]
 
 REACH = 250.0
 """Leaders farther ahead than this matter to nobody [m]: from 150 km/h one stops in less."""
@@ -51,14 +54,20 @@ class Perception:
         The drivers' eyes.
     roster : Roster or None
         Who is on the road; None for one of its own.
+    distant : bool
+        True where every call is a message to another process: leaders and speeds are subscribed to.
     """
 
-    def __init__(self, api: Api, fog: FogAccess, sight: DriverSight, roster: Roster | None = None) -> None:
+    def __init__(
+        self, api: Api, fog: FogAccess, sight: DriverSight, roster: Roster | None = None, distant: bool = False
+    ) -> None:
         self._vehicles = api.vehicle
-        self._leader = vehicle_getter(api, "getLeader")
+        sent = SubscribedPairs(api, REACH) if distant else None
+        self._leader: Getter = vehicle_getter(api, "getLeader") if sent is None else sent.leader
+        self._motion = MotionBounds(vehicle_getter(api, "getSpeed") if sent is None else sent.speed)
         self._roster = Roster(api) if roster is None else roster
         self._reaction_time = sight.reaction_time
-        self._pairs = PairSight(api, fog, sight)
+        self._pairs = PairSight(api, fog, sight, self._motion)
         self._schedule = Schedule(float(api.simulation.getDeltaT()), self._roster.time)
         self._mark = 0
         self._ignored: dict[str, str] = {}
@@ -128,8 +137,7 @@ class Perception:
                 rested.append(follower)
             else:
                 edge = self._surely_seen if gap <= self._surely_seen else self._surely_hidden
-                speed = self._pairs.closing_speed(follower, leader, LONGEST_PAUSE)
-                pause = abs(gap - edge) / speed
+                pause = abs(gap - edge) / self._motion.closing(follower, leader, LONGEST_PAUSE)
                 if pause < LONGEST_PAUSE:
                     self._rest((follower,), pause)
                 else:
@@ -171,3 +179,9 @@ class Perception:
             since = self._roster.time
             self._emerging[follower] = (leader, since)
         return self._roster.time - since >= self._reaction_time
+
+    def release(self) -> None:
+        """Let everybody on the road react to everybody again."""
+        for follower in self._roster.present.intersection(self._ignored):
+            self._see(follower)
+        self._ignored.clear()

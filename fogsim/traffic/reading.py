@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fogsim.traffic.appearance import lamps_from_many_signals
 from fogsim.traffic.bodies import Bodies
-from fogsim.traffic.getters import getter, vehicle_getter
+from fogsim.traffic.getters import vehicle_getter
 from fogsim.traffic.link import Api
 from fogsim.traffic.nearness import Nearness
 from fogsim.traffic.roster import Roster
@@ -98,8 +98,8 @@ class VehicleReader:
         self._ego = ego
         self._radius = radius
         self._bodies = Bodies(api)
-        self._nearness = Nearness(api, ego, radius, roster)
-        self._time = getter(api, "simulation", "getTime")
+        self._roster = Roster(api) if roster is None else roster
+        self._nearness = Nearness(api, ego, radius, self._roster)
         self._getters = tuple(vehicle_getter(api, name) for name in _CHANGING)
         self._leader = vehicle_getter(api, "getLeader")
         self._speed = vehicle_getter(api, "getSpeed")
@@ -109,13 +109,14 @@ class VehicleReader:
 
     def state(self, ego_lamps: Lamp) -> TrafficState:
         """Vehicles near the ego; see `Reader.state`."""
+        self._roster.look()
         now = self._moving()
         known = self._knowledge(now.ids)
         ego = known.ego
         lamps = self._lamps(now.signals)
         lamps[ego] = int(ego_lamps) | (int(lamps[ego]) & int(Lamp.STOP))
         return TrafficState(
-            time=self._time(),
+            time=self._roster.time,
             ids=tuple(now.ids),
             types=known.kinds,
             position=now.position,

@@ -1,7 +1,18 @@
 """Who is on the road, without asking for all names in every step."""
 
-from fogsim.traffic.getters import getter
+from collections.abc import Collection, Sequence
+
+from fogsim.traffic.getters import getter, subscribed
 from fogsim.traffic.link import Api
+
+_ASKED = {
+    "getTime": 0x66,
+    "getDepartedIDList": 0x74,
+    "getEndingTeleportIDList": 0x78,
+    "getStartingTeleportIDList": 0x76,
+    "getArrivedIDList": 0x7A,
+}
+"""Getters, and their variables in SUMO's TraCI protocol."""
 
 CHECK_PERIOD = 1.0
 """Time after which all names are asked for even so [s], should somebody have taken a vehicle away by hand."""
@@ -16,6 +27,8 @@ class Roster:
     ----------
     api : Api
         The simulation.
+    distant : bool
+        True where every call is a message to another process.
 
     Attributes
     ----------
@@ -23,19 +36,21 @@ class Roster:
         Vehicles on the road at `time`; not to be changed by others.
     time : float
         Simulated time of the last look [s].
+    beamed_away : sequence of str
+        Vehicles that SUMO has begun to teleport in the last step.
     departures : int
         How often somebody has gone: as long as it stays, nobody has.
     """
 
-    def __init__(self, api: Api) -> None:
-        names = ("getDepartedIDList", "getEndingTeleportIDList", "getStartingTeleportIDList", "getArrivedIDList")
-        self._now = getter(api, "simulation", "getTime")
-        self._changes = tuple(getter(api, "simulation", name) for name in names)
+    def __init__(self, api: Api, distant: bool = False) -> None:
+        getters = subscribed(api, _ASKED) if distant else [getter(api, "simulation", name) for name in _ASKED]
+        self._now, self._departed, self._back, self._off, self._arrived = getters
         self._everybody = getter(api, "vehicle", "getIDList")
         self._step = float(api.simulation.getDeltaT())
         self._checked = 0.0
         self._came: list[str] = []
         self.present: set[str] = set()
+        self.beamed_away: Sequence[str] = ()
         self.departures = 0
         self.time = float("nan")
         self.check()
@@ -45,22 +60,17 @@ class Roster:
         now = self._now()
         if now == self.time:
             return
+        self.beamed_away = self._off()
         # Lists of changes are of one step only: after a jump of time they do not tell all.
         if 0.0 < now - self.time < 1.5 * self._step and now - self._checked < CHECK_PERIOD:
             self.time = now
-            self._take_in()
+            self._come(self._departed())
+            # Who is beamed away and back in one step has ended up on the road.
+            self._go(self.beamed_away)
+            self._come(self._back())
+            self._go(self._arrived())
         else:
             self.check()
-
-    def _take_in(self) -> None:
-        departed, back, off, arrived = (change() for change in self._changes)
-        if not (departed or back or off or arrived):
-            return
-        # Who is beamed away and back in one step has ended up on the road.
-        self._come(departed)
-        self._go(off)
-        self._come(back)
-        self._go(arrived)
 
     def check(self) -> None:
         """Ask for all names."""
@@ -69,12 +79,13 @@ class Roster:
         self._go(self.present.difference(everybody))
         self._come(everybody)
 
-    def _come(self, vehicles: "tuple[str, ...]") -> None:
-        new = [v for v in vehicles if v not in self.present]
-        self._came += new
-        self.present.update(new)
+    def _come(self, vehicles: Sequence[str]) -> None:
+        if vehicles:
+            new = [v for v in vehicles if v not in self.present]
+            self._came += new
+            self.present.update(new)
 
-    def _go(self, vehicles: "tuple[str, ...] | set[str]") -> None:
+    def _go(self, vehicles: Collection[str]) -> None:
         if vehicles:
             self.departures += 1
             self.present.difference_update(vehicles)

@@ -22,6 +22,9 @@ REAR_LAMPS = ((int(Lamp.REAR_FOG), 200.0), (int(Lamp.STOP), 100.0), (int(Lamp.PO
 BRIGHTEST = REAR_LAMPS[0][1]
 """Luminous intensity of the brightest rear lamp [cd]."""
 
+EYE_HEIGHT = 1.2
+"""Height of a driver's eyes and of the middle of a rear above the road [m]."""
+
 NIGHT, DAY = 1.0, 1000.0
 """Horizontal illuminance up to which the eye is adapted to night, and from which to day [lx]."""
 

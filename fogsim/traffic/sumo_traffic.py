@@ -10,7 +10,7 @@ import numpy as np
 
 from fogsim.errors import SimulationError
 from fogsim.traffic.collisions import CollisionWatch
-from fogsim.traffic.control import Order, SpeedControl
+from fogsim.traffic.control import LaneKeeping, Order, SpeedControl
 from fogsim.traffic.driving import Drivers
 from fogsim.traffic.events import Script, Situation
 from fogsim.traffic.link import Api, SumoLink
@@ -27,7 +27,6 @@ from fogsim.traffic.signs import sign_map
 from fogsim.traffic.subscribed_reading import SubscribedReader
 from fogsim.values import Command, Lamp, RoadNetwork, SignMap, TrafficSnapshot, TrafficState
 
-_NO_LANE_CHANGES = 0
 _NOBODY: Mapping[str, float] = {}
 _FOR_EVER = "1e6"
 _SMOOTH_LANE_CHANGES = ("--lanechange.duration", "3")
@@ -44,6 +43,7 @@ class _Run:
     roster: Roster
     reader: Reader
     control: SpeedControl
+    lanes: LaneKeeping
     collisions: CollisionWatch
     script: Script
     perception: Perception | None = None
@@ -100,13 +100,14 @@ class SumoTraffic:
         """Begin, or begin anew, and run until the ego is on the road; see `Traffic.start`."""
         setup = self._setup
         api = self._link.begin(command_line(setup, seed))
-        roster = Roster(api)
+        roster = Roster(api, self._link.distant)
         reader = SubscribedReader if self._link.distant else VehicleReader
         self._run = _Run(
             api=api,
             roster=roster,
             reader=reader(api, setup.ego, setup.reading_radius, roster),
             control=SpeedControl(api, setup.step_length),
+            lanes=LaneKeeping(api, setup.keep_lane, roster),
             collisions=CollisionWatch(api),
             script=Script(setup.events),
         )
@@ -144,7 +145,9 @@ class SumoTraffic:
             setup, api, roster = self._setup, self._run.api, self._run.roster
             self._run = replace(
                 self._run,
-                perception=None if setup.sight is None else Perception(api, fog, setup.sight, roster),
+                perception=None
+                if setup.sight is None
+                else Perception(api, fog, setup.sight, roster, self._link.distant),
                 drivers=Drivers(api, setup.drivers, fog, setup.ego, self._seed, roster),
             )
 
@@ -212,10 +215,9 @@ class SumoTraffic:
 
     def _take_in(self, run: _Run) -> None:
         run.collisions.look()
-        self._teleported |= self._setup.ego in run.api.simulation.getStartingTeleportIDList()
-        if self._setup.keep_lane:
-            for vehicle in set(self._setup.keep_lane).intersection(run.api.simulation.getDepartedIDList()):
-                run.api.vehicle.setLaneChangeMode(vehicle, _NO_LANE_CHANGES)
+        run.roster.look()
+        self._teleported |= self._setup.ego in run.roster.beamed_away
+        run.lanes.keep()
 
     @_watched
     def observe(self) -> TrafficSnapshot | None:
@@ -240,6 +242,17 @@ class SumoTraffic:
             leader=run.reader.leader(),
             collisions=run.collisions.tell(),
         )
+
+    def _release(self) -> None:
+        """Give every vehicle on the road back what was changed about it: it drives and sees by itself again."""
+        run = self._running
+        run.roster.check()
+        run.control.release(run.roster.present)
+        run.lanes.release(run.roster.present)
+        if run.perception is not None:
+            run.perception.release()
+        if run.drivers is not None:
+            run.drivers.release()
 
     def close(self) -> None:
         """End the simulation; see `Traffic.close`."""

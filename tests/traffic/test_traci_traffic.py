@@ -9,15 +9,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import traci
 
+from fogsim.atmosphere import FieldAccess
 from fogsim.errors import SimulationError
-from fogsim.traffic import TraciLink, Traffic, TrafficSetup, libsumo_traffic, traci_traffic
+from fogsim.traffic import DriverSetup, DriverSight, TraciLink, Traffic, TrafficSetup, libsumo_traffic, traci_traffic
 from fogsim.traffic.link import Api, SumoLink
 from fogsim.traffic.reading import Reader, VehicleReader
 from fogsim.traffic.subscribed_reading import SubscribedReader
 from fogsim.traffic.sumo_library import LibsumoLink
 from fogsim.traffic.sumo_traffic import command_line
-from fogsim.values import Command, Lamp, SpeedAdvice, TrafficSnapshot, TrafficState
+from fogsim.values import Command, FogField, Lamp, SpeedAdvice, TrafficSnapshot, TrafficState
 
 FOLDER = Path(__file__).resolve().parents[2] / "scenarios" / "motorway_fog_bank"
 SETUP = TrafficSetup(
@@ -79,6 +81,38 @@ def test_the_traffic_is_the_same_as_in_process(link: TraciLink, in_process: list
             there.speed_limit,
         )
     assert len(in_process[-1].state.ids) > 10
+
+
+def test_drivers_in_fog_see_the_same_as_in_process_by_few_messages(
+    link: TraciLink, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What drivers see comes with the steps: far less than a message a vehicle and step."""
+    setup = replace(SETUP, sight=DriverSight(10_000.0), drivers=DriverSetup("too_fast"))
+    fog = FieldAccess(FogField(0.04, (3000.0, 3000.0, 3000.0)))
+
+    def in_fog(traffic: Traffic) -> list[TrafficSnapshot]:
+        traffic.enter_fog(fog)
+        return drive(traffic, 1, steps=120)
+
+    here = libsumo_traffic(setup)
+    try:
+        expected = in_fog(here)
+    finally:
+        here.close()
+    messages = 0
+    send = traci.connection.Connection._sendExact
+
+    def counted(connection: traci.connection.Connection) -> object:
+        nonlocal messages
+        messages += 1
+        return send(connection)
+
+    monkeypatch.setattr(traci.connection.Connection, "_sendExact", counted)
+    seen = in_fog(traci_traffic(setup, link))
+    for one, other in zip(expected, seen, strict=True):
+        assert equal(one.state, other.state)
+    steps = round(seen[-1].state.time / SETUP.step_length)
+    assert messages < 25 * steps
 
 
 def test_beginning_anew_loads_the_scenario_with_the_seed(link: TraciLink, in_process: list[TrafficSnapshot]) -> None:

@@ -1,0 +1,93 @@
+"""Keys of the fog: what they become, and how mistakes in them are told."""
+
+import math
+
+import numpy as np
+import pytest
+
+from fogsim.atmosphere import extinction
+from fogsim.errors import InputError
+from fogsim.scenario import build, load_scenario, resolved
+from fogsim.units import extinction_from_visibility
+from fogsim.values import FogChange, FogField, FogPatches
+
+ROUTE = np.array([[0.0, 0.0, 412.0], [3000.0, 0.0, 430.0]])
+"""A road 412 m above the zero of its net and higher."""
+
+
+def fog(*settings: str) -> FogField:
+    return build.fog_field(load_scenario("motorway_fog_bank", [f"fog.{s}" for s in settings]), ROUTE)
+
+
+def test_heights_count_from_the_lowest_point_of_the_route() -> None:
+    field = fog("visibility_m=100", "top_m=30", "top_edge_m=10", "base_m=2", "scale_height_m=15")
+    assert (field.ground, field.base, field.top, field.top_edge) == (412.0, 414.0, 442.0, 10.0)
+    assert field.scale_height == 15.0
+    k = extinction_from_visibility(100.0)
+    assert extinction(field, (0.0, 0.0, 412.0 + 15.0)) == pytest.approx(k / math.e)
+
+
+def test_fog_on_a_high_road_is_fog() -> None:
+    assert extinction(fog("visibility_m=80"), (100.0, 0.0, 414.0)) == pytest.approx(extinction_from_visibility(80.0))
+
+
+def test_wind_is_named_by_where_it_comes_from() -> None:
+    assert fog("visibility_m=100", "wind={speed_kmh: 36, from_deg: 270}").wind == pytest.approx((10.0, 0.0))
+    assert fog("visibility_m=100", "wind={speed_kmh: 36, from_deg: 0}").wind == pytest.approx((0.0, -10.0))
+
+
+def test_patches_and_changes() -> None:
+    field = fog(
+        "visibility_m=100",
+        "patches={correlation_length_m: 60, correlation_height_m: 8, strength: 0.7, seed: 5}",
+        "changes=[{at_s: 0}, {at_s: 60, density: 2}]",
+    )
+    assert field.patches == FogPatches(60.0, 8.0, 0.7, 5)
+    assert field.changes == (
+        FogChange(0.0, 1.0, -math.inf, 412.0 + 250.0),
+        FogChange(60.0, 2.0, -math.inf, 412.0 + 250.0),
+    )
+
+
+def test_lifting_fog() -> None:
+    field = fog("visibility_m=100", "changes=[{at_s: 0, base_m: -5, top_m: 50}, {at_s: 100, base_m: 15, top_m: 90}]")
+    eye = (0.0, 0.0, 413.5)
+    assert extinction(field, eye, time=0.0) > 0
+    assert extinction(field, eye, time=100.0) == 0.0
+
+
+def test_the_resolved_scenario_says_it_all_again() -> None:
+    settings = ["fog.visibility_m=100", "fog.patches={correlation_length_m: 60}", "fog.base_m=3", "fog.top_m=.inf"]
+    scenario = load_scenario("motorway_fog_bank", settings)
+    assert resolved(scenario)["fog"]["patches"]["strength"] == 0.6
+    assert resolved(scenario)["fog"]["top_m"] == "inf"
+
+
+@pytest.mark.parametrize(
+    ("setting", "told"),
+    [
+        ("visibility_m=0", "fog.visibility_m: input should be greater than 0; got 0"),
+        ("visibility_m=.nan", "fog.visibility_m: input should be greater than 0; got nan"),
+        ("patches={correlation_length_m: 0}", "fog.patches.correlation_length_m: input should be greater than 0"),
+        ("patches={correlation_length_m: 50, strength: 3}", "fog.patches.strength: input should be less than or eq"),
+        ("patches={correlation_lenght_m: 50}", "did you mean 'correlation_length_m'"),
+        ("changes=[{at_s: 5}, {at_s: 5}]", "fog: at_s of changes must increase, got 5 and then 5"),
+        ("changes=[{at_s: 5, density: -1}]", "fog.changes.0.density: input should be greater than or equal to 0"),
+        ("changes=[{at_s: 5, top_m: 9}, {at_s: 6}]", "top_m must be given in all changes or in none, got it in 1 of 2"),
+        ("changes=[{at_s: 5, top_m: .nan}]", "fog.changes.0.top_m"),
+        ("base_m=300", "top_m must lie above base_m, soft edges included, got 250 and 300"),
+        ("scale_height_m=0", "fog.scale_height_m: input should be greater than 0"),
+        ("wind={speed_kmh: 5}", "fog.wind.from_deg: this key is missing"),
+        ("banks=[{start_m: 500, end_m: 300, visibility_m: 40}]", "start_m must be less than end_m, got 500 and 300"),
+        ("airlight_shading=-0.1", "fog.airlight_shading: input should be greater than or equal to 0"),
+    ],
+)
+def test_mistakes_are_told(setting: str, told: str) -> None:
+    with pytest.raises(InputError) as error:
+        fog(setting)
+    assert told in str(error.value)
+
+
+def test_negative_illuminance_is_told() -> None:
+    with pytest.raises(InputError, match=r"light.illuminance_lx: input should be greater than .*; got -3"):
+        load_scenario("motorway_fog_bank", ["light.illuminance_lx=-3"])

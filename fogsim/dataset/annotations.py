@@ -123,7 +123,8 @@ def coco(information: Mapping[str, Any], records: Iterable[Mapping[str, Any]]) -
     records : iterable of mapping
         Each with an "image" and its "annotations".
     """
-    images, annotations = [], []
+    images: list[dict[str, Any]] = []
+    annotations: list[dict[str, Any]] = []
     for number, record in enumerate(records, start=1):
         images.append({"id": number, **record["image"]})
         for annotation in record["annotations"]:

@@ -1,0 +1,62 @@
+"""``fogsim dataset`` in processes of its own."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+FOGSIM = (sys.executable, "-m", "fogsim", "dataset", "motorway_fog_bank")
+SMALL = ("--set", "camera.width=96", "--set", "camera.height=72", "--visibility", "80")
+
+
+def fogsim(*arguments: str) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "COLUMNS": "200", "NO_COLOR": "1"}
+    return subprocess.run(
+        [*FOGSIM, *arguments], capture_output=True, text=True, timeout=240, env=environment, check=False
+    )
+
+
+def test_an_interrupted_command_says_so_and_the_same_one_continues_it(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    endless = [*FOGSIM, "--out", str(out), "--frames", "100000", *SMALL]
+    process = subprocess.Popen(
+        endless, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    deadline = time.monotonic() + 120
+    while not (out / "records" / "000002.json").exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGINT)  # as Ctrl-C does
+    stdout, stderr = process.communicate(timeout=60)
+    assert process.returncode == 130, stderr
+    assert "Traceback" not in stderr
+    assert "the same command continues it" in stdout
+    partial = json.loads((out / "annotations.json").read_text(encoding="utf-8"))
+    there = len(partial["images"])
+    assert there >= 3
+    assert not list(out.rglob("*.part"))
+    done = fogsim("--out", str(out), "--frames", str(there + 2), *SMALL)
+    assert done.returncode == 0, done.stderr
+    assert f"{there + 2} frames, 2 of them new" in done.stdout
+    assert json.loads((out / "annotations.json").read_text(encoding="utf-8"))["info"]["complete"] is True
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--frames", "0"], "frames must be at least 1, got 0"),
+        (["--frames", "3", "--every", "0"], "every must be at least 1, got 0"),
+        (["--frames", "3", "--seed", "-1"], "seed must be at least 0, got -1"),
+        (["--frames", "3", "--set", "camera.samples=9"], "camera.samples: input should be less than or equal to 3"),
+    ],
+)
+def test_bad_input_ends_in_one_message_and_writes_nothing(arguments: list[str], message: str, tmp_path: Path) -> None:
+    done = fogsim("--out", str(tmp_path / "out"), *arguments)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not (tmp_path / "out").exists()

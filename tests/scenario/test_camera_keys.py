@@ -1,0 +1,80 @@
+"""Camera keys of scenario files and what is built from them."""
+
+import math
+
+import pytest
+
+from fogsim.camera import Metering
+from fogsim.errors import InputError
+from fogsim.scenario import Scenario, build, load_scenario
+
+
+def scenario(*overrides: str) -> Scenario:
+    return load_scenario("motorway_fog_bank", overrides)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "automatic"),
+    [
+        ([], True),
+        (["camera.saturation_luminance_cdpm2=5000"], False),
+        (["camera.exposure.mode=fixed"], False),
+        (["camera.exposure.mode=fixed", "camera.saturation_luminance_cdpm2=5000"], False),
+        (["camera.exposure.mode=auto"], True),
+    ],
+)
+def test_exposure_is_automatic_unless_it_is_fixed(overrides: list[str], automatic: bool) -> None:
+    assert scenario(*overrides).camera.automatic is automatic
+
+
+def test_a_fixed_exposure_puts_the_airlight_at_60_percent() -> None:
+    """Airlight of 10 000 lx: 0.95 · 10 000 / π · 1.02 in the brightest channel."""
+    assert build.sensor(scenario()).saturation_luminance == pytest.approx(0.95 * 1e4 / math.pi * 1.02 / 0.6)
+    assert build.sensor(scenario("camera.saturation_luminance_cdpm2=4000")).saturation_luminance == 4000.0
+
+
+def test_what_is_metered_has_a_target_of_its_own() -> None:
+    assert build.auto_exposure(scenario()).target == 0.65
+    average = build.auto_exposure(scenario("camera.exposure.metering=log_average"))
+    assert (average.metering, average.target) == (Metering.LOG_AVERAGE, 0.18)
+    assert build.auto_exposure(scenario("camera.exposure.target_percent=40")).target == 0.4
+
+
+def test_told_errors_are_in_the_told_calibration_alone() -> None:
+    wrong = scenario(
+        "camera.bits=12",
+        "camera.roll_deg=1",
+        "camera.told={pitch_error_deg: 1, roll_error_deg: -2, focal_length_error_percent: 10, "
+        "mount_height_error_percent: -20}",
+    )
+    true, told = build.camera(wrong), build.told_camera(wrong)
+    assert math.degrees(told.pitch - true.pitch) == pytest.approx(1.0)
+    assert math.degrees(told.roll) == pytest.approx(-1.0)
+    assert told.focal_length == pytest.approx(1.1 * true.focal_length)
+    assert told.mount_height == pytest.approx(0.8 * true.mount_height)
+    assert (true.bits, told.bits, build.sensor(wrong).bits) == (12, 12, 12)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (["camera.bits=9"], r"camera\.bits: .*8, 10 or 12; got 9"),
+        (["camera.samples=4"], r"camera\.samples: .*less than or equal to 3; got 4"),
+        (["camera.samples=0"], r"camera\.samples: .*greater than or equal to 1; got 0"),
+        (["camera.samples=3", "camera.width=8000"], r"camera: .*at most 16384, got 8000 × 480 px with 3 samples"),
+        (["camera.exposure.mode=manual"], r"camera\.exposure\.mode: .*'auto' or 'fixed'; got 'manual'"),
+        (["camera.exposure.metering=spot"], r"camera\.exposure\.metering: .*'highlights' or 'log_average'; got 'spot'"),
+        (["camera.exposure.time_constant_s=-1"], r"time_constant_s: .*greater than or equal to 0; got -1"),
+        (["camera.exposure.target_percent=0"], r"target_percent: .*greater than or equal to 1; got 0"),
+        (["camera.exposure.darkest_cdpm2=500"], r"camera\.exposure: .*must not decrease .*got 500, 100 and 100000"),
+        (
+            ["camera.exposure.mode=auto", "camera.saturation_luminance_cdpm2=5000"],
+            r"camera: saturation_luminance_cdpm2 is that of a fixed exposure, but exposure\.mode is auto",
+        ),
+        (["camera.lens_shading=1.5"], r"camera\.lens_shading: .*less than or equal to 1; got 1.5"),
+        (["camera.body.pitch_deg_per_mps2=-0.1"], r"pitch_deg_per_mps2: .*greater than or equal to 0; got -0.1"),
+    ],
+)
+def test_mistakes_are_named(overrides: list[str], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        scenario(*overrides)

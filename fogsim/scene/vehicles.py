@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.scene.bodies import BODIES
+from fogsim.scene.bodies import body_of
 from fogsim.values.scene import Batch
 from fogsim.values.traffic import TrafficState
 
@@ -12,7 +12,7 @@ FIRST_VEHICLE = 16
 
 
 def vehicle_batches(state: TrafficState, skip: int | None) -> tuple[Batch, ...]:
-    """Build one batch for each kind of body that is on the road.
+    """Build one batch for each shape that is on the road.
 
     Parameters
     ----------
@@ -26,20 +26,26 @@ def vehicle_batches(state: TrafficState, skip: int | None) -> tuple[Batch, ...]:
     tuple of Batch
         Shapes fill a unit box, so the transforms scale them to length, width and height.
     """
-    kinds = np.array([kind if kind in BODIES else "car" for kind in state.types], dtype=np.str_)
+    names = np.array(body_names(state), dtype=np.str_)
     drawn = np.arange(len(state.ids)) != (-1 if skip is None else skip)
     transforms = _transforms(state)
     return tuple(
         Batch(
-            shape=kind,
+            shape=name,
             transforms=transforms[rows],
             paint=state.paint[rows].astype(np.float32),
             lamps=state.lamps[rows].astype(np.int32),
             instance=(FIRST_VEHICLE + rows).astype(np.int32),
         )
-        for kind in BODIES
-        if len(rows := np.flatnonzero(drawn & (kinds == kind)))
+        for name in dict.fromkeys(names.tolist())
+        if len(rows := np.flatnonzero(drawn & (names == name)))
     )
+
+
+def body_names(state: TrafficState) -> list[str]:
+    """Name of the shape of every vehicle."""
+    sizes = zip(state.ids, state.types, state.length.tolist(), state.height.tolist(), strict=True)
+    return [body_of(*vehicle) for vehicle in sizes]
 
 
 def _transforms(state: TrafficState) -> NDArray[np.float32]:

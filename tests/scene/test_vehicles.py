@@ -2,7 +2,9 @@ import numpy as np
 import pytest
 
 from fogsim.scene import vehicle_batches
-from fogsim.scene.bodies import BODIES, body_shapes
+from fogsim.scene.bodies import BODIES, body_of, body_shapes
+from fogsim.scene.bodies.lamp_patches import lamp_patches
+from fogsim.scene.bodies.parts import LIT_AREAS
 from fogsim.values import Lamp, Surface, TrafficState
 
 KINDS = ("car", "van", "truck", "bus", "motorcycle", "hovercraft")
@@ -52,9 +54,52 @@ def test_the_vehicle_with_the_camera_is_left_out(state: TrafficState) -> None:
     assert sorted(drawn) == [16, 17, 18, 20, 21]
 
 
-def test_an_unknown_body_is_drawn_as_a_car(state: TrafficState) -> None:
-    cars = next(batch for batch in vehicle_batches(state, None) if batch.shape == "car")
-    assert list(cars.instance) == [16, 21]
+def test_an_unknown_body_is_drawn_as_a_car() -> None:
+    for length, height in ((3.9, 1.4), (4.5, 1.5), (5.0, 1.5), (4.6, 1.8)):
+        assert body_of("v", "hovercraft", length, height) == body_of("v", "car", length, height)
+
+
+def test_cars_come_in_four_shapes_that_stay_with_their_vehicles() -> None:
+    names = [body_of(f"v{i}", "car", 4.4, 1.5) for i in range(400)]
+    assert names == [body_of(f"v{i}", "car", 4.4, 1.5) for i in range(400)]
+    shares = {name: names.count(name) / 400 for name in set(names)}
+    assert set(shares) == {"hatchback", "saloon", "estate", "suv"}
+    assert min(shares.values()) > 0.12
+
+
+def test_size_tells_what_a_vehicle_is() -> None:
+    assert {body_of(f"v{i}", "car", 3.8, 1.5) for i in range(50)} == {"hatchback"}
+    assert {body_of(f"v{i}", "car", 4.5, 1.7) for i in range(50)} == {"suv"}
+    assert "hatchback" not in {body_of(f"v{i}", "car", 5.0, 1.5) for i in range(50)}
+    assert {body_of(f"v{i}", "truck", 16.5, 4.0) for i in range(50)} == {"semitrailer", "semitrailer_curtain"}
+    assert body_of("v", "truck", 8.5, 3.6) == "rigid_truck"
+    assert body_of("v", "truck", 7.1, 2.4) == "flatbed_truck"
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_little_is_drawn_of_what_is_far(name: str) -> None:
+    near, far, tiny = (len(SHAPES[name + ending].faces) for ending in ("", ":far", ":tiny"))
+    assert near < 800
+    assert far < 115
+    assert tiny < 85
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_plates_send_light_back(name: str) -> None:
+    shape = SHAPES[name]
+    plates = shape.positions[shape.surface == Surface.SHEETING]
+    assert plates[:, 0].min() < -0.95
+
+
+@pytest.mark.parametrize("ending", ["", ":far", ":tiny"])
+@pytest.mark.parametrize("name", BODIES)
+def test_lit_surfaces_have_the_areas_of_lamps(name: str, ending: str) -> None:
+    _, width, height = BODIES[name].simple.size
+    for patch in lamp_patches(SHAPES[name + ending]):
+        area = patch.area * width * height
+        assert area < 1.06 * LIT_AREAS[patch.surface]
+        if name != "motorcycle" and patch.surface is not Surface.LAMP_STOP:
+            assert area > 0.35 * LIT_AREAS[patch.surface]
 
 
 def test_paint_and_lamps_follow_their_rows(state: TrafficState) -> None:
@@ -64,9 +109,10 @@ def test_paint_and_lamps_follow_their_rows(state: TrafficState) -> None:
         assert np.array_equal(batch.lamps, state.lamps[rows])
 
 
+@pytest.mark.parametrize("ending", ["", ":far", ":tiny"])
 @pytest.mark.parametrize("kind", BODIES)
-def test_every_body_has_every_lamp_where_it_belongs(kind: str) -> None:
-    shape = SHAPES[kind]
+def test_every_body_has_every_lamp_where_it_belongs(kind: str, ending: str) -> None:
+    shape = SHAPES[kind + ending]
     for surface, rear in (
         (Surface.LAMP_POSITION_REAR, True),
         (Surface.LAMP_STOP, True),

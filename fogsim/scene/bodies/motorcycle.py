@@ -16,15 +16,17 @@ from fogsim.scene.bodies.parts import (
     panel_back,
     panel_front,
 )
+from fogsim.scene.bodies.simple import Block, Simple
 from fogsim.scene.solids import BLACK_PLASTIC, STEEL, TYRE, Material, both_sides, box, cylinder, from_trimesh
 from fogsim.values.scene import Mesh
 
 _LEATHER = Material((0.035, 0.035, 0.04))
+_HELMET = Material((0.4, 0.4, 0.4))
 
 
-def motorcycle(*, detail: bool = True) -> Mesh:
+def motorcycle() -> Mesh:
     """Shape of a motorcycle with its rider in a unit box."""
-    sides, limbs = (18, 7) if detail else (6, 3)
+    sides, limbs = 14, 5
     rolling = [cylinder((x, -0.08, 0.31), (x, 0.08, 0.31), 0.31, TYRE, sides=sides) for x in (0.31, 1.86)]
     fairing = [
         [0.25, 0.10, 0.75, 0.95, 0.08, 0.03],
@@ -34,14 +36,14 @@ def motorcycle(*, detail: bool = True) -> Mesh:
         [2.00, 0.14, 0.70, 0.90, 0.10, 0.02],
     ]
     torso = [[0.88, 0.17, 0.88, 1.38, 0.19, 0.03], [1.35, 0.20, 0.80, 1.30, 0.18, 0.05]]
-    helmet = trimesh.creation.icosphere(subdivisions=1 if detail else 0, radius=0.14)
+    helmet = trimesh.creation.icosphere(subdivisions=1, radius=0.14)
     helmet.apply_translation((0.92, 0.0, 1.46))
     rider = (
         hull(np.array(torso), _LEATHER),
         both_sides(cylinder((1.05, 0.20, 1.25), (0.62, 0.34, 1.02), 0.055, _LEATHER, sides=limbs)),
         both_sides(cylinder((1.25, 0.18, 0.85), (0.85, 0.26, 0.72), 0.085, _LEATHER, sides=limbs)),
         both_sides(cylinder((0.85, 0.26, 0.72), (1.20, 0.22, 0.30), 0.065, _LEATHER, sides=limbs)),
-        from_trimesh(helmet, Material((0.4, 0.4, 0.4))),
+        from_trimesh(helmet, _HELMET),
     )
     lamps = (
         panel_back(2.06, (-0.09, 0.09), (0.80, 0.85), POSITION_LAMP),
@@ -57,3 +59,19 @@ def motorcycle(*, detail: bool = True) -> Mesh:
         cylinder((1.2, -0.18, 0.35), (2.0, -0.2, 0.5), 0.06, STEEL, sides=8),
     )
     return finished([*rolling, hull(np.array(fairing)), *rider, *lamps, *frame], 2.17, 0.2)
+
+
+MOTORCYCLE = Simple(
+    (2.17, 0.8, 1.6),
+    (
+        Block(((0.3, 0.16, 0.55, 0.95), (0.9, 0.2, 0.35, 0.9), (2.08, 0.12, 0.7, 0.9))),
+        Block(((0.72, 0.24, 0.85, 1.3), (1.3, 0.24, 0.85, 1.3)), _LEATHER, _LEATHER, _LEATHER),
+        Block(((0.8, 0.13, 1.32, 1.6), (1.05, 0.13, 1.32, 1.6)), _HELMET, _HELMET, _HELMET),
+        Block(((0.0, 0.07, 0.0, 0.62), (0.62, 0.07, 0.0, 0.62)), TYRE, TYRE, TYRE),
+        Block(((1.55, 0.07, 0.0, 0.62), (2.17, 0.07, 0.0, 0.62)), TYRE, TYRE, TYRE),
+        Block(((0.56, 0.4, 0.95, 1.02), (0.62, 0.4, 0.95, 1.02)), BLACK_PLASTIC, BLACK_PLASTIC, BLACK_PLASTIC),
+    ),
+    (),
+    0.31,
+    0.57,
+)

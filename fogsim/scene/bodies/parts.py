@@ -10,13 +10,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fogsim.scene.bodies.lamp_patches import with_lit_areas
 from fogsim.scene.solids import (
     PAINT,
     TYRE,
     UNDERBODY,
     Material,
     both_sides,
-    box,
     disc,
     grid,
     grid_faces,
@@ -36,11 +36,13 @@ FOG_LAMP = Material((0.22, 0.013, 0.015), Surface.LAMP_REAR_FOG)
 LEFT_INDICATOR = Material((0.36, 0.15, 0.03), Surface.LAMP_INDICATOR_LEFT)
 RIGHT_INDICATOR = Material((0.36, 0.15, 0.03), Surface.LAMP_INDICATOR_RIGHT)
 HEAD_LAMP = Material((0.50, 0.51, 0.52), Surface.LAMP_HEAD)
-PLATE = Material((0.62, 0.62, 0.58))
-RIM = Material((0.30, 0.31, 0.32))
+PLATE = Material((0.62, 0.62, 0.58), Surface.SHEETING)
+LENS = Material((0.42, 0.43, 0.44))
+"""Lamp without a surface of its own: front fog lamps."""
+RIM = Material((0.19, 0.195, 0.20))
 
 
-def hull(table: ArrayLike, material: Material = PAINT, *, columns: int = 5) -> Mesh:
+def hull(table: ArrayLike, material: Material = PAINT, *, columns: int = 5, levels: int = 4) -> Mesh:
     """Closed body through cross-sections.
 
     Parameters
@@ -50,12 +52,13 @@ def hull(table: ArrayLike, material: Material = PAINT, *, columns: int = 5) -> M
         the width there, and how much higher the middle is [m].
     material : Material
         Its skin; the underside is dark.
-    columns : int
-        Points across the top.
+    columns, levels : int
+        Points across the top and up each side; three levels make upright sides.
     """
     x, half, low, top, half_top, crown = np.asarray(table, float).T
     sides = []
-    for share, width in ((0.0, 0.93 * half), (0.22, half), (0.62, half), (1.0, half_top)):
+    shares = ((0.0, 0.93 * half), (0.22, half), (0.62, half), (1.0, half_top))
+    for share, width in shares if levels == 4 else shares[:2] + shares[3:]:
         sides.append(np.stack((x, width, low + share * (top - low)), axis=1))
     side = np.stack(sides, axis=1)
     across = np.linspace(1.0, -1.0, columns)
@@ -117,9 +120,7 @@ def pair(left: Mesh) -> Mesh:
     return merge((left, replace(twin, surface=swapped.astype(np.int32))))
 
 
-def wheels(
-    axles: Sequence[float], outside: float, radius: float, width: float, *, detail: bool, arch: bool = True
-) -> Mesh:
+def wheels(axles: Sequence[float], outside: float, radius: float, width: float, *, arch: bool = True) -> Mesh:
     """Pairs of wheels.
 
     Parameters
@@ -130,56 +131,66 @@ def wheels(
         y of the wheels' outer faces [m].
     radius, width : float
         Size of a tyre [m].
-    detail : bool
-        With rims and round tyres, else blocks.
     arch : bool
         With the dark opening of the wheel arch around it.
     """
-    if not detail:
-        blocks = [(x - 0.8 * radius, outside - width, 0.0, x + 0.8 * radius, outside, 1.9 * radius) for x in axles]
-        return both_sides(merge([box(block[:3], block[3:], TYRE) for block in blocks]))
     parts = []
     for x in axles:
         parts.append(_wheel(x, outside, radius, width))
         if arch:
             outline = [
                 (x - 1.2 * radius * np.cos(a), outside - 0.02, max(radius + 1.2 * radius * np.sin(a), 0.19))
-                for a in np.linspace(-0.35, np.pi + 0.35, 11)
+                for a in np.linspace(-0.35, np.pi + 0.35, 9)
             ]
             parts.append(polygon(outline, UNDERBODY, LEFT))
     return both_sides(merge(parts))
 
 
-def _wheel(x: float, outside: float, radius: float, width: float, sides: int = 16) -> Mesh:
+def _wheel(x: float, outside: float, radius: float, width: float, sides: int = 12) -> Mesh:
     angle = np.linspace(0.0, 2 * np.pi, sides + 1)
     rim = np.stack((np.cos(angle), np.zeros(sides + 1), np.sin(angle)), axis=1)
     hub = np.array([x, outside, radius])
     tread = np.stack((hub - (0, width, 0) + radius * rim, hub - (0, 0.012, 0) + radius * rim), axis=1)
     tyre = mesh(tread, grid_faces(sides + 1, 2), np.repeat(rim, 2, axis=0), TYRE)
     wall = disc(hub - (0, 0.012, 0), radius, -BACK, UP, TYRE, sides=sides)
-    return merge((tyre, wall, disc(hub, 0.64 * radius, -BACK, UP, RIM, sides=10, hole=0.2 * radius)))
+    return merge((tyre, wall, disc(hub, 0.64 * radius, -BACK, UP, RIM, sides=8)))
 
 
-def contact_shadow(length: float, half_width: float) -> Mesh:
+def contact_shadow(length: float, half_width: float, *, fine: bool = True) -> Mesh:
     """Darkness on the road under a body, deepest in the middle, fading towards its outline.
 
     Parameters
     ----------
     length, half_width : float
         The body's outline [m].
+    fine : bool
+        False for fewer triangles.
     """
-    x = length * np.array([0.005, 0.05, 0.15, 0.85, 0.95, 0.995])
-    y = half_width * np.array([-0.99, -0.82, 0.0, 0.82, 0.99])
-    points = np.array([[(a, b, 0.012) for b in y] for a in x])
-    depth = np.minimum.outer(np.array([0, 0.6, 1, 1, 0.6, 0]), np.array([0, 0.75, 1, 0.75, 0]))
+    x, along = np.array([0.005, 0.05, 0.15, 0.85, 0.95, 0.995]), np.array([0, 0.6, 1, 1, 0.6, 0])
+    y, across = np.array([-0.99, -0.82, 0.82, 0.99]), np.array([0, 0.75, 0.75, 0])
+    if not fine:
+        x, along, y, across = x[[0, 2, 3, 5]], along[[0, 2, 3, 5]], np.array([-0.95, 0.95]), np.array([0.6, 0.6])
+    points = np.array([[(a * length, b * half_width, 0.012) for b in y] for a in x])
+    depth = np.multiply.outer(along, across / 0.75)
     reflectance = np.repeat((0.058 - 0.048 * depth).reshape(-1, 1), 3, axis=1)
     return grid(points, UNDERBODY, UP, reflectance=reflectance)
 
 
-def finished(parts: Sequence[Mesh], length: float, half_width: float) -> Mesh:
+LIT_AREAS = {
+    Surface.LAMP_POSITION_REAR: 62e-4,
+    Surface.LAMP_STOP: 59e-4,
+    Surface.LAMP_REAR_FOG: 100e-4,
+    Surface.LAMP_INDICATOR_LEFT: 133e-4,
+    Surface.LAMP_INDICATOR_RIGHT: 133e-4,
+    Surface.LAMP_HEAD: 200e-4,
+}
+"""Luminous area of each lamp [m²]: with its intensity, the luminance that its surface has when it is lit."""
+
+
+def finished(parts: Sequence[Mesh], length: float, half_width: float, *, fine: bool = True) -> Mesh:
     """Shape of a body with its contact shadow in a unit box: x −1 (rear) … 0 (front), y ±1/2, z 0 … 1."""
-    body = merge(parts)
-    whole = merge((body, contact_shadow(length, half_width)))
+    body = with_lit_areas(merge(parts), LIT_AREAS) if fine else merge(parts)
+    whole = merge((body, contact_shadow(length, half_width, fine=fine)))
     low, high = body.positions.min(axis=0), body.positions.max(axis=0)
     size = (high - low).astype(np.float64)
     offset = np.array([low[0], 0.5 * (low[1] + high[1]), low[2]])

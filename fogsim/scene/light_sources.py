@@ -1,0 +1,236 @@
+"""Lit lamps that a camera may see: of other vehicles, and of streets."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.beam import luminous_intensity
+from fogsim.scene.bodies import BODIES
+from fogsim.scene.bodies.lamp_patches import Patch, lamp_patches
+from fogsim.scene.bodies.parts import LIT_AREAS
+from fogsim.scene.street_lamps import SIZE
+from fogsim.scene.vehicles import body_names
+from fogsim.values.lamps import Lamp
+from fogsim.values.light import Beam, LightSources
+from fogsim.values.scene import Surface
+from fogsim.values.traffic import TrafficState
+
+FARTHEST_VEHICLE = 1500.0
+"""Distance beyond which lamps of vehicles are left out [m]."""
+
+FARTHEST_STREET_LAMP = 400.0
+"""Distance beyond which street lamps are left out [m]."""
+
+_RED, _AMBER = (1.0, 0.03, 0.015), (1.0, 0.36, 0.015)
+_WHITE, _WARM = (1.0, 0.97, 0.90), (1.0, 0.90, 0.72)
+_WEIGHTS = (0.2126, 0.7152, 0.0722)  # share of each linear channel in luminance (ITU-R BT.709)
+
+SIGNAL_LAMPS: Mapping[tuple[Surface, bool], tuple[Lamp, float, tuple[float, float, float]]] = {
+    (Surface.LAMP_POSITION_REAR, False): (Lamp.POSITION, 8.0, _RED),
+    (Surface.LAMP_STOP, False): (Lamp.STOP, 100.0, _RED),
+    (Surface.LAMP_REAR_FOG, False): (Lamp.REAR_FOG, 200.0, _RED),
+    (Surface.LAMP_INDICATOR_LEFT, False): (Lamp.INDICATOR_LEFT, 200.0, _AMBER),
+    (Surface.LAMP_INDICATOR_RIGHT, False): (Lamp.INDICATOR_RIGHT, 200.0, _AMBER),
+    (Surface.LAMP_INDICATOR_LEFT, True): (Lamp.INDICATOR_LEFT, 200.0, _AMBER),
+    (Surface.LAMP_INDICATOR_RIGHT, True): (Lamp.INDICATOR_RIGHT, 200.0, _AMBER),
+    (Surface.LAMP_HEAD, True): (Lamp.DAYTIME, 600.0, _WHITE),
+}
+"""Lamp that lights a surface at the rear (False) or the front (True), intensity along its axis [cd], and colour.
+
+Within what UNECE allows: rear position 4–12 cd (R7), stop 60–185 cd (R7), rear fog 150–300 cd (R38), direction
+indicators 50–500 cd rear and 175–1000 cd front (R6), daytime 400–1200 cd (R87). Lamps whose surface is smaller than
+that of `LIT_AREAS`, as that of the third stop lamp, have so much less.
+"""
+
+_FOG_HEIGHT, _FOG_INSET = 0.55, 1.0  # front fog lamps lie below the head lamps: share of their height, and of their y
+_FOG_AREA = 0.010  # [m²]
+_SIGNALS = ~int(Lamp.LOW_BEAM | Lamp.HIGH_BEAM | Lamp.FRONT_FOG)  # lamps whose intensity no beam tells
+
+STREET_ANGLES = np.radians([0.0, 30.0, 50.0, 60.0, 65.0, 70.0, 75.0, 80.0, 85.0, 90.0])
+"""Angles from straight down to which `STREET_INTENSITIES` belong [rad]."""
+
+STREET_INTENSITIES = np.array([1500.0, 1800.0, 2400.0, 2900.0, 3000.0, 2900.0, 2000.0, 1000.0, 500.0, 0.0])
+"""Intensity of a street lamp of about 8 klm on a mast of 8 m [cd]."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Lamps:
+    """Lamps of all bodies in their unit boxes; row b of `of_body` has the numbers of those of body b, then −1."""
+
+    number: Mapping[str, int]
+    place: NDArray[np.float64]
+    area: NDArray[np.float64]
+    mask: NDArray[np.int64]
+    intensity: NDArray[np.float64]
+    colour: NDArray[np.float64]
+    forwards: NDArray[np.float64]
+    of_body: NDArray[np.int64]
+
+
+def light_sources(
+    state: TrafficState,
+    skip: int | None,
+    eye: Sequence[float] | NDArray[np.float64],
+    beams: Mapping[Lamp, Beam],
+    street_lamps: NDArray[np.float64] | None = None,
+) -> LightSources:
+    """Every lit lamp that shines toward a camera, whatever stands between.
+
+    Parameters
+    ----------
+    state : TrafficState
+        All vehicles and their lit lamps.
+    skip : int or None
+        Row that is left out, as a rule the vehicle that carries the camera.
+    eye : (3,) float64
+        Where the camera is [m].
+    beams : mapping of Lamp to Beam
+        Beam of one head lamp (LOW_BEAM, HIGH_BEAM) and one front fog lamp (FRONT_FOG); one that is not there is dark.
+    street_lamps : (n, 3) float64, optional
+        Middles of the luminous surfaces of street lamps [m], from `street_lamp_heads`.
+
+    Returns
+    -------
+    LightSources
+        Lamps that face away are left out. Signal lamps are dimmer off their axis by the fourth power of its cosine.
+    """
+    here = np.asarray(eye, np.float64)
+    parts = [_of_vehicles(state, skip, here, beams)] if len(state.ids) else []
+    if street_lamps is not None and len(street_lamps):
+        parts.append(_of_streets(street_lamps, here))
+    parts = [part for part in parts if len(part.intensity)]
+    if len(parts) == 1:
+        return parts[0]
+    if not parts:
+        return LightSources.none()
+    names = ("position", "intensity", "colour", "area")
+    return LightSources(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+
+def _of_vehicles(
+    state: TrafficState, skip: int | None, eye: NDArray[np.float64], beams: Mapping[Lamp, Beam]
+) -> LightSources:
+    table = _lamps()
+    offset = eye - state.position
+    cosine, sine = np.cos(state.heading), np.sin(state.heading)
+    ahead = offset[:, 0] * cosine + offset[:, 1] * sine
+    row, lamp = _lit(state, skip, ahead, offset, table)
+    if not len(row):
+        return LightSources.none()
+    cosine, sine, place = cosine[row], sine[row], table.place[lamp]
+    x, y = place[:, 0] * state.length[row], place[:, 1] * state.width[row]
+    # From the lamp to the eye, in the vehicle's axes.
+    forward = ahead[row] - x
+    left = offset[row, 1] * cosine - offset[row, 0] * sine - y
+    z = place[:, 2] * state.height[row]
+    up = offset[row, 2] - z
+    axial = forward * table.forwards[lamp]
+    facing = np.maximum(axial / np.sqrt(forward**2 + left**2 + up**2 + 1e-12), 0.0)
+    intensity = table.intensity[lamp] * facing**4 * ((state.lamps[row] & table.mask[lamp] & _SIGNALS) != 0)
+    _add_beams(intensity, state.lamps[row] & table.mask[lamp], (forward, left, up), beams)
+    position = state.position[row]
+    position[:, 0] += x * cosine - y * sine
+    position[:, 1] += x * sine + y * cosine
+    position[:, 2] += z
+    area = table.area[lamp] * state.width[row] * state.height[row] * facing
+    seen = intensity > 1e-3
+    return LightSources(position[seen], intensity[seen], table.colour[lamp[seen]], area[seen])
+
+
+def _lit(
+    state: TrafficState,
+    skip: int | None,
+    ahead: NDArray[np.float64],
+    offset: NDArray[np.float64],
+    table: _Lamps,
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Rows of vehicles and numbers of lamps that are lit and on the side of the vehicle that the eye is on."""
+    body = np.array([table.number[name] for name in body_names(state)])
+    lit = state.lamps.astype(np.int64)
+    if skip is not None:
+        lit[skip] = 0
+    lit[np.abs(offset[:, 0]) + np.abs(offset[:, 1]) > FARTHEST_VEHICLE] = 0
+    # The eye sees lamps at the front from before it, those at the rear from behind it.
+    numbers = table.of_body[body]
+    known = numbers >= 0
+    before = np.where(table.forwards[numbers] > 0, ahead[:, None] > 0, (ahead + state.length)[:, None] < 0)
+    row, column = np.nonzero(known & before & ((lit[:, None] & table.mask[numbers]) != 0))
+    return row, numbers[row, column]
+
+
+def _add_beams(
+    intensity: NDArray[np.float64],
+    lit: NDArray[np.int64],
+    toward: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    beams: Mapping[Lamp, Beam],
+) -> None:
+    """Add what head lamps and front fog lamps shine in a direction (forward, left, up) to the intensities."""
+    for lamp, beam in beams.items():
+        chosen = np.flatnonzero(lit & int(lamp))
+        if len(chosen):
+            forward, left, up = (part[chosen] for part in toward)
+            azimuth, elevation = np.arctan2(-left, forward), np.arctan2(up, np.hypot(forward, left))
+            intensity[chosen] += luminous_intensity(beam, azimuth, elevation)
+
+
+def _of_streets(heads: NDArray[np.float64], eye: NDArray[np.float64]) -> LightSources:
+    offset = eye - heads
+    distance = np.sqrt(np.einsum("ij,ij->i", offset, offset))
+    near = np.flatnonzero((distance < FARTHEST_STREET_LAMP) & (offset[:, 2] < 0))
+    down = -offset[near, 2] / distance[near]
+    intensity = np.interp(np.arccos(down), STREET_ANGLES, STREET_INTENSITIES)
+    length, width, depth = SIZE
+    # The surface bulges below the head, so that it does not vanish when seen from the side.
+    area = length * width * down + 0.5 * (length + width) * depth * np.sqrt(1.0 - down**2)
+    return LightSources(heads[near], intensity, np.tile(_luminance_one(_WARM), (len(near), 1)), area)
+
+
+def _luminance_one(colour: tuple[float, float, float]) -> NDArray[np.float64]:
+    return np.array(colour) / float(np.dot(colour, _WEIGHTS))
+
+
+@cache
+def _lamps() -> _Lamps:
+    """Lamps of all bodies, where their surfaces are."""
+    rows: list[tuple[NDArray[np.float64], float, int, float, NDArray[np.float64], float]] = []
+    members: list[list[int]] = []
+    for body in BODIES.values():
+        _, width, height = body.simple.size
+        first = len(rows)
+        for patch in lamp_patches(body.near()):
+            rows += _rows_of(patch, width * height)
+        members.append(list(range(first, len(rows))))
+    most = max(map(len, members))
+    place, area, mask, intensity, colour, forwards = zip(*rows, strict=True)
+    return _Lamps(
+        number={name: number for number, name in enumerate(BODIES)},
+        place=np.array(place),
+        area=np.array(area),
+        mask=np.array(mask),
+        intensity=np.array(intensity),
+        colour=np.array(colour),
+        forwards=np.array(forwards),
+        of_body=np.array([member + [-1] * (most - len(member)) for member in members]),
+    )
+
+
+def _rows_of(
+    patch: Patch, box_area: float
+) -> list[tuple[NDArray[np.float64], float, int, float, NDArray[np.float64], float]]:
+    """A lamp, and below a head lamp the front fog lamp."""
+    known = SIGNAL_LAMPS.get((patch.surface, patch.front))
+    if known is None:
+        return []
+    lamp, intensity, colour = known
+    forwards = 1.0 if patch.front else -1.0
+    tint = _luminance_one(colour)
+    share = min(patch.area * box_area / LIT_AREAS[patch.surface], 1.0)
+    if patch.surface is not Surface.LAMP_HEAD:
+        return [(patch.centre, patch.area, int(lamp), share * intensity, tint, forwards)]
+    lit = int(lamp | Lamp.LOW_BEAM | Lamp.HIGH_BEAM)
+    below = patch.centre * np.array([1.0, _FOG_INSET, _FOG_HEIGHT])
+    head = (patch.centre, patch.area, lit, share * intensity, tint, forwards)
+    return [head, (below, _FOG_AREA / box_area, int(Lamp.FRONT_FOG), 0.0, tint, forwards)]

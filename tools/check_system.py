@@ -1,5 +1,9 @@
 """Say in one line what FogSim needs from the operating system and does not find; exit 1 if anything is missing.
 
+    python3 tools/check_system.py [--all-tests] [--packages]
+
+``--all-tests`` asks also for what only the tests need: OpenGL, without which FogSim draws on the processor, and a
+display without a screen for sumo-gui. ``--packages`` prints nothing but the names of the Debian packages.
 Runs before anything is installed, so it uses the standard library alone.
 """
 
@@ -9,15 +13,11 @@ import shutil
 import sys
 
 MINIMUM = (3, 11)
-LIBRARIES = {
-    "libEGL.so.1": "libegl1 libegl-mesa0 libgl1-mesa-dri",
-    "libGL.so.1": "libgl1",
-    "libXrender.so.1": "libxrender1",
-    "libatomic.so.1": "libatomic1",
-}
+LIBRARIES = {"libXrender.so.1": "libxrender1", "libatomic.so.1": "libatomic1"}
+"""Shared libraries that SUMO's wheel loads, and the packages that provide them."""
 
-FOR_ALL_TESTS = {"Xvfb": "xvfb"}
-"""Programs that some tests need, which are skipped without them: sumo-gui's display without a screen."""
+TEST_LIBRARIES = {"libEGL.so.1": "libegl1 libegl-mesa0 libgl1-mesa-dri", "libGL.so.1": "libgl1"}
+TEST_PROGRAMS = {"Xvfb": "xvfb"}
 
 
 def missing_packages(for_all_tests: bool = False) -> list[str]:
@@ -25,18 +25,21 @@ def missing_packages(for_all_tests: bool = False) -> list[str]:
     packages = []
     if importlib.util.find_spec("ensurepip") is None:
         packages.append(f"python{sys.version_info.major}.{sys.version_info.minor}-venv")
-    for library, provided_by in LIBRARIES.items():
+    for library, provided_by in (LIBRARIES | (TEST_LIBRARIES if for_all_tests else {})).items():
         try:
             ctypes.CDLL(library)
         except OSError:
             packages += provided_by.split()
     if for_all_tests:
-        packages += [package for program, package in FOR_ALL_TESTS.items() if shutil.which(program) is None]
+        packages += [package for program, package in TEST_PROGRAMS.items() if shutil.which(program) is None]
     return packages
 
 
 def main() -> int:
     """Check and report."""
+    if "--packages" in sys.argv[1:]:
+        print(" ".join(missing_packages("--all-tests" in sys.argv[1:])))  # noqa: T201 - the line is the result
+        return 0
     if sys.version_info < MINIMUM:
         print(f"FogSim needs Python {MINIMUM[0]}.{MINIMUM[1]} or newer, this is {sys.version.split()[0]}.")  # noqa: T201 - the line is the result
         return 1

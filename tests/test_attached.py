@@ -103,6 +103,7 @@ def conduct(api: Any, vehicle: str) -> tuple[Any, ...]:
         get.getTau(vehicle),
         get.getSpeedMode(vehicle),
         get.getLaneChangeMode(vehicle),
+        float(get.getParameter(vehicle, "laneChangeModel.lcSpeedGain")),
     )
 
 
@@ -113,8 +114,8 @@ def test_every_vehicle_gets_back_what_was_changed(libsumo: Any, monkeypatch: pyt
     tell = libsumo.vehicle.setParameter
 
     def told(vehicle: str, key: str, value: str) -> None:
-        assert key == "carFollowModel.ignoreIDs"
-        ignored[vehicle] = value
+        if key == "carFollowModel.ignoreIDs":
+            ignored[vehicle] = value
         tell(vehicle, key, value)
 
     monkeypatch.setattr(libsumo.vehicle, "setParameter", told)
@@ -136,7 +137,7 @@ def test_every_vehicle_gets_back_what_was_changed(libsumo: Any, monkeypatch: pyt
     assert len(blind) > 3
     session.close()
     assert not {v for v in present if ignored.get(v)}
-    assert {0, 2} <= changed  # top speeds and headways
+    assert {0, 2, 5} <= changed  # top speeds, headways, and wishes to change lanes
     assert EGO in present
     assert {v: conduct(libsumo, v) for v in present} == {v: before[v] for v in present}
 

@@ -1,7 +1,8 @@
 """Drivers react to a leader only once they can see it.
 
 SUMO's own car-following models are told which leader to ignore (``carFollowModel.ignoreIDs``), and only when that
-changes; so Krauss, IDM, EIDM and the rest stay as they are, and an unseen vehicle stays on the road.
+changes; so Krauss, IDM, EIDM and the rest stay as they are, and an unseen vehicle stays on the road. Lane changing is
+told in the same moment; see `Ignoring`.
 
 Drivers are looked at only in steps in which what they see could have changed. Between two looks a gap changes at most
 by the fastest approach there is, and near the edge of sight by what speeds and accelerations allow; so for a leader
@@ -14,6 +15,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 from fogsim.traffic.getters import Getter, vehicle_getter
+from fogsim.traffic.ignoring import Ignoring
 from fogsim.traffic.link import Api
 from fogsim.traffic.motion_bounds import MotionBounds
 from fogsim.traffic.pair_sight import OwnLamps, Pair, PairSight
@@ -38,7 +40,6 @@ LONGEST_PAUSE = 0.5
 """Every driver looks at least this often [s], for leaders change."""
 
 _NOBODY = ("", 0.0)
-_IGNORE = "carFollowModel.ignoreIDs"
 
 
 class Perception:
@@ -61,7 +62,7 @@ class Perception:
     def __init__(
         self, api: Api, fog: FogAccess, sight: DriverSight, roster: Roster | None = None, distant: bool = False
     ) -> None:
-        self._vehicles = api.vehicle
+        self._ignoring = Ignoring(api)
         sent = SubscribedPairs(api, REACH) if distant else None
         self._leader: Getter = vehicle_getter(api, "getLeader") if sent is None else sent.leader
         self._motion = MotionBounds(vehicle_getter(api, "getSpeed") if sent is None else sent.speed)
@@ -116,6 +117,7 @@ class Perception:
         for follower in gone:
             self._ignored.pop(follower, None)
             self._emerging.pop(follower, None)
+            self._ignoring.forget(follower)
 
     def _decide_by_gap(self, due: Sequence[str]) -> list[Pair]:
         """Decide where the gap alone tells, and give back the rest."""
@@ -161,14 +163,14 @@ class Perception:
         """From now on a follower reacts to a leader no more."""
         self._emerging.pop(follower, None)
         if self._ignored.get(follower) != leader:
-            self._vehicles.setParameter(follower, _IGNORE, leader)
+            self._ignoring.ignore(follower, leader)
             self._ignored[follower] = leader
 
     def _see(self, follower: str) -> None:
         """From now on a follower reacts to everybody."""
         self._emerging.pop(follower, None)
         if self._ignored.pop(follower, None) is not None:
-            self._vehicles.setParameter(follower, _IGNORE, "")
+            self._ignoring.heed(follower)
 
     def _reacts(self, follower: str, leader: str) -> bool:
         """Whether a follower who sees a leader reacts: not at once if that leader has just come into view."""

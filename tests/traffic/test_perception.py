@@ -33,6 +33,15 @@ ROUTES = """<routes>
 </routes>"""
 
 
+SLOW_LEADER = """<routes>
+  <vType id="c" vClass="passenger" sigma="0" speedDev="0"/>
+  <vType id="s" vClass="passenger" sigma="0" speedDev="0" maxSpeed="8"/>
+  <route id="r" edges="approach bank exit"/>
+  <vehicle id="slow" type="s" route="r" depart="0" departPos="300" departSpeed="8" departLane="0"/>
+  <vehicle id="ego" type="c" route="r" depart="0" departPos="60" departSpeed="30" departLane="0"/>
+</routes>"""
+
+
 @dataclass(frozen=True)
 class Fog:
     """Homogeneous fog."""
@@ -137,6 +146,36 @@ def test_real_eyes_in_dense_fog_hit_and_in_thin_fog_stop(setup: TrafficSetup) ->
     eyes = replace(setup, sight=DriverSight(illuminance=10_000.0))
     assert len(collisions(eyes, k=3.0 / 30.0)[0]) == 1
     assert collisions(eyes, k=3.0 / 400.0)[0] == []
+
+
+def leaves_its_lane(setup: TrafficSetup, sight: DriverSight | SeesFrom | None, model: str = "LC2013") -> bool:
+    """Whether the ego, free to overtake, leaves the rightmost lane before it is 45 m from a slow vehicle there."""
+    setup.routes[0].write_text(SLOW_LEADER.replace("<vType", f'<vType laneChangeModel="{model}"'), encoding="utf-8")
+    traffic = libsumo_traffic(replace(setup, sight=sight, keep_lane=("slow",)))
+    traffic.enter_fog(Fog(0.05))
+    try:
+        traffic.start(1)
+        while True:
+            traffic.advance(Command())
+            snapshot = traffic.observe()
+            assert snapshot is not None
+            if not snapshot.state.lane[snapshot.ego].endswith("_0"):
+                return True
+            if snapshot.leader is not None and snapshot.leader.gap < 45.0:
+                return False
+    finally:
+        traffic.close()
+
+
+def test_who_does_not_see_a_leader_does_not_overtake_it(setup: TrafficSetup) -> None:
+    """SUMO's lane changing sees a slow leader through fog by itself."""
+    assert leaves_its_lane(setup, None)
+    assert leaves_its_lane(setup, SeesFrom(400.0))
+    assert not leaves_its_lane(setup, SeesFrom(40.0))
+
+
+def test_a_lane_change_model_that_cannot_be_told_keeps_seeing(setup: TrafficSetup) -> None:
+    assert leaves_its_lane(setup, SeesFrom(40.0), model="DK2008")
 
 
 def test_after_a_collision_both_stand_and_block_the_lane_or_vanish(setup: TrafficSetup) -> None:

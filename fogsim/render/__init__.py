@@ -12,12 +12,21 @@ __all__ = ["RENDERERS", "RenderError", "Renderer", "gl_report", "make_renderer"]
 
 def _pyrender(scene: Scene, illuminance: float) -> Renderer:
     # OpenGL is loaded by the process that draws, when it first draws: not by every one that imports FogSim.
-    from fogsim.render.gl.renderer import GLRenderer  # noqa: PLC0415
+    from fogsim.render.gl.rasteriser import GLRasteriser  # noqa: PLC0415
+    from fogsim.render.renderer import SceneRenderer  # noqa: PLC0415
 
-    return GLRenderer(scene, illuminance)  # type: ignore[return-value] # it draws no lamplight yet
+    return SceneRenderer(scene, illuminance, GLRasteriser)
 
 
-RENDERERS: Registry[Callable[[Scene, float], Renderer]] = Registry("renderer", {"pyrender": _pyrender})
+def _cpu(scene: Scene, illuminance: float) -> Renderer:
+    # So is numba.
+    from fogsim.render.cpu.rasteriser import CPURasteriser  # noqa: PLC0415
+    from fogsim.render.renderer import SceneRenderer  # noqa: PLC0415
+
+    return SceneRenderer(scene, illuminance, CPURasteriser)
+
+
+RENDERERS: Registry[Callable[[Scene, float], Renderer]] = Registry("renderer", {"pyrender": _pyrender, "cpu": _cpu})
 """Factories of renderers by name, each called with the scene and the horizontal illuminance [lx]."""
 
 

@@ -20,6 +20,7 @@ SKY_TINT = (0.988, 1.0, 1.035)
 """Colour of the overcast sky, of luminance 1."""
 
 _RED, _AMBER, _WHITE = (1.0, 0.03, 0.015), (1.0, 0.36, 0.015), (1.0, 0.97, 0.90)
+_WARM = (1.0, 0.86, 0.66)
 _BEAMS = Lamp.LOW_BEAM | Lamp.HIGH_BEAM | Lamp.DAYTIME
 
 LAMPS: Mapping[Surface, tuple[Lamp, float, tuple[float, float, float]]] = {
@@ -29,11 +30,13 @@ LAMPS: Mapping[Surface, tuple[Lamp, float, tuple[float, float, float]]] = {
     Surface.LAMP_INDICATOR_LEFT: (Lamp.INDICATOR_LEFT, 15e3, _AMBER),
     Surface.LAMP_INDICATOR_RIGHT: (Lamp.INDICATOR_RIGHT, 15e3, _AMBER),
     Surface.LAMP_HEAD: (_BEAMS, 30e3, _WHITE),
+    Surface.LAMP_STREET: (Lamp.NONE, 30e3, _WARM),
 }
 """Lamps that light a surface, its luminance then [cd/m²] and its colour.
 
 Luminous intensity over area: a tail lamp of 8 cd and 60 cm², a stop lamp of 100 cd and 60 cm², a rear fog lamp of
-200 cd and 100 cm², a head lamp seen beside its beam with 500 cd and 150 cm².
+200 cd and 100 cm², a head lamp seen beside its beam with 500 cd and 150 cm², a street lamp of 9 klm over a tenth of a
+square metre [M].
 """
 
 
@@ -65,3 +68,8 @@ def lamp_radiance(surface: Surface) -> NDArray[np.float64]:
 def lamp_mask(surface: Surface) -> Lamp:
     """Lamps any of which lights a surface."""
     return LAMPS[surface][0] if surface in LAMPS else Lamp.NONE
+
+
+def lighting_bits(surface: Surface) -> int:
+    """Bits of `Lamp` any of which lights a surface, −1 for a surface that is always lit."""
+    return -1 if surface == Surface.LAMP_STREET else int(lamp_mask(surface))

@@ -1,0 +1,285 @@
+"""The choice of what a picture may show: copies in view and large enough, small ones by simpler stand-ins."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.jit import kernel
+
+FARTHEST = 1600.0
+"""Distance beyond which no copy is drawn [m]."""
+
+_SMALLEST = 1.0  # radius in the picture below which a copy is left out [px]
+_DENSEST = 0.8  # square root of half a square's breadth per triangle, below which a stand-in does [px]
+_BINS = 64  # of distance, to draw near copies first
+_NUMBERS = 17  # 32-bit numbers of a record
+
+Array = NDArray[np.float32]
+Wide = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+class Shapes(NamedTuple):
+    """Shapes by number.
+
+    Attributes
+    ----------
+    centre, half_extent : (n, 3) float64
+        Middle and half the extents of each shape's bounding box.
+    stand_in : (n,) int64
+        The simpler shape that stands in for each where it is small, −1 if there is none.
+    detail : (n,) float64
+        Half the breadth in the picture below which it does [px].
+    faces : (n,) int64
+        Number of triangles.
+    """
+
+    centre: Wide
+    half_extent: Wide
+    stand_in: Index
+    detail: Wide
+    faces: Index
+
+
+class Copies(NamedTuple):
+    """Copies of shapes.
+
+    Attributes
+    ----------
+    shape : (n,) int64
+        Number of each copy's shape.
+    place : (n, 3) float64
+        Last column of its transform: where its origin is [m].
+    record : (n, 17) float32
+        Its `RECORD`, as numbers.
+    middle : (n, 3) float64
+        Middle of its bounding sphere [m].
+    radius : (n,) float64
+        Its radius [m].
+    breadth : (n,) float64
+        Half of the second largest of its three extents [m], which says how much of it there is to see.
+    """
+
+    shape: Index
+    place: Wide
+    record: Array
+    middle: Wide
+    radius: Wide
+    breadth: Wide
+
+
+class Cells(NamedTuple):
+    """Squares of the ground with the copies in them.
+
+    Attributes
+    ----------
+    first : (k + 1,) int64
+        First copy of each square, and the number of all copies.
+    middle : (k, 3) float64
+        Middle of a sphere around all the copies of each square [m].
+    radius : (k,) float64
+        Its radius [m].
+    """
+
+    first: Index
+    middle: Wide
+    radius: Wide
+
+
+class Chosen(NamedTuple):
+    """Memory for what is chosen: the arrays of a `Drawing`, and copies as found, their distance and their order."""
+
+    mesh: Index
+    record: Array
+    first: Index
+    copy: Index
+    bin: Index
+    order: Index
+
+
+def shapes_of(numbers: dict[str, int], low: Wide, high: Wide, faces: Index, endings: tuple[str, ...]) -> Shapes:
+    """Measure shapes.
+
+    Parameters
+    ----------
+    numbers : dict
+        Number of each shape.
+    low, high : (n, 3) float64
+        Corners of their bounding boxes.
+    faces : (n,) int64
+        Numbers of their triangles.
+    endings : tuple of str
+        Endings of the names of stand-ins, the most detailed first.
+    """
+    stand_in = np.full(len(numbers), -1, np.int64)
+    for name in numbers:
+        if not name.endswith(endings):
+            levels = [numbers[level] for level in (name, *(name + ending for ending in endings)) if level in numbers]
+            stand_in[levels[:-1]] = levels[1:]
+    return Shapes(0.5 * (low + high), 0.5 * (high - low), stand_in, _DENSEST * np.sqrt(faces), faces)
+
+
+def copies_of(shape: Index, record: Array, place: Wide, shapes: Shapes) -> Copies:
+    """Measure copies (see `Copies` for the arrays)."""
+    count = len(shape)
+    copies = Copies(shape, place, record, np.empty((count, 3)), np.empty(count), np.empty(count))
+    measure(shapes, copies, 0, count)
+    return copies
+
+
+def with_room(copies: Copies, count: int) -> Copies:
+    """Add room for so many more copies."""
+    return Copies(*(np.concatenate([column, np.zeros((count, *column.shape[1:]), column.dtype)]) for column in copies))
+
+
+def cells_of(copies: Copies, side: float) -> tuple[Copies, Cells]:
+    """Sort copies by squares of the ground with a side [m]."""
+    square = np.floor(copies.middle[:, :2] / side).astype(np.int64)
+    _, number = np.unique(square, axis=0, return_inverse=True)
+    order = np.argsort(number.ravel(), kind="stable")
+    sorted_copies = Copies(*(np.ascontiguousarray(column[order]) for column in copies))
+    first = np.concatenate(([0], np.cumsum(np.bincount(number.ravel())))).astype(np.int64)
+    middle, radius = np.zeros((len(first) - 1, 3)), np.zeros(len(first) - 1)
+    for cell, (start, end) in enumerate(zip(first[:-1], first[1:], strict=True)):
+        inside = sorted_copies.middle[start:end]
+        middle[cell] = 0.5 * (inside.min(axis=0) + inside.max(axis=0))
+        reach = np.linalg.norm(inside - middle[cell], axis=1) + sorted_copies.radius[start:end]
+        radius[cell] = reach.max()
+    return sorted_copies, Cells(first, middle, radius)
+
+
+@kernel
+def measure(shapes: Shapes, copies: Copies, begin: int, end: int) -> None:
+    """Set middle, radius and breadth of copies from `begin` to `end`."""
+    shape, record, place = copies.shape, copies.record, copies.place
+    centre, half_extent = shapes.centre, shapes.half_extent
+    for copy in range(begin, end):
+        number = shape[copy]
+        for row in range(3):
+            total = place[copy, row]
+            for column in range(3):
+                total += record[copy, 4 * row + column] * centre[number, column]
+            copies.middle[copy, row] = total
+        x, y, z = 0.0, 0.0, 0.0
+        for row in range(3):
+            x += record[copy, 4 * row] ** 2
+            y += record[copy, 4 * row + 1] ** 2
+            z += record[copy, 4 * row + 2] ** 2
+        x, y, z = x * half_extent[number, 0] ** 2, y * half_extent[number, 1] ** 2, z * half_extent[number, 2] ** 2
+        copies.radius[copy] = np.sqrt(x + y + z)
+        copies.breadth[copy] = np.sqrt(x + y + z - min(x, y, z) - max(x, y, z))
+
+
+@kernel
+def choose(
+    shapes: Shapes,
+    copies: Copies,
+    cells: Cells,
+    end: int,
+    planes: Wide,
+    eye: Wide,
+    focal: float,
+    chosen: Chosen,
+) -> int:
+    """Choose the copies that a picture may show, near ones first.
+
+    Parameters
+    ----------
+    shapes : Shapes
+        All shapes.
+    copies, cells : Copies, Cells
+        What stands still, and after it what moves.
+    end : int
+        Number of all copies.
+    planes : (5, 3) float64
+        Inward unit normals of the planes that bound the picture, the forward one last.
+    eye : (3,) float64
+        Where the camera is [m].
+    focal : float
+        Its focal length [px].
+    chosen : Chosen
+        Is filled; has room for all copies.
+
+    Returns
+    -------
+    int
+        Number of copies chosen.
+    """
+    middle, radius, first = copies.middle, copies.radius, cells.first
+    begin = first[len(first) - 1]
+    measure(shapes, copies, begin, end)
+    p, q, r, s, ahead = _row(planes, 0), _row(planes, 1), _row(planes, 2), _row(planes, 3), _row(planes, 4)
+    count = 0
+    for cell in range(len(cells.radius) + 1):
+        low, high = begin, end
+        if cell < len(cells.radius):
+            low, high = first[cell], first[cell + 1]
+            x, y, z = cells.middle[cell, 0] - eye[0], cells.middle[cell, 1] - eye[1], cells.middle[cell, 2] - eye[2]
+            if _depth((x, y, z), cells.radius[cell], p, q, r, s, ahead) >= FARTHEST:
+                continue
+        for copy in range(low, high):
+            x, y, z = middle[copy, 0] - eye[0], middle[copy, 1] - eye[1], middle[copy, 2] - eye[2]
+            depth = _depth((x, y, z), radius[copy], p, q, r, s, ahead)
+            if depth < FARTHEST and focal * radius[copy] > _SMALLEST * (depth + radius[copy]):
+                chosen.copy[count] = copy
+                chosen.bin[count] = min(int(6.0 * np.log2(1.0 + depth)), _BINS - 1)
+                count += 1
+    _sort(chosen, count)
+    _write(shapes, copies, ahead, eye, focal, chosen, count)
+    return count
+
+
+Vector = tuple[float, float, float]
+
+
+@kernel
+def _row(matrix: Wide, row: int) -> Vector:
+    return matrix[row, 0], matrix[row, 1], matrix[row, 2]
+
+
+@kernel
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
+def _depth(middle: Vector, radius: float, p: Vector, q: Vector, r: Vector, s: Vector, ahead: Vector) -> float:
+    """Depth of the nearest point of a sphere [m], infinite if it is out of view."""
+    if min(min(_dot(p, middle), _dot(q, middle)), min(_dot(r, middle), _dot(s, middle))) < -radius:
+        return np.inf
+    depth = _dot(ahead, middle)
+    return max(depth - radius, 0.0) if depth > -radius else np.inf
+
+
+@kernel
+def _sort(chosen: Chosen, count: int) -> None:
+    """Set the order in which copies are drawn: by bin of distance."""
+    bins, copies, order = chosen.bin, chosen.copy, chosen.order
+    place = np.zeros(_BINS + 1, np.int64)
+    for i in range(count):
+        place[bins[i] + 1] += 1
+    for i in range(_BINS):
+        place[i + 1] += place[i]
+    for i in range(count):
+        order[place[bins[i]]] = copies[i]
+        place[bins[i]] += 1
+
+
+@kernel
+def _write(shapes: Shapes, copies: Copies, ahead: Vector, eye: Wide, focal: float, chosen: Chosen, count: int) -> None:
+    """Write what is drawn of the chosen copies."""
+    mesh, record, first, order = chosen.mesh, chosen.record, chosen.first, chosen.order
+    first[0] = 0
+    for i in range(count):
+        copy = order[i]
+        x, y, z = copies.middle[copy, 0] - eye[0], copies.middle[copy, 1] - eye[1], copies.middle[copy, 2] - eye[2]
+        depth, shape = _dot(ahead, (x, y, z)), copies.shape[copy]
+        while shapes.stand_in[shape] >= 0 and focal * copies.breadth[copy] < shapes.detail[shape] * depth:
+            shape = shapes.stand_in[shape]
+        mesh[i] = shape
+        first[i + 1] = first[i] + shapes.faces[shape]
+        for number in range(_NUMBERS):
+            record[i, number] = copies.record[copy, number]
+        for axis in range(3):
+            record[i, 4 * axis + 3] = copies.place[copy, axis] - eye[axis]

@@ -1,0 +1,1 @@
+"""Finding what each pixel sees without any graphics system."""

@@ -1,0 +1,64 @@
+"""The rasteriser that needs no graphics system."""
+
+import sys
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.pinhole import camera_axes
+from fogsim.render.cpu.kernels import Triangles, Work, rasterise
+from fogsim.render.drawing import NEAR, Drawing, MeshTable
+from fogsim.values.camera import Camera, CameraPose
+
+_LOWER_HALF = 0 if sys.byteorder == "little" else 1  # which of the two halves of a number comes first in memory
+_TOGETHER = 2048  # most triangles that are worked on at a time, if no mesh has more
+
+
+class CPURasteriser:
+    """Finds what pixels see with one thread and to the bit the same every time (see `Rasteriser`).
+
+    Parameters
+    ----------
+    table : MeshTable
+        All meshes.
+    """
+
+    def __init__(self, table: MeshTable) -> None:
+        counts = np.diff(table.first_vertex)
+        start = np.repeat(table.first_vertex[:-1], np.diff(table.first_face))
+        self._triangles = Triangles(
+            positions=np.ascontiguousarray(table.positions.T),
+            faces=(table.faces - start[:, None]).astype(np.uint32),
+            first_vertex=table.first_vertex,
+            first_face=table.first_face,
+        )
+        faces = max(int(np.diff(table.first_face).max(initial=1)), _TOGETHER)
+        self._work = Work(
+            corners=np.empty((5, max(int(counts.max(initial=1)), 2 * _TOGETHER)), np.float32),
+            points=np.empty((faces, 9), np.float32),
+            box=np.empty((faces, 4), np.int32),
+            slot=np.empty(faces, np.int32),
+        )
+        self._picture = np.empty((0, 0), np.int64)
+
+    def slots(self, drawing: Drawing, camera: Camera, pose: CameraPose) -> NDArray[np.int32]:
+        """Find the nearest triangle of each pixel (see `Rasteriser.slots`)."""
+        size = (camera.height, camera.width)
+        if self._picture.shape != size:
+            self._picture = np.empty((size[0], (size[1] + 7) // 8 // 2 * 16 + 8), np.int64)[:, : size[1]]
+        rasterise(
+            self._triangles,
+            drawing.mesh,
+            drawing.record.view(np.float32).reshape(-1, 17),
+            drawing.first,
+            camera_axes(camera, pose),
+            np.array((camera.focal_length, *camera.principal_point)),
+            NEAR,
+            self._picture,
+            self._work,
+        )
+        return self._picture.base.view(np.int32)[:, _LOWER_HALF : 2 * size[1] : 2]
+
+    def close(self) -> None:
+        """Let go of its picture."""
+        self._picture = np.empty((0, 0), np.int64)

@@ -1,0 +1,157 @@
+"""The renderer: what may show, which triangle each pixel sees, and how bright it is."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.errors import InputError
+from fogsim.pinhole import camera_axes
+from fogsim.render.choice import Chosen, cells_of, choose, copies_of, shapes_of, with_room
+from fogsim.render.drawing import RECORD, Drawing, MeshTable, Rasteriser
+from fogsim.render.ground import Ground, split_ground
+from fogsim.render.protocol import RenderError
+from fogsim.render.shading import Shading
+from fogsim.values.camera import Camera, CameraPose
+from fogsim.values.image import View
+from fogsim.values.scene import Batch, Mesh, Scene
+
+STAND_INS = (":far", ":tiny")
+"""Endings of the names of shapes that stand in for the one without, where it is small."""
+
+_CELL = 120.0  # side of the squares in which copies are culled together [m]
+
+
+class SceneRenderer:
+    """Draws a scene in overcast daylight, with one sample a pixel and without clamping.
+
+    Parameters
+    ----------
+    scene : Scene
+        What stands still; its triangles of TERRAIN stand for one level plane without an edge.
+    illuminance : float
+        Horizontal illuminance E [lx].
+    make_rasteriser : callable
+        Makes what finds the triangle that each pixel sees.
+
+    Raises
+    ------
+    MissingDependencyError
+        If the rasteriser needs a library that is not there.
+    """
+
+    def __init__(self, scene: Scene, illuminance: float, make_rasteriser: Callable[[MeshTable], Rasteriser]) -> None:
+        ground = split_ground(scene.ground)
+        meshes = {**scene.shapes, **ground.pieces}
+        self._table = MeshTable.of(meshes)
+        self._rasteriser: Rasteriser | None = make_rasteriser(self._table)
+        self._shading = Shading(self._table, illuminance, ground.height, ground.reflectance)
+        low, high = (_extremes(meshes, end) for end in (np.min, np.max))
+        self._shapes = shapes_of(self._table.numbers, low, high, np.diff(self._table.first_face), STAND_INS)
+        shape, record, place = self._standing(scene.scenery, ground)
+        self._copies, self._cells = cells_of(copies_of(shape, record, place, self._shapes), _CELL)
+        self._still = len(shape)
+        self._chosen = _room(0)
+
+    def render(self, vehicles: Sequence[Batch], camera: Camera, pose: CameraPose, lamplight: bool = False) -> View:
+        """Draw the scene and the vehicles (see `Renderer.render`)."""
+        if self._rasteriser is None:
+            raise RenderError("this renderer is closed; make a new one")
+        end = self._place(vehicles)
+        eye = np.array(pose.position, np.float64)
+        planes = frustum(camera) @ camera_axes(camera, pose)
+        count = choose(self._shapes, self._copies, self._cells, end, planes, eye, camera.focal_length, self._chosen)
+        drawing = Drawing(
+            self._chosen.mesh[:count],
+            self._chosen.record.view(RECORD)[:count, 0],
+            self._chosen.first[: count + 1],
+        )
+        slots = self._rasteriser.slots(drawing, camera, pose)
+        return self._shading.view(slots, drawing, camera, pose, lamplight)
+
+    def close(self) -> None:
+        """Give back what the rasteriser holds."""
+        if self._rasteriser is not None:
+            self._rasteriser.close()
+        self._rasteriser = None
+
+    def _standing(
+        self, scenery: Sequence[Batch], ground: Ground
+    ) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.float64]]:
+        """Shapes, records and places of all that stands still."""
+        counts = [len(batch.transforms) for batch in scenery]
+        shape = np.repeat(np.array([self._number(batch) for batch in scenery], np.int64), counts)
+        record = np.concatenate([np.zeros((0, 17), np.float32), *map(_records, scenery)])
+        place = record[:, 3:12:4].astype(np.float64)
+        pieces = np.zeros((len(ground.pieces), 17), np.float32)
+        pieces[:, [0, 5, 10]] = 1.0
+        numbers = [self._table.numbers[name] for name in ground.pieces]
+        return (
+            np.concatenate([shape, np.array(numbers, np.int64)]),
+            np.concatenate([record, pieces]),
+            np.concatenate([place, ground.places]),
+        )
+
+    def _place(self, vehicles: Sequence[Batch]) -> int:
+        """Put the vehicles behind what stands still, and count all."""
+        end = self._still + sum(len(batch.transforms) for batch in vehicles)
+        if end > len(self._chosen.mesh):
+            self._copies = with_room(self._copies, end + 64 - len(self._copies.shape))
+            self._chosen = _room(len(self._copies.shape))
+        begin = self._still
+        for batch in vehicles:
+            stop = begin + len(batch.transforms)
+            record = self._copies.record[begin:stop]
+            record[:, :12] = batch.transforms[:, :3].reshape(-1, 12)
+            record[:, 12:15] = batch.paint
+            integers = record.view(np.int32)
+            integers[:, 15], integers[:, 16] = batch.lamps, batch.instance
+            self._copies.shape[begin:stop] = self._number(batch)
+            begin = stop
+        self._copies.place[self._still : end] = self._copies.record[self._still : end, 3:12:4]
+        return end
+
+    def _number(self, batch: Batch) -> int:
+        if batch.shape not in self._table.numbers:
+            known = sorted(self._table.numbers)
+            raise InputError(f"a batch names the shape {batch.shape!r}, which the scene does not have: {known}")
+        return self._table.numbers[batch.shape]
+
+
+def frustum(camera: Camera) -> NDArray[np.float64]:
+    """Inward unit normals (5, 3) of the planes that bound the picture, in camera axes, the forward one last."""
+    (u0, v0), focal = camera.principal_point, camera.focal_length
+    planes = np.array(
+        [
+            (focal, 0.0, u0 + 0.5),
+            (-focal, 0.0, camera.width - 0.5 - u0),
+            (0.0, focal, v0 + 0.5),
+            (0.0, -focal, camera.height - 0.5 - v0),
+            (0.0, 0.0, 1.0),
+        ]
+    )
+    return np.asarray(planes / np.sqrt((planes * planes).sum(axis=1))[:, None], np.float64)
+
+
+def _extremes(meshes: Mapping[str, Mesh], end: Callable[..., NDArray[np.float32]]) -> NDArray[np.float64]:
+    """Least or greatest coordinates of each mesh; zero for one without vertices."""
+    found = [end(mesh.positions, axis=0) if len(mesh.positions) else np.zeros(3) for mesh in meshes.values()]
+    return np.array(found, np.float64).reshape(-1, 3)
+
+
+def _records(batch: Batch) -> NDArray[np.float32]:
+    record = np.zeros(len(batch.transforms), RECORD)
+    record["transform"], record["paint"] = batch.transforms[:, :3], batch.paint
+    record["lamps"], record["instance"] = batch.lamps, batch.instance
+    return record.view(np.float32).reshape(-1, 17)
+
+
+def _room(count: int) -> Chosen:
+    return Chosen(
+        mesh=np.zeros(count, np.int64),
+        record=np.zeros((count, 17), np.float32),
+        first=np.zeros(count + 1, np.int64),
+        copy=np.zeros(count, np.int64),
+        bin=np.zeros(count, np.int64),
+        order=np.zeros(count, np.int64),
+    )

@@ -1,0 +1,295 @@
+"""Radiance of asphalt with its painted lines, and of grassland."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from fogsim.jit import kernel
+from fogsim.render.shading import layout
+from fogsim.render.shading.layout import Array, Lens, Picture, Runs, Wide
+from fogsim.render.shading.noise import GRAIN, PER_CELL, SMOOTH, Noise
+
+KIND, INSTANCE, LEAST, MOST, DEPTH = layout.KIND, layout.INSTANCE, layout.LEAST, layout.MOST, layout.DEPTH
+ALONG, ACROSS, WHITE = layout.ALONG, layout.ACROSS, layout.WHITE
+HALF_WIDTH, LINES, COLOUR = layout.HALF_WIDTH, layout.LINES, layout.COLOUR
+ROAD, TERRAIN = layout.ROAD, layout.TERRAIN
+
+_CHUNK = 32  # pixels of a row that share a footprint
+_LINE_REFLECTANCE, _LINE_WIDTH, _DASH, _PERIOD = 0.6, 0.2, 6.0, 18.0
+
+ROAD_RESPONSE = 0.0125
+"""Coefficient of retroreflected luminance of dry asphalt [cd/m² per lx] (middle of gallen2014's range)."""
+
+LINE_RESPONSE = 0.15
+"""That of its painted lines; dry ones have 0.1 … 0.3."""
+
+# Sides of the squares of noise [m] and deviations of reflectance: grain, mottling, patches and large patches.
+_ASPHALT = (0.01, 0.12, 0.25, 0.025, 3.0, 0.012, 12.0, 0.02)
+_GRASS = (0.08, 0.10, 0.7, 0.06, 5.0, 0.06, 31.0, 0.03)
+_DRY = (1.5, 0.4, -0.3)  # how much more of each channel the large patches of dry grass change
+_FAINTEST = 0.002  # deviation below which grain is left out
+
+
+class Bench(NamedTuple):
+    """Memory for one chunk: depths, texture, and places on the ground.
+
+    Attributes
+    ----------
+    depth, texture, tint : (_CHUNK,) float32
+        Depths [m], factors of reflectance, and the share of them that the largest patches have.
+    """
+
+    depth: Array
+    texture: Array
+    tint: Array
+
+
+def bench() -> Bench:
+    """Make memory for one chunk."""
+    return Bench(*(np.empty(_CHUNK, np.float32) for _ in range(3)))
+
+
+@kernel
+def _faded(deviation: float, side: float, wide: float, long: float) -> float:
+    """Deviation that is left of independent squares' once averaged over a footprint [m]."""
+    return deviation / math.sqrt(max(wide / side, 1.0) * max(long / side, 1.0))
+
+
+@kernel
+def _painted_below(x: float) -> float:
+    """Length of what lies below x of dashes that start at multiples of their period [m]."""
+    return math.floor(x / _PERIOD) * _DASH + min(x - _PERIOD * math.floor(x / _PERIOD), _DASH)
+
+
+@kernel
+def line_share(code: int, middle: float, along: float, across: float, length: float, width: float) -> float:
+    """Share of a footprint that a painted line covers.
+
+    Parameters
+    ----------
+    code : int
+        1 for a solid line, 2 for a dashed one.
+    middle : float
+        Where the middle of the line is, to the left of the lane's [m].
+    along, across, length, width : float
+        Middle and extents of the footprint along and across the lane [m].
+    """
+    low = max(across - 0.5 * width, middle - 0.5 * _LINE_WIDTH)
+    high = min(across + 0.5 * width, middle + 0.5 * _LINE_WIDTH)
+    share = max(high - low, 0.0) / width
+    if code == 1 or share == 0.0:
+        return share
+    start = along - 0.5 * length
+    return share * (_painted_below(start + length) - _painted_below(start)) / length
+
+
+@kernel
+def _smooth_at(tile: Array, x: float, y: float, side: float) -> float:
+    """Smooth noise with cells of a side [m], between its numbers too."""
+    x, y = x * (PER_CELL / side), y * (PER_CELL / side)
+    left, top = math.floor(x), math.floor(y)
+    a, b, mask = x - left, y - top, SMOOTH - 1
+    i, j = int(left) & mask, int(top) & mask
+    k, m = (i + 1) & mask, (j + 1) & mask
+    upper = tile[j * SMOOTH + i] * (1.0 - a) + tile[j * SMOOTH + k] * a
+    lower = tile[m * SMOOTH + i] * (1.0 - a) + tile[m * SMOOTH + k] * a
+    return upper * (1.0 - b) + lower * b
+
+
+@kernel
+def shade_ground(runs: Runs, count: int, lens: Lens, noise: Noise, work: Bench, picture: Picture) -> None:
+    """Shade the runs of road and terrain, and set their distances and instance ids.
+
+    Parameters
+    ----------
+    runs : Runs
+        The runs and what is known of their surfaces.
+    count : int
+        Number of runs.
+    lens : Lens
+        Where the camera is.
+    noise : Noise
+        Texture.
+    work : Bench
+        Memory.
+    picture : Picture
+        Is filled where these runs are.
+    """
+    run, known, rays, eye = runs.run, runs.surface, lens.rays, lens.eye
+    radiance, distance, instance, response = picture.radiance, picture.distance, picture.instance, picture.response
+    depths, texture, tint, grain, smooth = work.depth, work.texture, work.tint, noise.grain, noise.smooth
+    lamplight, one = len(response) > 0, np.float32(1.0)
+    focal, u0, v0 = lens.lens[0], lens.lens[1], lens.lens[2]
+    per_focal = np.float32(1.0 / focal)
+    for number in range(count):
+        k = run[number, 3]
+        kind = known[k, KIND]
+        if kind != ROAD and kind != TERRAIN:
+            continue
+        v, end, row, name = (
+            np.uint64(run[number, 0]),
+            run[number, 2],
+            float(run[number, 0]),
+            np.int32(known[k, INSTANCE]),
+        )
+        side, deviation, side_2, deviation_2, side_3, deviation_3, side_4, deviation_4 = (
+            _ASPHALT if kind == ROAD else _GRASS
+        )
+        zx, zy = known[k, DEPTH], known[k, DEPTH + 1]
+        least, most, slope = np.float32(known[k, LEAST]), np.float32(known[k, MOST]), np.float32(zx)
+        white = known[k, WHITE]
+        patches, large, fresh = 0.0, 0.0, True
+        begin = run[number, 1]
+        while begin < end:
+            size = min(end - begin, _CHUNK)
+            length = np.uint64(size)
+            base = zx * begin + zy * row + known[k, DEPTH + 2]
+            # Distances.
+            rest = np.float32(base)
+            x, y = np.float32((begin - u0) / focal), np.float32((row - v0) / focal)
+            square = one + y * y
+            for i in range(length):
+                step = np.float32(np.int32(i))
+                across = x + per_focal * step
+                z = one / min(max(rest + slope * step, least), most)
+                depths[i] = z
+                distance[v, np.uint64(begin) + i] = z * np.sqrt(square + across * across)
+                instance[v, np.uint64(begin) + i] = name
+            # The footprint of the pixel in the middle, from the derivatives of its place on the ground.
+            half = 0.5 * (size - 1)
+            z = 1.0 / min(max(base + zx * half, known[k, LEAST]), known[k, MOST])
+            rx = rays[0, 0] * (begin + half) + rays[0, 1] * row + rays[0, 2]
+            ry = rays[1, 0] * (begin + half) + rays[1, 1] * row + rays[1, 2]
+            ux, uy = z * (rays[0, 0] - rx * zx * z), z * (rays[1, 0] - ry * zx * z)
+            vx, vy = z * (rays[0, 1] - rx * zy * z), z * (rays[1, 1] - ry * zy * z)
+            wide, long = math.sqrt(ux * ux + uy * uy), math.sqrt(vx * vx + vy * vy)
+            narrow = min(wide, long)
+            # Large patches, linear from one end of the chunk to the other.
+            deviation_3 = _faded(_ASPHALT[5] if kind == ROAD else _GRASS[5], side_3, wide, long)
+            deviation_4 = _faded(_ASPHALT[7] if kind == ROAD else _GRASS[7], side_4, wide, long)
+            px, py = eye[0] + rx * z, eye[1] + ry * z
+            if fresh:
+                patches = _smooth_at(smooth, px - half * ux, py - half * uy, side_3)
+                large = _smooth_at(smooth, px - half * ux, py - half * uy, side_4)
+                fresh = False
+            next_patches = _smooth_at(smooth, px + (half + 1.0) * ux, py + (half + 1.0) * uy, side_3)
+            next_large = _smooth_at(smooth, px + (half + 1.0) * ux, py + (half + 1.0) * uy, side_4)
+            level = np.float32(1.0 + deviation_3 * patches + deviation_4 * large)
+            change = deviation_3 * (next_patches - patches) + deviation_4 * (next_large - large)
+            step_level = np.float32(change / size)
+            tint_level = np.float32(deviation_4 * large)
+            tint_step = np.float32(deviation_4 * (next_large - large) / size)
+            patches, large = next_patches, next_large
+            for i in range(length):
+                step = np.float32(np.int32(i))
+                texture[i] = level + step_level * step
+                tint[i] = tint_level + tint_step * step
+            # Grain and mottling: squares as large as the narrow side of a pixel, so that every pixel has its own.
+            gx, gy = np.float32(rays[0, 0] * begin + rays[0, 1] * row + rays[0, 2]), np.float32(rays[0, 0])
+            hx, hy = np.float32(rays[1, 0] * begin + rays[1, 1] * row + rays[1, 2]), np.float32(rays[1, 0])
+            strength = _faded(deviation, side, wide, long)
+            if strength > _FAINTEST:
+                scale = side * 2.0 ** max(math.floor(math.log2(narrow / side) + 0.5), -1.0)
+                period = scale * GRAIN
+                ox, oy = np.float32((eye[0] % period) / scale), np.float32((eye[1] % period) / scale)
+                per_scale, amount = np.float32(1.0 / scale), np.float32(strength)
+                far = np.float32(1 << 20)
+                for i in range(length):
+                    step = np.float32(np.int32(i))
+                    z32 = depths[i] * per_scale
+                    a = np.int32(ox + (gx + gy * step) * z32 + far) & (GRAIN - 1)
+                    b = np.int32(oy + (hx + hy * step) * z32 + far) & (GRAIN - 1)
+                    texture[i] += amount * grain[np.uint32(b * GRAIN + a)]
+            strength = _faded(deviation_2, side_2, wide, long)
+            if strength > _FAINTEST:
+                scale = side_2 / PER_CELL * 2.0 ** max(math.floor(math.log2(narrow / side_2) + 0.5), 0.0)
+                period = scale * SMOOTH
+                ox, oy = np.float32((eye[0] % period) / scale), np.float32((eye[1] % period) / scale)
+                per_scale, amount = np.float32(1.0 / scale), np.float32(strength)
+                far = np.float32(1 << 20)
+                for i in range(length):
+                    step = np.float32(np.int32(i))
+                    z32 = depths[i] * per_scale
+                    a = np.int32(ox + (gx + gy * step) * z32 + far) & (SMOOTH - 1)
+                    b = np.int32(oy + (hx + hy * step) * z32 + far) & (SMOOTH - 1)
+                    texture[i] += amount * smooth[np.uint32(b * SMOOTH + a)]
+            if kind == TERRAIN:
+                red, green, blue = known[k, COLOUR], known[k, COLOUR + 1], known[k, COLOUR + 2]
+                red, green, blue = np.float32(red * white), np.float32(green * white), np.float32(blue * white)
+                a, b, c = np.float32(_DRY[0]), np.float32(_DRY[1]), np.float32(_DRY[2])
+                for i in range(length):
+                    u = np.uint64(begin) + i
+                    radiance[v, u, 0] = red * (texture[i] + a * tint[i])
+                    radiance[v, u, 1] = green * (texture[i] + b * tint[i])
+                    radiance[v, u, 2] = blue * (texture[i] + c * tint[i])
+                if lamplight:
+                    # Seen and lit under the same angle to the ground.
+                    length_of_ray = math.sqrt(rx * rx + ry * ry + 1.0)
+                    sine = -(rays[2, 0] * (begin + half) + rays[2, 1] * row + rays[2, 2]) / length_of_ray
+                    answer = np.float32(sine / math.pi / max(white, 1e-30))
+                    if white == 0.0:
+                        red, green, blue = known[k, COLOUR], known[k, COLOUR + 1], known[k, COLOUR + 2]
+                        answer = np.float32(sine / math.pi)
+                    for i in range(length):
+                        u = np.uint64(begin) + i
+                        response[v, u, 0] = answer * np.float32(red) * texture[i]
+                        response[v, u, 1] = answer * np.float32(green) * texture[i]
+                        response[v, u, 2] = answer * np.float32(blue) * texture[i]
+                begin += size
+                continue
+            # Wheel tracks, and the place and extents of pixels on the lane.
+            sx, sy = known[k, ALONG], known[k, ALONG + 1]
+            tx, ty = known[k, ACROSS], known[k, ACROSS + 1]
+            s_base = sx * begin + sy * row + known[k, ALONG + 2]
+            t_base = tx * begin + ty * row + known[k, ACROSS + 2]
+            t_middle = (t_base + tx * half) * z
+            spread = abs(z * (tx - t_middle * zx)) + abs(z * (ty - t_middle * zy))
+            width = np.float32(1.0 / (0.28 + 0.5 * spread))
+            depth_of_track = np.float32(0.035 * 0.28) * width
+            t_rest, t_slope, track = np.float32(t_base), np.float32(tx), np.float32(0.85)
+            for i in range(length):
+                left = (t_rest + t_slope * np.float32(np.int32(i))) * depths[i]
+                off = (abs(left) - track) * width
+                off = one + off * off
+                texture[i] -= depth_of_track / (off * off)
+            red, green, blue = known[k, COLOUR], known[k, COLOUR + 1], known[k, COLOUR + 2]
+            mean = (red + green + blue) / 3.0
+            r32, g32, b32 = np.float32(red * white), np.float32(green * white), np.float32(blue * white)
+            for i in range(length):
+                u = np.uint64(begin) + i
+                radiance[v, u, 0], radiance[v, u, 1] = r32 * texture[i], g32 * texture[i]
+                radiance[v, u, 2] = b32 * texture[i]
+            if lamplight:
+                per_mean = ROAD_RESPONSE / max(mean, 1e-6)
+                r32, g32, b32 = np.float32(red * per_mean), np.float32(green * per_mean), np.float32(blue * per_mean)
+                for i in range(length):
+                    u = np.uint64(begin) + i
+                    response[v, u, 0], response[v, u, 1] = r32 * texture[i], g32 * texture[i]
+                    response[v, u, 2] = b32 * texture[i]
+            # Lines, where the chunk comes near one.
+            codes, half_lane = int(known[k, LINES]), known[k, HALF_WIDTH]
+            first_t = t_base / max(base, known[k, LEAST])
+            last_t = (t_base + tx * (size - 1)) / max(base + zx * (size - 1), known[k, LEAST])
+            reach = 0.5 * _LINE_WIDTH + spread
+            for place in range(2):
+                code, line = (codes // 3, half_lane) if place == 0 else (codes % 3, -half_lane)
+                if code == 0 or line > max(first_t, last_t) + reach or line < min(first_t, last_t) - reach:
+                    continue
+                paint, paint_response = np.float32(white * _LINE_REFLECTANCE), np.float32(LINE_RESPONSE)
+                for i in range(length):
+                    u, step, z = np.uint64(begin) + i, float(i), np.float64(depths[i])
+                    t, s = (t_base + tx * step) * z, (s_base + sx * step) * z
+                    across_px = max(abs(z * (tx - t * zx)) + abs(z * (ty - t * zy)), 1e-4)
+                    along_px = max(abs(z * (sx - s * zx)) + abs(z * (sy - s * zy)), 1e-4)
+                    share = np.float32(line_share(code, line, s, t, along_px, across_px))
+                    if share > 0.0:
+                        # Paint is worn where the asphalt below is coarse.
+                        worn = one + np.float32(0.5) * (texture[i] - one)
+                        for channel in range(np.uint64(3)):
+                            asphalt = radiance[v, u, channel]
+                            radiance[v, u, channel] = asphalt + share * (paint * worn - asphalt)
+                            if lamplight:
+                                asphalt = response[v, u, channel]
+                                response[v, u, channel] = asphalt + share * (paint_response * worn - asphalt)
+            begin += size

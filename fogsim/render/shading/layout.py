@@ -1,0 +1,123 @@
+"""What the kernels of shading share: the picture's geometry, and what is known of each surface that is seen."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float32]
+Wide = NDArray[np.float64]
+Numbers = NDArray[np.int32]
+Index = NDArray[np.int64]
+
+OBJECT, PLAIN, ROAD, TERRAIN, SKY = range(5)
+"""Kinds of surfaces: colour that varies over a triangle, one colour, textured ground, and what is no triangle."""
+
+# Columns of what is known of a surface. A plane is three numbers: times column, row and 1.
+KIND, INSTANCE, LEAST, MOST = range(4)  # least and greatest 1/z [1/m]
+DEPTH = 4  # plane of 1/z [1/m]
+LIGHT = 7  # radiance per channel: planes of it over z, or numbers
+RESPONSE = 16  # lamp response likewise
+LOW, HIGH = 25, 28  # least and greatest radiance of its corners
+RESPONSE_LOW, RESPONSE_HIGH = 31, 34
+ALONG, ACROSS = 7, 10  # of roads: planes of the distance along and across the lane, over z
+WHITE, HALF_WIDTH, LINES, COLOUR = 25, 26, 27, 28  # radiance of a white surface, half a lane, lines, reflectance
+COLUMNS = 40
+
+
+class Lens(NamedTuple):
+    """Where the camera is and how it looks.
+
+    Attributes
+    ----------
+    eye : (3,) float64
+        Where it is [m].
+    axes : (3, 3) float64
+        Its axes in the world as rows.
+    rays : (3, 3) float64
+        From a pixel (column, row, 1) to its viewing ray, 1 long along the optical axis.
+    lens : (3,) float64
+        Focal length and principal point [px].
+    """
+
+    eye: Wide
+    axes: Wide
+    rays: Wide
+    lens: Wide
+
+
+class Light(NamedTuple):
+    """Light and what shines.
+
+    Attributes
+    ----------
+    white : float
+        Radiance of a level white surface [cd/m²].
+    zenith : (3,) float64
+        Radiance of the zenith [cd/m²].
+    terrain : (4,) float64
+        Height of the terrain [m], infinite below if there is none, and its reflectance.
+    lamp_masks : (surfaces,) int32
+        Lamps any of which lights a surface, −1 if it is always lit.
+    lamp_radiance : (surfaces, 3) float64
+        Radiance that it then adds [cd/m²].
+    """
+
+    white: float
+    zenith: Wide
+    terrain: Wide
+    lamp_masks: Numbers
+    lamp_radiance: Wide
+
+
+class Meshes(NamedTuple):
+    """What shading reads of a `MeshTable`; see there."""
+
+    positions: Array
+    normals: Array
+    reflectance: Array
+    surface: Numbers
+    instance: Numbers
+    road: Array
+    faces: Numbers
+    first_face: Index
+
+
+class Copies(NamedTuple):
+    """A `Drawing` as plain numbers; records once as 32-bit floats and once as 32-bit integers."""
+
+    mesh: Index
+    record: Array
+    integers: Numbers
+    first: Index
+
+
+class Runs(NamedTuple):
+    """Neighbouring pixels of a row that see the same.
+
+    Attributes
+    ----------
+    run : (n, 4) int32
+        Row, first column, last column and surface.
+    surface_of_slot : (slots,) int32
+        Number of the surface of each slot, or −2 − its copy as long as it has none.
+    slot, copy : (n,) int32
+        Of each surface, from number 2 on; number 0 is the sky and 1 the terrain.
+    surface : (n, COLUMNS) float64
+        What is known of each.
+    """
+
+    run: Numbers
+    surface_of_slot: Numbers
+    slot: Numbers
+    copy: Numbers
+    surface: Wide
+
+
+class Picture(NamedTuple):
+    """The arrays of a `View`; the lamp response has no row if it is not wanted."""
+
+    radiance: Array
+    distance: Array
+    instance: Numbers
+    response: Array

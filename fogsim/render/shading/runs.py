@@ -1,0 +1,76 @@
+"""From the slots of pixels to runs of pixels, and a list of the surfaces that are seen."""
+
+import numpy as np
+
+from fogsim.jit import kernel
+from fogsim.render.shading.layout import Copies, Numbers, Runs, Wide
+
+
+@kernel
+def find_runs(slots: Numbers, copies: Copies, rays: Wide, terrain: bool, runs: Runs) -> tuple[int, int]:
+    """Find the runs of a picture.
+
+    Parameters
+    ----------
+    slots : (rows, cols) int32
+        What each pixel sees.
+    copies : Copies
+        What is drawn.
+    rays : (3, 3) float64
+        See `Lens`.
+    terrain : bool
+        Whether there is terrain below the horizon; else there is sky.
+    runs : Runs
+        Is filled, but for what is known of the surfaces.
+
+    Returns
+    -------
+    tuple of int
+        Numbers of runs and of surfaces.
+    """
+    run, surface_of_slot, slot_of, copy_of = runs.run, runs.surface_of_slot, runs.slot, runs.copy
+    first = copies.first
+    for copy in range(len(copies.mesh)):
+        for slot in range(first[copy], first[copy + 1]):
+            surface_of_slot[slot] = -2 - copy
+    count, surfaces = 0, 2
+    rows, columns = slots.shape
+    for v in range(rows):
+        begin = 0
+        while begin < columns:
+            slot, end = slots[v, begin], begin + 1
+            while end < columns and slots[v, end] == slot:
+                end += 1
+            surface = 0
+            if slot >= 0:
+                surface = surface_of_slot[slot]
+                if surface < 0:
+                    copy_of[surfaces], slot_of[surfaces] = -2 - surface, slot
+                    surface_of_slot[slot] = surface = surfaces
+                    surfaces += 1
+                split = end
+            else:
+                surface, split = _background(v, begin, end, rays, terrain)
+            run[count, 0], run[count, 1], run[count, 2], run[count, 3] = v, begin, split, surface
+            count += 1
+            if split < end:
+                run[count, 0], run[count, 1], run[count, 2], run[count, 3] = v, split, end, 1 - surface
+                count += 1
+            begin = end
+    return count, surfaces
+
+
+@kernel
+def _background(v: int, begin: int, end: int, rays: Wide, terrain: bool) -> tuple[int, int]:
+    """Whether a run of background begins with sky (0) or terrain (1), and where it changes to the other."""
+    slope, rest = rays[2, 0], rays[2, 1] * v + rays[2, 2]
+    surface = 1 if terrain and slope * begin + rest < 0.0 else 0
+    last = 1 if terrain and slope * (end - 1) + rest < 0.0 else 0
+    if surface == last:
+        return surface, end
+    split = min(max(int(np.ceil(-rest / slope)), begin + 1), end - 1)
+    while split > begin + 1 and (slope * (split - 1) + rest < 0.0) == (last == 1):
+        split -= 1
+    while split < end - 1 and (slope * split + rest < 0.0) != (last == 1):
+        split += 1
+    return surface, split

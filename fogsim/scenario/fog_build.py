@@ -39,6 +39,8 @@ def fog_along(fog: Fog, airlight: tuple[float, float, float], route: NDArray[np.
         wind=(0.0, 0.0) if fog.wind is None else _velocity(fog.wind),
         changes=_changes(fog, ground),
         airlight_shading=fog.airlight_shading,
+        forward_scatter=fog.forward_scatter,
+        forward_scatter_width=math.radians(fog.forward_scatter_deg),
     )
 
 

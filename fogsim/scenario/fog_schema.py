@@ -117,6 +117,12 @@ class Fog(Section):
     airlight_shading: Annotated[float, Field(ge=0, le=1)] = 0.0
     """Dimming of the airlight for each unit of optical depth overhead; 0.1 in real fog, 0 for an even airlight."""
 
+    forward_scatter: Annotated[float, Field(ge=0, le=0.3)] = 0.0
+    """Weight of the blur that forward scattering puts on what is seen through much fog by day."""
+
+    forward_scatter_deg: Annotated[float, Field(gt=0, le=10)] = 1.0
+    """Width of that blur (standard deviation)."""
+
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
         homogeneous = self.visibility_m is not None

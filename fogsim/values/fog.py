@@ -147,6 +147,10 @@ class FogField:
     airlight_shading : float
         How much the airlight dims with each unit of optical depth overhead [-]; 0 for airlight that is the same
         everywhere. Two-stream theory of a conservative layer gives ¾ (1 − g), about 0.1 in fog.
+    forward_scatter : float
+        Share of what the fog takes from the transmitted light that arrives blurred by day [-], 0 … 0.3.
+    forward_scatter_width : float
+        Standard deviation of that blur in directions [rad].
     """
 
     extinction: float
@@ -162,6 +166,8 @@ class FogField:
     wind: tuple[float, float] = (0.0, 0.0)
     changes: tuple[FogChange, ...] = ()
     airlight_shading: float = 0.0
+    forward_scatter: float = 0.0
+    forward_scatter_width: float = math.radians(1.0)
 
     def __post_init__(self) -> None:
         """Refuse a field that cannot be.

@@ -1,0 +1,234 @@
+"""Photons in fog: veils of head lamps and halos of lamps, to which the models of `fogsim.atmosphere` are compared.
+
+    python benchmarks/monte_carlo.py halo tests/data/monte_carlo_halo.csv --photons 1000000
+    python benchmarks/monte_carlo.py veil tests/data/monte_carlo_veil.csv --photons 400000
+
+Slow (minutes), seeded, and independent of the models: it shares with them only the tables of beams and phase functions.
+"""
+
+import argparse
+import math
+from pathlib import Path
+
+import numpy as np
+from numba import njit
+
+from fogsim.beam import luminous_intensity
+from fogsim.lighting.beams import high_beam, low_beam
+from fogsim.units import extinction_from_visibility
+
+PHASES = Path(__file__).parents[1] / "fogsim" / "atmosphere" / "data" / "phase_functions.csv"
+FOGS = ("heavy_advection", "moderate_advection", "heavy_radiation", "moderate_radiation")
+STEP = math.radians(0.02)
+HALO_DEPTHS = np.array([0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0])
+HALO_EDGES = np.radians(np.concatenate((np.geomspace(0.5, 60.0, 19), [80.0, 100.0, 130.0, 180.0])))
+HALO_END = 30.0
+VEIL_FOGS = ("heavy_advection", "heavy_radiation", "moderate_radiation")
+VISIBILITIES = (30.0, 50.0, 80.0, 100.0, 150.0, 200.0, 300.0, 500.0)
+DIRECTIONS = ((0.0, -2.02), (0.0, 2.0), (0.0, 8.0), (0.0, -8.0), (10.0, 0.0), (-15.0, -4.0))
+LAMPS = np.array([[1.8, 0.6, -0.85], [1.8, -0.6, -0.85]])
+EYE_HEIGHT = 1.5
+LAMP_SIZES = (0.06, 0.3)
+SMOOTHING = math.radians(1.5)
+
+
+def phase_table(fog):
+    """Phase function on a fine grid of angles [1/sr]."""
+    table = np.loadtxt(PHASES, delimiter=",", skiprows=4)
+    angle = np.arange(0.0, math.pi + STEP, STEP)
+    return np.exp(np.interp(np.degrees(angle), table[:, 0], np.log(table[:, 1 + FOGS.index(fog)])))
+
+
+def likely_cosines(phase):
+    """Cosines of equally likely scattering angles."""
+    angle = np.arange(len(phase)) * STEP
+    density = phase * np.sin(angle)
+    share = np.concatenate(([0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))))
+    return np.cos(np.interp((np.arange(200_000) + 0.5) / 200_000, share / share[-1], angle))
+
+
+def without_peak(phase):
+    """Phase function whose forward peak is flat within `SMOOTHING`, with the same light in it."""
+    angle = np.arange(len(phase)) * STEP
+    inside = angle < SMOOTHING
+    weight = np.sin(angle[inside])
+    smooth = phase.copy()
+    smooth[inside] = np.sum(phase[inside] * weight) / np.sum(weight)
+    return smooth
+
+
+@njit(cache=False)
+def turned(x, y, z, cosine, azimuth):
+    """A direction turned by an angle, at an azimuth about itself."""
+    sine = math.sqrt(max(0.0, 1.0 - cosine * cosine))
+    a, b = sine * math.cos(azimuth), sine * math.sin(azimuth)
+    flat = math.hypot(x, y)
+    if flat < 1e-9:
+        return a, b, math.copysign(cosine, z)
+    return cosine * x + (a * x * z - b * y) / flat, cosine * y + (a * y * z + b * x) / flat, cosine * z - a * flat
+
+
+@njit(cache=False)
+def count_crossings(along, square, length, once, depths, edges, total, single):
+    """Count a flight where it crosses spheres; `along` is the place projected on it, `square` its squared radius."""
+    for j in range(len(depths)):
+        inside = along * along - square + depths[j] ** 2
+        if inside <= 0:
+            continue
+        for sign in (-1.0, 1.0):
+            t = -along + sign * math.sqrt(inside)
+            if 0 < t <= length:
+                cosine = (along + t) / depths[j]
+                b = np.searchsorted(edges, math.acos(min(1.0, max(-1.0, cosine)))) - 1
+                if b >= 0:
+                    # Light that crosses at a slant passes less of the sphere's area.
+                    total[j, b] += 1.0 / max(abs(cosine), 0.02)
+                    if once:
+                        single[j, b] += 1.0 / max(abs(cosine), 0.02)
+
+
+@njit(cache=False)
+def halo(photons, rng, cosines, depths, edges, end):
+    """Radiance scattered (at all, and once) about an isotropic point source in endless fog, times R² / I.
+
+    Photons leave the source; each crossing of a sphere counts in the bin of its angle to the radius.
+    """
+    total = np.zeros((len(depths), len(edges) - 1))
+    single = np.zeros_like(total)
+    for _ in range(photons):
+        x = y = z = 0.0
+        dz, azimuth = 2.0 * rng.random() - 1.0, 2 * math.pi * rng.random()
+        flat = math.sqrt(1.0 - dz * dz)
+        dx, dy = flat * math.cos(azimuth), flat * math.sin(azimuth)
+        order = 0
+        while x * x + y * y + z * z < end * end:
+            length = -math.log(1.0 - rng.random())
+            if order > 0:
+                along, square = x * dx + y * dy + z * dz, x * x + y * y + z * z
+                count_crossings(along, square, length, order == 1, depths, edges, total, single)
+            x, y, z = x + length * dx, y + length * dy, z + length * dz
+            cosine = cosines[int(rng.random() * len(cosines))]
+            dx, dy, dz = turned(dx, dy, dz, cosine, 2 * math.pi * rng.random())
+            order += 1
+    for b in range(len(edges) - 1):
+        solid = 2 * math.pi * (math.cos(edges[b]) - math.cos(edges[b + 1]))
+        total[:, b] /= solid * photons
+        single[:, b] /= solid * photons
+    return total, single
+
+
+@njit(cache=False)
+def scattered_back(x, y, z, dx, dy, dz, k, phase, step, beam, lamps, lamp_size):
+    """Light of the lamps that droplets at a place scatter back along a path [cd/m² per optical depth]."""
+    total = 0.0
+    for i in range(len(lamps)):
+        lx, ly, lz = x - lamps[i, 0], y - lamps[i, 1], z - lamps[i, 2]
+        if lx <= 0:
+            continue
+        square = lx * lx + ly * ly + lz * lz
+        s = math.sqrt(square)
+        h = (math.atan2(-ly, lx) / math.pi + 0.5) * (beam.shape[1] - 1)
+        v = (math.asin(lz / s) / math.pi + 0.5) * (beam.shape[0] - 1)
+        cosine = -(lx * dx + ly * dy + lz * dz) / s
+        scattered = phase[int(math.acos(min(1.0, max(-1.0, cosine))) / step + 0.5)]
+        total += scattered * beam[int(v), int(h)] / (square + lamp_size * lamp_size) * math.exp(-k * s)
+    return total
+
+
+@njit(cache=False)
+def veil(paths, rng, k, towards, reach, phases, cosines, step, beam, lamps, ground, lamp_sizes):
+    """Radiance of lit fog in one direction, of light scattered once and of all [cd/m²], with standard errors.
+
+    Paths lead from the eye to the lamps. Where light is scattered again the phase function's forward peak is flattened
+    and lamps are larger, so that rare paths that pass close to one do not rule; the road is black.
+    """
+    near = 0.3
+    span = math.log(reach / near)
+    sums = np.zeros(4)
+    for _ in range(paths):
+        r = near * math.exp(span * rng.random())
+        weight = k * math.exp(-k * r) * r * span
+        dx, dy, dz = towards[0], towards[1], towards[2]
+        x, y, z = r * dx, r * dy, r * dz
+        once = weight * scattered_back(x, y, z, dx, dy, dz, k, phases[0], step, beam, lamps, lamp_sizes[0])
+        again = 0.0
+        while k * math.sqrt(x * x + y * y + z * z) < 25.0:
+            cosine = cosines[int(rng.random() * len(cosines))]
+            dx, dy, dz = turned(dx, dy, dz, cosine, 2 * math.pi * rng.random())
+            length = -math.log(1.0 - rng.random()) / k
+            if z + length * dz < ground:
+                break
+            x, y, z = x + length * dx, y + length * dy, z + length * dz
+            again += scattered_back(x, y, z, dx, dy, dz, k, phases[1], step, beam, lamps, lamp_sizes[1])
+        every = once + weight * again
+        sums += np.array([once, once * once, every, every * every])
+    means = sums / paths
+    errors = np.sqrt(np.maximum(means[1::2] - means[::2] ** 2, 0.0) / paths)
+    return means[0], errors[0], means[2], errors[1]
+
+
+def write_halo(out, photons):
+    """Table of halos."""
+    with out.open("w", encoding="utf-8") as file:
+        file.write("# Radiance scattered about an isotropic point source in endless fog, times R^2 / I.\n")
+        file.write("# Optical depth k R; geometric middle and edges of each bin of angles [degrees].\n")
+        file.write("# `single`: photons scattered once. The source's direct light is left out.\n")
+        file.write(f"# Command: python benchmarks/monte_carlo.py halo {out} --photons {photons}\n")
+        file.write("fog,optical_depth,angle,low_edge,high_edge,single,all\n")
+        for seed, fog in enumerate(FOGS):
+            rng = np.random.default_rng(seed)
+            total, single = halo(photons, rng, likely_cosines(phase_table(fog)), HALO_DEPTHS, HALO_EDGES, HALO_END)
+            for j, depth in enumerate(HALO_DEPTHS):
+                for b in range(len(HALO_EDGES) - 1):
+                    low, high = np.degrees(HALO_EDGES[b : b + 2])
+                    numbers = (depth, math.sqrt(low * high), low, high, single[j, b], total[j, b])
+                    file.write(f"{fog}," + ",".join(f"{n:.5g}" for n in numbers) + "\n")
+
+
+def ray(right, up):
+    """A direction (forward, left, up) and how far one sees along it [m]: the road, or a target 40 m ahead on it."""
+    a, e = math.radians(right), math.radians(up)
+    towards = np.array([math.cos(e) * math.cos(a), -math.cos(e) * math.sin(a), math.sin(e)])
+    return towards, min(EYE_HEIGHT / -towards[2] if up < 0 else math.inf, 40.0 if up == -2.02 else 400.0)
+
+
+def write_veil(out, paths):
+    """Table of veils."""
+    grid = np.linspace(-math.pi / 2, math.pi / 2, 1441)
+    beams = {"low": low_beam(), "high": high_beam()}
+    rng = np.random.default_rng(1)
+    with out.open("w", encoding="utf-8") as file:
+        file.write(
+            "# Radiance of fog lit by a pair of own head lamps [cd/m^2] (UMTRI median beams), black road.\n"
+        )
+        file.write("# Eye 1.5 m above the road, lamps 1.8 m ahead of it, 0.6 m aside, 0.65 m above the road.\n")
+        file.write("# Angles [degrees], lengths [m]; `single`: light scattered once, and standard errors.\n")
+        file.write(f"# Command: python benchmarks/monte_carlo.py veil {out} --photons {paths}\n")
+        file.write("fog,beam,visibility,right,up,reach,single,single_error,all,all_error\n")
+        for fog in VEIL_FOGS:
+            phase = phase_table(fog)
+            phases, cosines = np.stack((phase, without_peak(phase))), likely_cosines(phase)
+            for name, beam in beams.items():
+                table = luminous_intensity(beam, grid, grid[:, None])
+                for visibility in VISIBILITIES:
+                    k = extinction_from_visibility(visibility)
+                    for right, up in DIRECTIONS:
+                        towards, reach = ray(right, up)
+                        fixed = (phases, cosines, STEP, table, LAMPS, -EYE_HEIGHT, LAMP_SIZES)
+                        result = veil(paths, rng, k, towards, reach, *fixed)
+                        numbers = (visibility, right, up, reach, *result)
+                        file.write(f"{fog},{name}," + ",".join(f"{n:.5g}" for n in numbers) + "\n")
+
+
+def main():
+    """Write a table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("what", choices=("halo", "veil"))
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--photons", type=int, default=400_000)
+    arguments = parser.parse_args()
+    {"halo": write_halo, "veil": write_veil}[arguments.what](arguments.out, arguments.photons)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,41 @@
+"""Disability glare: the veil that light scattered inside the eye lays over what is looked at."""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fogsim.errors import InputError
+
+LEAST_ANGLE = math.radians(1.0)
+"""Angle below which the formula is read at this angle [rad]; it is known from 1° to 30°."""
+
+
+def veiling_luminance(illuminance: ArrayLike, angle: ArrayLike, age: float = 25.0) -> NDArray[np.float64]:
+    """Veil of disability glare, L_v = 10 E (1 + (A/70)⁴) / θ² with θ in degrees [cd/m²] (Vos 2003; CIE 146:2002).
+
+    Several sources add.
+
+    Parameters
+    ----------
+    illuminance : array_like
+        Illuminance at the eye from the glare source, across the line to it [lx], not negative.
+    angle : array_like
+        Angle between the source and what is looked at [rad]; less than 1° as 1°.
+    age : float
+        Age of the observer [years], positive.
+
+    Raises
+    ------
+    InputError
+        If an illuminance or the age is negative or not finite, or an angle is not in 0 … π.
+    """
+    light, theta = np.asarray(illuminance, dtype=np.float64), np.asarray(angle, dtype=np.float64)
+    if not (np.all(np.isfinite(light)) and np.all(light >= 0)):
+        raise InputError(f"illuminance at the eye must be finite and not negative [lx], got {illuminance!r}")
+    if not np.all((theta >= 0) & (theta <= math.pi)):
+        raise InputError(f"angle of a glare source must lie in 0 … π rad, got {angle!r}")
+    if not (age > 0 and math.isfinite(age)):
+        raise InputError(f"age must be positive [years], got {age!r}")
+    degrees = np.degrees(np.maximum(theta, LEAST_ANGLE))
+    return np.asarray(10.0 * light * (1.0 + (age / 70.0) ** 4) / degrees**2)

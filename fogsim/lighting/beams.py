@@ -1,0 +1,144 @@
+"""Beams of head lamps and front fog lamps, from published tables and the limits of regulations."""
+
+import math
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.beam import checked_beam, luminous_intensity
+from fogsim.errors import InputError
+from fogsim.values import Beam
+
+ECE_LEVEL = 0.40
+"""Intensity below the cut-off of the ECE-style beam relative to the US median low beam [-]: 0.3 … 0.45."""
+
+FRONT_FOG_PEAK = 4000.0
+"""Largest intensity of the front fog lamp [cd]; class F3 may have up to 8600 … 12000 cd."""
+
+
+@cache
+def low_beam() -> Beam:
+    """Median low beam of US cars of 2004, one lamp (UMTRI-2004-23, table 4)."""
+    return _packaged("umtri_low_beam.csv")
+
+
+@cache
+def high_beam() -> Beam:
+    """Median high beam of US cars of 2001, one lamp (UMTRI-2001-19, table 6)."""
+    return _packaged("umtri_high_beam.csv")
+
+
+@cache
+def ece_low_beam() -> Beam:
+    """Low beam with a European cut-off, for traffic that keeps to the right: sharp, 0.57° down, rising to the right.
+
+    Below the cut-off it is the US median low beam times `ECE_LEVEL`; above, the stray light that zone III of UNECE
+    R112 allows. The level is inferred from gallen2014's eq. (12), not measured.
+    """
+    right = np.radians(np.unique(np.concatenate((np.arange(-45.0, 46.0, 5.0), np.arange(-10.0, 10.01, 0.5)))))
+    up = np.radians(
+        np.concatenate((np.arange(-5.0, -1.0, 0.5), np.arange(-1.0, 1.2, 0.05), np.arange(1.25, 7.1, 0.25)))
+    )
+    below = luminous_intensity(low_beam(), right, up[:, None])
+    tilt = np.minimum(np.maximum(right, 0.0) * math.tan(math.radians(15.0)), math.radians(1.0))
+    over_edge = np.degrees(up[:, None] - (math.radians(-0.57) + tilt))
+    stray = np.minimum(below, 400.0 * np.exp(-np.maximum(over_edge, 0.0) / 0.8) + 80.0)
+    # A lens blurs the cut-off over some tenths of a degree.
+    lit = 1.0 / (1.0 + np.exp(over_edge / 0.08))
+    return checked_beam(Beam(right, up, lit * ECE_LEVEL * below + (1.0 - lit) * np.minimum(stray, 625.0)))
+
+
+@cache
+def front_fog_beam() -> Beam:
+    """Wide, flat beam of a front fog lamp with a horizontal cut-off, one lamp.
+
+    No measured table stands behind it: a peak of `FRONT_FOG_PEAK` 2.2° down, half of it 18° to either side, and at most
+    some hundred candela above the horizontal, as UNECE R19 class F3 asks (limits from memory).
+    """
+    right = np.radians(np.linspace(-60.0, 60.0, 61))
+    up = np.radians(np.concatenate((np.arange(-20.0, -5.0, 1.0), np.arange(-5.0, 0.5, 0.1), np.arange(0.5, 10.1, 0.5))))
+    sideways = np.exp(-math.log(2.0) * (np.abs(np.degrees(right)) / 18.0) ** 1.6)
+    depth = np.degrees(up) + 2.2
+    height = np.exp(-np.where(depth > 0, (depth / 1.2) ** 2, np.abs(depth / 4.0) ** 1.3))
+    stray = 150.0 * np.exp(-np.maximum(np.degrees(up), 0.0) / 4.0)
+    return checked_beam(Beam(right, up, np.maximum(FRONT_FOG_PEAK * height, stray)[:, None] * sideways + 5.0))
+
+
+def scaled_beam(beam: Beam, factor: float) -> Beam:
+    """The same beam, brighter or dimmer.
+
+    Parameters
+    ----------
+    beam : Beam
+        Any.
+    factor : float
+        What intensities are multiplied by, not negative.
+
+    Raises
+    ------
+    InputError
+        If the factor is negative or not finite.
+    """
+    return checked_beam(Beam(beam.azimuth, beam.elevation, beam.intensity * factor), f"beam times {factor!r}")
+
+
+def read_beam(text: str, name: str) -> Beam:
+    """Beam from a table.
+
+    Parameters
+    ----------
+    text : str
+        Comma-separated: a first row of degrees right of the axis, then rows that begin with degrees above the
+        horizontal, then candela. Lines that begin with # are comments.
+    name : str
+        What error messages call the table.
+
+    Raises
+    ------
+    InputError
+        If a cell is empty or no number, rows differ in length, directions do not ascend or an intensity is negative.
+    """
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    if len(lines) < 3:
+        raise InputError(f"{name}: a beam table needs a row of azimuths and two or more rows of intensities")
+    cells = [line.split(",") for line in lines]
+    width = len(cells[0])
+    for row, line in enumerate(cells):
+        if len(line) != width:
+            raise InputError(f"{name}: row {row} has {len(line)} cells, the first row has {width}")
+    right = [_number(cell, name, 0, column) for column, cell in enumerate(cells[0]) if column]
+    body = np.array([[_number(cell, name, r + 1, c) for c, cell in enumerate(row)] for r, row in enumerate(cells[1:])])
+    beam = Beam(np.radians(np.array(right)), np.radians(body[:, 0]), np.ascontiguousarray(body[:, 1:]))
+    return checked_beam(beam, name)
+
+
+def _number(cell: str, name: str, row: int, column: int) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        raise InputError(f"{name}: row {row}, column {column} must hold a number, got {cell!r}") from None
+
+
+def _packaged(name: str) -> Beam:
+    return read_beam((files("fogsim.lighting") / "data" / name).read_text(encoding="utf-8"), name)
+
+
+def luminous_flux(beam: Beam, right: tuple[float, float], up: tuple[float, float]) -> float:
+    """Flux through a window of directions [lm].
+
+    Parameters
+    ----------
+    beam : Beam
+        The lamp.
+    right, up : tuple of float
+        Ends of the window to the right and above the horizontal [rad].
+    """
+    azimuth, elevation = _middles(*right, 900), _middles(*up, 240)
+    solid_angle = np.cos(elevation) * (right[1] - right[0]) * (up[1] - up[0]) / (len(azimuth) * len(elevation))
+    return float(np.sum(luminous_intensity(beam, azimuth, elevation[:, None]) * solid_angle[:, None]))
+
+
+def _middles(start: float, end: float, count: int) -> NDArray[np.float64]:
+    return start + (end - start) * (np.arange(count) + 0.5) / count

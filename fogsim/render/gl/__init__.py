@@ -1,1 +1,1 @@
-"""Drawing with OpenGL on pyrender's EGL platform: the only package that imports either, in the process that draws."""
+"""OpenGL by EGL (made with pyrender) or OSMesa: the only package that imports either, in the process that draws."""

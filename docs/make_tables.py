@@ -12,6 +12,7 @@ from fogsim.metrics import RunMetrics
 from fogsim.recorders.table import table_columns
 from fogsim.scenario.methods import Method
 from fogsim.scenario.schema import Scenario
+from fogsim.scene import SIGN_KINDS
 
 HERE = Path(__file__).resolve().parent
 END = "<!-- end of table -->"
@@ -61,8 +62,16 @@ def metrics() -> list[tuple[str, ...]]:
     return [(f"`{key}`", meaning) for key, meaning in RunMetrics().summary().meanings.items()]
 
 
+def signs() -> list[tuple[str, ...]]:
+    """Kinds of signs that have a face of their own."""
+    return [(f"`{name}`", kind.code, kind.meaning) for name, kind in SIGN_KINDS.items()]
+
+
 TABLES = {
-    "scenarios.md": {"keys": (("key", "default", "meaning"), scenario_keys)},
+    "scenarios.md": {
+        "signs": (("kind", "code", "meaning"), signs),
+        "keys": (("key", "default", "meaning"), scenario_keys),
+    },
     "results.md": {
         "columns": (("column", "type", "meaning"), columns),
         "metrics": (("key", "meaning"), metrics),

@@ -46,22 +46,27 @@ def _counterclockwise(area: PavedArea) -> Points:
     return outline if _area(outline) >= 0 else outline[::-1]
 
 
-def free_borders(area: PavedArea, lanes: Sequence[Lane], index: LaneIndex) -> Iterator[Edge]:
-    """Parts of a junction's border where no road leads on.
+def free_borders(areas: Sequence[PavedArea], lanes: Sequence[Lane]) -> Iterator[Edge]:
+    """Parts of the borders of junctions where no road leads on.
 
     Parameters
     ----------
-    area : PavedArea
-        The junction.
+    areas : sequence of PavedArea
+        The junctions.
     lanes : sequence of Lane
-        Lanes of carriageways near it.
-    index : LaneIndex
         All lanes of carriageways and footways, those across junctions left out.
     """
-    outline = _counterclockwise(area)
-    limits = [lane.speed_limit for lane in lanes if _touches(lane, outline)]
-    if len(outline) < 3 or not limits:
-        return
+    index, limits = LaneIndex(lanes), np.repeat([lane.speed_limit for lane in lanes], 2)
+    ends = np.concatenate([lane.centreline[[0, -1], :2] for lane in lanes])
+    for outline in map(_counterclockwise, areas):
+        if len(outline) > 2:
+            apart = np.abs(ends[:, None] - outline[None, :, :2]).sum(axis=2).min(axis=1)
+            leading = limits[apart < _TOUCHING]
+            if len(leading):
+                yield from _free_parts(outline, float(leading.max()), index)
+
+
+def _free_parts(outline: Points, limit: float, index: LaneIndex) -> Iterator[Edge]:
     following = np.roll(outline, -1, axis=0)
     step = following - outline
     outward = np.column_stack((step[:, 1], -step[:, 0])) / np.hypot(step[:, 0], step[:, 1])[:, None]
@@ -71,12 +76,7 @@ def free_borders(area: PavedArea, lanes: Sequence[Lane], index: LaneIndex) -> It
     for run in _runs_around(free):
         corners = np.concatenate((outline[run], following[run[-1:]]))
         if np.sum(np.hypot(*np.diff(corners[:, :2], axis=0).T)) > 0.1:
-            yield Edge(corners, -1, 0.0, max(limits))
-
-
-def _touches(lane: Lane, outline: Points) -> bool:
-    ends = lane.centreline[[0, -1], :2]
-    return bool(np.min(np.linalg.norm(ends[:, None] - outline[None, :, :2], axis=2)) < _TOUCHING)
+            yield Edge(corners, -1, 0.0, limit)
 
 
 def _runs_around(chosen: NDArray[np.bool_]) -> list[NDArray[np.int64]]:

@@ -1,6 +1,7 @@
 """Lamps on poles beside streets."""
 
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,17 +43,20 @@ def street_lamp_shapes() -> dict[str, Mesh]:
 
 def lamp_posts(edges: Sequence[Edge]) -> list[Batch]:
     """Lamps about every 35 m along the right sides of roads, on one side of roads of two directions."""
-    found: list[tuple[NDArray[np.float64], float]] = []
+    places, turns, taken = [], [], dict[tuple[int, int], list[NDArray[np.float64]]]()
     for edge in edges:
         if edge.side > 0:
             continue
-        places, heading = stations(edge.line, _SPACING, -(edge.inner + edge.shoulder + _BESIDE))
-        for place, direction in zip(places, heading.tolist(), strict=True):
-            if all(np.hypot(*(place[:2] - other[:2])) > _APART for other, _ in found[-400:]):
-                found.append((place, direction))
-    if not found:
-        return []
-    return [placed(STREET_LAMP, np.array([place for place, _ in found]), np.array([turn for _, turn in found]))]
+        along, heading = stations(edge.line, _SPACING, -(edge.inner + edge.shoulder + _BESIDE))
+        for place, turn in zip(along, heading.tolist(), strict=True):
+            column, row = np.floor(place[:2] / _APART).astype(int).tolist()
+            around = product((column - 1, column, column + 1), (row - 1, row, row + 1))
+            near = [other for cell in around for other in taken.get(cell, ())]
+            if all(np.hypot(*(place[:2] - other[:2])) > _APART for other in near):
+                places.append(place)
+                turns.append(turn)
+                taken.setdefault((column, row), []).append(place)
+    return [placed(STREET_LAMP, np.array(places), np.array(turns))] if places else []
 
 
 def street_lamp_heads(scene: Scene) -> Points:

@@ -17,10 +17,14 @@ SIGN_TYPE = "fogsim.sign."
 """POIs and polygons of type ``fogsim.sign.KIND`` in an additional file are signs."""
 
 SPEED_LIMIT = "speed_limit"
+LIMITS = frozenset((SPEED_LIMIT, "end_of_speed_limit", "variable_speed_limit"))
+"""Kinds whose value is a speed, in km/h in additional files."""
 SIGN_CLEARANCE = 3.9
 """Lateral distance from the edge of the outermost lane to the middle of a sign [m]: behind shoulder and rail."""
 SIGN_HEIGHT = 2.6
 """Height of the middle of a sign's face above the road [m]."""
+GANTRY_HEIGHT = 6.2
+"""Height of the middle of a face that hangs over a lane, above the road [m]: vehicles up to 4.5 m pass below."""
 SIGN_DIAMETER = 0.9
 """Diameter of a round sign outside towns [m]; 0.75–0.9 m for speeds above 80 km/h (German VzKat size 3)."""
 
@@ -43,8 +47,9 @@ def sign_map(net: Any, additional: Iterable[Path]) -> SignMap:
         If a sign cannot be placed or has no usable value.
     """
     signs = [sign for edge in net.getEdges(withInternal=False) if (sign := _limit_sign(edge)) is not None]
+    roads = _Roads(net)
     for path in additional:
-        signs += opendrive_signs(path, _net_offset(net)) if is_opendrive(path) else _marked_signs(path)
+        signs += opendrive_signs(path, _net_offset(net)) if is_opendrive(path) else _marked_signs(path, roads)
     return SignMap(tuple(signs))
 
 
@@ -106,32 +111,55 @@ def _limit_sign(edge: Any) -> Sign | None:
     )
 
 
-def _marked_signs(path: Path) -> list[Sign]:
+class _Roads:
+    """Straight pieces of all lanes that vehicles drive on."""
+
+    def __init__(self, net: Any) -> None:
+        lanes = [lane for edge in net.getEdges(withInternal=False) for lane in edge.getLanes()]
+        lanes = [lane for lane in lanes if set(lane.getPermissions()) != {"pedestrian"}]
+        lines = [np.array(lane.getShape3D(), dtype=np.float64).reshape(-1, 3) for lane in lanes]
+        self._start = np.concatenate([line[:-1] for line in lines])
+        self._step = np.concatenate([np.diff(line, axis=0) for line in lines])
+        self._half_width = np.repeat([0.5 * lane.getWidth() for lane in lanes], [max(len(li) - 1, 0) for li in lines])
+
+    def below(self, x: float, y: float) -> tuple[float, bool]:
+        """Height of the nearest lane [m], and whether the place lies over it."""
+        offset, step = np.array([x, y]) - self._start[:, :2], self._step
+        square = np.maximum(np.sum(step[:, :2] ** 2, axis=1), 1e-12)
+        share = np.clip(np.sum(offset * step[:, :2], axis=1) / square, 0.0, 1.0)
+        gap = np.linalg.norm(offset - share[:, None] * step[:, :2], axis=1) - self._half_width
+        nearest = int(np.argmin(gap))
+        return float(self._start[nearest, 2] + share[nearest] * step[nearest, 2]), bool(gap[nearest] < 0)
+
+
+def _marked_signs(path: Path, roads: _Roads) -> list[Sign]:
     """Signs that POIs and polygons of an additional file stand for."""
     try:
         shapes = list(sumolib.xml.parse(str(path), ["poi", "poly"]))
     except Exception as error:  # whatever its parser makes of a file that is none
         raise InputError(f"{path}: not a SUMO additional file: {error}") from error
-    return [_marked_sign(path, s) for s in shapes if str(s.getAttributeSecure("type", "")).startswith(SIGN_TYPE)]
+    return [_marked_sign(path, s, roads) for s in shapes if str(s.getAttributeSecure("type", "")).startswith(SIGN_TYPE)]
 
 
-def _marked_sign(path: Path, shape: Any) -> Sign:
+def _marked_sign(path: Path, shape: Any, roads: _Roads) -> Sign:
     where = f"{path}: {shape.name} {shape.id!r}"
     kind = str(shape.type).removeprefix(SIGN_TYPE)
     parameters = {p.key: p.value for p in (shape.param or [])}
     try:
-        value = float(parameters["value"])
+        value = float(parameters["value"] if kind in LIMITS else parameters.get("value", 0.0))
         heading = math.radians(90.0 - float(shape.getAttributeSecure("angle", "")))
         x, y = _middle(shape)
         diameter = float(parameters.get("diameter", SIGN_DIAMETER))
+        ground, over_lane = roads.below(x, y)
+        above = float(parameters.get("height", GANTRY_HEIGHT if over_lane else SIGN_HEIGHT))
     except KeyError:
         raise InputError(f'{where}: a sign needs <param key="value" value="…"/>') from None
     except (TypeError, ValueError) as error:
         place = "shape" if shape.name == "poly" else "x, y"
         raise InputError(f"{where}: a sign needs numbers for {place}, angle and its value: {error}") from None
-    if kind == SPEED_LIMIT:
+    if kind in LIMITS:
         value /= KMH_PER_MPS
-    return Sign(str(shape.id), kind, value, (x, y, SIGN_HEIGHT), heading, diameter)
+    return Sign(str(shape.id), kind, value, (x, y, ground + above), heading, diameter)
 
 
 def _middle(shape: Any) -> tuple[float, float]:

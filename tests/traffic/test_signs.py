@@ -100,3 +100,21 @@ def test_a_net_that_says_nothing_about_where_it_is(tmp_path: Path) -> None:
     net.write_text(ONE_EDGE.format(location=""), encoding="utf-8")
     assert geographic_position(read_net(net)) is None
     assert [sign.sign_id for sign in sign_map(read_net(net), []).signs] == ["limit.e"]
+
+
+def test_a_sign_over_a_lane_hangs_high_and_all_stand_at_the_height_of_their_road(tmp_path: Path) -> None:
+    net = tmp_path / "hill.net.xml"
+    net.write_text(ONE_EDGE.format(location="").replace('"0,0 100,0"/', '"0,0,5 100,0,15"/'), encoding="utf-8")
+    value = '<param key="value" value="72"/>'
+    file = additional(
+        tmp_path,
+        f'<poi id="beside" type="fogsim.sign.stop" x="50" y="-8" angle="90">{value}</poi>'
+        f'<poi id="over" type="fogsim.sign.variable_speed_limit" x="50" y="0.5" angle="90">{value}</poi>'
+        f'<poi id="low" type="fogsim.sign.stop" x="0" y="-8" angle="90">{value}<param key="height" value="1.5"/></poi>',
+    )
+    signs = {sign.sign_id: sign for sign in sign_map(read_net(net), [file]).signs}
+    assert signs["beside"].position[2] == pytest.approx(10 + 2.6)
+    assert signs["over"].position[2] == pytest.approx(10 + 6.2)
+    assert signs["low"].position[2] == pytest.approx(5 + 1.5)
+    assert signs["over"].value == pytest.approx(20.0)
+    assert signs["beside"].value == 72.0

@@ -122,6 +122,7 @@ SIGN_KINDS: Mapping[str, SignKind] = {
 """Kinds by name. A kind may also be written as its code, plain or after ``xodr.``; any other gets a plate that says
 its code. A sign over a lane hangs from a gantry, any other stands on a post."""
 
+_LIMITS = [SIGN_KINDS[name] for name in ("speed_limit", "end_of_speed_limit", "variable_speed_limit")]
 _BY_CODE = {kind.code: kind for kind in SIGN_KINDS.values()}
 
 
@@ -129,7 +130,8 @@ def face_of(sign: Sign) -> Face:
     """Face of a sign; that of an unknown kind is a plate with its code."""
     code = sign.kind.removeprefix("xodr.")
     kind = SIGN_KINDS.get(code) or _BY_CODE.get(code)
-    return plate(code) if kind is None else kind.face(sign.value)
+    speechless = kind in _LIMITS and sign.value <= 0
+    return plate(code) if kind is None or speechless else kind.face(sign.value)
 
 
 def shape_name(sign: Sign) -> str:

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.forward_scatter import forward_scattered, pixel_width
+from fogsim.atmosphere.forward_scatter import add_forward_scatter, pixel_width
 from fogsim.atmosphere.frustum import frustum_grid, radiance_through_grid
 from fogsim.atmosphere.koschmieder import fogged_radiance
 from fogsim.atmosphere.medium import is_plain
@@ -35,9 +35,8 @@ def daytime_radiance(view: View, field: FogField, camera: Camera, pose: CameraPo
     if field.forward_scatter > 0:
         transmitted = _through_fog(view, dataclasses.replace(field, airlight=(0.0, 0.0, 0.0)), camera, pose)
         width = pixel_width(field.forward_scatter_width, camera.focal_length)
-        radiance += forward_scattered(
-            transmitted, transmission(view, field, camera, pose), field.forward_scatter, width
-        )
+        share = transmission(view, field, camera, pose)
+        add_forward_scatter(radiance, transmitted, share, field.forward_scatter, width)
     return radiance
 
 

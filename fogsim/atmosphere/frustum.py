@@ -17,6 +17,9 @@ COARSE = 16
 FINER = 4
 """How much denser the rays are at the horizon, where layers of fog are seen edge-on."""
 
+_WIDER = 1.6
+"""How much farther apart the rays are across the image, where fog changes less than with height."""
+
 _BINS = 2048
 _FOLD = 100.0
 
@@ -90,7 +93,7 @@ def _spacing(camera: Camera) -> float:
 
 
 def _grid_columns(camera: Camera) -> NDArray[np.float32]:
-    count = max(2, round(camera.width / _spacing(camera)) + 1)
+    count = max(2, round(camera.width / (_WIDER * _spacing(camera))) + 1)
     return np.linspace(0, camera.width - 1, count, dtype=np.float32)
 
 

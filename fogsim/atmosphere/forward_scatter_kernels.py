@@ -1,0 +1,37 @@
+"""The per-pixel loop of forward scattering by day."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.jit import kernel
+
+_NONE, _HALF = np.float32(0.0), np.float32(0.5)
+
+
+@kernel
+def exchange(
+    radiance: NDArray[np.float32],
+    transmitted: NDArray[np.float32],
+    transmission: NDArray[np.float32],
+    blurred: NDArray[np.float32],
+    block: int,
+    weight: np.float32,
+) -> None:
+    """Exchange a share w (1 − T) of transmitted light for its blur, of which each block (cols, rows, 3) has a value."""
+    columns, rows = blurred.shape[0], blurred.shape[1]
+    part = np.float32(1.0) / np.float32(block)
+    for v in range(transmission.shape[0]):
+        down = min(max((np.float32(v) + _HALF) * part - _HALF, _NONE), np.float32(rows - 1))
+        upper = min(int(down), max(rows - 2, 0))
+        lower = min(upper + 1, rows - 1)
+        b = down - np.float32(upper)
+        for u in range(transmission.shape[1]):
+            across = min(max((np.float32(u) + _HALF) * part - _HALF, _NONE), np.float32(columns - 1))
+            left = min(int(across), max(columns - 2, 0))
+            right = min(left + 1, columns - 1)
+            a = across - np.float32(left)
+            share = weight * (np.float32(1.0) - transmission[v, u])
+            for c in range(3):
+                above = blurred[left, upper, c] + (blurred[right, upper, c] - blurred[left, upper, c]) * a
+                below = blurred[left, lower, c] + (blurred[right, lower, c] - blurred[left, lower, c]) * a
+                radiance[v, u, c] += share * (above + (below - above) * b - transmitted[v, u, c])

@@ -1,0 +1,213 @@
+import math
+import os
+import subprocess
+import sys
+from ctypes.util import find_library
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fogsim.errors import MissingDependencyError
+from fogsim.pinhole import camera_axes
+from fogsim.render import RenderError
+from fogsim.render.cpu.rasteriser import CPURasteriser
+from fogsim.render.drawing import NEAR, NOTHING, RECORD, Drawing, MeshTable
+from fogsim.render.gl.context import context
+from fogsim.render.gl.packing import COMMAND, COPY, corners, packed
+from fogsim.render.gl.rasteriser import GLRasteriser
+from fogsim.values import Camera, CameraPose, Mesh
+
+CAMERA = Camera(160, 120, 144.25, (80.0, 60.0), 1.38, pitch=math.radians(2.0))
+POSE = CameraPose((3.0, -2.0, 1.38), heading=0.7)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _opengl() -> None:
+    try:
+        context()
+    except MissingDependencyError as error:
+        pytest.skip(str(error))
+
+
+def mesh_of(triangles: np.ndarray) -> Mesh:
+    """A mesh of triangles (n, 3, 3) that share no vertices."""
+    n = 3 * len(triangles)
+    return Mesh(
+        positions=triangles.reshape(n, 3).astype(np.float32),
+        normals=np.tile(np.float32([0, 0, 1]), (n, 1)),
+        reflectance=np.full((n, 3), 0.5, np.float32),
+        surface=np.zeros(n, np.int32),
+        road=np.zeros((n, 4), np.float32),
+        instance=np.zeros(n, np.int32),
+        faces=np.arange(n, dtype=np.uint32).reshape(-1, 3),
+    )
+
+
+def drawing_of(table: MeshTable, mesh: list[int], transforms: np.ndarray) -> Drawing:
+    record = np.zeros(len(mesh), RECORD)
+    record["transform"] = transforms
+    counts = np.diff(table.first_face)[mesh]
+    return Drawing(np.array(mesh, np.int64), record, np.cumsum([0, *counts], dtype=np.int64))
+
+
+def scattered(rng: np.random.Generator, number: int, axes: np.ndarray) -> np.ndarray:
+    """Turned and stretched transforms (n, 3, 4) to offsets that lie before a camera, some half beside the picture."""
+    turned = np.linalg.qr(rng.normal(size=(number, 3, 3)))[0] * rng.uniform(0.3, 3.0, (number, 1, 3))
+    depth = rng.uniform(10.0, 60.0, number)
+    offset = np.stack((rng.uniform(-0.7, 0.7, number) * depth, rng.uniform(-0.5, 0.5, number) * depth, depth), axis=1)
+    return np.concatenate((turned, (offset @ axes)[..., None]), axis=2)
+
+
+def soup(rng: np.random.Generator, counts: tuple[int, ...]) -> MeshTable:
+    """Meshes of so many small triangles each, scattered over a few metres."""
+    return MeshTable.of(
+        {f"mesh {n}": mesh_of(rng.normal(size=(n, 1, 3)) + 0.3 * rng.normal(size=(n, 3, 3))) for n in counts}
+    )
+
+
+def test_both_rasterisers_see_the_same_triangle_of_the_same_copy() -> None:
+    rng = np.random.default_rng(4)
+    table = soup(rng, (1, 7, 60, 300))
+    mesh = list(rng.integers(0, 4, 200))
+    drawing = drawing_of(table, mesh, scattered(rng, 200, camera_axes(CAMERA, POSE)))
+    by_opengl, by_numba = (maker(table).slots(drawing, CAMERA, POSE).copy() for maker in (GLRasteriser, CPURasteriser))
+    assert len(np.unique(by_opengl)) > 1000
+    # Triangles pierce one another all over the picture, and along those lines either may win.
+    assert np.mean(by_opengl == by_numba) > 0.99
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_both_rasterisers_cover_the_same_pixels_where_triangles_reach_behind_the_camera(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    table = MeshTable.of({"large": mesh_of(rng.normal(size=(4, 3, 3)))})
+    transforms = scattered(rng, 5, camera_axes(CAMERA, POSE))
+    transforms[..., 3] *= 0.05
+    drawing = drawing_of(table, [0] * 5, transforms)
+    seen = [maker(table).slots(drawing, CAMERA, POSE) != NOTHING for maker in (GLRasteriser, CPURasteriser)]
+    assert 0.1 < seen[0].mean() < 0.98
+    assert np.mean(seen[0] == seen[1]) > 0.999
+
+
+def quad(near: float, half: float, up: float = 0.0) -> np.ndarray:
+    """Two triangles (2, 3, 3) across the optical axis, in camera axes."""
+    a, b, c, d = ([x, y + up, near] for x, y in ((-half, -half), (half, -half), (half, half), (-half, half)))
+    return np.array([[a, b, c], [a, c, d]])
+
+
+@pytest.mark.parametrize("maker", [GLRasteriser, CPURasteriser])
+def test_the_nearer_is_seen_from_both_sides_and_nothing_before_the_near_plane(
+    maker: type[GLRasteriser] | type[CPURasteriser],
+) -> None:
+    turned = quad(20.0, 1.0)[:, ::-1]
+    table = MeshTable.of({"far": mesh_of(quad(30.0, 3.0)), "near": mesh_of(turned), "eye": mesh_of(quad(0.39, 1.0))})
+    axes = camera_axes(CAMERA, POSE)
+    level = np.concatenate((axes.T, np.zeros((3, 1))), axis=1)
+    slots = maker(table).slots(drawing_of(table, [2, 1, 0], np.array([level] * 3)), CAMERA, POSE)
+    middle, beside = slots[58:62, 78:82], slots[60, 80 + 10]
+    assert NEAR > 0.39
+    assert set(np.unique(middle)) <= {2, 3}
+    assert beside in {4, 5}
+    assert slots[0, 0] == NOTHING
+
+
+@pytest.mark.parametrize("maker", [GLRasteriser, CPURasteriser])
+@pytest.mark.parametrize("beside", [-0.01, 0.01])
+def test_a_pixel_is_seen_if_its_centre_is(maker: type[GLRasteriser] | type[CPURasteriser], beside: float) -> None:
+    # A quad whose left edge lies a hundredth of a pixel beside the centre of column 100 and its top beside row 70.
+    shifted = quad(10.0, 1.0)
+    shifted[..., 0] += 1.0 + (100 + beside - 80) * 10.0 / CAMERA.focal_length
+    shifted[..., 1] += 1.0 + (70 + beside - 60) * 10.0 / CAMERA.focal_length
+    table = MeshTable.of({"quad": mesh_of(shifted)})
+    level = np.concatenate((camera_axes(CAMERA, POSE).T, np.zeros((3, 1))), axis=1)
+    rows, columns = np.nonzero(maker(table).slots(drawing_of(table, [0], level[None]), CAMERA, POSE) != NOTHING)
+    assert (rows.min(), columns.min()) == ((70, 100) if beside < 0 else (71, 101))
+
+
+def test_an_empty_drawing_shows_nothing_and_forgets_the_last_one() -> None:
+    rng = np.random.default_rng(2)
+    table = soup(rng, (50,))
+    rasteriser = GLRasteriser(table)
+    full = drawing_of(table, [0] * 20, scattered(rng, 20, camera_axes(CAMERA, POSE)))
+    assert (rasteriser.slots(full, CAMERA, POSE) != NOTHING).any()
+    empty = drawing_of(table, [], np.empty((0, 3, 4)))
+    assert (rasteriser.slots(empty, CAMERA, POSE) == NOTHING).all()
+
+
+def test_packing_keeps_copies_of_a_mesh_together_and_their_slots() -> None:
+    table = soup(np.random.default_rng(1), (2, 3, 4))
+    transforms = np.random.default_rng(2).normal(size=(5, 3, 4)).astype(np.float32)
+    drawing = drawing_of(table, [2, 0, 2, 2, 0], transforms)
+    clip = np.random.default_rng(3).normal(size=(3, 3))
+    copies, commands = packed(drawing, clip, table.first_face)
+    assert (copies.dtype, commands.dtype) == (COPY, COMMAND)
+    assert commands.tolist() == [(6, 2, 0, 0), (12, 3, 15, 2)]
+    order = [1, 4, 0, 2, 3]
+    assert copies["first"].tolist() == drawing.first[order].tolist()
+    assert copies["clip"] == pytest.approx(np.einsum("ij,njk->nik", clip, transforms[order]), rel=1e-5, abs=1e-5)
+
+
+def test_every_corner_knows_the_number_of_its_triangle_in_its_mesh() -> None:
+    table = soup(np.random.default_rng(1), (2, 3))
+    made = corners(table)
+    assert made["triangle"].tolist() == [0] * 3 + [1] * 3 + [0] * 3 + [1] * 3 + [2] * 3
+    assert np.array_equal(made["position"], table.positions[table.faces.ravel()])
+
+
+def test_a_size_can_change_and_a_closed_one_is_refused() -> None:
+    rng = np.random.default_rng(2)
+    table = soup(rng, (50,))
+    rasteriser = GLRasteriser(table)
+    drawing = drawing_of(table, [0] * 20, scattered(rng, 20, camera_axes(CAMERA, POSE)))
+    first = rasteriser.slots(drawing, CAMERA, POSE).copy()
+    wide = Camera(200, 50, 144.25, (100.0, 25.0), 1.38)
+    assert rasteriser.slots(drawing, wide, POSE).shape == (50, 200)
+    assert np.array_equal(rasteriser.slots(drawing, CAMERA, POSE), first)
+    rasteriser.close()
+    rasteriser.close()
+    with pytest.raises(RenderError, match="closed"):
+        rasteriser.slots(drawing, CAMERA, POSE)
+
+
+DRAW = """
+import hashlib, sys
+sys.path.insert(0, {folder!r})
+import numpy as np
+import test_gl_rasteriser as t
+rng = np.random.default_rng(9)
+table = t.soup(rng, (3, 40, 90))
+drawing = t.drawing_of(table, [0, 1, 2, 1, 1, 2] * 4, t.scattered(rng, 24, t.camera_axes(t.CAMERA, t.POSE)))
+slots = t.GLRasteriser(table).slots(drawing, t.CAMERA, t.POSE)
+print(t.context().version, t.context().description)
+print(len(np.unique(slots)), hashlib.sha256(slots.tobytes()).hexdigest())
+"""
+
+
+def drawn(**environment: str) -> tuple[str, str]:
+    """OpenGL's version and a digest of a picture, drawn by another process."""
+    code = DRAW.format(folder=str(Path(__file__).parent))
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+        env={**os.environ, **environment},
+    )
+    version, digest = done.stdout.splitlines()
+    return version, digest
+
+
+def test_an_older_opengl_draws_the_same() -> None:
+    newer, old = drawn(), drawn(MESA_GL_VERSION_OVERRIDE="4.1")
+    if not old[0].startswith("(4, 1)"):
+        pytest.skip("this OpenGL is not Mesa's, which can be told to be old")
+    assert not newer[0].startswith("(4, 1)")
+    assert newer[1] == old[1]
+
+
+@pytest.mark.skipif(find_library("OSMesa") is None, reason="OSMesa is not installed here")
+def test_osmesa_draws_the_same_as_egl() -> None:
+    osmesa = drawn(PYOPENGL_PLATFORM="osmesa")
+    assert "OSMesa" in osmesa[0]
+    assert osmesa[1] == drawn()[1]

@@ -9,6 +9,7 @@ from fogsim.scene.bodies import body_shapes
 from fogsim.scene.chainage import Chainage
 from fogsim.scene.crosslines import cross_lines
 from fogsim.scene.edges import Edge, edge_meshes, guard_rail, lane_edge
+from fogsim.scene.houses import house_places, house_shapes, houses, shapes_in_use
 from fogsim.scene.junctions import Areas, area_mesh, free_borders
 from fogsim.scene.polyline import LaneIndex, cleaned, parallel
 from fogsim.scene.relief import Relief
@@ -72,8 +73,10 @@ def build_scene(network: RoadNetwork, signs: SignMap, rng: np.random.Generator, 
     if street_lamps:
         shapes |= street_lamp_shapes()
         posts += lamp_posts(edges)
-    growing = trees([(edge.side, edge.line) for edge in edges], index, shapes, relief, rng)
-    scenery = _joined([*posts, *sign_batches(signs.signs, hanging, relief), *growing])
+    built = houses(edges, index, relief, rng)
+    shapes |= shapes_in_use(house_shapes(), built)
+    growing = trees([(edge.side, edge.line) for edge in edges], index, house_places(built), shapes, relief, rng)
+    scenery = _joined([*posts, *sign_batches(signs.signs, hanging, relief), *built, *growing])
     return Scene(ground=merge(parts if land is None else [*parts, land]), shapes=shapes, scenery=scenery)
 
 

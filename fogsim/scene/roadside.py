@@ -91,6 +91,7 @@ def placed(
 def trees(
     stretches: Sequence[tuple[int, Points]],
     index: LaneIndex,
+    taken: Points,
     shapes: Mapping[str, Mesh],
     relief: Relief,
     rng: np.random.Generator,
@@ -103,6 +104,8 @@ def trees(
         Side (1 left, −1 right) and centreline of the lanes' free sides.
     index : LaneIndex
         The lanes.
+    taken : (n, 3) float64
+        Where something else stands [m].
     shapes : mapping from str to Mesh
         Among others the shapes of the trees.
     relief : Relief
@@ -111,16 +114,24 @@ def trees(
         What scatters them.
     """
     near = _scatter(stretches, rng, spacing=10.0, nearest=13.0, reach=38.0, clumps=90.0)
-    near = near[index.clearance(near) > TREE_CLEARANCE]
+    near = near[(index.clearance(near) > TREE_CLEARANCE) & _apart(near, taken, 11.0)]
     conifers = _clumps(near[:, :2], 160.0, rng) + 0.35 * rng.normal(size=len(near)) > 0.1
     batches = []
     for name, members in (("conifer", conifers), ("broad_leaved", ~conifers)):
         kinds = sorted(shape for shape in shapes if shape.startswith(name) and ":" not in shape)
         batches += _planted(near[members], kinds, relief, rng, height=(6.0, 15.0), slender=1.0)
     far = _scatter(stretches, rng, spacing=60.0, nearest=75.0, reach=170.0, clumps=400.0)
-    far = far[index.clearance(far) > 25.0]
+    far = far[(index.clearance(far) > 25.0) & _apart(far, taken, 35.0)]
     kinds = sorted(shape for shape in shapes if shape.startswith("woodland") and ":" not in shape)
     return batches + _planted(far, kinds, relief, rng, height=(9.0, 16.0), slender=5.0)
+
+
+def _apart(places: Points, taken: Points, distance: float) -> NDArray[np.bool_]:
+    """Tell which places lie farther from every place that is taken than a distance [m]."""
+    apart = np.ones(len(places), np.bool_)
+    for other in taken:
+        apart &= np.abs(places[:, :2] - other[:2]).max(axis=1) > distance
+    return apart
 
 
 def _scatter(

@@ -243,3 +243,28 @@ def test_street_lamps_stand_on_one_side_about_every_35_m_if_asked() -> None:
         world = glow @ batch.transforms[0, :3, :3].T + batch.transforms[0, :3, 3]
         middle = 0.5 * (world.min(axis=0) + world.max(axis=0))
         assert np.linalg.norm(heads - middle, axis=1).min() < 0.01
+
+
+def test_houses_stand_along_streets_only_and_clear_of_lanes_and_trees(town: RoadNetwork) -> None:
+    scene = build(town)
+    places = np.concatenate([b.transforms[:, :3, 3] for b in scene.scenery if b.shape.startswith("house")])
+    trees = [b for b in scene.scenery if b.shape.startswith(("conifer", "broad_leaved"))]
+    assert len(places) > 10
+    assert LaneIndex(town.lanes).clearance(places.astype(float)).min() > 9.0
+    apart = np.linalg.norm(places[:, None, :2] - places[None, :, :2], axis=2)
+    assert apart[~np.eye(len(places), dtype=bool)].min() > 16.0
+    for batch in trees:
+        gap = np.abs(batch.transforms[:, None, :2, 3] - places[None, :, :2]).max(axis=2)
+        assert gap.min() > 10.9
+    rural = dataclasses.replace(town, lanes=tuple(dataclasses.replace(one, speed_limit=25.0) for one in town.lanes))
+    assert not [batch for batch in build(rural).scenery if batch.shape.startswith("house")]
+
+
+def test_houses_face_their_street(town: RoadNetwork) -> None:
+    scene = build(town)
+    batch = next(b for b in scene.scenery if b.shape.startswith("house"))
+    for transform in batch.transforms.astype(float):
+        place, front = transform[:2, 3], -transform[:2, 1] / np.linalg.norm(transform[:2, 1])
+        before = np.array([[*(place + 4.0 * front), 0.0], [*(place - 4.0 * front), 0.0]])
+        nearer, farther = LaneIndex(town.lanes).clearance(before)
+        assert nearer < farther - 5.0

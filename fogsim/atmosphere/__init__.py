@@ -7,9 +7,11 @@ from fogsim.atmosphere.frustum import FrustumGrid, frustum_grid, radiance_throug
 from fogsim.atmosphere.koschmieder import fogged_radiance
 from fogsim.atmosphere.medium import field_at
 from fogsim.atmosphere.optical_depth import extinction, optical_depth, optical_depth_along
+from fogsim.atmosphere.phase import Droplets
 
 __all__ = [
     "Air",
+    "Droplets",
     "FieldAccess",
     "FrustumGrid",
     "airlight_from_illuminance",

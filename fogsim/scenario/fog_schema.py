@@ -5,6 +5,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
+from fogsim.atmosphere import Droplets
 from fogsim.scenario.section import NotNegative, Positive, Section, Visibility
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -113,6 +114,9 @@ class Fog(Section):
 
     changes: tuple[Change, ...] = ()
     """How the fog thickens, thins, sinks and lifts over time."""
+
+    droplets: Droplets = Droplets.MODERATE_RADIATION
+    """Sizes of the droplets, which set how fog scatters lamplight: large in advection fog, small in radiation fog."""
 
     airlight_shading: Annotated[float, Field(ge=0, le=1)] = 0.0
     """Dimming of the airlight for each unit of optical depth overhead; 0.1 in real fog, 0 for an even airlight."""

@@ -48,8 +48,9 @@ class Clocks(Section):
 class Light(Section):
     """Daylight."""
 
-    illuminance_lx: Positive = 10_000.0
-    """Horizontal illuminance of the overcast day."""
+    illuminance_lx: NotNegative = 10_000.0
+    """Horizontal illuminance of the overcast sky: 10 000 by day, 1 … 100 in twilight, 0.01 … 0.1 at night. Below 1000
+    lamps light the road and the fog."""
 
 
 class Lead(Section):
@@ -110,6 +111,9 @@ class Scenario(Section):
 
     renderer: Annotated[str, Field(default="auto")]
     """`auto` or a renderer's name."""
+
+    street_lamps: bool = False
+    """Whether lamps stand along the roads, about every 35 m."""
 
     scenery_seed: int = Field(default=0, ge=0)
     """Seed of trees and posts, which are the same for every seed of the run."""

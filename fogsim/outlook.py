@@ -1,0 +1,95 @@
+"""What the ego's camera looks at: the scene of a scenario, the renderer that draws it, and the air and lamps in it."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.atmosphere import Air
+from fogsim.camera import averaged, middle_samples, supersampled
+from fogsim.lighting import LampMount, own_head_lamps
+from fogsim.render import make_renderer
+from fogsim.scenario import Scenario, build
+from fogsim.scene import build_scene, light_sources, street_lamp_heads, vehicle_batches
+from fogsim.values import CameraPose, FogField, Lamp, Lights, RoadNetwork, SignMap, TrafficState, View
+
+LAMPLIGHT_BELOW = 1000.0
+"""Horizontal illuminance below which lamplight is drawn [lx].
+
+UNECE R48 lights the dipped beam by itself below it; above, the veil of the own lamps is less than 1 % of the airlight.
+"""
+
+
+class Outlook:
+    """The world of a scenario as the camera on its ego sees it.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario; of its traffic, nothing is used.
+    network : RoadNetwork
+        The roads.
+    signs : SignMap
+        The signs.
+
+    Attributes
+    ----------
+    signs : SignMap
+        The signs.
+    fog : FogField
+        The fog at the start of a run.
+
+    Raises
+    ------
+    MissingDependencyError
+        If the renderer does not work here.
+    """
+
+    def __init__(self, scenario: Scenario, network: RoadNetwork, signs: SignMap) -> None:
+        self.signs = signs
+        self.fog: FogField = build.fog_field(scenario, network.route)
+        self._camera, self._samples = build.camera(scenario), scenario.camera.samples
+        self._drawn_camera = supersampled(self._camera, self._samples)
+        self._setback = scenario.camera.setback_m
+        rng = np.random.default_rng(scenario.scenery_seed)
+        scene = build_scene(network, signs, rng, street_lamps=scenario.street_lamps)
+        self._by_lamplight = scenario.light.illuminance_lx < LAMPLIGHT_BELOW
+        self._mount, self._street_lamps = LampMount(), street_lamp_heads(scene)
+        self._air = Air(self.fog, scenario.fog.droplets)
+        self._renderer = make_renderer(scenario.renderer, scene, scenario.light.illuminance_lx)
+
+    def see(self, state: TrafficState, ego: int, pose: CameraPose, time: float) -> tuple[View, NDArray[np.float32]]:
+        """Draw what is there, and what of it reaches the camera through the air.
+
+        Parameters
+        ----------
+        state : TrafficState
+            Every vehicle.
+        ego : int
+            Row of the one that carries the camera.
+        pose : CameraPose
+            Where the camera is.
+        time : float
+            Time since the run began [s].
+
+        Returns
+        -------
+        View
+            The scene without air, one sample a pixel.
+        (rows, cols, 3) float32
+            Linear radiance at the camera [cd/m²], the mean of a pixel's samples.
+        """
+        camera, lights = self._drawn_camera, self._lights(state, ego, pose)
+        view = self._renderer.render(vehicle_batches(state, ego), camera, pose, lamplight=bool(lights.own))
+        radiance = self._air.radiance(view, camera, pose, lights, time)
+        return middle_samples(view, self._samples), averaged(radiance, self._samples)
+
+    def _lights(self, state: TrafficState, ego: int, pose: CameraPose) -> Lights:
+        if not self._by_lamplight:
+            return Lights.none()
+        return Lights(
+            own=own_head_lamps(Lamp(int(state.lamps[ego])), self._camera.mount_height, self._setback, self._mount),
+            others=light_sources(state, ego, pose.position, self._mount.beams, self._street_lamps),
+        )
+
+    def close(self) -> None:
+        """Free the renderer; closing twice is allowed."""
+        self._renderer.close()

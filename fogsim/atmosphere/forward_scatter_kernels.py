@@ -9,6 +9,23 @@ _NONE, _HALF = np.float32(0.0), np.float32(0.5)
 
 
 @kernel
+def blur_rows(image: NDArray[np.float32], weights: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+    """Convolve each row of an image (rows, cols, 3); what the weights miss at the edges is shared among the rest."""
+    columns, reach = image.shape[1], weights.shape[0] // 2
+    for u in range(columns):
+        first, last = max(0, u - reach), min(columns, u + reach + 1)
+        whole = np.float32(0.0)
+        for n in range(first, last):
+            whole += weights[n - u + reach]
+        for v in range(image.shape[0]):
+            for c in range(3):
+                total = np.float32(0.0)
+                for n in range(first, last):
+                    total += weights[n - u + reach] * image[v, n, c]
+                out[v, u, c] = total / whole
+
+
+@kernel
 def exchange(
     radiance: NDArray[np.float32],
     transmitted: NDArray[np.float32],
@@ -17,8 +34,8 @@ def exchange(
     block: int,
     weight: np.float32,
 ) -> None:
-    """Exchange a share w (1 − T) of transmitted light for its blur, of which each block (cols, rows, 3) has a value."""
-    columns, rows = blurred.shape[0], blurred.shape[1]
+    """Exchange a share w (1 − T) of transmitted light for its blur, of which each block (rows, cols, 3) has a value."""
+    rows, columns = blurred.shape[0], blurred.shape[1]
     part = np.float32(1.0) / np.float32(block)
     for v in range(transmission.shape[0]):
         down = min(max((np.float32(v) + _HALF) * part - _HALF, _NONE), np.float32(rows - 1))
@@ -32,6 +49,6 @@ def exchange(
             a = across - np.float32(left)
             share = weight * (np.float32(1.0) - transmission[v, u])
             for c in range(3):
-                above = blurred[left, upper, c] + (blurred[right, upper, c] - blurred[left, upper, c]) * a
-                below = blurred[left, lower, c] + (blurred[right, lower, c] - blurred[left, lower, c]) * a
+                above = blurred[upper, left, c] + (blurred[upper, right, c] - blurred[upper, left, c]) * a
+                below = blurred[lower, left, c] + (blurred[lower, right, c] - blurred[lower, left, c]) * a
                 radiance[v, u, c] += share * (above + (below - above) * b - transmitted[v, u, c])

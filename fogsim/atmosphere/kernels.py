@@ -16,7 +16,7 @@ ENDLESS = 1e7
 
 _LEVEL = np.float32(1e-12)
 _LOG2_E = np.float32(math.log2(math.e))
-_LEAST = np.float32(-126.0)
+_LEAST = np.float32(-100.0)
 _ONE = np.float32(1.0)
 # 2^f − 1 = f · P(f) on (−1, 0]: Remez-like weighted least squares, error 6·10⁻⁸; exact at 0, where clear air is.
 _P0, _P1, _P2, _P3, _P4 = (np.float32(c) for c in (0.69314442, 0.24018671, 0.05531669, 0.00922838, 0.00095403))

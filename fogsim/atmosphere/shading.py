@@ -18,10 +18,10 @@ _LEVELS = 800
 def airlight_source(field: FogField, grid: FrustumGrid) -> NDArray[np.float32] | None:
     """What fog scatters towards the eye beyond the field's even airlight.
 
-    Two-stream theory has the diffuse light in a layer that absorbs nothing fall with the optical depth τ↑ overhead as
-    1 / (1 + σ τ↑), σ = ¾ (1 − g) (Bohren 1987, Am. J. Phys. 55, 524: transmission of a cloud over dark ground). Here
-    the airlight of each place goes by that law, relative to the ground outside banks, where it is the field's; τ↑ is
-    that of the vertical column that is as dense as the place itself. By definition the result is zero for σ = 0.
+    A layer that absorbs nothing, over dark ground, lets the share 1 / (1 + σ τ↑) of diffuse light through, with
+    σ = ¾ (1 − g) in Eddington's two-stream approximation (Meador and Weaver 1980, J. Atmos. Sci. 37, 630). Here the
+    airlight of each place goes by that law, relative to the ground outside banks, where it is the field's; τ↑ is that
+    of the vertical column that is as dense as the place itself.
 
     Parameters
     ----------

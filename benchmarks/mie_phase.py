@@ -88,7 +88,7 @@ def main():
     degrees = angles()
     columns = [phase_function(a, d, degrees) for a, d in FOGS.values()]
     with path.open("w", encoding="utf-8") as file:
-        file.write("# Phase functions of fog droplets [1/sr], integral over the sphere 1; scattering angle [degrees].\n")
+        file.write("# Phase functions of fog droplets [1/sr], integral over the sphere 1; angle [degrees].\n")
         file.write("# Droplets: Shettle & Fenn (1979), AFGL-TR-79-0214; Mie theory for m = 1.333 at 0.55 um.\n")
         file.write("# Command: python benchmarks/mie_phase.py fogsim/atmosphere/data/phase_functions.csv\n")
         file.write("angle," + ",".join(FOGS) + "\n")

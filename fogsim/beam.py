@@ -11,7 +11,7 @@ from fogsim.values import Beam
 FALL_OFF = 0.07
 """How fast intensity falls beyond a measured table [decades per degree]; laboratory reports show 0.04 … 0.12."""
 
-FLOOR = 1.0
+FLOOR = 0.01
 """Least intensity that logarithms are taken of [cd]."""
 
 

@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.frustum import frustum_grid, radiance_through_grid
-from fogsim.atmosphere.koschmieder import fogged_radiance
-from fogsim.atmosphere.medium import field_at, is_plain
-from fogsim.atmosphere.shading import airlight_source
-from fogsim.pinhole import ray_from_pixel
+from fogsim.atmosphere.daytime import daytime_radiance, transmission
+from fogsim.atmosphere.halos import Halos
+from fogsim.atmosphere.lamplight import OwnLamplight
+from fogsim.atmosphere.medium import field_at
+from fogsim.atmosphere.phase import Droplets
 from fogsim.values import Camera, CameraPose, FogField, Lights, View
 
 _UNLIT = Lights.none()
@@ -24,10 +24,13 @@ class Air:
     ----------
     field : FogField
         The fog.
+    droplets : Droplets
+        Sizes of its droplets, which set how lamplight is scattered.
     """
 
-    def __init__(self, field: FogField) -> None:
+    def __init__(self, field: FogField, droplets: Droplets = Droplets.MODERATE_RADIATION) -> None:
         self._field = field
+        self._own, self._halos = OwnLamplight(droplets), Halos(droplets)
 
     def radiance(
         self, view: View, camera: Camera, pose: CameraPose, lights: Lights = _UNLIT, time: float = 0.0
@@ -51,10 +54,31 @@ class Air:
         -------
         (rows, cols, 3) float32
             Linear radiance at the camera [cd/m²].
+
+        Raises
+        ------
+        InputError
+            If the beam of a lit lamp has holes.
         """
-        del lights
         field = field_at(self._field, time)
-        if is_plain(field) and pose.position[2] <= field.top:
-            return fogged_radiance(view, field, pose.position, ray_from_pixel(camera, pose))
-        grid = frustum_grid(field, camera, pose)
-        return radiance_through_grid(view, grid, field.airlight, airlight_source(field, grid))
+        radiance = daytime_radiance(view, field, camera, pose)
+        if lights.own:
+            self._own.add(radiance, view, camera, pose, field, lights.own)
+        if len(lights.others.intensity):
+            self._halos.add(radiance, view, camera, pose, field, lights.others)
+        return radiance
+
+    def transmission(self, view: View, camera: Camera, pose: CameraPose, time: float = 0.0) -> NDArray[np.float32]:
+        """Transmission T = e^(−τ) up to what each pixel shows.
+
+        Parameters
+        ----------
+        view, camera, pose, time
+            As in `radiance`.
+
+        Returns
+        -------
+        (rows, cols) float32
+            0 … 1; for the sky, that of the whole path to the fog's end.
+        """
+        return transmission(view, field_at(self._field, time), camera, pose)

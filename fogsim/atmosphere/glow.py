@@ -24,19 +24,22 @@ from numpy.typing import ArrayLike, NDArray
 
 from fogsim.atmosphere.phase import Droplets, PhaseFunction, blurred, phase_function
 
-SPREADS = (0.4, 0.95)
+SPREADS = (0.42, 0.91)
 """Widths by which the phase functions p₂ and p₃ are blurred [rad]."""
 
-LOSSES = (0.65, 0.2)
-"""η₂ and η₃: parts of the extinction that spread light suffers [-]."""
+LOSS_ONCE_SPREAD = 0.70
+"""η₂: part of the extinction that light suffers which was spread a little [-]."""
+
+LOSS_OF_DIFFUSE_LIGHT = 1.5
+"""η₃ / (1 − g): light that was spread widely is lost by what droplets turn round, as in diffusion theory [-]."""
 
 FORWARD = math.radians(1.0)
 """Scattering angle below which light is not lost at all [rad]."""
 
-FOLD_CHORD = 0.05
+FOLD_CHORD = 0.15
 """Chord that is placed half-way in the table's direction of angles [-]."""
 
-_CHORDS = 96
+_CHORDS = 144
 _DEPTHS = np.geomspace(0.02, 16.0, 30)
 _STEPS = 240
 
@@ -88,12 +91,19 @@ def glow(depth: ArrayLike, angle: ArrayLike, droplets: Droplets) -> NDArray[np.f
     phase = phase_function(droplets)
     first = 1.0 - forward_share(phase)
     total = scattered_once(depth, angle, phase, first)
-    for spread, loss in zip(SPREADS, LOSSES, strict=True):
+    last = LOSS_OF_DIFFUSE_LIGHT * (1.0 - mean_cosine(phase))
+    for spread, loss in zip(SPREADS, (LOSS_ONCE_SPREAD, last), strict=True):
         wide = blurred(phase, spread)
         more = scattered_once(depth, angle, wide, loss) - scattered_once(depth, angle, wide, first)
         total = total + np.maximum(more, 0.0)
         first = min(first, loss)
     return total
+
+
+def mean_cosine(phase: PhaseFunction) -> float:
+    """Mean cosine g of the scattering angle."""
+    theta = np.linspace(0.0, math.pi, 20001)
+    return float(2.0 * math.pi * np.trapezoid(phase(theta) * np.sin(theta) * np.cos(theta), theta))
 
 
 def forward_share(phase: PhaseFunction, angle: float = FORWARD) -> float:

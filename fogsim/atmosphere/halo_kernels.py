@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from fogsim.atmosphere.kernels import three_times
 from fogsim.jit import kernel
 
-WIDE_SIZE = 160
+WIDE_SIZE = 200
 """Entries of a lamp's profile on the coarse image, over c² / (c² + WIDE_FOLD)."""
 
-WIDE_FOLD = 0.0025
+WIDE_FOLD = 0.02
 
 CORE_SIZE = 64
 """Entries of a lamp's profile near it, evenly over the distance on the image."""
@@ -60,7 +60,7 @@ def lamp_profiles(
         for c in range(line.shape[0]):
             line[c] = gain * math.exp(log_glow[row, c] + (log_glow[row + 1, c] - log_glow[row, c]) * share)
         for n in range(WIDE_SIZE):
-            u = min(n / (WIDE_SIZE - 1.0), 0.9994)
+            u = min(n / (WIDE_SIZE - 1.0), 0.995)
             chord = math.sqrt(WIDE_FOLD * u / (1.0 - u) + softness[i] ** 2 + core_softness**2)
             wide[i, n] = _glow(chord, line, fold)
         for n in range(CORE_SIZE):

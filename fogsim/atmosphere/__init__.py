@@ -1,6 +1,6 @@
 """Pure physics of light in fog: extinction, optical depth, airlight."""
 
-from fogsim.atmosphere.access import FieldAccess
+from fogsim.atmosphere.access import FieldAccess, FogNow
 from fogsim.atmosphere.air import Air
 from fogsim.atmosphere.daylight import airlight_from_illuminance
 from fogsim.atmosphere.frustum import FrustumGrid, frustum_grid, radiance_through_grid
@@ -13,6 +13,7 @@ __all__ = [
     "Air",
     "Droplets",
     "FieldAccess",
+    "FogNow",
     "FrustumGrid",
     "airlight_from_illuminance",
     "extinction",

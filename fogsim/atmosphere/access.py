@@ -68,3 +68,45 @@ class FieldAccess:
     def optical_depth(self, start: ArrayLike, end: ArrayLike, time: float | None = None) -> NDArray[np.float64]:
         """Optical depth between points (..., 3) [-]; see `fogsim.atmosphere.optical_depth`."""
         return optical_depth(self.field, start, end, self.time if time is None else time)
+
+
+class FogNow:
+    """A field as it is now, for those who ask about the fog and keep no time; whoever keeps the time sets it.
+
+    Parameters
+    ----------
+    field : FogField
+        The fog over time.
+    """
+
+    def __init__(self, field: FogField) -> None:
+        self._always = FieldAccess(field)
+        self._now = field_at(field, 0.0)
+
+    def set_time(self, time: float) -> None:
+        """Let it be a time from here on.
+
+        Parameters
+        ----------
+        time : float
+            Time since the run began [s].
+        """
+        self._now = field_at(self._always.field, time)
+
+    @property
+    def maximum_extinction(self) -> float:
+        """Extinction coefficient that is exceeded nowhere and never [1/m]."""
+        return self._always.maximum_extinction
+
+    @property
+    def minimum_extinction(self) -> float:
+        """Extinction coefficient that is reached always and everywhere [1/m]; see `FieldAccess`."""
+        return self._always.minimum_extinction
+
+    def extinction(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Extinction coefficient at points (..., 3) now [1/m]."""
+        return extinction(self._now, points)
+
+    def optical_depth(self, start: ArrayLike, end: ArrayLike) -> NDArray[np.float64]:
+        """Optical depth between points (..., 3) now [-]."""
+        return optical_depth(self._now, start, end)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fogsim.atmosphere import FieldAccess, extinction, field_at, optical_depth, optical_depth_along
+from fogsim.atmosphere import FieldAccess, FogNow, extinction, field_at, optical_depth, optical_depth_along
 from fogsim.atmosphere.noise import CELLS, patch_factors
 from fogsim.errors import InputError
 from fogsim.values import FogBank, FogChange, FogField, FogPatches
@@ -126,6 +126,17 @@ def test_access_answers_for_its_time_and_bounds_all_times() -> None:
         k = access.extinction(places, time)
         assert access.minimum_extinction <= k.min()
         assert k.max() <= access.maximum_extinction
+
+
+def test_fog_now_is_the_fog_of_the_time_that_was_set() -> None:
+    field = FogField(0.004, AIRLIGHT, (BANK,), patches=PATCHES, wind=(3.0, -2.0))
+    now, a, b = FogNow(field), np.array([0.0, 0.0, 1.0]), np.array([90.0, 40.0, 1.0])
+    for time in (0.0, 12.5):
+        now.set_time(time)
+        assert now.optical_depth(a, b) == optical_depth(field, a, b, time)
+        assert now.extinction(b) == extinction(field, b, time)
+    assert now.maximum_extinction == FieldAccess(field).maximum_extinction
+    assert now.minimum_extinction == FieldAccess(field).minimum_extinction
 
 
 def test_ground_fog_is_not_surely_anywhere() -> None:

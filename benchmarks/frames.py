@@ -1,16 +1,17 @@
 """Time of a camera frame: from where the vehicles are to an 8-bit image, in fog and with noise.
 
-What is timed is what the closed loop does for a frame (fogsim/onboard.py), stage by stage: batches of vehicles
-("scene"), drawing to radiance, distance and ids ("render"), fog and lamplight ("air"), exposure with photon and read
-noise, response curve and quantisation ("camera"). Traffic and estimators are not in it.
+What is timed is what the closed loop does for a frame: `Outlook.see` (vehicles to batches and lit lamps to lights,
+drawing to radiance, distance and ids, fog and lamplight) and `Photographer.take` (exposure with photon and read noise,
+response curve and quantisation). Traffic and estimators are not in it. Of the stages, "render" is the drawing, "air"
+fog and lamplight, "camera" the taking, and "scene" what is left.
 
 The scene is the road of the scenario motorway_fog_bank with trees, rails and posts, 30 vehicles of every kind with lit
-lamps on its lanes 12 … 250 m ahead and 10 signs beside it, in homogeneous fog of 100 m visibility. The camera
-drives on by 2.5 m a frame, over 50 m and again from the start. Repetitions of all renderers alternate, and each record
-has the median of the repetitions' medians and the fastest frame; on a machine that does other work too, only the
-fastest says something.
+lamps on its lanes 12 ... 250 m ahead and 10 signs beside it, in homogeneous fog of 100 m visibility; by night the
+camera's own low beam and everyone's lamps light it. The camera drives on by 2.5 m a frame, over 50 m and again from the
+start. Repetitions of all cases alternate, and each record has the median of the repetitions' medians, the fastest
+frame, and each stage's median; on a machine that does other work too, only the fastest says something.
 
-    python benchmarks/frames.py [--json] [--renderer cpu …] [--light night …] [--size 640x480 …] [--frames 60]
+    python benchmarks/frames.py [--json] [--renderer cpu ...] [--light night ...] [--size 640x480 ...] [--frames 60]
         [--repeat 5]
 """
 
@@ -21,20 +22,19 @@ import math
 import statistics
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import fogsim
-from fogsim.atmosphere import Air
-from fogsim.camera import Photographer, mounted_pose
-from fogsim.render import RENDERERS, Renderer, make_renderer
+from fogsim.camera import mounted_pose
+from fogsim.outlook import Outlook
+from fogsim.render import RENDERERS
 from fogsim.scenario import Scenario, build
 from fogsim.scene import build_scene, vehicle_batches
 from fogsim.traffic.network import read_net, road_network
-from fogsim.values import Camera, CameraPose, Lamp, RoadNetwork, Scene, Sign, SignMap, TrafficState
+from fogsim.values import Lamp, RoadNetwork, Sign, SignMap, TrafficState
 
 ROUTE = ("approach", "bank", "exit")
 LANES = (-3.75, 0.0, 3.75)  # to the left of the route, which is the middle lane [m]
@@ -47,18 +47,19 @@ SIZES = {  # length, width and height [m]
     "motorcycle": (2.1, 0.8, 1.5),
 }
 KINDS = ("car", "car", "truck", "car", "van", "car", "bus", "car", "car", "motorcycle")
-LIGHTS = {"day": 10_000.0}
+LIGHTS = {"day": 10_000.0, "night": 0.5}  # [lx]
 Key = tuple[str, str, str]
 """Renderer, light and size of a case."""
 
 STAGES = ("scene", "render", "air", "camera")
 
 
-def scenario(light: str, size: str) -> Scenario:
+def scenario(renderer: str, light: str, size: str) -> Scenario:
     """The scenario with homogeneous fog and a camera of a given size."""
     width, height = size.split("x")
-    overrides = (f"camera.width={width}", f"camera.height={height}", "fog={visibility_m: 100}")
-    return fogsim.load_scenario("motorway_fog_bank", [*overrides, f"light.illuminance_lx={LIGHTS[light]}"])
+    camera = (f"camera.width={width}", f"camera.height={height}")
+    lit = ("fog={visibility_m: 100}", f"light.illuminance_lx={LIGHTS[light]}", f"renderer={renderer}")
+    return fogsim.load_scenario("motorway_fog_bank", [*camera, *lit])
 
 
 def read_network() -> RoadNetwork:
@@ -112,62 +113,67 @@ def traffic_at(route: NDArray[np.float64], travelled: float) -> TrafficState:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Case:
-    """One renderer in one light at one size, ready to take frames."""
+class Timed:
+    """Stands before a part of the outlook and adds up the time [s] that one of its methods takes."""
 
-    renderer: Renderer
-    camera: Camera
-    air: Air
-    photographer: Photographer
-    traffic: tuple[TrafficState, ...]
-    poses: tuple[CameraPose, ...]
-    rng: np.random.Generator
+    def __init__(self, part: Any, method: str) -> None:
+        self._part, self._method, self.spent = part, method, 0.0
+
+    def __getattr__(self, name: str) -> Any:
+        """The part's own methods, the one of interest by a stopwatch."""
+        own = getattr(self._part, name)
+        if name != self._method:
+            return own
+
+        def timed(*arguments: Any, **options: Any) -> Any:
+            started = time.perf_counter()
+            result = own(*arguments, **options)
+            self.spent += time.perf_counter() - started
+            return result
+
+        return timed
+
+
+class Case:
+    """One renderer in one light at one size, ready to take frames.
+
+    Parameters
+    ----------
+    key : tuple of str
+        Renderer, light and size.
+    network : RoadNetwork
+        The roads.
+    """
+
+    def __init__(self, key: Key, network: RoadNetwork) -> None:
+        described = scenario(*key)
+        camera, setback = build.camera(described), described.camera.setback_m
+        self._outlook = Outlook(described, network, signs_beside(network.route))
+        self._photographer, self._rng = build.photographer(described), np.random.default_rng(1)
+        self.traffic = [traffic_at(network.route, STEP * number) for number in range(ROUND)]
+        self.poses = [mounted_pose(camera, one.position[0], float(one.heading[0]), setback) for one in self.traffic]
+        self._render = self._outlook._renderer = Timed(self._outlook._renderer, "render")
+        self._air = self._outlook._air = Timed(self._outlook._air, "radiance")
 
     def frame(self, number: int) -> list[float]:
-        """Take a frame; seconds spent in each stage."""
-        number %= len(self.poses)
-        state, pose = self.traffic[number], self.poses[number]
-        times = [time.perf_counter()]
-        batches = vehicle_batches(state, 0)
-        times.append(time.perf_counter())
-        view = self.renderer.render(batches, self.camera, pose)
-        times.append(time.perf_counter())
-        radiance = self.air.radiance(view, self.camera, pose, time=0.1 * number)
-        times.append(time.perf_counter())
-        self.photographer.take(radiance, self.rng)
-        times.append(time.perf_counter())
-        return [after - before for before, after in itertools.pairwise(times)]
+        """Take a frame; seconds that each stage took."""
+        number %= ROUND
+        self._render.spent = self._air.spent = 0.0
+        started = time.perf_counter()
+        _, radiance = self._outlook.see(self.traffic[number], 0, self.poses[number], 0.1 * number)
+        seen = time.perf_counter()
+        self._photographer.take(radiance, self._rng)
+        render, air = self._render.spent, self._air.spent
+        return [seen - started - render - air, render, air, time.perf_counter() - seen]
+
+    def close(self) -> None:
+        """Free the renderer."""
+        self._outlook.close()
 
 
-def world() -> tuple[Scene, RoadNetwork]:
-    """The scene, and the roads that it was made of."""
-    network = read_network()
-    return build_scene(network, signs_beside(network.route), np.random.default_rng(1)), network
-
-
-def case(renderer: str, light: str, size: str, scene: Scene, route: NDArray[np.float64]) -> Case:
-    """Everything that a frame needs."""
-    described = scenario(light, size)
-    camera = build.camera(described)
-    traffic = tuple(traffic_at(route, STEP * number) for number in range(ROUND))
-    poses = tuple(
-        mounted_pose(camera, state.position[0], float(state.heading[0]), described.camera.setback_m)
-        for state in traffic
-    )
-    return Case(
-        renderer=make_renderer(renderer, scene, LIGHTS[light]),
-        camera=camera,
-        air=Air(build.fog_field(described, route)),
-        photographer=build.photographer(described),
-        traffic=traffic,
-        poses=poses,
-        rng=np.random.default_rng(1),
-    )
-
-
-def triangles(scene: Scene, state: TrafficState) -> int:
+def triangles(network: RoadNetwork, state: TrafficState) -> int:
     """Number of triangles in the scene at full detail, the vehicles' among them."""
+    scene = build_scene(network, signs_beside(network.route), np.random.default_rng(1))
     copies = (*scene.scenery, *vehicle_batches(state, 0))
     return len(scene.ground.faces) + sum(len(scene.shapes[b.shape].faces) * len(b.transforms) for b in copies)
 
@@ -215,13 +221,12 @@ def main() -> None:
             arguments.renderer or list(RENDERERS), arguments.light or LIGHTS, arguments.size or ["160x120", "640x480"]
         )
     )
-    scene, network = world()
-    cases = {key: case(*key, scene, network.route) for key in keys}
-    state = next(iter(cases.values())).traffic[0]
-    shared = {"triangles": triangles(scene, state), "vehicles": VEHICLES, "signs": SIGNS}
+    network = read_network()
+    cases = {key: Case(key, network) for key in keys}
+    shared = {"triangles": triangles(network, cases[keys[0]].traffic[0]), "vehicles": VEHICLES, "signs": SIGNS}
     records = [one | shared for one in measure(cases, arguments.frames, arguments.repeat)]
     for one in cases.values():
-        one.renderer.close()
+        one.close()
     if arguments.json:
         print(json.dumps(records, indent=2))
         return

@@ -1,6 +1,5 @@
 """What is truly seen in a step's frame: how much light comes through the air, and what each pixel belongs to."""
 
-import dataclasses
 from enum import IntEnum
 
 import numpy as np
@@ -86,11 +85,7 @@ def transmission(step: Step) -> NDArray[np.float32]:
     truth = step.truth
     if truth.fog is None or truth.camera is None or truth.pose is None:
         raise InputError("the true transmission is known only of steps that a camera in a loop has made")
-    # A white scene in fog that adds no light of its own is seen as its transmission.
-    white = dataclasses.replace(step.view, radiance=np.ones_like(step.view.radiance), lamp_response=None)
-    dark = dataclasses.replace(truth.fog, airlight=(0.0, 0.0, 0.0))
-    seen = Air(dark).radiance(white, truth.camera, truth.pose)
-    return np.ascontiguousarray(seen[..., 0])
+    return Air(truth.fog).transmission(step.view, truth.camera, truth.pose)
 
 
 def semantic_mask(step: Step) -> NDArray[np.uint8]:

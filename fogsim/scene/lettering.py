@@ -16,7 +16,7 @@ Points = list[tuple[float, float]]
 
 
 def _arc(x: float, y: float, rx: float, ry: float, start: float, end: float) -> Points:
-    angle = np.radians(np.linspace(start, end, max(int(abs(end - start) / 20), 3)))
+    angle = np.radians(np.linspace(start, end, max(round(abs(end - start) / 36) + 1, 3)))
     return list(zip((x + rx * np.cos(angle)).tolist(), (y + ry * np.sin(angle)).tolist(), strict=True))
 
 

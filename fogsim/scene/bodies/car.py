@@ -165,12 +165,12 @@ def car(form: CarForm) -> Mesh:
 
 def simple_car(form: CarForm) -> Simple:
     """Stand-in of a car."""
-    rows = np.array([0, 2, 4, 7, 9])
+    rows = np.array([1, 2, 4, 7, 8])
     x = np.interp(_BODY[rows, 0], _BASE, form.along)
     low, top = (np.interp(_BODY[rows, i], _HEIGHTS, form.heights) for i in (2, 3))
     body = [(float(a), float(b), float(c), float(d)) for a, b, c, d in zip(x, _BODY[rows, 1], low, top, strict=True)]
     length, height = form.length, max(z for _, z in form.roof) + 0.035
-    body = [(min(max(a, 0.03), length - 0.03), *rest) for a, *rest in body]  # type: ignore[misc]  # four numbers
+    body = [(0.03, *body[0][1:]), *body[1:-1], (length - 0.03, *body[-1][1:])]
     (foot, belt), (top_x, _), *_, (rear_top, _), (rear_foot, _) = form.roof
     belt = form.heights[-1] - 0.04
     half = form.side(0.5 * (belt + height))

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.scene.bodies.lamp_patches import lamp_quads
-from fogsim.scene.bodies.parts import BACK, LEFT, PLATE, UP, finished, panel_back
-from fogsim.scene.solids import GLASS, PAINT, TYRE, UNDERBODY, Material, both_sides, merge, quad
+from fogsim.scene.bodies.parts import BACK, LEFT, PLATE, UP, finished, panel_back, panel_front
+from fogsim.scene.solids import BLACK_PLASTIC, GLASS, PAINT, TYRE, UNDERBODY, Material, both_sides, merge, quad
 from fogsim.values.scene import Mesh
 
 Section = tuple[float, float, float, float]
@@ -72,15 +72,27 @@ def far(form: Simple, near: Mesh) -> Mesh:
     parts += [_panes(block) for block in form.blocks if block.panes]
     parts += [_wheel(x, 0.5 * width, form.radius) for x in form.axles]
     parts.append(panel_back(length, (-0.26, 0.26), (form.plate - 0.06, form.plate + 0.06), PLATE))
-    return _with_lamps(form, parts, near)
+    if form.axles:
+        grille = (0.72 * form.plate, 0.92 * form.plate)
+        parts.append(panel_front(0.01, (-0.24 * width, 0.24 * width), grille, BLACK_PLASTIC))
+    return _with_lamps(form, [*parts, _under(form)], near)
 
 
 def tiny(form: Simple, near: Mesh) -> Mesh:
     """Speck of a few dozen triangles, with the lamps of the shape in full."""
+    return _with_lamps(form, [*(_block(_outermost(block)) for block in form.blocks), _under(form)], near)
+
+
+def _under(form: Simple) -> Mesh:
+    """Darkness between the wheels, seen from behind and from the front; none under a motorcycle."""
     length, width, _ = form.size
-    under = [(length, y, z) for y, z in ((-0.45, 0.0), (0.45, 0.0), (0.45, 1.0), (-0.45, 1.0))]
-    dark = [(x, y * width, 0.05 + z * form.radius) for x, y, z in under]
-    return _with_lamps(form, [*(_block(_outermost(block)) for block in form.blocks), quad(dark, UNDERBODY, BACK)], near)
+    if not form.axles:
+        return merge(())
+    y, high = 0.42 * width, 0.8 * form.radius
+    parts = []
+    for x, toward in ((0.04, -BACK), (length - 0.04, BACK)):
+        parts.append(quad([(x, -y, 0.02), (x, y, 0.02), (x, y, high), (x, -y, high)], UNDERBODY, toward))
+    return merge(parts)
 
 
 def _outermost(block: Block) -> Block:

@@ -27,9 +27,9 @@ def sign_shapes(signs: Sequence[Sign]) -> dict[str, Mesh]:
     shapes = {_POST: tube(0.0, 1.0, 0.038, 0.038, _BACK)} if signs else {}
     for name, sign in {shape_name(sign): sign for sign in signs}.items():
         face = face_of(sign)
-        rear = back(face.outline, _BACK)
-        shapes |= {name: merge((face.near(), rear)), name + FAR: merge((face.far(), rear))}
-        shapes[name + TINY] = merge((face.tiny(), rear))
+        shapes[name] = merge((face.near(), back(face.outline, _BACK)))
+        rear = back(face.coarse, _BACK)
+        shapes |= {name + FAR: merge((face.far(), rear)), name + TINY: merge((face.tiny(), rear))}
     return shapes
 
 

@@ -9,7 +9,8 @@ from fogsim.scene.signs.symbols import BLACK, FIELD, RED, SIGN, Corners, flat
 from fogsim.scene.solids import Material, merge
 from fogsim.values.scene import Mesh
 
-_CORE = 0.6  # size of the inner of two areas of a face that is very small in the picture
+_ROUND = 36  # corners of what is round
+_CORE = 0.66  # size of the inner of two areas of a face that is very small in the picture
 _LAYER = 0.013  # what is printed lies this far before what it is printed on, so that neither shows through
 
 
@@ -40,6 +41,11 @@ class Face:
     widths: tuple[float, float]
     symbol: Mesh
 
+    @property
+    def coarse(self) -> tuple[tuple[float, float], ...]:
+        """Outline with a third of its corners, if it is round."""
+        return self.outline[:: 3 if len(self.outline) == _ROUND else 1]
+
     def near(self) -> Mesh:
         """Triangles of the whole face."""
         frame, field = self.widths
@@ -52,15 +58,15 @@ class Face:
 
     def far(self) -> Mesh:
         """The face without its rim, which is too narrow to see."""
-        field = flat(_scaled(self.outline, self.widths[1]), self.field)
-        return _stacked(flat(self.outline, self.frame), field, self.symbol)
+        field = flat(_scaled(self.coarse, self.widths[1]), self.field)
+        return _stacked(flat(self.coarse, self.frame), field, self.symbol)
 
     def tiny(self) -> Mesh:
         """Two areas that have the mean colours of what is too small to see on them."""
-        field = _blended(flat(_scaled(self.outline, self.widths[1]), self.field), self.symbol)
-        core = flat(_scaled(self.outline, _CORE), self.field)
+        field = _blended(flat(_scaled(self.coarse, self.widths[1]), self.field), self.symbol)
+        core = flat(_scaled(self.coarse, _CORE), self.field)
         core = replace(core, reflectance=np.broadcast_to(field.reflectance[0], core.reflectance.shape).copy())
-        frame = flat(self.outline, self.frame)
+        frame = flat(self.coarse, self.frame)
         share = max(self.widths[1] ** 2 - _CORE**2, 0.0) / (1.0 - _CORE**2)
         mean = share * field.reflectance + (1.0 - share) * frame.reflectance[: len(field.reflectance)]
         return _stacked(replace(frame, reflectance=mean.astype(np.float32)), core)
@@ -111,7 +117,7 @@ def triangle(direction: float) -> tuple[tuple[float, float], ...]:
 
 def disc_face(symbol: Mesh, *, frame: Material = RED, field: Material = FIELD, ring: float = 0.78) -> Face:
     """Round sign: white rim, coloured ring, field."""
-    return Face(regular(32, 0.0), FIELD, frame, field, (0.965, ring), symbol)
+    return Face(regular(_ROUND, 0.0), FIELD, frame, field, (0.965, ring), symbol)
 
 
 def warning_face(symbol: Mesh) -> Face:

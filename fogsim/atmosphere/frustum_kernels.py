@@ -110,6 +110,7 @@ def grid_pixels(
     power = np.empty(columns, np.int32)
     in_channels, light = np.empty(3 * columns, np.float32), np.empty(3 * columns, np.float32)
     node, share = np.empty(columns, np.int64), np.empty(columns, np.float32)
+    reach, place = np.empty(columns, np.float32), np.empty(columns, np.int32)
     per_metre = np.empty(nodes - 1, np.float32)
     for n in range(nodes - 1):
         per_metre[n] = np.float32(1.0) / (distances[n + 1] - distances[n])
@@ -122,9 +123,11 @@ def grid_pixels(
         down = (np.float32(v) - rows[upper]) / (rows[upper + 1] - rows[upper])
         _between(depth[upper], depth[upper + 1], down, above)
         for u in range(columns):
-            d = min(distance[v, u], np.float32(ENDLESS))
-            n = interval[int(d / (d + fold) * np.float32(bins))]
-            f = min((d - distances[n]) * per_metre[n], np.float32(1.0))
+            reach[u] = min(distance[v, u], np.float32(ENDLESS))
+            place[u] = np.int32(reach[u] / (reach[u] + fold) * np.float32(bins))
+        for u in range(columns):
+            n = interval[place[u]]
+            f = min((reach[u] - distances[n]) * per_metre[n], np.float32(1.0))
             a = left[u] * nodes + n
             b = a + nodes
             near = above[a] + (above[b] - above[a]) * right_share[u]

@@ -9,7 +9,7 @@ from fogsim.scene.bodies.car import ESTATE, HATCHBACK, SALOON, SUV, CarForm, car
 from fogsim.scene.bodies.large import BUS, VAN, bus, van
 from fogsim.scene.bodies.motorcycle import MOTORCYCLE, motorcycle
 from fogsim.scene.bodies.simple import Simple, far, tiny
-from fogsim.scene.bodies.truck import FLATBED, RIGID, SEMITRAILER, flatbed, rigid, semitrailer
+from fogsim.scene.bodies.truck import FLATBED, RIGID, flatbed, rigid, semitrailer, simple_semitrailer
 from fogsim.scene.solids import PAINT, Material
 from fogsim.scene.trees import FAR, TINY
 from fogsim.values.scene import Mesh
@@ -43,8 +43,8 @@ BODIES: Mapping[str, Body] = {
     "estate": _car(ESTATE),
     "suv": _car(SUV),
     "van": Body(van, VAN),
-    "semitrailer": Body(partial(semitrailer, _WHITE_BOX), SEMITRAILER(_WHITE_BOX)),
-    "semitrailer_curtain": Body(partial(semitrailer, PAINT), SEMITRAILER(PAINT)),
+    "semitrailer": Body(partial(semitrailer, _WHITE_BOX), simple_semitrailer(_WHITE_BOX)),
+    "semitrailer_curtain": Body(partial(semitrailer, PAINT), simple_semitrailer(PAINT)),
     "rigid_truck": Body(rigid, RIGID),
     "flatbed_truck": Body(flatbed, FLATBED),
     "bus": Body(bus, BUS),

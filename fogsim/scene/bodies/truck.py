@@ -139,7 +139,7 @@ def _cab_front(tall: float = 1.0, wide: float = 1.0) -> Mesh:
     return merge((pair(merge((lamp, indicator, fog))), screen, grille, side_panel(outline, GLASS), plate, mirrors))
 
 
-def SEMITRAILER(material: Material) -> Simple:  # noqa: N802 - a value but for its material
+def simple_semitrailer(material: Material) -> Simple:
     """Stand-in of an articulated truck."""
     cab = Block(((0.05, 1.2, 0.4, 2.9), (0.25, 1.22, 0.4, 3.2), (2.3, 1.24, 0.6, 3.8)), panes=(0.5, 1.2, 1.75, 2.6))
     trailer = Block(((2.85, 1.26, 1.1, 4.0), (16.37, 1.26, 1.1, 4.0)), material, rear=material)

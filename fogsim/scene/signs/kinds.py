@@ -12,6 +12,7 @@ from fogsim.scene.signs.symbols import (
     GREY,
     RED,
     RED_DIODES,
+    SIGN,
     YELLOW,
     bend,
     exclamation,
@@ -72,7 +73,7 @@ def _stripes() -> Mesh:
 
 def _variable_limit(speed: float) -> Face:
     lit = text(number(speed), 0.42 if len(number(speed)) < 3 else 0.36, DIODES, widest=0.58)
-    ring = disc((0, 0, 0), 0.45, (1, 0, 0), (0, 1, 0), RED_DIODES, sides=32, hole=0.36, instance=4)
+    ring = disc((0, 0, 0), 0.45, (1, 0, 0), (0, 1, 0), RED_DIODES, sides=32, hole=0.36, instance=SIGN)
     housing = Material((0.012, 0.012, 0.013))
     return plate_face(merge((lit, ring)), field=housing, border=housing)
 

@@ -6,9 +6,7 @@ of whole traffic steps: drivers look (perception) and choose their speed, SUMO s
 vehicles within 1000 m of the ego are read. Figures are medians over blocks, the ratio
 that of neighbouring blocks; ``ms_state`` is the share of the reading.
 
-The simulation is a .sumocfg with SUMO's own defaults. FogSim's own scenarios add ``--lanechange.duration 3``, with
-which the bare step of this road takes 2 … 20 times as long (100 … 2000 vehicles): measured so, every ratio would come
-out near 1 and say nothing.
+The simulation is a .sumocfg with SUMO's own defaults, which FogSim's own scenarios share.
 
     python benchmarks/traffic.py [--json] [--vehicles 20 --vehicles 100 …] [--blocks 40] [--blind]
 

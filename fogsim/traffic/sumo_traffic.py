@@ -13,6 +13,7 @@ from fogsim.traffic.collisions import CollisionWatch
 from fogsim.traffic.control import LaneKeeping, Order, SpeedControl
 from fogsim.traffic.driving import Drivers
 from fogsim.traffic.events import Script, Situation
+from fogsim.traffic.lane_changes import LaneChangeSmoothing
 from fogsim.traffic.link import Api, SumoLink
 from fogsim.traffic.network import read_net, road_network
 from fogsim.traffic.opendrive import is_opendrive
@@ -29,8 +30,6 @@ from fogsim.values import Command, Lamp, RoadNetwork, SignMap, TrafficSnapshot, 
 
 _NOBODY: Mapping[str, float] = {}
 _FOR_EVER = "1e6"
-_SMOOTH_LANE_CHANGES = ("--lanechange.duration", "3")
-"""A lane change takes 3 s: the camera sees no vehicle jump, without the 13 … 40-fold cost of SUMO's sublane model."""
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
@@ -42,6 +41,7 @@ class _Run:
     api: Api
     roster: Roster
     reader: Reader
+    lane_changes: LaneChangeSmoothing
     control: SpeedControl
     lanes: LaneKeeping
     collisions: CollisionWatch
@@ -106,6 +106,7 @@ class SumoTraffic:
             api=api,
             roster=roster,
             reader=reader(api, setup.ego, setup.reading_radius, roster),
+            lane_changes=LaneChangeSmoothing(),
             control=SpeedControl(api, setup.step_length),
             lanes=LaneKeeping(api, setup.keep_lane, roster),
             collisions=CollisionWatch(api),
@@ -231,7 +232,8 @@ class SumoTraffic:
             return None
         self._route = self._route or RouteProgress(run.api, ego)
         route_position, route_length = self._route.now()
-        state = _with_dark(run.reader.state(self._ego_lamps), run.script.dark)
+        state = run.lane_changes.smoothed(run.reader.state(self._ego_lamps))
+        state = _with_dark(state, run.script.dark)
         row = state.ids.index(ego)
         return TrafficSnapshot(
             state=state,
@@ -287,7 +289,7 @@ def command_line(setup: TrafficSetup, seed: int) -> list[str]:
     quiet = ["--no-step-log", "true", "--duration-log.disable", "true", "--no-warnings", "true"]
     # Nobody is beamed away: collisions stay where they happen and are counted. How jams dissolve in a simulation of the
     # user's own is left to its configuration.
-    patient = ["--time-to-teleport", "-1", *_SMOOTH_LANE_CHANGES] if setup.config is None else []
+    patient = ["--time-to-teleport", "-1"] if setup.config is None else []
     physical = [*patient, "--collision.action"]
     if setup.after_collision is AfterCollision.STOP:
         return arguments + quiet + physical + ["warn", "--collision.stoptime", _FOR_EVER]

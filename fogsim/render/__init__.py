@@ -4,10 +4,11 @@ from collections.abc import Callable
 
 from fogsim.errors import InputError
 from fogsim.registry import Registry
+from fogsim.render.best import best_renderer
 from fogsim.render.protocol import Renderer, RenderError
 from fogsim.values.scene import Scene
 
-__all__ = ["RENDERERS", "RenderError", "Renderer", "gl_report", "make_renderer"]
+__all__ = ["RENDERERS", "RenderError", "Renderer", "best_renderer", "gl_report", "make_renderer"]
 
 
 def _pyrender(scene: Scene, illuminance: float) -> Renderer:
@@ -36,7 +37,7 @@ def make_renderer(name: str, scene: Scene, illuminance: float) -> Renderer:
     Parameters
     ----------
     name : str
-        Name in `RENDERERS`, or "auto" for the best one that works here.
+        Name in `RENDERERS`, or "auto" for the one that `best_renderer` names.
     scene : Scene
         What stands still.
     illuminance : float
@@ -53,7 +54,7 @@ def make_renderer(name: str, scene: Scene, illuminance: float) -> Renderer:
     """
     if not 0.0 <= illuminance < float("inf"):
         raise InputError(f"illuminance must be a finite number of lux ≥ 0, got {illuminance!r}")
-    return RENDERERS["pyrender" if name == "auto" else name](scene, illuminance)
+    return RENDERERS[best_renderer()[0] if name == "auto" else name](scene, illuminance)
 
 
 def gl_report() -> str:

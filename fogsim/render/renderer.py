@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
-from fogsim.pinhole import camera_axes
 from fogsim.render.choice import Chosen, cells_of, choose, copies_of, shapes_of, with_room
 from fogsim.render.drawing import RECORD, Drawing, MeshTable, Rasteriser
 from fogsim.render.ground import Ground, split_ground
+from fogsim.render.lens import lens_of
 from fogsim.render.protocol import RenderError
 from fogsim.render.shading import Shading
 from fogsim.values.camera import Camera, CameraPose
@@ -58,9 +58,10 @@ class SceneRenderer:
         if self._rasteriser is None:
             raise RenderError("this renderer is closed; make a new one")
         end = self._place(vehicles)
-        eye = np.array(pose.position, np.float64)
-        planes = frustum(camera) @ camera_axes(camera, pose)
-        count = choose(self._shapes, self._copies, self._cells, end, planes, eye, camera.focal_length, self._chosen)
+        lens = lens_of(camera, pose)
+        count = choose(
+            self._shapes, self._copies, self._cells, end, lens.planes, lens.eye, camera.focal_length, self._chosen
+        )
         drawing = Drawing(
             self._chosen.mesh[:count],
             self._chosen.record.view(RECORD)[:count, 0],
@@ -116,21 +117,6 @@ class SceneRenderer:
             known = sorted(self._table.numbers)
             raise InputError(f"a batch names the shape {batch.shape!r}, which the scene does not have: {known}")
         return self._table.numbers[batch.shape]
-
-
-def frustum(camera: Camera) -> NDArray[np.float64]:
-    """Inward unit normals (5, 3) of the planes that bound the picture, in camera axes, the forward one last."""
-    (u0, v0), focal = camera.principal_point, camera.focal_length
-    planes = np.array(
-        [
-            (focal, 0.0, u0 + 0.5),
-            (-focal, 0.0, camera.width - 0.5 - u0),
-            (0.0, focal, v0 + 0.5),
-            (0.0, -focal, camera.height - 0.5 - v0),
-            (0.0, 0.0, 1.0),
-        ]
-    )
-    return np.asarray(planes / np.sqrt((planes * planes).sum(axis=1))[:, None], np.float64)
 
 
 def _extremes(meshes: Mapping[str, Mesh], end: Callable[..., NDArray[np.float32]]) -> NDArray[np.float64]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from fogsim.jit import kernel
 
 _SMALL = 64  # boxes of no more pixels are looked at before their triangle is drawn
+_LANES = 8
 _EMPTY = 0xFFFFFFFF  # nothing, infinitely far away
 _SLACK = 1e-3  # by which boxes are widened, since corners are projected with 32 bits [px]
 
@@ -77,6 +78,7 @@ def rasterise(
     lens: Wide,
     near: float,
     picture: Index,
+    columns: int,
     work: Work,
 ) -> None:
     """Find the nearest triangle of each pixel.
@@ -95,9 +97,11 @@ def rasterise(
         Focal length and principal point [px].
     near : float
         Depth before which nothing is seen [m].
-    picture : (rows, cols) int64
+    picture : (rows, columns + at least 7) int64
         Is set to what is seen: in the lower half its slot, −1 for nothing, in the upper half the bits of its 1/z as a
         32-bit float, which sort like the float. Of two surfaces the greater number is the nearer one.
+    columns : int
+        Width of the picture [px]; what lies behind it is not set.
     work : Work
         Memory to work in, with room for the largest mesh.
     """
@@ -113,7 +117,7 @@ def rasterise(
                 break
             end += 1
         _project(triangles, mesh, record, begin, end, axes, lens, near, work.corners)
-        count = _select(triangles, mesh, first, begin, end, lens, near, picture.shape, work)
+        count = _select(triangles, mesh, first, begin, end, lens, near, (len(picture), columns), work)
         _fill(work, count, lens, near, picture)
         begin = end
 
@@ -143,12 +147,12 @@ def _project(
             b = np.float32(x * record[copy, 1] + y * record[copy, 5] + z * record[copy, 9])
             c = np.float32(x * record[copy, 2] + y * record[copy, 6] + z * record[copy, 10])
             d = np.float32(x * record[copy, 3] + y * record[copy, 7] + z * record[copy, 11])
-            for i in range(count):
-                k = start + i
-                corners[row, base + i] = a * positions[0, k] + b * positions[1, k] + c * positions[2, k] + d
+            for i in range(np.uint64(count)):
+                k = np.uint64(start) + i
+                corners[row, np.uint64(base) + i] = a * positions[0, k] + b * positions[1, k] + c * positions[2, k] + d
         for row in range(2):
             middle = np.float32(lens[1 + row])
-            for i in range(base, base + count):
+            for i in range(np.uint64(base), np.uint64(base + count)):
                 z = corners[2, i]
                 place = focal * corners[row, i] / z + middle
                 corners[3 + row, i] = place if z > nearest else nothing
@@ -281,18 +285,24 @@ def _fill(work: Work, count: int, lens: Wide, near: float, picture: Index) -> No
             top, bottom = _rows(top, bottom, ax, ay, az)
             top, bottom = _rows(top, bottom, bx, by, bz)
             top, bottom = _rows(top, bottom, cx, cy, cz)
-        first, last, number = float(left), float(right), slots[t]
+        first, last, number, step = float(left), float(right), slots[t], np.float32(zx)
         for v in range(np.uint64(top), np.uint64(bottom + 1)):
             row = float(v)
             low = max(max(a1 * row + a0, b1 * row + b0), max(c1 * row + c0, d1 * row + d0))
             high = min(min(a3 * row + a2, b3 * row + b2), min(c3 * row + c2, d3 * row + d2))
             low, high = np.ceil(max(low, first)), np.floor(min(high, last))
-            if not low <= high:
-                continue
-            start = zy * row + zz
+            # A row of few pixels is drawn as one of eight, some of them masked, and so is an empty one: to guess how
+            # often a short loop turns costs the processor more. Comparisons are such that NaN makes a row empty.
+            low = low if low < last else last
+            span = high - low if high >= low else -1.0
+            begin, end = np.uint64(low), np.int64(span)
+            start = np.float32(zx * low + zy * row + zz)
             # Unsigned numbers tell the compiler that no index counts from the end.
-            for u in range(np.uint64(low), np.uint64(high + 1.0)):
-                picture[v, u] = max(picture[v, u], _key(np.float32(zx * u + start), number))
+            for i in range(np.uint64(max(end + 1, _LANES))):
+                key = _key(start + step * np.float32(np.int32(i)), number)
+                key = key if np.int64(i) <= end else 0
+                before = picture[v, begin + i]
+                picture[v, begin + i] = key if key > before else before
 
 
 @kernel

@@ -5,9 +5,9 @@ import sys
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.pinhole import camera_axes
 from fogsim.render.cpu.kernels import Triangles, Work, rasterise
 from fogsim.render.drawing import NEAR, Drawing, MeshTable
+from fogsim.render.lens import lens_of
 from fogsim.values.camera import Camera, CameraPose
 
 _LOWER_HALF = 0 if sys.byteorder == "little" else 1  # which of the two halves of a number comes first in memory
@@ -43,21 +43,24 @@ class CPURasteriser:
 
     def slots(self, drawing: Drawing, camera: Camera, pose: CameraPose) -> NDArray[np.int32]:
         """Find the nearest triangle of each pixel (see `Rasteriser.slots`)."""
-        size = (camera.height, camera.width)
+        # Behind each row lies what vectors reach over its end, and so much that rows lie apart in the cache.
+        size = (camera.height, camera.width // 16 * 16 + 24)
         if self._picture.shape != size:
-            self._picture = np.empty((size[0], (size[1] + 7) // 8 // 2 * 16 + 8), np.int64)[:, : size[1]]
+            self._picture = np.empty(size, np.int64)
+        lens = lens_of(camera, pose)
         rasterise(
             self._triangles,
             drawing.mesh,
             drawing.record.view(np.float32).reshape(-1, 17),
             drawing.first,
-            camera_axes(camera, pose),
-            np.array((camera.focal_length, *camera.principal_point)),
+            lens.axes,
+            lens.lens,
             NEAR,
             self._picture,
+            camera.width,
             self._work,
         )
-        return self._picture.base.view(np.int32)[:, _LOWER_HALF : 2 * size[1] : 2]
+        return self._picture.view(np.int32)[:, _LOWER_HALF : 2 * camera.width : 2]
 
     def close(self) -> None:
         """Let go of its picture."""

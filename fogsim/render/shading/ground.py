@@ -5,9 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from numpy.typing import NDArray
+
 from fogsim.jit import kernel
+from fogsim.render.lens import Lens
 from fogsim.render.shading import layout
-from fogsim.render.shading.layout import Array, Lens, Picture, Runs, Wide
+from fogsim.render.shading.layout import Array, Picture, Runs
 from fogsim.render.shading.noise import GRAIN, PER_CELL, SMOOTH, Noise
 
 KIND, INSTANCE, LEAST, MOST, DEPTH = layout.KIND, layout.INSTANCE, layout.LEAST, layout.MOST, layout.DEPTH
@@ -15,7 +18,7 @@ ALONG, ACROSS, WHITE = layout.ALONG, layout.ACROSS, layout.WHITE
 HALF_WIDTH, LINES, COLOUR = layout.HALF_WIDTH, layout.LINES, layout.COLOUR
 ROAD, TERRAIN = layout.ROAD, layout.TERRAIN
 
-_CHUNK = 32  # pixels of a row that share a footprint
+_CHUNK, _PIECE = 128, 32  # pixels of a row that share a footprint, and over which large patches are linear
 _LINE_REFLECTANCE, _LINE_WIDTH, _DASH, _PERIOD = 0.6, 0.2, 6.0, 18.0
 
 ROAD_RESPONSE = 0.0125
@@ -38,22 +41,33 @@ class Bench(NamedTuple):
     ----------
     depth, texture, tint : (_CHUNK,) float32
         Depths [m], factors of reflectance, and the share of them that the largest patches have.
+    place : (_CHUNK,) uint32
+        Places in a tile of noise.
     """
 
     depth: Array
     texture: Array
     tint: Array
+    place: NDArray[np.uint32]
 
 
 def bench() -> Bench:
     """Make memory for one chunk."""
-    return Bench(*(np.empty(_CHUNK, np.float32) for _ in range(3)))
+    return Bench(*(np.empty(_CHUNK, np.float32) for _ in range(3)), np.empty(_CHUNK, np.uint32))
 
 
 @kernel
 def _faded(deviation: float, side: float, wide: float, long: float) -> float:
     """Deviation that is left of independent squares' once averaged over a footprint [m]."""
     return deviation / math.sqrt(max(wide / side, 1.0) * max(long / side, 1.0))
+
+
+@kernel
+def _doubled(side: float, narrow: float) -> float:
+    """Side doubled until it is about the narrow side of a footprint or more."""
+    while side * math.sqrt(2.0) < narrow:
+        side *= 2.0
+    return side
 
 
 @kernel
@@ -118,7 +132,14 @@ def shade_ground(runs: Runs, count: int, lens: Lens, noise: Noise, work: Bench, 
     """
     run, known, rays, eye = runs.run, runs.surface, lens.rays, lens.eye
     radiance, distance, instance, response = picture.radiance, picture.distance, picture.instance, picture.response
-    depths, texture, tint, grain, smooth = work.depth, work.texture, work.tint, noise.grain, noise.smooth
+    depths, texture, tint, places, grain, smooth = (
+        work.depth,
+        work.texture,
+        work.tint,
+        work.place,
+        noise.grain,
+        noise.smooth,
+    )
     lamplight, one = len(response) > 0, np.float32(1.0)
     focal, u0, v0 = lens.lens[0], lens.lens[1], lens.lens[2]
     per_focal = np.float32(1.0 / focal)
@@ -168,29 +189,29 @@ def shade_ground(runs: Runs, count: int, lens: Lens, noise: Noise, work: Bench, 
             # Large patches, linear from one end of the chunk to the other.
             deviation_3 = _faded(_ASPHALT[5] if kind == ROAD else _GRASS[5], side_3, wide, long)
             deviation_4 = _faded(_ASPHALT[7] if kind == ROAD else _GRASS[7], side_4, wide, long)
-            px, py = eye[0] + rx * z, eye[1] + ry * z
+            px, py = eye[0] + rx * z - half * ux, eye[1] + ry * z - half * uy
             if fresh:
-                patches = _smooth_at(smooth, px - half * ux, py - half * uy, side_3)
-                large = _smooth_at(smooth, px - half * ux, py - half * uy, side_4)
+                patches, large = _smooth_at(smooth, px, py, side_3), _smooth_at(smooth, px, py, side_4)
                 fresh = False
-            next_patches = _smooth_at(smooth, px + (half + 1.0) * ux, py + (half + 1.0) * uy, side_3)
-            next_large = _smooth_at(smooth, px + (half + 1.0) * ux, py + (half + 1.0) * uy, side_4)
-            level = np.float32(1.0 + deviation_3 * patches + deviation_4 * large)
-            change = deviation_3 * (next_patches - patches) + deviation_4 * (next_large - large)
-            step_level = np.float32(change / size)
-            tint_level = np.float32(deviation_4 * large)
-            tint_step = np.float32(deviation_4 * (next_large - large) / size)
-            patches, large = next_patches, next_large
-            for i in range(length):
-                step = np.float32(np.int32(i))
-                texture[i] = level + step_level * step
-                tint[i] = tint_level + tint_step * step
+            for first in range(0, size, _PIECE):
+                last = min(first + _PIECE, size)
+                next_patches = _smooth_at(smooth, px + last * ux, py + last * uy, side_3)
+                next_large = _smooth_at(smooth, px + last * ux, py + last * uy, side_4)
+                level = np.float32(1.0 + deviation_3 * patches + deviation_4 * large)
+                tint_level, share = np.float32(deviation_4 * large), 1.0 / (last - first)
+                tint_step = np.float32(deviation_4 * (next_large - large) * share)
+                step_level = tint_step + np.float32(deviation_3 * (next_patches - patches) * share)
+                patches, large = next_patches, next_large
+                for i in range(np.uint64(last - first)):
+                    step = np.float32(np.int32(i))
+                    texture[np.uint64(first) + i] = level + step_level * step
+                    tint[np.uint64(first) + i] = tint_level + tint_step * step
             # Grain and mottling: squares as large as the narrow side of a pixel, so that every pixel has its own.
             gx, gy = np.float32(rays[0, 0] * begin + rays[0, 1] * row + rays[0, 2]), np.float32(rays[0, 0])
             hx, hy = np.float32(rays[1, 0] * begin + rays[1, 1] * row + rays[1, 2]), np.float32(rays[1, 0])
             strength = _faded(deviation, side, wide, long)
             if strength > _FAINTEST:
-                scale = side * 2.0 ** max(math.floor(math.log2(narrow / side) + 0.5), -1.0)
+                scale = _doubled(0.5 * side, narrow)
                 period = scale * GRAIN
                 ox, oy = np.float32((eye[0] % period) / scale), np.float32((eye[1] % period) / scale)
                 per_scale, amount = np.float32(1.0 / scale), np.float32(strength)
@@ -200,10 +221,12 @@ def shade_ground(runs: Runs, count: int, lens: Lens, noise: Noise, work: Bench, 
                     z32 = depths[i] * per_scale
                     a = np.int32(ox + (gx + gy * step) * z32 + far) & (GRAIN - 1)
                     b = np.int32(oy + (hx + hy * step) * z32 + far) & (GRAIN - 1)
-                    texture[i] += amount * grain[np.uint32(b * GRAIN + a)]
+                    places[i] = np.uint32(b * GRAIN + a)
+                for i in range(length):
+                    texture[i] += amount * grain[places[i]]
             strength = _faded(deviation_2, side_2, wide, long)
             if strength > _FAINTEST:
-                scale = side_2 / PER_CELL * 2.0 ** max(math.floor(math.log2(narrow / side_2) + 0.5), 0.0)
+                scale = _doubled(side_2, narrow) / PER_CELL
                 period = scale * SMOOTH
                 ox, oy = np.float32((eye[0] % period) / scale), np.float32((eye[1] % period) / scale)
                 per_scale, amount = np.float32(1.0 / scale), np.float32(strength)
@@ -213,7 +236,9 @@ def shade_ground(runs: Runs, count: int, lens: Lens, noise: Noise, work: Bench, 
                     z32 = depths[i] * per_scale
                     a = np.int32(ox + (gx + gy * step) * z32 + far) & (SMOOTH - 1)
                     b = np.int32(oy + (hx + hy * step) * z32 + far) & (SMOOTH - 1)
-                    texture[i] += amount * smooth[np.uint32(b * SMOOTH + a)]
+                    places[i] = np.uint32(b * SMOOTH + a)
+                for i in range(length):
+                    texture[i] += amount * smooth[places[i]]
             if kind == TERRAIN:
                 red, green, blue = known[k, COLOUR], known[k, COLOUR + 1], known[k, COLOUR + 2]
                 red, green, blue = np.float32(red * white), np.float32(green * white), np.float32(blue * white)

@@ -25,27 +25,6 @@ WHITE, HALF_WIDTH, LINES, COLOUR = 25, 26, 27, 28  # radiance of a white surface
 COLUMNS = 40
 
 
-class Lens(NamedTuple):
-    """Where the camera is and how it looks.
-
-    Attributes
-    ----------
-    eye : (3,) float64
-        Where it is [m].
-    axes : (3, 3) float64
-        Its axes in the world as rows.
-    rays : (3, 3) float64
-        From a pixel (column, row, 1) to its viewing ray, 1 long along the optical axis.
-    lens : (3,) float64
-        Focal length and principal point [px].
-    """
-
-    eye: Wide
-    axes: Wide
-    rays: Wide
-    lens: Wide
-
-
 class Light(NamedTuple):
     """Light and what shines.
 

@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.pinhole import camera_axes, ray_from_pixel
 from fogsim.render.drawing import Drawing, MeshTable
+from fogsim.render.lens import Lens, lens_of
 from fogsim.render.photometry import SKY_TINT, lamp_radiance, lighting_bits, zenith_luminance
 from fogsim.render.shading import layout
 from fogsim.render.shading.ground import bench, shade_ground
-from fogsim.render.shading.layout import Copies, Lens, Light, Meshes, Picture, Runs
+from fogsim.render.shading.layout import Copies, Light, Meshes, Picture, Runs
 from fogsim.render.shading.noise import tiles
 from fogsim.render.shading.objects import shade_objects, shade_sky
 from fogsim.render.shading.runs import find_runs
@@ -71,12 +71,6 @@ class Shading:
         rows, columns = slots.shape
         if len(self._runs.run) < slots.size or len(self._runs.surface_of_slot) < drawing.first[-1]:
             self._runs = _room(slots.size, int(drawing.first[-1]))
-        lens = Lens(
-            np.array(pose.position, np.float64),
-            camera_axes(camera, pose),
-            ray_from_pixel(camera, pose),
-            np.array((camera.focal_length, *camera.principal_point)),
-        )
         copies = Copies(
             drawing.mesh,
             drawing.record.view(np.float32).reshape(-1, 17),
@@ -89,7 +83,7 @@ class Shading:
             np.empty((rows, columns), np.int32),
             np.empty((rows, columns, 3) if lamplight else (0, 0, 3), np.float32),
         )
-        self._shade(slots, copies, lens, lamplight, picture)
+        self._shade(slots, copies, lens_of(camera, pose), lamplight, picture)
         response = picture.response if lamplight else None
         return View(picture.radiance, picture.distance, picture.instance, response)
 

@@ -35,12 +35,16 @@ def find_runs(slots: Numbers, copies: Copies, rays: Wide, terrain: bool, runs: R
             surface_of_slot[slot] = -2 - copy
     count, surfaces = 0, 2
     rows, columns = slots.shape
+    width = np.uint64(columns)
     for v in range(rows):
         begin = 0
         while begin < columns:
-            slot, end = slots[v, begin], begin + 1
-            while end < columns and slots[v, end] == slot:
-                end += 1
+            slot = slots[v, begin]
+            # Unsigned numbers tell the compiler that no index counts from the end.
+            place = np.uint64(begin) + np.uint64(1)
+            while place < width and slots[np.uint64(v), place] == slot:
+                place += np.uint64(1)
+            end = np.int64(place)
             surface = 0
             if slot >= 0:
                 surface = surface_of_slot[slot]

@@ -6,8 +6,9 @@ import numpy as np
 
 from fogsim.jit import kernel
 from fogsim.render.drawing import NEAR
+from fogsim.render.lens import Lens
 from fogsim.render.shading import layout
-from fogsim.render.shading.layout import Copies, Lens, Light, Meshes, Runs
+from fogsim.render.shading.layout import Copies, Light, Meshes, Runs
 from fogsim.values.scene import Surface
 
 _ROAD, _PAINT, _SHEETING = int(Surface.ROAD), int(Surface.PAINT), int(Surface.SHEETING)

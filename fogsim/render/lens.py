@@ -1,0 +1,61 @@
+"""Where a camera is and how it looks, as kernels want it."""
+
+import functools
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.pinhole import camera_axes
+from fogsim.values.camera import Camera, CameraPose
+
+Wide = NDArray[np.float64]
+
+
+class Lens(NamedTuple):
+    """Where the camera is and how it looks.
+
+    Attributes
+    ----------
+    eye : (3,) float64
+        Where it is [m].
+    axes : (3, 3) float64
+        Its axes in the world as rows.
+    rays : (3, 3) float64
+        From a pixel (column, row, 1) to its viewing ray, 1 long along the optical axis.
+    lens : (3,) float64
+        Focal length and principal point [px].
+    planes : (5, 3) float64
+        Inward unit normals in the world of the planes that bound the picture, the forward one last.
+    """
+
+    eye: Wide
+    axes: Wide
+    rays: Wide
+    lens: Wide
+    planes: Wide
+
+
+# The parts of a renderer ask for the same one in turn.
+@functools.lru_cache(maxsize=8)
+def lens_of(camera: Camera, pose: CameraPose) -> Lens:
+    """Geometry of a picture; the arrays belong to all who asked and are not to be written to."""
+    axes, focal, (u0, v0) = camera_axes(camera, pose), camera.focal_length, camera.principal_point
+    plane = np.array([[1 / focal, 0.0, -u0 / focal], [0.0, 1 / focal, -v0 / focal], [0.0, 0.0, 1.0]])
+    lens = np.array((focal, u0, v0))
+    return Lens(np.array(pose.position, np.float64), axes, axes.T @ plane, lens, frustum(camera) @ axes)
+
+
+def frustum(camera: Camera) -> Wide:
+    """Inward unit normals (5, 3) of the planes that bound the picture, in camera axes, the forward one last."""
+    (u0, v0), focal = camera.principal_point, camera.focal_length
+    planes = np.array(
+        [
+            (focal, 0.0, u0 + 0.5),
+            (-focal, 0.0, camera.width - 0.5 - u0),
+            (0.0, focal, v0 + 0.5),
+            (0.0, -focal, camera.height - 0.5 - v0),
+            (0.0, 0.0, 1.0),
+        ]
+    )
+    return np.asarray(planes / np.sqrt((planes * planes).sum(axis=1))[:, None], np.float64)

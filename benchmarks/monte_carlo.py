@@ -198,9 +198,7 @@ def write_veil(out, paths):
     beams = {"low": low_beam(), "high": high_beam()}
     rng = np.random.default_rng(1)
     with out.open("w", encoding="utf-8") as file:
-        file.write(
-            "# Radiance of fog lit by a pair of own head lamps [cd/m^2] (UMTRI median beams), black road.\n"
-        )
+        file.write("# Radiance of fog lit by a pair of own head lamps [cd/m^2] (UMTRI median beams), black road.\n")
         file.write("# Eye 1.5 m above the road, lamps 1.8 m ahead of it, 0.6 m aside, 0.65 m above the road.\n")
         file.write("# Angles [degrees], lengths [m]; `single`: light scattered once, and standard errors.\n")
         file.write(f"# Command: python benchmarks/monte_carlo.py veil {out} --photons {paths}\n")

@@ -28,7 +28,7 @@ def _glow(chord: float, line: NDArray[np.float64], fold: float) -> float:
     """Glow at a chord, from its values times chord."""
     place = min(chord / (chord + fold) * (line.shape[0] - 1) * ((1.98 + fold) / 1.98), line.shape[0] - 1.001)
     c = int(place)
-    return (line[c] + (line[c + 1] - line[c]) * (place - c)) / chord
+    return float((line[c] + (line[c + 1] - line[c]) * (place - c)) / chord)
 
 
 @kernel

@@ -26,6 +26,8 @@ from fogsim.values import Beam, Camera, CameraPose, FogField, HeadLamp, View
 
 _AT_REST = CameraPose((0.0, 0.0, 0.0), 0.0)
 _MIRROR = np.diag((1.0, -1.0, 1.0))
+"""Tables of beams count to the right, the vehicle's axes to the left."""
+
 _REMEMBERED = 16
 
 K = TypeVar("K")
@@ -48,7 +50,7 @@ class _Memory:
     """What was computed and may be wanted again: it saves time and changes nothing."""
 
     tables: list[tuple[Beam, NDArray[np.float32]]] = field(default_factory=list)
-    rays: dict[Camera, VeilRays] = field(default_factory=dict)
+    rays: dict[Camera, tuple[VeilRays, NDArray[np.float32]]] = field(default_factory=dict)
     groups: dict[tuple[object, ...], _Group] = field(default_factory=dict)
     veils: dict[tuple[int, float], tuple[_Group, NDArray[np.float32]]] = field(default_factory=dict)
 
@@ -97,10 +99,8 @@ class OwnLamplight:
         """
         rows, columns = view.distance.shape
         response = np.zeros((0, columns, 3), np.float32) if view.lamp_response is None else view.lamp_response
-        rays = self._rays(camera)
+        rays, ray_map = self._rays(camera)
         mean, local = _extinction_on(rays, camera, pose, fog)
-        # Tables of beams count to the right, the vehicle's axes to the left.
-        ray_map = (_MIRROR @ ray_from_pixel(camera, _AT_REST)).astype(np.float32)
         for group in self._groups(camera, lamps):
             add_own_light(
                 np.ascontiguousarray(view.distance, dtype=np.float32),
@@ -110,15 +110,18 @@ class OwnLamplight:
                 group.tables,
                 group.colour,
                 rays.shape[1],
+                np.uint32(INTERVALS + 1),
                 np.float32(FOLD_DISTANCE),
-                self._veil(group, mean, local),
-                mean,
+                self._veil(group, mean, local).reshape(-1, rays.shape[1] * (INTERVALS + 1)),
+                mean if mean.size == 1 else mean.reshape(rays.shape[0], -1),
                 radiance.reshape(rows, 3 * columns),
             )
 
-    def _rays(self, camera: Camera) -> VeilRays:
+    def _rays(self, camera: Camera) -> tuple[VeilRays, NDArray[np.float32]]:
+        """Rays of the veil, and the map from pixels to rays by (forward, right, up)."""
         if camera not in self._memory.rays:
-            _keep(self._memory.rays, camera, veil_rays(camera))
+            ray_map = _MIRROR @ ray_from_pixel(camera, _AT_REST)
+            _keep(self._memory.rays, camera, (veil_rays(camera), ray_map.astype(np.float32)))
         return self._memory.rays[camera]
 
     def _table(self, beam: Beam) -> NDArray[np.float32]:
@@ -141,13 +144,15 @@ class OwnLamplight:
             return known
         places = list(dict.fromkeys(lamp.offset for lamp in lamps))
         # Lamps in one housing shine together.
-        tables = [sum(self._table(lamp.beam) for lamp in lamps if lamp.offset == place) for place in places]
+        tables = [
+            np.stack([self._table(lamp.beam) for lamp in lamps if lamp.offset == place]).sum(axis=0) for place in places
+        ]
         group = _Group(
             lamps=lamps,
             places=np.array(places, dtype=np.float32) @ _MIRROR.astype(np.float32),
             tables=np.stack([table[0] for table in tables]),
             colour=np.array(lamps[0].colour, dtype=np.float32),
-            air=lit_air(self._rays(camera), list(zip(places, tables, strict=True)), self._droplets),
+            air=lit_air(self._rays(camera)[0], list(zip(places, tables, strict=True)), self._droplets),
         )
         _keep(self._memory.groups, key, group)
         return group

@@ -18,26 +18,22 @@ _NEXT = np.uint32(1)
 
 
 @kernel
-def _row_between(
-    grid: NDArray[np.float32], row: int, share: np.float32, columns: int, out: NDArray[np.float32]
-) -> None:
-    """Profiles of the rays (rows · columns, nodes) at a place between two rows of the grid."""
-    for c in range(columns):
-        for n in range(out.shape[1]):
-            low = grid[row * columns + c, n]
-            out[c, n] = low + (grid[(row + 1) * columns + c, n] - low) * share
+def _between(low: NDArray[np.float32], high: NDArray[np.float32], share: np.float32, out: NDArray[np.float32]) -> None:
+    """Profiles of a row's rays at a place between two rows of the grid."""
+    for i in range(out.shape[0]):
+        out[i] = low[i] + (high[i] - low[i]) * share
 
 
 @kernel
 def _read_row(
-    profiles: NDArray[np.float32],
+    values: NDArray[np.float32],
+    nodes: np.uint32,
     left: NDArray[np.uint32],
     aside: NDArray[np.float32],
     node: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:
     """Value for each pixel of a row, linear between two rays and two nodes."""
-    values, nodes = profiles.reshape(-1), np.uint32(profiles.shape[1])
     for u in range(out.shape[0]):
         # Unsigned, because indices that may be negative cost a comparison each.
         n = np.uint32(node[u])
@@ -189,6 +185,7 @@ def add_own_light(
     tables: NDArray[np.float32],
     colour: NDArray[np.float32],
     grid_columns: int,
+    nodes: np.uint32,
     fold: np.float32,
     veil: NDArray[np.float32],
     attenuation: NDArray[np.float32],
@@ -197,15 +194,15 @@ def add_own_light(
     """Add to an image (rows, cols · 3) what own lamps of one colour make of it.
 
     `response` (rows, cols · 3) may have no rows. `ray_map` takes (u, v, 1) to a ray in the vehicle's axes (forward,
-    right, up), `lamps` (n, 3) are places there and `tables` (n, SIZE, SIZE) their beams. `veil` and `attenuation` hold
-    for the rays of the grid (rows · columns) the veil at each node and the mean extinction coefficient to there; where
-    fog is even, `attenuation` has one entry, and in clear air `veil` has no rows. Nodes are even over r / (r + fold).
+    right, up), `lamps` (n, 3) are places there and `tables` (n, SIZE, SIZE) their beams. `veil` and `attenuation`
+    (rows, columns · nodes) hold the veil at each node of the grid's rays and the mean extinction coefficient to there;
+    where fog is even `attenuation` has one entry, and in clear air `veil` has no rows. Nodes lie evenly over
+    r / (r + fold).
     """
     columns = distance.shape[1]
     uniform, clear, surfaces = attenuation.size == 1, veil.shape[0] == 0, response.shape[0] > 0
-    nodes = 2 if clear else veil.shape[1]
-    grid_rows = max(veil.shape[0], attenuation.shape[0]) // grid_columns
-    profiles = np.zeros((grid_columns, nodes), np.float32)
+    grid_rows = max(veil.shape[0], attenuation.shape[0])
+    profiles = np.zeros(grid_columns * nodes, np.float32)
     points, scratch = np.empty((3, columns), np.float32), np.empty((4, columns), np.float32)
     length, node, mean = np.empty(columns, np.float32), np.empty(columns, np.float32), np.empty(columns, np.float32)
     scattered, light = np.zeros(columns, np.float32), np.zeros(columns, np.float32)
@@ -225,12 +222,12 @@ def add_own_light(
         place = np.float32(v) * np.float32(grid_rows - 1) / np.float32(max(distance.shape[0] - 1, 1))
         upper = min(int(place), grid_rows - 2)
         if not clear:
-            _row_between(veil, upper, place - np.float32(upper), grid_columns, profiles)
-            _read_row(profiles, left, aside, node, scattered)
+            _between(veil[upper], veil[upper + 1], place - np.float32(upper), profiles)
+            _read_row(profiles, nodes, left, aside, node, scattered)
         if surfaces:
             if not uniform:
-                _row_between(attenuation, upper, place - np.float32(upper), grid_columns, profiles)
-                _read_row(profiles, left, aside, node, mean)
+                _between(attenuation[upper], attenuation[upper + 1], place - np.float32(upper), profiles)
+                _read_row(profiles, nodes, left, aside, node, mean)
             _row_points(ray_map, v, length, points[0], points[1], points[2])
             _light_row(points, length, mean, response[v], lamps, tables, scratch, power, lit, light)
             three_times(light, shone)

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from fogsim.atmosphere import FieldAccess
+from fogsim.atmosphere import FogNow
 from fogsim.errors import InputError, SimulationError
 from fogsim.loop import AdvisedDriving
 from fogsim.onboard import OnBoard
@@ -143,6 +143,7 @@ class AttachedSession:
         self._command = Command()
         self._times: tuple[float, float] | None = None
         self._index = 0
+        self._drivers_fog: FogNow | None = None
         self._started = False
         self._looked = False
         self._closed = False
@@ -173,13 +174,17 @@ class AttachedSession:
             self._started = True
             fog = self._onboard.begin(spawn_streams(self._seed), self._traffic.network).fog
             if self._drivers:
-                self._traffic.enter_fog(FieldAccess(fog))
+                self._drivers_fog = FogNow(fog)
+                self._traffic.enter_fog(self._drivers_fog)
         else:
             return None
         snapshot = self._traffic.observe()
         if snapshot is None:
             return None
-        step = self._onboard.finish(self._index, self._elapsed(snapshot.state.time), snapshot, self._command, None)
+        time = self._elapsed(snapshot.state.time)
+        if self._drivers_fog is not None:
+            self._drivers_fog.set_time(time)
+        step = self._onboard.finish(self._index, time, snapshot, self._command, None)
         self._index += 1
         return step
 

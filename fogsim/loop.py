@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from types import TracebackType
 from typing import Self
 
-from fogsim.atmosphere import FieldAccess
+from fogsim.atmosphere import FogNow
 from fogsim.errors import SimulationError
 from fogsim.onboard import OnBoard
 from fogsim.randomness import spawn_streams
@@ -92,7 +92,7 @@ class ClosedLoop:
         self._traffic = traffic or libsumo_traffic(build.traffic_setup(scenario))
         self._replays = traffic is None
         self._onboard = OnBoard(scenario)
-        self._in_fog = False
+        self._drivers_fog: FogNow | None = None
         self._step: Step | None = None
 
     def start(self, seed: int) -> Step:
@@ -112,23 +112,26 @@ class ClosedLoop:
         """
         streams = spawn_streams(seed)
         self._step = None
+        if self._drivers_fog is not None:
+            self._drivers_fog.set_time(0.0)
         self._traffic.start(streams.traffic_seed)
         fog = self._onboard.begin(streams, self._traffic.network).fog
-        if not self._in_fog and (fog.extinction > 0 or fog.banks):
-            self._enter_fog(fog, streams.traffic_seed)
+        if self._drivers_fog is None and (fog.extinction > 0 or fog.banks):
+            self._drivers_fog = self._enter_fog(fog, streams.traffic_seed)
         snapshot = self._traffic.observe()
         if snapshot is None:
             raise SimulationError("the ego left the road as soon as it had appeared")
         self._step = self._finish(0, snapshot, Command())
         return self._step
 
-    def _enter_fog(self, fog: FogField, seed: int) -> None:
+    def _enter_fog(self, fog: FogField, seed: int) -> FogNow:
         """Tell the traffic of the fog, whose place is known only when the ego's route is."""
-        self._traffic.enter_fog(FieldAccess(fog))
-        self._in_fog = True
+        drivers_fog = FogNow(fog)
+        self._traffic.enter_fog(drivers_fog)
         if self._replays:
             # Drivers must have had the fog about them while the road filled: begin once more, with it.
             self._traffic.start(seed)
+        return drivers_fog
 
     def advance(self, command: Command) -> Step:
         """Move by one camera period with a command in force.
@@ -150,7 +153,10 @@ class ClosedLoop:
         """
         if self._step is None or self._step.ending is not None:
             raise SimulationError("the run has not been started or is over: call start() before advance()")
-        for _ in range(self._periods.traffic_steps):
+        for number in range(self._periods.traffic_steps):
+            if self._drivers_fog is not None:
+                part = number / self._periods.traffic_steps
+                self._drivers_fog.set_time((self._step.index + part) * self._periods.camera_period)
             self._traffic.advance(command)
         snapshot, index = self._traffic.observe(), self._step.index + 1
         if snapshot is None:

@@ -202,7 +202,7 @@ def add_own_light(
     columns = distance.shape[1]
     uniform, clear, surfaces = attenuation.size == 1, veil.shape[0] == 0, response.shape[0] > 0
     grid_rows = max(veil.shape[0], attenuation.shape[0])
-    profiles = np.zeros(grid_columns * nodes, np.float32)
+    profiles = np.zeros(grid_columns * int(nodes), np.float32)
     points, scratch = np.empty((3, columns), np.float32), np.empty((4, columns), np.float32)
     length, node, mean = np.empty(columns, np.float32), np.empty(columns, np.float32), np.empty(columns, np.float32)
     scattered, light = np.zeros(columns, np.float32), np.zeros(columns, np.float32)
@@ -212,7 +212,7 @@ def add_own_light(
     for j in range(3 * columns):
         channels[j] = colour[j % 3]
     left, aside = np.empty(columns, np.uint32), np.empty(columns, np.float32)
-    _column_places(grid_columns - 1, nodes, left, aside)
+    _column_places(grid_columns - 1, int(nodes), left, aside)
     mean[:] = attenuation[0, 0]
     last = np.float32(nodes - 1)
     for v in range(distance.shape[0]):

@@ -17,8 +17,8 @@ _LIBRARIES = {"egl": ("EGL", "GL"), "osmesa": ("OSMesa",)}
 """Libraries that each way to an off-screen context needs, the better way first."""
 
 _NAMES = {"egl": "EGL", "osmesa": "OSMesa"}
-_ADVICE = "on Debian or Ubuntu: sudo apt-get install libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri"
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "software rasterizer")
+_ADVICE = "on Debian or Ubuntu: sudo apt-get install libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri"
 
 
 class Platform(Protocol):
@@ -44,7 +44,7 @@ class Context:
     software : bool
         True if the processor draws, for want of a graphics card.
     description : str
-        Renderer and version, for reports.
+        Way, version and renderer, for reports.
     """
 
     platform: Platform
@@ -106,7 +106,7 @@ def _only_context() -> Context:
         wanted = ".".join(map(str, OLDEST))
         raise MissingDependencyError(f"OpenGL {wanted} or newer is needed, {renderer} offers {text}; {_ADVICE}")
     software = any(name in renderer.lower() for name in _SOFTWARE)
-    return Context(platform, os.getpid(), version, software, f"{renderer}, OpenGL {text}, by {_NAMES[way]}")
+    return Context(platform, os.getpid(), version, software, f"OpenGL ({_NAMES[way]}) {text}, {renderer}")
 
 
 def _way() -> str:

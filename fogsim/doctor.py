@@ -42,10 +42,11 @@ class Finding:
 
 
 def examine() -> list[Finding]:
-    """Check Python, packages, SUMO, the renderer and the video encoder."""
+    """Check Python, packages, SUMO, the renderers and the video encoder."""
     findings = [Finding("Python", True, f"{platform.python_version()} on {platform.platform()}")]
     findings += [_package(name) for name in PACKAGES]
-    findings += [_try("SUMO", _sumo), _try("OpenGL (EGL)", _gl), _try("video encoder", _ffmpeg)]
+    findings += [_try("SUMO", _sumo), _try("renderer pyrender", _gl), _try("renderer cpu", _cpu)]
+    findings += [_try("renderer auto", _auto), _try("video encoder", _ffmpeg)]
     return findings
 
 
@@ -73,6 +74,17 @@ def _gl() -> str:
     from fogsim.render import gl_report  # noqa: PLC0415 - only when asked
 
     return gl_report()
+
+
+def _cpu() -> str:
+    return f"numba {version('numba')}; needs no OpenGL"
+
+
+def _auto() -> str:
+    from fogsim.render import best_renderer  # noqa: PLC0415 - only when asked
+
+    name, reason = best_renderer()
+    return f"draws with {name}: {reason}"
 
 
 def _ffmpeg() -> str:

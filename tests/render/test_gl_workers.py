@@ -1,0 +1,102 @@
+"""Renderers in other processes, without OpenGL, and many of them one after another."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from fogsim.errors import MissingDependencyError
+from fogsim.render import gl_report
+
+WORKERS = Path(__file__).with_name("workers.py")
+PACKAGES = "sudo apt-get install libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri"
+
+
+@pytest.fixture
+def _opengl() -> None:
+    try:
+        gl_report()
+    except MissingDependencyError as error:
+        pytest.skip(str(error))
+
+
+def run(*arguments: str, **environment: str) -> str:
+    """What a fresh Python says."""
+    done = subprocess.run(
+        [sys.executable, *arguments],
+        capture_output=True,
+        text=True,
+        timeout=240,
+        check=False,
+        env={**os.environ, **environment},
+    )
+    return done.stdout + done.stderr
+
+
+@pytest.mark.usefixtures("_opengl")
+@pytest.mark.parametrize("renderer", ["pyrender", "cpu"])
+@pytest.mark.parametrize("method", ["fork", "spawn", "forkserver"])
+def test_workers_of_vector_environments_draw(method: str, renderer: str) -> None:
+    assert "frames 2 2 alike" in run(str(WORKERS), method, renderer)
+
+
+@pytest.mark.usefixtures("_opengl")
+def test_workers_that_are_forked_after_the_parent_drew_with_opengl_say_so() -> None:
+    said = run(str(WORKERS), "fork", "pyrender", "--draw-first")
+    assert "RenderError" in said
+    assert "start workers before the parent draws, or with the start method 'spawn'" in said
+    assert "parent draws on" in said
+
+
+@pytest.mark.usefixtures("_opengl")
+def test_workers_that_are_spawned_after_the_parent_drew_draw() -> None:
+    assert "frames 2 2 alike" in run(str(WORKERS), "spawn", "pyrender", "--draw-first")
+
+
+def test_workers_that_are_forked_after_the_parent_drew_without_opengl_draw() -> None:
+    assert "frames 2 2 alike" in run(str(WORKERS), "fork", "cpu", "--draw-first")
+
+
+REPORT = (
+    "from fogsim.render import gl_report\ntry:\n    gl_report()\nexcept Exception as e:\n    print(type(e).__name__, e)"
+)
+
+
+def test_a_missing_library_names_the_packages_in_one_line() -> None:
+    said = run("-c", f"import sys\nsys.modules['pyrender.platforms'] = None\n{REPORT}")
+    assert said.startswith("MissingDependencyError")
+    assert PACKAGES in said
+    assert said.count("\n") == 1
+
+
+def test_a_platform_that_cannot_draw_off_screen_is_named() -> None:
+    said = run("-c", REPORT, PYOPENGL_PLATFORM="glx")
+    assert said.startswith("MissingDependencyError PYOPENGL_PLATFORM is 'glx'")
+    assert "'egl' or 'osmesa'" in said
+    assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize("missing", ["OpenGL", "pyrender"])
+def test_without_opengl_the_cpu_draws(missing: str) -> None:
+    code = (
+        f"import sys\nsys.modules['{missing}'] = None\nsys.argv = ['w', 'none', 'auto']\n"
+        f"exec(compile(open({str(WORKERS)!r}).read(), 'workers', 'exec'))"
+    )
+    assert "one frame" in run("-c", code)
+
+
+@pytest.mark.usefixtures("_opengl")
+@pytest.mark.parametrize("renderer", ["pyrender", "cpu"])
+def test_renderers_made_and_closed_leave_no_memory_behind(renderer: str) -> None:
+    code = (
+        "import sys\n"
+        f"sys.path[:0] = [{str(WORKERS.parents[2] / 'benchmarks')!r}]\n"
+        f"from renderers import soak\nprint(soak({renderer!r}, 20, 40)['heap_growth_kib_per_renderer'])"
+    )
+    grown = run("-c", code).strip()
+    if grown == "None":
+        pytest.skip("this C library does not tell what it has handed out")
+    # One renderer of the benchmark's scene holds some megabytes.
+    assert float(grown) < 100.0

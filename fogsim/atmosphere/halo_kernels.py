@@ -21,6 +21,7 @@ _FOLD = np.float32(WIDE_FOLD)
 _TWO, _ONE, _ZERO = np.float32(2.0), np.float32(1.0), np.float32(0.0)
 _LEAST = np.float32(1e-20)
 _NEXT = np.uint32(1)
+_RED, _GREEN, _BLUE = np.float32(0.2126), np.float32(0.7152), np.float32(0.0722)  # luminance of channels (BT.709)
 
 
 @kernel
@@ -103,7 +104,7 @@ def add_wide(
             blue[p] += light * b
             near[p] += light * n
     for p in range(count):
-        near[p] *= np.float32(3.0) / (red[p] + green[p] + blue[p])
+        near[p] /= _RED * red[p] + _GREEN * green[p] + _BLUE * blue[p]
 
 
 @kernel
@@ -203,7 +204,7 @@ def _drawn_about(
     drawn, free = 0.0, False
     for v in range(max(0, v0 - 1), min(rows, v0 + 3)):
         for u in range(max(0, u0 - 1), min(columns, u0 + 3)):
-            drawn += (radiance[v, 3 * u] + radiance[v, 3 * u + 1] + radiance[v, 3 * u + 2]) / 3.0
+            drawn += _RED * radiance[v, 3 * u] + _GREEN * radiance[v, 3 * u + 1] + _BLUE * radiance[v, 3 * u + 2]
             free |= distance[v, u] > nearest
     return drawn, free
 

@@ -53,10 +53,12 @@ def test_glow_has_no_edges():
     assert np.abs(np.diff(steps)).max() < 0.04
 
 
-def test_surfaces_cut_the_glow_behind_them():
-    near = drawn(fog(100), lamps((40.0, 0.0, 1.5)), empty_view(CAMERA, 10.0))[240, 360]
-    open_ = drawn(fog(100), lamps((40.0, 0.0, 1.5)), empty_view(CAMERA))[240, 360]
-    assert near == pytest.approx(0.25 * open_, rel=0.01)
+@pytest.mark.parametrize("colour", [(1.0, 1.0, 1.0), (1.0 / 0.2126, 0.0, 0.0)])
+def test_surfaces_cut_the_glow_behind_them(colour):
+    lamp = lamps((40.0, 0.0, 1.5), colour=colour)
+    near = drawn(fog(100), lamp, empty_view(CAMERA, 10.0))[240, 360]
+    open_ = drawn(fog(100), lamp, empty_view(CAMERA))[240, 360]
+    assert near == pytest.approx(0.25 * open_, rel=0.01, abs=1e-9)
 
 
 def flux(image, place):

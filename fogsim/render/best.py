@@ -3,8 +3,6 @@
 from fogsim.errors import MissingDependencyError
 from fogsim.render.protocol import RenderError
 
-_BY_PROCESSOR = ("llvmpipe", "softpipe", "swr", "swrast", "software rasterizer", "osmesa")
-
 
 def best_renderer() -> tuple[str, str]:
     """Choose the renderer that "auto" stands for.
@@ -14,14 +12,17 @@ def best_renderer() -> tuple[str, str]:
     tuple of str
         Its name in `RENDERERS`, and why.
     """
-    from fogsim.render import gl_report  # noqa: PLC0415 - it is defined after this module has been imported
+    from fogsim.render.gl.context import context  # noqa: PLC0415 - OpenGL is loaded only where it is asked for
 
     try:
-        report = gl_report()
+        found = context()
     except MissingDependencyError as error:
         return "cpu", f"OpenGL does not work here: {error}"
     except RenderError as error:
         return "cpu", f"OpenGL cannot be used in this process: {error}"
-    if any(name in report.lower() for name in _BY_PROCESSOR):
-        return "cpu", f"OpenGL is not drawn by a graphics card here ({report}), and then the cpu renderer is faster"
-    return "pyrender", f"there is a graphics card for OpenGL ({report})"
+    if found.software:
+        return (
+            "cpu",
+            f"OpenGL is not drawn by a graphics card here ({found.description}), and then the cpu renderer is faster",
+        )
+    return "pyrender", f"there is a graphics card for OpenGL ({found.description})"

@@ -293,8 +293,8 @@ def _fill(work: Work, count: int, lens: Wide, near: float, picture: Index) -> No
             low, high = np.ceil(max(low, first)), np.floor(min(high, last))
             # A row of few pixels is drawn as one of eight, some of them masked, and so is an empty one: to guess how
             # often a short loop turns costs the processor more. Comparisons are such that NaN makes a row empty.
-            low = low if low < last else last
             span = high - low if high >= low else -1.0
+            low = low if low < last else last
             begin, end = np.uint64(low), np.int64(span)
             start = np.float32(zx * low + zy * row + zz)
             # Unsigned numbers tell the compiler that no index counts from the end.

@@ -250,8 +250,8 @@ def shade_ground(runs: Runs, count: int, lens: Lens, noise: Noise, work: Bench, 
                     radiance[v, u, 2] = blue * (texture[i] + c * tint[i])
                 if lamplight:
                     # Seen and lit under the same angle to the ground.
-                    length_of_ray = math.sqrt(rx * rx + ry * ry + 1.0)
-                    sine = -(rays[2, 0] * (begin + half) + rays[2, 1] * row + rays[2, 2]) / length_of_ray
+                    rz = rays[2, 0] * (begin + half) + rays[2, 1] * row + rays[2, 2]
+                    sine = -rz / math.sqrt(rx * rx + ry * ry + rz * rz)
                     answer = np.float32(sine / math.pi / max(white, 1e-30))
                     if white == 0.0:
                         red, green, blue = known[k, COLOUR], known[k, COLOUR + 1], known[k, COLOUR + 2]

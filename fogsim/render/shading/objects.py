@@ -73,7 +73,8 @@ def shade_objects(runs: Runs, count: int, lens: Wide, picture: Picture) -> None:
                 for i in range(np.uint64(end - begin)):
                     step = np.float32(np.int32(i))
                     inverse = min(max(rest + slope * step, least), most)
-                    response[v, np.uint64(begin) + i, channel] = min(max((b + a * step) / inverse, low), high)
+                    answer = min(max((b + a * step) / inverse, low), high)
+                    response[v, np.uint64(begin) + i, channel] = answer / distance[v, np.uint64(begin) + i]
 
 
 @kernel

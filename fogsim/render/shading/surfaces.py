@@ -118,10 +118,11 @@ def know(meshes: Meshes, copies: Copies, lens: Lens, light: Light, lamplight: bo
             per_length = 1.0 / math.sqrt(nx * nx + ny * ny + nz * nz)
             nx, ny, nz = nx * per_length, ny * per_length, nz * per_length
             white = light.white * light_share(nx, ny, nz)
+            # Times the distance, by which each pixel divides; over a flat triangle the product is the same everywhere.
             cosine = 0.0
             if lamplight:
                 ox, oy, oz = offset[i, 0], offset[i, 1], offset[i, 2]
-                cosine = -(nx * ox + ny * oy + nz * oz) / math.sqrt(ox * ox + oy * oy + oz * oz)
+                cosine = -(nx * ox + ny * oy + nz * oz)
                 most = max(most, cosine)
             for channel in range(3):
                 reflectance = record[copy, 12 + channel] if kind == _PAINT else colours[vertex, channel]
@@ -148,7 +149,7 @@ def know(meshes: Meshes, copies: Copies, lens: Lens, light: Light, lamplight: bo
         if lamplight and kind == _SHEETING and most > 0.0:
             middle = math.sqrt(offset[0, 0] ** 2 + offset[0, 1] ** 2 + offset[0, 2] ** 2)
             # A lamp's light is spread over the sheeting's tilted face; beyond that, R falls like the cosine cubed [M].
-            strength = retroreflection(middle) * most * most / 0.66
+            strength = retroreflection(middle) * most * most / (middle * 0.66)
             for i in range(3):
                 for channel in range(3):
                     answer[i, channel] = strength * min(colours[faces[face, i], channel], np.float32(0.66))

@@ -1,10 +1,11 @@
-"""The motorway of the catalogue with vehicles and signs in view, without SUMO running."""
+"""The motorway of the catalogue with vehicles and signs in view, without SUMO running (for benchmarks too)."""
 
 import dataclasses
 import math
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from fogsim.scene import build_scene
 from fogsim.traffic.network import read_net, road_network
@@ -88,3 +89,8 @@ def traffic(places: list[tuple[np.ndarray, float]]) -> TrafficState:
         lamps=np.array([lamps | (int(Lamp.STOP) if i % 3 == 0 else 0) for i in range(len(places))], np.int32),
         paint=np.array([PAINTS[i % len(PAINTS)] for i in range(len(places))]).reshape(-1, 3),
     )
+
+
+@pytest.fixture(scope="session")
+def place() -> Place:
+    return motorway()

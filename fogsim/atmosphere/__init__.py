@@ -1,20 +1,26 @@
-"""Pure physics of light in fog: extinction, optical depth, airlight."""
+"""Pure physics of light in fog: extinction, optical depth, airlight, lamplight, and what is visible in it."""
 
 from fogsim.atmosphere.access import FieldAccess, FogNow
 from fogsim.atmosphere.air import Air
 from fogsim.atmosphere.daylight import airlight_from_illuminance
 from fogsim.atmosphere.frustum import FrustumGrid, frustum_grid, radiance_through_grid
+from fogsim.atmosphere.glare import veiling_luminance
 from fogsim.atmosphere.koschmieder import fogged_radiance
 from fogsim.atmosphere.medium import field_at
+from fogsim.atmosphere.night_visibility import FogKind, Observer, Pavement, visibility_distance
 from fogsim.atmosphere.optical_depth import extinction, optical_depth, optical_depth_along
 from fogsim.atmosphere.phase import Droplets
+from fogsim.atmosphere.visibility_level import visibility_level
 
 __all__ = [
     "Air",
     "Droplets",
     "FieldAccess",
+    "FogKind",
     "FogNow",
     "FrustumGrid",
+    "Observer",
+    "Pavement",
     "airlight_from_illuminance",
     "extinction",
     "field_at",
@@ -23,4 +29,7 @@ __all__ = [
     "optical_depth",
     "optical_depth_along",
     "radiance_through_grid",
+    "veiling_luminance",
+    "visibility_distance",
+    "visibility_level",
 ]

@@ -108,8 +108,10 @@ class Encoder:
         return self._complaints.read().decode(errors="replace").strip() or "no message"
 
 
-def encoder_command(path: Path, frame_period: float) -> list[str]:
-    """Command line of an encoder that takes frames of the panel and writes an mp4 file that browsers can play.
+def encoder_command(
+    path: Path, frame_period: float, size: tuple[int, int] = (FRAME_WIDTH, FRAME_HEIGHT)
+) -> list[str]:
+    """Command line of an encoder that takes raw frames and writes an mp4 file that browsers can play.
 
     Parameters
     ----------
@@ -117,15 +119,16 @@ def encoder_command(path: Path, frame_period: float) -> list[str]:
         The file.
     frame_period : float
         Time between two frames [s].
+    size : tuple of int
+        Columns and rows of a frame [px], both even; those of the panel if not given.
 
     Raises
     ------
     MissingDependencyError
         If there is no ffmpeg.
     """
-    rate = Fraction(1.0 / frame_period).limit_denominator(1000)
-    size = f"{FRAME_WIDTH}x{FRAME_HEIGHT}"
-    source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", str(rate), "-i", "-"]
+    rate = Fraction(1.0 / frame_period).limit_denominator(1001)
+    source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(rate), "-i", "-"]
     coding = ["-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-pix_fmt", "yuv420p"]
     sink = ["-movflags", "+faststart", "-f", "mp4", str(path)]
     return [_ffmpeg(), "-y", "-loglevel", "error", *source, *coding, *sink]

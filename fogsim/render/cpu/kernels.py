@@ -175,21 +175,26 @@ def _select(
     faces, first_vertex, first_face = triangles.faces, triangles.first_vertex, triangles.first_face
     corners, points, box, slot = work.corners, work.points, work.box, work.slot
     last_row, last_column, focal, u0, v0 = size[0] - 1.0, size[1] - 1.0, lens[0], lens[1], lens[2]
-    count, base = 0, np.uint32(0)
+    count, base, slack = 0, np.uint32(0), np.float32(_SLACK)
     for copy in range(begin, end):
         start = first_face[mesh[copy]]
         for face in range(start, first_face[mesh[copy] + 1]):
             i, j, k = faces[face, 0] + base, faces[face, 1] + base, faces[face, 2] + base
-            left, right = _range(corners[3, i], corners[3, j], corners[3, k])
-            top, bottom = _range(corners[4, i], corners[4, j], corners[4, k])
-            if left > right or top > bottom or right < 0 or bottom < 0 or left > last_column or top > last_row:
-                continue
-            if np.isnan(left):
-                if max(corners[2, i], corners[2, j], corners[2, k]) <= near:
-                    continue
+            a, b, c = corners[3, i], corners[3, j], corners[3, k]
+            if np.isnan(a + b + c):
                 z0, z1, z2 = np.float64(corners[2, i]), np.float64(corners[2, j]), np.float64(corners[2, k])
+                if max(z0, z1, z2) <= near:
+                    continue
                 left, right = _extent(corners[0, i], corners[0, j], corners[0, k], z0, z1, z2, focal, u0, near)
                 top, bottom = _extent(corners[1, i], corners[1, j], corners[1, k], z0, z1, z2, focal, v0, near)
+            else:
+                left, right = np.ceil(min(a, b, c) - slack), np.floor(max(a, b, c) + slack)
+                if left > right:
+                    continue
+                a, b, c = corners[4, i], corners[4, j], corners[4, k]
+                top, bottom = np.ceil(min(a, b, c) - slack), np.floor(max(a, b, c) + slack)
+            if top > bottom or right < 0 or bottom < 0 or left > last_column or top > last_row:
+                continue
             box[count, 0], box[count, 1] = np.int32(max(top, 0.0)), np.int32(min(bottom, last_row))
             box[count, 2], box[count, 3] = np.int32(max(left, 0.0)), np.int32(min(right, last_column))
             for row in range(3):
@@ -200,14 +205,6 @@ def _select(
             count += 1
         base += np.uint32(first_vertex[mesh[copy] + 1] - first_vertex[mesh[copy]])
     return count
-
-
-@kernel
-def _range(a: float, b: float, c: float) -> tuple[float, float]:
-    """First and last whole number in the range of three; NaN if any of them is."""
-    if np.isnan(a + b + c):
-        return np.nan, np.nan
-    return np.ceil(min(a, b, c) - _SLACK), np.floor(max(a, b, c) + _SLACK)
 
 
 @kernel
@@ -313,10 +310,11 @@ def _key(inverse_depth: float, slot: int) -> int:
 @kernel
 def _bounds(x: float, y: float, rest: float) -> tuple[float, float, float, float]:
     """Where x · u + y · v + rest is not negative: least u as slope over v and value at 0, and greatest u likewise."""
+    inverse = -1.0 / x
     if x > 0.0:
-        return -y / x, -rest / x, 0.0, np.inf
+        return y * inverse, rest * inverse, 0.0, np.inf
     if x < 0.0:
-        return 0.0, -np.inf, -y / x, -rest / x
+        return 0.0, -np.inf, y * inverse, rest * inverse
     return 0.0, -np.inf, 0.0, np.inf
 
 

@@ -28,8 +28,9 @@ LINE_RESPONSE = 0.15
 """That of its painted lines; dry ones have 0.1 … 0.3."""
 
 # Sides of the squares of noise [m] and deviations of reflectance: grain, mottling, patches and large patches.
-_ASPHALT = (0.01, 0.12, 0.25, 0.025, 3.0, 0.012, 12.0, 0.02)
-_GRASS = (0.08, 0.10, 0.7, 0.06, 5.0, 0.06, 31.0, 0.03)
+_ASPHALT_SIDES, _ASPHALT = (0.01, 0.25, 3.0, 12.0), (0.12, 0.025, 0.012, 0.02)
+_GRASS_SIDES, _GRASS = (0.08, 0.7, 5.0, 31.0), (0.10, 0.06, 0.06, 0.03)
+_FAR = float(1 << 20)  # a multiple of the sides of tiles, so that places are not negative
 _DRY = (1.5, 0.4, -0.3)  # how much more of each channel the large patches of dry grass change
 _FAINTEST = 0.002  # deviation below which grain is left out
 
@@ -112,6 +113,13 @@ def _smooth_at(tile: Array, x: float, y: float, side: float) -> float:
 
 
 @kernel
+def _scales(side: float, least: float, cells: int, wide: float, long: float, x: float, y: float) -> tuple[float, float, float]:
+    """Size of a number of a tile on the ground [m], and where on the tile the camera is."""
+    scale = _doubled(side * least, min(wide, long))
+    return scale, x / scale - cells * math.floor(x / (scale * cells)), y / scale - cells * math.floor(y / (scale * cells))
+
+
+@kernel
 def shade_ground(runs: Runs, count: int, lens: Lens, noise: Noise, work: Bench, picture: Picture) -> None:
     """Shade the runs of road and terrain, and set their distances and instance ids.
 
@@ -143,6 +151,9 @@ def shade_ground(runs: Runs, count: int, lens: Lens, noise: Noise, work: Bench, 
     lamplight, one = len(response) > 0, np.float32(1.0)
     focal, u0, v0 = lens.lens[0], lens.lens[1], lens.lens[2]
     per_focal = np.float32(1.0 / focal)
+    last_kind, last_wide, last_long = -1.0, 0.0, 0.0
+    strength_1, strength_2, strength_3, strength_4 = 0.0, 0.0, 0.0, 0.0
+    scale_1, x_1, y_1, scale_2, x_2, y_2 = 1.0, 0.0, 0.0, 1.0, 0.0, 0.0
     for number in range(count):
         k = run[number, 3]
         kind = known[k, KIND]
@@ -154,9 +165,7 @@ def shade_ground(runs: Runs, count: int, lens: Lens, noise: Noise, work: Bench, 
             float(run[number, 0]),
             np.int32(known[k, INSTANCE]),
         )
-        side, deviation, side_2, deviation_2, side_3, deviation_3, side_4, deviation_4 = (
-            _ASPHALT if kind == ROAD else _GRASS
-        )
+        sides, deviations = (_ASPHALT_SIDES, _ASPHALT) if kind == ROAD else (_GRASS_SIDES, _GRASS)
         zx, zy = known[k, DEPTH], known[k, DEPTH + 1]
         least, most, slope = np.float32(known[k, LEAST]), np.float32(known[k, MOST]), np.float32(zx)
         white = known[k, WHITE]
@@ -185,57 +194,53 @@ def shade_ground(runs: Runs, count: int, lens: Lens, noise: Noise, work: Bench, 
             ux, uy = z * (rays[0, 0] - rx * zx * z), z * (rays[1, 0] - ry * zx * z)
             vx, vy = z * (rays[0, 1] - rx * zy * z), z * (rays[1, 1] - ry * zy * z)
             wide, long = math.sqrt(ux * ux + uy * uy), math.sqrt(vx * vx + vy * vy)
-            narrow = min(wide, long)
-            # Large patches, linear from one end of the chunk to the other.
-            deviation_3 = _faded(_ASPHALT[5] if kind == ROAD else _GRASS[5], side_3, wide, long)
-            deviation_4 = _faded(_ASPHALT[7] if kind == ROAD else _GRASS[7], side_4, wide, long)
+            if kind != last_kind or abs(wide - last_wide) > 0.1 * wide or abs(long - last_long) > 0.1 * long:
+                last_kind, last_wide, last_long = kind, wide, long
+                strength_1, strength_2 = _faded(deviations[0], sides[0], wide, long), _faded(deviations[1], sides[1], wide, long)
+                strength_3, strength_4 = _faded(deviations[2], sides[2], wide, long), _faded(deviations[3], sides[3], wide, long)
+                # Squares are as large as the narrow side of a pixel, so that every pixel has its own.
+                scale_1, x_1, y_1 = _scales(sides[0], 0.5, GRAIN, wide, long, eye[0], eye[1])
+                scale_2, x_2, y_2 = _scales(sides[1] / PER_CELL, 1.0, SMOOTH, wide / PER_CELL, long / PER_CELL, eye[0], eye[1])
+            # Large patches, linear from one end of a piece to the other.
             px, py = eye[0] + rx * z - half * ux, eye[1] + ry * z - half * uy
             if fresh:
-                patches, large = _smooth_at(smooth, px, py, side_3), _smooth_at(smooth, px, py, side_4)
+                patches, large = _smooth_at(smooth, px, py, sides[2]), _smooth_at(smooth, px, py, sides[3])
                 fresh = False
             for first in range(0, size, _PIECE):
                 last = min(first + _PIECE, size)
-                next_patches = _smooth_at(smooth, px + last * ux, py + last * uy, side_3)
-                next_large = _smooth_at(smooth, px + last * ux, py + last * uy, side_4)
-                level = np.float32(1.0 + deviation_3 * patches + deviation_4 * large)
-                tint_level, share = np.float32(deviation_4 * large), 1.0 / (last - first)
-                tint_step = np.float32(deviation_4 * (next_large - large) * share)
-                step_level = tint_step + np.float32(deviation_3 * (next_patches - patches) * share)
+                next_patches = _smooth_at(smooth, px + last * ux, py + last * uy, sides[2])
+                next_large = _smooth_at(smooth, px + last * ux, py + last * uy, sides[3])
+                level = np.float32(1.0 + strength_3 * patches + strength_4 * large)
+                tint_level, share = np.float32(strength_4 * large), 1.0 / (last - first)
+                tint_step = np.float32(strength_4 * (next_large - large) * share)
+                step_level = tint_step + np.float32(strength_3 * (next_patches - patches) * share)
                 patches, large = next_patches, next_large
                 for i in range(np.uint64(last - first)):
                     step = np.float32(np.int32(i))
                     texture[np.uint64(first) + i] = level + step_level * step
                     tint[np.uint64(first) + i] = tint_level + tint_step * step
-            # Grain and mottling: squares as large as the narrow side of a pixel, so that every pixel has its own.
+            # Grain and mottling.
             gx, gy = np.float32(rays[0, 0] * begin + rays[0, 1] * row + rays[0, 2]), np.float32(rays[0, 0])
             hx, hy = np.float32(rays[1, 0] * begin + rays[1, 1] * row + rays[1, 2]), np.float32(rays[1, 0])
-            strength = _faded(deviation, side, wide, long)
-            if strength > _FAINTEST:
-                scale = _doubled(0.5 * side, narrow)
-                period = scale * GRAIN
-                ox, oy = np.float32((eye[0] % period) / scale), np.float32((eye[1] % period) / scale)
-                per_scale, amount = np.float32(1.0 / scale), np.float32(strength)
-                far = np.float32(1 << 20)
+            if strength_1 > _FAINTEST:
+                ox, oy = np.float32(x_1 + _FAR), np.float32(y_1 + _FAR)
+                per_scale, amount = np.float32(1.0 / scale_1), np.float32(strength_1)
                 for i in range(length):
                     step = np.float32(np.int32(i))
                     z32 = depths[i] * per_scale
-                    a = np.int32(ox + (gx + gy * step) * z32 + far) & (GRAIN - 1)
-                    b = np.int32(oy + (hx + hy * step) * z32 + far) & (GRAIN - 1)
+                    a = np.int32(ox + (gx + gy * step) * z32) & (GRAIN - 1)
+                    b = np.int32(oy + (hx + hy * step) * z32) & (GRAIN - 1)
                     places[i] = np.uint32(b * GRAIN + a)
                 for i in range(length):
                     texture[i] += amount * grain[places[i]]
-            strength = _faded(deviation_2, side_2, wide, long)
-            if strength > _FAINTEST:
-                scale = _doubled(side_2, narrow) / PER_CELL
-                period = scale * SMOOTH
-                ox, oy = np.float32((eye[0] % period) / scale), np.float32((eye[1] % period) / scale)
-                per_scale, amount = np.float32(1.0 / scale), np.float32(strength)
-                far = np.float32(1 << 20)
+            if strength_2 > _FAINTEST:
+                ox, oy = np.float32(x_2 + _FAR), np.float32(y_2 + _FAR)
+                per_scale, amount = np.float32(1.0 / scale_2), np.float32(strength_2)
                 for i in range(length):
                     step = np.float32(np.int32(i))
                     z32 = depths[i] * per_scale
-                    a = np.int32(ox + (gx + gy * step) * z32 + far) & (SMOOTH - 1)
-                    b = np.int32(oy + (hx + hy * step) * z32 + far) & (SMOOTH - 1)
+                    a = np.int32(ox + (gx + gy * step) * z32) & (SMOOTH - 1)
+                    b = np.int32(oy + (hx + hy * step) * z32) & (SMOOTH - 1)
                     places[i] = np.uint32(b * SMOOTH + a)
                 for i in range(length):
                     texture[i] += amount * smooth[places[i]]

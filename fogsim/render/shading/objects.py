@@ -29,7 +29,7 @@ def shade_objects(runs: Runs, count: int, lens: Wide, picture: Picture) -> None:
     """
     run, known = runs.run, runs.surface
     radiance, distance, instance, response = picture.radiance, picture.distance, picture.instance, picture.response
-    lamplight = len(response) > 0
+    lamplight, depths = len(response) > 0, np.empty(distance.shape[1], np.float32)
     per_focal, one = np.float32(1.0 / lens[0]), np.float32(1.0)
     for number in range(count):
         k = run[number, 3]
@@ -43,12 +43,13 @@ def shade_objects(runs: Runs, count: int, lens: Wide, picture: Picture) -> None:
         rest = np.float32(known[k, DEPTH] * begin + known[k, DEPTH + 1] * row + known[k, DEPTH + 2])
         x, y = np.float32((begin - lens[1]) / lens[0]), np.float32((row - lens[2]) / lens[0])
         square = one + y * y
-        for i in range(np.uint64(end - begin)):
-            u = np.uint64(begin) + i
+        length = np.uint64(end - begin)
+        for i in range(length):
             step = np.float32(np.int32(i))
-            across = x + per_focal * step
-            inverse = min(max(rest + slope * step, least), most)
-            distance[v, u] = np.sqrt(square + across * across) / inverse
+            across, z = x + per_focal * step, one / min(max(rest + slope * step, least), most)
+            depths[i] = z
+            distance[v, np.uint64(begin) + i] = np.sqrt(square + across * across) * z
+        for u in range(np.uint64(begin), np.uint64(end)):
             instance[v, u] = name
         if kind == PLAIN:
             red, green, blue = np.float32(known[k, LOW]), np.float32(known[k, LOW + 1]), np.float32(known[k, LOW + 2])
@@ -61,19 +62,16 @@ def shade_objects(runs: Runs, count: int, lens: Wide, picture: Picture) -> None:
             b = known[k, LIGHT + 3 * c] * begin + known[k, LIGHT + 3 * c + 1] * row
             b = np.float32(b + known[k, LIGHT + 3 * c + 2])
             low, high = np.float32(known[k, LOW + c]), np.float32(known[k, HIGH + c])
-            for i in range(np.uint64(end - begin)):
-                step = np.float32(np.int32(i))
-                inverse = min(max(rest + slope * step, least), most)
-                radiance[v, np.uint64(begin) + i, channel] = min(max((b + a * step) / inverse, low), high)
+            for i in range(length):
+                value = (b + a * np.float32(np.int32(i))) * depths[i]
+                radiance[v, np.uint64(begin) + i, channel] = min(max(value, low), high)
             if lamplight:
                 a = np.float32(known[k, RESPONSE + 3 * c])
                 b = known[k, RESPONSE + 3 * c] * begin + known[k, RESPONSE + 3 * c + 1] * row
                 b = np.float32(b + known[k, RESPONSE + 3 * c + 2])
                 low, high = np.float32(known[k, RESPONSE_LOW + c]), np.float32(known[k, RESPONSE_HIGH + c])
-                for i in range(np.uint64(end - begin)):
-                    step = np.float32(np.int32(i))
-                    inverse = min(max(rest + slope * step, least), most)
-                    answer = min(max((b + a * step) / inverse, low), high)
+                for i in range(length):
+                    answer = min(max((b + a * np.float32(np.int32(i))) * depths[i], low), high)
                     response[v, np.uint64(begin) + i, channel] = answer / distance[v, np.uint64(begin) + i]
 
 
@@ -82,6 +80,7 @@ def shade_sky(runs: Runs, count: int, rays: Wide, light: Light, picture: Picture
     """Shade the runs of sky: the CIE standard overcast sky, L(θ) = L_z (1 + 2 sin θ) / 3."""
     run = runs.run
     radiance, distance, instance, response = picture.radiance, picture.distance, picture.instance, picture.response
+    shares = np.empty(distance.shape[1], np.float32)
     lamplight, nothing, far = len(response) > 0, np.float32(0.0), np.float32(np.inf)
     red, green, blue = np.float32(light.zenith[0]), np.float32(light.zenith[1]), np.float32(light.zenith[2])
     third, two_thirds = np.float32(1.0 / 3.0), np.float32(2.0 / 3.0)
@@ -94,11 +93,13 @@ def shade_sky(runs: Runs, count: int, rays: Wide, light: Light, picture: Picture
         x = np.float32(rays[0, 0] * begin + rays[0, 1] * row + rays[0, 2])
         y = np.float32(rays[1, 0] * begin + rays[1, 1] * row + rays[1, 2])
         z = np.float32(rays[2, 0] * begin + rays[2, 1] * row + rays[2, 2])
+        # Loops apart, since each alone runs in vector registers.
         for i in range(np.uint64(end - begin)):
-            u = np.uint64(begin) + i
             step = np.float32(np.int32(i))
             a, b, c = x + dx * step, y + dy * step, z + dz * step
-            share = third + two_thirds * max(c / np.sqrt(a * a + b * b + c * c), nothing)
+            shares[i] = third + two_thirds * max(c / np.sqrt(a * a + b * b + c * c), nothing)
+        for i in range(np.uint64(end - begin)):
+            u, share = np.uint64(begin) + i, shares[i]
             radiance[v, u, 0], radiance[v, u, 1], radiance[v, u, 2] = red * share, green * share, blue * share
         for u in range(np.uint64(begin), np.uint64(end)):
             distance[v, u] = far

@@ -1,8 +1,6 @@
 """Compiled kernels: numba, cached on disk where a directory can be written, compiled anew where none can."""
 
-import os
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
@@ -22,17 +20,3 @@ def kernel(function: F) -> F:
     except RuntimeError:
         # numba found no place for its cache
         return cast("F", numba.njit(cache=False, **options)(function))
-
-
-def is_cached(*modules: str) -> bool:
-    """Tell whether compiled kernels of modules lie on disk already, so that no long first call is to be expected.
-
-    Parameters
-    ----------
-    modules : str
-        Paths of the modules' source files.
-    """
-    folders = [Path(m).parent / "__pycache__" for m in modules]
-    if os.environ.get("NUMBA_CACHE_DIR"):
-        folders = [Path(os.environ["NUMBA_CACHE_DIR"])]
-    return all(any(folder.rglob(f"{Path(m).stem}.*.nbi")) for m, folder in zip(modules, folders, strict=False))

@@ -34,6 +34,17 @@ def records(name: str, *arguments: str) -> list[dict[str, Any]]:
             ("--size", "160x120", "--seconds", "1", "--seeds", "1"),
             {"method", "visibility", "median_pct", "p95_pct", "valid_share", "ms"},
         ),
+        (
+            "frames.py",
+            ("--size", "64x48", "--frames", "2", "--repeat", "1"),
+            {"renderer", "light", "width", "height", "ms_median", "ms_min", "ms_render"},
+        ),
+        (
+            "renderers.py",
+            ("--renderers", "4", "--frames", "8"),
+            {"growth_kib_per_renderer", "growth_kib_per_1000_frames"},
+        ),
+        ("traffic.py", ("--vehicles", "20", "--blocks", "3"), {"vehicles", "ms_sumo", "ms_total", "ratio"}),
     ],
 )
 def test_records(name: str, arguments: tuple[str, ...], keys: set[str]) -> None:

@@ -92,16 +92,21 @@ def record_run(
     InputError
         If the directory holds results already and must not be overwritten.
     FogSimError
-        If a part of the loop cannot start or fails; the manifest then says so.
+        If a part of the loop cannot start, which leaves nothing behind, or fails on the way; the manifest then says so.
     """
     directory = RunDirectory(out, overwrite)
     metrics = RunMetrics()
     manifest = Manifest(Status.RUNNING, seed, resolved(scenario), datetime.now(UTC), command_line=command_line)
     write_manifest(directory.manifest, manifest)
-    opened = _open(recorders, scenario, seed, directory, metrics)
-    status, ending, message = Status.FAILED, None, ""
+    try:
+        opened = _open(recorders, scenario, seed, directory, metrics)
+    except Exception:
+        directory.discard()
+        raise
+    status, ending, message, begun = Status.FAILED, None, "", False
     try:
         for step in run(scenario, seed):
+            begun = True
             metrics.update(step)
             derived = step_metrics(step)
             for recorder in opened:
@@ -117,6 +122,8 @@ def record_run(
     finally:
         # The stack runs every step from the last to the first, also when one of them fails.
         with contextlib.ExitStack() as finishing:
+            if status is Status.FAILED and not begun:
+                finishing.callback(directory.discard)
             ended = dataclasses.replace(manifest, status=status, ending=ending, message=message)
             finishing.callback(_write_ended, directory, ended)
             complete = status is Status.COMPLETE

@@ -7,7 +7,7 @@ import pytest
 from pyarrow import parquet
 
 import fogsim
-from fogsim.errors import SimulationError
+from fogsim.errors import FogSimError, SimulationError
 from fogsim.recorders import ReportRecorder
 from fogsim.recording import record_run
 from fogsim.scenario import Scenario
@@ -49,9 +49,19 @@ def test_one_recorder_that_cannot_finish_does_not_cost_the_others_their_files(
     assert status(tmp_path / "out")["files"] == ["manifest.json", "metrics.json", "steps.parquet", "video.mp4"]
 
 
-def test_a_scenario_that_cannot_start_leaves_a_manifest_that_says_so(tmp_path: Path) -> None:
+@pytest.mark.parametrize("kept", [False, True])
+def test_a_scenario_that_cannot_start_leaves_nothing_of_its_own(tmp_path: Path, kept: bool) -> None:
+    out = tmp_path / "runs" / "out"
+    if kept:
+        out.mkdir(parents=True)
+        (out / "notes.txt").write_text("of the user", encoding="utf-8")
     scenario = fogsim.load_scenario("motorway_fog_bank", ["traffic.ego=nobody", "traffic.warm_up_limit_s=2"])
     with pytest.raises(SimulationError, match="nobody"):
-        record_run(scenario, 1, tmp_path / "out")
-    assert status(tmp_path / "out")["status"] == "failed"
-    assert not list((tmp_path / "out").glob("*.part"))
+        record_run(scenario, 1, out)
+    assert [path.name for path in tmp_path.rglob("*")] == (["runs", "out", "notes.txt"] if kept else [])
+
+
+def test_a_recorder_that_cannot_begin_leaves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(FogSimError, match="no_such_recorder"):
+        record_run(short(), 1, tmp_path / "out", recorders=("table", "no_such_recorder"))
+    assert not (tmp_path / "out").exists()

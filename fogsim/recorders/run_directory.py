@@ -32,6 +32,7 @@ class RunDirectory:
 
     def __init__(self, path: Path, overwrite: bool = False) -> None:
         self.path = Path(path)
+        self._made = [folder for folder in (self.path, *self.path.parents) if not folder.exists()]
         self._make()
         earlier = [name for name in self._own_files() if name.is_file()]
         if earlier and not overwrite:
@@ -50,6 +51,15 @@ class RunDirectory:
             raise InputError(f"results need a directory, but {self.path} is a file") from None
         except OSError as error:
             raise InputError(f"cannot make the directory {self.path} for the results: {error.strerror}") from error
+
+    def discard(self) -> None:
+        """Take everything away that FogSim has written here, and the directories that were made for it."""
+        for name in self._own_files():
+            name.unlink(missing_ok=True)
+        for folder in self._made:
+            if any(folder.iterdir()):
+                break
+            folder.rmdir()
 
     def _own_files(self) -> list[Path]:
         whole = [self.path / name for name in _NAMES.values()]

@@ -74,7 +74,7 @@ class TraciLink:
         return self._connection
 
     def _connect(self) -> Api:
-        traci = load_traci()
+        traci, begun = load_traci(), time.monotonic()
         for attempt in range(self._retries + 1):
             try:
                 # Its own retries would print to stdout.
@@ -82,15 +82,21 @@ class TraciLink:
                 break
             except (traci.FatalTraCIError, OSError) as error:
                 if attempt == self._retries:
-                    raise SimulationError(
-                        f"no SUMO answers {self._where} ({error}): start it with --remote-port {self._port}, "
-                        "and --num-clients if it is to have several clients"
-                    ) from error
+                    raise SimulationError(self._silence(time.monotonic() - begun, error)) from error
                 time.sleep(WAIT)
         if self._order is not None:
             with self.watched():
                 connection.setOrder(self._order)
         return connection
+
+    def _silence(self, waited: float, error: Exception) -> str:
+        """Say that nobody has answered, for how long, and what to do."""
+        # traci's own words only count the tries of one attempt, which is always one.
+        why = f" ({error})" if isinstance(error, OSError) else ""
+        return (
+            f"no SUMO answers {self._where}{why}, asked {self._retries + 1} times within {waited:.1f} s: start it with "
+            f"--remote-port {self._port}, and --num-clients if it is to have several clients"
+        )
 
     def _load(self, arguments: Sequence[str]) -> None:
         clients = int(self._connection.simulation.getOption("num-clients"))

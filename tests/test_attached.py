@@ -238,3 +238,18 @@ def test_a_connection_that_is_lost_on_the_way_is_one_error(sumo_process: Callabl
         process.wait(10)
         with pytest.raises(SimulationError, match=rf"SUMO at 127\.0\.0\.1:{port} is lost"):
             next(steps)
+
+
+def test_lane_changing_is_given_back_to_who_was_kept_in_lane(libsumo: Any) -> None:
+    """Who comes after the ego is kept in its lane until the session ends; who was there before is left alone."""
+    later, get = "veh22", libsumo.vehicle
+    session = fogsim.attach(libsumo, ego=EGO, visibility=120.0, settings=(*SMALL, f"traffic.keep_lane=[veh3, {later}]"))
+    while later not in get.getIDList():
+        libsumo.simulationStep()
+        present = get.getIDList()
+        before = {v: get.getLaneChangeMode(v) for v in present}
+        session.observe()
+    assert EGO in present
+    assert get.getLaneChangeMode(later) == 0 != before[later]
+    session.close()
+    assert {v: get.getLaneChangeMode(v) for v in present} == before

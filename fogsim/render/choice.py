@@ -1,6 +1,8 @@
 """The choice of what a picture may show: copies in view and large enough, small ones by simpler stand-ins."""
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,12 +100,12 @@ class Chosen(NamedTuple):
     order: Index
 
 
-def shapes_of(numbers: dict[str, int], low: Wide, high: Wide, faces: Index, endings: tuple[str, ...]) -> Shapes:
+def shapes_of(numbers: Mapping[str, int], low: Wide, high: Wide, faces: Index, endings: tuple[str, ...]) -> Shapes:
     """Measure shapes.
 
     Parameters
     ----------
-    numbers : dict
+    numbers : mapping from str to int
         Number of each shape.
     low, high : (n, 3) float64
         Corners of their bounding boxes.
@@ -130,7 +132,11 @@ def copies_of(shape: Index, record: Array, place: Wide, shapes: Shapes) -> Copie
 
 def with_room(copies: Copies, count: int) -> Copies:
     """Add room for so many more copies."""
-    return Copies(*(np.concatenate([column, np.zeros((count, *column.shape[1:]), column.dtype)]) for column in copies))
+
+    def longer(column: NDArray[Any]) -> NDArray[Any]:
+        return np.concatenate((column, np.zeros((count, *column.shape[1:]), column.dtype)))
+
+    return Copies._make(longer(np.asarray(column)) for column in copies)
 
 
 def cells_of(copies: Copies, side: float) -> tuple[Copies, Cells]:
@@ -138,10 +144,10 @@ def cells_of(copies: Copies, side: float) -> tuple[Copies, Cells]:
     square = np.floor(copies.middle[:, :2] / side).astype(np.int64)
     _, number = np.unique(square, axis=0, return_inverse=True)
     order = np.argsort(number.ravel(), kind="stable")
-    sorted_copies = Copies(*(np.ascontiguousarray(column[order]) for column in copies))
+    sorted_copies = Copies._make(np.ascontiguousarray(column[order]) for column in copies)
     first = np.concatenate(([0], np.cumsum(np.bincount(number.ravel())))).astype(np.int64)
     middle, radius = np.zeros((len(first) - 1, 3)), np.zeros(len(first) - 1)
-    for cell, (start, end) in enumerate(zip(first[:-1], first[1:], strict=True)):
+    for cell, (start, end) in enumerate(pairwise(first.tolist())):
         inside = sorted_copies.middle[start:end]
         middle[cell] = 0.5 * (inside.min(axis=0) + inside.max(axis=0))
         reach = np.linalg.norm(inside - middle[cell], axis=1) + sorted_copies.radius[start:end]
@@ -246,7 +252,7 @@ def _dot(a: Vector, b: Vector) -> float:
 @kernel
 def _depth(middle: Vector, radius: float, p: Vector, q: Vector, r: Vector, s: Vector, ahead: Vector) -> float:
     """Depth of the nearest point of a sphere [m], infinite if it is out of view."""
-    if min(min(_dot(p, middle), _dot(q, middle)), min(_dot(r, middle), _dot(s, middle))) < -radius:
+    if min(_dot(p, middle), _dot(q, middle), _dot(r, middle), _dot(s, middle)) < -radius:
         return np.inf
     depth = _dot(ahead, middle)
     return max(depth - radius, 0.0) if depth > -radius else np.inf

@@ -6,7 +6,7 @@ pixel, their sum is 1/z, and corners may lie behind the camera (Olano & Greer, "
 Homogeneous Coordinates", 1997).
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -285,17 +285,18 @@ def _fill(work: Work, count: int, lens: Wide, near: float, picture: Index) -> No
         first, last, number, step = float(left), float(right), slots[t], np.float32(zx)
         for v in range(np.uint64(top), np.uint64(bottom + 1)):
             row = float(v)
-            low = max(max(a1 * row + a0, b1 * row + b0), max(c1 * row + c0, d1 * row + d0))
-            high = min(min(a3 * row + a2, b3 * row + b2), min(c3 * row + c2, d3 * row + d2))
+            low = max(a1 * row + a0, b1 * row + b0, c1 * row + c0, d1 * row + d0)
+            high = min(a3 * row + a2, b3 * row + b2, c3 * row + c2, d3 * row + d2)
             low, high = np.ceil(max(low, first)), np.floor(min(high, last))
             # A row of few pixels is drawn as one of eight, some of them masked, and so is an empty one: to guess how
             # often a short loop turns costs the processor more. Comparisons are such that NaN makes a row empty.
             span = high - low if high >= low else -1.0
             low = low if low < last else last
             begin, end = np.uint64(low), np.int64(span)
+            lanes: Any = max(end + 1, _LANES)
             start = np.float32(zx * low + zy * row + zz)
             # Unsigned numbers tell the compiler that no index counts from the end.
-            for i in range(np.uint64(max(end + 1, _LANES))):
+            for i in range(np.uint64(lanes)):
                 key = _key(start + step * np.float32(np.int32(i)), number)
                 key = key if np.int64(i) <= end else 0
                 before = picture[v, begin + i]
@@ -303,7 +304,7 @@ def _fill(work: Work, count: int, lens: Wide, near: float, picture: Index) -> No
 
 
 @kernel
-def _key(inverse_depth: float, slot: int) -> int:
+def _key(inverse_depth: float | np.float32, slot: int) -> Any:
     return np.int64(np.float32(inverse_depth).view(np.int32)) << 32 | np.int64(slot)
 
 

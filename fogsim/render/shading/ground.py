@@ -4,7 +4,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
@@ -54,7 +53,8 @@ class Bench(NamedTuple):
 
 def bench() -> Bench:
     """Make memory for one chunk."""
-    return Bench(*(np.empty(_CHUNK, np.float32) for _ in range(3)), np.empty(_CHUNK, np.uint32))
+    depth, texture, tint = np.empty((3, _CHUNK), np.float32)
+    return Bench(depth, texture, tint, np.empty(_CHUNK, np.uint32))
 
 
 @kernel
@@ -109,18 +109,21 @@ def _smooth_at(tile: Array, x: float, y: float, side: float) -> float:
     k, m = (i + 1) & mask, (j + 1) & mask
     upper = tile[j * SMOOTH + i] * (1.0 - a) + tile[j * SMOOTH + k] * a
     lower = tile[m * SMOOTH + i] * (1.0 - a) + tile[m * SMOOTH + k] * a
-    return upper * (1.0 - b) + lower * b
+    return float(upper * (1.0 - b) + lower * b)
 
 
 @kernel
-def _scales(side: float, least: float, cells: int, wide: float, long: float, x: float, y: float) -> tuple[float, float, float]:
-    """Size of a number of a tile on the ground [m], and where on the tile the camera is."""
-    scale = _doubled(side * least, min(wide, long))
-    return scale, x / scale - cells * math.floor(x / (scale * cells)), y / scale - cells * math.floor(y / (scale * cells))
+def _scale(side: float, count: int, narrow: float, x: float, y: float) -> tuple[float, float, float]:
+    """Size of a number of a tile on the ground [m], and where on a tile of so many numbers the camera is."""
+    scale = _doubled(side, narrow)
+    period = scale * count
+    return scale, (x - period * math.floor(x / period)) / scale, (y - period * math.floor(y / period)) / scale
 
 
 @kernel
-def shade_ground(runs: Runs, count: int, lens: Lens, noise: Noise, work: Bench, picture: Picture) -> None:
+def shade_ground(  # noqa: C901, PLR0912, PLR0915 - one loop: handing arrays to functions costs more than a run's work
+    runs: Runs, count: int, lens: Lens, noise: Noise, work: Bench, picture: Picture
+) -> None:
     """Shade the runs of road and terrain, and set their distances and instance ids.
 
     Parameters
@@ -157,7 +160,7 @@ def shade_ground(runs: Runs, count: int, lens: Lens, noise: Noise, work: Bench, 
     for number in range(count):
         k = run[number, 3]
         kind = known[k, KIND]
-        if kind != ROAD and kind != TERRAIN:
+        if kind not in (ROAD, TERRAIN):
             continue
         v, end, row, name = (
             np.uint64(run[number, 0]),
@@ -196,11 +199,14 @@ def shade_ground(runs: Runs, count: int, lens: Lens, noise: Noise, work: Bench, 
             wide, long = math.sqrt(ux * ux + uy * uy), math.sqrt(vx * vx + vy * vy)
             if kind != last_kind or abs(wide - last_wide) > 0.1 * wide or abs(long - last_long) > 0.1 * long:
                 last_kind, last_wide, last_long = kind, wide, long
-                strength_1, strength_2 = _faded(deviations[0], sides[0], wide, long), _faded(deviations[1], sides[1], wide, long)
-                strength_3, strength_4 = _faded(deviations[2], sides[2], wide, long), _faded(deviations[3], sides[3], wide, long)
+                strength_1 = _faded(deviations[0], sides[0], wide, long)
+                strength_2 = _faded(deviations[1], sides[1], wide, long)
+                strength_3 = _faded(deviations[2], sides[2], wide, long)
+                strength_4 = _faded(deviations[3], sides[3], wide, long)
                 # Squares are as large as the narrow side of a pixel, so that every pixel has its own.
-                scale_1, x_1, y_1 = _scales(sides[0], 0.5, GRAIN, wide, long, eye[0], eye[1])
-                scale_2, x_2, y_2 = _scales(sides[1] / PER_CELL, 1.0, SMOOTH, wide / PER_CELL, long / PER_CELL, eye[0], eye[1])
+                narrow = min(wide, long)
+                scale_1, x_1, y_1 = _scale(0.5 * sides[0], GRAIN, narrow, eye[0], eye[1])
+                scale_2, x_2, y_2 = _scale(sides[1] / PER_CELL, SMOOTH, narrow / PER_CELL, eye[0], eye[1])
             # Large patches, linear from one end of a piece to the other.
             px, py = eye[0] + rx * z - half * ux, eye[1] + ry * z - half * uy
             if fresh:
@@ -247,12 +253,12 @@ def shade_ground(runs: Runs, count: int, lens: Lens, noise: Noise, work: Bench, 
             if kind == TERRAIN:
                 red, green, blue = known[k, COLOUR], known[k, COLOUR + 1], known[k, COLOUR + 2]
                 red, green, blue = np.float32(red * white), np.float32(green * white), np.float32(blue * white)
-                a, b, c = np.float32(_DRY[0]), np.float32(_DRY[1]), np.float32(_DRY[2])
+                dry, drier, driest = np.float32(_DRY[0]), np.float32(_DRY[1]), np.float32(_DRY[2])
                 for i in range(length):
                     u = np.uint64(begin) + i
-                    radiance[v, u, 0] = red * (texture[i] + a * tint[i])
-                    radiance[v, u, 1] = green * (texture[i] + b * tint[i])
-                    radiance[v, u, 2] = blue * (texture[i] + c * tint[i])
+                    radiance[v, u, 0] = red * (texture[i] + dry * tint[i])
+                    radiance[v, u, 1] = green * (texture[i] + drier * tint[i])
+                    radiance[v, u, 2] = blue * (texture[i] + driest * tint[i])
                 if lamplight:
                     # Seen and lit under the same angle to the ground.
                     rz = rays[2, 0] * (begin + half) + rays[2, 1] * row + rays[2, 2]
@@ -302,16 +308,16 @@ def shade_ground(runs: Runs, count: int, lens: Lens, noise: Noise, work: Bench, 
             first_t = t_base / max(base, known[k, LEAST])
             last_t = (t_base + tx * (size - 1)) / max(base + zx * (size - 1), known[k, LEAST])
             reach = 0.5 * _LINE_WIDTH + spread
-            for place in range(2):
-                code, line = (codes // 3, half_lane) if place == 0 else (codes % 3, -half_lane)
+            for edge in range(2):
+                code, line = (codes // 3, half_lane) if edge == 0 else (codes % 3, -half_lane)
                 if code == 0 or line > max(first_t, last_t) + reach or line < min(first_t, last_t) - reach:
                     continue
                 paint, paint_response = np.float32(white * _LINE_REFLECTANCE), np.float32(LINE_RESPONSE)
                 for i in range(length):
-                    u, step, z = np.uint64(begin) + i, float(i), np.float64(depths[i])
-                    t, s = (t_base + tx * step) * z, (s_base + sx * step) * z
-                    across_px = max(abs(z * (tx - t * zx)) + abs(z * (ty - t * zy)), 1e-4)
-                    along_px = max(abs(z * (sx - s * zx)) + abs(z * (sy - s * zy)), 1e-4)
+                    u, place, far = np.uint64(begin) + i, float(i), np.float64(depths[i])
+                    t, s = (t_base + tx * place) * far, (s_base + sx * place) * far
+                    across_px = max(abs(far * (tx - t * zx)) + abs(far * (ty - t * zy)), 1e-4)
+                    along_px = max(abs(far * (sx - s * zx)) + abs(far * (sy - s * zy)), 1e-4)
                     share = np.float32(line_share(code, line, s, t, along_px, across_px))
                     if share > 0.0:
                         # Paint is worn where the asphalt below is coarse.

@@ -47,6 +47,6 @@ def tiles() -> Noise:
 
 def _normalised(tile: NDArray[np.float64]) -> NDArray[np.float32]:
     centred = tile - tile.mean()
-    flat = (centred / centred.std()).astype(np.float32).ravel()
+    flat: NDArray[np.float32] = (centred / centred.std()).astype(np.float32).ravel()
     flat.flags.writeable = False
     return flat

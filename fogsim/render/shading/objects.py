@@ -13,7 +13,9 @@ OBJECT, PLAIN = layout.OBJECT, layout.PLAIN
 
 
 @kernel
-def shade_objects(runs: Runs, count: int, lens: Wide, picture: Picture) -> None:
+def shade_objects(  # noqa: C901 - one loop: handing arrays to functions costs more than a run's work
+    runs: Runs, count: int, lens: Wide, picture: Picture
+) -> None:
     """Shade the runs of triangles without texture, and set their distances and instance ids.
 
     Parameters
@@ -34,7 +36,7 @@ def shade_objects(runs: Runs, count: int, lens: Wide, picture: Picture) -> None:
     for number in range(count):
         k = run[number, 3]
         kind = known[k, KIND]
-        if kind != OBJECT and kind != PLAIN:
+        if kind not in (OBJECT, PLAIN):
             continue
         v, begin, end = np.uint64(run[number, 0]), run[number, 1], run[number, 2]
         row, name = float(run[number, 0]), np.int32(known[k, INSTANCE])
@@ -99,8 +101,12 @@ def shade_sky(runs: Runs, count: int, rays: Wide, light: Light, picture: Picture
             a, b, c = x + dx * step, y + dy * step, z + dz * step
             shares[i] = third + two_thirds * max(c / np.sqrt(a * a + b * b + c * c), nothing)
         for i in range(np.uint64(end - begin)):
-            u, share = np.uint64(begin) + i, shares[i]
-            radiance[v, u, 0], radiance[v, u, 1], radiance[v, u, 2] = red * share, green * share, blue * share
+            place, share = np.uint64(begin) + i, shares[i]
+            radiance[v, place, 0], radiance[v, place, 1], radiance[v, place, 2] = (
+                red * share,
+                green * share,
+                blue * share,
+            )
         for u in range(np.uint64(begin), np.uint64(end)):
             distance[v, u] = far
         for u in range(np.uint64(begin), np.uint64(end)):

@@ -1,5 +1,7 @@
 """From the slots of pixels to runs of pixels, and a list of the surfaces that are seen."""
 
+from typing import Any
+
 import numpy as np
 
 from fogsim.jit import kernel
@@ -31,21 +33,21 @@ def find_runs(slots: Numbers, copies: Copies, rays: Wide, terrain: bool, runs: R
     run, surface_of_slot, slot_of, copy_of = runs.run, runs.surface_of_slot, runs.slot, runs.copy
     first = copies.first
     for copy in range(len(copies.mesh)):
-        for slot in range(first[copy], first[copy + 1]):
-            surface_of_slot[slot] = -2 - copy
+        for own in range(first[copy], first[copy + 1]):
+            surface_of_slot[own] = -2 - copy
     count, surfaces = 0, 2
     rows, columns = slots.shape
     width = np.uint64(columns)
     for v in range(rows):
-        begin = 0
+        begin: Any = 0
         while begin < columns:
-            slot = slots[v, begin]
+            slot: Any = slots[v, begin]
             # Unsigned numbers tell the compiler that no index counts from the end.
             place = np.uint64(begin) + np.uint64(1)
             while place < width and slots[np.uint64(v), place] == slot:
                 place += np.uint64(1)
-            end = np.int64(place)
-            surface = 0
+            end: Any = np.int64(place)
+            surface: Any = 0
             if slot >= 0:
                 surface = surface_of_slot[slot]
                 if surface < 0:

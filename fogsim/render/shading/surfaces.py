@@ -61,7 +61,9 @@ def know_background(lens: Lens, light: Light, runs: Runs) -> None:
 
 
 @kernel
-def know(meshes: Meshes, copies: Copies, lens: Lens, light: Light, lamplight: bool, runs: Runs, count: int) -> None:
+def know(  # noqa: C901, PLR0912, PLR0915 - one loop: handing arrays to functions costs more than a surface's work
+    meshes: Meshes, copies: Copies, lens: Lens, light: Light, lamplight: bool, runs: Runs, count: int
+) -> None:
     """Set what is known of the surfaces from number 2 to `count`."""
     positions, normals, colours, surface_of = meshes.positions, meshes.normals, meshes.reflectance, meshes.surface
     faces, first_face, roads, vertex_instance = meshes.faces, meshes.first_face, meshes.road, meshes.instance

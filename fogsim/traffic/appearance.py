@@ -1,5 +1,6 @@
 """Body kinds, paints and lamps of SUMO's vehicles."""
 
+import functools
 import zlib
 from collections.abc import Sequence
 
@@ -65,6 +66,7 @@ def paint(vehicle_id: str, colour: tuple[int, ...]) -> tuple[float, float, float
     return (red, green, blue)
 
 
+@functools.lru_cache(maxsize=1024)
 def lamps_from_signals(signals: int) -> int:
     """Lamps, as bits of `Lamp`, that SUMO's vehicle signals stand for."""
     lamps = 0

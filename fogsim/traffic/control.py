@@ -77,7 +77,7 @@ class LaneKeeping:
     def keep(self) -> None:
         """Take charge of those who are new on the road."""
         new, self._mark = self._roster.newcomers(self._mark)
-        for vehicle in self._wanted.intersection(new):
+        for vehicle in self._wanted.intersection(new) if new else ():
             self._modes.setdefault(vehicle, self._vehicles.getLaneChangeMode(vehicle))
             self._vehicles.setLaneChangeMode(vehicle, _NO_LANE_CHANGES)
 

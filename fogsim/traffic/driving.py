@@ -57,6 +57,7 @@ class Drivers:
         self._table = DriverTable(api, setup, seed)
         self._advised_since: dict[str, float] = {}
         self._next = 0.0
+        self._mark = 0
 
     def update(self, advised: Mapping[str, float]) -> None:
         """Let every driver choose a speed, if it is time to think again.
@@ -71,8 +72,11 @@ class Drivers:
         if time < self._next:
             return
         self._next = time + CHOICE_PERIOD
+        new, self._mark = self._roster.newcomers(self._mark)
+        # In even fog and without advice, only who is new has not made up the mind yet.
+        settled = self._extinction is not None and not advised and not self._advised_since
         self._advised_since = {v: self._advised_since.get(v, time) for v in advised}
-        ids = [v for v in self._roster.present if v != self._ego]
+        ids = [v for v in (new if settled else self._roster.present) if v != self._ego and v in self._roster.present]
         if ids:
             self._think(ids, advised, time)
 

@@ -5,8 +5,9 @@ SUMO's vehicles change lane in one step. Its own ways to make them take time cos
 from the old lane to the new one; all that SUMO computes with (gaps, speeds, collisions) is as it was.
 """
 
+import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,32 @@ TOP_SPEED = 100.0
 LEAST_SPEED = 10.0
 """Slower vehicles turn to the side no farther than if they were this fast [m/s]."""
 
-_BEGUN, _OFFSET, _RATE, _DURATION = range(4)
+
+@dataclass(frozen=True, slots=True)
+class _Glide:
+    """The way to a lane: the cubic Hermite polynomial from (offset, rate) to (0, 0).
+
+    For who begins without sideways speed it is a smoothstep.
+
+    Attributes
+    ----------
+    begun, duration : float
+        When it began, and how long it takes [s].
+    offset, rate : float
+        What was left of the way then, to the left [m], and its rate of change [m/s].
+    """
+
+    begun: float
+    duration: float
+    offset: float
+    rate: float
+
+    def left(self, time: float) -> tuple[float, float]:
+        """What is left of the way at a time, to the left [m], and its rate of change [m/s]."""
+        s = min((time - self.begun) / self.duration, 1.0)
+        rest = 1.0 - s
+        left = self.offset * (1.0 + s * s * (2.0 * s - 3.0)) + self.rate * self.duration * s * rest * rest
+        return left, self.rate * rest * (1.0 - 3.0 * s) - 6.0 * self.offset / self.duration * s * rest
 
 
 class LaneChangeSmoothing:
@@ -41,8 +67,7 @@ class LaneChangeSmoothing:
 
     def __init__(self) -> None:
         self._last: TrafficState | None = None
-        self._ids: list[str] = []
-        self._glides = np.empty((0, 4))
+        self._glides: dict[str, _Glide] = {}
 
     def smoothed(self, state: TrafficState) -> TrafficState:
         """The state as it is to be seen; the states of one run are to be given in their order."""
@@ -51,41 +76,32 @@ class LaneChangeSmoothing:
             changed = _lane_changed(last, state)
             if changed:
                 self._begin(last, state, changed)
-        return self._glided(state) if self._ids else state
+        return self._glided(state) if self._glides else state
 
     def _begin(self, last: TrafficState, state: TrafficState, changed: Sequence[str]) -> None:
         """Let those who have jumped begin to glide, from where an earlier glide has brought them."""
-        jumps = _sideways_jumps(last, state, changed)
-        under_way = dict(zip(self._ids, self._glides, strict=True))
-        for vehicle, jump in zip(changed, jumps.tolist(), strict=True):
+        for vehicle, jump in zip(changed, _sideways_jumps(last, state, changed).tolist(), strict=True):
             if LEAST_JUMP <= abs(jump) <= LARGEST_JUMP:
-                offset, rate = jump, 0.0
-                if vehicle in under_way:
-                    (left,), (rate,) = _course(under_way[vehicle][None], state.time)
-                    offset += left
+                earlier = self._glides.get(vehicle)
+                left, rate = (0.0, 0.0) if earlier is None else earlier.left(state.time)
+                offset = left + jump
                 duration = DURATION * max(1.0, abs(offset) / LANE_WIDTH)
-                under_way[vehicle] = np.array([state.time, offset, rate, duration])
-        self._keep(under_way)
-
-    def _keep(self, glides: dict[str, NDArray[np.float64]]) -> None:
-        self._ids = list(glides)
-        self._glides = np.array(list(glides.values())).reshape(-1, 4)
+                self._glides[vehicle] = _Glide(state.time, duration, offset, rate)
 
     def _glided(self, state: TrafficState) -> TrafficState:
-        row = {vehicle: i for i, vehicle in enumerate(state.ids)}
-        over = state.time >= self._glides[:, _BEGUN] + self._glides[:, _DURATION]
-        if over.any() or not row.keys() >= set(self._ids):
-            glides = zip(self._ids, self._glides, over.tolist(), strict=True)
-            self._keep({v: glide for v, glide, is_over in glides if not is_over and v in row})
-            if not self._ids:
-                return state
-        rows = [row[vehicle] for vehicle in self._ids]
-        offset, rate = _course(self._glides, state.time)
         position, heading = state.position.copy(), state.heading.copy()
-        position[rows, 0] += offset * np.sin(heading[rows])
-        position[rows, 1] -= offset * np.cos(heading[rows])
-        heading[rows] -= np.arctan2(rate, np.maximum(state.speed[rows], LEAST_SPEED))
-        return replace(state, position=position, heading=heading)
+        # Plain numbers: mostly one vehicle or two are on their way, for which arrays would cost ten times as much.
+        for vehicle, glide in list(self._glides.items()):
+            row = state.row(vehicle)
+            if row is None or state.time >= glide.begun + glide.duration:
+                del self._glides[vehicle]
+                continue
+            left, rate = glide.left(state.time)
+            angle = float(heading[row])
+            position[row, 0] += left * math.sin(angle)
+            position[row, 1] -= left * math.cos(angle)
+            heading[row] = angle - math.atan2(rate, max(float(state.speed[row]), LEAST_SPEED))
+        return replace(state, position=position, heading=heading) if self._glides else state
 
 
 def _lane_changed(last: TrafficState, state: TrafficState) -> list[str]:
@@ -107,15 +123,3 @@ def _sideways_jumps(last: TrafficState, state: TrafficState, vehicles: Sequence[
     jump = moved[:, 1] * np.cos(middle) - moved[:, 0] * np.sin(middle)
     reach = TOP_SPEED * (state.time - last.time) + LARGEST_JUMP
     return np.where(np.hypot(moved[:, 0], moved[:, 1]) <= reach, jump, np.inf)
-
-
-def _course(glides: NDArray[np.float64], time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """What is left of the way to the new lane, to the left (n,) [m], and its rate of change (n,) [m/s].
-
-    The cubic Hermite polynomial from (offset, rate) to (0, 0); a smoothstep for who starts without sideways speed.
-    """
-    offset, rate, duration = glides[:, _OFFSET], glides[:, _RATE], glides[:, _DURATION]
-    s = np.minimum((time - glides[:, _BEGUN]) / duration, 1.0)
-    left = offset * (1.0 + s * s * (2.0 * s - 3.0)) + rate * duration * s * (1.0 - s) ** 2
-    change = 6.0 * offset / duration * s * (s - 1.0) + rate * (1.0 - s) * (1.0 - 3.0 * s)
-    return left, change

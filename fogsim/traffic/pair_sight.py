@@ -85,16 +85,18 @@ class PairSight:
     ) -> tuple[bool, float]:
         # Plain numbers: mostly there is a pair or two, and making arrays of them would cost more than all the rest.
         follower, leader, _ = pair
-        closing, deepening = self._rates(follower, leader, horizon)
         contrast = self._contrast(leader)
         spare = self._sight.body_limit(distance, contrast) - depth
         if spare >= 0.0:
             # In the own headlamps, the limit falls with the distance, and is asked for anew in each step.
-            return True, min(spare / deepening, horizon) if self._sight.illuminance >= DAYLIGHT else 0.0
+            if self._sight.illuminance < DAYLIGHT:
+                return True, 0.0
+            return True, min(spare / self._rates(follower, leader, horizon)[1], horizon)
         lit, brightest = self._intensities(leader, own_lamps)
         if depth <= self._sight.lamp_limit(distance, lit):
             # What lamps alone show may go dark at once.
             return True, 0.0
+        closing, deepening = self._rates(follower, leader, horizon)
         nearest = max(distance - closing * horizon, 0.1)
         limit = max(self._sight.body_limit(nearest, contrast), self._sight.lamp_limit(nearest, brightest))
         return False, min(max(depth - limit, 0.0) / deepening, horizon)

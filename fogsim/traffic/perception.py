@@ -11,7 +11,7 @@ that stays the same the decision is in every step the one that looking in every 
 `LONGEST_PAUSE` later; until then SUMO's driver sees it.
 """
 
-import math
+import itertools
 from collections.abc import Iterable, Sequence
 
 from fogsim.traffic.getters import Getter, vehicle_getter
@@ -106,12 +106,12 @@ class Perception:
     def _due(self) -> list[str]:
         roster, schedule = self._roster, self._schedule
         roster.look()
-        found = schedule.due(roster.time)
+        due = schedule.due(roster.time)
+        if not roster.present.issuperset(due):
+            self._forget(v for v in due if v not in roster.present)
+            due = [v for v in due if v in roster.present]
         new, self._mark = roster.newcomers(self._mark)
-        due = [v for v in found if v in roster.present]
-        if len(due) < len(found):
-            self._forget(v for v in found if v not in roster.present)
-        return [*due, *dict.fromkeys(v for v in new if v in roster.present and v not in schedule and v not in due)]
+        return due + [v for v in schedule.not_waiting(new) if v in roster.present and v not in due] if new else due
 
     def _forget(self, gone: Iterable[str]) -> None:
         for follower in gone:
@@ -121,38 +121,42 @@ class Perception:
 
     def _decide_by_gap(self, due: Sequence[str]) -> list[Pair]:
         """Decide where the gap alone tells, and give back the rest."""
-        leader_of, ignored = self._leader, self._ignored
+        ignored, emerging = self._ignored, self._emerging
+        # Far from any doubt: that most vehicles are, and they rest for as long as anybody.
         rested: list[str] = []
         doubtful: list[Pair] = []
-        for follower in due:
-            leader, gap = leader_of(follower, REACH) or _NOBODY
+        for follower, found in zip(due, map(self._leader, due, itertools.repeat(REACH)), strict=False):
+            leader, gap = found or _NOBODY
             if not leader:
-                gap = -math.inf
-                self._see(follower)
+                if follower in ignored:
+                    self._see(follower)
             elif gap > self._surely_hidden:
-                self._lose(follower, leader)
+                if ignored.get(follower) != leader or follower in emerging:
+                    self._lose(follower, leader)
+                if gap <= self._hidden_for_long:
+                    self._rest_near_edge(follower, leader, gap - self._surely_hidden)
+                    continue
             elif gap > self._surely_seen or follower in ignored:
                 doubtful.append((follower, leader, gap))
                 continue
-            # Far from any doubt: that most vehicles are, and they rest for as long as anybody.
-            if gap <= self._seen_for_long or gap > self._hidden_for_long:
-                rested.append(follower)
-            else:
-                edge = self._surely_seen if gap <= self._surely_seen else self._surely_hidden
-                pause = abs(gap - edge) / self._motion.closing(follower, leader, LONGEST_PAUSE)
-                if pause < LONGEST_PAUSE:
-                    self._rest((follower,), pause)
-                else:
-                    rested.append(follower)
+            elif gap > self._seen_for_long:
+                self._rest_near_edge(follower, leader, self._surely_seen - gap)
+                continue
+            rested.append(follower)
         self._rest(rested, LONGEST_PAUSE)
         return doubtful
+
+    def _rest_near_edge(self, follower: str, leader: str, distance: float) -> None:
+        """Let a follower rest until the gap could have changed by a distance [m]."""
+        closing = self._motion.closing(follower, leader, LONGEST_PAUSE)
+        self._rest((follower,), min(distance / closing, LONGEST_PAUSE))
 
     def _decide_by_sight(self, pairs: Sequence[Pair], own_lamps: OwnLamps) -> None:
         looks = self._pairs.look(pairs, own_lamps, LONGEST_PAUSE)
         for (follower, leader, _), (is_seen, pause) in zip(pairs, looks, strict=True):
             if not is_seen:
                 self._lose(follower, leader)
-            elif self._reacts(follower, leader):
+            elif follower in self._ignored and self._reacts(follower, leader):
                 self._see(follower)
             self._rest((follower,), 0.0 if follower in self._emerging else pause)
 

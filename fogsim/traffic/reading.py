@@ -3,7 +3,7 @@
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,13 +26,14 @@ _CHANGING = ("getAngle", "getSpeed", "getAcceleration", "getSignals", "getLaneID
 """Getters of what changes."""
 
 
-@dataclass(frozen=True, slots=True)
-class Moving:
+class Moving(NamedTuple):
     """What changes about vehicles, in SUMO's units; entry i of each belongs to ``ids[i]``.
+
+    A named tuple is made in a third of the time of a frozen dataclass, which is noticeable in each step.
 
     Attributes
     ----------
-    ids : sequence of str
+    ids : tuple of str
         Vehicle ids.
     position : (n, 3) float64
         Middle of the front bumper [m].
@@ -40,18 +41,18 @@ class Moving:
         Heading, clockwise from north [°].
     speed, acceleration : (n,) float64
         Speed [m/s] and acceleration [m/s²].
-    lane : sequence of str
+    lane : tuple of str
         Lane ids.
     signals : sequence of int
         SUMO's signal bits.
     """
 
-    ids: Sequence[str]
+    ids: tuple[str, ...]
     position: NDArray[np.float64]
     angle: NDArray[np.float64]
     speed: NDArray[np.float64]
     acceleration: NDArray[np.float64]
-    lane: Sequence[str]
+    lane: tuple[str, ...]
     signals: Sequence[int]
 
 
@@ -117,7 +118,7 @@ class VehicleReader:
         lamps[ego] = int(ego_lamps) | (int(lamps[ego]) & int(Lamp.STOP))
         return TrafficState(
             time=self._roster.time,
-            ids=tuple(now.ids),
+            ids=now.ids,
             types=known.kinds,
             position=now.position,
             heading=np.radians(90.0 - now.angle),
@@ -126,7 +127,7 @@ class VehicleReader:
             length=known.length,
             width=known.width,
             height=known.height,
-            lane=tuple(now.lane),
+            lane=now.lane,
             lamps=lamps,
             paint=known.paint,
         )
@@ -151,7 +152,7 @@ class VehicleReader:
         # One array for all: for few vehicles making arrays costs more than asking.
         flat = itertools.chain(map(angle, ids), map(speed, ids), map(acceleration, ids))
         angles, speeds, accelerations = np.fromiter(flat, np.float64, 3 * len(ids)).reshape(3, -1)
-        return Moving(ids, position, angles, speeds, accelerations, list(map(lane, ids)), list(map(signals, ids)))
+        return Moving(ids, position, angles, speeds, accelerations, tuple(map(lane, ids)), list(map(signals, ids)))
 
     def _is_near(self, ids: Sequence[str], position: NDArray[np.float64]) -> NDArray[np.bool_]:
         offset = position - position[ids.index(self._ego)]

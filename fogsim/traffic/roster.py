@@ -15,13 +15,13 @@ _ASKED = {
 """Getters, and their variables in SUMO's TraCI protocol."""
 
 CHECK_PERIOD = 1.0
-"""Time after which all names are asked for even so [s], should somebody have taken a vehicle away by hand."""
+"""Time after which the vehicles are counted [s], should somebody have taken one away by hand."""
 
 
 class Roster:
     """Keeps the set of vehicles on the road by who has come and who has gone in the last step.
 
-    All names are asked for at the first look, when steps were missed, and once a second.
+    All names are asked for at the first look, when steps were missed, and when once a second their number is another.
 
     Parameters
     ----------
@@ -46,6 +46,7 @@ class Roster:
         getters = subscribed(api, _ASKED) if distant else [getter(api, "simulation", name) for name in _ASKED]
         self._now, self._departed, self._back, self._off, self._arrived = getters
         self._everybody = getter(api, "vehicle", "getIDList")
+        self._count = getter(api, "vehicle", "getIDCount")
         self._step = float(api.simulation.getDeltaT())
         self._checked = 0.0
         self._came: list[str] = []
@@ -62,15 +63,19 @@ class Roster:
             return
         self.beamed_away = self._off()
         # Lists of changes are of one step only: after a jump of time they do not tell all.
-        if 0.0 < now - self.time < 1.5 * self._step and now - self._checked < CHECK_PERIOD:
-            self.time = now
-            self._come(self._departed())
-            # Who is beamed away and back in one step has ended up on the road.
-            self._go(self.beamed_away)
-            self._come(self._back())
-            self._go(self._arrived())
-        else:
+        if not 0.0 < now - self.time < 1.5 * self._step:
             self.check()
+            return
+        self.time = now
+        self._come(self._departed())
+        # Who is beamed away and back in one step has ended up on the road.
+        self._go(self.beamed_away)
+        self._come(self._back())
+        self._go(self._arrived())
+        if now - self._checked >= CHECK_PERIOD:
+            self._checked = now
+            if self._count() != len(self.present):
+                self.check()
 
     def check(self) -> None:
         """Ask for all names."""

@@ -1,5 +1,6 @@
 """Who is to be looked at in which step."""
 
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -26,14 +27,18 @@ class Schedule:
         self._step = step
         self._beat = max(1, round(BEAT / step))
         self._current = self._number(now)
-        self._waiting: set[str] = set()
         self._buckets: dict[int, list[str]] = {}
 
     def _number(self, time: float) -> int:
         return math.floor(time / self._step + _ROUNDING)
 
-    def __contains__(self, vehicle: str) -> bool:
-        return vehicle in self._waiting
+    def not_waiting(self, vehicles: Sequence[str]) -> list[str]:
+        """Those of some vehicles who wait for no step, each once."""
+        # Seldom asked for more than nobody, so that keeping a set of all who wait would cost more.
+        if not vehicles:
+            return []
+        waiting = set(itertools.chain.from_iterable(self._buckets.values()))
+        return [v for v in dict.fromkeys(vehicles) if v not in waiting]
 
     def put(self, vehicles: Sequence[str], time: float) -> None:
         """Let vehicles that are not waiting be due by a time [s], and at the earliest in the next step.
@@ -50,7 +55,6 @@ class Schedule:
             if number - self._current >= self._beat:
                 number -= number % self._beat
             self._buckets.setdefault(number, []).extend(vehicles)
-            self._waiting.update(vehicles)
 
     def due(self, now: float) -> list[str]:
         """Take out those who are due at a time [s]."""
@@ -61,10 +65,8 @@ class Schedule:
         else:
             passed = sorted(n for n in self._buckets if n <= number)
             found = [vehicle for n in passed for vehicle in self._buckets.pop(n)]
-        self._waiting.difference_update(found)
         return found
 
     def clear(self) -> None:
         """Forget everybody."""
-        self._waiting.clear()
         self._buckets.clear()

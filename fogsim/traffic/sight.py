@@ -201,6 +201,7 @@ def _eye_threshold(illuminance: float, at_night: float, by_day: float) -> float:
     return float(at_night * (by_day / at_night) ** min(share, 1.0))
 
 
+@functools.lru_cache(maxsize=1024)
 def rear_intensity(lamps: int) -> float:
     """Luminous intensity of the brightest rear lamp that is lit [cd].
 

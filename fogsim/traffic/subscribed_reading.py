@@ -32,14 +32,14 @@ class SubscribedReader(VehicleReader):
         everybody = sorted(vehicle for vehicle, row in rows.items() if all(v in row for v in _MOVING))
         position = np.array([rows[v][_POSITION_3D] for v in everybody])
         near = self._is_near(everybody, position)
-        ids = [v for v, is_near in zip(everybody, near, strict=True) if is_near]
+        ids = tuple(v for v, is_near in zip(everybody, near, strict=True) if is_near)
         return Moving(
             ids=ids,
             position=position[near],
             angle=np.array([rows[v][_ANGLE] for v in ids]),
             speed=np.array([rows[v][_SPEED] for v in ids]),
             acceleration=np.array([rows[v][_ACCELERATION] for v in ids]),
-            lane=[rows[v][_LANE] for v in ids],
+            lane=tuple(rows[v][_LANE] for v in ids),
             signals=[rows[v][_SIGNALS] for v in ids],
         )
 

@@ -136,7 +136,7 @@ def test_who_is_scheduled_is_due_in_time_and_once() -> None:
     assert seen["soon"] == pytest.approx(3.2)
     assert 3.1 < seen["later"] <= 3.74
     schedule.put(["a", "b"], 4.5)
-    assert "a" in schedule
+    assert schedule.not_waiting(["c", "a", "c"]) == ["c"]
     assert schedule.due(9.0) == ["a", "b"]
-    assert "a" not in schedule
+    assert schedule.not_waiting(["a", "c"]) == ["a", "c"]
     assert schedule.due(10.0) == []

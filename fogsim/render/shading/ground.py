@@ -172,10 +172,12 @@ def shade_ground(  # noqa: C901, PLR0912, PLR0915 - one loop: handing arrays to 
         zx, zy = known[k, DEPTH], known[k, DEPTH + 1]
         least, most, slope = np.float32(known[k, LEAST]), np.float32(known[k, MOST]), np.float32(zx)
         white = known[k, WHITE]
-        patches, large, fresh = 0.0, 0.0, True
+        patches, large = 0.0, 0.0
         begin = run[number, 1]
         while begin < end:
-            size = min(end - begin, _CHUNK)
+            # Chunks begin at the same columns whatever is seen, so that texture does not depend on where a run begins.
+            chunk = begin // _CHUNK * _CHUNK
+            size = min(end, chunk + _CHUNK) - begin
             length = np.uint64(size)
             base = zx * begin + zy * row + known[k, DEPTH + 2]
             # Distances.
@@ -190,14 +192,14 @@ def shade_ground(  # noqa: C901, PLR0912, PLR0915 - one loop: handing arrays to 
                 distance[v, np.uint64(begin) + i] = z * np.sqrt(square + across * across)
                 instance[v, np.uint64(begin) + i] = name
             # The footprint of the pixel in the middle, from the derivatives of its place on the ground.
-            half = 0.5 * (size - 1)
-            z = 1.0 / min(max(base + zx * half, known[k, LEAST]), known[k, MOST])
+            half = chunk + 0.5 * _CHUNK - begin
+            z = 1.0 / max(base + zx * half, 0.5 * base, 1e-9)
             rx = rays[0, 0] * (begin + half) + rays[0, 1] * row + rays[0, 2]
             ry = rays[1, 0] * (begin + half) + rays[1, 1] * row + rays[1, 2]
             ux, uy = z * (rays[0, 0] - rx * zx * z), z * (rays[1, 0] - ry * zx * z)
             vx, vy = z * (rays[0, 1] - rx * zy * z), z * (rays[1, 1] - ry * zy * z)
             wide, long = math.sqrt(ux * ux + uy * uy), math.sqrt(vx * vx + vy * vy)
-            if kind != last_kind or abs(wide - last_wide) > 0.1 * wide or abs(long - last_long) > 0.1 * long:
+            if kind != last_kind or abs(wide - last_wide) > 1e-4 * wide or abs(long - last_long) > 1e-4 * long:
                 last_kind, last_wide, last_long = kind, wide, long
                 strength_1 = _faded(deviations[0], sides[0], wide, long)
                 strength_2 = _faded(deviations[1], sides[1], wide, long)
@@ -209,22 +211,26 @@ def shade_ground(  # noqa: C901, PLR0912, PLR0915 - one loop: handing arrays to 
                 scale_2, x_2, y_2 = _scale(sides[1] / PER_CELL, SMOOTH, narrow / PER_CELL, eye[0], eye[1])
             # Large patches, linear from one end of a piece to the other.
             px, py = eye[0] + rx * z - half * ux, eye[1] + ry * z - half * uy
-            if fresh:
-                patches, large = _smooth_at(smooth, px, py, sides[2]), _smooth_at(smooth, px, py, sides[3])
-                fresh = False
-            for first in range(0, size, _PIECE):
-                last = min(first + _PIECE, size)
-                next_patches = _smooth_at(smooth, px + last * ux, py + last * uy, sides[2])
-                next_large = _smooth_at(smooth, px + last * ux, py + last * uy, sides[3])
-                level = np.float32(1.0 + strength_3 * patches + strength_4 * large)
-                tint_level, share = np.float32(strength_4 * large), 1.0 / (last - first)
-                tint_step = np.float32(strength_4 * (next_large - large) * share)
-                step_level = tint_step + np.float32(strength_3 * (next_patches - patches) * share)
+            first = begin
+            while first < begin + size:
+                node = first // _PIECE * _PIECE
+                last = min(node + _PIECE, begin + size)
+                if first == begin:
+                    ax, ay = px + (node - begin) * ux, py + (node - begin) * uy
+                    patches, large = _smooth_at(smooth, ax, ay, sides[2]), _smooth_at(smooth, ax, ay, sides[3])
+                ax, ay = px + (node + _PIECE - begin) * ux, py + (node + _PIECE - begin) * uy
+                next_patches, next_large = _smooth_at(smooth, ax, ay, sides[2]), _smooth_at(smooth, ax, ay, sides[3])
+                tint_change = strength_4 * (next_large - large) / _PIECE
+                change = tint_change + strength_3 * (next_patches - patches) / _PIECE
+                level = np.float32(1.0 + strength_3 * patches + strength_4 * large + change * (first - node))
+                tint_level = np.float32(strength_4 * large + tint_change * (first - node))
+                step_level, tint_step, start = np.float32(change), np.float32(tint_change), np.uint64(first - begin)
                 patches, large = next_patches, next_large
                 for i in range(np.uint64(last - first)):
                     step = np.float32(np.int32(i))
-                    texture[np.uint64(first) + i] = level + step_level * step
-                    tint[np.uint64(first) + i] = tint_level + tint_step * step
+                    texture[start + i] = level + step_level * step
+                    tint[start + i] = tint_level + tint_step * step
+                first = last
             # Grain and mottling.
             gx, gy = np.float32(rays[0, 0] * begin + rays[0, 1] * row + rays[0, 2]), np.float32(rays[0, 0])
             hx, hy = np.float32(rays[1, 0] * begin + rays[1, 1] * row + rays[1, 2]), np.float32(rays[1, 0])

@@ -44,7 +44,7 @@ def records(name: str, *arguments: str) -> list[dict[str, Any]]:
             ("--renderers", "4", "--frames", "8"),
             {"growth_kib_per_renderer", "growth_kib_per_1000_frames"},
         ),
-        ("traffic.py", ("--vehicles", "20", "--blocks", "3"), {"vehicles", "ms_sumo", "ms_total", "ratio"}),
+        ("traffic.py", ("--vehicles", "20", "--seconds", "1"), {"vehicles", "ms_sumo", "ms_total", "ratio"}),
     ],
 )
 def test_records(name: str, arguments: tuple[str, ...], keys: set[str]) -> None:

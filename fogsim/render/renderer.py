@@ -57,16 +57,7 @@ class SceneRenderer:
         """Draw the scene and the vehicles (see `Renderer.render`)."""
         if self._rasteriser is None:
             raise RenderError("this renderer is closed; make a new one")
-        end = self._place(vehicles)
-        lens = lens_of(camera, pose)
-        count = choose(
-            self._shapes, self._copies, self._cells, end, lens.planes, lens.eye, camera.focal_length, self._chosen
-        )
-        drawing = Drawing(
-            self._chosen.mesh[:count],
-            self._chosen.record.view(RECORD)[:count, 0],
-            self._chosen.first[: count + 1],
-        )
+        drawing = self._drawing(vehicles, camera, pose)
         slots = self._rasteriser.slots(drawing, camera, pose)
         return self._shading.view(slots, drawing, camera, pose, lamplight)
 
@@ -75,6 +66,19 @@ class SceneRenderer:
         if self._rasteriser is not None:
             self._rasteriser.close()
         self._rasteriser = None
+
+    def _drawing(self, vehicles: Sequence[Batch], camera: Camera, pose: CameraPose) -> Drawing:
+        """What a picture may show."""
+        end = self._place(vehicles)
+        lens = lens_of(camera, pose)
+        count = choose(
+            self._shapes, self._copies, self._cells, end, lens.planes, lens.eye, camera.focal_length, self._chosen
+        )
+        return Drawing(
+            self._chosen.mesh[:count],
+            self._chosen.record.view(RECORD)[:count, 0],
+            self._chosen.first[: count + 1],
+        )
 
     def _standing(
         self, scenery: Sequence[Batch], ground: Ground

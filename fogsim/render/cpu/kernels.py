@@ -79,9 +79,11 @@ def rasterise(
     near: float,
     picture: Index,
     columns: int,
+    top: int,
+    bottom: int,
     work: Work,
 ) -> None:
-    """Find the nearest triangle of each pixel.
+    """Find the nearest triangle of each pixel of some rows.
 
     Parameters
     ----------
@@ -102,10 +104,12 @@ def rasterise(
         32-bit float, which sort like the float. Of two surfaces the greater number is the nearer one.
     columns : int
         Width of the picture [px]; what lies behind it is not set.
+    top, bottom : int
+        First row, and the one after the last.
     work : Work
         Memory to work in, with room for the largest mesh.
     """
-    picture[:] = _EMPTY
+    picture[top:bottom] = _EMPTY
     # Handing an array to a function costs as much as drawing a triangle, so the functions below take many copies each.
     begin = 0
     while begin < len(mesh):
@@ -117,7 +121,7 @@ def rasterise(
                 break
             end += 1
         _project(triangles, mesh, record, begin, end, axes, lens, near, work.corners)
-        count = _select(triangles, mesh, first, begin, end, lens, near, (len(picture), columns), work)
+        count = _select(triangles, mesh, first, begin, end, lens, near, (top, bottom, columns), work)
         _fill(work, count, lens, near, picture)
         begin = end
 
@@ -168,13 +172,14 @@ def _select(
     end: int,
     lens: Wide,
     near: float,
-    size: tuple[int, int],
+    size: tuple[int, int, int],
     work: Work,
 ) -> int:
     """Set up those triangles of copies whose boxes hold the centre of any pixel, and count them."""
     faces, first_vertex, first_face = triangles.faces, triangles.first_vertex, triangles.first_face
     corners, points, box, slot = work.corners, work.points, work.box, work.slot
-    last_row, last_column, focal, u0, v0 = size[0] - 1.0, size[1] - 1.0, lens[0], lens[1], lens[2]
+    first_row, last_row, last_column = float(size[0]), size[1] - 1.0, size[2] - 1.0
+    focal, u0, v0 = lens[0], lens[1], lens[2]
     count, base, slack = 0, np.uint32(0), np.float32(_SLACK)
     for copy in range(begin, end):
         start = first_face[mesh[copy]]
@@ -193,9 +198,9 @@ def _select(
                     continue
                 a, b, c = corners[4, i], corners[4, j], corners[4, k]
                 top, bottom = np.ceil(min(a, b, c) - slack), np.floor(max(a, b, c) + slack)
-            if top > bottom or right < 0 or bottom < 0 or left > last_column or top > last_row:
+            if top > bottom or right < 0 or bottom < first_row or left > last_column or top > last_row:
                 continue
-            box[count, 0], box[count, 1] = np.int32(max(top, 0.0)), np.int32(min(bottom, last_row))
+            box[count, 0], box[count, 1] = np.int32(max(top, first_row)), np.int32(min(bottom, last_row))
             box[count, 2], box[count, 3] = np.int32(max(left, 0.0)), np.int32(min(right, last_column))
             for row in range(3):
                 points[count, row] = corners[row, i]

@@ -5,6 +5,7 @@ import sys
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.jit import Bands
 from fogsim.render.cpu.kernels import Triangles, Work, rasterise
 from fogsim.render.drawing import NEAR, Drawing, MeshTable
 from fogsim.render.lens import lens_of
@@ -15,7 +16,7 @@ _TOGETHER = 2048  # most triangles that are worked on at a time, if no mesh has 
 
 
 class CPURasteriser:
-    """Finds what pixels see with one thread and to the bit the same every time (see `Rasteriser`).
+    """Finds what pixels see to the bit the same every time, large pictures by two threads (see `Rasteriser`).
 
     Parameters
     ----------
@@ -32,13 +33,13 @@ class CPURasteriser:
             first_vertex=table.first_vertex,
             first_face=table.first_face,
         )
-        faces = max(int(np.diff(table.first_face).max(initial=1)), _TOGETHER)
-        self._work = Work(
-            corners=np.empty((5, max(int(counts.max(initial=1)), 2 * _TOGETHER)), np.float32),
-            points=np.empty((faces, 9), np.float32),
-            box=np.empty((faces, 4), np.int32),
-            slot=np.empty(faces, np.int32),
+        self._most = (
+            max(int(counts.max(initial=1)), 2 * _TOGETHER),
+            max(int(np.diff(table.first_face).max(initial=1)), _TOGETHER),
         )
+        # One for each band; the second is made when it is used.
+        self._work = [_room(*self._most)]
+        self._bands = Bands()
         self._picture = np.empty((0, 0), np.int64)
 
     def slots(self, drawing: Drawing, camera: Camera, pose: CameraPose) -> NDArray[np.int32]:
@@ -48,20 +49,39 @@ class CPURasteriser:
         if self._picture.shape != size:
             self._picture = np.empty(size, np.int64)
         lens = lens_of(camera, pose)
-        rasterise(
-            self._triangles,
-            drawing.mesh,
-            drawing.record.view(np.float32).reshape(-1, 17),
-            drawing.first,
-            lens.axes,
-            lens.lens,
-            NEAR,
-            self._picture,
-            camera.width,
-            self._work,
-        )
+        record = drawing.record.view(np.float32).reshape(-1, 17)
+
+        def draw(band: int, top: int, bottom: int) -> None:
+            if band == len(self._work):
+                self._work.append(_room(*self._most))
+            rasterise(
+                self._triangles,
+                drawing.mesh,
+                record,
+                drawing.first,
+                lens.axes,
+                lens.lens,
+                NEAR,
+                self._picture,
+                camera.width,
+                top,
+                bottom,
+                self._work[band],
+            )
+
+        self._bands.work(draw, camera.height, camera.width)
         return self._picture.view(np.int32)[:, _LOWER_HALF : 2 * camera.width : 2]
 
     def close(self) -> None:
         """Let go of its picture."""
         self._picture = np.empty((0, 0), np.int64)
+
+
+def _room(vertices: int, faces: int) -> Work:
+    """Memory for so many vertices and triangles at a time."""
+    return Work(
+        corners=np.empty((5, vertices), np.float32),
+        points=np.empty((faces, 9), np.float32),
+        box=np.empty((faces, 4), np.int32),
+        slot=np.empty(faces, np.int32),
+    )

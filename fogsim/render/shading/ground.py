@@ -154,7 +154,7 @@ def shade_ground(  # noqa: C901, PLR0912, PLR0915 - one loop: handing arrays to 
     lamplight, one = len(response) > 0, np.float32(1.0)
     focal, u0, v0 = lens.lens[0], lens.lens[1], lens.lens[2]
     per_focal = np.float32(1.0 / focal)
-    last_kind, last_wide, last_long = -1.0, 0.0, 0.0
+    last_kind, last_row, last_wide, last_long = -1.0, -1.0, 0.0, 0.0
     strength_1, strength_2, strength_3, strength_4 = 0.0, 0.0, 0.0, 0.0
     scale_1, x_1, y_1, scale_2, x_2, y_2 = 1.0, 0.0, 0.0, 1.0, 0.0, 0.0
     for number in range(count):
@@ -199,8 +199,10 @@ def shade_ground(  # noqa: C901, PLR0912, PLR0915 - one loop: handing arrays to 
             ux, uy = z * (rays[0, 0] - rx * zx * z), z * (rays[1, 0] - ry * zx * z)
             vx, vy = z * (rays[0, 1] - rx * zy * z), z * (rays[1, 1] - ry * zy * z)
             wide, long = math.sqrt(ux * ux + uy * uy), math.sqrt(vx * vx + vy * vy)
-            if kind != last_kind or abs(wide - last_wide) > 1e-4 * wide or abs(long - last_long) > 1e-4 * long:
-                last_kind, last_wide, last_long = kind, wide, long
+            near = abs(wide - last_wide) <= 1e-4 * wide and abs(long - last_long) <= 1e-4 * long
+            # What is kept from one row to the next would depend on where a band of rows begins.
+            if kind != last_kind or row != last_row or not near:
+                last_kind, last_row, last_wide, last_long = kind, row, wide, long
                 strength_1 = _faded(deviations[0], sides[0], wide, long)
                 strength_2 = _faded(deviations[1], sides[1], wide, long)
                 strength_3 = _faded(deviations[2], sides[2], wide, long)

@@ -3,13 +3,14 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.jit import Bands, kernel
 from fogsim.render.drawing import Drawing, MeshTable
 from fogsim.render.lens import Lens, lens_of
 from fogsim.render.photometry import SKY_TINT, lamp_radiance, lighting_bits, zenith_luminance
 from fogsim.render.shading import layout
-from fogsim.render.shading.ground import bench, shade_ground
-from fogsim.render.shading.layout import Copies, Light, Meshes, Picture, Runs
-from fogsim.render.shading.noise import tiles
+from fogsim.render.shading.ground import Bench, bench, shade_ground
+from fogsim.render.shading.layout import Copies, Light, Meshes, Numbers, Picture, Runs
+from fogsim.render.shading.noise import Noise, tiles
 from fogsim.render.shading.objects import shade_objects, shade_sky
 from fogsim.render.shading.runs import find_runs
 from fogsim.render.shading.surfaces import know, know_background
@@ -51,8 +52,9 @@ class Shading:
             lamp_masks=np.array([lighting_bits(surface) for surface in Surface], np.int32),
             lamp_radiance=np.array([lamp_radiance(surface) for surface in Surface]),
         )
-        self._noise, self._bench = tiles(), bench()
-        self._runs = _room(0, 0)
+        self._noise, self._bands = tiles(), Bands()
+        # For each band.
+        self._benches, self._runs = [bench(), bench()], [_room(0, 0), _room(0, 0)]
 
     def view(
         self, slots: NDArray[np.int32], drawing: Drawing, camera: Camera, pose: CameraPose, lamplight: bool
@@ -69,8 +71,6 @@ class Shading:
             Whether the answer to lamplight is wanted.
         """
         rows, columns = slots.shape
-        if len(self._runs.run) < slots.size or len(self._runs.surface_of_slot) < drawing.first[-1]:
-            self._runs = _room(slots.size, int(drawing.first[-1]))
         copies = Copies(
             drawing.mesh,
             drawing.record.view(np.float32).reshape(-1, 17),
@@ -83,24 +83,64 @@ class Shading:
             np.empty((rows, columns), np.int32),
             np.empty((rows, columns, 3) if lamplight else (0, 0, 3), np.float32),
         )
-        self._shade(slots, copies, lens_of(camera, pose), lamplight, picture)
+        lens = lens_of(camera, pose)
+
+        def shade(band: int, top: int, bottom: int) -> None:
+            runs = self._room(band, (bottom - top) * columns, int(drawing.first[-1]))
+            shade_rows(
+                slots,
+                top,
+                bottom,
+                self._meshes,
+                copies,
+                lens,
+                self._light,
+                self._noise,
+                runs,
+                self._benches[band],
+                picture,
+            )
+
+        self._bands.work(shade, rows, columns)
         response = picture.response if lamplight else None
         return View(picture.radiance, picture.distance, picture.instance, response)
 
-    def _shade(self, slots: NDArray[np.int32], copies: Copies, lens: Lens, lamplight: bool, picture: Picture) -> None:
-        runs = self._runs
-        terrain = bool(lens.eye[2] > self._light.terrain[0] > -np.inf)
-        count, surfaces = find_runs(slots, copies, lens.rays, terrain, runs)
-        know_background(lens, self._light, runs)
-        know(self._meshes, copies, lens, self._light, lamplight, runs, surfaces)
-        shade_objects(runs, count, lens.lens, picture)
-        shade_ground(runs, count, lens, self._noise, self._bench, picture)
-        shade_sky(runs, count, lens.rays, self._light, picture)
+    def _room(self, band: int, pixels: int, slots: int) -> Runs:
+        """Memory for the runs of a band."""
+        runs = self._runs[band]
+        if 2 * pixels > len(runs.run) or slots > len(runs.surface_of_slot):
+            # Bands change, and so does what is seen.
+            runs = self._runs[band] = _room(pixels + pixels // 4, slots + slots // 2)
+        return runs
+
+
+@kernel
+def shade_rows(
+    slots: Numbers,
+    top: int,
+    bottom: int,
+    meshes: Meshes,
+    copies: Copies,
+    lens: Lens,
+    light: Light,
+    noise: Noise,
+    runs: Runs,
+    work: Bench,
+    picture: Picture,
+) -> None:
+    """Shade the rows of a picture from `top` to the one before `bottom`."""
+    height = light.terrain[0]
+    terrain = lens.eye[2] > height > -np.inf
+    count, surfaces = find_runs(slots, top, bottom, copies, lens.rays, terrain, runs)
+    know_background(lens, light, runs)
+    know(meshes, copies, lens, light, len(picture.response) > 0, runs, surfaces)
+    shade_objects(runs, count, lens.lens, picture)
+    shade_ground(runs, count, lens, noise, work, picture)
+    shade_sky(runs, count, lens.rays, light, picture)
 
 
 def _room(pixels: int, slots: int) -> Runs:
     """Memory for a picture: at most every pixel is a run, and every slot or pixel a surface."""
-    slots = slots + slots // 2
     surfaces = min(pixels, slots) + 2
     return Runs(
         # A run of background may be split at the horizon.

@@ -9,13 +9,17 @@ from fogsim.render.shading.layout import Copies, Numbers, Runs, Wide
 
 
 @kernel
-def find_runs(slots: Numbers, copies: Copies, rays: Wide, terrain: bool, runs: Runs) -> tuple[int, int]:
-    """Find the runs of a picture.
+def find_runs(
+    slots: Numbers, top: int, bottom: int, copies: Copies, rays: Wide, terrain: bool, runs: Runs
+) -> tuple[int, int]:
+    """Find the runs of some rows.
 
     Parameters
     ----------
     slots : (rows, cols) int32
         What each pixel sees.
+    top, bottom : int
+        First row, and the one after the last.
     copies : Copies
         What is drawn.
     rays : (3, 3) float64
@@ -36,9 +40,9 @@ def find_runs(slots: Numbers, copies: Copies, rays: Wide, terrain: bool, runs: R
         for own in range(first[copy], first[copy + 1]):
             surface_of_slot[own] = -2 - copy
     count, surfaces = 0, 2
-    rows, columns = slots.shape
+    columns = slots.shape[1]
     width = np.uint64(columns)
-    for v in range(rows):
+    for v in range(top, bottom):
         begin: Any = 0
         while begin < columns:
             slot: Any = slots[v, begin]

@@ -1,9 +1,10 @@
-"""Draw docs/pictures/contact_sheet_cpu.jpg and contact_sheet_pyrender.jpg: ``python docs/contact_sheet.py`` (a minute).
+"""Draw contact_sheet_cpu.jpg, contact_sheet_pyrender.jpg and antialiasing.png of docs/pictures (takes a minute).
 
 The same pictures by both renderers. tests/docs/test_contact_sheet.py draws some of them again and compares.
 """
 
 import argparse
+import dataclasses
 import math
 
 import numpy as np
@@ -97,12 +98,24 @@ def contact_sheet(renderer: str) -> Image.Image:
     return sheet([(shot.title, tile(shot, renderer)) for shot in SHOTS], COLUMNS)
 
 
+def antialiasing() -> Image.Image:
+    """The middle of a picture with 1, 2 and 3 samples a pixel side, pixel by pixel."""
+    shot = Shot("", (fog("400"),), vehicles=OTHERS, boards=BOARDS)
+    pictures = []
+    for side in (1, 2, 3):
+        sampled = dataclasses.replace(shot, settings=(*shot.settings, f"camera.samples={side}"))
+        part = photograph(sampled, "cpu", SIZE).image[130:200, 150:310]
+        pictures.append((f"camera.samples: {side}", np.kron(part, np.ones((4, 4, 1), np.uint8))))
+    return sheet(pictures, 3)
+
+
 def main() -> None:
     """Draw and save."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--renderer", action="append", choices=list(RENDERERS), help="default: all")
     for renderer in parser.parse_args().renderer or list(RENDERERS):
         contact_sheet(renderer).save(PICTURES / f"contact_sheet_{renderer}.jpg", quality=88, subsampling=0)
+    antialiasing().save(PICTURES / "antialiasing.png")
 
 
 if __name__ == "__main__":

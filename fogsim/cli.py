@@ -13,6 +13,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from rich.table import Table
 
 from fogsim import __version__
+from fogsim.cli_estimate import estimate_command
 from fogsim.errors import FogSimError, InputError
 from fogsim.values import Step
 
@@ -313,6 +314,9 @@ def _pixel_values(text: str) -> tuple[float, ...]:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
         raise InputError(f"--airlight {text}: expected a pixel value, or red, green and blue as R,G,B") from None
+
+
+app.command("estimate")(estimate_command)
 
 
 @app.command("doctor")

@@ -108,9 +108,7 @@ class Encoder:
         return self._complaints.read().decode(errors="replace").strip() or "no message"
 
 
-def encoder_command(
-    path: Path, frame_period: float, size: tuple[int, int] = (FRAME_WIDTH, FRAME_HEIGHT)
-) -> list[str]:
+def encoder_command(path: Path, frame_period: float, size: tuple[int, int] = (FRAME_WIDTH, FRAME_HEIGHT)) -> list[str]:
     """Command line of an encoder that takes raw frames and writes an mp4 file that browsers can play.
 
     Parameters
@@ -131,7 +129,7 @@ def encoder_command(
     source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(rate), "-i", "-"]
     coding = ["-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-pix_fmt", "yuv420p"]
     sink = ["-movflags", "+faststart", "-f", "mp4", str(path)]
-    return [_ffmpeg(), "-y", "-loglevel", "error", *source, *coding, *sink]
+    return [ffmpeg_program(), "-y", "-loglevel", "error", *source, *coding, *sink]
 
 
 def encoder_report() -> str:
@@ -142,11 +140,18 @@ def encoder_report() -> str:
     MissingDependencyError
         If there is none.
     """
-    path = _ffmpeg()
+    path = ffmpeg_program()
     return f"ffmpeg {imageio_ffmpeg.get_ffmpeg_version()} at {path}"
 
 
-def _ffmpeg() -> str:
+def ffmpeg_program() -> str:
+    """Path of the ffmpeg that comes with imageio-ffmpeg.
+
+    Raises
+    ------
+    MissingDependencyError
+        If there is none.
+    """
     try:
         return str(imageio_ffmpeg.get_ffmpeg_exe())
     except RuntimeError as error:

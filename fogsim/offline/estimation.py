@@ -1,0 +1,185 @@
+"""Estimates of any method over images from disk."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from fogsim.errors import InputError, UnknownNameError
+from fogsim.estimators import ESTIMATORS, Estimator, make
+from fogsim.image_files import Pixels
+from fogsim.offline.find import find_source
+from fogsim.offline.source import Picture, Source
+from fogsim.values import Camera, Estimate, Frame, Observation
+
+ALL = "all"
+"""Stands for every method of the registry."""
+
+WHOLE_RANGE_BITS = 12
+"""Bit depth in which images that use all 16 bits are estimated; four more bits are noise in any camera."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameEstimates:
+    """What the methods say about one image.
+
+    Attributes
+    ----------
+    picture : Picture
+        The image, or the reason why it could not be used.
+    estimates : tuple of Estimate
+        One for each method in their order; empty if the image could not be used.
+    """
+
+    picture: Picture
+    estimates: tuple[Estimate, ...]
+
+
+def chosen_methods(names: Sequence[str]) -> tuple[str, ...]:
+    """Methods that are meant by names, each once, "all" being all.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such method; the message has the known ones and the nearest.
+    """
+    for name in names:
+        if name != ALL and name not in ESTIMATORS:
+            raise UnknownNameError("method", name, [*ESTIMATORS, ALL])
+    meant = [one for name in names for one in (ESTIMATORS if name == ALL else (name,))]
+    return tuple(dict.fromkeys(meant))
+
+
+def estimate_images(
+    inputs: Sequence[str | Path] | str | Path,
+    camera: Camera,
+    methods: Sequence[str] | str = ALL,
+    *,
+    sequence: bool | None = None,
+    rate: float | None = None,
+) -> Iterator[FrameEstimates]:
+    """Estimate the fog in a person's own images or video.
+
+    Parameters
+    ----------
+    inputs : path or sequence of paths
+        One video, or image files, folders and patterns; see `find_source`.
+    camera : Camera
+        Their calibration (`fogsim.camera_file.load_camera` reads it from a file).
+    methods : str or sequence of str
+        Names in `fogsim.estimators.ESTIMATORS`, or "all".
+    sequence : bool or None
+        Whether images follow one another in time, so that methods may use earlier ones; None to tell by their names.
+    rate : float or None
+        Images of a sequence in a second [1/s]; None for 10.
+
+    Yields
+    ------
+    FrameEstimates
+        For each image in turn; one that cannot be read has its reason in ``picture.error`` and no estimates.
+
+    Raises
+    ------
+    InputError
+        If there are no images, a method is unknown, the first images do not fit the camera, or none can be read.
+    """
+    names = [methods] if isinstance(methods, str) else methods
+    return estimates_of(find_source(inputs, sequence=sequence, rate=rate), camera, chosen_methods(names))
+
+
+def estimates_of(source: Source, camera: Camera, methods: Sequence[str]) -> Iterator[FrameEstimates]:
+    """Estimate the fog in the images of a source; see `estimate_images`.
+
+    An image that does not fit the camera is passed over like one that cannot be read, unless none has fitted before:
+    then it is the calibration that is of another camera.
+    """
+    bench = _Bench(camera, methods)
+    fitted = False
+    count = 0
+    for picture in source.pictures():
+        count += 1
+        if picture.image is None:
+            yield FrameEstimates(picture, ())
+            continue
+        if not source.temporal:
+            bench.reset()
+        try:
+            estimates = bench.estimates(picture.image, picture.time)
+        except InputError as error:
+            told = f"{_place(source, picture)}: {error}"
+            if not fitted:
+                raise InputError(told) from error
+            yield FrameEstimates(replace(picture, image=None, error=told), ())
+            continue
+        fitted = True
+        yield FrameEstimates(picture, estimates)
+    if not fitted:
+        raise InputError(f"none of the {count} images can be read" if count > 1 else "the only image cannot be read")
+
+
+def _place(source: Source, picture: Picture) -> str:
+    return picture.name if isinstance(picture.name, str) else f"{source.paths[0]}, frame {picture.name}"
+
+
+class _Bench:
+    """The estimators of several methods side by side, for each bit depth that occurs.
+
+    Parameters
+    ----------
+    camera : Camera
+        The told calibration.
+    methods : sequence of str
+        Names in the registry.
+    """
+
+    def __init__(self, camera: Camera, methods: Sequence[str]) -> None:
+        self._camera = camera
+        self._methods = tuple(methods)
+        self._estimators: dict[Camera, list[Estimator]] = {camera: self._made(camera)}
+
+    def _made(self, camera: Camera) -> list[Estimator]:
+        return [make(name, camera) for name in self._methods]
+
+    def reset(self) -> None:
+        """Forget all earlier images."""
+        for estimator in self._all():
+            estimator.reset()
+
+    def _all(self) -> Iterable[Estimator]:
+        return (one for estimators in self._estimators.values() for one in estimators)
+
+    def estimates(self, image: Pixels, time: float) -> tuple[Estimate, ...]:
+        """Estimates of all methods from an image.
+
+        Raises
+        ------
+        InputError
+            If the image is not one of the camera.
+        """
+        pixels, camera = _in_bits(image, self._camera)
+        if pixels.shape[:2] != (camera.height, camera.width):
+            rows, cols = pixels.shape[:2]
+            raise InputError(
+                f"the image has {cols} × {rows} pixels, the camera {camera.width} × {camera.height}; "
+                "they must be the same: which of them was scaled or cropped?"
+            )
+        if camera not in self._estimators:
+            self._estimators[camera] = self._made(camera)
+        observation = Observation(Frame(time, pixels, camera))
+        return tuple(estimator.update(observation) for estimator in self._estimators[camera])
+
+
+def _in_bits(image: Pixels, camera: Camera) -> tuple[Pixels, Camera]:
+    """Image and camera with the bit depth in which they are estimated.
+
+    Raises
+    ------
+    InputError
+        If the image has fewer bits than the camera.
+    """
+    if image.dtype == np.uint8 and camera.bits > 8:
+        raise InputError(f"the image has 8 bits, the camera {camera.bits}; leave `bits` out of the camera file")
+    if image.dtype == np.uint16 and camera.bits == 8:
+        return (image >> (16 - WHOLE_RANGE_BITS)).astype(np.uint16), replace(camera, bits=WHOLE_RANGE_BITS)
+    return image, camera

@@ -1,0 +1,124 @@
+"""From what stands on a command line to the images that are meant."""
+
+import glob
+import itertools
+import math
+import re
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from fogsim.errors import InputError, suggest
+from fogsim.offline.source import ImageFiles, Source
+from fogsim.offline.video_file import VideoFile
+
+IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".pgm", ".ppm")
+"""Endings of the files that are taken from a folder."""
+
+VIDEO_ENDINGS = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".ts", ".wmv", ".flv", ".3gp")
+"""Endings of files that are videos."""
+
+SEQUENCE_RATE = 10.0
+"""Images of a numbered sequence that are taken to make up a second [1/s]."""
+
+
+def find_source(
+    inputs: Sequence[str | Path] | str | Path, *, sequence: bool | None = None, rate: float | None = None
+) -> Source:
+    """Find the images that a person means.
+
+    Parameters
+    ----------
+    inputs : path or sequence of paths
+        One video, or any number of image files, folders of them (in the order of the numbers in their names), and
+        patterns like ``"drive/*.png"``.
+    sequence : bool or None
+        Whether images follow one another in time. None: a video does, and so do images whose names differ in one
+        number that counts on in equal steps.
+    rate : float or None
+        Images of a sequence in a second [1/s]; None for 10.
+
+    Returns
+    -------
+    Source
+        What was found; the images themselves are read later.
+
+    Raises
+    ------
+    InputError
+        If a file is not there, a folder or pattern has no images, the rate is not positive, or there is a video among
+        others.
+    """
+    given = [inputs] if isinstance(inputs, str | Path) else list(inputs)
+    if rate is not None and not (rate > 0 and math.isfinite(rate)):
+        raise InputError(f"--rate must be a positive number of images a second, got {rate!r}")
+    paths = [path for one in given for path in _paths(str(one))]
+    if not paths:
+        raise InputError("no image and no video is given")
+    if not any(_is_video(path) for path in paths):
+        temporal = is_sequence(paths) if sequence is None else sequence
+        return ImageFiles(tuple(paths), temporal, 1.0 / (rate or SEQUENCE_RATE))
+    if len(paths) > 1:
+        raise InputError(f"expected images, or one video alone, got {len(paths)} files with a video among them")
+    if rate is not None:
+        raise InputError(f"--rate is for image files; {paths[0]} is a video and has its own")
+    return VideoFile.open(paths[0], temporal=sequence is not False)
+
+
+def _is_video(path: Path) -> bool:
+    return path.suffix.lower() in VIDEO_ENDINGS
+
+
+def _paths(given: str) -> list[Path]:
+    path = Path(given)
+    if path.is_dir():
+        found = _ordered(one for one in path.iterdir() if one.suffix.lower() in IMAGE_ENDINGS and one.is_file())
+        if not found:
+            raise InputError(f"{path}: no image is in this folder; looked for {', '.join(IMAGE_ENDINGS)}")
+        return found
+    if path.exists():
+        return [path]
+    if any(sign in given for sign in "*?["):
+        found = _ordered(Path(one) for one in glob.glob(given, recursive=True) if Path(one).is_file())  # noqa: PTH207 - Path.glob takes no absolute pattern
+        if not found:
+            raise InputError(f"{given}: no file fits this pattern")
+        return found
+    raise InputError(f"{given}: there is no such file or folder{_nearest(path)}")
+
+
+def _nearest(path: Path) -> str:
+    """Which file of the folder was probably meant, if one is near."""
+    if not path.parent.is_dir():
+        return ""
+    told = suggest(path.name, sorted(one.name for one in path.parent.iterdir()))
+    return f"; {told.partition('?')[0]}?" if "?" in told else ""
+
+
+def _ordered(paths: Iterable[Path]) -> list[Path]:
+    """Sort by name, with numbers in it by their value: image 9 comes before image 10."""
+
+    def key(path: Path) -> list[tuple[int, int, str]]:
+        parts = re.split(r"([0-9]+)", str(path))
+        return [(1, int(part), part) if part.isdecimal() else (0, 0, part) for part in parts]
+
+    return sorted(paths, key=key)
+
+
+def is_sequence(paths: Sequence[Path]) -> bool:
+    """Whether files are a numbered sequence: names that differ in one number, which grows in equal steps.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        The files in their order.
+    """
+    if len(paths) < 2:
+        return False
+    # The last number counts: "drive2_cam1_0007.png".
+    parts = [re.fullmatch(r"(.*?)([0-9]+)([^0-9]*)", path.name) for path in paths]
+    matches = [part for part in parts if part is not None]
+    if len(matches) < len(paths):
+        return False
+    around = {(path.parent, match[1], match[3]) for path, match in zip(paths, matches, strict=True)}
+    numbers = [int(match[2]) for match in matches]
+    steps = {after - before for before, after in itertools.pairwise(numbers)}
+    return len(around) == 1 and len(steps) == 1 and min(steps) > 0

@@ -1,0 +1,129 @@
+"""An image with what the methods found in it drawn over it."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
+
+from fogsim.image_files import Pixels
+from fogsim.offline.estimation import FrameEstimates
+from fogsim.offline.wording import interval_text, metres
+from fogsim.recorders.camera_picture import scale_image
+from fogsim.recorders.style import GROUND, MUTED, TEXT, Colour, font, method_colour
+from fogsim.response import eight_bit
+from fogsim.values import Camera, Estimate
+
+WIDEST, NARROWEST = 1280, 640
+"""Columns that an image is scaled to if it has more or fewer [px]."""
+
+_LINE = 30
+"""Height of a line below the image [px]."""
+
+_DASH, _GAP = 14, 10
+
+
+class Overlay:
+    """Draws images of one camera, all in the same size.
+
+    Parameters
+    ----------
+    camera : Camera
+        The told calibration.
+    methods : sequence of str
+        Names of the methods, each of which has its line below the image.
+    """
+
+    def __init__(self, camera: Camera, methods: Sequence[str]) -> None:
+        self._bits = camera.bits
+        self._scale = min(max(camera.width, NARROWEST), WIDEST) / camera.width
+        # Videos of 4:2:0 have even sizes.
+        width, height = (2 * math.ceil(self._scale * side / 2) for side in (camera.width, camera.height))
+        self._picture_height = height
+        self.size = (width, height + _LINE * (len(methods) + 1))
+
+    def draw(self, result: FrameEstimates) -> Image.Image:
+        """Draw an image and its estimates.
+
+        Parameters
+        ----------
+        result : FrameEstimates
+            Of an image that could be read.
+
+        Returns
+        -------
+        PIL image
+            RGB, of this overlay's ``size``.
+        """
+        canvas = Image.new("RGB", self.size, GROUND)
+        if result.picture.image is not None:
+            shown = _shown(result.picture.image, self._bits)
+            canvas.paste(scale_image(shown, self.size[0], self._picture_height), (0, 0))
+        draw = ImageDraw.Draw(canvas)
+        for index, estimate in enumerate(result.estimates):
+            if estimate.valid:
+                self._draw_findings(draw, estimate, method_colour(index), labelled=index == 0)
+        self._draw_lines(draw, result)
+        return canvas
+
+    def _draw_findings(self, draw: ImageDraw.ImageDraw, estimate: Estimate, colour: Colour, *, labelled: bool) -> None:
+        band = estimate.diagnostics.get("band")
+        if isinstance(band, tuple) and len(band) == 4:
+            left, right, top, bottom = (float(side) for side in band)
+            corners = (self._at(left - 0.5), self._at(top - 0.5), self._at(right + 0.5), self._at(bottom + 0.5) - 1)
+            draw.rectangle(corners, outline=colour, width=2)
+        horizon, inflection = _row(estimate, "horizon_row"), _row(estimate, "inflection_row")
+        if horizon is not None:
+            self._draw_row(draw, horizon, colour, "horizon" if labelled else "", dashed=True)
+        if inflection is not None:
+            self._draw_row(draw, inflection, colour, "inflection" if labelled else "", dashed=False)
+
+    def _at(self, place: float) -> float:
+        """Row or column of the drawing; a pixel's centre has an integer coordinate in the image."""
+        return (place + 0.5) * self._scale
+
+    def _draw_row(self, draw: ImageDraw.ImageDraw, row: float, colour: Colour, label: str, *, dashed: bool) -> None:
+        y = self._at(row)
+        if not 0 <= y < self._picture_height:
+            return
+        width = self.size[0]
+        for start in range(0, width, _DASH + _GAP if dashed else width):
+            draw.line([(start, y), (min(start + _DASH, width) if dashed else width, y)], fill=colour, width=2)
+        # The horizon lies above the inflection, so their labels never meet.
+        place = (width - 8, y - 4 if dashed else y + 4)
+        anchor = "rs" if dashed else "rt"
+        draw.text(place, label, fill=colour, font=font(13), anchor=anchor, stroke_width=2, stroke_fill=GROUND)
+
+    def _draw_lines(self, draw: ImageDraw.ImageDraw, result: FrameEstimates) -> None:
+        y = self._picture_height + _LINE // 2
+        name = result.picture.name
+        told = f"frame {name}, {result.picture.time:.2f} s" if isinstance(name, int) else name
+        draw.text((12, y), told[-90:], fill=MUTED, font=font(13), anchor="lm")
+        for index, estimate in enumerate(result.estimates):
+            y += _LINE
+            _draw_estimate(draw, y, estimate, method_colour(index))
+
+
+def _draw_estimate(draw: ImageDraw.ImageDraw, y: int, estimate: Estimate, colour: Colour) -> None:
+    draw.text((12, y), estimate.method, fill=colour, font=font(15, bold=True), anchor="lm")
+    if not estimate.valid:
+        reason = f"cannot tell: {estimate.diagnostics.get('reason', 'no reason given')}"
+        draw.text((190, y), reason, fill=MUTED, font=font(13), anchor="lm")
+        return
+    draw.text((270, y), metres(estimate.visibility), fill=TEXT, font=font(17, bold=True), anchor="rm")
+    draw.text((288, y), f"90 %: {interval_text(estimate)}", fill=MUTED, font=font(13), anchor="lm")
+    category = estimate.category.value
+    draw.text((470, y), "no fog" if category == "none" else f"{category} fog", fill=TEXT, font=font(15), anchor="lm")
+
+
+def _row(estimate: Estimate, key: str) -> float | None:
+    row = estimate.diagnostics.get(key)
+    return float(row) if isinstance(row, int | float) and math.isfinite(row) else None
+
+
+def _shown(image: Pixels, bits: int) -> NDArray[np.uint8]:
+    """Image in 8 bits; one of 16 whose camera has 8 uses the whole range."""
+    if image.dtype == np.uint8:
+        return eight_bit(image, 8)
+    return eight_bit(image, bits if bits > 8 else 16)

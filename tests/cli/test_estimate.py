@@ -1,0 +1,198 @@
+"""``fogsim estimate``: what it prints, what it refuses, and with which exit code."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import fogsim
+from fogsim import cli
+
+HEIGHT, WIDTH = 240, 320
+CAMERA_YAML = """\
+width: 320
+height: 240
+focal_length_px: 288.45
+principal_point_px: [160, 120]
+mount_height_m: 1.38
+pitch_deg: 2
+response: srgb
+"""
+KEYS = {"frame", "method", "valid", "visibility_m", "visibility_low_m", "visibility_high_m"} | {
+    "extinction_per_m",
+    "category",
+    "horizon_row",
+}
+
+
+@pytest.fixture(scope="module")
+def drawn() -> list[np.ndarray]:
+    """Three frames in fog of 80 m."""
+    settings = ["fog.visibility_m=80", "duration_s=0.2", "camera.width=320", "camera.height=240"]
+    scenario = fogsim.load_scenario("motorway_fog_bank", settings)
+    return [step.observation.image for step in fogsim.run(scenario, seed=2)]
+
+
+@pytest.fixture
+def folder(drawn, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "drive").mkdir()
+    for index, image in enumerate(drawn):
+        Image.fromarray(image).save(tmp_path / "drive" / f"{index}.png")
+    (tmp_path / "camera.yaml").write_text(CAMERA_YAML, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.setenv("NO_COLOR", "1")
+    return tmp_path
+
+
+@pytest.fixture
+def estimate(folder, monkeypatch, capsys):
+    """Run the command in this process: gives exit code, stdout and stderr."""
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["fogsim", "estimate", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        told = capsys.readouterr()
+        return int(ended.value.code or 0), told.out, told.err
+
+    return run
+
+
+def test_json_is_all_there_is_on_stdout_and_the_same_each_time(folder: Path) -> None:
+    command = [sys.executable, "-m", "fogsim", "estimate", "drive", "--camera", "camera.yaml", "--json"]
+    environment = {**os.environ, "COLUMNS": "200", "NO_COLOR": "1"}
+    runs = [
+        subprocess.run(
+            [*command, "--method", "negru2013"], capture_output=True, timeout=120, env=environment, check=True
+        )
+        for _ in range(2)
+    ]
+    assert runs[0].stdout == runs[1].stdout
+    records = [json.loads(line) for line in runs[0].stdout.decode().splitlines()]
+    assert [record["frame"] for record in records] == ["drive/0.png", "drive/1.png", "drive/2.png"]
+    for record in records:
+        assert set(record) == KEYS
+        assert record["valid"] is True
+        assert record["visibility_m"] == pytest.approx(80.0, rel=0.05)
+        assert record["visibility_low_m"] < record["visibility_m"] < record["visibility_high_m"]
+        assert record["category"] == "dense"
+        assert record["horizon_row"] == pytest.approx(120 - 288.45 * np.tan(np.radians(2)), abs=0.01)
+
+
+def test_a_table_has_a_heading_and_a_row_each(estimate) -> None:
+    code, out, _ = estimate("drive", "--camera", "camera.yaml", "--method", "negru2013")
+    assert code == 0
+    lines = out.splitlines()
+    assert lines[0].split()[:3] == ["frame", "method", "visibility"]
+    assert [line.split()[0] for line in lines[1:]] == ["drive/0.png", "drive/1.png", "drive/2.png"]
+    assert all("dense" in line for line in lines[1:])
+
+
+def test_all_methods_speak_in_turn(estimate) -> None:
+    code, out, _ = estimate("drive/1.png", "--camera", "camera.yaml", "--json")
+    assert code == 0
+    assert [json.loads(line)["method"] for line in out.splitlines()] == list(fogsim.estimators.ESTIMATORS)
+
+
+def test_a_broken_image_among_good_ones_is_told_and_passed_over(estimate, folder: Path) -> None:
+    (folder / "drive" / "1.png").write_bytes(b"broken")
+    code, out, err = estimate("drive", "--camera", "camera.yaml", "--method", "negru2013", "--json")
+    assert code == 0
+    first, second, third = (json.loads(line) for line in out.splitlines())
+    assert set(second) == {"frame", "error"}
+    assert second["frame"] == "drive/1.png"
+    assert first["valid"]
+    assert third["valid"]
+    assert "passed over: drive/1.png: this is no image" in err
+
+
+def test_an_overlay_is_written(estimate, folder: Path) -> None:
+    code, out, err = estimate(
+        "drive", "--camera", "camera.yaml", "--method", "negru2013", "--json", "--overlay", "o.mp4"
+    )
+    assert code == 0
+    assert len(out.splitlines()) == 3
+    assert "overlay: o.mp4" in err
+    assert sorted(path.name for path in folder.iterdir()) == ["camera.yaml", "drive", "o.mp4"]
+    again, out, err = estimate("drive", "--camera", "camera.yaml", "--overlay", "o.mp4")
+    assert (again, out) == (2, "")
+    assert "--overwrite" in err
+
+
+def test_a_guessed_camera_is_written_and_good_to_use(estimate, folder: Path) -> None:
+    guess = ("drive", "--camera", "guess.yaml", "--guess-camera", "--mount-height", "1.38", "--field-of-view", "58.04")
+    code, out, err = estimate(*guess)
+    assert code == 0, err
+    assert "mount_height_m: 1.38  # as stated" in out
+    assert estimate(*guess)[0] == 2
+    assert estimate(*guess, "--overwrite")[0] == 0
+    code, out, _ = estimate("drive", "--camera", "guess.yaml", "--method", "negru2013", "--json")
+    assert code == 0
+    for line in out.splitlines():
+        assert json.loads(line)["visibility_m"] == pytest.approx(80.0, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("none.png", "--camera", "camera.yaml"), "none.png: there is no such file"),
+        (("drive", "--camera", "none.yaml"), "none.yaml: cannot be read"),
+        (("drive", "--camera", "typo.yaml"), "typo.yaml:1: widht: unknown key; did you mean 'width'"),
+        (("drive", "--camera", "large.yaml"), "the image has 320 × 240 pixels, the camera 640 × 240"),
+        (("drive", "--camera", "camera.yaml", "--method", "negru2031"), "did you mean 'negru2013'"),
+        (("empty", "--camera", "camera.yaml"), "no image is in this folder"),
+        (("*.bmp", "--camera", "camera.yaml"), "no file fits this pattern"),
+        (("empty.mp4", "--camera", "camera.yaml"), "this is no video"),
+        (("camera.yaml", "--camera", "camera.yaml"), "the only image cannot be read"),
+        (("drive", "--camera", "camera.yaml", "--mount-height", "1.4"), "--mount-height goes with --guess-camera"),
+        (("drive", "--camera", "camera.yaml", "--guess-camera", "--mount-height", "1.4"), "is there already"),
+        (("drive", "--camera", "new.yaml", "--guess-camera"), "needs --mount-height"),
+        (("drive", "--camera", "camera.yaml", "--overlay", "a.avi"), "ends in .mp4"),
+        (("drive", "--camera", "camera.yaml", "--rate", "-1"), "--rate must be"),
+    ],
+)
+def test_mistakes_end_with_exit_code_2(estimate, folder: Path, arguments: tuple[str, ...], told: str) -> None:
+    (folder / "typo.yaml").write_text(CAMERA_YAML.replace("width", "widht"), encoding="utf-8")
+    (folder / "large.yaml").write_text(CAMERA_YAML.replace("320", "640"), encoding="utf-8")
+    (folder / "empty").mkdir()
+    (folder / "empty.mp4").write_bytes(b"")
+    before = {path.name for path in folder.iterdir()}
+    code, _, err = estimate(*arguments)
+    assert code == 2
+    assert told in err
+    assert "Traceback" not in err
+    assert {path.name for path in folder.iterdir()} == before
+
+
+def test_a_video_without_frames_is_refused(estimate, folder: Path) -> None:
+    from fogsim.recorders.video import Encoder, encoder_command
+
+    encoder = Encoder(encoder_command(folder / "whole.mp4", 0.1, (WIDTH, HEIGHT)))
+    encoder.write(bytes(3 * WIDTH * HEIGHT))
+    encoder.finish()
+    whole = (folder / "whole.mp4").read_bytes()
+    # The index is at the file's beginning, so a header without pictures is left.
+    (folder / "none.mp4").write_bytes(whole[: whole.index(b"mdat") + 4])
+    code, out, err = estimate("none.mp4", "--camera", "camera.yaml", "--method", "negru2013", "--json")
+    assert (code, out) == (2, "")
+    assert "no frames" in err
+
+
+def test_black_images_are_not_valid(estimate, folder: Path) -> None:
+    shutil.rmtree(folder / "drive")
+    (folder / "drive").mkdir()
+    for index in range(2):
+        Image.fromarray(np.zeros((HEIGHT, WIDTH), np.uint8)).save(folder / "drive" / f"{index}.png")
+    code, out, _ = estimate("drive", "--camera", "camera.yaml", "--json")
+    assert code == 0
+    for line in out.splitlines():
+        record = json.loads(line)
+        assert record["valid"] is False
+        assert [record[key] for key in sorted(KEYS - {"frame", "method", "valid"})] == [None] * 6

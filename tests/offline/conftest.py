@@ -1,0 +1,54 @@
+"""A drive through fog of a known visibility, drawn by FogSim, as files that a dash camera could have left."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+
+import fogsim
+from fogsim.recorders.video import Encoder, encoder_command
+from fogsim.values import Camera
+
+VISIBILITY = 120.0
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Frames of one drive, ten a second."""
+
+    folder: Path
+    frames: tuple[NDArray[np.uint8], ...]
+    camera: Camera
+
+    @property
+    def camera_yaml(self) -> str:
+        camera = self.camera
+        return (
+            f"width: {camera.width}\nheight: {camera.height}\nfocal_length_px: {camera.focal_length!r}\n"
+            f"principal_point_px: [{camera.principal_point[0]!r}, {camera.principal_point[1]!r}]\n"
+            f"mount_height_m: {camera.mount_height!r}\npitch_deg: {math.degrees(camera.pitch)!r}\n"
+            f"response: {camera.response.value}\n"
+        )
+
+
+@pytest.fixture(scope="session")
+def drive(tmp_path_factory: pytest.TempPathFactory) -> Drive:
+    """``images/000.png`` …, ``drive.mp4`` and ``camera.yaml`` in a folder that no test may change."""
+    folder = tmp_path_factory.mktemp("drive")
+    scenario = fogsim.load_scenario("motorway_fog_bank", [f"fog.visibility_m={VISIBILITY}", "duration_s=0.7"])
+    seen = [step.observation.frame for step in fogsim.run(scenario, seed=1)]
+    frames, camera = tuple(frame.image for frame in seen), seen[0].camera
+    (folder / "images").mkdir()
+    for index, frame in enumerate(frames):
+        Image.fromarray(frame).save(folder / "images" / f"{index:03d}.png")
+    encoder = Encoder(encoder_command(folder / "drive.mp4", 0.1, (camera.width, camera.height)))
+    for frame in frames:
+        encoder.write(frame.tobytes())
+    encoder.finish()
+    made = Drive(folder, frames, camera)
+    (folder / "camera.yaml").write_text(made.camera_yaml, encoding="utf-8")
+    return made

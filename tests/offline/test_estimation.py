@@ -1,0 +1,144 @@
+"""What the methods say about images and videos that were written to disk and read back."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from PIL import Image
+
+from fogsim.errors import InputError, UnknownNameError
+from fogsim.estimators import ESTIMATORS, make
+from fogsim.offline import chosen_methods, estimate_images
+from fogsim.values import Frame, Observation
+
+
+def visibilities(results) -> list[float]:
+    return [estimate.visibility for result in results for estimate in result.estimates if estimate.valid]
+
+
+def test_images_say_the_visibility_in_which_they_were_drawn(drive) -> None:
+    results = list(estimate_images(drive.folder / "images", drive.camera, "negru2013"))
+    assert [result.picture.name for result in results] == [str(p) for p in sorted((drive.folder / "images").iterdir())]
+    found = visibilities(results)
+    assert len(found) == len(drive.frames)
+    # README: a p95 of 0.7 % at 100 m for negru2013 with the horizon known.
+    assert found == pytest.approx([120.0] * len(found), rel=0.03)
+
+
+def test_a_video_says_nearly_the_same_as_its_frames(drive) -> None:
+    results = list(estimate_images(drive.folder / "drive.mp4", drive.camera, "negru2013"))
+    assert [result.picture.name for result in results] == list(range(len(drive.frames)))
+    assert [result.picture.time for result in results] == pytest.approx([0.1 * i for i in range(len(results))])
+    assert visibilities(results) == pytest.approx([120.0] * len(results), rel=0.05)
+
+
+def test_images_from_disk_are_estimated_as_those_in_memory(drive) -> None:
+    estimator = make("negru2013", drive.camera)
+    in_memory = [estimator.update(Observation(Frame(0.0, frame, drive.camera))) for frame in drive.frames]
+    from_disk = [result.estimates[0] for result in estimate_images(drive.folder / "images", drive.camera, "negru2013")]
+    assert [one.extinction for one in from_disk] == [one.extinction for one in in_memory]
+
+
+def test_grey_opaque_and_16_bit_copies_say_the_same(drive, tmp_path: Path) -> None:
+    grey = np.asarray(Image.fromarray(drive.frames[0]).convert("L"))
+    Image.fromarray(grey).save(tmp_path / "a.png")
+    Image.fromarray(np.dstack([grey] * 3 + [np.full_like(grey, 9)])).save(tmp_path / "b.png")
+    cv2.imwrite(str(tmp_path / "c.tif"), grey.astype(np.uint16) * 257)
+    cv2.imwrite(str(tmp_path / "d.pgm"), grey)
+    found = visibilities(estimate_images(tmp_path, drive.camera, "negru2013"))
+    assert len(found) == 4
+    assert found[1] == found[0] == found[3]
+    assert found[2] == pytest.approx(found[0], rel=0.01)
+
+
+def test_colours_are_read_red_first(drive, tmp_path: Path) -> None:
+    red = np.zeros((*drive.frames[0].shape[:2], 3), np.uint8)
+    red[..., 0] = 200
+    Image.fromarray(red).save(tmp_path / "red.png")
+    (result,) = estimate_images(tmp_path / "red.png", drive.camera, "negru2013")
+    assert np.array_equal(result.picture.image, red)
+
+
+def test_what_cannot_tell_says_so(drive, tmp_path: Path) -> None:
+    for name, value in (("black", 0), ("white", 255)):
+        Image.fromarray(np.full_like(drive.frames[0], value)).save(tmp_path / f"{name}.png")
+    results = list(estimate_images(tmp_path, drive.camera, "all"))
+    assert len(results) == 2
+    for result in results:
+        assert [one.method for one in result.estimates] == list(ESTIMATORS)
+        assert not any(one.valid for one in result.estimates)
+
+
+def test_images_that_cannot_be_used_are_passed_over_with_their_reason(drive, tmp_path: Path) -> None:
+    Image.fromarray(drive.frames[0]).save(tmp_path / "a1.png")
+    (tmp_path / "a2.png").write_bytes((tmp_path / "a1.png").read_bytes()[:200])
+    (tmp_path / "a3.png").write_bytes(b"")
+    Image.fromarray(drive.frames[0][:-2]).save(tmp_path / "a4.png")
+    Image.fromarray(drive.frames[1]).save(tmp_path / "a5.png")
+    results = list(estimate_images(tmp_path, drive.camera, "negru2013"))
+    assert [len(result.estimates) for result in results] == [1, 0, 0, 0, 1]
+    assert "a2.png" in results[1].picture.error
+    assert "640 × 478" in results[3].picture.error
+    assert "640 × 480" in results[3].picture.error
+    # A sequence keeps its time where an image is missing.
+    assert [result.picture.time for result in results] == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4])
+
+
+def test_a_camera_of_another_size_ends_it_with_both_sizes(drive) -> None:
+    other = replace(drive.camera, width=1280, height=720)
+    for images in ("images", "drive.mp4"):
+        with pytest.raises(InputError, match=r"640 × 480 pixels, the camera 1280 × 720"):
+            list(estimate_images(drive.folder / images, other, "negru2013"))
+
+
+def test_images_of_8_bits_are_not_those_of_a_camera_of_12(drive) -> None:
+    with pytest.raises(InputError, match="8 bits, the camera 12"):
+        list(estimate_images(drive.folder / "images", replace(drive.camera, bits=12), "negru2013"))
+
+
+def test_no_readable_image_is_an_error(drive, tmp_path: Path) -> None:
+    for name in ("a.png", "b.png"):
+        (tmp_path / name).write_bytes(b"no image")
+    results = estimate_images(tmp_path, drive.camera, "negru2013")
+    assert next(results).picture.error
+    assert next(results).picture.error
+    with pytest.raises(InputError, match="none of the 2 images can be read"):
+        next(results)
+
+
+def test_methods_are_named_once_and_unknown_ones_answer_with_the_nearest() -> None:
+    assert chosen_methods(["negru2013", "all"])[0] == "negru2013"
+    assert sorted(chosen_methods(["negru2013", "all"])) == sorted(ESTIMATORS)
+    with pytest.raises(UnknownNameError, match="did you mean 'negru2013'"):
+        chosen_methods(["negru2031"])
+
+
+class Remembering:
+    """A stand-in for a temporal method: counts what it has seen since it was told to forget."""
+
+    method = "remembering"
+
+    def __init__(self, camera) -> None:  # noqa: ARG002 - what every factory is given
+        self.times: list[float] = []
+
+    def reset(self) -> None:
+        self.times = []
+
+    def update(self, observation):
+        from fogsim.values import Estimate
+
+        self.times.append(observation.time)
+        return Estimate(self.method, 0.01 * len(self.times), 0.001, diagnostics={"times": tuple(self.times)})
+
+
+@pytest.mark.parametrize(("sequence", "seen"), [(None, 3), (True, 3), (False, 1)])
+def test_only_sequences_have_a_memory(drive, monkeypatch, sequence, seen) -> None:
+    monkeypatch.setitem(ESTIMATORS._entries, "remembering", Remembering)
+    paths = sorted((drive.folder / "images").iterdir())[:3]
+    results = list(estimate_images(paths, drive.camera, "remembering", sequence=sequence))
+    times = results[-1].estimates[0].diagnostics["times"]
+    assert len(times) == seen
+    if sequence is not False:
+        assert times == pytest.approx((0.0, 0.1, 0.2))

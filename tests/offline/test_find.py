@@ -1,0 +1,90 @@
+"""Which files are meant by what stands on a command line."""
+
+from pathlib import Path
+
+import pytest
+
+from fogsim.errors import InputError
+from fogsim.offline import find_source
+from fogsim.offline.find import is_sequence
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    for name in ("f10.png", "f9.png", "f11.JPG", "notes.txt"):
+        (tmp_path / name).write_bytes(b"")
+    return tmp_path
+
+
+def names(source) -> list[str]:
+    return [path.name for path in source.paths]
+
+
+def test_folders_and_patterns_are_in_the_order_of_their_numbers(folder: Path) -> None:
+    assert names(find_source(folder)) == ["f9.png", "f10.png", "f11.JPG"]
+    assert names(find_source(str(folder / "*.png"))) == ["f9.png", "f10.png"]
+
+
+def test_files_stay_in_the_order_in_which_they_are_given(folder: Path) -> None:
+    assert names(find_source([folder / "f10.png", folder / "f9.png"])) == ["f10.png", "f9.png"]
+
+
+def test_a_file_with_the_signs_of_a_pattern_in_its_name_is_that_file(folder: Path) -> None:
+    (folder / "a[1].png").write_bytes(b"")
+    assert names(find_source(str(folder / "a[1].png"))) == ["a[1].png"]
+
+
+@pytest.mark.parametrize(
+    ("files", "sequence"),
+    [
+        (["a1.png", "a2.png", "a3.png"], True),
+        (["cam2_00010.png", "cam2_00015.png", "cam2_00020.png"], True),
+        (["a1.png", "a2.png", "a4.png"], False),
+        (["a2.png", "a1.png"], False),
+        (["a1.png", "b2.png"], False),
+        (["x/1.png", "y/2.png"], False),
+        (["fog.png", "mist.png"], False),
+        (["a1.png"], False),
+        ([], False),
+    ],
+)
+def test_numbers_that_count_on_in_equal_steps_make_a_sequence(files: list[str], sequence: bool) -> None:
+    assert is_sequence([Path(file) for file in files]) is sequence
+
+
+def test_what_was_found_is_told(folder: Path) -> None:
+    assert find_source(folder / "f9.png").description == "1 image"
+    assert find_source(str(folder / "*.png"), rate=25).description == "2 images, taken as a sequence of 25 a second"
+    assert find_source(folder, sequence=False).description == "3 images, taken as stills, each on its own"
+
+
+@pytest.mark.parametrize(
+    ("given", "options", "told"),
+    [
+        ("nowhere/a.png", {}, "there is no such file or folder"),
+        ("f99.png", {}, "did you mean 'f9.png'?"),
+        ("*.bmp", {}, "no file fits this pattern"),
+        ("empty", {}, "no image is in this folder; looked for .png"),
+        ("f9.png", {"rate": 0.0}, "--rate must be a positive"),
+        ("f9.png", {"rate": float("nan")}, "--rate must be a positive"),
+        ("bad.mp4", {}, "bad.mp4: this is no video that can be read"),
+        ("bad.mp4", {"rate": 5.0}, "--rate is for image files"),
+    ],
+)
+def test_mistakes_are_told(folder: Path, given: str, options: dict, told: str) -> None:
+    (folder / "empty").mkdir()
+    (folder / "bad.mp4").write_bytes(b"no video at all")
+    with pytest.raises(InputError) as caught:
+        find_source(str(folder / given), **options)
+    assert told in str(caught.value)
+
+
+def test_a_video_is_alone(folder: Path) -> None:
+    (folder / "a.mp4").write_bytes(b"")
+    with pytest.raises(InputError, match="one video alone, got 2 files"):
+        find_source([folder / "a.mp4", folder / "f9.png"])
+
+
+def test_nothing_is_refused() -> None:
+    with pytest.raises(InputError, match="no image and no video"):
+        find_source([])

@@ -1,0 +1,121 @@
+"""A calibration guessed from images whose true one is known."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from fogsim.camera_file import load_camera
+from fogsim.errors import InputError
+from fogsim.offline import camera_text, estimate_images, find_source, guess_camera, write_camera
+from fogsim.values import Response
+
+HEIGHT = 1.38
+
+
+def true_field_of_view(drive) -> float:
+    return 2.0 * math.atan(0.5 * drive.camera.width / drive.camera.focal_length)
+
+
+def test_the_pitch_comes_from_the_lines_of_the_road(drive) -> None:
+    guess = guess_camera(
+        find_source(drive.folder / "images"), mount_height=HEIGHT, field_of_view=true_field_of_view(drive)
+    )
+    assert guess.warnings == ()
+    assert guess.camera.pitch == pytest.approx(drive.camera.pitch, abs=math.radians(0.1))
+    assert guess.camera.focal_length == pytest.approx(drive.camera.focal_length, rel=1e-9)
+    assert (guess.camera.width, guess.camera.height, guess.camera.mount_height) == (640, 480, HEIGHT)
+    assert guess.camera.response is Response.SRGB
+    assert "8 of 8 images" in guess.reasons["pitch_deg"]
+
+
+def test_a_guessed_camera_is_good_enough_to_estimate_with(drive, tmp_path: Path) -> None:
+    source = find_source(drive.folder / "drive.mp4")
+    write_camera(
+        tmp_path / "camera.yaml",
+        guess_camera(source, mount_height=HEIGHT, field_of_view=true_field_of_view(drive)),
+    )
+    camera = load_camera(tmp_path / "camera.yaml")
+    found = [r.estimates[0].visibility for r in estimate_images(drive.folder / "images", camera, "negru2013")]
+    assert found == pytest.approx([120.0] * len(found), rel=0.06)
+
+
+def test_what_is_not_stated_is_assumed_and_said(drive) -> None:
+    source = find_source(drive.folder / "images")
+    by_height = guess_camera(source, mount_height=HEIGHT)
+    assert by_height.camera.focal_length == pytest.approx(320.0 / math.tan(math.radians(30.0)))
+    assert any("--field-of-view" in warning for warning in by_height.warnings)
+    by_angle = guess_camera(source, field_of_view=1.0)
+    assert by_angle.camera.mount_height == 1.3
+    assert any("measure it" in warning for warning in by_angle.warnings)
+    assert "ASSUMED" in camera_text(by_angle)
+
+
+def test_the_metadata_of_a_photograph_state_its_focal_length(drive, tmp_path: Path) -> None:
+    image = Image.fromarray(drive.frames[0])
+    exif = Image.Exif()
+    exif.get_ifd(0x8769)[0xA405] = 26
+    image.save(tmp_path / "photo.jpg", exif=exif, quality=95)
+    guess = guess_camera(find_source(tmp_path / "photo.jpg"), mount_height=HEIGHT)
+    # 26 mm on 36 mm × 24 mm, whose diagonal is 43.27 mm, by the image's own diagonal of 800 px.
+    assert guess.camera.focal_length == pytest.approx(26.0 * 800.0 / 43.27)
+    assert "metadata" in guess.reasons["focal_length_px"]
+    assert any("1 image alone" in warning for warning in guess.warnings)
+
+
+def test_a_stated_horizon_needs_no_lines(drive, tmp_path: Path) -> None:
+    Image.fromarray(np.full((480, 640, 3), 120, np.uint8)).save(tmp_path / "blank.png")
+    source = find_source(tmp_path / "blank.png")
+    with pytest.raises(InputError, match="--horizon-row"):
+        guess_camera(source, mount_height=HEIGHT)
+    camera = guess_camera(source, mount_height=HEIGHT, field_of_view=1.0, horizon_row=200.0).camera
+    assert camera.horizon_row == pytest.approx(200.0)
+
+
+def test_a_camera_that_looks_aside_is_told(drive, tmp_path: Path) -> None:
+    for index, frame in enumerate(drive.frames):
+        Image.fromarray(frame[:, 120:]).save(tmp_path / f"{index}.png")
+    guess = guess_camera(find_source(tmp_path), mount_height=HEIGHT, field_of_view=0.85)
+    assert any("turned to the right" in warning for warning in guess.warnings)
+
+
+def test_a_camera_file_says_what_it_was_guessed_from_and_reads_back(drive, tmp_path: Path) -> None:
+    guess = guess_camera(find_source(drive.folder / "images"), mount_height=HEIGHT)
+    path = tmp_path / "camera.yaml"
+    write_camera(path, guess)
+    text = path.read_text(encoding="utf-8")
+    assert "lines of the road meet" in text
+    assert "# Uncertain: the field of view is assumed" in text
+    read = load_camera(path)
+    rounded = replace(guess.camera, focal_length=read.focal_length, pitch=read.pitch)
+    assert read == rounded
+    assert read.pitch == pytest.approx(guess.camera.pitch, abs=math.radians(0.001))
+    with pytest.raises(InputError, match="--overwrite"):
+        write_camera(path, guess)
+    write_camera(path, guess, overwrite=True)
+    assert [one.name for one in tmp_path.iterdir()] == ["camera.yaml"]
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ({}, "needs --mount-height"),
+        ({"mount_height": 0.0}, "--mount-height must lie"),
+        ({"mount_height": float("nan")}, "--mount-height must lie"),
+        ({"field_of_view": math.radians(200.0)}, "--field-of-view must lie"),
+        ({"mount_height": 1.3, "horizon_row": math.inf}, "--horizon-row must be"),
+    ],
+)
+def test_mistakes_are_told(drive, options: dict, told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        guess_camera(find_source(drive.folder / "images"), **options)
+
+
+def test_images_of_two_sizes_are_of_two_cameras(drive, tmp_path: Path) -> None:
+    Image.fromarray(drive.frames[0]).save(tmp_path / "a.png")
+    Image.fromarray(drive.frames[0][:400]).save(tmp_path / "b.png")
+    with pytest.raises(InputError, match=r"640 × 400 pixels and .*a.png has 640 × 480"):
+        guess_camera(find_source(tmp_path), mount_height=HEIGHT)

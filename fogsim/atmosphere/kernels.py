@@ -105,15 +105,17 @@ def fog_pixels(
     extinction: np.float32,
     banks: NDArray[np.float32],
     airlight: NDArray[np.float32],
+    top: int,
+    bottom: int,
     out: NDArray[np.float32],
 ) -> None:
-    """Fog every pixel of an image (rows, cols · 3), τ exact through banks and up to a sharp top.
+    """Fog the rows from `top` to before `bottom` of an image (rows, cols · 3), τ exact through banks and up to a top.
 
     `ray_map` (3, 3) takes (u, v, 1) to a ray in the world (not normalised); `headroom` is the height of the fog's top
     above the eye. `banks` (n, 6) holds for each bank the axis (x, y), how far the eye is beyond its start and end, its
     edge and its extra extinction.
     """
-    rows, columns = distance.shape
+    columns = distance.shape[1]
     length, towards = np.empty(columns, np.float32), np.empty(columns, np.float32)
     depth, transmission = np.empty(columns, np.float32), np.empty(columns, np.float32)
     power = np.empty(columns, np.int32)
@@ -121,7 +123,7 @@ def fog_pixels(
     for j in range(3 * columns):
         light[j] = airlight[j % 3]
     right_x, right_y, right_z = ray_map[0, 0], ray_map[1, 0], ray_map[2, 0]
-    for v in range(rows):
+    for v in range(top, bottom):
         first_x = ray_map[0, 1] * np.float32(v) + ray_map[0, 2]
         first_y = ray_map[1, 1] * np.float32(v) + ray_map[1, 2]
         first_z = ray_map[2, 1] * np.float32(v) + ray_map[2, 2]

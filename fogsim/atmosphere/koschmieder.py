@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere.kernels import fog_pixels
+from fogsim.jit import Bands
 from fogsim.values import FogBank, FogField, View
 
 
@@ -33,16 +34,15 @@ def fogged_radiance(
         return radiance.copy()
     out = np.empty_like(radiance)
     rows, columns = view.distance.shape
-    fog_pixels(
-        radiance.reshape(rows, 3 * columns),
-        np.ascontiguousarray(view.distance, dtype=np.float32),
-        np.ascontiguousarray(ray_map, dtype=np.float32),
-        np.float32(field.top - eye[2]),
-        np.float32(field.extinction),
-        _bank_rows(field.banks, eye),
-        np.array(field.airlight, dtype=np.float32),
-        out.reshape(rows, 3 * columns),
-    )
+    lines, fogged = radiance.reshape(rows, 3 * columns), out.reshape(rows, 3 * columns)
+    distance, rays = np.ascontiguousarray(view.distance, dtype=np.float32), np.ascontiguousarray(ray_map, np.float32)
+    headroom, extinction = np.float32(field.top - eye[2]), np.float32(field.extinction)
+    banks, airlight = _bank_rows(field.banks, eye), np.array(field.airlight, dtype=np.float32)
+
+    def fog(_: int, top: int, bottom: int) -> None:
+        fog_pixels(lines, distance, rays, headroom, extinction, banks, airlight, top, bottom, fogged)
+
+    Bands().work(fog, rows, columns)
     return out
 
 

@@ -27,9 +27,11 @@ def develop(
     second_key: np.uint32,
     normals: NDArray[np.float32],
     response: NDArray[np.uint8] | NDArray[np.uint16],
+    begin: int,
+    end: int,
     out: NDArray[np.uint8] | NDArray[np.uint16],
 ) -> None:
-    """Pixel values from radiance; both are flat.
+    """Pixel values from radiance, of the samples from `begin` to before `end`; both arrays are flat.
 
     `gain` takes radiance to exposure relative to saturation. Shot noise has variance `shot_variance` · exposure and
     read noise `read_variance`, both relative to saturation². `response` takes exposure in even steps to pixel values.
@@ -41,8 +43,8 @@ def develop(
     zero, one = np.float32(0.0), np.float32(1.0)
     index = np.empty(BLOCK, np.uint32)
     noise = np.empty(BLOCK, np.float32)
-    for start in range(0, radiance.shape[0], BLOCK):
-        count = min(BLOCK, radiance.shape[0] - start)
+    for start in range(begin, end, BLOCK):
+        count = min(BLOCK, end - start)
         light, pixels = radiance[start : start + count], out[start : start + count]
         _hashed(np.uint32(start), count, first_key, second_key, index)
         for i in range(count):

@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 from fogsim import jit
+from fogsim.atmosphere.koschmieder import fogged_radiance
+from fogsim.camera.exposure import Sensor, expose
 from fogsim.jit import Bands
 from fogsim.render import make_renderer
 from fogsim.scene import vehicle_batches
-from fogsim.values import Camera
+from fogsim.values import Camera, FogBank, FogField, Response, View
 
 
 def test_pictures_do_not_depend_on_the_bands(place: Any, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -71,3 +73,19 @@ def test_failures_of_either_band_are_raised(failing: int, monkeypatch: pytest.Mo
 
     with pytest.raises(ValueError, match=f"band {failing}"):
         Bands().work(fail, 1000, 1000)
+
+
+def test_neither_fog_nor_noise_depends_on_the_bands(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(1)
+    shape = (300, 400)
+    view = View(rng.random((*shape, 3), np.float32), 300 * rng.random(shape, np.float32), np.zeros(shape, np.int32))
+    bank = FogBank((0.0, 0.0), (1.0, 0.0), 30.0, 90.0, 20.0, 0.01)
+    field = FogField(0.02, (0.5, 0.5, 0.5), top=9.0, banks=(bank,))
+    rays = np.array([[0, 0, 1.0], [-0.01, 0, 2], [0, -0.01, 1.5]])
+    pictures = []
+    for processors in (1, 2):
+        monkeypatch.setattr(jit, "processors", lambda count=processors: count)
+        light = fogged_radiance(view, field, (0.0, 0.0, 1.4), rays)
+        pictures.append((light, expose(light, Sensor(1.2), Response.SRGB, np.random.default_rng(2))))
+    for one, two in zip(*pictures, strict=True):
+        assert np.array_equal(one, two)

@@ -8,6 +8,8 @@ from PIL import Image
 
 import fogsim
 from fogsim.metrics import step_metrics
+from fogsim.offline import FrameEstimates, Picture
+from fogsim.offline.overlay import Overlay
 from fogsim.recorders import FramePanel
 
 OUT = Path(__file__).resolve().parent / "pictures"
@@ -43,10 +45,23 @@ def demo_frame(time: float) -> Image.Image:
     raise SystemExit(f"the demo ended before {time} s")
 
 
+def overlay(visibility: str, index: int) -> Image.Image:
+    """What ``fogsim estimate --overlay`` draws over a camera frame."""
+    scenario = fogsim.load_scenario("motorway_fog_bank", [f"fog.visibility_m={visibility}"])
+    for step in fogsim.run(scenario, seed=1):
+        if step.index == index:
+            camera = step.observation.frame.camera
+            estimate = fogsim.estimators.make("negru2013", camera).update(step.observation)
+            picture = Picture(f"drive/{index:04d}.png", step.time, step.observation.image)
+            return Overlay(camera, ["negru2013"]).draw(FrameEstimates(picture, (estimate,)))
+    raise SystemExit(f"the run at {visibility} m ended before frame {index}")
+
+
 def main() -> None:
     """Draw and save."""
     OUT.mkdir(exist_ok=True)
     contact_sheet().save(OUT / "visibilities.jpg", quality=88)
+    overlay("120", 6).save(OUT / "estimate.jpg", quality=88)
     demo_frame(91.0).save(OUT / "demo.jpg", quality=88)
 
 

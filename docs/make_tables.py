@@ -1,5 +1,6 @@
 """Write those tables of the docs that come from the code: ``python docs/make_tables.py`` (a test holds them to it)."""
 
+import inspect
 import sys
 from pathlib import Path
 from typing import Any, get_args
@@ -8,6 +9,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from fogsim.estimators import ESTIMATORS
 from fogsim.metrics import RunMetrics
 from fogsim.recorders.table import table_columns
 from fogsim.scenario.methods import Method
@@ -67,7 +69,13 @@ def signs() -> list[tuple[str, ...]]:
     return [(f"`{name}`", kind.code, kind.meaning) for name, kind in SIGN_KINDS.items()]
 
 
+def methods() -> list[tuple[str, ...]]:
+    """Estimators with the first line of what they say of themselves."""
+    return [(f"`{name}`", (inspect.getdoc(method) or "").partition("\n")[0]) for name, method in ESTIMATORS.items()]
+
+
 TABLES = {
+    "estimate.md": {"methods": (("method", "what it reads"), methods)},
     "scenarios.md": {
         "signs": (("kind", "code", "meaning"), signs),
         "keys": (("key", "default", "meaning"), scenario_keys),

@@ -33,10 +33,9 @@ def daytime_radiance(view: View, field: FogField, camera: Camera, pose: CameraPo
     """
     radiance = _through_fog(view, field, camera, pose)
     if field.forward_scatter > 0:
-        transmitted = _through_fog(view, dataclasses.replace(field, airlight=(0.0, 0.0, 0.0)), camera, pose)
         width = pixel_width(field.forward_scatter_width, camera.focal_length)
         share = transmission(view, field, camera, pose)
-        add_forward_scatter(radiance, transmitted, share, field.forward_scatter, width)
+        add_forward_scatter(radiance, field.airlight, share, field.forward_scatter, width)
     return radiance
 
 

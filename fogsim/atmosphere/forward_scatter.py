@@ -19,23 +19,24 @@ _DARK = 1e-12
 
 def add_forward_scatter(
     radiance: NDArray[np.float32],
-    transmitted: NDArray[np.float32],
+    airlight: tuple[float, float, float],
     transmission: NDArray[np.float32],
     weight: float,
     width: float,
 ) -> None:
     """Add to an image what forward scattering does to the light that a scene sends through fog.
 
-    Of the transmitted light D = L0 T, the share w (1 − T) is exchanged for its own blur h ∗ D, h being a Gaussian:
-    nothing in clear air, most for what lies deep in the fog. Where D is even, nothing changes. Forward lobes of fog
-    droplets are 1° to 2° wide; weight and width are assumptions, not measurements.
+    Of D = (L0 − L∞) T, by which the scene differs from the airlight, the share w (1 − T) is exchanged for its own blur
+    h ∗ D, h being a Gaussian: nothing in clear air, most for what lies deep in the fog. What is as bright as the
+    airlight stays so, and fog beside something dark is darker. Forward lobes of fog droplets are 1° to 2° wide; weight
+    and width are assumptions, not measurements.
 
     Parameters
     ----------
     radiance : (rows, cols, 3) float32
         Radiance at the camera [cd/m²]; added to in place.
-    transmitted : (rows, cols, 3) float32
-        L0 T [cd/m²].
+    airlight : tuple of float
+        L∞ per channel [cd/m²].
     transmission : (rows, cols) float32
         T.
     weight : float
@@ -44,13 +45,14 @@ def add_forward_scatter(
         Standard deviation of the blur [px].
     """
     block = max(1, int(width / _COARSEST))
-    small = _block_means(transmitted, block)
+    difference = radiance - np.array(airlight, np.float32)
+    small = _block_means(difference, block)
     reach = math.ceil(_REACH * width / block)
     weights = np.exp(-0.5 * np.square(np.arange(-reach, reach + 1) * block / width)).astype(np.float32)
     across_first, blurred = np.empty_like(small), np.empty_like(small)
     blur_rows(small, weights, across_first)
     blur_rows(across_first.transpose(1, 0, 2), weights, blurred.transpose(1, 0, 2))
-    exchange(radiance, transmitted, transmission, blurred, block, np.float32(weight))
+    exchange(radiance, difference, transmission, blurred, block, np.float32(weight))
 
 
 def _block_means(image: NDArray[np.float32], block: int) -> NDArray[np.float32]:
@@ -60,7 +62,7 @@ def _block_means(image: NDArray[np.float32], block: int) -> NDArray[np.float32]:
     shape = (padded.shape[0] // block, block, padded.shape[1] // block, block, 3)
     # One axis after the other: that is faster than both at once.
     means = padded.reshape(shape).sum(axis=1).sum(axis=2) / block**2
-    means[means < _DARK] = 0.0
+    means[np.abs(means) < _DARK] = 0.0
     return np.ascontiguousarray(means, dtype=np.float32)
 
 

@@ -28,13 +28,13 @@ def blur_rows(image: NDArray[np.float32], weights: NDArray[np.float32], out: NDA
 @kernel
 def exchange(
     radiance: NDArray[np.float32],
-    transmitted: NDArray[np.float32],
+    difference: NDArray[np.float32],
     transmission: NDArray[np.float32],
     blurred: NDArray[np.float32],
     block: int,
     weight: np.float32,
 ) -> None:
-    """Exchange a share w (1 − T) of transmitted light for its blur, of which each block (rows, cols, 3) has a value."""
+    """Exchange a share w (1 − T) of a difference for its blur, of which each block (rows, cols, 3) has a value."""
     rows, columns = blurred.shape[0], blurred.shape[1]
     part = np.float32(1.0) / np.float32(block)
     for v in range(transmission.shape[0]):
@@ -51,4 +51,4 @@ def exchange(
             for c in range(3):
                 above = blurred[upper, left, c] + (blurred[upper, right, c] - blurred[upper, left, c]) * a
                 below = blurred[lower, left, c] + (blurred[lower, right, c] - blurred[lower, left, c]) * a
-                radiance[v, u, c] += share * (above + (below - above) * b - transmitted[v, u, c])
+                radiance[v, u, c] += share * (above + (below - above) * b - difference[v, u, c])

@@ -84,7 +84,7 @@ class SumoTraffic:
         self._run: _Run | None = None
         self._fog: FogAccess | None = None
         self._seed = 0
-        self._ego_lamps = Lamp.NONE
+        self._ego_lamps = Command().lamps
         self._ego_since = 0.0
         self._route: RouteProgress | None = None
         self._teleported = False
@@ -115,7 +115,7 @@ class SumoTraffic:
         self._seed = seed
         if self._fog is not None:
             self.enter_fog(self._fog)
-        self._ego_lamps = Lamp.NONE
+        self._ego_lamps = Command().lamps
         self._route, self._teleported = None, False
         try:
             check_step_length(api, setup.step_length)

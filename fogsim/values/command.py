@@ -31,11 +31,11 @@ class Command:
     advice : SpeedAdvice
         The advice to the ego vehicle.
     lamps : Lamp
-        Lamps that the ego vehicle is to light.
+        Lamps that the ego vehicle is to light; dipped head lamps until somebody decides.
     advised_speeds : mapping from vehicle id to float
         Advice to other vehicles [m/s].
     """
 
     advice: SpeedAdvice = field(default_factory=SpeedAdvice)
-    lamps: Lamp = Lamp.NONE
+    lamps: Lamp = Lamp.POSITION | Lamp.LOW_BEAM
     advised_speeds: Mapping[str, float] = field(default_factory=dict)

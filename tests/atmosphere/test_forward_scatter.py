@@ -32,6 +32,19 @@ def test_an_edge_in_fog_is_softer_and_what_is_far_from_it_is_as_before() -> None
     assert np.all(np.diff(soft) >= -1e-2)
 
 
+def test_what_is_as_bright_as_the_airlight_stays_so_and_fog_beside_something_dark_is_darker() -> None:
+    distance = np.full((240, 320), np.inf, np.float32)
+    distance[:, 160:] = 60.0
+    ids = np.zeros((240, 320), np.int32)
+    bright = View(np.full((240, 320, 3), 3000.0, np.float32), distance, ids)
+    assert np.allclose(Air(BLURRED).radiance(bright, CAMERA, POSE), 3000.0, rtol=1e-5)
+    dark = dataclasses.replace(
+        bright, radiance=np.where(np.isinf(distance), 3000.0, 0.0)[..., None].repeat(3, 2).astype(np.float32)
+    )
+    row = Air(BLURRED).radiance(dark, CAMERA, POSE)[120, :, 1]
+    assert row[159] < row[150] < 3000.0 <= row[100] + 1e-2
+
+
 def test_the_blur_is_as_wide_as_it_is_said_to_be() -> None:
     view = step_edge(60.0)
     added = Air(BLURRED).radiance(view, CAMERA, POSE)[120, :, 1] - Air(EVEN).radiance(view, CAMERA, POSE)[120, :, 1]

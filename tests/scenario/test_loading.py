@@ -83,7 +83,7 @@ def test_an_unknown_key_inside_a_list(folder: Path) -> None:
         (
             "illuminance_lx: 10000",
             "illuminance_lx: -5",
-            r"light\.illuminance_lx: input should be greater than 0; got -5",
+            r"light\.illuminance_lx: input should be greater than or equal to 0; got -5",
         ),
         ("net: motorway.net.xml", "other: 3", r"traffic\.net: this key is missing"),
     ],

@@ -4,7 +4,7 @@ from typing import Any
 
 from fogsim.traffic.appearance import SUMO_DEFAULT_COLOUR, paint
 from fogsim.traffic.reading import OTHERS_LAMPS
-from fogsim.values import Lamp
+from fogsim.values import Command, Lamp
 
 EGO = "ego"
 """Id of the ego."""
@@ -30,7 +30,7 @@ class Fleet:
     def __init__(self, environment: Any, ego: Any) -> None:
         self.environment = environment
         self.ego = ego
-        self.ego_lamps = Lamp.NONE
+        self.ego_lamps = Command().lamps
         self.dark: frozenset[str] = frozenset()
         # Vehicles are equal only to themselves, so they serve as keys.
         self._names: dict[Any, str] = {ego: EGO}

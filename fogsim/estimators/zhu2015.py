@@ -1,0 +1,181 @@
+"""Fog and its class from the road's luminance in three frames (Zhu & Song 2015)."""
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.estimators.image_check import checked_image
+from fogsim.estimators.zhu2015_road import SeenRoad, fitted_fog, inflection_rows, seen_road
+from fogsim.values.camera import Camera
+from fogsim.values.estimate import Estimate, FogCategory, fog_category
+from fogsim.values.observation import Observation
+from fogsim.vision.horizon import PITCH_DEVIATION
+from fogsim.vision.road_image import CannotTellError
+
+FRAMES = 3
+"""Frames whose inflections are averaged, and equal classes that make a state."""
+
+
+def zhu_category(visibility: float) -> FogCategory:
+    """Class of a visibility by zhu2015, table 1: no fog from 1000 m, low from 300 m, moderate from 100 m, else dense.
+
+    Parameters
+    ----------
+    visibility : float
+        Meteorological visibility [m].
+    """
+    category = fog_category(visibility)
+    return FogCategory.DENSE if category is FogCategory.VERY_DENSE else category
+
+
+def weighted_row(rows: NDArray[np.float64]) -> float:
+    """Weighted average of rows by how often each occurs (zhu2015 section 3.4).
+
+    The largest and the smallest are dropped, mean and median of the rest are added to it, and every value counts by
+    its frequency; as values come one by one, a value that occurs n times has n² of the say.
+
+    Parameters
+    ----------
+    rows : (n,) float64
+        Rows at which regions end [px], at least one.
+    """
+    kept = np.sort(rows)[1:-1] if rows.size > 2 else rows
+    data = np.concatenate([kept, [kept.mean(), np.median(kept)]])
+    _, where, count = np.unique(data, return_inverse=True, return_counts=True)
+    weight = count[where] / data.size
+    return float(weight @ data) / float(weight.sum())
+
+
+@dataclass(frozen=True, slots=True)
+class _Reading:
+    """What one frame adds: rows relative to its horizon (as published), or an extinction (corrected)."""
+
+    rows: NDArray[np.float64]
+    extinction: float
+    deviation: float
+
+
+class Zhu2015:
+    """Classes of fog from three frames (Zhu & Song 2015).
+
+    Canny's edges, the longest lane lines left and right by a Hough transform of limited angle, the horizon at their
+    intersection, a region grown from the road's bottom row, the inflection averaged over three frames,
+    V = 3 λ / (2 (v_i − v_h)), four classes, and a state that changes after three equal ones.
+
+    As published the inflection is where the region ends, which cannot work: in dense fog the road fades into the sky
+    without an edge and the region grows beyond the horizon ("no fog"), and in thin fog it ends at the edge of the sky.
+    Corrected, the lane lines are fitted to a fraction of a pixel, the fog's own gradient draws no edges and stops no
+    growth, and k, R and A are those of least squares over the rows of the region and of the sky; frames are averaged
+    by their variances. Further errors of the paper: eq. 4 lacks the squares in its Gaussian, eq. 13's sign of θ holds
+    for a camera that looks up, eqs. 15 and 16 keep a tan θ that has cancelled, eqs. 18 to 20 have v₀ for v_h and
+    e^(−k·−kλ/…) for e^(−kλ/(v − v_h)), and the bound on ρ in section 3.2 is the whole diagonal of what is looked at,
+    which limits nothing. The angle that is limited to 10° … 170° is here that of the line to the rows, as the paper
+    words it; its eq. 7 has the normal's, by which upright lines would go and the horizon stay.
+
+    Luminance is linear in both forms, because Koschmieder's law is. Daytime, flat and straight road, road darker than
+    the airlight. With a tracked lead vehicle its part of the road is left out.
+
+    Parameters
+    ----------
+    camera : Camera
+        The calibration as the vehicle was told it.
+    as_published : bool
+        Take the row where the grown region ends for the inflection, and whole Hough cells for lines.
+    growth : float
+        G_max, the largest step of luminance between rows, as published [linear grey levels]; the paper names none.
+    growth_share : float
+        ρ < 1 of eq. 10, as published [-].
+    pitch_deviation : float
+        Standard deviation of the true pitch about the told one [rad].
+    """
+
+    method = "zhu2015"
+
+    def __init__(
+        self,
+        camera: Camera,
+        *,
+        as_published: bool = False,
+        growth: float = 6.0,
+        growth_share: float = 0.8,
+        pitch_deviation: float = PITCH_DEVIATION,
+    ) -> None:
+        self._camera = camera
+        self._as_published = as_published
+        self._growth = (growth, growth_share)
+        self._pitch_deviation = pitch_deviation
+        self._readings: deque[_Reading] = deque(maxlen=FRAMES)
+        self._classes: deque[FogCategory] = deque(maxlen=FRAMES)
+        self._state: FogCategory | None = None
+
+    def reset(self) -> None:
+        """Forget all frames and the state."""
+        self._readings.clear()
+        self._classes.clear()
+        self._state = None
+
+    def update(self, observation: Observation) -> Estimate:
+        """Estimate the fog from one image and the two before it.
+
+        Parameters
+        ----------
+        observation : Observation
+            Its image is used, and the range of its lead vehicle to leave that out.
+
+        Returns
+        -------
+        Estimate
+            Diagnostics: ``class`` of this estimate and ``state`` after three equal ones (`FogCategory` without "very
+            dense"; None before), ``horizon_row`` and ``inflection_row`` [px], ``vanishing_point`` (column, row) [px]
+            or None, ``frames`` averaged; or ``reason``.
+
+        Raises
+        ------
+        InputError
+            If the image is not of the camera's bit depth, not grey or colour, or not of the told camera's size.
+        """
+        image = checked_image(observation.image, self._camera)
+        diagnostics: dict[str, object] = {"state": self._state, "horizon_row": self._camera.horizon_row}
+        try:
+            growth = self._growth if self._as_published else None
+            road = seen_road(image, self._camera, self._pitch_deviation, growth, observation.lead)
+            diagnostics |= {"horizon_row": road.horizon.row, "vanishing_point": road.vanishing_point}
+            self._readings.append(self._reading(road))
+        except CannotTellError as reason:
+            self._readings.clear()
+            self._classes.clear()
+            return Estimate.invalid(self.method, str(reason), **diagnostics)
+        extinction, deviation = self._averaged()
+        inflection = road.horizon.row + 0.5 * extinction * self._camera.row_distance
+        diagnostics |= {"inflection_row": inflection, "frames": len(self._readings)}
+        return self._classified(Estimate(self.method, extinction, deviation), diagnostics)
+
+    def _reading(self, road: SeenRoad) -> _Reading:
+        if self._as_published:
+            return _Reading(inflection_rows(road), 0.0, 0.0)
+        extinction, deviation = fitted_fog(road, self._camera)
+        return _Reading(np.zeros(0), extinction, deviation)
+
+    def _averaged(self) -> tuple[float, float]:
+        """Extinction of the last frames and its standard deviation [1/m]."""
+        if self._as_published:
+            rows = np.concatenate([reading.rows for reading in self._readings])
+            per_row = 2.0 / self._camera.row_distance
+            # A region's end is known to a row at best.
+            return per_row * max(weighted_row(rows), 0.0), per_row * math.hypot(1.0, float(rows.std()))
+        weight = np.array([reading.deviation**-2 for reading in self._readings])
+        extinctions = np.array([reading.extinction for reading in self._readings])
+        mean = float(weight @ extinctions) / float(weight.sum())
+        # The same camera over the same road: what errs does so alike in all frames.
+        return mean, min(reading.deviation for reading in self._readings)
+
+    def _classified(self, estimate: Estimate, diagnostics: dict[str, object]) -> Estimate:
+        found = zhu_category(estimate.visibility)
+        self._classes.append(found)
+        if len(self._classes) == FRAMES and len(set(self._classes)) == 1:
+            self._state = found
+        diagnostics |= {"class": found, "state": self._state}
+        return Estimate(self.method, estimate.extinction, estimate.standard_deviation, diagnostics=diagnostics)

@@ -1,0 +1,203 @@
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fogsim.errors import InputError
+from fogsim.estimators import make
+from fogsim.estimators.zhu2015 import weighted_row, zhu_category
+from fogsim.values import Camera, FogCategory, LeadMeasurement, Observation, Response
+
+LEAD = LeadMeasurement(25.0, 0.0)
+
+
+def estimate(image, camera, lead=None, **options):
+    return make("zhu2015", camera, **options).update(Observation(image, lead=lead))
+
+
+def tilted(road, degrees, **changes):
+    """The road seen by a camera whose pitch is not the told one, and the told camera."""
+    told = replace(road.camera, **changes)
+    return road.but(camera=replace(told, pitch=told.pitch + np.radians(degrees))), told
+
+
+@pytest.mark.parametrize(
+    ("visibility", "category"),
+    [(0.1, "dense"), (99.9, "dense"), (100, "moderate"), (299, "moderate"), (300, "low"), (1000, "none")],
+)
+def test_classes_are_those_of_table_1(visibility, category):
+    assert zhu_category(visibility) is FogCategory(category)
+
+
+def test_weighted_row_drops_extremes_and_counts_values_by_how_often_they_occur():
+    # 1 and 90 go; mean 10.8 and median 10 join 10, 10, 10, 13: 10 has 4 votes of 6 four times over.
+    rows = np.array([10.0, 1.0, 10.0, 13.0, 90.0, 10.0])
+    expected = (4 * 4 * 10.0 + 13.0 + 10.75) / (4 * 4 + 2)
+    assert weighted_row(rows) == pytest.approx(expected)
+    assert weighted_row(np.array([7.0])) == 7.0
+
+
+@pytest.mark.parametrize(
+    ("visibility", "category"),
+    [(30, "dense"), (94, "dense"), (107, "moderate"), (280, "moderate"), (320, "low"), (900, "low"), (1e6, "none")],
+)
+def test_four_classes_under_a_pitch_that_is_not_told(render, road, visibility, category):
+    found = []
+    for seed, (degrees, focal_length) in enumerate(((-0.1, 577.0), (0.1, 577.0), (0.1, 1000.0))):
+        scene, told = tilted(road.but(visibility=visibility), degrees, focal_length=focal_length)
+        found.append(estimate(render(scene, seed), told).diagnostics["class"])
+    assert found.count(category) >= 2
+
+
+@pytest.mark.parametrize("visibility", [40.0, 90.0, 200.0, 500.0])
+@pytest.mark.parametrize(("airlight", "response"), [(120.0, Response.LINEAR), (260.0, Response.SRGB)])
+def test_recovers_visibility(render, road, visibility, airlight, response):
+    camera = replace(road.camera, response=response)
+    scene = road.but(visibility=visibility, airlight=airlight, camera=camera)
+    errors = [estimate(render(scene, seed), camera).visibility / visibility - 1 for seed in range(3)]
+    assert np.median(np.abs(errors)) < 0.08
+
+
+@pytest.mark.parametrize("visibility", [50.0, 200.0, 400.0])
+def test_a_lead_vehicle_does_not_clear_the_fog(render, road, visibility):
+    scene = road.but(visibility=visibility, lead_distance=25.0)
+    found = estimate(render(scene), road.camera, LEAD)
+    assert found.visibility == pytest.approx(visibility, rel=0.15)
+
+
+def test_the_vanishing_point_is_found_to_a_fraction_of_a_pixel(render, road):
+    for degrees in (-0.15, 0.1):
+        scene, told = tilted(road.but(visibility=150.0), degrees)
+        column, row = estimate(render(scene), told).diagnostics["vanishing_point"]
+        assert row == pytest.approx(scene.camera.horizon_row, abs=0.3)
+        assert column == pytest.approx(told.principal_point[0], abs=1.0)
+
+
+def test_as_published_the_row_where_the_region_ends_is_no_inflection(render, road):
+    # Dense fog has no edge that would stop the region below the horizon, so it is found thinner than thin fog.
+    dense = estimate(render(road.but(visibility=50.0)), road.camera, as_published=True)
+    thin = estimate(render(road.but(visibility=500.0)), road.camera, as_published=True)
+    assert dense.visibility > thin.visibility
+
+
+def test_three_frames_are_averaged_and_three_equal_classes_make_a_state(render, road):
+    estimator = make("zhu2015", road.camera)
+    states, frames = [], []
+    for seed, visibility in enumerate((200.0, 200.0, 200.0, 60.0, 60.0, 60.0, 60.0, 60.0)):
+        found = estimator.update(Observation(render(road.but(visibility=visibility), seed)))
+        states.append(found.diagnostics["state"])
+        frames.append(found.diagnostics["frames"])
+    assert states[:3] == [None, None, "moderate"]
+    assert states[3] == "moderate"
+    assert states[-1] == "dense"
+    assert frames == [1, 2, 3, 3, 3, 3, 3, 3]
+    estimator.reset()
+    again = estimator.update(Observation(render(road, 0)))
+    assert again.diagnostics["frames"] == 1
+    assert again.diagnostics["state"] is None
+
+
+def test_interval_covers_the_truth(render, road):
+    inside = []
+    for seed, visibility in enumerate((40.0, 80.0, 150.0, 250.0, 400.0, 40.0, 80.0, 150.0, 250.0, 400.0)):
+        scene, told = tilted(road.but(visibility=visibility), 0.1 * (-1) ** seed)
+        low, high = estimate(render(scene, seed), told).visibility_interval
+        inside.append(low < visibility < high)
+    assert np.mean(inside) >= 0.7
+
+
+def test_mirroring_changes_nothing(render, road):
+    image = render(road)
+    found = estimate(image, road.camera)
+    assert estimate(image[:, ::-1], road.camera).extinction == pytest.approx(found.extinction, rel=0.01)
+
+
+def test_grey_and_colour_and_more_bits_agree(render, road):
+    image = render(road)
+    found = estimate(image, road.camera).extinction
+    assert estimate(np.repeat(image[:, :, None], 3, axis=2), road.camera).extinction == pytest.approx(found, rel=1e-3)
+    deep = estimate(image.astype(np.uint16) * 16, replace(road.camera, bits=12))
+    assert deep.extinction == pytest.approx(found, rel=1e-2)
+
+
+def test_unsaturated_gain_changes_nothing_beyond_quantisation(render, road):
+    full = road.but(noise=0.0)
+    dim = full.but(airlight=100.0, asphalt=30.0, mark=75.0, terrain=22.5)
+    dark = estimate(render(dim), road.camera).extinction
+    assert dark == pytest.approx(estimate(render(full), road.camera).extinction, rel=0.04)
+
+
+def test_visibility_scales_with_the_told_height(render, road):
+    image = render(road)
+    tall = replace(road.camera, mount_height=2 * road.camera.mount_height)
+    # Rows that the corridor covers change with the told height, and nothing else but the scale.
+    assert estimate(image, tall).visibility == pytest.approx(2 * estimate(image, road.camera).visibility, rel=0.03)
+
+
+def tells_nothing():
+    rows = np.where(np.arange(480) > 225, 120 * np.clip((np.arange(480) - 225) / 255, 0, 1) ** 2, 2)
+    noise = np.random.default_rng(6)
+    return {
+        "black": np.zeros((480, 640), np.uint8),
+        "white": np.full((480, 640), 255, np.uint8),
+        "grey": np.full((480, 640), 128, np.uint8),
+        "night": np.clip(rows[:, None] + noise.normal(0, 1, (480, 640)), 0, 255).astype(np.uint8),
+        "noise": noise.integers(0, 256, (480, 640), dtype=np.uint8),
+        "colour noise": noise.integers(0, 256, (480, 640, 3), dtype=np.uint8),
+    }
+
+
+@pytest.mark.parametrize("as_published", [False, True])
+@pytest.mark.parametrize("name", tells_nothing())
+def test_an_image_without_a_foggy_road_is_refused_with_a_reason(road, name, as_published):
+    found = estimate(tells_nothing()[name], road.camera, as_published=as_published)
+    assert not found.valid
+    assert found.diagnostics["reason"]
+
+
+def test_upside_down_is_refused(render, road):
+    assert not estimate(render(road)[::-1], road.camera).valid
+    assert not estimate(render(road), replace(road.camera, roll=np.pi)).valid
+
+
+@pytest.mark.parametrize("pitch", [-40.0, 40.0, 89.0])
+def test_a_horizon_outside_the_image_is_refused(render, road, pitch):
+    found = estimate(render(road), replace(road.camera, pitch=np.radians(pitch)))
+    assert "horizon" in str(found.diagnostics["reason"])
+
+
+@pytest.mark.parametrize("size", [(1, 1), (16, 16), (2, 300), (300, 2), (33, 40)])
+def test_tiny_images_are_refused(size):
+    camera = Camera(*size, 100.0, (size[0] / 2, size[1] / 2), 1.4)
+    for value in (0, 90, 255):
+        assert not estimate(np.full(size[::-1], value, np.uint8), camera).valid
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_nothing_odd_gets_out_of_random_pictures(seed):
+    rng = np.random.default_rng(seed)
+    camera = Camera(96, 72, rng.uniform(30, 300), (48.0, rng.uniform(0, 72)), 1.4, rng.uniform(-0.3, 0.3))
+    rows = np.interp(np.arange(72), np.sort(rng.uniform(0, 72, 5)), rng.uniform(0, 300, 5))
+    image = np.clip(rows[:, None] + rng.normal(0, rng.choice([0, 1, 20]), (72, 96)), 0, 255).astype(np.uint8)
+    lead = LeadMeasurement(float(rng.uniform(0, 60)), 0.0)
+    found = estimate(image, camera, lead, as_published=bool(seed % 2))
+    assert np.isfinite(found.extinction)
+    assert found.extinction >= 0
+    assert found.valid == np.isfinite(found.standard_deviation)
+
+
+def test_what_is_no_image_of_the_camera_is_an_error(road):
+    with pytest.raises(InputError, match="160×120.*640×480"):
+        estimate(np.zeros((120, 160), np.uint8), road.camera)
+
+
+def test_a_frame_takes_few_milliseconds(render, road):
+    estimator, observation = make("zhu2015", road.camera), Observation(render(road))
+    times = []
+    for _ in range(10):
+        start = time.perf_counter()
+        estimator.update(observation)
+        times.append(time.perf_counter() - start)
+    # About 6 ms on one idle core; the wide margin is for busy machines.
+    assert min(times) < 50e-3

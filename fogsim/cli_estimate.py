@@ -95,7 +95,7 @@ def _estimate(
         progress = stack.enter_context(_progress())
         task = progress.add_task(source.description, total=source.count)
         if not as_json:
-            typer.echo(table_heading(source, methods))
+            _say(table_heading(source, methods))
         for result in estimates_of(source, camera, methods):
             _show(result, source, methods, as_json, drawn or None)
             progress.advance(task)
@@ -111,9 +111,15 @@ def _show(
     if result.picture.error:
         _err.print(f"[yellow]passed over:[/] {escape(result.picture.error)}", soft_wrap=True)
     for line in record_lines(result) if as_json else table_rows(source, methods, result):
-        typer.echo(line)
+        _say(line)
     if drawn is not None:
         drawn.add(result)
+
+
+def _say(line: str) -> None:
+    # Through sys.stdout as it is now: on a terminal rich has put itself there, to move its bar out of the way.
+    sys.stdout.write(line + "\n")
+    sys.stdout.flush()
 
 
 def _progress() -> Progress:

@@ -4,6 +4,7 @@ And what lets two of them work at once on a picture's rows.
 """
 
 import _thread
+import multiprocessing
 import os
 import time
 from collections.abc import Callable
@@ -58,7 +59,7 @@ class Bands:
             Called with the band's number 0 or 1, its first row and the one after its last, by two threads at once; it
             gains only where it gives up Python's lock, as kernels do.
         rows, columns : int
-            Size of the picture [px]: a small one is one band, and so is any where this process has one processor.
+            Size of the picture [px]: a small one is one band, and so is any in worker processes and on one processor.
         """
         middle = int(self.middle * rows)
         if rows * columns < _WORTHWHILE or not 0 < middle < rows or processors() < 2:
@@ -91,7 +92,9 @@ class Bands:
 
 
 def processors() -> int:
-    """Number of processors that this process may use."""
+    """Number of processors that this process may use: one where it is a worker, beside others that draw too."""
+    if multiprocessing.parent_process() is not None:
+        return 1
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

@@ -13,7 +13,7 @@ FARTHEST = 1600.0
 """Distance beyond which no copy is drawn [m]."""
 
 _SMALLEST = 1.0  # radius in the picture below which a copy is left out [px]
-_DENSEST = 0.8  # square root of half a square's breadth per triangle, below which a stand-in does [px]
+_DENSEST = 1.15  # half a square's breadth over the root of its triangles, below which a stand-in does [px]
 _BINS = 64  # of distance, to draw near copies first
 _NUMBERS = 17  # 32-bit numbers of a record
 
@@ -119,7 +119,9 @@ def shapes_of(numbers: Mapping[str, int], low: Wide, high: Wide, faces: Index, e
         if not name.endswith(endings):
             levels = [numbers[level] for level in (name, *(name + ending for ending in endings)) if level in numbers]
             stand_in[levels[:-1]] = levels[1:]
-    return Shapes(0.5 * (low + high), 0.5 * (high - low), stand_in, _DENSEST * np.sqrt(faces), faces)
+    # Where a shape has too many triangles and its stand-in would have too few, the mean of both decides.
+    mean = np.sqrt(faces * np.where(stand_in < 0, faces, faces[stand_in]))
+    return Shapes(0.5 * (low + high), 0.5 * (high - low), stand_in, _DENSEST * np.sqrt(mean), faces)
 
 
 def copies_of(shape: Index, record: Array, place: Wide, shapes: Shapes) -> Copies:

@@ -16,7 +16,7 @@ from fogsim.values.camera import Camera, CameraPose
 from fogsim.values.image import View
 from fogsim.values.scene import Batch, Mesh, Scene
 
-STAND_INS = (":far", ":tiny")
+STAND_INS = (":middle", ":far", ":tiny", ":speck")
 """Endings of the names of shapes that stand in for the one without, where it is small."""
 
 _CELL = 120.0  # side of the squares in which copies are culled together [m]

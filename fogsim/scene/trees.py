@@ -11,8 +11,15 @@ from fogsim.values.scene import Mesh
 
 BARK = Material((0.055, 0.042, 0.032))
 
-FAR, TINY = ":far", ":tiny"
-"""Endings of the names of a shape's simple stand-ins for when it is small and very small in the picture."""
+MIDDLE, FAR, TINY, SPECK = STAND_INS = (":middle", ":far", ":tiny", ":speck")
+"""Endings of the names of a shape's stand-ins for when it is small in the picture, each simpler than the one before."""
+
+
+_OCTAHEDRON = (
+    np.array([(1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)], np.float64),
+    np.array([(0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4), (1, 0, 5), (2, 1, 5), (3, 2, 5), (0, 3, 5)]),
+)
+"""Corners and triangles."""
 
 
 def conifer(rng: np.random.Generator, level: int = 0) -> Mesh:
@@ -23,16 +30,18 @@ def conifer(rng: np.random.Generator, level: int = 0) -> Mesh:
     rng : numpy Generator
         What makes it this tree.
     level : int
-        0 in full, 1 for the distance, 2 a speck.
+        0 in full, 1 … 4 the stand-ins in the order of `STAND_INS`.
     """
-    whorls, branches = ((11, 11), (5, 5), (2, 3))[level]
+    whorls, branches, long = ((11, 11, 0.24), (8, 8, 0.28), (5, 5, 0.36), (2, 3, 0.7), (1, 2, 1.0))[level]
     colour = np.array([0.030, 0.052, 0.028]) * rng.uniform(0.8, 1.2) + np.array([0.006, 0.004, 0.0]) * rng.random()
+    # Stand-ins have less of the bright tips.
+    colour *= (1.0, 1.015, 1.035, 1.06, 1.12)[level]
     spread = rng.uniform(0.17, 0.24)
-    parts = [_trunk(0.2, 0.016)] if level < 2 else []
+    parts = [_trunk(0.2, 0.016)] if level < 3 else []
     for place in range(whorls):
         share = place / whorls
         bottom = 0.07 + 0.88 * share
-        top = min(bottom + (0.24, 0.36, 0.7)[level] * (1.15 - share), 1.0)
+        top = min(bottom + long * (1.15 - share), 1.0)
         radius = spread * (1.0 - share) ** 0.85 * rng.uniform(0.88, 1.1)
         parts.append(_whorl(rng, bottom, top if place < whorls - 1 else 1.0, radius, branches, colour))
     return merge(parts)
@@ -72,21 +81,24 @@ def broad_leaved(rng: np.random.Generator, level: int = 0) -> Mesh:
     rng : numpy Generator
         What makes it this tree.
     level : int
-        0 in full, 1 for the distance, 2 a speck.
+        0 in full, 1 … 4 the stand-ins in the order of `STAND_INS`.
     """
     colour = np.array([0.044, 0.066, 0.026]) * rng.uniform(0.75, 1.25) + np.array([0.014, 0.006, 0.0]) * rng.random()
-    width = rng.uniform(0.22, 0.30)
+    # Stand-ins have less of the bright leaves and of the ragged outline.
+    colour *= (1.0, 1.035, 1.065, 1.09, 1.03)[level]
+    width = rng.uniform(0.22, 0.30) * (1.0, 1.0, 1.01, 1.13, 1.42)[level]
     middle, size = np.array([0.0, 0.0, 0.60]), np.array([1.15 * width, 1.15 * width, 0.33])
-    parts = [_trunk(0.4, 0.022)] if level < 2 else []
+    parts = [_trunk(0.4, 0.022)] if level < 3 else []
+    blobs, leaves = ((8, (80, 50)), (5, (30, 16)), (3, (0, 0)), (0, (0, 0)), (0, (0, 0)))[level]
     # A core that no light shines through, and around it what gives the crown its outline.
-    parts += _blob(rng, middle, size, colour, (80, 0, 0)[level])
+    parts += _blob(rng, middle, size, colour, leaves[0], level == 4)
     turn = rng.uniform(0, 2 * np.pi)
-    for place in range((8, 3, 0)[level]):
+    for place in range(blobs):
         # The golden angle spreads any number of blobs evenly around the crown.
         angle, rise = turn + 2.4 * place, rng.uniform(-0.75, 0.8)
         out = np.array([np.cos(angle), np.sin(angle), 0.0]) * np.sqrt(1 - rise**2) + np.array([0, 0, rise])
         blob = rng.uniform(0.40, 0.58) * size * (1.0, 1.0, 0.8)
-        parts += _blob(rng, middle + 0.8 * size * out, blob, colour, (50, 0, 0)[level])
+        parts += _blob(rng, middle + 0.8 * size * out, blob, colour, leaves[1])
     whole = merge(parts)
     return replace(whole, positions=whole.positions / whole.positions[:, 2].max())
 
@@ -97,12 +109,16 @@ def _blob(
     size: NDArray[np.float64],
     colour: NDArray[np.float64],
     leaves: int,
+    coarse: bool = False,
 ) -> list[Mesh]:
-    ball = trimesh.creation.icosphere(subdivisions=0)
-    direction = np.asarray(ball.vertices, np.float64)
+    if coarse:
+        direction, faces = _OCTAHEDRON
+    else:
+        ball = trimesh.creation.icosphere(subdivisions=0)
+        direction, faces = np.asarray(ball.vertices, np.float64), ball.faces
     points = centre + direction * size * rng.uniform(0.85, 1.15, (len(direction), 1))
     light = _crown_light(direction, points) * rng.uniform(0.8, 1.2, len(points))
-    parts = [mesh(points, ball.faces, direction, Material((0, 0, 0)), reflectance=light[:, None] * colour)]
+    parts = [mesh(points, faces, direction, Material((0, 0, 0)), reflectance=light[:, None] * colour)]
     return [*parts, _leaf_clusters(rng, centre, size, colour, leaves)] if leaves else parts
 
 
@@ -140,12 +156,14 @@ def woodland(rng: np.random.Generator, level: int = 0) -> Mesh:
     rng : numpy Generator
         What makes it this wood.
     level : int
-        0 in full, 1 for the distance, 2 a speck.
+        0 in full, 1 … 4 the stand-ins in the order of `STAND_INS`.
     """
-    columns = (30, 16, 7)[level]
+    columns = (30, 24, 16, 7, 4)[level]
     green = np.array([0.040, 0.057, 0.027]) * rng.uniform(0.8, 1.2)
     parts = []
-    for depth, tall, bright in ((0.08, 1.0, 0.7), (-0.06, 0.72, 1.0))[: 1 if level else 2]:
+    # One curtain alone is as bright as both.
+    curtains = ((0.08, 1.0, 0.7), (-0.06, 0.72, 1.0)) if level < 2 else ((0.0, 1.0, 1.0),)
+    for depth, tall, bright in curtains:
         x = np.linspace(-0.5, 0.5, columns) + rng.uniform(-0.4, 0.4, columns) / columns
         # Crowns of different trees: some points are gaps between them, and the ends fall off to bushes.
         gap = rng.choice([0.74, 0.9, 1.0], columns, p=[0.2, 0.3, 0.5])
@@ -173,6 +191,6 @@ def tree_shapes(rng: np.random.Generator, kinds: int = 5) -> dict[str, Mesh]:
         for i in range(kinds):
             # All levels get the same random numbers first, so colour and spread agree.
             seed = int(rng.integers(2**31))
-            for level, ending in enumerate(("", FAR, TINY)):
+            for level, ending in enumerate(("", *STAND_INS)):
                 shapes[f"{name}_{i}{ending}"] = grow(np.random.default_rng(seed), level)
     return shapes

@@ -348,7 +348,8 @@ def test_stand_ins_replace_shapes_level_by_level() -> None:
     box = np.ones((6, 3))
     shapes = shapes_of(names, -box, box, np.array([400, 100, 4, 9, 50, 8]), (":far", ":tiny"))
     assert shapes.stand_in.tolist() == [1, 2, -1, -1, 5, -1]
-    assert shapes.detail[0] == pytest.approx(2.0 * shapes.detail[1])
+    # The geometric mean of the triangles of both decides: of 200 and of 20.
+    assert shapes.detail[0] == pytest.approx(math.sqrt(10.0) * shapes.detail[1])
 
 
 def test_auto_is_one_of_the_renderers_and_says_why() -> None:

@@ -1,110 +1,137 @@
-"""Halos of lamps, drawn: wide ones on a coarse image, cores and tiny lamps on the full one."""
+"""Halos of lamps, drawn: wide ones on coarse images, cores and tiny lamps on the full one."""
 
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.atmosphere.halo_lamps import (
+    AHEAD,
+    BEHIND,
+    COLOUR,
+    DEPTH,
+    PIXELS,
+    PLACE_U,
+    PLACE_V,
+    RANGE,
+    SHOWN,
+    STRENGTH,
+    TOWARDS,
+)
+from fogsim.atmosphere.halo_profiles import CORE_SIZE, HIDDEN_SHARE, WIDE_FOLD, WIDE_SIZE, lamp_profile
 from fogsim.atmosphere.kernels import three_times
 from fogsim.jit import kernel
-
-WIDE_SIZE = 200
-"""Entries of a lamp's profile on the coarse image, over c² / (c² + WIDE_FOLD)."""
-
-WIDE_FOLD = 0.02
-
-CORE_SIZE = 64
-"""Entries of a lamp's profile near it, evenly over the distance on the image."""
 
 _LAST_WIDE = np.float32(WIDE_SIZE - 1.001)
 _FOLD = np.float32(WIDE_FOLD)
 _TWO, _ONE, _ZERO = np.float32(2.0), np.float32(1.0), np.float32(0.0)
 _LEAST = np.float32(1e-20)
 _NEXT = np.uint32(1)
+_FIRST, _SECOND, _THREE = np.uint64(1), np.uint64(2), np.uint64(3)
 _RED, _GREEN, _BLUE = np.float32(0.2126), np.float32(0.7152), np.float32(0.0722)  # luminance of channels (BT.709)
-
-
-@kernel
-def _glow(chord: float, line: NDArray[np.float64], fold: float) -> float:
-    """Glow at a chord, from its values times chord."""
-    place = min(chord / (chord + fold) * (line.shape[0] - 1) * ((1.98 + fold) / 1.98), line.shape[0] - 1.001)
-    c = int(place)
-    return float((line[c] + (line[c + 1] - line[c]) * (place - c)) / chord)
-
-
-@kernel
-def lamp_profiles(
-    depth: NDArray[np.float64],
-    strength: NDArray[np.float64],
-    softness: NDArray[np.float64],
-    core_softness: float,
-    core_reach: NDArray[np.float64],
-    log_depth: NDArray[np.float64],
-    log_glow: NDArray[np.float64],
-    fold: float,
-    wide: NDArray[np.float32],
-    core: NDArray[np.float32],
-) -> None:
-    """Luminance of each lamp's glow [cd/m²]: `wide` with its middle softened, `core` what is missing of it there.
-
-    `strength` is I / R². `softness` and `core_softness` [rad] are the radii within which the glow is flat: that of the
-    lamp, and that of the coarse image. `core` goes to 0 at `core_reach` [rad].
-    """
-    line = np.empty(log_glow.shape[1])
-    for i in range(depth.shape[0]):
-        # Below the table glow is proportional to optical depth, as the table's entries are.
-        place = (math.log(max(depth[i], 1e-9)) - log_depth[0]) / (log_depth[1] - log_depth[0])
-        place = min(max(place, 0.0), log_depth.shape[0] - 1.001)
-        row = int(place)
-        share = place - row
-        gain = strength[i] * depth[i]
-        for c in range(line.shape[0]):
-            line[c] = gain * math.exp(log_glow[row, c] + (log_glow[row + 1, c] - log_glow[row, c]) * share)
-        for n in range(WIDE_SIZE):
-            u = min(n / (WIDE_SIZE - 1.0), 0.995)
-            chord = math.sqrt(WIDE_FOLD * u / (1.0 - u) + softness[i] ** 2 + core_softness**2)
-            wide[i, n] = _glow(chord, line, fold)
-        for n in range(CORE_SIZE):
-            x = n / (CORE_SIZE - 1.0)
-            square = (core_reach[i] * x) ** 2 + softness[i] ** 2
-            sharp = _glow(math.sqrt(square), line, fold)
-            soft = _glow(math.sqrt(square + core_softness**2), line, fold)
-            core[i, n] = (sharp - soft) * (1.0 - x**4) ** 2
 
 
 @kernel
 def add_wide(
     directions: NDArray[np.float32],
-    towards: NDArray[np.float32],
-    profiles: NDArray[np.float32],
-    colours: NDArray[np.float32],
-    nearness: NDArray[np.float32],
+    lamps: NDArray[np.float64],
+    table: NDArray[np.float32],
+    log_depth: NDArray[np.float64],
+    faintest: float,
     out: NDArray[np.float32],
 ) -> None:
-    """Sum the wide glows on a coarse image: (4, m), three channels and the mean 1 / R of what shines there [1/m].
+    """Sum wide glows on the coarsest image: (4, m), three channels, and their luminance times 1 / R [1/m].
 
-    `directions` (3, m) and `towards` (n, 3) are unit vectors; `nearness` is 1 / R.
+    `directions` (3, m) are unit vectors. Glows that are nowhere brighter than `faintest` are left out.
     """
     red, green, blue, near = out[0], out[1], out[2], out[3]
     count = red.shape[0]
-    place = np.empty(count, np.float32)
+    place, profile = np.empty(count, np.float32), np.empty(WIDE_SIZE, np.float32)
     x, y, z = directions[0], directions[1], directions[2]
-    red[:], green[:], blue[:], near[:] = _LEAST, _LEAST, _LEAST, _ZERO
-    for i in range(towards.shape[0]):
-        lx, ly, lz = towards[i, 0], towards[i, 1], towards[i, 2]
+    for lamp in lamps:
+        lamp_profile(table, lamp, HIDDEN_SHARE, log_depth, profile)
+        if profile[0] < faintest:
+            continue
+        lx, ly, lz = np.float32(lamp[TOWARDS]), np.float32(lamp[TOWARDS + 1]), np.float32(lamp[TOWARDS + 2])
         for p in range(count):
             square = max(_TWO - _TWO * (x[p] * lx + y[p] * ly + z[p] * lz), _ZERO)
             place[p] = square / (square + _FOLD) * _LAST_WIDE
-        profile, r, g, b, n = profiles[i], colours[i, 0], colours[i, 1], colours[i, 2], nearness[i]
+        r, g, b = np.float32(lamp[COLOUR]), np.float32(lamp[COLOUR + 1]), np.float32(lamp[COLOUR + 2])
+        n = (_RED * r + _GREEN * g + _BLUE * b) / np.float32(lamp[RANGE])
         for p in range(count):
             entry = np.uint32(place[p])
-            light = profile[entry] + (profile[entry + _NEXT] - profile[entry]) * (place[p] - np.float32(entry))
-            red[p] += light * r
-            green[p] += light * g
-            blue[p] += light * b
-            near[p] += light * n
-    for p in range(count):
-        near[p] /= _RED * red[p] + _GREEN * green[p] + _BLUE * blue[p]
+            place[p] = profile[entry] + (profile[entry + _NEXT] - profile[entry]) * (place[p] - np.float32(entry))
+        for p in range(count):
+            red[p] += place[p] * r
+            green[p] += place[p] * g
+            blue[p] += place[p] * b
+            near[p] += place[p] * n
+
+
+@kernel
+def refine(coarsest: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+    """The coarsest image (4, rows, cols) stretched to the coarse one, linearly between its corners."""
+    rows, columns = out.shape[1], out.shape[2]
+    for v in range(rows):
+        place = v * (coarsest.shape[1] - 1) / (rows - 1)
+        upper = min(int(place), coarsest.shape[1] - 2)
+        down = np.float32(place - upper)
+        for u in range(columns):
+            along = u * (coarsest.shape[2] - 1) / (columns - 1)
+            left = min(int(along), coarsest.shape[2] - 2)
+            aside = np.float32(along - left)
+            for c in range(4):
+                low = coarsest[c, upper, left] + (coarsest[c, upper, left + 1] - coarsest[c, upper, left]) * aside
+                high = coarsest[c, upper + 1, left]
+                high += (coarsest[c, upper + 1, left + 1] - coarsest[c, upper + 1, left]) * aside
+                out[c, v, u] = low + (high - low) * down
+
+
+@kernel
+def add_middles(
+    directions: NDArray[np.float32],
+    cell: NDArray[np.float64],
+    reach: float,
+    lamps: NDArray[np.float64],
+    table: NDArray[np.float32],
+    log_depth: NDArray[np.float64],
+    faintest: float,
+    out: NDArray[np.float32],
+) -> None:
+    """Add to the coarse image (4, rows, cols) what the coarsest lacks within `reach` of the lamps [rad].
+
+    `cell` holds the width and height of a cell [px] and `reach` on the axis, in cells.
+    """
+    rows, columns = out.shape[1], out.shape[2]
+    profile, scale = np.empty(CORE_SIZE, np.float32), np.float32((CORE_SIZE - 1.0) / reach)
+    last = np.float32(CORE_SIZE - 1.001)
+    for lamp in lamps:
+        lamp_profile(table, lamp, 0.0, log_depth, profile)
+        if lamp[AHEAD] <= BEHIND or profile[0] < faintest:
+            continue
+        lx, ly, lz = np.float32(lamp[TOWARDS]), np.float32(lamp[TOWARDS + 1]), np.float32(lamp[TOWARDS + 2])
+        r, g, b = np.float32(lamp[COLOUR]), np.float32(lamp[COLOUR + 1]), np.float32(lamp[COLOUR + 2])
+        n = (_RED * r + _GREEN * g + _BLUE * b) / np.float32(lamp[RANGE])
+        u0, v0, half = lamp[PLACE_U] / cell[0], lamp[PLACE_V] / cell[1], cell[2] / lamp[AHEAD] ** 2 + 1.0
+        for v in range(max(0, math.ceil(v0 - half)), min(rows, math.floor(v0 + half) + 1)):
+            for u in range(max(0, math.ceil(u0 - half)), min(columns, math.floor(u0 + half) + 1)):
+                p = v * columns + u
+                cosine = directions[0, p] * lx + directions[1, p] * ly + directions[2, p] * lz
+                place = np.sqrt(max(_TWO - _TWO * cosine, _ZERO)) * scale
+                if place < last:
+                    entry = np.uint32(place)
+                    light = profile[entry] + (profile[entry + _NEXT] - profile[entry]) * (place - np.float32(entry))
+                    out[0, v, u] += light * r
+                    out[1, v, u] += light * g
+                    out[2, v, u] += light * b
+                    out[3, v, u] += light * n
+
+
+@kernel
+def mean_nearness(coarse: NDArray[np.float32]) -> None:
+    """Make of luminance over range in the last channel of a coarse image (4, m) the mean 1 / R [1/m]."""
+    for p in range(coarse.shape[1]):
+        coarse[3, p] /= max(_RED * coarse[0, p] + _GREEN * coarse[1, p] + _BLUE * coarse[2, p], _LEAST)
 
 
 @kernel
@@ -169,78 +196,100 @@ def add_stretched(
 
 @kernel
 def add_cores(
-    places: NDArray[np.float64],
-    reach: NDArray[np.float64],
-    ranges: NDArray[np.float64],
+    lamps: NDArray[np.float64],
+    bright: NDArray[np.bool_],
+    reach: float,
     profiles: NDArray[np.float32],
-    colours: NDArray[np.float64],
     distance: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:
-    """Add to an image (rows, cols · 3) the cores of glows about places (n, 2) [px] within a reach [px]."""
+    """Add to an image (rows, cols · 3) the cores of glows within a reach of the lamps [px]."""
     rows, columns = distance.shape
-    for i in range(places.shape[0]):
-        u0, v0 = places[i, 0], places[i, 1]
-        scale, near, profile = (CORE_SIZE - 1.001) / reach[i], 1.0 / ranges[i], profiles[i]
-        red, green, blue = colours[i, 0], colours[i, 1], colours[i, 2]
-        for v in range(max(0, math.ceil(v0 - reach[i])), min(rows, math.floor(v0 + reach[i]) + 1)):
-            half = math.sqrt(max(reach[i] ** 2 - (v - v0) ** 2, 0.0))
-            for u in range(max(0, math.ceil(u0 - half)), min(columns, math.floor(u0 + half) + 1)):
-                place = min(math.sqrt((u - u0) ** 2 + (v - v0) ** 2) * scale, CORE_SIZE - 1.001)
-                n = np.uint32(place)
-                light = profile[n] + (profile[n + _NEXT] - profile[n]) * (place - n)
-                light *= min(1.0, distance[v, u] * near)
-                out[v, 3 * u] += light * red
-                out[v, 3 * u + 1] += light * green
-                out[v, 3 * u + 2] += light * blue
+    scale, last = np.float32((CORE_SIZE - 1.001) / reach), np.float32(CORE_SIZE - 1.001)
+    place = np.empty(columns, np.float32)
+    for i in range(lamps.shape[0]):
+        if not bright[i]:
+            continue
+        u0, v0, near, profile = lamps[i, PLACE_U], lamps[i, PLACE_V], np.float32(1.0 / lamps[i, RANGE]), profiles[i]
+        red, green = np.float32(lamps[i, COLOUR]), np.float32(lamps[i, COLOUR + 1])
+        blue = np.float32(lamps[i, COLOUR + 2])
+        for v in range(max(0, math.ceil(v0 - reach)), min(rows, math.floor(v0 + reach) + 1)):
+            half = math.sqrt(max(reach**2 - (v - v0) ** 2, 0.0))
+            first, after = max(0, math.ceil(u0 - half)), min(columns, math.floor(u0 + half) + 1)
+            if after <= first:
+                continue
+            begin, size = np.uint64(first), np.uint64(after - first)
+            height, start = np.float32((v - v0) ** 2), np.float32(first - u0)
+            for n in range(size):
+                across = start + np.float32(np.int32(n))
+                place[n] = min(np.sqrt(height + across * across) * scale, last)
+            for n in range(size):
+                entry = np.uint32(place[n])
+                light = profile[entry] + (profile[entry + _NEXT] - profile[entry]) * (place[n] - np.float32(entry))
+                u = begin + n
+                light *= min(_ONE, distance[v, u] * near)
+                out[v, _THREE * u] += light * red
+                out[v, _THREE * u + _FIRST] += light * green
+                out[v, _THREE * u + _SECOND] += light * blue
 
 
 @kernel
-def _drawn_about(
-    radiance: NDArray[np.float32], distance: NDArray[np.float32], u0: int, v0: int, nearest: float
-) -> tuple[float, bool]:
-    """Sum of the luminance of the sixteen pixels about a place, and whether any of them sees beyond a distance."""
-    rows, columns = distance.shape
-    drawn, free = 0.0, False
-    for v in range(max(0, v0 - 1), min(rows, v0 + 3)):
+def _drawn_about(radiance: NDArray[np.float32], columns: int, u0: int, v0: int) -> float:
+    """Sum of the luminance of the sixteen pixels about a place."""
+    drawn = 0.0
+    for v in range(max(0, v0 - 1), min(radiance.shape[0], v0 + 3)):
         for u in range(max(0, u0 - 1), min(columns, u0 + 3)):
             drawn += _RED * radiance[v, 3 * u] + _GREEN * radiance[v, 3 * u + 1] + _BLUE * radiance[v, 3 * u + 2]
-            free |= distance[v, u] > nearest
-    return drawn, free
+    return drawn
 
 
 @kernel
 def add_points(
-    places: NDArray[np.float64],
-    ranges: NDArray[np.float64],
-    expected: NDArray[np.float64],
-    transmission: NDArray[np.float64],
-    colours: NDArray[np.float64],
+    lamps: NDArray[np.float64],
+    focal: float,
+    largest: float,
+    faintest: float,
     radiance: NDArray[np.float32],
-    distance: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:
-    """Add what a renderer lost of lamps that are hardly larger than a pixel.
+    """Add what a renderer lost of lamps that cover fewer pixels than `largest`.
 
-    `expected` is the sum over pixels of the luminance that a lamp should show without fog [cd/m²]; what of it
-    `radiance` (rows, cols · 3) holds already about the lamp, shared with its neighbours, is not added again. A lamp
-    behind something is left out. The light goes to the four pixels about the place.
+    What of the luminance that a lamp should show without fog `radiance` (rows, cols · 3) holds already about the lamp,
+    shared with its neighbours, is not added again. Of a lamp behind something the part that is hidden is left out. The
+    light goes to the four pixels about the place.
     """
-    rows, columns = distance.shape
-    for i in range(places.shape[0]):
-        u0, v0 = math.floor(places[i, 0]), math.floor(places[i, 1])
-        drawn, free = _drawn_about(radiance, distance, u0, v0, ranges[i] - 1.0)
-        if not free:
+    rows, columns = out.shape[0], out.shape[1] // 3
+    for i in range(lamps.shape[0]):
+        lamp = lamps[i]
+        inside = -1 < lamp[PLACE_U] < columns and -1 < lamp[PLACE_V] < rows and lamp[AHEAD] > BEHIND
+        if not inside or lamp[PIXELS] >= largest or lamp[SHOWN] == 0.0:
             continue
-        around = 0.0
-        for j in range(places.shape[0]):
-            if abs(places[j, 0] - places[i, 0]) < 2.5 and abs(places[j, 1] - places[i, 1]) < 2.5:
-                around += expected[j]
-        missing = expected[i] * max(0.0, 1.0 - drawn / around) * transmission[i]
-        right, down = places[i, 0] - u0, places[i, 1] - v0
+        # Sum over pixels of the luminance [cd/m²].
+        expected = lamp[STRENGTH] * focal**2 / lamp[AHEAD] ** 3
+        transmission = math.exp(-lamp[DEPTH]) * lamp[SHOWN]
+        if expected * transmission < faintest:
+            continue
+        u0, v0 = math.floor(lamp[PLACE_U]), math.floor(lamp[PLACE_V])
+        drawn, around = _drawn_about(radiance, columns, u0, v0), 0.0
+        for j in range(lamps.shape[0]):
+            if abs(lamps[j, PLACE_U] - lamp[PLACE_U]) < 2.5 and abs(lamps[j, PLACE_V] - lamp[PLACE_V]) < 2.5:
+                around += lamps[j, STRENGTH] * focal**2 / max(lamps[j, AHEAD], BEHIND) ** 3
+        missing = expected * max(0.0, 1.0 - drawn / around) * transmission
+        right, below = lamp[PLACE_U] - u0, lamp[PLACE_V] - v0
         for corner in range(4):
             u, v = u0 + corner % 2, v0 + corner // 2
             if 0 <= u < columns and 0 <= v < rows:
-                part = missing * (right if corner % 2 else 1.0 - right) * (down if corner // 2 else 1.0 - down)
+                part = missing * (right if corner % 2 else 1.0 - right) * (below if corner // 2 else 1.0 - below)
                 for c in range(3):
-                    out[v, 3 * u + c] += part * colours[i, c]
+                    out[v, 3 * u + c] += part * lamp[COLOUR + c]
+
+
+@kernel
+def mean_light(image: NDArray[np.float32], step: int) -> float:
+    """Mean of an image's green channel (rows, cols · 3), by each `step`-th row and column."""
+    total, count = 0.0, 0
+    for v in range(step // 2, image.shape[0], step):
+        for u in range(step // 2, image.shape[1] // 3, step):
+            total += image[v, 3 * u + 1]
+            count += 1
+    return total / max(count, 1)

@@ -2,27 +2,32 @@
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere.glow import FOLD_CHORD, glow_table
 from fogsim.atmosphere.halo_kernels import (
-    CORE_SIZE,
-    WIDE_SIZE,
     add_cores,
+    add_middles,
     add_points,
     add_stretched,
     add_wide,
-    lamp_profiles,
+    mean_light,
+    mean_nearness,
+    refine,
 )
+from fogsim.atmosphere.halo_lamps import COLUMNS, DEPTH, RANGE, fuse_lamps, judge_lamps, place_lamps
+from fogsim.atmosphere.halo_profiles import CORE_SIZE, WIDE_SIZE, core_profiles, profile_tables
+from fogsim.atmosphere.medium import is_even_up_to
 from fogsim.atmosphere.optical_depth import optical_depth
 from fogsim.atmosphere.phase import Droplets
 from fogsim.pinhole import camera_axes
 from fogsim.values import Camera, CameraPose, FogField, LightSources, View
 
 COARSE_PIXELS = 8
-"""Pixels between two of the coarse image; it has 40 … 80 cells across."""
+"""Pixels between two of the coarse image; it has 40 … 80 cells across, and the coarsest half as many."""
 
 FARTHEST = 16.0
 """Optical depth at which a lamp has faded from sight; it begins to fade at three quarters of that [-]."""
@@ -30,23 +35,43 @@ FARTHEST = 16.0
 SMALL = 2.25
 """Lamps that cover fewer pixels than this are completed [px²]."""
 
+FAINTEST = 1e-5
+"""What is fainter than this share of the image's mean is not drawn: a hundredth of what 8 bits and noise can show."""
+
 _SOFT_CELLS = 1.4
-_CORE_CELLS = 4.0
-_BEHIND = 0.2
+_REACH_CELLS = 4.0
+_SAME_CORE = 1.0  # lamps nearer to each other are drawn as one [px]
+_SAME_GLOW = 0.5  # the same for glows without their cores, in cells
+_DEPTHS = 96
 
 
 @dataclass(frozen=True, slots=True)
-class _Lamps:
-    """Lamps that may be seen, by the camera's axes (right, down, forward)."""
+class _Plan:
+    """What the halos in a camera's images have in common.
 
-    towards: NDArray[np.float64]
-    place: NDArray[np.float64]
-    ahead: NDArray[np.float64]
-    range: NDArray[np.float64]
-    depth: NDArray[np.float64]
-    intensity: NDArray[np.float64]
-    colour: NDArray[np.float64]
-    area: NDArray[np.float64]
+    Attributes
+    ----------
+    cell : (3,) float64
+        Width and height of a cell of the coarse image [px], and the reach of what the coarsest lacks, in cells.
+    shape, half_shape : tuple of int
+        Rows and columns of the coarse and the coarsest image.
+    directions, half_directions : (3, m) float32
+        Their directions in the camera's axes.
+    soft, reach : float
+        Radius within which glow is flat on the coarse image, and that of what the coarsest lacks [rad].
+    wide, middle : (depths, entries) float32
+        Profiles on the coarsest image, and of what is missing there.
+    """
+
+    cell: NDArray[np.float64]
+    shape: tuple[int, int]
+    half_shape: tuple[int, int]
+    directions: NDArray[np.float32]
+    half_directions: NDArray[np.float32]
+    soft: float
+    reach: float
+    wide: NDArray[np.float32]
+    middle: NDArray[np.float32]
 
 
 class Halos:
@@ -60,7 +85,7 @@ class Halos:
 
     def __init__(self, droplets: Droplets = Droplets.MODERATE_RADIATION) -> None:
         self._droplets = Droplets(droplets)
-        self._directions: dict[Camera, tuple[int, NDArray[np.float32]]] = {}
+        self._plans: dict[Camera, _Plan] = {}
 
     def add(
         self,
@@ -86,127 +111,106 @@ class Halos:
         sources : LightSources
             The lamps.
         """
-        lamps = _seen(camera, pose, fog, sources)
-        if not len(lamps.range):
-            return
-        rows, columns = view.distance.shape
-        image = radiance.reshape(rows, 3 * columns)
         distance = np.ascontiguousarray(view.distance, dtype=np.float32)
-        if np.any(lamps.depth > 0):
-            self._add_glow(image, distance, camera, lamps)
-        _complete(image, distance, view, camera, lamps)
+        lamps = _seen(camera, pose, fog, sources, distance)
+        if not len(lamps):
+            return
+        rows, columns = distance.shape
+        image = radiance.reshape(rows, 3 * columns)
+        faintest = FAINTEST * mean_light(image, 16)
+        if np.any(lamps[:, DEPTH] > 0):
+            self._add_glow(image, distance, camera, lamps, faintest)
+        drawn = np.ascontiguousarray(view.radiance, dtype=np.float32).reshape(rows, 3 * columns)
+        add_points(lamps, camera.focal_length, SMALL, faintest, drawn, image)
 
     def _add_glow(
         self,
         image: NDArray[np.float32],
         distance: NDArray[np.float32],
         camera: Camera,
-        lamps: _Lamps,
+        lamps: NDArray[np.float64],
+        faintest: float,
     ) -> None:
-        cell = camera.width / _cells(camera)
-        table, count = glow_table(self._droplets), len(lamps.range)
-        wide, core = np.empty((count, WIDE_SIZE), np.float32), np.empty((count, CORE_SIZE), np.float32)
-        # Off the axis a pixel sees a smaller angle.
-        angle_of_pixel = np.maximum(lamps.ahead, _BEHIND) ** 1.5 / camera.focal_length
-        reach = np.full(count, _CORE_CELLS * cell)
-        softness = np.sqrt(lamps.area / math.pi / lamps.range**2 + (0.5 * angle_of_pixel) ** 2)
-        lamp_profiles(
-            lamps.depth,
-            lamps.intensity / lamps.range**2 * _fade(lamps),
-            softness,
-            _SOFT_CELLS * cell / camera.focal_length,
-            reach * angle_of_pixel,
-            table.log_depth,
-            table.log_glow,
-            FOLD_CHORD,
-            wide,
-            core,
-        )
-        coarse_columns, directions = self._coarse(camera)
-        coarse = np.empty((4, directions.shape[1]), np.float32)
-        add_wide(
-            directions,
-            lamps.towards.astype(np.float32),
-            wide,
-            lamps.colour.astype(np.float32),
-            (1.0 / lamps.range).astype(np.float32),
-            coarse,
-        )
-        add_stretched(coarse, coarse_columns, distance, image)
-        inside = lamps.ahead > _BEHIND
-        cores = (lamps.place[inside], reach[inside], lamps.range[inside], core[inside], lamps.colour[inside])
-        add_cores(*cores, distance, image)
+        plan, (log_depth, lines) = self._plan(camera), _fine_table(self._droplets)
+        lamps, glows = _fused(lamps, _SAME_CORE), _fused(lamps, _SAME_GLOW * float(plan.cell[0]))
+        coarsest = np.zeros((4, *plan.half_shape), np.float32)
+        coarse = np.empty((4, *plan.shape), np.float32)
+        add_wide(plan.half_directions, glows, plan.wide, log_depth, faintest, coarsest.reshape(4, -1))
+        refine(coarsest, coarse)
+        add_middles(plan.directions, plan.cell, plan.reach, glows, plan.middle, log_depth, faintest, coarse)
+        flat = coarse.reshape(4, -1)
+        mean_nearness(flat)
+        add_stretched(flat, plan.shape[1], distance, image)
+        core, bright = np.empty((len(lamps), CORE_SIZE), np.float32), np.empty(len(lamps), np.bool_)
+        pixel, reach = 1.0 / camera.focal_length, _REACH_CELLS * float(plan.cell[0])
+        core_profiles(lamps, lines, log_depth, FOLD_CHORD, plan.soft, reach, pixel, faintest, core, bright)
+        add_cores(lamps, bright, reach, core, distance, image)
 
-    def _coarse(self, camera: Camera) -> tuple[int, NDArray[np.float32]]:
-        """Columns of the coarse image, and its directions in the camera's axes (3, m)."""
-        if camera not in self._directions:
-            cells = _cells(camera)
-            rows = max(2, math.ceil(cells * camera.height / camera.width)) + 1
-            u0, v0 = camera.principal_point
-            right = (np.linspace(0, camera.width - 1, cells + 1) - u0) / camera.focal_length
-            down = (np.linspace(0, camera.height - 1, rows) - v0) / camera.focal_length
-            plane = np.broadcast_arrays(right, down[:, None], np.ones((1, 1)))
-            rays = np.stack([part.reshape(-1) for part in plane])
-            unit = np.ascontiguousarray(rays / np.linalg.norm(rays, axis=0), dtype=np.float32)
-            self._directions = {camera: (cells + 1, unit)}
-        return self._directions[camera]
+    def _plan(self, camera: Camera) -> _Plan:
+        if camera not in self._plans:
+            self._plans = {camera: _plan(camera, self._droplets)}
+        return self._plans[camera]
 
 
-def _cells(camera: Camera) -> int:
-    """Cells of the coarse image across."""
-    return min(max(round(camera.width / COARSE_PIXELS), 40), 80)
+@cache
+def _fine_table(droplets: Droplets) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Logarithm of T in steps so fine that glow is linear between them, and glow times chord there."""
+    table = glow_table(droplets)
+    log_depth = np.linspace(table.log_depth[0], table.log_depth[-1], _DEPTHS)
+    columns = [np.interp(log_depth, table.log_depth, column) for column in table.log_glow.T]
+    return log_depth, np.ascontiguousarray(np.exp(np.stack(columns, axis=1) + log_depth[:, None]))
 
 
-def _seen(camera: Camera, pose: CameraPose, fog: FogField, sources: LightSources) -> _Lamps:
-    """Lamps that shine toward the camera from before it."""
-    eye = np.array(pose.position)
-    from_eye = sources.position - eye
-    distance = np.linalg.norm(from_eye, axis=1)
-    in_camera = from_eye @ camera_axes(camera, pose).T
-    ahead = in_camera[:, 2] / np.maximum(distance, 1e-9)
-    chosen = np.flatnonzero((sources.intensity > 0) & (distance > 0.5) & (ahead > 0.0))
-    depth = optical_depth(fog, np.repeat(eye[None], len(chosen), axis=0), sources.position[chosen])
-    near = depth < FARTHEST
-    chosen, depth = chosen[near], depth[near]
-    axis = np.array(camera.principal_point)
-    beside = in_camera[chosen, :2] / np.maximum(in_camera[chosen, 2:], 1e-9)
-    return _Lamps(
-        towards=in_camera[chosen] / distance[chosen, None],
-        place=axis + camera.focal_length * beside,
-        ahead=ahead[chosen],
-        range=distance[chosen],
-        depth=depth,
-        intensity=sources.intensity[chosen],
-        colour=np.ascontiguousarray(sources.colour[chosen]),
-        area=sources.area[chosen],
+def _fused(lamps: NDArray[np.float64], apart: float) -> NDArray[np.float64]:
+    fused = np.empty_like(lamps)
+    return fused[: fuse_lamps(lamps, apart, fused)]
+
+
+def _seen(
+    camera: Camera, pose: CameraPose, fog: FogField, sources: LightSources, distance: NDArray[np.float32]
+) -> NDArray[np.float64]:
+    """Table of the lamps that shine toward the camera from before it."""
+    eye, axes = np.array(pose.position, dtype=np.float64), camera_axes(camera, pose)
+    count = len(sources.intensity)
+    lamps, chosen = np.empty((count, COLUMNS)), np.empty(count, np.int64)
+    position, lens = np.ascontiguousarray(sources.position), np.array((camera.focal_length, *camera.principal_point))
+    chosen = chosen[: place_lamps(position, sources.intensity, eye, axes, lens, lamps, chosen)]
+    places = position[chosen]
+    if len(places) and is_even_up_to(fog, max(pose.position[2], float(places[:, 2].max()))):
+        depth = fog.extinction * lamps[: len(chosen), RANGE]
+    else:
+        depth = optical_depth(fog, eye, places)
+    light = (sources.intensity, sources.colour, sources.area)
+    return lamps[: judge_lamps(*light, chosen, depth, FARTHEST, camera.focal_length, distance, lamps)]
+
+
+def _plan(camera: Camera, droplets: Droplets) -> _Plan:
+    cells = min(max(round(camera.width / COARSE_PIXELS), 40), 80) // 2
+    rows = max(1, math.ceil(cells * camera.height / camera.width))
+    angle = camera.width / (2 * cells) / camera.focal_length
+    _, lines = _fine_table(droplets)
+    wide, middle = np.empty((_DEPTHS, WIDE_SIZE), np.float32), np.empty((_DEPTHS, CORE_SIZE), np.float32)
+    soft, reach = _SOFT_CELLS * angle, 2.0 * _REACH_CELLS * angle
+    profile_tables(lines, FOLD_CHORD, soft, 2.0 * soft, reach, wide, middle)
+    shape, half_shape = (2 * rows + 1, 2 * cells + 1), (rows + 1, cells + 1)
+    return _Plan(
+        cell=np.array(((camera.width - 1) / (2 * cells), (camera.height - 1) / (2 * rows), 2.0 * _REACH_CELLS)),
+        shape=shape,
+        half_shape=half_shape,
+        directions=_directions(camera, shape),
+        half_directions=_directions(camera, half_shape),
+        soft=soft,
+        reach=reach,
+        wide=wide,
+        middle=middle,
     )
 
 
-def _fade(lamps: _Lamps) -> NDArray[np.float64]:
-    """Factor that lets lamps vanish smoothly, far away and as they pass the camera."""
-    far = np.clip(4.0 * (1.0 - lamps.depth / FARTHEST), 0.0, 1.0)
-    passing = np.clip(lamps.ahead / _BEHIND, 0.0, 1.0)
-    return np.asarray((3.0 - 2.0 * far) * far**2 * (3.0 - 2.0 * passing) * passing**2)
-
-
-def _complete(
-    image: NDArray[np.float32], distance: NDArray[np.float32], view: View, camera: Camera, lamps: _Lamps
-) -> None:
-    """Add direct light of lamps that are too small to be met by a pixel's ray."""
-    # A pixel sees the solid angle cos³ / f² of its direction off the axis.
-    cosine = np.maximum(lamps.ahead, _BEHIND)
-    pixels = lamps.area / lamps.range**2 * camera.focal_length**2 / cosine**3
-    u, v = lamps.place.T
-    rows, columns = distance.shape
-    small = (pixels < SMALL) & (lamps.ahead > _BEHIND) & (u > -1) & (u < columns) & (v > -1) & (v < rows)
-    expected = lamps.intensity / lamps.range**2 * camera.focal_length**2 / cosine**3
-    add_points(
-        lamps.place[small],
-        lamps.range[small],
-        expected[small],
-        np.exp(-lamps.depth[small]),
-        lamps.colour[small],
-        np.ascontiguousarray(view.radiance, dtype=np.float32).reshape(rows, 3 * columns),
-        distance,
-        image,
-    )
+def _directions(camera: Camera, shape: tuple[int, int]) -> NDArray[np.float32]:
+    """Unit vectors in the camera's axes (3, rows · cols), from corner to corner of the image."""
+    u0, v0 = camera.principal_point
+    right = (np.linspace(0, camera.width - 1, shape[1]) - u0) / camera.focal_length
+    down = (np.linspace(0, camera.height - 1, shape[0]) - v0) / camera.focal_length
+    plane = np.broadcast_arrays(right, down[:, None], np.ones((1, 1)))
+    rays = np.stack([part.reshape(-1) for part in plane])
+    return np.ascontiguousarray(rays / np.linalg.norm(rays, axis=0), dtype=np.float32)

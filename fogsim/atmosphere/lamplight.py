@@ -1,5 +1,6 @@
 """Light of the own head lamps: on what the camera sees, and in the fog between."""
 
+import math
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 from fogsim.atmosphere.frustum_kernels import grid_depths
 from fogsim.atmosphere.lamp_tables import lamp_table
 from fogsim.atmosphere.lamplight_kernels import add_own_light
-from fogsim.atmosphere.medium import is_plain, medium_of
+from fogsim.atmosphere.medium import is_even_up_to, medium_of
 from fogsim.atmosphere.phase import Droplets
 from fogsim.atmosphere.veil import (
     FOLD_DISTANCE,
@@ -29,6 +30,14 @@ _MIRROR = np.diag((1.0, -1.0, 1.0))
 """Tables of beams count to the right, the vehicle's axes to the left."""
 
 _REMEMBERED = 16
+
+STEP_ANGLE = math.radians(0.6)
+"""Angle between pixels of a row for which light is computed, where they see one plane [rad]; beams change by little."""
+
+MOST_STEP = 8
+
+_HIGHEST = 50.0
+"""Height above the camera up to which own lamps light the fog [m]."""
 
 K = TypeVar("K")
 V = TypeVar("V")
@@ -106,6 +115,7 @@ class OwnLamplight:
                 np.ascontiguousarray(view.distance, dtype=np.float32),
                 np.ascontiguousarray(response, dtype=np.float32).reshape(len(response), 3 * columns),
                 ray_map,
+                min(max(int(STEP_ANGLE * camera.focal_length), 1), MOST_STEP),
                 group.places,
                 group.tables,
                 group.colour,
@@ -179,7 +189,7 @@ def _extinction_on(
     rays: VeilRays, camera: Camera, pose: CameraPose, fog: FogField
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Mean extinction coefficient to each node, and that in the interval before it; one number where fog is even."""
-    if is_plain(fog) and not fog.banks and pose.position[2] <= fog.top and fog.top - pose.position[2] > 50.0:
+    if is_even_up_to(fog, pose.position[2] + _HIGHEST):
         everywhere = np.full((1, 1), fog.extinction, np.float32)
         return everywhere, everywhere
     distances = node_distances()

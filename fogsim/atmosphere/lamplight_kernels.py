@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere.kernels import ENDLESS, three_times, transmissions
 from fogsim.atmosphere.lamp_tables import FOLD, SIZE
+from fogsim.atmosphere.plane_pieces import choose_pixels, spread
 from fogsim.jit import kernel
 
 _ONE, _HALF, _THIRD = np.float32(1.0), np.float32(0.5), np.float32(1.0 / 3.0)
@@ -12,7 +13,6 @@ _ZERO = np.float32(0.0)
 _FOLD = np.float32(FOLD)
 _MIDDLE = np.float32(0.5 * (SIZE - 1))
 _LAST_CELL = np.float32(SIZE - 1.001)
-_FARTHEST_LIT = np.float32(2000.0)
 _LEAST = np.float32(1e-6)
 _NEXT = np.uint32(1)
 
@@ -26,6 +26,7 @@ def _between(low: NDArray[np.float32], high: NDArray[np.float32], share: np.floa
 
 @kernel
 def _read_row(
+    count: np.uint64,
     values: NDArray[np.float32],
     nodes: np.uint32,
     left: NDArray[np.uint32],
@@ -33,9 +34,8 @@ def _read_row(
     node: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:
-    """Value for each pixel of a row, linear between two rays and two nodes."""
-    for u in range(out.shape[0]):
-        # Unsigned, because indices that may be negative cost a comparison each.
+    """Value for each chosen pixel of a row, linear between two rays and two nodes."""
+    for u in range(count):
         n = np.uint32(node[u])
         along, share = node[u] - np.float32(n), aside[u]
         a = left[u] + n
@@ -59,6 +59,7 @@ def _add_row(
 
 @kernel
 def _places(
+    count: np.uint64,
     along: NDArray[np.float32],
     across: NDArray[np.float32],
     start_along: np.float32,
@@ -66,13 +67,14 @@ def _places(
     out: NDArray[np.float32],
 ) -> None:
     """Where in a beam's table a row's pixels are, by one of the two tangents."""
-    for u in range(out.shape[0]):
+    for u in range(count):
         x, y = max(along[u] - start_along, _LEAST), across[u] - start_across
         out[u] = min((y / (_FOLD * x + abs(y)) + _ONE) * _MIDDLE, _LAST_CELL)
 
 
 @kernel
 def _weights(
+    count: np.uint64,
     forward: NDArray[np.float32],
     right: NDArray[np.float32],
     up: NDArray[np.float32],
@@ -83,7 +85,7 @@ def _weights(
 ) -> None:
     """e^(κ (r − s)) / s² for a row's pixels; the ways r to the eye and s to the lamp differ by little."""
     lamp_forward, lamp_right, lamp_up = lamp[0], lamp[1], lamp[2]
-    for u in range(out.shape[0]):
+    for u in range(count):
         x, y, z = forward[u] - lamp_forward, right[u] - lamp_right, up[u] - lamp_up
         square = x * x + y * y + z * z
         gain = attenuation[u] * (length[u] - np.sqrt(square))
@@ -93,17 +95,15 @@ def _weights(
 
 @kernel
 def _add_intensity(
+    count: np.uint64,
     table: NDArray[np.float32],
     row: NDArray[np.float32],
     column: NDArray[np.float32],
     weight: NDArray[np.float32],
-    lit: NDArray[np.bool_],
     out: NDArray[np.float32],
 ) -> None:
     """Add to a row's pixels the intensity of a lamp times their weight."""
-    for u in range(out.shape[0]):
-        if not lit[u]:
-            continue
+    for u in range(count):
         a, b = np.uint32(row[u]), np.uint32(column[u])
         down, aside = row[u] - np.float32(a), column[u] - np.float32(b)
         low = table[a, b] + (table[a, b + _NEXT] - table[a, b]) * aside
@@ -112,75 +112,90 @@ def _add_intensity(
 
 
 @kernel
-def _column_places(cells: int, nodes: int, left: NDArray[np.uint32], aside: NDArray[np.float32]) -> None:
-    """For each pixel of a row, where the profile of the ray left of it begins, and how far it is on to the next."""
-    for u in range(left.shape[0]):
-        place = np.float32(u) * np.float32(cells) / np.float32(max(left.shape[0] - 1, 1))
-        cell = min(int(place), cells - 1)
-        left[u], aside[u] = cell * nodes, place - np.float32(cell)
+def _column_places(
+    count: np.uint64,
+    pixel: NDArray[np.float32],
+    columns: int,
+    cells: int,
+    nodes: int,
+    left: NDArray[np.uint32],
+    aside: NDArray[np.float32],
+) -> None:
+    """For each chosen pixel, where the profile of the ray left of it begins, and how far it is on to the next."""
+    scale = np.float32(cells) / np.float32(max(columns - 1, 1))
+    for u in range(count):
+        place = pixel[u] * scale
+        cell = min(np.int32(place), np.int32(cells - 1))
+        left[u], aside[u] = np.uint32(cell * np.int32(nodes)), place - np.float32(cell)
 
 
 @kernel
 def _row_points(
+    count: np.uint64,
     ray_map: NDArray[np.float32],
     v: int,
+    pixel: NDArray[np.float32],
     length: NDArray[np.float32],
     forward: NDArray[np.float32],
     right: NDArray[np.float32],
     up: NDArray[np.float32],
 ) -> None:
-    """Where the things are that a row's pixels see."""
+    """Where the things are that chosen pixels of a row see."""
     first_x = ray_map[0, 1] * np.float32(v) + ray_map[0, 2]
     first_y = ray_map[1, 1] * np.float32(v) + ray_map[1, 2]
     first_z = ray_map[2, 1] * np.float32(v) + ray_map[2, 2]
-    for u in range(length.shape[0]):
-        x = first_x + ray_map[0, 0] * np.float32(u)
-        y = first_y + ray_map[1, 0] * np.float32(u)
-        z = first_z + ray_map[2, 0] * np.float32(u)
+    for u in range(count):
+        x = first_x + ray_map[0, 0] * pixel[u]
+        y = first_y + ray_map[1, 0] * pixel[u]
+        z = first_z + ray_map[2, 0] * pixel[u]
         scale = length[u] / np.sqrt(x * x + y * y + z * z)
         forward[u], right[u], up[u] = x * scale, y * scale, z * scale
 
 
 @kernel
 def _light_row(
+    count: np.uint64,
     points: NDArray[np.float32],
     length: NDArray[np.float32],
     mean: NDArray[np.float32],
-    response: NDArray[np.float32],
     lamps: NDArray[np.float32],
     tables: NDArray[np.float32],
     scratch: NDArray[np.float32],
     power: NDArray[np.int32],
-    lit: NDArray[np.bool_],
     light: NDArray[np.float32],
 ) -> None:
-    """Light of all lamps on what a row's pixels see, times its transmission to the eye [lx]."""
+    """Light of all lamps on what chosen pixels see, times its transmission to the eye [lx]."""
     forward, right, up = points[0], points[1], points[2]
     column, row, weight, kept = scratch[0], scratch[1], scratch[2], scratch[3]
-    any_lit = False
-    for u in range(length.shape[0]):
-        lit[u] = (response[3 * u + 1] > _ZERO) & (length[u] < _FARTHEST_LIT)
-        any_lit |= lit[u]
+    for u in range(count):
         light[u] = _ZERO
-    if not any_lit:
-        return
     for i in range(lamps.shape[0]):
-        _places(forward, right, lamps[i, 0], lamps[i, 1], column)
-        _places(forward, up, lamps[i, 0], lamps[i, 2], row)
-        _weights(forward, right, up, lamps[i], length, mean, weight)
-        _add_intensity(tables[i], row, column, weight, lit, light)
-    for u in range(length.shape[0]):
+        _places(count, forward, right, lamps[i, 0], lamps[i, 1], column)
+        _places(count, forward, up, lamps[i, 0], lamps[i, 2], row)
+        _weights(count, forward, right, up, lamps[i], length, mean, weight)
+        _add_intensity(count, tables[i], row, column, weight, light)
+    for u in range(count):
         weight[u] = np.float32(2.0) * mean[u] * length[u]
-    transmissions(weight, power, kept)
-    for u in range(length.shape[0]):
+    transmissions(weight[:count], power, kept)
+    for u in range(count):
         light[u] *= kept[u]
 
 
 @kernel
-def add_own_light(
+def _any_lit(response: NDArray[np.float32]) -> bool:
+    """Whether a row (cols · 3) answers to light at all."""
+    most = _ZERO
+    for j in range(1, response.shape[0], 3):
+        most = max(most, response[j])
+    return bool(most > _ZERO)
+
+
+@kernel
+def add_own_light(  # noqa: C901 - one loop: handing its many rows on costs more than their work on a small image
     distance: NDArray[np.float32],
     response: NDArray[np.float32],
     ray_map: NDArray[np.float32],
+    step: int,
     lamps: NDArray[np.float32],
     tables: NDArray[np.float32],
     colour: NDArray[np.float32],
@@ -194,42 +209,60 @@ def add_own_light(
     """Add to an image (rows, cols · 3) what own lamps of one colour make of it.
 
     `response` (rows, cols · 3) may have no rows. `ray_map` takes (u, v, 1) to a ray in the vehicle's axes (forward,
-    right, up), `lamps` (n, 3) are places there and `tables` (n, SIZE, SIZE) their beams. `veil` and `attenuation`
-    (rows, columns · nodes) hold the veil at each node of the grid's rays and the mean extinction coefficient to there;
-    where fog is even `attenuation` has one entry, and in clear air `veil` has no rows. Nodes lie evenly over
-    r / (r + fold).
+    right, up); on plane surfaces light is computed at each `step`-th pixel. `lamps` (n, 3) are places in those axes and
+    `tables` (n, SIZE, SIZE) their beams. `veil` and `attenuation` (rows, columns · nodes) hold the veil at each node of
+    the grid's rays and the mean extinction coefficient to there; where fog is even `attenuation` has one entry, and in
+    clear air `veil` has no rows. Nodes lie evenly over r / (r + fold).
     """
     columns = distance.shape[1]
     uniform, clear, surfaces = attenuation.size == 1, veil.shape[0] == 0, response.shape[0] > 0
     grid_rows = max(veil.shape[0], attenuation.shape[0])
     profiles = np.zeros(grid_columns * int(nodes), np.float32)
     points, scratch = np.empty((3, columns), np.float32), np.empty((4, columns), np.float32)
-    length, node, mean = np.empty(columns, np.float32), np.empty(columns, np.float32), np.empty(columns, np.float32)
+    length, inverse = np.empty(columns, np.float32), np.empty(columns, np.float32)
+    pixel, chosen, node = np.empty(columns, np.float32), np.empty(columns, np.float32), np.empty(columns, np.float32)
+    mean = np.full(columns, attenuation[0, 0])
+    few_scattered, few_light = np.empty(columns, np.float32), np.empty(columns, np.float32)
+    bent, power = np.empty(columns, np.uint8), np.empty(columns, np.int32)
+    first, even = np.empty(columns, np.uint64), np.empty(columns, np.bool_)
+    left, aside = np.empty(columns, np.uint32), np.empty(columns, np.float32)
     scattered, light = np.zeros(columns, np.float32), np.zeros(columns, np.float32)
-    lit, power = np.empty(columns, np.bool_), np.empty(columns, np.int32)
-    veiled, shone = np.empty(3 * columns, np.float32), np.zeros(3 * columns, np.float32)
+    veiled, shone = np.zeros(3 * columns, np.float32), np.zeros(3 * columns, np.float32)
     channels, no_response = np.empty(3 * columns, np.float32), np.zeros(3 * columns, np.float32)
     for j in range(3 * columns):
         channels[j] = colour[j % 3]
-    left, aside = np.empty(columns, np.uint32), np.empty(columns, np.float32)
-    _column_places(grid_columns - 1, int(nodes), left, aside)
-    mean[:] = attenuation[0, 0]
+    n = np.uint64(columns)
+    for u in range(columns):
+        pixel[u] = np.float32(u)
+    _column_places(n, pixel, columns, grid_columns - 1, int(nodes), left, aside)
     last = np.float32(nodes - 1)
     for v in range(distance.shape[0]):
+        lit = surfaces and _any_lit(response[v])
+        if clear and not lit:
+            continue
         for u in range(columns):
             length[u] = min(distance[v, u], np.float32(ENDLESS))
-            node[u] = min(last * length[u] / (length[u] + fold), last - np.float32(1e-3))
+        if step == 1:
+            for u in range(columns):
+                chosen[u] = length[u]
+        else:
+            n = choose_pixels(length, step, inverse, bent, pixel, chosen, first, even)
+            _column_places(n, pixel, columns, grid_columns - 1, int(nodes), left, aside)
+        for u in range(n):
+            node[u] = min(last * chosen[u] / (chosen[u] + fold), last - np.float32(1e-3))
         place = np.float32(v) * np.float32(grid_rows - 1) / np.float32(max(distance.shape[0] - 1, 1))
         upper = min(int(place), grid_rows - 2)
         if not clear:
             _between(veil[upper], veil[upper + 1], place - np.float32(upper), profiles)
-            _read_row(profiles, nodes, left, aside, node, scattered)
-        if surfaces:
+            _read_row(n, profiles, nodes, left, aside, node, few_scattered)
+            spread(few_scattered, step, first, even, scattered)
+            three_times(scattered, veiled)
+        if lit:
             if not uniform:
                 _between(attenuation[upper], attenuation[upper + 1], place - np.float32(upper), profiles)
-                _read_row(profiles, nodes, left, aside, node, mean)
-            _row_points(ray_map, v, length, points[0], points[1], points[2])
-            _light_row(points, length, mean, response[v], lamps, tables, scratch, power, lit, light)
+                _read_row(n, profiles, nodes, left, aside, node, mean)
+            _row_points(n, ray_map, v, pixel, chosen, points[0], points[1], points[2])
+            _light_row(n, points, chosen, mean, lamps, tables, scratch, power, few_light)
+            spread(few_light, step, first, even, light)
             three_times(light, shone)
-        three_times(scattered, veiled)
-        _add_row(channels, veiled, shone, response[v] if surfaces else no_response, out[v])
+        _add_row(channels, veiled, shone, response[v] if lit else no_response, out[v])

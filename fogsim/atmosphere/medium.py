@@ -132,3 +132,8 @@ def is_plain(field: FogField) -> bool:
         and field.top_edge == 0
         and field.airlight_shading == 0
     )
+
+
+def is_even_up_to(field: FogField, height: float) -> bool:
+    """Tell whether fog is the same everywhere below a height [m]."""
+    return is_plain(field) and not field.banks and height <= field.top

@@ -50,16 +50,24 @@ def optical_depth(field: FogField, start: ArrayLike, end: ArrayLike, time: float
     (...) float64
         τ ≥ 0; the transmission is exp(−τ).
     """
-    from_, to = np.broadcast_arrays(np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64))
-    depths = np.empty(from_.shape[:-1])
+    from_, to = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
+    shape = np.broadcast_shapes(from_.shape, to.shape)
+    depths = np.empty(shape[:-1])
     depths_between(
-        np.ascontiguousarray(from_.reshape(-1, 3)),
-        np.ascontiguousarray(to.reshape(-1, 3)),
+        _rows(from_, shape),
+        _rows(to, shape),
         medium_of(field_at(field, time)),
         depths.reshape(-1),
         np.empty((2, 4 * MOST_PIECES)),
     )
     return depths
+
+
+def _rows(points: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Points broadcast to a shape, one a row; memory of their own, as compiled kernels take no read-only views."""
+    if points.shape != shape:
+        points = np.array(np.broadcast_to(points, shape))
+    return np.ascontiguousarray(points.reshape(-1, 3))
 
 
 def optical_depth_along(

@@ -56,7 +56,9 @@ def test_glow_has_no_edges():
 @pytest.mark.parametrize("colour", [(1.0, 1.0, 1.0), (1.0 / 0.2126, 0.0, 0.0)])
 def test_surfaces_cut_the_glow_behind_them(colour):
     lamp = lamps((40.0, 0.0, 1.5), colour=colour)
-    near = drawn(fog(100), lamp, empty_view(CAMERA, 10.0))[240, 360]
+    wall = empty_view(CAMERA, 10.0)
+    wall.distance[235:245, 315:325] = np.inf  # a window through which the lamp is seen
+    near = drawn(fog(100), lamp, wall)[240, 360]
     open_ = drawn(fog(100), lamp, empty_view(CAMERA))[240, 360]
     assert near == pytest.approx(0.25 * open_, rel=0.01, abs=1e-9)
 
@@ -101,6 +103,34 @@ def test_two_lamps_close_together_share_what_was_drawn():
 
 def test_lamps_behind_something_send_no_direct_light():
     assert drawn(fog(math.inf), lamps((200.0, 0.0, 1.5)), empty_view(CAMERA, 50.0)).max() == 0.0
+
+
+def test_lamps_behind_something_do_not_shine_through():
+    view = empty_view(CAMERA, np.inf)
+    view.distance[160:320, 240:400] = 15.0
+    hidden = drawn(fog(100), lamps((30.0, 0.0, 1.5)), view)[240, :, 1]
+    open_ = drawn(fog(100), lamps((30.0, 0.0, 1.5)))[240, :, 1]
+    # No spot on what hides the lamp, but a glow in the fog about it.
+    assert hidden[320] < 3.0 * hidden[290]
+    assert hidden[320] < 1e-3 * open_[320]
+    assert hidden[410] > 0.3 * open_[410]
+
+
+def test_lamps_of_a_far_vehicle_glow_as_one():
+    left, right = (150.0, 0.6, 1.5), (150.0, -0.6, 1.5)
+    both = drawn(fog(100), lamps(left, right))
+    apart = drawn(fog(100), lamps(left)) + drawn(fog(100), lamps(right))
+    assert both == pytest.approx(apart, rel=0.04)
+
+
+def test_lamps_lost_in_the_light_of_others_are_left_out():
+    bright, faint = (20.0, 2.0, 1.5), (300.0, -40.0, 1.5)
+    view = dataclasses.replace(empty_view(CAMERA), radiance=np.full((480, 640, 3), 50.0, np.float32))
+    out = view.radiance.copy()
+    Halos(Droplets.HEAVY_RADIATION).add(out, view, CAMERA, POSE, fog(100), lamps(faint, intensity=0.05))
+    assert np.array_equal(out, view.radiance)
+    assert drawn(fog(100), lamps(faint, intensity=0.05)).max() > 0.0
+    assert drawn(fog(100), lamps(bright)).max() > 0.0
 
 
 def test_large_lamps_are_left_to_the_renderer():

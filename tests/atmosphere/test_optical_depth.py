@@ -58,3 +58,11 @@ def test_visibility_inside_and_outside_a_bank() -> None:
     assert extinction(FIELD, inside + np.array([0, 0, 60])) == 0.0
     half = np.array([100.0, 50.0, 1.0])
     assert extinction(FIELD, half) == pytest.approx(0.0015 + 0.045 / 2)
+
+
+def test_one_end_of_many_lines_may_be_given_once():
+    field, ends = FogField(0.03, (0.0, 0.0, 0.0)), np.array([[10.0, 0.0, 0.0], [0.0, 20.0, 0.0]])
+    assert optical_depth(field, (0.0, 0.0, 0.0), ends) == pytest.approx([0.3, 0.6])
+    assert optical_depth(field, np.zeros((1, 3)), ends[:1]) == pytest.approx([0.3])
+    assert optical_depth(field, ends, np.zeros(3)) == pytest.approx([0.3, 0.6])
+    assert optical_depth(field, (0.0, 0.0, 0.0), ends[:1]) == pytest.approx([0.3])

@@ -1,0 +1,88 @@
+"""Pieces of a row of pixels that see one plane: what changes little along it is computed at their ends only."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.jit import kernel
+
+_ONE, _STEP, _EVEN = np.float32(1.0), np.uint64(1), np.uint8(0)
+_BEND = np.float32(0.002)  # relative change of slope of 1 / distance from pixel to pixel, above which nothing is plane
+_STEEPEST = np.float32(0.2)  # relative change of 1 / distance over a piece above which light is not linear
+
+
+@kernel
+def choose_pixels(
+    length: NDArray[np.float32],
+    step: int,
+    inverse: NDArray[np.float32],
+    bent: NDArray[np.uint8],
+    pixel: NDArray[np.float32],
+    chosen: NDArray[np.float32],
+    first: NDArray[np.uint64],
+    even: NDArray[np.bool_],
+) -> np.uint64:
+    """Choose a row's pixels to compute: each `step`-th and the last, and all between where the surface is not plane.
+
+    Over a plane 1 / distance is linear. `pixel` and `chosen` take columns and distances of the pixels, `first` for each
+    piece of the row the number of its first pixel among them, `even` whether the piece is plane.
+    """
+    # Unsigned, because indices that may be negative cost a comparison each.
+    columns, size = np.uint64(length.shape[0]), np.uint64(step)
+    for u in range(columns):
+        inverse[u] = _ONE / length[u]
+    bent[0], bent[columns - _STEP] = _EVEN, _EVEN
+    for u in range(columns - _STEP - _STEP):
+        middle = inverse[u + _STEP]
+        curve = abs(inverse[u] + inverse[u + _STEP + _STEP] - middle - middle)
+        bent[u + _STEP] = np.uint8(curve > _BEND * middle)
+    count, pieces = np.uint64(0), (columns - _STEP - _STEP) // size + _STEP
+    for piece in range(pieces):
+        a = piece * size
+        b = min(a + size, columns - _STEP)
+        flags = bent[b]
+        for u in range(a, b):
+            flags |= bent[u]
+        whole = (flags == _EVEN) and (abs(inverse[b] - inverse[a]) < _STEEPEST * inverse[a])
+        even[piece], first[piece] = whole, count
+        pixel[count], chosen[count] = np.float32(np.int64(a)), length[a]
+        count += _STEP
+        if not whole:
+            for u in range(a + _STEP, b):
+                pixel[count], chosen[count] = np.float32(np.int64(u)), length[u]
+                count += _STEP
+    pixel[count], chosen[count] = np.float32(np.int64(columns - _STEP)), length[columns - _STEP]
+    return count + _STEP
+
+
+@kernel
+def spread(
+    values: NDArray[np.float32],
+    step: int,
+    first: NDArray[np.uint64],
+    even: NDArray[np.bool_],
+    out: NDArray[np.float32],
+) -> None:
+    """Values of the chosen pixels, for every pixel of a row."""
+    if step == 1:
+        for u in range(values.shape[0]):
+            out[u] = values[u]
+        return
+    columns, size = np.uint64(out.shape[0]), np.uint64(step)
+    pieces, n = (columns - _STEP - _STEP) // size + _STEP, np.uint64(0)
+    for piece in range(pieces):
+        a, n = piece * size, first[piece]
+        b = min(a + size, columns - _STEP)
+        value = values[n]
+        out[a] = value
+        if even[piece]:
+            n += _STEP
+            slope = (values[n] - value) / np.float32(np.int64(b - a))
+            for u in range(a + _STEP, b):
+                value += slope
+                out[u] = value
+        else:
+            for u in range(a + _STEP, b):
+                n += _STEP
+                out[u] = values[n]
+            n += _STEP
+    out[columns - _STEP] = values[n]

@@ -40,10 +40,17 @@ class Lens(NamedTuple):
 @functools.lru_cache(maxsize=8)
 def lens_of(camera: Camera, pose: CameraPose) -> Lens:
     """Geometry of a picture; the arrays belong to all who asked and are not to be written to."""
-    axes, focal, (u0, v0) = camera_axes(camera, pose), camera.focal_length, camera.principal_point
+    axes = camera_axes(camera, pose)
+    plane, lens, planes = _of_camera(camera)
+    return Lens(np.array(pose.position, np.float64), axes, axes.T @ plane, lens, planes @ axes)
+
+
+@functools.lru_cache(maxsize=8)
+def _of_camera(camera: Camera) -> tuple[Wide, Wide, Wide]:
+    """What does not depend on where the camera is: from pixels to rays in its axes, its numbers, its planes."""
+    focal, (u0, v0) = camera.focal_length, camera.principal_point
     plane = np.array([[1 / focal, 0.0, -u0 / focal], [0.0, 1 / focal, -v0 / focal], [0.0, 0.0, 1.0]])
-    lens = np.array((focal, u0, v0))
-    return Lens(np.array(pose.position, np.float64), axes, axes.T @ plane, lens, frustum(camera) @ axes)
+    return plane, np.array((focal, u0, v0)), frustum(camera)
 
 
 def frustum(camera: Camera) -> Wide:

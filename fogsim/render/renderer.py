@@ -99,21 +99,21 @@ class SceneRenderer:
 
     def _place(self, vehicles: Sequence[Batch]) -> int:
         """Put the vehicles behind what stands still, and count all."""
-        end = self._still + sum(len(batch.transforms) for batch in vehicles)
+        counts = [len(batch.transforms) for batch in vehicles]
+        end = self._still + sum(counts)
         if end > len(self._chosen.mesh):
             self._copies = with_room(self._copies, end + 64 - len(self._copies.shape))
             self._chosen = _room(len(self._copies.shape))
-        begin = self._still
-        for batch in vehicles:
-            stop = begin + len(batch.transforms)
-            record = self._copies.record[begin:stop]
-            record[:, :12] = batch.transforms[:, :3].reshape(-1, 12)
-            record[:, 12:15] = batch.paint
+        if vehicles:
+            record = self._copies.record[self._still : end]
             integers = record.view(np.int32)
-            integers[:, 15], integers[:, 16] = batch.lamps, batch.instance
-            self._copies.shape[begin:stop] = self._number(batch)
-            begin = stop
-        self._copies.place[self._still : end] = self._copies.record[self._still : end, 3:12:4]
+            transforms = np.concatenate([batch.transforms for batch in vehicles])
+            record[:, :12] = transforms.reshape(-1, 16)[:, :12]
+            record[:, 12:15] = np.concatenate([batch.paint for batch in vehicles])
+            integers[:, 15] = np.concatenate([batch.lamps for batch in vehicles])
+            integers[:, 16] = np.concatenate([batch.instance for batch in vehicles])
+            self._copies.shape[self._still : end] = np.repeat([self._number(batch) for batch in vehicles], counts)
+            self._copies.place[self._still : end] = record[:, 3:12:4]
         return end
 
     def _number(self, batch: Batch) -> int:

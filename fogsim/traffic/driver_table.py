@@ -21,8 +21,10 @@ class Column(IntEnum):
         The driver's factor on the chosen speed, and whether advice moves them, 0 or 1 [-].
     TOP_SPEED, HEADWAY
         Top speed [m/s] and wanted time headway [s] of the vehicle as it came.
-    SPEED_SET, SHORTENED
-        Top speed that it was given [m/s], and factor by which its headway was shortened [-].
+    SPEED_SET, SPEED_WANTED
+        Top speed that it was given, and the one that it is on the way to [m/s].
+    SHORTENED
+        Factor by which its headway was shortened [-].
     EXTINCTION, CHOICE
         Extinction coefficient where it was last [1/m], and the speed that goes with it [m/s].
     """
@@ -32,6 +34,7 @@ class Column(IntEnum):
     TOP_SPEED = auto()
     HEADWAY = auto()
     SPEED_SET = auto()
+    SPEED_WANTED = auto()
     SHORTENED = auto()
     EXTINCTION = auto()
     CHOICE = auto()
@@ -67,6 +70,10 @@ class DriverTable:
         """One column of some rows (n,)."""
         return np.asarray(self._numbers[rows, column])
 
+    def number(self, column: Column, row: int) -> float:
+        """What one row tells in one column."""
+        return float(self._numbers[row, column])
+
     def put(self, column: Column, rows: NDArray[np.intp] | int, values: NDArray[np.float64] | float) -> None:
         """Write one column of some rows."""
         self._numbers[rows, column] = values
@@ -77,6 +84,9 @@ class DriverTable:
             self._numbers = np.concatenate((self._numbers, np.empty_like(self._numbers)))
         driver, top_speed = nature(self._setup, vehicle, self._seed), float(self._top_speed(vehicle))
         headway = float(self._headway(vehicle))
-        self._numbers[row] = (driver.factor, driver.follows, top_speed, headway, top_speed, 1.0, -1.0, np.inf)
+        self._numbers[row] = (
+            *(driver.factor, driver.follows, top_speed, headway),
+            *(top_speed, top_speed, 1.0, -1.0, np.inf),
+        )
         self._row[vehicle] = row
         return row

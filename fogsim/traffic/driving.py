@@ -1,6 +1,7 @@
 """Setting how fast SUMO's vehicles may go and how closely they follow, by what their drivers choose and are told."""
 
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -18,10 +19,11 @@ from fogsim.traffic.getters import vehicle_getter
 from fogsim.traffic.link import Api
 from fogsim.traffic.roster import Roster
 from fogsim.traffic.sight import FogAccess
+from fogsim.traffic.top_speeds import TopSpeeds
 from fogsim.units import visibility_from_extinction
 
-UNNOTICED_SPEED, UNNOTICED_FACTOR = 0.3, 0.02
-"""Changes of a top speed [m/s] and of a headway's factor [-] that nobody would notice; setting each costs a call."""
+UNNOTICED_FACTOR = 0.02
+"""Change of a headway's factor [-] that nobody would notice; setting it costs a call."""
 
 
 class Drivers:
@@ -39,15 +41,26 @@ class Drivers:
         The ego, which others govern.
     seed : int
         With a vehicle's id it gives its driver's nature, so that it depends on nothing else.
+    deceleration : float
+        How hard they slow down to a lower speed that they want [m/s²].
     roster : Roster or None
         Who is on the road; None for one of its own.
     """
 
     def __init__(
-        self, api: Api, setup: DriverSetup, fog: FogAccess, ego: str, seed: int, roster: Roster | None = None
+        self,
+        api: Api,
+        setup: DriverSetup,
+        fog: FogAccess,
+        ego: str,
+        seed: int,
+        deceleration: float,
+        roster: Roster | None = None,
     ) -> None:
         self._vehicles = api.vehicle
         self._position = vehicle_getter(api, "getPosition3D")
+        self._departure = vehicle_getter(api, "getDeparture")
+        self._step = float(api.simulation.getDeltaT())
         self._setup = setup
         self._choice = SPEED_CHOICES[setup.speed_choice]
         self._fog = fog
@@ -55,46 +68,65 @@ class Drivers:
         self._ego = ego
         self._roster = Roster(api) if roster is None else roster
         self._table = DriverTable(api, setup, seed)
+        self._top_speeds = TopSpeeds(api, self._table, deceleration, self._roster.time)
         self._advised_since: dict[str, float] = {}
         self._next = 0.0
         self._mark = 0
 
     def update(self, advised: Mapping[str, float]) -> None:
-        """Let every driver choose a speed, if it is time to think again.
+        """Let who is new choose a speed, and every driver, if it is time to think again.
 
         Parameters
         ----------
         advised : mapping from vehicle id to float
             Advised speeds [m/s].
         """
-        self._roster.look()
-        time = self._roster.time
-        if time < self._next:
-            return
-        self._next = time + CHOICE_PERIOD
-        new, self._mark = self._roster.newcomers(self._mark)
-        # In even fog and without advice, only who is new has not made up the mind yet.
-        settled = self._extinction is not None and not advised and not self._advised_since
-        self._advised_since = {v: self._advised_since.get(v, time) for v in advised}
-        ids = [v for v in (new if settled else self._roster.present) if v != self._ego and v in self._roster.present]
-        if ids:
-            self._think(ids, advised, time)
+        roster = self._roster
+        roster.look()
+        time, present = roster.time, roster.present
+        new, self._mark = roster.newcomers(self._mark)
+        if new:
+            self._welcome([v for v in new if v != self._ego and v in present], advised)
+        if time >= self._next:
+            self._next = time + CHOICE_PERIOD
+            # In even fog and without advice, everybody has made up the mind already.
+            settled = self._extinction is not None and not advised and not self._advised_since
+            self._advised_since = {v: self._advised_since.get(v, time) for v in advised}
+            if not settled:
+                self._think([v for v in present if v != self._ego], advised)
+        self._top_speeds.move(time, present)
 
-    def _think(self, ids: Sequence[str], advised: Mapping[str, float], time: float) -> None:
+    def _welcome(self, new: Sequence[str], advised: Mapping[str, float]) -> None:
+        """Let who is new choose; who enters has driven in that fog before, past the signs that give the advice."""
+        # Departures carry the time at which their step began. Who came otherwise was on the road already.
+        since = self._roster.time - 1.5 * self._step
+        entering = [v for v in new if self._departure(v) >= since]
+        self._advised_since.update((v, -math.inf) for v in entering if v in advised)
+        if entering:
+            rows, wanted = self._wanted(entering, advised)
+            self._top_speeds.enter(entering, rows, wanted)
+        if len(entering) < len(new):
+            self._think([v for v in new if v not in set(entering)], advised)
+
+    def _think(self, ids: Sequence[str], advised: Mapping[str, float]) -> None:
+        if ids:
+            rows, wanted = self._wanted(ids, advised)
+            self._top_speeds.want(ids, rows, wanted)
+
+    def _wanted(self, ids: Sequence[str], advised: Mapping[str, float]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Rows of vehicles and the top speeds that their drivers want (n,) [m/s]."""
         table = self._table
         rows = table.rows(ids)
         self._notice_fog(ids, rows)
         if self._setup.misjudgement > 0:
             self._follow_closer(ids, rows)
         top_speed = table.get(Column.TOP_SPEED, rows)
-        target = np.minimum(table.get(Column.FACTOR, rows) * table.get(Column.CHOICE, rows), top_speed)
+        wanted = np.minimum(table.get(Column.FACTOR, rows) * table.get(Column.CHOICE, rows), top_speed)
         if advised:
             for i in np.flatnonzero(table.get(Column.FOLLOWS, rows)).tolist():
                 if ids[i] in advised:
-                    target[i] = self._advised(ids[i], float(target[i]), advised[ids[i]], time)
-        for i in np.flatnonzero(np.abs(target - table.get(Column.SPEED_SET, rows)) > UNNOTICED_SPEED).tolist():
-            self._vehicles.setMaxSpeed(ids[i], float(target[i]))
-            table.put(Column.SPEED_SET, int(rows[i]), float(target[i]))
+                    wanted[i] = self._advised(ids[i], float(wanted[i]), advised[ids[i]])
+        return rows, wanted
 
     def _notice_fog(self, ids: Sequence[str], rows: NDArray[np.intp]) -> None:
         """Choose a speed where the fog is another than at the last choice."""
@@ -120,9 +152,10 @@ class Drivers:
                 self._vehicles.setTau(vehicle, float(headway) / factor)
                 table.put(Column.SHORTENED, int(row), factor)
 
-    def _advised(self, vehicle: str, own: float, advised: float, time: float) -> float:
+    def _advised(self, vehicle: str, own: float, advised: float) -> float:
         """Top speed [m/s] of a driver who follows advice, once the delay is over."""
-        if time - self._advised_since[vehicle] < self._setup.compliance.delay:
+        time = self._roster.time
+        if time - self._advised_since.get(vehicle, time) < self._setup.compliance.delay:
             return own
         own = min(own, float(self._vehicles.getAllowedSpeed(vehicle)))
         return complied_speed(own, advised, self._setup.compliance.strength)
@@ -131,12 +164,8 @@ class Drivers:
         """Give every vehicle on the road the top speed and the headway back that it came with."""
         ids = [v for v in self._roster.present if v != self._ego]
         rows = self._table.rows(ids)
-        speeds, headways = (self._table.get(column, rows).tolist() for column in (Column.TOP_SPEED, Column.HEADWAY))
-        changed_speed = self._table.get(Column.SPEED_SET, rows) != speeds
-        changed_headway = self._table.get(Column.SHORTENED, rows) != 1.0
-        for i in np.flatnonzero(changed_speed).tolist():
-            self._vehicles.setMaxSpeed(ids[i], speeds[i])
-        for i in np.flatnonzero(changed_headway).tolist():
-            self._vehicles.setTau(ids[i], headways[i])
-        self._table.put(Column.SPEED_SET, rows, np.array(speeds))
+        self._top_speeds.release(ids, rows)
+        headways = self._table.get(Column.HEADWAY, rows)
+        for i in np.flatnonzero(self._table.get(Column.SHORTENED, rows) != 1.0).tolist():
+            self._vehicles.setTau(ids[i], float(headways[i]))
         self._table.put(Column.SHORTENED, rows, 1.0)

@@ -26,7 +26,7 @@ from fogsim.traffic.setup import AfterCollision, TrafficSetup
 from fogsim.traffic.sight import FogAccess
 from fogsim.traffic.signs import sign_map
 from fogsim.traffic.subscribed_reading import SubscribedReader
-from fogsim.values import Command, Lamp, RoadNetwork, SignMap, TrafficSnapshot, TrafficState
+from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot, TrafficState
 
 _NOBODY: Mapping[str, float] = {}
 _FOR_EVER = "1e6"
@@ -149,7 +149,7 @@ class SumoTraffic:
                 perception=None
                 if setup.sight is None
                 else Perception(api, fog, setup.sight, roster, self._link.distant),
-                drivers=Drivers(api, setup.drivers, fog, setup.ego, self._seed, roster),
+                drivers=Drivers(api, setup.drivers, fog, setup.ego, self._seed, setup.advice_deceleration, roster),
             )
 
     @_watched

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from fogsim.jit import kernel
 
 FARTHEST = 1600.0
-"""Distance beyond which no copy is drawn [m]."""
+"""Distance beyond which no copy is drawn, nearer in small pictures [m]."""
 
+_LARGEST = 8.0  # about the radius of what is largest, but for the ground and woods [m]
 _SMALLEST = 1.0  # radius in the picture below which a copy is left out [px]
 _DENSEST = 1.15  # half a square's breadth over the root of its triangles, below which a stand-in does [px]
 _BINS = 64  # of distance, to draw near copies first
@@ -218,18 +219,20 @@ def choose(
     begin = first[len(first) - 1]
     measure(shapes, copies, begin, end)
     p, q, r, s, ahead = _row(planes, 0), _row(planes, 1), _row(planes, 2), _row(planes, 3), _row(planes, 4)
+    # Farther away nearly all is left out for its size, and the ground lies in a fraction of the row at the horizon.
+    farthest = min(FARTHEST, _LARGEST * focal / _SMALLEST)
     count = 0
     for cell in range(len(cells.radius) + 1):
         low, high = begin, end
         if cell < len(cells.radius):
             low, high = first[cell], first[cell + 1]
             x, y, z = cells.middle[cell, 0] - eye[0], cells.middle[cell, 1] - eye[1], cells.middle[cell, 2] - eye[2]
-            if _depth((x, y, z), cells.radius[cell], p, q, r, s, ahead) >= FARTHEST:
+            if _depth((x, y, z), cells.radius[cell], p, q, r, s, ahead) >= farthest:
                 continue
         for copy in range(low, high):
             x, y, z = middle[copy, 0] - eye[0], middle[copy, 1] - eye[1], middle[copy, 2] - eye[2]
             depth = _depth((x, y, z), radius[copy], p, q, r, s, ahead)
-            if depth < FARTHEST and focal * radius[copy] > _SMALLEST * (depth + radius[copy]):
+            if depth < farthest and focal * radius[copy] > _SMALLEST * (depth + radius[copy]):
                 chosen.copy[count] = copy
                 chosen.bin[count] = min(int(6.0 * np.log2(1.0 + depth)), _BINS - 1)
                 count += 1

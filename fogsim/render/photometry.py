@@ -65,11 +65,8 @@ def lamp_radiance(surface: Surface) -> NDArray[np.float64]:
     return luminance * np.array(colour) / float(np.dot(colour, LUMINANCE_WEIGHTS))
 
 
-def lamp_mask(surface: Surface) -> Lamp:
-    """Lamps any of which lights a surface."""
-    return LAMPS[surface][0] if surface in LAMPS else Lamp.NONE
-
-
 def lighting_bits(surface: Surface) -> int:
-    """Bits of `Lamp` any of which lights a surface, −1 for a surface that is always lit."""
-    return -1 if surface == Surface.LAMP_STREET else int(lamp_mask(surface))
+    """Bits of `Lamp` any of which lights a surface: −1 for one that is always lit, 0 for what is no lamp."""
+    if surface == Surface.LAMP_STREET:
+        return -1
+    return int(LAMPS[surface][0]) if surface in LAMPS else 0

@@ -1,8 +1,10 @@
 """What fog and advice do to safety: collisions of the motorway's traffic around its standing lead vehicle.
 
-Traffic alone, without a camera: for each visibility, policy and seed, the motorway in homogeneous fog for 160 s, in
-which the lead stands in the middle lane for a while. Policies: ``none`` (drivers are left alone, with the speed choice
-given), ``oracle`` (every driver is advised the speed from which one can stop within the true visibility, and complies).
+Traffic alone, without a camera: for each visibility, policy and seed, the motorway in homogeneous fog. The ego and the
+lead ahead of it are its first vehicles; the road fills behind them and the other way for 120 s, then the lead stops in
+the middle lane for 90 s, and 30 s later the run ends. Collisions of the whole 240 s count. Policies: ``none`` (drivers
+are left alone, with the speed choice given), ``oracle`` (every driver is advised the speed from which one can stop
+within the true visibility, from the beginning and as they enter, and complies without delay).
 
     python benchmarks/collisions.py [--json] [--seeds 20] [--visibility 60 --visibility 1000]
                                     [--speed-choice unaffected]
@@ -12,6 +14,10 @@ Intervals are 95 % bootstrap intervals of the mean over seeds.
 
 import argparse
 import json
+import math
+import tempfile
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,44 +25,62 @@ import numpy as np
 import fogsim
 from fogsim.atmosphere import FieldAccess
 from fogsim.scenario import build
-from fogsim.traffic import libsumo_traffic
+from fogsim.traffic import BrakeEvent, Traffic, Trigger, libsumo_traffic
 from fogsim.traffic.drivers import within_sight
 from fogsim.values import Collision, Command, SpeedAdvice
 
-SECONDS = 160
+SECONDS, FILLING, STANDING = 240, 120, 90
+"""Time of a run, time before the lead stops, and time for which it stands [s]."""
+
+DEMAND = Path(__file__).resolve().parents[1] / "scenarios" / "motorway_fog_bank" / "motorway.rou.xml"
+
+
+def early_ego(folder: Path) -> Path:
+    """The motorway's demand with the lead and the ego departing first, so that advice holds while the road fills."""
+    demand = DEMAND.read_text(encoding="utf-8")
+    for name, written, wanted in (("lead", "177", "0"), ("ego", "180", "3")):
+        line = next(row for row in demand.splitlines() if f'<vehicle id="{name}"' in row)
+        demand = demand.replace(line, line.replace(f'depart="{written}"', f'depart="{wanted}"'))
+    path = folder / "early.rou.xml"
+    path.write_text(demand, encoding="utf-8")
+    return path
 
 
 def one_run(visibility: float, oracle: bool, speed_choice: str, seed: int) -> list[Collision]:
     """Collisions of one run."""
-    scenario = fogsim.load_scenario(
-        "motorway_fog_bank",
-        [
-            f"fog.visibility_m={visibility}",
-            f"drivers.speed_choice={speed_choice}",
-            "traffic.events.0.hold_s=90",
-            "traffic.reading_radius_m=100000",
-        ],
-    )
-    traffic = libsumo_traffic(build.traffic_setup(scenario))
-    # Homogeneous fog lies everywhere: the route that banks are laid along does not matter.
-    traffic.enter_fog(FieldAccess(build.fog_field(scenario, np.zeros((2, 3)))))
-    advised = within_sight(visibility)
+    with tempfile.TemporaryDirectory() as folder:
+        scenario = fogsim.load_scenario(
+            "motorway_fog_bank",
+            [
+                f"fog.visibility_m={visibility}",
+                f"drivers.speed_choice={speed_choice}",
+                "drivers.compliance.delay_s=0",
+                f"traffic.routes=[{early_ego(Path(folder))}]",
+                "traffic.reading_radius_m=100000",
+            ],
+        )
+        stop = BrakeEvent("lead", Trigger(at_time=FILLING), deceleration=6.0, hold=STANDING)
+        traffic = libsumo_traffic(replace(build.traffic_setup(scenario), events=(stop,)))
+        # Homogeneous fog lies everywhere: the route that banks are laid along does not matter.
+        traffic.enter_fog(FieldAccess(build.fog_field(scenario, np.zeros((2, 3)))))
+        try:
+            traffic.start(seed)
+            steps = round(SECONDS / scenario.clocks.traffic_step_s)
+            return drive(traffic, steps, within_sight(visibility) if oracle else math.inf)
+        finally:
+            traffic.close()
+
+
+def drive(traffic: Traffic, steps: int, advised: float) -> list[Collision]:
+    """Collisions of so many steps; everybody on the road, who has just come included, is advised a speed [m/s]."""
     collisions: list[Collision] = []
-    try:
-        traffic.start(seed)
-        steps = round(SECONDS / scenario.clocks.traffic_step_s)
-        command = Command()
-        for index in range(steps):
-            if index % 10 == 0:
-                snapshot = traffic.observe()
-                if snapshot is None:
-                    break
-                collisions += snapshot.collisions
-                if oracle:
-                    command = Command(SpeedAdvice(advised), advised_speeds=dict.fromkeys(snapshot.state.ids, advised))
-            traffic.advance(command)
-    finally:
-        traffic.close()
+    for _ in range(steps):
+        snapshot = traffic.observe()
+        if snapshot is None:
+            break
+        collisions += snapshot.collisions
+        everybody = snapshot.state.ids if math.isfinite(advised) else ()
+        traffic.advance(Command(SpeedAdvice(advised), advised_speeds=dict.fromkeys(everybody, advised)))
     return collisions
 
 

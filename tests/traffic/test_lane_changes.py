@@ -82,7 +82,7 @@ def attached_run(api: Any, steps: int) -> list[tuple[TrafficState, TrafficState]
         traffic.look()
         snapshot = traffic.observe()
         assert snapshot is not None
-        states.append((snapshot.state, truth.state(Lamp.NONE)))
+        states.append((snapshot.state, truth.state(Command().lamps)))
     traffic.release()
     return states
 

@@ -14,6 +14,7 @@ from rich.table import Table
 
 from fogsim import __version__
 from fogsim.cli_estimate import estimate_command
+from fogsim.cli_reproduce import reproduce_command
 from fogsim.errors import FogSimError, InputError
 from fogsim.values import Step
 
@@ -317,6 +318,7 @@ def _pixel_values(text: str) -> tuple[float, ...]:
 
 
 app.command("estimate")(estimate_command)
+app.command("reproduce")(reproduce_command)
 
 
 @app.command("doctor")

@@ -1,0 +1,64 @@
+"""``fogsim reproduce``: arguments, progress and exit codes, nothing else."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from fogsim.errors import InputError, UnknownNameError
+
+if TYPE_CHECKING:
+    from fogsim.reproduce import Reproduction
+
+_out = Console(highlight=False)
+_err = Console(stderr=True, highlight=False)
+
+ALL = "all"
+"""Stands for every paper."""
+
+
+def reproduce_command(
+    paper: Annotated[str, typer.Argument(metavar="PAPER|all", help="A paper whose evaluation is run again.")],
+    out: Annotated[Path | None, typer.Option(help="Folder for PAPER.png, a picture like the paper's.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Flat records, one a line, in place of the table.")] = False,
+) -> None:
+    """Run a paper's evaluation again on FogSim's frames; its figures stand beside ours."""
+    from fogsim.reproduce import REPRODUCTIONS  # noqa: PLC0415 - heavy; --help must be quick
+
+    if paper != ALL and paper not in REPRODUCTIONS:
+        raise UnknownNameError("paper", paper, [*REPRODUCTIONS, ALL])
+    if out is not None and out.exists() and not out.is_dir():
+        raise InputError(f"--out {out} is no folder")
+    for name in REPRODUCTIONS if paper == ALL else (paper,):
+        with _err.status(f"{name}: drawing and estimating"):
+            done = REPRODUCTIONS[name]()
+        _show(done, as_json=as_json)
+        if out is not None:
+            _save(done, out)
+
+
+def _show(done: "Reproduction", *, as_json: bool) -> None:
+    if as_json:
+        for record in done.records:
+            typer.echo(json.dumps(record, allow_nan=False))
+        return
+    heading, *rows = done.table
+    table = Table(*heading, title=done.paper, title_justify="left", box=None, pad_edge=False)
+    for row in rows:
+        table.add_row(*row)
+    _out.print(table)
+    for note in done.notes:
+        _out.print(f"- {escape(note)}", soft_wrap=True)
+
+
+def _save(done: "Reproduction", folder: Path) -> None:
+    from fogsim.image_files import write_image  # noqa: PLC0415 - heavy; --help must be quick
+
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{done.paper}.png"
+    write_image(path, done.picture[:, :, ::-1])
+    _err.print(f"picture: {escape(str(path))}", soft_wrap=True)

@@ -8,14 +8,33 @@ from fogsim.camera import averaged, middle_samples, supersampled
 from fogsim.lighting import LampMount, own_head_lamps
 from fogsim.render import make_renderer
 from fogsim.scenario import Scenario, build
-from fogsim.scene import build_scene, light_sources, street_lamp_heads, vehicle_batches
-from fogsim.values import CameraPose, FogField, Lamp, Lights, RoadNetwork, SignMap, TrafficState, View
+from fogsim.scene import build_scene, light_sources, street_lamp_heads, street_lighting, vehicle_batches
+from fogsim.values import (
+    CameraPose,
+    FogField,
+    HeadLamp,
+    Lamp,
+    Lights,
+    RoadNetwork,
+    SignMap,
+    StreetLighting,
+    TrafficState,
+    View,
+)
 
 LAMPLIGHT_BELOW = 1000.0
 """Horizontal illuminance below which lamplight is drawn [lx].
 
 UNECE R48 lights the dipped beam by itself below it; above, the veil of the own lamps is less than 1 % of the airlight.
 """
+
+DARKEST = 1e-4
+"""Illuminance below which no sky under street lamps is taken to be [lx]: that of an overcast night without a moon.
+
+Surfaces return street lamps' light as they return the sky's, of which there must be some.
+"""
+
+_USUAL = (Lamp.LOW_BEAM, Lamp.LOW_BEAM | Lamp.FRONT_FOG, Lamp.LOW_BEAM | Lamp.HIGH_BEAM)
 
 
 class Outlook:
@@ -49,12 +68,19 @@ class Outlook:
         self._camera, self._samples = build.camera(scenario), scenario.camera.samples
         self._drawn_camera = supersampled(self._camera, self._samples)
         self._setback = scenario.camera.setback_m
+        self._streets: StreetLighting | None = None
         rng = np.random.default_rng(scenario.scenery_seed)
         scene = build_scene(network, signs, rng, street_lamps=scenario.street_lamps)
         self._by_lamplight = scenario.light.illuminance_lx < LAMPLIGHT_BELOW
         self._mount, self._street_lamps = LampMount(), street_lamp_heads(scene)
         self._air = Air(self.fog, scenario.fog.droplets)
-        self._renderer = make_renderer(scenario.renderer, scene, scenario.light.illuminance_lx)
+        sky = scenario.light.illuminance_lx
+        if len(self._street_lamps) and self._by_lamplight:
+            sky = max(sky, DARKEST)
+            self._streets = street_lighting(self._street_lamps, sky)
+        self._renderer = make_renderer(scenario.renderer, scene, sky)
+        if self._by_lamplight:
+            self._air.prepare(self._drawn_camera, [self._own_lamps(lit) for lit in _USUAL])
 
     def see(self, state: TrafficState, ego: int, pose: CameraPose, time: float) -> tuple[View, NDArray[np.float32]]:
         """Draw what is there, and what of it reaches the camera through the air.
@@ -86,9 +112,13 @@ class Outlook:
         if not self._by_lamplight:
             return Lights.none()
         return Lights(
-            own=own_head_lamps(Lamp(int(state.lamps[ego])), self._camera.mount_height, self._setback, self._mount),
+            own=self._own_lamps(Lamp(int(state.lamps[ego]))),
             others=light_sources(state, ego, pose.position, self._mount.beams, self._street_lamps),
+            streets=self._streets,
         )
+
+    def _own_lamps(self, lit: Lamp) -> tuple[HeadLamp, ...]:
+        return own_head_lamps(lit, self._camera.mount_height, self._setback, self._mount)
 
     def close(self) -> None:
         """Free the renderer; closing twice is allowed."""

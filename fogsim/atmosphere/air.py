@@ -1,5 +1,7 @@
 """The air between a scene and a camera: what fog and lamplight make of a drawn view."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -8,7 +10,8 @@ from fogsim.atmosphere.halos import Halos
 from fogsim.atmosphere.lamplight import OwnLamplight
 from fogsim.atmosphere.medium import field_at
 from fogsim.atmosphere.phase import Droplets
-from fogsim.values import Camera, CameraPose, FogField, Lights, View
+from fogsim.atmosphere.streetlight import StreetLight
+from fogsim.values import Camera, CameraPose, FogField, HeadLamp, Lights, View
 
 _UNLIT = Lights.none()
 
@@ -16,9 +19,10 @@ _UNLIT = Lights.none()
 class Air:
     """The fog of a scenario, as a camera looks through it.
 
-    The radiance at the camera is L = (L₀ + R E_own) T + S: the drawn radiance L₀ and what surfaces return of the own
-    lamps' light (their response R times the illuminance E_own that reaches them), attenuated by T = e^(−τ), and the
-    light S that the fog scatters into the line of sight (airlight by day, the lamps' veil and halos at night).
+    The radiance at the camera is L = (L₀ (1 + E_street / E_sky) + R E_own) T + S: the drawn radiance L₀, to which
+    surfaces add of street lamps' light what they return of the sky's, and what they return of the own lamps' light
+    (their response R times the illuminance E_own that reaches them), attenuated by T = e^(−τ), and the light S that the
+    fog scatters into the line of sight (airlight by day, the lamps' veil and halos at night).
 
     Parameters
     ----------
@@ -30,7 +34,26 @@ class Air:
 
     def __init__(self, field: FogField, droplets: Droplets = Droplets.MODERATE_RADIATION) -> None:
         self._field = field
-        self._own, self._halos = OwnLamplight(droplets), Halos(droplets)
+        self._own, self._halos, self._streets = OwnLamplight(droplets), Halos(droplets), StreetLight()
+
+    def prepare(self, camera: Camera, lamps: Sequence[tuple[HeadLamp, ...]]) -> None:
+        """Compute beforehand what depends on lamps alone, which else takes the time of many frames when first lit.
+
+        Parameters
+        ----------
+        camera : Camera
+            The camera that will look.
+        lamps : sequence of tuple of HeadLamp
+            Sets of own lamps that may be lit.
+
+        Raises
+        ------
+        InputError
+            If the beam of a lamp has holes.
+        """
+        self._halos.prepare(camera)
+        for lit in lamps:
+            self._own.prepare(camera, lit)
 
     def radiance(
         self, view: View, camera: Camera, pose: CameraPose, lights: Lights = _UNLIT, time: float = 0.0
@@ -61,7 +84,8 @@ class Air:
             If the beam of a lit lamp has holes.
         """
         field = field_at(self._field, time)
-        radiance = daytime_radiance(view, field, camera, pose)
+        lit = view if lights.streets is None else self._streets.on(view, camera, pose, field, lights.streets)
+        radiance = daytime_radiance(lit, field, camera, pose)
         if lights.own:
             self._own.add(radiance, view, camera, pose, field, lights.own)
         if len(lights.others.intensity):

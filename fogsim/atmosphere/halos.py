@@ -87,6 +87,10 @@ class Halos:
         self._droplets = Droplets(droplets)
         self._plans: dict[Camera, _Plan] = {}
 
+    def prepare(self, camera: Camera) -> None:
+        """Compute beforehand what depends on camera and droplets alone."""
+        self._plan(camera)
+
     def add(
         self,
         radiance: NDArray[np.float32],

@@ -1,6 +1,5 @@
 """Light of the own head lamps: on what the camera sees, and in the fog between."""
 
-import math
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -12,6 +11,7 @@ from fogsim.atmosphere.lamp_tables import lamp_table
 from fogsim.atmosphere.lamplight_kernels import add_own_light
 from fogsim.atmosphere.medium import is_even_up_to, medium_of
 from fogsim.atmosphere.phase import Droplets
+from fogsim.atmosphere.plane_pieces import piece_length
 from fogsim.atmosphere.veil import (
     FOLD_DISTANCE,
     INTERVALS,
@@ -30,11 +30,6 @@ _MIRROR = np.diag((1.0, -1.0, 1.0))
 """Tables of beams count to the right, the vehicle's axes to the left."""
 
 _REMEMBERED = 16
-
-STEP_ANGLE = math.radians(0.6)
-"""Angle between pixels of a row for which light is computed, where they see one plane [rad]; beams change by little."""
-
-MOST_STEP = 8
 
 _HIGHEST = 50.0
 """Height above the camera up to which own lamps light the fog [m]."""
@@ -77,6 +72,10 @@ class OwnLamplight:
         self._droplets = Droplets(droplets)
         self._memory = _Memory()
 
+    def prepare(self, camera: Camera, lamps: tuple[HeadLamp, ...]) -> None:
+        """Compute beforehand what depends on camera, lamps and droplets alone."""
+        self._groups(camera, lamps)
+
     def add(
         self,
         radiance: NDArray[np.float32],
@@ -115,7 +114,7 @@ class OwnLamplight:
                 np.ascontiguousarray(view.distance, dtype=np.float32),
                 np.ascontiguousarray(response, dtype=np.float32).reshape(len(response), 3 * columns),
                 ray_map,
-                min(max(int(STEP_ANGLE * camera.focal_length), 1), MOST_STEP),
+                piece_length(camera.focal_length),
                 group.places,
                 group.tables,
                 group.colour,

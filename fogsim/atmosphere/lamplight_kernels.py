@@ -242,11 +242,8 @@ def add_own_light(  # noqa: C901 - one loop: handing its many rows on costs more
             continue
         for u in range(columns):
             length[u] = min(distance[v, u], np.float32(ENDLESS))
-        if step == 1:
-            for u in range(columns):
-                chosen[u] = length[u]
-        else:
-            n = choose_pixels(length, step, inverse, bent, pixel, chosen, first, even)
+        n = choose_pixels(length, step, inverse, bent, pixel, chosen, first, even)
+        if step > 1:
             _column_places(n, pixel, columns, grid_columns - 1, int(nodes), left, aside)
         for u in range(n):
             node[u] = min(last * chosen[u] / (chosen[u] + fold), last - np.float32(1e-3))

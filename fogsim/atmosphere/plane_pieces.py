@@ -1,5 +1,7 @@
 """Pieces of a row of pixels that see one plane: what changes little along it is computed at their ends only."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -8,6 +10,11 @@ from fogsim.jit import kernel
 _ONE, _STEP, _EVEN = np.float32(1.0), np.uint64(1), np.uint8(0)
 _BEND = np.float32(0.002)  # relative change of slope of 1 / distance from pixel to pixel, above which nothing is plane
 _STEEPEST = np.float32(0.2)  # relative change of 1 / distance over a piece above which light is not linear
+
+
+def piece_length(focal_length: float) -> int:
+    """Pixels of a piece of a camera with a focal length [px]: 0.6°, over which beams and light change by little."""
+    return min(max(int(math.radians(0.6) * focal_length), 1), 8)
 
 
 @kernel
@@ -28,6 +35,10 @@ def choose_pixels(
     """
     # Unsigned, because indices that may be negative cost a comparison each.
     columns, size = np.uint64(length.shape[0]), np.uint64(step)
+    if step == 1:
+        for u in range(columns):
+            pixel[u], chosen[u] = np.float32(np.int32(u)), length[u]
+        return columns
     for u in range(columns):
         inverse[u] = _ONE / length[u]
     bent[0], bent[columns - _STEP] = _EVEN, _EVEN

@@ -11,10 +11,10 @@ from fogsim.beam import luminous_intensity
 from fogsim.scene.bodies import BODIES
 from fogsim.scene.bodies.lamp_patches import Patch, lamp_patches
 from fogsim.scene.bodies.parts import LIT_AREAS
-from fogsim.scene.street_lamps import SIZE
+from fogsim.scene.street_lamps import HEIGHT, SIZE
 from fogsim.scene.vehicles import body_names
 from fogsim.values.lamps import Lamp
-from fogsim.values.light import Beam, LightSources
+from fogsim.values.light import Beam, LightSources, StreetLighting
 from fogsim.values.scene import Surface
 from fogsim.values.traffic import TrafficState
 
@@ -186,6 +186,21 @@ def _of_streets(heads: NDArray[np.float64], eye: NDArray[np.float64]) -> LightSo
     # The surface bulges below the head, so that it does not vanish when seen from the side.
     area = length * width * down + 0.5 * (length + width) * depth * np.sqrt(1.0 - down**2)
     return LightSources(heads[near], intensity, np.tile(_luminance_one(_WARM), (len(near), 1)), area)
+
+
+def street_lighting(heads: NDArray[np.float64], sky_illuminance: float) -> StreetLighting:
+    """Street lamps as what lights the road.
+
+    Parameters
+    ----------
+    heads : (n, 3) float64
+        Middles of their luminous surfaces [m], from `street_lamp_heads`.
+    sky_illuminance : float
+        Horizontal illuminance of the sky in which the scene is drawn [lx].
+    """
+    tint = _luminance_one(_WARM)
+    colour = (float(tint[0]), float(tint[1]), float(tint[2]))
+    return StreetLighting(heads, HEIGHT, STREET_ANGLES, STREET_INTENSITIES, colour, sky_illuminance)
 
 
 def _luminance_one(colour: tuple[float, float, float]) -> NDArray[np.float64]:

@@ -72,6 +72,33 @@ class LightSources:
 
 
 @dataclass(frozen=True, slots=True)
+class StreetLighting:
+    """Street lamps as what lights the road, all alike, beside the sky.
+
+    Attributes
+    ----------
+    position : (n, 3) float64
+        Places [m].
+    height : float
+        Height above the road [m].
+    angle, intensity : (m,) float64
+        Ascending angles from straight down [rad], and luminous intensity there, alike in all directions about the lamp
+        [cd].
+    colour : tuple of float
+        Linear colour of luminance 1.
+    sky_illuminance : float
+        Horizontal illuminance of the sky in which the scene is drawn [lx]; where it is 0 the lamps light nothing.
+    """
+
+    position: NDArray[np.float64]
+    height: float
+    angle: NDArray[np.float64]
+    intensity: NDArray[np.float64]
+    colour: tuple[float, float, float]
+    sky_illuminance: float
+
+
+@dataclass(frozen=True, slots=True)
 class Lights:
     """All light that is not daylight, at one instant.
 
@@ -81,10 +108,13 @@ class Lights:
         Lit lamps of the vehicle that carries the camera.
     others : LightSources
         Everyone else's.
+    streets : StreetLighting or None
+        Street lamps as what lights the road; how they are seen themselves is told by `others`.
     """
 
     own: tuple[HeadLamp, ...]
     others: LightSources
+    streets: StreetLighting | None = None
 
     @classmethod
     def none(cls) -> "Lights":

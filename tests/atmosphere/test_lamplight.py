@@ -112,3 +112,12 @@ def test_air_adds_lamplight_to_twilight():
     lights = Lights(LOW, LightSources.none())
     by_day = air.radiance(view, CAMERA, POSE)
     assert air.radiance(view, CAMERA, POSE, lights) - by_day == pytest.approx(drawn(field), abs=2e-6)
+
+
+def test_preparing_changes_nothing():
+    field, lights = fog(100), Lights(LOW, LightSources.none())
+    prepared, fresh = Air(field), Air(field)
+    prepared.prepare(CAMERA, [LOW])
+    assert np.array_equal(
+        prepared.radiance(road_view(), CAMERA, POSE, lights), fresh.radiance(road_view(), CAMERA, POSE, lights)
+    )

@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from fogsim.scene import build_scene, light_sources, street_lamp_heads, vehicle_batches
+from fogsim.scene import build_scene, light_sources, street_lamp_heads, street_lighting, vehicle_batches
 from fogsim.scene.bodies import body_shapes
 from fogsim.scene.light_sources import STREET_ANGLES, STREET_INTENSITIES
 from fogsim.values import Beam, Lamp, LightSources, RoadNetwork, SignMap, Surface, TrafficState
@@ -144,3 +144,12 @@ def test_an_empty_dark_road_has_no_sources() -> None:
     found = light_sources(empty, None, EYE, BEAMS)
     assert isinstance(found, LightSources)
     assert (found.position.shape, found.colour.shape) == ((0, 3), (0, 3))
+
+
+def test_street_lighting_is_what_the_lamps_are_seen_with():
+    heads = np.array([[0.0, 0.0, 8.0]])
+    lighting = street_lighting(heads, 0.1)
+    below = light_sources(one(Lamp.NONE), None, (0.0, 0.0, 0.0), {}, heads)
+    assert np.interp(0.0, lighting.angle, lighting.intensity) == pytest.approx(below.intensity[-1])
+    assert np.dot(lighting.colour, (0.2126, 0.7152, 0.0722)) == pytest.approx(1.0)
+    assert lighting.sky_illuminance == 0.1

@@ -26,7 +26,8 @@ def estimate_command(
     ],
     camera: Annotated[Path, typer.Option(help="camera.yaml: the calibration; --guess-camera writes it.")],
     method: Annotated[
-        list[str] | None, typer.Option(metavar="NAME|all", help="A method (fogsim list); may be repeated. [all]")
+        list[str] | None,
+        typer.Option(metavar="NAME|all", help="A method (fogsim list); may be repeated. Default: all."),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object a line and method on stdout.")] = False,
     overlay: Annotated[
@@ -34,9 +35,11 @@ def estimate_command(
     ] = None,
     sequence: Annotated[
         bool | None,
-        typer.Option("--sequence/--stills", help="Images follow one another, or each stands alone. [by their names]"),
+        typer.Option(
+            "--sequence/--stills", help="Images follow one another, or each stands alone. Default: by their names."
+        ),
     ] = None,
-    rate: Annotated[float | None, typer.Option(help="Images of a sequence in a second. [10]")] = None,
+    rate: Annotated[float | None, typer.Option(help="Images of a sequence in a second. Default: 10.")] = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace an overlay or a guessed camera file.")
     ] = False,

@@ -66,16 +66,17 @@ def expose(radiance: NDArray[np.float32], sensor: Sensor, response: Response, rn
     table = response_table(response, sensor.bits)
     out = np.empty(radiance.shape, dtype=table.dtype)
     key = int(rng.integers(1 << 62))
+    rows, columns, _ = radiance.shape
     light, values = np.ascontiguousarray(radiance, dtype=np.float32).reshape(-1), out.reshape(-1)
     gain, per_electron = np.float32(1.0 / sensor.saturation_luminance), np.float32(1.0 / sensor.full_well)
     read_variance = np.float32((sensor.read_noise / sensor.full_well) ** 2)
     keys, normals = (np.uint32(key & 0xFFFFFFFF), np.uint32(key >> 32)), _normal_table()
 
     def expose_rows(_: int, top: int, bottom: int) -> None:
-        begin, end = 3 * out.shape[1] * top, 3 * out.shape[1] * bottom
+        begin, end = 3 * columns * top, 3 * columns * bottom
         develop(light, gain, per_electron, read_variance, *keys, normals, table, begin, end, values)
 
-    Bands().work(expose_rows, *out.shape[:2])
+    Bands().work(expose_rows, rows, columns)
     return out
 
 

@@ -10,6 +10,7 @@ from fogsim.render.photometry import SKY_TINT, lamp_radiance, lighting_bits, zen
 from fogsim.render.shading import layout
 from fogsim.render.shading.ground import Bench, bench, shade_ground
 from fogsim.render.shading.layout import Copies, Light, Meshes, Numbers, Picture, Runs
+from fogsim.render.shading.memory import Memory
 from fogsim.render.shading.noise import Noise, tiles
 from fogsim.render.shading.objects import shade_objects, shade_sky
 from fogsim.render.shading.runs import find_runs
@@ -52,7 +53,7 @@ class Shading:
             lamp_masks=np.array([lighting_bits(surface) for surface in Surface], np.int32),
             lamp_radiance=np.array([lamp_radiance(surface) for surface in Surface]),
         )
-        self._noise, self._bands = tiles(), Bands()
+        self._noise, self._bands, self._memory = tiles(), Bands(), Memory()
         # For each band.
         self._benches, self._runs = [bench(), bench()], [_room(0, 0), _room(0, 0)]
 
@@ -78,10 +79,10 @@ class Shading:
             drawing.first,
         )
         picture = Picture(
-            np.empty((rows, columns, 3), np.float32),
-            np.empty((rows, columns), np.float32),
-            np.empty((rows, columns), np.int32),
-            np.empty((rows, columns, 3) if lamplight else (0, 0, 3), np.float32),
+            self._memory.empty((rows, columns, 3), np.float32),
+            self._memory.empty((rows, columns), np.float32),
+            self._memory.empty((rows, columns), np.int32),
+            self._memory.empty((rows, columns, 3) if lamplight else (0, 0, 3), np.float32),
         )
         lens = lens_of(camera, pose)
 

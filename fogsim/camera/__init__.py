@@ -1,6 +1,7 @@
-"""Where the camera is, its samples, exposure, noise, response and quantisation."""
+"""Where the camera is, its samples, glare, exposure, noise, response and quantisation."""
 
 from fogsim.camera.exposure import Pixels, Sensor, expose
+from fogsim.camera.glare import LensGlare
 from fogsim.camera.metering import AutoExposure, Metering
 from fogsim.camera.mount import BodyPitch, Suspension, mounted_pose
 from fogsim.camera.photographer import Photographer
@@ -9,6 +10,7 @@ from fogsim.camera.sampling import averaged, middle_samples, supersampled
 __all__ = [
     "AutoExposure",
     "BodyPitch",
+    "LensGlare",
     "Metering",
     "Photographer",
     "Pixels",

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.camera.exposure import Pixels, Sensor, expose
+from fogsim.camera.glare import LensGlare
 from fogsim.camera.metering import AutoExposure, followed, metered_luminance, sensor_at, wanted_saturation
 from fogsim.camera.shading import lens_shading
 from fogsim.values import Camera
@@ -24,15 +25,24 @@ class Photographer:
         Strength of the lens's shading; see `lens_shading`.
     period : float
         Time between two pictures [s].
+    glare : float
+        Share of lamps' light that the lens scatters; see `LensGlare`.
     """
 
     def __init__(
-        self, camera: Camera, sensor: Sensor, auto: AutoExposure | None, shading: float, period: float
+        self,
+        camera: Camera,
+        sensor: Sensor,
+        auto: AutoExposure | None,
+        shading: float,
+        period: float,
+        glare: float = 0.0,
     ) -> None:
         self._camera = camera
         self._sensor = sensor
         self._auto = auto
         self._shading = lens_shading(camera, shading)[..., None] if shading > 0 else None
+        self._glare = LensGlare(camera, glare) if glare > 0 else None
         self._period = period
         self._saturation: float | None = None
 
@@ -57,7 +67,11 @@ class Photographer:
         """
         if self._shading is not None:
             radiance = radiance * self._shading
-        return expose(radiance, self._sensor_for(radiance), self._camera.response, rng)
+        # Metered without glare: how bright a lamp must be to scatter light depends on the exposure.
+        sensor = self._sensor_for(radiance)
+        if self._glare is not None:
+            radiance = self._glare.scatter(radiance, sensor.saturation_luminance)
+        return expose(radiance, sensor, self._camera.response, rng)
 
     def _sensor_for(self, radiance: NDArray[np.float32]) -> Sensor:
         if self._auto is None:

@@ -162,7 +162,7 @@ def photographer(scenario: Scenario) -> Photographer:
     section = scenario.camera
     auto = auto_exposure(scenario) if section.automatic else None
     period = scenario.clocks.camera_period_s
-    return Photographer(camera(scenario), sensor(scenario), auto, section.lens_shading, period)
+    return Photographer(camera(scenario), sensor(scenario), auto, section.lens_shading, period, section.lens_glare)
 
 
 def sensor(scenario: Scenario) -> Sensor:

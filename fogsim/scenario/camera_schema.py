@@ -111,6 +111,9 @@ class CameraSection(Section):
     lens_shading: Share = 0.0
     """Darkening of the corners: 1 for the cos⁴ of a thin lens, 0 for none."""
 
+    lens_glare: Share = 0.01
+    """Share of the light of lamps that the lens scatters around them; 0 for none."""
+
     exposure: Exposure = Exposure()
     """How the exposure is set."""
 

@@ -72,6 +72,7 @@ def test_told_errors_are_in_the_told_calibration_alone() -> None:
             r"camera: saturation_luminance_cdpm2 is that of a fixed exposure, but exposure\.mode is auto",
         ),
         (["camera.lens_shading=1.5"], r"camera\.lens_shading: .*less than or equal to 1; got 1.5"),
+        (["camera.lens_glare=1.5"], r"camera\.lens_glare: .*less than or equal to 1; got 1.5"),
         (["camera.body.pitch_deg_per_mps2=-0.1"], r"pitch_deg_per_mps2: .*greater than or equal to 0; got -0.1"),
     ],
 )

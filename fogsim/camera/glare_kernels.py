@@ -1,0 +1,200 @@
+"""The loops of the lens's glare; grids of light are (rows, 3 · columns), so that colours go side by side."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.jit import kernel
+
+_ZERO, _ONE = np.float32(0.0), np.float32(1.0)
+
+
+@kernel
+def count_bright(lines: NDArray[np.float32], limit: np.float32, counts: NDArray[np.int32]) -> int:
+    """Values above a limit in each row, and in all: a sum of integers, of which compilers make vector instructions."""
+    total = 0
+    for row in range(lines.shape[0]):
+        line, found = lines[row], np.int32(0)
+        for i in range(line.shape[0]):
+            found += np.int32(line[i] > limit)
+        counts[row] = found
+        total += found
+    return total
+
+
+@kernel
+def _scattered(line: NDArray[np.float32], at: int, limit: np.float32, share: np.float32) -> np.float32:
+    """Share of its light that a pixel loses: of what is above the limit, in the pixel's own colour."""
+    peak = max(line[at], line[at + 1], line[at + 2])
+    return share * (_ONE - limit / peak) if peak > limit else _ZERO
+
+
+@kernel
+def gather(
+    lines: NDArray[np.float32],
+    counts: NDArray[np.int32],
+    limit: np.float32,
+    share: np.float32,
+    row_at: NDArray[np.int32],
+    row_share: NDArray[np.float32],
+    column_at: NDArray[np.int32],
+    column_share: NDArray[np.float32],
+    grid: NDArray[np.float32],
+) -> None:
+    """Add the light that bright pixels scatter to the four cells around each, so that its middle stays in place."""
+    for row in range(lines.shape[0]):
+        if counts[row] == 0:
+            continue
+        line, upper, lower = lines[row], grid[row_at[row]], grid[row_at[row] + 1]
+        down = row_share[row]
+        for column in range(column_at.shape[0]):
+            lost = _scattered(line, 3 * column, limit, share)
+            if lost > _ZERO:
+                right, cell = column_share[column], 3 * column_at[column]
+                for i in range(3):
+                    light = lost * line[3 * column + i]
+                    upper[cell + i] += (_ONE - down) * (_ONE - right) * light
+                    upper[cell + 3 + i] += (_ONE - down) * right * light
+                    lower[cell + i] += down * (_ONE - right) * light
+                    lower[cell + 3 + i] += down * right * light
+
+
+@kernel
+def coarsen(
+    fine: NDArray[np.float32],
+    row_at: NDArray[np.int32],
+    row_share: NDArray[np.float32],
+    column_at: NDArray[np.int32],
+    column_share: NDArray[np.float32],
+    coarse: NDArray[np.float32],
+) -> None:
+    """Add each cell's light to the four cells around it in a coarser grid."""
+    strip = np.zeros(coarse.shape[1], np.float32)
+    for row in range(fine.shape[0]):
+        line = fine[row]
+        if not line.any():
+            continue
+        strip[:] = _ZERO
+        for column in range(column_at.shape[0]):
+            right, cell = column_share[column], 3 * column_at[column]
+            for i in range(3):
+                light = line[3 * column + i]
+                strip[cell + i] += (_ONE - right) * light
+                strip[cell + 3 + i] += right * light
+        down, upper, lower = row_share[row], coarse[row_at[row]], coarse[row_at[row] + 1]
+        for i in range(strip.shape[0]):
+            upper[i] += (_ONE - down) * strip[i]
+            lower[i] += down * strip[i]
+
+
+@kernel
+def blur(grid: NDArray[np.float32], taps: NDArray[np.float32], gain: np.float32, out: NDArray[np.float32]) -> None:
+    """Add a grid, spread by the taps along rows and columns, to another; what leaves the grid is lost."""
+    reach = taps.shape[0] // 2
+    strip = np.empty(grid.shape[1] + 6 * reach, np.float32)
+    for row in range(grid.shape[0]):
+        if grid[row].any():
+            strip[:] = _ZERO
+            _spread_along(grid[row], taps, gain, 0, grid.shape[1], strip)
+            _spread_across(strip, taps, row, 0, grid.shape[1], out)
+
+
+@kernel
+def _spread_along(
+    line: NDArray[np.float32],
+    taps: NDArray[np.float32],
+    gain: np.float32,
+    begin: int,
+    end: int,
+    strip: NDArray[np.float32],
+) -> None:
+    """Add values `begin` to before `end` of a row to a strip that is longer by the taps' reach on either side."""
+    values = line[begin:end]
+    for k in range(taps.shape[0]):
+        tap, part = gain * taps[k], strip[begin + 3 * k : end + 3 * k]
+        for i in range(values.shape[0]):
+            part[i] += tap * values[i]
+
+
+@kernel
+def _spread_across(
+    strip: NDArray[np.float32], taps: NDArray[np.float32], row: int, begin: int, end: int, out: NDArray[np.float32]
+) -> None:
+    """Add a strip, as `_spread_along` makes it, to the rows within the taps' reach."""
+    reach = taps.shape[0] // 2
+    values = strip[begin + 3 * reach : end + 3 * reach]
+    for k in range(taps.shape[0]):
+        target = row + k - reach
+        if 0 <= target < out.shape[0]:
+            tap, part = taps[k], out[target, begin:end]
+            for i in range(values.shape[0]):
+                part[i] += tap * values[i]
+
+
+@kernel
+def widen(
+    grid: NDArray[np.float32],
+    column_at: NDArray[np.int32],
+    column_share: NDArray[np.float32],
+    wide: NDArray[np.float32],
+) -> None:
+    """Interpolate the rows of a grid at the columns of a finer one."""
+    for row in range(grid.shape[0]):
+        line, out = grid[row], wide[row]
+        for column in range(column_at.shape[0]):
+            cell, right = 3 * column_at[column], column_share[column]
+            for i in range(3):
+                left = line[cell + i]
+                out[3 * column + i] = left + right * (line[cell + 3 + i] - left)
+
+
+@kernel
+def add_rows(
+    lines: NDArray[np.float32],
+    wide: NDArray[np.float32],
+    row_at: NDArray[np.int32],
+    row_share: NDArray[np.float32],
+    begin: int,
+    end: int,
+    out: NDArray[np.float32],
+) -> None:
+    """The lines from `begin` to before `end`, plus rows that are interpolated between those of a coarser grid."""
+    for row in range(begin, end):
+        line, upper, lower, sums = lines[row], wide[row_at[row]], wide[row_at[row] + 1], out[row]
+        down = row_share[row]
+        up = _ONE - down
+        for i in range(line.shape[0]):
+            sums[i] = line[i] + (up * upper[i] + down * lower[i])
+
+
+@kernel
+def spread_core(
+    lines: NDArray[np.float32],
+    counts: NDArray[np.int32],
+    limit: np.float32,
+    share: np.float32,
+    taps: NDArray[np.float32],
+    gain: np.float32,
+    out: NDArray[np.float32],
+) -> None:
+    """Take the scattered light from the bright pixels and give the part `gain` of it to those next to them."""
+    reach, size = taps.shape[0] // 2, lines.shape[1]
+    light = np.zeros(size, np.float32)
+    strip = np.empty(size + 6 * reach, np.float32)
+    for row in range(lines.shape[0]):
+        if counts[row] == 0:
+            continue
+        line, kept = lines[row], out[row]
+        first, last = size, 0
+        for at in range(0, size, 3):
+            lost = _scattered(line, at, limit, share)
+            if lost > _ZERO:
+                first, last = min(first, at), at + 3
+                for i in range(at, at + 3):
+                    light[i] = lost * line[i]
+                    kept[i] -= light[i]
+        if gain > _ZERO and first < last:
+            strip[:] = _ZERO
+            _spread_along(light, taps, gain, first, last, strip)
+            begin, end = max(0, first - 3 * reach), min(size, last + 3 * reach)
+            _spread_across(strip, taps, row, begin, end, out)
+        light[first:last] = _ZERO

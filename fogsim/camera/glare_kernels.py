@@ -17,7 +17,7 @@ def count_bright(lines: NDArray[np.float32], limit: np.float32, counts: NDArray[
         for i in range(line.shape[0]):
             found += np.int32(line[i] > limit)
         counts[row] = found
-        total += found
+        total += int(found)
     return total
 
 

@@ -1,14 +1,18 @@
-"""Published visibility estimators, one method a module, in one registry."""
+"""Visibility estimators, one method a module, in one registry: published ones and two of this project's own."""
 
 from collections.abc import Callable
 
 from fogsim import registry
+from fogsim.estimators.joint_road import JointRoad
+from fogsim.estimators.lead_contrast import LeadContrast
 from fogsim.estimators.negru2013 import Negru2013
 from fogsim.estimators.protocol import Estimator
 from fogsim.registry import Registry
 from fogsim.values.camera import Camera
 
-ESTIMATORS: Registry[Callable[..., Estimator]] = Registry("estimator", {"negru2013": Negru2013})
+ESTIMATORS: Registry[Callable[..., Estimator]] = Registry(
+    "estimator", {"negru2013": Negru2013, "joint_road": JointRoad, "lead_contrast": LeadContrast}
+)
 """Every estimator by name: called with a camera and keyword parameters it gives an `Estimator`."""
 
 

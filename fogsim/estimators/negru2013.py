@@ -1,22 +1,26 @@
 """Fog from the luminance of the road in a single daytime image (Negru & Nedevschi, ICCP 2013)."""
 
 import math
-from dataclasses import dataclass
+from collections import deque
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.estimators.image_check import checked_image
+from fogsim.errors import InputError
+from fogsim.estimators.image_check import checked_count, checked_image
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import Observation
+from fogsim.vision.canny_deriche import CannyDeriche, DericheEdges
 from fogsim.vision.curve_fit import fit_curve
-from fogsim.vision.edges import edge_map, smoothed
+from fogsim.vision.edges import smoothed
 from fogsim.vision.horizon import PITCH_DEVIATION, Horizon, calibrated_horizon, levelled
-from fogsim.vision.inflection import FogModel, best_inflection, steepest_slope
+from fogsim.vision.inflection import FogModel, best_inflection, printed_inflection, steepest_slope
 from fogsim.vision.luminance import linear_luminance
 from fogsim.vision.profile import RoadCurve, band_profile, path_lengths
 from fogsim.vision.region import Band, crossing_band, grow_region
+from fogsim.vision.vanishing import VanishingPoint, vanishing_point
 
 MIN_COLS, MIN_ROWS = 32, 16  # [px] a road narrower than this, or lower below its horizon, shows no curve
 MIN_AIRLIGHT = 6.0  # [linear grey levels] darker than this above the horizon is no day
@@ -30,6 +34,9 @@ MAX_ABOVE = 0.05
 """Share of the image's height that a clear road's region may reach above the told horizon [-]."""
 
 NEAR_HORIZON = 4.0  # [px] a region that ends this close below the horizon has seen the whole road
+REACH = math.radians(4.0)  # [rad] about the told vanishing point, within which lines of the road may pass
+AGREES = 4.0  # [-] standard deviations within which a vanishing point fits the told horizon
+ALBEDO_DEVIATION = 0.015  # [-] of k by slow changes of the road's reflectance, which the residuals do not show
 MAX_RESIDUAL = 0.12  # [-] of the fitted contrast: more is no curve of Koschmieder's
 
 
@@ -70,11 +77,17 @@ class Negru2013:
     Edges, a region grown upward from the road, the widest vertical band that crosses it, the median of each of its
     rows, the row of steepest change whose model fits best: the extinction is k = 2 (v_i − v_h) / λ.
 
-    It departs from the paper thus: the horizon comes from the calibration (the paper's own alternative to vanishing
-    points); luminance is linear, because Koschmieder's law is; eqs. 17 and 18 have their signs set right; the fog's
-    own gradient draws no edges; the band is of limited width and near the vanishing point, where the road is; and k,
-    R and A are those of least squares over the whole curve, instead of those that one row gives. The paper's choice
-    of the best of the last N frames is left out: fusion does that job, with the uncertainties.
+    As published (`as_published`), the horizon is the vanishing point of the Hough lines that most agree on one, of the
+    last `horizon_frames` frames that with the highest score (that of the calibration until there is one), k is read
+    off the inflection's row, and of the last `inflection_frames` frames the one whose curve fits best counts.
+    `printed_signs` also takes eqs. 17 and 18 as they are printed, whose signs are wrong for rows that count downward
+    (they give A = 162 where the truth is 200, and mostly choose a wrong row).
+
+    Corrected (the default), lines are fitted within the pixel and the frame's own vanishing point is weighed against
+    the calibration; luminance is linear, because Koschmieder's law is; the fog's own gradient draws no edges; the band
+    is of limited width and near the vanishing point, where the road is; and k, R and A are those of least squares over
+    the whole curve, instead of those that one row gives. Frames stand alone: averaging is the fusion's job, with the
+    uncertainties.
 
     A region that reaches the horizon without an inflection gives k = 0 with the detection limit as its deviation;
     whatever else stands in the way gives an invalid estimate with the reason in its diagnostics. Daytime only, flat
@@ -85,20 +98,49 @@ class Negru2013:
     camera : Camera
         The calibration as the vehicle was told it.
     as_published : bool
-        Read k off the inflection's row alone, as the paper does.
+        Follow the paper where it is less accurate than what is known today.
+    printed_signs : bool
+        With `as_published`: take its eqs. 17 and 18 with their wrong signs.
+    vanishing_point : bool
+        Look for the vanishing point of the road's lines; else the calibration alone gives the horizon.
+    horizon_frames, inflection_frames : int
+        With `as_published`: frames of the temporal schemes.
     pitch_deviation : float
-        Standard deviation of the true pitch about the told one [rad], for the uncertainty.
+        Standard deviation of the true pitch about the told one [rad].
+
+    Raises
+    ------
+    InputError
+        If a number of frames is not a whole number ≥ 1, or the deviation is not positive.
     """
 
     method = "negru2013"
 
-    def __init__(self, camera: Camera, *, as_published: bool = False, pitch_deviation: float = PITCH_DEVIATION) -> None:
+    def __init__(
+        self,
+        camera: Camera,
+        *,
+        as_published: bool = False,
+        printed_signs: bool = False,
+        vanishing_point: bool = True,
+        horizon_frames: int = 500,
+        inflection_frames: int = 5,
+        pitch_deviation: float = PITCH_DEVIATION,
+    ) -> None:
+        if not (math.isfinite(pitch_deviation) and pitch_deviation > 0):
+            raise InputError(f"pitch_deviation must be a positive angle in radians, got {pitch_deviation!r}")
         self._camera = camera
-        self._pitch_deviation = pitch_deviation
-        self._model = best_inflection if as_published else fit_curve
+        self._told = calibrated_horizon(camera, pitch_deviation)
+        self._as_published, self._looks_for_lines = as_published, vanishing_point
+        self._model = (printed_inflection if printed_signs else best_inflection) if as_published else fit_curve
+        self._detector = CannyDeriche()
+        self._points: deque[VanishingPoint] = deque(maxlen=checked_count("horizon_frames", horizon_frames, 1))
+        self._models: deque[FogModel] = deque(maxlen=checked_count("inflection_frames", inflection_frames, 1))
 
     def reset(self) -> None:
-        """Forget nothing: every frame stands alone."""
+        """Forget the vanishing points and inflections of earlier frames."""
+        self._points.clear()
+        self._models.clear()
 
     def update(self, observation: Observation) -> Estimate:
         """Estimate the fog from one image.
@@ -123,7 +165,10 @@ class Negru2013:
         diagnostics: dict[str, object] = {"horizon_row": self._camera.horizon_row}
         try:
             road = self._road_image(image)
-            band = _band(road, self._camera.principal_point[0])
+            edges = self._edges(road)
+            road = replace(road, horizon=self._horizon(edges, road))
+            diagnostics["horizon_row"] = road.horizon.row
+            band = _band(road, edges, self._camera.principal_point[0])
             diagnostics["band"] = (band.left, band.right, band.top + road.first_row, band.bottom + road.first_row)
             curve = self._curve(road, band)
             diagnostics["profile"] = curve.luminance
@@ -134,10 +179,41 @@ class Negru2013:
             return Estimate.invalid(self.method, str(reason), **diagnostics)
         if model is None:
             return self._no_fog(curve, road.horizon, diagnostics)
+        if self._as_published:
+            self._models.append(model)
+            model = min(self._models, key=lambda m: m.residual / max(m.airlight - m.road, 1e-9))
         return self._fog_estimate(model, road.horizon, diagnostics)
 
+    def _edges(self, road: _RoadImage) -> DericheEdges:
+        edges = self._detector(road.luminance, _fog_slope(road).astype(np.float32))
+        if edges.threshold > road.contrast:
+            raise _CannotTell("noise or texture drowns the contrast of road and airlight")
+        return edges
+
+    def _horizon(self, edges: DericheEdges, road: _RoadImage) -> Horizon:
+        """Told horizon and vanishing point, weighed (corrected), or the best vanishing point of late (published)."""
+        if not self._looks_for_lines:
+            return self._told
+        guess = (self._camera.principal_point[0], self._told.row - road.first_row)
+        reach = max(REACH * self._camera.focal_length, 8.0)
+        point = vanishing_point(edges.gradient, edges.pixels, guess, reach, refined=not self._as_published)
+        if self._as_published:
+            if point is not None:
+                self._points.append(replace(point, row=point.row + road.first_row))
+            best = max(self._points, key=lambda p: p.score, default=None)
+            found = self._told if best is None else Horizon(best.row, best.deviation)
+            return found if 1.0 <= found.row <= self._camera.height - 1 - MIN_ROWS else self._told
+        if point is None:
+            return self._told
+        row, apart = point.row + road.first_row, math.hypot(point.deviation, self._told.standard_deviation)
+        if abs(row - self._told.row) > AGREES * apart:
+            return self._told
+        share = (self._told.standard_deviation / apart) ** 2
+        deviation = point.deviation * self._told.standard_deviation / apart
+        return Horizon(self._told.row + share * (row - self._told.row), deviation)
+
     def _road_image(self, image: NDArray[np.uint8] | NDArray[np.uint16]) -> _RoadImage:
-        horizon = calibrated_horizon(self._camera, self._pitch_deviation)
+        horizon = self._told
         rows, cols = image.shape[:2]
         if not 1.0 <= horizon.row <= rows - 1:
             raise _CannotTell(f"the horizon (row {horizon.row:.1f}) is outside the image")
@@ -193,7 +269,8 @@ class Negru2013:
         return Estimate(self.method, 0.0, limit, diagnostics=diagnostics)
 
     def _fog_estimate(self, model: FogModel, horizon: Horizon, diagnostics: dict[str, object]) -> Estimate:
-        deviation = math.hypot(model.standard_deviation, model.horizon_sensitivity * horizon.standard_deviation)
+        by_horizon = model.horizon_sensitivity * horizon.standard_deviation
+        deviation = math.hypot(model.standard_deviation, by_horizon, ALBEDO_DEVIATION * model.extinction)
         inflection = horizon.row + 0.5 * model.extinction * self._camera.row_distance
         found = {"inflection_row": inflection, "airlight": model.airlight, "road": model.road}
         return Estimate(self.method, model.extinction, deviation, diagnostics={**diagnostics, **found})
@@ -209,14 +286,14 @@ def _checked(road: _RoadImage) -> _RoadImage:
     return road
 
 
-def _band(road: _RoadImage, centre: float) -> Band:
+def _fog_slope(road: _RoadImage) -> NDArray[np.float64]:
+    below_horizon = np.arange(road.luminance.shape[0], dtype=np.float64) + (road.first_row - road.horizon.row)
+    return np.minimum(steepest_slope(below_horizon, road.airlight), SIMILARITY * road.contrast)
+
+
+def _band(road: _RoadImage, edges: DericheEdges, centre: float) -> Band:
     blurred = smoothed(road.luminance)
-    below_horizon = np.arange(blurred.shape[0], dtype=np.float64) + (road.first_row - road.horizon.row)
-    fog_slope = np.minimum(steepest_slope(below_horizon, road.airlight), SIMILARITY * road.contrast)
-    edges = edge_map(blurred, fog_slope.astype(np.float32))
-    if edges.threshold > road.contrast:
-        raise _CannotTell("noise or texture drowns the contrast of road and airlight")
-    steps = (fog_slope + edges.threshold).astype(np.float32)
+    steps = (_fog_slope(road) + edges.threshold).astype(np.float32)
     region = grow_region(blurred, edges.pixels, steps, SIMILARITY * road.contrast + edges.threshold)
     cols = region.shape[1]
     band = crossing_band(

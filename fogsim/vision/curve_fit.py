@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 MIN_INFLECTION = 0.1
 """Smallest k λ that is looked for, twice the rows of the inflection below the horizon [px]."""
 
-FIRST_COUNT = 60  # extinctions in the first search, evenly spaced in ln k
+FIRST_COUNT = 40  # extinctions in the first search, evenly spaced in ln k
 
 HUBER = 2.0
 """Residuals beyond this many standard deviations count linearly, not squared [-]."""
@@ -49,9 +49,9 @@ def _minimum(curve: RoadCurve, weight: Floats, low: float, high: float, count: i
         return None
     centre, step = float(grid[best]), float(grid[1] - grid[0])
     for _ in range(5):
-        grid = np.linspace(centre - step, centre + step, 9)
+        grid = np.linspace(centre - step, centre + step, 7)
         centre = float(grid[int(np.argmin(_line(np.exp(grid), curve, weight).error))])
-        step *= 0.25
+        step *= 0.3
     return math.exp(centre)
 
 
@@ -80,7 +80,7 @@ def fit_curve(curve: RoadCurve) -> FogModel | None:
         found = _minimum(curve, weight, low, high, count)
         if found is None:
             return None
-        extinction, low, high, count = found, 0.5 * found, 2.0 * found, 15
+        extinction, low, high, count = found, 0.7 * found, 1.4 * found, 9
         line = _line(np.array([extinction]), curve, weight)
         airlight, drop = float(line.airlight[0]), float(line.drop[0])
         residual = curve.luminance - koschmieder(extinction, airlight + drop, airlight, curve.distance)

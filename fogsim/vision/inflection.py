@@ -1,6 +1,7 @@
 """Koschmieder's law on a flat road seen by a camera: its inflection point and what follows from it."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from fogsim.vision.profile import RoadCurve, decreasing
 
 Floats = NDArray[np.float64]
+Parameters = Callable[[Floats, Floats, Floats, float], tuple[Floats, Floats, Floats]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +106,41 @@ def inflection_parameters(
     return 2.0 * below_horizon / row_distance, luminance + (math.e**2 - 1.0) * change, luminance - change
 
 
-def best_inflection(curve: RoadCurve) -> FogModel | None:
+def printed_parameters(
+    below_horizon: Floats, luminance: Floats, gradient: Floats, row_distance: float
+) -> tuple[Floats, Floats, Floats]:
+    """Fog from the row of the inflection with negru2013's eqs. 17 and 18 as printed, whose signs are wrong.
+
+    R = I_i − (1 − e²) e² (v_i − v_h)/2 · dI/dv and A = I_i + (v_i − v_h)/2 · dI/dv, for rows that count downward. Only
+    for comparison with the paper: see `inflection_parameters`.
+
+    Parameters
+    ----------
+    below_horizon, luminance, gradient, row_distance
+        As in `inflection_parameters`.
+
+    Returns
+    -------
+    tuple of float64
+        k [1/m], R, A.
+    """
+    change = 0.5 * below_horizon * gradient
+    square = math.e**2
+    return 2.0 * below_horizon / row_distance, luminance - (1.0 - square) * square * change, luminance + change
+
+
+def printed_inflection(curve: RoadCurve) -> FogModel | None:
+    """As `best_inflection`, with the equations as the paper prints them.
+
+    Parameters
+    ----------
+    curve : RoadCurve
+        Luminance of the road by row.
+    """
+    return best_inflection(curve, printed_parameters)
+
+
+def best_inflection(curve: RoadCurve, parameters: Parameters = inflection_parameters) -> FogModel | None:
     """Row of steepest change whose model fits the curve best (negru2013 section IV.B.c).
 
     Candidates are the local maxima of |dI/dv| of the monotone curve below the horizon. The standard deviation is that
@@ -114,6 +150,8 @@ def best_inflection(curve: RoadCurve) -> FogModel | None:
     ----------
     curve : RoadCurve
         Luminance of the road by row.
+    parameters : callable
+        k, R and A from row, luminance, slope and λ.
 
     Returns
     -------
@@ -126,7 +164,7 @@ def best_inflection(curve: RoadCurve) -> FogModel | None:
     rows = np.flatnonzero(peaks)
     if rows.size == 0:
         return None
-    k, road, airlight = inflection_parameters(curve.below_horizon[rows], smooth[rows], -slope[rows], curve.row_distance)
+    k, road, airlight = parameters(curve.below_horizon[rows], smooth[rows], -slope[rows], curve.row_distance)
     model = koschmieder(k[:, None], road[:, None], airlight[:, None], curve.distance)
     errors = ((model - curve.luminance) ** 2) @ curve.weight
     best = int(np.argmin(errors))

@@ -55,18 +55,54 @@ def grow_upward(
         near_seed = abs(luminance[rows - 1, col] - seed) <= seed_tolerance
         region[rows - 1, col] = near_seed and edges[rows - 1, col] == 0
     drift = seed_tolerance
+    nowhere = np.float32(np.inf)
+    # What lies below and belongs to the region, with a border; infinite where nothing does: one comparison tells both.
+    lower = np.full(cols + 2, nowhere, np.float32)
+    for col in range(cols):
+        lower[col + 1] = luminance[rows - 1, col] if region[rows - 1, col] != 0 else nowhere
+    joined = np.full(cols + 2, nowhere, np.float32)
     for row in range(rows - 2, -1, -1):
         step = steps[row]
         drift += step
+        line, marked, target = luminance[row], edges[row], region[row]
+        first, last = np.float32(seed - drift), np.float32(seed + drift)
+        before, under, behind, inside = lower[:cols], lower[1 : cols + 1], lower[2:], joined[1 : cols + 1]
         for col in range(cols):
-            value = luminance[row, col]
-            if edges[row, col] != 0 or abs(value - seed) > drift:
-                continue
-            for below in range(max(col - 1, 0), min(col + 2, cols)):
-                if region[row + 1, below] != 0 and abs(value - luminance[row + 1, below]) <= step:
-                    region[row, col] = 1
-                    break
+            value = line[col]
+            apart = min(abs(value - before[col]), abs(value - under[col]), abs(value - behind[col]))
+            inside[col] = value if (apart <= step) & (value >= first) & (value <= last) else nowhere
+        for col in range(cols):
+            if marked[col] != 0:
+                inside[col] = nowhere
+            target[col] = inside[col] != nowhere
+        lower, joined = joined, lower
     return region
+
+
+@kernel
+def levelled_gradient(
+    across: NDArray[np.float32],
+    down: NDArray[np.float32],
+    slope: NDArray[np.float32],
+    steps: float,
+    fixed_across: NDArray[np.int16],
+    fixed_down: NDArray[np.int16],
+) -> None:
+    """Take each row's (rows,) slope from the downward gradient, in place; write both gradients in fixed point.
+
+    What is steeper than 16 bits hold is an edge all the same, so it is cut off.
+    """
+    rows, cols = across.shape
+    unit, most = np.float32(steps), np.float32(32767.0)
+    for row in range(rows):
+        ramp = slope[row]
+        source, target = across[row], fixed_across[row]
+        for col in range(cols):
+            target[col] = np.int16(min(max(source[col] * unit, -most), most))
+        source, target = down[row], fixed_down[row]
+        for col in range(cols):
+            source[col] -= ramp
+            target[col] = np.int16(min(max(source[col] * unit, -most), most))
 
 
 @kernel
@@ -77,12 +113,16 @@ def column_tops(region: NDArray[np.uint8], hole: int) -> NDArray[np.int64]:
     """
     rows, cols = region.shape
     tops = np.full(cols, rows, np.int64)
-    for col in range(cols):
-        for row in range(rows - 1, -1, -1):
-            if region[row, col] != 0:
+    for row in range(rows - 1, -1, -1):
+        line = region[row]
+        going = 0
+        for col in range(cols):
+            unbroken = tops[col] - row <= hole + 1
+            going += unbroken
+            if unbroken and line[col] != 0:
                 tops[col] = row
-            elif tops[col] - row > hole:
-                break
+        if going == 0:
+            break
     return tops
 
 
@@ -115,7 +155,10 @@ def highest_band(
     tuple of int
         Top row, first column, width; the width is 0 where no band is wide enough.
     """
-    for top in range(bottom):
+    # Only where a column ends can a band appear that was not there a row higher.
+    for top in np.unique(tops):
+        if top >= bottom:
+            break
         start, width = best_run(tops, top, enough, centre)
         if width >= min_width:
             return top, start, width

@@ -19,9 +19,11 @@ class Road:
     terrain: float = 45.0
     sky: float | None = None  # luminance of the sky, the airlight if None
     patch_contrast: float = 0.03
+    drift: float = 0.0  # albedo wanders by as much within 40 m
     noise: float = 1.0  # pixel values
     lead_distance: float | None = None
     lead_paint: float = 30.0
+    lead_brakes: bool = False
     marks: bool = True
     camera: Camera = field(
         default_factory=lambda: Camera(640, 480, 577.0, (319.5, 239.5), 1.38, np.radians(2.0), response=Response.LINEAR)
@@ -33,7 +35,7 @@ class Road:
 
 def ground(road: Road, ahead: np.ndarray, left: np.ndarray, seed: int) -> np.ndarray:
     """Luminance of the ground without fog."""
-    asphalt = road.asphalt * (1.0 + road.patch_contrast * patches(ahead, left, seed))
+    asphalt = road.asphalt * (1.0 + road.patch_contrast * patches(ahead, left, seed) + road.drift * drift(ahead, seed))
     out = np.where(
         np.abs(left) < 5.4, asphalt, road.terrain * (1.0 + 3 * road.patch_contrast * patches(ahead, left, seed + 7))
     )
@@ -42,6 +44,12 @@ def ground(road: Road, ahead: np.ndarray, left: np.ndarray, seed: int) -> np.nda
         dashed = (np.abs(np.abs(left) - 1.75) < 0.075) & ((ahead % 12.0) < 4.0)
         out = np.where(solid | dashed, road.mark, out)
     return out
+
+
+def drift(ahead: np.ndarray, seed: int) -> np.ndarray:
+    """A slow change along the road: uniform within ±1 at every 40 m, straight in between."""
+    knots = np.random.default_rng(seed + 400).uniform(-1.0, 1.0, 64)
+    return np.interp(ahead % 2520.0, 40.0 * np.arange(64), knots)
 
 
 def patches(ahead: np.ndarray, left: np.ndarray, seed: int) -> np.ndarray:
@@ -76,6 +84,11 @@ def luminance(road: Road, rows: np.ndarray, cols: np.ndarray, seed: int) -> np.n
         height, side = camera.mount_height - plane * down, plane * x
         box = (np.abs(side) < 0.9) & (height > 0.0) & (height < 1.5) & ((plane < depth) | ~hits)
         intrinsic = np.where(box, np.where(height < 0.3, 8.0, road.lead_paint), intrinsic)
+        glass = box & (height > 0.95) & (height < 1.4) & (np.abs(side) < 0.7)
+        intrinsic = np.where(glass, 12.0, intrinsic)
+        if road.lead_brakes:
+            lamps = box & (np.abs(height - 0.8) < 0.09) & (np.abs(np.abs(side) - 0.72) < 0.12)
+            intrinsic = np.where(lamps, 900.0, intrinsic)
         length = np.where(box, plane * np.sqrt(x**2 + 1.0 + y**2), length)
     transmission = np.exp(-3.0 * np.where(np.isfinite(length), length, 0.0) / road.visibility)
     sky = road.airlight if road.sky is None else road.sky

@@ -33,7 +33,9 @@ def test_recovers_visibility_on_a_foreign_renderers_frames(render, road, visibil
 @pytest.mark.parametrize(("camera", "visibility"), [(SMALL, 50), (SMALL, 100), (SMALL, 200), (WIDE, 100), (WIDE, 400)])
 def test_recovers_visibility_with_other_cameras(render, road, camera, visibility):
     error = visibilities(render, road.but(visibility=visibility, camera=camera), range(3)) / visibility - 1
-    assert np.median(np.abs(error)) < 0.10
+    # With the small camera the inflection of 200 m is 1.5 rows below the horizon: one of three may not be seen.
+    assert np.isfinite(error).sum() >= 2
+    assert np.nanmedian(np.abs(error)) < 0.10
 
 
 def test_a_rolled_camera_sees_the_same_fog(render, road):
@@ -146,7 +148,7 @@ def test_visibility_scales_with_the_told_height(render, road):
 def test_diagnostics_say_what_was_found(render, road):
     found = estimate(render(road), road.camera)
     details = found.diagnostics
-    assert details["horizon_row"] == road.camera.horizon_row
+    assert details["horizon_row"] == pytest.approx(road.camera.horizon_row, abs=0.5)
     depth = road.camera.row_distance / (details["inflection_row"] - details["horizon_row"])
     assert depth == pytest.approx(2 / found.extinction)
     assert details["airlight"] == pytest.approx(200, abs=3)
@@ -269,3 +271,38 @@ def test_a_frame_takes_few_milliseconds(render, road):
         times.append(time.perf_counter() - start)
     # 3.4 ms on one idle core; the wide margin is for busy machines.
     assert min(times) < 20e-3
+
+
+def test_the_vanishing_point_mends_a_horizon_that_is_off(render, road):
+    errors = {True: [], False: []}
+    for seed, pitch in enumerate((-0.15, 0.15, -0.1, 0.1)):
+        true = replace(road.camera, pitch=road.camera.pitch + np.radians(pitch))
+        image = render(road.but(visibility=200.0, camera=true), seed)
+        for looks, found in errors.items():
+            found.append(abs(estimate(image, road.camera, vanishing_point=looks).visibility / 200.0 - 1.0))
+    assert np.mean(errors[True]) < 0.5 * np.mean(errors[False])
+
+
+def test_printed_signs_are_far_off(render, road):
+    # negru2013 eqs. 17 and 18 as printed; physics.md section 5.4 has the right ones.
+    right = visibilities(render, road, range(3), as_published=True)
+    printed = visibilities(render, road, range(3), as_published=True, printed_signs=True)
+    assert np.nanmin(np.abs(right / 100.0 - 1.0)) < 0.2
+    # What the printed equations make of the row is no model of the curve: refused, or far off.
+    assert all(np.isnan(found) or abs(found / 100.0 - 1.0) > 0.3 for found in printed)
+
+
+def test_as_published_keeps_the_best_vanishing_point_and_inflection(render, road):
+    estimator = make("negru2013", road.camera, as_published=True)
+    lined = estimator.update(Observation(render(road)))
+    bare = estimator.update(Observation(render(road.but(marks=False, terrain=60.0), 1)))
+    assert bare.diagnostics["horizon_row"] == lined.diagnostics["horizon_row"]
+    estimator.reset()
+    alone = estimator.update(Observation(render(road.but(marks=False, terrain=60.0), 1)))
+    assert alone.diagnostics["horizon_row"] == road.camera.horizon_row
+
+
+@pytest.mark.parametrize("name", ["horizon_frames", "inflection_frames", "pitch_deviation"])
+def test_parameters_out_of_range_are_errors(road, name):
+    with pytest.raises(InputError, match=name):
+        make("negru2013", road.camera, **{name: 0})

@@ -1,0 +1,206 @@
+"""Fog from the luminance of the road and the sky, fitted jointly with the horizon and an albedo that may wander."""
+
+import math
+from collections import deque
+from statistics import NormalDist
+
+from fogsim.errors import InputError
+from fogsim.estimators.image_check import checked_count, checked_image
+from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
+from fogsim.values.camera import Camera
+from fogsim.values.estimate import Estimate
+from fogsim.values.observation import LeadMeasurement, Observation
+from fogsim.vision.horizon import PITCH_DEVIATION, calibrated_horizon, levelled
+from fogsim.vision.joint_fit import JointFit, JointPrior, fit_jointly
+from fogsim.vision.response import linear_table
+from fogsim.vision.strips import (
+    SATURATED_SHARE,
+    Sky,
+    StripCurves,
+    linear_pixels,
+    mean_curves,
+    sky_above,
+    strip_curves,
+    strip_geometry,
+    without_clipped,
+)
+
+MIN_COLS, MIN_ROWS = 32, 16
+"""A road narrower than this, or lower below its horizon, shows no curve [px]."""
+
+MIN_AIRLIGHT = 6.0
+"""Sky darker than this is no day [linear grey levels]."""
+
+MIN_CONTRAST = 0.08
+"""Least contrast of the road to the airlight for fog to show [-]."""
+
+MAX_MISFIT = 4.0
+"""Mean square of the standardised residuals beyond which the curve is none of Koschmieder's [-]."""
+
+MIN_USED = 0.4
+"""Least share of the own lane's bins, as far as it is free, that must fit [-]."""
+
+SURE_OF_FOG = 2.0
+"""Least k in its standard deviations for an estimate of dense fog [-]."""
+
+CLEAR = OPTICAL_DEPTH_AT_VISIBILITY / 300.0
+"""Extinction that an unsure estimate must surely be below to say "little fog" [1/m]."""
+
+SKY_DEVIATION = 0.005
+"""Relative deviation of the airlight at the horizon from the sky above it [-]."""
+
+OVEREXPOSURE = 0.15
+"""How far a sky without any unsaturated pixel may lie above saturation, as a deviation [-]."""
+
+MOSTLY = 0.98
+"""Share of saturated pixels beyond which a sky tells no more than that it is brighter [-]."""
+
+RANGE_MARGIN = 0.5
+"""By how much a lead vehicle's foot may be nearer than its range says [m]."""
+
+
+class JointRoad:
+    """Joint fit of extinction, airlight, horizon and wandering albedo to strips of road and rows of sky.
+
+    The mean luminance of each row of three strips of road (the own lane's middle and those of both neighbours) follows
+    Koschmieder's law L = A − (A − R(d)) e^(−kd) along the slant path d = λ √(1 + x² + y²) / (v − v_h). Fitted are k, A
+    (prior: the sky), v_h (prior: the calibration) and R(d), which is a constant of each strip plus patches of its own
+    plus a smooth drift that the strips share. Patches and drift correlate the rows, so the fit is generalised least
+    squares by a Kalman filter along the road; how strong they are is averaged over by evidence. Rows that do not fit
+    are left out, and what lies behind an obstacle on the road with them; a tracked lead vehicle hides its lane.
+
+    Own method: no paper describes it. It stands on Hautière et al. 2006 and negru2013 for the geometry of fog on a
+    flat road. Daytime only; the road must be darker than the airlight.
+
+    Parameters
+    ----------
+    camera : Camera
+        The calibration as the vehicle was told it.
+    pitch_deviation : float
+        Standard deviation of the true pitch about the told one [rad].
+    frames : int
+        How many of the last frames' curves are averaged; 1 lets every frame stand alone. More average patches out,
+        and lag behind a change of fog by half as many frames.
+
+    Raises
+    ------
+    InputError
+        If `frames` is not a whole number ≥ 1 or the deviation is not positive.
+    """
+
+    method = "joint_road"
+
+    def __init__(self, camera: Camera, *, pitch_deviation: float = PITCH_DEVIATION, frames: int = 1) -> None:
+        if not (math.isfinite(pitch_deviation) and pitch_deviation > 0):
+            raise InputError(f"pitch_deviation must be a positive angle in radians, got {pitch_deviation!r}")
+        self._camera = camera
+        self._horizon = calibrated_horizon(camera, pitch_deviation)
+        self._impossible = _impossible(camera)
+        self._geometry = strip_geometry(camera, max(1.0, self._horizon.standard_deviation))
+        self._earlier: deque[tuple[StripCurves, Sky]] = deque(maxlen=checked_count("frames", frames, 1))
+
+    def reset(self) -> None:
+        """Forget all earlier frames."""
+        self._earlier.clear()
+
+    def update(self, observation: Observation) -> Estimate:
+        """Estimate the fog from one image, and the range of the lead vehicle if it is tracked.
+
+        Parameters
+        ----------
+        observation : Observation
+            Its image and its lead are used.
+
+        Returns
+        -------
+        Estimate
+            Diagnostics: ``horizon_row`` and ``told_horizon_row`` [px], ``inflection_row`` [px], ``airlight`` and
+            ``road`` [linear grey levels, 0 … 255], ``misfit`` [-], ``band`` (left, right, top, bottom) of the own
+            lane's rows in use [px]; or ``reason``.
+
+        Raises
+        ------
+        InputError
+            If the image is not of the camera's bit depth, not grey or colour, or not of the told camera's size.
+        """
+        image = checked_image(observation.image, self._camera)
+        found: dict[str, object] = {
+            "horizon_row": self._camera.horizon_row,
+            "told_horizon_row": self._camera.horizon_row,
+        }
+        if self._impossible:
+            return Estimate.invalid(self.method, self._impossible, **found)
+        pixels = linear_pixels(levelled(image, self._camera), self._camera)
+        sky = sky_above(pixels, self._camera, 3.0 * self._horizon.standard_deviation + 2.0)
+        if sky is None or sky.luminance < MIN_AIRLIGHT:
+            return Estimate.invalid(
+                self.method, "too dark above the horizon, or no sky: this is a daytime method", **found
+            )
+        free = _free_road(observation.lead)
+        curves = strip_curves(pixels, self._geometry, sky.noise, self._camera, free)
+        self._earlier.append((without_clipped(curves) if sky.is_clipped else curves, sky))
+        curves = mean_curves(tuple(self._earlier))
+        fit = fit_jointly(curves, self._geometry, self._prior(sky))
+        reason = "too little road is seen" if fit is None else self._doubt(fit, sky, curves, free)
+        if fit is None or reason:
+            return Estimate.invalid(self.method, reason, **found)
+        return self._estimate(fit, found)
+
+    def _prior(self, sky: Sky) -> JointPrior:
+        deviation = math.hypot(SKY_DEVIATION * sky.luminance, sky.deviation)
+        shift = self._horizon.standard_deviation
+        if not sky.is_clipped:
+            return JointPrior(sky.luminance, deviation, deviation, shift)
+        table = linear_table(self._camera.response, self._camera.bits)
+        level = float(table[-1] - table[-2]) * (2**self._camera.bits / 256.0)
+        if sky.saturated > MOSTLY:
+            return JointPrior(255.0 + level, 2.0 * level, OVEREXPOSURE * 255.0, shift)
+        if sky.saturated < SATURATED_SHARE:
+            # One of the colours is clipped: there is more light than the others show.
+            return JointPrior(sky.luminance + level, deviation + level, deviation + 4.0 * level, shift)
+        # Noise carries some of the sky's pixels below saturation: the share of the others tells how bright it is.
+        airlight = 255.0 - 0.5 * level + 1.3 * level * NormalDist().inv_cdf(sky.saturated)
+        return JointPrior(airlight, deviation + level, deviation + level, shift)
+
+    def _doubt(self, fit: JointFit, sky: Sky, curves: StripCurves, free: float) -> str:
+        """Say why a fit is not to be believed; empty if it is."""
+        if fit.road >= (1.0 - MIN_CONTRAST) * fit.airlight or fit.road >= 0.98 * sky.luminance:
+            return "the road is nearly as bright as the airlight, or brighter"
+        if fit.misfit > MAX_MISFIT:
+            return "the road fades, but not as Koschmieder's law has it"
+        near = (curves.variance[0] > 0) & (self._geometry.distance < min(free, 1.5 / max(fit.extinction, 0.01)))
+        if near.sum() < MIN_ROWS // 2 or fit.used[0][near].mean() < MIN_USED:
+            return "the road ahead is hidden, or is none"
+        upper = fit.extinction + 2.0 * fit.extinction_deviation
+        if fit.extinction < SURE_OF_FOG * fit.extinction_deviation and upper > CLEAR:
+            return "the extinction is not observable: too little road is seen"
+        return ""
+
+    def _estimate(self, fit: JointFit, found: dict[str, object]) -> Estimate:
+        horizon = self._camera.horizon_row + fit.shift
+        rows = self._geometry.first[fit.used[0]]
+        left, right = self._geometry.left[0][fit.used[0]], self._geometry.right[0][fit.used[0]]
+        found |= {"horizon_row": horizon, "airlight": fit.airlight, "road": fit.road, "misfit": fit.misfit}
+        found["band"] = (int(left.min()), int(right.max()), int(rows.min()), int(self._geometry.last[0]))
+        extinction = max(fit.extinction, 0.0)
+        if extinction > 0:
+            found["inflection_row"] = horizon + 0.5 * extinction * self._camera.row_distance
+        return Estimate(self.method, extinction, fit.extinction_deviation, diagnostics=found)
+
+
+def _impossible(camera: Camera) -> str:
+    """Say why a camera can never show a foggy road; empty if it can."""
+    if abs(camera.roll) > math.pi / 4:
+        return "the camera lies on its side or is upside-down"
+    if not 4.0 <= camera.horizon_row <= camera.height - 1:
+        return f"the horizon (row {camera.horizon_row:.1f}) is outside the image"
+    if camera.height - 1 - camera.horizon_row < MIN_ROWS or camera.width < MIN_COLS:
+        return "the image is too small to show a curve"
+    return ""
+
+
+def _free_road(lead: LeadMeasurement | None) -> float:
+    """Depth up to which the own lane is free of the tracked vehicle [m]."""
+    if lead is None or not math.isfinite(lead.distance):
+        return math.inf
+    return max(lead.distance - RANGE_MARGIN, 1.0)

@@ -1,0 +1,185 @@
+"""Joint fit of extinction, airlight and horizon over strips of road whose albedo may wander."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.vision import joint_kernels
+from fogsim.vision.strips import StripCurves, StripGeometry
+
+Floats = NDArray[np.float64]
+
+PATCH_LENGTH, DRIFT_LENGTH = 3.0, 30.0
+"""Lengths over which the albedo of a strip forgets itself: repaired patches, and slow change along the road [m]."""
+
+ALBEDOS = ((0.015, 0.005), (0.015, 0.04), (0.015, 0.12), (0.04, 0.05))
+"""Deviations of patches and of drift that are tried, relative to the road's luminance [-]."""
+
+ALBEDO_CHANCES = (0.4, 0.2, 0.25, 0.15)
+"""How likely each of those is before the image is seen [-]."""
+
+EXTINCTIONS = 22
+"""Extinctions of the first search, evenly in ln k."""
+
+STEPS, MORE_STEPS = 10, 5
+"""Most Gauss–Newton steps for the first strength of patches and drift, and from its answer for each of the others."""
+
+LEAST_BINS, NEAR_BINS = 8, 12
+"""Fewest bins of the own lane for a fit; nearest bins that the first guess of the road's luminance is made of."""
+
+
+@dataclass(frozen=True, slots=True)
+class JointFit:
+    """Posterior of a joint fit.
+
+    Attributes
+    ----------
+    extinction, extinction_deviation : float
+        k and its standard deviation [1/m]; k may come out a little below 0.
+    airlight : float
+        A [linear grey levels].
+    shift : float
+        Rows by which the horizon is lower than told [px].
+    road : float
+        Luminance of the own lane without fog [linear grey levels].
+    misfit : float
+        Mean square of the standardised residuals; about 1 where the model holds.
+    used : (strips, n) bool
+        Bins that took part.
+    """
+
+    extinction: float
+    extinction_deviation: float
+    airlight: float
+    shift: float
+    road: float
+    misfit: float
+    used: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class JointPrior:
+    """What is known before the road is looked at.
+
+    Attributes
+    ----------
+    airlight : float
+        Luminance of the sky [linear grey levels].
+    below, above : float
+        Deviation of the airlight from it, downward and upward; upward it is large where the sky is saturated.
+    shift_deviation : float
+        Standard deviation of the horizon's row [px].
+    """
+
+    airlight: float
+    below: float
+    above: float
+    shift_deviation: float
+
+
+def fit_jointly(curves: StripCurves, geometry: StripGeometry, prior: JointPrior) -> JointFit | None:
+    """Fit Koschmieder's law to strips of road.
+
+    The likelihood is that of `fogsim.vision.joint_kernels`; how much the albedo wanders is unknown, so several answers
+    are tried and averaged by their evidence (Laplace's approximation), which makes the deviation honest where the road
+    itself fades.
+
+    Parameters
+    ----------
+    curves : StripCurves
+        Luminance by bin.
+    geometry : StripGeometry
+        Where the bins are.
+    prior : JointPrior
+        Sky and horizon.
+
+    Returns
+    -------
+    JointFit or None
+        None if there are too few bins.
+    """
+    if int((curves.variance[0] > 0).sum()) < LEAST_BINS:
+        return None
+    data = _Data(curves, geometry)
+    start = data.start(prior.airlight)
+    if start is None:
+        return None
+    found = [data.refined(ALBEDOS[0], prior, np.array([start, prior.airlight, 0.0]), STEPS)]
+    found += [data.refined(albedo, prior, found[0].theta, MORE_STEPS) for albedo in ALBEDOS[1:]]
+    return _average(found)
+
+
+@dataclass(frozen=True, slots=True)
+class _Refined:
+    """Answer for one strength of patches and drift: k, airlight and shift with their covariance."""
+
+    theta: Floats
+    covariance: Floats
+    cost: float
+    misfit: float
+    road: float
+    used: NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True)
+class _Data:
+    """Strips of one image, as the kernels take them."""
+
+    curves: StripCurves
+    geometry: StripGeometry
+
+    @property
+    def _bins(self) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats, Floats]:
+        g = self.geometry
+        return (self.curves.luminance, self.curves.variance, g.below, g.half, g.path, g.distance, g.extent)
+
+    def start(self, airlight: float) -> float | None:
+        """Extinction of the greatest likelihood on a coarse grid, the horizon as told and the airlight as the sky."""
+        unit = 1.0 / float(self.geometry.path[0, 0])
+        extinctions = np.geomspace(0.2 * unit, 2.0 * unit * float(self.geometry.below[0]), EXTINCTIONS)
+        cost = joint_kernels.search(*self._bins, _albedo(ALBEDOS[1]), extinctions, airlight)
+        best = int(np.argmin(cost))
+        return float(extinctions[best]) if math.isfinite(cost[best]) else None
+
+    def refined(self, albedo: tuple[float, float], prior: JointPrior, start: Floats, steps: int) -> _Refined:
+        """Gauss–Newton from a start."""
+        luminance, noise, below, half, path = self._bins[:5]
+        strips, count = luminance.shape
+        k, airlight = float(start[0]), float(start[1])
+        near = [
+            joint_kernels.near_road(luminance[s], noise[s], below, half, path[s], k, airlight, NEAR_BINS)
+            for s in range(strips)
+        ]
+        road = np.clip(np.array(near), 0.01 * airlight, airlight)
+        used = np.zeros((strips, count), np.uint8)
+        known = np.array([prior.airlight, prior.below, prior.above, prior.shift_deviation])
+        theta, covariance, cost, squares, number = joint_kernels.refine(
+            *self._bins, _albedo(albedo), known, start, road, used, steps
+        )
+        return _Refined(theta, covariance, cost, squares / max(number, 1), float(road[0]), used)
+
+
+def _albedo(deviations: tuple[float, float]) -> Floats:
+    """Deviation and length of patches, deviation and length of drift, as the kernels take them."""
+    return np.array([deviations[0], PATCH_LENGTH, deviations[1], DRIFT_LENGTH])
+
+
+def _average(found: list[_Refined]) -> JointFit:
+    costs = np.array([f.cost for f in found]) - 2.0 * np.log(ALBEDO_CHANCES)
+    weight = np.exp(-0.5 * (costs - costs.min()))
+    weight /= weight.sum()
+    thetas = np.array([f.theta for f in found])
+    mean = weight @ thetas
+    variance = float(weight @ (np.array([f.covariance[0, 0] for f in found]) + (thetas[:, 0] - mean[0]) ** 2))
+    best = found[int(np.argmax(weight))]
+    return JointFit(
+        extinction=float(mean[0]),
+        extinction_deviation=math.sqrt(variance),
+        airlight=float(mean[1]),
+        shift=float(mean[2]),
+        road=best.road,
+        misfit=best.misfit,
+        used=best.used == joint_kernels.USED,
+    )

@@ -1,0 +1,324 @@
+"""Strips of road along the vehicle's axis, and rows of sky above it: what the joint fit of fog looks at."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.values.camera import Camera
+from fogsim.vision import strip_kernels
+from fogsim.vision.response import linear_table
+
+Floats = NDArray[np.float64]
+Pixels = NDArray[np.uint8] | NDArray[np.uint16]
+
+LANES = ((-1.4, 1.4), (-4.9, -2.1), (2.1, 4.9))
+"""Sides of the strips to the right of the vehicle's axis [m]: the own lane's middle, and those of its neighbours."""
+
+WHOLE_ROWS = 28.0
+"""Rows below the horizon up to which every row is a bin of its own [px]; from there bins grow with the distance."""
+
+GRAIN = 0.5
+"""Size of pieces of road whose albedo counts as independent beside the patches [m]."""
+
+LEAST_DEVIATION = 0.1
+"""Least deviation of a bin's mean: what quantisation leaves [linear grey levels]."""
+
+HALF_VEHICLE = 1.3
+"""Half the width that a tracked vehicle ahead may hide, its offset in the lane included [m]."""
+
+CHANNEL_WEIGHTS = (0.2126, 0.7152, 0.0722)
+"""Weights of red, green and blue in luminance (ITU-R BT.709) [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class StripGeometry:
+    """Where the strips lie in the image of a camera on a flat road, nearest bin of rows first.
+
+    Attributes
+    ----------
+    first, last : (n,) int64
+        Rows of each bin.
+    below, half : (n,) float64
+        Middle of each bin below the told horizon, and half its height [px].
+    distance, extent : (n,) float64
+        Depth of each bin along the road, and how much road it covers [m].
+    left, right : (strips, n) float64
+        Columns between which each strip lies.
+    path : (strips, n) float64
+        λ times the slant: over the rows below the horizon, the length of the ray [px·m].
+    """
+
+    first: NDArray[np.int64]
+    last: NDArray[np.int64]
+    below: Floats
+    half: Floats
+    distance: Floats
+    extent: Floats
+    left: Floats
+    right: Floats
+    path: Floats
+
+    @property
+    def rows(self) -> Floats:
+        """(n,) float64: height of each bin [px]."""
+        return 2.0 * self.half
+
+
+def strip_geometry(camera: Camera, nearest: float, lanes: tuple[tuple[float, float], ...] = LANES) -> StripGeometry:
+    """Lay strips over the image of a camera.
+
+    Parameters
+    ----------
+    camera : Camera
+        The told calibration; its roll is taken as undone.
+    nearest : float
+        Rows below the horizon from which the road is looked at [px].
+    lanes : tuple of (float, float)
+        Sides of each strip to the right of the vehicle's axis [m].
+    """
+    first, last = _row_bins(camera, nearest)
+    below: Floats = 0.5 * (first + last).astype(np.float64) - camera.horizon_row
+    half: Floats = 0.5 * (last - first + 1).astype(np.float64)
+    u0 = camera.principal_point[0]
+    # A lateral offset x at depth z, seen from a camera that looks down, is α x / z columns off the axis.
+    across = camera.focal_length / camera.row_distance * below
+    sides = np.array(lanes)
+    left, right = u0 + sides[:, :1] * across, u0 + sides[:, 1:] * across
+    left, right = _inside(left, right, camera.width)
+    slant = _mean_slant((left - u0) / camera.focal_length, (right - u0) / camera.focal_length, below, camera)
+    return StripGeometry(
+        first=first,
+        last=last,
+        below=below,
+        half=half,
+        distance=camera.row_distance / below,
+        extent=camera.row_distance * 2.0 * half / np.maximum(below**2 - half**2, 1e-9),
+        left=left,
+        right=right,
+        path=camera.row_distance * slant,
+    )
+
+
+def _inside(left: Floats, right: Floats, width: int) -> tuple[Floats, Floats]:
+    """Cut strips to the image; of what is mostly outside nothing is left."""
+    low, high = np.clip(left, -0.5, width - 0.5), np.clip(right, -0.5, width - 0.5)
+    return low, np.where(high - low < 0.3 * (right - left), low, high)
+
+
+def _mean_slant(left: Floats, right: Floats, below: Floats, camera: Camera) -> Floats:
+    """Length of the ray over the depth, averaged across each strip by Simpson's rule: near, a lane is wide."""
+    y = (below + camera.horizon_row - camera.principal_point[1]) / camera.focal_length
+    ends, middle = (np.sqrt(1.0 + x**2 + y**2) for x in (np.stack([left, right]), 0.5 * (left + right)))
+    return np.asarray((ends[0] + 4.0 * middle + ends[1]) / 6.0)
+
+
+def _row_bins(camera: Camera, nearest: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    first = []
+    last = []
+    row = camera.height - 1
+    top = max(math.ceil(camera.horizon_row + nearest), 0)
+    while row >= top:
+        height = max(int((row - camera.horizon_row) / WHOLE_ROWS), 1)
+        last.append(row)
+        first.append(max(row - height + 1, top))
+        row -= height
+    return np.array(first, np.int64), np.array(last, np.int64)
+
+
+@dataclass(frozen=True, slots=True)
+class LinearPixels:
+    """An image with what makes light of its values.
+
+    Attributes
+    ----------
+    pixels : (rows, cols, channels) uint8 or uint16
+        Contiguous.
+    tables : (channels, levels) float32
+        Linear grey levels that each channel adds.
+    """
+
+    pixels: Pixels
+    tables: NDArray[np.float32]
+
+
+def linear_pixels(image: Pixels, camera: Camera) -> LinearPixels:
+    """Pair an image with the inverse of its camera's response; no pixel is touched.
+
+    Parameters
+    ----------
+    image : (rows, cols) or (rows, cols, 3) uint8 or uint16
+        An image of the camera.
+    camera : Camera
+        The told calibration.
+    """
+    table = linear_table(camera.response, camera.bits)
+    weights = np.array(CHANNEL_WEIGHTS if image.ndim == 3 else (1.0,), np.float32)
+    pixels: NDArray[Any] = np.ascontiguousarray(image if image.ndim == 3 else image[:, :, None])
+    return LinearPixels(pixels, weights[:, None] * table)
+
+
+@dataclass(frozen=True, slots=True)
+class StripCurves:
+    """Luminance of each strip by bin.
+
+    Attributes
+    ----------
+    luminance : (strips, n) float64
+        Mean of the core of each bin [linear grey levels].
+    variance : (strips, n) float64
+        Its variance apart from what patches and drift of the albedo do; 0 where there is no datum.
+    """
+
+    luminance: Floats
+    variance: Floats
+
+
+def strip_curves(
+    image: LinearPixels, geometry: StripGeometry, noise: float, camera: Camera, free: float = math.inf
+) -> StripCurves:
+    """Read the strips.
+
+    Parameters
+    ----------
+    image : LinearPixels
+        The image.
+    geometry : StripGeometry
+        Where to look.
+    noise : float
+        Deviation of single pixels [linear grey levels].
+    camera : Camera
+        The told calibration.
+    free : float
+        Depth up to which the own lane is free; a tracked vehicle ahead hides what is behind [m].
+    """
+    strips, count = geometry.left.shape
+    luminance, variance = np.zeros((strips, count)), np.zeros((strips, count))
+    hidden_from, hidden_to, foot = math.inf, -math.inf, -math.inf
+    if math.isfinite(free):
+        reach = HALF_VEHICLE * camera.focal_length / free
+        hidden_from, hidden_to = camera.principal_point[0] - reach, camera.principal_point[0] + reach
+        foot = camera.horizon_row + camera.row_distance / free
+    for strip in range(strips):
+        mean, deviation, number = strip_kernels.strip_rows(
+            image.pixels,
+            image.tables,
+            geometry.first,
+            geometry.last,
+            geometry.left[strip],
+            geometry.right[strip],
+            hidden_from,
+            hidden_to,
+            foot,
+            max(noise, 2.0 * LEAST_DEVIATION),
+        )
+        metres = (geometry.right[strip] - geometry.left[strip]) * geometry.distance / camera.focal_length
+        pieces = np.maximum(metres / GRAIN, 1.0) * np.maximum(geometry.extent / GRAIN, 1.0)
+        counted = np.maximum(number, 1)
+        texture = np.maximum(deviation**2 - noise**2, 0.0) / np.minimum(counted, pieces)
+        seen = number > 0
+        luminance[strip] = mean
+        # Rounding does not average out where nothing dithers it: 1/√12 of a level without noise, nothing from half on.
+        rounding = np.exp(-4.0 * (np.pi * deviation) ** 2) / 12.0
+        variance[strip] = np.where(seen, noise**2 / counted + texture + rounding + LEAST_DEVIATION**2, 0.0)
+    return StripCurves(luminance, variance)
+
+
+SATURATED_SHARE = 0.02
+"""Share of the sky's pixels at the largest value from which on its brightness is not what its mean says [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sky:
+    """The sky above the horizon.
+
+    Attributes
+    ----------
+    luminance : float
+        Of its bright part [linear grey levels].
+    deviation : float
+        Its scatter from row to row [linear grey levels].
+    noise : float
+        Deviation of single pixels [linear grey levels].
+    saturated, clipped : float
+        Shares of its pixels of which all channels, and of which some, have the largest value [-].
+    """
+
+    luminance: float
+    deviation: float
+    noise: float
+    saturated: float
+    clipped: float
+
+    @property
+    def is_clipped(self) -> bool:
+        """Whether the sky may be brighter than it looks."""
+        return self.clipped > SATURATED_SHARE
+
+
+SKY_ROWS = 24
+"""Rows of sky that are looked at."""
+
+SKY_HEIGHT = 0.12
+"""How far above the horizon sky is looked at [rad]; as far as the image goes if that is less."""
+
+
+def sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
+    """Look at the sky in the middle two thirds of the image above the horizon.
+
+    Parameters
+    ----------
+    image : LinearPixels
+        The image.
+    camera : Camera
+        The told calibration.
+    margin : float
+        Rows above the horizon that are left out [px].
+
+    Returns
+    -------
+    Sky or None
+        None if there are no such rows.
+    """
+    bottom = min(math.floor(camera.horizon_row - margin), camera.height - 1)
+    top = max(0, math.floor(camera.horizon_row - SKY_HEIGHT * camera.focal_length))
+    if bottom - top < 1:
+        return None
+    rows = np.unique(np.linspace(top, bottom, SKY_ROWS).astype(np.int64))
+    side = camera.width // 6
+    noise = strip_kernels.pixel_noise(image.pixels, image.tables, rows)
+    found = strip_kernels.sky_rows(image.pixels, image.tables, rows, side, camera.width - side, max(noise, 0.3))
+    middle = float(np.median(found))
+    scatter = 1.4826 * float(np.median(np.abs(found - middle)))
+    largest = image.pixels[rows, side : camera.width - side] == image.tables.shape[1] - 1
+    return Sky(middle, scatter, noise, float(largest.all(axis=-1).mean()), float(largest.any(axis=-1).mean()))
+
+
+def mean_curves(frames: tuple[tuple[StripCurves, Sky], ...]) -> StripCurves:
+    """Average the curves of successive frames at the last one's exposure, which the sky shows.
+
+    Parameters
+    ----------
+    frames : tuple of (StripCurves, Sky)
+        Oldest first.
+    """
+    if len(frames) == 1:
+        return frames[0][0]
+    gains = np.array([frames[-1][1].luminance / sky.luminance for _, sky in frames])[:, None, None]
+    luminance = gains * np.stack([curves.luminance for curves, _ in frames])
+    variance = gains**2 * np.stack([curves.variance for curves, _ in frames])
+    seen = variance > 0
+    count = np.maximum(seen.sum(axis=0), 1)
+    mean = np.where(seen, luminance, 0.0).sum(axis=0) / count
+    return StripCurves(mean, np.where(seen, variance, 0.0).sum(axis=0) / count**2)
+
+
+CLIPPED = 0.95 * 255.0
+"""Brighter than this a row has lost some of its light where the sky is clipped [linear grey levels]."""
+
+
+def without_clipped(curves: StripCurves) -> StripCurves:
+    """Leave out bins so bright that their noise, or one of their colours, is clipped."""
+    return StripCurves(curves.luminance, np.where(curves.luminance > CLIPPED, 0.0, curves.variance))

@@ -1,0 +1,161 @@
+"""The vanishing point of the lines that run along the road: Hough's transform and random sample consensus."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.vision import line_kernels
+from fogsim.vision.deriche import Gradient
+
+Floats = NDArray[np.float64]
+
+SAMPLES = 48
+"""Pairs of lines that are drawn: with 30 % good lines one pair is good with a probability of 0.99 (negru2013)."""
+
+PEAKS, VOTES = 16, 30
+"""Most lines that are taken from the accumulator, and fewest votes of one."""
+
+CONSENSUS = 5.0
+"""Distance at which a line passes through a point in the choice of lines [px]."""
+
+AWAY = 50.0
+"""Rows below the vanishing point from which edges count for the sub-pixel lines: nearer, they blur together [px]."""
+
+LEAST_EDGE = 0.15
+"""Least deviation of an edge's place [px], for edges that are straighter than the model deserves."""
+
+BENT = 0.3
+"""Deviation by which a straight edge of the road misses the vanishing point for other reasons than noise [px]."""
+
+SMALLEST_ANGLE = 0.15
+"""Angle between two lines below which their crossing says little [rad]."""
+
+
+@dataclass(frozen=True, slots=True)
+class VanishingPoint:
+    """Where the lines along the road meet.
+
+    Attributes
+    ----------
+    col, row : float
+        In the image [px].
+    deviation : float
+        Standard deviation of the row [px].
+    score : float
+        Votes of the lines that agree.
+    lines : int
+        How many they are.
+    """
+
+    col: float
+    row: float
+    deviation: float
+    score: float
+    lines: int
+
+
+def vanishing_point(
+    gradient: Gradient, edges: NDArray[np.uint8], guess: tuple[float, float], reach: float, *, refined: bool = True
+) -> VanishingPoint | None:
+    """Find the vanishing point of the edges below a first guess (negru2013 section IV.B.a).
+
+    Edges vote along their gradient for lines that pass within `reach` of the guess; the highest peaks are lines; of
+    random pairs of lines that one is kept through whose crossing the most votes pass.
+
+    Parameters
+    ----------
+    gradient : Gradient
+        Derivatives of the image.
+    edges : (rows, cols) uint8
+        Non-zero on edges.
+    guess : tuple of float
+        Column and row of the first guess, in rows of `edges` [px].
+    reach : float
+        How far from it lines may pass [px].
+    refined : bool
+        Place the edges within the pixel, fit each line to edges of one polarity away from the vanishing point, and
+        intersect by weighted least squares; else take the centre of mass of the lines' crossings, as published.
+
+    Returns
+    -------
+    VanishingPoint or None
+        None if no two lines agree.
+    """
+    points = line_kernels.edge_points(gradient.across, gradient.down, edges, guess[0], guess[1])
+    lines, votes = line_kernels.hough_lines(points, reach, PEAKS, VOTES)
+    chosen = _consensus(lines, votes)
+    if chosen is None:
+        return None
+    agreeing, crossing = chosen
+    score = float(votes[agreeing].sum())
+    if not refined:
+        found: tuple[Floats, float] | None = _centre_of_mass(lines[agreeing])
+    else:
+        found = _least_squares(points, lines[agreeing], crossing)
+    if found is None:
+        return None
+    place, deviation = found
+    return VanishingPoint(guess[0] + float(place[0]), guess[1] + float(place[1]), deviation, score, int(agreeing.sum()))
+
+
+def _crossing(first: Floats, second: Floats) -> Floats | None:
+    """Point common to two lines u cos θ + v sin θ = ρ, or None if they are nearly parallel."""
+    normals = np.array([[math.cos(line[0]), math.sin(line[0])] for line in (first, second)])
+    if abs(float(np.linalg.det(normals))) < math.sin(SMALLEST_ANGLE):
+        return None
+    return np.asarray(np.linalg.solve(normals, np.array([first[1], second[1]])))
+
+
+def _consensus(lines: Floats, votes: Floats) -> tuple[NDArray[np.bool_], Floats] | None:
+    if len(lines) < 2:
+        return None
+    # The same pairs for the same number of lines: an estimate is a function of the image.
+    draws = np.random.default_rng(len(lines)).integers(0, len(lines), (SAMPLES, 2))
+    cosine, sine = np.cos(lines[:, 0]), np.sin(lines[:, 0])
+    turn = np.sin(lines[draws[:, 1], 0] - lines[draws[:, 0], 0])
+    usable = np.abs(turn) > math.sin(SMALLEST_ANGLE)
+    if not usable.any():
+        return None
+    a, b, turn = draws[usable, 0], draws[usable, 1], turn[usable]
+    u = (lines[a, 1] * sine[b] - lines[b, 1] * sine[a]) / turn
+    v = (lines[b, 1] * cosine[a] - lines[a, 1] * cosine[b]) / turn
+    passing = np.abs(u[:, None] * cosine + v[:, None] * sine - lines[:, 1]) < CONSENSUS
+    best = int(np.argmax(passing @ votes))
+    return passing[best], np.array([u[best], v[best]])
+
+
+def _centre_of_mass(lines: Floats) -> tuple[Floats, float] | None:
+    pairs = [(i, j) for i in range(len(lines)) for j in range(i)]
+    crossings = [c for i, j in pairs if (c := _crossing(lines[i], lines[j])) is not None]
+    if not crossings:
+        return None
+    spread = float(np.std([c[1] for c in crossings])) if len(crossings) > 1 else CONSENSUS
+    return np.mean(crossings, axis=0), max(spread, 1.0)
+
+
+def _least_squares(points: Floats, lines: Floats, crossing: Floats) -> tuple[Floats, float] | None:
+    fits = [
+        line_kernels.fit_line(points, float(theta), float(rho), float(crossing[1]) + AWAY, LEAST_EDGE)
+        for theta, rho in lines
+    ]
+    fits = [fit for fit in fits if fit[3] > 0.0]
+    place = crossing
+    for _ in range(3):
+        if len(fits) < 2:
+            return None
+        normal = np.array([[fit[0], fit[1]] for fit in fits])
+        # A line is known best where its points are: at the vanishing point it is known by extrapolation.
+        along = np.array([-fit[1] * (place[0] - fit[4]) + fit[0] * (place[1] - fit[5]) for fit in fits])
+        variance = BENT**2 + np.array([fit[3] for fit in fits]) + along**2 * np.array([fit[6] for fit in fits])
+        information = normal.T @ (normal / variance[:, None])
+        if float(np.linalg.det(information)) < 1e-6 * float(np.trace(information)) ** 2:
+            return None
+        covariance = np.linalg.inv(information)
+        place = covariance @ (normal.T @ (np.array([fit[2] for fit in fits]) / variance))
+        off = normal @ place - np.array([fit[2] for fit in fits])
+        kept = np.abs(off) <= np.maximum(3.0 * np.sqrt(variance), 1.0)
+        fits = [fit for fit, keep in zip(fits, kept, strict=True) if keep]
+    scatter = float((off**2 / variance).sum()) / max(len(off) - 2, 1)
+    return place, math.sqrt(float(covariance[1, 1]) * max(scatter, 1.0))

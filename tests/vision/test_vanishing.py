@@ -1,0 +1,66 @@
+import numpy as np
+import pytest
+
+from fogsim.vision.canny_deriche import CannyDeriche
+from fogsim.vision.vanishing import vanishing_point
+
+CENTRE, ROW = 320.3, 60.7
+
+
+def road_lines(offsets=(-1.9, -1.75, 1.75, 1.9), noise=1.0, seed=0, contrast=60.0):
+    """Bright stripes between lines that meet in (CENTRE, ROW), sampled 4 × 4."""
+    v, u = (np.mgrid[: 300 * 4, : 640 * 4] + 0.5) / 4 - 0.5
+    lateral = (u - CENTRE) / np.maximum(v - ROW, 1e-6) * 1.4
+    stripe = np.zeros(v.shape, bool)
+    for left, right in zip(offsets[::2], offsets[1::2], strict=True):
+        stripe |= (lateral > left) & (lateral < right) & (v > ROW)
+    fine = np.where(stripe, 60.0 + contrast, 60.0)
+    image = fine.reshape(300, 4, 640, 4).mean(axis=(1, 3))
+    return (image + np.random.default_rng(seed).normal(0, noise, image.shape)).astype(np.float32)
+
+
+def found(image, guess=(325.0, 64.0), **options):
+    edges = CannyDeriche()(image, None)
+    return vanishing_point(edges.gradient, edges.pixels, guess, 40.0, **options)
+
+
+def test_sub_pixel_lines_meet_within_a_third_of_a_pixel():
+    points = [found(road_lines(seed=seed)) for seed in range(6)]
+    rows, cols = np.array([p.row for p in points]), np.array([p.col for p in points])
+    assert np.median(np.abs(rows - ROW)) < 0.3
+    assert np.abs(rows - ROW).max() < 1.0
+    assert np.abs(cols - CENTRE).max() < 1.0
+    assert all(p.deviation < 1.0 and p.lines >= 2 for p in points)
+
+
+def test_published_recipe_is_coarser():
+    rows = np.array([found(road_lines(seed=seed), refined=False).row for seed in range(6)])
+    assert np.abs(rows - ROW).max() < 15.0
+    fine = np.array([found(road_lines(seed=seed)).row for seed in range(6)])
+    assert np.abs(fine - ROW).mean() < np.abs(rows - ROW).mean()
+
+
+def test_clutter_is_outvoted():
+    image = road_lines(offsets=(-5.3, -5.1, -1.9, -1.75, 1.75, 1.9))
+    rng = np.random.default_rng(3)
+    for _ in range(12):
+        u, v = rng.integers(20, 580), rng.integers(120, 270)
+        image[v : v + 18, u : u + 30] = rng.uniform(30, 200)
+    point = found(image)
+    assert point.row == pytest.approx(ROW, abs=1.5)
+
+
+def test_mirrored_lines_meet_in_the_mirrored_point():
+    image = road_lines()
+    point, mirrored = found(image), found(np.ascontiguousarray(image[:, ::-1]), guess=(639 - 325.0, 64.0))
+    assert mirrored.row == pytest.approx(point.row, abs=0.1)
+    assert mirrored.col == pytest.approx(639 - point.col, abs=0.1)
+
+
+@pytest.mark.parametrize("offsets", [(1.75, 1.76)])
+def test_one_faint_line_is_no_point(offsets):
+    assert found(road_lines(offsets=offsets, contrast=3.0)) is None
+
+
+def test_a_plain_image_has_none():
+    assert found(np.full((300, 640), 90.0, np.float32)) is None

@@ -52,8 +52,9 @@ HALF_ROAD = 5.0
 HALF_VEHICLE, VEHICLE_MARGIN = 1.5, 2.0
 """What a tracked vehicle hides either side of the axis, and how much nearer than told its foot may be [m]."""
 
-NEAR_HORIZON = 4.0
-"""A region that ends this close below the horizon has seen the whole road [px]."""
+NEAR_HORIZON, FAR_ENOUGH = 4.0, 100.0
+"""A region that ends this close below the horizon [px], or reaches this far [m], would have seen fog: at 100 m that of
+1000 m visibility takes a quarter of the road's contrast."""
 
 ALBEDO_SHARE = 0.03
 """Relative standard deviation of k that 3 % of patchy albedo make, which the residuals of one frame do not show [-]."""
@@ -175,7 +176,7 @@ def inflection_rows(road: SeenRoad) -> NDArray[np.float64]:
     tops = region_tops(road.region)
     if tops.size == 0:
         raise CannotTellError("no region grows from the bottom row")
-    return tops + (road.image.first_row - road.horizon.row)
+    return np.asarray(tops + (road.image.first_row - road.horizon.row), np.float64)
 
 
 def fitted_fog(road: SeenRoad, camera: Camera) -> tuple[float, float]:
@@ -191,7 +192,7 @@ def fitted_fog(road: SeenRoad, camera: Camera) -> tuple[float, float]:
     curve, top = _curve(road, camera)
     model = _credible(fit_curve(curve), curve, road.image)
     if model is None:
-        if top > NEAR_HORIZON:
+        if top > max(NEAR_HORIZON, camera.row_distance / FAR_ENOUGH):
             raise CannotTellError("the road's region ends below the horizon, and no inflection lies in it")
         if float(np.median(curve.luminance[curve.below_horizon > 0][:3])) > road.image.road + 0.5 * road.image.contrast:
             raise CannotTellError("the road fades into the airlight, but not as Koschmieder's law has it")
@@ -215,8 +216,8 @@ def _curve(road: SeenRoad, camera: Camera) -> tuple[RoadCurve, float]:
     sky = sky_profile(image, margin=3)
     # Half of the pixels of a row lie farther from the axis than this, and the ray to them is that much longer.
     across = 0.5 * (np.minimum(right, camera.width - 1) - np.maximum(left, 0))[seen] / 2.0
-    slant = np.sqrt(1.0 + (across**2 + (rows[seen] - v0) ** 2) / camera.focal_length**2)
-    distance = path_lengths(below[seen], camera.row_distance, slant)
+    slant: NDArray[np.float64] = np.sqrt(1.0 + (across**2 + (rows[seen] - v0) ** 2) / camera.focal_length**2)
+    distance = path_lengths(below[seen].astype(np.float64), camera.row_distance, slant)
     luminance = np.concatenate([sky, medians.luminance[seen]])
     counted = np.concatenate([np.ones(sky.size), medians.count[seen] / (medians.count[seen] + 8.0)])
     curve = RoadCurve(

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -97,7 +98,7 @@ def hough_lines(
         # OpenCV's angle is that of the normal: 0 for an upright line, π/2 for one along the rows.
         low, high = 0.5 * math.pi - steepest_angle, 0.5 * math.pi - lowest_angle
         span = (low, high) if side > 0 else (math.pi - high, math.pi - low)
-        peaks = cv2.HoughLinesWithAccumulator(
+        peaks: NDArray[Any] | None = cv2.HoughLinesWithAccumulator(
             lower, 1.0, math.radians(1.0), threshold, min_theta=span[0], max_theta=span[1]
         )
         for radius, angle, votes in [] if peaks is None else peaks.reshape(-1, 3)[:most]:

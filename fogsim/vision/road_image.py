@@ -120,7 +120,8 @@ def sky_profile(road: RoadImage, margin: int) -> NDArray[np.float64]:
     """
     side = road.luminance.shape[1] // 6
     rows = road.luminance[: max(road.sky_rows - margin, 0), side:-side]
-    bright = np.percentile(rows, 70, axis=1) if rows.size else np.zeros(0)
+    # A pixel's own value, so that at least that pixel is near it.
+    bright = np.percentile(rows, 70, axis=1, method="lower") if rows.size else np.zeros(0)
     found = []
     for row, level in zip(rows, bright, strict=True):
         core = row[np.abs(row - level) <= max(SKY_CORE * float(level), 3.0)]

@@ -188,7 +188,7 @@ def test_nothing_odd_gets_out_of_random_pictures(seed):
 
 
 def test_what_is_no_image_of_the_camera_is_an_error(road):
-    with pytest.raises(InputError, match="160×120.*640×480"):
+    with pytest.raises(InputError, match=r"160×120.*640×480"):
         estimate(np.zeros((120, 160), np.uint8), road.camera)
 
 

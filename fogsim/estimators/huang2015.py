@@ -1,0 +1,212 @@
+"""Rough and accurate visibility combined over time and way (Huang 2015, section 5.2)."""
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fogsim.errors import InputError
+from fogsim.estimators.huang2015_lead import Huang2015Lead
+from fogsim.estimators.huang2015_rough import Huang2015Rough
+from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
+from fogsim.values.camera import Camera
+from fogsim.values.estimate import Estimate
+from fogsim.values.observation import Observation
+from fogsim.vision.horizon import PITCH_DEVIATION
+
+MEASUREMENTS = 200
+"""Measurements that are remembered."""
+
+LEAST_WEIGHT = 1e-3
+"""Weight below which a measurement is forgotten [-]."""
+
+LEAST_EXTINCTION = OPTICAL_DEPTH_AT_VISIBILITY / 10_000.0
+"""Extinction that "no fog" is averaged as [1/m]: that of 10 km."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """One estimate, when and where.
+
+    Attributes
+    ----------
+    extinction, deviation : float
+        k and its standard deviation [1/m].
+    time : float
+        [s].
+    way : float
+        Driven since the start [m].
+    track : int
+        Which vehicle ahead it is from; 0 for the road.
+    """
+
+    extinction: float
+    deviation: float
+    time: float
+    way: float
+    track: int
+
+
+def decay(measurement: Measurement, time: float, way: float, time_scale: float, way_scale: float) -> float:
+    """Weight of a measurement later and farther on, e^(−d_s/t_s) e^(−d_t/t_t) (section 5.2) [-].
+
+    Parameters
+    ----------
+    measurement : Measurement
+        What was measured then and there.
+    time, way : float
+        Now [s] and here [m].
+    time_scale, way_scale : float
+        t_t [s] and t_s [m].
+    """
+    return math.exp(-abs(time - measurement.time) / time_scale - abs(way - measurement.way) / way_scale)
+
+
+def mixture(values: Sequence[float], weights: Sequence[float], within: Sequence[float]) -> tuple[float, float]:
+    """Mean and standard deviation of a mixture of normal distributions.
+
+    Eqs. 5.1 and 5.2 with the square that 5.2 lacks, weighted, and with the components' own variances.
+
+    Parameters
+    ----------
+    values, weights, within : sequence of float
+        Mean, weight and standard deviation of each component.
+    """
+    total = math.fsum(weights)
+    mean = math.fsum(w * v for w, v in zip(weights, values, strict=True)) / total
+    parts = zip(weights, values, within, strict=True)
+    return mean, math.sqrt(math.fsum(w * ((v - mean) ** 2 + s * s) for w, v, s in parts) / total)
+
+
+class Huang2015:
+    """Rough and accurate estimates as one, decaying over time and way (Huang 2015, section 5.2).
+
+    Every frame's road (`Huang2015Rough`) and every tracked vehicle (`Huang2015Lead`, its latest estimate) is a
+    measurement; its weight falls as e^(−d_s/t_s − d_t/t_t).
+
+    As published all measurements count alike and visibilities are averaged. Corrected, ln k is, weighted by the
+    inverse variances too: a vehicle followed over 60 m says more than a frame of road. The deviation is the mixture's,
+    which does not shrink with the number of frames, because their errors are the same road's and the same camera's.
+
+    Parameters
+    ----------
+    camera : Camera
+        The calibration as the vehicle was told it.
+    as_published : bool
+        Both methods and their combination as in the thesis.
+    time_scale, way_scale : float
+        t_t [s] and t_s [m]; the thesis gives none.
+    setback : float
+        From the own front bumper, where ranges begin, back to the camera [m].
+    blur : float
+        Standard deviation of the lens' blur beside the pixels' own size [px].
+    pitch_deviation : float
+        Standard deviation of the true pitch about the told one [rad].
+    """
+
+    method = "huang2015"
+
+    def __init__(
+        self,
+        camera: Camera,
+        *,
+        as_published: bool = False,
+        time_scale: float = 10.0,
+        way_scale: float = 200.0,
+        setback: float = 0.0,
+        blur: float = 0.0,
+        pitch_deviation: float = PITCH_DEVIATION,
+    ) -> None:
+        for name, scale in (("time_scale", time_scale), ("way_scale", way_scale)):
+            if not 0.0 < scale < math.inf:
+                raise InputError(f"{name} must be positive and finite, got {scale!r}")
+        self._rough = Huang2015Rough(camera, as_published=as_published, pitch_deviation=pitch_deviation)
+        self._lead = Huang2015Lead(camera, as_published=as_published, setback=setback, blur=blur)
+        self._as_published = as_published
+        self._scales = (time_scale, way_scale)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all measurements and the vehicle ahead."""
+        self._rough.reset()
+        self._lead.reset()
+        self._measurements: deque[Measurement] = deque(maxlen=MEASUREMENTS)
+        self._time: float | None = None
+        self._way = 0.0
+
+    def update(self, observation: Observation) -> Estimate:
+        """Estimate the fog from this and earlier frames.
+
+        Parameters
+        ----------
+        observation : Observation
+            Image, time, own speed and lead vehicle are used. Bare images have no time, and nothing decays.
+
+        Returns
+        -------
+        Estimate
+            Diagnostics: ``rough`` and ``accurate``, the `Estimate` of either method for this frame, ``measurements``,
+            how many are combined, and those of the accurate one's ``confidence_distances`` and ``confidence`` where it
+            is valid; or ``reason``.
+
+        Raises
+        ------
+        InputError
+            If the image is not of the camera's bit depth, not grey or colour, or not of the told camera's size, or the
+            range is NaN.
+        """
+        self._advance(observation)
+        rough, accurate = self._rough.update(observation), self._lead.update(observation)
+        self._remember(rough, 0)
+        self._remember(accurate, self._lead.tracks)
+        diagnostics: dict[str, object] = {"rough": rough, "accurate": accurate}
+        diagnostics |= {key: accurate.diagnostics[key] for key in accurate.diagnostics if key.startswith("confidence")}
+        if "horizon_row" in rough.diagnostics:
+            diagnostics["horizon_row"] = rough.diagnostics["horizon_row"]
+        known = [(m, self._weight(m)) for m in self._measurements]
+        known = [(m, weight) for m, weight in known if weight >= LEAST_WEIGHT]
+        diagnostics["measurements"] = len(known)
+        if not known:
+            return Estimate.invalid(self.method, str(rough.diagnostics.get("reason", "nothing seen")), **diagnostics)
+        extinction, deviation = _published(known) if self._as_published else _combined(known)
+        return Estimate(self.method, extinction, deviation, diagnostics=diagnostics)
+
+    def _advance(self, observation: Observation) -> None:
+        if self._time is not None:
+            self._way += max(observation.speed, 0.0) * max(observation.time - self._time, 0.0)
+        self._time = observation.time
+
+    def _weight(self, measurement: Measurement) -> float:
+        return decay(measurement, self._time or 0.0, self._way, *self._scales)
+
+    def _remember(self, estimate: Estimate, track: int) -> None:
+        if not estimate.valid:
+            return
+        if track:
+            # What a vehicle says is refined with every picture: one measurement a vehicle.
+            kept = [m for m in self._measurements if m.track != track]
+            self._measurements = deque(kept, maxlen=MEASUREMENTS)
+        found = Measurement(estimate.extinction, estimate.standard_deviation, self._time or 0.0, self._way, track)
+        self._measurements.append(found)
+
+
+def _published(known: list[tuple[Measurement, float]]) -> tuple[float, float]:
+    """Weighted mean of visibilities, as an extinction and its deviation [1/m]."""
+    seen = [OPTICAL_DEPTH_AT_VISIBILITY / max(m.extinction, LEAST_EXTINCTION) for m, _ in known]
+    mean, spread = mixture(seen, [weight for _, weight in known], [0.0] * len(known))
+    extinction = OPTICAL_DEPTH_AT_VISIBILITY / mean
+    # One measurement has no spread; its own deviation is all that is known then.
+    own = min(m.deviation for m, _ in known)
+    return extinction, max(extinction * spread / mean, own)
+
+
+def _combined(known: list[tuple[Measurement, float]]) -> tuple[float, float]:
+    """Mixture in ln k, as an extinction and its deviation [1/m]."""
+    logs = [math.log(max(m.extinction, LEAST_EXTINCTION)) for m, _ in known]
+    relative = [m.deviation / max(m.extinction, LEAST_EXTINCTION) for m, _ in known]
+    weights = [weight / max(sd, 1e-3) ** 2 for (_, weight), sd in zip(known, relative, strict=True)]
+    mean, deviation = mixture(logs, weights, [min(sd, 3.0) for sd in relative])
+    extinction = math.exp(mean)
+    if extinction <= 1.5 * LEAST_EXTINCTION:
+        return 0.0, max(m.deviation for m, _ in known)
+    return extinction, extinction * deviation

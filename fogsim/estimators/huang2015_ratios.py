@@ -1,0 +1,233 @@
+"""Extinction from how the contrast of a vehicle falls with its range, and the confidence in images that follows."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+KEPT = 0.5
+"""Ratios farther than this share from their row's median are dropped (section 4.3.3) [-]."""
+
+LARGEST_EXTINCTION = 0.09
+"""Upper end of the published search [1/m]: visibilities below 33 m cannot come out."""
+
+GRID = 1801
+"""Extinctions that the published search tries."""
+
+SLOPE_SHARE = 0.02
+"""Standard deviation of a ratio of contrasts that pixels do not show, relative: registration, detail too small [-]."""
+
+MEAN_SHARE, MEAN_CONTRAST_SHARE = 0.002, 0.01
+"""The same of a mean luminance, relative to the sky's and to its contrast to the sky [-]."""
+
+SKY_SHARE = 0.03
+"""Standard deviation of the airlight ahead relative to the sky's luminance above it [-]."""
+
+HUBER = 2.0
+"""Residuals beyond this many standard deviations count linearly, not squared [-]."""
+
+STEPS = 30
+"""Most Gauss–Newton steps of the fit."""
+
+RANGE_DEVIATION = 0.3
+"""Standard deviation of a range [m]."""
+
+
+def image_confidence(extinction: float, distance: Floats | float, reference: float = 0.0) -> Floats:
+    """Image confidence curve (huang2015 section 4.3.2): variance that is left of a thing's picture at a range.
+
+    e^(−2k (d − d₀)), of the thing's variance at the reference; the thesis shows it in per cent.
+
+    Parameters
+    ----------
+    extinction : float
+        Extinction coefficient k [1/m].
+    distance : float64 or float
+        Ranges d [m].
+    reference : float
+        Range d₀ at which the confidence is 1 [m].
+
+    Returns
+    -------
+    float64
+        Confidence [-]; more than 1 nearer than the reference.
+    """
+    return np.asarray(np.exp(-2.0 * extinction * (np.asarray(distance, np.float64) - reference)))
+
+
+def variance_ratio_extinction(near_distance: float, near: float, far_distance: float, far: float) -> float:
+    """Extinction from two variances of one thing's picture: k = ln(σ₁² / σ₂²) / (2 (d₂ − d₁)) (eq. 4.15) [1/m].
+
+    Parameters
+    ----------
+    near_distance, far_distance : float
+        d₁ and d₂ [m], different.
+    near, far : float
+        σ₁² and σ₂², positive, in one unit.
+    """
+    return 0.5 * math.log(near / far) / (far_distance - near_distance)
+
+
+@dataclass(frozen=True, slots=True)
+class RatioTable:
+    """Mean ratios of variances by difference of range (huang2015 table 4.2, after the ± 50 % rule).
+
+    Attributes
+    ----------
+    difference : (n,) float64
+        Far less near range [m], ascending, multiples of the spacing.
+    ratio : (n,) float64
+        Far over near variance [-].
+    count : (n,) int64
+        Ratios in each mean.
+    """
+
+    difference: Floats
+    ratio: Floats
+    count: NDArray[np.int64]
+
+
+def ratio_table(distances: Floats, variances: Floats, spacing: float) -> RatioTable:
+    """Ratios of every two variances, by their difference of range.
+
+    Parameters
+    ----------
+    distances : (n,) float64
+        Ranges [m].
+    variances : (n,) float64
+        Variances, positive.
+    spacing : float
+        Step of the differences [m].
+    """
+    apart = distances[None, :] - distances[:, None]
+    ratio = variances[None, :] / variances[:, None]
+    row = np.rint(apart / spacing).astype(np.int64)
+    found = []
+    for step in np.unique(row[row > 0]):
+        ratios = ratio[row == step]
+        kept = ratios[np.abs(ratios - np.median(ratios)) <= KEPT * np.median(ratios)]
+        if kept.size:
+            found.append((step * spacing, float(kept.mean()), kept.size))
+    difference, mean, count = (np.array(column) for column in zip(*found, strict=True)) if found else (np.zeros(0),) * 3
+    return RatioTable(difference.astype(np.float64), mean.astype(np.float64), count.astype(np.int64))
+
+
+def published_extinction(table: RatioTable) -> tuple[float, float]:
+    """Extinction of least squared error between mean and theoretical ratios, of k from 0 to 0.09 (section 4.3.3).
+
+    Returns
+    -------
+    tuple of float
+        k and the standard deviation that the ratios' misfit makes of it [1/m].
+    """
+    tried = np.linspace(0.0, LARGEST_EXTINCTION, GRID)
+    model = image_confidence(1.0, tried[:, None] * table.difference)
+    best = int(np.argmin(((model - table.ratio) ** 2).sum(axis=1)))
+    slope = -2.0 * table.difference * model[best]
+    misfit = float(((model[best] - table.ratio) ** 2).sum()) / max(table.ratio.size - 1, 1)
+    return float(tried[best]), math.sqrt(misfit / max(float(slope @ slope), 1e-12))
+
+
+@dataclass(frozen=True, slots=True)
+class Regressions:
+    """Regressions of n pictures of a vehicle on the nearest of them; luminances in that of the sky.
+
+    Attributes
+    ----------
+    distance : (n,) float64
+        Ranges [m].
+    slope, slope_deviation : (n,) float64
+        Contrast over that of the reference, and its deviation by pixel noise [-].
+    mean, mean_deviation : (n,) float64
+        Mean luminance of each picture and its deviation; ``inf`` where the sky is saturated [-].
+    near_mean : (n,) float64
+        Mean luminance of the same pixels of the reference [-].
+    """
+
+    distance: Floats
+    slope: Floats
+    slope_deviation: Floats
+    mean: Floats
+    mean_deviation: Floats
+    near_mean: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class ContrastFit:
+    """Koschmieder's law fitted to regressions.
+
+    Attributes
+    ----------
+    extinction, deviation : float
+        k, which may come out negative, and its standard deviation [1/m].
+    misfit : float
+        Mean square of the standardised residuals; about 1 where the model holds.
+    """
+
+    extinction: float
+    deviation: float
+    misfit: float
+
+
+def fitted_extinction(data: Regressions) -> ContrastFit | None:
+    """Fit slope = B t and mean = (1 + e) (1 − B t) + B t · near mean with t = e^(−k d), robustly.
+
+    Slopes need detail and no knowledge of the airlight; means need no detail, but the sky's luminance for the
+    airlight's. Their difference e is fitted along, as far from 0 as skies are.
+
+    Parameters
+    ----------
+    data : Regressions
+        At least three.
+
+    Returns
+    -------
+    ContrastFit or None
+        None if there are fewer, of one range, or none of them shows the vehicle.
+    """
+    apart = data.distance - data.distance.min(initial=math.inf)
+    seen = data.slope > 3.0 * np.hypot(data.slope_deviation, SLOPE_SHARE * data.slope)
+    if data.distance.size < 3 or int(seen.sum()) < 2 or float(np.ptp(data.distance[seen])) <= 0.0:
+        return None
+    values = np.concatenate([data.slope, data.mean, [0.0]])
+    state = np.array([max(-float(np.polyfit(apart[seen], np.log(data.slope[seen]), 1)[0]), 1e-4), 1.0, 0.0])
+    covariance: Floats = np.eye(3)
+    standardised: Floats = np.zeros(values.size)
+    for _ in range(STEPS):
+        model, jacobian, spread = _predicted(state, apart, data)
+        standardised = (values - model) / spread
+        # The last value is the prior of the sky, and no outlier.
+        weight = np.minimum(1.0, HUBER / np.maximum(np.abs(standardised), 1e-9)) / spread**2
+        weight[-1] = spread[-1] ** -2
+        covariance = np.asarray(np.linalg.pinv(jacobian.T @ (weight[:, None] * jacobian)), np.float64)
+        step = covariance @ (jacobian.T @ (weight * (values - model)))
+        state = state + np.clip(step, (-0.02, -0.2, -0.1), (0.02, 0.2, 0.1))
+        state[0], state[1] = min(max(state[0], -0.01), 1.0), min(max(state[1], 0.3), 3.0)
+        if abs(float(step[0])) < 1e-7:
+            break
+    finite = np.isfinite(spread)
+    misfit = float(np.mean(standardised[finite] ** 2))
+    return ContrastFit(float(state[0]), math.sqrt(max(misfit, 1.0) * float(covariance[0, 0])), misfit)
+
+
+def _predicted(state: Floats, apart: Floats, data: Regressions) -> tuple[Floats, Floats, Floats]:
+    """Values, their derivatives by k, B and e, and their standard deviations; the last row is the prior of e."""
+    extinction, level, excess = state
+    shape = np.exp(-extinction * apart)
+    t = level * shape
+    contrast = 1.0 + excess - data.near_mean
+    zero = np.zeros_like(t)
+    slopes = np.stack([-apart * t, shape, zero], axis=1)
+    means = np.stack([contrast * apart * t, -contrast * shape, 1.0 - t], axis=1)
+    # A range that is off by δ changes either by k δ; near pixels are of a range, too.
+    by_range = (RANGE_DEVIATION * extinction) ** 2
+    slope_spread = np.sqrt(data.slope_deviation**2 + (SLOPE_SHARE**2 + by_range) * t**2)
+    mean_spread = np.sqrt(
+        data.mean_deviation**2 + MEAN_SHARE**2 + (MEAN_CONTRAST_SHARE**2 + by_range) * (contrast * t) ** 2
+    )
+    values = np.concatenate([t, 1.0 + excess - contrast * t, [excess]])
+    jacobian = np.concatenate([slopes, means, [[0.0, 0.0, 1.0]]])
+    return values, jacobian, np.concatenate([slope_spread, mean_spread, [SKY_SHARE]])

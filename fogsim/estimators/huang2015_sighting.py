@@ -1,0 +1,158 @@
+"""One picture of the vehicle ahead, cut from a frame."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.values.camera import Camera
+from fogsim.vision.horizon import PITCH_DEVIATION, levelled
+from fogsim.vision.lead_window import ASIDE, LeadWindow
+from fogsim.vision.luminance import linear_luminance
+from fogsim.vision.patch import Patch
+from fogsim.vision.response import linear_table
+from fogsim.vision.road_image import MIN_AIRLIGHT, CannotTellError
+
+HALF_WIDTH, MIDDLE, HALF_HEIGHT = 0.42, 0.42, 0.32
+"""The part of a rear that is compared, in widths of the vehicle: half its width, its middle above the foot, and half
+its height [-]. It ends below the roof of the flattest car and above the shadow under it."""
+
+MARGIN, MARGIN_PIXELS = 0.12, 8
+"""What a stored picture holds around that part: widths of the vehicle [-] and pixels."""
+
+LEAST_WIDTH = 8.0
+"""Narrowest vehicle whose picture is compared [px]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """One picture of the vehicle ahead.
+
+    Attributes
+    ----------
+    distance : float
+        From the camera to its rear [m].
+    patch : Patch
+        The picture, about the middle of its body.
+    sky, noise : float
+        Luminance of the sky, and deviation of single pixels of the vehicle [linear grey levels].
+    width : float
+        Of the vehicle [px].
+    pitch_deviation : float
+        Rows by which pitch moves the picture between frames [px].
+    """
+
+    distance: float
+    patch: Patch
+    sky: float
+    noise: float
+    width: float
+    pitch_deviation: float
+
+
+@dataclass(frozen=True, slots=True)
+class Crop:
+    """The part of an image about a vehicle, and the sky's light."""
+
+    luminance: NDArray[np.float32]
+    origin: tuple[int, int]
+    sky: float
+    noise: float
+    pitch_deviation: float
+
+
+def vehicle_crop(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera, distance: float) -> Crop:
+    """Cut out of a frame where a vehicle at a distance can be.
+
+    Parameters
+    ----------
+    image : (rows, cols) or (rows, cols, 3) uint8 or uint16
+        An image of the camera.
+    camera : Camera
+        The told calibration.
+    distance : float
+        From the camera to the vehicle's rear [m].
+
+    Raises
+    ------
+    CannotTellError
+        If no vehicle can be seen there, or no sky by day.
+    """
+    if not 0.5 < distance < math.inf:
+        raise CannotTellError(f"a range of {distance:.1f} m is none of a vehicle ahead")
+    scale = camera.focal_length / distance
+    if 1.4 * scale < LEAST_WIDTH:
+        raise CannotTellError("the vehicle ahead is too small in the image")
+    foot, pitch = camera.horizon_row + camera.row_distance / distance, 0.01 * camera.focal_length
+    top, bottom = foot - 2.4 * scale - pitch, foot + 0.2 * scale + pitch
+    left, right = (camera.principal_point[0] + side * (ASIDE + 1.6) * scale for side in (-1.0, 1.0))
+    low_row, high_row = max(math.floor(top), 0), min(math.ceil(bottom) + 1, camera.height)
+    low_col, high_col = max(math.floor(left), 0), min(math.ceil(right) + 1, camera.width)
+    if high_row - low_row < 8 or high_col - low_col < 16 or foot >= camera.height:
+        raise CannotTellError("the vehicle ahead is outside the image")
+    level = levelled(image, camera)
+    luminance = linear_luminance(level[low_row:high_row, low_col:high_col], camera.response, camera.bits)
+    sky, noise = _sky(level, camera)
+    pitch = 1.5 * PITCH_DEVIATION * camera.focal_length
+    return Crop(luminance, (low_col, low_row), sky, noise * _steepness(luminance, sky, camera), pitch)
+
+
+def _sky(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera) -> tuple[float, float]:
+    """Luminance of the sky above the horizon, and deviation of its pixels [linear grey levels]."""
+    bottom = min(math.floor(camera.horizon_row - 3), camera.height)
+    if bottom < 2:
+        raise CannotTellError("no sky is in the image")
+    top, side = max(bottom - max(camera.height // 16, 4), 0), camera.width // 6
+    luminance = linear_luminance(image[top:bottom, side : camera.width - side], camera.response, camera.bits)
+    bright = float(np.percentile(luminance, 80, method="lower"))
+    if bright < MIN_AIRLIGHT:
+        raise CannotTellError("too dark above the horizon: this is a daytime method")
+    core = luminance[np.abs(luminance - bright) <= max(0.03 * bright, 4.0)]
+    across = np.abs(np.diff(luminance, axis=1))
+    # Half of the neighbours are of one surface even where trees stand before the sky.
+    noise = 1.4826 * float(np.median(across)) / math.sqrt(2.0)
+    return float(core.mean(dtype=np.float64)), noise
+
+
+def _steepness(luminance: NDArray[np.float32], sky: float, camera: Camera) -> float:
+    """How much larger noise is on a vehicle than on the sky once the response is undone, as noise is of the signal."""
+    table = linear_table(camera.response, camera.bits)
+    slope = np.gradient(table.astype(np.float64))
+    here, there = (int(np.searchsorted(table, level)) for level in (float(np.median(luminance)), sky))
+    most = table.size - 1
+    return float(slope[min(here, most)] / slope[min(there, most)])
+
+
+def sighting_of(crop: Crop, distance: float, window: LeadWindow, blur: float) -> Sighting:
+    """Cut the picture of a vehicle out, with room about it for what is not known of its place.
+
+    Parameters
+    ----------
+    crop : Crop
+        Where it can be.
+    distance : float
+        From the camera to its rear [m].
+    window : LeadWindow
+        Where it is or is expected [px].
+    blur : float
+        Standard deviation of the lens' blur [px].
+
+    Raises
+    ------
+    CannotTellError
+        If it is too small or outside the image.
+    """
+    if window.width < LEAST_WIDTH:
+        raise CannotTellError("the vehicle ahead is too small in the image")
+    row, col = window.foot - MIDDLE * window.width - crop.origin[1], window.column - crop.origin[0]
+    half_width, half_height = HALF_WIDTH * window.width, HALF_HEIGHT * window.width
+    margin = MARGIN * window.width + MARGIN_PIXELS
+    rows = max(math.floor(row - half_height - margin), 0), math.ceil(row + half_height + margin) + 1
+    cols = max(math.floor(col - half_width - margin), 0), math.ceil(col + half_width + margin) + 1
+    pixels = crop.luminance[rows[0] : max(rows[1], 0), cols[0] : max(cols[1], 0)].astype(np.float64)
+    patch = Patch(pixels, col - cols[0], row - rows[0], half_width, half_height, blur)
+    inside = 0 <= patch.column < pixels.shape[1] and 0 <= patch.row < pixels.shape[0]
+    if not inside or min(pixels.shape) < LEAST_WIDTH / 2:
+        raise CannotTellError("the vehicle ahead is outside the image")
+    return Sighting(distance, patch, crop.sky, max(crop.noise, 0.1), window.width, crop.pitch_deviation)

@@ -1,0 +1,144 @@
+"""Where the vehicle ahead is in the image: a window from its range and the calibration, refined on its edges."""
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.values.camera import Camera
+
+Floats = NDArray[np.float64]
+
+WIDTHS = (1.4, 2.7)
+"""Narrowest and widest rear that is looked for [m]: small cars to lorries; no motorcycles."""
+
+ASIDE = 3.5
+"""Farthest that a vehicle's middle is looked for beside the own axis [m]."""
+
+USUAL_ASIDE = 1.2
+"""Standard deviation of that offset [m]: place in the lane, heading of the own vehicle, bends."""
+
+BODY = (0.25, 0.95)
+"""Heights between which sides of all vehicles are upright [m]."""
+
+LEAST_EDGE = 3.0
+"""Least step across either side of a vehicle, in standard deviations of the column means' noise [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class LeadWindow:
+    """Rear of a vehicle in an image.
+
+    Attributes
+    ----------
+    column : float
+        Of its middle [px].
+    foot : float
+        Row at which it stands on the road [px].
+    width : float
+        [px].
+    """
+
+    column: float
+    foot: float
+    width: float
+
+
+def find_lead(
+    luminance: NDArray[np.float32], origin: tuple[int, int], camera: Camera, distance: float, noise: float
+) -> LeadWindow | None:
+    """Find the rear of a vehicle at a known distance.
+
+    Left and right edge are the pair of columns with the strongest steps over the height of a vehicle's body, one up
+    and one down, at a width that vehicles have, weighted by how symmetric it looks in between and how near to the own
+    axis it is. The foot is the strongest step down the rows near where the calibration has the road.
+
+    Parameters
+    ----------
+    luminance : (rows, cols) float32
+        A part of an image with level horizon that holds all rows and columns that are looked at.
+    origin : tuple of int
+        Column and row of the whole image that its first pixel is.
+    camera : Camera
+        The told calibration.
+    distance : float
+        From the camera to the rear [m].
+    noise : float
+        Standard deviation of single pixels [linear grey levels].
+
+    Returns
+    -------
+    LeadWindow or None
+        In pixels of the whole image; None if no such pair stands out of the noise.
+    """
+    scale = camera.focal_length / distance
+    foot = camera.horizon_row + camera.row_distance / distance - origin[1]
+    rows = _span(foot - BODY[1] * scale, foot - BODY[0] * scale, luminance.shape[0])
+    if rows is None or luminance.shape[1] < 8:
+        return None
+    body = luminance[rows]
+    pair = _best_pair(body, scale, camera.principal_point[0] - origin[0], noise)
+    if pair is None:
+        return None
+    left, right = pair
+    foot = _refined_foot(luminance[:, math.ceil(left) + 1 : math.floor(right)], foot, camera)
+    return LeadWindow(0.5 * (left + right) + origin[0], foot + origin[1], right - left)
+
+
+def _span(first: float, last: float, size: int) -> slice | None:
+    low, high = max(math.floor(first), 0), min(math.ceil(last) + 1, size)
+    return slice(low, high) if high - low >= 2 else None
+
+
+def _best_pair(body: NDArray[np.float32], scale: float, axis: float, noise: float) -> tuple[float, float] | None:
+    columns = cv2.GaussianBlur(body.mean(axis=0, dtype=np.float64)[None, :], (3, 1), 0.6)[0]
+    step = np.gradient(columns)
+    floor = LEAST_EDGE * max(noise, 0.3) / math.sqrt(2.0 * body.shape[0])
+    widths = np.arange(math.floor(WIDTHS[0] * scale), math.ceil(WIDTHS[1] * scale) + 1)
+    scores: list[tuple[float, int, int]] = []
+    for width in widths[(widths >= 4) & (widths < step.size - 1)]:
+        first, second = step[:-width], step[width:]
+        # A rear is darker than what is beside it on both sides, or brighter on both.
+        strength = np.where(first * second < 0, np.minimum(np.abs(first), np.abs(second)), 0.0)
+        middle = np.arange(strength.size) + 0.5 * width
+        usual = np.exp(-0.5 * ((middle - axis) / (USUAL_ASIDE * scale)) ** 2)
+        score = np.where(np.abs(middle - axis) <= ASIDE * scale, strength * usual, 0.0)
+        best = int(np.argmax(score))
+        if strength[best] > floor:
+            scores.append((float(score[best]), best, int(best + width)))
+    if not scores:
+        return None
+    likely = sorted(scores, reverse=True)[:12]
+    _, left, right = max(likely, key=lambda s: s[0] * (1.0 + max(_symmetry(body[:, s[1] : s[2] + 1]), 0.0)))
+    return _peak(np.abs(step), left), _peak(np.abs(step), right)
+
+
+def _symmetry(pixels: NDArray[np.float32]) -> float:
+    """Correlation of pixels with their mirror image."""
+    centred = pixels - pixels.mean()
+    power = float((centred**2).sum())
+    return float((centred * centred[:, ::-1]).sum()) / power if power > 0 else 0.0
+
+
+def _peak(values: Floats, at: int) -> float:
+    """Place of a maximum to a fraction of a pixel, by a parabola."""
+    if not 0 < at < values.size - 1:
+        return float(at)
+    left, here, right = values[at - 1 : at + 2]
+    bend = float(left - 2.0 * here + right)
+    return at + float(np.clip(0.5 * (left - right) / bend, -0.5, 0.5)) if bend < 0 else float(at)
+
+
+def _refined_foot(strip: NDArray[np.float32], foot: float, camera: Camera) -> float:
+    """Strongest step down the rows within half a degree of where the foot should be."""
+    reach = max(camera.focal_length * math.radians(0.3), 1.5)
+    first, last = max(int(foot - reach), 1), min(math.ceil(foot + reach), strip.shape[0] - 2)
+    if last - first < 2 or strip.shape[1] < 2:
+        return foot
+    rows = strip[first - 1 : last + 2].mean(axis=1, dtype=np.float64)
+    step = np.abs(np.gradient(rows))
+    usual = np.exp(-0.5 * ((np.arange(step.size) + first - 1 - foot) / (0.5 * reach)) ** 2)
+    best = int(np.argmax(step[1:-1] * usual[1:-1])) + 1
+    return _peak(step, best) + first - 1

@@ -1,0 +1,122 @@
+"""A near picture of a thing as a farther camera would show it."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+LEAST_BOX = 0.5
+"""Least width of the box over near pixels where both pictures are of one size [px]: no jumps from pixel to pixel."""
+
+
+@dataclass(frozen=True, slots=True)
+class Patch:
+    """A piece of an image and the point in it that is followed.
+
+    Attributes
+    ----------
+    luminance : (rows, cols) float64
+        Linear grey levels.
+    column, row : float
+        Position of the followed point, in columns and rows of the patch [px].
+    half_width, half_height : float
+        Size of the followed thing about that point [px]; the patch may hold more around it.
+    blur : float
+        Standard deviation of the lens' blur beside the pixels' own size [px].
+    """
+
+    luminance: Floats
+    column: float
+    row: float
+    half_width: float
+    half_height: float
+    blur: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Placement:
+    """Where a near patch's point is in a far patch, and how much smaller it is there.
+
+    Attributes
+    ----------
+    column, row : float
+        Columns and rows of the far patch [px].
+    scale : float
+        Far size over near size [-].
+    """
+
+    column: float
+    row: float
+    scale: float
+
+
+def box_weights(
+    near_size: int, centre: float, far: Floats, far_centre: float, scale: float, blur: float = 0.0
+) -> Floats:
+    """Shares of near pixels in each far pixel along one axis.
+
+    A far pixel covers 1/scale near ones, and its light is their mean: detail that the far picture cannot resolve is
+    averaged out of the near one before they are compared. Without that, thin fog is overestimated.
+
+    Parameters
+    ----------
+    near_size : int
+        Near pixels along the axis.
+    centre, far_centre : float
+        The common point in either [px].
+    far : (n,) float64
+        Far pixels [px].
+    scale : float
+        Far size over near size [-].
+    blur : float
+        Standard deviation of the lens' blur [px].
+
+    Returns
+    -------
+    (n, near_size) float64
+        Rows sum to 1 where the far pixel lies inside the near patch.
+    """
+    # A near pixel is itself a mean over 1 and blurred: squares of widths add, as variances do, and a box of width w
+    # has the variance w²/12.
+    half = 0.5 * math.sqrt(max((1.0 + 12.0 * blur**2) * (scale**-2 - 1.0), LEAST_BOX**2))
+    middle = centre + (far - far_centre) / scale
+    near = np.arange(near_size, dtype=np.float64)
+    upper = np.minimum(middle[:, None] + half, near + 0.5)
+    lower = np.maximum(middle[:, None] - half, near - 0.5)
+    return np.asarray(np.maximum(upper - lower, 0.0) / (2.0 * half), np.float64)
+
+
+@dataclass(frozen=True, slots=True)
+class PixelGrid:
+    """Far pixels that are compared."""
+
+    rows: Floats
+    cols: Floats
+    far: Floats
+
+
+def pixel_grid(near: Patch, far: Patch, at: Placement) -> PixelGrid | None:
+    """Far pixels that the followed thing covers wholly."""
+    spans = []
+    for centre, half, size in (
+        (at.row, near.half_height * at.scale, far.luminance.shape[0]),
+        (at.column, near.half_width * at.scale, far.luminance.shape[1]),
+    ):
+        first, last = math.ceil(centre - half + 0.5), math.floor(centre + half - 0.5)
+        first, last = max(first, 0), min(last, size - 1)
+        if last - first < 3:
+            return None
+        spans.append((first, last))
+    (top, bottom), (left, right) = spans
+    pixels = far.luminance[top : bottom + 1, left : right + 1]
+    return PixelGrid(np.arange(top, bottom + 1.0), np.arange(left, right + 1.0), pixels)
+
+
+def seen_as(near: Patch, grid: PixelGrid, at: Placement) -> Floats:
+    """Near patch as the far camera would see it without fog."""
+    rows = box_weights(near.luminance.shape[0], near.row, grid.rows, at.row, at.scale, near.blur)
+    cols = box_weights(near.luminance.shape[1], near.column, grid.cols, at.column, at.scale, near.blur)
+    return np.asarray(rows @ near.luminance @ cols.T)

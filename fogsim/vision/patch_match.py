@@ -1,0 +1,247 @@
+"""Registration of a near, sharp picture of a thing to a farther one, to a fraction of a pixel, and their regression."""
+
+import math
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.vision.patch import Patch, PixelGrid, Placement, pixel_grid, seen_as
+
+Floats = NDArray[np.float64]
+
+STEPS = 5
+"""Gauss–Newton steps of a registration."""
+
+NUDGE = 0.05
+"""Step of the numerical derivatives by the position [px]."""
+
+OUTLIER = 4.0
+"""Residual beyond which a pixel shows something that has changed (a lit lamp), in robust standard deviations [-]."""
+
+OWN_SHARE, EDGE_SHARE = 0.25, 0.5
+"""What a pixel's residual may be beside that: shares of its own contrast and of the change to its neighbours (half a
+pixel of misplacement), so that small bright things that carry the contrast are not taken for changes [-]."""
+
+SATURATED = 250.0
+"""Luminance that is clipped, or so near that noise is [linear grey levels]."""
+
+SURE = 7.0
+"""Slope in its standard deviations from which a placement is believed [-]."""
+
+LEAST_PIXELS = 24
+"""Fewest pixels that a regression is made of."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlacementPrior:
+    """What is known of a placement before looking.
+
+    Attributes
+    ----------
+    placement : Placement
+        The expected one.
+    column_deviation, row_deviation : float
+        Standard deviations of column and row [px].
+    scale_deviation : float
+        Standard deviation of the scale, relative [-].
+    """
+
+    placement: Placement
+    column_deviation: float
+    row_deviation: float
+    scale_deviation: float
+
+
+@dataclass(frozen=True, slots=True)
+class Regression:
+    """Far luminance as a line in near luminance, far = mean + slope · (near − near_mean).
+
+    Attributes
+    ----------
+    placement : Placement
+        Where the near patch fits.
+    slope, slope_deviation : float
+        Ratio of the contrasts and its standard deviation [-].
+    mean, near_mean : float
+        Means of the far and of the near pixels [linear grey levels].
+    residual : float
+        Robust standard deviation of what is left [linear grey levels].
+    variance : float
+        Variance of the far pixels [linear grey levels²].
+    correlation : float
+        Of far and near pixels [-].
+    pixels : int
+        How many took part.
+    """
+
+    placement: Placement
+    slope: float
+    slope_deviation: float
+    mean: float
+    near_mean: float
+    residual: float
+    variance: float
+    correlation: float
+    pixels: int
+
+
+def coarse_placement(near: Patch, far: Patch, prior: PlacementPrior) -> Placement | None:
+    """Whole-pixel placement of greatest posterior: normalised correlation under the prior.
+
+    Parameters
+    ----------
+    near, far : Patch
+        The two pictures.
+    prior : PlacementPrior
+        Where the near patch is expected in the far one.
+
+    Returns
+    -------
+    Placement or None
+        None if the far patch is too small.
+    """
+    grid = pixel_grid(near, far, prior.placement)
+    if grid is None:
+        return None
+    template = seen_as(near, grid, prior.placement).astype(np.float32)
+    if far.luminance.shape[0] < template.shape[0] or far.luminance.shape[1] < template.shape[1]:
+        return None
+    if float(template.std()) < 1e-3:
+        return None
+    image = far.luminance.astype(np.float32)
+    matched = np.nan_to_num(cv2.matchTemplate(image, template, cv2.TM_CCOEFF_NORMED), nan=0.0, posinf=0.0, neginf=0.0)
+    correlation = np.clip(matched.astype(np.float64), 0.0, 0.9999)
+    down = np.arange(correlation.shape[0]) - grid.rows[0]
+    across = np.arange(correlation.shape[1]) - grid.cols[0]
+    expected = 0.5 * (down[:, None] / prior.row_deviation) ** 2 + 0.5 * (across / prior.column_deviation) ** 2
+    cost = 0.5 * template.size * np.log1p(-(correlation**2)) + expected
+    row, col = np.unravel_index(int(np.argmin(cost)), cost.shape)
+    at = prior.placement
+    return replace(at, column=at.column + float(across[col]), row=at.row + float(down[row]))
+
+
+def register(near: Patch, far: Patch, prior: PlacementPrior, noise: float, most: float = math.inf) -> Regression | None:
+    """Place a near patch in a far one and regress the far pixels on it.
+
+    Gauss–Newton on column, row and scale with slope and mean projected out; pixels that have changed (lit lamps) and
+    saturated ones are left out. The noise of the near pixels is taken out of the slope. Where the detail does not
+    stand out of the noise, the best of many placements would be that of the noise: then the expected one is taken.
+
+    Parameters
+    ----------
+    near, far : Patch
+        The two pictures; the near one is at least as large.
+    prior : PlacementPrior
+        Where the near one is expected in the far one.
+    noise : float
+        Standard deviation of single pixels [linear grey levels].
+    most : float
+        Largest slope that can be true [-]; a placement that gives more is one on something else.
+
+    Returns
+    -------
+    Regression or None
+        None if too few pixels can be compared.
+    """
+    at = coarse_placement(near, far, prior)
+    placed = None if at is None else _placed(near, far, at, prior, noise)
+    found = None if placed is None else _regressed(near, far, placed, noise)
+    if found is not None and SURE * found.slope_deviation < found.slope <= most:
+        return found
+    return _regressed(near, far, prior.placement, noise)
+
+
+def _placed(near: Patch, far: Patch, at: Placement, prior: PlacementPrior, noise: float) -> Placement | None:
+    for _ in range(STEPS):
+        grid = pixel_grid(near, far, at)
+        step = None if grid is None else _step(near, grid, at, prior, noise)
+        if step is None:
+            return None
+        shift = np.clip(step[:2], -1.0, 1.0)
+        at = Placement(at.column + float(shift[0]), at.row + float(shift[1]), at.scale * math.exp(float(step[2])))
+        if float(np.abs(step[:2]).max()) < 0.01:
+            break
+    return at
+
+
+def _regressed(near: Patch, far: Patch, at: Placement, noise: float) -> Regression | None:
+    grid = pixel_grid(near, far, at)
+    return None if grid is None else _regression(near, grid, at, noise)
+
+
+def _line(shown: Floats, far: Floats) -> tuple[NDArray[np.bool_], float, float, float, float] | None:
+    """Pixels used, slope, means of near and far, and robust deviation of the residuals."""
+    used = (far < SATURATED) & (shown < SATURATED)
+    valid = used.copy()
+    down, across = np.gradient(shown)
+    change = np.abs(down) + np.abs(across)
+    for _ in range(4):
+        if int(used.sum()) < max(LEAST_PIXELS, 0.4 * used.size):
+            return None
+        near_mean, mean = float(shown[used].mean()), float(far[used].mean())
+        spread = float(((shown[used] - near_mean) ** 2).sum())
+        if spread <= 1e-9:
+            return None
+        slope = float(((shown[used] - near_mean) * far[used]).sum()) / spread
+        residual = far - mean - slope * (shown - near_mean)
+        scale = max(1.4826 * float(np.median(np.abs(residual[valid]))), 0.2)
+        own = abs(slope) * (OWN_SHARE * np.abs(shown - near_mean) + EDGE_SHARE * change)
+        kept = valid & (np.abs(residual) <= OUTLIER * scale + own)
+        if bool((kept == used).all()):
+            break
+        used = kept
+    return used, slope, near_mean, mean, scale
+
+
+def _step(near: Patch, grid: PixelGrid, at: Placement, prior: PlacementPrior, noise: float) -> Floats | None:
+    shown = seen_as(near, grid, at)
+    line = _line(shown, grid.far)
+    if line is None:
+        return None
+    used, slope, near_mean, mean, scale = line
+    residual = (grid.far - mean - slope * (shown - near_mean))[used]
+    moved = (
+        replace(at, column=at.column + NUDGE),
+        replace(at, row=at.row + NUDGE),
+        replace(at, scale=at.scale * math.exp(0.01)),
+    )
+    jacobian = np.stack([slope * (seen_as(near, grid, m) - shown)[used] for m in moved], axis=1)
+    jacobian /= (NUDGE, NUDGE, 0.01)
+    # What slope and mean can take up is no displacement.
+    base = np.stack([np.ones(residual.size), shown[used] - near_mean], axis=1)
+    jacobian -= base @ np.linalg.lstsq(base, jacobian, rcond=None)[0]
+    expected = prior.placement
+    deviation = np.array([prior.column_deviation, prior.row_deviation, prior.scale_deviation])
+    offset = np.array([at.column - expected.column, at.row - expected.row, math.log(at.scale / expected.scale)])
+    variance = max(scale, noise) ** 2
+    information = jacobian.T @ jacobian / variance + np.diag(deviation**-2)
+    return np.asarray(np.linalg.solve(information, jacobian.T @ residual / variance - offset / deviation**2))
+
+
+def _regression(near: Patch, grid: PixelGrid, at: Placement, noise: float) -> Regression | None:
+    shown = seen_as(near, grid, at)
+    line = _line(shown, grid.far)
+    if line is None:
+        return None
+    used, slope, near_mean, mean, scale = line
+    count = int(used.sum())
+    spread = float(((shown[used] - near_mean) ** 2).sum())
+    # Each shown pixel is the mean of 1/scale² near ones, and so is its noise, which flattens the line.
+    own = count * noise**2 * min(at.scale, 1.0) ** 2
+    if spread <= 2.0 * own:
+        return None
+    variance = float(grid.far[used].var())
+    correlation = slope * math.sqrt(spread / count / max(variance, 1e-12))
+    return Regression(
+        placement=at,
+        slope=slope * spread / (spread - own),
+        slope_deviation=max(scale, noise) / math.sqrt(spread - own),
+        mean=mean,
+        near_mean=near_mean,
+        residual=scale,
+        variance=variance,
+        correlation=min(correlation, 1.0),
+        pixels=count,
+    )

@@ -1,0 +1,358 @@
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+
+from fogsim.errors import InputError
+from fogsim.estimators import make
+from fogsim.estimators.huang2015_ratios import (
+    Regressions,
+    fitted_extinction,
+    image_confidence,
+    published_extinction,
+    ratio_table,
+    variance_ratio_extinction,
+)
+from fogsim.response import respond
+from fogsim.values import Camera, Frame, LeadMeasurement, Observation, Response
+
+LN20 = np.log(20.0)
+
+
+@dataclass(frozen=True)
+class Chase:
+    """A road with one vehicle ahead, drawn by point samples in the world: nothing of FogSim's renderer is in it.
+
+    Luminances in linear grey levels 0 … 255, lengths in metres.
+    """
+
+    visibility: float = 100.0
+    airlight: float = 200.0
+    asphalt: float = 60.0
+    paint: float = 90.0
+    width: float = 1.8
+    height: float = 1.5
+    across: float = 0.2
+    noise: float = 1.0
+    pitch_scatter: float = np.radians(0.1)
+    range_noise: float = 0.25
+    brakes_beyond: float = np.inf
+    gain_beyond: tuple[float, float] = (np.inf, 1.0)
+    sky_excess: float = 0.0
+    blur: bool = False
+    camera: Camera = field(
+        default_factory=lambda: Camera(688, 515, 700.0, (343.5, 257.0), 1.3, np.radians(1.0), response=Response.LINEAR)
+    )
+
+    def but(self, **changes):
+        return replace(self, **changes)
+
+
+def rear(chase: Chase, side: np.ndarray, up: np.ndarray, *, braking: bool) -> np.ndarray:
+    """Luminance of the rear of a vehicle without fog; `side` and `up` from the middle of its foot."""
+    w, h = 0.5 * chase.width, chase.height
+    out = np.full(side.shape, chase.paint)
+    out = np.where((up > 0.62 * h) & (up < 0.94 * h) & (np.abs(side) < 0.78 * w), 18.0 + 30.0 * (up / h - 0.6), out)
+    out = np.where(up < 0.16 * h, 12.0, out)
+    out = np.where((up > 0.3 * h) & (up < 0.36 * h), 0.6 * chase.paint, out)
+    out = np.where((np.abs(up - 0.42 * h) < 0.06) & (np.abs(side) < 0.26), 190.0, out)
+    lamps = (np.abs(up - 0.52 * h) < 0.09) & (np.abs(np.abs(side) - 0.8 * w) < 0.13)
+    return np.where(lamps, 700.0 if braking else 35.0, out)
+
+
+def light(chase: Chase, v: np.ndarray, u: np.ndarray, distance: float, pitch: float, table: np.ndarray) -> np.ndarray:
+    """Linear luminance at image points."""
+    camera = chase.camera
+    x, y = (u - camera.principal_point[0]) / camera.focal_length, (v - camera.principal_point[1]) / camera.focal_length
+    forward, down = np.cos(pitch) - y * np.sin(pitch), np.sin(pitch) + y * np.cos(pitch)
+    depth = np.where(down > 1e-6, camera.mount_height / np.maximum(down, 1e-6), np.inf)
+    shape = np.broadcast_shapes(x.shape, y.shape)
+    ahead = np.broadcast_to(np.minimum(depth * forward, 1e5), shape)
+    left = -np.minimum(depth, 1e5) * x
+    ground = chase.asphalt * (1.0 + 0.03 * table[(ahead / 0.9).astype(int) % 64, np.floor(left / 0.9).astype(int) % 64])
+    ground = np.where((np.abs(np.abs(left) - 1.8) < 0.08) & (ahead % 12.0 < 4.0), 2.4 * chase.asphalt, ground)
+    path = np.broadcast_to(depth, shape) * np.sqrt(1.0 + x**2 + y**2)
+    plane = distance / forward
+    side = np.broadcast_to(plane * x - chase.across, shape)
+    up = np.broadcast_to(camera.mount_height - plane * down, shape)
+    shadow = (ahead > distance) & (ahead < distance + 4.0) & (np.abs(left + chase.across) < 0.5 * chase.width)
+    ground = np.where(shadow, 0.25 * chase.asphalt, ground)
+    box = (np.abs(side) < 0.5 * chase.width) & (up > 0.18) & (up < chase.height)
+    ground = np.where(box, rear(chase, side, up, braking=distance > chase.brakes_beyond), ground)
+    path = np.where(box, plane * np.sqrt(1.0 + x**2 + y**2), path)
+    transmission = np.exp(-LN20 / chase.visibility * np.minimum(path, 1e6))
+    seen = ground * transmission + chase.airlight * (1.0 - transmission)
+    return np.where(np.isfinite(path), seen, chase.airlight * (1.0 + chase.sky_excess))
+
+
+def points(first: int, last: int, samples: int) -> np.ndarray:
+    return (np.arange(first, last)[:, None] + (np.arange(samples) + 0.5) / samples - 0.5).ravel()
+
+
+def pixel_means(chase: Chase, rows: tuple[int, int], cols: tuple[int, int], samples: int, *where) -> np.ndarray:
+    fine = light(chase, points(*rows, samples)[:, None], points(*cols, samples)[None, :], *where)
+    return fine.reshape(rows[1] - rows[0], samples, cols[1] - cols[0], samples).mean(axis=(1, 3))
+
+
+def picture(chase: Chase, distance: float, rng: np.random.Generator) -> np.ndarray:
+    """Linear luminance of one frame: one sample a pixel, of the vehicle 8 × 8."""
+    camera = chase.camera
+    where = (distance, camera.pitch + rng.normal(0.0, chase.pitch_scatter), rng.standard_normal((64, 64)))
+    out = pixel_means(chase, (0, camera.height), (0, camera.width), 1, *where)
+    scale = camera.focal_length / distance
+    foot, middle = camera.horizon_row + camera.row_distance / distance, camera.principal_point[0] + chase.across * scale
+    rows = max(int(foot - 1.2 * chase.height * scale - 8), 0), min(int(foot + 0.3 * scale + 8), camera.height)
+    cols = max(int(middle - 1.3 * scale), 0), min(int(middle + 1.3 * scale), camera.width)
+    out[slice(*rows), slice(*cols)] = pixel_means(chase, rows, cols, 8, *where)
+    if chase.blur:
+        padded = np.pad(out, 1, mode="edge")
+        across = 0.25 * padded[:, :-2] + 0.5 * padded[:, 1:-1] + 0.25 * padded[:, 2:]
+        out = 0.25 * across[:-2] + 0.5 * across[1:-1] + 0.25 * across[2:]
+    return out * (chase.gain_beyond[1] if distance > chase.gain_beyond[0] else 1.0)
+
+
+def exposed(chase: Chase, light: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    camera = chase.camera
+    most = 2**camera.bits - 1
+    signal = respond(np.clip(light / 255.0, 0.0, 1.0), camera.response) * most
+    noisy = np.rint(signal + rng.normal(0.0, chase.noise * most / 255.0, light.shape))
+    return np.clip(noisy, 0, most).astype(np.uint8 if camera.bits == 8 else np.uint16)
+
+
+def chased(chase: Chase, seed: int, ranges: np.ndarray) -> list[Observation]:
+    rng = np.random.default_rng(seed)
+    seen = []
+    for i, distance in enumerate(ranges):
+        image = exposed(chase, picture(chase, float(distance), rng), rng)
+        told = LeadMeasurement(float(distance) + rng.normal(0.0, chase.range_noise), 5.0)
+        seen.append(Observation(Frame(float(i), image, chase.camera), lead=told))
+    return seen
+
+
+AWAY = np.arange(25.0, 91.0, 5.0)
+
+
+def followed(chase: Chase, seed: int = 0, ranges: np.ndarray = AWAY, **options):
+    estimator = make("huang2015_lead", chase.camera, **options)
+    for observation in chased(chase, seed, ranges):
+        estimate = estimator.update(observation)
+    return estimate
+
+
+def test_variance_ratio_is_eq_4_15():
+    k = 0.02
+    near, far = 900.0, 900.0 * np.exp(-2 * k * 30.0)
+    assert variance_ratio_extinction(25.0, near, 55.0, far) == pytest.approx(k)
+
+
+def test_table_4_2_gives_the_thesis_its_visibility():
+    # The ratios that the thesis prints for 150 m, by difference of range.
+    found = ratio_table_of(
+        [92.0751, 77.1763, 92.1565, 84.9044], [71.0602, 71.1230, 78.2449], [65.4866, 60.3865], [55.6010]
+    )
+    extinction, deviation = published_extinction(found)
+    assert LN20 / extinction == pytest.approx(150.0, abs=55.0)
+    assert 0 < deviation < extinction
+
+
+def ratio_table_of(*rows):
+    table = ratio_table(np.array([25.0, 30.0, 35.0, 40.0, 45.0]), np.exp(-0.04 * np.arange(25.0, 46.0, 5.0)), 5.0)
+    return replace(table, ratio=np.array([np.mean(row) / 100.0 for row in rows]))
+
+
+def test_ratio_table_drops_what_is_far_from_its_rows_median():
+    distances = np.arange(20.0, 61.0, 5.0)
+    variances = np.exp(-2 * 0.01 * distances)
+    table = ratio_table(distances, variances, 5.0)
+    assert table.ratio == pytest.approx(np.exp(-0.02 * table.difference))
+    assert list(table.count) == [8, 7, 6, 5, 4, 3, 2, 1]
+    variances[4] *= 9.0
+    spoilt = ratio_table(distances, variances, 5.0)
+    assert spoilt.ratio[0] == pytest.approx(np.exp(-0.1))
+    assert spoilt.count[0] == 6
+
+
+def test_published_search_ends_at_33_m_of_visibility():
+    distances = np.arange(20.0, 61.0, 5.0)
+    extinction, _ = published_extinction(ratio_table(distances, np.exp(-2 * 0.15 * distances), 5.0))
+    assert extinction == 0.09
+
+
+def test_image_confidence_falls_to_one_part_in_400_at_the_visibility():
+    assert image_confidence(LN20 / 150.0, 150.0) == pytest.approx(0.05**2)
+    curve = image_confidence(0.02, np.array([25.0, 50.0, 75.0]), 25.0)
+    assert curve == pytest.approx([1.0, np.exp(-1.0), np.exp(-2.0)])
+    assert image_confidence(0.0, 1e6) == 1.0
+
+
+def exact(extinction, airlight=1.0, distances=AWAY):
+    t = np.exp(-extinction * (distances - distances[0]))
+    near = np.full(t.size, 0.4)
+    small = np.full(t.size, 1e-3)
+    return Regressions(distances, t, small, airlight - (airlight - near) * t, small, near)
+
+
+@pytest.mark.parametrize("extinction", [0.003, 0.02, 0.06, 0.2])
+@pytest.mark.parametrize("airlight", [1.0, 0.97])
+def test_fit_returns_what_was_put_in(extinction, airlight):
+    fit = fitted_extinction(exact(extinction, airlight))
+    # The prior of the sky pulls where thin fog leaves the airlight to it.
+    assert fit.extinction == pytest.approx(extinction, rel=0.01 if airlight == 1.0 else 0.03)
+    assert 0 < fit.deviation < 0.2 * extinction
+
+
+def test_fit_needs_ranges_that_differ():
+    data = exact(0.02)
+    assert fitted_extinction(replace(data, distance=np.full(AWAY.size, 30.0))) is None
+    assert fitted_extinction(exact(0.02, distances=AWAY[:2])) is None
+
+
+@pytest.mark.parametrize(("visibility", "bound"), [(30, 12), (50, 5), (100, 4), (200, 5), (300, 7), (500, 10)])
+def test_corrected_recovers_visibility(visibility, bound):
+    chase = Chase(visibility=float(visibility))
+    errors = [
+        followed(chase.but(across=a), seed).visibility / visibility - 1 for seed, a in enumerate((-0.5, 0.0, 0.4))
+    ]
+    assert np.median(np.abs(errors)) < bound / 100
+
+
+def test_interval_covers_the_truth():
+    inside = []
+    for seed, visibility in enumerate((50.0, 120.0, 200.0, 500.0)):
+        low, high = followed(Chase(visibility=visibility, paint=60.0), seed).visibility_interval
+        inside.append(low < visibility < high)
+    assert np.mean(inside) >= 0.75
+
+
+def test_as_published_errs_either_way_of_100_m():
+    # Noise adds to the variance in dense fog; distance takes detail away in thin fog.
+    assert followed(Chase(visibility=40.0), as_published=True).visibility > 50.0
+    assert followed(Chase(visibility=500.0), as_published=True).visibility < 420.0
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"brakes_beyond": 50.0},
+        {"gain_beyond": (55.0, 0.8)},
+        {"paint": 140.0, "width": 2.5, "height": 2.6},
+        {"sky_excess": 0.03},
+        {"airlight": 120.0, "asphalt": 36.0, "paint": 50.0},
+    ],
+    ids=lambda changes: next(iter(changes)),
+)
+def test_what_else_changes_the_picture_is_no_fog(changes):
+    assert followed(Chase(visibility=120.0, **changes)).visibility == pytest.approx(120.0, rel=0.08)
+
+
+def test_a_lens_that_blurs_is_no_fog_once_it_is_told():
+    # Three taps of a quarter, a half and a quarter have the variance 1/2.
+    chase = Chase(visibility=120.0, blur=True)
+    told, untold = followed(chase, blur=0.5**0.5), followed(chase)
+    assert told.visibility == pytest.approx(120.0, rel=0.06)
+    assert untold.visibility < told.visibility
+
+
+@pytest.mark.parametrize(("response", "bits"), [(Response.SRGB, 8), (Response.GAMMA, 12)])
+def test_other_cameras(response, bits):
+    camera = Camera(1024, 640, 1000.0, (500.0, 330.0), 1.6, np.radians(2.0), response=response, bits=bits)
+    assert followed(Chase(visibility=150.0, camera=camera)).visibility == pytest.approx(150.0, rel=0.06)
+
+
+def test_a_vehicle_that_comes_nearer_says_the_same():
+    assert followed(Chase(visibility=100.0), ranges=AWAY[::-1]).visibility == pytest.approx(100.0, rel=0.08)
+
+
+def test_mirroring_and_colour_change_nothing():
+    chase = Chase(visibility=100.0, across=0.0)
+    middle = Camera(687, 515, 700.0, (343.0, 257.0), 1.3, np.radians(1.0))
+    plain, mirrored, colour = (make("huang2015_lead", middle) for _ in range(3))
+    for seen in chased(chase.but(camera=middle), 1, AWAY):
+        image = seen.image
+        a = plain.update(Observation(image, lead=seen.lead))
+        b = mirrored.update(Observation(np.ascontiguousarray(image[:, ::-1]), lead=seen.lead))
+        c = colour.update(Observation(np.repeat(image[:, :, None], 3, axis=2), lead=seen.lead))
+    assert b.extinction == pytest.approx(a.extinction, rel=0.02)
+    assert c.extinction == pytest.approx(a.extinction, rel=1e-3)
+
+
+def test_scaling_all_ranges_scales_the_visibility():
+    data = exact(0.02)
+    doubled = fitted_extinction(replace(data, distance=2.0 * data.distance))
+    assert doubled.extinction == pytest.approx(0.5 * fitted_extinction(data).extinction, rel=0.01)
+
+
+def test_confidence_curve_is_given_with_the_estimate():
+    found = followed(Chase(visibility=150.0))
+    at, left = found.diagnostics["confidence_distances"], found.diagnostics["confidence"]
+    assert left == pytest.approx(np.exp(-2 * found.extinction * at))
+    assert left[0] == 1.0
+
+
+def test_the_window_is_where_the_vehicle_is():
+    chase = Chase(visibility=120.0, across=0.5, pitch_scatter=0.0)
+    found = followed(chase, ranges=np.array([30.0]))
+    column, foot, width = found.diagnostics["window"]
+    scale = chase.camera.focal_length / 30.0
+    assert column == pytest.approx(chase.camera.principal_point[0] + 0.5 * scale, abs=3.0)
+    assert foot == pytest.approx(chase.camera.horizon_row + chase.camera.row_distance / 30.0, abs=6.0)
+    assert width == pytest.approx(1.8 * scale, rel=0.1)
+    assert not found.valid
+    assert "not changed enough" in found.diagnostics["reason"]
+
+
+def test_another_vehicle_begins_another_track():
+    chase = Chase(visibility=100.0)
+    estimator = make("huang2015_lead", chase.camera)
+    for seen in (*chased(chase, 0, AWAY), *chased(chase, 1, np.array([25.0]))):
+        found = estimator.update(seen)
+    assert not found.valid
+    assert estimator.tracks == 2
+    assert estimator.update(Observation(seen.image)).diagnostics["reason"] == "no vehicle is tracked ahead"
+
+
+BAD = {
+    "black": np.zeros((515, 688), np.uint8),
+    "white": np.full((515, 688), 255, np.uint8),
+    "grey": np.full((515, 688), 128, np.uint8),
+    "noise": np.random.default_rng(0).integers(0, 256, (515, 688), dtype=np.uint8),
+}
+
+
+@pytest.mark.parametrize("as_published", [False, True])
+@pytest.mark.parametrize("name", BAD)
+def test_an_image_without_a_vehicle_says_nothing(name, as_published):
+    estimator = make("huang2015_lead", Chase().camera, as_published=as_published)
+    for distance in AWAY[:4]:
+        found = estimator.update(Observation(BAD[name], lead=LeadMeasurement(float(distance), 0.0)))
+        assert not found.valid
+        assert found.diagnostics["reason"]
+
+
+@pytest.mark.parametrize("distance", [-1.0, 0.0, 0.4, 1e9, np.inf])
+def test_odd_ranges_are_refused(distance):
+    found = make("huang2015_lead", Chase().camera).update(Observation(BAD["grey"], lead=LeadMeasurement(distance, 0.0)))
+    assert not found.valid
+
+
+def test_nan_range_and_odd_setback_are_errors():
+    with pytest.raises(InputError, match="NaN"):
+        make("huang2015_lead", Chase().camera).update(Observation(BAD["grey"], lead=LeadMeasurement(np.nan, 0.0)))
+    with pytest.raises(InputError, match="setback"):
+        make("huang2015_lead", Chase().camera, setback=np.nan)
+
+
+@pytest.mark.parametrize("pitch", [-40.0, 40.0, 89.0])
+def test_a_horizon_outside_the_image_is_refused(pitch):
+    camera = replace(Chase().camera, pitch=np.radians(pitch))
+    found = make("huang2015_lead", camera).update(Observation(BAD["noise"], lead=LeadMeasurement(30.0, 0.0)))
+    assert not found.valid
+
+
+@pytest.mark.parametrize("size", [(1, 1), (16, 16), (40, 30)])
+def test_tiny_images_are_refused(size):
+    camera = Camera(*size, 100.0, (size[0] / 2, size[1] / 2), 1.4)
+    found = make("huang2015_lead", camera).update(
+        Observation(np.full(size[::-1], 90, np.uint8), lead=LeadMeasurement(20.0, 0.0))
+    )
+    assert not found.valid

@@ -3,15 +3,28 @@
 from collections.abc import Callable
 
 from fogsim import registry
+from fogsim.estimators.huang2015 import Huang2015
+from fogsim.estimators.huang2015_lead import Huang2015Lead
+from fogsim.estimators.huang2015_rough import Huang2015Rough
 from fogsim.estimators.joint_road import JointRoad
 from fogsim.estimators.lead_contrast import LeadContrast
 from fogsim.estimators.negru2013 import Negru2013
 from fogsim.estimators.protocol import Estimator
+from fogsim.estimators.zhu2015 import Zhu2015
 from fogsim.registry import Registry
 from fogsim.values.camera import Camera
 
 ESTIMATORS: Registry[Callable[..., Estimator]] = Registry(
-    "estimator", {"negru2013": Negru2013, "joint_road": JointRoad, "lead_contrast": LeadContrast}
+    "estimator",
+    {
+        "negru2013": Negru2013,
+        "zhu2015": Zhu2015,
+        "huang2015": Huang2015,
+        "huang2015_rough": Huang2015Rough,
+        "huang2015_lead": Huang2015Lead,
+        "joint_road": JointRoad,
+        "lead_contrast": LeadContrast,
+    },
 )
 """Every estimator by name: called with a camera and keyword parameters it gives an `Estimator`."""
 

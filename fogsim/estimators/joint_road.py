@@ -55,6 +55,9 @@ OVEREXPOSURE = 0.15
 MOSTLY = 0.98
 """Share of saturated pixels beyond which a sky tells no more than that it is brighter [-]."""
 
+MODEL_DEVIATION = 0.006
+"""Relative deviation of k by what the model leaves out: marks, rounding, a road that is not quite flat [-]."""
+
 RANGE_MARGIN = 0.5
 """By how much a lead vehicle's foot may be nearer than its range says [m]."""
 
@@ -185,7 +188,8 @@ class JointRoad:
         extinction = max(fit.extinction, 0.0)
         if extinction > 0:
             found["inflection_row"] = horizon + 0.5 * extinction * self._camera.row_distance
-        return Estimate(self.method, extinction, fit.extinction_deviation, diagnostics=found)
+        deviation = math.hypot(fit.extinction_deviation, MODEL_DEVIATION * extinction)
+        return Estimate(self.method, extinction, deviation, diagnostics=found)
 
 
 def _impossible(camera: Camera) -> str:

@@ -35,6 +35,7 @@ MAX_ABOVE = 0.05
 
 NEAR_HORIZON = 4.0  # [px] a region that ends this close below the horizon has seen the whole road
 REACH = math.radians(4.0)  # [rad] about the told vanishing point, within which lines of the road may pass
+BENT_ROAD = 0.4  # [px] deviation of a vanishing point's row where the road bends or undulates
 AGREES = 4.0  # [-] standard deviations within which a vanishing point fits the told horizon
 ALBEDO_DEVIATION = 0.015  # [-] of k by slow changes of the road's reflectance, which the residuals do not show
 MAX_RESIDUAL = 0.12  # [-] of the fitted contrast: more is no curve of Koschmieder's
@@ -205,11 +206,12 @@ class Negru2013:
             return found if 1.0 <= found.row <= self._camera.height - 1 - MIN_ROWS else self._told
         if point is None:
             return self._told
-        row, apart = point.row + road.first_row, math.hypot(point.deviation, self._told.standard_deviation)
+        near = math.hypot(point.deviation, BENT_ROAD)
+        row, apart = point.row + road.first_row, math.hypot(near, self._told.standard_deviation)
         if abs(row - self._told.row) > AGREES * apart:
             return self._told
         share = (self._told.standard_deviation / apart) ** 2
-        deviation = point.deviation * self._told.standard_deviation / apart
+        deviation = near * self._told.standard_deviation / apart
         return Horizon(self._told.row + share * (row - self._told.row), deviation)
 
     def _road_image(self, image: NDArray[np.uint8] | NDArray[np.uint16]) -> _RoadImage:

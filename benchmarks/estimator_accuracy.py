@@ -6,7 +6,7 @@ to the estimators with a told pitch that is off by a normal error they are not t
 vehicle's range, "no lead" frames do not (the vehicles are there all the same). Errors are |V_est − V| / V of estimates
 that are valid and see fog; `coverage` is the share of 90 % intervals of k that hold the truth.
 
-    python benchmarks/estimator_accuracy.py [--json] [--docs] [--methods …] [--draws 2] [--scenes 6]
+    python benchmarks/estimator_accuracy.py [--json] [--docs] [--methods …] [--cameras 4] [--scenes 6] [--draws 2]
 """
 
 import argparse
@@ -78,7 +78,7 @@ def mispitched(camera: Camera, rng: np.random.Generator, deviation: float) -> Ca
 def observations(arguments: argparse.Namespace) -> Iterator[tuple[float, Camera, Observation]]:
     """Visibility, told camera and what the vehicle has, over cameras, scenes, exposures and fogs."""
     rng = np.random.default_rng(arguments.seed)
-    for size in CAMERAS:
+    for size in CAMERAS[: arguments.cameras]:
         for step in scenes(size, arguments.scenes, arguments.seed):
             drawn = np.exp(rng.uniform(math.log(BINS[0]), math.log(BINS[-1]), len(BINS) * arguments.draws))
             for visibility in [*drawn, math.inf]:
@@ -164,6 +164,7 @@ def main() -> None:
     parser.add_argument("--docs", action="store_true", help="write the table of docs/estimators.md")
     parser.add_argument("--methods", nargs="+", default=list(METHODS), help="estimators of single frames")
     parser.add_argument("--pitch-deviation", type=float, default=0.1, help="deviation of the told pitch [deg]")
+    parser.add_argument("--cameras", type=int, default=len(CAMERAS), help="how many of the cameras")
     parser.add_argument("--scenes", type=int, default=6, help="scenes for each camera")
     parser.add_argument("--draws", type=int, default=2, help="visibilities for each bin and scene, on average")
     parser.add_argument("--seed", type=int, default=1)

@@ -31,7 +31,7 @@ def records(name: str, *arguments: str) -> list[dict[str, Any]]:
         ("resets.py", ("--resets", "5"), {"ms_median", "growth_kib_per_reset"}),
         (
             "estimator_accuracy.py",
-            ("--size", "160x120", "--seconds", "1", "--seeds", "1"),
+            ("--cameras", "1", "--scenes", "1", "--draws", "1"),
             {"method", "visibility", "median_pct", "p95_pct", "valid_share", "ms"},
         ),
         (

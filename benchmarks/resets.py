@@ -14,12 +14,11 @@ Found with libsumo 1.28 on a 2-core Linux machine, growth per reset of resident 
 
     sumo         1000 resets   1.6 KiB / 1.8 KiB
     traffic       750 resets   2.1 KiB / 1.7 KiB   (counted from the 250th on)
-    environment   600 resets   2.7 KiB / 1.6 KiB
+    environment  1000 resets   3.1 KiB / 2.1 KiB
 
-So what grows is SUMO's own ``load``, below 2 KiB each whether the seed changes or not, some 2 MiB in 1000 resets; in
-the allocator's figures our stages, the scene, the renderer and the estimators add nothing to it. The resident set
-settles slowly (12 KiB a reset from the 20th to the 50th, 6 KiB from the 50th to the 200th, 2.7 KiB from the 150th to
-the 600th), so short runs show more.
+So most of what grows is SUMO's own ``load``, below 2 KiB each whether the seed changes or not, some 2 MiB in 1000
+resets; our stages, the scene, the renderer and the estimators add at most 0.5 KiB to it. The resident set settles
+slowly, so short runs show more.
 """
 
 import argparse

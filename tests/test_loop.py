@@ -76,12 +76,16 @@ def test_estimators_never_see_the_truth(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_estimators_are_told_a_calibration_that_may_be_wrong() -> None:
-    wrong = small("fog.visibility_m=80", "camera.told.pitch_error_deg=0.5", "duration_s=0.5")
-    right = small("fog.visibility_m=80", "duration_s=0.5")
+    # An estimator that trusts the pitch it is told.
+    trusting = ("estimators=[{method: joint_road, parameters: {pitch_deviation: 0.0001}}]",)
+    wrong = small("fog.visibility_m=80", "camera.told.pitch_error_deg=0.5", "duration_s=0.5", *trusting)
+    right = small("fog.visibility_m=80", "duration_s=0.5", *trusting)
     (*_, a), (*_, b) = fogsim.run(right, seed=1), fogsim.run(wrong, seed=1)
     assert np.array_equal(a.observation.image, b.observation.image)
     assert b.observation.frame.camera.pitch - a.observation.frame.camera.pitch == pytest.approx(np.radians(0.5))
-    # A horizon that is told too high makes the inflection seem nearer: the fog seems denser.
+    # A horizon that is told too high makes the road seem nearer: the fog seems denser.
+    assert a.estimates[0].valid
+    assert b.estimates[0].valid
     assert b.estimates[0].extinction > 1.05 * a.estimates[0].extinction
 
 

@@ -16,7 +16,11 @@ MINIMUM = (3, 11)
 LIBRARIES = {"libXrender.so.1": "libxrender1", "libatomic.so.1": "libatomic1"}
 """Shared libraries that SUMO's wheel loads, and the packages that provide them."""
 
-TEST_LIBRARIES = {"libEGL.so.1": "libegl1 libegl-mesa0 libgl1-mesa-dri", "libGL.so.1": "libgl1"}
+TEST_LIBRARIES = {
+    "libEGL.so.1": "libegl1 libegl-mesa0 libgl1-mesa-dri",
+    "libGL.so.1": "libgl1",
+    "libOSMesa.so.8": "libosmesa6",
+}
 TEST_PROGRAMS = {"Xvfb": "xvfb"}
 
 

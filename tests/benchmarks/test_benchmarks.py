@@ -44,6 +44,7 @@ def records(name: str, *arguments: str) -> list[dict[str, Any]]:
             ("--renderers", "4", "--frames", "8"),
             {"growth_kib_per_renderer", "growth_kib_per_1000_frames"},
         ),
+        ("air.py", ("--repeat", "2"), {"fog", "lamps", "changing", "width", "height", "ms_median", "ms_min", "ms_max"}),
         ("traffic.py", ("--vehicles", "20", "--seconds", "1"), {"vehicles", "ms_sumo", "ms_total", "ratio"}),
     ],
 )

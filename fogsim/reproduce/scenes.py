@@ -62,12 +62,19 @@ def views(camera: Camera, cars: Sequence[tuple[float, float]], *, trees: bool) -
     renderer = make_renderer("auto", scene if trees else replace(scene, scenery=()), illuminance=ILLUMINANCE)
     pose = CameraPose((0.0, 0.0, camera.mount_height), heading=0.0)
     try:
-        yield renderer.render(vehicle_batches(_standing(cars), None), camera, pose), pose
+        yield renderer.render(vehicle_batches(standing_cars(cars), None), camera, pose), pose
     finally:
         renderer.close()
 
 
-def _standing(cars: Sequence[tuple[float, float]]) -> TrafficState:
+def standing_cars(cars: Sequence[tuple[float, float]]) -> TrafficState:
+    """Cars along the road.
+
+    Parameters
+    ----------
+    cars : sequence of (float, float)
+        How far along the road the near end of each is, and how far left its middle is [m].
+    """
     n = len(cars)
     return TrafficState(
         time=0.0,

@@ -21,6 +21,9 @@ its height [-]. It ends below the roof of the flattest car and above the shadow 
 MARGIN, MARGIN_PIXELS = 0.12, 8
 """What a stored picture holds around that part: widths of the vehicle [-] and pixels."""
 
+MOST_NOISE = 0.1
+"""Noise of a sky relative to its luminance beyond which it is none [-]."""
+
 LEAST_WIDTH = 8.0
 """Narrowest vehicle whose picture is compared [px]."""
 
@@ -112,6 +115,8 @@ def _sky(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera) -> tuple
     across = np.abs(np.diff(luminance, axis=1))
     # Half of the neighbours are of one surface even where trees stand before the sky.
     noise = 1.4826 * float(np.median(across)) / math.sqrt(2.0)
+    if noise > MOST_NOISE * bright:
+        raise CannotTellError("what is above the horizon is no sky")
     return float(core.mean(dtype=np.float64)), noise
 
 

@@ -135,6 +135,9 @@ class LeadTrack:
             raise CannotTellError("no vehicle stands out where the range says that there is one")
         sighting = sighting_of(crop, distance, window, self._blur)
         comparison = _compared_with_itself(sighting)
+        if comparison.regression.mean >= sighting.sky:
+            # Fog only ever brings a vehicle nearer to the sky's light; lamps alone are brighter.
+            raise CannotTellError("what stands where the range says is brighter than the sky: no vehicle by day")
         self._reference, self._kept, self._comparisons = sighting, [sighting], [comparison]
         self._remember(window.column, window.foot, distance)
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from fogsim.errors import InputError
 from fogsim.estimators.huang2015_lead import Huang2015Lead
 from fogsim.estimators.huang2015_rough import Huang2015Rough
+from fogsim.estimators.image_check import checked_image
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
@@ -120,6 +121,7 @@ class Huang2015:
         for name, scale in (("time_scale", time_scale), ("way_scale", way_scale)):
             if not 0.0 < scale < math.inf:
                 raise InputError(f"{name} must be positive and finite, got {scale!r}")
+        self._camera = camera
         self._rough = Huang2015Rough(camera, as_published=as_published, pitch_deviation=pitch_deviation)
         self._lead = Huang2015Lead(camera, as_published=as_published, setback=setback, blur=blur)
         self._as_published = as_published
@@ -152,9 +154,10 @@ class Huang2015:
         Raises
         ------
         InputError
-            If the image is not of the camera's bit depth, not grey or colour, or not of the told camera's size, or the
-            range is NaN.
+            If the image is not of the camera's bit depth, not grey or colour, or not of the told camera's size, the
+            range is NaN, or time or speed are not finite.
         """
+        checked_image(observation.image, self._camera)
         self._advance(observation)
         rough, accurate = self._rough.update(observation), self._lead.update(observation)
         self._remember(rough, 0)
@@ -172,9 +175,12 @@ class Huang2015:
         return Estimate(self.method, extinction, deviation, diagnostics=diagnostics)
 
     def _advance(self, observation: Observation) -> None:
+        time, speed = observation.time, observation.speed
+        if not (math.isfinite(time) and math.isfinite(speed)):
+            raise InputError(f"an observation's time [s] and speed [m/s] must be finite, got {time!r} and {speed!r}")
         if self._time is not None:
-            self._way += max(observation.speed, 0.0) * max(observation.time - self._time, 0.0)
-        self._time = observation.time
+            self._way += max(speed, 0.0) * max(time - self._time, 0.0)
+        self._time = time
 
     def _weight(self, measurement: Measurement) -> float:
         return decay(measurement, self._time or 0.0, self._way, *self._scales)

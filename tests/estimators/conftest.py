@@ -1,6 +1,7 @@
 """A renderer of foggy roads that shares nothing with FogSim's own: the estimators' independent judge."""
 
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -105,7 +106,13 @@ def encode(linear: np.ndarray, response: Response) -> np.ndarray:
 
 
 def render_grey(road: Road, seed: int = 0, samples: int = 2) -> np.ndarray:
-    """One 8-bit image."""
+    """One 8-bit image, the caller's own."""
+    return drawn(road, seed, samples).copy()
+
+
+@lru_cache(maxsize=256)
+def drawn(road: Road, seed: int, samples: int) -> np.ndarray:
+    """The image: many methods look at the same roads."""
     camera = road.camera
     offsets = (np.arange(samples) + 0.5) / samples - 0.5
     rows = (np.arange(camera.height)[:, None] + offsets).ravel()
@@ -122,7 +129,7 @@ def render():
     return render_grey
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def road():
     """The road as it is if nothing is said."""
     return Road()

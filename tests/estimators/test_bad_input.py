@@ -1,0 +1,279 @@
+"""What each registered method does with input that no foggy road by day gives: a reason or an error, and no warning."""
+
+import dataclasses
+import math
+import re
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from fogsim.errors import FogSimError, InputError
+from fogsim.estimators import ESTIMATORS, make
+from fogsim.values import Camera, Estimate, Frame, LeadMeasurement, Observation, SignSighting
+
+METHODS = sorted(ESTIMATORS)
+ROWS, COLS = 240, 320
+CAMERA = Camera(COLS, ROWS, 289.0, (159.5, 119.5), 1.38, np.radians(2.0))
+RANGES = (14.0, 18.0, 22.0, 27.0, 33.0, 39.0, 46.0)
+"""Of the tracked vehicle, frame by frame [m]."""
+
+PERIOD = 0.4
+"""Time between two frames [s]."""
+
+
+@pytest.fixture(scope="module")
+def sequence(render, road):
+    """A drive behind a vehicle that draws away, in fog of 100 m."""
+    return [render(road.but(camera=CAMERA, lead_distance=d + 1.7), i) for i, d in enumerate(RANGES)]
+
+
+def observation(image, index: int = 0, **changes) -> Observation:
+    """Everything that a vehicle can have, so that no method abstains for want of a sensor."""
+    told = {
+        "frame": Frame(PERIOD * index, image, CAMERA),
+        "speed": 25.0,
+        "lead": LeadMeasurement(RANGES[index % len(RANGES)], 10.0),
+        "signs": (SignSighting("sign", "speed_limit", 22.2, 80.0 - 10.0 * index, -5.0, 0.9),),
+    }
+    return Observation(**(told | changes))
+
+
+def estimates(method: str, image, camera: Camera = CAMERA) -> list[Estimate]:
+    estimator = make(method, camera)
+    return [estimator.update(observation(image, index)) for index in range(len(RANGES))]
+
+
+def numbers(value: object) -> Iterator[float]:
+    """Every number in diagnostics, however deep."""
+    if isinstance(value, Estimate):
+        yield from numbers(value.diagnostics)
+    elif isinstance(value, dict):
+        yield from (number for one in value.values() for number in numbers(one))
+    elif isinstance(value, (tuple, list)):
+        yield from (number for one in value for number in numbers(one))
+    elif isinstance(value, np.ndarray) and value.dtype.kind == "f":
+        yield from value.ravel().tolist()
+    elif isinstance(value, float):
+        yield value
+
+
+def check_sound(found: Estimate, method: str) -> None:
+    """Whatever it says, an estimate is one: no NaN, no deviation without a value, no abstention without a reason."""
+    assert found.method == method
+    assert math.isfinite(found.extinction)
+    assert found.extinction >= 0.0
+    assert not any(math.isnan(number) for number in numbers(found.diagnostics))
+    if found.valid:
+        assert 0.0 < found.standard_deviation < math.inf
+    else:
+        assert (found.extinction, found.standard_deviation) == (0.0, math.inf)
+        assert found.diagnostics["reason"]
+
+
+def bytes_of(levels: np.ndarray) -> np.ndarray:
+    return np.clip(np.broadcast_to(levels, (ROWS, COLS)), 0, 255).astype(np.uint8)
+
+
+def texture(rng: np.random.Generator) -> np.ndarray:
+    """Leaves and branches: grains of 1 to 11 pixels."""
+    out = np.zeros((ROWS, COLS))
+    for size in (1, 2, 5, 11):
+        grains = rng.normal(0.0, 12.0, (ROWS // size + 1, COLS // size + 1))
+        out += grains.repeat(size, axis=0).repeat(size, axis=1)[:ROWS, :COLS]
+    return out
+
+
+def without_road() -> dict[str, np.ndarray]:
+    rng = np.random.default_rng(3)
+    row = np.arange(ROWS)[:, None]
+    below = row - int(CAMERA.horizon_row)
+    noise, forest = rng.normal(0.0, 1.5, (ROWS, COLS)), 60.0 + texture(rng)
+    lit = 120.0 * np.clip((below - 2) / 124.0, 0.0, 1.0) ** 2 + 2.0
+    cells = np.indices((ROWS, COLS))
+    return {
+        "black": bytes_of(np.zeros(1)),
+        "white": bytes_of(np.full(1, 255)),
+        "grey": bytes_of(np.full(1, 128)),
+        "noise": rng.integers(0, 256, (ROWS, COLS), dtype=np.uint8),
+        "colour noise": rng.integers(0, 256, (ROWS, COLS, 3), dtype=np.uint8),
+        "checkerboard of 1 px": bytes_of(cells.sum(axis=0) % 2 * 255),
+        "checkerboard of 7 px": bytes_of((cells // 7).sum(axis=0) % 2 * 255),
+        "checkerboard of 24 px": bytes_of((cells // 24).sum(axis=0) % 2 * 255),
+        "night": bytes_of(lit + noise),
+        "forest": bytes_of(forest),
+        "forest before the sky": bytes_of(np.where(below > -50, forest, 200.0)),
+        "snow, brighter than the sky": bytes_of(np.where(below > 0, 230.0, 150.0) + noise),
+        "sky alone": bytes_of(150.0 + 60.0 * row / ROWS + noise),
+        "wall": bytes_of(np.where(below > -50, 70.0, 200.0) + noise),
+    }
+
+
+WITHOUT_ROAD = without_road()
+
+
+@pytest.mark.parametrize("name", WITHOUT_ROAD)
+@pytest.mark.parametrize("method", METHODS)
+def test_a_picture_without_a_road_by_day_is_refused_with_a_reason(method, name):
+    for found in estimates(method, WITHOUT_ROAD[name]):
+        check_sound(found, method)
+        assert not found.valid
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_an_upside_down_camera_is_refused_or_turned(method, render, road):
+    upright = render(road.but(camera=CAMERA))
+    turned = np.ascontiguousarray(upright[::-1, ::-1])
+    assert not any(found.valid for found in estimates(method, turned))
+    told = dataclasses.replace(CAMERA, roll=math.pi)
+    assert not any(found.valid for found in estimates(method, upright, told))
+    for found in estimates(method, turned, told):
+        check_sound(found, method)
+
+
+@pytest.mark.parametrize("value", [0, 90, 255])
+@pytest.mark.parametrize("size", [(1, 1), (16, 16), (2, 300), (300, 2), (33, 20)])
+@pytest.mark.parametrize("method", METHODS)
+def test_tiny_images_are_refused_with_a_reason(method, size, value):
+    camera = Camera(*size, 100.0, (size[0] / 2, size[1] / 2), 1.4)
+    for found in estimates(method, np.full(size[::-1], value, np.uint8), camera):
+        check_sound(found, method)
+        assert not found.valid
+
+
+@pytest.mark.parametrize("pitch", [-89.0, -40.0, 40.0, 89.0])
+@pytest.mark.parametrize("method", METHODS)
+def test_a_horizon_outside_the_image_is_refused_with_a_reason(method, pitch, render, road):
+    image = render(road.but(camera=CAMERA, lead_distance=20.0))
+    for found in estimates(method, image, dataclasses.replace(CAMERA, pitch=math.radians(pitch))):
+        check_sound(found, method)
+        assert not found.valid
+
+
+@pytest.mark.parametrize("seed", range(15))
+@pytest.mark.parametrize("method", METHODS)
+def test_nothing_odd_gets_out_of_random_pictures(method, seed):
+    rng = np.random.default_rng(seed)
+    camera = Camera(96, 72, rng.uniform(30, 300), (48.0, rng.uniform(0, 72)), 1.4, rng.uniform(-0.3, 0.3))
+    rows = np.interp(np.arange(72), np.sort(rng.uniform(0, 72, 5)), rng.uniform(0, 300, 5))
+    image = np.clip(rows[:, None] + rng.normal(0, rng.choice([0, 1, 20]), (72, 96)), 0, 255).astype(np.uint8)
+    for found in estimates(method, image, camera):
+        check_sound(found, method)
+
+
+NAN_KEYS = ["focal_length", "mount_height", "pitch", "roll"]
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("key", NAN_KEYS)
+def test_a_calibration_that_is_no_number_cannot_be_made(key, value):
+    with pytest.raises(InputError, match=key):
+        dataclasses.replace(CAMERA, **{key: value})
+    with pytest.raises(InputError, match="principal_point must be finite"):
+        dataclasses.replace(CAMERA, principal_point=(value, 10.0))
+
+
+GREY = np.full((ROWS, COLS), 90, np.uint8)
+WRONG_IMAGES = {
+    "none": (None, "numpy array of uint8, got NoneType"),
+    "a list": ([[1, 2], [3, 4]], "numpy array of uint8, got list"),
+    "floats": (GREY / 255.0, "must have dtype uint8.*got float64"),
+    "NaN": (np.full((ROWS, COLS), np.nan), "must have dtype uint8.*got float64"),
+    "truth values": (GREY > 3, "must have dtype uint8.*got bool"),
+    "int64": (GREY.astype(np.int64), "must have dtype uint8.*got int64"),
+    "16 bits": (GREY.astype(np.uint16), "8 bits must have dtype uint8.*got uint16"),
+    "objects": (GREY.astype(object), "must have dtype uint8.*got object"),
+    "empty": (np.zeros((0, 0), np.uint8), "0×0 pixels.*told as 320×240"),
+    "one row": (GREY[0], r"shape \(rows, cols\) or \(rows, cols, 3\), got \(320,\)"),
+    "two channels": (np.dstack([GREY] * 2), r"got \(240, 320, 2\)"),
+    "opacity": (np.dstack([GREY] * 4), r"got \(240, 320, 4\)"),
+    "four axes": (GREY[None, :, :, None], r"got \(1, 240, 320, 1\)"),
+    "turned": (GREY.T, "240×320 pixels.*told as 320×240"),
+    "half": (GREY[::2, ::2], "160×120 pixels.*told as 320×240"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG_IMAGES)
+@pytest.mark.parametrize("method", METHODS)
+def test_an_image_of_the_wrong_kind_is_told_and_leaves_no_trace(method, name, sequence):
+    """The error says what was expected and what came, and later estimates are those of a drive without the frame."""
+    image, told = WRONG_IMAGES[name]
+    undisturbed, disturbed = make(method, CAMERA), make(method, CAMERA)
+    for index, frame in enumerate(sequence):
+        if index in (0, 3):
+            with pytest.raises(InputError, match=told):
+                disturbed.update(observation(image, index))
+        a, b = (one.update(observation(frame, index)) for one in (undisturbed, disturbed))
+        assert (a.valid, a.extinction, a.standard_deviation) == (b.valid, b.extinction, b.standard_deviation)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_values_beyond_the_bit_depth_are_told(method):
+    with pytest.raises(InputError, match=r"10 bits must have values 0 … 1023, got one of 1024"):
+        make(method, dataclasses.replace(CAMERA, bits=10)).update(observation(np.full((ROWS, COLS), 1024, np.uint16)))
+
+
+def sound_or_told(method: str, frames, *changes) -> list[Estimate]:
+    """Estimates of a drive; in place of one that is refused with a message that says something, nothing."""
+    estimator, found, messages = make(method, CAMERA), [], []
+    for index, (frame, change) in enumerate(zip(frames, changes, strict=True)):
+        try:
+            found.append(estimator.update(observation(frame, index, **change)))
+        except FogSimError as error:
+            messages.append(str(error))
+    for estimate in found:
+        check_sound(estimate, method)
+    # It names what was wrong with which value.
+    assert all(re.search(r"(distance|speed|time|diameter|lateral|value|range).*got", message) for message in messages)
+    return found
+
+
+ODD = [math.nan, math.inf, -math.inf]
+
+
+@pytest.mark.parametrize("speed", [*ODD, -10.0, 1e9])
+@pytest.mark.parametrize("distance", [*ODD, -1.0, 0.0, 1e-9, 1e9])
+@pytest.mark.parametrize("method", METHODS)
+def test_an_odd_range_is_refused_or_made_nothing_of(method, distance, speed, sequence):
+    sound_or_told(method, sequence, *[{"lead": LeadMeasurement(distance, speed)}] * len(sequence))
+    # One bad measurement among good ones.
+    odd: list[dict] = [{}] * len(sequence)
+    odd[3] = {"lead": LeadMeasurement(distance, speed)}
+    assert len(sound_or_told(method, sequence, *odd)) >= len(sequence) - 1
+
+
+@pytest.mark.parametrize("speed", [*ODD, -10.0, 1e9])
+@pytest.mark.parametrize("method", METHODS)
+def test_an_odd_own_speed_is_refused_or_made_nothing_of(method, speed, sequence):
+    odd: list[dict] = [{}] * len(sequence)
+    odd[2] = {"speed": speed}
+    found = sound_or_told(method, sequence, *odd)
+    assert found[-1].valid == sound_or_told(method, sequence, *[{}] * len(sequence))[-1].valid
+
+
+@pytest.mark.parametrize("field", ["value", "distance", "lateral", "diameter"])
+@pytest.mark.parametrize("value", [*ODD, -1.0, 0.0, 1e9])
+@pytest.mark.parametrize("method", METHODS)
+def test_an_odd_sign_is_refused_or_made_nothing_of(method, field, value, sequence):
+    sign = dataclasses.replace(observation(GREY).signs[0], **{field: value})
+    sound_or_told(method, sequence, *[{"signs": (sign,)}] * len(sequence))
+
+
+TIMES = {
+    "backwards": [0.0, 0.4, 0.8, 0.4, 0.0, -0.4, -0.8],
+    "at a stand": [5.0] * 7,
+    "with a leap": [0.0, 0.4, 1e12, 1e12, -1e12, 0.8, 1.2],
+    "once no number": [0.0, 0.4, math.nan, 1.2, 1.6, 2.0, 2.4],
+    "once endless": [0.0, 0.4, math.inf, 1.2, 1.6, 2.0, 2.4],
+    "never a number": [math.nan] * 7,
+}
+
+
+@pytest.mark.parametrize("name", TIMES)
+@pytest.mark.parametrize("method", METHODS)
+def test_time_may_do_as_it_likes(method, name, sequence):
+    changes = [{"frame": Frame(time, frame, CAMERA)} for time, frame in zip(TIMES[name], sequence, strict=True)]
+    found = sound_or_told(method, sequence, *changes)
+    if name in ("backwards", "once no number", "once endless"):
+        # It does not silence a method for good.
+        assert found[-1].valid == sound_or_told(method, sequence, *[{}] * len(sequence))[-1].valid

@@ -10,6 +10,7 @@ from fogsim.jit import kernel
 from fogsim.render.lens import Lens
 from fogsim.render.shading import layout
 from fogsim.render.shading.layout import Array, Picture, Runs
+from fogsim.render.shading.lines import columns_between, line_share, reach_of
 from fogsim.render.shading.noise import GRAIN, PER_CELL, SMOOTH, Noise
 
 KIND, INSTANCE, LEAST, MOST, DEPTH = layout.KIND, layout.INSTANCE, layout.LEAST, layout.MOST, layout.DEPTH
@@ -18,7 +19,7 @@ HALF_WIDTH, LINES, COLOUR = layout.HALF_WIDTH, layout.LINES, layout.COLOUR
 ROAD, TERRAIN = layout.ROAD, layout.TERRAIN
 
 _CHUNK, _PIECE = 128, 32  # pixels of a row that share a footprint, and over which large patches are linear
-_LINE_REFLECTANCE, _LINE_WIDTH, _DASH, _PERIOD = 0.6, 0.2, 6.0, 18.0
+_LINE_REFLECTANCE = 0.6
 
 ROAD_RESPONSE = 0.0125
 """Coefficient of retroreflected luminance of dry asphalt [cd/m² per lx] (middle of gallen2014's range)."""
@@ -69,34 +70,6 @@ def _doubled(side: float, narrow: float) -> float:
     while side * math.sqrt(2.0) < narrow:
         side *= 2.0
     return side
-
-
-@kernel
-def _painted_below(x: float) -> float:
-    """Length of what lies below x of dashes that start at multiples of their period [m]."""
-    return math.floor(x / _PERIOD) * _DASH + min(x - _PERIOD * math.floor(x / _PERIOD), _DASH)
-
-
-@kernel
-def line_share(code: int, middle: float, along: float, across: float, length: float, width: float) -> float:
-    """Share of a footprint that a painted line covers.
-
-    Parameters
-    ----------
-    code : int
-        1 for a solid line, 2 for a dashed one.
-    middle : float
-        Where the middle of the line is, to the left of the lane's [m].
-    along, across, length, width : float
-        Middle and extents of the footprint along and across the lane [m].
-    """
-    low = max(across - 0.5 * width, middle - 0.5 * _LINE_WIDTH)
-    high = min(across + 0.5 * width, middle + 0.5 * _LINE_WIDTH)
-    share = max(high - low, 0.0) / width
-    if code == 1 or share == 0.0:
-        return share
-    start = along - 0.5 * length
-    return share * (_painted_below(start + length) - _painted_below(start)) / length
 
 
 @kernel
@@ -313,15 +286,15 @@ def shade_ground(  # noqa: C901, PLR0912, PLR0915 - one loop: handing arrays to 
                     response[v, u, 2] = b32 * texture[i]
             # Lines, where the chunk comes near one.
             codes, half_lane = int(known[k, LINES]), known[k, HALF_WIDTH]
-            first_t = t_base / max(base, known[k, LEAST])
-            last_t = (t_base + tx * (size - 1)) / max(base + zx * (size - 1), known[k, LEAST])
-            reach = 0.5 * _LINE_WIDTH + spread
+            deepest = np.float64(max(depths[0], depths[length - np.uint64(1)]))
             for edge in range(2):
                 code, line = (codes // 3, half_lane) if edge == 0 else (codes % 3, -half_lane)
-                if code == 0 or line > max(first_t, last_t) + reach or line < min(first_t, last_t) - reach:
+                if code == 0:
                     continue
+                reach = reach_of(deepest * (abs(tx - line * zx) + abs(ty - line * zy)), deepest * (abs(zx) + abs(zy)))
+                painted, after = columns_between(t_base, tx, base, zx, line - reach, line + reach, size)
                 paint, paint_response = np.float32(white * _LINE_REFLECTANCE), np.float32(LINE_RESPONSE)
-                for i in range(length):
+                for i in range(np.uint64(painted), np.uint64(after)):
                     u, place, far = np.uint64(begin) + i, float(i), np.float64(depths[i])
                     t, s = (t_base + tx * place) * far, (s_base + sx * place) * far
                     across_px = max(abs(far * (tx - t * zx)) + abs(far * (ty - t * zy)), 1e-4)

@@ -1,0 +1,220 @@
+"""No method sees the truth: not in the loop, not through its imports, not through what it is given."""
+
+import ast
+import dataclasses
+import enum
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import grimp
+import numpy as np
+import pytest
+
+import fogsim
+from fogsim.estimators import ESTIMATORS
+from fogsim.values import (
+    Camera,
+    CameraPose,
+    Estimate,
+    FogField,
+    Frame,
+    LeadMeasurement,
+    Observation,
+    SignMap,
+    SignSighting,
+    Step,
+    Truth,
+)
+
+METHODS = sorted(ESTIMATORS)
+HONEST = ("fogsim.estimators", "fogsim.vision")
+"""What estimators are made of."""
+
+TRUTHFUL = ("render", "traffic", "atmosphere", "scene", "camera", "sensors", "scenario", "outlook", "onboard", "loop")
+"""Modules of fogsim that know the truth."""
+
+UNSEEN = {"Truth", "Step", "View", "FogField", "FogBank", "FogChange", "FogPatches", "CameraPose", "TrafficState"} | {
+    "TrafficSnapshot", "Leader", "Collision", "Scene", "Mesh", "Batch", "RoadNetwork", "Lights", "LightSources"
+}  # fmt: skip
+"""Value types that hold it."""
+
+
+def drive() -> list[Step]:
+    """A few frames in traffic with every method that is registered."""
+    methods = ", ".join(f"{{method: {name}}}" for name in METHODS)
+    size = ("camera.width=320", "camera.height=240", "duration_s=2", "fog.visibility_m=80")
+    scenario = fogsim.load_scenario("motorway_fog_bank", [*size, f"estimators=[{methods}]"])
+    return list(fogsim.run(scenario, seed=1))
+
+
+@pytest.fixture(scope="module")
+def as_it_is() -> list[Step]:
+    return drive()
+
+
+def essence(estimate: Estimate) -> tuple[object, ...]:
+    """What must be the same bit for bit."""
+    found = estimate.diagnostics
+    told = tuple(found.get(key) for key in ("reason", "horizon_row", "inflection_row", "airlight", "road", "class"))
+    return estimate.method, estimate.extinction, estimate.standard_deviation, estimate.valid, told
+
+
+def check_same(honest: list[Step], misled: list[Step]) -> None:
+    for a, b in zip(honest, misled, strict=True):
+        assert np.array_equal(a.observation.image, b.observation.image)
+        for one, other in zip(a.estimates, b.estimates, strict=True):
+            assert essence(one) == essence(other), f"{one.method}, frame {a.index}"
+        assert np.array_equal(a.belief.probability, b.belief.probability)
+        assert a.command == b.command
+
+
+def test_the_drive_tells_each_method_apart(as_it_is: list[Step]) -> None:
+    """What follows would hold of methods that never say anything: most of these do."""
+    telling = {estimate.method for step in as_it_is for estimate in step.estimates if estimate.valid}
+    assert [estimate.method for estimate in as_it_is[0].estimates] == METHODS
+    assert telling >= {"negru2013", "zhu2015", "huang2015", "huang2015_rough", "joint_road"}
+    assert as_it_is[-1].observation.lead is not None
+
+
+def test_deleting_the_truth_changes_nothing(as_it_is: list[Step], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fogsim.onboard.fog_truth", lambda *_: None)
+    blind = drive()
+    assert all(step.truth is None for step in blind)
+    check_same(as_it_is, blind)
+
+
+def test_a_false_truth_changes_nothing(as_it_is: list[Step], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another fog, visibility, calibration, place, distances, instances and leader than what was drawn and measured."""
+    from fogsim.outlook import Outlook
+    from fogsim.sensors import measure_lead
+
+    rng = np.random.default_rng(4)
+    see = Outlook.see
+
+    def false_truth(fog: FogField, pose: CameraPose, camera: Camera, signs: SignMap) -> Truth:
+        k = float(rng.uniform(0.0, 0.2))
+        wrong = dataclasses.replace(camera, pitch=-camera.pitch, mount_height=9.0, focal_length=77.0)
+        place = dataclasses.replace(pose, position=(0.0, 0.0, 50.0), heading=pose.heading + 1.0)
+        return Truth(k, 0.5 * k, wrong, place, dataclasses.replace(fog, extinction=k), dataclasses.replace(signs))
+
+    def see_falsely(self, *arguments):
+        view, radiance = see(self, *arguments)
+        shuffled = dataclasses.replace(
+            view, distance=rng.permuted(view.distance), instance=rng.permuted(view.instance), radiance=1.0 - radiance
+        )
+        return shuffled, radiance
+
+    def measure_another(leader, *arguments):
+        return measure_lead(leader and dataclasses.replace(leader, vehicle_id=f"v{rng.integers(99)}"), *arguments)
+
+    monkeypatch.setattr("fogsim.onboard.fog_truth", false_truth)
+    monkeypatch.setattr("fogsim.onboard.measure_lead", measure_another)
+    monkeypatch.setattr(Outlook, "see", see_falsely)
+    misled = drive()
+    assert misled[3].truth.visibility != as_it_is[3].truth.visibility
+    assert not np.array_equal(misled[3].view.distance, as_it_is[3].view.distance)
+    check_same(as_it_is, misled)
+
+
+ALLOWED = (Observation, Frame, Camera, LeadMeasurement, SignSighting, float, int, str, type(None), enum.Enum)
+
+
+def parts(value: object):
+    yield value
+    if dataclasses.is_dataclass(value):
+        for field in dataclasses.fields(value):
+            yield from parts(getattr(value, field.name))
+    elif isinstance(value, tuple):
+        for one in value:
+            yield from parts(one)
+
+
+def test_an_observation_holds_pixels_calibration_and_measurements_alone(as_it_is: list[Step]) -> None:
+    for step in as_it_is:
+        for part in parts(step.observation):
+            if isinstance(part, np.ndarray):
+                assert part.dtype == np.uint8
+                # Nothing else hangs on the pixels' memory.
+                assert part.base is None or np.asarray(part.base).size == part.size
+            else:
+                assert isinstance(part, (*ALLOWED, tuple)), type(part)
+
+
+REPLAY = """
+import pickle, sys
+from pathlib import Path
+
+class Wall:
+    def find_spec(self, name, path=None, target=None):
+        parts = name.split(".")
+        if parts[0] in {blocked_libraries!r} or parts[0] == "fogsim" and parts[1:2] and parts[1] in {blocked!r}:
+            raise ImportError(name + " knows the truth")
+        return None
+
+sys.meta_path.insert(0, Wall())
+from fogsim.estimators import ESTIMATORS, make
+camera, observations = pickle.loads(Path(sys.argv[1]).read_bytes())
+estimators = [make(name, camera) for name in sorted(ESTIMATORS)]
+found = [[(e.method, e.extinction, e.standard_deviation, e.valid) for e in (m.update(o) for m in estimators)]
+         for o in observations]
+Path(sys.argv[2]).write_bytes(pickle.dumps(found))
+"""
+
+
+def test_observations_alone_give_the_same_where_no_truth_can_be_imported(as_it_is: list[Step], tmp_path: Path) -> None:
+    """In another process that cannot import renderer, traffic, fog or anything else that knows the truth."""
+    observations = [step.observation for step in as_it_is]
+    frame = observations[0].frame
+    assert isinstance(frame, Frame)
+    (tmp_path / "seen").write_bytes(pickle.dumps((frame.camera, observations)))
+    program = REPLAY.format(
+        blocked=TRUTHFUL, blocked_libraries=("libsumo", "traci", "sumolib", "OpenGL", "highway_env")
+    )
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", program, tmp_path / "seen", tmp_path / "found"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    found = pickle.loads((tmp_path / "found").read_bytes())  # noqa: S301 - what this test has just written
+    assert found == [[essence(one)[:4] for one in step.estimates] for step in as_it_is]
+
+
+@pytest.fixture(scope="module")
+def imports() -> grimp.ImportGraph:
+    return grimp.build_graph("fogsim", cache_dir=None)
+
+
+@pytest.mark.parametrize("truthful", TRUTHFUL)
+@pytest.mark.parametrize("honest", HONEST)
+def test_no_chain_of_imports_leads_to_the_truth(imports: grimp.ImportGraph, honest: str, truthful: str) -> None:
+    chain = imports.find_shortest_chains(honest, f"fogsim.{truthful}", as_packages=True)
+    assert not chain, " → ".join(next(iter(chain)))
+
+
+def test_the_check_of_imports_finds_what_it_looks_for(imports: grimp.ImportGraph) -> None:
+    assert imports.find_shortest_chains("fogsim.outlook", "fogsim.render", as_packages=True)
+    assert unseen_names("from fogsim.values import Camera, Truth") == {"Truth"}
+
+
+def unseen_names(source: str) -> set[str]:
+    """Truthful value types that a module imports by name."""
+    return {
+        alias.name
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("fogsim")
+        for alias in node.names
+    } & UNSEEN
+
+
+@pytest.mark.parametrize("package", ["estimators", "vision", "fusion"])
+def test_no_type_that_holds_the_truth_is_imported(package: str) -> None:
+    """Import contracts see modules; `from fogsim.values import Truth` would pass them."""
+    folder = Path(fogsim.__file__).parent / package
+    modules = sorted(folder.rglob("*.py"))
+    assert modules
+    for module in modules:
+        assert not unseen_names(module.read_text(encoding="utf-8")), module

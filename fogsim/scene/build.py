@@ -8,10 +8,11 @@ from fogsim.errors import InputError
 from fogsim.scene.bodies import body_shapes
 from fogsim.scene.chainage import Chainage
 from fogsim.scene.crosslines import cross_lines
-from fogsim.scene.edges import Edge, edge_meshes, guard_rail, lane_edge
+from fogsim.scene.edges import Edge, edge_meshes, guard_rail, lane_edge, runs
 from fogsim.scene.houses import house_places, house_shapes, houses, shapes_in_use
-from fogsim.scene.junctions import Areas, area_mesh, free_borders
-from fogsim.scene.polyline import LaneIndex, cleaned, parallel
+from fogsim.scene.junctions import Areas, area_mesh, free_borders, walkable
+from fogsim.scene.lane_index import LaneIndex
+from fogsim.scene.polyline import cleaned, parallel
 from fogsim.scene.relief import Relief
 from fogsim.scene.road import FAST, footway_mesh, free_edges, lane_mesh, terrain
 from fogsim.scene.roadside import placed, post_shapes, stations, trees
@@ -86,7 +87,7 @@ def _pavement(network: RoadNetwork, lanes: Sequence[Lane], driven: Sequence[Lane
     # Lanes across a junction show only where its area does not reach.
     seen = [lane for lane in driven if lane.kind is LaneKind.CARRIAGEWAY or not areas.cover(lane.centreline)]
     footways = [lane for lane in lanes if lane.kind is LaneKind.FOOTWAY]
-    paved = [area_mesh(area) for area in network.areas]
+    paved = [area_mesh(area) for area in walkable(network.areas, driven)]
     return [
         *(lane_mesh(lane, chainage) for lane in seen),
         *(footway_mesh(cleaned(lane.centreline), (-lane.width / 2, lane.width / 2)) for lane in footways),
@@ -102,11 +103,11 @@ def _borders(network: RoadNetwork, lanes: Sequence[Lane], index: LaneIndex) -> l
     for lane in lanes:
         if lane.kind is LaneKind.CROSSING or (lane.kind is LaneKind.JUNCTION and areas.cover(lane.centreline)):
             continue
-        found += [(lane, lane_edge(lane, side, line)) for side, line in free_edges(lane, index)]
+        found += [(lane, lane_edge(lane, side, line, index)) for side, line in free_edges(lane, index)]
     leading = [lane for lane in lanes if lane.kind in {LaneKind.CARRIAGEWAY, LaneKind.FOOTWAY}]
     junctions = [area for area in network.areas if area.kind is LaneKind.JUNCTION]
     if junctions and leading:
-        found += [(None, edge) for edge in free_borders(junctions, leading)]
+        found += [(None, edge) for edge in free_borders(junctions, leading, index)]
     return found
 
 
@@ -118,13 +119,16 @@ class _Furniture:
 
     def along(self, edge: Edge) -> tuple[list[Mesh], list[Batch]]:
         """What stands along one free side."""
-        line, side, distance = edge.line, edge.side, edge.inner + edge.shoulder + _RAIL_BEHIND_SHOULDER
-        if np.any(self._index.clearance(parallel(line, side * (distance + 0.2)), same_level=2.5) < 0.4):
-            return [], []
-        posts, heading = stations(line, _POST_SPACING, side * (distance + 0.15))
-        delineators, direction = stations(line, _DELINEATOR_SPACING, side * (distance + 0.35))
-        batches = [placed("rail_post", posts, heading), placed("delineator", delineators, direction)]
-        return [guard_rail(line, side, distance)], batches
+        side, distance = edge.side, edge.inner + edge.shoulder + _RAIL_BEHIND_SHOULDER
+        free = self._index.clearance(parallel(edge.line, side * (distance + 0.2)), same_level=2.5) >= 0.4
+        rails, batches = list[Mesh](), list[Batch]()
+        for start, end in runs(free):
+            line = edge.line[start:end]
+            posts, heading = stations(line, _POST_SPACING, side * (distance + 0.15))
+            delineators, direction = stations(line, _DELINEATOR_SPACING, side * (distance + 0.35))
+            rails.append(guard_rail(line, side, distance))
+            batches += [placed("rail_post", posts, heading), placed("delineator", delineators, direction)]
+        return rails, batches
 
 
 def _joined(batches: list[Batch]) -> tuple[Batch, ...]:

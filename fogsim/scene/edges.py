@@ -5,11 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.scene.polyline import LaneIndex, Points, arc_length, left_normals, parallel, refined
+from fogsim.scene.lane_index import LaneIndex
+from fogsim.scene.polyline import Points, arc_length, left_normals, parallel, refined
 from fogsim.scene.relief import Relief
-from fogsim.scene.road import FAST, KERB, LINE_CODE, TOWN, footway_mesh, strip
+from fogsim.scene.road import FAST, KERB, LINE_CODE, LONGEST, TOWN, footway_mesh, strip
 from fogsim.scene.solids import Material, grid, mesh
-from fogsim.values.road import Lane, LaneMarking
+from fogsim.values.road import Lane, LaneKind, LaneMarking
 from fogsim.values.scene import Mesh, Surface
 
 SHOULDER = Material((0.097, 0.096, 0.094), Surface.ROAD)
@@ -19,6 +20,7 @@ CONCRETE = Material((0.24, 0.238, 0.23))
 
 # Shoulders lie this much lower [m], so that a lane that crosses one covers it; more would hide the line beside them.
 _SHOULDER_DROP = 0.002
+_LEVEL = 2.5  # roads higher or lower than this pass over or under one another [m]
 _VERGE = 0.7  # width of the gravel beside a shoulder [m]
 _FOOTWAY = 2.2  # width of a street's footway [m]
 _SPAN = 5.0  # a bridge spans this much on either side of the lanes that pass below it [m]
@@ -39,6 +41,10 @@ class Edge:
         Distance from the line to where the pavement ends [m].
     speed_limit : float
         Speed limit of the road [m/s].
+    shoulder : float
+        Width of the paved shoulder, or of a street's footway, where there is room for it [m].
+    room : (n,) float64
+        How far from the pavement there is room for shoulder and verge at each of the line's points [m].
     marking : LaneMarking
         Line painted where the pavement ends.
     """
@@ -47,17 +53,73 @@ class Edge:
     side: int
     inner: float
     speed_limit: float
+    shoulder: float
+    room: NDArray[np.float64]
     marking: LaneMarking = LaneMarking.NONE
 
-    @property
-    def shoulder(self) -> float:
-        """Width of the paved shoulder, or of a street's footway [m]."""
-        return shoulder_width(self.speed_limit, self.side)
+
+def lane_edge(lane: Lane, side: int, line: Points, index: LaneIndex) -> Edge:
+    """Free side of a lane, as from `free_edges`.
+
+    Beside a footway there is nothing more, and of the room up to another lane each side gets half.
+    """
+    width = 0.0 if lane.kind is LaneKind.FOOTWAY else shoulder_width(lane.speed_limit, side)
+    inner, marking = lane.width / 2, lane.left if side > 0 else lane.right
+    room = room_beside(line, side * inner, width + _VERGE, index, 0.5)
+    along, there = _thinned(line, room)
+    return Edge(along, side, inner, lane.speed_limit, width, there, marking)
 
 
-def lane_edge(lane: Lane, side: int, line: Points) -> Edge:
-    """Free side of a lane, as from `free_edges`."""
-    return Edge(line, side, lane.width / 2, lane.speed_limit, lane.left if side > 0 else lane.right)
+def border_edge(line: Points, speed_limit: float, index: LaneIndex) -> Edge:
+    """Free part of a junction's border, with the land on its right."""
+    width = shoulder_width(speed_limit, -1)
+    along, there = _thinned(line, room_beside(line, -0.0, width + _VERGE, index, 1.0))
+    return Edge(along, -1, 0.0, speed_limit, width, there)
+
+
+def room_beside(line: Points, inner: float, most: float, index: LaneIndex, share: float) -> NDArray[np.float64]:
+    """Room beside the points of a line.
+
+    Parameters
+    ----------
+    line : (n, 3) float64
+        The line [m].
+    inner : float
+        How far to the left of the line the room begins [m]; to the right if it is negative, −0.0 included.
+    most : float
+        More than this is not asked for [m].
+    index : LaneIndex
+        The lanes that it ends at.
+    share : float
+        Share of the gap up to such a lane that counts.
+
+    Returns
+    -------
+    (n,) float64
+        Room [m], at least 0.1 m.
+    """
+    width, side = most / share, np.copysign(1.0, inner)
+    gap, searched = np.full(len(line), 0.1), np.ones(len(line), np.bool_)
+    # The largest width is halved until its middle lies on no lane.
+    while width > 0.3:
+        clear = index.clearance(parallel(line, inner + side * width / 2), same_level=_LEVEL)
+        found = searched & (clear > 0.0)
+        # What is as far as the pavement itself is no other lane; bends bring the pavement a little nearer.
+        gap[found] = np.where(clear > 0.4 * width, width, width / 2 + clear)[found]
+        searched &= ~found
+        width /= 2
+    return np.clip(share * gap, 0.1, most)
+
+
+def _thinned(line: Points, room: NDArray[np.float64]) -> tuple[Points, NDArray[np.float64]]:
+    """A line and the room beside it, without the points between which it is straight and widens evenly."""
+    step = np.diff(line, axis=0)
+    step /= np.linalg.norm(step, axis=1, keepdims=True)
+    kept = np.ones(len(line), np.bool_)
+    kept[1:-1] = np.linalg.norm(np.diff(step, axis=0), axis=1) > 1e-6
+    kept[1:-1] |= np.abs(np.diff(room, n=2)) > 0.03
+    corners = refined(line[kept], LONGEST)
+    return corners, np.interp(arc_length(corners), arc_length(line), room)
 
 
 def shoulder_width(speed_limit: float, side: int) -> float:
@@ -84,23 +146,24 @@ def edge_meshes(edge: Edge, relief: Relief, index: LaneIndex, along: NDArray[np.
         Distance of the line's points along the road [m], if not along the line itself.
     """
     distance = arc_length(edge.line) if along is None else along
+    paved = edge.inner + np.minimum(edge.shoulder, edge.room)
     if edge.speed_limit <= TOWN:
-        border = (edge.side * edge.inner, edge.side * (edge.inner + edge.shoulder))
-        return [footway_mesh(edge.line, border), *_down(edge, edge.inner + edge.shoulder, KERB, relief, index)]
-    outer = edge.inner + edge.shoulder
+        footway = footway_mesh(edge.line, (edge.side * edge.inner, edge.side * paved))
+        return [*([footway] if edge.shoulder > 0 else []), *_down(edge, paved, KERB, relief, index)]
+    outer = edge.inner + edge.room
     rows = [
-        parallel(edge.line, edge.side * (outer - 0.02), -_SHOULDER_DROP - 0.001),
-        parallel(edge.line, edge.side * (outer + _VERGE), -0.06),
+        parallel(edge.line, edge.side * (paved - 0.02), -_SHOULDER_DROP - 0.001),
+        parallel(edge.line, edge.side * outer, -0.06),
     ]
     verge = grid(np.stack(rows, axis=1), GRAVEL, (0, 0, 1))
-    return [_shoulder(edge, distance), verge, *_down(edge, outer + _VERGE, -0.06, relief, index)]
+    return [_shoulder(edge, paved, distance), verge, *_down(edge, outer, -0.06, relief, index)]
 
 
-def _shoulder(edge: Edge, along: NDArray[np.float64]) -> Mesh:
+def _shoulder(edge: Edge, paved: NDArray[np.float64], along: NDArray[np.float64]) -> Mesh:
     marking = LINE_CODE[edge.marking]
     return strip(
         edge.line,
-        (edge.side * (edge.inner - 0.02), edge.side * (edge.inner + edge.shoulder)),
+        (edge.side * (edge.inner - 0.02), edge.side * paved),
         -_SHOULDER_DROP,
         edge.shoulder / 2,
         # It shows its half of the line beside it: on its right if it lies to the left of the road.
@@ -111,11 +174,12 @@ def _shoulder(edge: Edge, along: NDArray[np.float64]) -> Mesh:
     )
 
 
-def _down(edge: Edge, distance: float, lift: float, relief: Relief, index: LaneIndex) -> list[Mesh]:
-    """Embankment from a distance beside the line down to the land, or the side of a bridge."""
+def _down(edge: Edge, distance: NDArray[np.float64], lift: float, relief: Relief, index: LaneIndex) -> list[Mesh]:
+    """Embankment from distances beside the line down to the land, or the side of a bridge."""
     line = edge.line
     if np.max(line[:, 2] - relief.height(line)) > 3.0:
         line = refined(line, 6.0)
+        distance = np.interp(arc_length(line), arc_length(edge.line), distance)
     top = parallel(line, edge.side * distance, lift)
     deep = np.maximum(top[:, 2] - relief.height(top), 0.0)
     foot = parallel(line, edge.side * (distance + 0.3 + 1.5 * deep))
@@ -124,9 +188,9 @@ def _down(edge: Edge, distance: float, lift: float, relief: Relief, index: LaneI
         return []
     bridge = _over_road(top, foot, deep, index)
     parts = []
-    for start, end in _runs(~bridge, more=0):
+    for start, end in runs(~bridge):
         parts.append(grid(np.stack((top[start:end], foot[start:end]), axis=1), BANK, (0, 0, 1)))
-    for start, end in _runs(bridge, more=1):
+    for start, end in runs(bridge, more=1):
         deck = np.stack((top[start:end], top[start:end] - (0.0, 0.0, _DECK)), axis=1)
         parts.append(grid(deck, CONCRETE, np.append(foot[start, :2] - top[start, :2], 0.0)))
     return parts
@@ -140,12 +204,12 @@ def _over_road(top: Points, foot: Points, deep: NDArray[np.float64], index: Lane
     for share in (0.0, 0.5, 1.0):
         places = top + share * (foot - top)
         places[:, 2] = foot[:, 2]
-        below |= index.clearance(places, same_level=2.5) < _SPAN
+        below |= index.clearance(places, same_level=_LEVEL) < _SPAN
     return np.asarray(below & (deep > 3.0))
 
 
-def _runs(chosen: NDArray[np.bool_], *, more: int) -> list[tuple[int, int]]:
-    """Stretches of vertices (start, end) that are chosen, each with some more on either side."""
+def runs(chosen: NDArray[np.bool_], *, more: int = 0) -> list[tuple[int, int]]:
+    """Stretches of two vertices or more (start, end) that are chosen, each with some more on either side."""
     changes = np.flatnonzero(np.diff(np.concatenate(([0], chosen.astype(int), [0]))))
     widened = [(max(a - more, 0), min(b + more, len(chosen))) for a, b in changes.reshape(-1, 2).tolist()]
     return [(a, b) for a, b in widened if b - a > 1]

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.scene.edges import Edge
-from fogsim.scene.polyline import LaneIndex, Points
+from fogsim.scene.lane_index import LaneIndex
+from fogsim.scene.polyline import Points
 from fogsim.scene.relief import Relief
 from fogsim.scene.road import TOWN
 from fogsim.scene.roadside import placed, stations

@@ -5,14 +5,16 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.scene.edges import Edge
-from fogsim.scene.polyline import LaneIndex, Points, cleaned
+from fogsim.scene.edges import Edge, border_edge
+from fogsim.scene.lane_index import LaneIndex
+from fogsim.scene.polyline import Points, cleaned, refined
 from fogsim.scene.road import ASPHALT, FLAGSTONES, KERB, ROAD
 from fogsim.scene.solids import concave_faces, mesh
 from fogsim.values.road import Lane, LaneKind, PavedArea
 from fogsim.values.scene import Mesh
 
 _BELOW = 0.003  # junctions lie this far below the lanes that lead to them [m], so that lines end at full width
+_PIECE = 1.0  # longest piece of a border that is free or not as a whole [m]
 _TOUCHING = 6.0  # lanes that end no farther than this from a corner lead to the junction [m]
 
 
@@ -34,6 +36,30 @@ def area_mesh(area: PavedArea) -> Mesh | None:
     return mesh(points, faces, up, ASPHALT, road=road, instance=ROAD)
 
 
+def walkable(areas: Sequence[PavedArea], lanes: Sequence[Lane]) -> list[PavedArea]:
+    """Areas without those for walking that vehicles drive over, as where a footway ends at a junction.
+
+    Parameters
+    ----------
+    areas : sequence of PavedArea
+        The areas.
+    lanes : sequence of Lane
+        The lanes of vehicles.
+    """
+    places = np.concatenate([refined(cleaned(lane.centreline), _PIECE)[:, :2] for lane in lanes])
+    places = places[np.argsort(places[:, 0], kind="stable")]
+    return [area for area in areas if area.kind is not LaneKind.FOOTWAY or not _any_within(places, area)]
+
+
+def _any_within(places: NDArray[np.float64], area: PavedArea) -> bool:
+    """Whether an area has one of some places (n, 2), which are sorted by x."""
+    outline = _counterclockwise(area)[:, :2]
+    (west, south), (east, north) = outline.min(axis=0), outline.max(axis=0)
+    near = places[np.searchsorted(places[:, 0], west) : np.searchsorted(places[:, 0], east)]
+    near = near[(near[:, 1] > south) & (near[:, 1] < north)]
+    return len(near) > 0 and bool(np.any(_within(near, outline)))
+
+
 def _area(outline: Points) -> float:
     x, y = outline[:, 0], outline[:, 1]
     return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
@@ -46,7 +72,7 @@ def _counterclockwise(area: PavedArea) -> Points:
     return outline if _area(outline) >= 0 else outline[::-1]
 
 
-def free_borders(areas: Sequence[PavedArea], lanes: Sequence[Lane]) -> Iterator[Edge]:
+def free_borders(areas: Sequence[PavedArea], lanes: Sequence[Lane], everything: LaneIndex) -> Iterator[Edge]:
     """Parts of the borders of junctions where no road leads on.
 
     Parameters
@@ -55,6 +81,8 @@ def free_borders(areas: Sequence[PavedArea], lanes: Sequence[Lane]) -> Iterator[
         The junctions.
     lanes : sequence of Lane
         All lanes of carriageways and footways, those across junctions left out.
+    everything : LaneIndex
+        All lanes, those across junctions too.
     """
     index, limits = LaneIndex(lanes), np.repeat([lane.speed_limit for lane in lanes], 2)
     ends = np.concatenate([lane.centreline[[0, -1], :2] for lane in lanes])
@@ -63,10 +91,13 @@ def free_borders(areas: Sequence[PavedArea], lanes: Sequence[Lane]) -> Iterator[
             apart = np.abs(ends[:, None] - outline[None, :, :2]).sum(axis=2).min(axis=1)
             leading = limits[apart < _TOUCHING]
             if len(leading):
-                yield from _free_parts(outline, float(leading.max()), index)
+                for corners in _free_parts(outline, index):
+                    yield border_edge(corners, float(leading.max()), everything)
 
 
-def _free_parts(outline: Points, limit: float, index: LaneIndex) -> Iterator[Edge]:
+def _free_parts(corners: Points, index: LaneIndex) -> Iterator[Points]:
+    # In short pieces, since a road may lead on from the middle of a long side.
+    outline = refined(np.concatenate((corners, corners[:1])), _PIECE)[:-1]
     following = np.roll(outline, -1, axis=0)
     step = following - outline
     outward = np.column_stack((step[:, 1], -step[:, 0])) / np.hypot(step[:, 0], step[:, 1])[:, None]
@@ -74,9 +105,9 @@ def _free_parts(outline: Points, limit: float, index: LaneIndex) -> Iterator[Edg
     beside[:, :2] += 0.4 * outward
     free = index.clearance(beside, same_level=2.5) > 0.1
     for run in _runs_around(free):
-        corners = np.concatenate((outline[run], following[run[-1:]]))
-        if np.sum(np.hypot(*np.diff(corners[:, :2], axis=0).T)) > 0.1:
-            yield Edge(corners, -1, 0.0, limit)
+        line = np.concatenate((outline[run], following[run[-1:]]))
+        if np.sum(np.hypot(*np.diff(line[:, :2], axis=0).T)) > 0.1:
+            yield line
 
 
 def _runs_around(chosen: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
@@ -112,10 +143,15 @@ class Areas:
 
 
 def _inside(points: NDArray[np.float64], outline: NDArray[np.float64]) -> bool:
-    start, end = outline, np.roll(outline, -1, axis=0)
     # Points on the border, where lanes begin, count: they are moved a little towards the middle of all.
-    x, y = (points + 0.02 * (points.mean(axis=0) - points)).T[..., None]
+    return bool(np.all(_within(points + 0.02 * (points.mean(axis=0) - points), outline)))
+
+
+def _within(points: NDArray[np.float64], outline: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Tell which points (n, 2) lie within an outline (m, 2)."""
+    start, end = outline, np.roll(outline, -1, axis=0)
+    x, y = points.T[..., None]
     above = (start[:, 1] > y) != (end[:, 1] > y)
     rise = np.where(end[:, 1] == start[:, 1], 1.0, end[:, 1] - start[:, 1])
     crossing = start[:, 0] + (y - start[:, 1]) / rise * (end[:, 0] - start[:, 0])
-    return bool(np.all(np.sum(above & (x < crossing), axis=1) % 2 == 1))
+    return np.asarray(np.sum(above & (x < crossing), axis=1) % 2 == 1)

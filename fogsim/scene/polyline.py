@@ -1,19 +1,20 @@
-"""Polylines on the ground: lengths, directions, parallels, projection, and how far a point is from any lane."""
+"""Polylines on the ground: lengths, directions, parallels, projection."""
 
-from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.values.road import Lane
-
 Points = NDArray[np.float64]
+
+_TIGHT = 1e-9  # pieces whose length times that of the line's piece is less than this have no direction [m²]
 
 
 def cleaned(points: Points, shortest: float = 0.05) -> Points:
     """Polyline (n, 3) without segments shorter than `shortest` [m]."""
     array = np.asarray(points, np.float64)
+    if np.all(np.hypot(*np.diff(array[:, :2], axis=0).T) >= shortest):
+        return array
     kept = [0]
     for index in range(1, len(array)):
         if np.hypot(*(array[index, :2] - array[kept[-1], :2])) >= shortest:
@@ -36,6 +37,8 @@ def at_distance(points: Points, distance: NDArray[np.float64]) -> Points:
 def refined(points: Points, longest: float) -> Points:
     """Polyline with all its vertices and so many more that no segment is longer than `longest` [m]."""
     length = arc_length(points)
+    if not np.any(np.diff(length) > longest):
+        return points
     pieces = [
         np.linspace(start, end, max(int(np.ceil((end - start) / longest)), 1), endpoint=False)
         for start, end in pairwise(length.tolist())
@@ -57,9 +60,49 @@ def left_normals(points: Points) -> NDArray[np.float64]:
 
 
 def parallel(points: Points, left: float | NDArray[np.float64], lift: float = 0.0) -> Points:
-    """Polyline at a distance `left` to the left [m], raised by `lift` [m]."""
+    """Polyline at a distance `left` to the left [m], raised by `lift` [m].
+
+    On the inside of a bend that is tighter than the distance it is cut short, so that it never runs backwards; it has a
+    vertex for each of the line's all the same.
+    """
     shift = left_normals(points) * np.reshape(left, (-1, 1))
-    return np.column_stack((points[:, :2] + shift, points[:, 2] + lift))
+    return np.column_stack((_unfolded(points[:, :2], points[:, :2] + shift), points[:, 2] + lift))
+
+
+def _unfolded(line: NDArray[np.float64], beside: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A parallel (n, 2) of a line, whose pieces that run backwards are drawn together in one place."""
+    direction = np.diff(line, axis=0)
+    # Each round draws at least one more piece together.
+    for _ in range(len(direction)):
+        forward = np.einsum("ij,ij->i", np.diff(beside, axis=0), direction)
+        if not np.any(forward < -_TIGHT):
+            break
+        beside = beside.copy()
+        for first, last in _backward_runs(forward):
+            beside[first : last + 1] = _meeting(beside, first, last)
+    return beside
+
+
+def _backward_runs(forward: NDArray[np.float64]) -> list[tuple[int, int]]:
+    """First and last vertices of runs of pieces that do not lead forward, of which one leads backward."""
+    changes = np.flatnonzero(np.diff(np.concatenate(([0], (forward <= _TIGHT).astype(int), [0]))))
+    return [(a, b) for a, b in changes.reshape(-1, 2).tolist() if np.any(forward[a:b] < -_TIGHT)]
+
+
+def _meeting(beside: NDArray[np.float64], first: int, last: int) -> NDArray[np.float64]:
+    """Where what leads to one vertex meets what leads on from another; their middle where that is far off."""
+    middle = 0.5 * (beside[first] + beside[last])
+    if first == 0 or last == len(beside) - 1:
+        return np.asarray(middle, np.float64)
+    before, after = beside[first] - beside[first - 1], beside[last + 1] - beside[last]
+    cross = before[0] * after[1] - before[1] * after[0]
+    if abs(cross) < 1e-3 * np.hypot(*before) * np.hypot(*after):
+        return np.asarray(middle, np.float64)
+    gap = beside[last] - beside[first]
+    share = (gap[0] * after[1] - gap[1] * after[0]) / cross
+    place = beside[first] + share * before
+    near = np.hypot(*(place - middle)) <= np.hypot(*gap) + 1e-9
+    return np.asarray(place if near else middle, np.float64)
 
 
 def project(points: NDArray[np.float64], line: Points) -> NDArray[np.float64]:
@@ -72,65 +115,3 @@ def project(points: NDArray[np.float64], line: Points) -> NDArray[np.float64]:
     nearest = np.argmin(gap, axis=1)
     along = share[np.arange(len(points)), nearest] * length[nearest]
     return np.asarray(arc_length(line)[nearest] + along, np.float64)
-
-
-class LaneIndex:
-    """Distances from points to the paved lanes of a network, by a grid of square cells.
-
-    Parameters
-    ----------
-    lanes : sequence of Lane
-        The lanes.
-    cell : float
-        Side of a cell [m]; distances beyond it are not told apart.
-    """
-
-    def __init__(self, lanes: Sequence[Lane], cell: float = 60.0) -> None:
-        lines = [refined(cleaned(lane.centreline), 20.0) for lane in lanes if len(cleaned(lane.centreline)) > 1]
-        widths = [lane.width for lane in lanes if len(cleaned(lane.centreline)) > 1]
-        counts = [len(line) - 1 for line in lines]
-        self._cell = cell
-        self._start = np.concatenate([line[:-1] for line in lines])
-        self._step = np.concatenate([np.diff(line, axis=0) for line in lines])
-        self._half_width = np.repeat(np.asarray(widths) / 2, counts)
-        self._members = self._group(self._start + 0.5 * self._step)
-
-    def _group(self, middle: Points) -> dict[tuple[int, int], list[int]]:
-        members: dict[tuple[int, int], list[int]] = {}
-        for index, (column, row) in enumerate(np.floor(middle[:, :2] / self._cell).astype(int).tolist()):
-            for dx in (-1, 0, 1):
-                for dy in (-1, 0, 1):
-                    members.setdefault((column + dx, row + dy), []).append(index)
-        return members
-
-    def clearance(self, points: Points, same_level: float | None = None) -> NDArray[np.float64]:
-        """Distance from points (n, 3) to the nearest lane's edge [m], negative on a lane, at most the cell's side.
-
-        Parameters
-        ----------
-        points : (n, 3) float64
-            Points [m].
-        same_level : float, optional
-            Lanes higher or lower than the point by more than this [m] are left out.
-        """
-        result = np.full(len(points), self._cell / 2)
-        cells = np.floor(points[:, :2] / self._cell).astype(int)
-        _, group = np.unique(cells, axis=0, return_inverse=True)
-        order = np.argsort(group.ravel(), kind="stable")
-        for chunk in np.split(order, np.cumsum(np.bincount(group.ravel()))[:-1]):
-            column, row = cells[chunk[0]]
-            segments = self._members.get((int(column), int(row)))
-            if segments:
-                result[chunk] = np.minimum(result[chunk], self._nearest(points[chunk], segments, same_level))
-        return result
-
-    def _nearest(self, points: Points, segments: list[int], same_level: float | None) -> NDArray[np.float64]:
-        start, step = self._start[segments], self._step[segments]
-        offset = points[:, None, :] - start
-        square = np.maximum(np.sum(step[:, :2] ** 2, axis=1), 1e-12)
-        share = np.clip(np.einsum("ijk,jk->ij", offset[..., :2], step[:, :2]) / square, 0.0, 1.0)
-        gap = offset - share[..., None] * step
-        distance = np.hypot(gap[..., 0], gap[..., 1]) - self._half_width[segments]
-        if same_level is not None:
-            distance = np.where(np.abs(gap[..., 2]) <= same_level, distance, np.inf)
-        return np.asarray(distance.min(axis=1), np.float64)

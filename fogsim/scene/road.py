@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.scene.chainage import Chainage
-from fogsim.scene.polyline import LaneIndex, Points, cleaned, parallel, refined
+from fogsim.scene.lane_index import LaneIndex
+from fogsim.scene.polyline import Points, cleaned, parallel, refined
 from fogsim.scene.solids import Material, grid, merge, mesh
 from fogsim.values.road import Lane, LaneKind, LaneMarking
 from fogsim.values.scene import Mesh, Surface
@@ -30,14 +31,17 @@ KERBSTONE = Material((0.21, 0.208, 0.20))
 LINE_CODE = {LaneMarking.NONE: 0, LaneMarking.SOLID: 1, LaneMarking.DASHED: 2, LaneMarking.DOUBLE: 1}
 """Lines by their number in the road attributes of a mesh."""
 
-_STEP = 40.0  # longest piece of a strip [m]: short enough to follow curves and to be culled in pieces
+LONGEST = 40.0
+"""Longest piece of a strip [m]: short enough to be culled in pieces."""
+
+_LOOK = 2.0  # whether a side is free is looked at every so many metres
 _OVERLAP = 0.03  # neighbouring lanes overlap by this much on each side [m], so that no gap shows between them
 _INSET = 0.16  # the middle of each of two lines between directions lies this far inside its lane [m]
 
 
 def lane_mesh(lane: Lane, chainage: Chainage) -> Mesh:
     """One lane as a strip with its road attributes."""
-    centre = refined(cleaned(lane.centreline), _STEP)
+    centre = refined(cleaned(lane.centreline), LONGEST)
     half = lane.width / 2
     lines = 3 * LINE_CODE[lane.left] + LINE_CODE[lane.right]
     # Lanes without lines are what runs across junctions; where they overlap others, the painted ones shall show.
@@ -56,7 +60,7 @@ def lane_mesh(lane: Lane, chainage: Chainage) -> Mesh:
 
 def strip(
     line: Points,
-    left: tuple[float, float],
+    left: tuple[float | NDArray[np.float64], float | NDArray[np.float64]],
     lift: float,
     half: float,
     lines: int,
@@ -70,7 +74,7 @@ def strip(
     ----------
     line : (n, 3) float64
         The line [m].
-    left : tuple of float
+    left : tuple of float or (n,) float64
         How far to the left of it the strip's two edges lie [m].
     lift : float
         How far above it [m].
@@ -84,16 +88,17 @@ def strip(
     points = np.stack([parallel(line, side, lift) for side in left], axis=1)
     road = np.empty((*points.shape[:2], 4))
     road[..., 0] = along[:, None]
-    road[..., 1] = np.asarray(left) - middle
+    road[:, 0, 1], road[:, 1, 1] = left[0] - middle, left[1] - middle
     road[..., 2:] = half, lines
     return grid(points, material, (0, 0, 1), road=road.reshape(-1, 4), instance=ROAD)
 
 
-def footway_mesh(line: Points, left: tuple[float, float]) -> Mesh:
-    """Footway with kerbs along a line, between two distances to its left [m]; it lies `KERB` above the line."""
-    low, high = min(left), max(left)
+def footway_mesh(line: Points, left: tuple[float, float | NDArray[np.float64]]) -> Mesh:
+    """Footway with kerbs along a line, between distances to its left [m]; it lies `KERB` above the line."""
+    low, high = np.minimum(left[0], left[1]), np.maximum(left[0], left[1])
+    stone = np.minimum(0.13, (high - low) / 2)
     # A kerbstone on each side, and how far above the line each fold of the profile lies.
-    profile = [(low, -0.05), (low, KERB), (low + 0.13, KERB), (high - 0.13, KERB), (high, KERB), (high, -0.05)]
+    profile = [(low, -0.05), (low, KERB), (low + stone, KERB), (high - stone, KERB), (high, KERB), (high, -0.05)]
     rows = [parallel(line, offset, lift) for offset, lift in profile]
     faces = zip(rows[:-1], rows[1:], (KERBSTONE, KERBSTONE, FLAGSTONES, KERBSTONE, KERBSTONE), strict=True)
     side = parallel(line, 1.0)[0, :2] - line[0, :2]
@@ -112,18 +117,19 @@ def free_edges(lane: Lane, index: LaneIndex) -> Iterator[tuple[int, NDArray[np.f
     Yields
     ------
     tuple of int and (n, 3) float64
-        1 for the left or −1 for the right side, and the lane's centreline along the free stretch [m].
+        1 for the left or −1 for the right side, and the lane's centreline along the free stretch [m], with a vertex at
+        least every 2 m.
     """
-    centre = refined(cleaned(lane.centreline), _STEP)
+    fine = refined(cleaned(lane.centreline), _LOOK)
     for side in (1, -1):
         if side < 0 and not lane.outermost and lane.kind is not LaneKind.FOOTWAY:
             continue
-        beside = parallel(centre, side * (lane.width / 2 + 0.6))
+        beside = parallel(fine, side * (lane.width / 2 + 0.6))
         free = index.clearance(beside, same_level=2.5) > 0.2
         changes = np.flatnonzero(np.diff(np.concatenate(([0], free.astype(int), [0]))))
         for start, end in changes.reshape(-1, 2).tolist():
             if end - start >= 2:
-                yield side, centre[start:end]
+                yield side, fine[start:end]
 
 
 def terrain(lanes: Sequence[Lane], ground: float) -> Mesh:

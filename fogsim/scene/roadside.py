@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.scene.polyline import LaneIndex, arc_length, at_distance, left_normals
+from fogsim.scene.lane_index import LaneIndex
+from fogsim.scene.polyline import arc_length, at_distance, left_normals
 from fogsim.scene.relief import Relief
 from fogsim.scene.solids import ROADSIDE, Material, box, merge
 from fogsim.values.scene import Batch, Mesh, Surface
@@ -123,14 +124,18 @@ def trees(
     far = _scatter(stretches, rng, spacing=60.0, nearest=75.0, reach=170.0, clumps=400.0)
     far = far[(index.clearance(far) > 25.0) & _apart(far, taken, 35.0)]
     kinds = sorted(shape for shape in shapes if shape.startswith("woodland") and ":" not in shape)
-    return batches + _planted(far, kinds, relief, rng, height=(9.0, 16.0), slender=5.0)
+    return batches + _planted(far, kinds, relief, rng, height=(9.0, 16.0), slender=5.0, clear_of=index)
 
 
 def _apart(places: Points, taken: Points, distance: float) -> NDArray[np.bool_]:
     """Tell which places lie farther from every place that is taken than a distance [m]."""
     apart = np.ones(len(places), np.bool_)
-    for other in taken:
-        apart &= np.abs(places[:, :2] - other[:2]).max(axis=1) > distance
+    order = np.argsort(places[:, 0], kind="stable")
+    east = places[order, 0]
+    for x, y in taken[:, :2].tolist():
+        # Only those in the same strip from south to north may be near.
+        near = order[np.searchsorted(east, x - distance) : np.searchsorted(east, x + distance, "right")]
+        apart[near] &= (np.abs(places[near, 1] - y) > distance) | (np.abs(places[near, 0] - x) > distance)
     return apart
 
 
@@ -171,6 +176,7 @@ def _planted(
     *,
     height: tuple[float, float],
     slender: float,
+    clear_of: LaneIndex | None = None,
 ) -> list[Batch]:
     standing = np.column_stack((places[:, :2], relief.height(places) - 0.05))
     kind = rng.integers(len(kinds), size=len(places))
@@ -178,8 +184,17 @@ def _planted(
     wide = tall * slender * rng.uniform(0.85, 1.2, len(places))
     size = np.column_stack((wide, np.minimum(wide, 1.5 * tall), tall))
     turn = rng.uniform(0, 2 * np.pi, len(places))
-    return [
-        placed(name, standing[kind == i], turn[kind == i], size[kind == i])
-        for i, name in enumerate(kinds)
-        if np.any(kind == i)
-    ]
+    fits = np.ones(len(places), np.bool_) if clear_of is None else _fitting(standing, turn, wide, clear_of)
+    chosen = [(name, fits & (kind == i)) for i, name in enumerate(kinds)]
+    return [placed(name, standing[own], turn[own], size[own]) for name, own in chosen if np.any(own)]
+
+
+def _fitting(
+    places: Points, turn: NDArray[np.float64], wide: NDArray[np.float64], index: LaneIndex
+) -> NDArray[np.bool_]:
+    """Tell which woods, as wide as given [m], stand clear of every lane from end to end."""
+    along = np.column_stack((np.cos(turn), np.sin(turn), np.zeros(len(turn)))) * wide[:, None]
+    fits = np.ones(len(places), np.bool_)
+    for share in np.linspace(-0.5, 0.5, 9).tolist():
+        fits &= index.clearance(places + share * along) > TREE_CLEARANCE
+    return fits

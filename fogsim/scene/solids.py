@@ -93,12 +93,17 @@ def grid_faces(rows: int, columns: int) -> NDArray[np.int64]:
 
 
 def grid_normals(points: NDArray[np.float64], toward: ArrayLike) -> NDArray[np.float64]:
-    """Normals of a grid of points (n, m, 3) from differences of neighbours, all turned to the side of `toward`."""
+    """Normals of a grid of points (n, m, 3) from differences of neighbours, all turned to the side of `toward`.
+
+    Where points coincide, the normal is `toward` itself.
+    """
     along = np.gradient(points, axis=0)
     across = np.gradient(points, axis=1)
     normals = np.cross(along, across)
-    sign = 1.0 if normals.sum(axis=(0, 1)) @ np.asarray(toward, float) >= 0 else -1.0
-    return sign * normals
+    facing = np.asarray(toward, float)
+    sign = 1.0 if normals.sum(axis=(0, 1)) @ facing >= 0 else -1.0
+    nowhere = np.max(np.abs(normals), axis=2) < 1e-9
+    return np.where(nowhere[..., None], facing, sign * normals)
 
 
 def grid(

@@ -1,5 +1,7 @@
 """Roads of a SUMO network as plain geometry."""
 
+import gzip
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -16,6 +18,7 @@ _OFF_ROAD = frozenset(
     ("rail", "rail_urban", "rail_electric", "rail_fast", "tram", "subway", "cable_car", "ship", "aircraft", "drone")
 )
 _STOP_STATES = frozenset(("s", "w", "a"))  # stop sign, all-way stop, traffic light that turns right on red
+_ROOT, _HEAD = re.compile(rb"<net\s[^>]*>"), 1 << 20  # tag of the root, and in how many first bytes of a file it stands
 _ADJOINING = 0.6  # two carriageways whose borders lie nearer than this share a line [m]
 
 
@@ -28,12 +31,22 @@ def read_net(path: Path) -> Any:
         If the file is no SUMO network.
     """
     try:
-        net = sumolib.net.readNet(str(path), withInternal=True)
+        net = sumolib.net.readNet(str(path), withInternal=True, withFoes=False)
+        net.lefthand = _is_lefthand(path)
     except Exception as error:
         raise InputError(f"{path}: not a SUMO network: {error}") from error
     if not net.getEdges():
         raise InputError(f"{path}: the SUMO network has no edges")
     return net
+
+
+def _is_lefthand(path: Path) -> bool:
+    """Whether a network file says that its vehicles keep to the left, which sumolib does not tell."""
+    with path.open("rb") as plain:
+        packed = plain.read(2) == b"\x1f\x8b"
+    with gzip.open(path) if packed else path.open("rb") as source:
+        root = _ROOT.search(source.read(_HEAD))
+    return root is not None and b'lefthand="' in root[0] and b'lefthand="false"' not in root[0]
 
 
 def road_network(net: Any, route: Sequence[str]) -> RoadNetwork:
@@ -52,7 +65,8 @@ def road_network(net: Any, route: Sequence[str]) -> RoadNetwork:
         If a lane has no shape to draw.
     """
     edges = [edge for edge in net.getEdges() if edge.getFunction() != _WALKING_AREA]
-    lanes = tuple(_lane(lane) for edge in edges for lane in edge.getLanes() if _kind(lane))
+    lefthand = getattr(net, "lefthand", False)
+    lanes = tuple(_lane(lane, lefthand) for edge in edges for lane in edge.getLanes() if _kind(lane))
     return RoadNetwork(lanes=lanes, route=_route_axis(net, route), areas=(*_junctions(net), *_walking_areas(net)))
 
 
@@ -69,9 +83,12 @@ def _kind(lane: Any) -> LaneKind | None:
     return LaneKind.JUNCTION if function == "internal" else LaneKind.CARRIAGEWAY
 
 
-def _lane(lane: Any) -> Lane:
+def _lane(lane: Any, lefthand: bool) -> Lane:
     kind = _kind(lane) or LaneKind.CARRIAGEWAY
-    left, right = _markings(lane) if kind is LaneKind.CARRIAGEWAY else (LaneMarking.NONE, LaneMarking.NONE)
+    inner, outer = _markings(lane) if kind is LaneKind.CARRIAGEWAY else (LaneMarking.NONE, LaneMarking.NONE)
+    # Lanes are counted from the side that vehicles keep to.
+    left, right = (outer, inner) if lefthand else (inner, outer)
+    rightmost = _carriageway(lane.getEdge())[-1 if lefthand else 0] if kind is LaneKind.CARRIAGEWAY else None
     return Lane(
         lane_id=lane.getID(),
         edge_id=lane.getEdge().getID(),
@@ -80,7 +97,7 @@ def _lane(lane: Any) -> Lane:
         speed_limit=float(lane.getSpeed()),
         left=left,
         right=right,
-        outermost=kind is LaneKind.CARRIAGEWAY and lane is _carriageway(lane.getEdge())[0],
+        outermost=lane is rightmost,
         kind=kind,
         end=_end(lane) if kind is LaneKind.CARRIAGEWAY else LaneEnd.OPEN,
     )
@@ -97,19 +114,19 @@ def _shape(lane: Any) -> NDArray[np.float64]:
 
 
 def _carriageway(edge: Any) -> list[Any]:
-    """Lanes of an edge that vehicles drive on, the rightmost first."""
+    """Lanes of an edge that vehicles drive on, from the side that they keep to."""
     return [lane for lane in edge.getLanes() if _kind(lane) in {LaneKind.CARRIAGEWAY, LaneKind.JUNCTION}]
 
 
 def _markings(lane: Any) -> tuple[LaneMarking, LaneMarking]:
-    """Lines on the left and on the right."""
+    """Lines on the side of the other direction and on the side that vehicles keep to."""
     lanes = _carriageway(lane.getEdge())
     left = _between_directions(lanes) if lane is lanes[-1] else LaneMarking.DASHED
     return left, LaneMarking.SOLID if lane is lanes[0] else LaneMarking.DASHED
 
 
 def _between_directions(lanes: Sequence[Any]) -> LaneMarking:
-    """Line on the left of a carriageway: it may be overtaken on a road of two lanes, not on one of more."""
+    """Line towards the other direction: it may be overtaken on a road of two lanes, not on one of more."""
     edge = lanes[-1].getEdge()
     here = _shape(lanes[-1])
     for other in edge.getToNode().getOutgoing():

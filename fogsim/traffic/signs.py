@@ -46,7 +46,8 @@ def sign_map(net: Any, additional: Iterable[Path]) -> SignMap:
     InputError
         If a sign cannot be placed or has no usable value.
     """
-    signs = [sign for edge in net.getEdges(withInternal=False) if (sign := _limit_sign(edge)) is not None]
+    side = 1.0 if getattr(net, "lefthand", False) else -1.0
+    signs = [sign for edge in net.getEdges(withInternal=False) if (sign := _limit_sign(edge, side)) is not None]
     roads = _Roads(net)
     for path in additional:
         signs += opendrive_signs(path, _net_offset(net)) if is_opendrive(path) else _marked_signs(path, roads)
@@ -88,8 +89,11 @@ def _net_offset(net: Any) -> tuple[float, float]:
     return x, y
 
 
-def _limit_sign(edge: Any) -> Sign | None:
-    """Sign at the start of an edge whose limit differs from that of every edge leading to it."""
+def _limit_sign(edge: Any, side: float) -> Sign | None:
+    """Sign at the start of an edge whose limit differs from that of every edge leading to it.
+
+    It stands on the left (side 1) or right (side −1) of the road, on that to which vehicles keep.
+    """
     limit = edge.getSpeed()
     if any(abs(incoming.getSpeed() - limit) < 0.1 for incoming in edge.getIncoming()):
         return None
@@ -97,10 +101,10 @@ def _limit_sign(edge: Any) -> Sign | None:
     points = np.array(lane.getShape3D(), dtype=np.float64)
     along = points[1] - points[0]
     heading = math.atan2(along[1], along[0])
-    offset = lane.getWidth() / 2 + SIGN_CLEARANCE
+    offset = side * (lane.getWidth() / 2 + SIGN_CLEARANCE)
     # Ten metres into the edge, so that the sign stands on the stretch that it speaks for.
     x, y, z = points[0] + along / np.linalg.norm(along) * min(10.0, 0.5 * lane.getLength())
-    x, y = float(x) + offset * math.sin(heading), float(y) - offset * math.cos(heading)
+    x, y = float(x) - offset * math.sin(heading), float(y) + offset * math.cos(heading)
     return Sign(
         f"limit.{edge.getID()}",
         SPEED_LIMIT,

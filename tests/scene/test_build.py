@@ -5,7 +5,7 @@ import pytest
 
 from fogsim.errors import InputError
 from fogsim.scene import build_scene
-from fogsim.scene.polyline import LaneIndex
+from fogsim.scene.lane_index import LaneIndex
 from fogsim.values import Lane, LaneMarking, RoadNetwork, Scene, Sign, SignMap, Surface
 
 LIMIT = Sign("s", "speed_limit", 80 / 3.6, (200.0, -6.0, 2.2), 0.0, 0.9)

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from fogsim.scene.chainage import Chainage
-from fogsim.scene.polyline import LaneIndex, arc_length, at_distance, cleaned, parallel, project, refined
+from fogsim.scene.lane_index import LaneIndex
+from fogsim.scene.polyline import arc_length, at_distance, cleaned, parallel, project, refined
 from fogsim.values import Lane, LaneMarking, RoadNetwork
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
 from fogsim.vision.horizon import PITCH_DEVIATION, levelled
-from fogsim.vision.lead_window import ASIDE, LeadWindow
+from fogsim.vision.lead_window import ASIDE, WIDTHS, LeadWindow
 from fogsim.vision.luminance import linear_luminance
 from fogsim.vision.patch import Patch
 from fogsim.vision.response import linear_table
@@ -85,7 +85,7 @@ def vehicle_crop(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera, 
     if not 0.5 < distance < math.inf:
         raise CannotTellError(f"a range of {distance:.1f} m is none of a vehicle ahead")
     scale = camera.focal_length / distance
-    if 1.4 * scale < LEAST_WIDTH:
+    if WIDTHS[1] * scale < LEAST_WIDTH:
         raise CannotTellError("the vehicle ahead is too small in the image")
     foot, pitch = camera.horizon_row + camera.row_distance / distance, 0.01 * camera.focal_length
     top, bottom = foot - 2.4 * scale - pitch, foot + 0.2 * scale + pitch

@@ -12,7 +12,16 @@ from fogsim.values.camera import Camera
 Floats = NDArray[np.float64]
 
 WIDTHS = (1.4, 2.7)
-"""Narrowest and widest rear that is looked for [m]: small cars to lorries; no motorcycles."""
+"""Narrowest and widest rear of a vehicle with two tracks [m]: small cars to lorries."""
+
+NARROW_WIDTHS = (0.4, 1.0)
+"""Narrowest and widest motorcycle with its rider's legs [m]."""
+
+ALONE = 1.25
+"""How far from a motorcycle's middle nothing else has an edge as strong as its own [m]: of a car, something has."""
+
+NARROWER = 1.5
+"""Factor by which a motorcycle must stand out more than the wider vehicle that might be there instead [-]."""
 
 ASIDE = 3.5
 """Farthest that a vehicle's middle is looked for beside the own axis [m]."""
@@ -23,8 +32,14 @@ USUAL_ASIDE = 1.2
 BODY = (0.25, 0.95)
 """Heights between which sides of all vehicles are upright [m]."""
 
-LEAST_EDGE = 3.0
-"""Least step across either side of a vehicle, in standard deviations of the column means' noise [-]."""
+LEAST_EDGE = 4.5
+"""Least step across either side of a vehicle, in standard deviations of the step's noise [-]."""
+
+CLUTTER = 6.0
+"""Least step across either side of a vehicle, in medians of the steps between all columns [-]."""
+
+LEAST_STEP = 0.15
+"""Noise of a step that there is at least, as of rounding [linear grey levels]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,12 +108,28 @@ def _span(first: float, last: float, size: int) -> slice | None:
 
 
 def _best_pair(body: NDArray[np.float32], scale: float, axis: float, noise: float) -> tuple[float, float] | None:
-    columns = cv2.GaussianBlur(body.mean(axis=0, dtype=np.float64)[None, :], (3, 1), 0.6)[0]
-    step = np.gradient(columns)
-    floor = LEAST_EDGE * max(noise, 0.3) / math.sqrt(2.0 * body.shape[0])
-    widths = np.arange(math.floor(WIDTHS[0] * scale), math.ceil(WIDTHS[1] * scale) + 1)
+    smooth = cv2.GaussianBlur(body, (5, 1), 0.7)
+    # The median down the rows keeps what is upright; marks of the road, which run aslant, drop out.
+    step = np.asarray(np.median(np.gradient(smooth, axis=1), axis=0), np.float64)
+    # Blur, difference and median leave half of a pixel's noise in one row, and what the road's texture adds.
+    by_noise = LEAST_EDGE * max(0.5 * noise, LEAST_STEP) / math.sqrt(body.shape[0])
+    floor = max(by_noise, CLUTTER * float(np.median(np.abs(step))))
+    wide = _pair(body, step, WIDTHS, scale, axis, floor)
+    narrow = _pair(body, step, NARROW_WIDTHS, scale, axis, floor)
+    if narrow is not None:
+        narrow = _alone(narrow, step, scale, floor)
+    if narrow is not None and (wide is None or narrow[0] > NARROWER * wide[0]):
+        wide = narrow
+    return None if wide is None else (_peak(np.abs(step), wide[1]), _peak(np.abs(step), wide[2]))
+
+
+def _pair(
+    body: NDArray[np.float32], step: Floats, widths: tuple[float, float], scale: float, axis: float, floor: float
+) -> tuple[float, int, int] | None:
+    """Score, left and right column of the likeliest pair of edges of one of the widths."""
     scores: list[tuple[float, int, int]] = []
-    for width in widths[(widths >= 4) & (widths < step.size - 1)]:
+    wanted = np.arange(math.floor(widths[0] * scale), math.ceil(widths[1] * scale) + 1)
+    for width in wanted[(wanted >= 3) & (wanted < step.size - 1)]:
         first, second = step[:-width], step[width:]
         # A rear is darker than what is beside it on both sides, or brighter on both.
         strength = np.where(first * second < 0, np.minimum(np.abs(first), np.abs(second)), 0.0)
@@ -111,8 +142,19 @@ def _best_pair(body: NDArray[np.float32], scale: float, axis: float, noise: floa
     if not scores:
         return None
     likely = sorted(scores, reverse=True)[:12]
-    _, left, right = max(likely, key=lambda s: s[0] * (1.0 + max(_symmetry(body[:, s[1] : s[2] + 1]), 0.0)))
-    return _peak(np.abs(step), left), _peak(np.abs(step), right)
+    return max(likely, key=lambda s: s[0] * (1.0 + max(_symmetry(body[:, s[1] : s[2] + 1]), 0.0)))
+
+
+def _alone(pair: tuple[float, int, int], step: Floats, scale: float, floor: float) -> tuple[float, int, int] | None:
+    """The pair, weaker by the strongest edge about it; None if that leaves nothing."""
+    score, left, right = pair
+    reach = ALONE * scale - 0.5 * (right - left)
+    gap = max(round(0.12 * scale), 2)
+    before = np.abs(step[max(math.floor(left - reach), 0) : max(left - gap, 0)])
+    behind = np.abs(step[right + gap : max(math.ceil(right + reach), 0) + 1])
+    other = max(float(before.max(initial=0.0)), float(behind.max(initial=0.0)))
+    own = min(abs(step[left]), abs(step[right]))
+    return None if own - other < floor else (score * (own - other) / own, left, right)
 
 
 def _symmetry(pixels: NDArray[np.float32]) -> float:
@@ -138,7 +180,8 @@ def _refined_foot(strip: NDArray[np.float32], foot: float, camera: Camera) -> fl
     if last - first < 2 or strip.shape[1] < 2:
         return foot
     rows = strip[first - 1 : last + 2].mean(axis=1, dtype=np.float64)
-    step = np.abs(np.gradient(rows))
+    # Below it is the road, brighter than tyres and shadow.
+    step = np.maximum(np.gradient(rows), 0.0)
     usual = np.exp(-0.5 * ((np.arange(step.size) + first - 1 - foot) / (0.5 * reach)) ** 2)
     best = int(np.argmax(step[1:-1] * usual[1:-1])) + 1
     return _peak(step, best) + first - 1

@@ -1,5 +1,9 @@
-"""The geometry of a pinhole camera whose pixel centres lie at integer coordinates: what renderer and camera share."""
+"""The geometry of a pinhole camera whose pixel centres lie at integer coordinates: what renderer and camera share.
 
+The parts of a picture ask for the same in turn: the arrays belong to all who asked and are not to be written to.
+"""
+
+import functools
 import math
 
 import numpy as np
@@ -8,6 +12,7 @@ from numpy.typing import NDArray
 from fogsim.values.camera import Camera, CameraPose
 
 
+@functools.lru_cache(maxsize=8)
 def camera_axes(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
     """Axes of a camera in the world.
 
@@ -30,6 +35,7 @@ def camera_axes(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
     return np.array((right, lower, forward))
 
 
+@functools.lru_cache(maxsize=8)
 def ray_from_pixel(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
     """Matrix from a pixel (u, v, 1) [px] to its viewing ray in the world.
 
@@ -38,7 +44,11 @@ def ray_from_pixel(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
     (3, 3) float64
         The ray is 1 long along the optical axis, so its length is distance along the ray over depth.
     """
-    u0, v0 = camera.principal_point
-    focal = camera.focal_length
-    plane = np.array([[1 / focal, 0.0, -u0 / focal], [0.0, 1 / focal, -v0 / focal], [0.0, 0.0, 1.0]])
-    return np.asarray(camera_axes(camera, pose).T @ plane)
+    return np.asarray(camera_axes(camera, pose).T @ _camera_ray_from_pixel(camera))
+
+
+@functools.lru_cache(maxsize=8)
+def _camera_ray_from_pixel(camera: Camera) -> NDArray[np.float64]:
+    """Matrix from a pixel (u, v, 1) [px] to its viewing ray in the camera's axes."""
+    (u0, v0), focal = camera.principal_point, camera.focal_length
+    return np.array([[1 / focal, 0.0, -u0 / focal], [0.0, 1 / focal, -v0 / focal], [0.0, 0.0, 1.0]])

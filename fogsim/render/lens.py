@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.pinhole import camera_axes
+from fogsim.pinhole import camera_axes, ray_from_pixel
 from fogsim.values.camera import Camera, CameraPose
 
 Wide = NDArray[np.float64]
@@ -41,16 +41,14 @@ class Lens(NamedTuple):
 def lens_of(camera: Camera, pose: CameraPose) -> Lens:
     """Geometry of a picture; the arrays belong to all who asked and are not to be written to."""
     axes = camera_axes(camera, pose)
-    plane, lens, planes = _of_camera(camera)
-    return Lens(np.array(pose.position, np.float64), axes, axes.T @ plane, lens, planes @ axes)
+    lens, planes = _of_camera(camera)
+    return Lens(np.array(pose.position, np.float64), axes, ray_from_pixel(camera, pose), lens, planes @ axes)
 
 
 @functools.lru_cache(maxsize=8)
-def _of_camera(camera: Camera) -> tuple[Wide, Wide, Wide]:
-    """What does not depend on where the camera is: from pixels to rays in its axes, its numbers, its planes."""
-    focal, (u0, v0) = camera.focal_length, camera.principal_point
-    plane = np.array([[1 / focal, 0.0, -u0 / focal], [0.0, 1 / focal, -v0 / focal], [0.0, 0.0, 1.0]])
-    return plane, np.array((focal, u0, v0)), frustum(camera)
+def _of_camera(camera: Camera) -> tuple[Wide, Wide]:
+    """What does not depend on where the camera is: its numbers and its planes."""
+    return np.array((camera.focal_length, *camera.principal_point)), frustum(camera)
 
 
 def frustum(camera: Camera) -> Wide:

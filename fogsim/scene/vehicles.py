@@ -1,5 +1,7 @@
 """Vehicles as batches of the bodies' shapes."""
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,28 +28,38 @@ def vehicle_batches(state: TrafficState, skip: int | None) -> tuple[Batch, ...]:
     tuple of Batch
         Shapes fill a unit box, so the transforms scale them to length, width and height.
     """
+    shapes, rows = _grouped(state.ids, state.types, state.length.tobytes(), state.height.tobytes(), skip)
+    # Sorted all at once, and taken apart by slices, which cost little.
+    transforms, paint = _transforms(state)[rows], state.paint[rows].astype(np.float32)
+    lamps, instance = state.lamps[rows].astype(np.int32), (FIRST_VEHICLE + rows).astype(np.int32)
+    return tuple(Batch(name, transforms[own], paint[own], lamps[own], instance[own]) for name, own in shapes)
+
+
+# Traffic changes slowly: from one picture to the next nearly all vehicles are the same, in the same order.
+@lru_cache(maxsize=16)
+def _grouped(
+    ids: tuple[str, ...], types: tuple[str, ...], length: bytes, height: bytes, skip: int | None
+) -> tuple[tuple[tuple[str, slice], ...], NDArray[np.int64]]:
+    """Rows by shape: each shape with its slice of them, and the rows, which belong to all who asked."""
     groups: dict[str, list[int]] = {}
-    for row, name in enumerate(body_names(state)):
+    for row, name in enumerate(_names(ids, types, np.frombuffer(length), np.frombuffer(height))):
         group = groups.setdefault(name, [])
         if row != skip:
             group.append(row)
-    # Sorted all at once, and taken apart by slices, which cost little.
-    rows = np.array([row for group in groups.values() for row in group], np.int64)
-    transforms, paint = _transforms(state)[rows], state.paint[rows].astype(np.float32)
-    lamps, instance = state.lamps[rows].astype(np.int32), (FIRST_VEHICLE + rows).astype(np.int32)
-    batches, begin = list[Batch](), 0
-    for name, group in groups.items():
-        own = slice(begin, begin + len(group))
-        if group:
-            batches.append(Batch(name, transforms[own], paint[own], lamps[own], instance[own]))
-        begin = own.stop
-    return tuple(batches)
+    ends = np.cumsum([0, *map(len, groups.values())]).tolist()
+    shapes = tuple((name, slice(*ends[n : n + 2])) for n, name in enumerate(groups) if groups[name])
+    return shapes, np.array([row for group in groups.values() for row in group], np.int64)
 
 
 def body_names(state: TrafficState) -> list[str]:
     """Name of the shape of every vehicle."""
-    sizes = zip(state.ids, state.types, state.length.tolist(), state.height.tolist(), strict=True)
-    return [body_of(*vehicle) for vehicle in sizes]
+    return _names(state.ids, state.types, state.length, state.height)
+
+
+def _names(
+    ids: tuple[str, ...], types: tuple[str, ...], length: NDArray[np.float64], height: NDArray[np.float64]
+) -> list[str]:
+    return [body_of(*vehicle) for vehicle in zip(ids, types, length.tolist(), height.tolist(), strict=True)]
 
 
 def _transforms(state: TrafficState) -> NDArray[np.float32]:

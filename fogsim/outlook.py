@@ -1,14 +1,24 @@
 """What the ego's camera looks at: the scene of a scenario, the renderer that draws it, and the air and lamps in it."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere import Air
 from fogsim.camera import averaged, middle_samples, supersampled
 from fogsim.lighting import LampMount, own_head_lamps
-from fogsim.render import make_renderer
+from fogsim.render import Renderer, RenderError, make_renderer
 from fogsim.scenario import Scenario, build
-from fogsim.scene import build_scene, light_sources, street_lamp_heads, street_lighting, vehicle_batches
+from fogsim.scene import (
+    Nearness,
+    build_scene,
+    light_sources,
+    street_lamp_heads,
+    street_lighting,
+    surroundings,
+    vehicle_batches,
+)
 from fogsim.values import (
     CameraPose,
     FogField,
@@ -17,7 +27,6 @@ from fogsim.values import (
     Lights,
     RoadNetwork,
     SignMap,
-    StreetLighting,
     TrafficState,
     View,
 )
@@ -33,6 +42,9 @@ DARKEST = 1e-4
 
 Surfaces return street lamps' light as they return the sky's, of which there must be some.
 """
+
+_LEEWAY = 600.0
+"""How far the ego may leave its route before the scene is built anew around it [m], in a network that is larger."""
 
 _USUAL = (Lamp.LOW_BEAM, Lamp.LOW_BEAM | Lamp.FRONT_FOG, Lamp.LOW_BEAM | Lamp.HIGH_BEAM)
 
@@ -68,19 +80,30 @@ class Outlook:
         self._camera, self._samples = build.camera(scenario), scenario.camera.samples
         self._drawn_camera = supersampled(self._camera, self._samples)
         self._setback = scenario.camera.setback_m
-        self._streets: StreetLighting | None = None
-        rng = np.random.default_rng(scenario.scenery_seed)
-        scene = build_scene(network, signs, rng, street_lamps=scenario.street_lamps)
+        self._scenario, self._network = scenario, network
         self._by_lamplight = scenario.light.illuminance_lx < LAMPLIGHT_BELOW
-        self._mount, self._street_lamps = LampMount(), street_lamp_heads(scene)
+        self._mount = LampMount()
         self._air = Air(self.fog, scenario.fog.droplets)
+        self._renderer: Renderer | None = None
+        self._look_at(network.route)
+        if self._by_lamplight:
+            self._air.prepare(self._drawn_camera, [self._own_lamps(lit) for lit in _USUAL])
+
+    def _look_at(self, line: NDArray[np.float64]) -> Renderer:
+        """Build the scene along a line (n, 3) [m]."""
+        scenario, around = self._scenario, surroundings(self._network, self.signs, line)
+        rng = np.random.default_rng(scenario.scenery_seed)
+        scene = build_scene(around.network, around.signs, rng, street_lamps=scenario.street_lamps)
+        self._origin, self._streets = around.origin, None
+        self._known = None if around.whole else Nearness(line, _LEEWAY)
+        self._street_lamps = street_lamp_heads(scene) + around.origin
         sky = scenario.light.illuminance_lx
         if len(self._street_lamps) and self._by_lamplight:
             sky = max(sky, DARKEST)
             self._streets = street_lighting(self._street_lamps, sky)
+        self.close()
         self._renderer = make_renderer(scenario.renderer, scene, sky)
-        if self._by_lamplight:
-            self._air.prepare(self._drawn_camera, [self._own_lamps(lit) for lit in _USUAL])
+        return self._renderer
 
     def see(self, state: TrafficState, ego: int, pose: CameraPose, time: float) -> tuple[View, NDArray[np.float32]]:
         """Draw what is there, and what of it reaches the camera through the air.
@@ -103,10 +126,27 @@ class Outlook:
         (rows, cols, 3) float32
             Linear radiance at the camera [cd/m²], the mean of a pixel's samples.
         """
+        renderer = self._renderer_at(state.position[ego])
         camera, lights = self._drawn_camera, self._lights(state, ego, pose)
-        view = self._renderer.render(vehicle_batches(state, ego), camera, pose, lamplight=bool(lights.own))
+        near, seen_from = self._from_origin(state, pose)
+        view = renderer.render(vehicle_batches(near, ego), camera, seen_from, lamplight=bool(lights.own))
         radiance = self._air.radiance(view, camera, pose, lights, time)
         return middle_samples(view, self._samples), averaged(radiance, self._samples)
+
+    def _renderer_at(self, place: NDArray[np.float64]) -> Renderer:
+        """The renderer of a scene that has what is around a place."""
+        if self._renderer is None:
+            raise RenderError("this outlook is closed; make a new one")
+        if self._known is None or self._known.tell(place[None, :])[0]:
+            return self._renderer
+        return self._look_at(place[None, :])
+
+    def _from_origin(self, state: TrafficState, pose: CameraPose) -> tuple[TrafficState, CameraPose]:
+        """Vehicles and camera in the coordinates of the scene."""
+        if not np.any(self._origin):
+            return state, pose
+        x, y, z = (np.array(pose.position) - self._origin).tolist()
+        return replace(state, position=state.position - self._origin), replace(pose, position=(x, y, z))
 
     def _lights(self, state: TrafficState, ego: int, pose: CameraPose) -> Lights:
         if not self._by_lamplight:
@@ -122,4 +162,6 @@ class Outlook:
 
     def close(self) -> None:
         """Free the renderer; closing twice is allowed."""
-        self._renderer.close()
+        if self._renderer is not None:
+            self._renderer.close()
+        self._renderer = None

@@ -57,6 +57,9 @@ def build_scene(network: RoadNetwork, signs: SignMap, rng: np.random.Generator, 
     if not driven:
         raise InputError(f"a scene needs at least one lane with a length, got {len(network.lanes)} lanes without")
     index, relief = LaneIndex(lanes), Relief(lanes)
+    areas = Areas(network.areas)
+    # Lanes across a junction show only where its area does not reach.
+    lanes = [lane for lane in lanes if lane.kind is not LaneKind.JUNCTION or not areas.cover(lane.centreline)]
     borders = _borders(network, lanes, index)
     pavement, furniture, posts = _pavement(network, lanes, driven), _Furniture(index), list[Batch]()
     for lane, edge in borders:
@@ -83,9 +86,8 @@ def build_scene(network: RoadNetwork, signs: SignMap, rng: np.random.Generator, 
 
 def _pavement(network: RoadNetwork, lanes: Sequence[Lane], driven: Sequence[Lane]) -> list[Mesh]:
     """Lanes, junctions, footways and what is painted across them."""
-    chainage, areas = Chainage(driven), Areas(network.areas)
-    # Lanes across a junction show only where its area does not reach.
-    seen = [lane for lane in driven if lane.kind is LaneKind.CARRIAGEWAY or not areas.cover(lane.centreline)]
+    seen = [lane for lane in lanes if lane.kind in {LaneKind.CARRIAGEWAY, LaneKind.JUNCTION}]
+    chainage = Chainage(driven)
     footways = [lane for lane in lanes if lane.kind is LaneKind.FOOTWAY]
     paved = [area_mesh(area) for area in walkable(network.areas, driven)]
     return [
@@ -98,10 +100,9 @@ def _pavement(network: RoadNetwork, lanes: Sequence[Lane], driven: Sequence[Lane
 
 def _borders(network: RoadNetwork, lanes: Sequence[Lane], index: LaneIndex) -> list[tuple[Lane | None, Edge]]:
     """Free sides of lanes outside junctions, and those of junctions, which belong to no lane."""
-    areas = Areas(network.areas)
     found: list[tuple[Lane | None, Edge]] = []
     for lane in lanes:
-        if lane.kind is LaneKind.CROSSING or (lane.kind is LaneKind.JUNCTION and areas.cover(lane.centreline)):
+        if lane.kind is LaneKind.CROSSING:
             continue
         found += [(lane, lane_edge(lane, side, line, index)) for side, line in free_edges(lane, index)]
     leading = [lane for lane in lanes if lane.kind in {LaneKind.CARRIAGEWAY, LaneKind.FOOTWAY}]

@@ -1,5 +1,6 @@
 """Distances along lanes that neighbours share, so that a line painted half in each of two lanes meets itself."""
 
+import math
 from collections.abc import Mapping, Sequence
 from itertools import product
 
@@ -59,16 +60,17 @@ def _predecessors(lanes: Sequence[Lane], reference: Mapping[str, NDArray[np.floa
 def _opposites(reference: Mapping[str, NDArray[np.float64]]) -> dict[str, str]:
     """Edges that run the other way beside an edge: its end near the edge's start, and its start near the edge's end."""
     ends: dict[tuple[int, int], list[str]] = {}
-    for edge, line in reference.items():
-        column, row = np.floor(line[-1, :2] / _BESIDE).astype(int).tolist()
+    ends_of = {edge: line[[0, -1]].tolist() for edge, line in reference.items()}
+    for edge, (_, last) in ends_of.items():
+        column, row = (math.floor(x / _BESIDE) for x in last[:2])
         for cell in product((column - 1, column, column + 1), (row - 1, row, row + 1)):
             ends.setdefault(cell, []).append(edge)
     found = {}
-    for edge, line in reference.items():
-        column, row = np.floor(line[0, :2] / _BESIDE).astype(int).tolist()
+    for edge, mine in ends_of.items():
+        column, row = (math.floor(x / _BESIDE) for x in mine[0][:2])
         for other in ends.get((column, row), ()):
-            gaps = np.linalg.norm(reference[other][[-1, 0]] - line[[0, -1]], axis=1)
-            if other != edge and gaps.max() < _BESIDE:
+            theirs = ends_of[other]
+            if other != edge and max(math.dist(theirs[1], mine[0]), math.dist(theirs[0], mine[1])) < _BESIDE:
                 found[edge] = other
     return found
 

@@ -1,6 +1,8 @@
 """Houses along streets."""
 
+import math
 from collections.abc import Mapping, Sequence
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,7 +107,7 @@ def houses(edges: Sequence[Edge], index: LaneIndex, relief: Relief, rng: np.rand
         What chooses them.
     """
     found: dict[str, list[tuple[Points, float, float]]] = {}
-    taken: list[NDArray[np.float64]] = []
+    taken = _Taken(1.8 * HOUSE_RADIUS)
     for edge in edges:
         if edge.speed_limit > TOWN:
             continue
@@ -113,12 +115,28 @@ def houses(edges: Sequence[Edge], index: LaneIndex, relief: Relief, rng: np.rand
         room = index.clearance(places) > HOUSE_RADIUS
         for place, turn, free in zip(places, along.tolist(), room.tolist(), strict=True):
             built, kind, size = rng.random() < 0.8, int(rng.integers(len(_KINDS))), rng.uniform(0.9, 1.12)
-            far = not taken or np.min(np.sum((np.array(taken) - place[:2]) ** 2, axis=1)) > (1.8 * HOUSE_RADIUS) ** 2
-            if built and free and far:
-                taken.append(place[:2])
+            if built and free and taken.takes(place):
                 facing = turn if edge.side > 0 else turn + np.pi
                 found.setdefault(f"house_{kind}", []).append((place, facing, size))
     return [_built(name, members, relief) for name, members in found.items()]
+
+
+class _Taken:
+    """Places that keep a distance from one another, looked up by square cells of that side [m]."""
+
+    def __init__(self, distance: float) -> None:
+        self._distance = distance
+        self._cells: dict[tuple[int, int], list[tuple[float, float]]] = {}
+
+    def takes(self, place: NDArray[np.float64]) -> bool:
+        """Take a place (at least 2,) [m] unless one is taken that is too near."""
+        x, y = float(place[0]), float(place[1])
+        column, row = math.floor(x / self._distance), math.floor(y / self._distance)
+        for cell in product((column - 1, column, column + 1), (row - 1, row, row + 1)):
+            if any(math.dist(other, (x, y)) <= self._distance for other in self._cells.get(cell, ())):
+                return False
+        self._cells.setdefault((column, row), []).append((x, y))
+        return True
 
 
 def _built(name: str, members: Sequence[tuple[Points, float, float]], relief: Relief) -> Batch:

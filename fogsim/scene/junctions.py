@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from fogsim.scene.edges import Edge, border_edge
 from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.polyline import Points, cleaned, refined
+from fogsim.scene.polyline_kernels import crossed_oddly
 from fogsim.scene.road import ASPHALT, FLAGSTONES, KERB, ROAD
 from fogsim.scene.solids import concave_faces, mesh
 from fogsim.values.road import Lane, LaneKind, PavedArea
@@ -86,10 +87,14 @@ def free_borders(areas: Sequence[PavedArea], lanes: Sequence[Lane], everything: 
     """
     index, limits = LaneIndex(lanes), np.repeat([lane.speed_limit for lane in lanes], 2)
     ends = np.concatenate([lane.centreline[[0, -1], :2] for lane in lanes])
+    order = np.argsort(ends[:, 0], kind="stable")
+    ends, limits = ends[order], limits[order]
     for outline in map(_counterclockwise, areas):
         if len(outline) > 2:
-            apart = np.abs(ends[:, None] - outline[None, :, :2]).sum(axis=2).min(axis=1)
-            leading = limits[apart < _TOUCHING]
+            west, east = outline[:, 0].min() - _TOUCHING, outline[:, 0].max() + _TOUCHING
+            near = slice(*np.searchsorted(ends[:, 0], (west, east)).tolist())
+            apart = np.abs(ends[near, None] - outline[None, :, :2]).sum(axis=2).min(axis=1)
+            leading = limits[near][apart < _TOUCHING]
             if len(leading):
                 for corners in _free_parts(outline, index):
                     yield border_edge(corners, float(leading.max()), everything)
@@ -149,9 +154,4 @@ def _inside(points: NDArray[np.float64], outline: NDArray[np.float64]) -> bool:
 
 def _within(points: NDArray[np.float64], outline: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Tell which points (n, 2) lie within an outline (m, 2)."""
-    start, end = outline, np.roll(outline, -1, axis=0)
-    x, y = points.T[..., None]
-    above = (start[:, 1] > y) != (end[:, 1] > y)
-    rise = np.where(end[:, 1] == start[:, 1], 1.0, end[:, 1] - start[:, 1])
-    crossing = start[:, 0] + (y - start[:, 1]) / rise * (end[:, 0] - start[:, 0])
-    return np.asarray(np.sum(above & (x < crossing), axis=1) % 2 == 1)
+    return crossed_oddly(np.ascontiguousarray(points), np.ascontiguousarray(outline))

@@ -2,11 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike, NDArray
 
+from fogsim.scene.polyline_kernels import surface_normals
 from fogsim.values.scene import Mesh, Surface
 
 ROADSIDE = 3
@@ -84,12 +86,16 @@ def mesh(
     )
 
 
+@lru_cache(maxsize=256)
 def grid_faces(rows: int, columns: int) -> NDArray[np.int64]:
     """Two triangles for each cell of a grid of vertices numbered row by row."""
     corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
     lower = np.stack((corner, corner + 1, corner + columns), axis=1)
     upper = np.stack((corner + 1, corner + columns + 1, corner + columns), axis=1)
-    return np.concatenate((lower, upper))
+    faces = np.concatenate((lower, upper))
+    # The same array is given again.
+    faces.flags.writeable = False
+    return faces
 
 
 def grid_normals(points: NDArray[np.float64], toward: ArrayLike) -> NDArray[np.float64]:
@@ -97,13 +103,7 @@ def grid_normals(points: NDArray[np.float64], toward: ArrayLike) -> NDArray[np.f
 
     Where points coincide, the normal is `toward` itself.
     """
-    along = np.gradient(points, axis=0)
-    across = np.gradient(points, axis=1)
-    normals = np.cross(along, across)
-    facing = np.asarray(toward, float)
-    sign = 1.0 if normals.sum(axis=(0, 1)) @ facing >= 0 else -1.0
-    nowhere = np.max(np.abs(normals), axis=2) < 1e-9
-    return np.where(nowhere[..., None], facing, sign * normals)
+    return surface_normals(np.ascontiguousarray(points, np.float64), np.array(toward, np.float64))
 
 
 def grid(

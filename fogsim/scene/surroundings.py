@@ -1,0 +1,136 @@
+"""What of a network is near a line, in coordinates that single precision holds to the millimetre."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.scene.polyline import Points
+from fogsim.values.road import RoadNetwork, SignMap
+
+T = TypeVar("T")
+
+REACH = 1700.0
+"""What is nearer to a line than this [m] belongs to its surroundings; renderers show little that is farther away."""
+
+_SQUARE = 250.0  # side of the squares by which it is told what is near [m]
+_ORIGINS = 10_000.0  # origins are multiples of this [m], so that networks near the origin of theirs keep it
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """Part of a network.
+
+    Attributes
+    ----------
+    network : RoadNetwork
+        Its lanes and areas; its route is the whole one. Places are counted from the origin.
+    signs : SignMap
+        Its signs, likewise.
+    origin : (3,) float64
+        Where that origin is in the network's own coordinates [m].
+    whole : bool
+        True if nothing has been left out.
+    """
+
+    network: RoadNetwork
+    signs: SignMap
+    origin: NDArray[np.float64]
+    whole: bool
+
+
+def surroundings(network: RoadNetwork, signs: SignMap, line: Points) -> Surroundings:
+    """Surroundings of a line, as a rule the route.
+
+    Parameters
+    ----------
+    network : RoadNetwork
+        The network.
+    signs : SignMap
+        Its signs.
+    line : (n, 3) float64
+        The line [m].
+    """
+    plane = line[:, :2]
+    origin = np.append(np.round(0.5 * (plane.min(axis=0) + plane.max(axis=0)) / _ORIGINS) * _ORIGINS, 0.0)
+    near = Nearness(line, REACH)
+    lanes = _chosen(network.lanes, near.any([lane.centreline for lane in network.lanes]))
+    areas = _chosen(network.areas, near.any([area.outline for area in network.areas]))
+    posts = _chosen(signs.signs, near.any([np.array([sign.position]) for sign in signs.signs]))
+    return Surroundings(
+        RoadNetwork(
+            tuple(replace(lane, centreline=lane.centreline - origin) for lane in lanes),
+            network.route - origin,
+            tuple(replace(area, outline=area.outline - origin) for area in areas),
+        ),
+        SignMap(tuple(replace(sign, position=_moved(sign.position, origin)) for sign in posts)),
+        origin,
+        whole=len(lanes) == len(network.lanes) and len(areas) == len(network.areas) and len(posts) == len(signs.signs),
+    )
+
+
+def _chosen(things: Sequence[T], kept: Sequence[bool]) -> list[T]:
+    return [thing for thing, is_kept in zip(things, kept, strict=True) if is_kept]
+
+
+def _moved(position: tuple[float, float, float], origin: NDArray[np.float64]) -> tuple[float, float, float]:
+    x, y, z = (np.array(position) - origin).tolist()
+    return x, y, z
+
+
+class Nearness:
+    """Which places are near a line.
+
+    Parameters
+    ----------
+    line : (n, 3) float64
+        The line [m].
+    reach : float
+        How far from it they may be at least [m].
+    """
+
+    def __init__(self, line: Points, reach: float) -> None:
+        corner = line[:, :2].min(axis=0) - reach - _SQUARE
+        size = np.ceil((line[:, :2].max(axis=0) + reach + _SQUARE - corner) / _SQUARE).astype(int)
+        self._corner = corner
+        self._near = np.zeros(size, np.bool_)
+        wide = int(np.ceil(reach / _SQUARE))
+        i, j = np.mgrid[-wide : wide + 1, -wide : wide + 1]
+        around = np.column_stack((i.ravel(), j.ravel()))[np.hypot(i, j).ravel() * _SQUARE <= reach + _SQUARE]
+        for square in np.unique(self._squares(_dense(line)), axis=0):
+            column, row = np.clip(square + around, 0, size - 1).T
+            self._near[column, row] = True
+
+    def _squares(self, places: NDArray[np.float64]) -> NDArray[np.int64]:
+        return np.floor((places[:, :2] - self._corner) / _SQUARE).astype(np.int64)
+
+    def tell(self, places: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Tell which places (n, 2 or 3) [m] are near."""
+        squares = self._squares(places)
+        inside = np.all((squares >= 0) & (squares < self._near.shape), axis=1)
+        result = np.zeros(len(places), np.bool_)
+        result[inside] = self._near[squares[inside, 0], squares[inside, 1]]
+        return result
+
+    def any(self, lines: Sequence[NDArray[np.float64]]) -> list[bool]:
+        """Tell of which lines (n, 2 or 3) any part is near."""
+        if not lines:
+            return []
+        dense = [_dense(line) for line in lines]
+        near = self.tell(np.concatenate([points[:, :2] for points in dense]))
+        first = np.cumsum([0, *map(len, dense[:-1])])
+        found: list[bool] = np.logical_or.reduceat(near, first).tolist()
+        return found
+
+
+def _dense(line: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A line with points enough that none of the squares that it crosses is stepped over."""
+    if len(line) < 2 or np.max(np.abs(np.diff(line[:, :2], axis=0))) <= _SQUARE:
+        return line
+    pieces = [
+        start + np.linspace(0.0, 1.0, int(np.max(np.abs(step[:2])) / _SQUARE) + 2)[:, None] * step
+        for start, step in zip(line[:-1], np.diff(line, axis=0), strict=True)
+    ]
+    return np.concatenate(pieces)

@@ -3,8 +3,10 @@
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fogsim.errors import InputError
+from fogsim.estimators.huang2015_comparison import Comparison
 from fogsim.estimators.huang2015_ratios import (
     Regressions,
     fitted_extinction,
@@ -12,12 +14,14 @@ from fogsim.estimators.huang2015_ratios import (
     published_extinction,
     ratio_table,
 )
-from fogsim.estimators.huang2015_track import Comparison, LeadTrack
+from fogsim.estimators.huang2015_track import LeadTrack
 from fogsim.estimators.image_check import checked_image
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import Observation
 from fogsim.vision.road_image import CannotTellError
+
+Floats = NDArray[np.float64]
 
 SPACING, PUBLISHED_SPACING = 2.5, 5.0
 """Change of range between pictures that are kept [m]; the thesis clips one every 5 m."""
@@ -45,9 +49,11 @@ class Huang2015Lead:
     As published, variances of the windows are compared two by two: a table of ratios by difference of range, those
     beyond ± 50 % of their row's median dropped, means, least squares over k ≤ 0.09 1/m. Camera noise adds to every
     variance (dense fog comes out too thin) and detail is lost with distance (thin fog comes out too dense). Corrected,
-    the nearest picture is shrunk as the camera would, placed to a fraction of a pixel, and each farther picture
-    regressed on it; the slope, noise taken out, falls as e^(−kd), and lamps that were lit since are left out. Changes
-    of exposure are taken out by the sky.
+    the nearest picture is shrunk as the camera would, placed to a fraction of a pixel by the vehicle's outline, and
+    each farther picture compared with it in two ways. The slope of its regression, noise taken out, falls as e^(−kd);
+    so does the mean contrast to the sky, in which dark pixels count most, as no shading or loss of detail makes them
+    bright. Pixels that changed (lit lamps) are left out, slopes of pictures that show other detail are, too, and
+    changes of exposure are taken out by the sky.
 
     Errors of the thesis: eqs. 4.12 to 4.14 and 5.2 lack squares, eq. 4.14 has d₁ for d₂, eq. 4.16 is near over far
     where table 4.2 is far over near, the k grid excludes visibilities below 33 m, and 25 … 90 m every 5 m are 14
@@ -158,9 +164,9 @@ class Huang2015Lead:
         return Estimate(self.method, extinction, deviation, diagnostics=diagnostics)
 
     def _published(self) -> tuple[float, float] | None:
-        found = [c for c in self._track.comparisons if c.regression.variance > 0]
+        found = [c for c in self._track.comparisons if c.variance > 0]
         table = ratio_table(
-            np.array([c.distance for c in found]), np.array([c.regression.variance for c in found]), PUBLISHED_SPACING
+            np.array([c.distance for c in found]), np.array([c.variance for c in found]), PUBLISHED_SPACING
         )
         if table.ratio.size < 2:
             return None
@@ -179,12 +185,14 @@ class Huang2015Lead:
 
 
 def _regressions(found: tuple[Comparison, ...]) -> Regressions:
-    seen = [c.regression for c in found]
+    def column(name: str) -> Floats:
+        return np.array([getattr(c, name) for c in found])
+
     return Regressions(
-        distance=np.array([c.distance for c in found]),
-        slope=np.array([c.contrast for c in found]),
-        slope_deviation=np.array([c.deviation for c in found]),
-        mean=np.array([r.mean / c.sky for r, c in zip(seen, found, strict=True)]),
-        mean_deviation=np.array([c.mean_deviation for c in found]),
-        near_mean=np.array([r.near_mean / c.reference_sky for r, c in zip(seen, found, strict=True)]),
+        distance=column("distance"),
+        slope=column("contrast"),
+        slope_deviation=column("deviation"),
+        mean=column("mean"),
+        mean_deviation=column("mean_deviation"),
+        near_mean=column("near_mean"),
     )

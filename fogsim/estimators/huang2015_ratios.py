@@ -17,14 +17,20 @@ LARGEST_EXTINCTION = 0.09
 GRID = 1801
 """Extinctions that the published search tries."""
 
-SLOPE_SHARE = 0.02
+SLOPE_SHARE = 0.05
 """Standard deviation of a ratio of contrasts that pixels do not show, relative: registration, detail too small [-]."""
 
 MEAN_SHARE, MEAN_CONTRAST_SHARE = 0.002, 0.01
 """The same of a mean luminance, relative to the sky's and to its contrast to the sky [-]."""
 
-SKY_SHARE = 0.03
+SKY_SHARE = 0.01
 """Standard deviation of the airlight ahead relative to the sky's luminance above it [-]."""
+
+DETAIL_SHARE = 0.3
+"""Standard deviation of the share of its detail that only the reference shows: fine detail, noise told wrong [-]."""
+
+DRIFT = 0.015
+"""Standard deviation of the relative change of a mean contrast as a picture becomes smaller by a factor e [-]."""
 
 HUBER = 2.0
 """Residuals beyond this many standard deviations count linearly, not squared [-]."""
@@ -34,6 +40,9 @@ STEPS = 30
 
 RANGE_DEVIATION = 0.3
 """Standard deviation of a range [m]."""
+
+
+_LARGEST_STEP = np.array([0.02, 0.2, 0.1, 0.2, 0.05])  # of k, B, e, f and g in one of the steps
 
 
 def image_confidence(extinction: float, distance: Floats | float, reference: float = 0.0) -> Floats:
@@ -173,10 +182,12 @@ class ContrastFit:
 
 
 def fitted_extinction(data: Regressions) -> ContrastFit | None:
-    """Fit slope = B t and mean = (1 + e) (1 − B t) + B t · near mean with t = e^(−k d), robustly.
+    """Fit slope = B (1 + f) t and mean = (1 + e) − (1 + e − near mean) B t (1 + g ln d/d₀), t = e^(−k d), robustly.
 
     Slopes need detail and no knowledge of the airlight; means need no detail, but the sky's luminance for the
-    airlight's. Their difference e is fitted along, as far from 0 as skies are.
+    airlight's. What may be wrong is fitted along, as far from 0 as it can be: the difference e of airlight and sky, the
+    share f of the reference's own detail that others do not show, and the drift g of the mean contrast as a thing
+    becomes smaller in the picture.
 
     Parameters
     ----------
@@ -189,22 +200,24 @@ def fitted_extinction(data: Regressions) -> ContrastFit | None:
         None if there are fewer, of one range, or none of them shows the vehicle.
     """
     apart = data.distance - data.distance.min(initial=math.inf)
-    seen = data.slope > 3.0 * np.hypot(data.slope_deviation, SLOPE_SHARE * data.slope)
-    if data.distance.size < 3 or int(seen.sum()) < 2 or float(np.ptp(data.distance[seen])) <= 0.0:
+    first = _first_guess(data, apart)
+    if first is None:
         return None
-    values = np.concatenate([data.slope, data.mean, [0.0]])
-    state = np.array([max(-float(np.polyfit(apart[seen], np.log(data.slope[seen]), 1)[0]), 1e-4), 1.0, 0.0])
-    covariance: Floats = np.eye(3)
+    priors = np.array([SKY_SHARE, DETAIL_SHARE, DRIFT])
+    values = np.concatenate([data.slope, data.mean, np.zeros(priors.size)])
+    state = np.array([first, 1.0, 0.0, 0.0, 0.0])
+    covariance: Floats = np.eye(state.size)
     standardised: Floats = np.zeros(values.size)
+    spread: Floats = np.ones(values.size)
     for _ in range(STEPS):
-        model, jacobian, spread = _predicted(state, apart, data)
+        model, jacobian, spread = _predicted(state, apart, data, priors)
         standardised = (values - model) / spread
-        # The last value is the prior of the sky, and no outlier.
+        # The last values are priors, and no outliers.
         weight = np.minimum(1.0, HUBER / np.maximum(np.abs(standardised), 1e-9)) / spread**2
-        weight[-1] = spread[-1] ** -2
+        weight[-priors.size :] = priors**-2
         covariance = np.asarray(np.linalg.pinv(jacobian.T @ (weight[:, None] * jacobian)), np.float64)
         step = covariance @ (jacobian.T @ (weight * (values - model)))
-        state = state + np.clip(step, (-0.02, -0.2, -0.1), (0.02, 0.2, 0.1))
+        state = state + np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)
         state[0], state[1] = min(max(state[0], -0.01), 1.0), min(max(state[1], 0.3), 3.0)
         if abs(float(step[0])) < 1e-7:
             break
@@ -213,21 +226,33 @@ def fitted_extinction(data: Regressions) -> ContrastFit | None:
     return ContrastFit(float(state[0]), math.sqrt(max(misfit, 1.0) * float(covariance[0, 0])), misfit)
 
 
-def _predicted(state: Floats, apart: Floats, data: Regressions) -> tuple[Floats, Floats, Floats]:
-    """Values, their derivatives by k, B and e, and their standard deviations; the last row is the prior of e."""
-    extinction, level, excess = state
+def _first_guess(data: Regressions, apart: Floats) -> float | None:
+    """Extinction by the logarithms of what stands out of the noise: mean contrasts to the sky, or else of detail."""
+    contrast = 1.0 - np.stack([data.mean, data.near_mean])
+    for fallen, deviation in (
+        (contrast[0] / np.maximum(contrast[1], 1e-6), data.mean_deviation / np.maximum(contrast[1], 1e-6)),
+        (data.slope, np.hypot(data.slope_deviation, SLOPE_SHARE * data.slope)),
+    ):
+        seen = (fallen > 3.0 * deviation) & (contrast[1] > 0.0)
+        if data.distance.size >= 3 and int(seen.sum()) >= 2 and float(np.ptp(apart[seen])) > 0.0:
+            return max(-float(np.polyfit(apart[seen], np.log(fallen[seen]), 1)[0]), 1e-4)
+    return None
+
+
+def _predicted(state: Floats, apart: Floats, data: Regressions, priors: Floats) -> tuple[Floats, Floats, Floats]:
+    """Values, their derivatives by k, B, e, f and g, and their standard deviations; the last rows are the priors."""
+    extinction, level, excess, detail, drift = state
     shape = np.exp(-extinction * apart)
     t = level * shape
-    contrast = 1.0 + excess - data.near_mean
-    zero = np.zeros_like(t)
-    slopes = np.stack([-apart * t, shape, zero], axis=1)
-    means = np.stack([contrast * apart * t, -contrast * shape, 1.0 - t], axis=1)
+    smaller = np.log(data.distance / data.distance.min())
+    known, kept = 1.0 + excess - data.near_mean, 1.0 + drift * smaller
+    zero, seen = np.zeros_like(t), known * t * kept
+    slopes = (1.0 + detail) * np.stack([-apart * t, shape, zero, t / (1.0 + detail), zero], axis=1)
+    means = np.stack([apart * seen, -seen / level, 1.0 - t * kept, zero, -known * t * smaller], axis=1)
     # A range that is off by δ changes either by k δ; near pixels are of a range, too.
     by_range = (RANGE_DEVIATION * extinction) ** 2
     slope_spread = np.sqrt(data.slope_deviation**2 + (SLOPE_SHARE**2 + by_range) * t**2)
-    mean_spread = np.sqrt(
-        data.mean_deviation**2 + MEAN_SHARE**2 + (MEAN_CONTRAST_SHARE**2 + by_range) * (contrast * t) ** 2
-    )
-    values = np.concatenate([t, 1.0 + excess - contrast * t, [excess]])
-    jacobian = np.concatenate([slopes, means, [[0.0, 0.0, 1.0]]])
-    return values, jacobian, np.concatenate([slope_spread, mean_spread, [SKY_SHARE]])
+    mean_spread = np.sqrt(data.mean_deviation**2 + MEAN_SHARE**2 + (MEAN_CONTRAST_SHARE**2 + by_range) * seen**2)
+    values = np.concatenate([(1.0 + detail) * t, 1.0 + excess - seen, [excess, detail, drift]])
+    jacobian = np.concatenate([slopes, means, np.eye(5)[2:]])
+    return values, jacobian, np.concatenate([slope_spread, mean_spread, priors])

@@ -1,7 +1,7 @@
 """A near picture of a thing as a farther camera would show it."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,3 +120,42 @@ def seen_as(near: Patch, grid: PixelGrid, at: Placement) -> Floats:
     rows = box_weights(near.luminance.shape[0], near.row, grid.rows, at.row, at.scale, near.blur)
     cols = box_weights(near.luminance.shape[1], near.column, grid.cols, at.column, at.scale, near.blur)
     return np.asarray(rows @ near.luminance @ cols.T)
+
+
+def shrunk(patch: Patch, scale: float) -> Patch:
+    """Picture of fewer, larger pixels.
+
+    Parameters
+    ----------
+    patch : Patch
+        The picture.
+    scale : float
+        New size over old size, at most 1 [-].
+
+    Returns
+    -------
+    Patch
+        The same picture; as it is where the scale is 1.
+    """
+    if scale >= 1.0:
+        return patch
+    column, row = moved(patch.column, scale), moved(patch.row, scale)
+    rows, cols = (np.arange(max(math.floor(size * scale), 1), dtype=np.float64) for size in patch.luminance.shape)
+    down = box_weights(patch.luminance.shape[0], patch.row, rows, row, scale)
+    across = box_weights(patch.luminance.shape[1], patch.column, cols, column, scale)
+    # At the border a large pixel may reach out of the picture.
+    whole = np.maximum(down.sum(axis=1), 1e-9)[:, None] * np.maximum(across.sum(axis=1), 1e-9)
+    return replace(
+        patch,
+        luminance=np.asarray(down @ patch.luminance @ across.T / whole),
+        column=column,
+        row=row,
+        half_width=patch.half_width * scale,
+        half_height=patch.half_height * scale,
+        blur=patch.blur * scale,
+    )
+
+
+def moved(position: float, scale: float) -> float:
+    """Row or column of a point once the pixels are larger; they count from the middle of the first [px]."""
+    return (position + 0.5) * scale - 0.5

@@ -30,6 +30,15 @@ SATURATED = 250.0
 SURE = 7.0
 """Slope in its standard deviations from which a placement is believed [-]."""
 
+OTHER = 0.2
+"""Share of a far picture's variance that the near one does not explain beyond which its detail is another's [-]."""
+
+NOISE_SHARE = 0.3
+"""Relative standard deviation of the told noise's power, which is taken out of slopes [-]."""
+
+ALIKE = 8.0
+"""Neighbouring pixels that differ alike where a thing has changed: so many count as one [-]."""
+
 LEAST_PIXELS = 24
 """Fewest pixels that a regression is made of."""
 
@@ -63,15 +72,16 @@ class Regression:
     placement : Placement
         Where the near patch fits.
     slope, slope_deviation : float
-        Ratio of the contrasts and its standard deviation [-].
+        Ratio of the contrasts and its standard deviation by noise and by detail that only one of them shows [-];
+        ``inf`` where the near pixels show no detail.
+    noise_deviation : float
+        Its standard deviation by noise alone [-].
     mean, near_mean : float
         Means of the far and of the near pixels [linear grey levels].
     residual : float
         Robust standard deviation of what is left [linear grey levels].
     variance : float
         Variance of the far pixels [linear grey levels²].
-    correlation : float
-        Of far and near pixels [-].
     pixels : int
         How many took part.
     """
@@ -79,11 +89,11 @@ class Regression:
     placement: Placement
     slope: float
     slope_deviation: float
+    noise_deviation: float
     mean: float
     near_mean: float
     residual: float
     variance: float
-    correlation: float
     pixels: int
 
 
@@ -116,13 +126,15 @@ def coarse_placement(near: Patch, far: Patch, prior: PlacementPrior) -> Placemen
     down = np.arange(correlation.shape[0]) - grid.rows[0]
     across = np.arange(correlation.shape[1]) - grid.cols[0]
     expected = 0.5 * (down[:, None] / prior.row_deviation) ** 2 + 0.5 * (across / prior.column_deviation) ** 2
-    cost = 0.5 * template.size * np.log1p(-(correlation**2)) + expected
+    cost = 0.5 * template.size / ALIKE * np.log1p(-(correlation**2)) + expected
     row, col = np.unravel_index(int(np.argmin(cost)), cost.shape)
     at = prior.placement
     return replace(at, column=at.column + float(across[col]), row=at.row + float(down[row]))
 
 
-def register(near: Patch, far: Patch, prior: PlacementPrior, noise: float, most: float = math.inf) -> Regression | None:
+def register(
+    near: Patch, far: Patch, prior: PlacementPrior, noise: float, most: float = math.inf, outline: float = 1.0
+) -> Regression | None:
     """Place a near patch in a far one and regress the far pixels on it.
 
     Gauss–Newton on column, row and scale with slope and mean projected out; pixels that have changed (lit lamps) and
@@ -139,18 +151,22 @@ def register(near: Patch, far: Patch, prior: PlacementPrior, noise: float, most:
         Standard deviation of single pixels [linear grey levels].
     most : float
         Largest slope that can be true [-]; a placement that gives more is one on something else.
+    outline : float
+        Size of what is placed over that of what is regressed [-]: the outline of a thing places it where its own
+        detail is faint.
 
     Returns
     -------
     Regression or None
         None if too few pixels can be compared.
     """
-    at = coarse_placement(near, far, prior)
-    placed = None if at is None else _placed(near, far, at, prior, noise)
-    found = None if placed is None else _regressed(near, far, placed, noise)
-    if found is not None and SURE * found.slope_deviation < found.slope <= most:
-        return found
-    return _regressed(near, far, prior.placement, noise)
+    whole = replace(near, half_width=outline * near.half_width, half_height=outline * near.half_height)
+    at = coarse_placement(whole, far, prior)
+    placed = None if at is None else _placed(whole, far, at, prior, noise)
+    seen = None if placed is None else _regressed(whole, far, placed, noise)
+    sure = seen is not None and SURE * seen.noise_deviation < seen.slope <= most
+    found = _regressed(near, far, seen.placement, noise) if seen is not None and sure else None
+    return _regressed(near, far, prior.placement, noise) if found is None else found
 
 
 def _placed(near: Patch, far: Patch, at: Placement, prior: PlacementPrior, noise: float) -> Placement | None:
@@ -215,7 +231,7 @@ def _step(near: Patch, grid: PixelGrid, at: Placement, prior: PlacementPrior, no
     expected = prior.placement
     deviation = np.array([prior.column_deviation, prior.row_deviation, prior.scale_deviation])
     offset = np.array([at.column - expected.column, at.row - expected.row, math.log(at.scale / expected.scale)])
-    variance = max(scale, noise) ** 2
+    variance = noise**2 + ALIKE * max(scale**2 - noise**2, 0.0)
     information = jacobian.T @ jacobian / variance + np.diag(deviation**-2)
     return np.asarray(np.linalg.solve(information, jacobian.T @ residual / variance - offset / deviation**2))
 
@@ -230,18 +246,22 @@ def _regression(near: Patch, grid: PixelGrid, at: Placement, noise: float) -> Re
     spread = float(((shown[used] - near_mean) ** 2).sum())
     # Each shown pixel is the mean of 1/scale² near ones, and so is its noise, which flattens the line.
     own = count * noise**2 * min(at.scale, 1.0) ** 2
-    if spread <= 2.0 * own:
-        return None
     variance = float(grid.far[used].var())
-    correlation = slope * math.sqrt(spread / count / max(variance, 1e-12))
+    by_noise, changed = math.inf, 1.0
+    if spread > 2.0 * own:
+        slope *= spread / (spread - own)
+        by_noise = max(scale, noise) / math.sqrt(spread - own)
+        power = slope**2 * (spread - own) / count
+        changed = max(variance - power - noise**2, 0.0) / max(power, 1e-9) + 1.0 - count / used.size
+        changed += NOISE_SHARE * own / (spread - own)
     return Regression(
         placement=at,
-        slope=slope * spread / (spread - own),
-        slope_deviation=max(scale, noise) / math.sqrt(spread - own),
+        slope=slope,
+        slope_deviation=math.hypot(by_noise, changed * abs(slope)) if changed < OTHER else math.inf,
+        noise_deviation=by_noise,
         mean=mean,
         near_mean=near_mean,
         residual=scale,
         variance=variance,
-        correlation=min(correlation, 1.0),
         pixels=count,
     )

@@ -1,0 +1,210 @@
+"""Two pictures of the vehicle ahead compared: its place, its detail and its light."""
+
+import math
+from dataclasses import dataclass, replace
+
+from fogsim.estimators.huang2015_sighting import Sighting
+from fogsim.vision.patch import Patch, Placement, moved, shrunk
+from fogsim.vision.patch_light import shared_light
+from fogsim.vision.patch_match import PlacementPrior, Regression, register
+from fogsim.vision.road_image import CannotTellError
+
+RANGE_DEVIATION = 0.3
+"""Standard deviation of the told range [m]."""
+
+STEERING = 0.1
+"""Change of the lateral offset between frames in widths of the vehicle [-]."""
+
+SMALL = 0.6
+"""Relative standard deviation of a contrast by how little a small picture shows [px]: over the vehicle's width."""
+
+BROADEST = 64.0
+"""Width of a vehicle beyond which its picture is shrunk before it is compared [px]: it shows no more."""
+
+OUTLINE = 1.28
+"""Size of what a vehicle is placed by, over that of what is compared [-]: its outline tells more than its rear."""
+
+
+FULL = 254.7
+"""Mean luminance of a sky that is saturated; a little less, and its noise still shows where it is [linear levels]."""
+
+BUMPER = 0.15
+"""Height of the lowest part of a rear that tells no light, in widths of the vehicle [-]: black plinths and shadows end
+there at heights that no far picture resolves."""
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A sighting, and its window's variance before it was shrunk.
+
+    Attributes
+    ----------
+    sighting : Sighting
+        The vehicle, no broader than `BROADEST`.
+    variance : float
+        Of the window's pixels [linear grey levels²].
+    scale : float
+        Size over that in the frame [-].
+    """
+
+    sighting: Sighting
+    variance: float
+    scale: float
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """A picture compared with the reference.
+
+    Attributes
+    ----------
+    distance : float
+        From the camera to the vehicle's rear [m].
+    variance : float
+        Of the picture's window [linear grey levels²].
+    contrast, deviation : float
+        Detail over that of the reference, changes of exposure taken out, and its standard deviation [-].
+    mean, near_mean : float
+        Mean luminance of the picture and of the same pixels of the reference, either over its sky's [-].
+    mean_deviation : float
+        Standard deviation of the mean; ``inf`` if it is not known, as where the sky is saturated [-].
+    regression : Regression
+        Of the picture on the reference.
+    """
+
+    distance: float
+    variance: float
+    contrast: float
+    deviation: float
+    mean: float
+    near_mean: float
+    mean_deviation: float
+    regression: Regression
+
+    @property
+    def fallen(self) -> tuple[float, float]:
+        """Contrast to the sky over that of the reference, and its deviation; that of the detail if it is not known."""
+        if not self.shows_light:
+            return self.contrast, self.deviation
+        return (1.0 - self.mean) / (1.0 - self.near_mean), self.mean_deviation / (1.0 - self.near_mean)
+
+    @property
+    def shows_light(self) -> bool:
+        """Whether the reference differs from the sky by more than its mean may err."""
+        return 1.0 - self.near_mean > 3.0 * self.mean_deviation
+
+
+def picture_of(sighting: Sighting) -> Picture:
+    """Shrink a broad sighting; its variance is measured before."""
+    scale = min(BROADEST / sighting.width, 1.0)
+    small = replace(
+        sighting, patch=shrunk(sighting.patch, scale), width=sighting.width * scale, noise=sighting.noise * scale,
+        pitch_deviation=sighting.pitch_deviation * scale,
+    )  # fmt: skip
+    return Picture(small, window_variance(sighting.patch), scale)
+
+
+def placed(picture: Picture, sighting: Sighting, at: Placement) -> Picture:
+    """Picture of a sighting whose vehicle has been found at a place.
+
+    Parameters
+    ----------
+    picture : Picture
+        The sighting's.
+    sighting : Sighting
+        As it was cut from the frame.
+    at : Placement
+        Where the vehicle is in the picture.
+    """
+    small = replace(picture.sighting.patch, column=at.column, row=at.row)
+    column, row = (moved(place, 1.0 / picture.scale) for place in (at.column, at.row))
+    variance = window_variance(replace(sighting.patch, column=column, row=row))
+    return replace(picture, sighting=replace(picture.sighting, patch=small), variance=variance)
+
+
+def window_variance(patch: Patch) -> float:
+    """Variance of the pixels of the followed thing (eq. 4.12 with the square that it lacks); 0 if none are there."""
+    spans = (
+        slice(max(round(middle - half), 0), max(round(middle + half) + 1, 0))
+        for middle, half in ((patch.row, patch.half_height), (patch.column, patch.half_width))
+    )
+    pixels = patch.luminance[tuple(spans)]
+    return float(pixels.var()) if pixels.size else 0.0
+
+
+def expected_placement(reference: Sighting, sighting: Sighting) -> PlacementPrior:
+    """Where the reference is expected in the next frame: as before, but for pitch, steering and the range's noise."""
+    nearness = 1.0 / sighting.distance + 1.0 / reference.distance
+    placement = Placement(sighting.patch.column, sighting.patch.row, sighting.width / reference.width)
+    return PlacementPrior(
+        placement, 1.0 + STEERING * sighting.width, 0.5 + sighting.pitch_deviation, RANGE_DEVIATION * nearness
+    )
+
+
+def known_placement(reference: Sighting, sighting: Sighting) -> PlacementPrior:
+    """Where the reference is expected in a picture that has been registered before."""
+    return replace(expected_placement(reference, sighting), column_deviation=0.5, row_deviation=0.5)
+
+
+def compared(reference: Picture, picture: Picture, prior: PlacementPrior, most: float = math.inf) -> Comparison | None:
+    """Compare a picture with the reference.
+
+    Parameters
+    ----------
+    reference, picture : Picture
+        The two; the reference shows more.
+    prior : PlacementPrior
+        Where the reference is expected in the picture.
+    most : float
+        Largest contrast over the reference's that can be true [-].
+
+    Returns
+    -------
+    Comparison or None
+        None if too few pixels can be compared.
+    """
+    near, far = reference.sighting, picture.sighting
+    # A saturated sky does not tell the exposure.
+    seen = max(near.sky, far.sky) < FULL
+    gain = far.sky / near.sky if seen else 1.0
+    found = register(near.patch, far.patch, prior, far.noise, most * gain, OUTLINE)
+    if found is None:
+        return None
+    body, at = _above_bumper(near, found.placement)
+    light = shared_light(body, far.patch, at, (near.sky, far.sky), far.noise) if seen else None
+    # What a small picture does not resolve alike: its detail and its place.
+    by_size = SMALL / far.width * abs(found.slope)
+    return Comparison(
+        distance=far.distance,
+        variance=picture.variance,
+        contrast=found.slope / gain,
+        deviation=math.hypot(found.slope_deviation, by_size) / gain,
+        mean=found.mean / far.sky if light is None else light.far,
+        near_mean=found.near_mean / near.sky if light is None else light.near,
+        mean_deviation=math.inf if light is None else light.deviation,
+        regression=found,
+    )
+
+
+def _above_bumper(near: Sighting, at: Placement) -> tuple[Patch, Placement]:
+    """The rear without its lowest part, and where that is."""
+    cut = 0.5 * BUMPER * near.width
+    body = replace(near.patch, row=near.patch.row - cut, half_height=near.patch.half_height - cut)
+    return body, replace(at, row=at.row - cut * at.scale)
+
+
+def compared_with_itself(reference: Picture) -> Comparison:
+    """The reference as the first of its comparisons.
+
+    Its contrast is 1 by definition, which says nothing of how much of its detail others show; its light does count.
+
+    Raises
+    ------
+    CannotTellError
+        If it shows nothing that could be followed.
+    """
+    own = compared(reference, reference, known_placement(reference.sighting, reference.sighting))
+    if own is None or not (math.isfinite(own.regression.noise_deviation) or own.shows_light):
+        raise CannotTellError("the vehicle ahead shows nothing that could be followed")
+    exact = 0.0 if math.isfinite(own.mean_deviation) else math.inf
+    return replace(own, contrast=1.0, deviation=math.inf, mean=own.near_mean, mean_deviation=exact)

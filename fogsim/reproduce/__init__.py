@@ -3,10 +3,12 @@
 from collections.abc import Callable
 
 from fogsim.registry import Registry
-from fogsim.reproduce import negru2013
+from fogsim.reproduce import negru2013, zhu2015
 from fogsim.reproduce.result import Reproduction
 
-REPRODUCTIONS: Registry[Callable[[], Reproduction]] = Registry("paper", {"negru2013": negru2013.reproduce})
+REPRODUCTIONS: Registry[Callable[[], Reproduction]] = Registry(
+    "paper", {"negru2013": negru2013.reproduce, "zhu2015": zhu2015.reproduce}
+)
 """Every paper by name: called, it reruns the evaluation."""
 
 __all__ = ["REPRODUCTIONS", "Reproduction"]

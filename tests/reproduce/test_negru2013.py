@@ -65,7 +65,7 @@ def test_the_airlight_fills_the_pixels_and_nothing_stands_on_the_empty_road() ->
 @pytest.fixture
 def command(monkeypatch, capsys, done):
     """Run the command in this process, the evaluation itself being done: exit code, stdout and stderr."""
-    monkeypatch.setitem(REPRODUCTIONS._entries, "negru2013", lambda: done)
+    monkeypatch.setattr(REPRODUCTIONS, "_entries", {"negru2013": lambda: done})
     monkeypatch.setenv("COLUMNS", "200")
 
     def run(*arguments: str) -> tuple[int, str, str]:

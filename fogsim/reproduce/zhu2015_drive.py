@@ -1,0 +1,180 @@
+"""Drives along a foggy road, frame after frame: texture that passes, a body that pitches, a vehicle ahead."""
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.atmosphere import fogged_radiance
+from fogsim.camera import Sensor, expose
+from fogsim.pinhole import ray_from_pixel
+from fogsim.render import Renderer, make_renderer
+from fogsim.reproduce.scenes import AIRLIGHT, ILLUMINANCE, standing_cars, straight_road
+from fogsim.scene import build_scene, vehicle_batches
+from fogsim.units import extinction_from_visibility
+from fogsim.values import Camera, CameraPose, FogField, LeadMeasurement, Observation, SignMap, View
+
+Floats = NDArray[np.float64]
+
+SPEED, PERIOD = 20.0, 0.2
+"""Speed of the drive [m/s] and time between frames [s]."""
+
+SETBACK = 1.5
+"""Distance of the camera behind the front bumper [m]."""
+
+SENSOR = Sensor(saturation_luminance=AIRLIGHT * 255.0 / 200.0)
+"""A sensor with noise, exposed such that the airlight has 200 of 255 linear levels."""
+
+PITCH_ERROR, PITCH_SWAY = math.radians(0.1), math.radians(0.05)
+"""Standard deviations of the pitch about the told one: of a whole drive, and from frame to frame [rad]."""
+
+WEAR, WEAR_LENGTH = 0.03, 40.0
+"""Change of the road's albedo along the way, uniform within ± this [-], and the way between two such values [m]."""
+
+NEAREST, FARTHEST = 20.0, 60.0
+"""Gaps that a vehicle ahead begins with [m]; it then drifts by up to 1 m a frame."""
+
+RANGE_ERROR = 0.3
+"""Standard deviation of a tracked range [m]."""
+
+START, END = 0.0, 500.0
+"""Where drives begin [m]: at least 900 m of road lie ahead."""
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """What there is to see at one instant of a drive, before any air.
+
+    Attributes
+    ----------
+    view : View
+        The view of the true camera.
+    pose : CameraPose
+        Where it is; its grade is the pitch that the vehicle does not know of.
+    lead : LeadMeasurement or None
+        What a range sensor says of the vehicle ahead.
+    """
+
+    view: View
+    pose: CameraPose
+    lead: LeadMeasurement | None
+
+
+@contextmanager
+def road_renderer() -> Iterator[Renderer]:
+    """Renderer of a straight country road with what stands beside it."""
+    scene = build_scene(straight_road(), SignMap(()), np.random.default_rng(0))
+    renderer = make_renderer("auto", scene, illuminance=ILLUMINANCE)
+    try:
+        yield renderer
+    finally:
+        renderer.close()
+
+
+def drive(
+    renderer: Renderer, camera: Camera, frames: int, *, lead: bool, rng: np.random.Generator, wear: float = WEAR
+) -> Iterator[Moment]:
+    """Drive along the road.
+
+    Parameters
+    ----------
+    renderer : Renderer
+        Of the road.
+    camera : Camera
+        The told calibration; the true pitch differs from it.
+    frames : int
+        How many instants.
+    lead : bool
+        Whether a vehicle drives ahead and is tracked.
+    rng : numpy Generator
+        What decides on place, pitch, wear and the vehicle ahead.
+    wear : float
+        Change of the road's albedo along the way [-].
+    """
+    front, error = rng.uniform(START, END), rng.normal(0.0, PITCH_ERROR)
+    gap, closing = rng.uniform(NEAREST, FARTHEST), rng.uniform(-1.0, 1.0)
+    knots = 1.0 + wear * rng.uniform(-1.0, 1.0, 128)
+    for _ in range(frames):
+        pose = CameraPose(
+            (front - SETBACK, 0.0, camera.mount_height), heading=0.0, grade=error + rng.normal(0.0, PITCH_SWAY)
+        )
+        cars = [(front + gap, 0.0)] if lead else []
+        view = renderer.render(vehicle_batches(standing_cars(cars), None), camera, pose)
+        measured = LeadMeasurement(gap + rng.normal(0.0, RANGE_ERROR), closing / PERIOD) if lead else None
+        yield Moment(worn(view, camera, pose, knots), pose, measured)
+        front += SPEED * PERIOD
+        gap = max(gap + closing, 0.5 * NEAREST)
+
+
+def worn(view: View, camera: Camera, pose: CameraPose, knots: Floats) -> View:
+    """View of a level road whose albedo differs along the way.
+
+    Parameters
+    ----------
+    view : View
+        The view of the road as drawn.
+    camera : Camera
+        Its calibration, without roll.
+    pose : CameraPose
+        Where it is; its heading is that of the road, along x.
+    knots : (n,) float64
+        Factors of the albedo, `WEAR_LENGTH` apart and straight in between; repeated.
+    """
+    # A row shows the mean over the piece of road between its borders, which far away is longer than the wear.
+    borders = _ahead(np.arange(camera.height + 1, dtype=np.float64) - 0.5, camera, pose) + pose.position[0]
+    factor = np.diff(_wear_integral(borders, knots)) / np.diff(borders)
+    radiance = np.where(
+        (view.instance == ROAD)[:, :, None], view.radiance * factor[:, None, None].astype(np.float32), view.radiance
+    )
+    return replace(view, radiance=radiance)
+
+
+ROAD = 2
+"""Instance id of road in a `View`."""
+
+FAR = 20_000.0
+"""What lies above the horizon is taken to lie at most this far ahead [m]."""
+
+
+def _ahead(rows: Floats, camera: Camera, pose: CameraPose) -> Floats:
+    """How far ahead the level road is that rows show; strictly falling from the top down [m]."""
+    pitch = camera.pitch - pose.grade
+    angle = pitch + np.arctan((rows - camera.principal_point[1]) / camera.focal_length)
+    ahead = camera.mount_height / np.maximum(np.tan(angle), camera.mount_height / FAR)
+    # Above the horizon all rows lie equally far: a trifle keeps them apart.
+    return np.asarray(ahead + 1e-3 * (rows[-1] - rows), np.float64)
+
+
+def _wear_integral(places: Floats, knots: Floats) -> Floats:
+    """Integral of the factor from 0 to each of some places [m]."""
+    count = math.ceil(float(places.max()) / WEAR_LENGTH) + 1
+    ends = knots[np.arange(count + 1) % knots.size]
+    pieces = np.concatenate([[0.0], np.cumsum(0.5 * WEAR_LENGTH * (ends[1:] + ends[:-1]))])
+    grid = WEAR_LENGTH * np.arange(count + 1)
+    index = np.clip((places / WEAR_LENGTH).astype(np.int64), 0, count - 1)
+    along = places - grid[index]
+    slope = (ends[index + 1] - ends[index]) / WEAR_LENGTH
+    return np.asarray(pieces[index] + along * (ends[index] + 0.5 * slope * along), np.float64)
+
+
+def observed(moment: Moment, camera: Camera, visibility: float, rng: np.random.Generator) -> Observation:
+    """What the vehicle has at an instant in homogeneous fog.
+
+    Parameters
+    ----------
+    moment : Moment
+        The instant.
+    camera : Camera
+        The told calibration.
+    visibility : float
+        Meteorological visibility [m]; ``inf`` for clear air.
+    rng : numpy Generator
+        The sensor's noise.
+    """
+    fog = FogField(extinction_from_visibility(visibility), (AIRLIGHT,) * 3)
+    radiance = fogged_radiance(moment.view, fog, moment.pose.position, ray_from_pixel(camera, moment.pose))
+    image = expose(radiance, SENSOR, camera.response, rng)
+    return Observation(image, speed=SPEED, lead=moment.lead)

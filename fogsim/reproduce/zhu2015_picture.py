@@ -1,0 +1,94 @@
+"""A picture like zhu2015's figures 5 and 6: region, lane lines, horizon, inflection and the road's curve."""
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
+
+from fogsim.estimators import make
+from fogsim.estimators.zhu2015_road import SeenRoad, seen_road
+from fogsim.recorders.style import font
+from fogsim.reproduce.zhu2015_drive import Moment, observed
+from fogsim.values import Camera, Observation
+from fogsim.vision.horizon import PITCH_DEVIATION
+from fogsim.vision.road_growth import row_medians
+
+PICTURED = (60.0, 200.0, 600.0, float("inf"))
+"""Visibilities of the picture [m], one of each class."""
+
+GROWTH, GROWTH_SHARE = 6.0, 0.8
+"""G_max [linear grey levels] and ρ [-] of the estimator as published."""
+
+SHOWN = 10_000
+"""Visibility beyond which a number would say nothing [m]."""
+
+TITLE, SKY = 25, 65
+"""Height of the words, and rows above the horizon that are shown, the words among them [px]."""
+
+WHITE, BLACK = (255, 255, 255), (0, 0, 0)
+RED, BLUE, GREEN, YELLOW = (230, 30, 30), (30, 60, 255), (60, 200, 90), (255, 210, 0)
+
+
+def picture(moment: Moment, camera: Camera) -> NDArray[np.uint8]:
+    """Draw an instant in four fogs, as published on the left and corrected on the right.
+
+    Parameters
+    ----------
+    moment : Moment
+        The instant.
+    camera : Camera
+        The told calibration.
+
+    Returns
+    -------
+    (rows, cols, 3) uint8
+    """
+    rows = []
+    for visibility in PICTURED:
+        seen = observed(moment, camera, visibility, np.random.default_rng(0))
+        rows.append(
+            np.hstack([_panel(seen, camera, visibility, as_published=published) for published in (True, False)])
+        )
+    return np.vstack(rows)
+
+
+def _panel(seen: Observation, camera: Camera, visibility: float, *, as_published: bool) -> NDArray[np.uint8]:
+    estimate = make("zhu2015", camera, as_published=as_published).update(seen)
+    growth = (GROWTH, GROWTH_SHARE) if as_published else None
+    image = np.array(seen.image)
+    road = seen_road(image, camera, PITCH_DEVIATION, growth, seen.lead)
+    drawing = Image.fromarray(_with_region(image, road))
+    draw = ImageDraw.Draw(drawing)
+    _draw_lines_and_curve(draw, road, camera.height - 1)
+    for key, colour in (("horizon_row", BLACK), ("inflection_row", BLUE)):
+        row = estimate.diagnostics.get(key)
+        if isinstance(row, int | float):
+            draw.line([(0, row), (camera.width, row)], fill=colour, width=2)
+    name = "published" if as_published else "corrected"
+    told = f"{_metres(estimate.visibility)}, {estimate.diagnostics['class']}" if estimate.valid else "cannot tell"
+    top = max(round(camera.horizon_row) - SKY, 0)
+    draw.rectangle((0, top, camera.width, top + TITLE), fill=WHITE)
+    draw.text((10, top + 2), f"{name}: {told} (true: {_metres(visibility)})", fill=BLACK, font=font(18, bold=True))
+    return np.asarray(drawing)[top:]
+
+
+def _metres(visibility: float) -> str:
+    return f"{visibility:.0f} m" if visibility < SHOWN else f"over {SHOWN} m"
+
+
+def _with_region(image: NDArray[np.uint8], road: SeenRoad) -> NDArray[np.uint8]:
+    """Tint the grown region."""
+    part, inside = image[road.image.first_row :], road.region != 0
+    part[inside] = (0.75 * part[inside] + 0.25 * np.array(GREEN)).astype(np.uint8)
+    return image
+
+
+def _draw_lines_and_curve(draw: ImageDraw.ImageDraw, road: SeenRoad, bottom: int) -> None:
+    """Lane lines up to the horizon, and median luminance of the region's rows."""
+    first = road.image.first_row
+    ends = (road.horizon.row - first, float(bottom - first))
+    for line in road.lines:
+        draw.line([(line.column(row), row + first) for row in ends], fill=RED, width=2)
+    left = np.zeros(road.region.shape[0], np.int64)
+    medians = row_medians(road.image.luminance, road.region, left, left + road.region.shape[1])
+    rows = np.flatnonzero(medians.count)
+    draw.line([(float(medians.luminance[row]), float(row + first)) for row in rows], fill=YELLOW, width=2)

@@ -1,178 +1,184 @@
-"""Accuracy of the daytime estimators over cameras, exposures and visibilities, and the time of one estimate.
+"""Accuracy of the daytime estimators of single frames: visibility, class of fog, intervals, and time of one estimate.
 
-Scenes come from the motorway scenario in running traffic, once a camera; each is then fogged with visibilities drawn
-evenly in ln V from 25 to 1500 m (and clear air), exposed such that the airlight has 120, 200 or 255 levels, and handed
-to the estimators with a told pitch that is off by a normal error they are not told. "lead" frames have the tracked
-vehicle's range, "no lead" frames do not (the vehicles are there all the same). Errors are |V_est − V| / V of estimates
-that are valid and see fog; `coverage` is the share of 90 % intervals of k that hold the truth.
+Instants of the motorway scenario in running traffic are drawn again under four cameras (three focal lengths and more,
+mount heights, resolutions), with lane marks or without, and with a vehicle ahead in the own lane (12 to 80 m, of the
+traffic's kinds) or none. Each picture is fogged with a visibility drawn evenly in ln V from 25 to 1500 m, or none, and
+exposed such that the airlight has 120, 200 or 255 levels of light. The told pitch is off by a normal error that the
+estimators are not told.
 
-    python benchmarks/estimator_accuracy.py [--json] [--docs] [--methods …] [--cameras 4] [--scenes 6] [--draws 2]
+`lead`: "absent", no vehicle in the own lane; "told", one is there and its range is measured; "untold", the same picture
+without the range. Errors are |V_est − V| / V of estimates that are valid and see fog. `coverage` is the share of 90 %
+intervals of k that hold the truth, of valid ones. `class_share` is the share of the valid ones in the right of
+zhu2015's four classes, `class_off_edge_share` that of frames whose visibility is more than 5 % from an edge (100, 300,
+1000 m). `ms` is the fastest at 688×515, on one core.
+
+    python benchmarks/estimator_accuracy.py [--json] [--docs] [--methods …] [--cameras 4] [--scenes 12] [--draws 4]
+        [--workers 2] [--keep FILE]
+
+`--keep FILE` writes what is measured to a file as it comes; a later call with the same arguments goes on from there.
 """
 
 import argparse
 import dataclasses
 import json
 import math
+import os
+import sys
 import time
-from collections.abc import Iterator
-from itertools import pairwise
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from functools import cache
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from estimator_scenes import CAMERAS, Drive, Road, camera, drive, photograph, with_leader, without_leader
+from estimator_tables import BINS, TIMED, Row, records, tables
+from rich.console import Console
+from rich.progress import track
 
-import fogsim
-from fogsim.atmosphere import Air
-from fogsim.camera import Sensor, expose
-from fogsim.estimators import make
-from fogsim.units import extinction_from_visibility
-from fogsim.values import Camera, Observation, Step
-from fogsim.values.estimate import NORMAL_90_PERCENT
-
-CAMERAS = (
-    (640, 480, 58.0, 1.38, 2.0),
-    (688, 515, 45.0, 1.3, 1.0),
-    (1280, 720, 40.0, 1.6, 3.0),
-    (512, 383, 70.0, 2.0, 4.0),
-)
-"""Width, height [px], horizontal field of view [deg], mount height [m] and pitch [deg]."""
+from fogsim.estimators import ESTIMATORS, make
+from fogsim.estimators.zhu2015 import zhu_category
+from fogsim.registry import parameters
+from fogsim.values import Camera, Observation
 
 AIRLIGHT_LEVELS = (120.0, 200.0, 255.0)
-BINS = (25.0, 50.0, 100.0, 200.0, 400.0, 800.0, 1500.0)
-METHODS = ("negru2013", "joint_road")
+METHODS = ("negru2013", "zhu2015", "huang2015_rough", "joint_road")
+PUBLISHED = ", as published"
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "estimators.md"
+HEADING = "## Accuracy of single frames"
 MARK, END = "<!-- table: accuracy -->", "<!-- end of table -->"
 
-
-def scenes(size: tuple[int, int, float, float, float], count: int, seed: int) -> list[Step]:
-    """Instants of a drive in traffic, seen by one camera."""
-    width, height, view, mount, pitch = size
-    overrides = [
-        "fog.visibility_m=200",
-        f"duration_s={4 * count}",
-        "clocks.camera_period_s=0.5",
-        f"camera.width={width}",
-        f"camera.height={height}",
-        f"camera.field_of_view_deg={view}",
-        f"camera.mount_height_m={mount}",
-        f"camera.pitch_deg={pitch}",
-    ]
-    steps = fogsim.run(fogsim.load_scenario("motorway_fog_bank", overrides), seed)
-    return [step for i, step in enumerate(steps) if i % 8 == 0][:count]
+Unit = tuple[int, int]
+"""Number of a camera and of an instant: what is measured in one go."""
 
 
-def fogged(step: Step, visibility: float, levels: float, rng: np.random.Generator) -> np.ndarray:
-    """The scene of a step in another fog and at another exposure."""
-    extinction = extinction_from_visibility(visibility)
-    field = dataclasses.replace(step.truth.fog, extinction=extinction, banks=())
-    radiance = Air(field).radiance(step.view, step.truth.camera, step.truth.pose)
-    saturation = float(np.dot((0.2126, 0.7152, 0.0722), field.airlight)) * 255.0 / levels
-    return expose(radiance, Sensor(saturation), step.truth.camera.response, rng)
-
-
-def mispitched(camera: Camera, rng: np.random.Generator, deviation: float) -> Camera:
-    """The calibration as it is told: the pitch is off."""
-    return dataclasses.replace(camera, pitch=camera.pitch + math.radians(rng.normal(0.0, deviation)))
-
-
-def observations(arguments: argparse.Namespace) -> Iterator[tuple[float, Camera, Observation]]:
-    """Visibility, told camera and what the vehicle has, over cameras, scenes, exposures and fogs."""
-    rng = np.random.default_rng(arguments.seed)
-    for size in CAMERAS[: arguments.cameras]:
-        for step in scenes(size, arguments.scenes, arguments.seed):
-            drawn = np.exp(rng.uniform(math.log(BINS[0]), math.log(BINS[-1]), len(BINS) * arguments.draws))
-            for visibility in [*drawn, math.inf]:
-                image = fogged(step, float(visibility), float(rng.choice(AIRLIGHT_LEVELS)), rng)
-                told = mispitched(step.truth.camera, rng, arguments.pitch_deviation)
-                yield float(visibility), told, dataclasses.replace(step.observation, frame=image)
-
-
-def look(method: str, visibility: float, told: Camera, seen: Observation) -> dict[str, Any]:
-    """One estimate with its error."""
-    estimator = make(method, told)
-    # The first call makes room and compiles.
-    estimator.update(seen)
-    estimator.reset()
-    started = time.perf_counter()
-    found = estimator.update(seen)
-    spent = time.perf_counter() - started
-    truth = extinction_from_visibility(visibility)
-    fog = found.valid and found.extinction > 0 and truth > 0
+def look(form: str, told: Camera, seen: Observation) -> Row:
+    """One estimate, and the time of it where it counts."""
+    method = form.removesuffix(PUBLISHED)
+    estimator = make(method, told, **({"as_published": True} if form != method else {}))
+    found, spent = estimator.update(seen), None
+    if (told.width, told.height) == TIMED:
+        # The first call has made room and compiled.
+        estimator.reset()
+        started = time.perf_counter()
+        estimator.update(seen)
+        spent = 1e3 * (time.perf_counter() - started)
     return {
-        "visibility": visibility,
+        "form": form,
         "valid": found.valid,
-        "error": abs(found.visibility / visibility - 1.0) if fog else None,
-        "covered": abs(found.extinction - truth) <= NORMAL_90_PERCENT * found.standard_deviation,
-        "clear": found.valid and found.visibility >= 1000.0,
-        "ms": 1e3 * spent,
+        "extinction": found.extinction,
+        "deviation": found.standard_deviation if found.valid else None,
+        "class": found.diagnostics.get("class", zhu_category(found.visibility)),
+        "ms": spent,
     }
 
 
-def record(method: str, lead: str, low: float, high: float, rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Flat record of one bin of visibilities; of clear air, `median_pct` is none and `clear_share` tells."""
-    valid = [row for row in rows if row["valid"]]
-    errors = [100 * row["error"] for row in valid if row["error"] is not None]
-    return {
-        "method": method,
-        "lead": lead,
-        "visibility": f"{low:g}-{high:g}" if math.isfinite(high) else "inf",
-        "frames": len(rows),
-        "median_pct": round(float(np.median(errors)), 2) if errors else None,
-        "p95_pct": round(float(np.percentile(errors, 95)), 2) if errors else None,
-        "valid_share": round(len(valid) / len(rows), 3),
-        "coverage": round(float(np.mean([row["covered"] for row in valid])), 3) if valid else None,
-        "clear_share": round(float(np.mean([row["clear"] for row in rows])), 3),
-        "ms": round(min(row["ms"] for row in rows), 2),
-    }
+@cache
+def driven(scenes: int, seed: int) -> Drive:
+    """The drive; each process makes its own, and all are the same."""
+    return drive(scenes, seed)
 
 
-def measure(arguments: argparse.Namespace) -> list[dict[str, Any]]:
-    """All records."""
-    rows: dict[tuple[str, str], list[dict[str, Any]]] = {}
-    for visibility, told, seen in observations(arguments):
-        for method in arguments.methods:
-            for lead, given in (("told", seen), ("untold", dataclasses.replace(seen, lead=None))):
-                rows.setdefault((method, lead), []).append(look(method, visibility, told, given))
-    records = []
-    for (method, lead), all_rows in rows.items():
-        for low, high in [*pairwise(BINS), (math.inf, math.inf)]:
-            inside = [r for r in all_rows if low <= r["visibility"] < high or r["visibility"] == low]
-            if inside:
-                records.append(record(method, lead, low, high, inside))
-    return records
+@cache
+def road(scenes: int, seed: int) -> Road:
+    """Its road, ready to be drawn."""
+    return Road(driven(scenes, seed).signs)
 
 
-def table(records: list[dict[str, Any]]) -> str:
-    """Records as a table of the docs."""
-    lines = ["| " + " | ".join(records[0]) + " |", "|" + "---|" * len(records[0])]
-    lines += ["| " + " | ".join("–" if v is None else str(v) for v in r.values()) + " |" for r in records]
-    return "\n".join(lines)
+def measure_unit(unit: Unit, scenes: int, draws: int, seed: int, forms: tuple[str, ...], pitch: float) -> list[Row]:
+    """Every fog, exposure and form of one instant under one camera."""
+    number, index = unit
+    rng, true = np.random.default_rng([seed, number, index]), camera(number)
+    free = without_leader(driven(scenes, seed).instants[index])
+    fogs = np.exp(rng.uniform(math.log(BINS[0]), math.log(BINS[-1]), (len(BINS) - 1) * draws))
+    rows = []
+    for visibility in [*map(float, fogs), *[math.inf] * draws]:
+        marks, levels = bool(rng.integers(2)), float(rng.choice(AIRLIGHT_LEVELS))
+        told = dataclasses.replace(true, pitch=true.pitch + math.radians(rng.normal(0.0, pitch)))
+        occupied, measured = with_leader(free, rng)
+        condition = {"visibility": visibility, "marks": marks, "levels": levels, "camera": number}
+        for lead, instant in (("absent", free), ("untold", occupied)):
+            view = road(scenes, seed).view(instant.state, instant.ego, true, marks=marks)
+            seen = Observation(photograph(view, true, driven(scenes, seed).fog, visibility, levels, rng), 25.0)
+            rows += [condition | {"lead": lead} | look(form, told, seen) for form in forms]
+        seen = dataclasses.replace(seen, lead=measured)
+        # The papers' own forms make nothing of a range.
+        ranging = [form for form in forms if not form.endswith(PUBLISHED)]
+        rows += [condition | {"lead": "told"} | look(form, told, seen) for form in ranging]
+    return rows
 
 
-def write_docs(records: list[dict[str, Any]]) -> None:
-    """Put the table into the docs."""
+def forms_of(methods: list[str]) -> tuple[str, ...]:
+    """Methods, and their published forms where they have one."""
+    forms = [
+        (name, name + PUBLISHED) if "as_published" in parameters(ESTIMATORS[name]) else (name,) for name in methods
+    ]
+    return tuple(form for both in forms for form in both)
+
+
+def measure(arguments: argparse.Namespace) -> list[Row]:
+    """All rows: what is kept already, and the rest."""
+    forms = forms_of(arguments.methods)
+    settings = [arguments.scenes, arguments.draws, arguments.seed, forms, arguments.pitch_deviation]
+    known = kept(arguments.keep, settings)
+    units = [(number, index) for index in range(arguments.scenes) for number in range(arguments.cameras)]
+    rows = [row for unit in units for row in known.get(unit, [])]
+    missing = [unit for unit in units if unit not in known]
+    with ProcessPoolExecutor(arguments.workers, get_context("spawn")) as pool:
+        running = {pool.submit(measure_unit, unit, *settings): unit for unit in missing}
+        console = Console(stderr=True)
+        for done in track(as_completed(running), "instants × cameras", len(missing), console=console):
+            rows += done.result()
+            if arguments.keep:
+                with arguments.keep.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps([running[done], done.result()]) + "\n")
+    return rows
+
+
+def kept(path: Path | None, settings: list[Any]) -> dict[Unit, list[Row]]:
+    """What an earlier call with the same settings has measured; begins the file if there is none."""
+    if path is None:
+        return {}
+    if not path.exists():
+        path.write_text(json.dumps(settings) + "\n", encoding="utf-8")
+    # What an interrupted call has written in part does not count.
+    whole = path.read_text(encoding="utf-8").rpartition("\n")[0] + "\n"
+    path.write_text(whole, encoding="utf-8")
+    first, *lines = whole.splitlines()
+    if json.loads(first) != json.loads(json.dumps(settings)):
+        sys.exit(f"--keep {path}: it was measured with other arguments: {first}")
+    return {tuple(unit): rows for unit, rows in map(json.loads, lines)}
+
+
+def write_docs(all_records: list[Row]) -> None:
+    """Put the tables into the docs, under what this file says of them."""
     text = DOCS.read_text(encoding="utf-8")
-    before, rest = text.split(MARK, 1)
+    before, rest = text.split(HEADING, 1)
     after = rest.split(END, 1)[1]
-    DOCS.write_text(f"{before}{MARK}\n\n{table(records)}\n\n{END}{after}", encoding="utf-8")
+    told = "\n\n".join((__doc__ or "").split("\n\n")[1:3])
+    section = f"{HEADING}\n\n{told} Written by\n`python benchmarks/estimator_accuracy.py --docs`.\n\n{MARK}\n\n"
+    DOCS.write_text(f"{before}{section}{tables(all_records)}\n\n{END}{after}", encoding="utf-8")
 
 
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/estimators.md")
+    parser.add_argument("--docs", action="store_true", help="write the tables of docs/estimators.md")
     parser.add_argument("--methods", nargs="+", default=list(METHODS), help="estimators of single frames")
     parser.add_argument("--pitch-deviation", type=float, default=0.1, help="deviation of the told pitch [deg]")
     parser.add_argument("--cameras", type=int, default=len(CAMERAS), help="how many of the cameras")
-    parser.add_argument("--scenes", type=int, default=6, help="scenes for each camera")
-    parser.add_argument("--draws", type=int, default=2, help="visibilities for each bin and scene, on average")
+    parser.add_argument("--scenes", type=int, default=12, help="instants of the drive")
+    parser.add_argument("--draws", type=int, default=4, help="visibilities by bin, instant and camera, on average")
+    parser.add_argument("--workers", type=int, default=min(2, os.cpu_count() or 1), help="processes")
+    parser.add_argument("--keep", type=Path, help="file in which to keep what is measured, and from which to go on")
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
-    records = measure(arguments)
+    found = list(records(measure(arguments)))
     if arguments.docs:
-        write_docs(records)
-    print(json.dumps(records, indent=2) if arguments.json else table(records))
+        write_docs(found)
+    print(json.dumps(found, indent=2) if arguments.json else tables(found))
 
 
 if __name__ == "__main__":

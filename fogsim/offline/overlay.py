@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from fogsim.image_files import Pixels
+from fogsim.offline.colours import method_colours
 from fogsim.offline.estimation import FrameEstimates
 from fogsim.offline.wording import interval_text, metres
 from fogsim.recorders.camera_picture import scale_image
-from fogsim.recorders.style import GROUND, MUTED, TEXT, Colour, font, method_colour
+from fogsim.recorders.style import GROUND, MUTED, TEXT, Colour, font
 from fogsim.response import eight_bit
 from fogsim.values import Camera, Estimate
 
@@ -37,6 +38,7 @@ class Overlay:
 
     def __init__(self, camera: Camera, methods: Sequence[str]) -> None:
         self._bits = camera.bits
+        self._colours = method_colours(methods)
         self._scale = min(max(camera.width, NARROWEST), WIDEST) / camera.width
         # Videos of 4:2:0 have even sizes.
         width, height = (2 * math.ceil(self._scale * side / 2) for side in (camera.width, camera.height))
@@ -63,7 +65,7 @@ class Overlay:
         draw = ImageDraw.Draw(canvas)
         for index, estimate in enumerate(result.estimates):
             if estimate.valid:
-                self._draw_findings(draw, estimate, method_colour(index), labelled=index == 0)
+                self._draw_findings(draw, estimate, self._colours[estimate.method], labelled=index == 0)
         self._draw_lines(draw, result)
         return canvas
 
@@ -100,9 +102,9 @@ class Overlay:
         name = result.picture.name
         told = f"frame {name}, {result.picture.time:.2f} s" if isinstance(name, int) else name
         draw.text((12, y), told[-90:], fill=MUTED, font=font(13), anchor="lm")
-        for index, estimate in enumerate(result.estimates):
+        for estimate in result.estimates:
             y += _LINE
-            _draw_estimate(draw, y, estimate, method_colour(index))
+            _draw_estimate(draw, y, estimate, self._colours[estimate.method])
 
 
 def _draw_estimate(draw: ImageDraw.ImageDraw, y: int, estimate: Estimate, colour: Colour) -> None:

@@ -53,6 +53,8 @@ class Work(NamedTuple):
         Of each triangle that may cover a pixel, the corners in camera axes [m].
     box : (m, 4) int32
         Its first and last row and column.
+    vertex : (m, 3) uint32
+        Where its vertices are among the corners.
     slot : (m,) int32
         Its slot.
     """
@@ -60,6 +62,7 @@ class Work(NamedTuple):
     corners: Array
     points: Array
     box: NDArray[np.int32]
+    vertex: NDArray[np.uint32]
     slot: NDArray[np.int32]
 
 
@@ -121,7 +124,8 @@ def rasterise(
                 break
             end += 1
         _project(triangles, mesh, record, begin, end, axes, lens, near, work.corners)
-        count = _select(triangles, mesh, first, begin, end, lens, near, (top, bottom, columns), work)
+        count = _sift(triangles, mesh, first, begin, end, (top, bottom, columns), work)
+        count = _set_up(count, lens, near, (top, bottom, columns), work)
         _fill(work, count, lens, near, picture)
         begin = end
 
@@ -164,52 +168,82 @@ def _project(
 
 
 @kernel
-def _select(
-    triangles: Triangles,
-    mesh: Index,
-    first: Index,
-    begin: int,
-    end: int,
-    lens: Wide,
-    near: float,
-    size: tuple[int, int, int],
-    work: Work,
+def _sift(
+    triangles: Triangles, mesh: Index, first: Index, begin: int, end: int, size: tuple[int, int, int], work: Work
 ) -> int:
-    """Set up those triangles of copies whose boxes hold the centre of any pixel, and count them."""
+    """Triangles of copies whose boxes may hold the centre of any pixel, with vertices and slots; their count.
+
+    Every triangle is written down, and by the next one again unless it is kept: which are is hard to foresee, and so
+    costs a processor that guesses more than to write.
+    """
     faces, first_vertex, first_face = triangles.faces, triangles.first_vertex, triangles.first_face
-    corners, points, box, slot = work.corners, work.points, work.box, work.slot
-    first_row, last_row, last_column = float(size[0]), size[1] - 1.0, size[2] - 1.0
-    focal, u0, v0 = lens[0], lens[1], lens[2]
-    count, base, slack = 0, np.uint32(0), np.float32(_SLACK)
+    corners, vertex, slot = work.corners, work.vertex, work.slot
+    first_row, last_row, last_column = np.float32(size[0]), np.float32(size[1] - 1), np.float32(size[2] - 1)
+    zero, slack = np.float32(0.0), np.float32(_SLACK)
+    count, base = np.uint64(0), np.uint32(0)
     for copy in range(begin, end):
-        start = first_face[mesh[copy]]
-        for face in range(start, first_face[mesh[copy] + 1]):
+        start = np.uint64(first_face[mesh[copy]])
+        for own in range(np.uint64(first_face[mesh[copy] + 1]) - start):
+            face = start + own
             i, j, k = faces[face, 0] + base, faces[face, 1] + base, faces[face, 2] + base
             a, b, c = corners[3, i], corners[3, j], corners[3, k]
-            if np.isnan(a + b + c):
-                z0, z1, z2 = np.float64(corners[2, i]), np.float64(corners[2, j]), np.float64(corners[2, k])
-                if max(z0, z1, z2) <= near:
-                    continue
-                left, right = _extent(corners[0, i], corners[0, j], corners[0, k], z0, z1, z2, focal, u0, near)
-                top, bottom = _extent(corners[1, i], corners[1, j], corners[1, k], z0, z1, z2, focal, v0, near)
-            else:
-                left, right = np.ceil(min(a, b, c) - slack), np.floor(max(a, b, c) + slack)
-                if left > right:
-                    continue
-                a, b, c = corners[4, i], corners[4, j], corners[4, k]
-                top, bottom = np.ceil(min(a, b, c) - slack), np.floor(max(a, b, c) + slack)
+            left, right = np.ceil(_least(a, b, c) - slack), np.floor(_greatest(a, b, c) + slack)
+            whole = a + b + c
+            a, b, c = corners[4, i], corners[4, j], corners[4, k]
+            top, bottom = np.ceil(_least(a, b, c) - slack), np.floor(_greatest(a, b, c) + slack)
+            empty = (left > right) | (top > bottom) | (right < zero) | (left > last_column)
+            empty |= (bottom < first_row) | (top > last_row)
+            vertex[count, 0], vertex[count, 1], vertex[count, 2] = i, j, k
+            slot[count] = np.int32(first[copy]) + np.int32(own)
+            # Where a corner lies before the near plane nothing is known yet.
+            count += np.uint64(not (empty & (not np.isnan(whole))))
+        base += np.uint32(first_vertex[mesh[copy] + 1] - first_vertex[mesh[copy]])
+    return np.int64(count)
+
+
+@kernel
+def _least(a: np.float32, b: np.float32, c: np.float32) -> np.float32:
+    low = a if a < b else b
+    return low if low < c else c
+
+
+@kernel
+def _greatest(a: np.float32, b: np.float32, c: np.float32) -> np.float32:
+    high = a if a > b else b
+    return high if high > c else c
+
+
+@kernel
+def _set_up(sifted: int, lens: Wide, near: float, size: tuple[int, int, int], work: Work) -> int:
+    """Boxes and corners of sifted triangles, less those before the near plane; their count."""
+    corners, points, box, vertex, slot = work.corners, work.points, work.box, work.vertex, work.slot
+    first_row, last_row, last_column = float(size[0]), size[1] - 1.0, size[2] - 1.0
+    focal, u0, v0 = lens[0], lens[1], lens[2]
+    count, slack = np.uint64(0), np.float32(_SLACK)
+    for t in range(np.uint64(sifted)):
+        i, j, k = vertex[t, 0], vertex[t, 1], vertex[t, 2]
+        a, b, c = corners[3, i], corners[3, j], corners[3, k]
+        if np.isnan(a + b + c):
+            z0, z1, z2 = np.float64(corners[2, i]), np.float64(corners[2, j]), np.float64(corners[2, k])
+            if max(z0, z1, z2) <= near:
+                continue
+            left, right = _extent(corners[0, i], corners[0, j], corners[0, k], z0, z1, z2, focal, u0, near)
+            top, bottom = _extent(corners[1, i], corners[1, j], corners[1, k], z0, z1, z2, focal, v0, near)
             if top > bottom or right < 0 or bottom < first_row or left > last_column or top > last_row:
                 continue
-            box[count, 0], box[count, 1] = np.int32(max(top, first_row)), np.int32(min(bottom, last_row))
-            box[count, 2], box[count, 3] = np.int32(max(left, 0.0)), np.int32(min(right, last_column))
-            for row in range(3):
-                points[count, row] = corners[row, i]
-                points[count, 3 + row] = corners[row, j]
-                points[count, 6 + row] = corners[row, k]
-            slot[count] = first[copy] + face - start
-            count += 1
-        base += np.uint32(first_vertex[mesh[copy] + 1] - first_vertex[mesh[copy]])
-    return count
+        else:
+            left, right = np.ceil(_least(a, b, c) - slack), np.floor(_greatest(a, b, c) + slack)
+            a, b, c = corners[4, i], corners[4, j], corners[4, k]
+            top, bottom = np.ceil(_least(a, b, c) - slack), np.floor(_greatest(a, b, c) + slack)
+        box[count, 0], box[count, 1] = np.int32(max(top, first_row)), np.int32(min(bottom, last_row))
+        box[count, 2], box[count, 3] = np.int32(max(left, 0.0)), np.int32(min(right, last_column))
+        for row in range(3):
+            points[count, row] = corners[row, i]
+            points[count, 3 + row] = corners[row, j]
+            points[count, 6 + row] = corners[row, k]
+        slot[count] = slot[t]
+        count += np.uint64(1)
+    return np.int64(count)
 
 
 @kernel

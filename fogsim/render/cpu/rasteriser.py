@@ -83,5 +83,7 @@ def _room(vertices: int, faces: int) -> Work:
         corners=np.empty((5, vertices), np.float32),
         points=np.empty((faces, 9), np.float32),
         box=np.empty((faces, 4), np.int32),
-        slot=np.empty(faces, np.int32),
+        # One more, since the last one is written down before it is left out.
+        vertex=np.empty((faces + 1, 3), np.uint32),
+        slot=np.empty(faces + 1, np.int32),
     )

@@ -10,8 +10,8 @@ Wide = NDArray[np.float64]
 Numbers = NDArray[np.int32]
 Index = NDArray[np.int64]
 
-OBJECT, PLAIN, ROAD, TERRAIN, SKY = range(5)
-"""Kinds of surfaces: colour that varies over a triangle, one colour, textured ground, and what is no triangle."""
+OBJECT, ROAD, TERRAIN, SKY = range(4)
+"""Kinds of surfaces: colour that varies over a triangle, textured ground, and what is no triangle."""
 
 # Columns of what is known of a surface. A plane is three numbers: times column, row and 1.
 KIND, INSTANCE, LEAST, MOST = range(4)  # least and greatest 1/z [1/m]

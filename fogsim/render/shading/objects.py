@@ -9,13 +9,11 @@ from fogsim.render.shading.layout import Light, Picture, Runs, Wide
 KIND, INSTANCE, LEAST, MOST, DEPTH = layout.KIND, layout.INSTANCE, layout.LEAST, layout.MOST, layout.DEPTH
 LIGHT, RESPONSE, LOW, HIGH = layout.LIGHT, layout.RESPONSE, layout.LOW, layout.HIGH
 RESPONSE_LOW, RESPONSE_HIGH = layout.RESPONSE_LOW, layout.RESPONSE_HIGH
-OBJECT, PLAIN = layout.OBJECT, layout.PLAIN
+OBJECT = layout.OBJECT
 
 
 @kernel
-def shade_objects(  # noqa: C901 - one loop: handing arrays to functions costs more than a run's work
-    runs: Runs, count: int, lens: Wide, picture: Picture
-) -> None:
+def shade_objects(runs: Runs, count: int, lens: Wide, picture: Picture) -> None:
     """Shade the runs of triangles without texture, and set their distances and instance ids.
 
     Parameters
@@ -36,7 +34,7 @@ def shade_objects(  # noqa: C901 - one loop: handing arrays to functions costs m
     for number in range(count):
         k = run[number, 3]
         kind = known[k, KIND]
-        if kind not in (OBJECT, PLAIN):
+        if kind != OBJECT:
             continue
         v, begin, end = np.uint64(run[number, 0]), run[number, 1], run[number, 2]
         row, name = float(run[number, 0]), np.int32(known[k, INSTANCE])
@@ -46,35 +44,48 @@ def shade_objects(  # noqa: C901 - one loop: handing arrays to functions costs m
         x, y = np.float32((begin - lens[1]) / lens[0]), np.float32((row - lens[2]) / lens[0])
         square = one + y * y
         length = np.uint64(end - begin)
+        # Few loops, since most runs are of few pixels, and to guess where each ends costs more than the rest.
         for i in range(length):
-            step = np.float32(np.int32(i))
+            step, u = np.float32(np.int32(i)), np.uint64(begin) + i
             across, z = x + per_focal * step, one / min(max(rest + slope * step, least), most)
             depths[i] = z
-            distance[v, np.uint64(begin) + i] = np.sqrt(square + across * across) * z
-        for u in range(np.uint64(begin), np.uint64(end)):
+            distance[v, u] = np.sqrt(square + across * across) * z
             instance[v, u] = name
-        if kind == PLAIN:
-            red, green, blue = np.float32(known[k, LOW]), np.float32(known[k, LOW + 1]), np.float32(known[k, LOW + 2])
-            for u in range(np.uint64(begin), np.uint64(end)):
-                radiance[v, u, 0], radiance[v, u, 1], radiance[v, u, 2] = red, green, blue
-            continue
-        for channel in range(np.uint64(3)):
-            c = int(channel)
-            a = np.float32(known[k, LIGHT + 3 * c])
-            b = known[k, LIGHT + 3 * c] * begin + known[k, LIGHT + 3 * c + 1] * row
-            b = np.float32(b + known[k, LIGHT + 3 * c + 2])
-            low, high = np.float32(known[k, LOW + c]), np.float32(known[k, HIGH + c])
+        red, red_step = _along(known, k, LIGHT, begin, row)
+        green, green_step = _along(known, k, LIGHT + 3, begin, row)
+        blue, blue_step = _along(known, k, LIGHT + 6, begin, row)
+        red_low, green_low, blue_low = _numbers(known, k, LOW)
+        red_high, green_high, blue_high = _numbers(known, k, HIGH)
+        for i in range(length):
+            step, z, u = np.float32(np.int32(i)), depths[i], np.uint64(begin) + i
+            radiance[v, u, 0] = min(max((red + red_step * step) * z, red_low), red_high)
+            radiance[v, u, 1] = min(max((green + green_step * step) * z, green_low), green_high)
+            radiance[v, u, 2] = min(max((blue + blue_step * step) * z, blue_low), blue_high)
+        if lamplight:
+            red, red_step = _along(known, k, RESPONSE, begin, row)
+            green, green_step = _along(known, k, RESPONSE + 3, begin, row)
+            blue, blue_step = _along(known, k, RESPONSE + 6, begin, row)
+            red_low, green_low, blue_low = _numbers(known, k, RESPONSE_LOW)
+            red_high, green_high, blue_high = _numbers(known, k, RESPONSE_HIGH)
             for i in range(length):
-                value = (b + a * np.float32(np.int32(i))) * depths[i]
-                radiance[v, np.uint64(begin) + i, channel] = min(max(value, low), high)
-            if lamplight:
-                a = np.float32(known[k, RESPONSE + 3 * c])
-                b = known[k, RESPONSE + 3 * c] * begin + known[k, RESPONSE + 3 * c + 1] * row
-                b = np.float32(b + known[k, RESPONSE + 3 * c + 2])
-                low, high = np.float32(known[k, RESPONSE_LOW + c]), np.float32(known[k, RESPONSE_HIGH + c])
-                for i in range(length):
-                    answer = min(max((b + a * np.float32(np.int32(i))) * depths[i], low), high)
-                    response[v, np.uint64(begin) + i, channel] = answer / distance[v, np.uint64(begin) + i]
+                step, z, u = np.float32(np.int32(i)), depths[i], np.uint64(begin) + i
+                far = distance[v, u]
+                response[v, u, 0] = min(max((red + red_step * step) * z, red_low), red_high) / far
+                response[v, u, 1] = min(max((green + green_step * step) * z, green_low), green_high) / far
+                response[v, u, 2] = min(max((blue + blue_step * step) * z, blue_low), blue_high) / far
+
+
+@kernel
+def _along(known: Wide, number: int, plane: int, begin: int, row: float) -> tuple[np.float32, np.float32]:
+    """A plane at the first pixel of a run, and its change from one pixel to the next."""
+    slope = known[number, plane]
+    return np.float32(slope * begin + known[number, plane + 1] * row + known[number, plane + 2]), np.float32(slope)
+
+
+@kernel
+def _numbers(known: Wide, number: int, first: int) -> tuple[np.float32, np.float32, np.float32]:
+    """Three numbers that are known of a surface."""
+    return np.float32(known[number, first]), np.float32(known[number, first + 1]), np.float32(known[number, first + 2])
 
 
 @kernel

@@ -40,17 +40,12 @@ def find_runs(
         for own in range(first[copy], first[copy + 1]):
             surface_of_slot[own] = -2 - copy
     count, surfaces = 0, 2
-    columns = slots.shape[1]
-    width = np.uint64(columns)
+    columns = np.uint64(slots.shape[1])
+    ends = np.empty(columns, np.int32)
     for v in range(top, bottom):
-        begin: Any = 0
-        while begin < columns:
-            slot: Any = slots[v, begin]
-            # Unsigned numbers tell the compiler that no index counts from the end.
-            place = np.uint64(begin) + np.uint64(1)
-            while place < width and slots[np.uint64(v), place] == slot:
-                place += np.uint64(1)
-            end: Any = np.int64(place)
+        begin = np.int32(0)
+        for piece in range(_ends(slots[v], ends)):
+            end, slot = ends[piece], slots[v, begin]
             surface: Any = 0
             if slot >= 0:
                 surface = surface_of_slot[slot]
@@ -58,7 +53,7 @@ def find_runs(
                     copy_of[surfaces], slot_of[surfaces] = -2 - surface, slot
                     surface_of_slot[slot] = surface = surfaces
                     surfaces += 1
-                split = end
+                split: Any = end
             else:
                 surface, split = _background(v, begin, end, rays, terrain)
             run[count, 0], run[count, 1], run[count, 2], run[count, 3] = v, begin, split, surface
@@ -68,6 +63,22 @@ def find_runs(
                 count += 1
             begin = end
     return count, surfaces
+
+
+@kernel
+def _ends(row: Numbers, ends: Numbers) -> np.uint64:
+    """Columns after the last pixel of each stretch of equal slots in a row; their count.
+
+    Every column is written down, and by the next one again unless a stretch ends there: a processor that guesses where
+    that is loses more than it takes to write.
+    """
+    last, count = np.uint64(row.shape[0] - 1), np.uint64(0)
+    for u in range(last):
+        after = u + np.uint64(1)
+        ends[count] = np.int32(after)
+        count += np.uint64(row[u] != row[after])
+    ends[count] = np.int32(last) + np.int32(1)
+    return count + np.uint64(1)
 
 
 @kernel

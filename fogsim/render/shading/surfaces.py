@@ -19,7 +19,7 @@ LIGHT, RESPONSE, LOW, HIGH = layout.LIGHT, layout.RESPONSE, layout.LOW, layout.H
 RESPONSE_LOW, RESPONSE_HIGH = layout.RESPONSE_LOW, layout.RESPONSE_HIGH
 ALONG, ACROSS, WHITE = layout.ALONG, layout.ACROSS, layout.WHITE
 HALF_WIDTH, LINES, COLOUR = layout.HALF_WIDTH, layout.LINES, layout.COLOUR
-OBJECT, PLAIN, ROAD, TERRAIN = layout.OBJECT, layout.PLAIN, layout.ROAD, layout.TERRAIN
+OBJECT, ROAD, TERRAIN = layout.OBJECT, layout.ROAD, layout.TERRAIN
 
 Vector = tuple[float, float, float]
 
@@ -161,10 +161,7 @@ def know(  # noqa: C901, PLR0912, PLR0915 - one loop: handing arrays to function
             for i in range(3):
                 for channel in range(3):
                     answer[i, channel] = max(side * answer[i, channel], 0.0)
-        even = True
-        for channel in range(3):
-            even &= lit[0, channel] == lit[1, channel] and lit[0, channel] == lit[2, channel]
-        known[number, KIND] = PLAIN if even and not lamplight else OBJECT
+        known[number, KIND] = OBJECT
         for channel in range(3):
             a, b, c = lit[0, channel], lit[1, channel], lit[2, channel]
             known[number, LOW + channel], known[number, HIGH + channel] = min(a, b, c), max(a, b, c)

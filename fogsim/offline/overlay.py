@@ -24,6 +24,9 @@ _LINE = 30
 
 _DASH, _GAP = 14, 10
 
+_APART = 3.0
+"""Rows nearer to one another than this share a line [px]."""
+
 
 class Overlay:
     """Draws images of one camera, all in the same size.
@@ -63,35 +66,51 @@ class Overlay:
             shown = _shown(result.picture.image, self._bits)
             canvas.paste(scale_image(shown, self.size[0], self._picture_height), (0, 0))
         draw = ImageDraw.Draw(canvas)
-        for index, estimate in enumerate(result.estimates):
-            if estimate.valid:
-                self._draw_findings(draw, estimate, self._colours[estimate.method], labelled=index == 0)
+        valid = [estimate for estimate in result.estimates if estimate.valid]
+        for estimate in valid:
+            self._draw_band(draw, estimate)
+        self._draw_rows(draw, valid, "horizon", dashed=True)
+        self._draw_rows(draw, valid, "inflection", dashed=False)
         self._draw_lines(draw, result)
         return canvas
 
-    def _draw_findings(self, draw: ImageDraw.ImageDraw, estimate: Estimate, colour: Colour, *, labelled: bool) -> None:
+    def _draw_band(self, draw: ImageDraw.ImageDraw, estimate: Estimate) -> None:
         band = estimate.diagnostics.get("band")
         if isinstance(band, tuple) and len(band) == 4:
             left, right, top, bottom = (float(side) for side in band)
             corners = (self._at(left - 0.5), self._at(top - 0.5), self._at(right + 0.5), self._at(bottom + 0.5) - 1)
-            draw.rectangle(corners, outline=colour, width=2)
-        horizon, inflection = _row(estimate, "horizon_row"), _row(estimate, "inflection_row")
-        if horizon is not None:
-            self._draw_row(draw, horizon, colour, "horizon" if labelled else "", dashed=True)
-        if inflection is not None:
-            self._draw_row(draw, inflection, colour, "inflection" if labelled else "", dashed=False)
+            draw.rectangle(corners, outline=self._colours[estimate.method], width=2)
+
+    def _draw_rows(self, draw: ImageDraw.ImageDraw, estimates: Sequence[Estimate], name: str, *, dashed: bool) -> None:
+        """Draw one kind of row of all methods; where some lie upon one another, their colours take turns along it."""
+        found = {e.method: row for e in estimates if (row := _row(e, f"{name}_row")) is not None}
+        for place, (method, row) in enumerate(found.items()):
+            together = [other for other, its in found.items() if abs(its - row) * self._scale < _APART]
+            turn = (together.index(method), len(together))
+            self._draw_row(draw, row, self._colours[method], "" if place else name, turn, dashed=dashed)
 
     def _at(self, place: float) -> float:
         """Row or column of the drawing; a pixel's centre has an integer coordinate in the image."""
         return (place + 0.5) * self._scale
 
-    def _draw_row(self, draw: ImageDraw.ImageDraw, row: float, colour: Colour, label: str, *, dashed: bool) -> None:
+    def _draw_row(
+        self,
+        draw: ImageDraw.ImageDraw,
+        row: float,
+        colour: Colour,
+        label: str,
+        turn: tuple[int, int],
+        *,
+        dashed: bool,
+    ) -> None:
         y = self._at(row)
         if not 0 <= y < self._picture_height:
             return
-        width = self.size[0]
-        for start in range(0, width, _DASH + _GAP if dashed else width):
-            draw.line([(start, y), (min(start + _DASH, width) if dashed else width, y)], fill=colour, width=2)
+        width, (rank, sharers) = self.size[0], turn
+        whole = not dashed and sharers == 1
+        length = width if whole else _DASH if dashed else _DASH + _GAP
+        for start in range(0 if whole else rank * (_DASH + _GAP), width, width if whole else sharers * (_DASH + _GAP)):
+            draw.line([(start, y), (min(start + length, width), y)], fill=colour, width=2)
         # The horizon lies above the inflection, so their labels never meet.
         place = (width - 8, y - 4 if dashed else y + 4)
         anchor = "rs" if dashed else "rt"

@@ -73,6 +73,22 @@ def test_each_registered_method_has_a_colour_of_its_own_whatever_stands_beside_i
     assert not {MUTED, TEXT} & set(own.values())
 
 
+def test_methods_that_agree_are_all_seen(drive) -> None:
+    image = np.full((480, 640, 3), 90, np.uint8)
+    rows = {"negru2013": (100.0, 150.0), "zhu2015": (100.4, 150.2), "joint_road": (99.7, 220.0)}
+    found = [
+        Estimate(name, 0.02, 0.001, diagnostics={"horizon_row": horizon, "inflection_row": inflection})
+        for name, (horizon, inflection) in rows.items()
+    ]
+    drawn = np.asarray(Overlay(drive.camera, list(rows)).draw(FrameEstimates(Picture(0, 0.0, image), tuple(found))))
+    for name, colour in method_colours(list(rows)).items():
+        of_method = np.all(drawn[:480] == colour, axis=2)
+        alone = name == "joint_road"
+        # A quarter of the line at the least for each of those who share it, and all of it where it is one's own.
+        assert of_method[96:104].any(axis=0).mean() > 0.15
+        assert of_method[218:223].any(axis=0).mean() > 0.9 if alone else of_method[146:154].any(axis=0).mean() > 0.4
+
+
 def test_an_invalid_estimate_draws_nothing_on_the_image(drive) -> None:
     image = np.full((480, 640, 3), 90, np.uint8)
     refused = Estimate.invalid("negru2013", "the road is hidden", horizon_row=100.0, band=(1, 9, 1, 9))

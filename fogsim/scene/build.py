@@ -108,7 +108,7 @@ def _borders(network: RoadNetwork, lanes: Sequence[Lane], index: LaneIndex) -> l
     leading = [lane for lane in lanes if lane.kind in {LaneKind.CARRIAGEWAY, LaneKind.FOOTWAY}]
     junctions = [area for area in network.areas if area.kind is LaneKind.JUNCTION]
     if junctions and leading:
-        found += [(None, edge) for edge in free_borders(junctions, leading, index)]
+        found += [(None, edge) for edge in free_borders(junctions, leading)]
     return found
 
 

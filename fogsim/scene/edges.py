@@ -70,9 +70,9 @@ def lane_edge(lane: Lane, side: int, line: Points, index: LaneIndex) -> Edge:
     return Edge(along, side, inner, lane.speed_limit, width, there, marking)
 
 
-def border_edge(line: Points, speed_limit: float, index: LaneIndex) -> Edge:
-    """Free part of a junction's border, with the land on its right."""
-    width = shoulder_width(speed_limit, -1)
+def border_edge(line: Points, speed_limit: float, footways: bool, index: LaneIndex) -> Edge:
+    """Free part of a junction's border, with the land on its right; footways of the network may lead along it."""
+    width = 0.0 if footways else shoulder_width(speed_limit, -1)
     along, there = _thinned(line, room_beside(line, -0.0, width + _VERGE, index, 1.0))
     return Edge(along, -1, 0.0, speed_limit, width, there)
 
@@ -98,17 +98,9 @@ def room_beside(line: Points, inner: float, most: float, index: LaneIndex, share
     (n,) float64
         Room [m], at least 0.1 m.
     """
-    width, side = most / share, np.copysign(1.0, inner)
-    gap, searched = np.full(len(line), 0.1), np.ones(len(line), np.bool_)
-    # The largest width is halved until its middle lies on no lane.
-    while width > 0.3:
-        clear = index.clearance(parallel(line, inner + side * width / 2), same_level=_LEVEL)
-        found = searched & (clear > 0.0)
-        # What is as far as the pavement itself is no other lane; bends bring the pavement a little nearer.
-        gap[found] = np.where(clear > 0.4 * width, width, width / 2 + clear)[found]
-        searched &= ~found
-        width /= 2
-    return np.clip(share * gap, 0.1, most)
+    side = np.copysign(1.0, inner)
+    gap = index.room(parallel(line, inner), side * left_normals(line), most / share, _LEVEL)
+    return np.maximum(share * gap, 0.1)
 
 
 def _thinned(line: Points, room: NDArray[np.float64]) -> tuple[Points, NDArray[np.float64]]:

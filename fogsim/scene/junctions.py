@@ -16,6 +16,8 @@ from fogsim.values.scene import Mesh
 
 _BELOW = 0.003  # junctions lie this far below the lanes that lead to them [m], so that lines end at full width
 _PIECE = 1.0  # longest piece of a border that is free or not as a whole [m]
+_MEETS = 1.5  # a border begins at the lane whose edge ends no farther away than this [m]
+_LAP = 0.3  # length by which what lies along a border overlaps what lies along the roads that lead to it [m]
 _TOUCHING = 6.0  # lanes that end no farther than this from a corner lead to the junction [m]
 
 
@@ -73,7 +75,7 @@ def _counterclockwise(area: PavedArea) -> Points:
     return outline if _area(outline) >= 0 else outline[::-1]
 
 
-def free_borders(areas: Sequence[PavedArea], lanes: Sequence[Lane], everything: LaneIndex) -> Iterator[Edge]:
+def free_borders(areas: Sequence[PavedArea], lanes: Sequence[Lane]) -> Iterator[Edge]:
     """Parts of the borders of junctions where no road leads on.
 
     Parameters
@@ -82,22 +84,63 @@ def free_borders(areas: Sequence[PavedArea], lanes: Sequence[Lane], everything: 
         The junctions.
     lanes : sequence of Lane
         All lanes of carriageways and footways, those across junctions left out.
-    everything : LaneIndex
-        All lanes, those across junctions too.
     """
-    index, limits = LaneIndex(lanes), np.repeat([lane.speed_limit for lane in lanes], 2)
-    ends = np.concatenate([lane.centreline[[0, -1], :2] for lane in lanes])
-    order = np.argsort(ends[:, 0], kind="stable")
-    ends, limits = ends[order], limits[order]
+    index, ends = LaneIndex(lanes), _Ends(lanes)
     for outline in map(_counterclockwise, areas):
         if len(outline) > 2:
-            west, east = outline[:, 0].min() - _TOUCHING, outline[:, 0].max() + _TOUCHING
-            near = slice(*np.searchsorted(ends[:, 0], (west, east)).tolist())
-            apart = np.abs(ends[near, None] - outline[None, :, :2]).sum(axis=2).min(axis=1)
-            leading = limits[near][apart < _TOUCHING]
-            if len(leading):
-                for corners in _free_parts(outline, index):
-                    yield border_edge(corners, float(leading.max()), everything)
+            speed_limit = ends.speed_limit(outline)
+            if speed_limit > 0:
+                for line in _free_parts(outline, index):
+                    longer, footways = ends.led_on(line)
+                    yield border_edge(longer, speed_limit, footways, index)
+
+
+class _Ends:
+    """Both ends of lanes.
+
+    Parameters
+    ----------
+    lanes : sequence of Lane
+        The lanes.
+    """
+
+    def __init__(self, lanes: Sequence[Lane]) -> None:
+        lines = [cleaned(lane.centreline) for lane in lanes]
+        place = np.array([line[[0, -1], :2] for line in lines]).reshape(-1, 2)
+        out = np.array([(line[1, :2] - line[0, :2], line[-2, :2] - line[-1, :2]) for line in lines]).reshape(-1, 2)
+        order = np.argsort(place[:, 0], kind="stable")
+        self._place, self._out = place[order], (out / np.hypot(*out.T)[:, None])[order]
+        self._half, self._limit, self._footway = (
+            np.repeat(values, 2)[order]
+            for values in (
+                [0.5 * lane.width for lane in lanes],
+                [lane.speed_limit for lane in lanes],
+                [lane.kind is LaneKind.FOOTWAY for lane in lanes],
+            )
+        )
+
+    def _near(self, west: float, east: float) -> slice:
+        return slice(*np.searchsorted(self._place[:, 0], (west, east)).tolist())
+
+    def speed_limit(self, outline: Points) -> float:
+        """Highest speed limit of the lanes that lead to a junction [m/s]; 0 if none does."""
+        near = self._near(outline[:, 0].min() - _TOUCHING, outline[:, 0].max() + _TOUCHING)
+        apart = np.abs(self._place[near, None] - outline[None, :, :2]).sum(axis=2).min(axis=1)
+        return float(self._limit[near][apart < _TOUCHING].max(initial=0.0))
+
+    def led_on(self, line: Points) -> tuple[Points, bool]:
+        """A part of a border with short pieces along the roads at its ends, and whether one of those is a footway."""
+        parts, footways = [line], False
+        for at, where in ((0, 0), (-1, len(line))):
+            near = self._near(line[at, 0] - _TOUCHING, line[at, 0] + _TOUCHING)
+            out, offset = self._out[near], line[at, :2] - self._place[near]
+            along = np.abs(np.sum(offset * out, axis=1))
+            aside = np.abs(np.abs(offset[:, 0] * out[:, 1] - offset[:, 1] * out[:, 0]) - self._half[near])
+            if len(out) and np.min(along + aside) < _MEETS:
+                chosen = int(np.argmin(along + aside))
+                footways |= bool(self._footway[near][chosen])
+                parts.insert(min(where, len(parts)), line[at] + np.append(_LAP * out[chosen], 0.0)[None, :])
+        return np.concatenate(parts), footways
 
 
 def _free_parts(corners: Points, index: LaneIndex) -> Iterator[Points]:

@@ -14,6 +14,7 @@ FARTHEST = 30.0
 
 _CELL = 20.0  # side of the square cells in which pieces of lanes are looked up [m]
 _LONGEST = 20.0  # piece of a lane [m]
+_STEP = 0.1  # shortest step in the search for room [m]
 _AROUND = 2  # cells on each side that a piece as near as `FARTHEST` may lie in: (30 + 20 / 2) / 20
 
 
@@ -54,34 +55,88 @@ class LaneIndex:
         """
         places = np.ascontiguousarray(points, np.float64)
         level = np.inf if same_level is None else same_level
-        cells = np.floor(places[:, :2] / _CELL).astype(np.int64) - self._corner
-        return _clearances(places, cells, level, self._key, self._rows, self._pieces)
+        return _clearances(places, level, self._corner, self._key, self._rows, self._pieces)
+
+    def room(self, points: Points, normal: NDArray[np.float64], most: float, same_level: float) -> NDArray[np.float64]:
+        """How far one gets from points (n, 3) along their normals (n, 2) before a lane begins [m].
+
+        Parameters
+        ----------
+        points : (n, 3) float64
+            Points beside lanes [m].
+        normal : (n, 2) float64
+            Vectors from there, as from `left_normals`; the room is counted in their lengths.
+        most : float
+            More than this is not asked for [m].
+        same_level : float
+            Lanes higher or lower than the point by more than this [m] are left out.
+        """
+        places, directions = np.ascontiguousarray(points, np.float64), np.ascontiguousarray(normal, np.float64)
+        return _rooms(places, directions, most, same_level, self._corner, self._key, self._rows, self._pieces)
+
+
+@kernel
+def _rooms(
+    points: NDArray[np.float64],
+    normal: NDArray[np.float64],
+    most: float,
+    same_level: float,
+    corner: NDArray[np.int64],
+    key: NDArray[np.int64],
+    rows: int,
+    pieces: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    result = np.full(len(points), most)
+    for i in range(len(points)):
+        away = _STEP
+        while away < most:
+            x, y = points[i, 0] + away * normal[i, 0], points[i, 1] + away * normal[i, 1]
+            clear = _clearance(x, y, points[i, 2], same_level, corner, key, rows, pieces)
+            if clear <= 0.0:
+                result[i] = max(away + clear, 0.0)
+                break
+            away += max(clear, _STEP)
+    return result
 
 
 @kernel
 def _clearances(
     points: NDArray[np.float64],
-    cells: NDArray[np.int64],
     same_level: float,
+    corner: NDArray[np.int64],
     key: NDArray[np.int64],
     rows: int,
     pieces: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     result = np.empty(len(points))
     for i in range(len(points)):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        nearest = FARTHEST
-        low, high = max(cells[i, 1] - _AROUND, 0), min(cells[i, 1] + _AROUND, rows - 1)
-        if low <= high:
-            for column in range(cells[i, 0] - _AROUND, cells[i, 0] + _AROUND + 1):
-                for k in range(
-                    np.searchsorted(key, column * rows + low), np.searchsorted(key, column * rows + high + 1)
-                ):
-                    dx, dy = pieces[k, 3], pieces[k, 4]
-                    u, v = x - pieces[k, 0], y - pieces[k, 1]
-                    share = min(max((u * dx + v * dy) / max(dx * dx + dy * dy, 1e-12), 0.0), 1.0)
-                    if abs(z - pieces[k, 2] - share * pieces[k, 5]) <= same_level:
-                        u, v = u - share * dx, v - share * dy
-                        nearest = min(nearest, np.sqrt(u * u + v * v) - pieces[k, 6])
-        result[i] = nearest
+        result[i] = _clearance(points[i, 0], points[i, 1], points[i, 2], same_level, corner, key, rows, pieces)
     return result
+
+
+@kernel
+def _clearance(
+    x: float,
+    y: float,
+    z: float,
+    same_level: float,
+    corner: NDArray[np.int64],
+    key: NDArray[np.int64],
+    rows: int,
+    pieces: NDArray[np.float64],
+) -> float:
+    nearest = FARTHEST
+    middle, row = np.int64(np.floor(x / _CELL)) - corner[0], np.int64(np.floor(y / _CELL)) - corner[1]
+    low, high = max(row - _AROUND, 0), min(row + _AROUND, rows - 1)
+    if low > high:
+        return nearest
+    for column in range(middle - _AROUND, middle + _AROUND + 1):
+        first, end = np.searchsorted(key, column * rows + low), np.searchsorted(key, column * rows + high + 1)
+        for k in range(first, end):
+            dx, dy = pieces[k, 3], pieces[k, 4]
+            u, v = x - pieces[k, 0], y - pieces[k, 1]
+            share = min(max((u * dx + v * dy) / max(dx * dx + dy * dy, 1e-12), 0.0), 1.0)
+            if abs(z - pieces[k, 2] - share * pieces[k, 5]) <= same_level:
+                u, v = u - share * dx, v - share * dy
+                nearest = min(nearest, np.sqrt(u * u + v * v) - pieces[k, 6])
+    return nearest

@@ -35,6 +35,7 @@ LONGEST = 40.0
 """Longest piece of a strip [m]: short enough to be culled in pieces."""
 
 _LOOK = 2.0  # whether a side is free is looked at every so many metres
+_CLOSER = 8  # and so many times as closely where that changes
 _OVERLAP = 0.03  # neighbouring lanes overlap by this much on each side [m], so that no gap shows between them
 _INSET = 0.16  # the middle of each of two lines between directions lies this far inside its lane [m]
 
@@ -120,16 +121,27 @@ def free_edges(lane: Lane, index: LaneIndex) -> Iterator[tuple[int, NDArray[np.f
         1 for the left or −1 for the right side, and the lane's centreline along the free stretch [m], with a vertex at
         least every 2 m.
     """
-    fine = refined(cleaned(lane.centreline), _LOOK)
+    centre = refined(cleaned(lane.centreline), _LOOK)
     for side in (1, -1):
         if side < 0 and not lane.outermost and lane.kind is not LaneKind.FOOTWAY:
             continue
-        beside = parallel(fine, side * (lane.width / 2 + 0.6))
-        free = index.clearance(beside, same_level=2.5) > 0.2
+        fine, free = _looked_at(centre, side * (lane.width / 2 + 0.6), index)
         changes = np.flatnonzero(np.diff(np.concatenate(([0], free.astype(int), [0]))))
         for start, end in changes.reshape(-1, 2).tolist():
             if end - start >= 2:
                 yield side, fine[start:end]
+
+
+def _looked_at(line: Points, left: float, index: LaneIndex) -> tuple[Points, NDArray[np.bool_]]:
+    """Which points of a line have no lane at a distance to their left [m], with more points where that changes."""
+    free = index.clearance(parallel(line, left), same_level=2.5) > 0.2
+    before = np.flatnonzero(free[1:] != free[:-1])
+    if not len(before):
+        return line, free
+    share = np.arange(1, _CLOSER)[:, None] / _CLOSER
+    between = line[before, None] + share * (line[before + 1] - line[before])[:, None]
+    closer = np.insert(line, np.repeat(before + 1, _CLOSER - 1), between.reshape(-1, 3), axis=0)
+    return closer, index.clearance(parallel(closer, left), same_level=2.5) > 0.2
 
 
 def terrain(lanes: Sequence[Lane], ground: float) -> Mesh:

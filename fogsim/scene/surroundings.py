@@ -104,7 +104,7 @@ class Nearness:
             self._near[column, row] = True
 
     def _squares(self, places: NDArray[np.float64]) -> NDArray[np.int64]:
-        return np.floor((places[:, :2] - self._corner) / _SQUARE).astype(np.int64)
+        return np.asarray(np.floor((places[:, :2] - self._corner) / _SQUARE), np.int64)
 
     def tell(self, places: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Tell which places (n, 2 or 3) [m] are near."""

@@ -25,6 +25,9 @@ SATURATED = 250.0
 SKY_SHARE = 0.05
 """Share of the image's height above the horizon that is taken along [-]."""
 
+SKY_HEIGHT = 0.12
+"""How far above the horizon the airlight is looked for [rad]: over a wood that stands along the horizon."""
+
 SKY_CORE = 0.02
 """Half-width of the luminances that count as sky, relative to its bright part [-]."""
 
@@ -86,8 +89,11 @@ def road_image(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera, ho
         raise CannotTellError("the image is too small to show a curve")
     sky_end = math.ceil(horizon.row)
     first = max(0, sky_end - 4 - round(SKY_SHARE * rows))
-    luminance = linear_luminance(levelled(image, camera)[first:], camera.response, camera.bits)
-    airlight = float(np.percentile(luminance[: sky_end - first, ::4], 90))
+    level = levelled(image, camera)
+    luminance = linear_luminance(level[first:], camera.response, camera.bits)
+    top = min(first, max(0, sky_end - round(SKY_HEIGHT * camera.focal_length)))
+    above = linear_luminance(np.ascontiguousarray(level[top:sky_end:2, ::4]), camera.response, camera.bits)
+    airlight = float(np.percentile(above, 90))
     return _checked(RoadImage(luminance, first, sky_end - first, airlight, float(np.median(luminance[-1]))))
 
 

@@ -49,13 +49,53 @@ def test_four_classes_under_a_pitch_that_is_not_told(render, road, visibility, c
     assert found.count(category) >= 2
 
 
-@pytest.mark.parametrize("visibility", [40.0, 90.0, 200.0, 500.0])
+@pytest.mark.parametrize("visibility", [40.0, 90.0, 200.0, 500.0, 900.0])
 @pytest.mark.parametrize(("airlight", "response"), [(120.0, Response.LINEAR), (260.0, Response.SRGB)])
 def test_recovers_visibility(render, road, visibility, airlight, response):
     camera = replace(road.camera, response=response)
     scene = road.but(visibility=visibility, airlight=airlight, camera=camera)
     errors = [estimate(render(scene, seed), camera).visibility / visibility - 1 for seed in range(3)]
-    assert np.median(np.abs(errors)) < 0.08
+    assert np.median(np.abs(errors)) < 0.04
+
+
+@pytest.mark.parametrize(
+    ("visibility", "category"), [(60, "dense"), (95, "dense"), (200, "moderate"), (400, "low"), (800, "low")]
+)
+def test_state_after_three_frames_of_a_road_whose_albedo_drifts(render, road, visibility, category):
+    states = []
+    for drive in range(4):
+        scene, told = tilted(road.but(visibility=visibility, drift=0.15), 0.1 * (-1) ** drive)
+        estimator = make("zhu2015", told)
+        found = [estimator.update(Observation(render(scene, 10 * drive + frame))) for frame in range(3)]
+        states.append(found[-1].diagnostics["state"])
+    assert states.count(category) >= 3
+
+
+def verged(original):
+    """Ground of a lane with a solid line on its right, and beyond that a verge that brightens with distance."""
+
+    def ground(road, ahead, left, seed):
+        verge = road.asphalt * (1.0 + 0.6 * np.clip(ahead / 60.0, 0.0, 1.0))
+        lane = np.where(left < -1.85, verge, original(road, ahead, left, seed))
+        return np.where(np.abs(left + 1.75) < 0.1, road.mark, lane)
+
+    return ground
+
+
+@pytest.mark.parametrize("visibility", [50.0, 120.0])
+def test_a_verge_beside_the_lane_is_no_road(render, road, monkeypatch, visibility):
+    monkeypatch.setitem(render.__globals__, "ground", verged(render.__globals__["ground"]))
+    errors = [estimate(render(road.but(visibility=visibility), seed), road.camera).visibility for seed in range(3)]
+    assert np.median(errors) == pytest.approx(visibility, rel=0.03)
+
+
+def test_a_wood_along_the_horizon_is_not_taken_for_the_sky(render, road):
+    image = render(road.but(visibility=1e6))
+    horizon = int(road.camera.horizon_row)
+    image[horizon - 45 : horizon] = 20
+    found = estimate(image, road.camera)
+    assert found.valid
+    assert found.diagnostics["class"] is FogCategory.NONE
 
 
 @pytest.mark.parametrize("visibility", [50.0, 200.0, 400.0])

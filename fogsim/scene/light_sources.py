@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from fogsim.beam import luminous_intensity
 from fogsim.scene.bodies import BODIES
 from fogsim.scene.bodies.lamp_patches import Patch, lamp_patches
 from fogsim.scene.bodies.parts import LIT_AREAS
+from fogsim.scene.lamp_kernels import AREA, FORWARD, FOUND, INTENSITY, LEFT, UP, LampNumbers, find_lamps
 from fogsim.scene.street_lamps import HEIGHT, SIZE
 from fogsim.scene.vehicles import body_names
 from fogsim.values.lamps import Lamp
@@ -58,16 +59,11 @@ STREET_INTENSITIES = np.array([1500.0, 1800.0, 2400.0, 2900.0, 3000.0, 2900.0, 2
 
 @dataclass(frozen=True, slots=True)
 class _Lamps:
-    """Lamps of all bodies in their unit boxes; row b of `of_body` has the numbers of those of body b, then −1."""
+    """Lamps of all bodies, the numbers of the bodies by their names, and the lamps' colours (n, 3)."""
 
     number: Mapping[str, int]
-    place: NDArray[np.float64]
-    area: NDArray[np.float64]
-    mask: NDArray[np.int64]
-    intensity: NDArray[np.float64]
     colour: NDArray[np.float64]
-    forwards: NDArray[np.float64]
-    of_body: NDArray[np.int64]
+    lamps: LampNumbers
 
 
 def light_sources(
@@ -114,51 +110,32 @@ def _of_vehicles(
     state: TrafficState, skip: int | None, eye: NDArray[np.float64], beams: Mapping[Lamp, Beam]
 ) -> LightSources:
     table = _lamps()
-    offset = eye - state.position
-    cosine, sine = np.cos(state.heading), np.sin(state.heading)
-    ahead = offset[:, 0] * cosine + offset[:, 1] * sine
-    row, lamp = _lit(state, skip, ahead, offset, table)
-    if not len(row):
-        return LightSources.none()
-    cosine, sine, place = cosine[row], sine[row], table.place[lamp]
-    x, y = place[:, 0] * state.length[row], place[:, 1] * state.width[row]
-    # From the lamp to the eye, in the vehicle's axes.
-    forward = ahead[row] - x
-    left = offset[row, 1] * cosine - offset[row, 0] * sine - y
-    z = place[:, 2] * state.height[row]
-    up = offset[row, 2] - z
-    axial = forward * table.forwards[lamp]
-    facing = np.maximum(axial / np.sqrt(forward**2 + left**2 + up**2 + 1e-12), 0.0)
-    intensity = table.intensity[lamp] * facing**4 * ((state.lamps[row] & table.mask[lamp] & _SIGNALS) != 0)
-    _add_beams(intensity, state.lamps[row] & table.mask[lamp], (forward, left, up), beams)
-    position = state.position[row]
-    position[:, 0] += x * cosine - y * sine
-    position[:, 1] += x * sine + y * cosine
-    position[:, 2] += z
-    area = table.area[lamp] * state.width[row] * state.height[row] * facing
-    seen = intensity > 1e-3
-    return LightSources(position[seen], intensity[seen], table.colour[lamp[seen]], area[seen])
-
-
-def _lit(
-    state: TrafficState,
-    skip: int | None,
-    ahead: NDArray[np.float64],
-    offset: NDArray[np.float64],
-    table: _Lamps,
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Rows of vehicles and numbers of lamps that are lit and on the side of the vehicle that the eye is on."""
-    body = np.array([table.number[name] for name in body_names(state)])
-    lit = state.lamps.astype(np.int64)
+    bodies = _numbers(body_names(state))
+    most = len(bodies) * table.lamps.of_body.shape[1]
+    found, lit = np.empty((most, FOUND)), np.empty((2, most), np.int64)
+    heading = np.stack((np.cos(state.heading), np.sin(state.heading)))
+    size = np.stack((state.length, state.width, state.height))
+    lamps = state.lamps.astype(np.int64)
     if skip is not None:
-        lit[skip] = 0
-    lit[np.abs(offset[:, 0]) + np.abs(offset[:, 1]) > FARTHEST_VEHICLE] = 0
-    # The eye sees lamps at the front from before it, those at the rear from behind it.
-    numbers = table.of_body[body]
-    known = numbers >= 0
-    before = np.where(table.forwards[numbers] > 0, ahead[:, None] > 0, (ahead + state.length)[:, None] < 0)
-    row, column = np.nonzero(known & before & ((lit[:, None] & table.mask[numbers]) != 0))
-    return row, numbers[row, column]
+        lamps[skip] = 0
+    position = np.ascontiguousarray(state.position, np.float64)
+    count = find_lamps(position, heading, size, lamps, bodies, eye, FARTHEST_VEHICLE, _SIGNALS, table.lamps, found, lit)
+    found, lit = found[:count], lit[:, :count]
+    _add_beams(found[:, INTENSITY], lit[1], (found[:, FORWARD], found[:, LEFT], found[:, UP]), beams)
+    seen = np.flatnonzero(found[:, INTENSITY] > 1e-3)
+    found = found[seen]
+    return LightSources(
+        np.ascontiguousarray(found[:, :3]),
+        np.ascontiguousarray(found[:, INTENSITY]),
+        table.colour[lit[0, seen]],
+        np.ascontiguousarray(found[:, AREA]),
+    )
+
+
+@lru_cache(maxsize=16)
+def _numbers(names: tuple[str, ...]) -> NDArray[np.int64]:
+    """Numbers of bodies by the names of their shapes."""
+    return np.array([_lamps().number[name] for name in names], np.int64)
 
 
 def _add_beams(
@@ -222,13 +199,15 @@ def _lamps() -> _Lamps:
     place, area, mask, intensity, colour, forwards = zip(*rows, strict=True)
     return _Lamps(
         number={name: number for number, name in enumerate(BODIES)},
-        place=np.array(place),
-        area=np.array(area),
-        mask=np.array(mask),
-        intensity=np.array(intensity),
         colour=np.array(colour),
-        forwards=np.array(forwards),
-        of_body=np.array([member + [-1] * (most - len(member)) for member in members]),
+        lamps=LampNumbers(
+            place=np.array(place),
+            area=np.array(area),
+            mask=np.array(mask),
+            intensity=np.array(intensity),
+            forwards=np.array(forwards),
+            of_body=np.array([member + [-1] * (most - len(member)) for member in members]),
+        ),
     )
 
 

@@ -42,7 +42,7 @@ def _grouped(
 ) -> tuple[tuple[tuple[str, slice], ...], NDArray[np.int64]]:
     """Rows by shape: each shape with its slice of them, and the rows, which belong to all who asked."""
     groups: dict[str, list[int]] = {}
-    for row, name in enumerate(_names(ids, types, np.frombuffer(length), np.frombuffer(height))):
+    for row, name in enumerate(_names(ids, types, length, height)):
         group = groups.setdefault(name, [])
         if row != skip:
             group.append(row)
@@ -51,15 +51,15 @@ def _grouped(
     return shapes, np.array([row for group in groups.values() for row in group], np.int64)
 
 
-def body_names(state: TrafficState) -> list[str]:
+def body_names(state: TrafficState) -> tuple[str, ...]:
     """Name of the shape of every vehicle."""
-    return _names(state.ids, state.types, state.length, state.height)
+    return _names(state.ids, state.types, state.length.tobytes(), state.height.tobytes())
 
 
-def _names(
-    ids: tuple[str, ...], types: tuple[str, ...], length: NDArray[np.float64], height: NDArray[np.float64]
-) -> list[str]:
-    return [body_of(*vehicle) for vehicle in zip(ids, types, length.tolist(), height.tolist(), strict=True)]
+@lru_cache(maxsize=16)
+def _names(ids: tuple[str, ...], types: tuple[str, ...], length: bytes, height: bytes) -> tuple[str, ...]:
+    sizes = (np.frombuffer(length).tolist(), np.frombuffer(height).tolist())
+    return tuple(body_of(*vehicle) for vehicle in zip(ids, types, *sizes, strict=True))
 
 
 def _transforms(state: TrafficState) -> NDArray[np.float32]:

@@ -59,9 +59,9 @@ def columns_between(
     first, after = 0.0, float(size)
     for rest, slope in ((t_base - low * base, tx - low * zx), (high * base - t_base, high * zx - tx)):
         if slope > 0.0:
-            first = max(first, np.floor(-rest / slope))
+            first = max(first, np.ceil(-rest / slope))
         elif slope < 0.0:
-            after = min(after, np.ceil(-rest / slope) + 1.0)
+            after = min(after, np.floor(-rest / slope) + 1.0)
         elif rest < 0.0:
             after = 0.0
     after = max(after, 0.0)

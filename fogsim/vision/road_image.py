@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,7 +93,8 @@ def road_image(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera, ho
     level = levelled(image, camera)
     luminance = linear_luminance(level[first:], camera.response, camera.bits)
     top = min(first, max(0, sky_end - round(SKY_HEIGHT * camera.focal_length)))
-    above = linear_luminance(np.ascontiguousarray(level[top:sky_end:2, ::4]), camera.response, camera.bits)
+    sky: NDArray[Any] = np.ascontiguousarray(level[top:sky_end:2, ::4])
+    above = linear_luminance(sky, camera.response, camera.bits)
     airlight = float(np.percentile(above, 90))
     return _checked(RoadImage(luminance, first, sky_end - first, airlight, float(np.median(luminance[-1]))))
 

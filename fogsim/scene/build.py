@@ -1,8 +1,10 @@
 """The scene that stands still, from a network and its signs."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fogsim.errors import InputError
 from fogsim.scene.bodies import body_shapes
@@ -101,15 +103,24 @@ def _pavement(network: RoadNetwork, lanes: Sequence[Lane], driven: Sequence[Lane
 def _borders(network: RoadNetwork, lanes: Sequence[Lane], index: LaneIndex) -> list[tuple[Lane | None, Edge]]:
     """Free sides of lanes outside junctions, and those of junctions, which belong to no lane."""
     found: list[tuple[Lane | None, Edge]] = []
+    limits = {_place(lane.centreline[-1]): lane.speed_limit for lane in lanes if lane.kind is LaneKind.CARRIAGEWAY}
     for lane in lanes:
         if lane.kind is LaneKind.CROSSING:
             continue
+        if lane.kind is LaneKind.JUNCTION:
+            # Its own limit is what its bend allows; what lies beside it is as beside the road that leads to it.
+            lane = replace(lane, speed_limit=limits.get(_place(lane.centreline[0]), lane.speed_limit))  # noqa: PLW2901
         found += [(lane, lane_edge(lane, side, line, index)) for side, line in free_edges(lane, index)]
     leading = [lane for lane in lanes if lane.kind in {LaneKind.CARRIAGEWAY, LaneKind.FOOTWAY}]
     junctions = [area for area in network.areas if area.kind is LaneKind.JUNCTION]
     if junctions and leading:
         found += [(None, edge) for edge in free_borders(junctions, leading)]
     return found
+
+
+def _place(point: NDArray[np.float64]) -> tuple[int, int]:
+    column, row = np.round(point[:2] / 0.5).astype(int).tolist()
+    return column, row
 
 
 class _Furniture:

@@ -1,6 +1,7 @@
 """Body kinds, paints and lamps of SUMO's vehicles."""
 
 import functools
+import math
 import zlib
 from collections.abc import Sequence
 
@@ -17,8 +18,39 @@ BODY_KINDS = {
     "coach": "bus",
     "motorcycle": "motorcycle",
     "moped": "motorcycle",
+    "scooter": "motorcycle",
+    "bicycle": "motorcycle",
+    "pedestrian": "motorcycle",
+    "wheelchair": "motorcycle",
+    "emergency": "van",
+    "tram": "bus",
+    "rail_urban": "bus",
+    "rail": "bus",
+    "rail_electric": "bus",
+    "rail_fast": "bus",
+    "subway": "bus",
 }
-"""Body kind of a SUMO vehicle class; every other class is a car."""
+"""Body kind of a SUMO vehicle class, or what comes nearest to it; every other class is a car."""
+
+SHAPE_KINDS = {
+    "passenger/van": "van",
+    "delivery": "van",
+    "emergency": "van",
+    "firebrigade": "truck",
+    "truck": "truck",
+    "bus": "bus",
+    "motorcycle": "motorcycle",
+    "moped": "motorcycle",
+    "bicycle": "motorcycle",
+    "scooter": "motorcycle",
+}
+"""Body kind of a SUMO ``guiShape``, or of what stands before its stroke, where the class is that of a car."""
+
+CAR_SECTION, LARGE_SECTION = (1.8, 1.5), (2.5, 3.4)
+"""Width and height of SUMO's cars, and of trucks and buses whose type leaves them at that [m]."""
+
+LONGEST_CAR = 7.5
+"""Vehicles of a car's class that are longer than this are trucks [m]."""
 
 SUMO_DEFAULT_COLOUR = (255, 255, 0)
 
@@ -45,9 +77,26 @@ _SIGNALS = (
 )
 
 
-def body_kind(vehicle_class: str) -> str:
-    """Body kind of a SUMO vehicle class."""
-    return BODY_KINDS.get(vehicle_class, "car")
+def body_kind(vehicle_class: str, shape: str = "", length: float = 0.0) -> str:
+    """Body kind of a SUMO vehicle.
+
+    Parameters
+    ----------
+    vehicle_class : str
+        Its class.
+    shape : str
+        Its ``guiShape``, which tells what a type is meant to be whose class is left at that of a car.
+    length : float
+        Its length [m].
+    """
+    known = BODY_KINDS.get(vehicle_class) or SHAPE_KINDS.get(shape) or SHAPE_KINDS.get(shape.split("/", maxsplit=1)[0])
+    return known or ("truck" if length > LONGEST_CAR else "car")
+
+
+def section(kind: str, width: float, height: float) -> tuple[float, float]:
+    """Width and height [m] of a vehicle, those of a truck where its type says no more than that it is long."""
+    large = kind in {"truck", "bus"} and math.isclose(width, CAR_SECTION[0]) and math.isclose(height, CAR_SECTION[1])
+    return LARGE_SECTION if large else (width, height)
 
 
 def paint(vehicle_id: str, colour: tuple[int, ...]) -> tuple[float, float, float]:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.traffic.appearance import body_kind, paint
+from fogsim.traffic.appearance import body_kind, paint, section
 from fogsim.traffic.link import Api
 
 _COLUMNS = 6
@@ -40,8 +40,10 @@ class Bodies:
         get, row = self._api.vehicle, len(self._kinds)
         if row == len(self._numbers):
             self._numbers = np.concatenate((self._numbers, np.empty_like(self._numbers)))
-        self._numbers[row, :3] = get.getLength(vehicle), get.getWidth(vehicle), get.getHeight(vehicle)
+        length = get.getLength(vehicle)
+        kind = body_kind(get.getVehicleClass(vehicle), get.getShapeClass(vehicle), length)
+        self._numbers[row, :3] = length, *section(kind, get.getWidth(vehicle), get.getHeight(vehicle))
         self._numbers[row, 3:] = paint(vehicle, get.getColor(vehicle))
-        self._kinds.append(body_kind(get.getVehicleClass(vehicle)))
+        self._kinds.append(kind)
         self._row[vehicle] = row
         return row

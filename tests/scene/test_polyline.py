@@ -78,3 +78,28 @@ def test_both_directions_of_a_road_put_the_dashes_of_their_common_line_at_the_sa
         painted = [np.mod(chainage.along(each, points), 18.0) < 6.0 for each in (one, other)]
         assert np.mean(painted[0] == painted[1]) > 0.95
         assert 0.2 < np.mean(painted[0]) < 0.5
+
+
+def test_a_parallel_on_the_inside_of_a_tight_bend_never_runs_backwards() -> None:
+    line = np.array([[0.0, 0, 0], [10, 0, 0], [11, 0.3, 0], [11.6, 1, 0], [11.7, 2, 0], [11.7, 12, 0]])
+    inside = parallel(line, 2.2)
+    assert len(inside) == len(line)
+    forward = np.sum(np.diff(inside[:, :2], axis=0) * np.diff(line[:, :2], axis=0), axis=1)
+    assert forward.min() > -1e-6
+    # The two straight parts keep their distance, and meet.
+    assert inside[0, 1] == pytest.approx(2.2)
+    assert inside[-1, 0] == pytest.approx(9.5)
+    assert inside[2, :2] == pytest.approx([9.5, 2.2], abs=0.01)
+
+
+def test_no_points_have_no_clearance(motorway: RoadNetwork) -> None:
+    assert len(LaneIndex(motorway.lanes).clearance(np.zeros((0, 3)))) == 0
+
+
+def test_room_ends_where_a_lane_begins(motorway: RoadNetwork) -> None:
+    index = LaneIndex(motorway.lanes)
+    place = np.array([[300.0, -8.0, 0.0], [300.0, -8.0, 9.0]])
+    toward = np.array([[0.0, 1.0], [0.0, 1.0]])
+    # The rightmost lane lies around y = 0 and is 3.5 m wide; nine metres above it there is room.
+    assert index.room(place, toward, 20.0, 2.5) == pytest.approx([6.25, 20.0], abs=0.02)
+    assert index.room(place, -toward, 20.0, 2.5) == pytest.approx(20.0)

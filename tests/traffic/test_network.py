@@ -1,3 +1,4 @@
+import gzip
 from pathlib import Path
 
 import numpy as np
@@ -5,6 +6,7 @@ import pytest
 
 from fogsim.errors import InputError
 from fogsim.traffic.network import read_net, road_network
+from fogsim.traffic.signs import sign_map
 from fogsim.values import LaneEnd, LaneKind, LaneMarking
 
 FOLDER = Path(__file__).resolve().parents[2] / "scenarios" / "motorway_fog_bank"
@@ -74,3 +76,27 @@ def test_a_lane_without_a_shape_is_named(tmp_path: Path, lane: str, count: int) 
     )
     with pytest.raises(InputError, match=rf"lane '{lane}' of edge '{edge}'.*shape.*got {count}"):
         road_network(read_net(file), [edge])
+
+
+def test_where_vehicles_keep_to_the_left_lines_lie_the_other_way_round(tmp_path: Path) -> None:
+    text = GRID.read_text(encoding="utf-8").replace("<net ", '<net lefthand="true" ', 1)
+    file = tmp_path / "left.net.xml.gz"
+    file.write_bytes(gzip.compress(text.encode()))
+    usual, left = (
+        {lane.lane_id: lane for lane in road_network(read_net(path), ["A0B0"]).lanes} for path in (GRID, file)
+    )
+    assert set(usual) == set(left)
+    for name in ("A0B0_0", "A0B0_1"):
+        assert (left[name].left, left[name].right) == (usual[name].right, usual[name].left)
+        assert left[name].outermost is not usual[name].outermost
+
+
+def test_signs_stand_on_the_side_that_vehicles_keep_to(tmp_path: Path) -> None:
+    usual, file = NET.read_text(encoding="utf-8"), tmp_path / "left.net.xml"
+    file.write_text(usual.replace("<net ", '<net lefthand="true" ', 1), encoding="utf-8")
+    there, here = (sign_map(read_net(path), ()).signs for path in (NET, file))
+    assert there
+    for one, other in zip(there, here, strict=True):
+        to_the_left = np.array([-np.sin(one.heading), np.cos(one.heading)])
+        apart = np.array(other.position[:2]) - one.position[:2]
+        assert apart @ to_the_left > 5.0

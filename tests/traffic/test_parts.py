@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from fogsim.traffic.appearance import PAINTS, body_kind, lamps_from_signals, paint
+from fogsim.traffic.appearance import LARGE_SECTION, PAINTS, body_kind, lamps_from_signals, paint, section
 from fogsim.traffic.governor import governed_speed
 from fogsim.values import Lamp
 
@@ -16,6 +16,17 @@ def test_governed_speed_brakes_no_harder_than_told() -> None:
 
 def test_body_kinds() -> None:
     assert [body_kind(c) for c in ("passenger", "delivery", "trailer", "coach")] == ["car", "van", "truck", "bus"]
+    assert [body_kind(c) for c in ("bicycle", "tram", "emergency", "taxi")] == ["motorcycle", "bus", "van", "car"]
+
+
+def test_a_shape_or_a_length_tells_what_a_class_left_at_cars_does_not() -> None:
+    shapes = ("truck/semitrailer", "bus/coach", "passenger/sedan", "passenger/van", "unknown")
+    assert [body_kind("passenger", shape) for shape in shapes] == ["truck", "bus", "car", "van", "car"]
+    assert body_kind("bus", "truck") == "bus"
+    assert [body_kind("passenger", "passenger", length) for length in (5.0, 12.0)] == ["car", "truck"]
+    assert section("truck", 1.8, 1.5) == LARGE_SECTION
+    assert section("truck", 2.3, 1.5) == (2.3, 1.5)
+    assert section("car", 1.8, 1.5) == (1.8, 1.5)
 
 
 def test_paint_is_sumos_colour_or_one_of_the_common_ones() -> None:

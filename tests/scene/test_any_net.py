@@ -1,0 +1,94 @@
+"""What lies beside roads keeps off all others, in networks of any kind."""
+
+import numpy as np
+import pytest
+
+from fogsim.scene import build_scene
+from fogsim.scene.junctions import free_borders, walkable
+from fogsim.scene.lane_index import LaneIndex
+from fogsim.scene.road import KERB
+from fogsim.values import Lane, LaneKind, LaneMarking, Mesh, PavedArea, RoadNetwork, Scene, SignMap, Surface
+
+
+def build(network: RoadNetwork) -> Scene:
+    return build_scene(network, SignMap(), np.random.default_rng(5))
+
+
+def road_under(mesh: Mesh, x: float, y: float, surface: Surface = Surface.MATT) -> list[float]:
+    """Heights of all triangles of a surface above or below a place."""
+    corners = mesh.positions[mesh.faces[mesh.surface[mesh.faces[:, 0]] == int(surface)]].astype(float)
+    origin, u, v = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    double = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    double = np.where(np.abs(double) > 1e-9, double, np.inf)
+    dx, dy = x - origin[:, 0], y - origin[:, 1]
+    a, b = (dx * v[:, 1] - dy * v[:, 0]) / double, (u[:, 0] * dy - u[:, 1] * dx) / double
+    inside = np.isfinite(double) & (a >= -1e-9) & (b >= -1e-9) & (a + b <= 1 + 1e-9)
+    return list((origin[:, 2] + a * u[:, 2] + b * v[:, 2])[inside])
+
+
+def test_nothing_beside_a_road_covers_the_lanes_of_another() -> None:
+    # A street whose directions lie 1.2 m apart, and narrow to nothing.
+    line, solid = np.array([[0.0, 0, 0], [60, 0, 0], [120, 0, 0]]), LaneMarking.SOLID
+    there = Lane("a", "a", line, 3.2, 13.9, solid, solid, outermost=True)
+    beside = line[::-1] + np.array([[0.0, 3.2, 0], [0, 4.4, 0], [0, 4.4, 0]])
+    back = Lane("b", "b", beside, 3.2, 13.9, solid, solid, outermost=True)
+    ground = build(RoadNetwork((there, back), line)).ground
+    raised = (ground.surface == Surface.MATT) & (ground.positions[:, 2] > 0.01)
+    assert raised.sum() > 100
+    assert LaneIndex([there, back]).clearance(ground.positions[raised].astype(float)).min() > -0.15
+    # Both directions share the ground between them.
+    for y in (1.9, 2.5):
+        assert max(road_under(ground, 10.0, y, Surface.MATT)) == pytest.approx(KERB)
+
+
+def test_what_lies_beside_a_road_reaches_up_to_the_road_that_it_ends_at() -> None:
+    line, solid = np.array([[-100.0, 0, 0], [0, 0, 0]]), LaneMarking.SOLID
+    into = Lane("a", "a", line, 3.2, 13.9, solid, solid, outermost=True)
+    across = np.array([[1.6, 80.0, 0], [1.6, -80, 0]])
+    other = Lane("b", "b", across, 3.2, 13.9, solid, solid, outermost=True)
+    ground = build(RoadNetwork((into, other), line)).ground
+    assert max(road_under(ground, -0.5, -2.5, Surface.MATT)) == pytest.approx(KERB)
+
+
+def test_a_walking_area_that_vehicles_drive_over_is_no_kerb_in_their_way() -> None:
+    line, none = np.array([[-60.0, 0, 0], [60, 0, 0]]), LaneMarking.NONE
+    lane = Lane("a", "a", line, 3.2, 13.9, none, none, outermost=True)
+    over = np.array([[-3.0, -5, 0], [3, -5, 0], [3, 5, 0], [-3, 5, 0]])
+    beside = over + np.array([0.0, 8.0, 0.0])
+    areas = tuple(PavedArea(str(k), outline, LaneKind.FOOTWAY) for k, outline in enumerate((over, beside)))
+    assert [area.area_id for area in walkable(areas, [lane])] == ["1"]
+
+
+def test_a_road_leads_on_from_the_middle_of_a_long_border() -> None:
+    line, solid = np.array([[-60.0, 0, 0], [0, 0, 0]]), LaneMarking.SOLID
+    lane = Lane("a", "a", line, 3.2, 13.9, solid, solid, outermost=True)
+    area = PavedArea("j", np.array([[0.0, -8, 0], [6, -8, 0], [6, 8, 0], [0, 8, 0]]))
+    for edge in free_borders([area], [lane]):
+        inner = edge.line[np.abs(edge.line[:, 0]) < 0.01]
+        assert (np.abs(inner[:, 1]) > 1.5).all()
+
+
+def test_woods_keep_off_the_road_from_end_to_end() -> None:
+    solid, rng = LaneMarking.SOLID, np.random.default_rng(3)
+    lines = [np.array([[-900.0, y, 0], [900, y, 0]]) for y in (0.0, 160.0)]
+    lanes = [Lane(str(k), str(k), line, 3.5, 25.0, solid, solid, outermost=True) for k, line in enumerate(lines)]
+    scene = build_scene(RoadNetwork(tuple(lanes), lines[0]), SignMap(), rng)
+    woods = [batch.transforms.astype(float) for batch in scene.scenery if batch.shape.startswith("woodland")]
+    assert sum(map(len, woods)) > 10
+    index = LaneIndex(lanes)
+    for transform in np.concatenate(woods):
+        along = np.linspace(-0.5, 0.5, 21)[:, None] * transform[:3, 0]
+        assert index.clearance(transform[:3, 3] + along).min() > 5.0
+
+
+def test_houses_of_a_street_keep_their_distance_however_many_there_are() -> None:
+    line, solid = np.array([[0.0, 0, 0], [400, 0, 0]]), LaneMarking.SOLID
+    lanes = tuple(
+        Lane(f"{k}", f"{k}", line + np.array([0.0, 34.0 * k, 0]), 3.2, 13.9, solid, solid, outermost=True)
+        for k in range(6)
+    )
+    scene = build(RoadNetwork(lanes, line))
+    places = np.concatenate([b.transforms[:, :2, 3] for b in scene.scenery if b.shape.startswith("house")])
+    apart = np.linalg.norm(places[:, None] - places[None], axis=2)
+    assert len(places) > 40
+    assert apart[~np.eye(len(places), dtype=bool)].min() > 16.0

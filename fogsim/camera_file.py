@@ -1,6 +1,7 @@
 """The calibration of a camera in a file, ``camera.yaml``, for images that come from disk."""
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -13,6 +14,31 @@ from fogsim.scenario.section import Positive, Section
 from fogsim.values import Camera, Response
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """A camera as its owner knows it: what images from disk need before the methods can read them.
+
+    Attributes
+    ----------
+    camera : Camera
+        Size, focal length, principal point, mount height, pitch, roll, response and bits, as if the lens were a pinhole
+        and looked along the vehicle's axis.
+    distortion : tuple of float
+        Brown's coefficients of the lens k1, k2, p1, p2 as OpenCV has them [-]; empty for a pinhole.
+    yaw : float
+        Angle of the optical axis to the left of the vehicle's axis [rad].
+    """
+
+    camera: Camera
+    distortion: tuple[float, ...] = ()
+    yaw: float = 0.0
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether images are as they must be: of a pinhole that looks along the vehicle's axis."""
+        return self.yaw == 0.0 and not any(self.distortion)
 
 
 class CameraFile(Section):
@@ -39,6 +65,12 @@ class CameraFile(Section):
     roll_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
     """Roll; positive turns the image's right side down."""
 
+    yaw_deg: Annotated[float, Field(gt=-60, lt=60)] = 0.0
+    """Yaw; positive looks to the left of where the vehicle drives."""
+
+    distortion: tuple[Finite, Finite, Finite, Finite] | None = None
+    """Distortion of the lens [k1, k2, p1, p2] as OpenCV has it."""
+
     response: Response = Response.LINEAR
     """Curve from light to pixel values: `linear`, `gamma` (2.2) or `srgb`."""
 
@@ -47,7 +79,7 @@ class CameraFile(Section):
 
 
 def load_camera(path: Path) -> Camera:
-    """Read a camera file.
+    """Read the file of a camera whose images need no straightening.
 
     Parameters
     ----------
@@ -62,6 +94,34 @@ def load_camera(path: Path) -> Camera:
     Raises
     ------
     InputError
+        If the file cannot be read, a key does not fit (one line for each mistake), or there is a yaw or a distortion,
+        which a `Camera` cannot hold: see `load_calibration`.
+    """
+    calibration = load_calibration(path)
+    if not calibration.is_straight:
+        raise InputError(
+            f"{path}: distortion and yaw_deg are undone by `fogsim estimate` alone (in Python load_calibration); "
+            "here images must be straight: straighten them, and leave both keys out"
+        )
+    return calibration.camera
+
+
+def load_calibration(path: Path) -> Calibration:
+    """Read a camera file.
+
+    Parameters
+    ----------
+    path : Path
+        A YAML file with the keys of `CameraFile`.
+
+    Returns
+    -------
+    Calibration
+        In SI units and radians.
+
+    Raises
+    ------
+    InputError
         If the file cannot be read or a key does not fit; one line for each mistake.
     """
     document = read_document(path)
@@ -69,7 +129,7 @@ def load_camera(path: Path) -> Camera:
         keys = CameraFile.model_validate(document.data)
     except ValidationError as error:
         raise InputError("\n".join(_told(document, detail) for detail in error.errors())) from error
-    return Camera(
+    camera = Camera(
         width=keys.width,
         height=keys.height,
         focal_length=keys.focal_length_px,
@@ -80,6 +140,7 @@ def load_camera(path: Path) -> Camera:
         response=keys.response,
         bits=keys.bits,
     )
+    return Calibration(camera, keys.distortion or (), math.radians(keys.yaw_deg))
 
 
 def _told(document: Document, detail: ErrorDetails) -> str:

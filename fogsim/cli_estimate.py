@@ -81,18 +81,19 @@ def _estimate(
     rate: float | None,
     overwrite: bool,
 ) -> None:
-    from fogsim.camera_file import load_camera  # noqa: PLC0415 - heavy; --help must be quick
+    from fogsim.camera_file import load_calibration  # noqa: PLC0415 - heavy; --help must be quick
     from fogsim.offline import (  # noqa: PLC0415 - heavy; --help must be quick
         OverlayFile,
         chosen_methods,
         estimates_of,
         find_source,
+        straightened,
         table_heading,
     )
 
     methods = chosen_methods(names)
-    camera = load_camera(camera_file)
-    source = find_source(images, sequence=sequence, rate=rate)
+    calibration = load_calibration(camera_file)
+    source, camera = straightened(find_source(images, sequence=sequence, rate=rate), calibration)
     with contextlib.ExitStack() as stack:
         drawn = overlay and stack.enter_context(OverlayFile(overlay, source, camera, methods, overwrite=overwrite))
         progress = stack.enter_context(_progress())

@@ -7,6 +7,7 @@ from fogsim.offline.guess_file import camera_text, refuse_existing, write_camera
 from fogsim.offline.overlay_file import OverlayFile
 from fogsim.offline.record import record_lines
 from fogsim.offline.source import ImageFiles, Picture, Source
+from fogsim.offline.straighten import Straightener, straightened
 from fogsim.offline.table import table_heading, table_rows
 from fogsim.offline.video_file import VideoFile
 
@@ -17,6 +18,7 @@ __all__ = [
     "OverlayFile",
     "Picture",
     "Source",
+    "Straightener",
     "VideoFile",
     "camera_text",
     "chosen_methods",
@@ -26,6 +28,7 @@ __all__ = [
     "guess_camera",
     "record_lines",
     "refuse_existing",
+    "straightened",
     "table_heading",
     "table_rows",
     "write_camera",

@@ -6,11 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
+from fogsim.camera_file import Calibration
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.estimators import ESTIMATORS, Estimator, make
 from fogsim.image_files import Pixels
 from fogsim.offline.find import find_source
 from fogsim.offline.source import Picture, Source
+from fogsim.offline.straighten import straightened
 from fogsim.values import Camera, Estimate, Frame, Observation
 
 ALL = "all"
@@ -53,7 +55,7 @@ def chosen_methods(names: Sequence[str]) -> tuple[str, ...]:
 
 def estimate_images(
     inputs: Sequence[str | Path] | str | Path,
-    camera: Camera,
+    camera: Camera | Calibration,
     methods: Sequence[str] | str = ALL,
     *,
     sequence: bool | None = None,
@@ -65,8 +67,9 @@ def estimate_images(
     ----------
     inputs : path or sequence of paths
         One video, or image files, folders and patterns; see `find_source`.
-    camera : Camera
-        Their calibration (`fogsim.camera_file.load_camera` reads it from a file).
+    camera : Camera or Calibration
+        Their calibration (`fogsim.camera_file.load_calibration` reads it from a file). Images of a lens that distorts
+        or of a camera with yaw are straightened first; the result's pictures are the straightened ones.
     methods : str or sequence of str
         Names in `fogsim.estimators.ESTIMATORS`, or "all".
     sequence : bool or None
@@ -82,10 +85,13 @@ def estimate_images(
     Raises
     ------
     InputError
-        If there are no images, a method is unknown, the first images do not fit the camera, or none can be read.
+        If there are no images, a method is unknown, the first images do not fit the camera, its lens folds the image,
+        or none can be read.
     """
     names = [methods] if isinstance(methods, str) else methods
-    return estimates_of(find_source(inputs, sequence=sequence, rate=rate), camera, chosen_methods(names))
+    calibration = Calibration(camera) if isinstance(camera, Camera) else camera
+    source, pinhole = straightened(find_source(inputs, sequence=sequence, rate=rate), calibration)
+    return estimates_of(source, pinhole, chosen_methods(names))
 
 
 def estimates_of(source: Source, camera: Camera, methods: Sequence[str]) -> Iterator[FrameEstimates]:

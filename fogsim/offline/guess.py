@@ -229,7 +229,7 @@ def _doubts(points: list[MeetingPoint], row: float, deviation: float, focal: flo
     if abs(aside) > ASIDE:
         side = "left" if aside > 0 else "right"
         doubts.append(
-            f"the road leads {abs(math.degrees(aside)):.0f}° past the image's middle: the camera is turned to the "
-            f"{side} or the road bends; a camera file has no such angle"
+            f"the road leads {abs(math.degrees(aside)):.0f}° past the image's middle: either the road bends, or the "
+            f"camera is turned to the {side}: then add `yaw_deg: {math.degrees(aside):.1f}` to the camera file"
         )
     return doubts

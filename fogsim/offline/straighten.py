@@ -1,0 +1,188 @@
+"""Images of a lens that distorts, or of a camera that looks aside, as a pinhole along the vehicle's axis sees them."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, cast
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.camera_file import Calibration
+from fogsim.errors import InputError
+from fogsim.image_files import Pixels
+from fogsim.offline.source import Picture, Source
+from fogsim.pinhole import camera_axes
+from fogsim.values import Camera, CameraPose
+
+Floats = NDArray[np.float64]
+Maps = tuple[NDArray[np.int16], NDArray[np.uint16]]
+"""Where each pixel of a straightened image comes from, in OpenCV's fixed-point form."""
+
+
+class Straightener:
+    """Undoes lens distortion and yaw in the images of one camera.
+
+    A pixel of the straightened image is a ray of a pinhole of the same focal length, pitch and roll without yaw. The
+    ray is turned into the axes of the camera as it is, bent by Brown's model of the lens,
+    x″ = x′ (1 + k1 r² + k2 r⁴) + 2 p1 x′y′ + p2 (r² + 2 x′²) and y″ alike (OpenCV's `initUndistortRectifyMap`), and the
+    image is interpolated there by cubics, which keep detail better than straight lines do. The principal point moves
+    sideways by α tan(yaw), so that the image keeps showing what it showed. What it did not show repeats its border.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        The camera as it is.
+
+    Attributes
+    ----------
+    camera : Camera
+        The pinhole that the straightened images are of.
+
+    Raises
+    ------
+    InputError
+        If the lens folds the image: the model then does not hold.
+    """
+
+    def __init__(self, calibration: Calibration) -> None:
+        given = calibration.camera
+        u0, v0 = given.principal_point
+        self.camera: Camera = replace(given, principal_point=(u0 + given.focal_length * math.tan(calibration.yaw), v0))
+        self._size = (given.height, given.width)
+        self._maps: Maps | None = None
+        if not calibration.is_straight:
+            self._maps = _maps(calibration, self.camera)
+
+    def __call__(self, image: Pixels) -> Pixels:
+        """Straighten an image; one of another size than the camera's is given back as it is.
+
+        Parameters
+        ----------
+        image : (rows, cols) or (rows, cols, 3) uint8 or uint16
+            Pixel values.
+        """
+        if self._maps is None or image.shape[:2] != self._size:
+            return image
+        places, fractions = self._maps
+        # OpenCV keeps the type of the pixels, which its annotations do not say.
+        straight: Any = cv2.remap(image, places, fractions, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+        return cast("Pixels", straight)
+
+
+@dataclass(frozen=True, slots=True)
+class StraightenedSource:
+    """The pictures of a source, straightened."""
+
+    source: Source
+    straightener: Straightener
+
+    @property
+    def period(self) -> float:
+        """Time from one image to the next [s]."""
+        return self.source.period
+
+    @property
+    def temporal(self) -> bool:
+        """Whether each image shows the same drive a moment after the one before."""
+        return self.source.temporal
+
+    @property
+    def count(self) -> int:
+        """How many images there are."""
+        return self.source.count
+
+    @property
+    def description(self) -> str:
+        """What this is, in a few words."""
+        return f"{self.source.description}, straightened"
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """The files that are read."""
+        return self.source.paths
+
+    def pictures(self) -> Iterator[Picture]:
+        """Read and straighten the images."""
+        for picture in self.source.pictures():
+            yield picture if picture.image is None else replace(picture, image=self.straightener(picture.image))
+
+
+def straightened(source: Source, calibration: Calibration) -> tuple[Source, Camera]:
+    """Images as a pinhole along the vehicle's axis sees them, and that pinhole.
+
+    Parameters
+    ----------
+    source : Source
+        Images of the camera.
+    calibration : Calibration
+        The camera as it is; without yaw and distortion the source stays the same.
+
+    Raises
+    ------
+    InputError
+        If the lens folds the image.
+    """
+    if calibration.is_straight:
+        return source, calibration.camera
+    straightener = Straightener(calibration)
+    return StraightenedSource(source, straightener), straightener.camera
+
+
+def _maps(calibration: Calibration, straight: Camera) -> Maps:
+    given = calibration.camera
+    fold = _fold(calibration.distortion)
+    _refuse_folded(calibration, fold)
+    aside, along = (camera_axes(given, CameraPose((0.0, 0.0, 0.0), heading)) for heading in (calibration.yaw, 0.0))
+    turned = along @ aside.T
+    lens = np.array(calibration.distortion) if calibration.distortion else np.zeros(4)
+    size = (given.width, given.height)
+    columns, rows = cv2.initUndistortRectifyMap(_matrix(given), lens, turned, _matrix(straight), size, cv2.CV_32FC1)
+    beyond = _radius(straight, turned) >= fold
+    columns[beyond], rows[beyond] = -1.0, -1.0
+    places, fractions = cv2.convertMaps(columns, rows, cv2.CV_16SC2)
+    return places.astype(np.int16, copy=False), fractions.astype(np.uint16, copy=False)
+
+
+def _matrix(camera: Camera) -> Floats:
+    """Intrinsic matrix."""
+    u0, v0 = camera.principal_point
+    return np.array([[camera.focal_length, 0.0, u0], [0.0, camera.focal_length, v0], [0.0, 0.0, 1.0]])
+
+
+def _radius(straight: Camera, turned: Floats) -> Floats:
+    """Tangent of the angle between each straightened pixel's ray and the optical axis; behind it, endless."""
+    rows, columns = np.indices((straight.height, straight.width), dtype=np.float64)
+    u0, v0 = straight.principal_point
+    rays = np.stack([(columns - u0) / straight.focal_length, (rows - v0) / straight.focal_length, np.ones_like(rows)])
+    across, down, ahead = np.tensordot(turned.T, rays, axes=1)
+    forward = ahead > 1e-6
+    return np.where(forward, np.hypot(across, down) / np.where(forward, ahead, 1.0), np.inf)
+
+
+def _fold(distortion: tuple[float, ...]) -> float:
+    """Radius at which r (1 + k1 r² + k2 r⁴) ceases to grow; endless if it never does [-]."""
+    if not distortion:
+        return math.inf
+    k1, k2 = distortion[:2]
+    roots = np.roots([5.0 * k2, 3.0 * k1, 1.0]) if k1 or k2 else np.zeros(0)
+    squares = [float(root.real) for root in roots if abs(root.imag) < 1e-12 and root.real > 0]
+    return math.sqrt(min(squares, default=math.inf))
+
+
+def _refuse_folded(calibration: Calibration, fold: float) -> None:
+    """Refuse a lens that cannot show what is in the middle of the nearest of the image's sides."""
+    if math.isinf(fold):
+        return
+    camera, (k1, k2) = calibration.camera, calibration.distortion[:2]
+    u0, v0 = camera.principal_point
+    nearest = min(u0, camera.width - 1 - u0, v0, camera.height - 1 - v0)
+    reached = camera.focal_length * fold * (1.0 + k1 * fold**2 + k2 * fold**4)
+    if reached < nearest:
+        raise InputError(
+            f"distortion: with k1 = {k1:g} and k2 = {k2:g} the lens folds the image over {reached:.0f} px from the "
+            f"principal point, and the image goes on to {nearest:.0f} px and more: are they OpenCV's [k1, k2, p1, p2] "
+            f"for this focal length ({camera.focal_length:g} px)?"
+        )

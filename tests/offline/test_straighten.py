@@ -1,0 +1,230 @@
+"""Images of lenses that distort and of cameras that look aside, straightened."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+
+from fogsim.camera_file import Calibration, load_calibration, load_camera
+from fogsim.errors import InputError
+from fogsim.estimators import make
+from fogsim.offline import Straightener, estimate_images, find_source, guess_camera, straightened
+from fogsim.render import make_renderer
+from fogsim.reproduce.scenes import foggy_image, straight_road
+from fogsim.scene import build_scene
+from fogsim.values import Camera, CameraPose, Observation, Response, SignMap
+
+CAMERA = Camera(640, 480, 577.0, (322.0, 236.0), 1.38, math.radians(2.0), response=Response.LINEAR)
+BARREL = (-0.32, 0.09, 0.0011, -0.0007)
+"""About what a dash camera of 60° has."""
+
+VISIBILITY = 120.0
+METHODS = ("negru2013", "zhu2015")
+Draw = Callable[..., NDArray[np.uint8]]
+
+
+@pytest.fixture(scope="module")
+def draw() -> Draw:
+    """Function from a camera and where it heads to its image of a straight road along x, without noise."""
+    scene = build_scene(straight_road(), SignMap(()), np.random.default_rng(0))
+    renderer = make_renderer("auto", scene, illuminance=10_000.0)
+
+    def image(camera: Camera, heading: float = 0.0) -> NDArray[np.uint8]:
+        pose = CameraPose((0.0, 0.0, camera.mount_height), heading)
+        return foggy_image(renderer.render((), camera, pose), pose, camera, math.log(20.0) / VISIBILITY)
+
+    return image
+
+
+def seen_through(lens: tuple[float, ...], image: NDArray[np.uint8], wide: Camera, camera: Camera) -> NDArray[np.uint8]:
+    """What a lens makes of the picture of a pinhole that sees more: Brown's formula solved by iteration, by hand."""
+    k1, k2, p1, p2 = lens
+    rows, columns = np.indices((camera.height, camera.width), dtype=float)
+    bent = np.array([columns - camera.principal_point[0], rows - camera.principal_point[1]]) / camera.focal_length
+    x, y = bent
+    for _ in range(60):
+        r2 = x * x + y * y
+        radial = 1.0 + k1 * r2 + k2 * r2 * r2
+        x, y = (
+            (bent[0] - 2.0 * p1 * x * y - p2 * (r2 + 2.0 * x * x)) / radial,
+            (bent[1] - p1 * (r2 + 2.0 * y * y) - 2.0 * p2 * x * y) / radial,
+        )
+    return sampled(
+        image, y * wide.focal_length + wide.principal_point[1], x * wide.focal_length + wide.principal_point[0]
+    )
+
+
+def sampled(image: NDArray[np.uint8], rows: NDArray[np.float64], columns: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Bilinear interpolation."""
+    top, left = np.floor(rows).astype(int), np.floor(columns).astype(int)
+    down, right = (rows - top)[..., None], (columns - left)[..., None]
+    grey = image.astype(float)
+    above = grey[top, left] * (1 - right) + grey[top, left + 1] * right
+    below = grey[top + 1, left] * (1 - right) + grey[top + 1, left + 1] * right
+    return np.rint(above * (1 - down) + below * down).astype(np.uint8)
+
+
+@pytest.fixture(scope="module")
+def through_barrel(draw: Draw) -> NDArray[np.uint8]:
+    """The road through the lens of `BARREL`."""
+    wide = replace(
+        CAMERA, width=2400, height=1800, focal_length=2 * CAMERA.focal_length, principal_point=(1199.5, 899.5)
+    )
+    return seen_through(BARREL, draw(wide), wide, CAMERA)
+
+
+def difference(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> float:
+    """95th percentile of the difference in the middle, the road's grain blurred [pixel values]."""
+    one, other = (cv2.blur(image.astype(np.float32), (7, 7))[20:-20, 40:-40] for image in (a, b))
+    return float(np.percentile(np.abs(one - other), 95))
+
+
+def check_registered(found: NDArray[np.uint8], expected: NDArray[np.uint8]) -> None:
+    """The same picture to much less than a shift by one row makes."""
+    assert difference(found, expected) < 0.25 * difference(np.roll(expected, 1, axis=0), expected)
+
+
+def visibility(image: NDArray[np.uint8], camera: Camera, method: str) -> float:
+    found = make(method, camera).update(Observation(image))
+    return found.visibility if found.valid else math.nan
+
+
+def test_a_straight_camera_is_left_alone() -> None:
+    image = np.random.default_rng(0).integers(0, 256, (480, 640, 3), dtype=np.uint8)
+    straightener = Straightener(Calibration(CAMERA))
+    assert straightener(image) is image
+    assert straightener.camera == CAMERA
+    source = find_source(__file__)
+    assert straightened(source, Calibration(CAMERA)) == (source, CAMERA)
+
+
+def test_distortion_is_undone(draw: Draw, through_barrel: NDArray[np.uint8]) -> None:
+    straightener = Straightener(Calibration(CAMERA, BARREL))
+    assert straightener.camera == CAMERA
+    pinhole = draw(CAMERA)
+    assert difference(through_barrel, pinhole) > 5.0
+    check_registered(straightener(through_barrel), pinhole)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_visibility_through_a_lens_that_distorts(through_barrel: NDArray[np.uint8], method: str) -> None:
+    straightener = Straightener(Calibration(CAMERA, BARREL))
+    assert visibility(straightener(through_barrel), CAMERA, method) == pytest.approx(VISIBILITY, rel=0.05)
+
+
+@pytest.mark.parametrize("yaw", [-12.0, 4.0, 25.0])
+@pytest.mark.parametrize(("pitch", "roll"), [(2.0, 0.0), (6.0, -3.0)])
+def test_yaw_is_undone(draw: Draw, yaw: float, pitch: float, roll: float) -> None:
+    """Turned to the left, the camera sees the end of the road on its right; pitch and roll are its own."""
+    camera = replace(CAMERA, pitch=math.radians(pitch), roll=math.radians(roll))
+    straightener = Straightener(Calibration(camera, yaw=math.radians(yaw)))
+    assert (straightener.camera.principal_point[0] > camera.principal_point[0]) == (yaw > 0)
+    aside, along = draw(camera, math.radians(yaw)), draw(straightener.camera)
+    check_registered(straightener(aside), along)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_visibility_of_a_camera_that_looks_aside(draw: Draw, method: str) -> None:
+    calibration = Calibration(CAMERA, yaw=math.radians(9.0))
+    aside = draw(CAMERA, calibration.yaw)
+    straightener = Straightener(calibration)
+    assert visibility(straightener(aside), straightener.camera, method) == pytest.approx(VISIBILITY, rel=0.05)
+
+
+def test_lens_and_yaw_together_from_files(drive, tmp_path: Path, draw: Draw) -> None:
+    """What a person does: a folder of images and a camera file with both keys."""
+    wide = replace(
+        CAMERA, width=2400, height=1800, focal_length=2 * CAMERA.focal_length, principal_point=(1199.5, 899.5)
+    )
+    image = seen_through(BARREL, draw(wide, math.radians(5.0)), wide, CAMERA)
+    Image.fromarray(image).save(tmp_path / "a.png")
+    calibration = written(tmp_path, f"distortion: {list(BARREL)}\nyaw_deg: 5\n")
+    assert calibration == Calibration(CAMERA, BARREL, pytest.approx(math.radians(5.0)))
+    (result,) = estimate_images(tmp_path / "a.png", calibration, METHODS)
+    for found in result.estimates:
+        assert found.valid
+        assert found.visibility == pytest.approx(VISIBILITY, rel=0.05)
+    assert result.picture.image is not None
+    assert not np.array_equal(result.picture.image, image)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+@pytest.mark.parametrize("shape", [(480, 640), (480, 640, 3)])
+def test_depth_and_channels_are_kept(dtype: type, shape: tuple[int, ...]) -> None:
+    image = np.full(shape, 200, dtype)
+    straight = Straightener(Calibration(CAMERA, BARREL, 0.1))(image)
+    assert (straight.shape, straight.dtype) == (shape, dtype)
+    assert np.all(straight == 200)
+
+
+def test_an_image_of_another_size_is_still_told(tmp_path: Path) -> None:
+    Image.fromarray(np.zeros((100, 100), np.uint8)).save(tmp_path / "a.png")
+    with pytest.raises(InputError, match="100 × 100 pixels, the camera 640 × 480"):
+        list(estimate_images(tmp_path / "a.png", Calibration(CAMERA, BARREL), "negru2013"))
+
+
+def test_what_a_lens_cannot_show_repeats_its_border() -> None:
+    """Beyond the radius at which Brown's polynomial turns back there is nothing, and no ghost of the middle."""
+    image = np.zeros((480, 640), np.uint8)
+    image[200:280, 280:360] = 255
+    straight = Straightener(Calibration(CAMERA, (-0.75, 0.0, 0.0, 0.0)))(image)
+    assert straight[240, 320] == 255
+    assert np.all(straight[:60] == 0)
+    assert np.all(straight[:, :60] == 0)
+
+
+@pytest.mark.parametrize(
+    ("lens", "told"),
+    [((-2.0, 0.0, 0.0, 0.0), r"folds the image over 157 px .* goes on to 236 px"), ((0.1, -9.0, 0.0, 0.0), "folds")],
+)
+def test_a_lens_that_folds_the_image_is_refused(lens: tuple[float, ...], told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        Straightener(Calibration(CAMERA, lens))
+
+
+def written(folder: Path, keys: str) -> Calibration:
+    (folder / "camera.yaml").write_text(
+        f"width: 640\nheight: 480\nfocal_length_px: 577\nprincipal_point_px: [322, 236]\nmount_height_m: 1.38\n"
+        f"pitch_deg: 2\n{keys}",
+        encoding="utf-8",
+    )
+    return load_calibration(folder / "camera.yaml")
+
+
+@pytest.mark.parametrize(
+    ("keys", "told"),
+    [
+        ("distortion: [0.1, 0.2]\n", r"camera.yaml:7: distortion.* missing"),
+        ("distortion: [0.1, 0.2, 0, 0, 0.3]\n", r"camera.yaml:7: distortion: .*4 items.* got \[0.1"),
+        ("distortion: [.nan, 0, 0, 0]\n", r"camera.yaml:7: distortion.*finite number; got nan"),
+        ("distortion: 0.1\n", r"camera.yaml:7: distortion: .*tuple; got 0.1"),
+        ("distorsion: [0, 0, 0, 0]\n", "did you mean 'distortion'"),
+        ("yaw_deg: 90\n", r"camera.yaml:7: yaw_deg: .*less than 60; got 90"),
+        ("yaw_deg: .inf\n", "yaw_deg"),
+    ],
+)
+def test_mistakes_are_told_with_their_line(tmp_path: Path, keys: str, told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        written(tmp_path, keys)
+
+
+def test_whoever_needs_a_pinhole_is_not_given_another_camera(tmp_path: Path) -> None:
+    written(tmp_path, "distortion: [0, 0, 0, 0]\nyaw_deg: 0\n")
+    assert load_camera(tmp_path / "camera.yaml") == CAMERA
+    written(tmp_path, "yaw_deg: 3\n")
+    with pytest.raises(InputError, match=r"camera.yaml: distortion and yaw_deg are undone by `fogsim estimate`"):
+        load_camera(tmp_path / "camera.yaml")
+
+
+def test_a_guess_says_which_yaw_it_would_be(draw: Draw, tmp_path: Path) -> None:
+    Image.fromarray(draw(CAMERA, math.radians(6.0))).save(tmp_path / "a.png")
+    guess = guess_camera(find_source(tmp_path / "a.png"), mount_height=1.38, field_of_view=1.0124)
+    (told,) = [warning for warning in guess.warnings if "yaw_deg" in warning]
+    assert "turned to the left" in told
+    assert float(told.partition("yaw_deg: ")[2].partition("`")[0]) == pytest.approx(6.0, abs=0.3)

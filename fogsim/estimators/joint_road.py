@@ -4,25 +4,32 @@ import math
 from collections import deque
 from statistics import NormalDist
 
+import numpy as np
+
 from fogsim.errors import InputError
 from fogsim.estimators.image_check import checked_count, checked_image
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation
-from fogsim.vision.horizon import PITCH_DEVIATION, calibrated_horizon, levelled
+from fogsim.vision.horizon import PITCH_DEVIATION, Horizon, calibrated_horizon, levelled, weighed
 from fogsim.vision.joint_fit import JointFit, JointPrior, fit_jointly
 from fogsim.vision.response import linear_table
+from fogsim.vision.road_lines import meeting_lines
 from fogsim.vision.strips import (
     SATURATED_SHARE,
+    LinearPixels,
     Sky,
     StripCurves,
+    StripGeometry,
+    above_bonnet,
     linear_pixels,
     mean_curves,
     sky_above,
     strip_curves,
     strip_geometry,
     without_clipped,
+    without_rows_below,
 )
 
 MIN_COLS, MIN_ROWS = 32, 16
@@ -100,7 +107,7 @@ class JointRoad:
         self._horizon = calibrated_horizon(camera, pitch_deviation)
         self._impossible = _impossible(camera)
         self._geometry = strip_geometry(camera, max(1.0, self._horizon.standard_deviation))
-        self._earlier: deque[tuple[StripCurves, Sky]] = deque(maxlen=checked_count("frames", frames, 1))
+        self._earlier: deque[tuple[StripCurves, Sky]] = deque(maxlen=checked_count("frames", frames, 1) - 1)
 
     def reset(self) -> None:
         """Forget all earlier frames."""
@@ -139,31 +146,54 @@ class JointRoad:
             return Estimate.invalid(
                 self.method, "too dark above the horizon, or no sky: this is a daytime method", **found
             )
-        free = _free_road(observation.lead)
-        curves = strip_curves(pixels, self._geometry, sky.noise, self._camera, free)
-        self._earlier.append((without_clipped(curves) if sky.is_clipped else curves, sky))
-        curves = mean_curves(tuple(self._earlier))
-        fit = fit_jointly(curves, self._geometry, self._prior(sky))
-        reason = "too little road is seen" if fit is None else self._doubt(fit, sky, curves, free)
-        if fit is None or reason:
-            return Estimate.invalid(self.method, reason, **found)
+        prior = self._prior(sky, self._seen_horizon(pixels))
+        fit = self._fitted(pixels, sky, prior, _free_road(observation.lead))
+        if isinstance(fit, str):
+            return Estimate.invalid(self.method, fit, **found)
         return self._estimate(fit, found)
 
-    def _prior(self, sky: Sky) -> JointPrior:
-        deviation = math.hypot(SKY_DEVIATION * sky.luminance, sky.deviation)
-        shift = self._horizon.standard_deviation
+    def _fitted(self, pixels: LinearPixels, sky: Sky, prior: JointPrior, free: float) -> JointFit | str:
+        """Fit of the road that is free up to a depth, or why there is none that is to be believed.
+
+        What stands in the own lane hides, further on, the neighbours' lanes too: they are read again without it.
+        """
+        lowest = above_bonnet(pixels, self._camera, sky.luminance)
+        for _ in range(2):
+            curves = strip_curves(pixels, self._geometry, sky.noise, self._camera, free)
+            curves = without_rows_below(curves, self._geometry, lowest)
+            latest = (without_clipped(curves) if sky.is_clipped else curves, sky)
+            curves = mean_curves((*self._earlier, latest))
+            fit = fit_jointly(curves, self._geometry, prior)
+            if fit is None:
+                return "too little road is seen"
+            doubt = self._doubt(fit, sky, curves, free)
+            obstacle = _obstacle(fit, self._geometry)
+            if doubt or obstacle >= free:
+                break
+            free = obstacle
+        self._earlier.append(latest)
+        return doubt or fit
+
+    def _seen_horizon(self, pixels: LinearPixels) -> Horizon:
+        """Weigh the told horizon with the point in which the road's lines meet."""
+        point = meeting_lines(pixels, self._camera, self._horizon)
+        return self._horizon if point is None else weighed(self._horizon, point.horizon)
+
+    def _prior(self, sky: Sky, horizon: Horizon) -> JointPrior:
+        deviation, upward = (math.hypot(SKY_DEVIATION * sky.luminance, apart) for apart in (sky.deviation, sky.upward))
+        shift = (horizon.row - self._camera.horizon_row, horizon.standard_deviation)
         if not sky.is_clipped:
-            return JointPrior(sky.luminance, deviation, deviation, shift)
+            return JointPrior(sky.luminance, deviation, upward, *shift)
         table = linear_table(self._camera.response, self._camera.bits)
         level = float(table[-1] - table[-2]) * (2**self._camera.bits / 256.0)
         if sky.saturated > MOSTLY:
-            return JointPrior(255.0 + level, 2.0 * level, OVEREXPOSURE * 255.0, shift)
+            return JointPrior(255.0 + level, 2.0 * level, OVEREXPOSURE * 255.0, *shift)
         if sky.saturated < SATURATED_SHARE:
             # One of the colours is clipped: there is more light than the others show.
-            return JointPrior(sky.luminance + level, deviation + level, deviation + 4.0 * level, shift)
+            return JointPrior(sky.luminance + level, deviation + level, deviation + 4.0 * level, *shift)
         # Noise carries some of the sky's pixels below saturation: the share of the others tells how bright it is.
         airlight = 255.0 - 0.5 * level + 1.3 * level * NormalDist().inv_cdf(sky.saturated)
-        return JointPrior(airlight, deviation + level, deviation + level, shift)
+        return JointPrior(airlight, deviation + level, deviation + level, *shift)
 
     def _doubt(self, fit: JointFit, sky: Sky, curves: StripCurves, free: float) -> str:
         """Say why a fit is not to be believed; empty if it is."""
@@ -201,6 +231,14 @@ def _impossible(camera: Camera) -> str:
     if camera.height - 1 - camera.horizon_row < MIN_ROWS or camera.width < MIN_COLS:
         return "the image is too small to show a curve"
     return ""
+
+
+def _obstacle(fit: JointFit, geometry: StripGeometry) -> float:
+    """Depth at which something stands in the own lane that the fit has found to hide what is behind [m]."""
+    if not fit.hidden.any():
+        return math.inf
+    road = fit.used[0] & (geometry.distance < float(geometry.distance[np.argmax(fit.hidden)]))
+    return float(geometry.distance[road].max()) if road.any() else math.inf
 
 
 def _free_road(lead: LeadMeasurement | None) -> float:

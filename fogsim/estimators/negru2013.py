@@ -15,11 +15,13 @@ from fogsim.values.observation import Observation
 from fogsim.vision.canny_deriche import CannyDeriche, DericheEdges
 from fogsim.vision.curve_fit import fit_curve
 from fogsim.vision.edges import smoothed
-from fogsim.vision.horizon import PITCH_DEVIATION, Horizon, calibrated_horizon, levelled
+from fogsim.vision.horizon import PITCH_DEVIATION, Horizon, calibrated_horizon, levelled, weighed
 from fogsim.vision.inflection import FogModel, best_inflection, printed_inflection, steepest_slope
 from fogsim.vision.luminance import linear_luminance
 from fogsim.vision.profile import RoadCurve, band_profile, path_lengths
 from fogsim.vision.region import Band, crossing_band, grow_region
+from fogsim.vision.road_lines import meeting_lines
+from fogsim.vision.strips import linear_pixels
 from fogsim.vision.vanishing import VanishingPoint, vanishing_point
 
 MIN_COLS, MIN_ROWS = 32, 16  # [px] a road narrower than this, or lower below its horizon, shows no curve
@@ -35,8 +37,6 @@ MAX_ABOVE = 0.05
 
 NEAR_HORIZON = 4.0  # [px] a region that ends this close below the horizon has seen the whole road
 REACH = math.radians(4.0)  # [rad] about the told vanishing point, within which lines of the road may pass
-BENT_ROAD = 0.4  # [px] deviation of a vanishing point's row where the road bends or undulates
-AGREES = 4.0  # [-] standard deviations within which a vanishing point fits the told horizon
 ALBEDO_DEVIATION = 0.015  # [-] of k by slow changes of the road's reflectance, which the residuals do not show
 MAX_RESIDUAL = 0.12  # [-] of the fitted contrast: more is no curve of Koschmieder's
 
@@ -51,6 +51,8 @@ class _RoadImage:
 
     Attributes
     ----------
+    level : (rows, cols) or (rows, cols, 3) uint8 or uint16
+        The whole image without roll.
     luminance : (rows, cols) float32
         Linear grey levels.
     first_row : int
@@ -61,6 +63,7 @@ class _RoadImage:
         First guesses: the bright part of what lies above the horizon, and the median of the bottom row.
     """
 
+    level: NDArray[np.uint8] | NDArray[np.uint16]
     luminance: NDArray[np.float32]
     first_row: int
     horizon: Horizon
@@ -195,24 +198,17 @@ class Negru2013:
         """Told horizon and vanishing point, weighed (corrected), or the best vanishing point of late (published)."""
         if not self._looks_for_lines:
             return self._told
+        if not self._as_published:
+            meeting = meeting_lines(linear_pixels(road.level, self._camera), self._camera, self._told)
+            return self._told if meeting is None else weighed(self._told, meeting.horizon)
         guess = (self._camera.principal_point[0], self._told.row - road.first_row)
         reach = max(REACH * self._camera.focal_length, 8.0)
-        point = vanishing_point(edges.gradient, edges.pixels, guess, reach, refined=not self._as_published)
-        if self._as_published:
-            if point is not None:
-                self._points.append(replace(point, row=point.row + road.first_row))
-            best = max(self._points, key=lambda p: p.score, default=None)
-            found = self._told if best is None else Horizon(best.row, best.deviation)
-            return found if 1.0 <= found.row <= self._camera.height - 1 - MIN_ROWS else self._told
-        if point is None:
-            return self._told
-        near = math.hypot(point.deviation, BENT_ROAD)
-        row, apart = point.row + road.first_row, math.hypot(near, self._told.standard_deviation)
-        if abs(row - self._told.row) > AGREES * apart:
-            return self._told
-        share = (self._told.standard_deviation / apart) ** 2
-        deviation = near * self._told.standard_deviation / apart
-        return Horizon(self._told.row + share * (row - self._told.row), deviation)
+        point = vanishing_point(edges.gradient, edges.pixels, guess, reach)
+        if point is not None:
+            self._points.append(replace(point, row=point.row + road.first_row))
+        best = max(self._points, key=lambda p: p.score, default=None)
+        found = self._told if best is None else Horizon(best.row, best.deviation)
+        return found if 1.0 <= found.row <= self._camera.height - 1 - MIN_ROWS else self._told
 
     def _road_image(self, image: NDArray[np.uint8] | NDArray[np.uint16]) -> _RoadImage:
         horizon = self._told
@@ -223,10 +219,10 @@ class Negru2013:
             raise _CannotTell("the image is too small to show a curve")
         sky_rows = math.ceil(horizon.row)
         first = max(0, sky_rows - 4 - rows // 20)
-        level = levelled(image, self._camera)[first:]
-        luminance = linear_luminance(level, self._camera.response, self._camera.bits)
+        level = levelled(image, self._camera)
+        luminance = linear_luminance(level[first:], self._camera.response, self._camera.bits)
         airlight = float(np.percentile(luminance[: sky_rows - first, ::4], 90))
-        return _checked(_RoadImage(luminance, first, horizon, airlight, float(np.median(luminance[-1]))))
+        return _checked(_RoadImage(level, luminance, first, horizon, airlight, float(np.median(luminance[-1]))))
 
     def _curve(self, road: _RoadImage, band: Band) -> RoadCurve:
         camera = self._camera

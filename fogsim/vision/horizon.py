@@ -49,6 +49,20 @@ def calibrated_horizon(camera: Camera, pitch_deviation: float = PITCH_DEVIATION)
     return Horizon(row=camera.horizon_row, standard_deviation=deviation)
 
 
+def weighed(first: Horizon, second: Horizon) -> Horizon:
+    """Weigh two independent measurements of the horizon by their variances.
+
+    Parameters
+    ----------
+    first, second : Horizon
+        The measurements.
+    """
+    apart = math.hypot(first.standard_deviation, second.standard_deviation)
+    share = (first.standard_deviation / apart) ** 2
+    deviation = first.standard_deviation * second.standard_deviation / apart
+    return Horizon(first.row + share * (second.row - first.row), deviation)
+
+
 def levelled(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera) -> NDArray[np.uint8] | NDArray[np.uint16]:
     """Turn an image about the principal point such that its horizon is level.
 

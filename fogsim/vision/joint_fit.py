@@ -20,14 +20,24 @@ ALBEDOS = ((0.015, 0.005), (0.015, 0.04), (0.015, 0.12), (0.04, 0.05))
 ALBEDO_CHANCES = (0.4, 0.2, 0.25, 0.15)
 """How likely each of those is before the image is seen [-]."""
 
-EXTINCTIONS = 22
-"""Extinctions of the first search, evenly in ln k."""
+EXTINCTIONS, SIMPLE_EXTINCTIONS = 14, 28
+"""Extinctions of the first searches, evenly in ln k."""
+
+ALIKE = 0.3
+"""Difference of ln k below which two starts lead to the same answer [-]."""
 
 STEPS, MORE_STEPS = 10, 5
 """Most Gauss–Newton steps for the first strength of patches and drift, and from its answer for each of the others."""
 
 LEAST_BINS, NEAR_BINS = 8, 12
 """Fewest bins of the own lane for a fit; nearest bins that the first guess of the road's luminance is made of."""
+
+
+UNSURE = 0.008
+"""Relative deviation of the airlight from which on its place is sought [-]."""
+
+FAR_BINS = 8
+"""Farthest bins of the own lane, which show the airlight where the fog is dense."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +58,8 @@ class JointFit:
         Mean square of the standardised residuals; about 1 where the model holds.
     used : (strips, n) bool
         Bins that took part.
+    hidden : (n,) bool
+        Bins of the first strip that lie behind an obstacle which stands on it.
     """
 
     extinction: float
@@ -57,6 +69,7 @@ class JointFit:
     road: float
     misfit: float
     used: NDArray[np.bool_]
+    hidden: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,13 +82,14 @@ class JointPrior:
         Luminance of the sky [linear grey levels].
     below, above : float
         Deviation of the airlight from it, downward and upward; upward it is large where the sky is saturated.
-    shift_deviation : float
-        Standard deviation of the horizon's row [px].
+    shift, shift_deviation : float
+        Rows by which the horizon is lower than told, and their standard deviation [px].
     """
 
     airlight: float
     below: float
     above: float
+    shift: float
     shift_deviation: float
 
 
@@ -103,11 +117,10 @@ def fit_jointly(curves: StripCurves, geometry: StripGeometry, prior: JointPrior)
     if int((curves.variance[0] > 0).sum()) < LEAST_BINS:
         return None
     data = _Data(curves, geometry)
-    start = data.start(prior.airlight)
-    if start is None:
-        return None
-    found = [data.refined(ALBEDOS[0], prior, np.array([start, prior.airlight, 0.0]), STEPS)]
-    found += [data.refined(albedo, prior, found[0].theta, MORE_STEPS) for albedo in ALBEDOS[1:]]
+    starts = data.starts(prior)
+    found = [data.refined(ALBEDOS[0], prior, np.array([*start, prior.shift]), STEPS) for start in starts]
+    best = min(found, key=lambda f: f.cost)
+    found = [best] + [data.refined(albedo, prior, best.theta, MORE_STEPS) for albedo in ALBEDOS[1:]]
     return _average(found)
 
 
@@ -135,30 +148,51 @@ class _Data:
         g = self.geometry
         return (self.curves.luminance, self.curves.variance, g.below, g.half, g.path, g.distance, g.extent)
 
-    def start(self, airlight: float) -> float | None:
-        """Extinction of the greatest likelihood on a coarse grid, the horizon as told and the airlight as the sky."""
+    def starts(self, prior: JointPrior) -> list[tuple[float, float]]:
+        """Extinctions and airlights that may be near the greatest likelihood.
+
+        The best of a coarse grid with an airlight as in the prior or, where that is unsure, as what the farthest road
+        may have faded into; and that of a simpler model, whose likelihood is not so narrow that a grid may miss it.
+        """
         unit = 1.0 / float(self.geometry.path[0, 0])
-        extinctions = np.geomspace(0.2 * unit, 2.0 * unit * float(self.geometry.below[0]), EXTINCTIONS)
-        cost = joint_kernels.search(*self._bins, _albedo(ALBEDOS[1]), extinctions, airlight)
-        best = int(np.argmin(cost))
-        return float(extinctions[best]) if math.isfinite(cost[best]) else None
+        least, most = 0.2 * unit, 2.0 * unit * float(self.geometry.below[0])
+        grid = np.geomspace(least, most, SIMPLE_EXTINCTIONS)
+        found = [joint_kernels.simple_search(*self._bins[:5], grid, _known(prior))]
+        airlights = [prior.airlight]
+        if prior.below > UNSURE * prior.airlight:
+            airlights.append(self._farthest())
+        grid = np.geomspace(least, most, EXTINCTIONS)
+        for airlight in airlights:
+            cost = joint_kernels.search(*self._bins, _albedo(ALBEDOS[1]), grid, airlight, prior.shift)
+            best = int(np.argmin(cost))
+            new = all(abs(math.log(grid[best] / k)) > ALIKE for k, _ in found)
+            if math.isfinite(cost[best]) and new:
+                found.append((float(grid[best]), airlight))
+        return found
+
+    def _farthest(self) -> float:
+        seen = self.curves.luminance[0][self.curves.variance[0] > 0]
+        return float(np.median(seen[-FAR_BINS:]))
 
     def refined(self, albedo: tuple[float, float], prior: JointPrior, start: Floats, steps: int) -> _Refined:
         """Gauss–Newton from a start."""
         luminance, noise, below, half, path = self._bins[:5]
         strips, count = luminance.shape
-        k, airlight = float(start[0]), float(start[1])
+        k, airlight, shift = (float(value) for value in start)
         near = [
-            joint_kernels.near_road(luminance[s], noise[s], below, half, path[s], k, airlight, NEAR_BINS)
+            joint_kernels.near_road(luminance[s], noise[s], below, half, path[s], k, airlight, shift, NEAR_BINS)
             for s in range(strips)
         ]
         road = np.clip(np.array(near), 0.01 * airlight, airlight)
         used = np.zeros((strips, count), np.uint8)
-        known = np.array([prior.airlight, prior.below, prior.above, prior.shift_deviation])
         theta, covariance, cost, squares, number = joint_kernels.refine(
-            *self._bins, _albedo(albedo), known, start, road, used, steps
+            *self._bins, _albedo(albedo), _known(prior), start, road, used, steps
         )
         return _Refined(theta, covariance, cost, squares / max(number, 1), float(road[0]), used)
+
+
+def _known(prior: JointPrior) -> Floats:
+    return np.array([prior.airlight, prior.below, prior.above, prior.shift, prior.shift_deviation])
 
 
 def _albedo(deviations: tuple[float, float]) -> Floats:
@@ -182,4 +216,5 @@ def _average(found: list[_Refined]) -> JointFit:
         road=best.road,
         misfit=best.misfit,
         used=best.used == joint_kernels.USED,
+        hidden=best.used[0] == joint_kernels.HIDDEN,
     )

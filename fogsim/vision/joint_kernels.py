@@ -27,6 +27,9 @@ equally likely and few are expected, or that is behind an obstacle, compared to 
 USED, HIDDEN = 1, 2
 """What `used` says of bins in use, and of those behind an obstacle; 0 of outliers and where there is no datum."""
 
+GRAINY = 0.01
+"""Deviation of bins by the road's texture in the simple search, relative to the airlight [-]."""
+
 OUTLIERS_OF_OBSTACLE = 3
 """Fewest outliers that make an obstacle."""
 
@@ -230,10 +233,11 @@ def near_road(
     path: NDArray[np.float64],
     k: float,
     airlight: float,
+    shift: float,
     bins: int,
 ) -> float:
     """Luminance of a strip without fog: median of what its nearest bins say, given the fog."""
-    value, _, _ = transmissions(below, half, path, k, 0.0)
+    value, _, _ = transmissions(below, half, path, k, shift)
     found = np.empty(bins)
     count = 0
     for i in range(below.size):
@@ -255,6 +259,7 @@ def search(
     albedo: NDArray[np.float64],
     extinctions: NDArray[np.float64],
     airlight: float,
+    shift: float,
 ) -> NDArray[np.float64]:
     """Minus twice the log likelihood of each of several extinctions, the rest at their first guesses; inf for none."""
     strips, count = luminance.shape
@@ -264,9 +269,9 @@ def search(
     for j in range(extinctions.size):
         k, possible = extinctions[j], True
         for strip in range(strips):
-            road = near_road(luminance[strip], noise[strip], below, half, path[strip], k, airlight, 12)
+            road = near_road(luminance[strip], noise[strip], below, half, path[strip], k, airlight, shift, 12)
             possible = possible and 0.0 < road < 1.5 * airlight
-            value, _, _ = transmissions(below, half, path[strip], k, 0.0)
+            value, _, _ = transmissions(below, half, path[strip], k, shift)
             columns[strip, :, 0] = luminance[strip] - airlight - (road - airlight) * value
             scale[strip] = road * value
         cost[j] = np.inf
@@ -274,6 +279,57 @@ def search(
             cost[j] = whiten(columns, scale, noise, distance, extent, albedo, airlight, True, used, out, constant)
             cost[j] += (out**2).sum()
     return cost
+
+
+@kernel
+def simple_search(
+    luminance: NDArray[np.float64],
+    noise: NDArray[np.float64],
+    below: NDArray[np.float64],
+    half: NDArray[np.float64],
+    path: NDArray[np.float64],
+    extinctions: NDArray[np.float64],
+    prior: NDArray[np.float64],
+) -> tuple[float, float]:
+    """Extinction and airlight that best fit all strips as one road of constant albedo, in Cauchy's norm.
+
+    A smooth broad search, where `search` has narrow minima: what does not fit weighs little, and nothing is explained
+    by an albedo that wanders.
+    """
+    strips, count = luminance.shape
+    best, best_k, best_airlight = np.inf, extinctions[0], prior[0]
+    scale = (GRAINY * prior[0]) ** 2
+    stride = max(count // 36, 1)
+    for k in extinctions:
+        value, _, _ = transmissions(below[::stride], half[::stride], path[0, ::stride], k, prior[3])
+        airlight, drop, total = prior[0], 0.0, 0.0
+        for iteration in range(4):
+            s0, s1, s2, r0, r1 = 0.0, 0.0, 0.0, 0.0, 0.0
+            total = 0.0
+            for strip in range(strips):
+                for j in range(value.size):
+                    i = j * stride
+                    if noise[strip, i] <= 0.0:
+                        continue
+                    t, spread = value[j], noise[strip, i] + scale * (value[j] ** 2 + 0.02)
+                    rest = luminance[strip, i] - airlight - drop * t
+                    weight = 1.0 / (spread + rest * rest) if iteration else 1.0 / spread
+                    if iteration == 3:
+                        total += math.log1p(rest * rest / spread)
+                    y = luminance[strip, i] - prior[0]
+                    s0, s1, s2 = s0 + weight, s1 + weight * t, s2 + weight * t * t
+                    r0, r1 = r0 + weight * y, r1 + weight * t * y
+            off = airlight - prior[0]
+            known = 1.0 / (prior[1] if off < 0.0 else prior[2]) ** 2
+            total += known * off * off
+            s0 += known
+            determinant = max(s0 * s2 - s1 * s1, 1e-12)
+            airlight = prior[0] + (s2 * r0 - s1 * r1) / determinant
+            drop = min((s0 * r1 - s1 * r0) / determinant, 0.0)
+            drop = max(drop, -airlight)
+        if total < best:
+            best, best_k, best_airlight = total, k, airlight
+    return best_k, best_airlight
 
 
 @kernel
@@ -298,8 +354,8 @@ def refine(  # noqa: C901, PLR0912 - one iteration of a solver, which shares all
     ----------
     luminance, noise, path : (strips, n) float64
         See `whiten` and `transmissions`.
-    prior : (4,) float64
-        Airlight by the sky, its deviation downward and upward, deviation of the horizon's row.
+    prior : (5,) float64
+        Airlight by the sky, its deviation downward and upward, the horizon's row and its deviation.
     start : (3,) float64
         k, airlight, shift.
     road : (strips,) float64
@@ -357,9 +413,10 @@ def refine(  # noqa: C901, PLR0912 - one iteration of a solver, which shares all
         weight = 1.0 / (prior[1] if off < 0.0 else prior[2]) ** 2
         normal[1, 1] += weight
         gradient[1] -= weight * off
-        normal[2, 2] += 1.0 / prior[3] ** 2
-        gradient[2] -= theta[2] / prior[3] ** 2
-        cost += weight * off * off + (theta[2] / prior[3]) ** 2
+        lower = theta[2] - prior[3]
+        normal[2, 2] += 1.0 / prior[4] ** 2
+        gradient[2] -= lower / prior[4] ** 2
+        cost += weight * off * off + (lower / prior[4]) ** 2
         # A weak hold on k keeps the matrix regular where there is nothing to see.
         normal[0, 0] += 1.0
         covariance = np.linalg.inv(normal).astype(np.float64)
@@ -368,7 +425,7 @@ def refine(  # noqa: C901, PLR0912 - one iteration of a solver, which shares all
             break
         step = covariance @ gradient
         most = abs(theta[0]) + 0.3 * unit
-        damped = min(1.0, most / max(abs(step[0]), 1e-12), 1.5 * prior[3] / max(abs(step[2]), 1e-12))
+        damped = min(1.0, most / max(abs(step[0]), 1e-12), 1.5 * prior[4] / max(abs(step[2]), 1e-12))
         if theta[0] + damped * step[0] < -2.0 * unit:
             damped = 0.5 * damped
         for a in range(3):

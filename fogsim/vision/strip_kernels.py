@@ -10,12 +10,22 @@ from fogsim.jit import kernel
 MOST_SAMPLES = 64
 """Pixels that one row's statistic is made of; more cost time and gain little beside the road's own texture."""
 
+SKY_SHARE, SKY_WIDTH = 7, 0.012
+"""Part of a row (one in so many) that sky must fill to be found, and half the width of its luminances, relative [-]."""
+
+LEAST_SKY_ROWS = 4
+"""Rows of sky before it can end downward."""
+
+LEAST_SKY_HEIGHT, STEEPEST_SKY = 0.04, 0.8
+"""Height that rows must span to show how the sky brightens upward [rad], and most that it does [1/rad]."""
+
 KEPT = 2.5
 """Half-width of the core of a row, in its robust standard deviations: marks and other narrow things lie outside."""
 
 
 @kernel
-def _light(pixels: NDArray[np.uint8] | NDArray[np.uint16], tables: NDArray[np.float32], row: int, col: int) -> float:
+def light(pixels: NDArray[np.uint8] | NDArray[np.uint16], tables: NDArray[np.float32], row: int, col: int) -> float:
+    """Luminance of a pixel [linear grey levels]."""
     total = np.float32(0.0)
     for channel in range(pixels.shape[2]):
         total += tables[channel, pixels[row, col, channel]]
@@ -89,7 +99,7 @@ def strip_rows(
             col = min(max(math.floor(low + (j + 0.5) * width / wanted + 0.5), 0), cols - 1)
             if hides and hidden_from <= col <= hidden_to:
                 continue
-            samples[taken] = _light(pixels, tables, row, col)
+            samples[taken] = light(pixels, tables, row, col)
             taken += 1
         if taken < 2 or taken < 0.25 * wanted:
             continue
@@ -106,23 +116,22 @@ def sky_rows(
     left: int,
     right: int,
     floor: float,
-) -> NDArray[np.float64]:
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Brightness of the bright part of each row: of the sky, where trees and vehicles stand before it.
 
-    Starts at the row's upper quartile and moves to the mean of what lies near, so that up to about half of the row may
-    be covered by what is darker.
+    Starts near the row's brightest and moves to the mean of what lies near, so that what is darker may cover most of
+    the row. The second of the two arrays is the share of the row that is as bright.
     """
-    out = np.zeros(rows.size)
+    bright, share = np.zeros(rows.size), np.zeros(rows.size)
     samples = np.empty(MOST_SAMPLES, np.float32)
     count = min(MOST_SAMPLES, right - left)
     for i in range(rows.size):
         for j in range(count):
             col = left + int((j + 0.5) * (right - left) / count)
-            samples[j] = _light(pixels, tables, rows[i], col)
+            samples[j] = light(pixels, tables, rows[i], col)
         ordered = np.sort(samples[:count])
-        centre = float(ordered[(3 * count) // 4])
-        upper = float(ordered[count - 1 - count // 20]) - centre
-        reach = max(3.0 * upper, 3.0 * floor)
+        centre, kept = float(ordered[count - 1 - count // SKY_SHARE]), 0
+        reach = max(2.5 * floor, SKY_WIDTH * centre)
         for _ in range(4):
             total, kept = 0.0, 0
             for value in ordered:
@@ -130,8 +139,55 @@ def sky_rows(
                     total += float(value)
                     kept += 1
             centre = total / kept
-        out[i] = centre
-    return out
+        bright[i], share[i] = centre, kept / count
+    return bright, share
+
+
+@kernel
+def level_at_horizon(
+    bright: NDArray[np.float64], height: NDArray[np.float64], step: float
+) -> tuple[float, float, float, float]:
+    """Brightness of the sky at the horizon, from that of rows above it (Theil and Sen's robust straight line).
+
+    Where rows darken downward by more than `step` from one to the next, something stands before the sky, and the rows
+    below say nothing.
+
+    Parameters
+    ----------
+    bright : (n,) float64
+        Brightness of rows, the highest first.
+    height : (n,) float64
+        Their height above the horizon.
+    step : float
+        Darkening that is no sky's, as a share.
+
+    Returns
+    -------
+    tuple of float
+        Brightness at height 0, slope, robust deviation of the rows from the line, height of the lowest row in use.
+    """
+    drops = np.zeros(bright.size)
+    count = 1
+    for i in range(1, bright.size):
+        usual = max(float(np.median(drops[1:i])), 0.0) if i > 1 else 0.0
+        drops[i] = bright[i - 1] - bright[i]
+        twice = bright[max(i - 2, 0)] - bright[i]
+        least = step * bright[i - 1]
+        if count >= LEAST_SKY_ROWS and (drops[i] > least + 2.0 * usual or twice > 1.5 * least + 4.0 * usual):
+            break
+        count = i + 1
+    slopes = np.zeros(count * (count - 1) // 2 + 1)
+    number = 0
+    for i in range(count):
+        for j in range(i):
+            slopes[number] = (bright[i] - bright[j]) / (height[i] - height[j])
+            number += 1
+    middle, slope = float(np.median(bright[:count])), 0.0
+    if height[0] - height[count - 1] > LEAST_SKY_HEIGHT:
+        slope = min(max(float(np.median(slopes[:number])), -STEEPEST_SKY * middle), STEEPEST_SKY * middle)
+    rest = bright[:count] - slope * height[:count]
+    level = float(np.median(rest))
+    return level, slope, 1.4826 * float(np.median(np.abs(rest - level))), height[count - 1]
 
 
 @kernel
@@ -147,7 +203,7 @@ def pixel_noise(
     for row in rows:
         for col in range(0, cols - 1, 2 * step):
             if count < apart.size:
-                apart[count] = abs(_light(pixels, tables, row, col) - _light(pixels, tables, row, col + 1))
+                apart[count] = abs(light(pixels, tables, row, col) - light(pixels, tables, row, col + 1))
                 count += 1
     # The root of the mean square of the lower three quarters stands for all: medians of whole numbers jump.
     ordered = np.sort(apart[:count])
@@ -157,3 +213,35 @@ def pixel_noise(
         square += ordered[i] * ordered[i]
     # For a normal difference of deviation √2 σ, the lower three quarters have a mean square of 0.3692 · 2 σ².
     return math.sqrt(square / kept / (2.0 * 0.3692))
+
+
+@kernel
+def saturation(
+    pixels: NDArray[np.uint8] | NDArray[np.uint16], largest: int, rows: NDArray[np.int64], side: int
+) -> tuple[float, float]:
+    """Shares of rows' pixels with all and with some channels saturated, but for `side` columns at either end."""
+    cols, channels = pixels.shape[1], pixels.shape[2]
+    every, some = 0, 0
+    for row in rows:
+        for col in range(side, cols - side):
+            count = 0
+            for channel in range(channels):
+                count += pixels[row, col, channel] == largest
+            every += count == channels
+            some += count > 0
+    total = max(rows.size * (cols - 2 * side), 1)
+    return every / total, some / total
+
+
+@kernel
+def middle_levels(
+    pixels: NDArray[np.uint8] | NDArray[np.uint16], tables: NDArray[np.float32], rows: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Median of the middle third of each row (n,) [linear grey levels]."""
+    cols = pixels.shape[1]
+    out, samples = np.empty(rows.size), np.empty(24, np.float32)
+    for i in range(rows.size):
+        for j in range(samples.size):
+            samples[j] = light(pixels, tables, rows[i], cols // 3 + int((j + 0.5) * (cols // 3) / samples.size))
+        out[i] = np.median(samples)
+    return out

@@ -226,6 +226,37 @@ def strip_curves(
     return StripCurves(luminance, variance)
 
 
+BONNET_SHARE, BONNET_ROWS = 0.3, 60
+"""Share of the road's rows that the own bonnet may cover, and how many of them are looked at."""
+
+BONNET_STEP = 0.06
+"""Step of luminance at the bonnet's edge, relative to the airlight [-]; fog and patches make smaller ones."""
+
+
+def above_bonnet(image: LinearPixels, camera: Camera, airlight: float) -> int:
+    """Lowest row that shows road, not the own vehicle's bonnet or dashboard.
+
+    Parameters
+    ----------
+    image : LinearPixels
+        A level image.
+    camera : Camera
+        The told calibration.
+    airlight : float
+        Luminance of the sky [linear grey levels].
+    """
+    bottom = camera.height - 1
+    top = math.floor(bottom - BONNET_SHARE * (bottom - camera.horizon_row))
+    rows = np.unique(np.linspace(bottom, top, BONNET_ROWS).astype(np.int64))[::-1]
+    if rows.size < 8:
+        return bottom
+    level = strip_kernels.middle_levels(image.pixels, image.tables, rows)
+    # Three rows each side of a gap of two, since a bonnet's edge is bent.
+    mean = np.convolve(level, np.full(3, 1.0 / 3.0), "valid")
+    steps = np.flatnonzero(np.abs(mean[5:] - mean[:-5]) > BONNET_STEP * airlight)
+    return int(rows[min(steps[-1] + 6, rows.size - 1)]) if steps.size else bottom
+
+
 SATURATED_SHARE = 0.02
 """Share of the sky's pixels at the largest value from which on its brightness is not what its mean says [-]."""
 
@@ -237,9 +268,9 @@ class Sky:
     Attributes
     ----------
     luminance : float
-        Of its bright part [linear grey levels].
-    deviation : float
-        Its scatter from row to row [linear grey levels].
+        At the horizon, of its bright part [linear grey levels].
+    deviation, upward : float
+        Standard deviation of its luminance at the horizon, downward and upward [linear grey levels].
     noise : float
         Deviation of single pixels [linear grey levels].
     saturated, clipped : float
@@ -248,6 +279,7 @@ class Sky:
 
     luminance: float
     deviation: float
+    upward: float
     noise: float
     saturated: float
     clipped: float
@@ -261,8 +293,18 @@ class Sky:
 SKY_ROWS = 24
 """Rows of sky that are looked at."""
 
-SKY_HEIGHT = 0.12
+SKY_HEIGHT = 0.2
 """How far above the horizon sky is looked at [rad]; as far as the image goes if that is less."""
+
+DARKER = 0.012
+"""Darkening from a row to the next below beyond which it is no longer sky that is seen, as a share [-]."""
+
+UNSEEN, CLOSE = 0.3, 0.01
+"""Deviation of the sky's luminance for each radian that is hidden above the horizon [1/rad], but for so much [rad]."""
+
+PATCHY, SCATTERED, BRIGHTER = 0.35, 0.004, 0.3
+"""Share of a row that is alike, and relative scatter of the rows, beyond which trees may be taken for sky; by how much
+the sky may be brighter then, as a deviation [-]."""
 
 
 def sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
@@ -289,11 +331,15 @@ def sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
     rows = np.unique(np.linspace(top, bottom, SKY_ROWS).astype(np.int64))
     side = camera.width // 6
     noise = strip_kernels.pixel_noise(image.pixels, image.tables, rows)
-    found = strip_kernels.sky_rows(image.pixels, image.tables, rows, side, camera.width - side, max(noise, 0.3))
-    middle = float(np.median(found))
-    scatter = 1.4826 * float(np.median(np.abs(found - middle)))
-    largest = image.pixels[rows, side : camera.width - side] == image.tables.shape[1] - 1
-    return Sky(middle, scatter, noise, float(largest.all(axis=-1).mean()), float(largest.any(axis=-1).mean()))
+    bright, share = strip_kernels.sky_rows(image.pixels, image.tables, rows, side, camera.width - side, max(noise, 0.3))
+    height = (camera.horizon_row - rows) / camera.focal_length
+    level, _, scatter, lowest = strip_kernels.level_at_horizon(bright, height, max(DARKER, 2.0 * noise / bright.max()))
+    unseen = UNSEEN * max(float(lowest) - margin / camera.focal_length - CLOSE, 0.0) * level
+    deviation = math.hypot(scatter, unseen)
+    # What looks everywhere different is a wood rather than a sky, which is no darker than that.
+    covered = float(np.median(share)) < PATCHY and scatter > SCATTERED * level
+    saturated, clipped = strip_kernels.saturation(image.pixels, image.tables.shape[1] - 1, rows, side)
+    return Sky(level, deviation, BRIGHTER * level if covered else deviation, noise, saturated, clipped)
 
 
 def mean_curves(frames: tuple[tuple[StripCurves, Sky], ...]) -> StripCurves:
@@ -322,3 +368,8 @@ CLIPPED = 0.95 * 255.0
 def without_clipped(curves: StripCurves) -> StripCurves:
     """Leave out bins so bright that their noise, or one of their colours, is clipped."""
     return StripCurves(curves.luminance, np.where(curves.luminance > CLIPPED, 0.0, curves.variance))
+
+
+def without_rows_below(curves: StripCurves, geometry: StripGeometry, lowest: int) -> StripCurves:
+    """Leave out bins that reach below a row."""
+    return StripCurves(curves.luminance, np.where(geometry.last > lowest, 0.0, curves.variance))

@@ -1,8 +1,10 @@
 """Roads of a SUMO network as plain geometry."""
 
+import contextlib
+import gc
 import gzip
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,13 +33,26 @@ def read_net(path: Path) -> Any:
         If the file is no SUMO network.
     """
     try:
-        net = sumolib.net.readNet(str(path), withInternal=True, withFoes=False)
+        with _no_garbage():
+            net = sumolib.net.readNet(str(path), withInternal=True, withFoes=False)
         net.lefthand = _is_lefthand(path)
     except Exception as error:
         raise InputError(f"{path}: not a SUMO network: {error}") from error
     if not net.getEdges():
         raise InputError(f"{path}: the SUMO network has no edges")
     return net
+
+
+@contextlib.contextmanager
+def _no_garbage() -> Iterator[None]:
+    """Do without the search for garbage, which takes two thirds of the time where only what stays is made."""
+    was_searching = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_searching:
+            gc.enable()
 
 
 def _is_lefthand(path: Path) -> bool:

@@ -1,6 +1,9 @@
 """Images of lenses that distort and of cameras that look aside, straightened."""
 
+import json
 import math
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -228,3 +231,30 @@ def test_a_guess_says_which_yaw_it_would_be(draw: Draw, tmp_path: Path) -> None:
     (told,) = [warning for warning in guess.warnings if "yaw_deg" in warning]
     assert "turned to the left" in told
     assert float(told.partition("yaw_deg: ")[2].partition("`")[0]) == pytest.approx(6.0, abs=0.3)
+
+
+def test_the_command_straightens(draw: Draw, tmp_path: Path) -> None:
+    """A camera 20° aside: told so, the method sees the road's fog, and the overlay shows the straightened image."""
+    calibration = written(tmp_path, "yaw_deg: 20\n")
+    Image.fromarray(draw(CAMERA, math.radians(20.0))).save(tmp_path / "a.png")
+    asked = ["a.png", "--camera", "camera.yaml", "--method", "negru2013", "--json", "--overlay", "found.png"]
+    done = subprocess.run(
+        [sys.executable, "-m", "fogsim", "estimate", *asked], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["visibility_m"] == pytest.approx(VISIBILITY, rel=0.05)
+    with Image.open(tmp_path / "a.png") as picture:
+        image = np.asarray(picture)
+    verge = slice(300, 470), slice(0, 200)
+    straight = Straightener(calibration)(image)
+    assert not np.array_equal(straight[verge], image[verge])
+    with Image.open(tmp_path / "found.png") as overlay:
+        assert np.array_equal(np.asarray(overlay)[verge], straight[verge])
+
+
+def test_the_page_shows_a_file_that_can_be_read(tmp_path: Path) -> None:
+    page = (Path(__file__).resolve().parents[2] / "docs" / "estimate.md").read_text(encoding="utf-8")
+    (tmp_path / "camera.yaml").write_text(page.split("```yaml\n")[1].split("```")[0], encoding="utf-8")
+    calibration = load_calibration(tmp_path / "camera.yaml")
+    assert len(calibration.distortion) == 4
+    assert Straightener(calibration).camera.width == 1920

@@ -13,6 +13,7 @@ from fogsim.values.scene import Surface
 
 _ROAD, _PAINT, _SHEETING = int(Surface.ROAD), int(Surface.PAINT), int(Surface.SHEETING)
 _PERIOD = 18.0  # of dashed lines [m]
+_PER_PI = 1.0 / math.pi
 
 KIND, INSTANCE, LEAST, MOST, DEPTH = layout.KIND, layout.INSTANCE, layout.LEAST, layout.MOST, layout.DEPTH
 LIGHT, RESPONSE, LOW, HIGH = layout.LIGHT, layout.RESPONSE, layout.LOW, layout.HIGH
@@ -46,6 +47,11 @@ def retroreflection(distance: float) -> float:
         share = (angle - math.log(0.2)) / (middle - math.log(0.2))
         return math.exp(math.log(250.0) + share * math.log(180.0 / 250.0))
     return math.exp(math.log(180.0) + (angle - middle) / (math.log(2.0) - middle) * math.log(5.0 / 180.0))
+
+
+@kernel
+def _inverse_square(x: float, y: float, z: float) -> float:
+    return 1.0 / (x * x + y * y + z * z)
 
 
 @kernel
@@ -94,9 +100,10 @@ def know(  # noqa: C901, PLR0912, PLR0915 - one loop: handing arrays to function
         determinant = corner[0, 0] * plane[0, 0] + corner[0, 1] * plane[0, 1] + corner[0, 2] * plane[0, 2]
         low, high = min(corner[0, 2], corner[1, 2], corner[2, 2]), max(corner[0, 2], corner[1, 2], corner[2, 2])
         scale = 1.0 / determinant if abs(determinant) > 1e-12 else 0.0
+        per_focal = scale / focal
         for i in range(3):
-            plane[i, 0] *= scale / focal
-            plane[i, 1] *= scale / focal
+            plane[i, 0] *= per_focal
+            plane[i, 1] *= per_focal
             plane[i, 2] = plane[i, 2] * scale - plane[i, 0] * u0 - plane[i, 1] * v0
             if scale == 0.0:  # seen edge on: its middle stands for all of it
                 plane[i, 2] = 1.0 / (3.0 * max(0.5 * (low + high), NEAR))
@@ -110,12 +117,12 @@ def know(  # noqa: C901, PLR0912, PLR0915 - one loop: handing arrays to function
         xx, xy, xz = float(record[copy, 0]), float(record[copy, 4]), float(record[copy, 8])
         yx, yy, yz = float(record[copy, 1]), float(record[copy, 5]), float(record[copy, 9])
         zx, zy, zz = float(record[copy, 2]), float(record[copy, 6]), float(record[copy, 10])
-        sx, sy, sz = xx * xx + xy * xy + xz * xz, yx * yx + yy * yy + yz * yz, zx * zx + zy * zy + zz * zz
+        per_x, per_y, per_z = _inverse_square(xx, xy, xz), _inverse_square(yx, yy, yz), _inverse_square(zx, zy, zz)
         shining = masks[kind] < 0 or (integers[copy, 15] & masks[kind]) != 0
         most = -1.0
         for i in range(3):
             vertex = faces[face, i]
-            a, b, c = normals[vertex, 0] / sx, normals[vertex, 1] / sy, normals[vertex, 2] / sz
+            a, b, c = normals[vertex, 0] * per_x, normals[vertex, 1] * per_y, normals[vertex, 2] * per_z
             nx, ny, nz = xx * a + yx * b + zx * c, xy * a + yy * b + zy * c, xz * a + yz * b + zz * c
             per_length = 1.0 / math.sqrt(nx * nx + ny * ny + nz * nz)
             nx, ny, nz = nx * per_length, ny * per_length, nz * per_length
@@ -126,10 +133,11 @@ def know(  # noqa: C901, PLR0912, PLR0915 - one loop: handing arrays to function
                 ox, oy, oz = offset[i, 0], offset[i, 1], offset[i, 2]
                 cosine = -(nx * ox + ny * oy + nz * oz)
                 most = max(most, cosine)
+            share = cosine * _PER_PI
             for channel in range(3):
                 reflectance = record[copy, 12 + channel] if kind == _PAINT else colours[vertex, channel]
                 lit[i, channel] = reflectance * white + (lamps[kind, channel] if shining else 0.0)
-                answer[i, channel] = reflectance * cosine / math.pi
+                answer[i, channel] = reflectance * share
             if kind == _ROAD and i == 0:
                 known[number, WHITE] = white
         if kind == _ROAD:

@@ -99,7 +99,10 @@ def _limit_sign(edge: Any, side: float) -> Sign | None:
         return None
     lane = edge.getLanes()[0]
     points = np.array(lane.getShape3D(), dtype=np.float64)
-    along = points[1] - points[0]
+    ahead = points[np.linalg.norm(points[:, :2] - points[0, :2], axis=1) > 0.01]
+    if not len(ahead):
+        return None  # a lane of no length, as networks written by hand may have, has no direction to face
+    along = ahead[0] - points[0]
     heading = math.atan2(along[1], along[0])
     offset = side * (lane.getWidth() / 2 + SIGN_CLEARANCE)
     # Ten metres into the edge, so that the sign stands on the stretch that it speaks for.

@@ -100,3 +100,18 @@ def test_signs_stand_on_the_side_that_vehicles_keep_to(tmp_path: Path) -> None:
         to_the_left = np.array([-np.sin(one.heading), np.cos(one.heading)])
         apart = np.array(other.position[:2]) - one.position[:2]
         assert apart @ to_the_left > 5.0
+
+
+def test_a_lane_of_no_length_has_no_sign(tmp_path: Path) -> None:
+    lane = '<edge id="{0}" from="{1}" to="{2}"><lane id="{0}_0" index="0" speed="{3}" length="9" shape="{4}"/></edge>'
+    edges = lane.format("a", "n", "m", 10, "0,0 0,0 9,0"), lane.format("b", "m", "n", 20, "9,0 9,0")
+    nodes = "".join(
+        f'<junction id="{name}" type="dead_end" x="{x}" y="0" incLanes="" intLanes="" shape=""/>'
+        for name, x in (("n", 0), ("m", 9))
+    )
+    file = tmp_path / "small.net.xml"
+    file.write_text(f'<net version="1.20">{"".join(edges)}{nodes}</net>', encoding="utf-8")
+    (sign,) = sign_map(read_net(file), ()).signs
+    assert sign.sign_id == "limit.a"
+    assert np.isfinite(sign.position).all()
+    assert sign.heading == 0.0

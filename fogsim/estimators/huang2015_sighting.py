@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
 from fogsim.vision.horizon import PITCH_DEVIATION, levelled
-from fogsim.vision.lead_window import ASIDE, WIDTHS, LeadWindow
+from fogsim.vision.lead_scene import steepness
+from fogsim.vision.lead_window import WIDTHS, LeadWindow, lead_region
 from fogsim.vision.luminance import linear_luminance
 from fogsim.vision.patch import Patch
-from fogsim.vision.response import linear_table
 from fogsim.vision.road_image import MIN_AIRLIGHT, CannotTellError
 
 HALF_WIDTH, MIDDLE, HALF_HEIGHT = 0.42, 0.42, 0.32
@@ -87,18 +87,15 @@ def vehicle_crop(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera, 
     scale = camera.focal_length / distance
     if WIDTHS[1] * scale < LEAST_WIDTH:
         raise CannotTellError("the vehicle ahead is too small in the image")
-    foot, pitch = camera.horizon_row + camera.row_distance / distance, 0.01 * camera.focal_length
-    top, bottom = foot - 2.4 * scale - pitch, foot + 0.2 * scale + pitch
-    left, right = (camera.principal_point[0] + side * (ASIDE + 1.6) * scale for side in (-1.0, 1.0))
-    low_row, high_row = max(math.floor(top), 0), min(math.ceil(bottom) + 1, camera.height)
-    low_col, high_col = max(math.floor(left), 0), min(math.ceil(right) + 1, camera.width)
-    if high_row - low_row < 8 or high_col - low_col < 16 or foot >= camera.height:
+    region = lead_region(camera, distance)
+    if region is None:
         raise CannotTellError("the vehicle ahead is outside the image")
+    rows, cols = region
     level = levelled(image, camera)
-    luminance = linear_luminance(level[low_row:high_row, low_col:high_col], camera.response, camera.bits)
+    luminance = linear_luminance(level[rows, cols], camera.response, camera.bits)
     sky, noise = _sky(level, camera)
     pitch = 1.5 * PITCH_DEVIATION * camera.focal_length
-    return Crop(luminance, (low_col, low_row), sky, noise * _steepness(luminance, sky, camera), pitch)
+    return Crop(luminance, (cols.start, rows.start), sky, noise * steepness(luminance, sky, camera), pitch)
 
 
 def _sky(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera) -> tuple[float, float]:
@@ -118,15 +115,6 @@ def _sky(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera) -> tuple
     if noise > MOST_NOISE * bright:
         raise CannotTellError("what is above the horizon is no sky")
     return float(core.mean(dtype=np.float64)), noise
-
-
-def _steepness(luminance: NDArray[np.float32], sky: float, camera: Camera) -> float:
-    """How much larger noise is on a vehicle than on the sky once the response is undone, as noise is of the signal."""
-    table = linear_table(camera.response, camera.bits)
-    slope = np.gradient(table.astype(np.float64))
-    here, there = (int(np.searchsorted(table, level)) for level in (float(np.median(luminance)), sky))
-    most = table.size - 1
-    return float(slope[min(here, most)] / slope[min(there, most)])
 
 
 def sighting_of(crop: Crop, distance: float, window: LeadWindow, blur: float) -> Sighting:

@@ -1,178 +1,223 @@
-"""The rear of the vehicle ahead, found in the pixels near where its range says that it is."""
+"""Pictures of the vehicle ahead as contrast to the airlight, placed on each other and compared."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.values.camera import Camera
-from fogsim.vision.strips import LinearPixels, Sky
-
 Floats = NDArray[np.float64]
 
-HALF_PANEL = 0.5
-"""Half the width of the part of the rear that is looked at [m]: between the lamps of any car."""
+HALF_BODY = 0.42
+"""Half the width of the part of the rear that is compared, in widths of the vehicle [-]."""
 
-FLANKS = (1.2, 1.7)
-"""Where beside a vehicle's middle its surroundings are looked at [m]."""
+HEIGHTS = (0.3, 1.2)
+"""Heights of that part above the road [m]: above the road's shadow, below the roof of the flattest car."""
 
-SIDEWAYS = 4.0
-"""How far from the vehicle's axis the vehicle ahead is looked for [m]: a lane's width of a curve."""
+ASIDE, ABOVE, BELOW = 0.25, 0.15, 0.4
+"""What is placed reaches so far beyond that part, or beyond the vehicle's sides [m]: its outline tells the place."""
 
-HEIGHTS = np.arange(-0.3, 2.01, 0.05)
-"""Heights above the road at which the rear is sampled [m]."""
+FINEST = 0.02
+"""Smallest cell on which pictures are compared [m]."""
 
-PANEL = (HEIGHTS >= 0.4) & (HEIGHTS <= 1.2)
-"""The heights that every vehicle's rear covers, above shadow and bumper edge and below a low roof."""
+OUTLIER, OWN_SHARE, EDGE_SHARE = 4.0, 0.25, 0.5
+"""Residual of a cell that has changed, as a lit lamp has: robust deviations, and shares of the cell's own contrast and
+of that to its neighbours, which a small displacement makes [-]."""
 
-LEAST_STEP = 1.0
-"""Least difference of the panel to both its flanks for it to be found by [linear grey levels]."""
+LEAST_KEPT = 0.5
+"""Share of the cells that must not have changed [-]."""
 
-MIN_PIXELS = 3.0
-"""Least width of the panel in the image [px]."""
+INDEPENDENT = 8.0
+"""Cells that count as one where what is left is no noise, but detail that is not resolved alike [-]."""
 
 
 @dataclass(frozen=True, slots=True)
-class LeadPatch:
-    """Contrast of a vehicle's rear to the airlight by height.
+class LeadPicture:
+    """A part of an image around the rear of a vehicle.
 
     Attributes
     ----------
-    contrast : (n,) float64
-        (A − L) / A at `HEIGHTS` [-].
-    deviation : float
-        Noise of each of them [-].
-    offset : float
-        Lateral place of the vehicle's middle, to the right of the axis [m].
-    box : tuple of int
-        Left, right, top and bottom of the panel in the image [px].
+    contrast : (rows, cols) float64
+        (A − L) / A, A the luminance of the sky [-].
+    noise : float
+        Deviation of single pixels of it [-].
+    column, foot : float
+        Where the middle of the rear meets the road, in columns and rows of the picture [px].
+    scale : float
+        Pixels in a metre at the vehicle [px/m].
+    width : float
+        Of the vehicle [m].
     """
 
     contrast: Floats
+    noise: float
+    column: float
+    foot: float
+    scale: float
+    width: float
+
+    def moved(self, right: float, up: float) -> "LeadPicture":
+        """The same picture of a vehicle that is farther right and up [m]."""
+        return replace(self, column=self.column + right * self.scale, foot=self.foot - up * self.scale)
+
+
+@dataclass(frozen=True, slots=True)
+class Fading:
+    """Contrast of a picture over that of another of the same vehicle.
+
+    Attributes
+    ----------
+    ratio, deviation : float
+        The ratio and its standard deviation by noise and by cells that differ [-].
+    lever : float
+        Change of the ratio with an error of the airlight relative to it [-].
+    visible : float
+        Contrast of the reference in standard deviations of the other picture's cells [-].
+    kept : float
+        Share of the cells that took part [-].
+    """
+
+    ratio: float
     deviation: float
-    offset: float
-    box: tuple[int, int, int, int]
-
-    @property
-    def panel(self) -> float:
-        """Mean contrast of the panel [-]."""
-        return float(self.contrast[PANEL].mean())
+    lever: float
+    visible: float
+    kept: float
 
 
-def lead_patch(image: LinearPixels, camera: Camera, depth: float, sky: Sky, expected: float | None) -> LeadPatch | None:
-    """Find the rear of a vehicle and read its contrast.
+def _weights(size: int, centres: Floats, box: float) -> tuple[Floats, slice]:
+    """Shares of pixels in boxes about centres, and which pixels; beyond the border there is nothing to share."""
+    first = min(max(math.floor(centres.min() - 0.5 * box), 0), size - 1)
+    last = min(max(math.ceil(centres.max() + 0.5 * box) + 1, first + 1), size)
+    pixels = np.arange(first, last, dtype=np.float64)
+    upper = np.minimum(centres[:, None] + 0.5 * box, pixels + 0.5)
+    lower = np.maximum(centres[:, None] - 0.5 * box, pixels - 0.5)
+    shares = np.maximum(upper - lower, 0.0)
+    return np.asarray(shares / np.maximum(shares.sum(axis=1, keepdims=True), 1e-9), np.float64), slice(first, last)
 
-    Sideways it is where the panel differs most from both its flanks, near `expected` if that is known.
+
+def _resampled(picture: LeadPicture, lateral: Floats, height: Floats, cell: float) -> tuple[Floats, float]:
+    """Contrast on a grid in metres as seen by pixels of one cell, and the variance of its noise.
+
+    A far picture's box is one pixel; a near one's is wider by what a far pixel blurs, and squares of widths add.
+    """
+    box = math.sqrt(max(2.0 * (cell * picture.scale) ** 2 - 1.0, 1.0))
+    rows, down = _weights(picture.contrast.shape[0], picture.foot - height * picture.scale, box)
+    cols, across = _weights(picture.contrast.shape[1], picture.column + lateral * picture.scale, box)
+    left = float((rows**2).sum(axis=1).mean() * (cols**2).sum(axis=1).mean())
+    return np.asarray(rows @ picture.contrast[down, across] @ cols.T), picture.noise**2 * left
+
+
+def _cell(one: LeadPicture, other: LeadPicture) -> float:
+    return max(1.0 / one.scale, 1.0 / other.scale, FINEST)
+
+
+def _grid(low: float, high: float, cell: float, least: int) -> Floats:
+    count = max(round((high - low) / cell), least)
+    return 0.5 * (low + high) + cell * (np.arange(count) - 0.5 * (count - 1))
+
+
+def placed(
+    reference: LeadPicture, picture: LeadPicture, aside: float, pitch: float
+) -> tuple[LeadPicture, float] | None:
+    """Find the vehicle of a reference in a picture.
 
     Parameters
     ----------
-    image : LinearPixels
-        The image, level.
-    camera : Camera
-        The told calibration.
-    depth : float
-        Depth of the rear from the camera [m].
-    sky : Sky
-        The airlight and the pixels' noise.
-    expected : float or None
-        Lateral place at which it was seen before [m].
+    reference : LeadPicture
+        The vehicle as it was seen.
+    picture : LeadPicture
+        Where it is expected.
+    aside, pitch : float
+        Standard deviations of its place sideways and upward [m].
 
     Returns
     -------
-    LeadPatch or None
-        None if it is too small, outside the image or not told apart from what is beside it.
+    (LeadPicture, float) or None
+        The picture with the place of greatest posterior, and the correlation there [-]; None if it is too small.
     """
-    scale = camera.focal_length / depth
-    if 2.0 * HALF_PANEL * scale < MIN_PIXELS:
+    cell = _cell(reference, picture)
+    side = 0.5 * reference.width + ASIDE
+    lateral, height = _grid(-side, side, cell, 5), _grid(HEIGHTS[0] - BELOW, HEIGHTS[1] + ABOVE, cell, 4)
+    across, up = (max(math.ceil(2.5 * deviation / cell), 1) for deviation in (aside, pitch))
+    template, _ = _resampled(reference, lateral, height, cell)
+    wide = cell * np.arange(-across, across + 1), cell * np.arange(-up, up + 1)
+    lateral = np.concatenate([lateral[0] + wide[0][:across], lateral, lateral[-1] + wide[0][across + 1 :]])
+    height = np.concatenate([height[0] + wide[1][:up], height, height[-1] + wide[1][up + 1 :]])
+    seen, _ = _resampled(picture, lateral, height, cell)
+    if float(template.std()) < 1e-4:
         return None
-    rows = camera.horizon_row + (camera.mount_height - HEIGHTS) * camera.row_distance / (camera.mount_height * depth)
-    top, bottom = math.floor(rows[-1]), math.ceil(rows[0]) + 1
-    reach = math.ceil((SIDEWAYS + FLANKS[1]) * scale)
-    middle = camera.principal_point[0]
-    left, right = max(math.floor(middle) - reach, 0), min(math.ceil(middle) + reach + 1, camera.width)
-    if top < 0 or bottom >= camera.height or right - left < 2.0 * FLANKS[1] * scale:
-        return None
-    light = _luminance(image, top, bottom + 1, left, right)
-    panel_rows = slice(round(rows[PANEL][-1]) - top, max(round(rows[PANEL][0]) - top, round(rows[PANEL][-1]) - top + 1))
-    offset = _sideways(light[panel_rows].mean(axis=0), left - middle, scale, expected, sky.noise)
-    if offset is None:
-        return None
-    centre = middle + offset * scale
-    first, last = round(centre - HALF_PANEL * scale) - left, round(centre + HALF_PANEL * scale) - left + 1
-    profile = _unlit_mean(light[:, max(first, 0) : last], sky)
-    contrast = 1.0 - np.interp(rows, np.arange(top, bottom + 1), profile) / sky.luminance
-    pixels = max((last - first) * float(PANEL.sum()) * 0.05 * scale, 1.0)
-    box = (left + first, left + last - 1, top + panel_rows.start, top + panel_rows.stop - 1)
-    return LeadPatch(contrast, sky.noise / sky.luminance / math.sqrt(pixels), offset, box)
+    match = cv2.matchTemplate(seen.astype(np.float32), template.astype(np.float32), cv2.TM_CCOEFF_NORMED)
+    found = np.clip(np.nan_to_num(match.astype(np.float64), nan=0.0, posinf=0.0, neginf=0.0), 0.0, 0.9999)
+    known = 0.5 * (wide[1][:, None] / pitch) ** 2 + 0.5 * (wide[0] / aside) ** 2
+    cost = 0.5 * template.size * np.log1p(-(found**2)) + known
+    row, col = np.unravel_index(int(np.argmin(cost)), cost.shape)
+    right = (float(col) - across + _vertex(cost[row], int(col))) * cell
+    high = (float(row) - up + _vertex(cost[:, col], int(row))) * cell
+    return picture.moved(right, high), float(found[row, col])
 
 
-def _luminance(image: LinearPixels, top: int, bottom: int, left: int, right: int) -> Floats:
-    part = image.pixels[top:bottom, left:right]
-    channels = [image.tables[c].astype(np.float64)[part[:, :, c]] for c in range(part.shape[2])]
-    return np.asarray(np.sum(channels, axis=0))
+def _vertex(cost: Floats, at: int) -> float:
+    """Place of a minimum between cells, by a parabola."""
+    if not 0 < at < cost.size - 1:
+        return 0.0
+    left, here, right = (float(value) for value in cost[at - 1 : at + 2])
+    bend = left - 2.0 * here + right
+    return min(max(0.5 * (left - right) / bend, -0.5), 0.5) if bend > 0 else 0.0
 
 
-def _sideways(columns: Floats, start: float, scale: float, expected: float | None, noise: float) -> float | None:
-    """Lateral place [m] at which the mean of the panel differs most from both flanks."""
-    total = np.concatenate([[0.0], np.cumsum(columns)])
-    most = SIDEWAYS if expected is None else 1.0
-    offsets = np.arange(-most, most + 1e-9, max(0.1, 0.5 / scale)) + (expected or 0.0)
+def compared(reference: LeadPicture, picture: LeadPicture) -> Fading | None:
+    """Ratio of the contrasts of two pictures of one vehicle: a line through the airlight, not a free one.
 
-    def mean(low: Floats, high: Floats) -> Floats:
-        first = np.clip(np.rint(low * scale - start), 0, columns.size - 1).astype(np.int64)
-        last = np.clip(np.rint(high * scale - start) + 1, first + 1, columns.size).astype(np.int64)
-        return np.asarray((total[last] - total[first]) / (last - first))
-
-    inside = mean(offsets - HALF_PANEL, offsets + HALF_PANEL)
-    before, behind = mean(offsets - FLANKS[1], offsets - FLANKS[0]), mean(offsets + FLANKS[0], offsets + FLANKS[1])
-    # Of the same sign against both flanks: else it is the edge of something wider.
-    step = np.where(
-        (inside - before) * (inside - behind) > 0, np.minimum(abs(inside - before), abs(inside - behind)), 0
-    )
-    likely = step * np.exp(-0.5 * ((offsets - (expected or 0.0)) / (1.5 if expected is None else 0.4)) ** 2)
-    best = likely >= 0.9 * likely.max()
-    if step.max() <= 3.0 * noise / math.sqrt(max(HALF_PANEL * scale, 1.0)) + LEAST_STEP:
-        # Faded into the fog, it still is where it was.
-        return expected
-    return float(np.average(offsets[best], weights=likely[best]))
-
-
-def _unlit_mean(light: Floats, sky: Sky) -> Floats:
-    """Mean of each row without what is brighter than the airlight, which is lamps."""
-    unlit = light <= sky.luminance + 4.0 * sky.noise + 1.0
-    count = unlit.sum(axis=1)
-    return np.where(count > 0, np.where(unlit, light, 0.0).sum(axis=1) / np.maximum(count, 1), sky.luminance)
-
-
-def registered_contrast(contrast: Floats, template: Floats, deviation: float, shift_deviation: float) -> float:
-    """Mean contrast of the panel after a vertical shift that makes a profile most like a template.
+    Every part of the rear fades alike, dark ones tell the most, and what is as bright as the airlight tells nothing.
+    Cells that have changed are left out.
 
     Parameters
     ----------
-    contrast, template : (n,) float64
-        Profiles over `HEIGHTS`.
-    deviation : float
-        Noise of the panel's mean [-].
-    shift_deviation : float
-        Standard deviation of the shift [m].
+    reference, picture : LeadPicture
+        The vehicle, placed in both.
 
     Returns
     -------
-    float
-        Mean over `PANEL` of the shifted profile, relative to that of the template.
+    Fading or None
+        None if the reference shows no contrast, or too much has changed.
     """
-    best, found = math.inf, 0.0
-    step = float(HEIGHTS[1] - HEIGHTS[0])
-    noise = deviation * math.sqrt(float(PANEL.sum()))
-    reach = min(math.ceil(2.5 * shift_deviation / step), 8)
-    weight = template[PANEL]
-    for shift in range(-reach, reach + 1):
-        moved = np.roll(contrast, shift)
-        size = float(moved[PANEL] @ weight) / max(float(weight @ weight), 1e-12)
-        inner = slice(8, -8)
-        misfit = float(((moved[inner] - size * template[inner]) ** 2).sum()) / max(noise, 0.002) ** 2
-        misfit += (shift * step / shift_deviation) ** 2
-        if misfit < best:
-            best, found = misfit, float(moved[PANEL].mean())
-    return found / float(weight.mean())
+    cell = _cell(reference, picture)
+    side = HALF_BODY * reference.width
+    lateral, height = _grid(-side, side, cell, 2), _grid(*HEIGHTS, cell, 3)
+    shown, shown_noise = _resampled(reference, lateral, height, cell)
+    seen, seen_noise = _resampled(picture, lateral, height, cell)
+    line = _line(shown, seen, math.sqrt(seen_noise))
+    if line is None:
+        return None
+    used, ratio, scatter = line
+    count = int(used.sum())
+    power = float((shown[used] ** 2).sum()) - count * shown_noise
+    if power <= 4.0 * math.sqrt(count) * shown_noise or power < count * 1e-4:
+        return None
+    # Noise of the reference flattens the line.
+    ratio *= (power + count * shown_noise) / power
+    detail = math.sqrt(max(scatter**2 - seen_noise - ratio**2 * shown_noise, 0.0))
+    deviation = math.sqrt((seen_noise + ratio**2 * shown_noise + INDEPENDENT * detail**2) / power)
+    lever = abs(float(shown[used].sum())) / power
+    return Fading(ratio, deviation, lever, math.sqrt(power / count / max(seen_noise, 1e-12)), count / used.size)
+
+
+def _line(shown: Floats, seen: Floats, noise: float) -> tuple[NDArray[np.bool_], float, float] | None:
+    """Cells used, slope through the origin and deviation of what is left."""
+    used = np.ones(shown.shape, bool)
+    down, across = np.gradient(shown)
+    change = np.abs(down) + np.abs(across)
+    ratio = scatter = 0.0
+    for _ in range(5):
+        power = float((shown[used] ** 2).sum())
+        if used.sum() < max(LEAST_KEPT * used.size, 6) or power <= 0:
+            return None
+        ratio = float((shown[used] * seen[used]).sum()) / power
+        residual = np.abs(seen - ratio * shown)
+        scatter = max(1.4826 * float(np.median(residual)), noise)
+        kept = residual <= OUTLIER * scatter + abs(ratio) * (OWN_SHARE * np.abs(shown) + EDGE_SHARE * change)
+        if bool((kept == used).all()):
+            break
+        used = kept
+    return used, ratio, scatter

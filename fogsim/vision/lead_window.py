@@ -32,6 +32,9 @@ USUAL_ASIDE = 1.2
 BODY = (0.25, 0.95)
 """Heights between which sides of all vehicles are upright [m]."""
 
+SMALLEST = 4.0
+"""Least width of the widest vehicle for anything to be looked for [px]."""
+
 LEAST_EDGE = 4.5
 """Least step across either side of a vehicle, in standard deviations of the step's noise [-]."""
 
@@ -59,6 +62,31 @@ class LeadWindow:
     column: float
     foot: float
     width: float
+
+
+def lead_region(camera: Camera, distance: float) -> tuple[slice, slice] | None:
+    """Rows and columns of a level image in which a vehicle at a distance can be.
+
+    Parameters
+    ----------
+    camera : Camera
+        The told calibration.
+    distance : float
+        From the camera to the vehicle's rear [m].
+
+    Returns
+    -------
+    tuple of two slices, or None
+        None if it is outside the image, or too small to be seen.
+    """
+    scale = camera.focal_length / distance
+    foot, pitch = camera.horizon_row + camera.row_distance / distance, 0.01 * camera.focal_length
+    middle, aside = camera.principal_point[0], (ASIDE + 1.6) * scale
+    rows = max(math.floor(foot - 2.4 * scale - pitch), 0), min(math.ceil(foot + 0.2 * scale + pitch) + 1, camera.height)
+    cols = max(math.floor(middle - aside), 0), min(math.ceil(middle + aside) + 1, camera.width)
+    if rows[1] - rows[0] < 8 or cols[1] - cols[0] < 16 or foot >= camera.height or WIDTHS[1] * scale < SMALLEST:
+        return None
+    return slice(*rows), slice(*cols)
 
 
 def find_lead(

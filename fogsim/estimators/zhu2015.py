@@ -69,12 +69,13 @@ class Zhu2015:
     without an edge and the region grows beyond the horizon ("no fog"), and in thin fog it ends at the edge of the sky.
     Corrected, the lane lines are fitted to a fraction of a pixel and weighed against the calibration, the fog's own
     gradient draws no edges and stops no growth, and k, A and the horizon are fitted jointly to the rows of the region
-    within the own lane and its neighbours, with an albedo that may wander and the sky's brightness as the prior of A;
-    frames are averaged by their variances. Further errors of the paper: eq. 4 lacks the squares in its Gaussian, eq. 13's sign of θ holds
-    for a camera that looks up, eqs. 15 and 16 keep a tan θ that has cancelled, eqs. 18 to 20 have v₀ for v_h and
-    e^(−k·−kλ/…) for e^(−kλ/(v − v_h)), and the bound on ρ in section 3.2 is the whole diagonal of what is looked at,
-    which limits nothing. The angle that is limited to 10° … 170° is here that of the line to the rows, as the paper
-    words it; its eq. 7 has the normal's, by which upright lines would go and the horizon stay.
+    within the own lane and those neighbours that agree with it, with an albedo that may wander and the sky's
+    brightness as the prior of A; frames are averaged by their variances. Further errors of the paper: eq. 4 lacks the
+    squares in its Gaussian, eqs. 13 and 14 contradict each other (13's sign of θ holds for a camera that looks up),
+    eqs. 18 to 20 have v₀ for v_h and e^(−k·−kλ/…) for e^(−kλ/(v − v_h)), and the bound on ρ in section 3.2 is the
+    whole diagonal of what is looked at, which limits nothing. The angle that is limited to 10° … 170° is here that of
+    the line to the rows, as the paper words it; its eq. 7 has the normal's, by which upright lines would go and the
+    horizon stay.
 
     Luminance is linear in both forms, because Koschmieder's law is. Daytime, flat and straight road, road darker than
     the airlight. With a tracked lead vehicle its part of the road is left out.

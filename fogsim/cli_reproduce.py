@@ -24,7 +24,7 @@ ALL = "all"
 def reproduce_command(
     paper: Annotated[str, typer.Argument(metavar="PAPER|all", help="A paper whose evaluation is run again.")],
     out: Annotated[Path | None, typer.Option(help="Folder for PAPER.png, a picture like the paper's.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Flat records, one a line, in place of the table.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Flat records, one a line, in place of the tables.")] = False,
 ) -> None:
     """Run a paper's evaluation again on FogSim's frames; its figures stand beside ours."""
     from fogsim.reproduce import REPRODUCTIONS  # noqa: PLC0415 - heavy; --help must be quick
@@ -46,11 +46,15 @@ def _show(done: "Reproduction", *, as_json: bool) -> None:
         for record in done.records:
             typer.echo(json.dumps(record, allow_nan=False))
         return
-    heading, *rows = done.table
-    table = Table(*heading, title=done.paper, title_justify="left", box=None, pad_edge=False)
-    for row in rows:
-        table.add_row(*row)
-    _out.print(table)
+    for told in done.told:
+        heading, *rows = told.rows
+        table = Table(*map(escape, heading), box=None, pad_edge=False)
+        for row in rows:
+            table.add_row(*map(escape, row))
+        _out.print(f"[italic]{escape(told.title)}[/]", soft_wrap=True)
+        _out.print(table)
+        if done.tables:
+            _out.print()
     for note in done.notes:
         _out.print(f"- {escape(note)}", soft_wrap=True)
 

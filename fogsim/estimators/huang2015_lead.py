@@ -70,15 +70,29 @@ class Huang2015Lead:
     blur : float
         Standard deviation of the lens' blur beside the pixels' own size [px]. Detail that it takes from far pictures
         would be taken for fog: with 0.7 px that are not told, 120 m come out as some 105 m.
+    spacing : float, optional
+        Change of range between pictures that are kept [m]: 2.5 m, as published 5 m.
     """
 
     method = "huang2015_lead"
 
-    def __init__(self, camera: Camera, *, as_published: bool = False, setback: float = 0.0, blur: float = 0.0) -> None:
+    def __init__(
+        self,
+        camera: Camera,
+        *,
+        as_published: bool = False,
+        setback: float = 0.0,
+        blur: float = 0.0,
+        spacing: float | None = None,
+    ) -> None:
         if not 0.0 <= setback < 20.0:
             raise InputError(f"setback must be 0 … 20 m, got {setback!r}")
         if not 0.0 <= blur <= 10.0:
             raise InputError(f"blur must be 0 … 10 px, got {blur!r}")
+        usual = PUBLISHED_SPACING if as_published else SPACING
+        self._spacing = usual if spacing is None else spacing
+        if not 0.1 <= self._spacing <= 100.0:
+            raise InputError(f"spacing must be 0.1 … 100 m, got {spacing!r}")
         self._blur = blur
         self._camera = camera
         self._as_published = as_published
@@ -97,7 +111,7 @@ class Huang2015Lead:
         return self._tracks
 
     def _new_track(self) -> LeadTrack:
-        return LeadTrack(self._camera, self._setback, PUBLISHED_SPACING if self._as_published else SPACING, self._blur)
+        return LeadTrack(self._camera, self._setback, self._spacing, self._blur)
 
     def update(self, observation: Observation) -> Estimate:
         """Estimate the fog from this and all earlier pictures of the vehicle ahead.
@@ -110,9 +124,10 @@ class Huang2015Lead:
         Returns
         -------
         Estimate
-            Diagnostics: ``distances`` and ``contrasts`` (n,) of the kept pictures [m] and [-] over the nearest,
-            ``window`` (column, foot, width) [px], ``range_change`` [m], and where valid ``confidence_distances`` (m,)
-            [m] and ``confidence`` (m,) [-], the image confidence curve from range 0; or ``reason``.
+            Diagnostics: ``distances``, ``contrasts`` and ``variances`` (n,) of the kept pictures [m], [-] over the
+            nearest and [linear grey levels²], ``window`` (column, foot, width) [px], ``range_change`` [m], and where
+            valid ``confidence_distances`` (m,) [m] and ``confidence`` (m,) [-], the image confidence curve from range
+            0; or ``reason``.
 
         Raises
         ------
@@ -150,10 +165,11 @@ class Huang2015Lead:
         diagnostics: dict[str, object] = {
             "distances": distances,
             "contrasts": np.array([c.contrast for c in found]),
+            "variances": np.array([c.variance for c in found]),
             "window": None if window is None else (window.column, window.foot, window.width),
             "range_change": change,
         }
-        if change < LEAST_CHANGE or distances.size < 3:
+        if change < LEAST_CHANGE or distances.size < (2 if self._as_published else 3):
             return Estimate.invalid(self.method, "the vehicle's range has not changed enough", **diagnostics)
         measured = self._published() if self._as_published else self._corrected()
         if measured is None or not math.isfinite(measured[1]):
@@ -166,9 +182,9 @@ class Huang2015Lead:
     def _published(self) -> tuple[float, float] | None:
         found = [c for c in self._track.comparisons if c.variance > 0]
         table = ratio_table(
-            np.array([c.distance for c in found]), np.array([c.variance for c in found]), PUBLISHED_SPACING
+            np.array([c.distance for c in found]), np.array([c.variance for c in found]), self._spacing
         )
-        if table.ratio.size < 2:
+        if table.ratio.size < 1:
             return None
         extinction, deviation = published_extinction(table)
         return extinction, max(deviation, 1e-6)

@@ -17,6 +17,9 @@ LARGEST_EXTINCTION = 0.09
 GRID = 1801
 """Extinctions that the published search tries."""
 
+RATIO_DEVIATION = 0.03
+"""Least standard deviation of a ratio of variances, be there one or many [-]."""
+
 SLOPE_SHARE = 0.05
 """Standard deviation of a ratio of contrasts that pixels do not show, relative: registration, detail too small [-]."""
 
@@ -87,7 +90,7 @@ class RatioTable:
     Attributes
     ----------
     difference : (n,) float64
-        Far less near range [m], ascending, multiples of the spacing.
+        Far less near range [m], ascending: means of rows that are a spacing apart.
     ratio : (n,) float64
         Far over near variance [-].
     count : (n,) int64
@@ -119,7 +122,7 @@ def ratio_table(distances: Floats, variances: Floats, spacing: float) -> RatioTa
         ratios = ratio[row == step]
         kept = ratios[np.abs(ratios - np.median(ratios)) <= KEPT * np.median(ratios)]
         if kept.size:
-            found.append((step * spacing, float(kept.mean()), kept.size))
+            found.append((float(apart[row == step].mean()), float(kept.mean()), kept.size))
     difference, mean, count = (np.array(column) for column in zip(*found, strict=True)) if found else (np.zeros(0),) * 3
     return RatioTable(difference.astype(np.float64), mean.astype(np.float64), count.astype(np.int64))
 
@@ -137,6 +140,7 @@ def published_extinction(table: RatioTable) -> tuple[float, float]:
     best = int(np.argmin(((model - table.ratio) ** 2).sum(axis=1)))
     slope = -2.0 * table.difference * model[best]
     misfit = float(((model[best] - table.ratio) ** 2).sum()) / max(table.ratio.size - 1, 1)
+    misfit = max(misfit, RATIO_DEVIATION**2)
     return float(tried[best]), math.sqrt(misfit / max(float(slope @ slope), 1e-12))
 
 

@@ -87,7 +87,8 @@ class Huang2015Rough:
         Returns
         -------
         Estimate
-            Diagnostics: ``horizon_row`` and ``inflection_row`` [px]; or ``reason``.
+            Diagnostics: ``horizon_row`` and ``inflection_row`` [px], as published also ``first_extinction``, that
+            before the optimisation [1/m]; or ``reason``.
 
         Raises
         ------
@@ -116,11 +117,12 @@ class Huang2015Rough:
         first = 2.0 * (inflection - horizon) / self._camera.row_distance
         extinction = _optimised(medians, horizon, inflection, first, self._camera)
         # 20 rows place an inflection no better than to a quarter of them.
-        return self._estimate(extinction, 2.0 / self._camera.row_distance * 0.25 * ROWS_APART, horizon)
+        deviation = 2.0 / self._camera.row_distance * 0.25 * ROWS_APART
+        return self._estimate(extinction, deviation, horizon, first_extinction=first)
 
-    def _estimate(self, extinction: float, deviation: float, horizon: float) -> Estimate:
+    def _estimate(self, extinction: float, deviation: float, horizon: float, **more: float) -> Estimate:
         inflection = horizon + 0.5 * extinction * self._camera.row_distance
-        found = {"horizon_row": horizon, "inflection_row": inflection}
+        found = {"horizon_row": horizon, "inflection_row": inflection, **more}
         return Estimate(self.method, extinction, deviation, diagnostics=found)
 
 

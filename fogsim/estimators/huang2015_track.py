@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.estimators.huang2015_comparison import (
+    RANGE_DEVIATION,
     Comparison,
     Picture,
     compared,
@@ -30,7 +31,7 @@ GROWTH, UNSURE = 1.25, 4.0
 MOST_JUMP = 12.0
 """Change of range between frames by more than which the vehicle is another one [m]."""
 
-SIGHTINGS = 48
+SIGHTINGS = 64
 """Pictures of a vehicle that are kept."""
 
 NEARER = 0.9
@@ -124,7 +125,9 @@ class LeadTrack:
         at, by = comparison.regression.placement, prior.placement
         moved = (at.column - by.column) / picture.scale, (at.row - by.row) / picture.scale
         self._remember(expected.column + moved[0], expected.foot + moved[1], distance)
-        if all(abs(distance - kept.sighting.distance) >= self._spacing for kept in self._kept):
+        # Noise of the ranges makes some steps look shorter than they are.
+        least = self._spacing - min(0.25 * self._spacing, 4.0 * RANGE_DEVIATION)
+        if all(abs(distance - kept.sighting.distance) >= least for kept in self._kept):
             found = placed(picture, sighting, at)
             self._keep(found, replace(comparison, variance=found.variance), reference)
 

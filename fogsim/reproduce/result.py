@@ -9,6 +9,26 @@ from numpy.typing import NDArray
 Cell = str | float | bool | None
 
 
+Rows = tuple[tuple[str, ...], ...]
+"""A table as it is told: the headings, then the rows."""
+
+
+@dataclass(frozen=True, slots=True)
+class TitledTable:
+    """One of several tables.
+
+    Attributes
+    ----------
+    title : str
+        What it is, and of which table of the paper.
+    rows : tuple of tuples of str
+        The headings, then the rows; the paper's figure stands beside ours.
+    """
+
+    title: str
+    rows: Rows
+
+
 @dataclass(frozen=True, slots=True)
 class Reproduction:
     """A paper's evaluation on our frames.
@@ -20,15 +40,24 @@ class Reproduction:
     records : tuple of mappings
         One flat record for each case: what was set, what each variant of the method found; None where it cannot tell.
     table : tuple of tuples of str
-        What is told: the headings, then the rows; the paper's figure stands beside ours.
+        What is told: the headings, then the rows; the paper's figure stands beside ours. The first of `tables`, if
+        there are several.
     notes : tuple of str
         What the paper leaves open, and where and why we do not reach it.
     picture : (rows, cols, 3) uint8
         A picture like the paper's.
+    tables : tuple of TitledTable
+        All tables, of a paper that has several.
     """
 
     paper: str
     records: tuple[Mapping[str, Cell], ...]
-    table: tuple[tuple[str, ...], ...]
+    table: Rows
     notes: tuple[str, ...]
     picture: NDArray[np.uint8]
+    tables: tuple[TitledTable, ...] = ()
+
+    @property
+    def told(self) -> tuple[TitledTable, ...]:
+        """All tables, one or several."""
+        return self.tables or (TitledTable(self.paper, self.table),)

@@ -139,21 +139,32 @@ def shrunk(patch: Patch, scale: float) -> Patch:
     """
     if scale >= 1.0:
         return patch
-    column, row = moved(patch.column, scale), moved(patch.row, scale)
-    rows, cols = (np.arange(max(math.floor(size * scale), 1), dtype=np.float64) for size in patch.luminance.shape)
-    down = box_weights(patch.luminance.shape[0], patch.row, rows, row, scale)
-    across = box_weights(patch.luminance.shape[1], patch.column, cols, column, scale)
-    # At the border a large pixel may reach out of the picture.
-    whole = np.maximum(down.sum(axis=1), 1e-9)[:, None] * np.maximum(across.sum(axis=1), 1e-9)
+    # Pixels are means over 1 already; what is left to widen them to 1/scale.
+    half = 0.5 * math.sqrt(scale**-2 - 1.0)
+    luminance = _box_means(_box_means(patch.luminance, scale, half).T, scale, half).T
     return replace(
         patch,
-        luminance=np.asarray(down @ patch.luminance @ across.T / whole),
-        column=column,
-        row=row,
+        luminance=np.ascontiguousarray(luminance),
+        column=moved(patch.column, scale),
+        row=moved(patch.row, scale),
         half_width=patch.half_width * scale,
         half_height=patch.half_height * scale,
         blur=patch.blur * scale,
     )
+
+
+def _box_means(values: Floats, scale: float, half: float) -> Floats:
+    """Means of rows over boxes about the middles of fewer, larger rows, cut off at the border."""
+    total = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
+    middle = (np.arange(max(math.floor(values.shape[0] * scale), 1)) + 0.5) / scale
+    low, high = np.maximum(middle - half, 0.0), np.minimum(middle + half, float(values.shape[0]))
+
+    def upto(edge: Floats) -> Floats:
+        whole = np.minimum(edge.astype(np.int64), values.shape[0] - 1)
+        share = (edge - whole)[:, None]
+        return np.asarray((1.0 - share) * total[whole] + share * total[whole + 1])
+
+    return np.asarray((upto(high) - upto(low)) / (high - low)[:, None])
 
 
 def moved(position: float, scale: float) -> float:

@@ -1,0 +1,218 @@
+"""Accuracy of the estimators that follow the vehicle ahead, over visibilities, exposures, cameras and vehicles.
+
+On a straight road a vehicle drives away from 25 to 90 m; frames are taken every 2.5 m. Each range is drawn once for a
+camera and a vehicle, with the own vehicle's pitch swaying and the vehicle ahead weaving a little, then fogged with each
+visibility and exposed such that the airlight has 120, 200 or 255 levels. The estimators are told the camera without the
+sway, the camera's place behind the bumper, and the radar's noisy range. An error is |V_est − V| / V after the last
+frame, of estimates that are valid and see fog; `bias_pct` is the median of (V_est − V) / V, `coverage` the share of
+90 % intervals of k that hold the truth, `ms` the fastest mean time of a frame. `airlight`, `camera` and `vehicle` are
+"all" in the first records, then each in turn is told apart over visibilities from 50 to 300 m.
+
+    python benchmarks/lead_accuracy.py [--json] [--docs] [--methods …] [--cameras 3] [--vehicles 5] [--step 2.5]
+"""
+
+import argparse
+import json
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fogsim.estimators import make
+from fogsim.render import Renderer
+from fogsim.reproduce.huang2015_chase import FASTER, OWN_SPEED, Followed, drawn, fogged, road
+from fogsim.units import extinction_from_visibility
+from fogsim.values import Camera, Estimate, Frame, LeadMeasurement, Observation, Response
+from fogsim.values.estimate import NORMAL_90_PERCENT
+
+CAMERAS = {
+    "688 px, 52°": Camera(688, 515, 700.0, (343.5, 257.0), 1.3, math.radians(1.0)),
+    "640 px, 58°": Camera(640, 480, 577.0, (319.5, 239.5), 1.38, math.radians(2.0), response=Response.SRGB),
+    "1280 px, 40°": Camera(1280, 720, 1760.0, (639.5, 359.5), 1.6, math.radians(2.0), response=Response.SRGB),
+    "1024 px, 54°": Camera(1024, 640, 1000.0, (500.0, 330.0), 1.5, math.radians(1.5), response=Response.GAMMA),
+}
+VEHICLES = {
+    "red hatchback": Followed("car", 4.05, 1.78, 1.47, (0.45, 0.05, 0.04)),
+    "black saloon": Followed("car", 4.75, 1.80, 1.44, (0.05, 0.05, 0.06)),
+    "white SUV": Followed("car", 4.60, 1.90, 1.70, (0.70, 0.70, 0.70)),
+    "white van": Followed("van", 5.90, 2.00, 2.40, (0.75, 0.75, 0.75)),
+    "blue lorry": Followed("truck", 16.5, 2.55, 4.00, (0.10, 0.20, 0.50)),
+}
+VISIBILITIES = (30.0, 50.0, 100.0, 200.0, 300.0, 500.0, 800.0)
+AIRLIGHT_LEVELS = (120.0, 200.0, 255.0)
+METHODS: dict[str, tuple[str, dict[str, Any]]] = {
+    "huang2015_lead, published": ("huang2015_lead", {"as_published": True}),
+    "huang2015_lead": ("huang2015_lead", {}),
+    "huang2015, published": ("huang2015", {"as_published": True}),
+    "huang2015": ("huang2015", {}),
+    "lead_contrast": ("lead_contrast", {}),
+}
+NEAREST, FARTHEST = 25.0, 90.0
+SETBACK = 1.7
+"""From the own bumper, where ranges begin, back to the camera [m]."""
+
+MIDDLING = (50.0, 300.0)
+DOCS = Path(__file__).resolve().parent.parent / "docs" / "estimators.md"
+MARK, END = "<!-- table: lead accuracy -->", "<!-- end of lead accuracy -->"
+
+
+@dataclass(frozen=True, slots=True)
+class Fog:
+    """One fog and exposure, and the estimators that see it."""
+
+    visibility: float
+    levels: float
+    estimators: dict[str, Any]
+    latest: dict[str, Estimate]
+    seconds: dict[str, float]
+
+
+def fogs(arguments: argparse.Namespace, camera: Camera, first: int) -> list[Fog]:
+    """Every visibility, at exposures that change from one to the next."""
+    found = []
+    for i, visibility in enumerate(VISIBILITIES):
+        estimators = {}
+        for name in arguments.methods:
+            method, options = METHODS[name]
+            estimators[name] = make(method, camera, setback=SETBACK, **options)
+        levels = AIRLIGHT_LEVELS[(first + i) % len(AIRLIGHT_LEVELS)]
+        found.append(Fog(visibility, levels, estimators, {}, dict.fromkeys(estimators, 0.0)))
+    return found
+
+
+def follow(
+    arguments: argparse.Namespace, renderer: Renderer, camera: Camera, vehicle: Followed, seen: list[Fog], seed: int
+) -> int:
+    """Let a vehicle drive away in every fog; the number of frames."""
+    rng = np.random.default_rng(seed)
+    ranges = np.arange(NEAREST, FARTHEST + 1e-9, arguments.step)
+    left, begin = rng.normal(0.0, 0.3), rng.uniform(0.0, 100.0)
+    for ahead in ranges:
+        now = (ahead - NEAREST) / FASTER
+        sway = math.radians(arguments.sway * rng.normal())
+        weaving = replace(vehicle, left=left + 0.05 * rng.normal())
+        scene = drawn(
+            renderer, replace(camera, pitch=camera.pitch + sway), weaving, float(ahead), begin + now * OWN_SPEED
+        )
+        gap = float(ahead) - SETBACK + arguments.range_noise * float(rng.normal())
+        for fog in seen:
+            frame = Frame(now, fogged(scene, fog.visibility, fog.levels, rng), camera)
+            look(fog, Observation(frame, OWN_SPEED, LeadMeasurement(gap, FASTER + 0.1 * float(rng.normal()))))
+    return len(ranges)
+
+
+def look(fog: Fog, seen: Observation) -> None:
+    """Show a frame to every estimator."""
+    for name, estimator in fog.estimators.items():
+        started = time.perf_counter()
+        fog.latest[name] = estimator.update(seen)
+        fog.seconds[name] += time.perf_counter() - started
+
+
+def sequences(arguments: argparse.Namespace) -> Iterator[dict[str, Any]]:
+    """What every method found at the end of every sequence."""
+    with road() as renderer:
+        for i, (camera_name, camera) in enumerate(list(CAMERAS.items())[: arguments.cameras]):
+            for j, (vehicle_name, vehicle) in enumerate(list(VEHICLES.items())[: arguments.vehicles]):
+                seen = fogs(arguments, camera, i + j)
+                frames = follow(arguments, renderer, camera, vehicle, seen, arguments.seed + 100 * i + j)
+                for fog in seen:
+                    for name, estimate in fog.latest.items():
+                        told = {"camera": camera_name, "vehicle": vehicle_name, "airlight": f"{fog.levels:g}"}
+                        yield {"method": name, **told, **outcome(fog, estimate, fog.seconds[name] / frames)}
+
+
+def outcome(fog: Fog, estimate: Estimate, seconds: float) -> dict[str, Any]:
+    """One sequence's error."""
+    truth = extinction_from_visibility(fog.visibility)
+    sees = estimate.valid and estimate.extinction > 0
+    return {
+        "visibility": fog.visibility,
+        "valid": estimate.valid,
+        "error": 100.0 * (estimate.visibility / fog.visibility - 1.0) if sees else None,
+        "covered": abs(estimate.extinction - truth) <= NORMAL_90_PERCENT * estimate.standard_deviation,
+        "ms": 1e3 * seconds,
+    }
+
+
+def record(rows: list[dict[str, Any]], **told: str) -> dict[str, Any]:
+    """Flat record of a group of sequences."""
+    errors = [row["error"] for row in rows if row["error"] is not None]
+    valid = [row for row in rows if row["valid"]]
+    return {
+        "method": rows[0]["method"],
+        "airlight": "all",
+        "camera": "all",
+        "vehicle": "all",
+        **told,
+        "sequences": len(rows),
+        "median_pct": round(float(np.median(np.abs(errors))), 2) if errors else None,
+        "p95_pct": round(float(np.percentile(np.abs(errors), 95)), 2) if errors else None,
+        "bias_pct": round(float(np.median(errors)), 2) if errors else None,
+        "valid_share": round(len(valid) / len(rows), 3),
+        "coverage": round(float(np.mean([row["covered"] for row in valid])), 3) if valid else None,
+        "ms": round(min(row["ms"] for row in rows), 2),
+    }
+
+
+def measure(arguments: argparse.Namespace) -> list[dict[str, Any]]:
+    """All records."""
+    rows = list(sequences(arguments))
+    records = []
+    for name in arguments.methods:
+        for visibility in VISIBILITIES:
+            group = [r for r in rows if r["method"] == name and r["visibility"] == visibility]
+            records.append(record(group, visibility=f"{visibility:g}"))
+    low, high = MIDDLING
+    for key in ("airlight", "camera", "vehicle"):
+        for name in arguments.methods:
+            inside = [r for r in rows if r["method"] == name and low <= r["visibility"] <= high]
+            for value in dict.fromkeys(r[key] for r in inside):
+                group = [r for r in inside if r[key] == value]
+                records.append(record(group, visibility=f"{low:g}-{high:g}", **{key: value}))
+    return records
+
+
+def table(records: list[dict[str, Any]]) -> str:
+    """Records as a table of the docs."""
+    lines = ["| " + " | ".join(records[0]) + " |", "|" + "---|" * len(records[0])]
+    lines += ["| " + " | ".join("–" if v is None else str(v) for v in r.values()) + " |" for r in records]
+    return "\n".join(lines)
+
+
+def write_docs(records: list[dict[str, Any]]) -> None:
+    """Put the tables into the docs: of all visibilities, then of what else changes."""
+    text = DOCS.read_text(encoding="utf-8")
+    before, rest = text.split(MARK, 1)
+    after = rest.split(END, 1)[1]
+    parts = ("airlight", "camera", "vehicle")
+    whole = [{k: v for k, v in r.items() if k not in parts} for r in records if all(r[p] == "all" for p in parts)]
+    apart = [r for r in records if any(r[p] != "all" for p in parts) and "published" not in r["method"]]
+    DOCS.write_text(f"{before}{MARK}\n\n{table(whole)}\n\n{table(apart)}\n\n{END}{after}", encoding="utf-8")
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", action="store_true", help="print a list of flat records")
+    parser.add_argument("--docs", action="store_true", help="write the tables of docs/estimators.md")
+    parser.add_argument("--methods", nargs="+", default=list(METHODS), choices=list(METHODS), help="what is measured")
+    parser.add_argument("--cameras", type=int, default=3, help="how many of the cameras")
+    parser.add_argument("--vehicles", type=int, default=len(VEHICLES), help="how many of the vehicles")
+    parser.add_argument("--step", type=float, default=2.5, help="change of range between frames [m]")
+    parser.add_argument("--range-noise", type=float, default=0.25, help="deviation of the told range [m]")
+    parser.add_argument("--sway", type=float, default=0.07, help="deviation of the own vehicle's pitch [deg]")
+    parser.add_argument("--seed", type=int, default=1)
+    arguments = parser.parse_args()
+    records = measure(arguments)
+    if arguments.docs:
+        write_docs(records)
+    print(json.dumps(records, indent=2) if arguments.json else table(records))
+
+
+if __name__ == "__main__":
+    main()

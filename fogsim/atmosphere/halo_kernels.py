@@ -225,9 +225,10 @@ def add_cores(
                 place[n] = min(np.sqrt(height + across * across) * scale, last)
             for n in range(size):
                 entry = np.uint32(place[n])
-                light = profile[entry] + (profile[entry + _NEXT] - profile[entry]) * (place[n] - np.float32(entry))
+                place[n] = profile[entry] + (profile[entry + _NEXT] - profile[entry]) * (place[n] - np.float32(entry))
+            for n in range(size):
                 u = begin + n
-                light *= min(_ONE, distance[v, u] * near)
+                light = place[n] * min(_ONE, distance[v, u] * near)
                 out[v, _THREE * u] += light * red
                 out[v, _THREE * u + _FIRST] += light * green
                 out[v, _THREE * u + _SECOND] += light * blue

@@ -191,7 +191,7 @@ def _any_lit(response: NDArray[np.float32]) -> bool:
 
 
 @kernel
-def add_own_light(  # noqa: C901 - one loop: handing its many rows on costs more than their work on a small image
+def add_own_light(  # noqa: C901, PLR0912 - one loop: handing its many rows on costs more than their work on a small image
     distance: NDArray[np.float32],
     response: NDArray[np.float32],
     ray_map: NDArray[np.float32],
@@ -235,6 +235,9 @@ def add_own_light(  # noqa: C901 - one loop: handing its many rows on costs more
     for u in range(columns):
         pixel[u] = np.float32(u)
     _column_places(n, pixel, columns, grid_columns - 1, int(nodes), left, aside)
+    if step == 1:
+        # Every pixel is chosen, so that what is found for the chosen ones is every pixel's.
+        chosen, scattered, light = length, few_scattered, few_light
     last = np.float32(nodes - 1)
     for v in range(distance.shape[0]):
         lit = surfaces and _any_lit(response[v])
@@ -242,8 +245,8 @@ def add_own_light(  # noqa: C901 - one loop: handing its many rows on costs more
             continue
         for u in range(columns):
             length[u] = min(distance[v, u], np.float32(ENDLESS))
-        n = choose_pixels(length, step, inverse, bent, pixel, chosen, first, even)
         if step > 1:
+            n = choose_pixels(length, step, inverse, bent, pixel, chosen, first, even)
             _column_places(n, pixel, columns, grid_columns - 1, int(nodes), left, aside)
         for u in range(n):
             node[u] = min(last * chosen[u] / (chosen[u] + fold), last - np.float32(1e-3))
@@ -252,7 +255,8 @@ def add_own_light(  # noqa: C901 - one loop: handing its many rows on costs more
         if not clear:
             _between(veil[upper], veil[upper + 1], place - np.float32(upper), profiles)
             _read_row(n, profiles, nodes, left, aside, node, few_scattered)
-            spread(few_scattered, step, first, even, scattered)
+            if step > 1:
+                spread(few_scattered, step, first, even, scattered)
             three_times(scattered, veiled)
         if lit:
             if not uniform:
@@ -260,6 +264,7 @@ def add_own_light(  # noqa: C901 - one loop: handing its many rows on costs more
                 _read_row(n, profiles, nodes, left, aside, node, mean)
             _row_points(n, ray_map, v, pixel, chosen, points[0], points[1], points[2])
             _light_row(n, points, chosen, mean, lamps, tables, scratch, power, few_light)
-            spread(few_light, step, first, even, light)
+            if step > 1:
+                spread(few_light, step, first, even, light)
             three_times(light, shone)
         _add_row(channels, veiled, shone, response[v] if lit else no_response, out[v])

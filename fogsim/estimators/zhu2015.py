@@ -66,7 +66,8 @@ class Zhu2015:
     V = 3 λ / (2 (v_i − v_h)), four classes, and a state that changes after three equal ones.
 
     As published the inflection is where the region ends, which cannot work: in dense fog the road fades into the sky
-    without an edge and the region grows beyond the horizon ("no fog"), and in thin fog it ends at the edge of the sky.
+    without an edge and the region grows beyond the horizon ("no fog"), and in thin fog, which is steeper from row to
+    row, it stops far below the inflection; a smaller G_max makes all fog dense (`fogsim reproduce zhu2015`).
     Corrected, the lane lines are fitted to a fraction of a pixel and weighed against the calibration, the fog's own
     gradient draws no edges and stops no growth, and k, A and the horizon are fitted jointly to the rows of the region
     within the own lane and those neighbours that agree with it, with an albedo that may wander and the sky's

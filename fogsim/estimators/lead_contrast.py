@@ -56,12 +56,12 @@ WORST = 0.4
 SURELY = 2.5
 """Standard deviations by which the contrast must grow with the range for it to be no vehicle's [-]."""
 
-CLEAR = OPTICAL_DEPTH_AT_VISIBILITY / 400.0
+CLEAR = OPTICAL_DEPTH_AT_VISIBILITY / 500.0
 """Extinction that an unsure estimate must surely be below to say "little fog" [1/m]."""
 
 
 class LeadContrast:
-    """Contrast of the tracked vehicle ahead to the sky against its range (Duntley's law, c = C e^(−kd)).
+    """Mean contrast of the tracked vehicle ahead to the sky against its range (Duntley's law, c = C e^(−kd)).
 
     The range of the sensor says where to look; edges and symmetry show the rear, car or motorcycle, and from then on it
     is placed by its likeness to the nearest picture. A picture's contrast over that one's is a line through the

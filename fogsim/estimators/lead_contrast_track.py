@@ -12,6 +12,10 @@ from fogsim.vision.road_image import CannotTellError
 SPACING = 1.0
 """Change of range that makes a new picture worth keeping [m]; between, a picture only shows where the vehicle is."""
 
+CHANGED, REFRESHED = 0.1, 10.0
+"""Relative change of the contrast at a range from which the fog is another one and the track begins anew [-], and age
+from which a sight gives way to another from its range [s]."""
+
 NEARER = 0.85
 """A vehicle that has come this much nearer than its reference picture, relative to that, becomes the reference [-]."""
 
@@ -137,11 +141,30 @@ class ContrastTrack:
         if sight is None:
             sight = self._begun(scene, distance, time)
         self._aside = scene.aside(sight.picture)
-        if all(abs(distance - known.distance) >= SPACING for known in self.sights):
-            self.sights.append(sight)
+        self._keep(sight)
         if self.reference is None or sight.depth < NEARER * self.reference.depth:
             self._compare_anew(sight)
         return sight
+
+    def _keep(self, sight: Sight) -> None:
+        """Keep a sight from a new range; one from a known range tells whether fog has changed, or replaces it."""
+        known = min(self.sights, key=lambda s: abs(s.distance - sight.distance), default=None)
+        if known is None or abs(known.distance - sight.distance) >= SPACING:
+            self.sights.append(sight)
+            return
+        noise = math.hypot(known.fading.deviation, sight.fading.deviation)
+        if abs(sight.fading.ratio - known.fading.ratio) > CHANGED * known.fading.ratio + 5.0 * noise:
+            self.sights.clear()
+            self.sights.append(sight)
+            self._compare_anew(sight)
+        elif sight.time - known.time > REFRESHED and known.picture is not self._reference_picture:
+            rest = [s for s in self.sights if s is not known]
+            self.sights.clear()
+            self.sights.extend([*rest, sight])
+
+    @property
+    def _reference_picture(self) -> LeadPicture | None:
+        return None if self.reference is None else self.reference.picture
 
     def _begun(self, scene: LeadScene, distance: float, time: float) -> Sight:
         """Find a vehicle that has not been seen before."""

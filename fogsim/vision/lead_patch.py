@@ -114,7 +114,7 @@ def _cell(one: LeadPicture, other: LeadPicture) -> float:
 
 def _grid(low: float, high: float, cell: float, least: int) -> Floats:
     count = max(round((high - low) / cell), least)
-    return 0.5 * (low + high) + cell * (np.arange(count) - 0.5 * (count - 1))
+    return np.asarray(0.5 * (low + high) + cell * (np.arange(count) - 0.5 * (count - 1)), np.float64)
 
 
 def placed(

@@ -193,6 +193,17 @@ def test_no_change_of_range_is_no_answer():
     assert found.diagnostics["reason"]
 
 
+def test_fog_that_thickens_while_the_range_stays_ends_the_track():
+    before = list(drive(300, away(RANGES[:8]), 9))
+    estimator = make("lead_contrast", CAMERA)
+    assert [estimator.update(observation) for observation in before][-1].valid
+    for i, visibility in enumerate((280, 240, 200, 160, 130, 110, 90, 80)):
+        image = paint(CAMERA, (Rear(60.0),), visibility, 500 + i)
+        lead = LeadMeasurement(60.0 - SETBACK, 0.0)
+        found = estimator.update(Observation(Frame(8.0 + i, image, CAMERA), lead=lead))
+    assert not found.valid
+
+
 def boards():
     v, u = np.mgrid[: CAMERA.height, : CAMERA.width]
     rng = np.random.default_rng(0)

@@ -6,65 +6,16 @@ pixel, their sum is 1/z, and corners may lie behind the camera (Olano & Greer, "
 Homogeneous Coordinates", 1997).
 """
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fogsim.jit import kernel
+from fogsim.render.cpu.selection import Array, Index, Triangles, Wide, Work, project, set_up, sift
 
 _SMALL = 64  # boxes of no more pixels are looked at before their triangle is drawn
 _LANES = 8
 _EMPTY = 0xFFFFFFFF  # nothing, infinitely far away
-_SLACK = 1e-3  # by which boxes are widened, since corners are projected with 32 bits [px]
-
-Array = NDArray[np.float32]
-Wide = NDArray[np.float64]
-Index = NDArray[np.int64]
-
-
-class Triangles(NamedTuple):
-    """All meshes, as rasterising wants them.
-
-    Attributes
-    ----------
-    positions : (3, n) float32
-        x, y and z of all vertices [m].
-    faces : (m, 3) uint32
-        Vertices of each triangle, numbered within its mesh.
-    first_vertex, first_face : (k + 1,) int64
-        Where those of each mesh begin.
-    """
-
-    positions: Array
-    faces: NDArray[np.uint32]
-    first_vertex: Index
-    first_face: Index
-
-
-class Work(NamedTuple):
-    """Memory for some copies at a time, so few that it stays near the processor.
-
-    Attributes
-    ----------
-    corners : (5, n) float32
-        Vertices: x, y, z in camera axes [m], then column and row [px], NaN before the near plane.
-    points : (m, 9) float32
-        Of each triangle that may cover a pixel, the corners in camera axes [m].
-    box : (m, 4) int32
-        Its first and last row and column.
-    vertex : (m, 3) uint32
-        Where its vertices are among the corners.
-    slot : (m,) int32
-        Its slot.
-    """
-
-    corners: Array
-    points: Array
-    box: NDArray[np.int32]
-    vertex: NDArray[np.uint32]
-    slot: NDArray[np.int32]
-
 
 Point = tuple[float, float, float]
 Edges = tuple[float, float, float, float, float, float, float, float, float, float, float, float]
@@ -123,142 +74,11 @@ def rasterise(
             if vertices > work.corners.shape[1] or faces > len(work.points):
                 break
             end += 1
-        _project(triangles, mesh, record, begin, end, axes, lens, near, work.corners)
-        count = _sift(triangles, mesh, first, begin, end, (top, bottom, columns), work)
-        count = _set_up(count, lens, near, (top, bottom, columns), work)
+        project(triangles, mesh, record, begin, end, axes, lens, near, work.corners)
+        count = sift(triangles, mesh, first, begin, end, (top, bottom, columns), work)
+        count = set_up(count, lens, near, (top, bottom, columns), work)
         _fill(work, count, lens, near, picture)
         begin = end
-
-
-@kernel
-def _project(
-    triangles: Triangles,
-    mesh: Index,
-    record: Array,
-    begin: int,
-    end: int,
-    axes: Wide,
-    lens: Wide,
-    near: float,
-    corners: Array,
-) -> None:
-    """Vertices of copies one after another; one loop for each number, since each alone runs in vector registers."""
-    positions, first_vertex = triangles.positions, triangles.first_vertex
-    focal, nearest, nothing = np.float32(lens[0]), np.float32(near), np.float32(np.nan)
-    base = 0
-    for copy in range(begin, end):
-        start = first_vertex[mesh[copy]]
-        count = first_vertex[mesh[copy] + 1] - start
-        for row in range(3):
-            x, y, z = axes[row, 0], axes[row, 1], axes[row, 2]
-            a = np.float32(x * record[copy, 0] + y * record[copy, 4] + z * record[copy, 8])
-            b = np.float32(x * record[copy, 1] + y * record[copy, 5] + z * record[copy, 9])
-            c = np.float32(x * record[copy, 2] + y * record[copy, 6] + z * record[copy, 10])
-            d = np.float32(x * record[copy, 3] + y * record[copy, 7] + z * record[copy, 11])
-            for i in range(np.uint64(count)):
-                k = np.uint64(start) + i
-                corners[row, np.uint64(base) + i] = a * positions[0, k] + b * positions[1, k] + c * positions[2, k] + d
-        for row in range(2):
-            middle = np.float32(lens[1 + row])
-            for i in range(np.uint64(base), np.uint64(base + count)):
-                z = corners[2, i]
-                place = focal * corners[row, i] / z + middle
-                corners[3 + row, i] = place if z > nearest else nothing
-        base += count
-
-
-@kernel
-def _sift(
-    triangles: Triangles, mesh: Index, first: Index, begin: int, end: int, size: tuple[int, int, int], work: Work
-) -> int:
-    """Triangles of copies whose boxes may hold the centre of any pixel, with vertices and slots; their count.
-
-    Every triangle is written down, and by the next one again unless it is kept: which are is hard to foresee, and so
-    costs a processor that guesses more than to write.
-    """
-    faces, first_vertex, first_face = triangles.faces, triangles.first_vertex, triangles.first_face
-    corners, vertex, slot = work.corners, work.vertex, work.slot
-    first_row, last_row, last_column = np.float32(size[0]), np.float32(size[1] - 1), np.float32(size[2] - 1)
-    zero, slack = np.float32(0.0), np.float32(_SLACK)
-    count, base = np.uint64(0), np.uint32(0)
-    for copy in range(begin, end):
-        start = np.uint64(first_face[mesh[copy]])
-        for own in range(np.uint64(first_face[mesh[copy] + 1]) - start):
-            face = start + own
-            i, j, k = faces[face, 0] + base, faces[face, 1] + base, faces[face, 2] + base
-            a, b, c = corners[3, i], corners[3, j], corners[3, k]
-            left, right = np.ceil(_least(a, b, c) - slack), np.floor(_greatest(a, b, c) + slack)
-            whole = a + b + c
-            a, b, c = corners[4, i], corners[4, j], corners[4, k]
-            top, bottom = np.ceil(_least(a, b, c) - slack), np.floor(_greatest(a, b, c) + slack)
-            empty = (left > right) | (top > bottom) | (right < zero) | (left > last_column)
-            empty |= (bottom < first_row) | (top > last_row)
-            vertex[count, 0], vertex[count, 1], vertex[count, 2] = i, j, k
-            slot[count] = np.int32(first[copy]) + np.int32(own)
-            # Where a corner lies before the near plane nothing is known yet.
-            count += np.uint64(not (empty & (not np.isnan(whole))))
-        base += np.uint32(first_vertex[mesh[copy] + 1] - first_vertex[mesh[copy]])
-    return np.int64(count)
-
-
-@kernel
-def _least(a: np.float32, b: np.float32, c: np.float32) -> np.float32:
-    low = a if a < b else b
-    return low if low < c else c
-
-
-@kernel
-def _greatest(a: np.float32, b: np.float32, c: np.float32) -> np.float32:
-    high = a if a > b else b
-    return high if high > c else c
-
-
-@kernel
-def _set_up(sifted: int, lens: Wide, near: float, size: tuple[int, int, int], work: Work) -> int:
-    """Boxes and corners of sifted triangles, less those before the near plane; their count."""
-    corners, points, box, vertex, slot = work.corners, work.points, work.box, work.vertex, work.slot
-    first_row, last_row, last_column = float(size[0]), size[1] - 1.0, size[2] - 1.0
-    focal, u0, v0 = lens[0], lens[1], lens[2]
-    count, slack = np.uint64(0), np.float32(_SLACK)
-    for t in range(np.uint64(sifted)):
-        i, j, k = vertex[t, 0], vertex[t, 1], vertex[t, 2]
-        a, b, c = corners[3, i], corners[3, j], corners[3, k]
-        if np.isnan(a + b + c):
-            z0, z1, z2 = np.float64(corners[2, i]), np.float64(corners[2, j]), np.float64(corners[2, k])
-            if max(z0, z1, z2) <= near:
-                continue
-            left, right = _extent(corners[0, i], corners[0, j], corners[0, k], z0, z1, z2, focal, u0, near)
-            top, bottom = _extent(corners[1, i], corners[1, j], corners[1, k], z0, z1, z2, focal, v0, near)
-            if top > bottom or right < 0 or bottom < first_row or left > last_column or top > last_row:
-                continue
-        else:
-            left, right = np.ceil(_least(a, b, c) - slack), np.floor(_greatest(a, b, c) + slack)
-            a, b, c = corners[4, i], corners[4, j], corners[4, k]
-            top, bottom = np.ceil(_least(a, b, c) - slack), np.floor(_greatest(a, b, c) + slack)
-        box[count, 0], box[count, 1] = np.int32(max(top, first_row)), np.int32(min(bottom, last_row))
-        box[count, 2], box[count, 3] = np.int32(max(left, 0.0)), np.int32(min(right, last_column))
-        for row in range(3):
-            points[count, row] = corners[row, i]
-            points[count, 3 + row] = corners[row, j]
-            points[count, 6 + row] = corners[row, k]
-        slot[count] = slot[t]
-        count += np.uint64(1)
-    return np.int64(count)
-
-
-@kernel
-def _extent(
-    x0: float, x1: float, x2: float, z0: float, z1: float, z2: float, focal: float, middle: float, near: float
-) -> tuple[float, float]:
-    """First and last column or row of that part of a triangle which lies beyond the near plane."""
-    low, high = np.inf, -np.inf
-    for here, there, z, other in ((x0, x1, z0, z1), (x1, x2, z1, z2), (x2, x0, z2, z0)):
-        if z > near:
-            low, high = min(low, here / z), max(high, here / z)
-        if (z > near) != (other > near):
-            at = (here + (near - z) / (other - z) * (there - here)) / near
-            low, high = min(low, at), max(high, at)
-    return np.ceil(focal * low + middle - _SLACK), np.floor(focal * high + middle + _SLACK)
 
 
 @kernel

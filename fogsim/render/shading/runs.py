@@ -55,7 +55,7 @@ def find_runs(
                     surfaces += 1
                 split: Any = end
             else:
-                surface, split = _background(v, begin, end, rays, terrain)
+                surface, split = _background(v, int(begin), int(end), rays, terrain)
             run[count, 0], run[count, 1], run[count, 2], run[count, 3] = v, begin, split, surface
             count += 1
             if split < end:

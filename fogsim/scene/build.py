@@ -1,6 +1,6 @@
 """The scene that stands still, from a network and its signs."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,9 +14,9 @@ from fogsim.scene.edges import Edge, edge_meshes, guard_rail, lane_edge, runs
 from fogsim.scene.houses import house_places, house_shapes, houses, shapes_in_use
 from fogsim.scene.junctions import Areas, area_mesh, free_borders, walkable
 from fogsim.scene.lane_index import LaneIndex
-from fogsim.scene.polyline import cleaned, parallel
+from fogsim.scene.polyline import Points, cleaned, parallel, refined
 from fogsim.scene.relief import Relief
-from fogsim.scene.road import FAST, footway_mesh, free_edges, lane_mesh, terrain
+from fogsim.scene.road import FAST, LONGEST, footway_mesh, free_edges, lane_mesh, terrain
 from fogsim.scene.roadside import placed, post_shapes, stations, trees
 from fogsim.scene.signs import gantries, gantry_mesh, sign_batches, sign_shapes
 from fogsim.scene.solids import merge
@@ -26,6 +26,9 @@ from fogsim.values.road import Lane, LaneKind, RoadNetwork, SignMap
 from fogsim.values.scene import Batch, Mesh, Scene
 
 _RAIL_BEHIND_SHOULDER = 0.5  # [m]
+_LOOK = 1.0  # whether a road lies across a footway is looked at every so many metres
+_ASTRAY = 0.3  # footways may be so much on a road [m]
+_STICKING_OUT = 0.4  # lanes may stick out of their junction by so much [m]
 _POST_SPACING = 4.0  # of guard rails [m]
 _DELINEATOR_SPACING = 50.0  # [m]
 
@@ -60,10 +63,13 @@ def build_scene(network: RoadNetwork, signs: SignMap, rng: np.random.Generator, 
         raise InputError(f"a scene needs at least one lane with a length, got {len(network.lanes)} lanes without")
     index, relief = LaneIndex(lanes), Relief(lanes)
     areas = Areas(network.areas)
-    # Lanes across a junction show only where its area does not reach.
-    lanes = [lane for lane in lanes if lane.kind is not LaneKind.JUNCTION or not areas.cover(lane.centreline)]
+    # Lanes across a junction show only where its area does not reach; some stick out of it in bends.
+    across = [lane for lane in lanes if lane.kind is LaneKind.JUNCTION and areas.cover(lane.centreline)]
+    bulging = [lane for lane in across if not areas.cover(_sides(lane))]
+    covered = {lane.lane_id for lane in across}
+    lanes = [lane for lane in lanes if lane.lane_id not in covered]
     borders = _borders(network, lanes, index)
-    pavement, furniture, posts = _pavement(network, lanes, driven), _Furniture(index), list[Batch]()
+    pavement, furniture, posts = _pavement(network, [*lanes, *bulging], driven), _Furniture(index), list[Batch]()
     for lane, edge in borders:
         pavement += edge_meshes(edge, relief, index)
         if lane is not None and lane.speed_limit >= FAST:
@@ -78,12 +84,18 @@ def build_scene(network: RoadNetwork, signs: SignMap, rng: np.random.Generator, 
     edges = [edge for lane, edge in borders if lane is not None]
     if street_lamps:
         shapes |= street_lamp_shapes()
-        posts += lamp_posts(edges)
+        posts += lamp_posts(edges, index)
     built = houses(edges, index, relief, rng)
     shapes |= shapes_in_use(house_shapes(), built)
     growing = trees([(edge.side, edge.line) for edge in edges], index, house_places(built), shapes, relief, rng)
     scenery = _joined([*posts, *sign_batches(signs.signs, hanging, relief), *built, *growing])
     return Scene(ground=merge(parts if land is None else [*parts, land]), shapes=shapes, scenery=scenery)
+
+
+def _sides(lane: Lane) -> Points:
+    """Both sides of a lane but for what may well stick out of a junction."""
+    line, half = cleaned(lane.centreline), max(lane.width / 2 - _STICKING_OUT, 0.0)
+    return np.concatenate((parallel(line, half), parallel(line, -half)))
 
 
 def _pavement(network: RoadNetwork, lanes: Sequence[Lane], driven: Sequence[Lane]) -> list[Mesh]:
@@ -94,10 +106,21 @@ def _pavement(network: RoadNetwork, lanes: Sequence[Lane], driven: Sequence[Lane
     paved = [area_mesh(area) for area in walkable(network.areas, driven)]
     return [
         *(lane_mesh(lane, chainage) for lane in seen),
-        *(footway_mesh(cleaned(lane.centreline), (-lane.width / 2, lane.width / 2)) for lane in footways),
+        *(footway_mesh(line, (-half, half)) for line, half in _kept_off(footways, LaneIndex(driven))),
         *(area for area in paved if area is not None),
         *cross_lines(lanes),
     ]
+
+
+def _kept_off(footways: Sequence[Lane], driven: LaneIndex) -> Iterator[tuple[Points, float]]:
+    """Stretches of footways where no road lies across them, each with half its width [m]."""
+    for lane in footways:
+        line, half = refined(cleaned(lane.centreline), LONGEST), lane.width / 2
+        least = min(half, 0.8) - _ASTRAY
+        if np.any(driven.clearance(refined(line, _LOOK), same_level=2.5) < least):
+            line = refined(line, _LOOK)
+        for start, end in runs(driven.clearance(line, same_level=2.5) >= least):
+            yield line[start:end], half
 
 
 def _borders(network: RoadNetwork, lanes: Sequence[Lane], index: LaneIndex) -> list[tuple[Lane | None, Edge]]:
@@ -114,7 +137,7 @@ def _borders(network: RoadNetwork, lanes: Sequence[Lane], index: LaneIndex) -> l
     leading = [lane for lane in lanes if lane.kind in {LaneKind.CARRIAGEWAY, LaneKind.FOOTWAY}]
     junctions = [area for area in network.areas if area.kind is LaneKind.JUNCTION]
     if junctions and leading:
-        found += [(None, edge) for edge in free_borders(junctions, leading)]
+        found += [(None, edge) for edge in free_borders(junctions, leading, index)]
     return found
 
 

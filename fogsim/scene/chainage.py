@@ -45,6 +45,10 @@ class Chainage:
             return np.asarray(_DASH - self._offset[other] - project(points, self._reference[other]))
         return self._offset[lane.edge_id] + project(points, self._reference[lane.edge_id])
 
+    def follows(self, lane: Lane) -> bool:
+        """Tell whether the lane is measured along the other direction of its road."""
+        return lane.edge_id in self._other
+
 
 def _key(point: NDArray[np.float64]) -> tuple[int, int, int]:
     column, row, level = np.round(np.asarray(point) / (0.5, 0.5, 2.0)).astype(int).tolist()

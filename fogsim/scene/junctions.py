@@ -75,7 +75,7 @@ def _counterclockwise(area: PavedArea) -> Points:
     return outline if _area(outline) >= 0 else outline[::-1]
 
 
-def free_borders(areas: Sequence[PavedArea], lanes: Sequence[Lane]) -> Iterator[Edge]:
+def free_borders(areas: Sequence[PavedArea], lanes: Sequence[Lane], everything: LaneIndex) -> Iterator[Edge]:
     """Parts of the borders of junctions where no road leads on.
 
     Parameters
@@ -84,13 +84,15 @@ def free_borders(areas: Sequence[PavedArea], lanes: Sequence[Lane]) -> Iterator[
         The junctions.
     lanes : sequence of Lane
         All lanes of carriageways and footways, those across junctions left out.
+    everything : LaneIndex
+        All lanes; where those across a junction stick out of it, its border is not free.
     """
     index, ends = LaneIndex(lanes), _Ends(lanes)
     for outline in map(_counterclockwise, areas):
         if len(outline) > 2:
             speed_limit = ends.speed_limit(outline)
             if speed_limit > 0:
-                for line in _free_parts(outline, index):
+                for line in _free_parts(outline, index, everything):
                     longer, footways = ends.led_on(line)
                     yield border_edge(longer, speed_limit, footways, index)
 
@@ -143,7 +145,7 @@ class _Ends:
         return np.concatenate(parts), footways
 
 
-def _free_parts(corners: Points, index: LaneIndex) -> Iterator[Points]:
+def _free_parts(corners: Points, index: LaneIndex, everything: LaneIndex) -> Iterator[Points]:
     # In short pieces, since a road may lead on from the middle of a long side.
     outline = refined(np.concatenate((corners, corners[:1])), _PIECE)[:-1]
     following = np.roll(outline, -1, axis=0)
@@ -151,7 +153,7 @@ def _free_parts(corners: Points, index: LaneIndex) -> Iterator[Points]:
     outward = np.column_stack((step[:, 1], -step[:, 0])) / np.hypot(step[:, 0], step[:, 1])[:, None]
     beside = 0.5 * (outline + following)
     beside[:, :2] += 0.4 * outward
-    free = index.clearance(beside, same_level=2.5) > 0.1
+    free = (index.clearance(beside, same_level=2.5) > 0.1) & (everything.clearance(beside, same_level=2.5) > -0.1)
     for run in _runs_around(free):
         line = np.concatenate((outline[run], following[run[-1:]]))
         if np.sum(np.hypot(*np.diff(line[:, :2], axis=0).T)) > 0.1:

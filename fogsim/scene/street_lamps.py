@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.scene.edges import Edge
-from fogsim.scene.polyline import Points
+from fogsim.scene.lane_index import LaneIndex
+from fogsim.scene.polyline import Points, arc_length
 from fogsim.scene.roadside import placed, stations, tube
 from fogsim.scene.solids import Material, box, merge
 from fogsim.scene.trees import FAR, TINY
@@ -41,14 +42,18 @@ def street_lamp_shapes() -> dict[str, Mesh]:
     return {STREET_LAMP: near, STREET_LAMP + FAR: far, STREET_LAMP + TINY: far}
 
 
-def lamp_posts(edges: Sequence[Edge]) -> list[Batch]:
-    """Lamps about every 35 m along the right sides of roads, on one side of roads of two directions."""
+def lamp_posts(edges: Sequence[Edge], index: LaneIndex) -> list[Batch]:
+    """Lamps about every 35 m along the outer sides of roads, on one side of roads of two directions, off all lanes."""
+    side = outer_side(edges)
     places, turns, taken = [], [], dict[tuple[int, int], list[NDArray[np.float64]]]()
     for edge in edges:
-        if edge.side > 0:
+        if edge.side != side:
             continue
-        along, heading = stations(edge.line, _SPACING, -(edge.inner + edge.shoulder + _BESIDE))
-        for place, turn in zip(along, heading.tolist(), strict=True):
+        along, heading = stations(edge.line, _SPACING, side * (edge.inner + edge.shoulder + _BESIDE))
+        free = index.clearance(along, same_level=2.5) > 0.3
+        # Their arms reach to the left of where they look.
+        facing = heading if side < 0 else heading + np.pi
+        for place, turn in zip(along[free], facing[free].tolist(), strict=True):
             column, row = np.floor(place[:2] / _APART).astype(int).tolist()
             around = product((column - 1, column, column + 1), (row - 1, row, row + 1))
             near = [other for cell in around for other in taken.get(cell, ())]
@@ -57,6 +62,12 @@ def lamp_posts(edges: Sequence[Edge]) -> list[Batch]:
                 turns.append(turn)
                 taken.setdefault((column, row), []).append(place)
     return [placed(STREET_LAMP, np.array(places), np.array(turns))] if places else []
+
+
+def outer_side(edges: Sequence[Edge]) -> int:
+    """Side of roads, 1 left or −1 right, that most of the free sides are on: that to which vehicles keep."""
+    lengths = {side: sum(float(arc_length(edge.line)[-1]) for edge in edges if edge.side == side) for side in (1, -1)}
+    return 1 if lengths[1] > 1.001 * lengths[-1] else -1
 
 
 def street_lamp_heads(scene: Scene) -> Points:

@@ -21,6 +21,8 @@ LIMITS = frozenset((SPEED_LIMIT, "end_of_speed_limit", "variable_speed_limit"))
 """Kinds whose value is a speed, in km/h in additional files."""
 SIGN_CLEARANCE = 3.9
 """Lateral distance from the edge of the outermost lane to the middle of a sign [m]: behind shoulder and rail."""
+_OTHER_CLEARANCES = (2.0, 1.0, 6.0, 8.0, 12.0, 18.0, 24.0)
+"""Where a sign stands if that is on another road, the first that is not [m]."""
 SIGN_HEIGHT = 2.6
 """Height of the middle of a sign's face above the road [m]."""
 GANTRY_HEIGHT = 6.2
@@ -104,10 +106,14 @@ def _limit_sign(edge: Any, side: float) -> Sign | None:
         return None  # a lane of no length, as networks written by hand may have, has no direction to face
     along = ahead[0] - points[0]
     heading = math.atan2(along[1], along[0])
-    offset = side * (lane.getWidth() / 2 + SIGN_CLEARANCE)
     # Ten metres into the edge, so that the sign stands on the stretch that it speaks for.
     x, y, z = points[0] + along / np.linalg.norm(along) * min(10.0, 0.5 * lane.getLength())
-    x, y = float(x) - offset * math.sin(heading), float(y) + offset * math.cos(heading)
+    places = [
+        (float(x) - left * math.sin(heading), float(y) + left * math.cos(heading))
+        for left in (side * (lane.getWidth() / 2 + away) for away in (SIGN_CLEARANCE, *_OTHER_CLEARANCES))
+    ]
+    # Beside it may be another road, where roads part or meet.
+    x, y = next((place for place in places if _is_beside_roads(place, edge)), places[0])
     return Sign(
         f"limit.{edge.getID()}",
         SPEED_LIMIT,
@@ -115,6 +121,17 @@ def _limit_sign(edge: Any, side: float) -> Sign | None:
         (x, y, float(z) + SIGN_HEIGHT),
         heading,
         SIGN_DIAMETER,
+    )
+
+
+def _is_beside_roads(place: tuple[float, float], edge: Any) -> bool:
+    """Whether a place lies on no lane of the edges that meet this one."""
+    nodes = edge.getFromNode(), edge.getToNode()
+    edges = {other.getID(): other for node in nodes for other in (*node.getOutgoing(), *node.getIncoming())}
+    return all(
+        sumolib.geomhelper.distancePointToPolygon(place, lane.getShape()) > 0.5 * lane.getWidth() + 0.5
+        for other in edges.values()
+        for lane in other.getLanes()
     )
 
 

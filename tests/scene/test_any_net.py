@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fogsim.scene import build_scene
+from fogsim.scene import build_scene, street_lamp_heads
 from fogsim.scene.junctions import free_borders, walkable
 from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.road import KERB
@@ -63,7 +63,7 @@ def test_a_road_leads_on_from_the_middle_of_a_long_border() -> None:
     line, solid = np.array([[-60.0, 0, 0], [0, 0, 0]]), LaneMarking.SOLID
     lane = Lane("a", "a", line, 3.2, 13.9, solid, solid, outermost=True)
     area = PavedArea("j", np.array([[0.0, -8, 0], [6, -8, 0], [6, 8, 0], [0, 8, 0]]))
-    for edge in free_borders([area], [lane]):
+    for edge in free_borders([area], [lane], LaneIndex([lane])):
         inner = edge.line[np.abs(edge.line[:, 0]) < 0.01]
         assert (np.abs(inner[:, 1]) > 1.5).all()
 
@@ -92,3 +92,40 @@ def test_houses_of_a_street_keep_their_distance_however_many_there_are() -> None
     apart = np.linalg.norm(places[:, None] - places[None], axis=2)
     assert len(places) > 40
     assert apart[~np.eye(len(places), dtype=bool)].min() > 16.0
+
+
+def test_a_footway_ends_where_a_road_lies_across_it() -> None:
+    line, solid = np.array([[-40.0, 0, 0], [40, 0, 0]]), LaneMarking.SOLID
+    road = Lane("a", "a", line, 3.2, 13.9, solid, solid, outermost=True)
+    none = LaneMarking.NONE
+    way = Lane("w", "w", line[:, [1, 0, 2]], 2.0, 2.8, none, none, outermost=False, kind=LaneKind.FOOTWAY)
+    ground = build(RoadNetwork((road, way), line)).ground
+    assert max(road_under(ground, 0.0, 10.0)) == pytest.approx(KERB)
+    assert max(road_under(ground, 0.0, 0.0), default=-1.0) < 0.0
+
+
+def test_a_border_is_not_free_where_lanes_stick_out_of_their_junction() -> None:
+    solid, none = LaneMarking.SOLID, LaneMarking.NONE
+    leading = Lane("a", "a", np.array([[-40.0, 0, 0], [0, 0, 0]]), 3.2, 13.9, solid, solid, outermost=True)
+    area = PavedArea("j", np.array([[0.0, -2, 0], [20, -2, 0], [20, 2, 0], [0, 2, 0]]))
+    bend = np.array([[0.0, 0, 0], [10, -2.5, 0], [20, 0, 0]])
+    across = Lane(":j", ":j", bend, 3.2, 6.0, none, none, outermost=False, kind=LaneKind.JUNCTION)
+    reached = []
+    for lanes in ([leading], [leading, across]):
+        edges = free_borders([area], [leading], LaneIndex(lanes))
+        lower = np.concatenate([edge.line[edge.line[:, 1] < -1.9, 0] for edge in edges])
+        reached.append(bool(np.any((lower > 8.5) & (lower < 11.5))) or len(lower) < 4)
+    assert reached == [True, False]
+
+
+def test_street_lamps_stand_on_the_left_where_vehicles_keep_to_it() -> None:
+    line, solid = np.array([[0.0, 0, 0], [200, 0, 0]]), LaneMarking.SOLID
+    there = Lane("a", "a", line, 3.2, 13.9, solid, solid, outermost=True)
+    back = Lane("b", "b", line[::-1] - np.array([0.0, 3.2, 0.0]), 3.2, 13.9, solid, solid, outermost=True)
+    scene = build_scene(RoadNetwork((there, back), line), SignMap(), np.random.default_rng(5), street_lamps=True)
+    heads = street_lamp_heads(scene)
+    feet = np.concatenate([b.transforms[:, :3, 3] for b in scene.scenery if b.shape == "street_lamp"]).astype(float)
+    index = LaneIndex([there, back])
+    assert len(heads) >= 5
+    # Arms reach from the pole to the road.
+    assert (index.clearance(heads) < index.clearance(feet) - 1.0).all()

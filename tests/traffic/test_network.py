@@ -115,3 +115,24 @@ def test_a_lane_of_no_length_has_no_sign(tmp_path: Path) -> None:
     assert sign.sign_id == "limit.a"
     assert np.isfinite(sign.position).all()
     assert sign.heading == 0.0
+
+
+def test_a_sign_stands_on_no_other_road(tmp_path: Path) -> None:
+    lane = '<edge id="{0}" from="{1}" to="{2}"><lane id="{0}_0" index="0" speed="{3}" length="99" shape="{4}"/></edge>'
+    # A slip road on the right of the road whose limit changes where they part.
+    edges = (
+        lane.format("a", "l", "n", 30, "-99,0 0,0"),
+        lane.format("b", "n", "m", 20, "0,0 99,0"),
+        lane.format("c", "n", "k", 30, "0,-5.5 99,-5.5"),
+    )
+    nodes = "".join(
+        f'<junction id="{name}" type="dead_end" x="{x}" y="0" incLanes="" intLanes="" shape=""/>'
+        for name, x in (("l", -99), ("n", 0), ("m", 99), ("k", 99))
+    )
+    joins = '<connection from="a" to="{}" fromLane="0" toLane="0" dir="s" state="M"/>'
+    text = f'<net version="1.20">{"".join(edges)}{nodes}{joins.format("b")}{joins.format("c")}</net>'
+    file = tmp_path / "slip.net.xml"
+    file.write_text(text, encoding="utf-8")
+    sign = next(sign for sign in sign_map(read_net(file), ()).signs if sign.sign_id == "limit.b")
+    assert sign.position[1] < -1.6
+    assert abs(sign.position[1] + 5.5) > 1.6

@@ -2,7 +2,6 @@
 
 import math
 from collections import deque
-from statistics import NormalDist
 
 import numpy as np
 
@@ -14,10 +13,9 @@ from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation
 from fogsim.vision.horizon import PITCH_DEVIATION, Horizon, calibrated_horizon, levelled, weighed
 from fogsim.vision.joint_fit import JointFit, JointPrior, fit_jointly
-from fogsim.vision.response import linear_table
+from fogsim.vision.joint_prior import joint_prior
 from fogsim.vision.road_lines import meeting_lines
 from fogsim.vision.strips import (
-    SATURATED_SHARE,
     LinearPixels,
     Sky,
     StripCurves,
@@ -52,15 +50,6 @@ SURE_OF_FOG = 2.0
 
 CLEAR = OPTICAL_DEPTH_AT_VISIBILITY / 300.0
 """Extinction that an unsure estimate must surely be below to say "little fog" [1/m]."""
-
-SKY_DEVIATION = 0.005
-"""Relative deviation of the airlight at the horizon from the sky above it [-]."""
-
-OVEREXPOSURE = 0.15
-"""How far a sky without any unsaturated pixel may lie above saturation, as a deviation [-]."""
-
-MOSTLY = 0.98
-"""Share of saturated pixels beyond which a sky tells no more than that it is brighter [-]."""
 
 MODEL_DEVIATION = 0.006
 """Relative deviation of k by what the model leaves out: marks, rounding, a road that is not quite flat [-]."""
@@ -146,7 +135,7 @@ class JointRoad:
             return Estimate.invalid(
                 self.method, "too dark above the horizon, or no sky: this is a daytime method", **found
             )
-        prior = self._prior(sky, self._seen_horizon(pixels))
+        prior = joint_prior(sky, self._camera, self._seen_horizon(pixels))
         fit = self._fitted(pixels, sky, prior, _free_road(observation.lead))
         if isinstance(fit, str):
             return Estimate.invalid(self.method, fit, **found)
@@ -178,22 +167,6 @@ class JointRoad:
         """Weigh the told horizon with the point in which the road's lines meet."""
         point = meeting_lines(pixels, self._camera, self._horizon)
         return self._horizon if point is None else weighed(self._horizon, point.horizon)
-
-    def _prior(self, sky: Sky, horizon: Horizon) -> JointPrior:
-        deviation, upward = (math.hypot(SKY_DEVIATION * sky.luminance, apart) for apart in (sky.deviation, sky.upward))
-        shift = (horizon.row - self._camera.horizon_row, horizon.standard_deviation)
-        if not sky.is_clipped:
-            return JointPrior(sky.luminance, deviation, upward, *shift)
-        table = linear_table(self._camera.response, self._camera.bits)
-        level = float(table[-1] - table[-2]) * (2**self._camera.bits / 256.0)
-        if sky.saturated > MOSTLY:
-            return JointPrior(255.0 + level, 2.0 * level, OVEREXPOSURE * 255.0, *shift)
-        if sky.saturated < SATURATED_SHARE:
-            # One of the colours is clipped: there is more light than the others show.
-            return JointPrior(sky.luminance + level, deviation + level, deviation + 4.0 * level, *shift)
-        # Noise carries some of the sky's pixels below saturation: the share of the others tells how bright it is.
-        airlight = 255.0 - 0.5 * level + 1.3 * level * NormalDist().inv_cdf(sky.saturated)
-        return JointPrior(airlight, deviation + level, deviation + level, *shift)
 
     def _doubt(self, fit: JointFit, sky: Sky, curves: StripCurves, free: float) -> str:
         """Say why a fit is not to be believed; empty if it is."""

@@ -2,32 +2,30 @@
 
 import math
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
 from fogsim.estimators.image_check import checked_count, checked_image
+from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import Observation
 from fogsim.vision.canny_deriche import CannyDeriche, DericheEdges
-from fogsim.vision.curve_fit import fit_curve
 from fogsim.vision.edges import smoothed
-from fogsim.vision.horizon import PITCH_DEVIATION, Horizon, calibrated_horizon, levelled, weighed
+from fogsim.vision.horizon import PITCH_DEVIATION, Horizon, calibrated_horizon, weighed
 from fogsim.vision.inflection import FogModel, best_inflection, printed_inflection, steepest_slope
-from fogsim.vision.luminance import linear_luminance
+from fogsim.vision.joint_fit import JointFit, fit_jointly
+from fogsim.vision.joint_prior import joint_prior
 from fogsim.vision.profile import RoadCurve, band_profile, path_lengths
 from fogsim.vision.region import Band, crossing_band, grow_region
+from fogsim.vision.road_image import MIN_CONTRAST, MIN_ROWS, SATURATED, CannotTellError, RoadImage, road_image
 from fogsim.vision.road_lines import meeting_lines
-from fogsim.vision.strips import linear_pixels
+from fogsim.vision.strips import band_geometry, linear_pixels, sky_above, strip_curves, without_clipped
 from fogsim.vision.vanishing import VanishingPoint, vanishing_point
 
-MIN_COLS, MIN_ROWS = 32, 16  # [px] a road narrower than this, or lower below its horizon, shows no curve
-MIN_AIRLIGHT = 6.0  # [linear grey levels] darker than this above the horizon is no day
-MIN_CONTRAST = 6.0  # [linear grey levels] between road and airlight; below it quantisation hides the curve
-SATURATED = 250.0  # [linear grey levels] clipped, or so near that noise is
 SIMILARITY = 0.25  # [-] steepest fog, in contrasts of road to airlight a row; a silhouette takes at least 0.34
 MAX_ASIDE = 0.1
 """Share of the image's width by which a clear road may lie beside the vanishing column [-]."""
@@ -37,42 +35,14 @@ MAX_ABOVE = 0.05
 
 NEAR_HORIZON = 4.0  # [px] a region that ends this close below the horizon has seen the whole road
 REACH = math.radians(4.0)  # [rad] about the told vanishing point, within which lines of the road may pass
-ALBEDO_DEVIATION = 0.015  # [-] of k by slow changes of the road's reflectance, which the residuals do not show
+ALBEDO_DEVIATION = 0.015  # [-] of k by slow changes of the road's reflectance, which one row's inflection does not show
 MAX_RESIDUAL = 0.12  # [-] of the fitted contrast: more is no curve of Koschmieder's
-
-
-class _CannotTell(Exception):  # noqa: N818 - no error: the honest answer to some images, turned into an Estimate
-    """Why this frame says nothing."""
-
-
-@dataclass(frozen=True, slots=True)
-class _RoadImage:
-    """The part of an image from a little above the horizon to its bottom row.
-
-    Attributes
-    ----------
-    level : (rows, cols) or (rows, cols, 3) uint8 or uint16
-        The whole image without roll.
-    luminance : (rows, cols) float32
-        Linear grey levels.
-    first_row : int
-        Row of the whole image that is row 0 here.
-    horizon : Horizon
-        In rows of the whole image.
-    airlight, road : float
-        First guesses: the bright part of what lies above the horizon, and the median of the bottom row.
-    """
-
-    level: NDArray[np.uint8] | NDArray[np.uint16]
-    luminance: NDArray[np.float32]
-    first_row: int
-    horizon: Horizon
-    airlight: float
-    road: float
-
-    @property
-    def contrast(self) -> float:
-        return self.airlight - self.road
+MAX_MISFIT = 4.0  # [-] mean square of standardised residuals: more is no curve of Koschmieder's either
+LEAST_CONTRAST = 0.08  # [-] of the road to the airlight, for fog to show
+SURE_OF_FOG = 4.5  # [-] least k in its standard deviations
+CLEAR = OPTICAL_DEPTH_AT_VISIBILITY / 300.0  # [1/m] what k must surely be below to be called no fog
+USUAL_HEIGHT = 1.3  # [m] of a camera, for which the lengths of the fit are meant
+MODEL_DEVIATION = 0.008  # [-] of k by what the model leaves out: marks, rounding, a road that is not quite flat
 
 
 class Negru2013:
@@ -136,7 +106,7 @@ class Negru2013:
         self._camera = camera
         self._told = calibrated_horizon(camera, pitch_deviation)
         self._as_published, self._looks_for_lines = as_published, vanishing_point
-        self._model = (printed_inflection if printed_signs else best_inflection) if as_published else fit_curve
+        self._model = printed_inflection if printed_signs else best_inflection
         self._detector = CannyDeriche()
         self._points: deque[VanishingPoint] = deque(maxlen=checked_count("horizon_frames", horizon_frames, 1))
         self._models: deque[FogModel] = deque(maxlen=checked_count("inflection_frames", inflection_frames, 1))
@@ -168,33 +138,84 @@ class Negru2013:
         image = checked_image(observation.image, self._camera)
         diagnostics: dict[str, object] = {"horizon_row": self._camera.horizon_row}
         try:
-            road = self._road_image(image)
+            road = road_image(image, self._camera, self._told)
             edges = self._edges(road)
-            road = replace(road, horizon=self._horizon(edges, road))
-            diagnostics["horizon_row"] = road.horizon.row
-            band = _band(road, edges, self._camera.principal_point[0])
+            horizon = self._horizon(edges, road)
+            diagnostics["horizon_row"] = horizon.row
+            band = _band(road, edges, self._camera, self._told)
             diagnostics["band"] = (band.left, band.right, band.top + road.first_row, band.bottom + road.first_row)
-            curve = self._curve(road, band)
+            curve = self._curve(road, band, horizon)
             diagnostics["profile"] = curve.luminance
-            model = self._fog(curve, road)
-            if model is None:
-                self._check_clear_view(curve, band)
-        except _CannotTell as reason:
+            if self._as_published:
+                return self._published(curve, road, horizon, band, diagnostics)
+            return self._corrected(curve, road, horizon, band, diagnostics)
+        except CannotTellError as reason:
             return Estimate.invalid(self.method, str(reason), **diagnostics)
-        if model is None:
-            return self._no_fog(curve, road.horizon, diagnostics)
-        if self._as_published:
-            self._models.append(model)
-            model = min(self._models, key=lambda m: m.residual / max(m.airlight - m.road, 1e-9))
-        return self._fog_estimate(model, road.horizon, diagnostics)
 
-    def _edges(self, road: _RoadImage) -> DericheEdges:
-        edges = self._detector(road.luminance, _fog_slope(road).astype(np.float32))
+    def _published(
+        self, curve: RoadCurve, road: RoadImage, horizon: Horizon, band: Band, diagnostics: dict[str, object]
+    ) -> Estimate:
+        """Fog from the row of the inflection, of the last frames the one whose curve fits best."""
+        model = _credible(self._inflection(curve), curve, road)
+        if model is None:
+            self._check_clear_view(curve, band, road)
+            # An inflection needs a row on either side: the topmost that could have been seen is the second.
+            rows = max(float(curve.below_horizon[0]), 1.0) + 1.0
+            limit = 2.0 / self._camera.row_distance * math.hypot(rows, horizon.standard_deviation)
+            return Estimate(self.method, 0.0, limit, diagnostics=diagnostics)
+        self._models.append(model)
+        model = min(self._models, key=lambda m: m.residual / max(m.airlight - m.road, 1e-9))
+        by_horizon = model.horizon_sensitivity * horizon.standard_deviation
+        deviation = math.hypot(model.standard_deviation, by_horizon, ALBEDO_DEVIATION * model.extinction)
+        inflection = horizon.row + 0.5 * model.extinction * self._camera.row_distance
+        found = {"inflection_row": inflection, "airlight": model.airlight, "road": model.road}
+        return Estimate(self.method, model.extinction, deviation, diagnostics={**diagnostics, **found})
+
+    def _corrected(
+        self, curve: RoadCurve, road: RoadImage, horizon: Horizon, band: Band, diagnostics: dict[str, object]
+    ) -> Estimate:
+        """Fog from all rows of the band, whose albedo may wander, and the sky."""
+        fit = self._fit(road, horizon, band)
+        scale = USUAL_HEIGHT / self._camera.mount_height
+        k = scale * fit.extinction
+        deviation = math.hypot(scale * fit.extinction_deviation, MODEL_DEVIATION * k)
+        found = {"airlight": fit.airlight, "road": fit.road, "horizon_row": self._camera.horizon_row + fit.shift}
+        if k < SURE_OF_FOG * deviation:
+            self._check_clear_view(curve, band, road)
+            if k + SURE_OF_FOG * deviation > CLEAR:
+                raise CannotTellError("the extinction is not observable: too little road is seen")
+            return Estimate(self.method, 0.0, math.hypot(max(k, 0.0), deviation), diagnostics={**diagnostics, **found})
+        found["inflection_row"] = found["horizon_row"] + 0.5 * k * self._camera.row_distance
+        return Estimate(self.method, k, deviation, diagnostics={**diagnostics, **found})
+
+    def _fit(self, road: RoadImage, horizon: Horizon, band: Band) -> JointFit:
+        """Fit of the band, in distances of a camera of the usual height: flat roads scale with it."""
+        camera = replace(self._camera, mount_height=USUAL_HEIGHT)
+        pixels = linear_pixels(road.level, camera)
+        sky = sky_above(pixels, camera, 3.0 * self._told.standard_deviation + 2.0)
+        if sky is None:
+            raise CannotTellError("no sky is seen above the horizon")
+        rows = (band.top + road.first_row, band.bottom + road.first_row)
+        nearest = max(1.0, horizon.standard_deviation) + max(horizon.row - camera.horizon_row, 0.0)
+        geometry = band_geometry(camera, nearest, (band.left, band.right), rows)
+        curves = strip_curves(pixels, geometry, sky.noise, camera)
+        curves = without_clipped(curves) if sky.is_clipped else curves
+        fit = fit_jointly(curves, geometry, joint_prior(sky, camera, horizon))
+        if fit is None:
+            raise CannotTellError("too little road is seen")
+        if fit.road >= (1.0 - LEAST_CONTRAST) * fit.airlight:
+            raise CannotTellError("the road is nearly as bright as the airlight, or brighter")
+        if fit.misfit > MAX_MISFIT:
+            raise CannotTellError("the road fades into the airlight, but not as Koschmieder's law has it")
+        return fit
+
+    def _edges(self, road: RoadImage) -> DericheEdges:
+        edges = self._detector(road.luminance, _fog_slope(road, self._told).astype(np.float32))
         if edges.threshold > road.contrast:
-            raise _CannotTell("noise or texture drowns the contrast of road and airlight")
+            raise CannotTellError("noise or texture drowns the contrast of road and airlight")
         return edges
 
-    def _horizon(self, edges: DericheEdges, road: _RoadImage) -> Horizon:
+    def _horizon(self, edges: DericheEdges, road: RoadImage) -> Horizon:
         """Told horizon and vanishing point, weighed (corrected), or the best vanishing point of late (published)."""
         if not self._looks_for_lines:
             return self._told
@@ -210,24 +231,10 @@ class Negru2013:
         found = self._told if best is None else Horizon(best.row, best.deviation)
         return found if 1.0 <= found.row <= self._camera.height - 1 - MIN_ROWS else self._told
 
-    def _road_image(self, image: NDArray[np.uint8] | NDArray[np.uint16]) -> _RoadImage:
-        horizon = self._told
-        rows, cols = image.shape[:2]
-        if not 1.0 <= horizon.row <= rows - 1:
-            raise _CannotTell(f"the horizon (row {horizon.row:.1f}) is outside the image")
-        if rows - 1 - horizon.row < MIN_ROWS or cols < MIN_COLS:
-            raise _CannotTell("the image is too small to show a curve")
-        sky_rows = math.ceil(horizon.row)
-        first = max(0, sky_rows - 4 - rows // 20)
-        level = levelled(image, self._camera)
-        luminance = linear_luminance(level[first:], self._camera.response, self._camera.bits)
-        airlight = float(np.percentile(luminance[: sky_rows - first, ::4], 90))
-        return _checked(_RoadImage(level, luminance, first, horizon, airlight, float(np.median(luminance[-1]))))
-
-    def _curve(self, road: _RoadImage, band: Band) -> RoadCurve:
+    def _curve(self, road: RoadImage, band: Band, horizon: Horizon) -> RoadCurve:
         camera = self._camera
         rows = np.arange(band.top, band.bottom + 1, dtype=np.float64) + road.first_row
-        below = rows - road.horizon.row
+        below = rows - horizon.row
         u0, v0 = camera.principal_point
         across = (0.5 * (band.left + band.right) - u0) / camera.focal_length
         slant = np.sqrt(1.0 + across**2 + ((rows - v0) / camera.focal_length) ** 2)
@@ -235,74 +242,46 @@ class Negru2013:
         weight = (luminance < SATURATED).astype(np.float64)
         return RoadCurve(below, luminance, path_lengths(below, camera.row_distance, slant), weight, camera.row_distance)
 
-    def _fog(self, curve: RoadCurve, road: _RoadImage) -> FogModel | None:
-        """Model of the fog, or None if the whole road is seen without an inflection."""
-        model = _credible(self._inflection(curve), curve, road)
-        if model is None and curve.below_horizon[0] > NEAR_HORIZON:
-            raise _CannotTell("the road's region ends below the horizon, and no inflection lies in it")
-        if model is None and float(np.median(curve.luminance[:3])) > road.road + 0.5 * road.contrast:
-            raise _CannotTell("the road fades into the airlight, but not as Koschmieder's law has it")
-        return model
-
-    def _check_clear_view(self, curve: RoadCurve, band: Band) -> None:
+    def _check_clear_view(self, curve: RoadCurve, band: Band, road: RoadImage) -> None:
         """Refuse to say "no fog" of anything but the road itself, seen up to the horizon where it vanishes.
 
         Beside a vehicle close ahead, a dark flank or verge can look like a road without fog.
         """
+        if curve.below_horizon[0] > NEAR_HORIZON:
+            raise CannotTellError("the road's region ends below the horizon, and no inflection lies in it")
+        if float(np.median(curve.luminance[:3])) > road.road + 0.5 * road.contrast:
+            raise CannotTellError("the road fades into the airlight, but not as Koschmieder's law has it")
         aside = abs(0.5 * (band.left + band.right) - self._camera.principal_point[0])
         if aside > MAX_ASIDE * self._camera.width:
-            raise _CannotTell("the road ahead is hidden: a dark surface is seen only beside it")
+            raise CannotTellError("the road ahead is hidden: a dark surface is seen only beside it")
         if -float(curve.below_horizon[0]) > MAX_ABOVE * self._camera.height:
-            raise _CannotTell("what is seen of the road goes on above the horizon: it is no road")
+            raise CannotTellError("what is seen of the road goes on above the horizon: it is no road")
 
     def _inflection(self, curve: RoadCurve) -> FogModel | None:
         if curve.weight.sum() < MIN_ROWS // 2:
             return None
         return self._model(curve)
 
-    def _no_fog(self, curve: RoadCurve, horizon: Horizon, diagnostics: dict[str, object]) -> Estimate:
-        # An inflection needs a row on either side: the topmost that could have been seen is the second.
-        rows = max(float(curve.below_horizon[0]), 1.0) + 1.0
-        limit = 2.0 / self._camera.row_distance * math.hypot(rows, horizon.standard_deviation)
-        return Estimate(self.method, 0.0, limit, diagnostics=diagnostics)
 
-    def _fog_estimate(self, model: FogModel, horizon: Horizon, diagnostics: dict[str, object]) -> Estimate:
-        by_horizon = model.horizon_sensitivity * horizon.standard_deviation
-        deviation = math.hypot(model.standard_deviation, by_horizon, ALBEDO_DEVIATION * model.extinction)
-        inflection = horizon.row + 0.5 * model.extinction * self._camera.row_distance
-        found = {"inflection_row": inflection, "airlight": model.airlight, "road": model.road}
-        return Estimate(self.method, model.extinction, deviation, diagnostics={**diagnostics, **found})
-
-
-def _checked(road: _RoadImage) -> _RoadImage:
-    if road.airlight < MIN_AIRLIGHT:
-        raise _CannotTell("too dark above the horizon: this is a daytime method")
-    if road.road >= SATURATED:
-        raise _CannotTell("the road is saturated")
-    if road.contrast < max(MIN_CONTRAST, 0.05 * road.airlight):
-        raise _CannotTell("the road is nearly as bright as the airlight, or brighter")
-    return road
-
-
-def _fog_slope(road: _RoadImage) -> NDArray[np.float64]:
-    below_horizon = np.arange(road.luminance.shape[0], dtype=np.float64) + (road.first_row - road.horizon.row)
+def _fog_slope(road: RoadImage, horizon: Horizon) -> NDArray[np.float64]:
+    below_horizon = np.arange(road.luminance.shape[0], dtype=np.float64) + (road.first_row - horizon.row)
     return np.minimum(steepest_slope(below_horizon, road.airlight), SIMILARITY * road.contrast)
 
 
-def _band(road: _RoadImage, edges: DericheEdges, centre: float) -> Band:
+def _band(road: RoadImage, edges: DericheEdges, camera: Camera, horizon: Horizon) -> Band:
     blurred = smoothed(road.luminance)
-    steps = (_fog_slope(road) + edges.threshold).astype(np.float32)
+    steps = (_fog_slope(road, horizon) + edges.threshold).astype(np.float32)
     region = grow_region(blurred, edges.pixels, steps, SIMILARITY * road.contrast + edges.threshold)
-    cols = region.shape[1]
+    cols, centre = region.shape[1], camera.principal_point[0]
     band = crossing_band(
         region, centre, min_width=max(3, cols // 80), max_width=max(5, cols // 24), hole=max(2, cols // 128)
     )
     if band is None or band.bottom - band.top < MIN_ROWS // 2:
-        raise _CannotTell("no vertical band crosses the road's region")
+        raise CannotTellError("no vertical band crosses the road's region")
     return band
 
 
-def _credible(model: FogModel | None, curve: RoadCurve, road: _RoadImage) -> FogModel | None:
+def _credible(model: FogModel | None, curve: RoadCurve, road: RoadImage) -> FogModel | None:
     """Pass a model only if it is one of fog over this road and its inflection was seen.
 
     The airlight is what is seen at the horizon: where that is much brighter than the model says, the model has fitted

@@ -14,10 +14,10 @@ Floats = NDArray[np.float64]
 PATCH_LENGTH, DRIFT_LENGTH = 3.0, 30.0
 """Lengths over which the albedo of a strip forgets itself: repaired patches, and slow change along the road [m]."""
 
-ALBEDOS = ((0.015, 0.005), (0.015, 0.04), (0.015, 0.12), (0.04, 0.05))
+ALBEDOS = ((0.015, 0.005), (0.015, 0.04), (0.015, 0.12), (0.04, 0.05), (0.08, 0.1))
 """Deviations of patches and of drift that are tried, relative to the road's luminance [-]."""
 
-ALBEDO_CHANCES = (0.4, 0.2, 0.25, 0.15)
+ALBEDO_CHANCES = (0.4, 0.2, 0.2, 0.15, 0.05)
 """How likely each of those is before the image is seen [-]."""
 
 EXTINCTIONS, SIMPLE_EXTINCTIONS = 14, 28

@@ -51,6 +51,8 @@ class RoadImage:
         Rows here that lie above the horizon.
     airlight, road : float
         First guesses: the bright part of what lies above the horizon, and the median of the bottom row.
+    level : (all rows, cols) or (all rows, cols, 3) uint8 or uint16
+        The whole image without roll.
     """
 
     luminance: NDArray[np.float32]
@@ -58,6 +60,7 @@ class RoadImage:
     sky_rows: int
     airlight: float
     road: float
+    level: NDArray[np.uint8] | NDArray[np.uint16]
 
     @property
     def contrast(self) -> float:
@@ -96,7 +99,8 @@ def road_image(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera, ho
     sky: NDArray[Any] = np.ascontiguousarray(level[top:sky_end:2, ::4])
     above = linear_luminance(sky, camera.response, camera.bits)
     airlight = float(np.percentile(above, 90))
-    return _checked(RoadImage(luminance, first, sky_end - first, airlight, float(np.median(luminance[-1]))))
+    seed = float(np.median(luminance[-1]))
+    return _checked(RoadImage(luminance, first, sky_end - first, airlight, seed, level))
 
 
 def _checked(road: RoadImage) -> RoadImage:

@@ -17,6 +17,9 @@ NARROW = 5.5
 EDGE_IN_NOISE = 6.0
 """Least gradient of an edge, in deviations of the row's own gradients [-]."""
 
+SAMPLED = 64
+"""Gradients of a row that show how much they scatter, as many from either side."""
+
 LEAST_GRADIENT = 0.7
 """Least gradient of an edge [linear grey levels per px]."""
 
@@ -101,7 +104,12 @@ def _row_edges(slope: NDArray[np.float32], edge: NDArray[np.float64], sign: NDAr
     """Peaks of a row's gradient that stand out of it; returns how many."""
     cols = slope.size
     # Half of a row's gradients, at least, are noise and texture.
-    middle = float(np.median(np.abs(slope[REACH : cols - REACH : max(cols // 64, 1)])))
+    sample = np.empty(SAMPLED, np.float32)
+    step = max((cols - 2 * REACH) // SAMPLED, 1)
+    for i in range(SAMPLED // 2):
+        sample[2 * i] = abs(slope[min(REACH + i * step, cols - 1)])
+        sample[2 * i + 1] = abs(slope[max(cols - 1 - REACH - i * step, 0)])
+    middle = float(np.median(sample))
     least = np.float32(max(EDGE_IN_NOISE * middle / 0.6745, LEAST_GRADIENT))
     found = 0
     for col in range(REACH + 1, cols - REACH - 1):

@@ -95,7 +95,7 @@ def meeting_lines(image: LinearPixels, camera: Camera, horizon: Horizon) -> Meet
     across, below = place[:, 0] - camera.principal_point[0], place[:, 1] - horizon.row
     reach = YAW * camera.focal_length
     offsets = np.linspace(-reach, reach, 2 * math.ceil(YAW / YAW_STEP) + 1)
-    slopes = np.arange(-STEEPEST, STEEPEST + SLOPE_STEP, SLOPE_STEP)
+    slopes = np.linspace(-STEEPEST, STEEPEST, 2 * round(STEEPEST / SLOPE_STEP) + 1)
     least = max(int(road_line_kernels.LEAST_POINTS), rows.size // 8)
     found, kinds = road_line_kernels.vote(across, below, kind, offsets, slopes, MOST_LINES, least)
     lines = road_line_kernels.straighten(across, below, kind, found, kinds, 0.5 * (offsets[1] - offsets[0]) + 2.0)

@@ -90,12 +90,13 @@ def strip_rows(
         low, width, height = left[i], right[i] - left[i], last[i] - first[i] + 1
         if width < 2.0:
             continue
-        wanted = int(min(width * height, float(MOST_SAMPLES)))
+        # An even number: the middle one of an odd number would lie between two columns.
+        wanted = int(min(width * height, float(MOST_SAMPLES))) // 2 * 2
         hides = first[i] <= hidden_above
         taken = 0
         for j in range(wanted):
-            # Rows of the bin in turn, columns evenly: neighbouring samples do not share a row.
-            row = first[i] + j % height
+            # Rows of the bin in turn, columns evenly: most neighbours share no row, and a mirrored image gives the same.
+            row = first[i] + min(j, wanted - 1 - j) % height
             col = min(max(math.floor(low + (j + 0.5) * width / wanted + 0.5), 0), cols - 1)
             if hides and hidden_from <= col <= hidden_to:
                 continue
@@ -201,7 +202,7 @@ def pixel_noise(
     apart = np.empty(rows.size * (per_row // step + 1))
     count = 0
     for row in rows:
-        for col in range(0, cols - 1, 2 * step):
+        for col in range(((cols - 2) % (2 * step)) // 2, cols - 1, 2 * step):
             if count < apart.size:
                 apart[count] = abs(light(pixels, tables, row, col) - light(pixels, tables, row, col + 1))
                 count += 1

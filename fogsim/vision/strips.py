@@ -17,6 +17,9 @@ Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 LANES = ((-1.4, 1.4), (-4.9, -2.1), (2.1, 4.9))
 """Sides of the strips to the right of the vehicle's axis [m]: the own lane's middle, and those of its neighbours."""
 
+HALF_ROAD = 2.5
+"""How far to either side of the vehicle's axis a band is surely road [m]."""
+
 WHOLE_ROWS = 28.0
 """Rows below the horizon up to which every row is a bin of its own [px]; from there bins grow with the distance."""
 
@@ -79,7 +82,7 @@ def strip_geometry(camera: Camera, nearest: float, lanes: tuple[tuple[float, flo
     lanes : tuple of (float, float)
         Sides of each strip to the right of the vehicle's axis [m].
     """
-    first, last = _row_bins(camera, nearest)
+    first, last = _row_bins(camera, nearest, camera.height - 1)
     below: Floats = 0.5 * (first + last).astype(np.float64) - camera.horizon_row
     half: Floats = 0.5 * (last - first + 1).astype(np.float64)
     u0 = camera.principal_point[0]
@@ -102,6 +105,31 @@ def strip_geometry(camera: Camera, nearest: float, lanes: tuple[tuple[float, flo
     )
 
 
+def band_geometry(camera: Camera, nearest: float, columns: tuple[int, int], rows: tuple[int, int]) -> StripGeometry:
+    """Take a vertical band of the image, as far as it is road, for the only strip.
+
+    Parameters
+    ----------
+    camera : Camera
+        The told calibration; its roll is taken as undone.
+    nearest : float
+        Rows below the horizon from which the road is looked at [px].
+    columns, rows : (int, int)
+        First and last of the band.
+    """
+    first, last = _row_bins(camera, max(nearest, rows[0] - camera.horizon_row), rows[1])
+    below: Floats = 0.5 * (first + last).astype(np.float64) - camera.horizon_row
+    half: Floats = 0.5 * (last - first + 1).astype(np.float64)
+    u0, focal = camera.principal_point[0], camera.focal_length
+    # Far away even a narrow band is wider than the road.
+    reach = HALF_ROAD * focal / camera.row_distance * below[None, :]
+    left, right = np.maximum(columns[0] - 0.5, u0 - reach), np.minimum(columns[1] + 0.5, u0 + reach)
+    slant = _mean_slant((left - u0) / focal, (right - u0) / focal, below, camera)
+    distance = camera.row_distance / below
+    extent = camera.row_distance * 2.0 * half / np.maximum(below**2 - half**2, 1e-9)
+    return StripGeometry(first, last, below, half, distance, extent, left, right, camera.row_distance * slant)
+
+
 def _inside(left: Floats, right: Floats, width: int) -> tuple[Floats, Floats]:
     """Cut strips to the image; of what is mostly outside nothing is left."""
     low, high = np.clip(left, -0.5, width - 0.5), np.clip(right, -0.5, width - 0.5)
@@ -115,10 +143,10 @@ def _mean_slant(left: Floats, right: Floats, below: Floats, camera: Camera) -> F
     return np.asarray((ends[0] + 4.0 * middle + ends[1]) / 6.0)
 
 
-def _row_bins(camera: Camera, nearest: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _row_bins(camera: Camera, nearest: float, bottom: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     first = []
     last = []
-    row = camera.height - 1
+    row = bottom
     top = max(math.ceil(camera.horizon_row + nearest), 0)
     while row >= top:
         height = max(int((row - camera.horizon_row) / WHOLE_ROWS), 1)
@@ -220,17 +248,30 @@ def strip_curves(
         texture = np.maximum(deviation**2 - noise**2, 0.0) / np.minimum(counted, pieces)
         seen = number > 0
         luminance[strip] = mean
-        # Rounding does not average out where nothing dithers it: 1/√12 of a level without noise, nothing from half on.
-        rounding = np.exp(-4.0 * (np.pi * deviation) ** 2) / 12.0
-        variance[strip] = np.where(seen, noise**2 / counted + texture + rounding + LEAST_DEVIATION**2, 0.0)
+        variance[strip] = np.where(seen, noise**2 / counted + texture + LEAST_DEVIATION**2, 0.0)
+        variance[strip] += np.where(seen, _coarseness(mean, deviation, noise, camera), 0.0)
     return StripCurves(luminance, variance)
+
+
+QUIET, SMOOTHED = 0.3, 1.0
+"""Pixel noise, in levels, below which an image was compressed, and the deviation that this leaves in a mean [-]."""
+
+
+def _coarseness(mean: Floats, deviation: Floats, noise: float, camera: Camera) -> Floats:
+    """Variance of means by rounding to levels, and by compression, which does away with noise and faint gradients."""
+    table = linear_table(camera.response, camera.bits)
+    level: Floats = np.maximum(np.interp(mean, table[:-1], np.diff(table)), 1e-6)
+    # Rounding does not average out where nothing dithers it: 1/√12 of a level without noise, nothing from half on.
+    rounding = np.exp(-4.0 * (np.pi * deviation / level) ** 2) / 12.0
+    quiet = np.maximum(1.0 - noise / (QUIET * level), 0.0)
+    return np.asarray(level**2 * (rounding + (SMOOTHED * quiet) ** 2))
 
 
 BONNET_SHARE, BONNET_ROWS = 0.3, 60
 """Share of the road's rows that the own bonnet may cover, and how many of them are looked at."""
 
-BONNET_STEP = 0.06
-"""Step of luminance at the bonnet's edge, relative to the airlight [-]; fog and patches make smaller ones."""
+BONNET_STEP, BONNET_OUTLIER = 0.03, 6.0
+"""Least step of luminance at the bonnet's edge, relative to the airlight, and in median changes over as many rows."""
 
 
 def above_bonnet(image: LinearPixels, camera: Camera, airlight: float) -> int:
@@ -253,7 +294,9 @@ def above_bonnet(image: LinearPixels, camera: Camera, airlight: float) -> int:
     level = strip_kernels.middle_levels(image.pixels, image.tables, rows)
     # Three rows each side of a gap of two, since a bonnet's edge is bent.
     mean = np.convolve(level, np.full(3, 1.0 / 3.0), "valid")
-    steps = np.flatnonzero(np.abs(mean[5:] - mean[:-5]) > BONNET_STEP * airlight)
+    change = mean[5:] - mean[:-5]
+    apart = np.abs(change - np.median(change))
+    steps = np.flatnonzero(apart > max(BONNET_STEP * airlight, BONNET_OUTLIER * float(np.median(apart))))
     return int(rows[min(steps[-1] + 6, rows.size - 1)]) if steps.size else bottom
 
 
@@ -333,7 +376,8 @@ def sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
     noise = strip_kernels.pixel_noise(image.pixels, image.tables, rows)
     bright, share = strip_kernels.sky_rows(image.pixels, image.tables, rows, side, camera.width - side, max(noise, 0.3))
     height = (camera.horizon_row - rows) / camera.focal_length
-    level, _, scatter, lowest = strip_kernels.level_at_horizon(bright, height, max(DARKER, 2.0 * noise / bright.max()))
+    darker = max(DARKER, 2.0 * noise / max(float(bright.max()), 1e-9))
+    level, _, scatter, lowest = strip_kernels.level_at_horizon(bright, height, darker)
     unseen = UNSEEN * max(float(lowest) - margin / camera.focal_length - CLOSE, 0.0) * level
     deviation = math.hypot(scatter, unseen)
     # What looks everywhere different is a wood rather than a sky, which is no darker than that.

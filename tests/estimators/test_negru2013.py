@@ -265,10 +265,26 @@ def test_the_vanishing_point_mends_a_horizon_that_is_off(render, road):
     errors = {True: [], False: []}
     for seed, pitch in enumerate((-0.15, 0.15, -0.1, 0.1)):
         true = replace(road.camera, pitch=road.camera.pitch + np.radians(pitch))
-        image = render(road.but(visibility=200.0, camera=true), seed)
+        # In denser fog the road's curve itself shows the horizon.
+        image = render(road.but(visibility=1000.0, camera=true), seed)
         for looks, found in errors.items():
-            found.append(abs(estimate(image, road.camera, vanishing_point=looks).visibility / 200.0 - 1.0))
+            found.append(abs(estimate(image, road.camera, vanishing_point=looks).visibility / 1000.0 - 1.0))
     assert np.mean(errors[True]) < 0.5 * np.mean(errors[False])
+    assert np.mean(errors[True]) < 0.05
+
+
+@pytest.mark.parametrize("visibility", [400.0, 700.0, 1000.0])
+def test_thin_fog_is_measured_and_the_interval_holds(render, road, visibility):
+    camera = replace(road.camera, width=688, height=515, focal_length=700.0, principal_point=(343.5, 257.0))
+    inside = []
+    for seed in range(6):
+        pitch = np.random.default_rng(seed).normal(0.0, np.radians(0.1))
+        image = render(road.but(visibility=visibility, camera=replace(camera, pitch=camera.pitch + pitch)), seed)
+        found = estimate(image, camera)
+        # The judge takes k = 3 / V.
+        assert found.extinction * visibility / 3.0 == pytest.approx(1.0, abs=0.12)
+        inside.append(abs(found.extinction - 3.0 / visibility) < 1.645 * found.standard_deviation)
+    assert np.mean(inside) > 0.8
 
 
 def test_printed_signs_are_far_off(render, road):

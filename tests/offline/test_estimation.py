@@ -53,7 +53,9 @@ def test_grey_opaque_and_16_bit_copies_say_the_same(drive, tmp_path: Path) -> No
     cv2.imwrite(str(tmp_path / "d.pgm"), grey)
     found = visibilities(estimate_images(tmp_path, drive.camera, "negru2013"))
     assert len(found) == 4
-    assert found[1] == found[0] == found[3]
+    assert found[3] == found[0]
+    # Weights of the channels add up to 1 but for their rounding.
+    assert found[1] == pytest.approx(found[0], rel=1e-4)
     assert found[2] == pytest.approx(found[0], rel=0.01)
 
 

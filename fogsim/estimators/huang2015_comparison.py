@@ -169,9 +169,14 @@ def compared(reference: Picture, picture: Picture, prior: PlacementPrior, most: 
     gain = far.sky / near.sky if seen else 1.0
     found = register(near.patch, far.patch, prior, far.noise, most * gain, OUTLINE)
     if found is None:
+        # Too many pixels are near saturation, or none differ: only its light may say something.
+        found = _unplaced(prior.placement) if seen else None
+    if found is None:
         return None
     body, at = _above_bumper(near, found.placement)
     light = shared_light(body, far.patch, at, (near.sky, far.sky), far.noise) if seen else None
+    if light is None and found.pixels == 0:
+        return None
     # What a small picture does not resolve alike: its detail and its place.
     by_size = SMALL / far.width * abs(found.slope)
     return Comparison(
@@ -183,6 +188,21 @@ def compared(reference: Picture, picture: Picture, prior: PlacementPrior, most: 
         near_mean=found.near_mean / near.sky if light is None else light.near,
         mean_deviation=math.inf if light is None else light.deviation,
         regression=found,
+    )
+
+
+def _unplaced(at: Placement) -> Regression:
+    """Regression of no pixels, where the vehicle is expected."""
+    return Regression(
+        placement=at,
+        slope=0.0,
+        slope_deviation=math.inf,
+        noise_deviation=math.inf,
+        mean=0.0,
+        near_mean=0.0,
+        residual=0.0,
+        variance=0.0,
+        pixels=0,
     )
 
 

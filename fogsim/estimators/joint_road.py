@@ -147,21 +147,23 @@ class JointRoad:
         What stands in the own lane hides, further on, the neighbours' lanes too: they are read again without it.
         """
         lowest = above_bonnet(pixels, self._camera, sky.luminance)
-        for _ in range(2):
-            curves = strip_curves(pixels, self._geometry, sky.noise, self._camera, free)
-            curves = without_rows_below(curves, self._geometry, lowest)
-            latest = (without_clipped(curves) if sky.is_clipped else curves, sky)
-            curves = mean_curves((*self._earlier, latest))
-            fit = fit_jointly(curves, self._geometry, prior)
-            if fit is None:
-                return "too little road is seen"
-            doubt = self._doubt(fit, sky, curves, free)
-            obstacle = _obstacle(fit, self._geometry)
-            if doubt or obstacle >= free:
-                break
-            free = obstacle
+        latest, fit = self._read(pixels, sky, prior, lowest, free)
+        doubt = "too little road is seen" if fit is None else self._doubt(fit, sky, latest[0], free)
+        obstacle = math.inf if fit is None else _obstacle(fit, self._geometry)
+        if not doubt and obstacle < free:
+            latest, fit = self._read(pixels, sky, prior, lowest, obstacle)
+            doubt = "too little road is seen" if fit is None else self._doubt(fit, sky, latest[0], obstacle)
         self._earlier.append(latest)
-        return doubt or fit
+        return doubt if fit is None or doubt else fit
+
+    def _read(
+        self, pixels: LinearPixels, sky: Sky, prior: JointPrior, lowest: int, free: float
+    ) -> tuple[tuple[StripCurves, Sky], JointFit | None]:
+        """Curves of the strips, and the fit to them and those of the earlier frames."""
+        curves = strip_curves(pixels, self._geometry, sky.noise, self._camera, free)
+        curves = without_rows_below(curves, self._geometry, lowest)
+        latest = (without_clipped(curves) if sky.is_clipped else curves, sky)
+        return latest, fit_jointly(mean_curves((*self._earlier, latest)), self._geometry, prior)
 
     def _seen_horizon(self, pixels: LinearPixels) -> Horizon:
         """Weigh the told horizon with the point in which the road's lines meet."""

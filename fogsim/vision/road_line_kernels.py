@@ -65,8 +65,9 @@ def row_points(
     cols = pixels.shape[1]
     place, kind = np.empty((MOST_POINTS, 2)), np.empty(MOST_POINTS, np.int64)
     line, slope = np.zeros(cols, np.float32), np.zeros(cols, np.float32)
-    weight = np.arange(REACH + 1) * np.exp(-0.5 * (np.arange(REACH + 1) / SMOOTHING) ** 2)
-    weight /= 2.0 * (weight * np.arange(REACH + 1)).sum()
+    tap = np.arange(REACH + 1).astype(np.float64)
+    weight = tap * np.exp(-0.5 * (tap / SMOOTHING) ** 2)
+    weight = weight / (2.0 * (weight * tap).sum())
     w1, w2, w3, w4 = np.float32(weight[1]), np.float32(weight[2]), np.float32(weight[3]), np.float32(weight[4])
     # Views that start at each tap: indices that cannot be negative let the loop be vectorised.
     l4, l3, l2, l1 = line, line[1:], line[2:], line[3:]
@@ -297,7 +298,8 @@ def meet(  # noqa: C901, PLR0912, PLR0915 - one iteration of a solver, which sha
     size = 3 + lines
     slope, bend, reach = slopes.copy(), 0.0, 3.0
     scatter, number = np.full(lines, 0.5), np.zeros(lines)
-    inverse, which = np.eye(size), np.empty(across.size, np.int64)
+    inverse: NDArray[np.float64] = np.eye(size)
+    which = np.empty(across.size, np.int64)
     for _ in range(5):
         squares, number = np.zeros(lines), np.zeros(lines)
         for i in range(across.size):
@@ -354,7 +356,7 @@ def meet(  # noqa: C901, PLR0912, PLR0915 - one iteration of a solver, which sha
         for a in range(size):
             for b in range(a):
                 normal[a, b] = normal[b, a]
-        inverse = np.linalg.inv(normal)
+        inverse = np.linalg.inv(normal).astype(np.float64)
         step = inverse @ right
         offset, row, bend = offset + step[0], row + min(max(step[1], -5.0), 5.0), bend + step[2]
         slope += step[3:]

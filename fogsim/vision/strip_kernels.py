@@ -95,7 +95,7 @@ def strip_rows(
         hides = first[i] <= hidden_above
         taken = 0
         for j in range(wanted):
-            # Rows of the bin in turn, columns evenly: most neighbours share no row, and a mirrored image gives the same.
+            # Rows of the bin in turn, columns evenly: a mirrored image gives the same.
             row = first[i] + min(j, wanted - 1 - j) % height
             col = min(max(math.floor(low + (j + 0.5) * width / wanted + 0.5), 0), cols - 1)
             if hides and hidden_from <= col <= hidden_to:

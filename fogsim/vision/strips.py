@@ -375,7 +375,7 @@ def sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
     side = camera.width // 6
     noise = strip_kernels.pixel_noise(image.pixels, image.tables, rows)
     bright, share = strip_kernels.sky_rows(image.pixels, image.tables, rows, side, camera.width - side, max(noise, 0.3))
-    height = (camera.horizon_row - rows) / camera.focal_length
+    height = (camera.horizon_row - rows.astype(np.float64)) / camera.focal_length
     darker = max(DARKER, 2.0 * noise / max(float(bright.max()), 1e-9))
     level, _, scatter, lowest = strip_kernels.level_at_horizon(bright, height, darker)
     unseen = UNSEEN * max(float(lowest) - margin / camera.focal_length - CLOSE, 0.0) * level

@@ -20,15 +20,6 @@ PEAKS, VOTES = 16, 30
 CONSENSUS = 5.0
 """Distance at which a line passes through a point in the choice of lines [px]."""
 
-AWAY = 50.0
-"""Rows below the vanishing point from which edges count for the sub-pixel lines: nearer, they blur together [px]."""
-
-LEAST_EDGE = 0.15
-"""Least deviation of an edge's place [px], for edges that are straighter than the model deserves."""
-
-BENT = 0.3
-"""Deviation by which a straight edge of the road misses the vanishing point for other reasons than noise [px]."""
-
 SMALLEST_ANGLE = 0.15
 """Angle between two lines below which their crossing says little [rad]."""
 
@@ -57,12 +48,13 @@ class VanishingPoint:
 
 
 def vanishing_point(
-    gradient: Gradient, edges: NDArray[np.uint8], guess: tuple[float, float], reach: float, *, refined: bool = True
+    gradient: Gradient, edges: NDArray[np.uint8], guess: tuple[float, float], reach: float
 ) -> VanishingPoint | None:
     """Find the vanishing point of the edges below a first guess (negru2013 section IV.B.a).
 
     Edges vote along their gradient for lines that pass within `reach` of the guess; the highest peaks are lines; of
-    random pairs of lines that one is kept through whose crossing the most votes pass.
+    random pairs of lines that one is kept through whose crossing the most votes pass, and the centre of mass of the
+    crossings of all that pass there is the answer. It is several pixels off; see `fogsim.vision.road_lines`.
 
     Parameters
     ----------
@@ -74,9 +66,6 @@ def vanishing_point(
         Column and row of the first guess, in rows of `edges` [px].
     reach : float
         How far from it lines may pass [px].
-    refined : bool
-        Place the edges within the pixel, fit each line to edges of one polarity away from the vanishing point, and
-        intersect by weighted least squares; else take the centre of mass of the lines' crossings, as published.
 
     Returns
     -------
@@ -88,16 +77,12 @@ def vanishing_point(
     chosen = _consensus(lines, votes)
     if chosen is None:
         return None
-    agreeing, crossing = chosen
-    score = float(votes[agreeing].sum())
-    if not refined:
-        found: tuple[Floats, float] | None = _centre_of_mass(lines[agreeing])
-    else:
-        found = _least_squares(points, lines[agreeing], crossing)
+    score = float(votes[chosen].sum())
+    found = _centre_of_mass(lines[chosen])
     if found is None:
         return None
     place, deviation = found
-    return VanishingPoint(guess[0] + float(place[0]), guess[1] + float(place[1]), deviation, score, int(agreeing.sum()))
+    return VanishingPoint(guess[0] + float(place[0]), guess[1] + float(place[1]), deviation, score, int(chosen.sum()))
 
 
 def _crossing(first: Floats, second: Floats) -> Floats | None:
@@ -108,7 +93,7 @@ def _crossing(first: Floats, second: Floats) -> Floats | None:
     return np.asarray(np.linalg.solve(normals, np.array([first[1], second[1]])))
 
 
-def _consensus(lines: Floats, votes: Floats) -> tuple[NDArray[np.bool_], Floats] | None:
+def _consensus(lines: Floats, votes: Floats) -> NDArray[np.bool_] | None:
     if len(lines) < 2:
         return None
     # The same pairs for the same number of lines: an estimate is a function of the image.
@@ -122,8 +107,7 @@ def _consensus(lines: Floats, votes: Floats) -> tuple[NDArray[np.bool_], Floats]
     u = (lines[a, 1] * sine[b] - lines[b, 1] * sine[a]) / turn
     v = (lines[b, 1] * cosine[a] - lines[a, 1] * cosine[b]) / turn
     passing = np.abs(u[:, None] * cosine + v[:, None] * sine - lines[:, 1]) < CONSENSUS
-    best = int(np.argmax(passing @ votes))
-    return passing[best], np.array([u[best], v[best]])
+    return np.asarray(passing[int(np.argmax(passing @ votes))])
 
 
 def _centre_of_mass(lines: Floats) -> tuple[Floats, float] | None:
@@ -133,29 +117,3 @@ def _centre_of_mass(lines: Floats) -> tuple[Floats, float] | None:
         return None
     spread = float(np.std([c[1] for c in crossings])) if len(crossings) > 1 else CONSENSUS
     return np.mean(crossings, axis=0), max(spread, 1.0)
-
-
-def _least_squares(points: Floats, lines: Floats, crossing: Floats) -> tuple[Floats, float] | None:
-    fits = [
-        line_kernels.fit_line(points, float(theta), float(rho), float(crossing[1]) + AWAY, LEAST_EDGE)
-        for theta, rho in lines
-    ]
-    fits = [fit for fit in fits if fit[3] > 0.0]
-    place = crossing
-    for _ in range(3):
-        if len(fits) < 2:
-            return None
-        normal = np.array([[fit[0], fit[1]] for fit in fits])
-        # A line is known best where its points are: at the vanishing point it is known by extrapolation.
-        along = np.array([-fit[1] * (place[0] - fit[4]) + fit[0] * (place[1] - fit[5]) for fit in fits])
-        variance = BENT**2 + np.array([fit[3] for fit in fits]) + along**2 * np.array([fit[6] for fit in fits])
-        information = normal.T @ (normal / variance[:, None])
-        if float(np.linalg.det(information)) < 1e-6 * float(np.trace(information)) ** 2:
-            return None
-        covariance = np.linalg.inv(information)
-        place = covariance @ (normal.T @ (np.array([fit[2] for fit in fits]) / variance))
-        off = normal @ place - np.array([fit[2] for fit in fits])
-        kept = np.abs(off) <= np.maximum(3.0 * np.sqrt(variance), 1.0)
-        fits = [fit for fit, keep in zip(fits, kept, strict=True) if keep]
-    scatter = float((off**2 / variance).sum()) / max(len(off) - 2, 1)
-    return place, math.sqrt(float(covariance[1, 1]) * max(scatter, 1.0))

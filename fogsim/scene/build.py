@@ -93,9 +93,11 @@ def build_scene(network: RoadNetwork, signs: SignMap, rng: np.random.Generator, 
 
 
 def _sides(lane: Lane) -> Points:
-    """Both sides of a lane but for what may well stick out of a junction."""
-    line, half = cleaned(lane.centreline), max(lane.width / 2 - _STICKING_OUT, 0.0)
-    return np.concatenate((parallel(line, half), parallel(line, -half)))
+    """Both sides of a lane but for what may well stick out of a junction, and for the ends, which lie on its border."""
+    line, half = refined(cleaned(lane.centreline), 2.0), max(lane.width / 2 - _STICKING_OUT, 0.0)
+    if len(line) < 3:
+        return line
+    return np.concatenate((parallel(line, half)[1:-1], parallel(line, -half)[1:-1]))
 
 
 def _pavement(network: RoadNetwork, lanes: Sequence[Lane], driven: Sequence[Lane]) -> list[Mesh]:

@@ -35,6 +35,11 @@ def records(name: str, *arguments: str) -> list[dict[str, Any]]:
             {"method", "visibility", "median_pct", "p95_pct", "valid_share", "ms"},
         ),
         (
+            "lead_accuracy.py",
+            ("--cameras", "1", "--vehicles", "1", "--step", "10", "--methods", "huang2015_lead"),
+            {"method", "visibility", "airlight", "camera", "vehicle", "median_pct", "p95_pct", "coverage", "ms"},
+        ),
+        (
             "frames.py",
             ("--size", "64x48", "--frames", "2", "--repeat", "1"),
             {"renderer", "light", "width", "height", "ms_median", "ms_min", "ms_render"},

@@ -345,6 +345,10 @@ DARKER = 0.012
 UNSEEN, CLOSE = 0.3, 0.01
 """Deviation of the sky's luminance for each radian that is hidden above the horizon [1/rad], but for so much [rad]."""
 
+MOST_HIDDEN = 0.14
+"""Angle above the horizon up to which something may hide all of the sky, beyond which it is no road that lies ahead but
+a wall or a wood [rad]."""
+
 PATCHY, SCATTERED, BRIGHTER = 0.35, 0.004, 0.3
 """Share of a row that is alike, and relative scatter of the rows, beyond which trees may be taken for sky; by how much
 the sky may be brighter then, as a deviation [-]."""
@@ -365,7 +369,7 @@ def sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
     Returns
     -------
     Sky or None
-        None if there are no such rows.
+        None if there are no such rows, or something high hides the sky all along them.
     """
     bottom = min(math.floor(camera.horizon_row - margin), camera.height - 1)
     top = max(0, math.floor(camera.horizon_row - SKY_HEIGHT * camera.focal_length))
@@ -378,6 +382,8 @@ def sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
     height = (camera.horizon_row - rows.astype(np.float64)) / camera.focal_length
     darker = max(DARKER, 2.0 * noise / max(float(bright.max()), 1e-9))
     level, _, scatter, lowest = strip_kernels.level_at_horizon(bright, height, darker)
+    if lowest > MOST_HIDDEN:
+        return None
     unseen = UNSEEN * max(float(lowest) - margin / camera.focal_length - CLOSE, 0.0) * level
     deviation = math.hypot(scatter, unseen)
     # What looks everywhere different is a wood rather than a sky, which is no darker than that.

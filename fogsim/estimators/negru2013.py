@@ -23,7 +23,7 @@ from fogsim.vision.profile import RoadCurve, band_profile, path_lengths
 from fogsim.vision.region import Band, crossing_band, grow_region
 from fogsim.vision.road_image import MIN_CONTRAST, MIN_ROWS, SATURATED, CannotTellError, RoadImage, road_image
 from fogsim.vision.road_lines import meeting_lines
-from fogsim.vision.strips import band_geometry, linear_pixels, sky_above, strip_curves, without_clipped
+from fogsim.vision.strips import above_bonnet, band_geometry, linear_pixels, sky_above, strip_curves, without_clipped
 from fogsim.vision.vanishing import VanishingPoint, vanishing_point
 
 SIMILARITY = 0.25  # [-] steepest fog, in contrasts of road to airlight a row; a silhouette takes at least 0.34
@@ -38,6 +38,7 @@ REACH = math.radians(4.0)  # [rad] about the told vanishing point, within which 
 ALBEDO_DEVIATION = 0.015  # [-] of k by slow changes of the road's reflectance, which one row's inflection does not show
 MAX_RESIDUAL = 0.12  # [-] of the fitted contrast: more is no curve of Koschmieder's
 MAX_MISFIT = 4.0  # [-] mean square of standardised residuals: more is no curve of Koschmieder's either
+MIN_USED = 0.6  # [-] least share of the band's rows that must fit
 LEAST_CONTRAST = 0.08  # [-] of the road to the airlight, for fog to show
 SURE_OF_FOG = 4.5  # [-] least k in its standard deviations
 CLEAR = OPTICAL_DEPTH_AT_VISIBILITY / 300.0  # [1/m] what k must surely be below to be called no fog
@@ -138,7 +139,7 @@ class Negru2013:
         image = checked_image(observation.image, self._camera)
         diagnostics: dict[str, object] = {"horizon_row": self._camera.horizon_row}
         try:
-            road = road_image(image, self._camera, self._told)
+            road = self._road(image)
             edges = self._edges(road)
             horizon = self._horizon(edges, road)
             diagnostics["horizon_row"] = horizon.row
@@ -151,6 +152,15 @@ class Negru2013:
             return self._corrected(curve, road, horizon, band, diagnostics)
         except CannotTellError as reason:
             return Estimate.invalid(self.method, str(reason), **diagnostics)
+
+    def _road(self, image: NDArray[np.uint8] | NDArray[np.uint16]) -> RoadImage:
+        """Road from a little above the horizon down to the image's bottom or (corrected) the own bonnet."""
+        road = road_image(image, self._camera, self._told)
+        if self._as_published:
+            return road
+        lowest = above_bonnet(linear_pixels(road.level, self._camera), self._camera, road.airlight)
+        luminance = road.luminance[: lowest + 1 - road.first_row]
+        return replace(road, luminance=luminance, road=float(np.median(luminance[-1])))
 
     def _published(
         self, curve: RoadCurve, road: RoadImage, horizon: Horizon, band: Band, diagnostics: dict[str, object]
@@ -205,6 +215,8 @@ class Negru2013:
             raise CannotTellError("too little road is seen")
         if fit.road >= (1.0 - LEAST_CONTRAST) * fit.airlight:
             raise CannotTellError("the road is nearly as bright as the airlight, or brighter")
+        if fit.used[0].sum() < MIN_USED * (curves.variance[0] > 0).sum():
+            raise CannotTellError("the road ahead is hidden, or is none")
         if fit.misfit > MAX_MISFIT:
             raise CannotTellError("the road fades into the airlight, but not as Koschmieder's law has it")
         return fit

@@ -30,6 +30,9 @@ SIMILARITY = 0.25  # [-] steepest fog, in contrasts of road to airlight a row; a
 MAX_ASIDE = 0.1
 """Share of the image's width by which a clear road may lie beside the vanishing column [-]."""
 
+MIDDLE, LEAST_MIDDLE = 0.3, 200.0
+"""How far to either side of the vanishing column a band is sought, a share of the image's width and at least [px]."""
+
 MAX_ABOVE = 0.05
 """Share of the image's height that a clear road's region may reach above the told horizon [-]."""
 
@@ -140,10 +143,11 @@ class Negru2013:
         diagnostics: dict[str, object] = {"horizon_row": self._camera.horizon_row}
         try:
             road = self._road(image)
-            edges = self._edges(road)
+            looked_at, first_column = self._middle(road)
+            edges = self._edges(looked_at)
             horizon = self._horizon(edges, road)
             diagnostics["horizon_row"] = horizon.row
-            band = _band(road, edges, self._camera, self._told)
+            band = _band(looked_at, edges, self._camera, self._told, first_column)
             diagnostics["band"] = (band.left, band.right, band.top + road.first_row, band.bottom + road.first_row)
             curve = self._curve(road, band, horizon)
             diagnostics["profile"] = curve.luminance
@@ -161,6 +165,14 @@ class Negru2013:
         lowest = above_bonnet(linear_pixels(road.level, self._camera), self._camera, road.airlight)
         luminance = road.luminance[: lowest + 1 - road.first_row]
         return replace(road, luminance=luminance, road=float(np.median(luminance[-1])))
+
+    def _middle(self, road: RoadImage) -> tuple[RoadImage, int]:
+        """Part of the road image that a band may lie in, and its first column; the verges only cost time."""
+        if self._as_published:
+            return road, 0
+        centre, reach = self._camera.principal_point[0], max(MIDDLE * self._camera.width, LEAST_MIDDLE)
+        first, last = max(round(centre - reach), 0), min(round(centre + reach) + 1, self._camera.width)
+        return replace(road, luminance=np.ascontiguousarray(road.luminance[:, first:last])), first
 
     def _published(
         self, curve: RoadCurve, road: RoadImage, horizon: Horizon, band: Band, diagnostics: dict[str, object]
@@ -280,17 +292,17 @@ def _fog_slope(road: RoadImage, horizon: Horizon) -> NDArray[np.float64]:
     return np.minimum(steepest_slope(below_horizon, road.airlight), SIMILARITY * road.contrast)
 
 
-def _band(road: RoadImage, edges: DericheEdges, camera: Camera, horizon: Horizon) -> Band:
+def _band(road: RoadImage, edges: DericheEdges, camera: Camera, horizon: Horizon, first_column: int) -> Band:
     blurred = smoothed(road.luminance)
     steps = (_fog_slope(road, horizon) + edges.threshold).astype(np.float32)
     region = grow_region(blurred, edges.pixels, steps, SIMILARITY * road.contrast + edges.threshold)
-    cols, centre = region.shape[1], camera.principal_point[0]
+    cols, centre = camera.width, camera.principal_point[0] - first_column
     band = crossing_band(
         region, centre, min_width=max(3, cols // 80), max_width=max(5, cols // 24), hole=max(2, cols // 128)
     )
     if band is None or band.bottom - band.top < MIN_ROWS // 2:
         raise CannotTellError("no vertical band crosses the road's region")
-    return band
+    return replace(band, left=band.left + first_column, right=band.right + first_column)
 
 
 def _credible(model: FogModel | None, curve: RoadCurve, road: RoadImage) -> FogModel | None:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
 from fogsim.vision.horizon import PITCH_DEVIATION, levelled
+from fogsim.vision.lead_daylight import check_road, road_before
 from fogsim.vision.lead_scene import steepness
 from fogsim.vision.lead_window import WIDTHS, LeadWindow, lead_region
 from fogsim.vision.luminance import linear_luminance
@@ -80,7 +81,7 @@ def vehicle_crop(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera, 
     Raises
     ------
     CannotTellError
-        If no vehicle can be seen there, or no sky by day.
+        If no vehicle can be seen there, or no sky by day, or lamps light the road.
     """
     if not 0.5 < distance < math.inf:
         raise CannotTellError(f"a range of {distance:.1f} m is none of a vehicle ahead")
@@ -94,6 +95,7 @@ def vehicle_crop(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera, 
     level = levelled(image, camera)
     luminance = linear_luminance(level[rows, cols], camera.response, camera.bits)
     sky, noise = _sky(level, camera)
+    check_road(linear_luminance(level[road_before(camera, distance)], camera.response, camera.bits), sky)
     pitch = 1.5 * PITCH_DEVIATION * camera.focal_length
     return Crop(luminance, (cols.start, rows.start), sky, noise * steepness(luminance, sky, camera), pitch)
 

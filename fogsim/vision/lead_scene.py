@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
 from fogsim.vision.horizon import levelled
+from fogsim.vision.lead_daylight import check_road, road_before
 from fogsim.vision.lead_patch import LeadPicture
 from fogsim.vision.lead_window import LeadWindow, find_lead, lead_region
 from fogsim.vision.response import linear_table
@@ -33,9 +34,6 @@ SKY_HEIGHT = 0.06
 
 HALF_TRUCK = 1.6
 """How much of the sky beside the axis a high vehicle ahead can hide [m]."""
-
-BRIGHT_ROAD = 1.1
-"""Luminance of the road before the vehicle over that of the sky, from which on there is no daylight, or no road [-]."""
 
 LEAST_WIDTH = 3.0
 """Narrowest vehicle that is looked at [px]."""
@@ -154,7 +152,7 @@ def lead_scene(image: Pixels, camera: Camera, depth: float, pitch_deviation: flo
         sky=sky,
         noise=max(sky.noise * steepness(luminance, sky.luminance, camera), 0.3 * 255.0 / 2**camera.bits),
     )
-    _check_road(pixels, scene)
+    check_road(_luminance(pixels, *road_before(camera, depth)), sky.luminance)
     return scene
 
 
@@ -197,17 +195,6 @@ def _airlight(light: NDArray[np.float32], sky: Sky, axis: float, hidden: float) 
         means.append(float(core.mean()) if core.size else middle)
     # Whatever stands before it makes either reading darker.
     return max(float(np.percentile(means, BRIGHT_BLOCKS)), sky.luminance)
-
-
-def _check_road(pixels: LinearPixels, scene: LeadScene) -> None:
-    """Refuse a road that is brighter than the sky: head lamps light it, or the image is upside-down."""
-    camera, scale = scene.camera, scene.scale
-    first = min(math.ceil(camera.horizon_row + camera.row_distance / scene.depth + 0.3 * scale), camera.height - 3)
-    middle, half = camera.principal_point[0], max(0.6 * scale, 4.0)
-    cols = slice(max(math.floor(middle - half), 0), min(math.ceil(middle + half) + 1, camera.width))
-    road = _luminance(pixels, slice(max(first, 0), camera.height, 4), cols)
-    if road.size and float(np.median(road)) > BRIGHT_ROAD * scene.sky.luminance:
-        raise CannotTellError("the road is brighter than the sky: this is a daytime method")
 
 
 def steepness(luminance: NDArray[np.float32], sky: float, camera: Camera) -> float:

@@ -311,6 +311,17 @@ def test_another_vehicle_begins_another_track():
     assert estimator.update(Observation(seen.image)).diagnostics["reason"] == "no vehicle is tracked ahead"
 
 
+@pytest.mark.parametrize("as_published", [False, True])
+@pytest.mark.parametrize("paint", [40.0, 90.0])
+def test_a_road_that_lamps_light_is_no_answer(paint, as_published):
+    # At dusk the own head lamps make road and vehicle brighter than they are to the sky.
+    dusk = Chase(visibility=100.0, airlight=60.0, asphalt=110.0, paint=paint)
+    for ranges in (AWAY, AWAY[::-1]):
+        found = followed(dusk, ranges=ranges, as_published=as_published)
+        assert not found.valid
+        assert "brighter than the sky" in found.diagnostics["reason"]
+
+
 BAD = {
     "black": np.zeros((515, 688), np.uint8),
     "white": np.full((515, 688), 255, np.uint8),

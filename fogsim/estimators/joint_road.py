@@ -11,8 +11,10 @@ from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation
+from fogsim.vision.agreeing_strips import fit_agreeing
 from fogsim.vision.horizon import PITCH_DEVIATION, Horizon, calibrated_horizon, levelled, weighed
-from fogsim.vision.joint_fit import JointFit, JointPrior, fit_jointly
+from fogsim.vision.joint_checks import no_road
+from fogsim.vision.joint_fit import JointFit, JointPrior
 from fogsim.vision.joint_prior import joint_prior
 from fogsim.vision.road_lines import meeting_lines
 from fogsim.vision.strips import (
@@ -163,7 +165,7 @@ class JointRoad:
         curves = strip_curves(pixels, self._geometry, sky.noise, self._camera, free)
         curves = without_rows_below(curves, self._geometry, lowest)
         latest = (without_clipped(curves) if sky.is_clipped else curves, sky)
-        return latest, fit_jointly(mean_curves((*self._earlier, latest)), self._geometry, prior)
+        return latest, fit_agreeing(mean_curves((*self._earlier, latest)), self._geometry, prior)
 
     def _seen_horizon(self, pixels: LinearPixels) -> Horizon:
         """Weigh the told horizon with the point in which the road's lines meet."""
@@ -179,6 +181,8 @@ class JointRoad:
         near = (curves.variance[0] > 0) & (self._geometry.distance < min(free, 1.5 / max(fit.extinction, 0.01)))
         if near.sum() < MIN_ROWS // 2 or fit.used[0][near].mean() < MIN_USED:
             return "the road ahead is hidden, or is none"
+        if why := no_road(fit, curves, self._geometry, self._camera):
+            return why
         upper = fit.extinction + 2.0 * fit.extinction_deviation
         if fit.extinction < SURE_OF_FOG * fit.extinction_deviation and upper > CLEAR:
             return "the extinction is not observable: too little road is seen"

@@ -17,6 +17,7 @@ from fogsim.vision.canny_deriche import CannyDeriche, DericheEdges
 from fogsim.vision.edges import smoothed
 from fogsim.vision.horizon import PITCH_DEVIATION, Horizon, calibrated_horizon, weighed
 from fogsim.vision.inflection import FogModel, best_inflection, printed_inflection, steepest_slope
+from fogsim.vision.joint_checks import no_road
 from fogsim.vision.joint_fit import JointFit, fit_jointly
 from fogsim.vision.joint_prior import joint_prior
 from fogsim.vision.profile import RoadCurve, band_profile, path_lengths
@@ -231,6 +232,8 @@ class Negru2013:
             raise CannotTellError("the road ahead is hidden, or is none")
         if fit.misfit > MAX_MISFIT:
             raise CannotTellError("the road fades into the airlight, but not as Koschmieder's law has it")
+        if why := no_road(fit, curves, geometry, camera):
+            raise CannotTellError(why)
         return fit
 
     def _edges(self, road: RoadImage) -> DericheEdges:

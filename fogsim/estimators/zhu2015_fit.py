@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
+from fogsim.vision.agreeing_strips import MODEL_DEVIATION, fit_agreeing
 from fogsim.vision.horizon import Horizon
-from fogsim.vision.joint_fit import JointFit, JointPrior, fit_jointly
+from fogsim.vision.joint_checks import no_road
+from fogsim.vision.joint_fit import JointFit, JointPrior
 from fogsim.vision.road_image import CannotTellError
 from fogsim.vision.strips import (
     LinearPixels,
@@ -43,12 +45,6 @@ MAX_MISFIT = 4.0
 
 CLEAR = OPTICAL_DEPTH_AT_VISIBILITY / 300.0
 """Extinction that an estimate which may as well be none must surely be below [1/m]."""
-
-DISAGREEMENT = 2.0
-"""Standard deviations by which a neighbouring strip may change the extinction [-]."""
-
-MODEL_DEVIATION = 0.01
-"""Relative deviation of k by what the model leaves out: marks, rounding, a road that is not quite flat [-]."""
 
 
 def fitted_strips(
@@ -89,8 +85,12 @@ def fitted_strips(
     geometry = strip_geometry(level, max(1.0, horizon.standard_deviation))
     curves = strip_curves(pixels, geometry, sky.noise, level, free)
     curves = _on_road(without_clipped(curves) if sky.is_clipped else curves, geometry, region, first_row)
-    fit = _agreeing(curves, geometry, _prior(sky, horizon))
+    fit = fit_agreeing(curves, geometry, _prior(sky, horizon))
+    if fit is None:
+        raise CannotTellError("no road is seen")
     _check(fit, sky)
+    if why := no_road(fit, curves, geometry, level):
+        raise CannotTellError(why)
     return fit, math.hypot(fit.extinction_deviation, MODEL_DEVIATION * fit.extinction)
 
 
@@ -108,39 +108,7 @@ def _on_road(curves: StripCurves, geometry: StripGeometry, region: NDArray[np.ui
         nearest = np.flatnonzero(curves.variance[strip] > 0)[:FIRST_BINS]
         if nearest.size == 0 or road[strip, nearest].mean() < FIRST_COVERED:
             road[strip] = False
-    return StripCurves(curves.luminance, np.where(road, curves.variance, 0.0))
-
-
-def _agreeing(curves: StripCurves, geometry: StripGeometry, prior: JointPrior) -> JointFit:
-    """Fit of the own lane and of those neighbours that agree with it.
-
-    A strip that holds a lane at one distance and a verge at another looks like fog of another density.
-    """
-    own = _fitted(curves, geometry, prior, [0])
-    seen = [strip for strip in range(1, len(curves.variance)) if (curves.variance[strip] > 0).any()]
-    if not seen:
-        return own
-    best = _fitted(curves, geometry, prior, [0, *seen])
-    if _agree(own, best):
-        return best
-    kept = [strip for strip in seen if _agree(own, _fitted(curves, geometry, prior, [0, strip]))]
-    return _fitted(curves, geometry, prior, [0, *kept]) if 0 < len(kept) < len(seen) else own
-
-
-def _agree(own: JointFit, more: JointFit) -> bool:
-    """Whether more strips change the extinction by no more than they sharpen it (Hausman 1978)."""
-    sharpened = max(own.extinction_deviation**2 - more.extinction_deviation**2, 0.0)
-    return abs(more.extinction - own.extinction) <= DISAGREEMENT * math.hypot(
-        math.sqrt(sharpened), MODEL_DEVIATION * own.extinction
-    )
-
-
-def _fitted(curves: StripCurves, geometry: StripGeometry, prior: JointPrior, strips: list[int]) -> JointFit:
-    kept = replace(geometry, left=geometry.left[strips], right=geometry.right[strips], path=geometry.path[strips])
-    fit = fit_jointly(StripCurves(curves.luminance[strips], curves.variance[strips]), kept, prior)
-    if fit is None:
-        raise CannotTellError("no road is seen")
-    return fit
+    return replace(curves, variance=np.where(road, curves.variance, 0.0))
 
 
 def _prior(sky: Sky, horizon: Horizon) -> JointPrior:

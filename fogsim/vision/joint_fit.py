@@ -93,7 +93,9 @@ class JointPrior:
     shift_deviation: float
 
 
-def fit_jointly(curves: StripCurves, geometry: StripGeometry, prior: JointPrior) -> JointFit | None:
+def fit_jointly(
+    curves: StripCurves, geometry: StripGeometry, prior: JointPrior, near: JointFit | None = None
+) -> JointFit | None:
     """Fit Koschmieder's law to strips of road.
 
     The likelihood is that of `fogsim.vision.joint_kernels`; how much the albedo wanders is unknown, so several answers
@@ -108,6 +110,8 @@ def fit_jointly(curves: StripCurves, geometry: StripGeometry, prior: JointPrior)
         Where the bins are.
     prior : JointPrior
         Sky and horizon.
+    near : JointFit or None
+        Answer for some of the strips, from which to start in place of a search.
 
     Returns
     -------
@@ -117,8 +121,8 @@ def fit_jointly(curves: StripCurves, geometry: StripGeometry, prior: JointPrior)
     if int((curves.variance[0] > 0).sum()) < LEAST_BINS:
         return None
     data = _Data(curves, geometry)
-    starts = data.starts(prior)
-    found = [data.refined(ALBEDOS[0], prior, np.array([*start, prior.shift]), STEPS) for start in starts]
+    starts = data.starts(prior) if near is None else data.starts_near(near, prior)
+    found = [data.refined(ALBEDOS[0], prior, start, STEPS) for start in starts]
     best = min(found, key=lambda f: f.cost)
     found = [best] + [data.refined(albedo, prior, best.theta, MORE_STEPS) for albedo in ALBEDOS[1:]]
     return _average(found)
@@ -148,14 +152,28 @@ class _Data:
         g = self.geometry
         return (self.curves.luminance, self.curves.variance, g.below, g.half, g.path, g.distance, g.extent)
 
-    def starts(self, prior: JointPrior) -> list[tuple[float, float]]:
-        """Extinctions and airlights that may be near the greatest likelihood.
+    def starts_near(self, near: JointFit, prior: JointPrior) -> list[Floats]:
+        """Answer for some of the strips, and that of the simple model for all if it is another."""
+        found = [np.array([near.extinction, near.airlight, near.shift])]
+        least, most = self._span()
+        grid = np.geomspace(least, most, SIMPLE_EXTINCTIONS)
+        k, airlight = joint_kernels.simple_search(*self._bins[:5], grid, _known(prior))
+        if abs(math.log(k / max(near.extinction, least))) > ALIKE:
+            found.append(np.array([k, airlight, prior.shift]))
+        return found
+
+    def _span(self) -> tuple[float, float]:
+        """Least and greatest extinction that show [1/m]."""
+        unit = 1.0 / float(self.geometry.path[0, 0])
+        return 0.2 * unit, 2.0 * unit * float(self.geometry.below[0])
+
+    def starts(self, prior: JointPrior) -> list[Floats]:
+        """Extinctions, airlights and shifts that may be near the greatest likelihood.
 
         The best of a coarse grid with an airlight as in the prior or, where that is unsure, as what the farthest road
         may have faded into; and that of a simpler model, whose likelihood is not so narrow that a grid may miss it.
         """
-        unit = 1.0 / float(self.geometry.path[0, 0])
-        least, most = 0.2 * unit, 2.0 * unit * float(self.geometry.below[0])
+        least, most = self._span()
         grid = np.geomspace(least, most, SIMPLE_EXTINCTIONS)
         found = [joint_kernels.simple_search(*self._bins[:5], grid, _known(prior))]
         airlights = [prior.airlight]
@@ -168,7 +186,7 @@ class _Data:
             new = all(abs(math.log(grid[best] / k)) > ALIKE for k, _ in found)
             if math.isfinite(cost[best]) and new:
                 found.append((float(grid[best]), airlight))
-        return found
+        return [np.array([*start, prior.shift]) for start in found]
 
     def _farthest(self) -> float:
         seen = self.curves.luminance[0][self.curves.variance[0] > 0]

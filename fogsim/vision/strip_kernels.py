@@ -33,21 +33,22 @@ def light(pixels: NDArray[np.uint8] | NDArray[np.uint16], tables: NDArray[np.flo
 
 
 @kernel
-def _core(samples: NDArray[np.float32], count: int, floor: float) -> tuple[float, float]:
-    """Mean and deviation of what lies near the median of the first `count` samples."""
+def _core(samples: NDArray[np.float32], count: int, floor: float) -> tuple[float, float, float]:
+    """Mean and deviation of what lies near the median of the first `count` samples; mean distance of all from it."""
     ordered = np.sort(samples[:count])
     middle = 0.5 * (ordered[(count - 1) // 2] + ordered[count // 2])
     apart = np.sort(np.abs(ordered - middle))
     reach = KEPT * max(1.4826 * float(apart[count // 2]), floor)
-    total, square, kept = 0.0, 0.0, 0
+    total, square, kept, away = 0.0, 0.0, 0, 0.0
     for value in ordered:
         offset = float(value) - middle
+        away += abs(offset)
         if abs(offset) <= reach:
             total += offset
             square += offset * offset
             kept += 1
     mean = total / kept
-    return middle + mean, math.sqrt(max(square / kept - mean * mean, 0.0))
+    return middle + mean, math.sqrt(max(square / kept - mean * mean, 0.0)), away / count
 
 
 @kernel
@@ -62,8 +63,8 @@ def strip_rows(
     hidden_to: float,
     hidden_above: float,
     floor: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Mean and deviation of the core of each bin of rows of one strip, and how many pixels that is of.
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Mean and deviation of the core of each bin of rows of one strip, scatter of the whole bin, and number of pixels.
 
     Parameters
     ----------
@@ -84,7 +85,8 @@ def strip_rows(
     """
     cols = pixels.shape[1]
     count = first.size
-    mean, deviation, number = np.zeros(count), np.zeros(count), np.zeros(count, np.int64)
+    mean, deviation, scatter = np.zeros(count), np.zeros(count), np.zeros(count)
+    number = np.zeros(count, np.int64)
     samples = np.empty(MOST_SAMPLES, np.float32)
     for i in range(count):
         low, width, height = left[i], right[i] - left[i], last[i] - first[i] + 1
@@ -104,9 +106,9 @@ def strip_rows(
             taken += 1
         if taken < 2 or taken < 0.25 * wanted:
             continue
-        mean[i], deviation[i] = _core(samples, taken, floor)
+        mean[i], deviation[i], scatter[i] = _core(samples, taken, floor)
         number[i] = taken
-    return mean, deviation, number
+    return mean, deviation, scatter, number
 
 
 @kernel

@@ -1,7 +1,7 @@
 """Strips of road along the vehicle's axis, and rows of sky above it: what the joint fit of fog looks at."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -198,10 +198,13 @@ class StripCurves:
         Mean of the core of each bin [linear grey levels].
     variance : (strips, n) float64
         Its variance apart from what patches and drift of the albedo do; 0 where there is no datum.
+    scatter : (strips, n) float64
+        Mean distance of all single pixels from the bin's median, marks and the like included [linear grey levels].
     """
 
     luminance: Floats
     variance: Floats
+    scatter: Floats
 
 
 def strip_curves(
@@ -223,14 +226,14 @@ def strip_curves(
         Depth up to which the own lane is free; a tracked vehicle ahead hides what is behind [m].
     """
     strips, count = geometry.left.shape
-    luminance, variance = np.zeros((strips, count)), np.zeros((strips, count))
+    luminance, variance, scatter = (np.zeros((strips, count)) for _ in range(3))
     hidden_from, hidden_to, foot = math.inf, -math.inf, -math.inf
     if math.isfinite(free):
         reach = HALF_VEHICLE * camera.focal_length / free
         hidden_from, hidden_to = camera.principal_point[0] - reach, camera.principal_point[0] + reach
         foot = camera.horizon_row + camera.row_distance / free
     for strip in range(strips):
-        mean, deviation, number = strip_kernels.strip_rows(
+        mean, deviation, scatter[strip], number = strip_kernels.strip_rows(
             image.pixels,
             image.tables,
             geometry.first,
@@ -250,7 +253,7 @@ def strip_curves(
         luminance[strip] = mean
         variance[strip] = np.where(seen, noise**2 / counted + texture + LEAST_DEVIATION**2, 0.0)
         variance[strip] += np.where(seen, _coarseness(mean, deviation, noise, camera), 0.0)
-    return StripCurves(luminance, variance)
+    return StripCurves(luminance, variance, scatter)
 
 
 QUIET, SMOOTHED = 0.3, 1.0
@@ -408,7 +411,8 @@ def mean_curves(frames: tuple[tuple[StripCurves, Sky], ...]) -> StripCurves:
     seen = variance > 0
     count = np.maximum(seen.sum(axis=0), 1)
     mean = np.where(seen, luminance, 0.0).sum(axis=0) / count
-    return StripCurves(mean, np.where(seen, variance, 0.0).sum(axis=0) / count**2)
+    scatter = np.where(seen, gains * np.stack([curves.scatter for curves, _ in frames]), 0.0).sum(axis=0) / count
+    return StripCurves(mean, np.where(seen, variance, 0.0).sum(axis=0) / count**2, scatter)
 
 
 CLIPPED = 0.95 * 255.0
@@ -417,9 +421,9 @@ CLIPPED = 0.95 * 255.0
 
 def without_clipped(curves: StripCurves) -> StripCurves:
     """Leave out bins so bright that their noise, or one of their colours, is clipped."""
-    return StripCurves(curves.luminance, np.where(curves.luminance > CLIPPED, 0.0, curves.variance))
+    return replace(curves, variance=np.where(curves.luminance > CLIPPED, 0.0, curves.variance))
 
 
 def without_rows_below(curves: StripCurves, geometry: StripGeometry, lowest: int) -> StripCurves:
     """Leave out bins that reach below a row."""
-    return StripCurves(curves.luminance, np.where(geometry.last > lowest, 0.0, curves.variance))
+    return replace(curves, variance=np.where(geometry.last > lowest, 0.0, curves.variance))

@@ -26,6 +26,7 @@ class Road:
     lead_paint: float = 30.0
     lead_brakes: bool = False
     marks: bool = True
+    verge: bool = False  # in place of the lane on the right, beyond a solid line: it brightens with distance
     camera: Camera = field(
         default_factory=lambda: Camera(640, 480, 577.0, (319.5, 239.5), 1.38, np.radians(2.0), response=Response.LINEAR)
     )
@@ -44,6 +45,9 @@ def ground(road: Road, ahead: np.ndarray, left: np.ndarray, seed: int) -> np.nda
         solid = np.abs(np.abs(left) - 5.25) < 0.075
         dashed = (np.abs(np.abs(left) - 1.75) < 0.075) & ((ahead % 12.0) < 4.0)
         out = np.where(solid | dashed, road.mark, out)
+    if road.verge:
+        out = np.where(left < -1.85, road.asphalt * (1.0 + 0.6 * np.clip(ahead / 60.0, 0.0, 1.0)), out)
+        out = np.where(np.abs(left + 1.75) < 0.1, road.mark, out)
     return out
 
 

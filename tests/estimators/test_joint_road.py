@@ -44,6 +44,13 @@ def test_albedo_that_drifts_costs_little(render, road, visibility):
     assert 100 * np.abs(error).max() < 20
 
 
+@pytest.mark.parametrize("visibility", [30.0, 50.0, 80.0])
+def test_a_verge_in_place_of_the_neighbouring_lane_is_left_out(render, road, visibility):
+    scene = road.but(visibility=visibility, verge=True)
+    found = [estimate(render(scene, seed), road.camera).extinction for seed in range(3)]
+    assert np.array(found) * visibility / 3.0 == pytest.approx(1.0, abs=0.03)
+
+
 @pytest.mark.parametrize("told", [True, False])
 @pytest.mark.parametrize("paint", [30.0, 170.0])
 @pytest.mark.parametrize("visibility", [50, 150, 400])

@@ -1,0 +1,73 @@
+"""Joint fit of the own lane and of those neighbouring strips of road that agree with it."""
+
+import math
+from dataclasses import replace
+
+from fogsim.vision.joint_fit import JointFit, JointPrior, fit_jointly
+from fogsim.vision.strips import StripCurves, StripGeometry
+
+DISAGREEMENT = 2.0
+"""Standard deviations by which a neighbouring strip may change the extinction [-]."""
+
+MODEL_DEVIATION = 0.01
+"""Relative deviation of k by what the model leaves out: marks, rounding, a road that is not quite flat [-]."""
+
+SURE = 0.03
+"""Relative deviation of k up to which the own lane's answer judges its neighbours [-]: one that is less sure, as where
+something stands in that lane, is itself more easily wrong than they."""
+
+
+def fit_agreeing(curves: StripCurves, geometry: StripGeometry, prior: JointPrior) -> JointFit | None:
+    """Fit the own lane, which is the first strip, with the neighbours that agree with it.
+
+    A strip that holds a lane at one distance and a verge at another looks like fog of another density. Where the own
+    lane alone says little, all strips count.
+
+    Parameters
+    ----------
+    curves : StripCurves
+        Luminance by bin.
+    geometry : StripGeometry
+        Where the bins are.
+    prior : JointPrior
+        Sky and horizon.
+
+    Returns
+    -------
+    JointFit or None
+        None if the own lane has too few bins.
+    """
+    own = _fitted(curves, geometry, prior, [0])
+    seen = [strip for strip in range(1, len(curves.variance)) if (curves.variance[strip] > 0).any()]
+    if own is None or not seen:
+        return own
+    best = _fitted(curves, geometry, prior, [0, *seen], own)
+    if best is None or own.extinction_deviation > SURE * own.extinction or agree(own, best):
+        return best
+    pairs = {strip: _fitted(curves, geometry, prior, [0, strip], own) for strip in seen}
+    kept = [strip for strip, pair in pairs.items() if pair is not None and agree(own, pair)]
+    if not kept:
+        return own
+    return pairs[kept[0]] if len(kept) == 1 else own
+
+
+def agree(own: JointFit, more: JointFit) -> bool:
+    """Whether more strips change the extinction by no more than they sharpen it (Hausman 1978, eq. 2.2).
+
+    Parameters
+    ----------
+    own, more : JointFit
+        Fit of the own lane, and of it with others.
+    """
+    sharpened = max(own.extinction_deviation**2 - more.extinction_deviation**2, 0.0)
+    return abs(more.extinction - own.extinction) <= DISAGREEMENT * math.hypot(
+        math.sqrt(sharpened), MODEL_DEVIATION * own.extinction
+    )
+
+
+def _fitted(
+    curves: StripCurves, geometry: StripGeometry, prior: JointPrior, strips: list[int], near: JointFit | None = None
+) -> JointFit | None:
+    lanes = replace(geometry, left=geometry.left[strips], right=geometry.right[strips], path=geometry.path[strips])
+    read = StripCurves(curves.luminance[strips], curves.variance[strips], curves.scatter[strips])
+    return fit_jointly(read, lanes, prior, near)

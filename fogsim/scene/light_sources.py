@@ -190,7 +190,7 @@ def _lamps() -> _Lamps:
     rows: list[tuple[NDArray[np.float64], float, int, float, NDArray[np.float64], float]] = []
     members: list[list[int]] = []
     for body in BODIES.values():
-        _, width, height = body.simple.size
+        _, width, height = body.size
         first = len(rows)
         for patch in lamp_patches(body.near()):
             rows += _rows_of(patch, width * height)

@@ -32,7 +32,7 @@ def state() -> TrafficState:
     )
 
 
-@pytest.mark.parametrize("ending", ["", ":far", ":tiny"])
+@pytest.mark.parametrize("ending", ["", ":far", ":tiny", ":speck"])
 def test_a_drawn_vehicle_fills_its_box_behind_its_front_bumper(state: TrafficState, ending: str) -> None:
     rows = []
     for batch in vehicle_batches(state, None):
@@ -45,7 +45,9 @@ def test_a_drawn_vehicle_fills_its_box_behind_its_front_bumper(state: TrafficSta
             along, left = offset[:, :2] @ ahead, offset[:, :2] @ (-ahead[1], ahead[0])
             box = (-state.length[row], 0.0, -state.width[row] / 2, state.width[row] / 2, 0.0, state.height[row])
             drawn = (along.min(), along.max(), left.min(), left.max(), offset[:, 2].min(), offset[:, 2].max())
-            assert drawn == pytest.approx(box, abs=1e-4)
+            # A stand-in has the area of its body; handlebars and mirrors that stick out are spread over its zones.
+            room = 1e-4 if not ending else (0.35 if batch.shape == "motorcycle" else 0.06) * state.width[row]
+            assert drawn == pytest.approx(box, abs=room)
     assert sorted(rows) == list(range(len(KINDS)))
 
 
@@ -78,10 +80,11 @@ def test_size_tells_what_a_vehicle_is() -> None:
 
 @pytest.mark.parametrize("name", BODIES)
 def test_little_is_drawn_of_what_is_far(name: str) -> None:
-    near, far, tiny = (len(SHAPES[name + ending].faces) for ending in ("", ":far", ":tiny"))
+    near, far, tiny, speck = (len(SHAPES[name + ending].faces) for ending in ("", ":far", ":tiny", ":speck"))
     assert near < 800
-    assert far < 115
-    assert tiny < 85
+    assert far < 165
+    assert tiny < 120
+    assert speck < 90
 
 
 @pytest.mark.parametrize("name", BODIES)
@@ -91,10 +94,10 @@ def test_plates_send_light_back(name: str) -> None:
     assert plates[:, 0].min() < -0.95
 
 
-@pytest.mark.parametrize("ending", ["", ":far", ":tiny"])
+@pytest.mark.parametrize("ending", ["", ":far", ":tiny", ":speck"])
 @pytest.mark.parametrize("name", BODIES)
 def test_lit_surfaces_have_the_areas_of_lamps(name: str, ending: str) -> None:
-    _, width, height = BODIES[name].simple.size
+    _, width, height = BODIES[name].size
     for patch in lamp_patches(SHAPES[name + ending]):
         area = patch.area * width * height
         assert area < 1.06 * LIT_AREAS[patch.surface]
@@ -109,7 +112,7 @@ def test_paint_and_lamps_follow_their_rows(state: TrafficState) -> None:
         assert np.array_equal(batch.lamps, state.lamps[rows])
 
 
-@pytest.mark.parametrize("ending", ["", ":far", ":tiny"])
+@pytest.mark.parametrize("ending", ["", ":far", ":tiny", ":speck"])
 @pytest.mark.parametrize("kind", BODIES)
 def test_every_body_has_every_lamp_where_it_belongs(kind: str, ending: str) -> None:
     shape = SHAPES[kind + ending]

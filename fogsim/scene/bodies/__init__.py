@@ -5,13 +5,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache, partial
 
-from fogsim.scene.bodies.car import ESTATE, HATCHBACK, SALOON, SUV, CarForm, car, simple_car
-from fogsim.scene.bodies.large import BUS, VAN, bus, van
-from fogsim.scene.bodies.motorcycle import MOTORCYCLE, motorcycle
-from fogsim.scene.bodies.simple import Simple, far, tiny
-from fogsim.scene.bodies.truck import FLATBED, RIGID, flatbed, rigid, semitrailer, simple_semitrailer
+from fogsim.scene.bodies.car import ESTATE, HATCHBACK, SALOON, SUV, CarForm, car, car_size
+from fogsim.scene.bodies.large import bus, van
+from fogsim.scene.bodies.motorcycle import motorcycle
+from fogsim.scene.bodies.seen import Size
+from fogsim.scene.bodies.simple import Detail, stand_ins
+from fogsim.scene.bodies.truck import flatbed, rigid, semitrailer
 from fogsim.scene.solids import PAINT, Material
-from fogsim.scene.trees import FAR, TINY
+from fogsim.scene.trees import FAR, SPECK, TINY
 from fogsim.values.scene import Mesh
 
 
@@ -23,16 +24,19 @@ class Body:
     ----------
     near : callable
         Makes the shape in full.
-    simple : Simple
-        What is left of it at a distance.
+    size : tuple of float
+        Its length, width and height [m].
+    shadow : float
+        Half the breadth of the darkness under it, in widths.
     """
 
     near: Callable[[], Mesh]
-    simple: Simple
+    size: Size
+    shadow: float = 0.5
 
 
 def _car(form: CarForm) -> Body:
-    return Body(partial(car, form), simple_car(form))
+    return Body(partial(car, form), car_size(form))
 
 
 _WHITE_BOX = Material((0.58, 0.585, 0.58))
@@ -42,23 +46,37 @@ BODIES: Mapping[str, Body] = {
     "saloon": _car(SALOON),
     "estate": _car(ESTATE),
     "suv": _car(SUV),
-    "van": Body(van, VAN),
-    "semitrailer": Body(partial(semitrailer, _WHITE_BOX), simple_semitrailer(_WHITE_BOX)),
-    "semitrailer_curtain": Body(partial(semitrailer, PAINT), simple_semitrailer(PAINT)),
-    "rigid_truck": Body(rigid, RIGID),
-    "flatbed_truck": Body(flatbed, FLATBED),
-    "bus": Body(bus, BUS),
-    "motorcycle": Body(motorcycle, MOTORCYCLE),
+    "van": Body(van, (5.92, 2.0, 2.59)),
+    "semitrailer": Body(partial(semitrailer, _WHITE_BOX), (16.5, 2.55, 4.0)),
+    "semitrailer_curtain": Body(partial(semitrailer, PAINT), (16.5, 2.55, 4.0)),
+    "rigid_truck": Body(rigid, (8.5, 2.5, 3.6)),
+    "flatbed_truck": Body(flatbed, (7.1, 2.4, 2.4)),
+    "bus": Body(bus, (12.0, 2.55, 3.38)),
+    "motorcycle": Body(motorcycle, (2.17, 0.8, 1.6), shadow=0.25),
 }
 """Bodies by the name of their shape."""
 
 
+_DETAILS = {
+    FAR: Detail({"rear": 6, "front": 6, "left": 5}, 0.03),
+    TINY: Detail({"rear": 5, "front": 4, "left": 3}, 0.03),
+    SPECK: Detail({"rear": 4, "front": 2, "left": 1}, 0.1),
+}
+
+
 def body_shapes() -> dict[str, Mesh]:
     """Shapes of all bodies, each with its simple stand-ins for the distance."""
+    return dict(_shapes())
+
+
+@lru_cache(maxsize=1)
+def _shapes() -> Mapping[str, Mesh]:
     shapes: dict[str, Mesh] = {}
     for name, body in BODIES.items():
         near = body.near()
-        shapes |= {name: near, name + FAR: far(body.simple, near), name + TINY: tiny(body.simple, near)}
+        simpler = stand_ins(near, body.size, tuple(_DETAILS.values()), body.shadow)
+        shapes[name] = near
+        shapes |= {name + ending: one for ending, one in zip(_DETAILS, simpler, strict=True)}
     return shapes
 
 

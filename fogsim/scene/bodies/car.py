@@ -24,7 +24,6 @@ from fogsim.scene.bodies.parts import (
     side_panel,
     wheels,
 )
-from fogsim.scene.bodies.simple import Block, Simple
 from fogsim.scene.solids import BLACK_PLASTIC, CHROME, GLASS, PAINT, Material, both_sides, box, grid, merge, quad
 from fogsim.values.scene import Mesh
 
@@ -163,27 +162,9 @@ def car(form: CarForm) -> Mesh:
     return finished(parts, form.length, half)
 
 
-def simple_car(form: CarForm) -> Simple:
-    """Stand-in of a car."""
-    rows = np.array([1, 2, 4, 7, 8])
-    x = np.interp(_BODY[rows, 0], _BASE, form.along)
-    low, top = (np.interp(_BODY[rows, i], _HEIGHTS, form.heights) for i in (2, 3))
-    body = [(float(a), float(b), float(c), float(d)) for a, b, c, d in zip(x, _BODY[rows, 1], low, top, strict=True)]
-    length, height = form.length, max(z for _, z in form.roof) + 0.035
-    body = [(0.03, *body[0][1:]), *body[1:-1], (length - 0.03, *body[-1][1:])]
-    (foot, belt), (top_x, _), *_, (rear_top, _), (rear_foot, _) = form.roof
-    belt = form.heights[-1] - 0.04
-    half = form.side(0.5 * (belt + height))
-    # A cabin of vertical sides: its slopes are those of its ends.
-    cabin = ((foot, half, belt, belt + 0.02), (top_x, half, belt, height), (rear_top, half, belt, height))
-    panes = (form.panes[0] + 0.2, max(form.panes[2:]), belt + 0.06, height - 0.10)
-    return Simple(
-        size=(length, 1.8, height),
-        blocks=(Block(tuple(body)), Block((*cabin, (rear_foot, half, belt, belt + 0.02)), slopes=GLASS, panes=panes)),
-        axles=form.axles,
-        radius=form.radius,
-        plate=form.heights[3] - 0.06,
-    )
+def car_size(form: CarForm) -> tuple[float, float, float]:
+    """Length, width and height of a car [m]."""
+    return form.length, 1.8, max(z for _, z in form.roof) + 0.035
 
 
 def _cabin(form: CarForm) -> Mesh:

@@ -141,11 +141,11 @@ def with_lit_areas(body: Mesh, areas: Mapping[Surface, float]) -> Mesh:
     lamps = np.isin(body.surface, LAMP_SURFACES)
     core += 0.006 * body.normals
     lit = replace(body, positions=core.astype(np.float32), faces=body.faces[lamps[body.faces[:, 0]]])
-    return merge((replace(body, surface=lens), _used(lit)))
+    return merge((replace(body, surface=lens), used(lit)))
 
 
-def _used(part: Mesh) -> Mesh:
-    """Mesh without the vertices that no triangle has."""
+def used(part: Mesh) -> Mesh:
+    """The mesh without the vertices that no triangle has."""
     used, renumbered = np.unique(part.faces, return_inverse=True)
     return Mesh(
         positions=part.positions[used],

@@ -21,7 +21,6 @@ from fogsim.scene.bodies.parts import (
     side_panel,
     wheels,
 )
-from fogsim.scene.bodies.simple import Block, Simple
 from fogsim.scene.solids import BLACK_PLASTIC, GLASS, PAINT, Material, both_sides, box, merge
 from fogsim.values.scene import Mesh
 
@@ -118,30 +117,3 @@ def bus() -> Mesh:
     )
     rolling = wheels((2.7, 8.9), 1.275, 0.50, 0.32)
     return finished([hull(_COACH, PAINT), pair(lamps), mirrors, *panes, *ends, rolling], 12.0, 1.275)
-
-
-VAN = Simple(
-    (5.92, 2.0, 2.59),
-    (
-        Block(((0.05, 0.8, 0.3, 0.85), (0.8, 0.97, 0.25, 1.28), (1.62, 0.98, 0.25, 2.4))),
-        Block(((1.6, 0.96, 0.25, 2.5), (5.88, 0.96, 0.3, 2.55)), panes=(1.65, 2.25, 1.35, 2.1)),
-        Block(((0.86, 0.74, 1.34, 1.4), (1.5, 0.74, 1.36, 2.3)), GLASS, GLASS, GLASS),
-        Block(((5.80, 0.72, 1.5, 2.18), (5.89, 0.72, 1.5, 2.18)), GLASS, GLASS, GLASS),
-    ),
-    (1.0, 4.65),
-    0.345,
-    0.915,
-)
-BUS = Simple(
-    (12.0, 2.55, 3.38),
-    (
-        Block(
-            ((0.05, 1.2, 0.36, 2.9), (0.4, 1.26, 0.33, 3.3), (11.97, 1.2, 0.36, 3.25)), panes=(1.2, 11.4, 1.62, 2.75)
-        ),
-        Block(((0.03, 1.05, 1.35, 2.75), (0.06, 1.05, 1.35, 2.75)), GLASS, GLASS, GLASS),
-        Block(((11.9, 0.95, 1.95, 2.8), (11.98, 0.95, 1.95, 2.8)), GLASS, GLASS, GLASS),
-    ),
-    (2.7, 8.9),
-    0.5,
-    0.68,
-)

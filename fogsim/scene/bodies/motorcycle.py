@@ -16,7 +16,6 @@ from fogsim.scene.bodies.parts import (
     panel_back,
     panel_front,
 )
-from fogsim.scene.bodies.simple import Block, Simple
 from fogsim.scene.solids import BLACK_PLASTIC, STEEL, TYRE, Material, both_sides, box, cylinder, from_trimesh
 from fogsim.values.scene import Mesh
 
@@ -59,19 +58,3 @@ def motorcycle() -> Mesh:
         cylinder((1.2, -0.18, 0.35), (2.0, -0.2, 0.5), 0.06, STEEL, sides=8),
     )
     return finished([*rolling, hull(np.array(fairing)), *rider, *lamps, *frame], 2.17, 0.2)
-
-
-MOTORCYCLE = Simple(
-    (2.17, 0.8, 1.6),
-    (
-        Block(((0.3, 0.16, 0.55, 0.95), (0.9, 0.2, 0.35, 0.9), (2.08, 0.12, 0.7, 0.9))),
-        Block(((0.72, 0.24, 0.85, 1.3), (1.3, 0.24, 0.85, 1.3)), _LEATHER, _LEATHER, _LEATHER),
-        Block(((0.8, 0.13, 1.32, 1.6), (1.05, 0.13, 1.32, 1.6)), _HELMET, _HELMET, _HELMET),
-        Block(((0.0, 0.07, 0.0, 0.62), (0.62, 0.07, 0.0, 0.62)), TYRE, TYRE, TYRE),
-        Block(((1.55, 0.07, 0.0, 0.62), (2.17, 0.07, 0.0, 0.62)), TYRE, TYRE, TYRE),
-        Block(((0.56, 0.4, 0.95, 1.02), (0.62, 0.4, 0.95, 1.02)), BLACK_PLASTIC, BLACK_PLASTIC, BLACK_PLASTIC),
-    ),
-    (),
-    0.31,
-    0.57,
-)

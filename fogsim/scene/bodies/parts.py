@@ -169,7 +169,9 @@ def contact_shadow(length: float, half_width: float, *, fine: bool = True) -> Me
     x, along = np.array([0.005, 0.05, 0.15, 0.85, 0.95, 0.995]), np.array([0, 0.6, 1, 1, 0.6, 0])
     y, across = np.array([-0.99, -0.82, 0.82, 0.99]), np.array([0, 0.75, 0.75, 0])
     if not fine:
-        x, along, y, across = x[[0, 2, 3, 5]], along[[0, 2, 3, 5]], np.array([-0.95, 0.95]), np.array([0.6, 0.6])
+        # As dark in the mean, along and across.
+        x, along = x[[0, 2, 3, 5]], np.array([0.29, 1.0, 1.0, 0.29])
+        y, across = np.array([-0.99, 0.99]), np.array([0.686, 0.686])
     points = np.array([[(a * length, b * half_width, 0.012) for b in y] for a in x])
     depth = np.multiply.outer(along, across / 0.75)
     reflectance = np.repeat((0.058 - 0.048 * depth).reshape(-1, 1), 3, axis=1)
@@ -187,10 +189,10 @@ LIT_AREAS = {
 """Luminous area of each lamp [m²]: with its intensity, the luminance that its surface has when it is lit."""
 
 
-def finished(parts: Sequence[Mesh], length: float, half_width: float, *, fine: bool = True) -> Mesh:
+def finished(parts: Sequence[Mesh], length: float, half_width: float) -> Mesh:
     """Shape of a body with its contact shadow in a unit box: x −1 (rear) … 0 (front), y ±1/2, z 0 … 1."""
-    body = with_lit_areas(merge(parts), LIT_AREAS) if fine else merge(parts)
-    whole = merge((body, contact_shadow(length, half_width, fine=fine)))
+    body = with_lit_areas(merge(parts), LIT_AREAS)
+    whole = merge((body, contact_shadow(length, half_width)))
     low, high = body.positions.min(axis=0), body.positions.max(axis=0)
     size = (high - low).astype(np.float64)
     offset = np.array([low[0], 0.5 * (low[1] + high[1]), low[2]])

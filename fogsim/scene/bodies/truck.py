@@ -19,7 +19,6 @@ from fogsim.scene.bodies.parts import (
     side_panel,
     wheels,
 )
-from fogsim.scene.bodies.simple import Block, Simple
 from fogsim.scene.solids import BLACK_PLASTIC, GLASS, PAINT, STEEL, UNDERBODY, Material, both_sides, box, merge
 from fogsim.values.scene import Mesh, Surface
 
@@ -137,36 +136,3 @@ def _cab_front(tall: float = 1.0, wide: float = 1.0) -> Mesh:
     plate = panel_front(-0.03, (-0.26, 0.26), (0.42, 0.53), PLATE)
     mirrors = both_sides(box((0.02, 1.11 * wide, up(1.95)), (0.16, 1.25 * wide, up(2.55)), BLACK_PLASTIC))
     return merge((pair(merge((lamp, indicator, fog))), screen, grille, side_panel(outline, GLASS), plate, mirrors))
-
-
-def simple_semitrailer(material: Material) -> Simple:
-    """Stand-in of an articulated truck."""
-    cab = Block(((0.05, 1.2, 0.4, 2.9), (0.25, 1.22, 0.4, 3.2), (2.3, 1.24, 0.6, 3.8)), panes=(0.5, 1.2, 1.75, 2.6))
-    trailer = Block(((2.85, 1.26, 1.1, 4.0), (16.37, 1.26, 1.1, 4.0)), material, rear=material)
-    skirt = Block(((6.2, 1.2, 0.45, 1.1), (15.5, 1.2, 0.45, 1.1)), UNDERBODY, UNDERBODY, UNDERBODY)
-    screen = Block(((0.02, 1.02, 1.72, 2.7), (0.24, 1.02, 1.72, 2.8)), GLASS, GLASS, GLASS)
-    return Simple((16.5, 2.55, 4.0), (cab, screen, trailer, skirt), (1.4, 12.7), 0.5, 0.94)
-
-
-RIGID = Simple(
-    (8.5, 2.5, 3.6),
-    (
-        Block(((0.05, 1.15, 0.4, 2.3), (0.2, 1.2, 0.4, 2.6), (1.95, 1.2, 0.6, 3.0)), panes=(0.5, 1.1, 1.4, 2.1)),
-        Block(((0.02, 1.0, 1.4, 2.1), (0.2, 1.0, 1.4, 2.2)), GLASS, GLASS, GLASS),
-        Block(((2.15, 1.23, 1.05, 3.6), (8.38, 1.23, 1.05, 3.6)), Material((0.58, 0.585, 0.58)), rear=PAINT),
-    ),
-    (1.25, 6.3),
-    0.47,
-    0.88,
-)
-FLATBED = Simple(
-    (7.1, 2.4, 2.4),
-    (
-        Block(((0.05, 1.05, 0.4, 1.75), (0.2, 1.1, 0.4, 2.0), (1.7, 1.12, 0.6, 2.38)), panes=(0.45, 1.0, 1.1, 1.6)),
-        Block(((0.02, 0.9, 1.05, 1.6), (0.2, 0.9, 1.05, 1.65)), GLASS, GLASS, GLASS),
-        Block(((1.85, 1.18, 0.92, 1.5), (6.97, 1.18, 0.92, 1.5)), STEEL, STEEL, STEEL),
-    ),
-    (1.1, 5.3),
-    0.4,
-    0.76,
-)

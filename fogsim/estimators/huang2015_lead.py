@@ -175,15 +175,16 @@ class Huang2015Lead:
         if measured is None or not math.isfinite(measured[1]):
             return Estimate.invalid(self.method, "the vehicle's contrast follows no law of fog", **diagnostics)
         extinction, deviation = measured
+        road = self._track.road
+        if not self._as_published and road is not None and road.is_lit(extinction, deviation):
+            return Estimate.invalid(self.method, "lamps light the road: this is a daytime method", **diagnostics)
         curve = np.arange(0.0, CURVE_END + CURVE_STEP, CURVE_STEP)
         diagnostics |= {"confidence_distances": curve, "confidence": image_confidence(extinction, curve)}
         return Estimate(self.method, extinction, deviation, diagnostics=diagnostics)
 
     def _published(self) -> tuple[float, float] | None:
         found = [c for c in self._track.comparisons if c.variance > 0]
-        table = ratio_table(
-            np.array([c.distance for c in found]), np.array([c.variance for c in found]), self._spacing
-        )
+        table = ratio_table(np.array([c.distance for c in found]), np.array([c.variance for c in found]), self._spacing)
         if table.ratio.size < 1:
             return None
         extinction, deviation = published_extinction(table)

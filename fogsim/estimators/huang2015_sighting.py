@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
 from fogsim.vision.horizon import PITCH_DEVIATION, levelled
-from fogsim.vision.lead_daylight import check_road, road_before
+from fogsim.vision.lead_daylight import RoadFall, check_road, road_before, road_fall
 from fogsim.vision.lead_scene import steepness
 from fogsim.vision.lead_window import WIDTHS, LeadWindow, lead_region
 from fogsim.vision.luminance import linear_luminance
@@ -57,13 +57,14 @@ class Sighting:
 
 @dataclass(frozen=True, slots=True)
 class Crop:
-    """The part of an image about a vehicle, and the sky's light."""
+    """The part of an image about a vehicle, the sky's light, and how the road's contrast to it falls."""
 
     luminance: NDArray[np.float32]
     origin: tuple[int, int]
     sky: float
     noise: float
     pitch_deviation: float
+    road: RoadFall
 
 
 def vehicle_crop(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera, distance: float) -> Crop:
@@ -95,9 +96,14 @@ def vehicle_crop(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera, 
     level = levelled(image, camera)
     luminance = linear_luminance(level[rows, cols], camera.response, camera.bits)
     sky, noise = _sky(level, camera)
-    check_road(linear_luminance(level[road_before(camera, distance)], camera.response, camera.bits), sky)
+
+    def luminance_of(rows: slice, cols: slice) -> NDArray[np.float32]:
+        return linear_luminance(level[rows, cols], camera.response, camera.bits)
+
+    check_road(luminance_of(*road_before(camera, distance)), sky)
+    road = road_fall(luminance_of, camera, distance, sky)
     pitch = 1.5 * PITCH_DEVIATION * camera.focal_length
-    return Crop(luminance, (cols.start, rows.start), sky, noise * steepness(luminance, sky, camera), pitch)
+    return Crop(luminance, (cols.start, rows.start), sky, noise * steepness(luminance, sky, camera), pitch, road)
 
 
 def _sky(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera) -> tuple[float, float]:

@@ -19,6 +19,7 @@ from fogsim.estimators.huang2015_comparison import (
 )
 from fogsim.estimators.huang2015_sighting import Crop, sighting_of, vehicle_crop
 from fogsim.values.camera import Camera
+from fogsim.vision.lead_daylight import RoadFall
 from fogsim.vision.lead_window import LeadWindow, find_lead
 from fogsim.vision.road_image import CannotTellError
 
@@ -51,6 +52,11 @@ class LeadTrack:
         Change of range that makes a new picture worth keeping [m].
     blur : float
         Standard deviation of the lens' blur beside the pixels' own size [px].
+
+    Attributes
+    ----------
+    road : RoadFall or None
+        How the contrast of the nearest road falls in the last frame; None before the first.
     """
 
     def __init__(self, camera: Camera, setback: float, spacing: float, blur: float) -> None:
@@ -63,6 +69,7 @@ class LeadTrack:
         self._comparisons: list[Comparison] = []
         self._offset = (0.0, 0.0)
         self._last_distance = math.nan
+        self.road: RoadFall | None = None
 
     @property
     def comparisons(self) -> tuple[Comparison, ...]:
@@ -97,6 +104,7 @@ class LeadTrack:
         """
         distance = told_distance + self._setback
         crop = vehicle_crop(image, self._camera, distance)
+        self.road = crop.road
         if self._reference is None:
             self._begin(crop, distance)
         else:

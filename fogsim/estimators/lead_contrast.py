@@ -15,6 +15,7 @@ from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation
 from fogsim.vision.decay_fit import DecayFit, fit_decay
 from fogsim.vision.horizon import PITCH_DEVIATION
+from fogsim.vision.lead_daylight import RoadFall
 from fogsim.vision.lead_patch import HALF_BODY, HEIGHTS
 from fogsim.vision.lead_scene import lead_scene
 from fogsim.vision.road_image import CannotTellError
@@ -149,18 +150,18 @@ class LeadContrast:
             return Estimate.invalid(self.method, "no vehicle ahead is tracked", **found)
         surprise = self._surprise(lead, observation.time)
         self._last = (observation.time, lead)
-        reason = ""
+        reason, road = "", None
         try:
             scene = lead_scene(image, self._camera, lead.distance + self._setback, self._pitch_deviation)
             fit = self._fit()
             densest = math.inf if fit is None else max(fit.extinction + 2.0 * fit.deviation, 0.0)
             sight = self._track.look(scene, lead.distance, observation.time, surprise=surprise, densest=densest)
-            found["lead_box"] = _box(sight)
+            found["lead_box"], road = _box(sight), scene.road
             self._missed = 0
         except CannotTellError as error:
             reason = str(error)
             self._miss(observation.time)
-        return self._estimate(reason, found)
+        return self._estimate(reason, road, found)
 
     def _miss(self, time: float) -> None:
         """Count a frame without the vehicle."""
@@ -181,7 +182,7 @@ class LeadContrast:
             return 0.0
         return min(jump, surprise)
 
-    def _estimate(self, reason: str, found: dict[str, object]) -> Estimate:
+    def _estimate(self, reason: str, road: RoadFall | None, found: dict[str, object]) -> Estimate:
         found |= {
             "distance": self._column("distance"),
             "contrast": np.array([s.fading.ratio for s in self._track.sights]),
@@ -190,7 +191,7 @@ class LeadContrast:
         if reason or fit is None:
             return Estimate.invalid(self.method, reason or "the track is too short yet", **found)
         found["misfit"] = fit.misfit
-        reason = _doubt(fit)
+        reason = _doubt(fit, road)
         if reason:
             return Estimate.invalid(self.method, reason, **found)
         return Estimate(self.method, max(fit.extinction, 0.0), fit.deviation, diagnostics=found)
@@ -220,11 +221,13 @@ class LeadContrast:
         return replace(fit, deviation=math.hypot(fit.deviation, shape / max(float(np.ptp(distance)), SPACING)))
 
 
-def _doubt(fit: DecayFit) -> str:
+def _doubt(fit: DecayFit, road: RoadFall | None) -> str:
     if fit.misfit > MAX_MISFIT or fit.extinction < -SURELY * fit.deviation:
         return "the contrast does not fall with the range as Duntley's law has it"
     if fit.deviation > WORST * fit.extinction and fit.extinction + 2.0 * fit.deviation > CLEAR:
         return "the range has not changed enough yet"
+    if road is not None and road.is_lit(fit.extinction, fit.deviation):
+        return "lamps light the road: this is a daytime method"
     return ""
 
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
 from fogsim.vision.horizon import levelled
-from fogsim.vision.lead_daylight import check_road, road_before
+from fogsim.vision.lead_daylight import RoadFall, check_road, road_before, road_fall
 from fogsim.vision.lead_patch import LeadPicture
 from fogsim.vision.lead_window import LeadWindow, find_lead, lead_region
 from fogsim.vision.response import linear_table
@@ -57,6 +58,8 @@ class LeadScene:
         The airlight.
     noise : float
         Deviation of its single pixels [linear grey levels].
+    road : RoadFall
+        How the contrast of the nearest road falls.
     """
 
     camera: Camera
@@ -65,6 +68,7 @@ class LeadScene:
     origin: tuple[int, int]
     sky: Sky
     noise: float
+    road: RoadFall
 
     @property
     def scale(self) -> float:
@@ -144,16 +148,16 @@ def lead_scene(image: Pixels, camera: Camera, depth: float, pitch_deviation: flo
     if region is None:
         raise CannotTellError("the vehicle ahead is too small in the image, or outside it")
     luminance = _luminance(pixels, *region)
-    scene = LeadScene(
+    check_road(_luminance(pixels, *road_before(camera, depth)), sky.luminance)
+    return LeadScene(
         camera=camera,
         depth=depth,
         luminance=luminance,
         origin=(region[1].start, region[0].start),
         sky=sky,
         noise=max(sky.noise * steepness(luminance, sky.luminance, camera), 0.3 * 255.0 / 2**camera.bits),
+        road=road_fall(partial(_luminance, pixels), camera, depth, sky.luminance),
     )
-    check_road(_luminance(pixels, *road_before(camera, depth)), sky.luminance)
-    return scene
 
 
 def _luminance(pixels: LinearPixels, rows: slice, cols: slice) -> NDArray[np.float32]:

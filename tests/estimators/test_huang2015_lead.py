@@ -15,6 +15,7 @@ from fogsim.estimators.huang2015_ratios import (
 )
 from fogsim.response import respond
 from fogsim.values import Camera, Frame, LeadMeasurement, Observation, Response
+from fogsim.vision.lead_daylight import RoadFall, road_fall
 
 LN20 = np.log(20.0)
 
@@ -40,6 +41,7 @@ class Chase:
     gain_beyond: tuple[float, float] = (np.inf, 1.0)
     sky_excess: float = 0.0
     blur: bool = False
+    beam: float = 0.0
     camera: Camera = field(
         default_factory=lambda: Camera(688, 515, 700.0, (343.5, 257.0), 1.3, np.radians(1.0), response=Response.LINEAR)
     )
@@ -71,6 +73,7 @@ def light(chase: Chase, v: np.ndarray, u: np.ndarray, distance: float, pitch: fl
     left = -np.minimum(depth, 1e5) * x
     ground = chase.asphalt * (1.0 + 0.03 * table[(ahead / 0.9).astype(int) % 64, np.floor(left / 0.9).astype(int) % 64])
     ground = np.where((np.abs(np.abs(left) - 1.8) < 0.08) & (ahead % 12.0 < 4.0), 2.4 * chase.asphalt, ground)
+    ground = ground * (1.0 + chase.beam * (6.0 / np.maximum(ahead, 2.0)) ** 2)
     path = np.broadcast_to(depth, shape) * np.sqrt(1.0 + x**2 + y**2)
     plane = distance / forward
     side = np.broadcast_to(plane * x - chase.across, shape)
@@ -320,6 +323,44 @@ def test_a_road_that_lamps_light_is_no_answer(paint, as_published):
         found = followed(dusk, ranges=ranges, as_published=as_published)
         assert not found.valid
         assert "brighter than the sky" in found.diagnostics["reason"]
+
+
+def test_a_road_that_is_brightest_nearby_is_lit_by_lamps_though_darker_than_the_sky():
+    day = Chase(visibility=100.0, asphalt=40.0)
+    assert followed(day).valid
+    assert "lamps light the road" in followed(day.but(beam=2.5)).diagnostics["reason"]
+
+
+@pytest.mark.parametrize("extinction", [0.003, 0.03, 0.1])
+@pytest.mark.parametrize("reflectance", [0.05, 0.5])
+def test_the_roads_contrast_falls_as_fog_has_it(extinction, reflectance):
+    camera = Chase().camera
+
+    def row(beam):
+        def luminance_of(rows, cols):
+            d = camera.row_distance / (np.arange(camera.height)[rows] - camera.horizon_row)
+            light = reflectance * (1.0 + beam * (6.0 / d) ** 2)
+            seen = 200.0 * (1.0 - (1.0 - light) * np.exp(-extinction * d))
+            return np.repeat(seen[:, None], 9, axis=1).astype(np.float32)
+
+        return road_fall(luminance_of, camera, 40.0, 200.0)
+
+    day, lit = row(0.0), row(0.8)
+    assert day.fall == pytest.approx(extinction * day.apart, rel=0.03)
+    assert not day.is_lit(extinction, 0.0)
+    assert not day.is_lit(1.1 * extinction, 0.0)
+    assert lit.fall < day.fall
+    assert lit.is_lit(extinction, 0.0) == (reflectance == 0.5)
+    assert row(4.0).fall < lit.fall
+
+
+def test_where_little_road_is_seen_nothing_is_lit():
+    camera = Chase().camera
+    for depth, light in ((10.0, 50.0), (60.0, 200.0), (60.0, 250.0)):
+        even = np.full((camera.height, camera.width), light, np.float32)
+        found = road_fall(lambda *where, even=even: even[where], camera, depth, 200.0)
+        assert found == RoadFall(0.0, 0.0)
+        assert not found.is_lit(1.0, 0.0)
 
 
 BAD = {

@@ -48,8 +48,8 @@ class Rear:
         return light
 
 
-def paint(camera, rears, visibility, seed, airlight=200.0, pitch=0.0, side=2):
-    """Image of a grainy road with kerbs, rears on it, and fog; `side`² samples a pixel."""
+def paint(camera, rears, visibility, seed, airlight=200.0, pitch=0.0, side=2, beam=0.0):
+    """Image of a grainy road with kerbs, lit by a beam, rears on it, and fog; `side`² samples a pixel."""
     rng = np.random.default_rng(seed)
     at = (np.arange(side) + 0.5) / side - 0.5
     v, u = ((np.arange(n)[:, None] + at).ravel() for n in (camera.height, camera.width))
@@ -63,7 +63,7 @@ def paint(camera, rears, visibility, seed, airlight=200.0, pitch=0.0, side=2):
     row, col = ((far + 1.7 * seed) / 0.7).astype(int) % 128, (x * far / 0.7).astype(int) % 128
     light = np.where(np.abs(x * far) < 5.5, 0.3, 0.2) * cells[row, col]
     light = np.where(np.abs(np.abs(x * far) - 1.75) < 0.08, 0.7, light)
-    depth = ground
+    light, depth = light * (1.0 + beam * (6.0 / np.maximum(ground, 2.0)) ** 2), ground
     for rear in sorted(rears, key=lambda r: -r.depth):
         height = camera.mount_height - rear.depth * slope
         across = x * rear.depth - rear.aside
@@ -76,13 +76,13 @@ def paint(camera, rears, visibility, seed, airlight=200.0, pitch=0.0, side=2):
     return np.clip(np.rint(signal + rng.normal(0.0, 1.2, signal.shape)), 0, 255).astype(np.uint8)
 
 
-def drive(visibility, rears, seed=0, camera=CAMERA, noise=0.25, bias=0.0, gains=None, told=None):
+def drive(visibility, rears, seed=0, camera=CAMERA, noise=0.25, bias=0.0, gains=None, told=None, beam=0.0):
     """Observations of the first of each frame's rears, once a second."""
     rng = np.random.default_rng(seed)
     depths = told or [frame[0].depth for frame in rears]
     for i, (frame, depth) in enumerate(zip(rears, depths, strict=True)):
         gain = 200.0 * (gains[i] if gains else 1.0)
-        image = paint(camera, frame, visibility, 1000 * seed + i, gain, rng.normal(0.0, np.radians(0.1)))
+        image = paint(camera, frame, visibility, 1000 * seed + i, gain, rng.normal(0.0, np.radians(0.1)), beam=beam)
         speed = depths[min(i + 1, len(depths) - 1)] - depths[max(i - 1, 0)]
         speed /= min(i + 1, len(depths) - 1) - max(i - 1, 0)
         lead = LeadMeasurement(depth - SETBACK + bias + rng.normal(0.0, noise), speed)
@@ -231,6 +231,12 @@ def test_pictures_of_no_road_are_no_answer(name, image, ranges):
 def test_darkness_is_no_answer():
     dark = [replace(o, frame=replace(o.frame, image=o.frame.image // 50)) for o in drive(150, away())]
     assert not any(found.valid for found in every(dark))
+
+
+def test_a_road_that_is_brightest_nearby_is_lit_by_lamps():
+    day, lit = (every(drive(80, away(), beam=beam))[-1] for beam in (0.0, 1.2))
+    assert day.valid
+    assert lit.diagnostics["reason"] == "lamps light the road: this is a daytime method"
 
 
 @pytest.mark.parametrize("visibility", [60, 150, 600])

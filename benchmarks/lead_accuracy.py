@@ -3,7 +3,8 @@
 On a straight road a vehicle drives away from 25 to 90 m; frames are taken every 2.5 m. Each range is drawn once for a
 camera and a vehicle, with the own vehicle's pitch swaying and the vehicle ahead weaving a little, then fogged with each
 visibility and exposed such that the airlight has 120, 200 or 255 levels. The estimators are told the camera without the
-sway, the camera's place behind the bumper, and the radar's noisy range. An error is |V_est − V| / V after the last
+sway and with a pitch that is off by an error of the whole sequence, the camera's place behind the bumper, and the
+radar's noisy range. An error is |V_est − V| / V after the last
 frame, of estimates that are valid and see fog; `bias_pct` is the median of (V_est − V) / V, `coverage` the share of
 90 % intervals of k that hold the truth, `ms` the fastest mean time of a frame. `airlight`, `camera` and `vehicle` are
 "all" in the first records, then each in turn is told apart over visibilities from 50 to 300 m.
@@ -91,9 +92,10 @@ def follow(
     rng = np.random.default_rng(seed)
     ranges = np.arange(NEAREST, FARTHEST + 1e-9, arguments.step)
     left, begin = rng.normal(0.0, 0.3), rng.uniform(0.0, 100.0)
+    misaligned = arguments.pitch_deviation * rng.normal()
     for ahead in ranges:
         now = (ahead - NEAREST) / FASTER
-        sway = math.radians(arguments.sway * rng.normal())
+        sway = math.radians(misaligned + arguments.sway * rng.normal())
         weaving = replace(vehicle, left=left + 0.05 * rng.normal())
         scene = drawn(
             renderer, replace(camera, pitch=camera.pitch + sway), weaving, float(ahead), begin + now * OWN_SPEED
@@ -118,8 +120,9 @@ def sequences(arguments: argparse.Namespace) -> Iterator[dict[str, Any]]:
     with road() as renderer:
         for i, (camera_name, camera) in enumerate(list(CAMERAS.items())[: arguments.cameras]):
             for j, (vehicle_name, vehicle) in enumerate(list(VEHICLES.items())[: arguments.vehicles]):
+                seed = arguments.seed + 100 * i + j
                 seen = fogs(arguments, camera, i + j)
-                frames = follow(arguments, renderer, camera, vehicle, seen, arguments.seed + 100 * i + j)
+                frames = follow(arguments, renderer, camera, vehicle, seen, seed)
                 for fog in seen:
                     for name, estimate in fog.latest.items():
                         told = {"camera": camera_name, "vehicle": vehicle_name, "airlight": f"{fog.levels:g}"}
@@ -206,6 +209,9 @@ def main() -> None:
     parser.add_argument("--step", type=float, default=2.5, help="change of range between frames [m]")
     parser.add_argument("--range-noise", type=float, default=0.25, help="deviation of the told range [m]")
     parser.add_argument("--sway", type=float, default=0.07, help="deviation of the own vehicle's pitch [deg]")
+    parser.add_argument(
+        "--pitch-deviation", type=float, default=0.1, help="deviation of the told pitch, constant over a sequence [deg]"
+    )
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
     records = measure(arguments)

@@ -26,6 +26,9 @@ EXTINCTIONS, SIMPLE_EXTINCTIONS = 14, 28
 ALIKE = 0.3
 """Difference of ln k below which two starts lead to the same answer [-]."""
 
+CLEAR_MISFIT, CLEAR_USED = 1.5, 0.97
+"""Misfit below which, and share of bins in use from which on, the simple model's answer needs no other beside it [-]."""
+
 STEPS, MORE_STEPS = 10, 5
 """Most Gauss–Newton steps for the first strength of patches and drift, and from its answer for each of the others."""
 
@@ -121,9 +124,7 @@ def fit_jointly(
     if int((curves.variance[0] > 0).sum()) < LEAST_BINS:
         return None
     data = _Data(curves, geometry)
-    starts = data.starts(prior) if near is None else data.starts_near(near, prior)
-    found = [data.refined(ALBEDOS[0], prior, start, STEPS) for start in starts]
-    best = min(found, key=lambda f: f.cost)
+    best = data.from_search(prior) if near is None else data.from_near(near, prior)
     found = [best] + [data.refined(albedo, prior, best.theta, MORE_STEPS) for albedo in ALBEDOS[1:]]
     return _average(found)
 
@@ -152,41 +153,53 @@ class _Data:
         g = self.geometry
         return (self.curves.luminance, self.curves.variance, g.below, g.half, g.path, g.distance, g.extent)
 
-    def starts_near(self, near: JointFit, prior: JointPrior) -> list[Floats]:
-        """Answer for some of the strips, and that of the simple model for all if it is another."""
-        found = [np.array([near.extinction, near.airlight, near.shift])]
-        least, most = self._span()
-        grid = np.geomspace(least, most, SIMPLE_EXTINCTIONS)
-        k, airlight = joint_kernels.simple_search(*self._bins[:5], grid, _known(prior))
-        if abs(math.log(k / max(near.extinction, least))) > ALIKE:
-            found.append(np.array([k, airlight, prior.shift]))
-        return found
+    def from_near(self, near: JointFit, prior: JointPrior) -> _Refined:
+        """Best answer from one for some of the strips, and from that of the simple model if it is another."""
+        found = [self._refined_from(prior, (near.extinction, near.airlight), near.shift)]
+        simple = self._simple(prior)
+        if abs(math.log(simple[0] / max(near.extinction, self._span()[0]))) > ALIKE:
+            found.append(self._refined_from(prior, simple, prior.shift))
+        return min(found, key=lambda f: f.cost)
+
+    def from_search(self, prior: JointPrior) -> _Refined:
+        """Best answer from that of the simple model, whose likelihood is not so narrow that a grid may miss it.
+
+        Where it does not fit nearly all bins, others are tried: the best of a coarse grid with an airlight as in the
+        prior or, where that is unsure, as what the farthest road may have faded into.
+        """
+        starts = [self._simple(prior)]
+        found = [self._refined_from(prior, starts[0], prior.shift)]
+        if self._is_clear(found[0]):
+            return found[0]
+        airlights = [prior.airlight]
+        if prior.below > UNSURE * prior.airlight:
+            airlights.append(self._farthest())
+        grid = np.geomspace(*self._span(), EXTINCTIONS)
+        for airlight in airlights:
+            cost = joint_kernels.search(*self._bins, _albedo(ALBEDOS[1]), grid, airlight, prior.shift)
+            best = int(np.argmin(cost))
+            new = all(abs(math.log(grid[best] / k)) > ALIKE for k, _ in starts)
+            if math.isfinite(cost[best]) and new:
+                starts.append((float(grid[best]), airlight))
+                found.append(self._refined_from(prior, starts[-1], prior.shift))
+        return min(found, key=lambda f: f.cost)
+
+    def _simple(self, prior: JointPrior) -> tuple[float, float]:
+        grid = np.geomspace(*self._span(), SIMPLE_EXTINCTIONS)
+        return joint_kernels.simple_search(*self._bins[:5], grid, _known(prior))
 
     def _span(self) -> tuple[float, float]:
         """Least and greatest extinction that show [1/m]."""
         unit = 1.0 / float(self.geometry.path[0, 0])
         return 0.2 * unit, 2.0 * unit * float(self.geometry.below[0])
 
-    def starts(self, prior: JointPrior) -> list[Floats]:
-        """Extinctions, airlights and shifts that may be near the greatest likelihood.
+    def _refined_from(self, prior: JointPrior, start: tuple[float, float], shift: float) -> _Refined:
+        return self.refined(ALBEDOS[0], prior, np.array([*start, shift]), STEPS)
 
-        The best of a coarse grid with an airlight as in the prior or, where that is unsure, as what the farthest road
-        may have faded into; and that of a simpler model, whose likelihood is not so narrow that a grid may miss it.
-        """
-        least, most = self._span()
-        grid = np.geomspace(least, most, SIMPLE_EXTINCTIONS)
-        found = [joint_kernels.simple_search(*self._bins[:5], grid, _known(prior))]
-        airlights = [prior.airlight]
-        if prior.below > UNSURE * prior.airlight:
-            airlights.append(self._farthest())
-        grid = np.geomspace(least, most, EXTINCTIONS)
-        for airlight in airlights:
-            cost = joint_kernels.search(*self._bins, _albedo(ALBEDOS[1]), grid, airlight, prior.shift)
-            best = int(np.argmin(cost))
-            new = all(abs(math.log(grid[best] / k)) > ALIKE for k, _ in found)
-            if math.isfinite(cost[best]) and new:
-                found.append((float(grid[best]), airlight))
-        return [np.array([*start, prior.shift]) for start in found]
+    def _is_clear(self, found: _Refined) -> bool:
+        """Whether an answer leaves nothing to explain, even on a road that hardly wanders."""
+        used = int((found.used == joint_kernels.USED).sum())
+        return found.misfit < CLEAR_MISFIT and used >= CLEAR_USED * int((self.curves.variance > 0).sum())
 
     def _farthest(self) -> float:
         seen = self.curves.luminance[0][self.curves.variance[0] > 0]

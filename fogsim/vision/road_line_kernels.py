@@ -165,13 +165,21 @@ def vote(
     for i in range(across.size):
         _cast(cells[kind[i]], across[i], below[i], offsets, slopes, 1)
     lines, kinds, free = np.empty((most, 2)), np.empty(most, np.int64), np.ones(across.size, np.bool_)
-    flat = cells.reshape(-1)
+    # Votes only ever get fewer, so that a row's last maximum bounds it: only rows that may hold the best are looked at.
+    table = cells.reshape(KINDS * offsets.size, slopes.size)
+    bound, place = np.full(table.shape[0], np.iinfo(np.int16).max, np.int16), np.zeros(table.shape[0], np.int64)
     for line in range(most):
-        best = int(np.argmax(flat))
-        if flat[best] < least:
+        best = int(np.argmax(bound))
+        while True:
+            place[best] = np.argmax(table[best])
+            if table[best, place[best]] == bound[best]:
+                break
+            bound[best] = table[best, place[best]]
+            best = int(np.argmax(bound))
+        if bound[best] < least:
             return lines[:line].copy(), kinds[:line].copy()
-        which, rest = best // (offsets.size * slopes.size), best % (offsets.size * slopes.size)
-        offset, slope = offsets[rest // slopes.size], slopes[rest % slopes.size]
+        which = best // offsets.size
+        offset, slope = offsets[best % offsets.size], slopes[place[best]]
         lines[line, 0], lines[line, 1], kinds[line] = offset, slope, which
         # What lies on this line votes for no other.
         for i in range(across.size):

@@ -35,10 +35,19 @@ def light(pixels: NDArray[np.uint8] | NDArray[np.uint16], tables: NDArray[np.flo
 @kernel
 def _core(samples: NDArray[np.float32], count: int, floor: float) -> tuple[float, float, float]:
     """Mean and deviation of what lies near the median of the first `count` samples; mean distance of all from it."""
-    ordered = np.sort(samples[:count])
+    ordered = samples[:count]
+    ordered.sort()
     middle = 0.5 * (ordered[(count - 1) // 2] + ordered[count // 2])
-    apart = np.sort(np.abs(ordered - middle))
-    reach = KEPT * max(1.4826 * float(apart[count // 2]), floor)
+    # The nearest half of sorted samples is a run of them: take ends away, the farther first, until it is left.
+    low, high, apart = 0, count - 1, np.float32(0.0)
+    for _ in range(count - count // 2):
+        below, above = middle - ordered[low], ordered[high] - middle
+        apart = max(below, above)
+        if below > above:
+            low += 1
+        else:
+            high -= 1
+    reach = KEPT * max(1.4826 * float(apart), floor)
     total, square, kept, away = 0.0, 0.0, 0, 0.0
     for value in ordered:
         offset = float(value) - middle

@@ -58,7 +58,7 @@ BODIES: Mapping[str, Body] = {
 
 
 _DETAILS = {
-    FAR: Detail({"rear": 6, "front": 6, "left": 5}, 0.03),
+    FAR: Detail({"rear": 6, "front": 6, "left": 5}, 0.06),
     TINY: Detail({"rear": 5, "front": 4, "left": 3}, 0.03),
     SPECK: Detail({"rear": 4, "front": 2, "left": 1}, 0.1),
 }

@@ -1,0 +1,159 @@
+"""Runs: the parts without a gap of a zone of a body, from one side, and how light what they show is."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.scene.bodies.seen import COLUMNS, Mask, Seen, Wide, light_of
+
+_NARROW = 0.03  # runs of columns and gaps between them, and edges of panels, that are left out [units of the box]
+_UNEVEN = 0.06  # how far a surface may lie from a straight line [units of the box]
+BEHIND = 0.003  # how far panels stay behind lamps and plates [units of the box]
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """A body from one side: all of it but its shadow, and of that what its stand-ins keep."""
+
+    side: str
+    seen: Seen
+    over: Seen
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """Part of a zone without a gap, from one side.
+
+    Attributes
+    ----------
+    zone : tuple of int
+        First row and the one after the last.
+    middle, breadth, depth : (2,) float64
+        At its lower and upper edge [units of the box].
+    split : tuple of float
+        Where across it the panel of what is not paint begins and ends (0 … 1).
+    colour : (3,) float64
+        Reflectance of that panel.
+    light : float
+        Share of the sky's light on the paint beside it.
+    normals : tuple of (3,) float64
+        Mean normals of what is not paint, and of paint.
+    """
+
+    zone: tuple[int, int]
+    middle: Wide
+    breadth: Wide
+    depth: Wide
+    split: tuple[float, float]
+    colour: Wide
+    light: float
+    normals: tuple[Wide, Wide]
+
+
+def runs_of(look: Look, zone: tuple[int, int], little: float) -> list[Run]:
+    """Runs of columns of a zone that are covered for the most part, each with the samples nearest to it."""
+    covered = look.seen.covered[zone[0] : zone[1]]
+    columns = covered.sum(axis=0)
+    full = columns >= 0.5 * max(columns.max(), 1)
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], full, [False]))))
+    spans: list[list[int]] = []
+    for first, last in edges.reshape(-1, 2).tolist():
+        if spans and first - spans[-1][1] < _NARROW * COLUMNS:
+            spans[-1][1] = last
+        elif last - first >= _NARROW * COLUMNS:
+            spans.append([first, last])
+    if not spans and columns.any():
+        seen_at = np.flatnonzero(columns)
+        spans = [[int(seen_at[0]), int(seen_at[-1]) + 1]]
+    if not spans:
+        return []
+    middles = np.arange(COLUMNS) + 0.5
+    away = np.array([np.maximum(first - middles, middles - last) for first, last in spans])
+    nearest = np.argmin(away, axis=0)
+    alone = len(spans) == 1
+    return [_run(look, zone, covered & (nearest == number), alone, little) for number in range(len(spans))]
+
+
+def _run(look: Look, zone: tuple[int, int], inside: Mask, alone: bool, little: float) -> Run:
+    """A run of samples; if it is not alone, it is upright lest it should meet the next one."""
+    z: Wide = np.arange(len(inside), dtype=np.float64) + 0.5
+    count = inside.sum(axis=1)
+    centre = inside @ (np.arange(COLUMNS) + 0.5) / np.maximum(count, 1) / COLUMNS
+    middle, breadth = np.full(2, count @ centre / count.sum()), np.full(2, count.mean() / COLUMNS)
+    line = _line(z, count / COLUMNS, np.ones(len(z)), len(z))
+    even = np.abs(count / COLUMNS - line[0] - (line[1] - line[0]) * z / len(z)).max() < _UNEVEN
+    if alone and even and line.min() >= 0.0 and line.max() <= 1.0:
+        breadth, middle = line, _line(z, centre, count, len(z))
+    rows, full = slice(*zone), count > 0
+    depth = _depth(np.where(inside, look.seen.depth[rows], np.inf)[full], z[full], count[full], len(z))
+    before = look.over.depth[rows][inside & look.over.covered[rows]]
+    if len(before):
+        depth = np.maximum(depth, before.max() + BEHIND)
+    return Run(zone, middle, breadth, np.clip(depth, 0.0, 1.0), *_materials(look, zone, inside, little))
+
+
+def _depth(samples: Wide, z: Wide, count: NDArray[np.int64], height: int) -> Wide:
+    """Depth of a run at its lower and upper edge: along a straight line if that is how it lies, else its median."""
+    rows = np.take_along_axis(np.sort(samples, axis=1), (count // 2)[:, None], axis=1)[:, 0]
+    line = _line(z, rows, count, height)
+    if np.abs(rows - line[0] - (line[1] - line[0]) * z / height).max() > _UNEVEN:
+        return np.full(2, np.median(samples[np.isfinite(samples)]))
+    return line
+
+
+def within(run: Run, rear: Seen) -> Run:
+    """The run of a flank no farther out at its edges than the body is broad there, lest it should show from behind."""
+    breadth = rear.covered.mean(axis=1)
+    edges = (breadth[run.zone[0] : run.zone[0] + 3].max(), breadth[run.zone[1] - 3 : run.zone[1]].max())
+    return replace(run, depth=np.maximum(run.depth, 0.5 - 0.5 * np.array(edges)))
+
+
+def _line(z: Wide, values: Wide, weights: NDArray[Any], height: int) -> Wide:
+    """Values of the straight line of least squares at 0 and at a height."""
+    whole = weights.sum()
+    mean, level = weights @ z / whole, weights @ values / whole
+    spread = weights @ (z - mean) ** 2
+    slope = weights @ ((z - mean) * (values - level)) / spread if spread > 0.0 else 0.0
+    return np.asarray(level + slope * (np.array([0.0, height]) - mean))
+
+
+def _materials(
+    look: Look, zone: tuple[int, int], inside: Mask, little: float
+) -> tuple[tuple[float, float], Wide, float, tuple[Wide, Wide]]:
+    """Split, colour, light and normals of a run (see `Run`) with which it shows the light of the body there."""
+    rows = slice(*zone)
+    kept, normal = look.over.depth[rows] < np.inf, look.seen.normal[rows]
+    free, paint = inside & ~kept, inside & (look.seen.paint[rows] > 0.5)
+    own = inside & ~paint
+    whole = max(int(free.sum()), 1)
+    start, end = _place(look.side, free, own, 1.0 - paint.sum() / whole, little)
+    room = whole * (end - start)
+    means = _mean(normal[own]), _mean(normal[paint])
+    # What is kept shows its own light, whatever it hides.
+    light = look.seen.own[rows][own].sum(axis=0) - look.over.own[rows][inside & kept].sum(axis=0)
+    colour = light / max(room, 1.0) / light_of(means[0][2])
+    lit = float(paint.sum() * light_of(means[1][2])) / max(whole - room, 1.0)
+    return (start, end), colour, lit, means
+
+
+def _mean(normals: Wide) -> Wide:
+    return np.asarray(normals.mean(axis=0)) if len(normals) else np.zeros(3)
+
+
+def _place(side: str, free: Mask, own: Mask, share: float, little: float) -> tuple[float, float]:
+    """Where across a run the panel of what is not paint begins and ends (0 … 1), for its share of the run."""
+    if share > 1.0 - little:
+        return 0.0, 1.0
+    if share < little:
+        return 1.0, 1.0
+    if side != "left":
+        return 0.5 - 0.5 * share, 0.5 + 0.5 * share
+    across = np.concatenate(([0.0], np.cumsum(free.sum(axis=0)))) / max(free.sum(), 1)
+    content = np.concatenate(([0.0], np.cumsum(own.sum(axis=0))))
+    starts = np.linspace(0.0, 1.0 - share, 65)
+    best = starts[np.argmax(np.interp(starts + share, across, content) - np.interp(starts, across, content))]
+    if best < _NARROW:
+        return 0.0, share
+    return (1.0 - share, 1.0) if best + share > 1.0 - _NARROW else (float(best), float(best + share))

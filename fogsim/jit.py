@@ -4,13 +4,18 @@ And what lets two of them work at once on a picture's rows.
 """
 
 import _thread
+import functools
+import hashlib
 import multiprocessing
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import FunctionType, ModuleType
 from typing import Any, TypeVar, cast
 
 import numba
+import numpy as np
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -28,11 +33,49 @@ def kernel(function: F) -> F:
     neither can be written it is compiled again by each process.
     """
     options = {"nogil": True, "fastmath": False, "error_model": "numpy"}
+    plain = cast("FunctionType", function)
+    # numba names the file after the function, and compiles again when the function's module changes, but not when
+    # another does that it calls or takes constants from: so the name that numba sees says what those were.
+    name = plain.__qualname__
+    plain.__qualname__ = f"{name}-{_fingerprint(plain)}"
     try:
         return cast("F", numba.njit(cache=True, **options)(function))
     except RuntimeError:
         # numba found no place for its cache
         return cast("F", numba.njit(cache=False, **options)(function))
+    finally:
+        plain.__qualname__ = name
+
+
+def _fingerprint(function: FunctionType) -> str:
+    """Digest of all that is compiled into a function besides its own source."""
+    return hashlib.sha256("\n".join(_compiled_in(function, set())).encode()).hexdigest()[:12]
+
+
+def _compiled_in(function: FunctionType, seen: set[FunctionType]) -> Iterator[str]:
+    """Sources of the kernels that a function calls and of the modules that it names, and the constants it uses."""
+    seen.add(function)
+    for name in function.__code__.co_names:
+        value = function.__globals__.get(name)
+        called = getattr(value, "py_func", None)
+        if called is not None and called not in seen:
+            yield _digest(called.__code__.co_filename)
+            yield from _compiled_in(called, seen)
+        elif isinstance(value, ModuleType) and value.__name__.startswith(f"{__package__}."):
+            yield _digest(str(value.__file__))
+        elif isinstance(value, np.ndarray):
+            yield f"{name} {value.dtype} {value.tobytes().hex()}"
+        elif isinstance(value, int | float | complex | str | tuple | np.generic):
+            yield f"{name} {value!r}"
+
+
+@functools.cache
+def _digest(path: str) -> str:
+    """Digest of a file, empty if it cannot be read."""
+    try:
+        return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    except OSError:
+        return ""
 
 
 class Bands:

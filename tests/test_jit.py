@@ -1,0 +1,71 @@
+"""Compiled code that is kept on disk is never older than the sources it came from."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+CALLED = """
+from fogsim.jit import kernel
+
+FACTOR = {factor}
+
+@kernel
+def twice(x):
+    return {twice} * x
+"""
+
+CALLER = """
+import {called}
+from fogsim.jit import kernel
+from {called} import FACTOR, twice
+
+@kernel
+def middle(x):
+    return twice(x)
+
+@kernel
+def answer(x):
+    return middle(x) + FACTOR
+"""
+
+ASK = "from caller import answer; print(answer(10.0), answer.__name__, sum(answer.stats.cache_hits.values()))"
+
+
+def write(folder: Path, twice: float, factor: float) -> None:
+    """Write the module that is called; the caller stays as it is."""
+    (folder / "called.py").write_text(CALLED.format(twice=twice, factor=factor))
+
+
+def ask(folder: Path) -> list[str]:
+    """What a new process gets."""
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join((str(folder), *sys.path)),
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
+    environment.pop("NUMBA_CACHE_DIR", None)
+    told = subprocess.run([sys.executable, "-c", ASK], env=environment, capture_output=True, text=True, check=True)
+    return told.stdout.split()
+
+
+@pytest.mark.parametrize(("twice", "factor", "answer"), [(3.0, 1.0, "31.0"), (2.0, 5.0, "25.0")])
+def test_a_changed_source_is_compiled_into_those_who_call_it(
+    tmp_path: Path, twice: float, factor: float, answer: str
+) -> None:
+    """Neither numba's stamp of the caller's own file nor its time says that a module it calls has changed."""
+    (tmp_path / "caller.py").write_text(CALLER.format(called="called"))
+    write(tmp_path, 2.0, 1.0)
+    assert ask(tmp_path)[:2] == ["21.0", "answer"]
+    write(tmp_path, twice, factor)
+    assert ask(tmp_path)[0] == answer
+
+
+def test_unchanged_sources_are_not_compiled_again(tmp_path: Path) -> None:
+    """What one process compiled the next one loads."""
+    (tmp_path / "caller.py").write_text(CALLER.format(called="called"))
+    write(tmp_path, 2.0, 1.0)
+    assert ask(tmp_path) == ["21.0", "answer", "0"]
+    assert ask(tmp_path) == ["21.0", "answer", "1"]

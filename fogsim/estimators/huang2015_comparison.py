@@ -122,6 +122,15 @@ def placed(picture: Picture, sighting: Sighting, at: Placement) -> Picture:
     return replace(picture, sighting=replace(picture.sighting, patch=small), variance=variance)
 
 
+def lowered(picture: Picture, widths: float) -> Picture:
+    """The same picture of a vehicle that turned out to stand lower in it, by so many of its widths [-]."""
+    sighting = picture.sighting
+    patch = replace(sighting.patch, row=sighting.patch.row + widths * sighting.width)
+    # Of a picture that was shrunk the frame's own pixels are gone, and with them its exact variance.
+    variance = window_variance(patch) if picture.scale == 1.0 else picture.variance
+    return replace(picture, sighting=replace(sighting, patch=patch), variance=variance)
+
+
 def window_variance(patch: Patch) -> float:
     """Variance of the pixels of the followed thing (eq. 4.12 with the square that it lacks); 0 if none are there."""
     spans = (

@@ -14,6 +14,7 @@ from fogsim.estimators.huang2015_comparison import (
     compared_with_itself,
     expected_placement,
     known_placement,
+    lowered,
     picture_of,
     placed,
 )
@@ -28,6 +29,9 @@ FOLLOWED = 0.4
 
 GROWTH, UNSURE = 1.25, 4.0
 """Factor by which contrast may seem to grow with range [-], and standard deviations that it may besides."""
+
+SAME = 0.2
+"""By how much a window that is found again may differ from what is known of it, in widths of the vehicle [-]."""
 
 MOST_JUMP = 12.0
 """Change of range between frames by more than which the vehicle is another one [m]."""
@@ -138,6 +142,8 @@ class LeadTrack:
         if all(abs(distance - kept.sighting.distance) >= least for kept in self._kept):
             found = placed(picture, sighting, at)
             self._keep(found, replace(comparison, variance=found.variance), reference)
+            if distance < NEARER * reference.sighting.distance:
+                self._renew(crop, self._kept[-1])
 
     def _most_contrast(self, distance: float) -> float:
         """Contrast that fog leaves at most: not more than nearer by, but for errors."""
@@ -150,11 +156,21 @@ class LeadTrack:
         if len(self._kept) > SIGHTINGS:
             oldest = next(i for i, kept in enumerate(self._kept) if kept is not reference)
             del self._kept[oldest], self._comparisons[oldest]
-        if picture.sighting.distance < NEARER * reference.sighting.distance:
-            self._compare_anew(picture)
+
+    def _renew(self, crop: Crop, nearest: Picture) -> None:
+        """Take the nearest picture for the reference of all: it shows the most, and best where the vehicle stands."""
+        known = self._expected(nearest.sighting.distance, nearest)
+        found = find_lead(crop.luminance, crop.origin, self._camera, nearest.sighting.distance, crop.noise)
+        if found is not None and _is_same(found, known):
+            lower = (found.foot - known.foot) / known.width
+            index = next(i for i, kept in enumerate(self._kept) if kept is nearest)
+            self._kept = [lowered(kept, lower) for kept in self._kept]
+            nearest = self._kept[index]
+            self._offset = (self._offset[0], self._offset[1] + found.foot - known.foot)
+        self._compare_anew(nearest)
 
     def _compare_anew(self, reference: Picture) -> None:
-        """Take the nearest picture for the reference of all: it shows the most."""
+        """Compare all pictures with a new reference."""
         own = compared_with_itself(reference)
         others = [kept for kept in self._kept if kept is not reference]
         found = [
@@ -181,6 +197,12 @@ class LeadTrack:
             foot=camera.horizon_row + camera.row_distance / distance + self._offset[1],
             width=near.width / reference.scale * near.distance / distance,
         )
+
+
+def _is_same(found: LeadWindow, known: LeadWindow) -> bool:
+    """Whether two windows of one picture are of one vehicle."""
+    apart = max(abs(found.column - known.column), abs(found.foot - known.foot), abs(found.width - known.width))
+    return apart < SAME * known.width
 
 
 def _exceeds(comparison: Comparison, most: float) -> bool:

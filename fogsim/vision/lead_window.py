@@ -44,6 +44,10 @@ CLUTTER = 6.0
 LEAST_STEP = 0.15
 """Noise of a step that there is at least, as of rounding [linear grey levels]."""
 
+REACH, STANDS_OUT = math.radians(0.3), 2.5
+"""How far from where the calibration has it the foot is looked for [rad], and the least step there over the usual one;
+where none stands out so, the calibration says more [-]."""
+
 
 @dataclass(frozen=True, slots=True)
 class LeadWindow:
@@ -126,7 +130,7 @@ def find_lead(
     if pair is None:
         return None
     left, right = pair
-    foot = _refined_foot(luminance[:, math.ceil(left) + 1 : math.floor(right)], foot, camera)
+    foot = _refined_foot(luminance[:, math.ceil(left) + 1 : math.floor(right)], foot, camera, noise)
     return LeadWindow(0.5 * (left + right) + origin[0], foot + origin[1], right - left)
 
 
@@ -201,15 +205,19 @@ def _peak(values: Floats, at: int) -> float:
     return at + float(np.clip(0.5 * (left - right) / bend, -0.5, 0.5)) if bend < 0 else float(at)
 
 
-def _refined_foot(strip: NDArray[np.float32], foot: float, camera: Camera) -> float:
-    """Strongest step down the rows within half a degree of where the foot should be."""
-    reach = max(camera.focal_length * math.radians(0.3), 1.5)
+def _refined_foot(strip: NDArray[np.float32], foot: float, camera: Camera, noise: float) -> float:
+    """Row near where the foot should be at which the road begins, brighter than tyres and shadow above it."""
+    reach = max(camera.focal_length * REACH, 1.5)
     first, last = max(int(foot - reach), 1), min(math.ceil(foot + reach), strip.shape[0] - 2)
     if last - first < 2 or strip.shape[1] < 2:
         return foot
     rows = strip[first - 1 : last + 2].mean(axis=1, dtype=np.float64)
-    # Below it is the road, brighter than tyres and shadow.
-    step = np.maximum(np.gradient(rows), 0.0)
-    usual = np.exp(-0.5 * ((np.arange(step.size) + first - 1 - foot) / (0.5 * reach)) ** 2)
-    best = int(np.argmax(step[1:-1] * usual[1:-1])) + 1
-    return _peak(step, best) + first - 1
+    step = np.gradient(rows)
+    # What the told pitch says counts as much as a step does that stands out of the noise and of the other steps.
+    other = max(noise / math.sqrt(2.0 * strip.shape[1]), float(np.median(np.abs(step))), LEAST_STEP)
+    at = (np.arange(step.size) + first - 1 - foot) / (0.5 * reach)
+    evidence = np.log1p((np.maximum(step, 0.0) / other) ** 2) - 0.5 * at**2
+    best = int(np.argmax(evidence[1:-1])) + 1
+    if step[best] < STANDS_OUT * other:
+        return foot
+    return _peak(np.maximum(step, 0.0), best) + first - 1

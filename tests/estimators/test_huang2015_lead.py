@@ -13,9 +13,11 @@ from fogsim.estimators.huang2015_ratios import (
     ratio_table,
     variance_ratio_extinction,
 )
+from fogsim.estimators.huang2015_sighting import vehicle_crop
 from fogsim.response import respond
 from fogsim.values import Camera, Frame, LeadMeasurement, Observation, Response
 from fogsim.vision.lead_daylight import RoadFall, road_fall
+from fogsim.vision.lead_window import find_lead
 
 LN20 = np.log(20.0)
 
@@ -264,6 +266,30 @@ def test_other_cameras(response, bits):
 
 def test_a_vehicle_that_comes_nearer_says_the_same():
     assert followed(Chase(visibility=100.0), ranges=AWAY[::-1]).visibility == pytest.approx(100.0, rel=0.08)
+
+
+@pytest.mark.parametrize("visibility", [100.0, 300.0, 600.0])
+def test_as_published_says_the_same_on_the_way_back(visibility):
+    # The window found at 90 m is placed anew as the vehicle comes nearer, or it would hold a strip of sky.
+    chase = Chase(visibility=visibility, across=0.0)
+    away, back = (followed(chase, 1, ranges, as_published=True).visibility for ranges in (AWAY, AWAY[::-1]))
+    assert back == pytest.approx(away, rel=0.05)
+
+
+@pytest.mark.parametrize(("distance", "bound"), [(90.0, 0.2), (60.0, 0.15), (30.0, 0.07)])
+@pytest.mark.parametrize("visibility", [120.0, 200.0, 500.0])
+def test_the_foot_is_found_as_well_as_the_pitch_is_known_or_better(distance, visibility, bound):
+    errors = []
+    for seed in range(4):
+        chase, rng = Chase(visibility=visibility), np.random.default_rng(seed)
+        pitch = np.random.default_rng(seed).normal(0.0, chase.pitch_scatter)
+        image = exposed(chase, picture(chase, distance, rng), rng)
+        crop = vehicle_crop(image, chase.camera, distance)
+        found = find_lead(crop.luminance, crop.origin, chase.camera, distance, crop.noise)
+        camera = replace(chase.camera, pitch=chase.camera.pitch + pitch)
+        errors.append((found.foot - camera.horizon_row - camera.row_distance / distance) * distance)
+    # The told pitch alone is 0.15 m off at 90 m.
+    assert np.sqrt(np.mean(np.square(errors))) / chase.camera.focal_length < bound
 
 
 def test_mirroring_and_colour_change_nothing():

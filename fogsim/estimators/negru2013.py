@@ -47,7 +47,7 @@ LEAST_CONTRAST = 0.08  # [-] of the road to the airlight, for fog to show
 SURE_OF_FOG = 4.5  # [-] least k in its standard deviations
 CLEAR = OPTICAL_DEPTH_AT_VISIBILITY / 300.0  # [1/m] what k must surely be below to be called no fog
 USUAL_HEIGHT = 1.3  # [m] of a camera, for which the lengths of the fit are meant
-MODEL_DEVIATION = 0.008  # [-] of k by what the model leaves out: marks, rounding, a road that is not quite flat
+MODEL_DEVIATION = 0.02  # [-] of k by what the model leaves out: dark corners, marks, a road that is not quite flat
 
 
 class Negru2013:
@@ -144,11 +144,10 @@ class Negru2013:
         diagnostics: dict[str, object] = {"horizon_row": self._camera.horizon_row}
         try:
             road = self._road(image)
-            looked_at, first_column = self._middle(road)
-            edges = self._edges(looked_at)
+            edges = self._edges(road)
             horizon = self._horizon(edges, road)
             diagnostics["horizon_row"] = horizon.row
-            band = _band(looked_at, edges, self._camera, self._told, first_column)
+            band = _band(road, edges, self._camera, self._told)
             diagnostics["band"] = (band.left, band.right, band.top + road.first_row, band.bottom + road.first_row)
             curve = self._curve(road, band, horizon)
             diagnostics["profile"] = curve.luminance
@@ -160,20 +159,15 @@ class Negru2013:
 
     def _road(self, image: NDArray[np.uint8] | NDArray[np.uint16]) -> RoadImage:
         """Road from a little above the horizon down to the image's bottom or (corrected) the own bonnet."""
-        road = road_image(image, self._camera, self._told)
         if self._as_published:
-            return road
+            return road_image(image, self._camera, self._told)
+        # A band may lie in the middle only: the verges would but cost time.
+        centre, reach = self._camera.principal_point[0], max(MIDDLE * self._camera.width, LEAST_MIDDLE)
+        columns = max(round(centre - reach), 0), min(round(centre + reach) + 1, self._camera.width)
+        road = road_image(image, self._camera, self._told, columns)
         lowest = above_bonnet(linear_pixels(road.level, self._camera), self._camera, road.airlight)
         luminance = road.luminance[: lowest + 1 - road.first_row]
         return replace(road, luminance=luminance, road=float(np.median(luminance[-1])))
-
-    def _middle(self, road: RoadImage) -> tuple[RoadImage, int]:
-        """Part of the road image that a band may lie in, and its first column; the verges only cost time."""
-        if self._as_published:
-            return road, 0
-        centre, reach = self._camera.principal_point[0], max(MIDDLE * self._camera.width, LEAST_MIDDLE)
-        first, last = max(round(centre - reach), 0), min(round(centre + reach) + 1, self._camera.width)
-        return replace(road, luminance=np.ascontiguousarray(road.luminance[:, first:last])), first
 
     def _published(
         self, curve: RoadCurve, road: RoadImage, horizon: Horizon, band: Band, diagnostics: dict[str, object]
@@ -265,7 +259,8 @@ class Negru2013:
         u0, v0 = camera.principal_point
         across = (0.5 * (band.left + band.right) - u0) / camera.focal_length
         slant = np.sqrt(1.0 + across**2 + ((rows - v0) / camera.focal_length) ** 2)
-        luminance = band_profile(road.luminance, band)
+        here = replace(band, left=band.left - road.first_column, right=band.right - road.first_column)
+        luminance = band_profile(road.luminance, here)
         weight = (luminance < SATURATED).astype(np.float64)
         return RoadCurve(below, luminance, path_lengths(below, camera.row_distance, slant), weight, camera.row_distance)
 
@@ -295,17 +290,17 @@ def _fog_slope(road: RoadImage, horizon: Horizon) -> NDArray[np.float64]:
     return np.minimum(steepest_slope(below_horizon, road.airlight), SIMILARITY * road.contrast)
 
 
-def _band(road: RoadImage, edges: DericheEdges, camera: Camera, horizon: Horizon, first_column: int) -> Band:
+def _band(road: RoadImage, edges: DericheEdges, camera: Camera, horizon: Horizon) -> Band:
     blurred = smoothed(road.luminance)
     steps = (_fog_slope(road, horizon) + edges.threshold).astype(np.float32)
     region = grow_region(blurred, edges.pixels, steps, SIMILARITY * road.contrast + edges.threshold)
-    cols, centre = camera.width, camera.principal_point[0] - first_column
+    cols, centre = camera.width, camera.principal_point[0] - road.first_column
     band = crossing_band(
         region, centre, min_width=max(3, cols // 80), max_width=max(5, cols // 24), hole=max(2, cols // 128)
     )
     if band is None or band.bottom - band.top < MIN_ROWS // 2:
         raise CannotTellError("no vertical band crosses the road's region")
-    return replace(band, left=band.left + first_column, right=band.right + first_column)
+    return replace(band, left=band.left + road.first_column, right=band.right + road.first_column)
 
 
 def _credible(model: FogModel | None, curve: RoadCurve, road: RoadImage) -> FogModel | None:

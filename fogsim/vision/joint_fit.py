@@ -27,7 +27,7 @@ ALIKE = 0.3
 """Difference of ln k below which two starts lead to the same answer [-]."""
 
 CLEAR_MISFIT, CLEAR_USED = 1.5, 0.97
-"""Misfit below which, and share of bins in use from which on, the simple model's answer needs no other beside it [-]."""
+"""Misfit below which, and share of bins in use from which on, the simple model's answer needs no other [-]."""
 
 STEPS, MORE_STEPS = 10, 5
 """Most Gauss–Newton steps for the first strength of patches and drift, and from its answer for each of the others."""
@@ -174,7 +174,7 @@ class _Data:
         airlights = [prior.airlight]
         if prior.below > UNSURE * prior.airlight:
             airlights.append(self._farthest())
-        grid = np.geomspace(*self._span(), EXTINCTIONS)
+        grid = self._grid(EXTINCTIONS)
         for airlight in airlights:
             cost = joint_kernels.search(*self._bins, _albedo(ALBEDOS[1]), grid, airlight, prior.shift)
             best = int(np.argmin(cost))
@@ -185,8 +185,11 @@ class _Data:
         return min(found, key=lambda f: f.cost)
 
     def _simple(self, prior: JointPrior) -> tuple[float, float]:
-        grid = np.geomspace(*self._span(), SIMPLE_EXTINCTIONS)
-        return joint_kernels.simple_search(*self._bins[:5], grid, _known(prior))
+        return joint_kernels.simple_search(*self._bins[:5], self._grid(SIMPLE_EXTINCTIONS), _known(prior))
+
+    def _grid(self, count: int) -> Floats:
+        least, most = self._span()
+        return np.exp(np.linspace(math.log(least), math.log(most), count))
 
     def _span(self) -> tuple[float, float]:
         """Least and greatest extinction that show [1/m]."""

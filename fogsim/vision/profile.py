@@ -34,9 +34,9 @@ def band_profile(luminance: NDArray[np.float32], band: Band) -> NDArray[np.float
     count = width // block
     left = band.left + (width - count * block) // 2
     strip = luminance[band.top : band.bottom + 1, left : left + count * block]
-    means = strip.reshape(strip.shape[0], count, block).mean(axis=2, dtype=np.float64)
-    profile: NDArray[np.float64] = np.median(means, axis=1)
-    return profile
+    if block > 1:
+        strip = strip.reshape(strip.shape[0], count, block).mean(axis=2, dtype=np.float64)
+    return np.asarray(np.median(strip, axis=1), np.float64)
 
 
 def decreasing(profile: NDArray[np.float64]) -> NDArray[np.float64]:

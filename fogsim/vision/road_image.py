@@ -53,6 +53,8 @@ class RoadImage:
         First guesses: the bright part of what lies above the horizon, and the median of the bottom row.
     level : (all rows, cols) or (all rows, cols, 3) uint8 or uint16
         The whole image without roll.
+    first_column : int
+        Column of the whole image that is column 0 here.
     """
 
     luminance: NDArray[np.float32]
@@ -61,6 +63,7 @@ class RoadImage:
     airlight: float
     road: float
     level: NDArray[np.uint8] | NDArray[np.uint16]
+    first_column: int = 0
 
     @property
     def contrast(self) -> float:
@@ -68,7 +71,12 @@ class RoadImage:
         return self.airlight - self.road
 
 
-def road_image(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera, horizon: Horizon) -> RoadImage:
+def road_image(
+    image: NDArray[np.uint8] | NDArray[np.uint16],
+    camera: Camera,
+    horizon: Horizon,
+    columns: tuple[int, int] | None = None,
+) -> RoadImage:
     """Cut, level and linearise an image.
 
     Parameters
@@ -79,6 +87,8 @@ def road_image(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera, ho
         The told calibration.
     horizon : Horizon
         Where the calibration has the horizon.
+    columns : (int, int) or None
+        First column and that after the last to be cut out; None for all.
 
     Raises
     ------
@@ -94,13 +104,14 @@ def road_image(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera, ho
     sky_end = math.ceil(horizon.row)
     first = max(0, sky_end - 4 - round(SKY_SHARE * rows))
     level = levelled(image, camera)
-    luminance = linear_luminance(level[first:], camera.response, camera.bits)
+    left, right = columns or (0, cols)
+    luminance = linear_luminance(level[first:, left:right], camera.response, camera.bits)
     top = min(first, max(0, sky_end - round(SKY_HEIGHT * camera.focal_length)))
     sky: NDArray[Any] = np.ascontiguousarray(level[top:sky_end:2, ::4])
     above = linear_luminance(sky, camera.response, camera.bits)
     airlight = float(np.percentile(above, 90))
     seed = float(np.median(luminance[-1]))
-    return _checked(RoadImage(luminance, first, sky_end - first, airlight, seed, level))
+    return _checked(RoadImage(luminance, first, sky_end - first, airlight, seed, level, left))
 
 
 def _checked(road: RoadImage) -> RoadImage:

@@ -33,6 +33,29 @@ def light(pixels: NDArray[np.uint8] | NDArray[np.uint16], tables: NDArray[np.flo
 
 
 @kernel
+def row_bins(horizon: float, top: int, bottom: int, whole_rows: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """First and last row of bins from the bottom up to a top row; their height grows with their rows below the horizon.
+
+    Parameters
+    ----------
+    horizon : float
+        Row of the horizon [px].
+    top, bottom : int
+        First and last row.
+    whole_rows : float
+        Rows below the horizon up to which every row is a bin of its own [px].
+    """
+    first, last = np.empty(max(bottom - top + 1, 0), np.int64), np.empty(max(bottom - top + 1, 0), np.int64)
+    row, count = bottom, 0
+    while row >= top:
+        height = max(int((row - horizon) / whole_rows), 1)
+        first[count], last[count] = max(row - height + 1, top), row
+        row -= height
+        count += 1
+    return first[:count].copy(), last[:count].copy()
+
+
+@kernel
 def _core(samples: NDArray[np.float32], count: int, floor: float) -> tuple[float, float, float]:
     """Mean and deviation of what lies near the median of the first `count` samples; mean distance of all from it."""
     ordered = samples[:count]
@@ -255,5 +278,6 @@ def middle_levels(
     for i in range(rows.size):
         for j in range(samples.size):
             samples[j] = light(pixels, tables, rows[i], cols // 3 + int((j + 0.5) * (cols // 3) / samples.size))
-        out[i] = np.median(samples)
+        samples.sort()
+        out[i] = 0.5 * (float(samples[(samples.size - 1) // 2]) + float(samples[samples.size // 2]))
     return out

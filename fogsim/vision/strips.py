@@ -144,16 +144,8 @@ def _mean_slant(left: Floats, right: Floats, below: Floats, camera: Camera) -> F
 
 
 def _row_bins(camera: Camera, nearest: float, bottom: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    first = []
-    last = []
-    row = bottom
     top = max(math.ceil(camera.horizon_row + nearest), 0)
-    while row >= top:
-        height = max(int((row - camera.horizon_row) / WHOLE_ROWS), 1)
-        last.append(row)
-        first.append(max(row - height + 1, top))
-        row -= height
-    return np.array(first, np.int64), np.array(last, np.int64)
+    return strip_kernels.row_bins(camera.horizon_row, top, bottom, WHOLE_ROWS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,35 +217,23 @@ def strip_curves(
     free : float
         Depth up to which the own lane is free; a tracked vehicle ahead hides what is behind [m].
     """
-    strips, count = geometry.left.shape
-    luminance, variance, scatter = (np.zeros((strips, count)) for _ in range(3))
     hidden_from, hidden_to, foot = math.inf, -math.inf, -math.inf
     if math.isfinite(free):
         reach = HALF_VEHICLE * camera.focal_length / free
         hidden_from, hidden_to = camera.principal_point[0] - reach, camera.principal_point[0] + reach
         foot = camera.horizon_row + camera.row_distance / free
-    for strip in range(strips):
-        mean, deviation, scatter[strip], number = strip_kernels.strip_rows(
-            image.pixels,
-            image.tables,
-            geometry.first,
-            geometry.last,
-            geometry.left[strip],
-            geometry.right[strip],
-            hidden_from,
-            hidden_to,
-            foot,
-            max(noise, 2.0 * LEAST_DEVIATION),
-        )
-        metres = (geometry.right[strip] - geometry.left[strip]) * geometry.distance / camera.focal_length
-        pieces = np.maximum(metres / GRAIN, 1.0) * np.maximum(geometry.extent / GRAIN, 1.0)
-        counted = np.maximum(number, 1)
-        texture = np.maximum(deviation**2 - noise**2, 0.0) / np.minimum(counted, pieces)
-        seen = number > 0
-        luminance[strip] = mean
-        variance[strip] = np.where(seen, noise**2 / counted + texture + LEAST_DEVIATION**2, 0.0)
-        variance[strip] += np.where(seen, _coarseness(mean, deviation, noise, camera), 0.0)
-    return StripCurves(luminance, variance, scatter)
+    rows, floor = (geometry.first, geometry.last), max(noise, 2.0 * LEAST_DEVIATION)
+    read = [
+        strip_kernels.strip_rows(image.pixels, image.tables, *rows, left, right, hidden_from, hidden_to, foot, floor)
+        for left, right in zip(geometry.left, geometry.right, strict=True)
+    ]
+    mean, deviation, scatter, number = (np.stack(values) for values in zip(*read, strict=True))
+    metres = (geometry.right - geometry.left) * geometry.distance / camera.focal_length
+    pieces = np.maximum(metres / GRAIN, 1.0) * np.maximum(geometry.extent / GRAIN, 1.0)
+    counted = np.maximum(number, 1)
+    texture = np.maximum(deviation**2 - noise**2, 0.0) / np.minimum(counted, pieces)
+    variance = noise**2 / counted + texture + LEAST_DEVIATION**2 + _coarseness(mean, deviation, noise, camera)
+    return StripCurves(mean, np.where(number > 0, variance, 0.0), scatter)
 
 
 QUIET, SMOOTHED = 0.3, 1.0

@@ -51,6 +51,15 @@ def test_a_verge_in_place_of_the_neighbouring_lane_is_left_out(render, road, vis
     assert np.array(found) * visibility / 3.0 == pytest.approx(1.0, abs=0.03)
 
 
+@pytest.mark.parametrize("response", list(Response))
+@pytest.mark.parametrize("visibility", [13.0, 16.0, 25.0])
+def test_the_densest_fog_is_not_taken_for_a_ramp(render, road, visibility, response):
+    camera = replace(SMALL, response=response)
+    found = estimate(render(road.but(visibility=visibility, camera=camera), 3), camera)
+    assert found.valid
+    assert found.extinction * visibility / 3.0 == pytest.approx(1.0, abs=0.05)
+
+
 @pytest.mark.parametrize("told", [True, False])
 @pytest.mark.parametrize("paint", [30.0, 170.0])
 @pytest.mark.parametrize("visibility", [50, 150, 400])

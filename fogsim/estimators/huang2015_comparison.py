@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from fogsim.estimators.huang2015_sighting import Sighting
 from fogsim.vision.patch import Patch, Placement, moved, shrunk
-from fogsim.vision.patch_light import shared_light
+from fogsim.vision.patch_light import SharedLight, shared_light
 from fogsim.vision.patch_match import PlacementPrior, Regression, register
 from fogsim.vision.road_image import CannotTellError
 
@@ -24,6 +24,10 @@ BROADEST = 64.0
 OUTLINE = 1.28
 """Size of what a vehicle is placed by, over that of what is compared [-]: its outline tells more than its rear."""
 
+
+AGREES, CONTRADICTED = 0.1, 1.0
+"""Relative difference of the fading of detail and of mean contrast that says nothing, and the share of the rest of it
+that the mean may err by [-]."""
 
 FULL = 254.7
 """Mean luminance of a sky that is saturated; a little less, and its noise still shows where it is [linear levels]."""
@@ -195,9 +199,19 @@ def compared(reference: Picture, picture: Picture, prior: PlacementPrior, most: 
         deviation=math.hypot(found.slope_deviation, by_size) / gain,
         mean=found.mean / far.sky if light is None else light.far,
         near_mean=found.near_mean / near.sky if light is None else light.near,
-        mean_deviation=math.inf if light is None else light.deviation,
+        mean_deviation=math.inf if light is None else math.hypot(light.deviation, _contradiction(found, gain, light)),
         regression=found,
     )
+
+
+def _contradiction(found: Regression, gain: float, light: SharedLight) -> float:
+    """What a mean may err by because detail that is clearly seen has faded otherwise: it is drawn or lit otherwise."""
+    contrast = 1.0 - light.near
+    if contrast <= 0.0 or not math.isfinite(found.noise_deviation):
+        return 0.0
+    fallen = (1.0 - light.far) / contrast
+    apart = abs(found.slope / gain - fallen) - AGREES * abs(fallen) - 2.0 * found.noise_deviation / gain
+    return CONTRADICTED * max(apart, 0.0) * contrast
 
 
 def _unplaced(at: Placement) -> Regression:

@@ -20,7 +20,7 @@ GRID = 1801
 RATIO_DEVIATION = 0.03
 """Least standard deviation of a ratio of variances, be there one or many [-]."""
 
-SLOPE_SHARE = 0.05
+SLOPE_SHARE = 0.02
 """Standard deviation of a ratio of contrasts that pixels do not show, relative: registration, detail too small [-]."""
 
 MEAN_SHARE, MEAN_CONTRAST_SHARE = 0.002, 0.01

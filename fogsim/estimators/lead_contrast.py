@@ -29,10 +29,11 @@ MIN_ALIKE = 3
 REGISTRATION = 0.008
 """Relative deviation of a contrast by what is not noise: place, shading [-]."""
 
-SHAPE = 0.012
-"""Relative deviation of the farthest contrast from the nearest by what size and aspect do: a slope's error [-]."""
+SHAPE, BRIGHT_SHAPE = 0.012, 0.07
+"""Relative deviation of the farthest contrast from the nearest by what size and aspect do: a slope's error [-]. The
+latter is that of the luminance, which matters as much more as a vehicle is brighter than its contrast to the sky."""
 
-LARGE, LARGE_SHAPE = 2.25, 0.05
+LARGE, LARGE_SHAPE = 2.25, 0.035
 """Width from which a vehicle is a lorry or a bus [m], and that deviation then: one sees below it, and differently far
 as it moves away [-]."""
 
@@ -217,8 +218,23 @@ class LeadContrast:
         fit = fit_decay(distance, contrast, noise, relative, offset)
         if fit is None:
             return None
-        shape = SHAPE if self._track.sights[0].picture.width < LARGE else LARGE_SHAPE
-        return replace(fit, deviation=math.hypot(fit.deviation, shape / max(float(np.ptp(distance)), SPACING)))
+        certain = contrast**2 / (noise**2 + (relative * contrast) ** 2 + offset**2)
+        shape = self._shape(fit.extinction, float(np.median(lever)))
+        return replace(fit, deviation=math.hypot(fit.deviation, shape / max(_span(distance, certain), SPACING)))
+
+    def _shape(self, extinction: float, lever: float) -> float:
+        """By how much size and aspect may change the farthest contrast, relative [-]."""
+        depth = min(sight.depth for sight in self._track.sights)
+        # What the lever would be without fog is over 1 by luminance over contrast.
+        bright = max(lever * math.exp(-max(extinction, 0.0) * depth) - 1.0, 0.0)
+        large = self._track.sights[0].picture.width >= LARGE
+        return math.hypot(LARGE_SHAPE if large else SHAPE, BRIGHT_SHAPE * bright)
+
+
+def _span(distance: NDArray[np.float64], weight: NDArray[np.float64]) -> float:
+    """Change of range over which the contrast is known: that of an even density of the same spread [m]."""
+    mean = float((weight * distance).sum() / weight.sum())
+    return math.sqrt(12.0 * float((weight * (distance - mean) ** 2).sum() / weight.sum()))
 
 
 def _doubt(fit: DecayFit, road: RoadFall | None) -> str:

@@ -8,9 +8,9 @@ from scattered free memory.
 
     python benchmarks/renderers.py [--json] [--renderers 200] [--frames 10000] [--renderer cpu ...]
 
-Found with llvmpipe (Mesa 22.3) on a 2-core Linux machine, growth of resident set / allocator: "pyrender" below 0 / 0.2
-KiB per renderer, 2.1 / 0.0 KiB per 1000 frames. The resident set settles slowly: from the 400th to the 1500th frame it
-still grows by 5 MiB, after that no more.
+Found with 200 renderers and 10,000 frames (llvmpipe of Mesa 22.3, 2-core Linux machine busy with other work), growth of
+resident set / allocator: "cpu" 0.56 / 0.07 KiB per renderer, 0.0 / 0.0 KiB per 1000 frames; "pyrender" 30 / 0.07 and
+729 / 0.0. Mesa's resident set settles slowly, by about 5 MiB in all: with 20,000 frames 0.3 KiB per 1000 are left.
 """
 
 import argparse

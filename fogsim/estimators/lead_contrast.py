@@ -16,7 +16,7 @@ from fogsim.values.observation import LeadMeasurement, Observation
 from fogsim.vision.decay_fit import DecayFit, fit_decay
 from fogsim.vision.horizon import PITCH_DEVIATION
 from fogsim.vision.lead_daylight import RoadFall
-from fogsim.vision.lead_patch import HALF_BODY, HEIGHTS
+from fogsim.vision.lead_patch import HALF_BODY, LARGE
 from fogsim.vision.lead_scene import lead_scene
 from fogsim.vision.road_image import CannotTellError
 
@@ -33,9 +33,8 @@ SHAPE, BRIGHT_SHAPE = 0.012, 0.07
 """Relative deviation of the farthest contrast from the nearest by what size and aspect do: a slope's error [-]. The
 latter is that of the luminance, which matters as much more as a vehicle is brighter than its contrast to the sky."""
 
-LARGE, LARGE_SHAPE = 2.25, 0.035
-"""Width from which a vehicle is a lorry or a bus [m], and that deviation then: one sees below it, and differently far
-as it moves away [-]."""
+LARGE_SHAPE = 0.035
+"""That deviation of a lorry or a bus: one sees below it, and differently far as it moves away [-]."""
 
 AIRLIGHT_DEVIATION = 0.002
 """Relative deviation of the airlight behind the vehicle from the sky above it [-]."""
@@ -250,5 +249,6 @@ def _doubt(fit: DecayFit, road: RoadFall | None) -> str:
 def _box(sight: Sight) -> tuple[int, int, int, int]:
     """Left, right, top and bottom of the part of a rear that is compared [px]."""
     window, scale = sight.window, sight.picture.scale
+    low, high = sight.picture.heights
     left, right = window.column - HALF_BODY * window.width, window.column + HALF_BODY * window.width
-    return round(left), round(right), round(window.foot - HEIGHTS[1] * scale), round(window.foot - HEIGHTS[0] * scale)
+    return round(left), round(right), round(window.foot - high * scale), round(window.foot - low * scale)

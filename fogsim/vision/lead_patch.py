@@ -15,6 +15,10 @@ HALF_BODY = 0.42
 HEIGHTS = (0.3, 1.2)
 """Heights of that part above the road [m]: above the road's shadow, below the roof of the flattest car."""
 
+LARGE, HIGH = 2.25, (0.6, 1.6)
+"""Width from which a vehicle is a lorry or a bus [m], and those heights then [m]: one sees below a semitrailer, and
+differently from afar, so the part begins above the bar that keeps cars from running under it."""
+
 ASIDE, ABOVE, BELOW = 0.25, 0.15, 0.4
 """What is placed reaches so far beyond that part, or beyond the vehicle's sides [m]: its outline tells the place."""
 
@@ -56,6 +60,11 @@ class LeadPicture:
     foot: float
     scale: float
     width: float
+
+    @property
+    def heights(self) -> tuple[float, float]:
+        """Lowest and highest part of the rear that is compared, above the road [m]."""
+        return HIGH if self.width >= LARGE else HEIGHTS
 
     def moved(self, right: float, up: float) -> "LeadPicture":
         """The same picture of a vehicle that is farther right and up [m]."""
@@ -138,7 +147,8 @@ def placed(
     """
     cell = _cell(reference, picture)
     side = 0.5 * reference.width + ASIDE
-    lateral, height = _grid(-side, side, cell, 5), _grid(HEIGHTS[0] - BELOW, HEIGHTS[1] + ABOVE, cell, 4)
+    low, high = reference.heights
+    lateral, height = _grid(-side, side, cell, 5), _grid(low - BELOW, high + ABOVE, cell, 4)
     across, up = (max(math.ceil(2.5 * deviation / cell), 1) for deviation in (aside, pitch))
     template, _ = _resampled(reference, lateral, height, cell)
     wide = cell * np.arange(-across, across + 1), cell * np.arange(-up, up + 1)
@@ -184,7 +194,7 @@ def compared(reference: LeadPicture, picture: LeadPicture) -> Fading | None:
     """
     cell = _cell(reference, picture)
     side = HALF_BODY * reference.width
-    lateral, height = _grid(-side, side, cell, 2), _grid(*HEIGHTS, cell, 3)
+    lateral, height = _grid(-side, side, cell, 2), _grid(*reference.heights, cell, 3)
     shown, shown_noise = _resampled(reference, lateral, height, cell)
     seen, seen_noise = _resampled(picture, lateral, height, cell)
     line = _line(shown, seen, math.sqrt(seen_noise))

@@ -2,12 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from io import BytesIO
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from PIL import Image
 
 from fogsim.estimators import make
 from fogsim.estimators.huang2015_ratios import image_confidence
@@ -55,7 +57,7 @@ def picture(renderer: Renderer, chase: Chase, shown: Sequence[Tracked]) -> NDArr
     (rows, cols, 3) uint8
     """
     figure = Figure(figsize=(12.8, 3.2 + 1.7 * len(shown)), dpi=100, layout="constrained")
-    canvas = FigureCanvasAgg(figure)
+    FigureCanvasAgg(figure)
     grid = figure.add_gridspec(len(shown) + 1, 1, height_ratios=[*([1.0] * len(shown)), 2.0])
     found = _patches(renderer, chase, [row.visibility for row in shown])
     for i, row in enumerate(shown):
@@ -65,8 +67,9 @@ def picture(renderer: Renderer, chase: Chase, shown: Sequence[Tracked]) -> NDArr
     plots = figure.add_subfigure(grid[len(shown)]).subplots(1, len(shown), squeeze=False)[0]
     for axes, row in zip(plots, shown, strict=True):
         _curves(axes, row)
-    canvas.draw()
-    return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
+    drawn = BytesIO()
+    figure.savefig(drawn, format="png")
+    return np.asarray(Image.open(drawn).convert("RGB"))
 
 
 def _patches(

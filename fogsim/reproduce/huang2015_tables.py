@@ -60,7 +60,7 @@ def _said(value: float | str | None) -> str:
 def _last(results: Results, case: Case) -> Estimate | None:
     """Estimate of a case after its last frame."""
     found = results.get(case)
-    return None if not found else found[next(reversed(found))]
+    return list(found.values())[-1] if found else None
 
 
 def _table_4_1(rough: Rough) -> Rows:

@@ -54,7 +54,7 @@ def picture(moment: Moment, camera: Camera) -> NDArray[np.uint8]:
 def _panel(seen: Observation, camera: Camera, visibility: float, *, as_published: bool) -> NDArray[np.uint8]:
     estimate = make("zhu2015", camera, as_published=as_published).update(seen)
     growth = (GROWTH, GROWTH_SHARE) if as_published else None
-    image = np.array(seen.image)
+    image = np.array(seen.image, np.uint8)
     road = seen_road(image, camera, PITCH_DEVIATION, growth, seen.lead)
     drawing = Image.fromarray(_with_region(image, road))
     draw = ImageDraw.Draw(drawing)

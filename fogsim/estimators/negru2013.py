@@ -20,6 +20,7 @@ from fogsim.vision.inflection import FogModel, best_inflection, printed_inflecti
 from fogsim.vision.joint_checks import no_road
 from fogsim.vision.joint_fit import JointFit, fit_jointly
 from fogsim.vision.joint_prior import joint_prior
+from fogsim.vision.median import median
 from fogsim.vision.profile import RoadCurve, band_profile, path_lengths
 from fogsim.vision.region import Band, crossing_band, grow_region
 from fogsim.vision.road_image import MIN_CONTRAST, MIN_ROWS, SATURATED, CannotTellError, RoadImage, road_image
@@ -167,7 +168,7 @@ class Negru2013:
         road = road_image(image, self._camera, self._told, columns)
         lowest = above_bonnet(linear_pixels(road.level, self._camera), self._camera, road.airlight)
         luminance = road.luminance[: lowest + 1 - road.first_row]
-        return replace(road, luminance=luminance, road=float(np.median(luminance[-1])))
+        return replace(road, luminance=luminance, road=median(luminance[-1]))
 
     def _published(
         self, curve: RoadCurve, road: RoadImage, horizon: Horizon, band: Band, diagnostics: dict[str, object]
@@ -271,7 +272,7 @@ class Negru2013:
         """
         if curve.below_horizon[0] > NEAR_HORIZON:
             raise CannotTellError("the road's region ends below the horizon, and no inflection lies in it")
-        if float(np.median(curve.luminance[:3])) > road.road + 0.5 * road.contrast:
+        if median(curve.luminance[:3]) > road.road + 0.5 * road.contrast:
             raise CannotTellError("the road fades into the airlight, but not as Koschmieder's law has it")
         aside = abs(0.5 * (band.left + band.right) - self._camera.principal_point[0])
         if aside > MAX_ASIDE * self._camera.width:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fogsim.vision import kernels
 from fogsim.vision.deriche import Gradient, derivative_kernel, smoothing_kernel
 from fogsim.vision.edges import EDGE_FACTOR, MIN_GRADIENT
+from fogsim.vision.median import median, row_medians
 
 GRADIENT_STEPS = 128.0  # fixed-point steps per grey level in the 16-bit gradients that the detector takes
 
@@ -72,7 +73,7 @@ class CannyDeriche:
         slope = np.zeros(luminance.shape[0], np.float32)
         if fog_slope is not None:
             # Fog over a dark road brightens upward, so dI/dv is negative.
-            slope = np.clip(np.median(self._down[:, ::32], axis=1), -fog_slope, 0.0).astype(np.float32)
+            slope = np.clip(row_medians(self._down[:, ::32]), -fog_slope, 0.0).astype(np.float32)
         kernels.levelled_gradient(self._across, self._down, slope, GRADIENT_STEPS, *self._fixed)
         high = max(EDGE_FACTOR * _median_gradient(self._across, self._down), MIN_GRADIENT)
         low_step, high_step = 0.5 * high * GRADIENT_STEPS, high * GRADIENT_STEPS
@@ -90,4 +91,4 @@ class CannyDeriche:
 
 def _median_gradient(across: NDArray[np.float32], down: NDArray[np.float32]) -> float:
     lower = slice(across.shape[0] // 2, None, 6)
-    return float(np.median(np.hypot(across[lower, ::6], down[lower, ::6])))
+    return median(np.hypot(across[lower, ::6], down[lower, ::6]))

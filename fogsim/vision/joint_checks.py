@@ -4,6 +4,7 @@ import numpy as np
 
 from fogsim.values.camera import Camera
 from fogsim.vision.joint_fit import JointFit
+from fogsim.vision.median import median
 from fogsim.vision.response import linear_table
 from fogsim.vision.strips import StripCurves, StripGeometry
 
@@ -51,7 +52,7 @@ def is_scattered(fit: JointFit, curves: StripCurves, geometry: StripGeometry) ->
     near = fit.used[0] & (fit.extinction * geometry.distance < 1.5)
     if not near.any():
         return False
-    return float(np.median(curves.scatter[0][near])) > MAX_SCATTER * (fit.airlight - fit.road)
+    return median(curves.scatter[0][near]) > MAX_SCATTER * (fit.airlight - fit.road)
 
 
 def is_ramp(curves: StripCurves, geometry: StripGeometry, camera: Camera) -> bool:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.vision import kernels
+from fogsim.vision.median import row_medians
 from fogsim.vision.region import Band
 
 MAX_BLOCKS = 48  # columns that a row's median is taken over; more cost time and gain nothing
@@ -36,7 +37,7 @@ def band_profile(luminance: NDArray[np.float32], band: Band) -> NDArray[np.float
     strip = luminance[band.top : band.bottom + 1, left : left + count * block]
     if block > 1:
         strip = strip.reshape(strip.shape[0], count, block).mean(axis=2, dtype=np.float64)
-    return np.asarray(np.median(strip, axis=1), np.float64)
+    return row_medians(strip)
 
 
 def decreasing(profile: NDArray[np.float64]) -> NDArray[np.float64]:

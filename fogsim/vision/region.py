@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.vision import kernels
+from fogsim.vision.median import median
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +52,7 @@ def grow_region(
     (rows, cols) uint8
         1 inside the region.
     """
-    seed = float(np.median(luminance[-1]))
+    seed = median(luminance[-1])
     region: NDArray[np.uint8] = kernels.grow_upward(luminance, edges, steps, seed, float(seed_tolerance))
     return region
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fogsim.values.camera import Camera
 from fogsim.vision.horizon import Horizon, levelled
 from fogsim.vision.luminance import linear_luminance
+from fogsim.vision.median import median
 
 MIN_COLS, MIN_ROWS = 32, 16
 """[px] A road narrower than this, or lower below its horizon, shows no curve."""
@@ -110,7 +111,7 @@ def road_image(
     sky: NDArray[Any] = np.ascontiguousarray(level[top:sky_end:2, ::4])
     above = linear_luminance(sky, camera.response, camera.bits)
     airlight = float(np.percentile(above, 90))
-    seed = float(np.median(luminance[-1]))
+    seed = median(luminance[-1])
     return _checked(RoadImage(luminance, first, sky_end - first, airlight, seed, level, left))
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
 from fogsim.vision import strip_kernels
+from fogsim.vision.median import median
 from fogsim.vision.response import linear_table
 
 Floats = NDArray[np.float64]
@@ -278,8 +279,8 @@ def above_bonnet(image: LinearPixels, camera: Camera, airlight: float) -> int:
     # Three rows each side of a gap of two, since a bonnet's edge is bent.
     mean = np.convolve(level, np.full(3, 1.0 / 3.0), "valid")
     change = mean[5:] - mean[:-5]
-    apart = np.abs(change - np.median(change))
-    steps = np.flatnonzero(apart > max(BONNET_STEP * airlight, BONNET_OUTLIER * float(np.median(apart))))
+    apart = np.abs(change - median(change))
+    steps = np.flatnonzero(apart > max(BONNET_STEP * airlight, BONNET_OUTLIER * median(apart)))
     return int(rows[min(steps[-1] + 6, rows.size - 1)]) if steps.size else bottom
 
 
@@ -370,7 +371,7 @@ def sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
     unseen = UNSEEN * max(float(lowest) - margin / camera.focal_length - CLOSE, 0.0) * level
     deviation = math.hypot(scatter, unseen)
     # What looks everywhere different is a wood rather than a sky, which is no darker than that.
-    covered = float(np.median(share)) < PATCHY and scatter > SCATTERED * level
+    covered = median(share) < PATCHY and scatter > SCATTERED * level
     saturated, clipped = strip_kernels.saturation(image.pixels, image.tables.shape[1] - 1, rows, side)
     return Sky(level, deviation, BRIGHTER * level if covered else deviation, noise, saturated, clipped)
 

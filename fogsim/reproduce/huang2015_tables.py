@@ -21,8 +21,8 @@ NOTES = (
     "As published, the optimisation takes the bottom row's luminance for the road's own. It is fogged: with this lens"
     " that row is 19 m away and has 141 levels where the road has 19 (V_met = 50 m), so V_met comes out too large.",
     "As published, noise adds to every variance: with an ordinary sensor 50 m come out more than 3 times too large.",
-    "As published, the way back fails in thin fog: found first at 90 m, the window sits 0.2 m too high and holds a"
-    " strip of sky, whose step to the roof is no detail of the vehicle. The corrected variant uses no variances.",
+    "As published, the way back fails in thin fog: found first at 90 m, the window holds a strip of sky down to 40 m,"
+    " whose step to the roof is no detail of the vehicle. The corrected variant uses no variances.",
     "Without noise, 8 bits leave steps that nothing dithers: at 50 m the corrected variant is 6 % low, with noise 2 %.",
     "25 to 90 m every 5 m are 14 pictures over 65 m, not 13 over 75 m. Table 5.1 has ways of 80 to 250 m, which that"
     " vehicle never drives: we have none there.",

@@ -28,7 +28,7 @@ demo: $(VENV)/.installed ## Run the demo scenario; results go to runs/demo/
 	@$(BIN)/fogsim run motorway_fog_bank --seed 1 --out runs/demo --overwrite
 
 test: $(VENV)/.installed-test ## Run the whole test suite
-	@$(BIN)/python -m pytest
+	@$(BIN)/python -m pytest -n auto --dist worksteal
 
 lint: $(VENV)/.installed-test ## Check style
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check .

@@ -1,4 +1,4 @@
-"""Medians of few numbers, without the checks and the generality of numpy's, which take longer than the search."""
+"""Medians and quantiles of few numbers, without the checks of numpy's, which take longer than the search."""
 
 from typing import Any
 
@@ -20,6 +20,24 @@ def median(values: NDArray[np.floating[Any]]) -> float:
         return float(np.partition(flat, half)[half])
     ordered = np.partition(flat, (half - 1, half))
     return 0.5 * (float(ordered[half - 1]) + float(ordered[half]))
+
+
+def quantile(values: NDArray[np.floating[Any]], share: float) -> float:
+    """What a share of numbers lie below, linear between neighbours.
+
+    Parameters
+    ----------
+    values : (n, …) float
+        At least one number; all are finite.
+    share : float
+        0 … 1.
+    """
+    flat = values.ravel()
+    place = share * (flat.size - 1)
+    below = min(int(place), flat.size - 1)
+    above = min(below + 1, flat.size - 1)
+    ordered = np.partition(flat, (below, above))
+    return float(ordered[below]) + (place - below) * (float(ordered[above]) - float(ordered[below]))
 
 
 def row_medians(values: NDArray[np.floating[Any]]) -> NDArray[np.float64]:

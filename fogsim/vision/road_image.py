@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fogsim.values.camera import Camera
 from fogsim.vision.horizon import Horizon, levelled
 from fogsim.vision.luminance import linear_luminance
-from fogsim.vision.median import median
+from fogsim.vision.median import median, quantile
 
 MIN_COLS, MIN_ROWS = 32, 16
 """[px] A road narrower than this, or lower below its horizon, shows no curve."""
@@ -110,7 +110,7 @@ def road_image(
     top = min(first, max(0, sky_end - round(SKY_HEIGHT * camera.focal_length)))
     sky: NDArray[Any] = np.ascontiguousarray(level[top:sky_end:2, ::4])
     above = linear_luminance(sky, camera.response, camera.bits)
-    airlight = float(np.percentile(above, 90))
+    airlight = quantile(above, 0.9)
     seed = median(luminance[-1])
     return _checked(RoadImage(luminance, first, sky_end - first, airlight, seed, level, left))
 

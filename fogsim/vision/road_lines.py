@@ -1,5 +1,6 @@
 """The vanishing point of the lines along a road, near where the calibration expects it."""
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -93,9 +94,7 @@ def meeting_lines(image: LinearPixels, camera: Camera, horizon: Horizon) -> Meet
         return None
     place, kind = road_line_kernels.row_points(image.pixels, image.tables, rows)
     across, below = place[:, 0] - camera.principal_point[0], place[:, 1] - horizon.row
-    reach = YAW * camera.focal_length
-    offsets = np.linspace(-reach, reach, 2 * math.ceil(YAW / YAW_STEP) + 1)
-    slopes = np.linspace(-STEEPEST, STEEPEST, 2 * round(STEEPEST / SLOPE_STEP) + 1)
+    offsets, slopes = _cells(YAW * camera.focal_length)
     least = max(int(road_line_kernels.LEAST_POINTS), rows.size // 8)
     found, kinds = road_line_kernels.vote(across, below, kind, offsets, slopes, MOST_LINES, least)
     lines = road_line_kernels.straighten(across, below, kind, found, kinds, 0.5 * (offsets[1] - offsets[0]) + 2.0)
@@ -112,6 +111,13 @@ def meeting_lines(image: LinearPixels, camera: Camera, horizon: Horizon) -> Meet
     if count < 2 or span < road_line_kernels.LEAST_TURN or not abs(row) <= apart:
         return None
     return MeetingLines(camera.principal_point[0] + offset, horizon.row + row, deviation, count)
+
+
+@functools.lru_cache(maxsize=8)
+def _cells(reach: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Offsets [px] and slopes of the lines that are voted for; they belong to all who ask."""
+    offsets = np.linspace(-reach, reach, 2 * math.ceil(YAW / YAW_STEP) + 1)
+    return offsets, np.linspace(-STEEPEST, STEEPEST, 2 * round(STEEPEST / SLOPE_STEP) + 1)
 
 
 def _rows(camera: Camera, horizon: Horizon) -> NDArray[np.int64]:

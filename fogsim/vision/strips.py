@@ -1,5 +1,6 @@
 """Strips of road along the vehicle's axis, and rows of sky above it: what the joint fit of fog looks at."""
 
+import functools
 import math
 from dataclasses import dataclass, replace
 from typing import Any
@@ -272,7 +273,7 @@ def above_bonnet(image: LinearPixels, camera: Camera, airlight: float) -> int:
     """
     bottom = camera.height - 1
     top = math.floor(bottom - BONNET_SHARE * (bottom - camera.horizon_row))
-    rows = np.unique(np.linspace(bottom, top, BONNET_ROWS).astype(np.int64))[::-1]
+    rows = _even_rows(bottom, top, BONNET_ROWS)[::-1]
     if rows.size < 8:
         return bottom
     level = strip_kernels.middle_levels(image.pixels, image.tables, rows)
@@ -282,6 +283,12 @@ def above_bonnet(image: LinearPixels, camera: Camera, airlight: float) -> int:
     apart = np.abs(change - median(change))
     steps = np.flatnonzero(apart > max(BONNET_STEP * airlight, BONNET_OUTLIER * median(apart)))
     return int(rows[min(steps[-1] + 6, rows.size - 1)]) if steps.size else bottom
+
+
+@functools.lru_cache(maxsize=64)
+def _even_rows(first: int, last: int, count: int) -> NDArray[np.int64]:
+    """Up to so many rows from the first to the last, evenly and downward; they belong to all who ask."""
+    return np.unique(np.linspace(first, last, count).astype(np.int64))
 
 
 SATURATED_SHARE = 0.02
@@ -359,7 +366,7 @@ def sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
     top = max(0, math.floor(camera.horizon_row - SKY_HEIGHT * camera.focal_length))
     if bottom - top < 1:
         return None
-    rows = np.unique(np.linspace(top, bottom, SKY_ROWS).astype(np.int64))
+    rows = _even_rows(top, bottom, SKY_ROWS)
     side = camera.width // 6
     noise = strip_kernels.pixel_noise(image.pixels, image.tables, rows)
     bright, share = strip_kernels.sky_rows(image.pixels, image.tables, rows, side, camera.width - side, max(noise, 0.3))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fogsim.vision.median import median, row_medians
+from fogsim.vision.median import median, quantile, row_medians
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 11, 100, 1001])
@@ -14,4 +14,6 @@ def test_medians_are_those_of_numpy(count: int, kind: type[np.float32] | type[np
     before = values.copy()
     assert row_medians(values) == pytest.approx(np.median(values, axis=1), rel=1e-6)
     assert median(values) == pytest.approx(float(np.median(values)), rel=1e-6)
+    for share in (0.0, 0.3, 0.9, 1.0):
+        assert quantile(values, share) == pytest.approx(float(np.quantile(values, share)), rel=1e-5)
     assert (values == before).all()

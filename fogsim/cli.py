@@ -16,6 +16,7 @@ from fogsim import __version__
 from fogsim.cli_estimate import estimate_command
 from fogsim.cli_reproduce import reproduce_command
 from fogsim.errors import FogSimError, InputError
+from fogsim.interruption import interruptible
 from fogsim.values import Step
 
 if TYPE_CHECKING:
@@ -39,7 +40,11 @@ _err = Console(stderr=True, highlight=False)
 def main() -> None:
     """Run the command line; errors that a user can mend end in one message and exit code 2."""
     try:
-        app()
+        with interruptible():
+            app()
+    except KeyboardInterrupt:
+        _err.print("interrupted")
+        sys.exit(INTERRUPTED)
     except FogSimError as error:
         _err.print(f"[bold red]error:[/] {escape(str(error))}", soft_wrap=True)
         sys.exit(BAD_INPUT)

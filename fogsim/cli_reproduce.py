@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 _out = Console(highlight=False)
 _err = Console(stderr=True, highlight=False)
 
+_UNBROKEN = 200  # wider than any table [characters]
+
 ALL = "all"
 """Stands for every paper."""
 
@@ -46,13 +48,15 @@ def _show(done: "Reproduction", *, as_json: bool) -> None:
         for record in done.records:
             typer.echo(json.dumps(record, allow_nan=False))
         return
+    # Files and pipes have no width that rows must be broken for.
+    wide = _out if _out.is_terminal else Console(highlight=False, width=_UNBROKEN)
     for told in done.told:
         heading, *rows = told.rows
         table = Table(*map(escape, heading), box=None, pad_edge=False)
         for row in rows:
             table.add_row(*map(escape, row))
         _out.print(f"[italic]{escape(told.title)}[/]", soft_wrap=True)
-        _out.print(table)
+        wide.print(table)
         if done.tables:
             _out.print()
     for note in done.notes:

@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from fogsim.errors import InputError
+from fogsim.interruption import interruptible
 from fogsim.loop import run
 from fogsim.metrics import RunMetrics, RunSummary, step_metrics
 from fogsim.recorders import (
@@ -105,14 +106,15 @@ def record_run(
         raise
     status, ending, message, begun = Status.FAILED, None, "", False
     try:
-        for step in run(scenario, seed):
-            begun = True
-            metrics.update(step)
-            derived = step_metrics(step)
-            for recorder in opened:
-                recorder.record(step, derived)
-            watch(step)
-            ending = step.ending
+        with interruptible():
+            for step in run(scenario, seed):
+                begun = True
+                metrics.update(step)
+                derived = step_metrics(step)
+                for recorder in opened:
+                    recorder.record(step, derived)
+                watch(step)
+                ending = step.ending
         status = Status.COMPLETE
     except KeyboardInterrupt:
         status = Status.INTERRUPTED

@@ -13,6 +13,7 @@ from fogsim.dataset.directory import DatasetDirectory
 from fogsim.dataset.encoding import DEPTH_UNIT, TRANSMISSION_UNIT, encoded_depth, encoded_transmission
 from fogsim.dataset.ground_truth import SemanticClass, depth, instance_mask, semantic_mask, transmission
 from fogsim.errors import InputError
+from fogsim.interruption import interruptible
 from fogsim.loop import AdvisedDriving, ClosedLoop
 from fogsim.scenario import Scenario, resolved
 from fogsim.values import Ending, Step
@@ -90,7 +91,7 @@ def write_dataset(
         raise InputError(f"{directory.path} holds {more} frames already, more than the {frames} asked for")
     written = 0
     try:
-        with contextlib.closing(_missing(scenario, directory, frames, seed, every)) as missing:
+        with interruptible(), contextlib.closing(_missing(scenario, directory, frames, seed, every)) as missing:
             for number, run_number, step in missing:
                 if step is not None:
                     _write_frame(directory, number, step, run_number, seed)

@@ -1,112 +1,10 @@
-"""A renderer of foggy roads that shares nothing with FogSim's own: the estimators' independent judge."""
+"""Foggy roads that FogSim's own renderer did not draw, for all tests of estimators."""
 
-from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
 import pytest
-
-from fogsim.values import Camera, Response
-
-
-@dataclass(frozen=True)
-class Road:
-    """What stands on the flat world, all luminances in linear grey levels 0 … 255, all lengths in metres."""
-
-    visibility: float = 100.0
-    airlight: float = 200.0
-    asphalt: float = 60.0
-    mark: float = 150.0
-    terrain: float = 45.0
-    sky: float | None = None  # luminance of the sky, the airlight if None
-    patch_contrast: float = 0.03
-    drift: float = 0.0  # albedo wanders by as much within 40 m
-    noise: float = 1.0  # pixel values
-    lead_distance: float | None = None
-    lead_paint: float = 30.0
-    lead_brakes: bool = False
-    marks: bool = True
-    verge: bool = False  # in place of the lane on the right, beyond a solid line: it brightens with distance
-    camera: Camera = field(
-        default_factory=lambda: Camera(640, 480, 577.0, (319.5, 239.5), 1.38, np.radians(2.0), response=Response.LINEAR)
-    )
-
-    def but(self, **changes) -> "Road":
-        return replace(self, **changes)
-
-
-def ground(road: Road, ahead: np.ndarray, left: np.ndarray, seed: int) -> np.ndarray:
-    """Luminance of the ground without fog."""
-    asphalt = road.asphalt * (1.0 + road.patch_contrast * patches(ahead, left, seed) + road.drift * drift(ahead, seed))
-    out = np.where(
-        np.abs(left) < 5.4, asphalt, road.terrain * (1.0 + 3 * road.patch_contrast * patches(ahead, left, seed + 7))
-    )
-    if road.marks:
-        solid = np.abs(np.abs(left) - 5.25) < 0.075
-        dashed = (np.abs(np.abs(left) - 1.75) < 0.075) & ((ahead % 12.0) < 4.0)
-        out = np.where(solid | dashed, road.mark, out)
-    if road.verge:
-        out = np.where(left < -1.85, road.asphalt * (1.0 + 0.6 * np.clip(ahead / 60.0, 0.0, 1.0)), out)
-        out = np.where(np.abs(left + 1.75) < 0.1, road.mark, out)
-    return out
-
-
-def drift(ahead: np.ndarray, seed: int) -> np.ndarray:
-    """A slow change along the road: uniform within ±1 at every 40 m, straight in between."""
-    knots = np.random.default_rng(seed + 400).uniform(-1.0, 1.0, 64)
-    return np.interp(ahead % 2520.0, 40.0 * np.arange(64), knots)
-
-
-def patches(ahead: np.ndarray, left: np.ndarray, seed: int) -> np.ndarray:
-    """Blocky noise of unit deviation with cells of 0.3 to 7.7 m."""
-    rng = np.random.default_rng(seed)
-    sizes = (0.3, 1.1, 2.9, 7.7)
-    total = np.zeros(ahead.shape)
-    for size in sizes:
-        table = rng.standard_normal((64, 64))
-        total += table[(ahead / size).astype(int) % 64, np.floor(left / size).astype(int) % 64]
-    return total / np.sqrt(len(sizes))
-
-
-def luminance(road: Road, rows: np.ndarray, cols: np.ndarray, seed: int) -> np.ndarray:
-    """Linear luminance at image points: rays in the world, flat road, box, Koschmieder's law."""
-    camera = road.camera
-    x = (cols - camera.principal_point[0]) / camera.focal_length
-    y = (rows - camera.principal_point[1]) / camera.focal_length
-    x, y = (
-        x * np.cos(camera.roll) + y * np.sin(camera.roll),
-        -x * np.sin(camera.roll) + y * np.cos(camera.roll),
-    )
-    forward = np.cos(camera.pitch) - y * np.sin(camera.pitch)
-    down = np.sin(camera.pitch) + y * np.cos(camera.pitch)
-    hits = down > 1e-9
-    depth = np.where(hits, camera.mount_height / np.where(hits, down, 1.0), 0.0)
-    ahead, left = depth * forward, -depth * x
-    intrinsic = ground(road, ahead, left, seed)
-    length = np.where(hits, depth * np.sqrt(x**2 + forward**2 + down**2), np.inf)
-    if road.lead_distance is not None:
-        plane = road.lead_distance / forward
-        height, side = camera.mount_height - plane * down, plane * x
-        box = (np.abs(side) < 0.9) & (height > 0.0) & (height < 1.5) & ((plane < depth) | ~hits)
-        intrinsic = np.where(box, np.where(height < 0.3, 8.0, road.lead_paint), intrinsic)
-        glass = box & (height > 0.95) & (height < 1.4) & (np.abs(side) < 0.7)
-        intrinsic = np.where(glass, 12.0, intrinsic)
-        if road.lead_brakes:
-            lamps = box & (np.abs(height - 0.8) < 0.09) & (np.abs(np.abs(side) - 0.72) < 0.12)
-            intrinsic = np.where(lamps, 900.0, intrinsic)
-        length = np.where(box, plane * np.sqrt(x**2 + 1.0 + y**2), length)
-    transmission = np.exp(-3.0 * np.where(np.isfinite(length), length, 0.0) / road.visibility)
-    sky = road.airlight if road.sky is None else road.sky
-    return np.where(np.isfinite(length), intrinsic * transmission + road.airlight * (1 - transmission), sky)
-
-
-def encode(linear: np.ndarray, response: Response) -> np.ndarray:
-    share = np.clip(linear / 255.0, 0.0, 1.0)
-    if response is Response.GAMMA:
-        return 255.0 * share ** (1 / 2.2)
-    if response is Response.SRGB:
-        return 255.0 * np.where(share <= 0.0031308, 12.92 * share, 1.055 * share ** (1 / 2.4) - 0.055)
-    return 255.0 * share
+from flat_road import Road, photograph, scan
 
 
 def render_grey(road: Road, seed: int = 0, samples: int = 2) -> np.ndarray:
@@ -117,14 +15,7 @@ def render_grey(road: Road, seed: int = 0, samples: int = 2) -> np.ndarray:
 @lru_cache(maxsize=256)
 def drawn(road: Road, seed: int, samples: int) -> np.ndarray:
     """The image: many methods look at the same roads."""
-    camera = road.camera
-    offsets = (np.arange(samples) + 0.5) / samples - 0.5
-    rows = (np.arange(camera.height)[:, None] + offsets).ravel()
-    cols = (np.arange(camera.width)[:, None] + offsets).ravel()
-    fine = luminance(road, *np.meshgrid(rows, cols, indexing="ij"), seed)
-    linear = fine.reshape(camera.height, samples, camera.width, samples).mean(axis=(1, 3))
-    noise = np.random.default_rng(seed + 1000).normal(0.0, road.noise, linear.shape) if road.noise else 0.0
-    return np.clip(np.rint(encode(linear, camera.response) + noise), 0, 255).astype(np.uint8)
+    return photograph(road, scan(road, seed, samples), seed)
 
 
 @pytest.fixture(scope="session")

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from stripes import CENTRE, ROW, road_lines
 
 from fogsim.values import Camera
 from fogsim.vision.canny_deriche import CannyDeriche
@@ -7,20 +8,6 @@ from fogsim.vision.horizon import Horizon
 from fogsim.vision.road_lines import meeting_lines
 from fogsim.vision.strips import linear_pixels
 from fogsim.vision.vanishing import vanishing_point
-
-CENTRE, ROW = 320.3, 60.7
-
-
-def road_lines(offsets=(-1.9, -1.75, 1.75, 1.9), noise=1.0, seed=0, contrast=60.0):
-    """Bright stripes between lines that meet in (CENTRE, ROW), sampled 4 × 4."""
-    v, u = (np.mgrid[: 300 * 4, : 640 * 4] + 0.5) / 4 - 0.5
-    lateral = (u - CENTRE) / np.maximum(v - ROW, 1e-6) * 1.4
-    stripe = np.zeros(v.shape, bool)
-    for left, right in zip(offsets[::2], offsets[1::2], strict=True):
-        stripe |= (lateral > left) & (lateral < right) & (v > ROW)
-    fine = np.where(stripe, 60.0 + contrast, 60.0)
-    image = fine.reshape(300, 4, 640, 4).mean(axis=(1, 3))
-    return (image + np.random.default_rng(seed).normal(0, noise, image.shape)).astype(np.float32)
 
 
 def published(image, guess=(325.0, 64.0)):

@@ -1,0 +1,149 @@
+"""What `estimator_targets.py` makes of its rows: flat records held against the targets, and their table."""
+
+import shlex
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+Row = dict[str, Any]
+
+FEWEST = 3
+"""Fewest estimates of which a group is called the worst."""
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """What is asked for: errors at most, or a share of right answers at least."""
+
+    text: str
+    unit: str = "%"
+    median: float | None = None
+    p95: float | None = None
+    right_share: float | None = None
+
+
+TARGETS = {
+    "road to 300": Target("joint road fit, single frame, horizon sd 0.1°, 30–300 m", "%", 3.0, 8.0),
+    "road to 1000": Target("joint road fit, single frame, horizon sd 0.1°, to 1000 m", "%", 5.0, 12.0),
+    "drift": Target("same with ±15 % albedo drift", "%", 10.0, 20.0),
+    "lead": Target("same with a vehicle at 25 m, to 400 m", "%", 5.0, 15.0),
+    "horizon": Target("vanishing-point horizon, where two lines are found", "px", 0.3, 2.0),
+    "classes": Target("four classes, more than 5 % off an edge", "right", right_share=0.95),
+}
+ELSEWHERE = (
+    (Target("four classes, more than 5 % off an edge", "right", right_share=0.95), "in traffic, four cameras",
+     "python benchmarks/estimator_accuracy.py"),
+    (Target("tracked vehicle, 25 → 90 m", "%", 2.0, 5.0), "V 50–300 m", "python benchmarks/lead_accuracy.py"),
+    (Target("tracked vehicle, 25 → 90 m", "%", 4.0, 10.0), "V 500 m", "python benchmarks/lead_accuracy.py"),
+    (Target("signs, photometric", "%", 5.0, 10.0), "V 100–300 m", "no such estimator in this version"),
+)  # fmt: skip
+"""Targets that other commands measure, or none yet."""
+
+
+def percentile(errors: list[float], share: float) -> float | None:
+    """Percentile of errors; None of none."""
+    return round(float(np.percentile(errors, share)), 2) if errors else None
+
+
+def mean(values: list[bool]) -> float | None:
+    """Share of truths; None of none."""
+    return round(float(np.mean(values)), 3) if values else None
+
+
+def is_met(one: Row) -> bool:
+    """Whether what a record says is as good as its target asks for; of nothing found nothing is met."""
+    if one["target_right_share"] is not None:
+        return one["right_share"] is not None and one["right_share"] >= one["target_right_share"]
+    found = (one["median"], one["target_median"]), (one["p95"], one["target_p95"])
+    return all(value is not None and value <= target for value, target in found)
+
+
+def worst(rows: list[Row], as_share: bool) -> str | None:
+    """The group of rows, by anything in which they differ, that is furthest off, and how far."""
+    groups: dict[str, list[float]] = {}
+    for row in rows:
+        for name, value in row["within"].items() if row["valid"] else ():
+            groups.setdefault(f"{name} {value}", []).append(row["error"])
+    # A group that is the whole cell tells nothing of where it is weak.
+    whole = sum(row["valid"] for row in rows)
+    known = {name: errors for name, errors in groups.items() if FEWEST <= len(errors) < whole}
+    if not known:
+        return None
+    name = max(known, key=lambda one: np.mean(known[one]) if as_share else np.percentile(known[one], 95))
+    errors = known[name]
+    told = f"{1 - np.mean(errors):.2f}" if as_share else f"{percentile(errors, 50)} / {percentile(errors, 95)}"
+    return f"{name}: {told} (n = {len(errors)})"
+
+
+def blank(target: Target, cell: str, command: str) -> Row:
+    """Flat record in which nothing is measured."""
+    return {
+        "target": target.text,
+        "cell": cell,
+        "images": None,
+        "valid_share": None,
+        "unit": target.unit,
+        "median": None,
+        "p95": None,
+        "right_share": None,
+        "target_median": target.median,
+        "target_p95": target.p95,
+        "target_right_share": target.right_share,
+        "met": None,
+        "coverage": None,
+        "worst_cell": None,
+        "command": command,
+    }
+
+
+def record(target: Target, cell: str, rows: list[Row], command: str) -> Row:
+    """Flat record of the rows of a cell."""
+    errors = [row["error"] for row in rows if row["valid"]]
+    as_share = target.right_share is not None
+    found = blank(target, cell, command) | {
+        "images": len(rows),
+        "valid_share": mean([row["valid"] for row in rows]),
+        "median": None if as_share else percentile(errors, 50),
+        "p95": None if as_share else percentile(errors, 95),
+        "right_share": mean([error == 0.0 for error in errors]) if as_share else None,
+        "coverage": mean([row["covered"] for row in rows if row["covered"] is not None]),
+        "worst_cell": worst(rows, as_share),
+    }
+    return found | {"met": is_met(found)}
+
+
+def records(rows: list[Row], arguments: list[str]) -> Iterator[Row]:
+    """Every cell of every target, and what is measured elsewhere."""
+    command = shlex.join(["python", "benchmarks/estimator_targets.py", *arguments])
+    for name, target in TARGETS.items():
+        own = [row for row in rows if row["target"] == name]
+        for cell in dict.fromkeys(row["cell"] for row in own):
+            yield record(target, cell, [row for row in own if row["cell"] == cell], command)
+    for target, cell, elsewhere in ELSEWHERE:
+        yield blank(target, cell, elsewhere)
+
+
+def written(one: Row) -> str:
+    """One line of the table."""
+    if one["target_right_share"] is not None:
+        asked, found = f"≥ {one['target_right_share']:g} {one['unit']}", one["right_share"]
+    else:
+        asked = f"≤ {one['target_median']:g} / {one['target_p95']:g} {one['unit']}"
+        found = f"{one['median']} / {one['p95']}" if one["median"] is not None else "–"
+    head = f"| {one['target']} | {one['cell']} | {asked} |"
+    if one["met"] is None:
+        told = f"`{one['command']}`" if one["command"].startswith("python") else one["command"]
+        return f"{head} {told} | | | | | |"
+    tail = (one["images"], one["valid_share"], one["coverage"], one["worst_cell"])
+    return f"{head} {found} | {'yes' if one['met'] else '**no**'} | " + " | ".join(
+        "–" if value is None else str(value) for value in tail
+    ) + " |"  # fmt: skip
+
+
+def table(all_records: list[Row]) -> str:
+    """Records as the table that is printed and that the docs hold."""
+    columns = ("target", "cell", "asked", "median / p95", "met", "images", "valid", "coverage", "worst group")
+    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
+    return "\n".join(lines + [written(one) for one in all_records])

@@ -1,0 +1,143 @@
+"""The table of targets says what it measured, and "met" follows from its numbers; how good they are is not judged."""
+
+import ast
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PROGRAM = ROOT / "benchmarks" / "estimator_targets.py"
+PICTURES = sorted((ROOT / "tests" / "pictures").glob("*.py"))
+
+FIELDS = {
+    "target", "cell", "images", "valid_share", "unit", "median", "p95", "right_share", "target_median", "target_p95",
+    "target_right_share", "met", "coverage", "worst_cell", "command",
+}  # fmt: skip
+
+
+def run(*arguments: str | Path) -> "subprocess.CompletedProcess[str]":
+    return subprocess.run(
+        [sys.executable, str(PROGRAM), *map(str, arguments)], capture_output=True, text=True, timeout=280, check=False
+    )
+
+
+@pytest.fixture(scope="module")
+def keep(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("targets") / "kept"
+
+
+@pytest.fixture(scope="module")
+def records(keep: Path) -> list[dict[str, Any]]:
+    done = run("--json", "--images", "1", "--keep", keep)
+    assert done.returncode == 0, done.stderr
+    found: list[dict[str, Any]] = json.loads(done.stdout)
+    return found
+
+
+def test_every_target_has_its_cells(records: list[dict[str, Any]]) -> None:
+    cells = {(one["target"], one["cell"]) for one in records}
+    assert len(cells) == len(records)
+    for part in ("single frame", "drift", "vehicle at 25 m", "vanishing-point", "four classes", "tracked", "signs"):
+        assert any(part in target for target, _ in cells), part
+    assert sum("vanishing-point" in target for target, _ in cells) > 32
+    assert {cell for target, cell in cells if "four classes" in target} >= {"dense", "moderate", "low", "none"}
+    assert all(set(one) == FIELDS for one in records)
+
+
+def test_met_follows_from_the_numbers(records: list[dict[str, Any]]) -> None:
+    measured = [one for one in records if one["images"] is not None]
+    assert len(measured) > 40
+    for one in measured:
+        if one["target_right_share"] is not None:
+            assert one["met"] == (one["right_share"] is not None and one["right_share"] >= one["target_right_share"])
+        elif one["median"] is None:
+            assert one["met"] is False
+            assert one["valid_share"] == 0
+        else:
+            assert one["met"] == (one["median"] <= one["target_median"] and one["p95"] <= one["target_p95"])
+            assert one["median"] <= one["p95"] < math.inf
+            assert 0 <= one["coverage"] <= 1
+
+
+def test_what_another_command_measures_is_not_copied(records: list[dict[str, Any]]) -> None:
+    elsewhere = [one for one in records if one["images"] is None]
+    assert elsewhere
+    for one in elsewhere:
+        assert one["met"] is one["median"] is one["p95"] is one["right_share"] is None
+        name = one["command"].removeprefix("python ")
+        assert (ROOT / name).exists() or one["command"].startswith("no such estimator")
+
+
+def test_kept_rows_give_the_same_again_and_belong_to_their_seed(keep: Path, records: list[dict[str, Any]]) -> None:
+    assert json.loads(run("--json", "--images", "1", "--keep", keep).stdout) == records
+    other = run("--images", "1", "--keep", keep, "--seed", "1")
+    assert other.returncode != 0
+    assert "another seed" in other.stderr
+    table = run("--images", "1", "--keep", keep).stdout.splitlines()
+    assert len(table) == 2 + len(records)
+    assert all(line.count("|") == table[0].count("|") for line in table)
+
+
+def test_no_image_is_too_few() -> None:
+    done = run("--images", "0")
+    assert done.returncode == 2
+    assert "at least 1" in done.stderr
+
+
+@pytest.fixture
+def tables(monkeypatch: pytest.MonkeyPatch) -> Any:
+    monkeypatch.syspath_prepend(str(PROGRAM.parent))
+    import target_tables
+
+    return target_tables
+
+
+def rows(errors: list[float | None], group: str = "V 30 m") -> list[dict[str, Any]]:
+    valid = [error is not None for error in errors]
+    return [
+        {"valid": ok, "error": error, "covered": ok or None, "within": {"V": group}}
+        for ok, error in zip(valid, errors, strict=True)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("errors", "met"),
+    [
+        ([2.9] * 40, True),
+        ([3.1] * 40, False),
+        ([1.0] * 30 + [9.0] * 10, False),
+        ([1.0] * 39 + [900.0], True),
+        ([None, None], False),
+        ([1.0] + [None] * 9, True),
+    ],
+)
+def test_a_record_holds_errors_against_the_target(tables: Any, errors: list[float | None], met: bool) -> None:
+    one = tables.record(tables.Target("all", "%", 3.0, 8.0), "cell", rows(errors), "python it.py")
+    assert one["met"] is met
+    assert one["images"] == len(errors)
+    assert one["valid_share"] == round(sum(error is not None for error in errors) / len(errors), 3)
+
+
+def test_a_share_is_held_against_the_least_share(tables: Any) -> None:
+    target = tables.Target("all", "right", right_share=0.95)
+    assert tables.record(target, "cell", rows([0.0] * 19 + [1.0]), "")["met"] is True
+    assert tables.record(target, "cell", rows([0.0] * 18 + [1.0] * 2), "")["met"] is False
+
+
+def test_the_worst_group_is_named(tables: Any) -> None:
+    mixed = rows([1.0] * 9) + rows([2.0] * 3, "60 m") + rows([50.0], "90 m")
+    assert tables.worst(mixed, as_share=False) == "V 60 m: 2.0 / 2.0 (n = 3)"
+    assert tables.worst(rows([1.0] * 9), as_share=False) is None
+
+
+@pytest.mark.parametrize("path", PICTURES, ids=lambda path: path.name)
+def test_pictures_share_nothing_with_the_renderer(path: Path) -> None:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    named = {node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    named |= {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
+    assert {name for name in named if name.startswith("fogsim")} <= {"fogsim.values"}

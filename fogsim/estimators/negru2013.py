@@ -13,8 +13,8 @@ from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import Observation
-from fogsim.vision.canny_deriche import CannyDeriche, DericheEdges
-from fogsim.vision.edges import smoothed
+from fogsim.vision.canny_deriche import CannyDeriche
+from fogsim.vision.edges import Edges, smoothed
 from fogsim.vision.horizon import PITCH_DEVIATION, Horizon, calibrated_horizon, weighed
 from fogsim.vision.inflection import FogModel, best_inflection, printed_inflection, steepest_slope
 from fogsim.vision.joint_checks import no_road
@@ -231,13 +231,13 @@ class Negru2013:
             raise CannotTellError(why)
         return fit
 
-    def _edges(self, road: RoadImage) -> DericheEdges:
+    def _edges(self, road: RoadImage) -> Edges:
         edges = self._detector(road.luminance, _fog_slope(road, self._told).astype(np.float32))
         if edges.threshold > road.contrast:
             raise CannotTellError("noise or texture drowns the contrast of road and airlight")
         return edges
 
-    def _horizon(self, edges: DericheEdges, road: RoadImage) -> Horizon:
+    def _horizon(self, edges: Edges, road: RoadImage) -> Horizon:
         """Told horizon and vanishing point, weighed (corrected), or the best vanishing point of late (published)."""
         if not self._looks_for_lines:
             return self._told
@@ -291,7 +291,7 @@ def _fog_slope(road: RoadImage, horizon: Horizon) -> NDArray[np.float64]:
     return np.minimum(steepest_slope(below_horizon, road.airlight), SIMILARITY * road.contrast)
 
 
-def _band(road: RoadImage, edges: DericheEdges, camera: Camera, horizon: Horizon) -> Band:
+def _band(road: RoadImage, edges: Edges, camera: Camera, horizon: Horizon) -> Band:
     blurred = smoothed(road.luminance)
     steps = (_fog_slope(road, horizon) + edges.threshold).astype(np.float32)
     region = grow_region(blurred, edges.pixels, steps, SIMILARITY * road.contrast + edges.threshold)

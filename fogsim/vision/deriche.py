@@ -1,11 +1,12 @@
 """Deriche's smoothing and derivative (Deriche 1987), the gradient of the Canny–Deriche edge detector."""
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+
+from fogsim.jit import kernel
 
 Image = NDArray[np.float32]
 
@@ -64,15 +65,48 @@ def _taps(alpha: float) -> NDArray[np.float64]:
     return np.arange(-reach, reach + 1, dtype=np.float64)
 
 
-@dataclass(frozen=True, slots=True)
-class Gradient:
-    """First derivatives of a smoothed image.
+TAPS = math.ceil(REACH / ALPHA)
+"""Taps on either side of the middle one: known to the compiler, which then does without the loops over them."""
 
-    Attributes
+
+def derivatives(image: Image, across: Image, down: Image) -> None:
+    """Derivatives of an image, each smoothed across its own direction.
+
+    Parameters
     ----------
+    image : (rows, cols) float32
+        The image; what lies outside is as its border.
     across, down : (rows, cols) float32
-        Change a pixel to the right and downward [linear grey levels per px].
+        Change a pixel to the right and downward; are written.
     """
+    _derivatives(image, _half(smoothing_kernel()), _half(derivative_kernel()), across, down)
 
-    across: Image
-    down: Image
+
+def _half(weights: NDArray[np.float64]) -> Image:
+    """From the middle one on: the rest is its mirror image."""
+    return weights[TAPS:].astype(np.float32)
+
+
+@kernel
+def _derivatives(image: Image, smooth: Image, derivative: Image, across: Image, down: Image) -> None:
+    """Down the columns first, which both share, then along the row, before the next row is begun.
+
+    Pixels at equal distances are added first, so that a mirrored image gives the same to the last bit.
+    """
+    rows, cols = image.shape
+    line = np.empty((2, cols + 2 * TAPS), np.float32)
+    for row in range(rows):
+        for col in range(cols):
+            mean, slope = smooth[0] * image[row, col], np.float32(0.0)
+            for tap in range(1, TAPS + 1):
+                lower, upper = image[min(row + tap, rows - 1), col], image[max(row - tap, 0), col]
+                mean += smooth[tap] * (lower + upper)
+                slope += derivative[tap] * (lower - upper)
+            line[0, TAPS + col], line[1, TAPS + col] = mean, slope
+        line[:, :TAPS], line[:, TAPS + cols :] = line[:, TAPS : TAPS + 1], line[:, TAPS + cols - 1 : TAPS + cols]
+        for col in range(cols):
+            slope, mean = np.float32(0.0), smooth[0] * line[1, TAPS + col]
+            for tap in range(1, TAPS + 1):
+                slope += derivative[tap] * (line[0, TAPS + col + tap] - line[0, TAPS + col - tap])
+                mean += smooth[tap] * (line[1, TAPS + col + tap] + line[1, TAPS + col - tap])
+            across[row, col], down[row, col] = slope, mean

@@ -1,10 +1,17 @@
-"""Edges that are not fog."""
+"""Canny's edges of an image (Canny 1986), but for those that fog draws."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+from fogsim.vision import kernels
+from fogsim.vision.median import median, row_medians
+
+Image = NDArray[np.float32]
 
 EDGE_FACTOR = 10.0
 """Gradient of an edge in multiples of the road's own median gradient, which is noise and asphalt grain [-]."""
@@ -12,7 +19,19 @@ EDGE_FACTOR = 10.0
 MIN_GRADIENT = 1.5
 """Smallest gradient that can be an edge [linear grey levels per px]: that of the quantisation of 8 bits."""
 
-GRADIENT_STEPS = 32.0  # fixed-point steps per grey level in the 16-bit gradients that the detector takes
+
+@dataclass(frozen=True, slots=True)
+class Gradient:
+    """First derivatives of a smoothed image.
+
+    Attributes
+    ----------
+    across, down : (rows, cols) float32
+        Change a pixel to the right and downward [linear grey levels per px].
+    """
+
+    across: Image
+    down: Image
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,26 +44,91 @@ class Edges:
         Non-zero on edges.
     threshold : float
         Gradient above which a pixel starts an edge [linear grey levels per px].
+    gradient : Gradient
+        Derivatives of the image, the fog's own gradient taken away.
     """
 
     pixels: NDArray[np.uint8]
     threshold: float
+    gradient: Gradient
 
 
-def smoothed(luminance: NDArray[np.float32]) -> NDArray[np.float32]:
+def smoothed(luminance: Image) -> Image:
     """Smooth (rows, cols) float32 with a Gaussian of 1 px."""
     return np.asarray(cv2.GaussianBlur(luminance, (5, 5), 1.0, borderType=cv2.BORDER_REPLICATE), np.float32)
 
 
-def edge_map(blurred: NDArray[np.float32], fog_slope: NDArray[np.float32]) -> Edges:
-    """Edge pixels after Canny, without those that the fog itself draws.
+class EdgeDetector:
+    """Edge detector for images of one size, which works in buffers of its own.
 
-    A Gaussian of 1 px stands in for Deriche's recursive filter. Fog makes rows brighten toward the horizon, and the
-    steepest row is the inflection that is sought: a plain detector would draw an edge right there and stop the
-    region below it (the published recipe's blind spot beyond some 300 m). So each row's median gradient is taken away
-    first, as far as fog could have made it; what differs from its own row (vehicles, marks, kerbs) stays, and so does
-    what is too steep for fog where it is. The thresholds follow the median gradient of the lower half, where the road
-    is.
+    Large arrays made anew for every frame cost more than the filters: the result of a call is overwritten by the next.
+
+    Parameters
+    ----------
+    derivatives : callable
+        Writes the derivatives of its first argument, across and down, into its second and third.
+    of_row, of_road : int
+        Every which column a row's median gradient is of, and every which row and column the road's [px].
+    steps : float
+        Fixed-point steps per grey level in the 16-bit gradients that Canny's search takes.
+    """
+
+    def __init__(
+        self,
+        derivatives: Callable[[Image, Image, Image], None],
+        *,
+        of_row: int = 32,
+        of_road: int = 6,
+        steps: float = 128.0,
+    ) -> None:
+        self._derivatives, self._of_row, self._of_road, self._steps = derivatives, of_row, of_road, steps
+        self._shape: tuple[int, ...] = ()
+
+    def __call__(self, luminance: Image, fog_slope: Image | None) -> Edges:
+        """Find edges, without those that the fog itself draws.
+
+        Fog makes rows brighten toward the horizon, and the steepest row is the inflection that is sought: a plain
+        detector would draw an edge right there and stop the region below it (the published recipe's blind spot beyond
+        some 300 m). So each row's median gradient is taken away first, as far as fog could have made it; what differs
+        from its own row (vehicles, marks, kerbs) stays, and so does what is too steep for fog where it is. The
+        thresholds follow the median gradient of the lower half, where the road is.
+
+        Parameters
+        ----------
+        luminance : (rows, cols) float32
+            Linear luminance, 0 … 255.
+        fog_slope : (rows,) float32 or None
+            Steepest brightening upward that fog can make of each row [linear grey levels per px]; None leaves the
+            fog's gradient in, as published.
+
+        Returns
+        -------
+        Edges
+            The edge pixels, the threshold that they had to pass, and the gradient.
+        """
+        self._make_room(luminance.shape)
+        across, down = self._gradient.across, self._gradient.down
+        self._derivatives(luminance, across, down)
+        slope = np.zeros(luminance.shape[0], np.float32)
+        if fog_slope is not None:
+            # Fog over a dark road brightens upward, so dI/dv is negative.
+            slope = np.clip(row_medians(down[:, :: self._of_row]), -fog_slope, 0.0).astype(np.float32)
+        kernels.levelled_gradient(across, down, slope, self._steps, *self._fixed)
+        high = max(EDGE_FACTOR * _median_size(self._gradient, self._of_road), MIN_GRADIENT)
+        low_step, high_step = 0.5 * high * self._steps, high * self._steps
+        cv2.Canny(*self._fixed, low_step, high_step, edges=self._pixels, L2gradient=True)
+        return Edges(self._pixels, high, self._gradient)
+
+    def _make_room(self, shape: tuple[int, ...]) -> None:
+        if shape != self._shape:
+            self._shape = shape
+            self._gradient = Gradient(np.empty(shape, np.float32), np.empty(shape, np.float32))
+            self._fixed: tuple[NDArray[Any], NDArray[Any]] = (np.empty(shape, np.int16), np.empty(shape, np.int16))
+            self._pixels: NDArray[np.uint8] = np.empty(shape, np.uint8)
+
+
+def edge_map(blurred: Image, fog_slope: Image) -> Edges:
+    """Edge pixels after Canny by Sobel's derivatives of an image that is smooth already.
 
     Parameters
     ----------
@@ -56,27 +140,17 @@ def edge_map(blurred: NDArray[np.float32], fog_slope: NDArray[np.float32]) -> Ed
     Returns
     -------
     Edges
-        The edge pixels and the threshold that they had to pass.
+        See `EdgeDetector`.
     """
-    across, down = _gradient(blurred, 1, 0), _gradient(blurred, 0, 1)
-    # Fog over a dark road brightens upward, so dI/dv is negative.
-    down -= np.clip(np.median(down[:, ::8], axis=1), -fog_slope, 0.0)[:, None]
-    high = max(EDGE_FACTOR * _median_gradient(across, down), MIN_GRADIENT)
-    low_step, high_step = 0.5 * high * GRADIENT_STEPS, high * GRADIENT_STEPS
-    pixels = cv2.Canny(_fixed_point(across), _fixed_point(down), low_step, high_step, L2gradient=True)
-    return Edges(np.asarray(pixels, np.uint8), high)
+    return EdgeDetector(_sobel, of_row=8, of_road=4, steps=32.0)(blurred, fog_slope)
 
 
-def _gradient(image: NDArray[np.float32], across: int, down: int) -> NDArray[np.float32]:
-    """Sobel derivative [linear grey levels per px]."""
-    sobel = cv2.Sobel(image, cv2.CV_32F, across, down, scale=0.125, borderType=cv2.BORDER_REPLICATE)
-    return np.asarray(sobel, np.float32)
+def _sobel(image: Image, across: Image, down: Image) -> None:
+    cv2.Sobel(image, cv2.CV_32F, 1, 0, dst=across, scale=0.125, borderType=cv2.BORDER_REPLICATE)
+    cv2.Sobel(image, cv2.CV_32F, 0, 1, dst=down, scale=0.125, borderType=cv2.BORDER_REPLICATE)
 
 
-def _median_gradient(across: NDArray[np.float32], down: NDArray[np.float32]) -> float:
-    lower = slice(across.shape[0] // 2, None, 4)
-    return float(np.median(np.hypot(across[lower, ::4], down[lower, ::4])))
-
-
-def _fixed_point(gradient: NDArray[np.float32]) -> NDArray[np.int16]:
-    return np.asarray(np.rint(gradient * np.float32(GRADIENT_STEPS)), np.int16)
+def _median_size(gradient: Gradient, step: int) -> float:
+    """Median size of the gradient in the lower half."""
+    lower = slice(gradient.across.shape[0] // 2, None, step)
+    return median(np.hypot(gradient.across[lower, ::step], gradient.down[lower, ::step]))

@@ -98,11 +98,11 @@ def levelled_gradient(
         ramp = slope[row]
         source, target = across[row], fixed_across[row]
         for col in range(cols):
-            target[col] = np.int16(min(max(source[col] * unit, -most), most))
+            target[col] = np.int16(np.rint(min(max(source[col] * unit, -most), most)))
         source, target = down[row], fixed_down[row]
         for col in range(cols):
             source[col] -= ramp
-            target[col] = np.int16(min(max(source[col] * unit, -most), most))
+            target[col] = np.int16(np.rint(min(max(source[col] * unit, -most), most)))
 
 
 @kernel
@@ -112,12 +112,14 @@ def column_tops(region: NDArray[np.uint8], hole: int) -> NDArray[np.int64]:
     Gaps of up to `hole` pixels are stepped over; a column that does not start at the bottom gets `rows`.
     """
     rows, cols = region.shape
-    tops = np.full(cols, rows, np.int32)
+    tops, filled = np.full(cols, rows, np.int32), np.empty(cols, np.int32)
     for row in range(rows - 1, -1, -1):
         line, here, reach = region[row], np.int32(row), np.int32(row + hole + 1)
-        # Without a branch, so that the loop runs in vector registers.
+        # Without a branch and with numbers of one size, so that the loop runs in vector registers.
         for col in range(cols):
-            tops[col] = here if (tops[col] <= reach) & (line[col] != 0) else tops[col]
+            filled[col] = line[col]
+        for col in range(cols):
+            tops[col] = here if (tops[col] <= reach) & (filled[col] != 0) else tops[col]
     return tops.astype(np.int64)
 
 

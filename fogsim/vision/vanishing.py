@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.vision import line_kernels
-from fogsim.vision.deriche import Gradient
+from fogsim.vision.edges import Gradient
 
 Floats = NDArray[np.float64]
 

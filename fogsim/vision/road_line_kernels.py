@@ -233,7 +233,8 @@ def straighten(
                 if kind[i] != kinds[line] or abs(x - offset - slope * y) > near:
                     continue
                 n, sy, sx, syy, sxy = n + 1.0, sy + y, sx + x, syy + y * y, sxy + x * y
-                low, high = min(low, y), max(high, y)
+                # Points come by row: one or two that are not of the line make it no longer.
+                low, high = y if n <= 3.0 else low, y
             spread = syy - sy * sy / max(n, 1.0)
             count = n
             # A line is known by points near and far.

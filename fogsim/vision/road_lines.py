@@ -11,6 +11,7 @@ from fogsim.values.camera import Camera
 from fogsim.vision import road_line_kernels
 from fogsim.vision.horizon import Horizon
 from fogsim.vision.strips import LinearPixels
+from fogsim.vision.uprights import lying
 
 Floats = NDArray[np.float64]
 
@@ -92,7 +93,7 @@ def meeting_lines(image: LinearPixels, camera: Camera, horizon: Horizon) -> Meet
     rows = _rows(camera, horizon)
     if rows.size < road_line_kernels.LEAST_POINTS:
         return None
-    place, kind = road_line_kernels.row_points(image.pixels, image.tables, rows)
+    place, kind = _points(image, rows, horizon)
     across, below = place[:, 0] - camera.principal_point[0], place[:, 1] - horizon.row
     offsets, slopes = _cells(YAW * camera.focal_length)
     least = max(int(road_line_kernels.LEAST_POINTS), rows.size // 8)
@@ -111,6 +112,17 @@ def meeting_lines(image: LinearPixels, camera: Camera, horizon: Horizon) -> Meet
     if count < 2 or span < road_line_kernels.LEAST_TURN or not abs(row) <= apart:
         return None
     return MeetingLines(camera.principal_point[0] + offset, horizon.row + row, deviation, count)
+
+
+def _points(
+    image: LinearPixels, rows: NDArray[np.int64], horizon: Horizon
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Edges on rows, without those that stand upright: these are followed up to the horizon."""
+    step = int(rows[1] - rows[0])
+    above = np.arange(int(rows[0]) - step, max(math.floor(horizon.row), -1), -step, dtype=np.int64)[::-1]
+    place, kind = road_line_kernels.row_points(image.pixels, image.tables, np.concatenate((above, rows)))
+    lies = lying(place, step) & (place[:, 1] >= rows[0])
+    return place[lies], kind[lies]
 
 
 @functools.lru_cache(maxsize=8)

@@ -2,7 +2,7 @@
 
 import math
 from collections import deque
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,15 @@ from fogsim.vision.profile import RoadCurve, band_profile, path_lengths
 from fogsim.vision.region import Band, crossing_band, grow_region
 from fogsim.vision.road_image import MIN_CONTRAST, MIN_ROWS, SATURATED, CannotTellError, RoadImage, road_image
 from fogsim.vision.road_lines import meeting_lines
-from fogsim.vision.strips import above_bonnet, band_geometry, linear_pixels, sky_above, strip_curves, without_clipped
+from fogsim.vision.strips import (
+    LinearPixels,
+    above_bonnet,
+    band_geometry,
+    linear_pixels,
+    sky_above,
+    strip_curves,
+    without_clipped,
+)
 from fogsim.vision.vanishing import VanishingPoint, vanishing_point
 
 SIMILARITY = 0.25  # [-] steepest fog, in contrasts of road to airlight a row; a silhouette takes at least 0.34
@@ -49,6 +57,22 @@ SURE_OF_FOG = 4.5  # [-] least k in its standard deviations
 CLEAR = OPTICAL_DEPTH_AT_VISIBILITY / 300.0  # [1/m] what k must surely be below to be called no fog
 USUAL_HEIGHT = 1.3  # [m] of a camera, for which the lengths of the fit are meant
 MODEL_DEVIATION = 0.02  # [-] of k by what the model leaves out: dark corners, marks, a road that is not quite flat
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """A band of road: the image it is in, the horizon above it, and the median luminance of each of its rows."""
+
+    road: RoadImage
+    pixels: LinearPixels
+    horizon: Horizon
+    band: Band
+    profile: NDArray[np.float64]
+
+    @property
+    def below_horizon(self) -> NDArray[np.float64]:
+        """Rows of the band below the horizon [px]."""
+        return np.arange(self.band.top, self.band.bottom + 1) + (self.road.first_row - self.horizon.row)
 
 
 class Negru2013:
@@ -109,7 +133,8 @@ class Negru2013:
     ) -> None:
         if not (math.isfinite(pitch_deviation) and pitch_deviation > 0):
             raise InputError(f"pitch_deviation must be a positive angle in radians, got {pitch_deviation!r}")
-        self._camera = camera
+        # The fit takes the distances of a camera of the usual height: flat roads scale with it.
+        self._camera, self._usual = camera, replace(camera, mount_height=USUAL_HEIGHT)
         self._told = calibrated_horizon(camera, pitch_deviation)
         self._as_published, self._looks_for_lines = as_published, vanishing_point
         self._model = printed_inflection if printed_signs else best_inflection
@@ -144,39 +169,40 @@ class Negru2013:
         image = checked_image(observation.image, self._camera)
         diagnostics: dict[str, object] = {"horizon_row": self._camera.horizon_row}
         try:
-            road = self._road(image)
-            edges = self._edges(road)
-            horizon = self._horizon(edges, road)
+            road, pixels = self._road(image)
+            slope = _fog_slope(road, self._told)
+            edges = self._edges(road, slope)
+            horizon = self._horizon(edges, road, pixels)
             diagnostics["horizon_row"] = horizon.row
-            band = _band(road, edges, self._camera, self._told)
+            band = _band(road, edges, slope, self._camera)
             diagnostics["band"] = (band.left, band.right, band.top + road.first_row, band.bottom + road.first_row)
-            curve = self._curve(road, band, horizon)
-            diagnostics["profile"] = curve.luminance
-            if self._as_published:
-                return self._published(curve, road, horizon, band, diagnostics)
-            return self._corrected(curve, road, horizon, band, diagnostics)
+            here = replace(band, left=band.left - road.first_column, right=band.right - road.first_column)
+            seen = _Seen(road, pixels, horizon, band, band_profile(road.luminance, here))
+            diagnostics["profile"] = seen.profile
+            return self._published(seen, diagnostics) if self._as_published else self._corrected(seen, diagnostics)
         except CannotTellError as reason:
             return Estimate.invalid(self.method, str(reason), **diagnostics)
 
-    def _road(self, image: NDArray[np.uint8] | NDArray[np.uint16]) -> RoadImage:
+    def _road(self, image: NDArray[np.uint8] | NDArray[np.uint16]) -> tuple[RoadImage, LinearPixels]:
         """Road from a little above the horizon down to the image's bottom or (corrected) the own bonnet."""
         if self._as_published:
-            return road_image(image, self._camera, self._told)
+            road = road_image(image, self._camera, self._told)
+            return road, linear_pixels(road.level, self._camera)
         # A band may lie in the middle only: the verges would but cost time.
         centre, reach = self._camera.principal_point[0], max(MIDDLE * self._camera.width, LEAST_MIDDLE)
         columns = max(round(centre - reach), 0), min(round(centre + reach) + 1, self._camera.width)
         road = road_image(image, self._camera, self._told, columns)
-        lowest = above_bonnet(linear_pixels(road.level, self._camera), self._camera, road.airlight)
+        pixels = linear_pixels(road.level, self._camera)
+        lowest = above_bonnet(pixels, self._camera, road.airlight)
         luminance = road.luminance[: lowest + 1 - road.first_row]
-        return replace(road, luminance=luminance, road=median(luminance[-1]))
+        return replace(road, luminance=luminance, road=median(luminance[-1])), pixels
 
-    def _published(
-        self, curve: RoadCurve, road: RoadImage, horizon: Horizon, band: Band, diagnostics: dict[str, object]
-    ) -> Estimate:
+    def _published(self, seen: _Seen, diagnostics: dict[str, object]) -> Estimate:
         """Fog from the row of the inflection, of the last frames the one whose curve fits best."""
-        model = _credible(self._inflection(curve), curve, road)
+        horizon, curve = seen.horizon, self._curve(seen)
+        model = _credible(self._inflection(curve), curve, seen.road)
         if model is None:
-            self._check_clear_view(curve, band, road)
+            self._check_clear_view(seen)
             # An inflection needs a row on either side: the topmost that could have been seen is the second.
             rows = max(float(curve.below_horizon[0]), 1.0) + 1.0
             limit = 2.0 / self._camera.row_distance * math.hypot(rows, horizon.standard_deviation)
@@ -189,31 +215,28 @@ class Negru2013:
         found = {"inflection_row": inflection, "airlight": model.airlight, "road": model.road}
         return Estimate(self.method, model.extinction, deviation, diagnostics={**diagnostics, **found})
 
-    def _corrected(
-        self, curve: RoadCurve, road: RoadImage, horizon: Horizon, band: Band, diagnostics: dict[str, object]
-    ) -> Estimate:
+    def _corrected(self, seen: _Seen, diagnostics: dict[str, object]) -> Estimate:
         """Fog from all rows of the band, whose albedo may wander, and the sky."""
-        fit = self._fit(road, horizon, band)
+        fit = self._fit(seen)
         scale = USUAL_HEIGHT / self._camera.mount_height
         k = scale * fit.extinction
         deviation = math.hypot(scale * fit.extinction_deviation, MODEL_DEVIATION * k)
         found = {"airlight": fit.airlight, "road": fit.road, "horizon_row": self._camera.horizon_row + fit.shift}
         if k < SURE_OF_FOG * deviation:
-            self._check_clear_view(curve, band, road)
+            self._check_clear_view(seen)
             if k + SURE_OF_FOG * deviation > CLEAR:
                 raise CannotTellError("the extinction is not observable: too little road is seen")
             return Estimate(self.method, 0.0, math.hypot(max(k, 0.0), deviation), diagnostics={**diagnostics, **found})
         found["inflection_row"] = found["horizon_row"] + 0.5 * k * self._camera.row_distance
         return Estimate(self.method, k, deviation, diagnostics={**diagnostics, **found})
 
-    def _fit(self, road: RoadImage, horizon: Horizon, band: Band) -> JointFit:
-        """Fit of the band, in distances of a camera of the usual height: flat roads scale with it."""
-        camera = replace(self._camera, mount_height=USUAL_HEIGHT)
-        pixels = linear_pixels(road.level, camera)
+    def _fit(self, seen: _Seen) -> JointFit:
+        """Fit of the band, in distances of a camera of the usual height."""
+        camera, pixels, band, horizon = self._usual, seen.pixels, seen.band, seen.horizon
         sky = sky_above(pixels, camera, 3.0 * self._told.standard_deviation + 2.0)
         if sky is None:
             raise CannotTellError("no sky is seen above the horizon")
-        rows = (band.top + road.first_row, band.bottom + road.first_row)
+        rows = (band.top + seen.road.first_row, band.bottom + seen.road.first_row)
         nearest = max(1.0, horizon.standard_deviation) + max(horizon.row - camera.horizon_row, 0.0)
         geometry = band_geometry(camera, nearest, (band.left, band.right), rows)
         curves = strip_curves(pixels, geometry, sky.noise, camera)
@@ -231,18 +254,18 @@ class Negru2013:
             raise CannotTellError(why)
         return fit
 
-    def _edges(self, road: RoadImage) -> Edges:
-        edges = self._detector(road.luminance, _fog_slope(road, self._told).astype(np.float32))
+    def _edges(self, road: RoadImage, slope: NDArray[np.float32]) -> Edges:
+        edges = self._detector(road.luminance, slope)
         if edges.threshold > road.contrast:
             raise CannotTellError("noise or texture drowns the contrast of road and airlight")
         return edges
 
-    def _horizon(self, edges: Edges, road: RoadImage) -> Horizon:
+    def _horizon(self, edges: Edges, road: RoadImage, pixels: LinearPixels) -> Horizon:
         """Told horizon and vanishing point, weighed (corrected), or the best vanishing point of late (published)."""
         if not self._looks_for_lines:
             return self._told
         if not self._as_published:
-            meeting = meeting_lines(linear_pixels(road.level, self._camera), self._camera, self._told)
+            meeting = meeting_lines(pixels, self._camera, self._told)
             return self._told if meeting is None else weighed(self._told, meeting.horizon)
         guess = (self._camera.principal_point[0], self._told.row - road.first_row)
         reach = max(REACH * self._camera.focal_length, 8.0)
@@ -253,31 +276,30 @@ class Negru2013:
         found = self._told if best is None else Horizon(best.row, best.deviation)
         return found if 1.0 <= found.row <= self._camera.height - 1 - MIN_ROWS else self._told
 
-    def _curve(self, road: RoadImage, band: Band, horizon: Horizon) -> RoadCurve:
-        camera = self._camera
-        rows = np.arange(band.top, band.bottom + 1, dtype=np.float64) + road.first_row
-        below = rows - horizon.row
+    def _curve(self, seen: _Seen) -> RoadCurve:
+        camera, below, band = self._camera, seen.below_horizon, seen.band
         u0, v0 = camera.principal_point
         across = (0.5 * (band.left + band.right) - u0) / camera.focal_length
-        slant = np.sqrt(1.0 + across**2 + ((rows - v0) / camera.focal_length) ** 2)
-        here = replace(band, left=band.left - road.first_column, right=band.right - road.first_column)
-        luminance = band_profile(road.luminance, here)
-        weight = (luminance < SATURATED).astype(np.float64)
-        return RoadCurve(below, luminance, path_lengths(below, camera.row_distance, slant), weight, camera.row_distance)
+        slant = np.sqrt(1.0 + across**2 + ((below + (seen.horizon.row - v0)) / camera.focal_length) ** 2)
+        weight = (seen.profile < SATURATED).astype(np.float64)
+        return RoadCurve(
+            below, seen.profile, path_lengths(below, camera.row_distance, slant), weight, camera.row_distance
+        )
 
-    def _check_clear_view(self, curve: RoadCurve, band: Band, road: RoadImage) -> None:
+    def _check_clear_view(self, seen: _Seen) -> None:
         """Refuse to say "no fog" of anything but the road itself, seen up to the horizon where it vanishes.
 
         Beside a vehicle close ahead, a dark flank or verge can look like a road without fog.
         """
-        if curve.below_horizon[0] > NEAR_HORIZON:
+        road, band, top = seen.road, seen.band, float(seen.below_horizon[0])
+        if top > NEAR_HORIZON:
             raise CannotTellError("the road's region ends below the horizon, and no inflection lies in it")
-        if median(curve.luminance[:3]) > road.road + 0.5 * road.contrast:
+        if median(seen.profile[:3]) > road.road + 0.5 * road.contrast:
             raise CannotTellError("the road fades into the airlight, but not as Koschmieder's law has it")
         aside = abs(0.5 * (band.left + band.right) - self._camera.principal_point[0])
         if aside > MAX_ASIDE * self._camera.width:
             raise CannotTellError("the road ahead is hidden: a dark surface is seen only beside it")
-        if -float(curve.below_horizon[0]) > MAX_ABOVE * self._camera.height:
+        if -top > MAX_ABOVE * self._camera.height:
             raise CannotTellError("what is seen of the road goes on above the horizon: it is no road")
 
     def _inflection(self, curve: RoadCurve) -> FogModel | None:
@@ -286,14 +308,14 @@ class Negru2013:
         return self._model(curve)
 
 
-def _fog_slope(road: RoadImage, horizon: Horizon) -> NDArray[np.float64]:
+def _fog_slope(road: RoadImage, horizon: Horizon) -> NDArray[np.float32]:
+    """Steepest brightening upward that fog can make of each row [linear grey levels per px]."""
     below_horizon = np.arange(road.luminance.shape[0], dtype=np.float64) + (road.first_row - horizon.row)
-    return np.minimum(steepest_slope(below_horizon, road.airlight), SIMILARITY * road.contrast)
+    return np.minimum(steepest_slope(below_horizon, road.airlight), SIMILARITY * road.contrast).astype(np.float32)
 
 
-def _band(road: RoadImage, edges: Edges, camera: Camera, horizon: Horizon) -> Band:
-    blurred = smoothed(road.luminance)
-    steps = (_fog_slope(road, horizon) + edges.threshold).astype(np.float32)
+def _band(road: RoadImage, edges: Edges, slope: NDArray[np.float32], camera: Camera) -> Band:
+    blurred, steps = smoothed(road.luminance), slope + np.float32(edges.threshold)
     region = grow_region(blurred, edges.pixels, steps, SIMILARITY * road.contrast + edges.threshold)
     cols, centre = camera.width, camera.principal_point[0] - road.first_column
     band = crossing_band(

@@ -54,8 +54,16 @@ class Edges:
 
 
 def smoothed(luminance: Image) -> Image:
-    """Smooth (rows, cols) float32 with a Gaussian of 1 px."""
-    return np.asarray(cv2.GaussianBlur(luminance, (5, 5), 1.0, borderType=cv2.BORDER_REPLICATE), np.float32)
+    """Smooth (rows, cols) float32 with a Gaussian of 1 px, over 5 px; what lies outside is as its border."""
+    blurred = np.empty_like(luminance)
+    kernels.smooth(luminance, _gaussian(), blurred)
+    return blurred
+
+
+def _gaussian() -> Image:
+    """Weights from the middle one on: the rest is its mirror image."""
+    weights = np.exp(-0.5 * np.arange(kernels.SMOOTH_TAPS + 1) ** 2)
+    return np.asarray(weights / (2.0 * weights.sum() - weights[0]), np.float32)
 
 
 class EdgeDetector:

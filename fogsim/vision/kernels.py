@@ -37,6 +37,29 @@ def colour_luminance(image: Pixels, table: NDArray[np.float32]) -> NDArray[np.fl
     return out
 
 
+SMOOTH_TAPS = 2
+"""Taps of the smoothing on either side of the middle one: known to the compiler, which then does without that loop."""
+
+
+@kernel
+def smooth(image: NDArray[np.float32], weights: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+    """Smooth (rows, cols) down the columns and along each row, with (`SMOOTH_TAPS` + 1,) weights from the middle on."""
+    rows, cols = image.shape
+    line = np.empty(cols + 2 * SMOOTH_TAPS, np.float32)
+    for row in range(rows):
+        for col in range(cols):
+            value = weights[0] * image[row, col]
+            for tap in range(1, SMOOTH_TAPS + 1):
+                value += weights[tap] * (image[min(row + tap, rows - 1), col] + image[max(row - tap, 0), col])
+            line[SMOOTH_TAPS + col] = value
+        line[:SMOOTH_TAPS], line[SMOOTH_TAPS + cols :] = line[SMOOTH_TAPS], line[SMOOTH_TAPS + cols - 1]
+        for col in range(cols):
+            value = weights[0] * line[SMOOTH_TAPS + col]
+            for tap in range(1, SMOOTH_TAPS + 1):
+                value += weights[tap] * (line[SMOOTH_TAPS + col + tap] + line[SMOOTH_TAPS + col - tap])
+            out[row, col] = value
+
+
 @kernel
 def grow_upward(
     luminance: NDArray[np.float32],

@@ -2,27 +2,27 @@
 
 import math
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
 from fogsim.estimators.image_check import checked_count, checked_image
+from fogsim.estimators.negru2013_band import SeenBand, fog_slope, road_band, road_curve
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import Observation
 from fogsim.vision.canny_deriche import CannyDeriche
-from fogsim.vision.edges import Edges, smoothed
+from fogsim.vision.edges import Edges
 from fogsim.vision.horizon import PITCH_DEVIATION, Horizon, calibrated_horizon, weighed
-from fogsim.vision.inflection import FogModel, best_inflection, printed_inflection, steepest_slope
+from fogsim.vision.inflection import FogModel, best_inflection, printed_inflection
 from fogsim.vision.joint_checks import no_road
 from fogsim.vision.joint_fit import JointFit, fit_jointly
 from fogsim.vision.joint_prior import joint_prior
 from fogsim.vision.median import median
-from fogsim.vision.profile import RoadCurve, band_profile, path_lengths
-from fogsim.vision.region import Band, crossing_band, grow_region
+from fogsim.vision.profile import RoadCurve, band_profile
 from fogsim.vision.road_image import MIN_CONTRAST, MIN_ROWS, SATURATED, CannotTellError, RoadImage, road_image
 from fogsim.vision.road_lines import meeting_lines
 from fogsim.vision.strips import (
@@ -36,7 +36,6 @@ from fogsim.vision.strips import (
 )
 from fogsim.vision.vanishing import VanishingPoint, vanishing_point
 
-SIMILARITY = 0.25  # [-] steepest fog, in contrasts of road to airlight a row; a silhouette takes at least 0.34
 MAX_ASIDE = 0.1
 """Share of the image's width by which a clear road may lie beside the vanishing column [-]."""
 
@@ -57,22 +56,6 @@ SURE_OF_FOG = 4.5  # [-] least k in its standard deviations
 CLEAR = OPTICAL_DEPTH_AT_VISIBILITY / 300.0  # [1/m] what k must surely be below to be called no fog
 USUAL_HEIGHT = 1.3  # [m] of a camera, for which the lengths of the fit are meant
 MODEL_DEVIATION = 0.02  # [-] of k by what the model leaves out: dark corners, marks, a road that is not quite flat
-
-
-@dataclass(frozen=True, slots=True)
-class _Seen:
-    """A band of road: the image it is in, the horizon above it, and the median luminance of each of its rows."""
-
-    road: RoadImage
-    pixels: LinearPixels
-    horizon: Horizon
-    band: Band
-    profile: NDArray[np.float64]
-
-    @property
-    def below_horizon(self) -> NDArray[np.float64]:
-        """Rows of the band below the horizon [px]."""
-        return np.arange(self.band.top, self.band.bottom + 1) + (self.road.first_row - self.horizon.row)
 
 
 class Negru2013:
@@ -170,14 +153,14 @@ class Negru2013:
         diagnostics: dict[str, object] = {"horizon_row": self._camera.horizon_row}
         try:
             road, pixels = self._road(image)
-            slope = _fog_slope(road, self._told)
+            slope = fog_slope(road, self._told)
             edges = self._edges(road, slope)
             horizon = self._horizon(edges, road, pixels)
             diagnostics["horizon_row"] = horizon.row
-            band = _band(road, edges, slope, self._camera)
+            band = road_band(road, edges, slope, self._camera)
             diagnostics["band"] = (band.left, band.right, band.top + road.first_row, band.bottom + road.first_row)
             here = replace(band, left=band.left - road.first_column, right=band.right - road.first_column)
-            seen = _Seen(road, pixels, horizon, band, band_profile(road.luminance, here))
+            seen = SeenBand(road, pixels, horizon, band, band_profile(road.luminance, here))
             diagnostics["profile"] = seen.profile
             return self._published(seen, diagnostics) if self._as_published else self._corrected(seen, diagnostics)
         except CannotTellError as reason:
@@ -197,9 +180,9 @@ class Negru2013:
         luminance = road.luminance[: lowest + 1 - road.first_row]
         return replace(road, luminance=luminance, road=median(luminance[-1])), pixels
 
-    def _published(self, seen: _Seen, diagnostics: dict[str, object]) -> Estimate:
+    def _published(self, seen: SeenBand, diagnostics: dict[str, object]) -> Estimate:
         """Fog from the row of the inflection, of the last frames the one whose curve fits best."""
-        horizon, curve = seen.horizon, self._curve(seen)
+        horizon, curve = seen.horizon, road_curve(seen, self._camera)
         model = _credible(self._inflection(curve), curve, seen.road)
         if model is None:
             self._check_clear_view(seen)
@@ -215,7 +198,7 @@ class Negru2013:
         found = {"inflection_row": inflection, "airlight": model.airlight, "road": model.road}
         return Estimate(self.method, model.extinction, deviation, diagnostics={**diagnostics, **found})
 
-    def _corrected(self, seen: _Seen, diagnostics: dict[str, object]) -> Estimate:
+    def _corrected(self, seen: SeenBand, diagnostics: dict[str, object]) -> Estimate:
         """Fog from all rows of the band, whose albedo may wander, and the sky."""
         fit = self._fit(seen)
         scale = USUAL_HEIGHT / self._camera.mount_height
@@ -230,7 +213,7 @@ class Negru2013:
         found["inflection_row"] = found["horizon_row"] + 0.5 * k * self._camera.row_distance
         return Estimate(self.method, k, deviation, diagnostics={**diagnostics, **found})
 
-    def _fit(self, seen: _Seen) -> JointFit:
+    def _fit(self, seen: SeenBand) -> JointFit:
         """Fit of the band, in distances of a camera of the usual height."""
         camera, pixels, band, horizon = self._usual, seen.pixels, seen.band, seen.horizon
         sky = sky_above(pixels, camera, 3.0 * self._told.standard_deviation + 2.0)
@@ -276,17 +259,7 @@ class Negru2013:
         found = self._told if best is None else Horizon(best.row, best.deviation)
         return found if 1.0 <= found.row <= self._camera.height - 1 - MIN_ROWS else self._told
 
-    def _curve(self, seen: _Seen) -> RoadCurve:
-        camera, below, band = self._camera, seen.below_horizon, seen.band
-        u0, v0 = camera.principal_point
-        across = (0.5 * (band.left + band.right) - u0) / camera.focal_length
-        slant = np.sqrt(1.0 + across**2 + ((below + (seen.horizon.row - v0)) / camera.focal_length) ** 2)
-        weight = (seen.profile < SATURATED).astype(np.float64)
-        return RoadCurve(
-            below, seen.profile, path_lengths(below, camera.row_distance, slant), weight, camera.row_distance
-        )
-
-    def _check_clear_view(self, seen: _Seen) -> None:
+    def _check_clear_view(self, seen: SeenBand) -> None:
         """Refuse to say "no fog" of anything but the road itself, seen up to the horizon where it vanishes.
 
         Beside a vehicle close ahead, a dark flank or verge can look like a road without fog.
@@ -306,24 +279,6 @@ class Negru2013:
         if curve.weight.sum() < MIN_ROWS // 2:
             return None
         return self._model(curve)
-
-
-def _fog_slope(road: RoadImage, horizon: Horizon) -> NDArray[np.float32]:
-    """Steepest brightening upward that fog can make of each row [linear grey levels per px]."""
-    below_horizon = np.arange(road.luminance.shape[0], dtype=np.float64) + (road.first_row - horizon.row)
-    return np.minimum(steepest_slope(below_horizon, road.airlight), SIMILARITY * road.contrast).astype(np.float32)
-
-
-def _band(road: RoadImage, edges: Edges, slope: NDArray[np.float32], camera: Camera) -> Band:
-    blurred, steps = smoothed(road.luminance), slope + np.float32(edges.threshold)
-    region = grow_region(blurred, edges.pixels, steps, SIMILARITY * road.contrast + edges.threshold)
-    cols, centre = camera.width, camera.principal_point[0] - road.first_column
-    band = crossing_band(
-        region, centre, min_width=max(3, cols // 80), max_width=max(5, cols // 24), hole=max(2, cols // 128)
-    )
-    if band is None or band.bottom - band.top < MIN_ROWS // 2:
-        raise CannotTellError("no vertical band crosses the road's region")
-    return replace(band, left=band.left + road.first_column, right=band.right + road.first_column)
 
 
 def _credible(model: FogModel | None, curve: RoadCurve, road: RoadImage) -> FogModel | None:

@@ -1,8 +1,10 @@
+import cv2
 import numpy as np
 import pytest
 
 from fogsim.vision.canny_deriche import CannyDeriche
-from fogsim.vision.deriche import derivative_kernel, smoothing_kernel
+from fogsim.vision.deriche import derivative_kernel, derivatives, smoothing_kernel
+from fogsim.vision.edges import smoothed
 
 
 def recursion(signal, alpha):
@@ -56,3 +58,27 @@ def test_an_edge_is_found_where_it_is_and_fog_draws_none():
     assert edges.gradient.across[40, 39:41].max() > 10
     ramp = np.repeat(np.linspace(200, 60, 80, dtype=np.float32)[:, None], 100, axis=1)
     assert not CannyDeriche()(ramp, np.full(80, 5.0, np.float32)).pixels.any()
+
+
+@pytest.mark.parametrize("shape", [(80, 101), (5, 40), (40, 3)])
+def test_derivatives_are_the_kernels_along_one_axis_and_across_it(shape):
+    image = np.random.default_rng(1).uniform(0.0, 255.0, shape).astype(np.float32)
+    across, down = np.empty_like(image), np.empty_like(image)
+    derivatives(image, across, down)
+    smooth, derivative = smoothing_kernel(), derivative_kernel()
+    border = cv2.BORDER_REPLICATE
+    for found, by_row, by_column in ((across, derivative, smooth), (down, smooth, derivative)):
+        expected = cv2.sepFilter2D(image, cv2.CV_64F, by_row, by_column, borderType=border)
+        assert found == pytest.approx(expected, abs=1e-3)
+    mirrored = np.ascontiguousarray(image[:, ::-1])
+    mirrored_across, mirrored_down = np.empty_like(image), np.empty_like(image)
+    derivatives(mirrored, mirrored_across, mirrored_down)
+    assert (mirrored_across[:, ::-1] == -across).all()
+    assert (mirrored_down[:, ::-1] == down).all()
+
+
+@pytest.mark.parametrize("shape", [(80, 101), (2, 40), (40, 1)])
+def test_smoothing_is_a_gaussian_of_one_pixel(shape):
+    image = np.random.default_rng(2).uniform(0.0, 255.0, shape).astype(np.float32)
+    expected = cv2.GaussianBlur(image, (5, 5), 1.0, borderType=cv2.BORDER_REPLICATE)
+    assert smoothed(image) == pytest.approx(expected, abs=1e-3)

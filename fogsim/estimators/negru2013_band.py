@@ -1,0 +1,94 @@
+"""The band of road in whose rows negru2013 looks for fog (Negru & Nedevschi 2013, section IV.B.b)."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.values.camera import Camera
+from fogsim.vision.edges import Edges, smoothed
+from fogsim.vision.horizon import Horizon
+from fogsim.vision.inflection import steepest_slope
+from fogsim.vision.profile import RoadCurve, path_lengths
+from fogsim.vision.region import Band, crossing_band, grow_region
+from fogsim.vision.road_image import MIN_ROWS, SATURATED, CannotTellError, RoadImage
+from fogsim.vision.strips import LinearPixels
+
+SIMILARITY = 0.25  # [-] steepest fog, in contrasts of road to airlight a row; a silhouette takes at least 0.34
+
+
+@dataclass(frozen=True, slots=True)
+class SeenBand:
+    """A band of road and the picture that it is in.
+
+    Attributes
+    ----------
+    road : RoadImage
+        The picture, cut out and linear.
+    pixels : LinearPixels
+        The whole picture without roll.
+    horizon : Horizon
+        The horizon above it.
+    band : Band
+        Where the band is: columns of the whole picture, rows of `road`.
+    profile : (n,) float64
+        Median luminance of each of its rows from the top down [linear grey levels].
+    """
+
+    road: RoadImage
+    pixels: LinearPixels
+    horizon: Horizon
+    band: Band
+    profile: NDArray[np.float64]
+
+    @property
+    def below_horizon(self) -> NDArray[np.float64]:
+        """Rows of the band below the horizon [px]."""
+        rows = np.arange(self.band.top, self.band.bottom + 1, dtype=np.float64)
+        return rows + (self.road.first_row - self.horizon.row)
+
+
+def fog_slope(road: RoadImage, horizon: Horizon) -> NDArray[np.float32]:
+    """Steepest brightening upward that fog can make of each row [linear grey levels per px]."""
+    below_horizon = np.arange(road.luminance.shape[0], dtype=np.float64) + (road.first_row - horizon.row)
+    return np.minimum(steepest_slope(below_horizon, road.airlight), SIMILARITY * road.contrast).astype(np.float32)
+
+
+def road_band(road: RoadImage, edges: Edges, slope: NDArray[np.float32], camera: Camera) -> Band:
+    """Find the band of road: columns are counted in the whole picture, rows in that of the road.
+
+    Parameters
+    ----------
+    road : RoadImage
+        The picture.
+    edges : Edges
+        Its edges.
+    slope : (rows,) float32
+        What fog can change from row to row, see `fog_slope`.
+    camera : Camera
+        The told calibration.
+
+    Raises
+    ------
+    CannotTellError
+        If no vertical band crosses the road's region.
+    """
+    blurred, steps = smoothed(road.luminance), slope + np.float32(edges.threshold)
+    region = grow_region(blurred, edges.pixels, steps, SIMILARITY * road.contrast + edges.threshold)
+    cols, centre = camera.width, camera.principal_point[0] - road.first_column
+    band = crossing_band(
+        region, centre, min_width=max(3, cols // 80), max_width=max(5, cols // 24), hole=max(2, cols // 128)
+    )
+    if band is None or band.bottom - band.top < MIN_ROWS // 2:
+        raise CannotTellError("no vertical band crosses the road's region")
+    return replace(band, left=band.left + road.first_column, right=band.right + road.first_column)
+
+
+def road_curve(seen: SeenBand, camera: Camera) -> RoadCurve:
+    """Luminance of a band of road over the rows below its horizon."""
+    below, band = seen.below_horizon, seen.band
+    u0, v0 = camera.principal_point
+    across = (0.5 * (band.left + band.right) - u0) / camera.focal_length
+    slant = np.sqrt(1.0 + across**2 + ((below + (seen.horizon.row - v0)) / camera.focal_length) ** 2)
+    weight = (seen.profile < SATURATED).astype(np.float64)
+    return RoadCurve(below, seen.profile, path_lengths(below, camera.row_distance, slant), weight, camera.row_distance)

@@ -26,14 +26,14 @@ MIN_SAMPLES = 4
 MIN_ALIKE = 3
 """Fewest of them at which the vehicle was surely seen; it may have faded at the others."""
 
-REGISTRATION = 0.008
+REGISTRATION = 0.005
 """Relative deviation of a contrast by what is not noise: place, shading [-]."""
 
-SHAPE, BRIGHT_SHAPE = 0.012, 0.07
+SHAPE, BRIGHT_SHAPE = 0.005, 0.03
 """Relative deviation of the farthest contrast from the nearest by what size and aspect do: a slope's error [-]. The
 latter is that of the luminance, which matters as much more as a vehicle is brighter than its contrast to the sky."""
 
-LARGE_SHAPE = 0.035
+LARGE_SHAPE = 0.018
 """That deviation of a lorry or a bus: one sees below it, and differently far as it moves away [-]."""
 
 AIRLIGHT_DEVIATION = 0.002

@@ -4,7 +4,8 @@ import math
 from collections import deque
 from dataclasses import dataclass, replace
 
-from fogsim.vision.lead_patch import Fading, LeadPicture, compared, placed
+from fogsim.vision.lead_patch import Fading, LeadPicture, compared
+from fogsim.vision.lead_place import Surroundings, placed
 from fogsim.vision.lead_scene import LeadScene
 from fogsim.vision.lead_window import LeadWindow
 from fogsim.vision.road_image import CannotTellError
@@ -21,6 +22,9 @@ NEARER = 0.85
 
 STEERING = 0.25
 """Deviation of the vehicle's place sideways from where it was in the last picture [m]."""
+
+FOLLOWED = 0.1
+"""Least share of a new place's height in what is expected next: pitch of the moment is no trend [-]."""
 
 ALIKE = 0.6
 """Least correlation with the reference where the vehicle must be visible [-]."""
@@ -106,7 +110,13 @@ class ContrastTrack:
         """Forget the vehicle."""
         self.sights.clear()
         self.reference: Sight | None = None
-        self._aside = 0.0
+        self._aside = self._lift = 0.0
+        self._swayed = 0
+
+    def _follow_pitch(self, lift: float) -> None:
+        """What of the pitch's error is common to all frames: their mean, later frames no less than a share of it."""
+        self._lift += max(1.0 / (self._swayed + 1.0), FOLLOWED) * (lift - self._lift)
+        self._swayed += 1
 
     def look(self, scene: LeadScene, distance: float, time: float, *, surprise: float, densest: float) -> Sight:
         """Find the vehicle in a frame and keep its picture if the range is new.
@@ -141,6 +151,7 @@ class ContrastTrack:
         if sight is None:
             sight = self._begun(scene, distance, time)
         self._aside = scene.aside(sight.picture)
+        self._follow_pitch(scene.lift(sight.picture))
         self._keep(sight)
         if self.reference is None or sight.depth < NEARER * self.reference.depth:
             self._compare_anew(sight)
@@ -176,8 +187,11 @@ class ContrastTrack:
 
     def _followed(self, scene: LeadScene, distance: float, time: float, reference: Sight, densest: float) -> Sight:
         """Find the vehicle that is tracked."""
-        expected = scene.expected(self._aside, reference.picture.width)
-        found = placed(reference.picture, expected, STEERING, 1.5 * scene.depth * self._pitch_deviation + 0.02)
+        expected = scene.expected(self._aside, reference.picture.width).moved(0.0, self._lift * scene.depth)
+        pitch = scene.depth * self._pitch_deviation + 0.02
+        known = min(self.sights, key=lambda s: abs(s.distance - distance)).fading.ratio
+        around = Surroundings(scene.camera.mount_height, known)
+        found = placed(reference.picture, expected, STEERING, pitch, around)
         fading = None if found is None else compared(reference.picture, found[0])
         if found is None or fading is None:
             raise CannotTellError("the vehicle ahead is too small in the image, or hidden")
@@ -222,5 +236,6 @@ def _likeness_if_fixed(scene: LeadScene, reference: Sight) -> float:
     change = abs(math.log(scene.depth / reference.depth))
     if change < SCALED:
         return 0.0
-    found = placed(reference.picture, scene.picture(reference.window, reference.picture.scale), 0.1, 0.1)
+    around = Surroundings(scene.camera.mount_height, 1.0)
+    found = placed(reference.picture, scene.picture(reference.window, reference.picture.scale), 0.1, 0.1, around)
     return 0.0 if found is None else found[1] - (BETTER if change < RESCALED else 0.0)

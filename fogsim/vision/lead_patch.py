@@ -1,11 +1,12 @@
-"""Pictures of the vehicle ahead as contrast to the airlight, placed on each other and compared."""
+"""Pictures of the vehicle ahead as contrast to the airlight, compared with each other."""
 
 import math
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+from fogsim.vision.clipped_sky import darker_by
 
 Floats = NDArray[np.float64]
 
@@ -19,15 +20,27 @@ LARGE, HIGH = 2.25, (0.6, 1.6)
 """Width from which a vehicle is a lorry or a bus [m], and those heights then [m]: one sees below a semitrailer, and
 differently from afar, so the part begins above the bar that keeps cars from running under it."""
 
-ASIDE, ABOVE, BELOW = 0.25, 0.15, 0.4
-"""What is placed reaches so far beyond that part, or beyond the vehicle's sides [m]: its outline tells the place."""
+TOP = 2.2
+"""Height to which a rear may reach [m]: dark windows of vans and lorries tell the most; sky above a car tells nothing."""
 
 FINEST = 0.02
 """Smallest cell on which pictures are compared [m]."""
 
-OUTLIER, OWN_SHARE, EDGE_SHARE = 4.0, 0.25, 0.5
-"""Residual of a cell that has changed, as a lit lamp has: robust deviations, and shares of the cell's own contrast and
-of that to its neighbours, which a small displacement makes [-]."""
+DARKEST = 0.05
+"""Luminance, over the sky's, that the darkest parts of any vehicle have from nearby: glass, tyres, shadow [-]."""
+
+SHADING = 0.08
+"""Standard deviation of a surface's own luminance between two pictures, relative [-]: gloss, shading, what is drawn or
+resolved of it. White paint is uncertain by that much of the sky's light, glass by next to nothing."""
+
+MISPLACED = 0.5
+"""Misplacement of a cell that is reckoned with, in cells: what else is resolved in it [-]."""
+
+BIWEIGHT = 4.7
+"""Residual at which a cell no longer counts, in robust standard deviations [-] (Tukey's biweight): a lit lamp."""
+
+LOST = 0.25
+"""Deviation of what clipping takes from a vehicle, relative to it [-]."""
 
 LEAST_KEPT = 0.5
 """Share of the cells that must not have changed [-]."""
@@ -52,6 +65,9 @@ class LeadPicture:
         Pixels in a metre at the vehicle [px/m].
     width : float
         Of the vehicle [m].
+    clipped : tuple of float
+        By how much the light from which channels are clipped is above the sky's, and their single deviation, over it;
+        the latter is 0 where nothing is clipped [-].
     """
 
     contrast: Floats
@@ -60,6 +76,7 @@ class LeadPicture:
     foot: float
     scale: float
     width: float
+    clipped: tuple[float, float] = (1.0, 0.0)
 
     @property
     def heights(self) -> tuple[float, float]:
@@ -105,7 +122,7 @@ def _weights(size: int, centres: Floats, box: float) -> tuple[Floats, slice]:
     return np.asarray(shares / np.maximum(shares.sum(axis=1, keepdims=True), 1e-9), np.float64), slice(first, last)
 
 
-def _resampled(picture: LeadPicture, lateral: Floats, height: Floats, cell: float) -> tuple[Floats, float]:
+def resampled(picture: LeadPicture, lateral: Floats, height: Floats, cell: float) -> tuple[Floats, float]:
     """Contrast on a grid in metres as seen by pixels of one cell, and the variance of its noise.
 
     A far picture's box is one pixel; a near one's is wider by what a far pixel blurs, and squares of widths add.
@@ -117,70 +134,21 @@ def _resampled(picture: LeadPicture, lateral: Floats, height: Floats, cell: floa
     return np.asarray(rows @ picture.contrast[down, across] @ cols.T), picture.noise**2 * left
 
 
-def _cell(one: LeadPicture, other: LeadPicture) -> float:
+def cell_of(one: LeadPicture, other: LeadPicture) -> float:
     return max(1.0 / one.scale, 1.0 / other.scale, FINEST)
 
 
-def _grid(low: float, high: float, cell: float, least: int) -> Floats:
+def grid(low: float, high: float, cell: float, least: int) -> Floats:
     count = max(round((high - low) / cell), least)
     return np.asarray(0.5 * (low + high) + cell * (np.arange(count) - 0.5 * (count - 1)), np.float64)
-
-
-def placed(
-    reference: LeadPicture, picture: LeadPicture, aside: float, pitch: float
-) -> tuple[LeadPicture, float] | None:
-    """Find the vehicle of a reference in a picture.
-
-    Parameters
-    ----------
-    reference : LeadPicture
-        The vehicle as it was seen.
-    picture : LeadPicture
-        Where it is expected.
-    aside, pitch : float
-        Standard deviations of its place sideways and upward [m].
-
-    Returns
-    -------
-    (LeadPicture, float) or None
-        The picture with the place of greatest posterior, and the correlation there [-]; None if it is too small.
-    """
-    cell = _cell(reference, picture)
-    side = 0.5 * reference.width + ASIDE
-    low, high = reference.heights
-    lateral, height = _grid(-side, side, cell, 5), _grid(low - BELOW, high + ABOVE, cell, 4)
-    across, up = (max(math.ceil(2.5 * deviation / cell), 1) for deviation in (aside, pitch))
-    template, _ = _resampled(reference, lateral, height, cell)
-    wide = cell * np.arange(-across, across + 1), cell * np.arange(-up, up + 1)
-    lateral = np.concatenate([lateral[0] + wide[0][:across], lateral, lateral[-1] + wide[0][across + 1 :]])
-    height = np.concatenate([height[0] + wide[1][:up], height, height[-1] + wide[1][up + 1 :]])
-    seen, _ = _resampled(picture, lateral, height, cell)
-    if float(template.std()) < 1e-4:
-        return None
-    match = cv2.matchTemplate(seen.astype(np.float32), template.astype(np.float32), cv2.TM_CCOEFF_NORMED)
-    found = np.clip(np.nan_to_num(match.astype(np.float64), nan=0.0, posinf=0.0, neginf=0.0), 0.0, 0.9999)
-    known = 0.5 * (wide[1][:, None] / pitch) ** 2 + 0.5 * (wide[0] / aside) ** 2
-    cost = 0.5 * template.size * np.log1p(-(found**2)) + known
-    row, col = np.unravel_index(int(np.argmin(cost)), cost.shape)
-    right = (float(col) - across + _vertex(cost[row], int(col))) * cell
-    high = (float(row) - up + _vertex(cost[:, col], int(row))) * cell
-    return picture.moved(right, high), float(found[row, col])
-
-
-def _vertex(cost: Floats, at: int) -> float:
-    """Place of a minimum between cells, by a parabola."""
-    if not 0 < at < cost.size - 1:
-        return 0.0
-    left, here, right = (float(value) for value in cost[at - 1 : at + 2])
-    bend = left - 2.0 * here + right
-    return min(max(0.5 * (left - right) / bend, -0.5), 0.5) if bend > 0 else 0.0
 
 
 def compared(reference: LeadPicture, picture: LeadPicture) -> Fading | None:
     """Ratio of the contrasts of two pictures of one vehicle: a line through the airlight, not a free one.
 
-    Every part of the rear fades alike, dark ones tell the most, and what is as bright as the airlight tells nothing.
-    Cells that have changed are left out.
+    Every part of the rear fades alike. Parts count by how well that is known: dark ones the most, as no shading and no
+    loss of detail makes them bright; edges, which are not resolved alike, little; what is as bright as the airlight and
+    what has changed (lit lamps) not at all.
 
     Parameters
     ----------
@@ -192,42 +160,65 @@ def compared(reference: LeadPicture, picture: LeadPicture) -> Fading | None:
     Fading or None
         None if the reference shows no contrast, or too much has changed.
     """
-    cell = _cell(reference, picture)
+    cell = cell_of(reference, picture)
     side = HALF_BODY * reference.width
-    lateral, height = _grid(-side, side, cell, 2), _grid(*reference.heights, cell, 3)
-    shown, shown_noise = _resampled(reference, lateral, height, cell)
-    seen, seen_noise = _resampled(picture, lateral, height, cell)
-    line = _line(shown, seen, math.sqrt(seen_noise))
-    if line is None:
+    lateral, height = grid(-side, side, cell, 2), grid(reference.heights[0], TOP, cell, 3)
+    shown, shown_noise = resampled(reference, lateral, height, cell)
+    seen, seen_noise = resampled(picture, lateral, height, cell)
+    own = _uncertainty(shown, math.sqrt(shown_noise))
+    if own is None:
         return None
-    used, ratio, scatter = line
-    count = int(used.sum())
-    power = float((shown[used] ** 2).sum()) - count * shown_noise
-    if power <= 4.0 * math.sqrt(count) * shown_noise or power < count * 1e-4:
+    weight, ratio = _line(shown, seen, own, (shown_noise, seen_noise))
+    count = int((weight > 0).sum())
+    if count < max(LEAST_KEPT * shown.size, 6):
+        return None
+    power, by_noise = float((weight * shown**2).sum()), float(weight.sum()) * shown_noise
+    if power <= by_noise + 4.0 * math.sqrt(float((weight**2).sum())) * shown_noise:
         return None
     # Noise of the reference flattens the line.
-    ratio *= (power + count * shown_noise) / power
-    detail = math.sqrt(max(scatter**2 - seen_noise - ratio**2 * shown_noise, 0.0))
-    deviation = math.sqrt((seen_noise + ratio**2 * shown_noise + INDEPENDENT * detail**2) / power)
-    lever = abs(float(shown[used].sum())) / power
-    return Fading(ratio, deviation, lever, math.sqrt(power / count / max(seen_noise, 1e-12)), count / used.size)
+    power -= by_noise
+    ratio *= 1.0 + by_noise / power
+    spread = seen_noise + ratio**2 * (shown_noise + INDEPENDENT * own**2)
+    deviation = math.sqrt(float((weight**2 * shown**2 * spread).sum())) / power
+    lever = abs(float((weight * shown).sum())) / power
+    visible = math.sqrt(power / float(weight.sum()) / max(seen_noise, 1e-12))
+    if lever > 0.0:
+        fall, lost = darker_by(ratio / lever, *picture.clipped)
+        ratio, deviation = fall * lever, math.hypot(deviation, LOST * lost * lever)
+    return Fading(ratio, deviation, lever, visible, count / shown.size)
 
 
-def _line(shown: Floats, seen: Floats, noise: float) -> tuple[NDArray[np.bool_], float, float] | None:
-    """Cells used, slope through the origin and deviation of what is left."""
-    used = np.ones(shown.shape, bool)
-    down, across = np.gradient(shown)
-    change = np.abs(down) + np.abs(across)
-    ratio = scatter = 0.0
-    for _ in range(5):
-        power = float((shown[used] ** 2).sum())
-        if used.sum() < max(LEAST_KEPT * used.size, 6) or power <= 0:
+def _uncertainty(shown: Floats, noise: float) -> Floats | None:
+    """Deviation of each cell's own contrast between two pictures; None if nothing stands out of the noise."""
+    most = float(np.percentile(shown, 95))
+    if most <= 2.0 * noise:
+        most = float(np.percentile(np.abs(shown), 95))
+        if most <= 2.0 * noise:
             return None
-        ratio = float((shown[used] * seen[used]).sum()) / power
-        residual = np.abs(seen - ratio * shown)
-        scatter = max(1.4826 * float(np.median(residual)), noise)
-        kept = residual <= OUTLIER * scatter + abs(ratio) * (OWN_SHARE * np.abs(shown) + EDGE_SHARE * change)
-        if bool((kept == used).all()):
-            break
-        used = kept
-    return used, ratio, scatter
+    through = most / (1.0 - DARKEST)
+    luminance = np.maximum(1.0 - shown / through, DARKEST)
+    down, across = np.gradient(shown)
+    return np.asarray(np.sqrt((SHADING * through * luminance) ** 2 + MISPLACED**2 * (down**2 + across**2)), np.float64)
+
+
+def _line(shown: Floats, seen: Floats, own: Floats, noise: tuple[float, float]) -> tuple[Floats, float]:
+    """Weights of the cells, and the slope through the origin."""
+    weight = shown**2 / (noise[1] + noise[0] + own**2)
+    ratio = _weighted_median(seen / np.where(np.abs(shown) > 1e-9, shown, 1e-9), weight)
+    for _ in range(5):
+        t = min(max(ratio, 0.0), 2.0)
+        variance = noise[1] + t**2 * (noise[0] + own**2)
+        residual = np.abs(seen - ratio * shown) / np.sqrt(variance)
+        scale = max(1.4826 * float(np.median(residual)), 1.0)
+        weight = np.maximum(1.0 - (residual / (BIWEIGHT * scale)) ** 2, 0.0) ** 2 / variance
+        power = float((weight * shown**2).sum())
+        if power <= 0.0:
+            return np.zeros_like(shown), ratio
+        ratio = float((weight * shown * seen).sum()) / power
+    return weight, ratio
+
+
+def _weighted_median(values: Floats, weights: Floats) -> float:
+    order = np.argsort(values, axis=None)
+    upto = np.cumsum(weights.ravel()[order])
+    return float(values.ravel()[order][int(np.searchsorted(upto, 0.5 * upto[-1]))])

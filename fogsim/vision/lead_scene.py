@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
+from fogsim.vision.clipped_sky import Clipping, clipping
 from fogsim.vision.horizon import levelled
 from fogsim.vision.lead_daylight import RoadFall, check_road, road_before, road_fall
 from fogsim.vision.lead_patch import LeadPicture
@@ -60,6 +61,8 @@ class LeadScene:
         Deviation of its single pixels [linear grey levels].
     road : RoadFall
         How the contrast of the nearest road falls.
+    clipping : float
+        Deviation of single channels of the sky's pixels where some are clipped, otherwise 0 [linear grey levels].
     """
 
     camera: Camera
@@ -69,6 +72,7 @@ class LeadScene:
     sky: Sky
     noise: float
     road: RoadFall
+    clipping: float
 
     @property
     def scale(self) -> float:
@@ -103,6 +107,7 @@ class LeadScene:
             foot=window.foot - self.origin[1],
             scale=scale,
             width=window.width / scale,
+            clipped=(255.0 / self.sky.luminance - 1.0, self.clipping / self.sky.luminance),
         )
 
     def window(self, picture: LeadPicture) -> LeadWindow:
@@ -113,6 +118,10 @@ class LeadScene:
     def aside(self, picture: LeadPicture) -> float:
         """How far the vehicle is to the right of the axis [m]."""
         return (picture.column + self.origin[0] - self.camera.principal_point[0]) / self.scale
+
+    def lift(self, picture: LeadPicture) -> float:
+        """How far above where the told pitch has it the vehicle is [rad]."""
+        return (self._road_row - picture.foot - self.origin[1]) / self.camera.focal_length
 
     @property
     def _road_row(self) -> float:
@@ -143,7 +152,7 @@ def lead_scene(image: Pixels, camera: Camera, depth: float, pitch_deviation: flo
     if not 1.0 < depth < math.inf:
         raise CannotTellError(f"a range of {depth:.1f} m is none of a vehicle ahead")
     pixels = linear_pixels(levelled(image, camera), camera)
-    sky = _daylight(pixels, camera, 3.0 * pitch_deviation * camera.focal_length + 2.0, depth)
+    sky, lost = _daylight(pixels, camera, 3.0 * pitch_deviation * camera.focal_length + 2.0, depth)
     region = lead_region(camera, depth)
     if region is None:
         raise CannotTellError("the vehicle ahead is too small in the image, or outside it")
@@ -157,6 +166,7 @@ def lead_scene(image: Pixels, camera: Camera, depth: float, pitch_deviation: flo
         sky=sky,
         noise=max(sky.noise * steepness(luminance, sky.luminance, camera), 0.3 * 255.0 / 2**camera.bits),
         road=road_fall(partial(_luminance, pixels), camera, depth, sky.luminance),
+        clipping=lost.spread,
     )
 
 
@@ -170,8 +180,8 @@ def _luminance(pixels: LinearPixels, rows: slice, cols: slice) -> NDArray[np.flo
     return light
 
 
-def _daylight(pixels: LinearPixels, camera: Camera, margin: float, depth: float) -> Sky:
-    """Sky by day, or the reason why this is none."""
+def _daylight(pixels: LinearPixels, camera: Camera, margin: float, depth: float) -> tuple[Sky, Clipping]:
+    """Sky by day with what clipping takes of it, or the reason why this is none."""
     sky = sky_above(pixels, camera, margin)
     if sky is None or sky.luminance < MIN_AIRLIGHT:
         raise CannotTellError("too dark above the horizon, or no sky: this is a daytime method")
@@ -184,7 +194,12 @@ def _daylight(pixels: LinearPixels, camera: Camera, margin: float, depth: float)
     if sky.noise > MOST_NOISE * sky.luminance or not core.size or float(core.mean()) < SKY_SHARE:
         raise CannotTellError("what is above the horizon is no sky")
     hidden = HALF_TRUCK * camera.focal_length / depth
-    return replace(sky, luminance=_airlight(light, sky, camera.principal_point[0] - camera.width // 6, hidden))
+    luminance = _airlight(light, sky, camera.principal_point[0] - camera.width // 6, hidden)
+    clear = np.abs(light - luminance) <= 4.0 * max(sky.noise, 1.0)
+    lost = clipping(pixels.pixels[rows, camera.width // 6 : camera.width - camera.width // 6][clear], camera)
+    # What clipping takes from the sky, its noise shows; then it is no longer clipped.
+    clipped = 0.0 if lost.noise > 0.0 else sky.clipped
+    return replace(sky, luminance=luminance + lost.loss, noise=max(sky.noise, lost.noise), clipped=clipped), lost
 
 
 def _airlight(light: NDArray[np.float32], sky: Sky, axis: float, hidden: float) -> float:

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from fogsim.vision.lead_patch import LeadPicture, compared, placed
+from fogsim.vision.lead_patch import LeadPicture, compared
+from fogsim.vision.lead_place import Surroundings, placed
 
 CELLS = np.random.default_rng(3).uniform(0.4, 0.9, (12, 12))
 
@@ -45,7 +46,7 @@ def test_lamps_that_were_lit_are_left_out():
 @pytest.mark.parametrize(("right", "up"), [(0.0, 0.0), (0.21, -0.06), (-0.37, 0.1)])
 def test_the_place_is_found_to_a_fraction_of_a_pixel(right, up):
     reference, far = picture(28.0), picture(12.0, 0.3, seed=2)
-    found, likeness = placed(reference, far.moved(right, up), 0.25, 0.08)
+    found, likeness = placed(reference, far.moved(right, up), 0.25, 0.08, Surroundings(1.3, 0.3))
     assert found.column == pytest.approx(far.column, abs=0.25)
     assert found.foot == pytest.approx(far.foot, abs=0.3)
     assert likeness > 0.9
@@ -54,7 +55,7 @@ def test_the_place_is_found_to_a_fraction_of_a_pixel(right, up):
 def test_another_thing_does_not_look_alike():
     other = picture(12.0, 0.5)
     other = LeadPicture(other.contrast[::-1, ::-1].T.copy(), other.noise, other.column, other.foot, 12.0, 1.8)
-    _, likeness = placed(picture(28.0), other, 0.25, 0.08)
+    _, likeness = placed(picture(28.0), other, 0.25, 0.08, Surroundings(1.3, 0.5))
     assert likeness < 0.8
 
 

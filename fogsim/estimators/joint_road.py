@@ -11,23 +11,20 @@ from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation
-from fogsim.vision.agreeing_strips import fit_agreeing
+from fogsim.vision.agreeing_strips import fit_own, with_neighbours
 from fogsim.vision.horizon import PITCH_DEVIATION, Horizon, calibrated_horizon, levelled, weighed
 from fogsim.vision.joint_checks import no_road
 from fogsim.vision.joint_fit import JointFit, JointPrior
 from fogsim.vision.joint_prior import joint_prior
+from fogsim.vision.linear_pixels import LinearPixels, linear_pixels
 from fogsim.vision.road_lines import meeting_lines
+from fogsim.vision.sky import Sky, sky_above
+from fogsim.vision.strip_geometry import StripGeometry, strip_geometry
 from fogsim.vision.strips import (
-    LinearPixels,
-    Sky,
     StripCurves,
-    StripGeometry,
     above_bonnet,
-    linear_pixels,
     mean_curves,
-    sky_above,
     strip_curves,
-    strip_geometry,
     without_clipped,
     without_rows_below,
 )
@@ -53,9 +50,16 @@ SURE_OF_FOG = 2.0
 CLEAR = OPTICAL_DEPTH_AT_VISIBILITY / 300.0
 """Extinction that an unsure estimate must surely be below to say "little fog" [1/m]."""
 
-MODEL_DEVIATION = 0.02
-"""Relative deviation of k by what the model leaves out: a lens that darkens its corners by 5 to 10 %, which alone makes
-2 to 5 %, marks, rounding, a road that is not quite flat [-]."""
+OVERCONFIDENCE = 1.6
+"""By how much the fit's deviation is too small where roads and cameras are not what its model knows: verges, tracks and
+repairs in the strips, compression, soiled windscreens; measured on pictures that FogSim did not draw [-]."""
+
+MODEL_DEVIATION, LEAST_DEVIATION = 0.01, 1e-4
+"""Relative deviation of k by what the model leaves out: marks, rounding, a road that is not quite flat [-]; and the
+deviation that this leaves in clear air [1/m]."""
+
+MOST_OBSTACLES = 2
+"""How often what stands in the own lane is looked for anew, each time nearer."""
 
 RANGE_MARGIN = 0.5
 """By how much a lead vehicle's foot may be nearer than its range says [m]."""
@@ -150,23 +154,36 @@ class JointRoad:
         What stands in the own lane hides, further on, the neighbours' lanes too: they are read again without it.
         """
         lowest = above_bonnet(pixels, self._camera, sky.luminance)
-        latest, fit = self._read(pixels, sky, prior, lowest, free)
-        doubt = "too little road is seen" if fit is None else self._doubt(fit, sky, latest[0], free)
-        obstacle = math.inf if fit is None else _obstacle(fit, self._geometry)
-        if not doubt and obstacle < free:
-            latest, fit = self._read(pixels, sky, prior, lowest, obstacle)
-            doubt = "too little road is seen" if fit is None else self._doubt(fit, sky, latest[0], obstacle)
-        self._earlier.append(latest)
-        return doubt if fit is None or doubt else fit
+        curves = self._usable(strip_curves(pixels, self._geometry, sky.noise, self._camera, free), sky, lowest)
+        own = fit = fit_own(self._averaged(curves, sky), self._geometry, prior)
+        for _ in range(MOST_OBSTACLES):
+            if own is None or fit is None:
+                break
+            obstacle = _obstacle(fit, self._geometry)
+            if obstacle < free:
+                if self._is_hidden(fit, curves, free):
+                    break
+                free = obstacle
+                curves = strip_curves(pixels, self._geometry, sky.noise, self._camera, free, curves)
+                curves = self._usable(curves, sky, lowest)
+            elif fit is not own:
+                break
+            fit = with_neighbours(own, self._averaged(curves, sky), self._geometry, prior)
+            if fit is own:
+                break
+        self._earlier.append((curves, sky))
+        if fit is None:
+            return "too little road is seen"
+        return self._doubt(fit, sky, curves, free) or fit
 
-    def _read(
-        self, pixels: LinearPixels, sky: Sky, prior: JointPrior, lowest: int, free: float
-    ) -> tuple[tuple[StripCurves, Sky], JointFit | None]:
-        """Curves of the strips, and the fit to them and those of the earlier frames."""
-        curves = strip_curves(pixels, self._geometry, sky.noise, self._camera, free)
+    def _usable(self, curves: StripCurves, sky: Sky, lowest: int) -> StripCurves:
+        """Leave out the own bonnet, and what is clipped."""
         curves = without_rows_below(curves, self._geometry, lowest)
-        latest = (without_clipped(curves) if sky.is_clipped else curves, sky)
-        return latest, fit_agreeing(mean_curves((*self._earlier, latest)), self._geometry, prior)
+        return without_clipped(curves) if sky.is_clipped else curves
+
+    def _averaged(self, curves: StripCurves, sky: Sky) -> StripCurves:
+        """Average with the earlier frames' curves."""
+        return mean_curves((*self._earlier, (curves, sky)))
 
     def _seen_horizon(self, pixels: LinearPixels) -> Horizon:
         """Weigh the told horizon with the point in which the road's lines meet."""
@@ -179,15 +196,19 @@ class JointRoad:
             return "the road is nearly as bright as the airlight, or brighter"
         if fit.misfit > MAX_MISFIT:
             return "the road fades, but not as Koschmieder's law has it"
-        near = (curves.variance[0] > 0) & (self._geometry.distance < min(free, 1.5 / max(fit.extinction, 0.01)))
-        if near.sum() < MIN_ROWS // 2 or fit.used[0][near].mean() < MIN_USED:
+        if self._is_hidden(fit, curves, free):
             return "the road ahead is hidden, or is none"
         if why := no_road(fit, curves, self._geometry, self._camera):
             return why
-        upper = fit.extinction + 2.0 * fit.extinction_deviation
-        if fit.extinction < SURE_OF_FOG * fit.extinction_deviation and upper > CLEAR:
+        deviation = _deviation(fit)
+        if fit.extinction < SURE_OF_FOG * deviation and fit.extinction + 2.0 * deviation > CLEAR:
             return "the extinction is not observable: too little road is seen"
         return ""
+
+    def _is_hidden(self, fit: JointFit, curves: StripCurves, free: float) -> bool:
+        """Whether too little of the own lane, as far as it is free, fits a road."""
+        near = (curves.variance[0] > 0) & (self._geometry.distance < min(free, 1.5 / max(fit.extinction, 0.01)))
+        return bool(near.sum() < MIN_ROWS // 2 or fit.used[0][near].mean() < MIN_USED)
 
     def _estimate(self, fit: JointFit, found: dict[str, object]) -> Estimate:
         horizon = self._camera.horizon_row + fit.shift
@@ -198,8 +219,7 @@ class JointRoad:
         extinction = max(fit.extinction, 0.0)
         if extinction > 0:
             found["inflection_row"] = horizon + 0.5 * extinction * self._camera.row_distance
-        deviation = math.hypot(fit.extinction_deviation, MODEL_DEVIATION * extinction)
-        return Estimate(self.method, extinction, deviation, diagnostics=found)
+        return Estimate(self.method, extinction, _deviation(fit), diagnostics=found)
 
 
 def _impossible(camera: Camera) -> str:
@@ -211,6 +231,11 @@ def _impossible(camera: Camera) -> str:
     if camera.height - 1 - camera.horizon_row < MIN_ROWS or camera.width < MIN_COLS:
         return "the image is too small to show a curve"
     return ""
+
+
+def _deviation(fit: JointFit) -> float:
+    """Standard deviation of the extinction, what the model leaves out included [1/m]."""
+    return math.hypot(OVERCONFIDENCE * fit.extinction_deviation, MODEL_DEVIATION * fit.extinction, LEAST_DEVIATION)
 
 
 def _obstacle(fit: JointFit, geometry: StripGeometry) -> float:

@@ -1,10 +1,10 @@
 """Joint fit of the own lane and of those neighbouring strips of road that agree with it."""
 
 import math
-from dataclasses import replace
 
 from fogsim.vision.joint_fit import JointFit, JointPrior, fit_jointly
-from fogsim.vision.strips import StripCurves, StripGeometry
+from fogsim.vision.strip_geometry import StripGeometry
+from fogsim.vision.strips import StripCurves
 
 DISAGREEMENT = 2.0
 """Standard deviations by which a neighbouring strip may change the extinction [-]."""
@@ -15,6 +15,9 @@ MODEL_DEVIATION = 0.01
 SURE = 0.03
 """Relative deviation of k up to which the own lane's answer judges its neighbours [-]: one that is less sure, as where
 something stands in that lane, is itself more easily wrong than they."""
+
+UNSURE = 1.0
+"""How much farther than its deviation says such an answer may be off [-]."""
 
 
 def fit_agreeing(curves: StripCurves, geometry: StripGeometry, prior: JointPrior) -> JointFit | None:
@@ -37,18 +40,47 @@ def fit_agreeing(curves: StripCurves, geometry: StripGeometry, prior: JointPrior
     JointFit or None
         None if the own lane has too few bins.
     """
-    own = _fitted(curves, geometry, prior, [0])
+    own = fit_own(curves, geometry, prior)
+    return None if own is None else with_neighbours(own, curves, geometry, prior)
+
+
+def fit_own(curves: StripCurves, geometry: StripGeometry, prior: JointPrior) -> JointFit | None:
+    """Fit the own lane alone.
+
+    Parameters
+    ----------
+    curves, geometry, prior
+        See `fit_agreeing`.
+
+    Returns
+    -------
+    JointFit or None
+        None if it has too few bins.
+    """
+    return _fitted(curves, geometry, prior, [0])
+
+
+def with_neighbours(own: JointFit, curves: StripCurves, geometry: StripGeometry, prior: JointPrior) -> JointFit:
+    """Fit the own lane again, with the neighbours that agree with it.
+
+    Parameters
+    ----------
+    own : JointFit
+        Fit of the own lane alone.
+    curves, geometry, prior
+        See `fit_agreeing`.
+    """
     seen = [strip for strip in range(1, len(curves.variance)) if (curves.variance[strip] > 0).any()]
-    if own is None or not seen:
+    best = _fitted(curves, geometry, prior, [0, *seen], own) if seen else None
+    if best is None:
         return own
-    best = _fitted(curves, geometry, prior, [0, *seen], own)
-    if best is None or own.extinction_deviation > SURE * own.extinction or agree(own, best):
+    if agree(own, best):
         return best
-    pairs = {strip: _fitted(curves, geometry, prior, [0, strip], own) for strip in seen}
-    kept = [strip for strip, pair in pairs.items() if pair is not None and agree(own, pair)]
-    if not kept:
+    if len(seen) == 1:
         return own
-    return pairs[kept[0]] if len(kept) == 1 else own
+    pairs = [_fitted(curves, geometry, prior, [0, strip], own) for strip in seen]
+    kept = [pair for pair in pairs if pair is not None and agree(own, pair)]
+    return kept[0] if len(kept) == 1 else own
 
 
 def agree(own: JointFit, more: JointFit) -> bool:
@@ -60,6 +92,8 @@ def agree(own: JointFit, more: JointFit) -> bool:
         Fit of the own lane, and of it with others.
     """
     sharpened = max(own.extinction_deviation**2 - more.extinction_deviation**2, 0.0)
+    if own.extinction_deviation > SURE * own.extinction:
+        sharpened = (UNSURE * own.extinction_deviation) ** 2
     return abs(more.extinction - own.extinction) <= DISAGREEMENT * math.hypot(
         math.sqrt(sharpened), MODEL_DEVIATION * own.extinction
     )
@@ -68,6 +102,6 @@ def agree(own: JointFit, more: JointFit) -> bool:
 def _fitted(
     curves: StripCurves, geometry: StripGeometry, prior: JointPrior, strips: list[int], near: JointFit | None = None
 ) -> JointFit | None:
-    lanes = replace(geometry, left=geometry.left[strips], right=geometry.right[strips], path=geometry.path[strips])
+    lanes = geometry.only(strips)
     read = StripCurves(curves.luminance[strips], curves.variance[strips], curves.scatter[strips])
     return fit_jointly(read, lanes, prior, near)

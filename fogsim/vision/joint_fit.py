@@ -6,8 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.vision import joint_kernels
-from fogsim.vision.strips import StripCurves, StripGeometry
+from fogsim.vision import albedo_filter, joint_kernels, joint_search
+from fogsim.vision.sky import UNTOLD_DARKENING
+from fogsim.vision.strip_geometry import StripGeometry
+from fogsim.vision.strips import StripCurves
 
 Floats = NDArray[np.float64]
 
@@ -29,15 +31,18 @@ ALIKE = 0.3
 CLEAR_MISFIT, CLEAR_USED = 1.5, 0.97
 """Misfit below which, and share of bins in use from which on, the simple model's answer needs no other [-]."""
 
-STEPS, MORE_STEPS = 10, 5
+STEPS, MORE_STEPS = 10, 2
 """Most Gauss–Newton steps for the first strength of patches and drift, and from its answer for each of the others."""
 
-LEAST_BINS, NEAR_BINS = 8, 12
-"""Fewest bins of the own lane for a fit; nearest bins that the first guess of the road's luminance is made of."""
+LEAST_BINS = 8
+"""Fewest bins of the own lane for a fit."""
 
 
 UNSURE = 0.008
 """Relative deviation of the airlight from which on its place is sought [-]."""
+
+MOST_DARKENED = 0.6
+"""Most that a lens takes of a bin's light [-]."""
 
 FAR_BINS = 8
 """Farthest bins of the own lane, which show the airlight where the fog is dense."""
@@ -87,6 +92,9 @@ class JointPrior:
         Deviation of the airlight from it, downward and upward; upward it is large where the sky is saturated.
     shift, shift_deviation : float
         Rows by which the horizon is lower than told, and their standard deviation [px].
+    darkening, darkening_deviation : float
+        How much of what a simple lens takes from pixels off its axis (1 − cos⁴) this one takes, and the standard
+        deviation of that [-].
     """
 
     airlight: float
@@ -94,6 +102,8 @@ class JointPrior:
     above: float
     shift: float
     shift_deviation: float
+    darkening: float = 0.0
+    darkening_deviation: float = UNTOLD_DARKENING
 
 
 def fit_jointly(
@@ -123,7 +133,7 @@ def fit_jointly(
     """
     if int((curves.variance[0] > 0).sum()) < LEAST_BINS:
         return None
-    data = _Data(curves, geometry)
+    data = _Data(_brightened(curves, geometry, prior.darkening), geometry)
     best = data.from_search(prior) if near is None else data.from_near(near, prior)
     found = [best] + [data.refined(albedo, prior, best.theta, MORE_STEPS) for albedo in ALBEDOS[1:]]
     return _average(found)
@@ -131,7 +141,7 @@ def fit_jointly(
 
 @dataclass(frozen=True, slots=True)
 class _Refined:
-    """Answer for one strength of patches and drift: k, airlight and shift with their covariance."""
+    """Answer for one strength of patches and drift: k, airlight, shift and darkening with their covariance."""
 
     theta: Floats
     covariance: Floats
@@ -176,7 +186,7 @@ class _Data:
             airlights.append(self._farthest())
         grid = self._grid(EXTINCTIONS)
         for airlight in airlights:
-            cost = joint_kernels.search(*self._bins, _albedo(ALBEDOS[1]), grid, airlight, prior.shift)
+            cost = joint_search.search(*self._bins, _albedo(ALBEDOS[1]), grid, airlight, prior.shift)
             best = int(np.argmin(cost))
             new = all(abs(math.log(grid[best] / k)) > ALIKE for k, _ in starts)
             if math.isfinite(cost[best]) and new:
@@ -185,7 +195,7 @@ class _Data:
         return min(found, key=lambda f: f.cost)
 
     def _simple(self, prior: JointPrior) -> tuple[float, float]:
-        return joint_kernels.simple_search(*self._bins[:5], self._grid(SIMPLE_EXTINCTIONS), _known(prior))
+        return joint_search.simple_search(*self._bins[:5], self._grid(SIMPLE_EXTINCTIONS), _known(prior))
 
     def _grid(self, count: int) -> Floats:
         least, most = self._span()
@@ -197,11 +207,11 @@ class _Data:
         return 0.2 * unit, 2.0 * unit * float(self.geometry.below[0])
 
     def _refined_from(self, prior: JointPrior, start: tuple[float, float], shift: float) -> _Refined:
-        return self.refined(ALBEDOS[0], prior, np.array([*start, shift]), STEPS)
+        return self.refined(ALBEDOS[0], prior, np.array([*start, shift, 0.0]), STEPS)
 
     def _is_clear(self, found: _Refined) -> bool:
         """Whether an answer leaves nothing to explain, even on a road that hardly wanders."""
-        used = int((found.used == joint_kernels.USED).sum())
+        used = int((found.used == albedo_filter.USED).sum())
         return found.misfit < CLEAR_MISFIT and used >= CLEAR_USED * int((self.curves.variance > 0).sum())
 
     def _farthest(self) -> float:
@@ -210,23 +220,25 @@ class _Data:
 
     def refined(self, albedo: tuple[float, float], prior: JointPrior, start: Floats, steps: int) -> _Refined:
         """Gauss–Newton from a start."""
-        luminance, noise, below, half, path = self._bins[:5]
-        strips, count = luminance.shape
-        k, airlight, shift = (float(value) for value in start)
-        near = [
-            joint_kernels.near_road(luminance[s], noise[s], below, half, path[s], k, airlight, shift, NEAR_BINS)
-            for s in range(strips)
-        ]
-        road = np.clip(np.array(near), 0.01 * airlight, airlight)
-        used = np.zeros((strips, count), np.uint8)
-        theta, covariance, cost, squares, number = joint_kernels.refine(
-            *self._bins, _albedo(albedo), _known(prior), start, road, used, steps
+        used = np.zeros(self.curves.luminance.shape, np.uint8)
+        bins = (*self._bins, self.geometry.off_axis)
+        theta, covariance, road, cost, squares, number = joint_kernels.refine(
+            *bins, _albedo(albedo), _known(prior), start, used, steps
         )
-        return _Refined(theta, covariance, cost, squares / max(number, 1), float(road[0]), used)
+        return _Refined(theta, covariance, cost, squares / max(number, 1), road, used)
 
 
 def _known(prior: JointPrior) -> Floats:
-    return np.array([prior.airlight, prior.below, prior.above, prior.shift, prior.shift_deviation])
+    shift = (prior.shift, prior.shift_deviation)
+    return np.array([prior.airlight, prior.below, prior.above, *shift, prior.darkening_deviation])
+
+
+def _brightened(curves: StripCurves, geometry: StripGeometry, darkening: float) -> StripCurves:
+    """Undo the lens's darkening."""
+    if darkening == 0.0:
+        return curves
+    gain = 1.0 / (1.0 - np.minimum(darkening * geometry.off_axis, MOST_DARKENED))
+    return StripCurves(gain * curves.luminance, gain**2 * curves.variance, curves.scatter)
 
 
 def _albedo(deviations: tuple[float, float]) -> Floats:
@@ -249,6 +261,6 @@ def _average(found: list[_Refined]) -> JointFit:
         shift=float(mean[2]),
         road=best.road,
         misfit=best.misfit,
-        used=best.used == joint_kernels.USED,
-        hidden=best.used[0] == joint_kernels.HIDDEN,
+        used=best.used == albedo_filter.USED,
+        hidden=best.used[0] == albedo_filter.HIDDEN,
     )

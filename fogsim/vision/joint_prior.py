@@ -7,7 +7,7 @@ from fogsim.values.camera import Camera
 from fogsim.vision.horizon import Horizon
 from fogsim.vision.joint_fit import JointPrior
 from fogsim.vision.response import linear_table
-from fogsim.vision.strips import SATURATED_SHARE, Sky
+from fogsim.vision.sky import SATURATED_SHARE, Sky
 
 SKY_DEVIATION = 0.005
 """Relative deviation of the airlight at the horizon from the sky above it [-]."""
@@ -31,19 +31,32 @@ def joint_prior(sky: Sky, camera: Camera, horizon: Horizon) -> JointPrior:
     horizon : Horizon
         What is known of the horizon.
     """
+    airlight, below, above = _airlight(sky, camera)
+    return JointPrior(
+        airlight=airlight,
+        below=below,
+        above=above,
+        shift=horizon.row - camera.horizon_row,
+        shift_deviation=horizon.standard_deviation,
+        darkening=sky.darkening,
+        darkening_deviation=sky.darkening_deviation,
+    )
+
+
+def _airlight(sky: Sky, camera: Camera) -> tuple[float, float, float]:
+    """Brightness of the airlight, and its deviations downward and upward [linear grey levels]."""
     deviation, upward = (math.hypot(SKY_DEVIATION * sky.luminance, apart) for apart in (sky.deviation, sky.upward))
-    shift = (horizon.row - camera.horizon_row, horizon.standard_deviation)
     if not sky.is_clipped:
-        return JointPrior(sky.luminance, deviation, upward, *shift)
+        return sky.luminance, deviation, upward
     table = linear_table(camera.response, camera.bits)
     level = float(table[-1] - table[-2]) * (2**camera.bits / 256.0)
     if sky.saturated > MOSTLY:
-        return JointPrior(255.0 + level, 2.0 * level, OVEREXPOSURE * 255.0, *shift)
+        return 255.0 + level, 2.0 * level, OVEREXPOSURE * 255.0
     if sky.saturated < SATURATED_SHARE:
         # One of the colours is clipped: there is more light than the others show.
-        return JointPrior(sky.luminance + level, deviation + level, deviation + 4.0 * level, *shift)
+        return sky.luminance + level, deviation + level, deviation + 4.0 * level
     # Noise carries some of the sky's pixels below saturation: the share of the others tells how bright it is.
     airlight = 255.0 - 0.5 * level + 1.3 * level * NormalDist().inv_cdf(sky.saturated)
     # Noise that is added after clipping tells nothing of what was clipped.
     above = OVEREXPOSURE * 255.0 if sky.saturated > HALF else deviation + level
-    return JointPrior(airlight, deviation + level, above, *shift)
+    return airlight, deviation + level, above

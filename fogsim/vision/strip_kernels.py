@@ -10,14 +10,11 @@ from fogsim.jit import kernel
 MOST_SAMPLES = 64
 """Pixels that one row's statistic is made of; more cost time and gain little beside the road's own texture."""
 
-SKY_SHARE, SKY_WIDTH = 7, 0.012
-"""Part of a row (one in so many) that sky must fill to be found, and half the width of its luminances, relative [-]."""
+LEAST_DEVIATION = 0.1
+"""Least deviation of a bin's mean: what quantisation leaves [linear grey levels]."""
 
-LEAST_SKY_ROWS = 4
-"""Rows of sky before it can end downward."""
-
-LEAST_SKY_HEIGHT, STEEPEST_SKY = 0.04, 0.8
-"""Height that rows must span to show how the sky brightens upward [rad], and most that it does [1/rad]."""
+QUIET, SMOOTHED = 0.3, 1.0
+"""Pixel noise, in levels, below which an image was compressed, and the deviation that this leaves in a mean [-]."""
 
 KEPT = 2.5
 """Half-width of the core of a row, in its robust standard deviations: marks and other narrow things lie outside."""
@@ -84,19 +81,19 @@ def _core(samples: NDArray[np.float32], count: int, floor: float) -> tuple[float
 
 
 @kernel
-def strip_rows(
+def strip_bins(
     pixels: NDArray[np.uint8] | NDArray[np.uint16],
     tables: NDArray[np.float32],
-    first: NDArray[np.int64],
-    last: NDArray[np.int64],
-    left: NDArray[np.float64],
-    right: NDArray[np.float64],
-    hidden_from: float,
-    hidden_to: float,
-    hidden_above: float,
-    floor: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Mean and deviation of the core of each bin of rows of one strip, scatter of the whole bin, and number of pixels.
+    table: NDArray[np.float32],
+    rows: NDArray[np.int64],
+    sides: NDArray[np.float64],
+    pieces: NDArray[np.float64],
+    vehicle: NDArray[np.float64],
+    noise: float,
+    out: NDArray[np.float64],
+    again: bool,
+) -> None:
+    """Luminance of the core of each bin of rows of one strip, its variance, and the scatter of the whole bin.
 
     Parameters
     ----------
@@ -104,168 +101,62 @@ def strip_rows(
         The image.
     tables : (channels, levels) float32
         Linear grey levels that each channel adds.
-    first, last : (n,) int64
-        Rows of each bin.
-    left, right : (n,) float64
+    table : (levels,) float32
+        Linear grey levels of all channels together.
+    rows : (2, n) int64
+        First and last row of each bin.
+    sides : (2, n) float64
         Columns between which the strip lies on each bin.
-    hidden_from, hidden_to : float
-        Columns between which an obstacle hides the road on rows up from `hidden_above`.
-    hidden_above : float
-        Row of that obstacle's foot.
-    floor : float
-        Least deviation that a core has [linear grey levels].
+    pieces : (n,) float64
+        Pieces of road in each bin whose albedo counts as independent.
+    vehicle : (3,) float64
+        Columns between which a vehicle hides the road, and the row of its foot, from which on upward it does.
+    noise : float
+        Deviation of single pixels [linear grey levels].
+    out : (3, n) float64
+        Luminance, variance (0 where there is no datum) and scatter; is written.
+    again : bool
+        Read only bins that the vehicle hides, if only in part, and that have a datum.
     """
     cols = pixels.shape[1]
-    count = first.size
-    mean, deviation, scatter = np.zeros(count), np.zeros(count), np.zeros(count)
-    number = np.zeros(count, np.int64)
     samples = np.empty(MOST_SAMPLES, np.float32)
-    for i in range(count):
-        low, width, height = left[i], right[i] - left[i], last[i] - first[i] + 1
+    for i in range(rows.shape[1]):
+        low, width, height = sides[0, i], sides[1, i] - sides[0, i], rows[1, i] - rows[0, i] + 1
+        hides = rows[0, i] <= vehicle[2]
+        beside = sides[1, i] < vehicle[0] - 1.0 or low > vehicle[1] + 1.0
+        if again and (not hides or beside or out[1, i] <= 0.0):
+            continue
+        out[:, i] = 0.0
         if width < 2.0:
             continue
         # An even number: the middle one of an odd number would lie between two columns.
         wanted = int(min(width * height, float(MOST_SAMPLES))) // 2 * 2
-        hides = first[i] <= hidden_above
         taken = 0
         for j in range(wanted):
             # Rows of the bin in turn, columns evenly: a mirrored image gives the same.
-            row = first[i] + min(j, wanted - 1 - j) % height
+            row = rows[0, i] + min(j, wanted - 1 - j) % height
             col = min(max(math.floor(low + (j + 0.5) * width / wanted + 0.5), 0), cols - 1)
-            if hides and hidden_from <= col <= hidden_to:
+            if hides and vehicle[0] <= col <= vehicle[1]:
                 continue
             samples[taken] = light(pixels, tables, row, col)
             taken += 1
         if taken < 2 or taken < 0.25 * wanted:
             continue
-        mean[i], deviation[i], scatter[i] = _core(samples, taken, floor)
-        number[i] = taken
-    return mean, deviation, scatter, number
+        mean, deviation, scatter = _core(samples, taken, max(noise, 2.0 * LEAST_DEVIATION))
+        texture = max(deviation**2 - noise**2, 0.0) / min(float(taken), pieces[i])
+        out[0, i], out[2, i] = mean, scatter
+        out[1, i] = noise**2 / taken + texture + LEAST_DEVIATION**2 + _coarseness(mean, deviation, noise, table)
 
 
 @kernel
-def sky_rows(
-    pixels: NDArray[np.uint8] | NDArray[np.uint16],
-    tables: NDArray[np.float32],
-    rows: NDArray[np.int64],
-    left: int,
-    right: int,
-    floor: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Brightness of the bright part of each row: of the sky, where trees and vehicles stand before it.
-
-    Starts near the row's brightest and moves to the mean of what lies near, so that what is darker may cover most of
-    the row. The second of the two arrays is the share of the row that is as bright.
-    """
-    bright, share = np.zeros(rows.size), np.zeros(rows.size)
-    samples = np.empty(MOST_SAMPLES, np.float32)
-    count = min(MOST_SAMPLES, right - left)
-    for i in range(rows.size):
-        for j in range(count):
-            col = left + int((j + 0.5) * (right - left) / count)
-            samples[j] = light(pixels, tables, rows[i], col)
-        ordered = np.sort(samples[:count])
-        centre, kept = float(ordered[count - 1 - count // SKY_SHARE]), 0
-        reach = max(2.5 * floor, SKY_WIDTH * centre)
-        for _ in range(4):
-            total, kept = 0.0, 0
-            for value in ordered:
-                if abs(float(value) - centre) <= reach:
-                    total += float(value)
-                    kept += 1
-            centre = total / kept
-        bright[i], share[i] = centre, kept / count
-    return bright, share
-
-
-@kernel
-def level_at_horizon(
-    bright: NDArray[np.float64], height: NDArray[np.float64], step: float
-) -> tuple[float, float, float, float]:
-    """Brightness of the sky at the horizon, from that of rows above it (Theil and Sen's robust straight line).
-
-    Where rows darken downward by more than `step` from one to the next, something stands before the sky, and the rows
-    below say nothing.
-
-    Parameters
-    ----------
-    bright : (n,) float64
-        Brightness of rows, the highest first.
-    height : (n,) float64
-        Their height above the horizon.
-    step : float
-        Darkening that is no sky's, as a share.
-
-    Returns
-    -------
-    tuple of float
-        Brightness at height 0, slope, robust deviation of the rows from the line, height of the lowest row in use.
-    """
-    drops = np.zeros(bright.size)
-    count = 1
-    for i in range(1, bright.size):
-        usual = max(float(np.median(drops[1:i])), 0.0) if i > 1 else 0.0
-        drops[i] = bright[i - 1] - bright[i]
-        twice = bright[max(i - 2, 0)] - bright[i]
-        least = step * bright[i - 1]
-        if count >= LEAST_SKY_ROWS and (drops[i] > least + 2.0 * usual or twice > 1.5 * least + 4.0 * usual):
-            break
-        count = i + 1
-    slopes = np.zeros(count * (count - 1) // 2 + 1)
-    number = 0
-    for i in range(count):
-        for j in range(i):
-            slopes[number] = (bright[i] - bright[j]) / (height[i] - height[j])
-            number += 1
-    middle, slope = float(np.median(bright[:count])), 0.0
-    if height[0] - height[count - 1] > LEAST_SKY_HEIGHT:
-        slope = min(max(float(np.median(slopes[:number])), -STEEPEST_SKY * middle), STEEPEST_SKY * middle)
-    rest = bright[:count] - slope * height[:count]
-    level = float(np.median(rest))
-    return level, slope, 1.4826 * float(np.median(np.abs(rest - level))), height[count - 1]
-
-
-@kernel
-def pixel_noise(
-    pixels: NDArray[np.uint8] | NDArray[np.uint16], tables: NDArray[np.float32], rows: NDArray[np.int64]
-) -> float:
-    """Robust deviation of single pixels on rows, from the differences of neighbours [linear grey levels]."""
-    cols = pixels.shape[1]
-    per_row = max((cols - 1) // 2, 1)
-    step = max(per_row // 32, 1)
-    apart = np.empty(rows.size * (per_row // step + 1))
-    count = 0
-    for row in rows:
-        for col in range(((cols - 2) % (2 * step)) // 2, cols - 1, 2 * step):
-            if count < apart.size:
-                apart[count] = abs(light(pixels, tables, row, col) - light(pixels, tables, row, col + 1))
-                count += 1
-    # The root of the mean square of the lower three quarters stands for all: medians of whole numbers jump.
-    ordered = np.sort(apart[:count])
-    kept = max((3 * count) // 4, 1)
-    square = 0.0
-    for i in range(kept):
-        square += ordered[i] * ordered[i]
-    # For a normal difference of deviation √2 σ, the lower three quarters have a mean square of 0.3692 · 2 σ².
-    return math.sqrt(square / kept / (2.0 * 0.3692))
-
-
-@kernel
-def saturation(
-    pixels: NDArray[np.uint8] | NDArray[np.uint16], largest: int, rows: NDArray[np.int64], side: int
-) -> tuple[float, float]:
-    """Shares of rows' pixels with all and with some channels saturated, but for `side` columns at either end."""
-    cols, channels = pixels.shape[1], pixels.shape[2]
-    every, some = 0, 0
-    for row in rows:
-        for col in range(side, cols - side):
-            count = 0
-            for channel in range(channels):
-                count += pixels[row, col, channel] == largest
-            every += count == channels
-            some += count > 0
-    total = max(rows.size * (cols - 2 * side), 1)
-    return every / total, some / total
+def _coarseness(mean: float, deviation: float, noise: float, table: NDArray[np.float32]) -> float:
+    """Variance of means by rounding to levels, and by compression, which does away with noise and faint gradients."""
+    place = min(max(int(np.searchsorted(table, mean)) - 1, 0), table.size - 2)
+    level = max(float(table[place + 1] - table[place]), 1e-6)
+    # Rounding does not average out where nothing dithers it: 1/√12 of a level without noise, nothing from half on.
+    rounding = math.exp(-4.0 * (math.pi * deviation / level) ** 2) / 12.0
+    quiet = max(1.0 - noise / (QUIET * level), 0.0)
+    return level**2 * (rounding + (SMOOTHED * quiet) ** 2)
 
 
 @kernel

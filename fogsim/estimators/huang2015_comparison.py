@@ -3,7 +3,8 @@
 import math
 from dataclasses import dataclass, replace
 
-from fogsim.estimators.huang2015_sighting import Sighting
+from fogsim.estimators.huang2015_sighting import MIDDLE, TOP, Sighting
+from fogsim.vision.clipped_sky import darker_by
 from fogsim.vision.patch import Patch, Placement, moved, shrunk
 from fogsim.vision.patch_light import SharedLight, shared_light
 from fogsim.vision.patch_match import PlacementPrior, Regression, register
@@ -25,12 +26,15 @@ OUTLINE = 1.28
 """Size of what a vehicle is placed by, over that of what is compared [-]: its outline tells more than its rear."""
 
 
-AGREES, CONTRADICTED = 0.1, 1.0
+AGREES, CONTRADICTED = 0.1, 0.1
 """Relative difference of the fading of detail and of mean contrast that says nothing, and the share of the rest of it
 that the mean may err by [-]."""
 
-FULL = 254.7
-"""Mean luminance of a sky that is saturated; a little less, and its noise still shows where it is [linear levels]."""
+MISPLACED = 3.0
+"""Standard deviation of the fading of detail that is faster than the light's, over their difference [-]."""
+
+LOST = 0.25
+"""Deviation of what clipping takes from a vehicle, relative to it [-]."""
 
 BUMPER = 0.15
 """Height of the lowest part of a rear that tells no light, in widths of the vehicle [-]: black plinths and shadows end
@@ -103,7 +107,7 @@ def picture_of(sighting: Sighting) -> Picture:
     scale = min(BROADEST / sighting.width, 1.0)
     small = replace(
         sighting, patch=shrunk(sighting.patch, scale), width=sighting.width * scale, noise=sighting.noise * scale,
-        pitch_deviation=sighting.pitch_deviation * scale,
+        pitch_deviation=sighting.pitch_deviation * scale, metre=sighting.metre * scale,
     )  # fmt: skip
     return Picture(small, window_variance(sighting.patch), scale)
 
@@ -178,7 +182,7 @@ def compared(reference: Picture, picture: Picture, prior: PlacementPrior, most: 
     """
     near, far = reference.sighting, picture.sighting
     # A saturated sky does not tell the exposure.
-    seen = max(near.sky, far.sky) < FULL
+    seen = near.lost is not None and far.lost is not None
     gain = far.sky / near.sky if seen else 1.0
     found = register(near.patch, far.patch, prior, far.noise, most * gain, OUTLINE)
     if found is None:
@@ -188,30 +192,33 @@ def compared(reference: Picture, picture: Picture, prior: PlacementPrior, most: 
         return None
     body, at = _above_bumper(near, found.placement)
     light = shared_light(body, far.patch, at, (near.sky, far.sky), far.noise) if seen else None
+    light = None if light is None else _unclipped(light, far)
     if light is None and found.pixels == 0:
         return None
     # What a small picture does not resolve alike: its detail and its place.
     by_size = SMALL / far.width * abs(found.slope)
+    # Detail that has faded otherwise than the light was not found where it is, or it is drawn or lit otherwise.
+    apart = _apart(found, gain, light)
+    contradicted = 0.0 if light is None else CONTRADICTED * max(apart, 0.0) * (1.0 - light.near)
     return Comparison(
         distance=far.distance,
         variance=picture.variance,
         contrast=found.slope / gain,
-        deviation=math.hypot(found.slope_deviation, by_size) / gain,
+        deviation=math.hypot(found.slope_deviation / gain, by_size / gain, MISPLACED * abs(apart)),
         mean=found.mean / far.sky if light is None else light.far,
         near_mean=found.near_mean / near.sky if light is None else light.near,
-        mean_deviation=math.inf if light is None else math.hypot(light.deviation, _contradiction(found, gain, light)),
+        mean_deviation=math.inf if light is None else math.hypot(light.deviation, contradicted),
         regression=found,
     )
 
 
-def _contradiction(found: Regression, gain: float, light: SharedLight) -> float:
-    """What a mean may err by because detail that is clearly seen has faded otherwise: it is drawn or lit otherwise."""
-    contrast = 1.0 - light.near
-    if contrast <= 0.0 or not math.isfinite(found.noise_deviation):
+def _apart(found: Regression, gain: float, light: SharedLight | None) -> float:
+    """By how much detail that is clearly seen has faded less than the mean contrast, beyond what says nothing [-]."""
+    if light is None or light.near >= 1.0 or not math.isfinite(found.noise_deviation):
         return 0.0
-    fallen = (1.0 - light.far) / contrast
-    apart = abs(found.slope / gain - fallen) - AGREES * abs(fallen) - 2.0 * found.noise_deviation / gain
-    return CONTRADICTED * max(apart, 0.0) * contrast
+    fallen = (1.0 - light.far) / (1.0 - light.near)
+    apart = found.slope / gain - fallen
+    return math.copysign(max(abs(apart) - AGREES * abs(fallen) - 2.0 * found.noise_deviation / gain, 0.0), apart)
 
 
 def _unplaced(at: Placement) -> Regression:
@@ -229,11 +236,23 @@ def _unplaced(at: Placement) -> Regression:
     )
 
 
+def _unclipped(light: SharedLight, far: Sighting) -> SharedLight:
+    """The same light with what clipping takes of pixels that are hardly darker than the sky."""
+    if far.lost is None or far.lost.noise <= 0.0:
+        return light
+    fall, lost = darker_by(1.0 - light.far, 255.0 / far.sky - 1.0, far.lost.spread / far.sky)
+    return replace(light, far=1.0 - fall, deviation=math.hypot(light.deviation, LOST * lost))
+
+
 def _above_bumper(near: Sighting, at: Placement) -> tuple[Patch, Placement]:
-    """The rear without its lowest part, and where that is."""
-    cut = 0.5 * BUMPER * near.width
-    body = replace(near.patch, row=near.patch.row - cut, half_height=near.patch.half_height - cut)
-    return body, replace(at, row=at.row - cut * at.scale)
+    """The rear from above its lowest part up to where roofs of all vehicles may be, and where that is."""
+    bottom = near.patch.row + near.patch.half_height - BUMPER * near.width
+    top = max(
+        min(near.patch.row - near.patch.half_height, near.patch.row + MIDDLE * near.width - TOP * near.metre), 0.5
+    )
+    middle = 0.5 * (bottom + top)
+    body = replace(near.patch, row=middle, half_height=bottom - middle)
+    return body, replace(at, row=at.row + (middle - near.patch.row) * at.scale)
 
 
 def compared_with_itself(reference: Picture) -> Comparison:

@@ -51,9 +51,10 @@ class Huang2015Lead:
     variance (dense fog comes out too thin) and detail is lost with distance (thin fog comes out too dense). Corrected,
     the nearest picture is shrunk as the camera would, placed to a fraction of a pixel by the vehicle's outline, and
     each farther picture compared with it in two ways. The slope of its regression, noise taken out, falls as e^(−kd);
-    so does the mean contrast to the sky, in which dark pixels count most, as no shading or loss of detail makes them
-    bright. Pixels that changed (lit lamps) are left out, slopes of pictures that show other detail are, too, and
-    changes of exposure are taken out by the sky.
+    so does the mean contrast to the sky up to the roof, in which dark pixels count most, as no shading or loss of
+    detail makes them bright. Where the two contradict each other, detail was misplaced. Pixels that changed (lit
+    lamps) are left out, slopes of pictures that show other detail are, too, and changes of exposure are taken out by
+    the sky.
 
     Errors of the thesis: eqs. 4.12 to 4.14 and 5.2 lack squares, eq. 4.14 has d₁ for d₂, eq. 4.16 is near over far
     where table 4.2 is far over near, the k grid excludes visibilities below 33 m, and 25 … 90 m every 5 m are 14

@@ -20,10 +20,10 @@ GRID = 1801
 RATIO_DEVIATION = 0.03
 """Least standard deviation of a ratio of variances, be there one or many [-]."""
 
-SLOPE_SHARE = 0.02
+SLOPE_SHARE = 0.045
 """Standard deviation of a ratio of contrasts that pixels do not show, relative: registration, detail too small [-]."""
 
-MEAN_SHARE, MEAN_CONTRAST_SHARE = 0.002, 0.01
+MEAN_SHARE, MEAN_CONTRAST_SHARE = 0.0015, 0.006
 """The same of a mean luminance, relative to the sky's and to its contrast to the sky [-]."""
 
 SKY_SHARE = 0.01
@@ -32,7 +32,7 @@ SKY_SHARE = 0.01
 DETAIL_SHARE = 0.3
 """Standard deviation of the share of its detail that only the reference shows: fine detail, noise told wrong [-]."""
 
-DRIFT = 0.015
+DRIFT = 0.009
 """Standard deviation of the relative change of a mean contrast as a picture becomes smaller by a factor e [-]."""
 
 HUBER = 2.0

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
+from fogsim.vision.clipped_sky import Clipping, clipping
 from fogsim.vision.horizon import PITCH_DEVIATION, levelled
 from fogsim.vision.lead_daylight import RoadFall, check_road, road_before, road_fall
 from fogsim.vision.lead_scene import steepness
@@ -24,6 +25,12 @@ MARGIN, MARGIN_PIXELS = 0.12, 8
 
 MOST_NOISE = 0.1
 """Noise of a sky relative to its luminance beyond which it is none [-]."""
+
+FULL = 254.7
+"""Mean luminance of a sky that is saturated; a little less, and its noise still shows where it is [linear levels]."""
+
+TOP = 2.2
+"""Height up to which the light of a rear is compared [m]: dark windows tell the most, sky above a car nothing."""
 
 LEAST_WIDTH = 8.0
 """Narrowest vehicle whose picture is compared [px]."""
@@ -45,6 +52,10 @@ class Sighting:
         Of the vehicle [px].
     pitch_deviation : float
         Rows by which pitch moves the picture between frames [px].
+    metre : float
+        Pixels in a metre at the vehicle [px/m].
+    lost : Clipping or None
+        What clipping takes of the sky; None if the sky is saturated, and its luminance unknown.
     """
 
     distance: float
@@ -53,6 +64,8 @@ class Sighting:
     noise: float
     width: float
     pitch_deviation: float
+    metre: float
+    lost: Clipping | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +78,8 @@ class Crop:
     noise: float
     pitch_deviation: float
     road: RoadFall
+    metre: float
+    lost: Clipping | None
 
 
 def vehicle_crop(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera, distance: float) -> Crop:
@@ -95,7 +110,7 @@ def vehicle_crop(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera, 
     rows, cols = region
     level = levelled(image, camera)
     luminance = linear_luminance(level[rows, cols], camera.response, camera.bits)
-    sky, noise = _sky(level, camera)
+    sky, noise, lost = _sky(level, camera)
 
     def luminance_of(rows: slice, cols: slice) -> NDArray[np.float32]:
         return linear_luminance(level[rows, cols], camera.response, camera.bits)
@@ -103,26 +118,30 @@ def vehicle_crop(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera, 
     check_road(luminance_of(*road_before(camera, distance)), sky)
     road = road_fall(luminance_of, camera, distance, sky)
     pitch = 1.5 * PITCH_DEVIATION * camera.focal_length
-    return Crop(luminance, (cols.start, rows.start), sky, noise * steepness(luminance, sky, camera), pitch, road)
+    noise *= steepness(luminance, sky, camera)
+    return Crop(luminance, (cols.start, rows.start), sky, noise, pitch, road, scale, lost)
 
 
-def _sky(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera) -> tuple[float, float]:
-    """Luminance of the sky above the horizon, and deviation of its pixels [linear grey levels]."""
+def _sky(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera) -> tuple[float, float, Clipping | None]:
+    """Luminance of the sky above the horizon, deviation of its pixels [linear grey levels], and what clipping takes."""
     bottom = min(math.floor(camera.horizon_row - 3), camera.height)
     if bottom < 2:
         raise CannotTellError("no sky is in the image")
     top, side = max(bottom - max(camera.height // 16, 4), 0), camera.width // 6
-    luminance = linear_luminance(image[top:bottom, side : camera.width - side], camera.response, camera.bits)
+    pixels = image[top:bottom, side : camera.width - side]
+    luminance = linear_luminance(pixels, camera.response, camera.bits)
     bright = float(np.percentile(luminance, 80, method="lower"))
     if bright < MIN_AIRLIGHT:
         raise CannotTellError("too dark above the horizon: this is a daytime method")
-    core = luminance[np.abs(luminance - bright) <= max(0.03 * bright, 4.0)]
+    even = np.abs(luminance - bright) <= max(0.03 * bright, 4.0)
     across = np.abs(np.diff(luminance, axis=1))
     # Half of the neighbours are of one surface even where trees stand before the sky.
     noise = 1.4826 * float(np.median(across)) / math.sqrt(2.0)
     if noise > MOST_NOISE * bright:
         raise CannotTellError("what is above the horizon is no sky")
-    return float(core.mean(dtype=np.float64)), noise
+    mean, lost = float(luminance[even].mean(dtype=np.float64)), clipping(pixels[even], camera)
+    known = lost if lost.noise > 0.0 or mean < FULL else None
+    return mean + lost.loss, max(noise, lost.noise), known
 
 
 def sighting_of(crop: Crop, distance: float, window: LeadWindow, blur: float) -> Sighting:
@@ -149,11 +168,14 @@ def sighting_of(crop: Crop, distance: float, window: LeadWindow, blur: float) ->
     row, col = window.foot - MIDDLE * window.width - crop.origin[1], window.column - crop.origin[0]
     half_width, half_height = HALF_WIDTH * window.width, HALF_HEIGHT * window.width
     margin = MARGIN * window.width + MARGIN_PIXELS
-    rows = max(math.floor(row - half_height - margin), 0), math.ceil(row + half_height + margin) + 1
+    above = max(half_height, TOP * crop.metre - MIDDLE * window.width)
+    rows = max(math.floor(row - above - margin), 0), math.ceil(row + half_height + margin) + 1
     cols = max(math.floor(col - half_width - margin), 0), math.ceil(col + half_width + margin) + 1
     pixels = crop.luminance[rows[0] : max(rows[1], 0), cols[0] : max(cols[1], 0)].astype(np.float64)
     patch = Patch(pixels, col - cols[0], row - rows[0], half_width, half_height, blur)
     inside = 0 <= patch.column < pixels.shape[1] and 0 <= patch.row < pixels.shape[0]
     if not inside or min(pixels.shape) < LEAST_WIDTH / 2:
         raise CannotTellError("the vehicle ahead is outside the image")
-    return Sighting(distance, patch, crop.sky, max(crop.noise, 0.1), window.width, crop.pitch_deviation)
+    return Sighting(
+        distance, patch, crop.sky, max(crop.noise, 0.1), window.width, crop.pitch_deviation, crop.metre, crop.lost
+    )

@@ -21,7 +21,7 @@ LARGE, HIGH = 2.25, (0.6, 1.6)
 differently from afar, so the part begins above the bar that keeps cars from running under it."""
 
 TOP = 2.2
-"""Height to which a rear may reach [m]: dark windows of vans and lorries tell the most; sky above a car tells nothing."""
+"""Height to which a rear may reach [m]: dark windows of vans tell the most, and sky above a car tells nothing."""
 
 FINEST = 0.02
 """Smallest cell on which pictures are compared [m]."""
@@ -135,10 +135,12 @@ def resampled(picture: LeadPicture, lateral: Floats, height: Floats, cell: float
 
 
 def cell_of(one: LeadPicture, other: LeadPicture) -> float:
+    """Size of a pixel of the coarser of two pictures [m]."""
     return max(1.0 / one.scale, 1.0 / other.scale, FINEST)
 
 
 def grid(low: float, high: float, cell: float, least: int) -> Floats:
+    """Middles of cells between two places [m], at least so many."""
     count = max(round((high - low) / cell), least)
     return np.asarray(0.5 * (low + high) + cell * (np.arange(count) - 0.5 * (count - 1)), np.float64)
 

@@ -31,7 +31,7 @@ ALIKE = 0.3
 CLEAR_MISFIT, CLEAR_USED = 1.5, 0.97
 """Misfit below which, and share of bins in use from which on, the simple model's answer needs no other [-]."""
 
-STEPS, MORE_STEPS = 10, 2
+STEPS, MORE_STEPS = 10, 5
 """Most Gauss–Newton steps for the first strength of patches and drift, and from its answer for each of the others."""
 
 LEAST_BINS = 8

@@ -59,8 +59,8 @@ def clipping(pixels: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera) -> 
     channels = pixels.reshape(pixels.shape[0], -1)
     weights = _WEIGHTS if channels.shape[1] == 3 else (1.0,)
     loss = variance = spread = 0.0
-    for weight, channel in zip(weights, channels.T, strict=True):
-        lost, noise = _censored(channel, camera)
+    for index, weight in enumerate(weights):
+        lost, noise = _censored(channels[:, index], camera)
         loss += weight * lost
         variance += (weight * noise) ** 2
         spread += weight * noise

@@ -13,8 +13,10 @@ FARTHEST = 1600.0
 """Distance beyond which no copy is drawn, nearer in small pictures [m]."""
 
 _LARGEST = 8.0  # about the radius of what is largest, but for the ground and woods [m]
-_SMALLEST = 1.0  # radius in the picture below which a copy is left out [px]
-_DENSEST = 1.15  # half a square's breadth over the root of its triangles, below which a stand-in does [px]
+_SMALLEST, _SMALLEST_PLAIN = 1.0, 2.0  # radius in the picture below which a copy is left out [px]
+# Half a square's breadth over the root of its triangles, below which a stand-in does [px]: in general, and for what has
+# neither paint nor lamps nor signs' sheeting, such as trees, of which more is seen than of all else.
+_DENSEST, _DENSEST_PLAIN = 1.15, 1.5
 _BINS = 64  # of distance, to draw near copies first
 _NUMBERS = 17  # 32-bit numbers of a record
 
@@ -36,6 +38,8 @@ class Shapes(NamedTuple):
         Half the breadth in the picture below which it does [px].
     faces : (n,) int64
         Number of triangles.
+    smallest : (n,) float64
+        Radius in the picture below which a copy is left out [px].
     """
 
     centre: Wide
@@ -43,6 +47,7 @@ class Shapes(NamedTuple):
     stand_in: Index
     detail: Wide
     faces: Index
+    smallest: Wide
 
 
 class Copies(NamedTuple):
@@ -101,7 +106,9 @@ class Chosen(NamedTuple):
     order: Index
 
 
-def shapes_of(numbers: Mapping[str, int], low: Wide, high: Wide, faces: Index, endings: tuple[str, ...]) -> Shapes:
+def shapes_of(
+    numbers: Mapping[str, int], low: Wide, high: Wide, faces: Index, plain: NDArray[np.bool_], endings: tuple[str, ...]
+) -> Shapes:
     """Measure shapes.
 
     Parameters
@@ -112,6 +119,8 @@ def shapes_of(numbers: Mapping[str, int], low: Wide, high: Wide, faces: Index, e
         Corners of their bounding boxes.
     faces : (n,) int64
         Numbers of their triangles.
+    plain : (n,) bool
+        Whether they have neither paint nor lamps nor sheeting, and so may be simpler than others.
     endings : tuple of str
         Endings of the names of stand-ins, the most detailed first.
     """
@@ -122,7 +131,15 @@ def shapes_of(numbers: Mapping[str, int], low: Wide, high: Wide, faces: Index, e
             stand_in[levels[:-1]] = levels[1:]
     # Where a shape has too many triangles and its stand-in would have too few, the mean of both decides.
     mean = np.sqrt(faces * np.where(stand_in < 0, faces, faces[stand_in]))
-    return Shapes(0.5 * (low + high), 0.5 * (high - low), stand_in, _DENSEST * np.sqrt(mean), faces)
+    densest = np.where(plain, _DENSEST_PLAIN, _DENSEST)
+    return Shapes(
+        0.5 * (low + high),
+        0.5 * (high - low),
+        stand_in,
+        densest * np.sqrt(mean),
+        faces,
+        np.where(plain, _SMALLEST_PLAIN, _SMALLEST),
+    )
 
 
 def copies_of(shape: Index, record: Array, place: Wide, shapes: Shapes) -> Copies:
@@ -215,7 +232,7 @@ def choose(
     int
         Number of copies chosen.
     """
-    middle, radius, first = copies.middle, copies.radius, cells.first
+    middle, radius, first, smallest = copies.middle, copies.radius, cells.first, shapes.smallest
     begin = first[len(first) - 1]
     measure(shapes, copies, begin, end)
     p, q, r, s, ahead = _row(planes, 0), _row(planes, 1), _row(planes, 2), _row(planes, 3), _row(planes, 4)
@@ -232,7 +249,7 @@ def choose(
         for copy in range(low, high):
             x, y, z = middle[copy, 0] - eye[0], middle[copy, 1] - eye[1], middle[copy, 2] - eye[2]
             depth = _depth((x, y, z), radius[copy], p, q, r, s, ahead)
-            if depth < farthest and focal * radius[copy] > _SMALLEST * (depth + radius[copy]):
+            if depth < farthest and focal * radius[copy] > smallest[copies.shape[copy]] * (depth + radius[copy]):
                 chosen.copy[count] = copy
                 chosen.bin[count] = min(int(6.0 * np.log2(1.0 + depth)), _BINS - 1)
                 count += 1

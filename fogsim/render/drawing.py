@@ -5,13 +5,15 @@ pixel sees (a `Rasteriser`), and shade what is seen (`fogsim.render.shading`). O
 and by OpenGL, so where both see the same triangle they give the same picture to the bit.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.render.solids import in_solids
 from fogsim.values.camera import Camera, CameraPose
 from fogsim.values.scene import Mesh
 
@@ -41,6 +43,8 @@ class MeshTable:
         As in `Mesh`.
     faces : (m, 3) int32
         Vertices of each triangle, numbered through all meshes.
+    in_solid : (m,) bool
+        Whether a triangle is part of a closed solid that no camera is in: its inner side need not be drawn.
     first_vertex, first_face : (k + 1,) int64
         Where the vertices and triangles of each of the k meshes begin, and their numbers n and m at the end.
     """
@@ -53,14 +57,26 @@ class MeshTable:
     instance: NDArray[np.int32]
     road: NDArray[np.float32]
     faces: NDArray[np.int32]
+    in_solid: NDArray[np.bool_]
     first_vertex: NDArray[np.int64]
     first_face: NDArray[np.int64]
 
     @classmethod
-    def of(cls, meshes: Mapping[str, Mesh]) -> "MeshTable":
-        """Put meshes one after another and number them in their order."""
+    def of(cls, meshes: Mapping[str, Mesh], never_inside: Callable[[str], bool] = lambda _: False) -> "MeshTable":
+        """Put meshes one after another and number them in their order.
+
+        Parameters
+        ----------
+        meshes : mapping from str to Mesh
+            The meshes by name.
+        never_inside : callable
+            Tells by a name whether no camera is ever inside what the mesh shows.
+        """
         parts = list(meshes.values())
         first_vertex = np.cumsum([0, *(len(part.positions) for part in parts)], dtype=np.int64)
+        in_solid = [
+            in_solids(part) if never_inside(name) else np.zeros(len(part.faces)) for name, part in meshes.items()
+        ]
         faces = [part.faces.astype(np.int64) + first for part, first in zip(parts, first_vertex, strict=False)]
         return cls(
             numbers={name: number for number, name in enumerate(meshes)},
@@ -71,9 +87,19 @@ class MeshTable:
             instance=_joined([part.instance for part in parts], np.int32),
             road=_joined([part.road for part in parts], np.float32, 4),
             faces=_joined(faces, np.int32, 3),
+            in_solid=_joined(in_solid, np.bool_),
             first_vertex=first_vertex,
             first_face=np.cumsum([0, *map(len, faces)], dtype=np.int64),
         )
+
+    def extremes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Least and greatest coordinates (k, 3) of each mesh [m]; zero for one without vertices."""
+        ends = np.zeros((2, len(self.numbers), 3))
+        for number, (start, end) in enumerate(pairwise(self.first_vertex.tolist())):
+            if end > start:
+                own = self.positions[start:end]
+                ends[0, number], ends[1, number] = own.min(axis=0), own.max(axis=0)
+        return ends[0], ends[1]
 
 
 def _joined(parts: list[NDArray[Any]], kind: type[np.generic], columns: int = 0) -> NDArray[Any]:

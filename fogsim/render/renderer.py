@@ -1,6 +1,6 @@
 """The renderer: what may show, which triangle each pixel sees, and how bright it is."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from fogsim.render.protocol import RenderError
 from fogsim.render.shading import Shading
 from fogsim.values.camera import Camera, CameraPose
 from fogsim.values.image import View
-from fogsim.values.scene import Batch, Mesh, Scene
+from fogsim.values.scene import Batch, Scene, Surface
 
 STAND_INS = (":middle", ":far", ":tiny", ":speck")
 """Endings of the names of shapes that stand in for the one without, where it is small."""
@@ -43,11 +43,13 @@ class SceneRenderer:
     def __init__(self, scene: Scene, illuminance: float, make_rasteriser: Callable[[MeshTable], Rasteriser]) -> None:
         ground = split_ground(scene.ground)
         meshes = {**scene.shapes, **ground.pieces}
-        self._table = MeshTable.of(meshes)
+        # Stand-ins are drawn where they are small, and so from outside.
+        self._table = MeshTable.of(meshes, lambda name: name.endswith(STAND_INS))
         self._rasteriser: Rasteriser | None = make_rasteriser(self._table)
         self._shading = Shading(self._table, illuminance, ground.height, ground.reflectance)
-        low, high = (_extremes(meshes, end) for end in (np.min, np.max))
-        self._shapes = shapes_of(self._table.numbers, low, high, np.diff(self._table.first_face), STAND_INS)
+        plain = np.array([bool(np.all(mesh.surface == int(Surface.MATT))) for mesh in meshes.values()])
+        faces = np.diff(self._table.first_face)
+        self._shapes = shapes_of(self._table.numbers, *self._table.extremes(), faces, plain, STAND_INS)
         shape, record, place = self._standing(scene.scenery, ground)
         self._copies, self._cells = cells_of(copies_of(shape, record, place, self._shapes), _CELL)
         self._still = len(shape)
@@ -112,7 +114,10 @@ class SceneRenderer:
             record[:, 12:15] = np.concatenate([batch.paint for batch in vehicles])
             integers[:, 15] = np.concatenate([batch.lamps for batch in vehicles])
             integers[:, 16] = np.concatenate([batch.instance for batch in vehicles])
-            self._copies.shape[self._still : end] = np.repeat([self._number(batch) for batch in vehicles], counts)
+            begin = self._still
+            for batch, count in zip(vehicles, counts, strict=True):
+                self._copies.shape[begin : begin + count] = self._number(batch)
+                begin += count
             self._copies.place[self._still : end] = record[:, 3:12:4]
         return end
 
@@ -121,12 +126,6 @@ class SceneRenderer:
             known = sorted(self._table.numbers)
             raise InputError(f"a batch names the shape {batch.shape!r}, which the scene does not have: {known}")
         return self._table.numbers[batch.shape]
-
-
-def _extremes(meshes: Mapping[str, Mesh], end: Callable[..., NDArray[np.float32]]) -> NDArray[np.float64]:
-    """Least or greatest coordinates of each mesh; zero for one without vertices."""
-    found = [end(mesh.positions, axis=0) if len(mesh.positions) else np.zeros(3) for mesh in meshes.values()]
-    return np.array(found, np.float64).reshape(-1, 3)
 
 
 def _records(batch: Batch) -> NDArray[np.float32]:

@@ -346,10 +346,14 @@ def test_a_closed_renderer_says_so() -> None:
 def test_stand_ins_replace_shapes_level_by_level() -> None:
     names = {"car": 0, "car:far": 1, "car:tiny": 2, "post": 3, "hut": 4, "hut:tiny": 5}
     box = np.ones((6, 3))
-    shapes = shapes_of(names, -box, box, np.array([400, 100, 4, 9, 50, 8]), (":far", ":tiny"))
+    plain = np.array([False, False, False, False, True, True])
+    shapes = shapes_of(names, -box, box, np.array([400, 100, 4, 9, 50, 8]), plain, (":far", ":tiny"))
     assert shapes.stand_in.tolist() == [1, 2, -1, -1, 5, -1]
     # The geometric mean of the triangles of both decides: of 200 and of 20.
     assert shapes.detail[0] == pytest.approx(math.sqrt(10.0) * shapes.detail[1])
+    # What is plain gives way sooner, and is sooner left out.
+    assert shapes.detail[4] > shapes.detail[1]  # both for a stand-in of 20 triangles
+    assert shapes.smallest[4] > shapes.smallest[0]
 
 
 def test_auto_is_one_of_the_renderers_and_says_why() -> None:

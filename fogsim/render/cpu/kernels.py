@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from fogsim.jit import kernel
+from fogsim.render.cpu.gathering import gather, key
 from fogsim.render.cpu.selection import Array, Index, Triangles, Wide, Work, project, set_up, sift
 
 _SMALL = 64  # boxes of no more pixels are looked at before their triangle is drawn
@@ -65,20 +66,14 @@ def rasterise(
     """
     picture[top:bottom] = _EMPTY
     # Handing an array to a function costs as much as drawing a triangle, so the functions below take many copies each.
-    begin = 0
+    size, begin = (top, bottom, columns), 0
     while begin < len(mesh):
-        end, vertices, faces = begin, 0, 0
-        while end < len(mesh):
-            vertices += triangles.first_vertex[mesh[end] + 1] - triangles.first_vertex[mesh[end]]
-            faces += triangles.first_face[mesh[end] + 1] - triangles.first_face[mesh[end]]
-            if vertices > work.corners.shape[1] or faces > len(work.points):
-                break
-            end += 1
-        project(triangles, mesh, record, begin, end, axes, lens, near, work.corners)
-        count = sift(triangles, mesh, first, begin, end, (top, bottom, columns), work)
-        count = set_up(count, lens, near, (top, bottom, columns), work)
+        count, begin = gather(triangles, mesh, record, begin, axes, lens, near, picture, size, work)
+        copies = work.copy[:count]
+        project(triangles, mesh, record, copies, axes, lens, near, work.corners)
+        count = sift(triangles, mesh, first, copies, size, work)
+        count = set_up(count, lens, near, size, work)
         _fill(work, count, lens, near, picture)
-        begin = end
 
 
 @kernel
@@ -118,12 +113,15 @@ def _fill(work: Work, count: int, lens: Wide, near: float, picture: Index) -> No
         top, bottom, left, right = int(box[t, 0]), int(box[t, 1]), int(box[t, 2]), int(box[t, 3])
         least = min(points[t, 2], points[t, 5], points[t, 8])
         crossing = least <= near
-        if not crossing and (bottom - top) * (right - left) < _SMALL:
+        if not crossing and right - left < _LANES:
             # Most small triangles are hidden by what has been drawn already, and to see that is cheap.
-            limit, hidden = _key(np.float32(1.0001) / least, 0), True
+            limit, hidden = key(np.float32(1.0001) / least, 0), True
+            beside, over = np.uint64(left), np.int64(right - left)
             for v in range(np.uint64(top), np.uint64(bottom + 1)):
-                for u in range(np.uint64(left), np.uint64(right + 1)):
-                    hidden &= picture[v, u] > limit
+                shown = 0
+                for i in range(np.uint64(_LANES)):
+                    shown |= (picture[v, beside + i] <= limit) & (np.int64(i) <= over)
+                hidden = shown == 0
                 if not hidden:
                     break
             if hidden:
@@ -156,15 +154,10 @@ def _fill(work: Work, count: int, lens: Wide, near: float, picture: Index) -> No
             start = np.float32(zx * low + zy * row + zz)
             # Unsigned numbers tell the compiler that no index counts from the end.
             for i in range(np.uint64(lanes)):
-                key = _key(start + step * np.float32(np.int32(i)), number)
-                key = key if np.int64(i) <= end else 0
+                found = key(start + step * np.float32(np.int32(i)), number)
+                found = found if np.int64(i) <= end else 0
                 before = picture[v, begin + i]
-                picture[v, begin + i] = key if key > before else before
-
-
-@kernel
-def _key(inverse_depth: float | np.float32, slot: int) -> Any:
-    return np.int64(np.float32(inverse_depth).view(np.int32)) << 32 | np.int64(slot)
+                picture[v, begin + i] = found if found > before else before
 
 
 @kernel

@@ -27,12 +27,16 @@ class CPURasteriser:
 
     def __init__(self, table: MeshTable) -> None:
         counts = np.diff(table.first_vertex)
+        low, high = table.extremes()
         start = np.repeat(table.first_vertex[:-1], np.diff(table.first_face))
         self._triangles = Triangles(
             positions=np.ascontiguousarray(table.positions.T),
             faces=(table.faces - start[:, None]).astype(np.uint32),
             first_vertex=table.first_vertex,
             first_face=table.first_face,
+            in_solid=table.in_solid,
+            centre=0.5 * (low + high),
+            half_extent=0.5 * (high - low),
         )
         self._most = (
             max(int(counts.max(initial=1)), 2 * _TOGETHER),
@@ -87,4 +91,5 @@ def _room(vertices: int, faces: int) -> Work:
         # One more, since the last one is written down before it is left out.
         vertex=np.empty((faces + 1, 3), np.uint32),
         slot=np.empty(faces + 1, np.int32),
+        copy=np.empty(faces, np.int64),
     )

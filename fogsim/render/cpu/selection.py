@@ -25,12 +25,19 @@ class Triangles(NamedTuple):
         Vertices of each triangle, numbered within its mesh.
     first_vertex, first_face : (k + 1,) int64
         Where those of each mesh begin.
+    in_solid : (m,) bool
+        As in `MeshTable`.
+    centre, half_extent : (k, 3) float64
+        Middle and half the extents of the bounding box of each mesh [m].
     """
 
     positions: Array
     faces: NDArray[np.uint32]
     first_vertex: Index
     first_face: Index
+    in_solid: NDArray[np.bool_]
+    centre: Wide
+    half_extent: Wide
 
 
 class Work(NamedTuple):
@@ -48,6 +55,8 @@ class Work(NamedTuple):
         Where its vertices are among the corners.
     slot : (m,) int32
         Its slot.
+    copy : (c,) int64
+        The copies that are worked on.
     """
 
     corners: Array
@@ -55,6 +64,7 @@ class Work(NamedTuple):
     box: NDArray[np.int32]
     vertex: NDArray[np.uint32]
     slot: NDArray[np.int32]
+    copy: Index
 
 
 @kernel
@@ -62,8 +72,7 @@ def project(
     triangles: Triangles,
     mesh: Index,
     record: Array,
-    begin: int,
-    end: int,
+    copies: Index,
     axes: Wide,
     lens: Wide,
     near: float,
@@ -73,7 +82,7 @@ def project(
     positions, first_vertex = triangles.positions, triangles.first_vertex
     focal, nearest, nothing = np.float32(lens[0]), np.float32(near), np.float32(np.nan)
     base = 0
-    for copy in range(begin, end):
+    for copy in copies:
         start = first_vertex[mesh[copy]]
         count = first_vertex[mesh[copy] + 1] - start
         for row in range(3):
@@ -95,30 +104,30 @@ def project(
 
 
 @kernel
-def sift(
-    triangles: Triangles, mesh: Index, first: Index, begin: int, end: int, size: tuple[int, int, int], work: Work
-) -> int:
+def sift(triangles: Triangles, mesh: Index, first: Index, copies: Index, size: tuple[int, int, int], work: Work) -> int:
     """Triangles of copies whose boxes may hold the centre of any pixel, with vertices and slots; their count.
 
     Every triangle is written down, and by the next one again unless it is kept: which are is hard to foresee, and so
     costs a processor that guesses more than to write.
     """
     faces, first_vertex, first_face = triangles.faces, triangles.first_vertex, triangles.first_face
+    in_solid = triangles.in_solid
     corners, vertex, slot = work.corners, work.vertex, work.slot
     first_row, last_row, last_column = np.float32(size[0]), np.float32(size[1] - 1), np.float32(size[2] - 1)
     zero, slack = np.float32(0.0), np.float32(_SLACK)
     count, base = np.uint64(0), np.uint32(0)
-    for copy in range(begin, end):
+    for copy in copies:
         start = np.uint64(first_face[mesh[copy]])
         for own in range(np.uint64(first_face[mesh[copy] + 1]) - start):
             face = start + own
             i, j, k = faces[face, 0] + base, faces[face, 1] + base, faces[face, 2] + base
             a, b, c = corners[3, i], corners[3, j], corners[3, k]
             left, right = np.ceil(_least(a, b, c) - slack), np.floor(_greatest(a, b, c) + slack)
-            whole = a + b + c
+            whole, p, q = a + b + c, b - a, c - a
             a, b, c = corners[4, i], corners[4, j], corners[4, k]
             top, bottom = np.ceil(_least(a, b, c) - slack), np.floor(_greatest(a, b, c) + slack)
-            empty = (left > right) | (top > bottom) | (right < zero) | (left > last_column)
+            behind = in_solid[face] & (p * (c - a) - q * (b - a) > zero)
+            empty = behind | (left > right) | (top > bottom) | (right < zero) | (left > last_column)
             empty |= (bottom < first_row) | (top > last_row)
             vertex[count, 0], vertex[count, 1], vertex[count, 2] = i, j, k
             slot[count] = np.int32(first[copy]) + np.int32(own)

@@ -14,7 +14,7 @@ OBJECT, ROAD, TERRAIN, SKY = range(4)
 """Kinds of surfaces: colour that varies over a triangle, textured ground, and what is no triangle."""
 
 # Columns of what is known of a surface. A plane is three numbers: times column, row and 1.
-KIND, INSTANCE, LEAST, MOST = range(4)  # least and greatest 1/z [1/m]
+INSTANCE, LEAST, MOST = range(3)  # least and greatest 1/z [1/m]
 DEPTH = 4  # plane of 1/z [1/m]
 LIGHT = 7  # radiance per channel: planes of it over z, or numbers
 RESPONSE = 16  # lamp response times distance likewise
@@ -82,14 +82,17 @@ class Runs(NamedTuple):
         Number of the surface of each slot, or −2 − its copy as long as it has none.
     slot, copy : (n,) int32
         Of each surface, from number 2 on; number 0 is the sky and 1 the terrain.
+    kind : (n,) int32
+        Kind of each.
     surface : (n, COLUMNS) float64
-        What is known of each.
+        What else is known of each.
     """
 
     run: Numbers
     surface_of_slot: Numbers
     slot: Numbers
     copy: Numbers
+    kind: Numbers
     surface: Wide
 
 

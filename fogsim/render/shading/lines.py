@@ -1,4 +1,4 @@
-"""Painted lines beside a lane: what of a pixel's footprint they cover, and which pixels of a run come near one."""
+"""Painted lines beside a lane: which pixels of a run come near one, and how much of a dashed one is paint."""
 
 import math
 
@@ -6,63 +6,44 @@ import numpy as np
 
 from fogsim.jit import kernel
 
-_LINE_WIDTH, _DASH, _PERIOD = 0.2, 6.0, 18.0
-_ANYWHERE = 1e6  # wider than any lane [m]
+LINE_WIDTH = 0.2
+"""Width of a line [m]."""
+
+_DASH, _PERIOD = 6.0, 18.0
+
+
+@kernel
+def columns_near(away: float, change: float, reach: float, size: int) -> tuple[int, int]:
+    """First of the pixels of a run that lie within reach of a line, and the one after the last.
+
+    Parameters
+    ----------
+    away, change : float
+        How far to the left of the line the first pixel is, and by how much each further one is more so.
+    reach : float
+        How far from the line a pixel may be.
+    size : int
+        Number of pixels.
+    """
+    if abs(change) * size <= 1e-9 * reach:  # the row runs along the line
+        return 0, size if abs(away) < reach else 0
+    per_change = 1.0 / change
+    middle, half = -away * per_change, reach * abs(per_change)
+    end = size - 1.0
+    first, last = np.ceil(min(max(middle - half, 0.0), end + 1.0)), np.floor(min(max(middle + half, -1.0), end))
+    return int(first), int(max(last + 1.0, first))
+
+
+@kernel
+def dashed_share(along: float, length: float) -> float:
+    """Share of a footprint that dashes cover, from the place of its middle along the line and its length [m]."""
+    length = max(length, 1e-4)
+    start = along - 0.5 * length
+    return (_painted_below(start + length) - _painted_below(start)) / length
 
 
 @kernel
 def _painted_below(x: float) -> float:
     """Length of what lies below x of dashes that start at multiples of their period [m]."""
-    return math.floor(x / _PERIOD) * _DASH + min(x - _PERIOD * math.floor(x / _PERIOD), _DASH)
-
-
-@kernel
-def line_share(code: int, middle: float, along: float, across: float, length: float, width: float) -> float:
-    """Share of a footprint that a painted line covers.
-
-    Parameters
-    ----------
-    code : int
-        1 for a solid line, 2 for a dashed one.
-    middle : float
-        Where the middle of the line is, to the left of the lane's [m].
-    along, across, length, width : float
-        Middle and extents of the footprint along and across the lane [m].
-    """
-    low = max(across - 0.5 * width, middle - 0.5 * _LINE_WIDTH)
-    high = min(across + 0.5 * width, middle + 0.5 * _LINE_WIDTH)
-    share = max(high - low, 0.0) / width
-    if code == 1 or share == 0.0:
-        return share
-    start = along - 0.5 * length
-    return share * (_painted_below(start + length) - _painted_below(start)) / length
-
-
-@kernel
-def reach_of(across: float, change: float) -> float:
-    """How far from the middle of a line a footprint's middle may be that still touches it [m].
-
-    `across` is the greatest extent of a footprint in the middle of the line [m], and `change` how much greater it is at
-    most for each metre beside it.
-    """
-    return 1.01 * (_LINE_WIDTH + across) / (2.0 - change) if change < 1.0 else _ANYWHERE
-
-
-@kernel
-def columns_between(
-    t_base: float, tx: float, base: float, zx: float, low: float, high: float, size: int
-) -> tuple[int, int]:
-    """First pixel of a run, and the one after the last, that lie from `low` to `high` to the left of the lane's middle.
-
-    Over the run's columns the place t / z on the lane and 1 / z are linear, so each end is where a line crosses zero.
-    """
-    first, after = 0.0, float(size)
-    for rest, slope in ((t_base - low * base, tx - low * zx), (high * base - t_base, high * zx - tx)):
-        if slope > 0.0:
-            first = max(first, np.ceil(-rest / slope))
-        elif slope < 0.0:
-            after = min(after, np.floor(-rest / slope) + 1.0)
-        elif rest < 0.0:
-            after = 0.0
-    after = max(after, 0.0)
-    return int(min(first, after)), int(after)
+    periods = math.floor(x / _PERIOD)
+    return periods * _DASH + min(x - _PERIOD * periods, _DASH)

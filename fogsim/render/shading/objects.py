@@ -6,7 +6,7 @@ from fogsim.jit import kernel
 from fogsim.render.shading import layout
 from fogsim.render.shading.layout import Light, Picture, Runs, Wide
 
-KIND, INSTANCE, LEAST, MOST, DEPTH = layout.KIND, layout.INSTANCE, layout.LEAST, layout.MOST, layout.DEPTH
+INSTANCE, LEAST, MOST, DEPTH = layout.INSTANCE, layout.LEAST, layout.MOST, layout.DEPTH
 LIGHT, RESPONSE, LOW, HIGH = layout.LIGHT, layout.RESPONSE, layout.LOW, layout.HIGH
 RESPONSE_LOW, RESPONSE_HIGH = layout.RESPONSE_LOW, layout.RESPONSE_HIGH
 OBJECT = layout.OBJECT
@@ -27,14 +27,13 @@ def shade_objects(runs: Runs, count: int, lens: Wide, picture: Picture) -> None:
     picture : Picture
         Is filled where these runs are.
     """
-    run, known = runs.run, runs.surface
+    run, kinds, known = runs.run, runs.kind, runs.surface
     radiance, distance, instance, response = picture.radiance, picture.distance, picture.instance, picture.response
     lamplight, depths = len(response) > 0, np.empty(distance.shape[1], np.float32)
     per_focal, one = np.float32(1.0 / lens[0]), np.float32(1.0)
     for number in range(count):
         k = run[number, 3]
-        kind = known[k, KIND]
-        if kind != OBJECT:
+        if kinds[k] != OBJECT:
             continue
         v, begin, end = np.uint64(run[number, 0]), run[number, 1], run[number, 2]
         row, name = float(run[number, 0]), np.int32(known[k, INSTANCE])

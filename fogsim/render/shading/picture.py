@@ -8,13 +8,15 @@ from fogsim.render.drawing import Drawing, MeshTable
 from fogsim.render.lens import Lens, lens_of
 from fogsim.render.photometry import SKY_TINT, lamp_radiance, lighting_bits, zenith_luminance
 from fogsim.render.shading import layout
-from fogsim.render.shading.ground import Bench, bench, shade_ground
 from fogsim.render.shading.layout import Copies, Light, Meshes, Numbers, Picture, Runs
 from fogsim.render.shading.memory import Memory
 from fogsim.render.shading.noise import Noise, tiles
 from fogsim.render.shading.objects import shade_objects, shade_sky
+from fogsim.render.shading.road import shade_road
 from fogsim.render.shading.runs import find_runs
 from fogsim.render.shading.surfaces import know, know_background
+from fogsim.render.shading.terrain import shade_terrain
+from fogsim.render.shading.texture import Row, memory_for_row
 from fogsim.values.camera import Camera, CameraPose
 from fogsim.values.image import View
 from fogsim.values.scene import Surface
@@ -55,7 +57,7 @@ class Shading:
         )
         self._noise, self._bands, self._memory = tiles(), Bands(), Memory()
         # For each band.
-        self._benches, self._runs = [bench(), bench()], [_room(0, 0), _room(0, 0)]
+        self._rows, self._runs = [memory_for_row(0), memory_for_row(0)], [_room(0, 0), _room(0, 0)]
 
     def view(
         self, slots: NDArray[np.int32], drawing: Drawing, camera: Camera, pose: CameraPose, lamplight: bool
@@ -88,6 +90,8 @@ class Shading:
 
         def shade(band: int, top: int, bottom: int) -> None:
             runs = self._room(band, (bottom - top) * columns, int(drawing.first[-1]))
+            if len(self._rows[band].depth) != columns:
+                self._rows[band] = memory_for_row(columns)
             shade_rows(
                 slots,
                 top,
@@ -98,7 +102,7 @@ class Shading:
                 self._light,
                 self._noise,
                 runs,
-                self._benches[band],
+                self._rows[band],
                 picture,
             )
 
@@ -126,7 +130,7 @@ def shade_rows(
     light: Light,
     noise: Noise,
     runs: Runs,
-    work: Bench,
+    work: Row,
     picture: Picture,
 ) -> None:
     """Shade the rows of a picture from `top` to the one before `bottom`."""
@@ -136,7 +140,8 @@ def shade_rows(
     know_background(lens, light, runs)
     know(meshes, copies, lens, light, len(picture.response) > 0, runs, surfaces)
     shade_objects(runs, count, lens.lens, picture)
-    shade_ground(runs, count, lens, noise, work, picture)
+    shade_road(runs, count, lens, noise, work, picture)
+    shade_terrain(runs, count, lens, noise, work, picture)
     shade_sky(runs, count, lens.rays, light, picture)
 
 
@@ -149,5 +154,6 @@ def _room(pixels: int, slots: int) -> Runs:
         surface_of_slot=np.empty(slots, np.int32),
         slot=np.empty(surfaces, np.int32),
         copy=np.empty(surfaces, np.int32),
+        kind=np.empty(surfaces, np.int32),
         surface=np.empty((surfaces, layout.COLUMNS)),
     )

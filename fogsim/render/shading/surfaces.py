@@ -15,7 +15,7 @@ _ROAD, _PAINT, _SHEETING = int(Surface.ROAD), int(Surface.PAINT), int(Surface.SH
 _PERIOD = 18.0  # of dashed lines [m]
 _PER_PI = 1.0 / math.pi
 
-KIND, INSTANCE, LEAST, MOST, DEPTH = layout.KIND, layout.INSTANCE, layout.LEAST, layout.MOST, layout.DEPTH
+INSTANCE, LEAST, MOST, DEPTH = layout.INSTANCE, layout.LEAST, layout.MOST, layout.DEPTH
 LIGHT, RESPONSE, LOW, HIGH = layout.LIGHT, layout.RESPONSE, layout.LOW, layout.HIGH
 RESPONSE_LOW, RESPONSE_HIGH = layout.RESPONSE_LOW, layout.RESPONSE_HIGH
 ALONG, ACROSS, WHITE = layout.ALONG, layout.ACROSS, layout.WHITE
@@ -57,9 +57,9 @@ def _inverse_square(x: float, y: float, z: float) -> float:
 @kernel
 def know_background(lens: Lens, light: Light, runs: Runs) -> None:
     """Set what is known of sky and terrain."""
-    surface, height = runs.surface, lens.eye[2] - light.terrain[0]
-    surface[0, KIND], surface[0, INSTANCE] = layout.SKY, 0
-    surface[1, KIND], surface[1, INSTANCE], surface[1, WHITE] = TERRAIN, 1, light.white
+    kind, surface, height = runs.kind, runs.surface, lens.eye[2] - light.terrain[0]
+    kind[0], surface[0, INSTANCE] = layout.SKY, 0
+    kind[1], surface[1, INSTANCE], surface[1, WHITE] = TERRAIN, 1, light.white
     surface[1, LEAST], surface[1, MOST] = 0.0, np.inf
     for column in range(3):
         surface[1, DEPTH + column] = -lens.rays[2, column] / height
@@ -74,7 +74,7 @@ def know(  # noqa: C901, PLR0912, PLR0915 - one loop: handing arrays to function
     positions, normals, colours, surface_of = meshes.positions, meshes.normals, meshes.reflectance, meshes.surface
     faces, first_face, roads, vertex_instance = meshes.faces, meshes.first_face, meshes.road, meshes.instance
     record, integers, mesh, first, axes = copies.record, copies.integers, copies.mesh, copies.first, lens.axes
-    slot_of, copy_of, known = runs.slot, runs.copy, runs.surface
+    slot_of, copy_of, kinds, known = runs.slot, runs.copy, runs.kind, runs.surface
     focal, u0, v0 = lens.lens[0], lens.lens[1], lens.lens[2]
     masks, lamps = light.lamp_masks, light.lamp_radiance
     corner, plane, offset = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
@@ -141,7 +141,7 @@ def know(  # noqa: C901, PLR0912, PLR0915 - one loop: handing arrays to function
             if kind == _ROAD and i == 0:
                 known[number, WHITE] = white
         if kind == _ROAD:
-            known[number, KIND] = ROAD
+            kinds[number] = ROAD
             i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
             start = _PERIOD * math.floor(roads[i, 0] / _PERIOD)
             for axis in range(3):
@@ -169,7 +169,7 @@ def know(  # noqa: C901, PLR0912, PLR0915 - one loop: handing arrays to function
             for i in range(3):
                 for channel in range(3):
                     answer[i, channel] = max(side * answer[i, channel], 0.0)
-        known[number, KIND] = OBJECT
+        kinds[number] = OBJECT
         for channel in range(3):
             a, b, c = lit[0, channel], lit[1, channel], lit[2, channel]
             known[number, LOW + channel], known[number, HIGH + channel] = min(a, b, c), max(a, b, c)

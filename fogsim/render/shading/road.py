@@ -1,0 +1,141 @@
+"""Radiance of asphalt with its wheel tracks and painted lines."""
+
+import numpy as np
+
+from fogsim.jit import kernel
+from fogsim.render.lens import Lens
+from fogsim.render.shading import layout
+from fogsim.render.shading.layout import Picture, Runs
+from fogsim.render.shading.lines import LINE_WIDTH, columns_near, dashed_share
+from fogsim.render.shading.noise import Noise
+from fogsim.render.shading.stretches import next_stretch
+from fogsim.render.shading.texture import ASPHALT, Row, weave
+
+DEPTH, ALONG, ACROSS, WHITE = layout.DEPTH, layout.ALONG, layout.ACROSS, layout.WHITE
+HALF_WIDTH, LINES, COLOUR, ROAD = layout.HALF_WIDTH, layout.LINES, layout.COLOUR, layout.ROAD
+
+_LINE_REFLECTANCE = 0.6
+_TRACK, _TRACK_WIDTH, _TRACK_DEPTH = 0.85, 0.28, 0.035  # wheel tracks beside a lane's middle [m], and how dark they are
+
+ROAD_RESPONSE = 0.0125
+"""Coefficient of retroreflected luminance of dry asphalt [cd/m² per lx] (middle of gallen2014's range)."""
+
+LINE_RESPONSE = 0.15
+"""That of its painted lines; dry ones have 0.1 … 0.3."""
+
+
+@kernel
+def shade_road(runs: Runs, count: int, lens: Lens, noise: Noise, work: Row, picture: Picture) -> None:
+    """Shade the runs of road, and set their distances and instance ids.
+
+    Parameters
+    ----------
+    runs : Runs
+        The runs and what is known of their surfaces.
+    count : int
+        Number of runs.
+    lens : Lens
+        Where the camera is.
+    noise : Noise
+        Texture.
+    work : Row
+        Memory.
+    picture : Picture
+        Is filled where these runs are.
+    """
+    run, known, member = runs.run, runs.surface, work.member
+    members, number = next_stretch(ROAD, runs, 0, count, lens.lens, work, picture)
+    while members > 0:
+        k, row = run[member[0], 3], float(run[member[0], 0])
+        begin, end = run[member[0], 1], run[member[members - 1], 2]
+        weave(ASPHALT, known[k, DEPTH], known[k, DEPTH + 1], known[k, DEPTH + 2], row, begin, end, lens, noise, work)
+        _pave(members, runs, work, picture)
+        _paint(members, runs, work, picture)
+        members, number = next_stretch(ROAD, runs, number, count, lens.lens, work, picture)
+
+
+@kernel
+def _pave(members: int, runs: Runs, work: Row, picture: Picture) -> None:
+    """Asphalt of the members of a stretch, darker where wheels roll."""
+    run, known, depth, texture, member = runs.run, runs.surface, work.depth, work.texture, work.member
+    radiance, response = picture.radiance, picture.response
+    one, track = np.float32(1.0), np.float32(_TRACK)
+    for place in range(members):
+        number = member[place]
+        k, v, row = run[number, 3], np.uint64(run[number, 0]), float(run[number, 0])
+        begin, size = np.uint64(run[number, 1]), np.uint64(run[number, 2] - run[number, 1])
+        zx, zy = known[k, DEPTH], known[k, DEPTH + 1]
+        tx, ty = known[k, ACROSS], known[k, ACROSS + 1]
+        base = tx * run[number, 1] + ty * row + known[k, ACROSS + 2]
+        middle = size // np.uint64(2)
+        z = np.float64(depth[begin + middle])
+        across = (base + tx * float(middle)) * z
+        spread = abs(z * (tx - across * zx)) + abs(z * (ty - across * zy))
+        width = np.float32(1.0 / (_TRACK_WIDTH + 0.5 * spread))
+        darker = np.float32(_TRACK_DEPTH * _TRACK_WIDTH) * width
+        rest, slope, white = np.float32(base), np.float32(tx), known[k, WHITE]
+        red, green, blue = known[k, COLOUR], known[k, COLOUR + 1], known[k, COLOUR + 2]
+        r, g, b = np.float32(red * white), np.float32(green * white), np.float32(blue * white)
+        for i in range(size):
+            column = begin + i
+            off = (abs((rest + slope * np.float32(np.int32(i))) * depth[column]) - track) * width
+            off = one + off * off
+            texture[column] -= darker / (off * off)
+        # A loop of its own, since each alone runs in vector registers.
+        for u in range(begin, np.uint64(run[number, 2])):
+            radiance[v, u, 0], radiance[v, u, 1], radiance[v, u, 2] = r * texture[u], g * texture[u], b * texture[u]
+        if len(response) > 0:
+            per_mean = 3.0 * ROAD_RESPONSE / max(red + green + blue, 3e-6)
+            r, g, b = np.float32(red * per_mean), np.float32(green * per_mean), np.float32(blue * per_mean)
+            for u in range(begin, np.uint64(run[number, 2])):
+                response[v, u, 0], response[v, u, 1], response[v, u, 2] = r * texture[u], g * texture[u], b * texture[u]
+
+
+@kernel
+def _paint(members: int, runs: Runs, work: Row, picture: Picture) -> None:
+    """Lines on the members of a stretch, where they come near one."""
+    run, known, depth, texture, member = runs.run, runs.surface, work.depth, work.texture, work.member
+    radiance, response, one = picture.radiance, picture.response, np.float32(1.0)
+    lamplight, paint_response = len(response) > 0, np.float32(LINE_RESPONSE)
+    for place in range(members):
+        number = member[place]
+        k, v, row = run[number, 3], np.uint64(run[number, 0]), float(run[number, 0])
+        codes, half_lane = int(known[k, LINES]), known[k, HALF_WIDTH]
+        if codes == 0:
+            continue
+        begin, size = run[number, 1], run[number, 2] - run[number, 1]
+        zx, zy = known[k, DEPTH], known[k, DEPTH + 1]
+        sx, sy = known[k, ALONG], known[k, ALONG + 1]
+        tx, ty = known[k, ACROSS], known[k, ACROSS + 1]
+        s_base = sx * begin + sy * row + known[k, ALONG + 2]
+        t_base = tx * begin + ty * row + known[k, ACROSS + 2]
+        base = zx * begin + zy * row + known[k, DEPTH + 2]
+        paint = np.float32(known[k, WHITE] * _LINE_REFLECTANCE)
+        for edge in range(2):
+            code, line = (codes // 3, half_lane) if edge == 0 else (codes % 3, -half_lane)
+            if code == 0:
+                continue
+            # All over z: how far the line is, and the extents across it of the line itself and of a pixel's footprint.
+            away, change = t_base - line * base, tx - line * zx
+            footprint = max(abs(change) + abs(ty - line * zy), 1e-9)
+            per_footprint = 1.0 / footprint
+            first, after = columns_near(
+                away, change, 0.5 * (LINE_WIDTH * max(base, base + zx * size) + footprint), size
+            )
+            for i in range(np.uint64(first), np.uint64(after)):
+                u, step = np.uint64(begin) + i, float(i)
+                width = LINE_WIDTH * (base + zx * step)
+                covered = 0.5 * (width + footprint) - abs(away + change * step)
+                share = min(max(covered, 0.0), width, footprint) * per_footprint
+                if code == 2:
+                    far = np.float64(depth[u])
+                    s = (s_base + sx * step) * far
+                    share *= dashed_share(s, far * (abs(sx - s * zx) + abs(sy - s * zy)))
+                # Paint is worn where the asphalt below is coarse.
+                worn, part = one + np.float32(0.5) * (texture[u] - one), np.float32(share)
+                for channel in range(np.uint64(3)):
+                    asphalt = radiance[v, u, channel]
+                    radiance[v, u, channel] = asphalt + part * (paint * worn - asphalt)
+                    if lamplight:
+                        asphalt = response[v, u, channel]
+                        response[v, u, channel] = asphalt + part * (paint_response * worn - asphalt)

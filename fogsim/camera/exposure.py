@@ -2,12 +2,11 @@
 
 from dataclasses import dataclass
 from functools import cache
-from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.camera.kernels import NORMAL_TABLE_BITS, develop
+from fogsim.camera.kernels import develop
 from fogsim.jit import Bands
 from fogsim.response import respond
 from fogsim.values import Response
@@ -45,7 +44,7 @@ def expose(radiance: NDArray[np.float32], sensor: Sensor, response: Response, rn
     """Take an image.
 
     Photon noise is drawn as normal with the Poisson distribution's variance, which at the tens of electrons and more
-    that fog gives is the same (EMVA 1288: σ² = σ_read² + electrons). No draw is further than 3.7 σ from the mean.
+    that fog gives is the same (EMVA 1288: σ² = σ_read² + electrons). No draw is further than 4.5 σ from the mean.
 
     Parameters
     ----------
@@ -70,25 +69,14 @@ def expose(radiance: NDArray[np.float32], sensor: Sensor, response: Response, rn
     light, values = np.ascontiguousarray(radiance, dtype=np.float32).reshape(-1), out.reshape(-1)
     gain, per_electron = np.float32(1.0 / sensor.saturation_luminance), np.float32(1.0 / sensor.full_well)
     read_variance = np.float32((sensor.read_noise / sensor.full_well) ** 2)
-    keys, normals = (np.uint32(key & 0xFFFFFFFF), np.uint32(key >> 32)), _normal_table()
+    keys = np.uint32(key & 0xFFFFFFFF), np.uint32(key >> 32)
 
     def expose_rows(_: int, top: int, bottom: int) -> None:
         begin, end = 3 * columns * top, 3 * columns * bottom
-        develop(light, gain, per_electron, read_variance, *keys, normals, table, begin, end, values)
+        develop(light, gain, per_electron, read_variance, *keys, table, begin, end, values)
 
     Bands().work(expose_rows, rows, columns)
     return out
-
-
-@cache
-def _normal_table() -> NDArray[np.float32]:
-    """Standard normal deviates at the middles of 2^12 equally likely classes, scaled to a variance of 1."""
-    count = 1 << NORMAL_TABLE_BITS
-    inverse = NormalDist().inv_cdf
-    deviates = np.array([inverse((i + 0.5) / count) for i in range(count)])
-    table: NDArray[np.float32] = (deviates / deviates.std()).astype(np.float32)
-    table.setflags(write=False)
-    return table
 
 
 @cache

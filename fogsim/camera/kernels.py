@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from fogsim.jit import kernel
 
-NORMAL_TABLE_BITS = 12
-"""Noise is drawn from 2^12 normal quantiles by a hash of seed and sample: a table that stays in the nearest cache."""
+_MEAN, _FIRST, _THIRD, _FIFTH = 510.0, 6.5477767300336385e-3, 1.2394842240073496e-9, 2.7005539623815466e-14
+"""What makes the sum of four evenly distributed bytes, less its mean, a normal deviate: an odd polynomial fitted to the
+quantiles of both, of variance 1 and kurtosis 2.997; its distribution is within 0.0008 of the normal one everywhere."""
 
 BLOCK = 1024
 """Samples that go through the stages together: few enough for their buffers to stay in the nearest cache."""
@@ -25,7 +26,6 @@ def develop(
     read_variance: np.float32,
     first_key: np.uint32,
     second_key: np.uint32,
-    normals: NDArray[np.float32],
     response: NDArray[np.uint8] | NDArray[np.uint16],
     begin: int,
     end: int,
@@ -36,25 +36,27 @@ def develop(
     `gain` takes radiance to exposure relative to saturation. Shot noise has variance `shot_variance` · exposure and
     read noise `read_variance`, both relative to saturation². `response` takes exposure in even steps to pixel values.
 
-    Each stage is a loop of its own, so that the compiler turns hash and arithmetic into vector instructions and only
-    the two tables are read one by one; slices, since an offset index would be checked for its sign.
+    Hash and arithmetic are loops that the compiler turns into vector instructions; only the response is read from a
+    table, one by one. Slices, since an offset index would be checked for its sign.
     """
     top, half = np.float32(response.shape[0] - 1), np.float32(0.5)
     zero, one = np.float32(0.0), np.float32(1.0)
     index = np.empty(BLOCK, np.uint32)
-    noise = np.empty(BLOCK, np.float32)
+    mean, first, third, fifth = np.float32(_MEAN), np.float32(_FIRST), np.float32(_THIRD), np.float32(_FIFTH)
     for start in range(begin, end, BLOCK):
         count = min(BLOCK, end - start)
         light, pixels = radiance[start : start + count], out[start : start + count]
         _hashed(np.uint32(start), count, first_key, second_key, index)
         for i in range(count):
-            noise[i] = normals[index[i]]
-        for i in range(count):
             exposure = light[i] * gain
             # Written so that what is not a number counts as black, and never as an index into nowhere.
             exposure = exposure if exposure > zero else zero
             exposure = exposure if exposure < MOST_EXPOSURE else MOST_EXPOSURE
-            exposure += noise[i] * np.float32(math.sqrt(shot_variance * exposure + read_variance))
+            pairs = (index[i] & np.uint32(0x00FF00FF)) + ((index[i] >> np.uint32(8)) & np.uint32(0x00FF00FF))
+            off = np.float32(np.int32((pairs & np.uint32(0xFFFF)) + (pairs >> np.uint32(16)))) - mean
+            square = off * off
+            noise = off * (first + square * (third + square * fifth))
+            exposure += noise * np.float32(math.sqrt(shot_variance * exposure + read_variance))
             exposure = exposure if exposure > zero else zero
             exposure = exposure if exposure < one else one
             index[i] = np.uint32(np.int32(exposure * top + half))
@@ -66,7 +68,7 @@ def develop(
 def _hashed(
     start: np.uint32, count: int, first_key: np.uint32, second_key: np.uint32, index: NDArray[np.uint32]
 ) -> None:
-    """Evenly distributed indices of the normal table for the samples from `start` on.
+    """Evenly distributed numbers of 32 bits for the samples from `start` on.
 
     A counter through multiply and xor-shift with full avalanche (the constants are those of Wellons' lowbias32), in 32
     bits, which vector units multiply. The second key enters midway: with a first one alone, the noise of one frame
@@ -79,7 +81,7 @@ def _hashed(
         mixed ^= mixed >> np.uint32(15)
         mixed = np.uint32(mixed + second_key)
         mixed = np.uint32(mixed * np.uint32(0x846CA68B))
-        index[i] = mixed >> np.uint32(32 - NORMAL_TABLE_BITS)
+        index[i] = mixed ^ (mixed >> np.uint32(16))
 
 
 @kernel

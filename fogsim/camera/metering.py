@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from fogsim.camera.exposure import Sensor
 from fogsim.camera.kernels import luminance_samples
 
-SAMPLES = 4800
-"""About as many pixels as are metered, evenly spread: every 64th of a 640 × 480 image."""
+SAMPLES = 2400
+"""About as many pixels as are metered, evenly spread: every 121st of a 640 × 480 image."""
 
 HIGHLIGHT_SHARE = 0.95
 """Quantile of luminance that `Metering.HIGHLIGHTS` goes by: bright surfaces and sky, yet not the lamps among them."""

@@ -66,7 +66,6 @@ def test_noise_is_normal() -> None:
     assert (normal**3).mean() == pytest.approx(0.0, abs=0.015)
     assert (normal**4).mean() == pytest.approx(3.0, abs=0.04)
     beyond = [float((np.abs(normal) > k).mean()) for k in (1, 2, 3)]
-    # 4096 classes have 5.5 of them beyond 3 standard deviations on either side.
     assert beyond[:2] == pytest.approx([0.3173, 0.0455], rel=0.03)
     assert beyond[2] == pytest.approx(0.0027, rel=0.12)
 

@@ -13,10 +13,10 @@ FARTHEST = 1600.0
 """Distance beyond which no copy is drawn, nearer in small pictures [m]."""
 
 _LARGEST = 8.0  # about the radius of what is largest, but for the ground and woods [m]
-_SMALLEST, _SMALLEST_PLAIN = 1.0, 2.0  # radius in the picture below which a copy is left out [px]
+_SMALLEST, _SMALLEST_PLAIN = 1.0, 3.0  # radius in the picture below which a copy is left out [px]
 # Half a square's breadth over the root of its triangles, below which a stand-in does [px]: in general, and for what has
 # neither paint nor lamps nor signs' sheeting, such as trees, of which more is seen than of all else.
-_DENSEST, _DENSEST_PLAIN = 1.15, 1.5
+_DENSEST, _DENSEST_PLAIN = 1.15, 1.7
 _BINS = 64  # of distance, to draw near copies first
 _NUMBERS = 17  # 32-bit numbers of a record
 

@@ -47,11 +47,11 @@ def conifer(rng: np.random.Generator, level: int = 0) -> Mesh:
     return merge(parts)
 
 
-def _trunk(height: float, radius: float) -> Mesh:
-    angle = np.linspace(0, 2 * np.pi, 5)
-    ring = np.column_stack((np.cos(angle), np.sin(angle), np.zeros(5)))
+def _trunk(height: float, radius: float, sides: int = 4) -> Mesh:
+    angle = np.linspace(0, 2 * np.pi, sides + 1)
+    ring = np.column_stack((np.cos(angle), np.sin(angle), np.zeros(sides + 1)))
     points = np.stack((ring * radius, ring * radius * 0.8 + (0, 0, height)))
-    return mesh(points, grid_faces(2, 5), np.vstack((ring, ring)), BARK)
+    return mesh(points, grid_faces(2, sides + 1), np.vstack((ring, ring)), BARK)
 
 
 def _whorl(
@@ -88,7 +88,7 @@ def broad_leaved(rng: np.random.Generator, level: int = 0) -> Mesh:
     colour *= (1.0, 1.035, 1.065, 1.09, 1.03)[level]
     width = rng.uniform(0.22, 0.30) * (1.0, 1.0, 1.01, 1.13, 1.42)[level]
     middle, size = np.array([0.0, 0.0, 0.60]), np.array([1.15 * width, 1.15 * width, 0.33])
-    parts = [_trunk(0.4, 0.022)] if level < 3 else []
+    parts = [_trunk(0.4, 0.022, 4 if level < 3 else 3)] if level < 4 else []
     blobs, leaves = ((8, (80, 50)), (5, (30, 16)), (3, (0, 0)), (0, (0, 0)), (0, (0, 0)))[level]
     # A core that no light shines through, and around it what gives the crown its outline.
     parts += _blob(rng, middle, size, colour, leaves[0], level == 4)

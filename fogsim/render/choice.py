@@ -248,8 +248,11 @@ def choose(
                 continue
         for copy in range(low, high):
             x, y, z = middle[copy, 0] - eye[0], middle[copy, 1] - eye[1], middle[copy, 2] - eye[2]
+            # Most are too small, and that is the quickest to see.
+            if focal * radius[copy] <= smallest[copies.shape[copy]] * max(_dot(ahead, (x, y, z)), radius[copy]):
+                continue
             depth = _depth((x, y, z), radius[copy], p, q, r, s, ahead)
-            if depth < farthest and focal * radius[copy] > smallest[copies.shape[copy]] * (depth + radius[copy]):
+            if depth < farthest:
                 chosen.copy[count] = copy
                 chosen.bin[count] = min(int(6.0 * np.log2(1.0 + depth)), _BINS - 1)
                 count += 1

@@ -11,6 +11,7 @@ from fogsim.vision.clipped_sky import Clipping, clipping
 from fogsim.vision.horizon import PITCH_DEVIATION, levelled
 from fogsim.vision.lead_daylight import RoadFall, check_road, road_before, road_fall
 from fogsim.vision.lead_scene import steepness
+from fogsim.vision.lead_sky import airlight_beside, hidden_beside
 from fogsim.vision.lead_window import WIDTHS, LeadWindow, lead_region
 from fogsim.vision.luminance import linear_luminance
 from fogsim.vision.patch import Patch
@@ -110,7 +111,7 @@ def vehicle_crop(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera, 
     rows, cols = region
     level = levelled(image, camera)
     luminance = linear_luminance(level[rows, cols], camera.response, camera.bits)
-    sky, noise, lost = _sky(level, camera)
+    sky, noise, lost = _sky(level, camera, distance)
 
     def luminance_of(rows: slice, cols: slice) -> NDArray[np.float32]:
         return linear_luminance(level[rows, cols], camera.response, camera.bits)
@@ -122,7 +123,9 @@ def vehicle_crop(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera, 
     return Crop(luminance, (cols.start, rows.start), sky, noise, pitch, road, scale, lost)
 
 
-def _sky(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera) -> tuple[float, float, Clipping | None]:
+def _sky(
+    image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera, distance: float
+) -> tuple[float, float, Clipping | None]:
     """Luminance of the sky above the horizon, deviation of its pixels [linear grey levels], and what clipping takes."""
     bottom = min(math.floor(camera.horizon_row - 3), camera.height)
     if bottom < 2:
@@ -139,7 +142,9 @@ def _sky(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera) -> tuple
     noise = 1.4826 * float(np.median(across)) / math.sqrt(2.0)
     if noise > MOST_NOISE * bright:
         raise CannotTellError("what is above the horizon is no sky")
-    mean, lost = float(luminance[even].mean(dtype=np.float64)), clipping(pixels[even], camera)
+    hidden = hidden_beside(camera.focal_length, distance)
+    mean = airlight_beside(luminance, bright, noise, camera.principal_point[0] - side, hidden)
+    lost = clipping(pixels[even], camera)
     known = lost if lost.noise > 0.0 or mean < FULL else None
     return mean + lost.loss, max(noise, lost.noise), known
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.vision.box_means import box_means
 from fogsim.vision.clipped_sky import darker_by
 
 Floats = NDArray[np.float64]
@@ -111,27 +112,15 @@ class Fading:
     kept: float
 
 
-def _weights(size: int, centres: Floats, box: float) -> tuple[Floats, slice]:
-    """Shares of pixels in boxes about centres, and which pixels; beyond the border there is nothing to share."""
-    first = min(max(math.floor(centres.min() - 0.5 * box), 0), size - 1)
-    last = min(max(math.ceil(centres.max() + 0.5 * box) + 1, first + 1), size)
-    pixels = np.arange(first, last, dtype=np.float64)
-    upper = np.minimum(centres[:, None] + 0.5 * box, pixels + 0.5)
-    lower = np.maximum(centres[:, None] - 0.5 * box, pixels - 0.5)
-    shares = np.maximum(upper - lower, 0.0)
-    return np.asarray(shares / np.maximum(shares.sum(axis=1, keepdims=True), 1e-9), np.float64), slice(first, last)
-
-
 def resampled(picture: LeadPicture, lateral: Floats, height: Floats, cell: float) -> tuple[Floats, float]:
     """Contrast on a grid in metres as seen by pixels of one cell, and the variance of its noise.
 
     A far picture's box is one pixel; a near one's is wider by what a far pixel blurs, and squares of widths add.
     """
     box = math.sqrt(max(2.0 * (cell * picture.scale) ** 2 - 1.0, 1.0))
-    rows, down = _weights(picture.contrast.shape[0], picture.foot - height * picture.scale, box)
-    cols, across = _weights(picture.contrast.shape[1], picture.column + lateral * picture.scale, box)
-    left = float((rows**2).sum(axis=1).mean() * (cols**2).sum(axis=1).mean())
-    return np.asarray(rows @ picture.contrast[down, across] @ cols.T), picture.noise**2 * left
+    rows, cols = picture.foot - height * picture.scale, picture.column + lateral * picture.scale
+    means, left = box_means(picture.contrast, rows, cols, box)
+    return means, picture.noise**2 * left
 
 
 def cell_of(one: LeadPicture, other: LeadPicture) -> float:

@@ -13,6 +13,7 @@ from fogsim.vision.clipped_sky import Clipping, clipping
 from fogsim.vision.horizon import levelled
 from fogsim.vision.lead_daylight import RoadFall, check_road, road_before, road_fall
 from fogsim.vision.lead_patch import LeadPicture
+from fogsim.vision.lead_sky import airlight_beside, hidden_beside
 from fogsim.vision.lead_window import LeadWindow, find_lead, lead_region
 from fogsim.vision.response import linear_table
 from fogsim.vision.road_image import CannotTellError
@@ -28,14 +29,8 @@ SKY_CORE, SKY_SHARE = 0.08, 0.25
 """Relative half-width of the luminances that count as sky, and how much of the middle of the image above the horizon
 must have them [-]."""
 
-BLOCKS, BRIGHT_BLOCKS = 12, 80.0
-"""Blocks of columns of the sky, and the percentile of their brightness that is the airlight: trees hide the others."""
-
 SKY_HEIGHT = 0.06
 """How far above the horizon the airlight is read [rad]; less where the image ends."""
-
-HALF_TRUCK = 1.6
-"""How much of the sky beside the axis a high vehicle ahead can hide [m]."""
 
 LEAST_WIDTH = 3.0
 """Narrowest vehicle that is looked at [px]."""
@@ -193,27 +188,14 @@ def _daylight(pixels: LinearPixels, camera: Camera, margin: float, depth: float)
     core = np.abs(light - sky.luminance) <= SKY_CORE * sky.luminance + 4.0 * sky.noise
     if sky.noise > MOST_NOISE * sky.luminance or not core.size or float(core.mean()) < SKY_SHARE:
         raise CannotTellError("what is above the horizon is no sky")
-    hidden = HALF_TRUCK * camera.focal_length / depth
-    luminance = _airlight(light, sky, camera.principal_point[0] - camera.width // 6, hidden)
+    hidden = hidden_beside(camera.focal_length, depth)
+    axis = camera.principal_point[0] - camera.width // 6
+    luminance = airlight_beside(light, sky.luminance, sky.noise, axis, hidden)
     clear = np.abs(light - luminance) <= 4.0 * max(sky.noise, 1.0)
     lost = clipping(pixels.pixels[rows, camera.width // 6 : camera.width - camera.width // 6][clear], camera)
     # What clipping takes from the sky, its noise shows; then it is no longer clipped.
     clipped = 0.0 if lost.noise > 0.0 else sky.clipped
     return replace(sky, luminance=luminance + lost.loss, noise=max(sky.noise, lost.noise), clipped=clipped), lost
-
-
-def _airlight(light: NDArray[np.float32], sky: Sky, axis: float, hidden: float) -> float:
-    """Brightness of the sky where neither trees, however faint, nor the vehicle ahead stand before it."""
-    columns = np.array_split(np.arange(light.shape[1]), BLOCKS)
-    free = [block for block in columns if block.size and abs(float(block.mean()) - axis) > hidden]
-    means = []
-    for block in free if len(free) >= BLOCKS // 3 else columns:
-        part = light[:, block].astype(np.float64)
-        middle = float(np.median(part)) if part.size else sky.luminance
-        core = part[np.abs(part - middle) <= max(3.0 * sky.noise, 1.0)]
-        means.append(float(core.mean()) if core.size else middle)
-    # Whatever stands before it makes either reading darker.
-    return max(float(np.percentile(means, BRIGHT_BLOCKS)), sky.luminance)
 
 
 def steepness(luminance: NDArray[np.float32], sky: float, camera: Camera) -> float:

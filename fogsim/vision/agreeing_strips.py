@@ -78,8 +78,12 @@ def with_neighbours(own: JointFit, curves: StripCurves, geometry: StripGeometry,
         return best
     if len(seen) == 1:
         return own
-    pairs = [_fitted(curves, geometry, prior, [0, strip], own) for strip in seen]
-    kept = [pair for pair in pairs if pair is not None and agree(own, pair)]
+    found = [_fitted(curves, geometry, prior, [0, strip], own) for strip in seen]
+    pairs = [pair for pair in found if pair is not None]
+    # With an obstacle where there is none, or without the one that there is, a lane alone fits well and is far off.
+    if own.hidden.any() and len(pairs) == len(seen) and all(_alike(pair, best) for pair in pairs):
+        return best
+    kept = [pair for pair in pairs if agree(own, pair)]
     return kept[0] if len(kept) == 1 else own
 
 
@@ -97,6 +101,12 @@ def agree(own: JointFit, more: JointFit) -> bool:
     return abs(more.extinction - own.extinction) <= DISAGREEMENT * math.hypot(
         math.sqrt(sharpened), MODEL_DEVIATION * own.extinction
     )
+
+
+def _alike(first: JointFit, second: JointFit) -> bool:
+    """Whether two answers differ by no more than their deviations."""
+    apart = math.hypot(first.extinction_deviation, second.extinction_deviation)
+    return abs(first.extinction - second.extinction) <= DISAGREEMENT * apart
 
 
 def _fitted(

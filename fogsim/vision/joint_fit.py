@@ -22,6 +22,10 @@ ALBEDOS = ((0.015, 0.005), (0.015, 0.04), (0.015, 0.12), (0.04, 0.05), (0.08, 0.
 ALBEDO_CHANCES = (0.4, 0.2, 0.2, 0.15, 0.05)
 """How likely each of those is before the image is seen [-]."""
 
+SMOOTH, EXPLAINED = 3, 1.0
+"""How many of those have patches as faint as the first, and misfit of the first up to which stronger ones are not tried:
+they explain nothing then."""
+
 EXTINCTIONS, SIMPLE_EXTINCTIONS = 14, 28
 """Extinctions of the first searches, evenly in ln k."""
 
@@ -135,8 +139,8 @@ def fit_jointly(
         return None
     data = _Data(_brightened(curves, geometry, prior.darkening), geometry)
     best = data.from_search(prior) if near is None else data.from_near(near, prior)
-    found = [best] + [data.refined(albedo, prior, best.theta, MORE_STEPS) for albedo in ALBEDOS[1:]]
-    return _average(found)
+    tried = ALBEDOS if best.misfit > EXPLAINED else ALBEDOS[:SMOOTH]
+    return _average([best] + [data.refined(albedo, prior, best.theta, MORE_STEPS) for albedo in tried[1:]])
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,7 +251,7 @@ def _albedo(deviations: tuple[float, float]) -> Floats:
 
 
 def _average(found: list[_Refined]) -> JointFit:
-    costs = np.array([f.cost for f in found]) - 2.0 * np.log(ALBEDO_CHANCES)
+    costs = np.array([f.cost for f in found]) - 2.0 * np.log(ALBEDO_CHANCES[: len(found)])
     weight = np.exp(-0.5 * (costs - costs.min()))
     weight /= weight.sum()
     thetas = np.array([f.theta for f in found])

@@ -19,7 +19,7 @@ PARAMETERS = 4
 NEAR_BINS = 12
 """Nearest bins that the first guess of the road's luminance is made of."""
 
-CONVERGED = 1e-4
+CONVERGED = 1e-3
 """Step of k, relative to it and to the least that shows, below which no other is made [-]."""
 
 
@@ -210,6 +210,6 @@ def refine(
             break
         step = covariance @ gradient
         _move(theta, step, road, constant, unit, prior[4])
-        if iteration >= 3 and abs(step[0]) < CONVERGED * (abs(theta[0]) + unit):
+        if iteration >= 2 and abs(step[0]) < CONVERGED * (abs(theta[0]) + unit):
             iterations = min(iterations, iteration + 1)
     return theta, covariance, road[0], cost, squares, number

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
-from fogsim.vision.strip_kernels import light
+from fogsim.vision.sort_kernels import median_of_few
+from fogsim.vision.strip_kernels import row_light
 
 RISING, FALLING, RIDGE = 0, 1, 2
 """Kinds of points: edges to the brighter and to the darker side, and the middle of a narrow bright stripe."""
@@ -76,8 +77,7 @@ def row_points(
     edge, sign = np.empty(MOST_A_ROW), np.empty(MOST_A_ROW, np.int64)
     count = 0
     for row in rows:
-        for col in range(cols):
-            line[col] = light(pixels, tables, row, col)
+        row_light(pixels, tables, row, line)
         for col in range(cols - 2 * REACH):
             inner[col] = (
                 w1 * (r1[col] - l1[col])
@@ -105,12 +105,12 @@ def _row_edges(slope: NDArray[np.float32], edge: NDArray[np.float64], sign: NDAr
     """Peaks of a row's gradient that stand out of it; returns how many."""
     cols = slope.size
     # Half of a row's gradients, at least, are noise and texture.
-    sample = np.empty(SAMPLED, np.float32)
+    sample, ordered = np.empty(SAMPLED, np.float32), np.empty(SAMPLED, np.float32)
     step = max((cols - 2 * REACH) // SAMPLED, 1)
     for i in range(SAMPLED // 2):
         sample[2 * i] = abs(slope[min(REACH + i * step, cols - 1)])
         sample[2 * i + 1] = abs(slope[max(cols - 1 - REACH - i * step, 0)])
-    middle = float(np.median(sample))
+    middle = median_of_few(sample, ordered)
     least = np.float32(max(EDGE_IN_NOISE * middle / 0.6745, LEAST_GRADIENT))
     found = 0
     for col in range(REACH + 1, cols - REACH - 1):

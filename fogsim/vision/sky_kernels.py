@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
-from fogsim.vision.strip_kernels import MOST_SAMPLES, light
+from fogsim.vision.sort_kernels import sort_few
+from fogsim.vision.strip_kernels import MOST_SAMPLES, even_column, light
 
 SKY_SHARE, SKY_WIDTH = 7, 0.012
 """Part of a row (one in so many) that sky must fill to be found, and half the width of its luminances, relative [-]."""
@@ -33,13 +34,12 @@ def sky_rows(
     the row. The second of the two arrays is the share of the row that is as bright.
     """
     bright, share = np.zeros(rows.size), np.zeros(rows.size)
-    samples = np.empty(MOST_SAMPLES, np.float32)
     count = min(MOST_SAMPLES, right - left)
+    samples, ordered = np.empty(count, np.float32), np.empty(count, np.float32)
     for i in range(rows.size):
         for j in range(count):
-            col = left + int((j + 0.5) * (right - left) / count)
-            samples[j] = light(pixels, tables, rows[i], col)
-        ordered = np.sort(samples[:count])
+            samples[j] = light(pixels, tables, rows[i], even_column(j, count, left - 0.5, right - 0.5))
+        sort_few(samples, ordered)
         centre, kept = float(ordered[count - 1 - count // SKY_SHARE]), 0
         reach = max(2.5 * floor, SKY_WIDTH * centre)
         for _ in range(4):
@@ -193,7 +193,7 @@ def sky_bowl(
     covariance: NDArray[np.float64] = np.eye(4)
     seen, place = np.empty((rows.size, count)), np.empty(count)
     for j in range(count):
-        col = min(int((j + 0.5) * cols / count), cols - 1)
+        col = even_column(j, count, -0.5, cols - 0.5)
         place[j] = (col - axis[0]) / axis[3]
         for i in range(rows.size):
             seen[i, j] = light(pixels, tables, rows[i], col)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
+from fogsim.vision.sort_kernels import median_of_few
 
 MOST_SAMPLES = 64
 """Pixels that one row's statistic is made of; more cost time and gain little beside the road's own texture."""
@@ -27,6 +28,31 @@ def light(pixels: NDArray[np.uint8] | NDArray[np.uint16], tables: NDArray[np.flo
     for channel in range(pixels.shape[2]):
         total += tables[channel, pixels[row, col, channel]]
     return float(total)
+
+
+@kernel
+def row_light(
+    pixels: NDArray[np.uint8] | NDArray[np.uint16],
+    tables: NDArray[np.float32],
+    row: int,
+    line: NDArray[np.float32],
+) -> None:
+    """Luminance of all pixels of a row; `line` (cols,) is written [linear grey levels]."""
+    seen = pixels[row]
+    if pixels.shape[2] == 3:
+        red, green, blue = tables[0], tables[1], tables[2]
+        for col in range(line.size):
+            line[col] = red[seen[col, 0]] + green[seen[col, 1]] + blue[seen[col, 2]]
+    else:
+        for col in range(line.size):
+            line[col] = tables[0, seen[col, 0]]
+
+
+@kernel
+def even_column(j: int, count: int, left: float, right: float) -> int:
+    """Column of the j-th of `count` samples evenly between two sides [px]; those of a mirrored image are mirrored."""
+    apart = (min(j, count - 1 - j) + 0.5) * (right - left) / count
+    return math.floor(left + apart + 0.5) if 2 * j < count else math.ceil(right - apart - 0.5)
 
 
 @kernel
@@ -53,11 +79,12 @@ def row_bins(horizon: float, top: int, bottom: int, whole_rows: float) -> tuple[
 
 
 @kernel
-def _core(samples: NDArray[np.float32], count: int, floor: float) -> tuple[float, float, float]:
-    """Mean and deviation of what lies near the median of the first `count` samples; mean distance of all from it."""
-    ordered = samples[:count]
-    ordered.sort()
-    middle = 0.5 * (ordered[(count - 1) // 2] + ordered[count // 2])
+def _core(samples: NDArray[np.float32], ordered: NDArray[np.float32], floor: float) -> tuple[float, float, float]:
+    """Mean and deviation of what lies near the median of samples; mean distance of all from it.
+
+    `ordered` is as many numbers of room.
+    """
+    count, middle = samples.size, median_of_few(samples, ordered)
     # The nearest half of sorted samples is a run of them: take ends away, the farther first, until it is left.
     low, high, apart = 0, count - 1, np.float32(0.0)
     for _ in range(count - count // 2):
@@ -119,7 +146,7 @@ def strip_bins(
         Read only bins that the vehicle hides, if only in part, and that have a datum.
     """
     cols = pixels.shape[1]
-    samples = np.empty(MOST_SAMPLES, np.float32)
+    samples, ordered = np.empty(MOST_SAMPLES, np.float32), np.empty(MOST_SAMPLES, np.float32)
     for i in range(rows.shape[1]):
         low, width, height = sides[0, i], sides[1, i] - sides[0, i], rows[1, i] - rows[0, i] + 1
         hides = rows[0, i] <= vehicle[2]
@@ -130,19 +157,19 @@ def strip_bins(
         if width < 2.0:
             continue
         # An even number: the middle one of an odd number would lie between two columns.
-        wanted = int(min(width * height, float(MOST_SAMPLES))) // 2 * 2
-        taken = 0
-        for j in range(wanted):
-            # Rows of the bin in turn, columns evenly: a mirrored image gives the same.
-            row = rows[0, i] + min(j, wanted - 1 - j) % height
-            col = min(max(math.floor(low + (j + 0.5) * width / wanted + 0.5), 0), cols - 1)
-            if hides and vehicle[0] <= col <= vehicle[1]:
-                continue
-            samples[taken] = light(pixels, tables, row, col)
-            taken += 1
+        pairs = int(min(width * height, float(MOST_SAMPLES))) // 2
+        wanted, step, row, taken = 2 * pairs, 0.5 * width / pairs, rows[0, i], 0
+        for j in range(pairs):
+            # Rows of the bin in turn, columns evenly from both sides inward: a mirrored image gives the same.
+            apart = (j + 0.5) * step + 0.5
+            for col in (math.floor(low + apart), math.ceil(sides[1, i] - apart)):
+                if not (hides and vehicle[0] <= col <= vehicle[1]):
+                    samples[taken] = light(pixels, tables, row, min(max(col, 0), cols - 1))
+                    taken += 1
+            row = row + 1 if row < rows[1, i] else rows[0, i]
         if taken < 2 or taken < 0.25 * wanted:
             continue
-        mean, deviation, scatter = _core(samples, taken, max(noise, 2.0 * LEAST_DEVIATION))
+        mean, deviation, scatter = _core(samples[:taken], ordered[:taken], max(noise, 2.0 * LEAST_DEVIATION))
         texture = max(deviation**2 - noise**2, 0.0) / min(float(taken), pieces[i])
         out[0, i], out[2, i] = mean, scatter
         out[1, i] = noise**2 / taken + texture + LEAST_DEVIATION**2 + _coarseness(mean, deviation, noise, table)
@@ -164,11 +191,10 @@ def middle_levels(
     pixels: NDArray[np.uint8] | NDArray[np.uint16], tables: NDArray[np.float32], rows: NDArray[np.int64]
 ) -> NDArray[np.float64]:
     """Median of the middle third of each row (n,) [linear grey levels]."""
-    cols = pixels.shape[1]
-    out, samples = np.empty(rows.size), np.empty(24, np.float32)
+    cols, samples, ordered = pixels.shape[1], np.empty(24, np.float32), np.empty(24, np.float32)
+    left, right, out = cols // 3 - 0.5, cols - cols // 3 - 0.5, np.empty(rows.size)
     for i in range(rows.size):
         for j in range(samples.size):
-            samples[j] = light(pixels, tables, rows[i], cols // 3 + int((j + 0.5) * (cols // 3) / samples.size))
-        samples.sort()
-        out[i] = 0.5 * (float(samples[(samples.size - 1) // 2]) + float(samples[samples.size // 2]))
+            samples[j] = light(pixels, tables, rows[i], even_column(j, samples.size, left, right))
+        out[i] = median_of_few(samples, ordered)
     return out

@@ -3,8 +3,9 @@
 import math
 from dataclasses import dataclass
 from enum import StrEnum
+from numbers import Real
 
-from fogsim.errors import InputError
+from fogsim.errors import InputError, suggest
 
 BIT_DEPTHS = (8, 10, 12)
 """Bit depths that a camera can have."""
@@ -16,6 +17,16 @@ class Response(StrEnum):
     LINEAR = "linear"
     GAMMA = "gamma"
     SRGB = "srgb"
+
+
+def _finite(value: object) -> bool:
+    """Whether a value is a number, and neither NaN nor infinite; True and False are none."""
+    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _whole(value: object) -> bool:
+    """Whether a value is a whole number, of whatever type."""
+    return isinstance(value, Real) and _finite(value) and float(value).is_integer()
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,24 +71,40 @@ class Camera:
         Raises
         ------
         InputError
-            If a size, length or angle is out of range or not finite.
+            If a size, length or angle is no number, not finite or out of range, or a size or depth not whole, or there
+            is no such response.
         """
-        object.__setattr__(self, "response", Response(self.response))
-        object.__setattr__(self, "principal_point", (float(self.principal_point[0]), float(self.principal_point[1])))
+        self._check_kinds()
         for name in ("width", "height"):
-            if int(getattr(self, name)) != getattr(self, name) or getattr(self, name) < 1:
+            if not (_whole(getattr(self, name)) and getattr(self, name) >= 1):
                 raise InputError(f"camera {name} must be a whole number of pixels ≥ 1, got {getattr(self, name)!r}")
         for name in ("focal_length", "mount_height"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
+            if not (_finite(getattr(self, name)) and getattr(self, name) > 0):
                 raise InputError(f"camera {name} must be positive and finite, got {getattr(self, name)!r}")
-        if not all(math.isfinite(value) for value in self.principal_point):
-            raise InputError(f"camera principal_point must be finite, got {self.principal_point!r}")
-        if not abs(self.pitch) < math.pi / 2:
+        if not (_finite(self.pitch) and abs(self.pitch) < math.pi / 2):
             raise InputError(f"camera pitch must lie within ±π/2 rad, got {self.pitch!r}")
-        if not abs(self.roll) <= math.pi:
+        if not (_finite(self.roll) and abs(self.roll) <= math.pi):
             raise InputError(f"camera roll must lie within ±π rad, got {self.roll!r}")
-        if self.bits not in BIT_DEPTHS:
+        if not (_whole(self.bits) and self.bits in BIT_DEPTHS):
             raise InputError(f"camera bits must be 8, 10 or 12, got {self.bits!r}")
+        for name in ("width", "height", "bits"):
+            object.__setattr__(self, name, int(getattr(self, name)))
+
+    def _check_kinds(self) -> None:
+        """Take a response by its name and any pair of numbers for the principal point."""
+        try:
+            object.__setattr__(self, "response", Response(self.response))
+        except ValueError:
+            raise InputError(
+                f"camera response: {suggest(str(self.response), Response)}, got {self.response!r}"
+            ) from None
+        try:
+            u0, v0 = self.principal_point
+        except (TypeError, ValueError):
+            u0 = v0 = math.nan
+        if not (_finite(u0) and _finite(v0)):
+            raise InputError(f"camera principal_point must be two finite numbers, got {self.principal_point!r}")
+        object.__setattr__(self, "principal_point", (float(u0), float(v0)))
 
     @property
     def horizon_row(self) -> float:

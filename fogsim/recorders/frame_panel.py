@@ -9,6 +9,7 @@ from PIL import Image, ImageDraw
 
 from fogsim.recorders import camera_picture
 from fogsim.recorders.camera_picture import draw_camera_picture
+from fogsim.recorders.method_colours import method_colours
 from fogsim.recorders.protocol import Derived
 from fogsim.recorders.strip_chart import Axis, Curve, StripChart
 from fogsim.recorders.style import (
@@ -26,7 +27,6 @@ from fogsim.recorders.style import (
     WELL,
     Colour,
     font,
-    method_colour,
 )
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Collision, Estimate, Lamp, Step
@@ -188,8 +188,9 @@ def _draw_visibilities(draw: ImageDraw.ImageDraw, step: Step) -> None:
     _draw_visibility(draw, 150, "belief", BELIEF, (_metres(middle), f"{_metres(low)} – {_metres(high)}"), 15)
     y = 168
     shown = step.estimates if len(step.estimates) <= _MOST_METHODS else step.estimates[: _MOST_METHODS - 1]
-    for index, estimate in enumerate(shown):
-        _draw_visibility(draw, y, estimate.method, method_colour(index), _say_estimate(estimate), 12)
+    colours = method_colours([estimate.method for estimate in step.estimates])
+    for estimate in shown:
+        _draw_visibility(draw, y, estimate.method, colours[estimate.method], _say_estimate(estimate), 12)
         y += 14
     if len(shown) < len(step.estimates):
         draw.text((_LEFT, y), f"and {len(step.estimates) - len(shown)} more", fill=MUTED, font=font(11), anchor="ls")

@@ -10,12 +10,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
+from fogsim.recorders.method_colours import ON_LIGHT, method_colours
 from fogsim.recorders.report_data import Curves
 from fogsim.units import KMH_PER_MPS
 
 _TRUTH, _BELIEF, _ADVICE, _ALARM, _SPEED = "#c28a00", "#1f6fd0", "#1f9d61", "#cf3a34", "#1c2733"
 _MUTED = "#7b8794"
-_METHODS = ("#9b4fc4", "#0f9aa5", "#dd6b3d", "#7d9b1e", "#d0488f")
 _VISIBILITY_TICKS = (20, 50, 100, 200, 500, 1000, 2000)
 _MOST_MARGIN = 300.0
 """Safety margins beyond this are drawn at it, so that the dangerous part can be read [m]."""
@@ -110,9 +110,10 @@ def _draw_visibility(axis: Axes, curves: Curves) -> None:
     low, high = (np.clip(_array(values), *_ends()) for values in (curves.low, curves.high))
     axis.fill_between(curves.time, low, high, color=_BELIEF, alpha=0.18, linewidth=0, label="90 % interval")
     axis.plot(curves.time, curves.belief, color=_BELIEF, linewidth=1.6, label="belief")
-    for index, (method, points) in enumerate(curves.estimates.items()):
-        colour = _METHODS[index % len(_METHODS)]
+    colours = method_colours(list(curves.estimates), ON_LIGHT)
+    for method, points in curves.estimates.items():
         times, values = np.array(points, dtype=np.float64).reshape(-1, 2).T
+        colour = [part / 255.0 for part in colours[method]]
         axis.scatter(times, values, s=5, color=colour, linewidths=0, alpha=0.7, label=method)
     truth = np.where(np.isfinite(_array(curves.truth)), _array(curves.truth), _ends()[1])
     axis.plot(curves.time, truth, color=_TRUTH, linewidth=1.8, linestyle=(0, (5, 1.5)), label="truth ahead")

@@ -20,13 +20,6 @@ BELIEF_BAND: Colour = (36, 70, 110)
 ADVICE: Colour = (86, 200, 140)
 ALARM: Colour = (226, 72, 66)
 AMBER: Colour = (240, 160, 60)
-METHODS: tuple[Colour, ...] = ((204, 128, 232), (96, 208, 214), (240, 140, 110), (170, 205, 90), (236, 130, 180))
-"""Colours of the estimators, in their order; they repeat after the last."""
-
-
-def method_colour(index: int) -> Colour:
-    """Colour of the estimator with a given place in the order."""
-    return METHODS[index % len(METHODS)]
 
 
 @cache

@@ -8,11 +8,9 @@ import pytest
 from PIL import Image
 
 from fogsim.errors import InputError
-from fogsim.estimators import ESTIMATORS
 from fogsim.offline import FrameEstimates, OverlayFile, Picture, estimates_of, find_source
-from fogsim.offline.colours import COLOURS, method_colours
 from fogsim.offline.overlay import Overlay
-from fogsim.recorders.style import GROUND, MUTED, TEXT
+from fogsim.recorders.method_colours import method_colours
 from fogsim.values import Estimate
 
 
@@ -30,47 +28,6 @@ def test_rows_and_band_are_drawn_where_they_were_found(drive) -> None:
     assert coloured[300, 300]
     assert coloured[300, 320]
     assert np.all(drawn[300, 310] == 90)
-
-
-# Machado, Oliveira & Fernandes 2009, table 1, severity 1: linear RGB as protanopes, deuteranopes and tritanopes see it.
-SIGHTS = {
-    "normal": np.eye(3),
-    "protanopia": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
-    "deuteranopia": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.01182, 0.04294, 0.968881]],
-    "tritanopia": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.3039]],
-}
-
-
-def lab(colours, sight) -> np.ndarray:
-    """L*a*b* of sRGB colours as an eye sees them (D65)."""
-    share = np.array(colours) / 255.0
-    light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4) @ np.array(sight).T
-    to_xyz = np.array(
-        [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
-    )
-    xyz = np.clip(light, 0.0, 1.0) @ to_xyz.T / to_xyz.sum(axis=1)
-    root = np.where(xyz > 216 / 24389, np.cbrt(xyz), (24389 / 27 * xyz + 16) / 116)
-    x, y, z = root.T
-    return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=1)
-
-
-@pytest.mark.parametrize("sight", SIGHTS)
-def test_colours_are_told_apart_by_every_eye(sight: str) -> None:
-    """2.3 is just noticeable side by side; thin lines apart from one another need several times that."""
-    seen = lab(COLOURS, SIGHTS[sight])
-    apart = np.linalg.norm(seen[:, None] - seen, axis=2) + 1e9 * np.eye(len(seen))
-    assert apart.min() > 18.0
-    assert np.linalg.norm(seen - lab([GROUND], SIGHTS[sight]), axis=1).min() > 35.0
-
-
-def test_each_registered_method_has_a_colour_of_its_own_whatever_stands_beside_it() -> None:
-    everyone = method_colours(list(ESTIMATORS))
-    assert len(set(everyone.values())) == len(ESTIMATORS)
-    for name, colour in everyone.items():
-        assert method_colours([name]) == {name: colour}
-    own = method_colours([*ESTIMATORS, "mine", "yours"])
-    assert len(set(own.values())) == len(ESTIMATORS) + 2
-    assert not {MUTED, TEXT} & set(own.values())
 
 
 def test_methods_that_agree_are_all_seen(drive) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
+from fogsim.render.vectors import Vector, dot, row
 
 FARTHEST = 1600.0
 """Distance beyond which no copy is drawn, nearer in small pictures [m]."""
@@ -182,16 +183,16 @@ def measure(shapes: Shapes, copies: Copies, begin: int, end: int) -> None:
     centre, half_extent = shapes.centre, shapes.half_extent
     for copy in range(begin, end):
         number = shape[copy]
-        for row in range(3):
-            total = place[copy, row]
+        for axis in range(3):
+            total = place[copy, axis]
             for column in range(3):
-                total += record[copy, 4 * row + column] * centre[number, column]
-            copies.middle[copy, row] = total
+                total += record[copy, 4 * axis + column] * centre[number, column]
+            copies.middle[copy, axis] = total
         x, y, z = 0.0, 0.0, 0.0
-        for row in range(3):
-            x += record[copy, 4 * row] ** 2
-            y += record[copy, 4 * row + 1] ** 2
-            z += record[copy, 4 * row + 2] ** 2
+        for axis in range(3):
+            x += record[copy, 4 * axis] ** 2
+            y += record[copy, 4 * axis + 1] ** 2
+            z += record[copy, 4 * axis + 2] ** 2
         x, y, z = x * half_extent[number, 0] ** 2, y * half_extent[number, 1] ** 2, z * half_extent[number, 2] ** 2
         copies.radius[copy] = np.sqrt(x + y + z)
         copies.breadth[copy] = np.sqrt(x + y + z - min(x, y, z) - max(x, y, z))
@@ -235,7 +236,7 @@ def choose(
     middle, radius, first, smallest = copies.middle, copies.radius, cells.first, shapes.smallest
     begin = first[len(first) - 1]
     measure(shapes, copies, begin, end)
-    p, q, r, s, ahead = _row(planes, 0), _row(planes, 1), _row(planes, 2), _row(planes, 3), _row(planes, 4)
+    p, q, r, s, ahead = row(planes, 0), row(planes, 1), row(planes, 2), row(planes, 3), row(planes, 4)
     # Farther away nearly all is left out for its size, and the ground lies in a fraction of the row at the horizon.
     farthest = min(FARTHEST, _LARGEST * focal / _SMALLEST)
     count = 0
@@ -249,7 +250,7 @@ def choose(
         for copy in range(low, high):
             x, y, z = middle[copy, 0] - eye[0], middle[copy, 1] - eye[1], middle[copy, 2] - eye[2]
             # Most are too small, and that is the quickest to see.
-            if focal * radius[copy] <= smallest[copies.shape[copy]] * max(_dot(ahead, (x, y, z)), radius[copy]):
+            if focal * radius[copy] <= smallest[copies.shape[copy]] * max(dot(ahead, (x, y, z)), radius[copy]):
                 continue
             depth = _depth((x, y, z), radius[copy], p, q, r, s, ahead)
             if depth < farthest:
@@ -261,25 +262,12 @@ def choose(
     return count
 
 
-Vector = tuple[float, float, float]
-
-
-@kernel
-def _row(matrix: Wide, row: int) -> Vector:
-    return matrix[row, 0], matrix[row, 1], matrix[row, 2]
-
-
-@kernel
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
 @kernel
 def _depth(middle: Vector, radius: float, p: Vector, q: Vector, r: Vector, s: Vector, ahead: Vector) -> float:
     """Depth of the nearest point of a sphere [m], infinite if it is out of view."""
-    if min(_dot(p, middle), _dot(q, middle), _dot(r, middle), _dot(s, middle)) < -radius:
+    if min(dot(p, middle), dot(q, middle), dot(r, middle), dot(s, middle)) < -radius:
         return np.inf
-    depth = _dot(ahead, middle)
+    depth = dot(ahead, middle)
     return max(depth - radius, 0.0) if depth > -radius else np.inf
 
 
@@ -305,7 +293,7 @@ def _write(shapes: Shapes, copies: Copies, ahead: Vector, eye: Wide, focal: floa
     for i in range(count):
         copy = order[i]
         x, y, z = copies.middle[copy, 0] - eye[0], copies.middle[copy, 1] - eye[1], copies.middle[copy, 2] - eye[2]
-        depth, shape = _dot(ahead, (x, y, z)), copies.shape[copy]
+        depth, shape = dot(ahead, (x, y, z)), copies.shape[copy]
         while shapes.stand_in[shape] >= 0 and focal * copies.breadth[copy] < shapes.detail[shape] * depth:
             shape = shapes.stand_in[shape]
         mesh[i] = shape

@@ -8,12 +8,14 @@ from fogsim.jit import kernel
 from fogsim.render.drawing import NEAR
 from fogsim.render.lens import Lens
 from fogsim.render.shading import layout
-from fogsim.render.shading.layout import Copies, Light, Meshes, Runs
+from fogsim.render.shading.layout import Array, Copies, Light, Meshes, Runs, Wide
+from fogsim.render.vectors import Triple, Vector, columns_times, cross, dot, plus, row, rows_times, scaled, unit
 from fogsim.values.scene import Surface
 
 _ROAD, _PAINT, _SHEETING = int(Surface.ROAD), int(Surface.PAINT), int(Surface.SHEETING)
 _PERIOD = 18.0  # of dashed lines [m]
 _PER_PI = 1.0 / math.pi
+_WHITE_SHEETING = 0.66  # its reflectance
 
 INSTANCE, LEAST, MOST, DEPTH = layout.INSTANCE, layout.LEAST, layout.MOST, layout.DEPTH
 LIGHT, RESPONSE, LOW, HIGH = layout.LIGHT, layout.RESPONSE, layout.LOW, layout.HIGH
@@ -21,8 +23,6 @@ RESPONSE_LOW, RESPONSE_HIGH = layout.RESPONSE_LOW, layout.RESPONSE_HIGH
 ALONG, ACROSS, WHITE = layout.ALONG, layout.ACROSS, layout.WHITE
 HALF_WIDTH, LINES, COLOUR = layout.HALF_WIDTH, layout.LINES, layout.COLOUR
 OBJECT, ROAD, TERRAIN = layout.OBJECT, layout.ROAD, layout.TERRAIN
-
-Vector = tuple[float, float, float]
 
 
 @kernel
@@ -50,11 +50,6 @@ def retroreflection(distance: float) -> float:
 
 
 @kernel
-def _inverse_square(x: float, y: float, z: float) -> float:
-    return 1.0 / (x * x + y * y + z * z)
-
-
-@kernel
 def know_background(lens: Lens, light: Light, runs: Runs) -> None:
     """Set what is known of sky and terrain."""
     kind, surface, height = runs.kind, runs.surface, lens.eye[2] - light.terrain[0]
@@ -67,119 +62,165 @@ def know_background(lens: Lens, light: Light, runs: Runs) -> None:
 
 
 @kernel
-def know(  # noqa: C901, PLR0912, PLR0915 - one loop: handing arrays to functions costs more than a surface's work
-    meshes: Meshes, copies: Copies, lens: Lens, light: Light, lamplight: bool, runs: Runs, count: int
-) -> None:
+def know(meshes: Meshes, copies: Copies, lens: Lens, light: Light, lamplight: bool, runs: Runs, count: int) -> None:
     """Set what is known of the surfaces from number 2 to `count`."""
-    positions, normals, colours, surface_of = meshes.positions, meshes.normals, meshes.reflectance, meshes.surface
-    faces, first_face, roads, vertex_instance = meshes.faces, meshes.first_face, meshes.road, meshes.instance
-    record, integers, mesh, first, axes = copies.record, copies.integers, copies.mesh, copies.first, lens.axes
+    surface_of, faces, first_face, vertex_instance = meshes.surface, meshes.faces, meshes.first_face, meshes.instance
+    positions, normals, colours = meshes.positions, meshes.normals, meshes.reflectance
+    integers, record, mesh, first = copies.integers, copies.record, copies.mesh, copies.first
     slot_of, copy_of, kinds, known = runs.slot, runs.copy, runs.kind, runs.surface
-    focal, u0, v0 = lens.lens[0], lens.lens[1], lens.lens[2]
     masks, lamps = light.lamp_masks, light.lamp_radiance
-    corner, plane, offset = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    lit, answer = np.empty((3, 3)), np.empty((3, 3))
+    axes = row(lens.axes, 0), row(lens.axes, 1), row(lens.axes, 2)
+    pinhole = lens.lens[0], lens.lens[1], lens.lens[2]
     for number in range(2, count):
         copy = copy_of[number]
         face = first_face[mesh[copy]] + slot_of[number] - first[copy]
-        kind = surface_of[faces[face, 0]]
-        for i in range(3):
-            x, y, z = positions[faces[face, i], 0], positions[faces[face, i], 1], positions[faces[face, i], 2]
-            for row in range(3):
-                k = 4 * row
-                offset[i, row] = np.float64(record[copy, k]) * x + np.float64(record[copy, k + 1]) * y
-                offset[i, row] += np.float64(record[copy, k + 2]) * z + np.float64(record[copy, k + 3])
-            for row in range(3):
-                corner[i, row] = axes[row, 0] * offset[i, 0] + axes[row, 1] * offset[i, 1] + axes[row, 2] * offset[i, 2]
-        # Rows of the inverse of the matrix of corners, as planes over column, row and 1.
-        for i in range(3):
-            p, q = (i + 1) % 3, (i + 2) % 3
-            for axis in range(3):
-                b, c = (axis + 1) % 3, (axis + 2) % 3
-                plane[i, axis] = corner[p, b] * corner[q, c] - corner[p, c] * corner[q, b]
-        determinant = corner[0, 0] * plane[0, 0] + corner[0, 1] * plane[0, 1] + corner[0, 2] * plane[0, 2]
-        low, high = min(corner[0, 2], corner[1, 2], corner[2, 2]), max(corner[0, 2], corner[1, 2], corner[2, 2])
-        scale = 1.0 / determinant if abs(determinant) > 1e-12 else 0.0
-        per_focal = scale / focal
-        for i in range(3):
-            plane[i, 0] *= per_focal
-            plane[i, 1] *= per_focal
-            plane[i, 2] = plane[i, 2] * scale - plane[i, 0] * u0 - plane[i, 1] * v0
-            if scale == 0.0:  # seen edge on: its middle stands for all of it
-                plane[i, 2] = 1.0 / (3.0 * max(0.5 * (low + high), NEAR))
-        known[number, LEAST], known[number, MOST] = 1.0 / max(high, NEAR), 1.0 / max(low, NEAR)
-        for axis in range(3):
-            known[number, DEPTH + axis] = plane[0, axis] + plane[1, axis] + plane[2, axis]
-        own = integers[copy, 16]
-        known[number, INSTANCE] = own if own != 0 else vertex_instance[faces[face, 0]]
-
+        i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
+        kind, own = surface_of[i], integers[copy, 16]
+        known[number, INSTANCE] = own if own != 0 else vertex_instance[i]
+        turn = _column(record, copy, 0), _column(record, copy, 1), _column(record, copy, 2)
+        place = _column(record, copy, 3)
+        p, q, r = (
+            plus(columns_times(turn, row(positions, i)), place),
+            plus(columns_times(turn, row(positions, j)), place),
+            plus(columns_times(turn, row(positions, k)), place),
+        )
+        planes = _know_place(known, number, (rows_times(axes, p), rows_times(axes, q), rows_times(axes, r)), pinhole)
         # Normals turn with the transform, and against the lengths of its columns.
-        xx, xy, xz = float(record[copy, 0]), float(record[copy, 4]), float(record[copy, 8])
-        yx, yy, yz = float(record[copy, 1]), float(record[copy, 5]), float(record[copy, 9])
-        zx, zy, zz = float(record[copy, 2]), float(record[copy, 6]), float(record[copy, 10])
-        per_x, per_y, per_z = _inverse_square(xx, xy, xz), _inverse_square(yx, yy, yz), _inverse_square(zx, zy, zz)
-        shining = masks[kind] < 0 or (integers[copy, 15] & masks[kind]) != 0
-        most = -1.0
-        for i in range(3):
-            vertex = faces[face, i]
-            a, b, c = normals[vertex, 0] * per_x, normals[vertex, 1] * per_y, normals[vertex, 2] * per_z
-            nx, ny, nz = xx * a + yx * b + zx * c, xy * a + yy * b + zy * c, xz * a + yz * b + zz * c
-            per_length = 1.0 / math.sqrt(nx * nx + ny * ny + nz * nz)
-            nx, ny, nz = nx * per_length, ny * per_length, nz * per_length
-            white = light.white * light_share(nx, ny, nz)
-            # Times the distance, by which each pixel divides; over a flat triangle the product is the same everywhere.
-            cosine = 0.0
-            if lamplight:
-                ox, oy, oz = offset[i, 0], offset[i, 1], offset[i, 2]
-                cosine = -(nx * ox + ny * oy + nz * oz)
-                most = max(most, cosine)
-            share = cosine * _PER_PI
-            for channel in range(3):
-                reflectance = record[copy, 12 + channel] if kind == _PAINT else colours[vertex, channel]
-                lit[i, channel] = reflectance * white + (lamps[kind, channel] if shining else 0.0)
-                answer[i, channel] = reflectance * share
-            if kind == _ROAD and i == 0:
-                known[number, WHITE] = white
+        straight = (
+            scaled(turn[0], 1.0 / dot(turn[0], turn[0])),
+            scaled(turn[1], 1.0 / dot(turn[1], turn[1])),
+            scaled(turn[2], 1.0 / dot(turn[2], turn[2])),
+        )
+        a = unit(columns_times(straight, row(normals, i)))
         if kind == _ROAD:
             kinds[number] = ROAD
-            i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
-            start = _PERIOD * math.floor(roads[i, 0] / _PERIOD)
-            for axis in range(3):
-                known[number, ALONG + axis] = (
-                    (roads[i, 0] - start) * plane[0, axis]
-                    + (roads[j, 0] - start) * plane[1, axis]
-                    + (roads[k, 0] - start) * plane[2, axis]
-                )
-                known[number, ACROSS + axis] = (
-                    roads[i, 1] * plane[0, axis] + roads[j, 1] * plane[1, axis] + roads[k, 1] * plane[2, axis]
-                )
-                known[number, COLOUR + axis] = (colours[i, axis] + colours[j, axis] + colours[k, axis]) / 3.0
-            known[number, HALF_WIDTH], known[number, LINES] = roads[i, 2], roads[i, 3]
+            known[number, WHITE] = light.white * light_share(a[0], a[1], a[2])
+            _know_road(known, number, meshes.road, colours, (i, j, k), planes)
             continue
-        if lamplight and kind == _SHEETING and most > 0.0:
-            middle = math.sqrt(offset[0, 0] ** 2 + offset[0, 1] ** 2 + offset[0, 2] ** 2)
-            # A lamp's light is spread over the sheeting's tilted face; beyond that, R falls like the cosine cubed [M].
-            strength = retroreflection(middle) * most * most / (middle * 0.66)
-            for i in range(3):
-                for channel in range(3):
-                    answer[i, channel] = strength * min(colours[faces[face, i], channel], np.float32(0.66))
-        elif lamplight:
-            # Of what is seen from behind, as of leaves, the other side is lit.
-            side = 1.0 if most > 0.0 else -1.0
-            for i in range(3):
-                for channel in range(3):
-                    answer[i, channel] = max(side * answer[i, channel], 0.0)
         kinds[number] = OBJECT
-        for channel in range(3):
-            a, b, c = lit[0, channel], lit[1, channel], lit[2, channel]
-            known[number, LOW + channel], known[number, HIGH + channel] = min(a, b, c), max(a, b, c)
-            for axis in range(3):
-                known[number, LIGHT + 3 * channel + axis] = a * plane[0, axis] + b * plane[1, axis] + c * plane[2, axis]
-            if lamplight:
-                a, b, c = answer[0, channel], answer[1, channel], answer[2, channel]
-                known[number, RESPONSE_LOW + channel] = min(a, b, c)
-                known[number, RESPONSE_HIGH + channel] = max(a, b, c)
-                for axis in range(3):
-                    known[number, RESPONSE + 3 * channel + axis] = (
-                        a * plane[0, axis] + b * plane[1, axis] + c * plane[2, axis]
-                    )
+        b = unit(columns_times(straight, row(normals, j)))
+        c = unit(columns_times(straight, row(normals, k)))
+        paint = record[copy, 12], record[copy, 13], record[copy, 14]
+        tints = (
+            paint if kind == _PAINT else row(colours, i),
+            paint if kind == _PAINT else row(colours, j),
+            paint if kind == _PAINT else row(colours, k),
+        )
+        shining = masks[kind] < 0 or (integers[copy, 15] & masks[kind]) != 0
+        glow = row(lamps, kind) if shining else (0.0, 0.0, 0.0)
+        white = (
+            light.white * light_share(a[0], a[1], a[2]),
+            light.white * light_share(b[0], b[1], b[2]),
+            light.white * light_share(c[0], c[1], c[2]),
+        )
+        _know_colours(known, number, LIGHT, LOW, HIGH, tints, white, glow, planes)
+        if lamplight:
+            # Times the distance, by which each pixel divides; over a flat triangle the product is the same everywhere.
+            facing = -dot(a, p), -dot(b, q), -dot(c, r)
+            _know_answer(known, number, kind == _SHEETING, p, tints, facing, planes)
+
+
+@kernel
+def _know_place(known: Wide, number: int, corners: Triple, pinhole: Vector) -> Triple:
+    """Set the depth of a triangle from its corners in camera axes [m].
+
+    Returns what interpolates over it: for each corner a plane over column, row and 1 of its share over z [1/m].
+    """
+    p, q, r = corners
+    focal, u0, v0 = pinhole
+    # Rows of the inverse of the matrix of corners.
+    a, b, c = cross(q, r), cross(r, p), cross(p, q)
+    determinant = dot(p, a)
+    low, high = min(p[2], q[2], r[2]), max(p[2], q[2], r[2])
+    scale = 1.0 / determinant if abs(determinant) > 1e-12 else 0.0
+    # Of one that is seen edge on, its middle stands for all of it.
+    edge_on = 1.0 / (3.0 * max(0.5 * (low + high), NEAR)) if scale == 0.0 else 0.0
+    planes = (
+        _over_pixels(a, scale, focal, u0, v0, edge_on),
+        _over_pixels(b, scale, focal, u0, v0, edge_on),
+        _over_pixels(c, scale, focal, u0, v0, edge_on),
+    )
+    known[number, LEAST], known[number, MOST] = 1.0 / max(high, NEAR), 1.0 / max(low, NEAR)
+    _blend(known, number, DEPTH, (1.0, 1.0, 1.0), planes)
+    return planes
+
+
+@kernel
+def _over_pixels(plane: Vector, scale: float, focal: float, u0: float, v0: float, edge_on: float) -> Vector:
+    """Plane over column, row and 1 of one over viewing rays."""
+    x, y = plane[0] * scale / focal, plane[1] * scale / focal
+    return x, y, plane[2] * scale - x * u0 - y * v0 + edge_on
+
+
+@kernel
+def _know_road(
+    known: Wide, number: int, road: Array, colours: Array, corners: tuple[int, int, int], planes: Triple
+) -> None:
+    """Set where a triangle lies on its lane, the lane's lines and its mean reflectance."""
+    i, j, k = corners
+    start = _PERIOD * math.floor(road[i, 0] / _PERIOD)
+    _blend(known, number, ALONG, (road[i, 0] - start, road[j, 0] - start, road[k, 0] - start), planes)
+    _blend(known, number, ACROSS, (road[i, 1], road[j, 1], road[k, 1]), planes)
+    for channel in range(3):
+        known[number, COLOUR + channel] = (colours[i, channel] + colours[j, channel] + colours[k, channel]) / 3.0
+    known[number, HALF_WIDTH], known[number, LINES] = road[i, 2], road[i, 3]
+
+
+@kernel
+def _know_answer(
+    known: Wide, number: int, sheeting: bool, middle: Vector, tints: Triple, facing: Vector, planes: Triple
+) -> None:
+    """Set what a triangle returns of lamplight, times distance; `facing` is that times the cosines to its normals."""
+    most = max(facing[0], facing[1], facing[2])
+    if sheeting and most > 0.0:
+        far = math.sqrt(dot(middle, middle))
+        # A lamp's light is spread over the sheeting's tilted face; beyond that, R falls like the cosine cubed [M].
+        strength = retroreflection(far) * most * most / (far * _WHITE_SHEETING)
+        share = strength, strength, strength
+        tints = _capped(tints[0]), _capped(tints[1]), _capped(tints[2])
+    else:
+        # Of what is seen from behind, as of leaves, the other side is lit.
+        side = _PER_PI if most > 0.0 else -_PER_PI
+        share = max(side * facing[0], 0.0), max(side * facing[1], 0.0), max(side * facing[2], 0.0)
+    _know_colours(known, number, RESPONSE, RESPONSE_LOW, RESPONSE_HIGH, tints, share, (0.0, 0.0, 0.0), planes)
+
+
+@kernel
+def _capped(tint: Vector) -> Vector:
+    """Reflectance of sheeting, which is no whiter than white sheeting."""
+    return min(tint[0], _WHITE_SHEETING), min(tint[1], _WHITE_SHEETING), min(tint[2], _WHITE_SHEETING)
+
+
+@kernel
+def _know_colours(
+    known: Wide,
+    number: int,
+    first: int,
+    low: int,
+    high: int,
+    tints: Triple,
+    white: Vector,
+    glow: Vector,
+    planes: Triple,
+) -> None:
+    """Set planes and extremes of each channel, from the corners' reflectances, what white ones return, and a glow."""
+    for channel in range(3):
+        a = tints[0][channel] * white[0] + glow[channel]
+        b = tints[1][channel] * white[1] + glow[channel]
+        c = tints[2][channel] * white[2] + glow[channel]
+        known[number, low + channel], known[number, high + channel] = min(a, b, c), max(a, b, c)
+        _blend(known, number, first + 3 * channel, (a, b, c), planes)
+
+
+@kernel
+def _blend(known: Wide, number: int, first: int, values: Vector, planes: Triple) -> None:
+    """Set a plane that has given values times z⁻¹ at the corners."""
+    a, b, c = values
+    for axis in range(3):
+        known[number, first + axis] = a * planes[0][axis] + b * planes[1][axis] + c * planes[2][axis]
+
+
+@kernel
+def _column(record: Array, copy: int, column: int) -> Vector:
+    """Column of a copy's transform."""
+    return float(record[copy, column]), float(record[copy, 4 + column]), float(record[copy, 8 + column])

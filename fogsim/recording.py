@@ -63,37 +63,59 @@ def record_run(
     command_line: Sequence[str] = (),
     watch: Callable[[Step], None] = lambda _: None,
 ) -> RecordedRun:
-    """Run a scenario and write its results.
+    """Run a scenario and write its results into a directory.
+
+    Of these files each is whole under its name; docs/results.md tells what is in them:
+
+    - ``manifest.json``, always: status, ending, seed, resolved scenario, versions, command line, times [UTC]. It is
+      written before the first step (status "running") and again at the end.
+    - ``metrics.json``, always, at the end: `RunSummary`'s keys, which end in their units, and ``complete``.
+    - ``steps.parquet``, by the recorder ``table``: a row for each step, columns in SI units and radians.
+    - ``video.mp4``, by ``video``: a frame of 1024×480 px (H.264) for each step, at real speed.
+    - ``report.html``, by ``report``: metrics, figures and pictures in one file.
 
     Parameters
     ----------
     scenario : Scenario
-        The scenario.
+        From `load_scenario`; the step is its camera period [s], the run ends at its duration [s] or earlier.
     seed : int
-        Its seed.
+        At least 0; the same scenario and seed give the same steps, bit for bit.
     out : Path
-        Directory for the results.
+        Directory for the results; it is made with its parents where it is not there.
     overwrite : bool
-        True to replace results that are there.
+        True to remove the results that are there, before anything is started; files that are not FogSim's stay.
     recorders : iterable of str
-        Which of `RECORDERS` write.
+        Which of `RECORDERS` write, each at most once; all by default.
     command_line : sequence of str
-        How it was started, for the manifest.
+        Program and arguments of the command that started it, for the manifest; empty if none did.
     watch : callable
-        Called with each finished step, for a progress bar.
+        Called with each finished `Step` after all recorders have taken it, for a progress bar. What it raises ends the
+        run as any other error does, KeyboardInterrupt as Ctrl-C.
 
     Returns
     -------
     RecordedRun
-        Interrupted (KeyboardInterrupt, as from Ctrl-C) or complete; in both cases every file is readable and says
-        which it is.
+        Complete, or interrupted by KeyboardInterrupt (Ctrl-C), which is not raised again; in both cases every file is
+        readable and says which it is.
 
     Raises
     ------
     InputError
-        If the directory holds results already and must not be overwritten.
+        If `out` is a file, cannot be made, or holds results and must not be overwritten.
+    UnknownNameError
+        If there is no such recorder.
+    MissingDependencyError
+        If a video is to be written and there is no ffmpeg.
     FogSimError
-        If a part of the loop cannot start, which leaves nothing behind, or fails on the way; the manifest then says so.
+        If a part of the loop cannot start or fails on the way.
+    ValueError, TypeError
+        If the seed is negative or no integer.
+
+    Notes
+    -----
+    Any error is raised again. One before the first step leaves none of the files and none of the directories that were
+    made for them; one after it leaves what was recorded until then, and a manifest of status "failed" with the error's
+    message.
     """
     directory = RunDirectory(out, overwrite)
     metrics = RunMetrics()

@@ -7,7 +7,7 @@ import pytest
 from pyarrow import parquet
 
 import fogsim
-from fogsim.errors import FogSimError, SimulationError
+from fogsim.errors import FogSimError, SimulationError, UnknownNameError
 from fogsim.recorders import ReportRecorder
 from fogsim.recording import record_run
 from fogsim.scenario import Scenario
@@ -65,3 +65,15 @@ def test_a_recorder_that_cannot_begin_leaves_nothing(tmp_path: Path) -> None:
     with pytest.raises(FogSimError, match="no_such_recorder"):
         record_run(short(), 1, tmp_path / "out", recorders=("table", "no_such_recorder"))
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("mistake", "kind"),
+    [({"seed": -1}, ValueError), ({"seed": 1.5}, TypeError), ({"recorders": ("table", "film")}, UnknownNameError)],
+)
+def test_mistakes_that_stop_a_run_before_its_first_step_leave_nothing(
+    tmp_path: Path, mistake: dict[str, object], kind: type[Exception]
+) -> None:
+    with pytest.raises(kind):
+        record_run(**{"scenario": short(), "seed": 1, "out": tmp_path / "new" / "out", **mistake})
+    assert list(tmp_path.iterdir()) == []

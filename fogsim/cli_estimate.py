@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
+from fogsim.cli_progress import progress_bar
 from fogsim.errors import InputError
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ def _estimate(
     source, camera = straightened(find_source(images, sequence=sequence, rate=rate), calibration)
     with contextlib.ExitStack() as stack:
         drawn = overlay and stack.enter_context(OverlayFile(overlay, source, camera, methods, overwrite=overwrite))
-        progress = stack.enter_context(_progress())
+        progress = stack.enter_context(progress_bar(_err))
         task = progress.add_task(source.description, total=source.count)
         if not as_json:
             _say(table_heading(source, methods))
@@ -124,13 +124,6 @@ def _say(line: str) -> None:
     # Through sys.stdout as it is now: on a terminal rich has put itself there, to move its bar out of the way.
     sys.stdout.write(line + "\n")
     sys.stdout.flush()
-
-
-def _progress() -> Progress:
-    # rich would lead stdout to its own console, which is stderr: fine on a terminal, and wrong for a pipe or a file.
-    to_terminal = sys.stdout.isatty()
-    columns = (BarColumn(bar_width=20), TaskProgressColumn(), TextColumn("{task.description}"), TimeRemainingColumn())
-    return Progress(*columns, console=_err, transient=True, redirect_stdout=to_terminal)
 
 
 def _guess(

@@ -9,15 +9,19 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from fogsim.cli_progress import progress_bar
 from fogsim.errors import InputError, UnknownNameError
+from fogsim.interruption import interruptible
 
 if TYPE_CHECKING:
-    from fogsim.reproduce import Reproduction
+    from fogsim.reproduce import Evaluation, Reproduction
 
 _out = Console(highlight=False)
 _err = Console(stderr=True, highlight=False)
 
 _UNBROKEN = 200  # wider than any table [characters]
+
+_INTERRUPTED = 130
 
 ALL = "all"
 """Stands for every paper."""
@@ -36,11 +40,30 @@ def reproduce_command(
     if out is not None and out.exists() and not out.is_dir():
         raise InputError(f"--out {out} is no folder")
     for name in REPRODUCTIONS if paper == ALL else (paper,):
-        with _err.status(f"{name}: drawing and estimating"):
-            done = REPRODUCTIONS[name]()
+        done = _evaluated(name, REPRODUCTIONS[name])
         _show(done, as_json=as_json)
         if out is not None:
             _save(done, out)
+
+
+def _evaluated(name: str, evaluation: "Evaluation") -> "Reproduction":
+    """Run an evaluation under a bar; Ctrl-C ends the command in one line."""
+    steps = "0 steps"
+    with progress_bar(_err) as progress:
+        task = progress.add_task(f"{name}: a first run compiles for some seconds", total=None)
+
+        def watch(done: int, total: int) -> None:
+            nonlocal steps
+            steps = f"{done} of {total} steps"
+            progress.update(task, completed=done, total=total, description=f"{name}: {steps}")
+
+        try:
+            with interruptible():
+                return evaluation(watch=watch)
+        except KeyboardInterrupt:
+            progress.stop()
+            _err.print(f"interrupted: {name} after {steps}; nothing of it is told or written", soft_wrap=True)
+            raise typer.Exit(_INTERRUPTED) from None
 
 
 def _show(done: "Reproduction", *, as_json: bool) -> None:

@@ -1,14 +1,22 @@
 """Papers' evaluations run again on FogSim's frames, one paper a module, in one registry."""
 
-from collections.abc import Callable
+from typing import Protocol
 
 from fogsim.registry import Registry
 from fogsim.reproduce import huang2015, negru2013, zhu2015
-from fogsim.reproduce.result import Reproduction
+from fogsim.reproduce.result import Reproduction, Watch, unwatched
 
-REPRODUCTIONS: Registry[Callable[[], Reproduction]] = Registry(
+
+class Evaluation(Protocol):
+    """Reruns a paper's evaluation."""
+
+    def __call__(self, *, watch: Watch = unwatched) -> Reproduction:
+        """Run it; the watch is told of every step."""
+
+
+REPRODUCTIONS: Registry[Evaluation] = Registry(
     "paper", {"negru2013": negru2013.reproduce, "zhu2015": zhu2015.reproduce, "huang2015": huang2015.reproduce}
 )
 """Every paper by name: called, it reruns the evaluation."""
 
-__all__ = ["REPRODUCTIONS", "Reproduction"]
+__all__ = ["REPRODUCTIONS", "Evaluation", "Reproduction", "Watch"]

@@ -10,17 +10,19 @@ from fogsim.reproduce.huang2015_chase import Chase, Scene, drawn, fogged, road
 from fogsim.reproduce.huang2015_picture import Tracked, picture
 from fogsim.reproduce.huang2015_plan import CAMERA, LAST, VARIANTS, VEHICLE, Case, Plan
 from fogsim.reproduce.huang2015_tables import NOTES, records, tables, verdicts
-from fogsim.reproduce.result import Reproduction
+from fogsim.reproduce.result import Reproduction, Steps, Watch, unwatched
 from fogsim.values import Estimate, Observation
 
 
-def reproduce(plan: Plan | None = None) -> Reproduction:
+def reproduce(plan: Plan | None = None, *, watch: Watch = unwatched) -> Reproduction:
     """Run the evaluation again.
 
     Parameters
     ----------
     plan : Plan, optional
         A part of it; all by default.
+    watch : Watch
+        Told of every frame of every case that is done.
 
     Returns
     -------
@@ -30,13 +32,16 @@ def reproduce(plan: Plan | None = None) -> Reproduction:
     plan = plan or Plan()
     rng = np.random.default_rng(2015)
     cases = _cases(plan)
+    # Each of the rough method's images is a step, and so is the picture.
+    steps = Steps(sum(len(case.frames) for case in cases) + len(plan.methods) + 1, watch)
     with road() as renderer:
         results: dict[Case, dict[float, Estimate]] = {}
         for way in ((False, False), (True, False), (False, True)):
-            results |= _followed(renderer, [case for case in cases if (case.back, case.noisy) == way], rng)
-        rough = _rough(drawn(renderer, CAMERA, None, 0.0), plan.methods, rng)
+            results |= _followed(renderer, [case for case in cases if (case.back, case.noisy) == way], rng, steps)
+        rough = _rough(drawn(renderer, CAMERA, None, 0.0), plan.methods, rng, steps)
         shown = [Tracked(v, {name: results[Case(v, name)][LAST] for name in VARIANTS}) for v in plan.ratios]
         drawing = picture(renderer, Chase(CAMERA, VEHICLE), shown)
+        steps.advance()
     found, told = records(results, rough, plan), tables(results, rough, plan)
     return Reproduction("huang2015", tuple(found), told[0].rows, (*NOTES, *verdicts(found)), drawing, told)
 
@@ -55,7 +60,9 @@ def _cases(plan: Plan) -> list[Case]:
     return list(found)
 
 
-def _followed(renderer: Renderer, cases: Sequence[Case], rng: np.random.Generator) -> dict[Case, dict[float, Estimate]]:
+def _followed(
+    renderer: Renderer, cases: Sequence[Case], rng: np.random.Generator, steps: Steps
+) -> dict[Case, dict[float, Estimate]]:
     """Show every frame to the estimators that want it; all of one way and one sensor."""
     estimators = {
         case: make("huang2015_lead", CAMERA, as_published=case.variant == "published", spacing=case.interval)
@@ -72,10 +79,13 @@ def _followed(renderer: Renderer, cases: Sequence[Case], rng: np.random.Generato
         for visibility, observation in seen.items():
             for case in wanted[ahead][visibility]:
                 results[case][ahead] = estimators[case].update(observation)
+                steps.advance()
     return results
 
 
-def _rough(scene: Scene, visibilities: Sequence[float], rng: np.random.Generator) -> dict[float, dict[str, Estimate]]:
+def _rough(
+    scene: Scene, visibilities: Sequence[float], rng: np.random.Generator, steps: Steps
+) -> dict[float, dict[str, Estimate]]:
     """Estimates from the road alone, by visibility and variant."""
     found: dict[float, dict[str, Estimate]] = {}
     for visibility in visibilities:
@@ -83,4 +93,5 @@ def _rough(scene: Scene, visibilities: Sequence[float], rng: np.random.Generator
         found[visibility] = {
             name: make("huang2015_rough", CAMERA, as_published=name == "published").update(seen) for name in VARIANTS
         }
+        steps.advance()
     return found

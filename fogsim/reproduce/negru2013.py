@@ -9,7 +9,7 @@ from PIL import Image, ImageDraw
 
 from fogsim.estimators import make
 from fogsim.recorders.style import font
-from fogsim.reproduce.result import Cell, Reproduction
+from fogsim.reproduce.result import Cell, Reproduction, Steps, Watch, unwatched
 from fogsim.reproduce.scenes import foggy_image, views
 from fogsim.units import visibility_from_extinction
 from fogsim.values import Camera, Estimate, Observation, fog_category
@@ -50,8 +50,13 @@ NOTES = (
 )
 
 
-def reproduce() -> Reproduction:
+def reproduce(watch: Watch = unwatched) -> Reproduction:
     """Run the evaluation again.
+
+    Parameters
+    ----------
+    watch : Watch
+        Told of every image that is done.
 
     Returns
     -------
@@ -60,6 +65,7 @@ def reproduce() -> Reproduction:
     """
     records: list[Mapping[str, Cell]] = []
     pictures = []
+    steps = Steps(len(SCENES) * len(EXTINCTIONS), watch)
     milliseconds = float("inf")
     for scene, (trees, cars) in SCENES.items():
         with views(CAMERA, cars, trees=trees) as (view, pose):
@@ -70,6 +76,7 @@ def reproduce() -> Reproduction:
                 if extinction == PICTURED:
                     pictures.append(_picture(image, estimates["corrected"]))
                     milliseconds = min(milliseconds, _milliseconds(image))
+                steps.advance()
     speed = f"One frame takes {milliseconds:.1f} ms here, {PAPER_MS:.0f} ms in the paper (2013, an i7)."
     return Reproduction("negru2013", tuple(records), _table(records), (*NOTES, speed), np.hstack(pictures))
 

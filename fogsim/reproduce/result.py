@@ -1,12 +1,40 @@
 """What comes out when a paper's evaluation is run again."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 Cell = str | float | bool | None
+
+Watch = Callable[[int, int], None]
+"""Called with the steps that are done and how many there are."""
+
+
+def unwatched(done: int, total: int) -> None:
+    """Watch that shows nothing."""
+
+
+class Steps:
+    """Counts the steps of an evaluation, of similar length each, and tells of every one.
+
+    Parameters
+    ----------
+    total : int
+        How many there are.
+    watch : Watch
+        Who is told, first of none.
+    """
+
+    def __init__(self, total: int, watch: Watch) -> None:
+        self._done, self._total, self._watch = 0, total, watch
+        watch(0, total)
+
+    def advance(self) -> None:
+        """Count one more."""
+        self._done += 1
+        self._watch(self._done, self._total)
 
 
 Rows = tuple[tuple[str, ...], ...]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fogsim.errors import InputError
 from fogsim.estimators import make
 from fogsim.estimators.zhu2015 import FRAMES
-from fogsim.reproduce.result import Cell, Reproduction
+from fogsim.reproduce.result import Cell, Reproduction, Steps, Watch, unwatched
 from fogsim.reproduce.zhu2015_drive import Moment, drive, observed, road_renderer
 from fogsim.reproduce.zhu2015_picture import picture
 from fogsim.values import Camera, Estimate, FogCategory, Observation, Response
@@ -90,7 +90,7 @@ NOTES = (
 )
 
 
-def reproduce(drives: int = 10, visibilities: int = 4, frames: int = 6) -> Reproduction:
+def reproduce(drives: int = 10, visibilities: int = 4, frames: int = 6, *, watch: Watch = unwatched) -> Reproduction:
     """Run the evaluation again.
 
     Parameters
@@ -101,6 +101,8 @@ def reproduce(drives: int = 10, visibilities: int = 4, frames: int = 6) -> Repro
         Visibilities of each class in a drive.
     frames : int
         Frames of a drive, at least three.
+    watch : Watch
+        Told of every fog of every drive that is done.
 
     Returns
     -------
@@ -120,6 +122,8 @@ def reproduce(drives: int = 10, visibilities: int = 4, frames: int = 6) -> Repro
         )
     records: list[Mapping[str, Cell]] = []
     pictured: list[Moment] = []
+    # Of "sunny" there is one more, and the picture is a step too.
+    steps = Steps(drives * (len(WEATHERS) * visibilities + 1) + 1, watch)
     with road_renderer() as renderer:
         for number in range(drives):
             rng = np.random.default_rng([2015, number])
@@ -129,7 +133,10 @@ def reproduce(drives: int = 10, visibilities: int = 4, frames: int = 6) -> Repro
             for weather, visibility in _drawn(visibilities, rng):
                 observations = [observed(moment, CAMERA, visibility, rng) for moment in moments]
                 records += _records(weather, visibility, lead=lead, drive=number, observations=observations)
-    return Reproduction("zhu2015", tuple(records), _table(records), NOTES, picture(pictured[-1], CAMERA))
+                steps.advance()
+    drawing = picture(pictured[-1], CAMERA)
+    steps.advance()
+    return Reproduction("zhu2015", tuple(records), _table(records), NOTES, drawing)
 
 
 def _drawn(count: int, rng: np.random.Generator) -> Iterator[tuple[Weather, float]]:

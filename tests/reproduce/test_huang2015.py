@@ -25,7 +25,10 @@ PART = Plan(
 
 @pytest.fixture(scope="module")
 def done() -> Reproduction:
-    return reproduce(PART)
+    told = []
+    done = reproduce(PART, watch=lambda step, total: told.append((step, total)))
+    assert told == [(step, told[0][1]) for step in range(told[0][1] + 1)]
+    return done
 
 
 def found(done: Reproduction, table: str, variant: str, **more) -> list[dict]:

@@ -17,7 +17,10 @@ from fogsim.reproduce.scenes import foggy_image, views
 
 @pytest.fixture(scope="module")
 def done() -> Reproduction:
-    return REPRODUCTIONS["negru2013"]()
+    told = []
+    done = REPRODUCTIONS["negru2013"](watch=lambda step, total: told.append((step, total)))
+    assert told == [(step, len(SCENES) * len(EXTINCTIONS)) for step in range(len(SCENES) * len(EXTINCTIONS) + 1)]
+    return done
 
 
 def test_every_scene_and_density_of_the_paper_is_there(done) -> None:
@@ -65,7 +68,7 @@ def test_the_airlight_fills_the_pixels_and_nothing_stands_on_the_empty_road() ->
 @pytest.fixture
 def command(monkeypatch, capsys, done):
     """Run the command in this process, the evaluation itself being done: exit code, stdout and stderr."""
-    monkeypatch.setattr(REPRODUCTIONS, "_entries", {"negru2013": lambda: done})
+    monkeypatch.setattr(REPRODUCTIONS, "_entries", {"negru2013": lambda **_: done})
     monkeypatch.setenv("COLUMNS", "200")
 
     def run(*arguments: str) -> tuple[int, str, str]:

@@ -20,7 +20,10 @@ DRIVES, VISIBILITIES, FRAMES = 2, 2, 4
 
 @pytest.fixture(scope="module")
 def done() -> Reproduction:
-    return reproduce(DRIVES, VISIBILITIES, FRAMES)
+    told = []
+    done = reproduce(DRIVES, VISIBILITIES, FRAMES, watch=lambda step, total: told.append((step, total)))
+    assert told == [(step, told[0][1]) for step in range(told[0][1] + 1)]
+    return done
 
 
 @pytest.fixture(scope="module")
@@ -127,7 +130,7 @@ def test_wear_changes_the_road_where_it_lies_and_is_averaged_where_a_row_holds_m
 
 
 def test_the_command_prints_table_and_records(monkeypatch, capsys, done) -> None:
-    monkeypatch.setattr(REPRODUCTIONS, "_entries", {"zhu2015": lambda: done})
+    monkeypatch.setattr(REPRODUCTIONS, "_entries", {"zhu2015": lambda **_: done})
     monkeypatch.setenv("COLUMNS", "200")
     for arguments in (["zhu2015"], ["zhu2015", "--json"]):
         monkeypatch.setattr(sys, "argv", ["fogsim", "reproduce", *arguments])

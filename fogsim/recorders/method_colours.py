@@ -8,9 +8,9 @@ _NAMED = ("negru2013", "zhu2015", "huang2015", "huang2015_rough", "huang2015_lea
 """Methods that the first colours belong to, whichever others stand beside them."""
 
 ON_DARK: tuple[Colour, ...] = (
-    (225, 0, 135),
-    (165, 45, 255),
     (210, 255, 15),
+    (165, 45, 255),
+    (225, 0, 135),
     (150, 105, 75),
     (240, 45, 0),
     (180, 195, 255),
@@ -32,9 +32,9 @@ dichromacies as Machado et al. 2009 simulate them; found by search over a grid o
 """
 
 ON_LIGHT: tuple[Colour, ...] = (
-    (225, 0, 135),
-    (165, 45, 255),
     (45, 90, 90),
+    (165, 45, 255),
+    (225, 0, 135),
     (150, 105, 75),
     (105, 45, 0),
     (0, 0, 135),

@@ -78,6 +78,8 @@ class Comparison:
         Standard deviation of the mean; ``inf`` if it is not known, as where the sky is saturated [-].
     regression : Regression
         Of the picture on the reference.
+    number : int
+        Number of the measured range.
     """
 
     distance: float
@@ -88,6 +90,7 @@ class Comparison:
     near_mean: float
     mean_deviation: float
     regression: Regression
+    number: int = 0
 
     @property
     def fallen(self) -> tuple[float, float]:
@@ -209,6 +212,7 @@ def compared(reference: Picture, picture: Picture, prior: PlacementPrior, most: 
         near_mean=found.near_mean / near.sky if light is None else light.near,
         mean_deviation=math.inf if light is None else math.hypot(light.deviation, contradicted),
         regression=found,
+        number=far.number,
     )
 
 

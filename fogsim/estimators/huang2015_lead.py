@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
-from fogsim.estimators.huang2015_comparison import Comparison
+from fogsim.estimators.huang2015_comparison import RANGE_DEVIATION, Comparison
 from fogsim.estimators.huang2015_ratios import (
     Regressions,
     fitted_extinction,
@@ -112,7 +112,8 @@ class Huang2015Lead:
         return self._tracks
 
     def _new_track(self) -> LeadTrack:
-        return LeadTrack(self._camera, self._setback, self._spacing, self._blur)
+        smoothed_by = 0.0 if self._as_published else RANGE_DEVIATION
+        return LeadTrack(self._camera, self._setback, self._spacing, self._blur, smoothed_by)
 
     def update(self, observation: Observation) -> Estimate:
         """Estimate the fog from this and all earlier pictures of the vehicle ahead.
@@ -146,7 +147,7 @@ class Huang2015Lead:
             if not self._track.follows(observation.lead.distance):
                 self._track = self._new_track()
                 self._tracks += 1
-            self._track.see(image, observation.lead.distance)
+            self._track.see(image, observation.lead, observation.time)
         except CannotTellError as reason:
             self._miss()
             return Estimate.invalid(self.method, str(reason))

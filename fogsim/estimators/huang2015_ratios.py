@@ -35,6 +35,10 @@ DETAIL_SHARE = 0.3
 DRIFT = 0.009
 """Standard deviation of the relative change of a mean contrast as a picture becomes smaller by a factor e [-]."""
 
+SIZE_SHARE = 0.01
+"""Standard deviation of the relative change of a contrast from the nearest to the farthest picture by size and place,
+which all pictures between share [-]."""
+
 HUBER = 2.0
 """Residuals beyond this many standard deviations count linearly, not squared [-]."""
 
@@ -227,7 +231,8 @@ def fitted_extinction(data: Regressions) -> ContrastFit | None:
             break
     finite = np.isfinite(spread)
     misfit = float(np.mean(standardised[finite] ** 2))
-    return ContrastFit(float(state[0]), math.sqrt(max(misfit, 1.0) * float(covariance[0, 0])), misfit)
+    deviation = math.hypot(math.sqrt(max(misfit, 1.0) * float(covariance[0, 0])), SIZE_SHARE / float(np.ptp(apart)))
+    return ContrastFit(float(state[0]), deviation, misfit)
 
 
 def _first_guess(data: Regressions, apart: Floats) -> float | None:

@@ -57,6 +57,8 @@ class Sighting:
         Pixels in a metre at the vehicle [px/m].
     lost : Clipping or None
         What clipping takes of the sky; None if the sky is saturated, and its luminance unknown.
+    number : int
+        Number of the measured range.
     """
 
     distance: float
@@ -67,6 +69,7 @@ class Sighting:
     pitch_deviation: float
     metre: float
     lost: Clipping | None
+    number: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,9 @@ from fogsim.estimators.huang2015_comparison import (
     placed,
 )
 from fogsim.estimators.huang2015_sighting import Crop, sighting_of, vehicle_crop
+from fogsim.estimators.lead_ranges import LeadRanges
 from fogsim.values.camera import Camera
+from fogsim.values.observation import LeadMeasurement
 from fogsim.vision.lead_daylight import RoadFall
 from fogsim.vision.lead_window import LeadWindow, find_lead
 from fogsim.vision.road_image import CannotTellError
@@ -56,6 +58,8 @@ class LeadTrack:
         Change of range that makes a new picture worth keeping [m].
     blur : float
         Standard deviation of the lens' blur beside the pixels' own size [px].
+    range_deviation : float
+        Standard deviation by which ranges are smoothed [m]; 0 leaves them as they are.
 
     Attributes
     ----------
@@ -63,11 +67,12 @@ class LeadTrack:
         How the contrast of the nearest road falls in the last frame; None before the first.
     """
 
-    def __init__(self, camera: Camera, setback: float, spacing: float, blur: float) -> None:
+    def __init__(self, camera: Camera, setback: float, spacing: float, blur: float, range_deviation: float) -> None:
         self._camera = camera
         self._setback = setback
         self._spacing = spacing
         self._blur = blur
+        self._ranges = LeadRanges(range_deviation)
         self._reference: Picture | None = None
         self._kept: list[Picture] = []
         self._comparisons: list[Comparison] = []
@@ -77,8 +82,12 @@ class LeadTrack:
 
     @property
     def comparisons(self) -> tuple[Comparison, ...]:
-        """Every kept picture against the reference, nearest first."""
-        return tuple(sorted(self._comparisons, key=lambda c: c.distance))
+        """Every kept picture against the reference at its likely range, nearest first."""
+        found = self._comparisons
+        measured = np.array([c.distance for c in found]) - self._setback
+        likely = self._ranges.smoothed([c.number for c in found], measured) + self._setback
+        placed = (replace(c, distance=float(d)) for c, d in zip(found, likely, strict=True))
+        return tuple(sorted(placed, key=lambda c: c.distance))
 
     @property
     def window(self) -> LeadWindow | None:
@@ -91,34 +100,37 @@ class LeadTrack:
         """Whether a range can be that of the same vehicle as before."""
         return self._reference is not None and abs(distance + self._setback - self._last_distance) <= MOST_JUMP
 
-    def see(self, image: NDArray[np.uint8] | NDArray[np.uint16], told_distance: float) -> None:
+    def see(self, image: NDArray[np.uint8] | NDArray[np.uint16], told: LeadMeasurement, time: float) -> None:
         """Look for the vehicle in the next frame.
 
         Parameters
         ----------
         image : (rows, cols) or (rows, cols, 3) uint8 or uint16
             An image of the camera.
-        told_distance : float
-            Range by the radar [m].
+        told : LeadMeasurement
+            Range and relative speed by the radar.
+        time : float
+            [s].
 
         Raises
         ------
         CannotTellError
             If it is not there to be seen.
         """
-        distance = told_distance + self._setback
+        distance = told.distance + self._setback
+        number = self._ranges.add(time, told)
         crop = vehicle_crop(image, self._camera, distance)
         self.road = crop.road
         if self._reference is None:
-            self._begin(crop, distance)
+            self._begin(crop, distance, number)
         else:
-            self._follow(crop, distance, self._reference)
+            self._follow(crop, distance, number, self._reference)
 
-    def _begin(self, crop: Crop, distance: float) -> None:
+    def _begin(self, crop: Crop, distance: float, number: int) -> None:
         window = find_lead(crop.luminance, crop.origin, self._camera, distance, crop.noise)
         if window is None:
             raise CannotTellError("no vehicle stands out where the range says that there is one")
-        picture = picture_of(sighting_of(crop, distance, window, self._blur))
+        picture = picture_of(replace(sighting_of(crop, distance, window, self._blur), number=number))
         comparison = compared_with_itself(picture)
         if comparison.mean >= 1.0:
             # Fog only ever brings a vehicle nearer to the sky's light; lamps alone are brighter.
@@ -126,9 +138,9 @@ class LeadTrack:
         self._reference, self._kept, self._comparisons = picture, [picture], [comparison]
         self._remember(window.column, window.foot, distance)
 
-    def _follow(self, crop: Crop, distance: float, reference: Picture) -> None:
+    def _follow(self, crop: Crop, distance: float, number: int, reference: Picture) -> None:
         expected = self._expected(distance, reference)
-        sighting = sighting_of(crop, distance, expected, self._blur)
+        sighting = replace(sighting_of(crop, distance, expected, self._blur), number=number)
         picture, most = picture_of(sighting), self._most_contrast(distance)
         prior = expected_placement(reference.sighting, picture.sighting)
         comparison = compared(reference, picture, prior, most)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from fogsim.errors import InputError
 from fogsim.estimators.image_check import checked_count, checked_image
 from fogsim.estimators.lead_contrast_track import SPACING, ContrastTrack, Sight
+from fogsim.estimators.lead_ranges import LeadRanges
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
@@ -120,6 +121,7 @@ class LeadContrast:
     def reset(self) -> None:
         """Forget the track."""
         self._track.forget()
+        self._ranges = LeadRanges(self._range_deviation)
         self._missed = 0
         self._last: tuple[float, LeadMeasurement] | None = None
 
@@ -152,10 +154,12 @@ class LeadContrast:
         self._last = (observation.time, lead)
         reason, road = "", None
         try:
-            scene = lead_scene(image, self._camera, lead.distance + self._setback, self._pitch_deviation)
+            number = self._ranges.add(observation.time, lead)
+            likely = float(self._ranges.smoothed([number], np.array([lead.distance]))[0])
+            scene = lead_scene(image, self._camera, likely + self._setback, self._pitch_deviation)
             fit = self._fit()
             densest = math.inf if fit is None else max(fit.extinction + 2.0 * fit.deviation, 0.0)
-            sight = self._track.look(scene, lead.distance, observation.time, surprise=surprise, densest=densest)
+            sight = self._track.look(scene, number, lead.distance, observation.time, surprise=surprise, densest=densest)
             found["lead_box"], road = _box(sight), scene.road
             self._missed = 0
         except CannotTellError as error:
@@ -184,7 +188,7 @@ class LeadContrast:
 
     def _estimate(self, reason: str, road: RoadFall | None, found: dict[str, object]) -> Estimate:
         found |= {
-            "distance": self._column("distance"),
+            "distance": self._distances(),
             "contrast": np.array([s.fading.ratio for s in self._track.sights]),
         }
         fit = self._fit()
@@ -196,13 +200,15 @@ class LeadContrast:
             return Estimate.invalid(self.method, reason, **found)
         return Estimate(self.method, max(fit.extinction, 0.0), fit.deviation, diagnostics=found)
 
-    def _column(self, name: str) -> NDArray[np.float64]:
-        return np.array([getattr(sample, name) for sample in self._track.sights])
+    def _distances(self) -> NDArray[np.float64]:
+        """Likely ranges of the sights [m]."""
+        sights = self._track.sights
+        return self._ranges.smoothed([s.number for s in sights], np.array([s.distance for s in sights]))
 
     def _fit(self) -> DecayFit | None:
         if len(self._track.sights) < MIN_SAMPLES or sum(sample.alike for sample in self._track.sights) < MIN_ALIKE:
             return None
-        distance = self._column("distance")
+        distance = self._distances()
         contrast, noise, lever = (
             np.array([getattr(s.fading, name) for s in self._track.sights]) for name in ("ratio", "deviation", "lever")
         )

@@ -45,6 +45,9 @@ SUSPICION = 2.5
 SURE = 12.0
 """Contrast in its deviations from which a vehicle's place in a picture is believed [-]."""
 
+UNPLACED = 0.15
+"""Relative deviation of its contrast where it is not: what is off its place shows less [-]."""
+
 DENSEST = 0.1
 """Densest fog that is thought of before a track says more [1/m]."""
 
@@ -55,6 +58,8 @@ class Sight:
 
     Attributes
     ----------
+    number : int
+        Number of the measured range.
     distance, depth : float
         Its range as measured, and from the camera to its rear [m].
     time : float
@@ -71,6 +76,7 @@ class Sight:
         Whether it looks like the reference, and is not only where that is expected.
     """
 
+    number: int
     distance: float
     depth: float
     time: float
@@ -118,15 +124,17 @@ class ContrastTrack:
         self._lift += max(1.0 / (self._swayed + 1.0), FOLLOWED) * (lift - self._lift)
         self._swayed += 1
 
-    def look(self, scene: LeadScene, distance: float, time: float, *, surprise: float, densest: float) -> Sight:
+    def look(
+        self, scene: LeadScene, number: int, distance: float, time: float, *, surprise: float, densest: float
+    ) -> Sight:
         """Find the vehicle in a frame and keep its picture if the range is new.
 
         Parameters
         ----------
         scene : LeadScene
             The frame.
-        distance : float
-            Range as measured [m].
+        number, distance : int, float
+            Number of the measured range, and that range [m].
         time : float
             [s].
         surprise : float
@@ -143,13 +151,13 @@ class ContrastTrack:
         sight = None
         if self.reference is not None:
             try:
-                sight = self._followed(scene, distance, time, self.reference, densest)
+                sight = replace(self._followed(scene, distance, time, self.reference, densest), number=number)
             except CannotTellError:
                 if surprise < SUSPICION:
                     raise
                 self.forget()
         if sight is None:
-            sight = self._begun(scene, distance, time)
+            sight = replace(self._begun(scene, distance, time), number=number)
         self._aside = scene.aside(sight.picture)
         self._follow_pitch(scene.lift(sight.picture))
         self._keep(sight)
@@ -183,7 +191,7 @@ class ContrastTrack:
         fading = compared(picture, picture)
         if fading is None:
             raise CannotTellError("the vehicle ahead hardly differs from the airlight")
-        return Sight(distance, scene.depth, time, picture, scene.window(picture), fading, scene.sky.is_clipped, True)
+        return Sight(0, distance, scene.depth, time, picture, scene.window(picture), fading, scene.sky.is_clipped, True)
 
     def _followed(self, scene: LeadScene, distance: float, time: float, reference: Sight, densest: float) -> Sight:
         """Find the vehicle that is tracked."""
@@ -199,13 +207,14 @@ class ContrastTrack:
         if fading.ratio < SURE * fading.deviation:
             # The best of many places would be that of the noise: it is where it was expected.
             picture, fading = expected, compared(reference.picture, expected) or fading
+            fading = replace(fading, deviation=math.hypot(fading.deviation, UNPLACED * fading.ratio))
         least, most = self._bounds(distance, densest)
         if fading.visible * least > VISIBLE and likeness < max(ALIKE, _likeness_if_fixed(scene, reference)):
             raise CannotTellError("what is seen there does not look like the vehicle that was tracked")
         if fading.ratio > most + 4.0 * fading.deviation:
             raise CannotTellError("what is seen there has more contrast than fog leaves")
         window, alike = scene.window(picture), likeness >= ALIKE
-        return Sight(distance, scene.depth, time, picture, window, fading, scene.sky.is_clipped, alike)
+        return Sight(0, distance, scene.depth, time, picture, window, fading, scene.sky.is_clipped, alike)
 
     def _bounds(self, distance: float, densest: float) -> tuple[float, float]:
         """Least and greatest contrast that the vehicle can have at a range, over that of the reference."""

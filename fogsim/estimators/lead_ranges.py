@@ -1,0 +1,124 @@
+"""Ranges of the vehicle ahead, made smoother by the relative speed that the same sensor measures."""
+
+import math
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.jit import kernel
+from fogsim.values.observation import LeadMeasurement
+
+Floats = NDArray[np.float64]
+
+KEPT = 512
+"""Measurements that are smoothed together; older ones are taken as they were measured."""
+
+SPEED_DEVIATION, UNEVEN = 0.15, 0.3
+"""Standard deviation of a relative speed [m/s], and of what the mean of two leaves out of the change of range between
+them over the square of the time between [m/s²]."""
+
+LONGEST = 2.0
+"""Time between two measurements beyond which speeds say nothing of the way between [s]."""
+
+SURPRISING = 4.0
+"""Standard deviations by which a change of range contradicts the speeds [-]: the sensor has jumped."""
+
+LATEST, CONTRADICTED = 8, 1.8
+"""Of how many of the last measurements, and of all, the root mean square change by smoothing may be, in deviations of a
+range [-]: more, and the speeds are not those of these ranges."""
+
+
+class LeadRanges:
+    """Ranges as measured, and as they are likely with those before and after and the speeds between.
+
+    Parameters
+    ----------
+    deviation : float
+        Standard deviation of a measured range [m]; 0 leaves them as they are.
+    """
+
+    def __init__(self, deviation: float) -> None:
+        self._deviation = deviation
+        self._measured: deque[tuple[float, float, float]] = deque(maxlen=KEPT)
+        self._count = 0
+
+    def add(self, time: float, measured: LeadMeasurement) -> int:
+        """Take a measurement.
+
+        Parameters
+        ----------
+        time : float
+            [s].
+        measured : LeadMeasurement
+            Its range must be finite.
+
+        Returns
+        -------
+        int
+            Its number, by which it is asked for.
+        """
+        speed = measured.relative_speed if math.isfinite(measured.relative_speed) else 0.0
+        self._measured.append((time, measured.distance, speed))
+        self._count += 1
+        return self._count - 1
+
+    def smoothed(self, numbers: list[int], measured: Floats) -> Floats:
+        """Likely ranges of measurements.
+
+        Parameters
+        ----------
+        numbers : (n,) list of int
+            Their numbers.
+        measured : (n,) float64
+            Their ranges, which those that are too old keep [m].
+
+        Returns
+        -------
+        (n,) float64
+            [m].
+        """
+        if self._deviation <= 0.0 or len(self._measured) < 3:
+            return measured
+        time, distance, speed = np.array(self._measured).T.copy()
+        likely = _smoothed(time, distance, speed, self._deviation)
+        change = np.abs(likely - distance) / self._deviation
+        if max(_root_mean_square(change), _root_mean_square(change[-LATEST:])) > CONTRADICTED:
+            return measured
+        at = np.array(numbers, np.int64) - (self._count - time.size)
+        return np.asarray(np.where(at >= 0, likely[np.maximum(at, 0)], measured))
+
+
+def _root_mean_square(values: Floats) -> float:
+    return math.sqrt(float(np.mean(values**2)))
+
+
+@kernel
+def _smoothed(time: Floats, distance: Floats, speed: Floats, deviation: float) -> Floats:
+    """Ranges of greatest likelihood (a Kalman filter of one state from either end, joined at each measurement)."""
+    forward, certain = _filtered(time, distance, speed, deviation, 1)
+    backward, known = _filtered(time, distance, speed, deviation, -1)
+    own = 1.0 / deviation**2
+    # Either has the measurement itself in it, which counts once.
+    return (forward * certain + backward * known - distance * own) / (certain + known - own)
+
+
+@kernel
+def _filtered(time: Floats, distance: Floats, speed: Floats, deviation: float, way: int) -> tuple[Floats, Floats]:
+    """Ranges by the measurements on one side, and their information [1/m²]."""
+    likely, information = distance.copy(), np.full(distance.size, 1.0 / deviation**2)
+    last = 0 if way > 0 else distance.size - 1
+    for _ in range(1, distance.size):
+        i = last + way
+        apart = time[i] - time[last]
+        if 0.0 < way * apart < LONGEST:
+            moved = 0.5 * (speed[i] + speed[last]) * apart
+            unsure = (SPEED_DEVIATION * apart) ** 2 / 2.0 + (UNEVEN * apart**2) ** 2
+            surprise = distance[i] - distance[last] - moved
+            if surprise**2 < SURPRISING**2 * (2.0 * deviation**2 + unsure):
+                weight = 1.0 / (1.0 / information[last] + unsure)
+                likely[i] = (likely[last] + moved) * weight + distance[i] / deviation**2
+                information[i] = weight + 1.0 / deviation**2
+                likely[i] /= information[i]
+        last = i
+    return likely, information

@@ -19,7 +19,7 @@ from fogsim.atmosphere.halo_lamps import (
     TOWARDS,
 )
 from fogsim.atmosphere.halo_profiles import CORE_SIZE, HIDDEN_SHARE, WIDE_FOLD, WIDE_SIZE, lamp_profile
-from fogsim.atmosphere.kernels import three_times
+from fogsim.atmosphere.kernels import between, three_times
 from fogsim.jit import kernel
 
 _LAST_WIDE = np.float32(WIDE_SIZE - 1.001)
@@ -154,12 +154,6 @@ def _stretch(
 
 
 @kernel
-def _between(low: NDArray[np.float32], high: NDArray[np.float32], share: np.float32, out: NDArray[np.float32]) -> None:
-    for j in range(out.shape[0]):
-        out[j] = low[j] + (high[j] - low[j]) * share
-
-
-@kernel
 def _add_product(light: NDArray[np.float32], seen: NDArray[np.float32], out: NDArray[np.float32]) -> None:
     for j in range(out.shape[0]):
         out[j] += light[j] * seen[j]
@@ -186,8 +180,8 @@ def add_stretched(
             ready += 1
             _stretch(coarse, ready * coarse_columns, coarse_columns, lights[ready % 2], nears[ready % 2])
         share, top = place - np.float32(upper), upper % 2
-        _between(lights[top], lights[1 - top], share, light)
-        _between(nears[top], nears[1 - top], share, near)
+        between(lights[top], lights[1 - top], share, light)
+        between(nears[top], nears[1 - top], share, near)
         for u in range(columns):
             near[u] = min(_ONE, distance[v, u] * near[u])
         three_times(near, seen)

@@ -21,6 +21,7 @@ _ONE = np.float32(1.0)
 # 2^f − 1 = f · P(f) on (−1, 0]: Remez-like weighted least squares, error 6·10⁻⁸; exact at 0, where clear air is.
 _P0, _P1, _P2, _P3, _P4 = (np.float32(c) for c in (0.69314442, 0.24018671, 0.05531669, 0.00922838, 0.00095403))
 _ALONG = np.float32(0.1)
+_NEXT = np.uint32(1)
 
 
 @kernel
@@ -47,6 +48,30 @@ def three_times(values: NDArray[np.float32], out: NDArray[np.float32]) -> None:
         out[3 * u] = values[u]
         out[3 * u + 1] = values[u]
         out[3 * u + 2] = values[u]
+
+
+@kernel
+def each_channel(colour: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+    """A colour (3) in each of a row's pixels of three interleaved channels."""
+    for j in range(out.shape[0]):
+        out[j] = colour[j % 3]
+
+
+@kernel
+def between(low: NDArray[np.float32], high: NDArray[np.float32], share: np.float32, out: NDArray[np.float32]) -> None:
+    """A row that lies between two rows of a coarser grid, at a share of the way from the lower to the higher."""
+    for j in range(out.shape[0]):
+        out[j] = low[j] + (high[j] - low[j]) * share
+
+
+@kernel
+def bilinear(table: NDArray[np.float32], row: np.float32, column: np.float32) -> np.float32:
+    """Value of a table at a place within it, before its last row and column."""
+    a, b = np.uint32(row), np.uint32(column)
+    down, aside = row - np.float32(a), column - np.float32(b)
+    low = table[a, b] + (table[a, b + _NEXT] - table[a, b]) * aside
+    high = table[a + _NEXT, b] + (table[a + _NEXT, b + _NEXT] - table[a + _NEXT, b]) * aside
+    return low + (high - low) * down
 
 
 @kernel

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.kernels import ENDLESS, three_times, transmissions
+from fogsim.atmosphere.kernels import ENDLESS, between, bilinear, each_channel, three_times, transmissions
 from fogsim.atmosphere.lamp_tables import FOLD, SIZE
-from fogsim.atmosphere.plane_pieces import choose_pixels, spread
+from fogsim.atmosphere.plane_pieces import choose_pixels, row_points, spread
 from fogsim.jit import kernel
 
 _ONE, _HALF, _THIRD = np.float32(1.0), np.float32(0.5), np.float32(1.0 / 3.0)
@@ -15,13 +15,6 @@ _MIDDLE = np.float32(0.5 * (SIZE - 1))
 _LAST_CELL = np.float32(SIZE - 1.001)
 _LEAST = np.float32(1e-6)
 _NEXT = np.uint32(1)
-
-
-@kernel
-def _between(low: NDArray[np.float32], high: NDArray[np.float32], share: np.float32, out: NDArray[np.float32]) -> None:
-    """Profiles of a row's rays at a place between two rows of the grid."""
-    for i in range(out.shape[0]):
-        out[i] = low[i] + (high[i] - low[i]) * share
 
 
 @kernel
@@ -104,11 +97,7 @@ def _add_intensity(
 ) -> None:
     """Add to a row's pixels the intensity of a lamp times their weight."""
     for u in range(count):
-        a, b = np.uint32(row[u]), np.uint32(column[u])
-        down, aside = row[u] - np.float32(a), column[u] - np.float32(b)
-        low = table[a, b] + (table[a, b + _NEXT] - table[a, b]) * aside
-        high = table[a + _NEXT, b] + (table[a + _NEXT, b + _NEXT] - table[a + _NEXT, b]) * aside
-        out[u] += (low + (high - low) * down) * weight[u]
+        out[u] += bilinear(table, row[u], column[u]) * weight[u]
 
 
 @kernel
@@ -127,29 +116,6 @@ def _column_places(
         place = pixel[u] * scale
         cell = min(np.int32(place), np.int32(cells - 1))
         left[u], aside[u] = np.uint32(cell * np.int32(nodes)), place - np.float32(cell)
-
-
-@kernel
-def _row_points(
-    count: np.uint64,
-    ray_map: NDArray[np.float32],
-    v: int,
-    pixel: NDArray[np.float32],
-    length: NDArray[np.float32],
-    forward: NDArray[np.float32],
-    right: NDArray[np.float32],
-    up: NDArray[np.float32],
-) -> None:
-    """Where the things are that chosen pixels of a row see."""
-    first_x = ray_map[0, 1] * np.float32(v) + ray_map[0, 2]
-    first_y = ray_map[1, 1] * np.float32(v) + ray_map[1, 2]
-    first_z = ray_map[2, 1] * np.float32(v) + ray_map[2, 2]
-    for u in range(count):
-        x = first_x + ray_map[0, 0] * pixel[u]
-        y = first_y + ray_map[1, 0] * pixel[u]
-        z = first_z + ray_map[2, 0] * pixel[u]
-        scale = length[u] / np.sqrt(x * x + y * y + z * z)
-        forward[u], right[u], up[u] = x * scale, y * scale, z * scale
 
 
 @kernel
@@ -191,7 +157,7 @@ def _any_lit(response: NDArray[np.float32]) -> bool:
 
 
 @kernel
-def add_own_light(  # noqa: C901, PLR0912 - one loop: handing its many rows on costs more than their work on a small image
+def add_own_light(  # noqa: C901 - one loop: handing its many rows on costs more than their work on a small image
     distance: NDArray[np.float32],
     response: NDArray[np.float32],
     ray_map: NDArray[np.float32],
@@ -229,8 +195,7 @@ def add_own_light(  # noqa: C901, PLR0912 - one loop: handing its many rows on c
     scattered, light = np.zeros(columns, np.float32), np.zeros(columns, np.float32)
     veiled, shone = np.zeros(3 * columns, np.float32), np.zeros(3 * columns, np.float32)
     channels, no_response = np.empty(3 * columns, np.float32), np.zeros(3 * columns, np.float32)
-    for j in range(3 * columns):
-        channels[j] = colour[j % 3]
+    each_channel(colour, channels)
     n = np.uint64(columns)
     for u in range(columns):
         pixel[u] = np.float32(u)
@@ -253,16 +218,16 @@ def add_own_light(  # noqa: C901, PLR0912 - one loop: handing its many rows on c
         place = np.float32(v) * np.float32(grid_rows - 1) / np.float32(max(distance.shape[0] - 1, 1))
         upper = min(int(place), grid_rows - 2)
         if not clear:
-            _between(veil[upper], veil[upper + 1], place - np.float32(upper), profiles)
+            between(veil[upper], veil[upper + 1], place - np.float32(upper), profiles)
             _read_row(n, profiles, nodes, left, aside, node, few_scattered)
             if step > 1:
                 spread(few_scattered, step, first, even, scattered)
             three_times(scattered, veiled)
         if lit:
             if not uniform:
-                _between(attenuation[upper], attenuation[upper + 1], place - np.float32(upper), profiles)
+                between(attenuation[upper], attenuation[upper + 1], place - np.float32(upper), profiles)
                 _read_row(n, profiles, nodes, left, aside, node, mean)
-            _row_points(n, ray_map, v, pixel, chosen, points[0], points[1], points[2])
+            row_points(n, ray_map, v, pixel, chosen, points)
             _light_row(n, points, chosen, mean, lamps, tables, scratch, power, few_light)
             if step > 1:
                 spread(few_light, step, first, even, light)

@@ -66,6 +66,28 @@ def choose_pixels(
 
 
 @kernel
+def row_points(
+    count: np.uint64,
+    ray_map: NDArray[np.float32],
+    v: int,
+    pixel: NDArray[np.float32],
+    length: NDArray[np.float32],
+    points: NDArray[np.float32],
+) -> None:
+    """Where the things are (3, n) that chosen pixels of row `v` see, in the axes of `ray_map`'s rays [m]."""
+    first_x = ray_map[0, 1] * np.float32(v) + ray_map[0, 2]
+    first_y = ray_map[1, 1] * np.float32(v) + ray_map[1, 2]
+    first_z = ray_map[2, 1] * np.float32(v) + ray_map[2, 2]
+    to_x, to_y, to_z = points[0], points[1], points[2]
+    for n in range(count):
+        x = first_x + ray_map[0, 0] * pixel[n]
+        y = first_y + ray_map[1, 0] * pixel[n]
+        z = first_z + ray_map[2, 0] * pixel[n]
+        scale = length[n] / np.sqrt(x * x + y * y + z * z)
+        to_x[n], to_y[n], to_z[n] = x * scale, y * scale, z * scale
+
+
+@kernel
 def spread(
     values: NDArray[np.float32],
     step: int,

@@ -5,13 +5,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.kernels import three_times
-from fogsim.atmosphere.plane_pieces import choose_pixels, spread
+from fogsim.atmosphere.kernels import bilinear, each_channel, three_times
+from fogsim.atmosphere.plane_pieces import choose_pixels, row_points, spread
 from fogsim.jit import kernel
 
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)
 _FARTHEST = np.float32(500.0)  # half the diagonal of a map, and more
-_NEXT = np.uint32(1)
 
 
 @kernel
@@ -64,53 +63,31 @@ def _any_near(distance: NDArray[np.float32]) -> bool:
 
 
 @kernel
-def _row_places(
-    count: np.uint64,
-    ray_map: NDArray[np.float32],
-    v: int,
-    start: NDArray[np.float32],
-    pixel: NDArray[np.float32],
-    length: NDArray[np.float32],
-    places: NDArray[np.float32],
-) -> None:
-    """Where chosen pixels of a row look, in cells of the map and metres above the eye."""
-    first_x = ray_map[0, 1] * np.float32(v) + ray_map[0, 2]
-    first_y = ray_map[1, 1] * np.float32(v) + ray_map[1, 2]
-    first_z = ray_map[2, 1] * np.float32(v) + ray_map[2, 2]
-    per_cell, east, north, up = start[2], places[0], places[1], places[2]
-    for n in range(count):
-        x = first_x + ray_map[0, 0] * pixel[n]
-        y = first_y + ray_map[1, 0] * pixel[n]
-        z = first_z + ray_map[2, 0] * pixel[n]
-        scale = length[n] / np.sqrt(x * x + y * y + z * z)
-        east[n], north[n], up[n] = start[0] + x * scale * per_cell, start[1] + y * scale * per_cell, z * scale
-
-
-@kernel
 def _read_map(
     count: np.uint64,
-    places: NDArray[np.float32],
+    points: NDArray[np.float32],
+    start: NDArray[np.float32],
     eye_height: np.float32,
     illuminance: NDArray[np.float32],
     tops: NDArray[np.float32],
     light: NDArray[np.float32],
 ) -> bool:
-    """Illuminance of what chosen pixels see, linear between the map's cells, none above the lamps; whether any."""
+    """Illuminance of what chosen pixels see, none above the lamps; whether there is any.
+
+    `points` (3, n) are from the eye, `start` and `eye_height` as for `light_streets`.
+    """
     last_row, last_column = np.float32(illuminance.shape[0] - 1.001), np.float32(illuminance.shape[1] - 1.001)
-    east, north, up = places[0], places[1], places[2]
+    east, north, up, per_cell = points[0], points[1], points[2], start[2]
     any_light = False
     for n in range(count):
-        x, y = east[n], north[n]
+        x, y = start[0] + east[n] * per_cell, start[1] + north[n] * per_cell
         light[n] = _ZERO
         if not (_ZERO <= x < last_column and _ZERO <= y < last_row):
             continue
-        i, j = np.uint32(y), np.uint32(x)
-        down, aside = y - np.float32(i), x - np.float32(j)
-        low = illuminance[i, j] + (illuminance[i, j + _NEXT] - illuminance[i, j]) * aside
-        high = illuminance[i + _NEXT, j] + (illuminance[i + _NEXT, j + _NEXT] - illuminance[i + _NEXT, j]) * aside
-        value = low + (high - low) * down
+        value = bilinear(illuminance, y, x)
         if value > _ZERO:
-            light[n] = value * min(max(tops[i, j] - (eye_height + up[n]), _ZERO), _ONE)
+            top = tops[np.uint32(y), np.uint32(x)]
+            light[n] = value * min(max(top - (eye_height + up[n]), _ZERO), _ONE)
             any_light = True
     return any_light
 
@@ -149,7 +126,7 @@ def light_streets(
     on the map and the cells per metre.
     """
     columns = distance.shape[1]
-    places, light, few = (
+    points, light, few = (
         np.empty((3, columns), np.float32),
         np.empty(columns, np.float32),
         np.empty(columns, np.float32),
@@ -158,16 +135,15 @@ def light_streets(
     pixel, chosen = np.empty(columns, np.float32), np.empty(columns, np.float32)
     bent, first, even = np.empty(columns, np.uint8), np.empty(columns, np.uint64), np.empty(columns, np.bool_)
     lit, channels = np.empty(3 * columns, np.float32), np.empty(3 * columns, np.float32)
-    for j in range(3 * columns):
-        channels[j] = factor[j % 3]
+    each_channel(factor, channels)
     for v in range(distance.shape[0]):
         any_light = False
         if _any_near(distance[v]):
             for u in range(columns):
                 length[u] = min(distance[v, u], _FARTHEST)
             n = choose_pixels(length, step, inverse, bent, pixel, chosen, first, even)
-            _row_places(n, ray_map, v, start, pixel, chosen, places)
-            any_light = _read_map(n, places, eye_height, illuminance, tops, few)
+            row_points(n, ray_map, v, pixel, chosen, points)
+            any_light = _read_map(n, points, start, eye_height, illuminance, tops, few)
         if any_light:
             spread(few, step, first, even, light)
             three_times(light, lit)

@@ -128,6 +128,24 @@ def _seen_covariance(
 
 
 @kernel
+def _is_road(
+    seen: tuple[float, float],
+    h0: float,
+    h1: float,
+    h2: float,
+    strip: int,
+    p: NDArray[np.float64],
+    state: NDArray[np.float64],
+) -> bool:
+    """Whether a bin, of which a residual and its variance are seen, is no outlier; see `_seen_covariance`."""
+    c, d = strip, strip + 1
+    total = h0 * h0 * p[0, 0] + h1 * h1 * p[c, c] + h2 * h2 * p[d, d]
+    total += 2.0 * (h0 * h1 * p[0, c] + h0 * h2 * p[0, d] + h1 * h2 * p[c, d])
+    innovation = seen[0] - h0 * state[0, 0] - h1 * state[c, 0] - h2 * state[d, 0]
+    return innovation * innovation <= OUTLIER**2 * (total + seen[1])
+
+
+@kernel
 def _unexplained(used: int, noise: float, airlight: float) -> float:
     """What a bin adds to the cost that is not in use."""
     if used == HIDDEN:
@@ -154,7 +172,7 @@ def _learn(
 
 
 @kernel
-def whiten(
+def whiten(  # noqa: C901 - one pass of a filter, which shares all its arrays
     columns: NDArray[np.float64],
     scale: NDArray[np.float64],
     noise: NDArray[np.float64],
@@ -197,6 +215,13 @@ def whiten(
     for i in range(count):
         if i:
             _age(covariance, state, changes[i], albedo)
+        if reject:
+            # All strips by what lies nearer, so that none comes before another.
+            for strip in range(strips):
+                h1 = scale[strip, i]
+                h0, h2 = h1 * changes[i, 5], h1 * changes[i, 6]
+                seen = (columns[strip, i, 0], noise[strip, i])
+                used[strip, i] = USED if _is_road(seen, h0, h1, h2, 2 + 2 * strip, covariance, state) else 0
         for strip in range(strips):
             out[strip, i, :] = 0.0
             if noise[strip, i] <= 0.0:
@@ -208,8 +233,6 @@ def whiten(
             total = h0 * gain[0] + h1 * gain[c] + h2 * gain[c + 1] + noise[strip, i]
             for j in range(width):
                 innovation[j] = columns[strip, i, j] - h0 * state[0, j] - h1 * state[c, j] - h2 * state[c + 1, j]
-            if reject:
-                used[strip, i] = USED if innovation[0] ** 2 <= OUTLIER**2 * total else 0
             if used[strip, i] != USED:
                 log_determinant += _unexplained(used[strip, i], noise[strip, i], airlight)
                 continue
@@ -226,15 +249,26 @@ def whiten(
 
 
 @kernel
-def hide_behind_obstacle(noise: NDArray[np.float64], used: NDArray[np.uint8]) -> None:
-    """Drop what lies behind the nearest outlier from which on most is outliers: it stands on the road and hides it."""
-    seen, outliers, foot = 0, 0, noise.size
-    for i in range(noise.size - 1, -1, -1):
-        if noise[i] <= 0.0:
-            continue
-        seen += 1
-        if used[i] != USED:
-            outliers += 1
-            if outliers >= OUTLIERS_OF_OBSTACLE and 2 * outliers > seen:
-                foot = i
-    used[foot:] = HIDDEN
+def hide_behind_obstacles(noise: NDArray[np.float64], used: NDArray[np.uint8]) -> bool:
+    """Drop what lies behind each strip's nearest outlier from which on most is outliers: it stands there and hides it.
+
+    Returns
+    -------
+    bool
+        Whether any bin was in use that now is not.
+    """
+    changed = False
+    for strip in range(noise.shape[0]):
+        seen, outliers, foot = 0, 0, noise.shape[1]
+        for i in range(noise.shape[1] - 1, -1, -1):
+            if noise[strip, i] <= 0.0:
+                continue
+            seen += 1
+            if used[strip, i] != USED:
+                outliers += 1
+                if outliers >= OUTLIERS_OF_OBSTACLE and 2 * outliers > seen:
+                    foot = i
+        for i in range(foot, noise.shape[1]):
+            changed = changed or used[strip, i] == USED
+            used[strip, i] = HIDDEN
+    return changed

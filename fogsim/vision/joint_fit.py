@@ -23,8 +23,8 @@ ALBEDO_CHANCES = (0.4, 0.2, 0.2, 0.15, 0.05)
 """How likely each of those is before the image is seen [-]."""
 
 SMOOTH, EXPLAINED = 3, 1.0
-"""How many of those have patches as faint as the first, and misfit of the first up to which stronger ones are not tried:
-they explain nothing then."""
+"""How many of those have patches as faint as the first, and misfit of the first up to which stronger ones are not tried
+[-]: they explain nothing then."""
 
 EXTINCTIONS, SIMPLE_EXTINCTIONS = 14, 28
 """Extinctions of the first searches, evenly in ln k."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
-from fogsim.vision.albedo_filter import USED, hide_behind_obstacle, wandering, whiten
+from fogsim.vision.albedo_filter import USED, hide_behind_obstacles, wandering, whiten
 from fogsim.vision.road_curve import near_road, transmission
 
 PARAMETERS = 4
@@ -199,9 +199,9 @@ def refine(
         # What is an outlier is settled before the last steps, so that they converge.
         reject = iteration < max(iterations - 2, 1)
         cost = whiten(columns, scale, noise, changes, albedo, prior[0], reject, used, out, constant)
-        if reject:
-            for s in range(strips):
-                hide_behind_obstacle(noise[s], used[s])
+        if reject and hide_behind_obstacles(noise, used):
+            # Else what was seen of the bins that are now hidden would still count through the others.
+            cost = whiten(columns, scale, noise, changes, albedo, prior[0], False, used, out, constant)
         normal, gradient = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
         squares, number = _add_bins(out, used, normal, gradient)
         cost += squares + _add_prior(theta, prior, normal, gradient)

@@ -34,6 +34,9 @@ SHAPE, BRIGHT_SHAPE = 0.005, 0.03
 """Relative deviation of the farthest contrast from the nearest by what size and aspect do: a slope's error [-]. The
 latter is that of the luminance, which matters as much more as a vehicle is brighter than its contrast to the sky."""
 
+SMOOTHED = 0.008
+"""Relative deviation of k by what neighbouring sights share: errors of smoothed ranges, places in noise [-]."""
+
 LARGE_SHAPE = 0.018
 """That deviation of a lorry or a bus: one sees below it, and differently far as it moves away [-]."""
 
@@ -225,7 +228,8 @@ class LeadContrast:
             return None
         certain = contrast**2 / (noise**2 + (relative * contrast) ** 2 + offset**2)
         shape = self._shape(fit.extinction, float(np.median(lever)))
-        return replace(fit, deviation=math.hypot(fit.deviation, shape / max(_span(distance, certain), SPACING)))
+        by_shape = shape / max(_span(distance, certain), SPACING)
+        return replace(fit, deviation=math.hypot(fit.deviation, by_shape, SMOOTHED * fit.extinction))
 
     def _shape(self, extinction: float, lever: float) -> float:
         """By how much size and aspect may change the farthest contrast, relative [-]."""

@@ -142,7 +142,7 @@ def _is_road(
     total = h0 * h0 * p[0, 0] + h1 * h1 * p[c, c] + h2 * h2 * p[d, d]
     total += 2.0 * (h0 * h1 * p[0, c] + h0 * h2 * p[0, d] + h1 * h2 * p[c, d])
     innovation = seen[0] - h0 * state[0, 0] - h1 * state[c, 0] - h2 * state[d, 0]
-    return innovation * innovation <= OUTLIER**2 * (total + seen[1])
+    return bool(innovation * innovation <= OUTLIER**2 * (total + seen[1]))
 
 
 @kernel

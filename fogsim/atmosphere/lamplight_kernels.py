@@ -16,6 +16,10 @@ _LAST_CELL = np.float32(SIZE - 1.001)
 _LEAST = np.float32(1e-6)
 _NEXT = np.uint32(1)
 
+_Floats = NDArray[np.float32]
+_ChoiceRows = tuple[_Floats, _Floats, NDArray[np.uint32], _Floats, NDArray[np.uint64], NDArray[np.bool_]]
+_LightRows = tuple[_Floats, _Floats, _Floats, _Floats, _Floats, _Floats]
+
 
 @kernel
 def _read_row(
@@ -157,7 +161,44 @@ def _any_lit(response: NDArray[np.float32]) -> bool:
 
 
 @kernel
-def add_own_light(  # noqa: C901 - one loop: handing its many rows on costs more than their work on a small image
+def _cut_lengths(distance: NDArray[np.float32], length: NDArray[np.float32]) -> None:
+    """Distances of a row, endless ones cut to a length that can be computed with."""
+    for u in range(length.shape[0]):
+        length[u] = min(distance[u], np.float32(ENDLESS))
+
+
+@kernel
+def _node_places(
+    count: np.uint64, length: NDArray[np.float32], last: np.float32, fold: np.float32, node: NDArray[np.float32]
+) -> None:
+    """Where between the nodes of their rays, of which `last` is the last, the things are that chosen pixels see."""
+    for u in range(count):
+        node[u] = min(last * length[u] / (length[u] + fold), last - np.float32(1e-3))
+
+
+@kernel
+def _rows_of_choice(columns: int, cells: int, nodes: int) -> _ChoiceRows:
+    """Rows for the pixels that are chosen: columns, distances, profiles left of them and how far on, and pieces.
+
+    They begin as if every pixel were chosen.
+    """
+    pixel, chosen = np.arange(columns).astype(np.float32), np.empty(columns, np.float32)
+    left, aside = np.empty(columns, np.uint32), np.empty(columns, np.float32)
+    _column_places(np.uint64(columns), pixel, columns, cells, nodes, left, aside)
+    return pixel, chosen, left, aside, np.empty(columns, np.uint64), np.empty(columns, np.bool_)
+
+
+@kernel
+def _rows_of_light(columns: int) -> _LightRows:
+    """Rows for what is scattered and what shines on surfaces: of the chosen pixels, of every pixel, of each channel."""
+    few_scattered, few_light = np.empty(columns, np.float32), np.empty(columns, np.float32)
+    scattered, light = np.zeros(columns, np.float32), np.zeros(columns, np.float32)
+    veiled, shone = np.zeros(3 * columns, np.float32), np.zeros(3 * columns, np.float32)
+    return few_scattered, few_light, scattered, light, veiled, shone
+
+
+@kernel
+def add_own_light(
     distance: NDArray[np.float32],
     response: NDArray[np.float32],
     ray_map: NDArray[np.float32],
@@ -182,39 +223,28 @@ def add_own_light(  # noqa: C901 - one loop: handing its many rows on costs more
     """
     columns = distance.shape[1]
     uniform, clear, surfaces = attenuation.size == 1, veil.shape[0] == 0, response.shape[0] > 0
-    grid_rows = max(veil.shape[0], attenuation.shape[0])
-    profiles = np.zeros(grid_columns * int(nodes), np.float32)
+    grid_rows, cells, last = max(veil.shape[0], attenuation.shape[0]), grid_columns - 1, np.float32(nodes - 1)
+    profiles, node = np.zeros(grid_columns * int(nodes), np.float32), np.empty(columns, np.float32)
     points, scratch = np.empty((3, columns), np.float32), np.empty((4, columns), np.float32)
     length, inverse = np.empty(columns, np.float32), np.empty(columns, np.float32)
-    pixel, chosen, node = np.empty(columns, np.float32), np.empty(columns, np.float32), np.empty(columns, np.float32)
-    mean = np.full(columns, attenuation[0, 0])
-    few_scattered, few_light = np.empty(columns, np.float32), np.empty(columns, np.float32)
     bent, power = np.empty(columns, np.uint8), np.empty(columns, np.int32)
-    first, even = np.empty(columns, np.uint64), np.empty(columns, np.bool_)
-    left, aside = np.empty(columns, np.uint32), np.empty(columns, np.float32)
-    scattered, light = np.zeros(columns, np.float32), np.zeros(columns, np.float32)
-    veiled, shone = np.zeros(3 * columns, np.float32), np.zeros(3 * columns, np.float32)
-    channels, no_response = np.empty(3 * columns, np.float32), np.zeros(3 * columns, np.float32)
+    mean, channels = np.full(columns, attenuation[0, 0]), np.empty(3 * columns, np.float32)
+    no_response, n = np.zeros(3 * columns, np.float32), np.uint64(columns)
+    pixel, chosen, left, aside, first, even = _rows_of_choice(columns, cells, int(nodes))
+    few_scattered, few_light, scattered, light, veiled, shone = _rows_of_light(columns)
     each_channel(colour, channels)
-    n = np.uint64(columns)
-    for u in range(columns):
-        pixel[u] = np.float32(u)
-    _column_places(n, pixel, columns, grid_columns - 1, int(nodes), left, aside)
     if step == 1:
         # Every pixel is chosen, so that what is found for the chosen ones is every pixel's.
         chosen, scattered, light = length, few_scattered, few_light
-    last = np.float32(nodes - 1)
     for v in range(distance.shape[0]):
         lit = surfaces and _any_lit(response[v])
         if clear and not lit:
             continue
-        for u in range(columns):
-            length[u] = min(distance[v, u], np.float32(ENDLESS))
+        _cut_lengths(distance[v], length)
         if step > 1:
             n = choose_pixels(length, step, inverse, bent, pixel, chosen, first, even)
-            _column_places(n, pixel, columns, grid_columns - 1, int(nodes), left, aside)
-        for u in range(n):
-            node[u] = min(last * chosen[u] / (chosen[u] + fold), last - np.float32(1e-3))
+            _column_places(n, pixel, columns, cells, int(nodes), left, aside)
+        _node_places(n, chosen, last, fold, node)
         place = np.float32(v) * np.float32(grid_rows - 1) / np.float32(max(distance.shape[0] - 1, 1))
         upper = min(int(place), grid_rows - 2)
         if not clear:

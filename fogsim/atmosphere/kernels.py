@@ -71,7 +71,8 @@ def bilinear(table: NDArray[np.float32], row: np.float32, column: np.float32) ->
     down, aside = row - np.float32(a), column - np.float32(b)
     low = table[a, b] + (table[a, b + _NEXT] - table[a, b]) * aside
     high = table[a + _NEXT, b] + (table[a + _NEXT, b + _NEXT] - table[a + _NEXT, b]) * aside
-    return low + (high - low) * down
+    value: np.float32 = low + (high - low) * down
+    return value
 
 
 @kernel

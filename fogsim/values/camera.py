@@ -21,7 +21,7 @@ class Response(StrEnum):
 
 def _finite(value: object) -> bool:
     """Whether a value is a number, and neither NaN nor infinite; True and False are none."""
-    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+    return not isinstance(value, bool) and isinstance(value, Real) and math.isfinite(value)
 
 
 def _whole(value: object) -> bool:

@@ -46,6 +46,8 @@ Surfaces return street lamps' light as they return the sky's, of which there mus
 _LEEWAY = 600.0
 """How far the ego may leave its route before the scene is built anew around it [m], in a network that is larger."""
 
+_UNLIT = Lights.none()
+
 _USUAL = (Lamp.LOW_BEAM, Lamp.LOW_BEAM | Lamp.FRONT_FOG, Lamp.LOW_BEAM | Lamp.HIGH_BEAM)
 
 
@@ -94,7 +96,7 @@ class Outlook:
         scenario, around = self._scenario, surroundings(self._network, self.signs, line)
         rng = np.random.default_rng(scenario.scenery_seed)
         scene = build_scene(around.network, around.signs, rng, street_lamps=scenario.street_lamps)
-        self._origin, self._streets = around.origin, None
+        self._origin, self._shifted, self._streets = around.origin, bool(np.any(around.origin)), None
         self._known = None if around.whole else Nearness(line, _LEEWAY)
         self._street_lamps = street_lamp_heads(scene) + around.origin
         sky = scenario.light.illuminance_lx
@@ -143,14 +145,14 @@ class Outlook:
 
     def _from_origin(self, state: TrafficState, pose: CameraPose) -> tuple[TrafficState, CameraPose]:
         """Vehicles and camera in the coordinates of the scene."""
-        if not np.any(self._origin):
+        if not self._shifted:
             return state, pose
         x, y, z = (np.array(pose.position) - self._origin).tolist()
         return replace(state, position=state.position - self._origin), replace(pose, position=(x, y, z))
 
     def _lights(self, state: TrafficState, ego: int, pose: CameraPose) -> Lights:
         if not self._by_lamplight:
-            return Lights.none()
+            return _UNLIT
         return Lights(
             own=self._own_lamps(Lamp(int(state.lamps[ego]))),
             others=light_sources(state, ego, pose.position, self._mount.beams, self._street_lamps),

@@ -18,7 +18,7 @@ _SMALLEST, _SMALLEST_PLAIN = 1.0, 3.0  # radius in the picture below which a cop
 # Half a square's breadth over the root of its triangles, below which a stand-in does [px]: in general, and for what has
 # neither paint nor lamps nor signs' sheeting, such as trees, of which more is seen than of all else.
 _DENSEST, _DENSEST_PLAIN = 1.15, 1.7
-_BINS = 64  # of distance, to draw near copies first
+_BINS = 64  # of distance, to draw near copies first: four while it doubles
 _NUMBERS = 17  # 32-bit numbers of a record
 
 Array = NDArray[np.float32]
@@ -255,7 +255,7 @@ def choose(
             depth = _depth((x, y, z), radius[copy], p, q, r, s, ahead)
             if depth < farthest:
                 chosen.copy[count] = copy
-                chosen.bin[count] = min(int(6.0 * np.log2(1.0 + depth)), _BINS - 1)
+                chosen.bin[count] = _bin(depth)
                 count += 1
     _sort(chosen, count)
     _write(shapes, copies, ahead, eye, focal, chosen, count)
@@ -269,6 +269,13 @@ def _depth(middle: Vector, radius: float, p: Vector, q: Vector, r: Vector, s: Ve
         return np.inf
     depth = dot(ahead, middle)
     return max(depth - radius, 0.0) if depth > -radius else np.inf
+
+
+@kernel
+def _bin(depth: float) -> int:
+    """Bin of a distance [m], from the exponent and the first two bits of the mantissa of a float."""
+    bits = np.float32(1.0 + depth).view(np.int32) - np.float32(1.0).view(np.int32)
+    return min(int(bits) >> 21, _BINS - 1)
 
 
 @kernel

@@ -1,7 +1,7 @@
 """How a camera sets its own exposure."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
@@ -112,4 +112,4 @@ def sensor_at(sensor: Sensor, saturation: float, auto: AutoExposure) -> Sensor:
         Where gain begins.
     """
     filled = sensor.full_well * min(1.0, saturation / auto.ungained)
-    return replace(sensor, saturation_luminance=saturation, full_well=filled)
+    return Sensor(saturation, filled, sensor.read_noise, sensor.bits)

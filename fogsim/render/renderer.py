@@ -108,12 +108,11 @@ class SceneRenderer:
             self._chosen = _room(len(self._copies.shape))
         if vehicles:
             record = self._copies.record[self._still : end]
-            integers = record.view(np.int32)
-            transforms = np.concatenate([batch.transforms for batch in vehicles])
-            record[:, :12] = transforms.reshape(-1, 16)[:, :12]
-            record[:, 12:15] = np.concatenate([batch.paint for batch in vehicles])
-            integers[:, 15] = np.concatenate([batch.lamps for batch in vehicles])
-            integers[:, 16] = np.concatenate([batch.instance for batch in vehicles])
+            integers, upper = record.view(np.int32), record[:, :12].reshape(-1, 3, 4)
+            np.concatenate([batch.transforms[:, :3] for batch in vehicles], out=upper)
+            np.concatenate([batch.paint for batch in vehicles], out=record[:, 12:15])
+            np.concatenate([batch.lamps for batch in vehicles], out=integers[:, 15])
+            np.concatenate([batch.instance for batch in vehicles], out=integers[:, 16])
             begin = self._still
             for batch, count in zip(vehicles, counts, strict=True):
                 self._copies.shape[begin : begin + count] = self._number(batch)

@@ -17,7 +17,7 @@ ASPHALT = ((0.01, 0.25, 3.0, 12.0), (0.12, 0.025, 0.012, 0.02))
 GRASS = ((0.08, 0.7, 5.0, 31.0), (0.10, 0.06, 0.06, 0.03))
 """Those of grassland."""
 
-_CHUNK, _PIECE = 128, 32  # pixels of a row that share a footprint, and over which large patches are linear
+_CHUNK, _PIECE = 256, 32  # pixels of a row that share a footprint, and over which large patches are linear
 _FAR = float(1 << 20)  # a multiple of the sides of tiles, so that places are not negative
 _FAINTEST = 0.002  # deviation below which grain is left out
 

@@ -63,4 +63,3 @@ def test_each_stand_in_is_simpler_than_the_one_before(kind: str) -> None:
     assert counts == sorted(counts, reverse=True)
     assert len(set(counts)) == len(counts)
     assert counts[-1] <= 8
-

@@ -173,7 +173,7 @@ NAN_KEYS = ["focal_length", "mount_height", "pitch", "roll"]
 def test_a_calibration_that_is_no_number_cannot_be_made(key, value):
     with pytest.raises(InputError, match=key):
         dataclasses.replace(CAMERA, **{key: value})
-    with pytest.raises(InputError, match="principal_point must be finite"):
+    with pytest.raises(InputError, match="principal_point must be two finite numbers"):
         dataclasses.replace(CAMERA, principal_point=(value, 10.0))
 
 

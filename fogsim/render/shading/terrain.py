@@ -18,23 +18,7 @@ _DRY = (1.5, 0.4, -0.3)  # how much more of each channel the large patches of dr
 
 @kernel
 def shade_terrain(runs: Runs, count: int, lens: Lens, noise: Noise, work: Row, picture: Picture) -> None:
-    """Shade the runs of terrain, and set their distances and instance ids.
-
-    Parameters
-    ----------
-    runs : Runs
-        The runs and what is known of their surfaces.
-    count : int
-        Number of runs.
-    lens : Lens
-        Where the camera is.
-    noise : Noise
-        Texture.
-    work : Row
-        Memory.
-    picture : Picture
-        Is filled where these runs are.
-    """
+    """Shade the runs of terrain, and set their distances and instance ids (parameters as for `shade_road`)."""
     run, known, rays, member = runs.run, runs.surface, lens.rays, work.member
     texture, tint, radiance, response = work.texture, work.tint, picture.radiance, picture.response
     dry, drier, driest = np.float32(_DRY[0]), np.float32(_DRY[1]), np.float32(_DRY[2])

@@ -198,13 +198,31 @@ def exact(extinction, airlight=1.0, distances=AWAY):
     return Regressions(distances, t, small, airlight - (airlight - near) * t, small, near)
 
 
-@pytest.mark.parametrize("extinction", [0.003, 0.02, 0.06, 0.2])
-@pytest.mark.parametrize("airlight", [1.0, 0.97])
+PULLED = pytest.mark.xfail(
+    strict=True, reason="the sky's prior pulls by 5 and 3.4 %, since slopes of detail count less"
+)
+
+
+@pytest.mark.parametrize(
+    ("extinction", "airlight"),
+    [
+        *((extinction, 1.0) for extinction in (0.003, 0.02, 0.06, 0.2)),
+        pytest.param(0.003, 0.97, marks=PULLED),
+        pytest.param(0.02, 0.97, marks=PULLED),
+        (0.06, 0.97),
+        (0.2, 0.97),
+    ],
+)
 def test_fit_returns_what_was_put_in(extinction, airlight):
     fit = fitted_extinction(exact(extinction, airlight))
-    # The prior of the sky, of which 0.97 is three deviations, pulls where thin fog leaves the airlight to it.
-    pulled = 0.01 if airlight == 1.0 else 0.03 if extinction > 0.05 else 0.06
-    assert fit.extinction == pytest.approx(extinction, rel=pulled)
+    # The prior of the sky pulls where thin fog leaves the airlight to it.
+    assert fit.extinction == pytest.approx(extinction, rel=0.01 if airlight == 1.0 else 0.03)
+
+
+@pytest.mark.parametrize("extinction", [0.003, 0.02, 0.06, 0.2])
+@pytest.mark.parametrize("airlight", [1.0, 0.97])
+def test_interval_of_a_fit_holds_what_was_put_in(extinction, airlight):
+    fit = fitted_extinction(exact(extinction, airlight))
     assert abs(fit.extinction - extinction) < NORMAL_90_PERCENT * fit.deviation
     assert 0 < fit.deviation < 0.2 * extinction
 

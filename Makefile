@@ -24,10 +24,15 @@ $(VENV)/.installed-test: $(VENV)/.installed
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --use-pep517 --editable '.[test]'
 	@touch $@
 
+$(VENV)/.compiled: $(VENV)/.installed-test
+	@echo "Compiling kernels (once, a minute or two) …"
+	@$(BIN)/fogsim compile
+	@touch $@
+
 demo: $(VENV)/.installed ## Run the demo scenario; results go to runs/demo/
 	@$(BIN)/fogsim run motorway_fog_bank --seed 1 --out runs/demo --overwrite
 
-test: $(VENV)/.installed-test ## Run the whole test suite
+test: $(VENV)/.installed-test $(VENV)/.compiled ## Run the whole test suite
 	@$(BIN)/python -m pytest -n auto --dist worksteal
 
 lint: $(VENV)/.installed-test ## Check style

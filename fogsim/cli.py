@@ -326,6 +326,16 @@ app.command("estimate")(estimate_command)
 app.command("reproduce")(reproduce_command)
 
 
+@app.command("compile")
+def compile_command() -> None:
+    """Compile ahead what a first run would, on all cores; the result is kept on disk."""
+    from fogsim.compilation import compile_kernels  # noqa: PLC0415 - heavy; --help must be quick
+
+    with _err.status("compiling for this processor, about a minute"):
+        for ready in compile_kernels():
+            _out.print(f"compiled: {ready}")
+
+
 @app.command("doctor")
 def doctor_command() -> None:
     """Say what works on this machine, what is missing, and how to get it."""

@@ -6,6 +6,7 @@ And what lets two of them work at once on a picture's rows.
 import _thread
 import functools
 import hashlib
+import logging
 import multiprocessing
 import os
 import time
@@ -16,6 +17,7 @@ from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
+from numba.core import event
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -24,6 +26,38 @@ _WORTHWHILE = 100_000
 
 _GAIN = 0.05
 """How far the middle moves towards the slower band, over the picture's rows and the bands' relative difference."""
+
+_PATIENCE = 0.5
+"""Time that a process compiles before it says so [s]: one kernel more is no news, a first run is."""
+
+
+class _Announcement(event.Listener):  # type: ignore[misc] # numba is untyped
+    """Tells the user once in a process that the time goes into compiling, and that it will not the next time."""
+
+    def __init__(self) -> None:
+        self._depth = 0
+        self._spent = self._started = 0.0
+
+    def on_start(self, _: Any) -> None:
+        """Begin to count at the outermost kernel; those that it calls are compiled within it."""
+        if self._depth == 0:
+            if self._spent > _PATIENCE:
+                event.unregister("numba:compile", self)
+                logging.getLogger(__package__).warning(
+                    "fogsim: compiling for this processor, about a minute, the first time only "
+                    "(ahead of time and on all cores: fogsim compile)"
+                )
+            self._started = time.monotonic()
+        self._depth += 1
+
+    def on_end(self, compiling: Any) -> None:
+        """Count what was compiled."""
+        self._depth -= 1
+        if self._depth == 0 and compiling.data["dispatcher"].py_func.__module__.startswith(f"{__package__}."):
+            self._spent += time.monotonic() - self._started
+
+
+event.register("numba:compile", _Announcement())
 
 
 def kernel(function: F) -> F:

@@ -1,0 +1,96 @@
+"""Compile the kernels ahead of the first run, in several processes at once."""
+
+import logging
+import multiprocessing
+from collections.abc import Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.estimators import ESTIMATORS
+from fogsim.jit import processors
+from fogsim.loop import run
+from fogsim.scenario import load_scenario
+from fogsim.units import extinction_from_visibility
+from fogsim.values import Camera, Frame, LeadMeasurement, Observation
+
+_SIZES = ((160, 120), (640, 480))
+"""Pictures that are estimated: methods choose what they do by size [px]."""
+
+
+_SKY = 1e6
+"""Distance of the sky in those pictures [m]."""
+
+
+def compile_kernels() -> Iterator[str]:
+    """Compile what drives by day and by night need, and keep it on disk; what is compiled already costs seconds.
+
+    Yields
+    ------
+    str
+        What is ready, as soon as it is.
+
+    Raises
+    ------
+    FogSimError
+        If a part of the loop does not work here.
+    """
+    with ProcessPoolExecutor(min(2, processors()), multiprocessing.get_context("spawn"), _be_quiet) as pool:
+        # The estimators share hardly a kernel with the drawing; drawing by night shares many with drawing by day.
+        pending: dict[Future[None], str] = {
+            pool.submit(_drive, "motorway_fog_bank"): "drives by day",
+            pool.submit(_estimate_visibility): "estimators",
+        }
+        while pending:
+            for done in wait(pending, return_when=FIRST_COMPLETED).done:
+                done.result()
+                ready = pending.pop(done)
+                if ready == "drives by day":
+                    pending[pool.submit(_drive, "night_motorway_fog")] = "drives by night"
+                yield ready
+
+
+def _be_quiet() -> None:
+    """Let these processes not announce what they were started for."""
+    logging.getLogger("fogsim").setLevel(logging.ERROR)
+
+
+def _drive(scenario: str) -> None:
+    """Draw the first frames of a scenario, with an estimator that needs the fewest kernels."""
+    published = "estimators=[{method: negru2013, parameters: {as_published: true}}]"
+    for _ in islice(run(load_scenario(scenario, [published]), seed=1), 3):
+        pass
+
+
+def _estimate_visibility() -> None:
+    """Let every daytime method read pictures of a foggy road with a vehicle ahead that drives away."""
+    for width, height in _SIZES:
+        camera = Camera(width, height, 0.9 * width, (width / 2, height / 2), 1.4, pitch=0.03)
+        for name in ESTIMATORS:
+            estimator = ESTIMATORS[name](camera=camera)
+            for index in range(4):
+                distance = 25.0 + 5.0 * index
+                frame = Frame(0.1 * index, _foggy_road(camera, distance), camera)
+                estimator.update(Observation(frame, 20.0, LeadMeasurement(distance, 5.0), ()))
+
+
+def _foggy_road(camera: Camera, lead: float, visibility: float = 120.0) -> NDArray[np.uint8]:
+    """Picture of a straight road in fog with lane marks and a dark vehicle ahead: (rows, cols, 3) uint8."""
+    rows, cols = np.mgrid[: camera.height, : camera.width].astype(np.float64)
+    below = rows - camera.horizon_row
+    ahead = np.where(below > 0.5, camera.row_distance / np.maximum(below, 0.5), _SKY)
+    aside = np.where(
+        below > 0.5, (cols - camera.principal_point[0]) * camera.mount_height / np.maximum(below, 0.5), 0.0
+    )
+    marks = (np.abs(np.abs(aside) - 1.75) < 0.08) & ((ahead % 12.0 < 4.0) | (aside < 0.0))
+    grain = np.random.default_rng(0).normal(0.0, 1.0, rows.shape)
+    surface = np.where(marks, 150.0, np.where(np.abs(aside) < 6.0, 60.0, 45.0))
+    size = camera.focal_length / lead
+    foot = camera.horizon_row + camera.mount_height * size
+    vehicle = (np.abs(cols - camera.principal_point[0]) < 0.9 * size) & (rows < foot) & (rows > foot - 1.4 * size)
+    surface, ahead = np.where(vehicle, 20.0, surface), np.where(vehicle, lead, ahead)
+    light = 200.0 + (surface - 200.0) * np.exp(-extinction_from_visibility(visibility) * ahead)
+    grey = np.clip(light + grain, 0.0, 255.0).round().astype(np.uint8)
+    return np.repeat(grey[:, :, None], 3, axis=2)

@@ -9,6 +9,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.linear_algebra import matrix_product
 from fogsim.values.camera import Camera, CameraPose
 
 
@@ -44,7 +45,7 @@ def ray_from_pixel(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
     (3, 3) float64
         The ray is 1 long along the optical axis, so its length is distance along the ray over depth.
     """
-    return np.asarray(camera_axes(camera, pose).T @ _camera_ray_from_pixel(camera))
+    return np.asarray(matrix_product(camera_axes(camera, pose).T, _camera_ray_from_pixel(camera)))
 
 
 @functools.lru_cache(maxsize=8)

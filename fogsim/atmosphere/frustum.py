@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from fogsim.atmosphere.frustum_kernels import grid_depths, grid_pixels
 from fogsim.atmosphere.medium import medium_of
 from fogsim.atmosphere.node_distances import node_distances
+from fogsim.linear_algebra import matrix_product
 from fogsim.pinhole import ray_from_pixel
 from fogsim.values import Camera, CameraPose, FogField, View
 
@@ -117,7 +118,7 @@ def _directions(
 ) -> NDArray[np.float64]:
     pixels = np.ones((len(rows), len(columns), 3))
     pixels[..., 0], pixels[..., 1] = columns, rows[:, None]
-    rays = pixels @ ray_map.T
+    rays = matrix_product(pixels, ray_map.T)
     return np.asarray(rays / np.sqrt(np.einsum("rci,rci->rc", rays, rays))[..., None])
 
 

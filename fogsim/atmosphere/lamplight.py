@@ -22,6 +22,7 @@ from fogsim.atmosphere.veil import (
     veil_along,
     veil_rays,
 )
+from fogsim.linear_algebra import matrix_product
 from fogsim.pinhole import camera_axes, ray_from_pixel
 from fogsim.values import Beam, Camera, CameraPose, FogField, HeadLamp, View
 
@@ -129,7 +130,7 @@ class OwnLamplight:
     def _rays(self, camera: Camera) -> tuple[VeilRays, NDArray[np.float32]]:
         """Rays of the veil, and the map from pixels to rays by (forward, right, up)."""
         if camera not in self._memory.rays:
-            ray_map = _MIRROR @ ray_from_pixel(camera, _AT_REST)
+            ray_map = matrix_product(_MIRROR, ray_from_pixel(camera, _AT_REST))
             _keep(self._memory.rays, camera, (veil_rays(camera), ray_map.astype(np.float32)))
         return self._memory.rays[camera]
 
@@ -158,7 +159,7 @@ class OwnLamplight:
         ]
         group = _Group(
             lamps=lamps,
-            places=np.array(places, dtype=np.float32) @ _MIRROR.astype(np.float32),
+            places=matrix_product(np.array(places, dtype=np.float32), _MIRROR.astype(np.float32)),
             tables=np.stack([table[0] for table in tables]),
             colour=np.array(lamps[0].colour, dtype=np.float32),
             air=lit_air(self._rays(camera)[0], list(zip(places, tables, strict=True)), self._droplets),
@@ -192,10 +193,10 @@ def _extinction_on(
         everywhere = np.full((1, 1), fog.extinction, np.float32)
         return everywhere, everywhere
     distances = node_distances()
-    to_world = camera_axes(camera, pose).T @ camera_axes(camera, _AT_REST)
+    to_world = matrix_product(camera_axes(camera, pose).T, camera_axes(camera, _AT_REST))
     shape = (len(rays.directions), len(distances))
     extinction, depth = np.empty(shape, np.float32), np.empty(shape, np.float32)
-    directions = np.ascontiguousarray(rays.directions.astype(np.float64) @ to_world.T)
+    directions = np.ascontiguousarray(matrix_product(rays.directions.astype(np.float64), to_world.T))
     grid_depths(np.array(pose.position), directions, distances, medium_of(fog), extinction, depth)
     lengths = distances.astype(np.float32)
     local = np.diff(depth, axis=1) / np.diff(lengths)

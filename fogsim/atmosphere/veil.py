@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from fogsim.atmosphere.lamp_tables import phase_table
 from fogsim.atmosphere.phase import Droplets, blurred, phase_function
 from fogsim.atmosphere.veil_kernels import gather_light, light_air
+from fogsim.linear_algebra import matrix_product
 from fogsim.pinhole import camera_axes
 from fogsim.values import Camera, CameraPose
 
@@ -88,7 +89,7 @@ def veil_rays(camera: Camera) -> VeilRays:
     right = (np.linspace(0, camera.width - 1, cells + 1) - u0) / camera.focal_length
     down = (np.linspace(0, camera.height - 1, rows) - v0) / camera.focal_length
     plane = np.stack(np.broadcast_arrays(right, down[:, None], np.ones((1, 1))), axis=-1).reshape(-1, 3)
-    rays = plane @ camera_axes(camera, CameraPose((0.0, 0.0, 0.0), 0.0))
+    rays = matrix_product(plane, camera_axes(camera, CameraPose((0.0, 0.0, 0.0), 0.0)))
     at, length = ray_pieces()
     directions = rays / np.linalg.norm(rays, axis=1)[:, None]
     return VeilRays((rows, cells + 1), np.ascontiguousarray(directions, dtype=np.float32), at, length)

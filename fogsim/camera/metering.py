@@ -72,7 +72,7 @@ def metered_luminance(radiance: NDArray[np.float32], metering: Metering) -> floa
     if metering is Metering.HIGHLIGHTS:
         place = int(HIGHLIGHT_SHARE * (samples.size - 1))
         return float(np.partition(samples.ravel(), place)[place])
-    return math.exp(float(np.mean(np.log(np.maximum(samples, _DARKEST_METERED)))))
+    return math.exp(float(np.mean(np.log(np.maximum(samples, _DARKEST_METERED, dtype=np.float64)))))
 
 
 def wanted_saturation(luminance: float, auto: AutoExposure) -> float:

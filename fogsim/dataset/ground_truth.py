@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere import Air
 from fogsim.errors import InputError
+from fogsim.linear_algebra import matrix_product
 from fogsim.pinhole import ray_from_pixel
 from fogsim.values import Step, Truth, View
 
@@ -141,7 +142,7 @@ def _places(view: View, truth: Truth, rows: NDArray[np.intp], cols: NDArray[np.i
     if truth.camera is None or truth.pose is None:
         raise InputError("signs can be told apart only in steps that a camera in a loop has made")
     pixels = np.stack((cols, rows, np.ones(rows.shape)), axis=1)
-    rays = pixels @ ray_from_pixel(truth.camera, truth.pose).T
+    rays = matrix_product(pixels, ray_from_pixel(truth.camera, truth.pose).T)
     rays *= (view.distance[rows, cols] / np.linalg.norm(rays, axis=1))[:, None]
     return np.asarray(truth.pose.position + rays)
 

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.linear_algebra import inverse_of, matrix_product, straight_line
+
 Floats = NDArray[np.float64]
 
 KEPT = 0.5
@@ -145,7 +147,7 @@ def published_extinction(table: RatioTable) -> tuple[float, float]:
     slope = -2.0 * table.difference * model[best]
     misfit = float(((model[best] - table.ratio) ** 2).sum()) / max(table.ratio.size - 1, 1)
     misfit = max(misfit, RATIO_DEVIATION**2)
-    return float(tried[best]), math.sqrt(misfit / max(float(slope @ slope), 1e-12))
+    return float(tried[best]), math.sqrt(misfit / max(float(matrix_product(slope, slope)), 1e-12))
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,8 +225,8 @@ def fitted_extinction(data: Regressions) -> ContrastFit | None:
         # The last values are priors, and no outliers.
         weight = np.minimum(1.0, HUBER / np.maximum(np.abs(standardised), 1e-9)) / spread**2
         weight[-priors.size :] = priors**-2
-        covariance = np.asarray(np.linalg.pinv(jacobian.T @ (weight[:, None] * jacobian)), np.float64)
-        step = covariance @ (jacobian.T @ (weight * (values - model)))
+        covariance = inverse_of(matrix_product(jacobian.T, weight[:, None] * jacobian))
+        step = matrix_product(covariance, matrix_product(jacobian.T, weight * (values - model)))
         state = state + np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)
         state[0], state[1] = min(max(state[0], -0.01), 1.0), min(max(state[1], 0.3), 3.0)
         if abs(float(step[0])) < 1e-7:
@@ -244,7 +246,7 @@ def _first_guess(data: Regressions, apart: Floats) -> float | None:
     ):
         seen = (fallen > 3.0 * deviation) & (contrast[1] > 0.0)
         if data.distance.size >= 3 and int(seen.sum()) >= 2 and float(np.ptp(apart[seen])) > 0.0:
-            return max(-float(np.polyfit(apart[seen], np.log(fallen[seen]), 1)[0]), 1e-4)
+            return max(-straight_line(apart[seen], np.log(fallen[seen]))[0], 1e-4)
     return None
 
 

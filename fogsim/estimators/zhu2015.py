@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fogsim.estimators.image_check import checked_image
 from fogsim.estimators.zhu2015_road import SeenRoad, fitted_fog, inflection_rows, seen_road
+from fogsim.linear_algebra import matrix_product
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate, FogCategory, fog_category
 from fogsim.values.observation import Observation
@@ -46,7 +47,7 @@ def weighted_row(rows: NDArray[np.float64]) -> float:
     data = np.concatenate([kept, [kept.mean(), np.median(kept)]])
     _, where, count = np.unique(data, return_inverse=True, return_counts=True)
     weight = count[where] / data.size
-    return float(weight @ data) / float(weight.sum())
+    return float(matrix_product(weight, data)) / float(weight.sum())
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,7 +172,7 @@ class Zhu2015:
             return per_row * max(weighted_row(rows), 0.0), per_row * math.hypot(1.0, float(rows.std()))
         weight = np.array([reading.deviation**-2 for reading in self._readings])
         extinctions = np.array([reading.extinction for reading in self._readings])
-        mean = float(weight @ extinctions) / float(weight.sum())
+        mean = float(matrix_product(weight, extinctions)) / float(weight.sum())
         # The same camera over the same road: what errs does so alike in all frames.
         return mean, min(reading.deviation for reading in self._readings)
 

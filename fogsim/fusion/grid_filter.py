@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
+from fogsim.linear_algebra import convolution
 from fogsim.units import extinction_from_visibility
 from fogsim.values.belief import Belief
 from fogsim.values.estimate import Estimate
@@ -127,7 +128,7 @@ class GridFilter:
         leap = np.exp(-np.abs(self._offset) / self._leap_scale)
         leaps = -math.expm1(-self._leap_rate * elapsed)
         step = (1.0 - leaps) * walk + leaps * leap / leap.sum()
-        spread = np.convolve(self._probability, step)
+        spread = convolution(self._probability, step)
         inside = spread[CELLS - 1 : 2 * CELLS - 1].copy()
         inside[: CELLS - 1] += spread[CELLS - 2 :: -1]
         inside[1:] += spread[: 2 * CELLS - 2 : -1]

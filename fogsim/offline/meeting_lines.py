@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.image_files import Pixels
+from fogsim.linear_algebra import inverse_of, matrix_product
 from fogsim.values import Response
 from fogsim.vision.luminance import linear_luminance
 
@@ -68,7 +69,7 @@ class _Segments:
 
     def miss(self, point: Floats) -> Floats:
         """By how much each one's line passes a point [px]."""
-        return np.asarray(self.normal @ point - self.offset)
+        return matrix_product(self.normal, point) - self.offset
 
     def leans_both_ways(self, chosen: NDArray[np.bool_]) -> bool:
         return bool((self.lean[chosen] < 0).any() and (self.lean[chosen] > 0).any())
@@ -125,9 +126,10 @@ def _first_point(segments: _Segments, rows: int, cols: int) -> Floats | None:
     best, most = None, 0.0
     for i in longest[segments.lean[longest] < 0]:
         for j in longest[segments.lean[longest] > 0]:
-            sides = segments.normal[[i, j]]
+            (a, b), (c, d) = segments.normal[[i, j]].tolist()
+            e, f = segments.offset[[i, j]].tolist()
             # Of two that lean to either side by 8° or more, none is parallel to the other.
-            point = np.asarray(np.linalg.solve(sides, segments.offset[[i, j]]), np.float64)
+            point = np.array([d * e - b * f, a * f - c * e]) / (a * d - b * c)
             if not (0.0 <= point[1] <= 0.8 * rows and 0.1 * cols <= point[0] <= 0.9 * cols):
                 continue
             reach = np.maximum(FIRST_REACH * np.hypot(*(point - segments.middle).T), 1.0)
@@ -153,9 +155,9 @@ def _fitted(segments: _Segments, point: Floats) -> MeetingPoint | None:
         if not segments.leans_both_ways(pointing):
             return None
         weight = pointing / deviation**2
-        inverse = np.linalg.inv((segments.normal * weight[:, None]).T @ segments.normal)
-        point = inverse @ ((segments.normal * weight[:, None]).T @ segments.offset)
+        inverse = inverse_of(matrix_product((segments.normal * weight[:, None]).T, segments.normal))
+        point = matrix_product(inverse, matrix_product((segments.normal * weight[:, None]).T, segments.offset))
     count = int(pointing.sum())
-    scale = float(weight @ segments.miss(point) ** 2) / max(count - 2, 1)
+    scale = float(matrix_product(weight, segments.miss(point) ** 2)) / max(count - 2, 1)
     spread = math.sqrt(max(scale, 1.0) * float(inverse[1, 1]))
     return MeetingPoint(float(point[0]), float(point[1]), spread, count)

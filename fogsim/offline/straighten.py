@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fogsim.camera_file import Calibration
 from fogsim.errors import InputError
 from fogsim.image_files import Pixels
+from fogsim.linear_algebra import matrix_product
 from fogsim.offline.source import Picture, Source
 from fogsim.pinhole import camera_axes
 from fogsim.values import Camera, CameraPose
@@ -136,7 +137,7 @@ def _maps(calibration: Calibration, straight: Camera) -> Maps:
     fold = _fold(calibration.distortion)
     _refuse_folded(calibration, fold)
     aside, along = (camera_axes(given, CameraPose((0.0, 0.0, 0.0), heading)) for heading in (calibration.yaw, 0.0))
-    turned = along @ aside.T
+    turned = matrix_product(along, aside.T)
     lens = np.array(calibration.distortion) if calibration.distortion else np.zeros(4)
     size = (given.width, given.height)
     columns, rows = cv2.initUndistortRectifyMap(_matrix(given), lens, turned, _matrix(straight), size, cv2.CV_32FC1)
@@ -156,8 +157,8 @@ def _radius(straight: Camera, turned: Floats) -> Floats:
     """Tangent of the angle between each straightened pixel's ray and the optical axis; behind it, endless."""
     rows, columns = np.indices((straight.height, straight.width), dtype=np.float64)
     u0, v0 = straight.principal_point
-    rays = np.stack([(columns - u0) / straight.focal_length, (rows - v0) / straight.focal_length, np.ones_like(rows)])
-    across, down, ahead = np.tensordot(turned.T, rays, axes=1)
+    right, under = (columns - u0) / straight.focal_length, (rows - v0) / straight.focal_length
+    across, down, ahead = (x * right + y * under + z for x, y, z in turned.T.tolist())
     forward = ahead > 1e-6
     return np.where(forward, np.hypot(across, down) / np.where(forward, ahead, 1.0), np.inf)
 
@@ -167,9 +168,10 @@ def _fold(distortion: tuple[float, ...]) -> float:
     if not distortion:
         return math.inf
     k1, k2 = distortion[:2]
-    roots = np.roots([5.0 * k2, 3.0 * k1, 1.0]) if k1 or k2 else np.zeros(0)
-    squares = [float(root.real) for root in roots if abs(root.imag) < 1e-12 and root.real > 0]
-    return math.sqrt(min(squares, default=math.inf))
+    # Its derivative is 1 + 3 k1 r² + 5 k2 r⁴; the greatest 1 / r² at which that is zero is the nearest fold.
+    square = 9.0 * k1**2 - 20.0 * k2
+    greatest = 0.5 * (math.sqrt(square) - 3.0 * k1) if square >= 0.0 else 0.0
+    return math.sqrt(1.0 / greatest) if greatest > 0.0 else math.inf
 
 
 def _refuse_folded(calibration: Calibration, fold: float) -> None:

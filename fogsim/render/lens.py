@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.linear_algebra import matrix_product
 from fogsim.pinhole import camera_axes, ray_from_pixel
 from fogsim.values.camera import Camera, CameraPose
 
@@ -42,7 +43,9 @@ def lens_of(camera: Camera, pose: CameraPose) -> Lens:
     """Geometry of a picture; the arrays belong to all who asked and are not to be written to."""
     axes = camera_axes(camera, pose)
     lens, planes = _of_camera(camera)
-    return Lens(np.array(pose.position, np.float64), axes, ray_from_pixel(camera, pose), lens, planes @ axes)
+    return Lens(
+        np.array(pose.position, np.float64), axes, ray_from_pixel(camera, pose), lens, matrix_product(planes, axes)
+    )
 
 
 @functools.lru_cache(maxsize=8)

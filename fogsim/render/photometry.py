@@ -62,7 +62,7 @@ def lamp_radiance(surface: Surface) -> NDArray[np.float64]:
     if surface not in LAMPS:
         return np.zeros(3)
     _, luminance, colour = LAMPS[surface]
-    return luminance * np.array(colour) / float(np.dot(colour, LUMINANCE_WEIGHTS))
+    return luminance * np.array(colour) / float(np.multiply(colour, LUMINANCE_WEIGHTS).sum())
 
 
 def lighting_bits(surface: Surface) -> int:

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.linear_algebra import matrix_product
 from fogsim.pinhole import camera_axes, ray_from_pixel
 from fogsim.render.drawing import NEAR
 from fogsim.values.camera import Camera, CameraPose
@@ -28,7 +29,7 @@ def clip_from_offset(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
     """Projection (4, 4) of offsets from the camera in world axes [m] to clip coordinates."""
     turn = np.eye(4)
     turn[:3, :3] = camera_axes(camera, pose)
-    return clip_from_camera(camera) @ turn
+    return matrix_product(clip_from_camera(camera), turn)
 
 
 def highest_terrain_row(camera: Camera, pose: CameraPose) -> int:

@@ -72,10 +72,10 @@ def _bank(bank: Bank, outside: float, route: NDArray[np.float64]) -> FogBank:
         # Before the start and beyond the end of the route, go straight on.
         first, last = route[1, :2] - route[0, :2], route[-1, :2] - route[-2, :2]
         before, beyond = min(at, 0.0), max(at - station[-1], 0.0)
-        return np.asarray(inside + before * first / np.linalg.norm(first) + beyond * last / np.linalg.norm(last))
+        return np.asarray(inside + before * first / math.hypot(*first) + beyond * last / math.hypot(*last))
 
     start, end = place(bank.start_m), place(bank.end_m)
-    chord = float(np.linalg.norm(end - start))
+    chord = math.dist(start, end)
     axis = (end - start) / chord
     return FogBank(
         origin=(float(start[0]), float(start[1])),

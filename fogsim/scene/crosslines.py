@@ -1,5 +1,6 @@
 """Lines painted across lanes: where to stop, where to give way, where pedestrians cross."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -62,7 +63,7 @@ def _painted(corners: Points) -> Mesh:
 
     Only part of the attributes' line is as wide as its patch, so that its edges are smoothed like those of any line.
     """
-    along = float(np.linalg.norm(corners[1, 0] - corners[0, 0]))
+    along = math.dist(corners[0, 0], corners[1, 0])
     middle = corners.mean(axis=1, keepdims=True)
     widened = middle + 1.5 * (corners - middle)
     road = np.zeros((2, 2, 4))

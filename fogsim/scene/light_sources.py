@@ -181,7 +181,7 @@ def street_lighting(heads: NDArray[np.float64], sky_illuminance: float) -> Stree
 
 
 def _luminance_one(colour: tuple[float, float, float]) -> NDArray[np.float64]:
-    return np.array(colour) / float(np.dot(colour, _WEIGHTS))
+    return np.array(colour) / float(np.multiply(colour, _WEIGHTS).sum())
 
 
 @cache

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.linear_algebra import matrix_product
 from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.polyline import arc_length, at_distance, left_normals
 from fogsim.scene.relief import Relief
@@ -165,7 +166,7 @@ def _clumps(places: NDArray[np.float64], wavelength: float, rng: np.random.Gener
     angle, phase = rng.uniform(0, 2 * np.pi, (2, 6))
     number = 2 * np.pi / (wavelength * rng.uniform(0.6, 1.8, 6))
     waves = np.stack((np.cos(angle), np.sin(angle))) * number
-    return np.asarray(np.sin(places @ waves + phase).mean(axis=1) * 1.8, np.float64)
+    return np.asarray(np.sin(matrix_product(places, waves) + phase).mean(axis=1) * 1.8, np.float64)
 
 
 def _planted(

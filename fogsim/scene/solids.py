@@ -1,5 +1,6 @@
 """Small meshes to build with: patches, polygons, boxes, cylinders, blobs, and how to put them together."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -8,6 +9,7 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike, NDArray
 
+from fogsim.linear_algebra import matrix_product
 from fogsim.scene.polyline_kernels import surface_normals
 from fogsim.values.scene import Mesh, Surface
 
@@ -70,7 +72,7 @@ def mesh(
     instance : int
         Instance id.
     """
-    points = np.asarray(positions, np.float32).reshape(-1, 3)
+    points = _snapped(np.asarray(positions, np.float64)).reshape(-1, 3)
     count = len(points)
     directions = np.asarray(normals, np.float64).reshape(-1, 3)
     length = np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-12)
@@ -84,6 +86,11 @@ def mesh(
         instance=np.full(count, instance, np.int32),
         faces=np.asarray(faces, np.uint32).reshape(-1, 3),
     )
+
+
+def _snapped(positions: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Positions to the nanometre: what lies in a plane of symmetry does so exactly, however it was computed."""
+    return (np.round(positions, 9) + 0.0).astype(np.float32)
 
 
 @lru_cache(maxsize=256)
@@ -191,9 +198,14 @@ def _turn(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]
 
 def from_trimesh(solid: trimesh.Trimesh, material: Material, instance: int = ROADSIDE) -> Mesh:
     """Facetted mesh of a trimesh solid: every triangle has its own normal."""
-    corners = np.asarray(solid.triangles, np.float64).reshape(-1, 3)
-    normals = np.repeat(np.asarray(solid.face_normals, np.float64), 3, axis=0)
-    return mesh(corners, np.arange(len(corners)).reshape(-1, 3), normals, material, instance=instance)
+    return _facetted(np.asarray(solid.triangles, np.float64), material, instance)
+
+
+def _facetted(triangles: NDArray[np.float64], material: Material, instance: int = ROADSIDE) -> Mesh:
+    """Mesh of triangles (n, 3, 3), counterclockwise as seen from outside, each with its own normal."""
+    a, b, c = triangles.transpose(1, 0, 2)
+    normals = np.repeat(np.cross(b - a, c - a), 3, axis=0)
+    return mesh(triangles, np.arange(3 * len(triangles)).reshape(-1, 3), normals, material, instance=instance)
 
 
 def box(low: ArrayLike, high: ArrayLike, material: Material, instance: int = ROADSIDE) -> Mesh:
@@ -204,8 +216,28 @@ def box(low: ArrayLike, high: ArrayLike, material: Material, instance: int = ROA
 
 def cylinder(start: ArrayLike, end: ArrayLike, radius: float, material: Material, *, sides: int = 12) -> Mesh:
     """Closed facetted cylinder between the middles of its two ends."""
-    segment = np.stack((np.asarray(start, float), np.asarray(end, float)))
-    return from_trimesh(trimesh.creation.cylinder(radius, segment=segment, sections=sides), material)
+    # trimesh's own is turned by singular vectors, which LAPACK rounds as the processor has it.
+    ends = np.stack((np.asarray(start, float), np.asarray(end, float)))
+    along = (ends[1] - ends[0]) / math.dist(*ends)
+    across, angle = _perpendicular(along), np.linspace(0.0, 2 * np.pi, sides, endpoint=False)[:, None]
+    rim = radius * (np.cos(angle) * across + np.sin(angle) * np.cross(along, across))
+    below, above = ends[:, None] + rim
+    next_below, next_above = np.roll(below, -1, axis=0), np.roll(above, -1, axis=0)
+    low, high = (np.broadcast_to(end, rim.shape) for end in ends)
+    triangles = (
+        (below, next_below, next_above),
+        (below, next_above, above),
+        (low, next_below, below),
+        (high, above, next_above),
+    )
+    return _facetted(np.concatenate([np.stack(corners, axis=1) for corners in triangles]), material)
+
+
+def _perpendicular(along: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit vector at right angles to a unit vector: where Householder's reflection of that to x takes z."""
+    x, y, z = along.tolist()
+    share = math.copysign(1.0 / (1.0 + abs(x)), x)
+    return np.array([z, share * y * z, share * z * z - math.copysign(1.0, x)])
 
 
 def disc(
@@ -265,9 +297,9 @@ def both_sides(part: Mesh) -> Mesh:
 def moved(part: Mesh, matrix: NDArray[np.float64]) -> Mesh:
     """Place a part by a rigid transform (4, 4)."""
     rotation = matrix[:3, :3]
-    positions = part.positions @ rotation.T + matrix[:3, 3]
+    positions = matrix_product(part.positions, rotation.T) + matrix[:3, 3]
     return replace(
         part,
-        positions=positions.astype(np.float32),
-        normals=(part.normals @ rotation.T).astype(np.float32),
+        positions=_snapped(positions),
+        normals=matrix_product(part.normals, rotation.T).astype(np.float32),
     )

@@ -6,6 +6,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.linear_algebra import matrix_product
 from fogsim.scene.edges import Edge
 from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.polyline import Points, arc_length
@@ -76,4 +77,4 @@ def street_lamp_heads(scene: Scene) -> Points:
     if not batches:
         return np.zeros((0, 3))
     head = np.array([0.0, _ARM, HEIGHT - SIZE[2] / 2, 1.0])
-    return np.asarray(np.concatenate(batches).astype(np.float64)[:, :3] @ head)
+    return matrix_product(np.concatenate(batches).astype(np.float64)[:, :3], head)

@@ -39,7 +39,7 @@ def nature(setup: DriverSetup, vehicle: str, seed: int) -> Nature:
     """
     rng = np.random.default_rng([seed, zlib.crc32(vehicle.encode())])
     return Nature(
-        factor=float(np.exp(setup.spread * rng.standard_normal())),
+        factor=math.exp(setup.spread * rng.standard_normal()),
         follows=bool(rng.random() < setup.compliance.reached_share) and bool(rng.random() < setup.compliance.rate),
     )
 

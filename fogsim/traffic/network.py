@@ -3,6 +3,7 @@
 import contextlib
 import gc
 import gzip
+import math
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -149,7 +150,7 @@ def _between_directions(lanes: Sequence[Any]) -> LaneMarking:
         if other.getToNode() is not edge.getFromNode() or other is edge or not opposite:
             continue
         apart = 0.5 * (lanes[-1].getWidth() + opposite[-1].getWidth())
-        if abs(np.linalg.norm(here[0, :2] - _shape(opposite[-1])[-1, :2]) - apart) < _ADJOINING:
+        if abs(math.dist(here[0, :2], _shape(opposite[-1])[-1, :2]) - apart) < _ADJOINING:
             return LaneMarking.DASHED if len(lanes) == len(opposite) == 1 else LaneMarking.DOUBLE
     return LaneMarking.SOLID
 

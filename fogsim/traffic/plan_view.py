@@ -7,6 +7,8 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from fogsim.linear_algebra import matrix_product
+
 SPIRAL_NODES, SPIRAL_WEIGHTS = np.polynomial.legendre.leggauss(24)
 """Gauss-Legendre rule on −1 … 1; on a spiral that turns by π it is exact to far below a millimetre."""
 
@@ -43,8 +45,8 @@ class Piece:
         if self.curvature_rate:
             along = 0.5 * distance * (SPIRAL_NODES + 1.0)
             angles = self.heading + self.curvature * along + 0.5 * self.curvature_rate * along**2
-            dx = 0.5 * distance * float(SPIRAL_WEIGHTS @ np.cos(angles))
-            dy = 0.5 * distance * float(SPIRAL_WEIGHTS @ np.sin(angles))
+            dx = 0.5 * distance * float(matrix_product(SPIRAL_WEIGHTS, np.cos(angles)))
+            dy = 0.5 * distance * float(matrix_product(SPIRAL_WEIGHTS, np.sin(angles)))
         else:
             # A chord of an arc: its length is that of the arc times sin(a) / a, its direction the middle one.
             half = 0.5 * turned

@@ -107,7 +107,7 @@ def _limit_sign(edge: Any, side: float) -> Sign | None:
     along = ahead[0] - points[0]
     heading = math.atan2(along[1], along[0])
     # Ten metres into the edge, so that the sign stands on the stretch that it speaks for.
-    x, y, z = points[0] + along / np.linalg.norm(along) * min(10.0, 0.5 * lane.getLength())
+    x, y, z = points[0] + along / math.hypot(*along) * min(10.0, 0.5 * lane.getLength())
     places = [
         (float(x) - left * math.sin(heading), float(y) + left * math.cos(heading))
         for left in (side * (lane.getWidth() / 2 + away) for away in (SIGN_CLEARANCE, *_OTHER_CLEARANCES))

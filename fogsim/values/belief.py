@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.linear_algebra import matrix_product
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 
 
@@ -43,5 +44,5 @@ class Belief:
     @property
     def log_standard_deviation(self) -> float:
         """Standard deviation of ln k [-]."""
-        mean = float(self.probability @ self.log_extinction)
-        return float(np.sqrt(self.probability @ (self.log_extinction - mean) ** 2))
+        mean = float(matrix_product(self.probability, self.log_extinction))
+        return float(np.sqrt(matrix_product(self.probability, (self.log_extinction - mean) ** 2)))

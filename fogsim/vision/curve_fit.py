@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.linear_algebra import inverse_of, matrix_product
 from fogsim.vision.inflection import FogModel, koschmieder
 from fogsim.vision.profile import RoadCurve
 
@@ -32,12 +33,12 @@ class _Line:
 def _line(extinctions: Floats, curve: RoadCurve, weight: Floats) -> _Line:
     transmission = np.exp(-extinctions[:, None] * curve.distance)
     share = weight / weight.sum()
-    mean_t, mean_y = transmission @ share, float(curve.luminance @ share)
+    mean_t, mean_y = matrix_product(transmission, share), float(matrix_product(curve.luminance, share))
     centred = curve.luminance - mean_y
-    spread = np.maximum(transmission**2 @ share - mean_t**2, 1e-12)
-    covariance = transmission @ (share * centred)
+    spread = np.maximum(matrix_product(transmission**2, share) - mean_t**2, 1e-12)
+    covariance = matrix_product(transmission, share * centred)
     drop = covariance / spread
-    error = float(centred**2 @ share) - covariance * drop
+    error = float(matrix_product(centred**2, share)) - covariance * drop
     return _Line(airlight=mean_y - drop * mean_t, drop=drop, error=error)
 
 
@@ -102,10 +103,10 @@ def _model(
     by_k = -drop * distance * transmission
     by_horizon = extinction * by_k / below
     jacobian = np.stack([by_k, transmission, np.ones_like(transmission)], axis=1)
-    inverse = np.linalg.pinv(jacobian.T @ (weight[:, None] * jacobian))
-    mean_square = float(weight @ residual**2) / max(float(weight.sum()) - 3.0, 1.0)
+    inverse = inverse_of(matrix_product(jacobian.T, weight[:, None] * jacobian))
+    mean_square = float(matrix_product(weight, residual**2)) / max(float(weight.sum()) - 3.0, 1.0)
     inflation = _correlation_inflation(residual[curve.weight > 0])
-    gain = inverse @ (jacobian.T @ (weight * by_horizon))
+    gain = matrix_product(inverse, matrix_product(jacobian.T, weight * by_horizon))
     return FogModel(
         extinction=extinction,
         road=airlight + drop,
@@ -118,8 +119,8 @@ def _model(
 
 def _correlation_inflation(residual: Floats) -> float:
     """Variance of a mean of residuals over that of independent ones, from their lag-one correlation."""
-    power = float(residual @ residual)
+    power = float(matrix_product(residual, residual))
     if power <= 0 or residual.size < 4:
         return 1.0
-    correlation = min(max(float(residual[1:] @ residual[:-1]) / power, 0.0), 0.95)
+    correlation = min(max(float(matrix_product(residual[1:], residual[:-1])) / power, 0.0), 0.95)
     return (1.0 + correlation) / (1.0 - correlation)

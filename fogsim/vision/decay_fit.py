@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
+from fogsim.linear_algebra import straight_line
 
 Floats = NDArray[np.float64]
 
@@ -103,5 +104,5 @@ def _first_guess(distance: Floats, contrast: Floats, noise: Floats) -> tuple[flo
     clear = sign * contrast > 3.0 * noise
     if clear.sum() < 2 or float(np.ptp(distance[clear])) <= 0:
         return float(contrast.mean()), 0.0
-    slope, height = np.polyfit(distance[clear], np.log(sign * contrast[clear]), 1)
-    return sign * math.exp(min(float(height), 5.0)), -float(slope)
+    slope, height = straight_line(distance[clear], np.log(sign * contrast[clear]))
+    return sign * math.exp(min(height, 5.0)), -slope

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.linear_algebra import matrix_product
 from fogsim.vision.profile import RoadCurve, decreasing
 
 Floats = NDArray[np.float64]
@@ -166,7 +167,7 @@ def best_inflection(curve: RoadCurve, parameters: Parameters = inflection_parame
         return None
     k, road, airlight = parameters(curve.below_horizon[rows], smooth[rows], -slope[rows], curve.row_distance)
     model = koschmieder(k[:, None], road[:, None], airlight[:, None], curve.distance)
-    errors = ((model - curve.luminance) ** 2) @ curve.weight
+    errors = matrix_product((model - curve.luminance) ** 2, curve.weight)
     best = int(np.argmin(errors))
     half_width = 0.5 * _bandwidth(slope, int(rows[best]))
     per_row = 2.0 / curve.row_distance

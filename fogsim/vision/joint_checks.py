@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from fogsim.linear_algebra import matrix_product
 from fogsim.values.camera import Camera
 from fogsim.vision.joint_fit import JointFit
 from fogsim.vision.median import median
@@ -73,7 +74,7 @@ def is_ramp(curves: StripCurves, geometry: StripGeometry, camera: Camera) -> boo
     table = linear_table(camera.response, camera.bits)
     values = np.interp(curves.luminance[0][seen], table, np.linspace(0.0, 255.0, table.size))
     rows = geometry.below[seen] - geometry.below[seen].mean()
-    slope = float(rows @ values) / float(rows @ rows)
+    slope = float(matrix_product(rows, values)) / float(matrix_product(rows, rows))
     rest = values - values.mean() - slope * rows
     rise = -slope * float(np.ptp(rows))
     return rise > LEAST_RISE and float(np.sqrt(np.mean(rest**2))) < STRAIGHT * rise

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
+from fogsim.linear_algebra import times
 from fogsim.vision.albedo_filter import USED, hide_behind_obstacles, wandering, whiten
 from fogsim.vision.road_curve import near_road, transmission
 
@@ -208,7 +209,7 @@ def refine(
         cost += _invert(normal, covariance)
         if iteration >= iterations:
             break
-        step = covariance @ gradient
+        step = times(covariance, gradient)
         _move(theta, step, road, constant, unit, prior[4])
         if iteration >= 2 and abs(step[0]) < CONVERGED * (abs(theta[0]) + unit):
             iterations = min(iterations, iteration + 1)

@@ -8,6 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.linear_algebra import inverse_of, matrix_product
+
 Floats = NDArray[np.float64]
 
 HALVES = (1.0, -1.0)
@@ -189,10 +191,10 @@ def _least_squares(rows: Floats, cols: Floats) -> LaneLine | None:
         return None
     centre, middle = float(rows.mean()), float(cols.mean())
     apart = rows - centre
-    spread = float(apart @ apart)
+    spread = float(matrix_product(apart, apart))
     if spread < LEAST_PIXELS**3 / 12.0:
         return None
-    slope = float(apart @ (cols - middle)) / spread
+    slope = float(matrix_product(apart, cols - middle)) / spread
     return LaneLine(slope, middle - slope * centre, rows.size, centre, math.sqrt(spread))
 
 
@@ -247,7 +249,7 @@ def vanishing_point(lines: list[LaneLine], expected: tuple[float, float], tolera
         return None
     if abs(point[1] - expected[1]) > tolerance:
         return None
-    scale = max(1.0, math.sqrt(float(residual @ residual) / max(len(kept) - 2, 1)))
+    scale = max(1.0, math.sqrt(float(matrix_product(residual, residual)) / max(len(kept) - 2, 1)))
     return VanishingPoint(float(point[0]), float(point[1]), scale * math.sqrt(covariance[1, 1]), len(kept))
 
 
@@ -261,7 +263,7 @@ def _intersection(lines: list[LaneLine]) -> tuple[Floats, Floats, Floats]:
         variance = np.array([EDGE_DEVIATION**2 * (1 / n.votes + ((row - n.centre) / n.spread) ** 2) for n in lines])
         weight = 1.0 / (variance * (1.0 + slope**2) + 0.04)
         jacobian = np.column_stack((np.ones_like(slope), -slope))
-        covariance = np.linalg.pinv(jacobian.T @ (weight[:, None] * jacobian))
-        point = covariance @ (jacobian.T @ (weight * offset))
+        covariance = inverse_of(matrix_product(jacobian.T, weight[:, None] * jacobian))
+        point = matrix_product(covariance, matrix_product(jacobian.T, weight * offset))
         row = float(point[1])
-    return point, covariance, (offset - jacobian @ point) * np.sqrt(weight)
+    return point, covariance, (offset - matrix_product(jacobian, point)) * np.sqrt(weight)

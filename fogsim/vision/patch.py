@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.linear_algebra import matrix_product
+
 Floats = NDArray[np.float64]
 
 LEAST_BOX = 0.5
@@ -119,7 +121,7 @@ def seen_as(near: Patch, grid: PixelGrid, at: Placement) -> Floats:
     """Near patch as the far camera would see it without fog."""
     rows = box_weights(near.luminance.shape[0], near.row, grid.rows, at.row, at.scale, near.blur)
     cols = box_weights(near.luminance.shape[1], near.column, grid.cols, at.column, at.scale, near.blur)
-    return np.asarray(rows @ near.luminance @ cols.T)
+    return matrix_product(matrix_product(rows, near.luminance), cols.T)
 
 
 def shrunk(patch: Patch, scale: float) -> Patch:

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.linear_algebra import inverse_of, matrix_product
 from fogsim.vision.patch import Patch, PixelGrid, Placement, pixel_grid, seen_as
 
 Floats = NDArray[np.float64]
@@ -226,14 +227,17 @@ def _step(near: Patch, grid: PixelGrid, at: Placement, prior: PlacementPrior, no
     jacobian = np.stack([slope * (seen_as(near, grid, m) - shown)[used] for m in moved], axis=1)
     jacobian /= (NUDGE, NUDGE, 0.01)
     # What slope and mean can take up is no displacement.
-    base = np.stack([np.ones(residual.size), shown[used] - near_mean], axis=1)
-    jacobian -= base @ np.linalg.lstsq(base, jacobian, rcond=None)[0]
+    jacobian -= jacobian.mean(axis=0)
+    apart = shown[used] - shown[used].mean()
+    jacobian -= apart[:, None] * matrix_product(apart, jacobian) / max(float(matrix_product(apart, apart)), 1e-12)
     expected = prior.placement
     deviation = np.array([prior.column_deviation, prior.row_deviation, prior.scale_deviation])
     offset = np.array([at.column - expected.column, at.row - expected.row, math.log(at.scale / expected.scale)])
     variance = noise**2 + ALIKE * max(scale**2 - noise**2, 0.0)
-    information = jacobian.T @ jacobian / variance + np.diag(deviation**-2)
-    return np.asarray(np.linalg.solve(information, jacobian.T @ residual / variance - offset / deviation**2))
+    information = matrix_product(jacobian.T, jacobian) / variance + np.diag(deviation**-2)
+    return np.asarray(
+        matrix_product(inverse_of(information), matrix_product(jacobian.T, residual) / variance - offset / deviation**2)
+    )
 
 
 def _regression(near: Patch, grid: PixelGrid, at: Placement, noise: float) -> Regression | None:

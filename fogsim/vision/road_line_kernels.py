@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
+from fogsim.linear_algebra import inverse_of, times
 from fogsim.vision.sort_kernels import median_of_few
 from fogsim.vision.strip_kernels import row_light
 
@@ -365,8 +366,8 @@ def meet(  # noqa: C901, PLR0912, PLR0915 - one iteration of a solver, which sha
         for a in range(size):
             for b in range(a):
                 normal[a, b] = normal[b, a]
-        inverse = np.linalg.inv(normal).astype(np.float64)
-        step = inverse @ right
+        inverse = inverse_of(normal)
+        step = times(inverse, right)
         offset, row, bend = offset + step[0], row + min(max(step[1], -5.0), 5.0), bend + step[2]
         slope += step[3:]
         reach = max(0.6 * reach, 1.0)

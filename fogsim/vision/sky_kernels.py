@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
+from fogsim.linear_algebra import inverse_of, times
 from fogsim.vision.sort_kernels import sort_few
 from fogsim.vision.strip_kernels import MOST_SAMPLES, even_column, light
 
@@ -232,7 +233,7 @@ def sky_bowl(
         for a in range(4):
             for b in range(a):
                 normal[a, b] = normal[b, a]
-        inverse = np.linalg.inv(normal).astype(np.float64)
-        found = inverse @ right
+        inverse = inverse_of(normal)
+        found = times(inverse, right)
         covariance = inverse * (ALIKE * max(squares / max(number, 1), noise * noise))
     return found, covariance, number / seen.size

@@ -128,7 +128,7 @@ def above_bonnet(image: LinearPixels, camera: Camera, airlight: float) -> int:
         return bottom
     level = strip_kernels.middle_levels(image.pixels, image.tables, rows)
     # Three rows each side of a gap of two, since a bonnet's edge is bent.
-    mean = np.convolve(level, np.full(3, 1.0 / 3.0), "valid")
+    mean = (level[:-2] + level[1:-1] + level[2:]) / 3.0
     change = mean[5:] - mean[:-5]
     apart = np.abs(change - median(change))
     steps = np.flatnonzero(apart > max(BONNET_STEP * airlight, BONNET_OUTLIER * median(apart)))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.linear_algebra import matrix_product
 from fogsim.vision import line_kernels
 from fogsim.vision.edges import Gradient
 
@@ -87,10 +88,11 @@ def vanishing_point(
 
 def _crossing(first: Floats, second: Floats) -> Floats | None:
     """Point common to two lines u cos θ + v sin θ = ρ, or None if they are nearly parallel."""
-    normals = np.array([[math.cos(line[0]), math.sin(line[0])] for line in (first, second)])
-    if abs(float(np.linalg.det(normals))) < math.sin(SMALLEST_ANGLE):
+    (a, b), (c, d) = ((math.cos(line[0]), math.sin(line[0])) for line in (first, second))
+    turn = a * d - b * c
+    if abs(turn) < math.sin(SMALLEST_ANGLE):
         return None
-    return np.asarray(np.linalg.solve(normals, np.array([first[1], second[1]])))
+    return np.array([d * first[1] - b * second[1], a * second[1] - c * first[1]]) / turn
 
 
 def _consensus(lines: Floats, votes: Floats) -> NDArray[np.bool_] | None:
@@ -107,7 +109,7 @@ def _consensus(lines: Floats, votes: Floats) -> NDArray[np.bool_] | None:
     u = (lines[a, 1] * sine[b] - lines[b, 1] * sine[a]) / turn
     v = (lines[b, 1] * cosine[a] - lines[a, 1] * cosine[b]) / turn
     passing = np.abs(u[:, None] * cosine + v[:, None] * sine - lines[:, 1]) < CONSENSUS
-    return np.asarray(passing[int(np.argmax(passing @ votes))])
+    return np.asarray(passing[int(np.argmax(matrix_product(passing, votes)))])
 
 
 def _centre_of_mass(lines: Floats) -> tuple[Floats, float] | None:

@@ -7,6 +7,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.linear_algebra import matrix_product
 from fogsim.scene.solids import Material, merge, quad
 from fogsim.values.scene import Mesh, Surface
 
@@ -41,6 +42,8 @@ class Patch:
         Area as seen from straight ahead or behind, in units of the box's width times its height.
     front : bool
         True if it shines forwards, else backwards.
+    side : int
+        1 on the left, −1 on the right, 0 if in the middle.
     reflectance : (3,) float64
         Colour of its lens.
     vertices : (n,) int64
@@ -53,6 +56,7 @@ class Patch:
     high: NDArray[np.float64]
     area: float
     front: bool
+    side: int
     reflectance: NDArray[np.float64]
     vertices: NDArray[np.int64]
 
@@ -81,11 +85,12 @@ def _patches(shape: Mesh, side: NDArray[np.int64], middle_x: float) -> list[Patc
             patches.append(
                 Patch(
                     surface=surface,
-                    centre=weight[chosen] @ middle[chosen] / weight[chosen].sum(),
+                    centre=matrix_product(weight[chosen], middle[chosen]) / weight[chosen].sum(),
                     low=corners[chosen].min(axis=(0, 1)),
                     high=corners[chosen].max(axis=(0, 1)),
                     area=float(seen[chosen].sum()),
                     front=front,
+                    side=which,
                     reflectance=shape.reflectance[vertices[0]].astype(np.float64),
                     vertices=vertices,
                 )
@@ -163,7 +168,7 @@ def lamp_quads(shape: Mesh) -> Mesh:
     patches = lamp_patches(shape)
     parts = [_rectangle(patch, *_lit_box(patch), patch.surface, 0.0) for patch in patches]
     for which in (-1, 1):
-        red = [p for p in patches if p.surface in _RED and not p.front and np.sign(p.centre[1]) == which and _at_end(p)]
+        red = [p for p in patches if p.surface in _RED and not p.front and p.side == which and _at_end(p)]
         if red:
             low, high = np.min([p.low for p in red], axis=0), np.max([p.high for p in red], axis=0)
             parts.append(_rectangle(red[0], low, high, Surface.MATT, 0.002))

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.linear_algebra import matrix_product
 from fogsim.scene.bodies.seen import COLUMNS, Mask, Seen, Wide, light_of
 
 _NARROW = 0.03  # runs of columns and gaps between them, and edges of panels, that are left out [units of the box]
@@ -80,8 +81,8 @@ def _run(look: Look, zone: tuple[int, int], inside: Mask, alone: bool, little: f
     """A run of samples; if it is not alone, it is upright lest it should meet the next one."""
     z: Wide = np.arange(len(inside), dtype=np.float64) + 0.5
     count = inside.sum(axis=1)
-    centre = inside @ (np.arange(COLUMNS) + 0.5) / np.maximum(count, 1) / COLUMNS
-    middle, breadth = np.full(2, count @ centre / count.sum()), np.full(2, count.mean() / COLUMNS)
+    centre = matrix_product(inside, np.arange(COLUMNS) + 0.5) / np.maximum(count, 1) / COLUMNS
+    middle, breadth = np.full(2, matrix_product(count, centre) / count.sum()), np.full(2, count.mean() / COLUMNS)
     line = _line(z, count / COLUMNS, np.ones(len(z)), len(z))
     even = np.abs(count / COLUMNS - line[0] - (line[1] - line[0]) * z / len(z)).max() < _UNEVEN
     if alone and even and line.min() >= 0.0 and line.max() <= 1.0:
@@ -113,9 +114,9 @@ def within(run: Run, rear: Seen) -> Run:
 def _line(z: Wide, values: Wide, weights: NDArray[Any], height: int) -> Wide:
     """Values of the straight line of least squares at 0 and at a height."""
     whole = weights.sum()
-    mean, level = weights @ z / whole, weights @ values / whole
-    spread = weights @ (z - mean) ** 2
-    slope = weights @ ((z - mean) * (values - level)) / spread if spread > 0.0 else 0.0
+    mean, level = matrix_product(weights, z) / whole, matrix_product(weights, values) / whole
+    spread = matrix_product(weights, (z - mean) ** 2)
+    slope = matrix_product(weights, (z - mean) * (values - level)) / spread if spread > 0.0 else 0.0
     return np.asarray(level + slope * (np.array([0.0, height]) - mean))
 
 

@@ -181,7 +181,7 @@ def _normals(side: str, mean: Wide, upwards: float, size: Size) -> Wide:
     mean[2] = np.clip(upwards, -0.99, 0.99)
     level = float(np.hypot(mean[0], mean[1]))
     mean[:2] *= min(1.0, math.sqrt(1.0 - mean[2] ** 2) / max(level, 1e-9))
-    level, length = max(float(np.hypot(mean[0], mean[1])), 1e-9), max(float(np.linalg.norm(mean)), 1e-9)
+    level, length = max(float(np.hypot(mean[0], mean[1])), 1e-9), max(math.hypot(*mean), 1e-9)
     # Turned up as much at the upper edge as down at the lower one, for normals are all of one length.
     upright = np.array([-mean[2] * mean[0] / level, -mean[2] * mean[1] / level, level]) / length
     turn = math.sqrt(max(1.0 - length**2, 0.0)) * upright

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fogsim.linear_algebra import matrix_product
 from fogsim.scene.signs.symbols import BLACK, FIELD, RED, SIGN, Corners, flat
 from fogsim.scene.solids import Material, merge
 from fogsim.values.scene import Mesh
@@ -94,7 +95,7 @@ def _blended(field: Mesh, symbol: Mesh) -> Mesh:
     printed, whole = _areas(symbol), float(_areas(field).sum())
     ink = symbol.reflectance[symbol.faces[:, 0]]
     bare = max(whole - float(printed.sum()), 0.0)
-    mean = (bare * field.reflectance[0] + printed @ ink) / (bare + float(printed.sum()))
+    mean = (bare * field.reflectance[0] + matrix_product(printed, ink)) / (bare + float(printed.sum()))
     return replace(field, reflectance=np.broadcast_to(mean.astype(np.float32), field.reflectance.shape).copy())
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.linear_algebra import matrix_product
 from fogsim.scene.polyline import cleaned
 from fogsim.scene.relief import Relief
 from fogsim.scene.solids import Material, box, merge, moved
@@ -97,12 +98,12 @@ class _Pieces:
     def _crossed(self, sign: Sign, ahead: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Offset to the left and half width [m] of the lanes that lead through the sign's plane in its direction."""
         offset = self._start[:, :2] - np.array(sign.position[:2])
-        before, ahead_of = offset @ ahead, (offset + self._step[:, :2]) @ ahead
+        before, ahead_of = matrix_product(offset, ahead), matrix_product(offset + self._step[:, :2], ahead)
         through = (before <= 0) & (ahead_of > 0) & (sign.position[2] > self._start[:, 2])
         through &= np.abs(sign.position[2] - self._start[:, 2]) < 10.0
         share = before[through] / (before[through] - ahead_of[through])
         places = offset[through] + share[:, None] * self._step[through, :2]
-        left = places @ np.array([-ahead[1], ahead[0]])
+        left = matrix_product(places, np.array([-ahead[1], ahead[0]]))
         near = np.abs(left) < _SIDEWAYS
         return left[near], self._half[through][near]
 

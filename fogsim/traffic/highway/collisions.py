@@ -5,9 +5,9 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
 from highway_env.utils import are_polygons_intersecting
 
+from fogsim.linear_algebra import matrix_product
 from fogsim.traffic.highway.fleet import Fleet
 from fogsim.values import Collision
 
@@ -40,7 +40,7 @@ class CollisionWatch:
             if pair not in self._known:
                 self._known.add(pair)
                 collider, victim = (one, other) if _approach(one, other) >= _approach(other, one) else (other, one)
-                impact = float(np.linalg.norm(one.velocity - other.velocity))
+                impact = math.dist(one.velocity, other.velocity)
                 self._untold.append(Collision(self._fleet.time, name(collider), name(victim), impact))
 
     def tell(self) -> tuple[Collision, ...]:
@@ -66,4 +66,4 @@ def _hits(road: Any, period: float) -> Iterator[tuple[Any, Any]]:
 
 def _approach(one: Any, other: Any) -> float:
     """How fast one moves towards the other, times their distance."""
-    return float(np.dot(one.velocity, other.position - one.position))
+    return float(matrix_product(one.velocity, other.position - one.position))

@@ -10,6 +10,7 @@ from highway_env.road.lane import LineType
 from highway_env.vehicle.kinematics import Vehicle
 from numpy.typing import ArrayLike, NDArray
 
+from fogsim.linear_algebra import matrix_product
 from fogsim.values import Lane, LaneMarking, RoadNetwork
 
 SAMPLING = 2.0
@@ -138,9 +139,9 @@ def station_along(line: NDArray[np.float64], point: NDArray[np.float64]) -> tupl
     best, station, driven = math.inf, 0.0, 0.0
     for start, end in itertools.pairwise(line):
         along = end - start
-        length = float(np.linalg.norm(along))
-        share = float(np.clip((point - start) @ along / length**2, 0.0, 1.0))
-        distance = float(np.linalg.norm(start + share * along - point))
+        length = math.hypot(*along)
+        share = float(np.clip(matrix_product(point - start, along) / length**2, 0.0, 1.0))
+        distance = math.dist(start + share * along, point)
         if distance < best:
             best, station = distance, driven + share * length
         driven += length

@@ -4,6 +4,7 @@ Its drivers ask their road who is ahead of them; in fog, a road answers with nob
 and MOBIL stay as they are.
 """
 
+import math
 from typing import Any
 
 import numpy as np
@@ -65,7 +66,7 @@ class VisibleNeighbours:
     def _sees(self, vehicle: Any, front: Any) -> bool:
         lift = np.array([0.0, 0.0, EYE_HEIGHT])
         eye, rear = front_bumper(vehicle) + lift, rear_bumper(front) + lift
-        distance = max(float(np.linalg.norm(rear - eye)), 0.1)
+        distance = max(math.dist(eye, rear), 0.1)
         if distance <= self._surely_seen:
             return True
         depth, fleet = self._fog.optical_depth(eye, rear), self._fleet

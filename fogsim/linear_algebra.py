@@ -1,0 +1,98 @@
+"""Products and inverses of small matrices that are the same on every processor.
+
+BLAS and LAPACK, which numpy's ``@`` and most of `numpy.linalg` call, round as it suits the processor that they find.
+Here every operation is one of IEEE 754, in an order that only the shapes decide.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.jit import kernel
+
+LEAST_PIVOT = 1e-14
+"""Share of a diagonal element below which what others leave of it counts as nothing [-]."""
+
+
+def matrix_product(left: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
+    """Product of two matrices, of a matrix and a vector, or of two vectors, as ``left @ right``.
+
+    Parameters
+    ----------
+    left : (…, n) array
+        A vector, a matrix, or many matrices.
+    right : (n,) or (n, m) array
+        A vector or a matrix.
+    """
+    if right.ndim == 1:
+        return np.asarray((left * right).sum(axis=-1))
+    return np.asarray((left[..., None] * right).sum(axis=-2))
+
+
+@kernel
+def inverse_of(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Inverse (n, n) of a symmetric matrix (n, n) without negative eigenvalues, such as that of normal equations.
+
+    What it says nothing of, or nothing beside the others, has zeros in its row and column (a generalised inverse).
+    Beaton's sweep operator (Goodnight 1979, The American Statistician 33, 149–158), the largest pivots first.
+    """
+    count = len(matrix)
+    swept, left = matrix.copy(), np.ones(count, np.bool_)
+    for _ in range(count):
+        pivot, largest = -1, LEAST_PIVOT
+        for i in range(count):
+            # Relative to what it was, so that units do not matter.
+            if left[i] and swept[i, i] > largest * matrix[i, i]:
+                pivot, largest = i, swept[i, i] / matrix[i, i]
+        if pivot < 0:
+            break
+        left[pivot] = False
+        _sweep(swept, pivot)
+    for i in range(count):
+        for j in range(count):
+            swept[i, j] = 0.0 if left[i] or left[j] else -swept[i, j]
+    return swept
+
+
+@kernel
+def _sweep(matrix: NDArray[np.float64], pivot: int) -> None:
+    scale = 1.0 / matrix[pivot, pivot]
+    for i in range(len(matrix)):
+        if i != pivot:
+            share = scale * matrix[i, pivot]
+            for j in range(len(matrix)):
+                if j != pivot:
+                    matrix[i, j] -= share * matrix[pivot, j]
+    for i in range(len(matrix)):
+        matrix[i, pivot] *= scale
+        matrix[pivot, i] = matrix[i, pivot]
+    matrix[pivot, pivot] = -scale
+
+
+@kernel
+def times(matrix: NDArray[np.float64], vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Product of a matrix (n, m) and a vector (m,), for kernels."""
+    out = np.zeros(len(matrix))
+    for i in range(len(matrix)):
+        for j in range(len(vector)):
+            out[i] += matrix[i, j] * vector[j]
+    return out
+
+
+@kernel
+def convolution(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Full convolution (n + m - 1,) of two series (n,) and (m,)."""
+    out = np.zeros(len(one) + len(other) - 1)
+    for i in range(len(one)):
+        for j in range(len(other)):
+            out[i + j] += one[i] * other[j]
+    return out
+
+
+def straight_line(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
+    """Slope and height at zero of the straight line of least squares through points of which two x differ."""
+    middle, level = float(x.mean()), float(y.mean())
+    apart = x - middle
+    slope = float(matrix_product(apart, y - level)) / float(matrix_product(apart, apart))
+    return slope, level - slope * middle

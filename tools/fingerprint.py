@@ -1,0 +1,157 @@
+"""Print what must be the same on every x86-64 processor, as JSON, or compare it with what another one printed.
+
+    python tools/fingerprint.py [--part shapes --part day --part night] > here.json
+    python tools/fingerprint.py --compare there.json
+
+Shapes and scenes are told as hashes; a short drive by day and one by night as hashes of what was drawn and of the
+frames' bytes, as decisions, as the text of metrics.json, and as numbers, which must agree to 1e-9 of their size.
+With --compare the differences are listed, and the exit code is 1 if there are any.
+"""
+
+import argparse
+import dataclasses
+import hashlib
+import json
+import math
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import fogsim
+from fogsim.recorders import write_json
+from fogsim.metrics import RunMetrics
+from fogsim.scenario import build
+from fogsim.scene import SIGN_KINDS, build_scene
+from fogsim.traffic.network import read_net, road_network
+from fogsim.values import RoadNetwork, Sign, SignMap, Step
+
+TOLERANCE = 1e-9
+TOWN = Path(__file__).resolve().parents[1] / "tests" / "data" / "grid" / "grid.net.xml"
+COMMON = (
+    "duration_s=1.5",
+    "renderer=cpu",
+    "camera.width=160",
+    "camera.height=120",
+    "estimators=[negru2013, zhu2015, huang2015, huang2015_rough, huang2015_lead, joint_road, lead_contrast]",
+)
+DRIVES = {
+    "day": ("motorway_fog_bank", ("fog={outside_visibility_m: 150, banks: [{start_m: 20, end_m: 600, edge_m: 60, visibility_m: 60}]}",)),
+    "night": ("night_motorway_fog", ("street_lamps=true",)),
+}
+
+
+def shapes() -> dict[str, str]:
+    """Hash of every shape and of all else in the scenes of a motorway and of a town."""
+    found = {}
+    setup = build.traffic_setup(fogsim.load_scenario("motorway_fog_bank"))
+    assert setup.net is not None
+    scenes = {
+        "motorway": road_network(read_net(setup.net), ("approach", "bank", "exit")),
+        "town": road_network(read_net(TOWN), ("A0B0",)),
+    }
+    for place, network in scenes.items():
+        scene = build_scene(network, _signs(network), np.random.default_rng(1), street_lamps=True)
+        for name, shape in scene.shapes.items():
+            found[f"{place} {name}"] = _digest(shape)
+        found[f"{place} ground"] = _digest(scene.ground)
+        found |= {f"{place} places of {batch.shape}": _digest(batch) for batch in scene.scenery}
+    return found
+
+
+def _signs(network: RoadNetwork) -> SignMap:
+    """One sign of every kind."""
+    x, y, z = network.route[0].tolist()
+    places = [(x + 20.0 * number, y - 8.0, z + 2.2) for number in range(len(SIGN_KINDS))]
+    signs = [Sign(f"a {kind}", kind, 80 / 3.6, place, 0.3, 0.75) for kind, place in zip(SIGN_KINDS, places, strict=True)]
+    return SignMap(tuple(signs))
+
+
+def drive(name: str) -> dict[str, Any]:
+    """What came of a short drive."""
+    scenario, overrides = DRIVES[name]
+    told: dict[str, Any] = {"frames": [], "drawn": [], "decisions": [], "numbers": {}}
+    metrics = RunMetrics()
+    for step in fogsim.run(fogsim.load_scenario(scenario, [*COMMON, *overrides]), seed=1):
+        metrics.update(step)
+        told["frames"].append(_hash(step.observation.frame.image))
+        told["drawn"].append(_digest(step.view))
+        told["decisions"].append(_decisions(step))
+        told["numbers"] |= {f"{step.index} {key}": value for key, value in _numbers(step)}
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "metrics.json")
+        write_json(file, metrics.summary().to_json())
+        told["metrics"] = file.read_text().splitlines()
+    return told
+
+
+def _decisions(step: Step) -> str:
+    valid = " ".join(f"{estimate.method} {estimate.valid}" for estimate in step.estimates)
+    return f"{step.command.advice.speed!r} {int(step.command.lamps)} {len(step.traffic.ids)} {valid}"
+
+
+def _numbers(step: Step) -> Iterator[tuple[str, float]]:
+    yield from ((f"{one.method} k", one.extinction) for one in step.estimates)
+    yield from ((f"{one.method} deviation", one.standard_deviation) for one in step.estimates)
+    yield "believed deviation", step.belief.log_standard_deviation
+    yield "believed visibility", step.belief.visibility
+    yield "route", step.route_position
+    for row, vehicle in enumerate(step.traffic.ids):
+        for name in ("position", "heading", "speed", "acceleration"):
+            for place, value in enumerate(np.ravel(getattr(step.traffic, name)[row]).tolist()):
+                yield f"{vehicle} {name} {place}", value
+
+
+def _digest(value: Any) -> str:
+    """Hash of all arrays of a dataclass."""
+    arrays = [getattr(value, field.name) for field in dataclasses.fields(value)]
+    return _hash(*(array for array in arrays if isinstance(array, np.ndarray)))
+
+
+def _hash(*arrays: Any) -> str:
+    digest = hashlib.sha256()
+    for array in arrays:
+        digest.update(f"{array.dtype} {array.shape}".encode())
+        # Zero has one sign more than it has values.
+        digest.update(np.ascontiguousarray(array + array.dtype.type(0)).tobytes())
+    return digest.hexdigest()[:16]
+
+
+def differences(here: Any, there: Any, where: str = "") -> Iterator[str]:
+    """What does not agree, one line each."""
+    if isinstance(here, dict) and isinstance(there, dict):
+        for key in sorted(here.keys() | there.keys()):
+            yield from differences(here.get(key), there.get(key), f"{where}/{key}")
+    elif isinstance(here, list) and isinstance(there, list) and len(here) == len(there):
+        for number, pair in enumerate(zip(here, there, strict=True)):
+            yield from differences(*pair, f"{where}/{number}")
+    elif isinstance(here, float) and isinstance(there, float):
+        if not (here == there or math.isclose(here, there, rel_tol=TOLERANCE, abs_tol=1e-12)):
+            yield f"{where}: {here!r} here, {there!r} there"
+    elif here != there:
+        yield f"{where}: {here!r} here, {there!r} there"
+
+
+PARTS = {"shapes": shapes, "day": lambda: drive("day"), "night": lambda: drive("night")}
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--part", action="append", choices=PARTS)
+    parser.add_argument("--compare", type=Path)
+    arguments = parser.parse_args()
+    here = {part: PARTS[part]() for part in arguments.part or PARTS}
+    if arguments.compare is None:
+        print(json.dumps(here, indent=1))
+        return 0
+    there = json.loads(arguments.compare.read_text())
+    found = list(differences(json.loads(json.dumps(here)), {part: there.get(part) for part in here}))
+    print("\n".join(found) or "the same")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

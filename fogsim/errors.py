@@ -3,6 +3,9 @@
 import difflib
 from collections.abc import Iterable
 
+LONGEST_SHOWN = 80
+"""Most characters of a user's value that a message repeats."""
+
 
 class FogSimError(Exception):
     """Base of every error that a user can cause or mend; the command line prints it and exits with 2."""
@@ -29,7 +32,7 @@ class UnknownNameError(InputError):
 
     def __init__(self, kind: str, name: object, known: Iterable[str]) -> None:
         names = sorted(known)
-        super().__init__(f"unknown {kind} {name!r}; {suggest(str(name), names)}")
+        super().__init__(f"unknown {kind} {shown(name)}; {suggest(str(name), names)}")
 
 
 def suggest(name: str, known: Iterable[str]) -> str:
@@ -49,5 +52,17 @@ def suggest(name: str, known: Iterable[str]) -> str:
     """
     names = list(known)
     listing = ", ".join(names) if names else "none"
-    near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
-    return f"did you mean {near[0]!r}? Known: {listing}" if near else f"known: {listing}"
+    near = nearest(name, names)
+    return f"known: {listing}" if near is None else f"did you mean {near!r}? Known: {listing}"
+
+
+def nearest(name: str, known: Iterable[str]) -> str | None:
+    """Which of the known names was probably meant; None if none is near."""
+    return next(iter(difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)), None)
+
+
+def shown(value: object) -> str:
+    """A user's value as messages repeat it: `repr`, cut short in the middle if it is long."""
+    text = repr(value)
+    half = LONGEST_SHOWN // 2
+    return text if len(text) <= LONGEST_SHOWN else f"{text[:half]} … {text[-half:]}"

@@ -1,15 +1,16 @@
 """A YAML file as plain data that remembers on which line each key stands."""
 
-from collections.abc import Iterable, Mapping, Sequence
+import stat
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from fogsim.errors import InputError
+from fogsim.scenario.overrides import override_path, told_override
+from fogsim.scenario.plain_yaml import MOST_BYTES, KeyPath, PlainYamlError, dotted, parse_yaml
 
-KeyPath = tuple[str | int, ...]
+__all__ = ["Document", "KeyPath", "dotted", "read_document"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,18 +40,23 @@ class Document:
         return str(self.path)
 
     def overridden(self, overrides: Iterable[str]) -> "Document":
-        """Copy in which the keys that overrides set stand where the overrides do.
+        """Copy in which the keys that overrides set, and all below them, stand where the overrides do.
+
+        Blocks around them stand at both places.
 
         Parameters
         ----------
         overrides : iterable of str
             ``key.path=value`` each, known to be well formed.
         """
-        set_by = {}
+        origins = dict(self.origins)
         for text in overrides:
-            keys = text.partition("=")[0].strip().split(".")
-            set_by[tuple(int(key) if key.isdecimal() else key for key in keys)] = f"--set {text}"
-        return replace(self, origins={**self.origins, **set_by})
+            at, told = override_path(text), told_override(text)
+            origins = {key: origin for key, origin in origins.items() if key[: len(at)] != at}
+            for block in (at[:length] for length in range(1, len(at))):
+                origins[block] = f"{origins[block]} with {told}" if block in origins else told
+            origins[at] = told
+        return replace(self, origins=origins)
 
 
 def read_document(path: Path) -> Document:
@@ -59,41 +65,34 @@ def read_document(path: Path) -> Document:
     Raises
     ------
     InputError
-        If it cannot be read, is no YAML, has a key twice, or is no mapping.
+        If it cannot be read, is no regular file of UTF-8 text, is too large (see `plain_yaml`), is no YAML, has a key
+        twice, or is no mapping.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-        root = yaml.compose(text, Loader=yaml.SafeLoader)
-        data = yaml.safe_load(text)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not valid YAML: {' '.join(str(error).split())}") from error
-    if not isinstance(data, dict) or root is None:
+        data, lines = parse_yaml(_text(path))
+    except PlainYamlError as error:
+        where = path if error.line is None else f"{path}:{error.line}"
+        raise InputError(f"{where}: not valid YAML: {error.problem}") from error
+    if not isinstance(data, dict):
         raise InputError(f"{path}: expected a mapping of keys to values, got {type(data).__name__}")
-    lines: dict[KeyPath, int] = {}
-    _collect_lines(path, root, (), lines)
     return Document(path, data, {key: f"{path}:{line}" for key, line in lines.items()})
 
 
-def _collect_lines(path: Path, node: yaml.Node, at: KeyPath, lines: dict[KeyPath, int]) -> None:
-    if isinstance(node, yaml.MappingNode):
-        for key, value in node.value:
-            here = (*at, str(key.value))
-            if here in lines:
-                raise InputError(
-                    f"{path}:{key.start_mark.line + 1}: {dotted(here)}: this key stands twice, "
-                    f"first on line {lines[here]}"
-                )
-            lines[here] = key.start_mark.line + 1
-            _collect_lines(path, value, here, lines)
-    elif isinstance(node, yaml.SequenceNode):
-        for index, value in enumerate(node.value):
-            here = (*at, index)
-            lines[here] = value.start_mark.line + 1
-            _collect_lines(path, value, here, lines)
-
-
-def dotted(key_path: Sequence[str | int]) -> str:
-    """Key path as it is written after ``--set``."""
-    return ".".join(map(str, key_path))
+def _text(path: Path) -> str:
+    try:
+        # What is no regular file (a pipe, a device) may never end.
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise InputError(f"{path}: cannot be read: it is no regular file")
+        with path.open("rb") as file:
+            raw = file.read(MOST_BYTES + 1)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    if len(raw) > MOST_BYTES:
+        raise InputError(f"{path}: cannot be read: it has more than {MOST_BYTES} bytes")
+    try:
+        return raw.decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = 1 + raw[: error.start].count(b"\n")
+        raise InputError(
+            f"{path}:{line}: not valid YAML: not UTF-8 text, got the byte 0x{raw[error.start]:02x}"
+        ) from error

@@ -2,16 +2,17 @@
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from fogsim.errors import InputError, suggest
+from fogsim.errors import InputError, nearest, shown, suggest
 from fogsim.scenario.document import Document, KeyPath, dotted, read_document
-from fogsim.scenario.locating import SCENARIO_FILE, scenario_file
+from fogsim.scenario.locating import SCENARIO_FILE, is_file, is_folder, scenario_file
+from fogsim.scenario.methods import MISTAKE
 from fogsim.scenario.overrides import apply_overrides
 from fogsim.scenario.schema import Scenario
 from fogsim.scenario.traffic_schema import AnyEvent
@@ -22,6 +23,18 @@ LONG_RUN = 600.0
 
 DAY = 86_400.0
 """Simulated time within which the ego of a simulation of the user's own must appear [s]."""
+
+MOST_TOLD = 50
+"""Most mistakes of a file that are told one by one."""
+
+WORDED = {
+    "model_type": "must be a block of keys",
+    "dict_type": "must be a block of keys",
+    "tuple_type": "must be a list",
+    "too_short": "must have at least one entry",
+    "path_type": "must be a path",
+}
+"""Messages of pydantic in the words of a file's reader."""
 
 
 def load_scenario(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Scenario:
@@ -126,28 +139,51 @@ def _without_infinities(value: Any) -> Any:
 
 
 def _checked(document: Document, overrides: Iterable[str], folder: Path, named_files: bool = True) -> Scenario:
+    if isinstance(overrides, str):
+        raise InputError(f"overrides must be a list of key.path=value each, got the text {shown(overrides)}")
     overrides = tuple(overrides)
     data = apply_overrides(document.data, overrides)
     document = document.overridden(overrides)
-    mistakes = _unnamed_files(document, data) if named_files else []
+    mistakes = _unnamed_files(document, data) if named_files else {}
     try:
-        scenario = Scenario.model_validate({**data, "directory": folder})
+        scenario = Scenario.model_validate(data).model_copy(update={"directory": folder})
     except ValidationError as error:
-        mistakes = [_told(document, detail) for detail in error.errors()] + mistakes
+        raise InputError(_all_told(document, error.errors(include_url=False), mistakes)) from error
     if mistakes:
-        raise InputError("\n".join(mistakes))
+        raise InputError("\n".join(mistakes.values()))
     _check_files(document, scenario)
     return scenario
 
 
-def _unnamed_files(document: Document, data: dict[str, Any]) -> list[str]:
+def _unnamed_files(document: Document, data: dict[str, Any]) -> dict[KeyPath, str]:
     """Say which files a scenario does not name, and must; the schema knows no keys of which either one or others do."""
     traffic = data.get("traffic")
     if not isinstance(traffic, dict) or traffic.get("config") is not None:
-        return []
+        return {}
     what = "net with routes is required, or config (a SUMO configuration) in their place"
-    where = document.where(("traffic",))
-    return [f"{where}: traffic.{key}: this key is missing; {what}" for key in ("net", "routes") if not traffic.get(key)]
+    places = [("traffic", key) for key in ("net", "routes") if traffic.get(key) in (None, "", [])]
+    return {place: f"{document.where(place)}: {dotted(place)}: this key is missing; {what}" for place in places}
+
+
+def _all_told(document: Document, details: Sequence[ErrorDetails], unnamed: Mapping[KeyPath, str]) -> str:
+    """Every mistake in a line of its own, without those that are there for another's sake.
+
+    A list whose entries are wrong is not too short, and a key whose name is misspelt is not missing.
+    """
+    blocks = {detail["loc"][:length] for detail in details for length in range(len(detail["loc"]))}
+    own = [detail for detail in details if detail["loc"] not in blocks]
+    misspelt = {_meant(detail["loc"]) for detail in own[:MOST_TOLD] if detail["type"] == "extra_forbidden"}
+    told = [_told(document, d) for d in own[:MOST_TOLD] if d["type"] != "missing" or d["loc"] not in misspelt]
+    if ("traffic", "config") not in misspelt:
+        told += [message for place, message in unnamed.items() if place not in misspelt]
+    if len(own) > MOST_TOLD:
+        told.append(f"{document.path}: and {len(own) - MOST_TOLD} more mistakes")
+    return "\n".join(told)
+
+
+def _meant(location: KeyPath) -> KeyPath:
+    """Location of the key that an unknown one was probably meant to be, or of itself."""
+    return (*location[:-1], nearest(str(location[-1]), _known_keys(location[:-1])) or location[-1])
 
 
 def _told(document: Document, detail: ErrorDetails) -> str:
@@ -160,16 +196,21 @@ def _told(document: Document, detail: ErrorDetails) -> str:
     if detail["type"] == "union_tag_invalid":
         context = detail["ctx"]
         allowed = [kind.strip(" '") for kind in str(context["expected_tags"]).split(",")]
-        return f"{where}.kind: unknown kind {context['tag']!r}; {suggest(str(context['tag']), allowed)}"
+        return f"{where}.kind: unknown kind {shown(context['tag'])}; {suggest(str(context['tag']), allowed)}"
     if detail["type"] == "union_tag_not_found":
         return f"{where}.kind: this key is missing; it is required"
     if detail["type"] == "missing":
         return f"{where}: this key is missing; it is required"
-    message = detail["msg"].removeprefix("Value error, ")
+    if detail["type"] == MISTAKE:
+        return f"{where}: {detail['msg']}"
+    message = WORDED.get(detail["type"], detail["msg"].removeprefix("Value error, "))
     value = detail["input"]
-    # A message about a whole block names the values that it is about itself.
-    shown = "" if isinstance(value, dict | BaseModel) else f"; got {value!r}"
-    return f"{where}: {message[0].lower()}{message[1:]}{shown}"
+    if isinstance(value, dict | BaseModel):
+        # A message about a whole block names the values that it is about itself.
+        got = "; got a block of keys" if detail["type"].endswith("_type") else ""
+    else:
+        got = f"; got {shown(value)}"
+    return f"{where}: {message[0].lower()}{message[1:]}{got}"
 
 
 def _without_kinds(location: KeyPath) -> KeyPath:
@@ -216,11 +257,12 @@ def _check_files(document: Document, scenario: Scenario) -> None:
     named += [(("traffic", "routes", i), p) for i, p in enumerate(traffic.routes)]
     named += [(("traffic", "additional", i), p) for i, p in enumerate(traffic.additional)]
     for key_path, path in named:
-        if not (scenario.directory / path).is_file():
+        if not is_file(scenario.directory / path):
+            folder = (scenario.directory / path).parent
             pattern = "*.sumocfg" if key_path[-1] == "config" else "*.xml"
-            there = sorted(p.name for p in (scenario.directory / path).parent.glob(pattern))
+            there = sorted(p.name for p in folder.glob(pattern)) if is_folder(folder) else []
             raise InputError(
-                f"{document.where(key_path)}: {dotted(key_path)}: there is no file {str(path)!r} in "
+                f"{document.where(key_path)}: {dotted(key_path)}: there is no file {shown(str(path))} in "
                 f"{scenario.directory}; {suggest(path.name, there)}"
             )
     if traffic.config is not None:

@@ -28,12 +28,13 @@ def scenario_file(name_or_path: str | Path) -> Path:
     Raises
     ------
     InputError
-        If there is no such file; `UnknownNameError` for an unknown name.
+        If there is nothing of that name; `UnknownNameError` for an unknown name of the catalogue.
     """
     path = Path(name_or_path)
-    if path.is_dir():
+    # Without a name, the path is that of the working directory.
+    if is_folder(path) and str(name_or_path):
         path = path / SCENARIO_FILE
-    if path.is_file():
+    if exists(path) and not path.is_dir():
         return path
     known = catalogue()
     if str(name_or_path) in known:
@@ -41,3 +42,21 @@ def scenario_file(name_or_path: str | Path) -> Path:
     if path.suffix in {".yaml", ".yml"} or len(path.parts) > 1:
         raise InputError(f"{name_or_path}: there is no such scenario file")
     raise UnknownNameError("scenario", str(name_or_path), known)
+
+
+def exists(path: Path) -> bool:
+    """Whether there is something of a name; a name that none can have is not there."""
+    try:
+        return path.exists()
+    except OSError:
+        return False
+
+
+def is_folder(path: Path) -> bool:
+    """Whether there is a folder of a name; a name that none can have is none."""
+    return exists(path) and path.is_dir()
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is a regular file of a name; a name that none can have is none."""
+    return exists(path) and path.is_file()

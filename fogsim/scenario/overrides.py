@@ -4,9 +4,8 @@ import copy
 from collections.abc import Iterable
 from typing import Any
 
-import yaml
-
-from fogsim.errors import InputError
+from fogsim.errors import InputError, shown
+from fogsim.scenario.plain_yaml import DEEPEST, KeyPath, PlainYamlError, parse_yaml
 
 TAKES_THE_PLACE_OF = {
     ("fog", "visibility_m"): ("outside_visibility_m", "banks"),
@@ -17,6 +16,23 @@ TAKES_THE_PLACE_OF = {
 }
 """Setting the key on the left leaves out those beside it that exclude it: ``--set fog.visibility_m=80`` makes the fog
 homogeneous whatever kind the file has."""
+
+LONGEST_TOLD = 200
+"""Most characters of an override that a message repeats."""
+
+
+def told_override(text: str) -> str:
+    """An override as messages name it."""
+    return f"--set {text if text.isprintable() and len(text) <= LONGEST_TOLD else shown(text)}"
+
+
+def override_path(text: str) -> KeyPath:
+    """Key path of a well-formed override; a number in it is a place in a list."""
+    return tuple(int(key) if _is_place(key) else key for key in text.partition("=")[0].strip().split("."))
+
+
+def _is_place(key: str) -> bool:
+    return key.isdecimal() and len(key) < 10
 
 
 def parse_override(text: str) -> tuple[tuple[str, ...], Any]:
@@ -30,11 +46,13 @@ def parse_override(text: str) -> tuple[tuple[str, ...], Any]:
     key, equals, value = text.partition("=")
     path = tuple(key.strip().split("."))
     if not equals or not all(path):
-        raise InputError(f"--set {text}: expected key.path=value, for example --set fog.visibility_m=80")
+        raise InputError(f"{told_override(text)}: expected key.path=value, for example --set fog.visibility_m=80")
+    if len(path) > DEEPEST:
+        raise InputError(f"{told_override(text)}: a key path has at most {DEEPEST} keys, got {len(path)}")
     try:
-        return path, yaml.safe_load(value)
-    except yaml.YAMLError as error:
-        raise InputError(f"--set {text}: the value is not valid YAML: {' '.join(str(error).split())}") from error
+        return path, parse_yaml(value)[0]
+    except PlainYamlError as error:
+        raise InputError(f"{told_override(text)}: the value is not valid YAML: {error.problem}") from error
 
 
 def apply_overrides(data: dict[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
@@ -66,10 +84,11 @@ def apply_overrides(data: dict[str, Any], overrides: Iterable[str]) -> dict[str,
 def _set(data: dict[str, Any], path: tuple[str, ...], value: object, text: str) -> None:
     block: Any = data
     for depth, key in enumerate(path[:-1]):
-        if isinstance(block, dict):
-            block = block.setdefault(key, {})
-        else:
-            block = block[_place(block, key, path[: depth + 1], text)]
+        place = key if isinstance(block, dict) else _place(block, key, path[: depth + 1], text)
+        # A block of which the file has but the name is an empty one.
+        if isinstance(block, dict) and block.get(key) is None:
+            block[key] = {}
+        block = block[place]
     if isinstance(block, dict):
         block[path[-1]] = value
     else:
@@ -79,7 +98,11 @@ def _set(data: dict[str, Any], path: tuple[str, ...], value: object, text: str) 
 def _place(block: object, key: str, path: tuple[str, ...], text: str) -> int:
     above = ".".join(path[:-1])
     if not isinstance(block, list):
-        raise InputError(f"--set {text}: {above} is a single value and has no keys below it")
-    if not key.isdecimal() or int(key) >= len(block):
-        raise InputError(f"--set {text}: {above} is a list of {len(block)}; its places are 0 … {len(block) - 1}")
+        raise InputError(f"{told_override(text)}: {above} is a single value and has no keys below it")
+    if not block:
+        raise InputError(f"{told_override(text)}: {above} is an empty list; set it as a whole, {above}=[…]")
+    if not _is_place(key) or int(key) >= len(block):
+        raise InputError(
+            f"{told_override(text)}: {above} is a list of {len(block)}; its places are 0 … {len(block) - 1}"
+        )
     return int(key)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Self
 
 from pydantic import Field, field_validator, model_validator
+from pydantic_core import PydanticCustomError
 
 from fogsim.advice import ADVISERS
 from fogsim.errors import UnknownNameError
@@ -136,6 +137,12 @@ class Scenario(Section):
     """How the belief becomes lamps."""
 
     directory: Path = Field(default=Path(), exclude=True)
+
+    @field_validator("directory", mode="before")
+    @classmethod
+    def _no_key(cls, _: object) -> None:
+        # Where the file lies is known when it is read; nobody writes it.
+        raise PydanticCustomError("extra_forbidden", "unknown key")
 
     @field_validator("renderer")
     @classmethod

@@ -120,7 +120,7 @@ class OnBoard:
             speed_limit=snapshot.speed_limit,
             leader=snapshot.leader,
             collisions=snapshot.collisions,
-            truth=fog_truth(field_at(outlook.fog, time), pose, self._camera, outlook.signs),
+            truth=fog_truth(field_at(outlook.fog, time), pose, self._camera, outlook.signs, float(state.grade[ego])),
             view=view,
             observation=observation,
             estimates=estimates,
@@ -130,9 +130,10 @@ class OnBoard:
         )
 
     def _pose(self, state: TrafficState, ego: int) -> CameraPose:
-        grade = self._body.update(float(state.acceleration[ego]))
+        body_pitch = self._body.update(float(state.acceleration[ego]))
         heading, setback = float(state.heading[ego]), self._scenario.camera.setback_m
-        return mounted_pose(self._camera, state.position[ego], heading, setback, grade)
+        grade = float(state.grade[ego])
+        return mounted_pose(self._camera, state.position[ego], heading, setback, grade, body_pitch)
 
     def _observe(self, frame: Frame, snapshot: TrafficSnapshot, signs: SignMap, streams: Streams) -> Observation:
         state, ego = snapshot.state, snapshot.ego
@@ -151,8 +152,8 @@ class OnBoard:
         self._outlook, self._streams = None, None
 
 
-def fog_truth(fog: FogField, pose: CameraPose, camera: Camera, signs: SignMap) -> Truth:
-    """The fog at a camera, and as far as it sees along its heading.
+def fog_truth(fog: FogField, pose: CameraPose, camera: Camera, signs: SignMap, grade: float = 0.0) -> Truth:
+    """The fog at a camera, and as far as it sees along its heading, parallel to the road under it.
 
     Parameters
     ----------
@@ -164,9 +165,12 @@ def fog_truth(fog: FogField, pose: CameraPose, camera: Camera, signs: SignMap) -
         Its true calibration.
     signs : SignMap
         The signs that stand in the world.
+    grade : float
+        Inclination of the road along the heading [rad], positive uphill; that of the pose has the pitch of a body that
+        brakes in it, which moves the picture, but not what lies ahead.
     """
-    eye = np.array(pose.position)
-    direction = np.array([math.cos(pose.heading), math.sin(pose.heading), 0.0])
+    eye, level = np.array(pose.position), math.cos(grade)
+    direction = np.array([math.cos(pose.heading) * level, math.sin(pose.heading) * level, math.sin(grade)])
     depth = optical_depth_along(fog, eye, direction, _SIGHT_LINE)
     # Optical depth grows along the line, so the distance at which it reaches ln 20 is found by interpolation.
     reached = depth[-1] >= OPTICAL_DEPTH_AT_VISIBILITY

@@ -128,7 +128,8 @@ class CameraPose:
     heading : float
         Direction of travel, counterclockwise from east [rad].
     grade : float
-        Upward inclination of the vehicle [rad], added to the camera's own pitch.
+        Upward inclination of the vehicle's body, that of the road under it and its own pitch on the road together
+        [rad]; the camera's own pitch is measured from it.
     """
 
     position: tuple[float, float, float]

@@ -58,6 +58,7 @@ def read_everything(api: Any, ego_lamps: Lamp, radius: float) -> TrafficState:
         lane=tuple(get.getLaneID(v) for v in ids),
         lamps=np.array(lamps, dtype=np.int32),
         paint=np.array([paint(v, get.getColor(v)) for v in ids]),
+        grade=np.array([np.radians(get.getSlope(v)) for v in ids]),
     )
 
 

@@ -120,7 +120,7 @@ class OnBoard:
             speed_limit=snapshot.speed_limit,
             leader=snapshot.leader,
             collisions=snapshot.collisions,
-            truth=fog_truth(field_at(outlook.fog, time), pose, self._camera, outlook.signs, float(state.grade[ego])),
+            truth=fog_truth(field_at(outlook.fog, time), pose, self._camera, outlook.signs),
             view=view,
             observation=observation,
             estimates=estimates,
@@ -152,7 +152,7 @@ class OnBoard:
         self._outlook, self._streams = None, None
 
 
-def fog_truth(fog: FogField, pose: CameraPose, camera: Camera, signs: SignMap, grade: float = 0.0) -> Truth:
+def fog_truth(fog: FogField, pose: CameraPose, camera: Camera, signs: SignMap) -> Truth:
     """The fog at a camera, and as far as it sees along its heading, parallel to the road under it.
 
     Parameters
@@ -165,12 +165,9 @@ def fog_truth(fog: FogField, pose: CameraPose, camera: Camera, signs: SignMap, g
         Its true calibration.
     signs : SignMap
         The signs that stand in the world.
-    grade : float
-        Inclination of the road along the heading [rad], positive uphill; that of the pose has the pitch of a body that
-        brakes in it, which moves the picture, but not what lies ahead.
     """
-    eye, level = np.array(pose.position), math.cos(grade)
-    direction = np.array([math.cos(pose.heading) * level, math.sin(pose.heading) * level, math.sin(grade)])
+    eye, level = np.array(pose.position), math.cos(pose.road_grade)
+    direction = np.array([math.cos(pose.heading) * level, math.sin(pose.heading) * level, math.sin(pose.road_grade)])
     depth = optical_depth_along(fog, eye, direction, _SIGHT_LINE)
     # Optical depth grows along the line, so the distance at which it reaches ln 20 is found by interpolation.
     reached = depth[-1] >= OPTICAL_DEPTH_AT_VISIBILITY

@@ -40,7 +40,7 @@ def mounted_pose(
     x = float(front_bumper[0]) - along * math.cos(heading)
     y = float(front_bumper[1]) - along * math.sin(heading)
     z = float(front_bumper[2]) - setback * up + camera.mount_height * forward
-    return CameraPose(position=(x, y, z), heading=heading, grade=grade + body_pitch)
+    return CameraPose(position=(x, y, z), heading=heading, grade=grade + body_pitch, road_grade=grade)
 
 
 @dataclass(frozen=True, slots=True)

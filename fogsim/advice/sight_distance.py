@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from fogsim.kinematics import safe_speed
+from fogsim.kinematics import DECELERATION, REACTION_TIME, safe_speed
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Belief, SpeedAdvice
 
@@ -36,8 +36,8 @@ class StoppingSightDistance:
         while nothing but the rear of a truck is to be seen.
     """
 
-    reaction_time: float = 2.5
-    deceleration: float = 3.4
+    reaction_time: float = REACTION_TIME
+    deceleration: float = DECELERATION
     quantile: float = 0.25
     sight_share: float = 1.0
     rounding: float = 10.0 / KMH_PER_MPS

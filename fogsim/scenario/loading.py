@@ -14,6 +14,7 @@ from fogsim.scenario.document import Document, KeyPath, dotted, read_document
 from fogsim.scenario.locating import SCENARIO_FILE, scenario_file
 from fogsim.scenario.overrides import apply_overrides
 from fogsim.scenario.schema import Scenario
+from fogsim.scenario.sumo_clock import uncountable_step
 from fogsim.scenario.traffic_schema import AnyEvent
 from fogsim.traffic.configuration import configured_files
 
@@ -134,6 +135,12 @@ def _checked(document: Document, overrides: Iterable[str], folder: Path, named_f
         scenario = Scenario.model_validate({**data, "directory": folder})
     except ValidationError as error:
         mistakes = [_told(document, detail) for detail in error.errors()] + mistakes
+    else:
+        # A simulation that runs already, or is none of SUMO's, keeps its own time.
+        uncountable = uncountable_step(scenario.clocks) if named_files else None
+        if uncountable:
+            key_path = ("clocks", "traffic_step_s")
+            mistakes.append(f"{document.where(key_path)}: {dotted(key_path)}: {uncountable}")
     if mistakes:
         raise InputError("\n".join(mistakes))
     _check_files(document, scenario)

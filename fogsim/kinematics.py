@@ -4,6 +4,9 @@ import math
 
 from fogsim.units import GRAVITY
 
+REACTION_TIME, DECELERATION = 2.5, 3.4
+"""Design values of the stopping sight distance [s], [m/s²] (AASHTO Green Book), where nothing else is said."""
+
 
 def stopping_sight_distance(speed: float, reaction_time: float, deceleration: float, grade: float = 0.0) -> float:
     """Distance to react and stop, v t + v² / 2(a + g G) [m] (AASHTO Green Book with t = 2.5 s, a = 3.4 m/s²).

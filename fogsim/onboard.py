@@ -130,9 +130,10 @@ class OnBoard:
         )
 
     def _pose(self, state: TrafficState, ego: int) -> CameraPose:
-        grade = self._body.update(float(state.acceleration[ego]))
+        body_pitch = self._body.update(float(state.acceleration[ego]))
         heading, setback = float(state.heading[ego]), self._scenario.camera.setback_m
-        return mounted_pose(self._camera, state.position[ego], heading, setback, grade)
+        grade = float(state.grade[ego])
+        return mounted_pose(self._camera, state.position[ego], heading, setback, grade, body_pitch)
 
     def _observe(self, frame: Frame, snapshot: TrafficSnapshot, signs: SignMap, streams: Streams) -> Observation:
         state, ego = snapshot.state, snapshot.ego
@@ -152,7 +153,7 @@ class OnBoard:
 
 
 def fog_truth(fog: FogField, pose: CameraPose, camera: Camera, signs: SignMap) -> Truth:
-    """The fog at a camera, and as far as it sees along its heading.
+    """The fog at a camera, and as far as it sees along its heading, parallel to the road under it.
 
     Parameters
     ----------
@@ -165,8 +166,8 @@ def fog_truth(fog: FogField, pose: CameraPose, camera: Camera, signs: SignMap) -
     signs : SignMap
         The signs that stand in the world.
     """
-    eye = np.array(pose.position)
-    direction = np.array([math.cos(pose.heading), math.sin(pose.heading), 0.0])
+    eye, level = np.array(pose.position), math.cos(pose.road_grade)
+    direction = np.array([math.cos(pose.heading) * level, math.sin(pose.heading) * level, math.sin(pose.road_grade)])
     depth = optical_depth_along(fog, eye, direction, _SIGHT_LINE)
     # Optical depth grows along the line, so the distance at which it reaches ln 20 is found by interpolation.
     reached = depth[-1] >= OPTICAL_DEPTH_AT_VISIBILITY

@@ -118,7 +118,7 @@ def record_run(
     message.
     """
     directory = RunDirectory(out, overwrite)
-    metrics = RunMetrics()
+    metrics = RunMetrics(build.safety_standard(scenario))
     manifest = Manifest(Status.RUNNING, seed, resolved(scenario), datetime.now(UTC), command_line=command_line)
     write_manifest(directory.manifest, manifest)
     try:
@@ -132,7 +132,7 @@ def record_run(
             for step in run(scenario, seed):
                 begun = True
                 metrics.update(step)
-                derived = step_metrics(step)
+                derived = step_metrics(step, metrics.standard)
                 for recorder in opened:
                     recorder.record(step, derived)
                 watch(step)

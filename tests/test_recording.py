@@ -45,7 +45,10 @@ def test_one_recorder_that_cannot_finish_does_not_cost_the_others_their_files(
     with pytest.raises(OSError, match="No space left"):
         record_run(short(), 1, tmp_path / "out")
     assert parquet.read_table(tmp_path / "out" / "steps.parquet").num_rows == 11
-    assert json.loads((tmp_path / "out" / "metrics.json").read_text(encoding="utf-8"))["complete"] is True
+    metrics = json.loads((tmp_path / "out" / "metrics.json").read_text(encoding="utf-8"))
+    assert metrics["complete"] is True
+    # Judged by what the scenario's advice counts with.
+    assert (metrics["stopping_reaction_time_s"], metrics["stopping_deceleration_mps2"]) == (2.0, 3.4)
     assert status(tmp_path / "out")["files"] == ["manifest.json", "metrics.json", "steps.parquet", "video.mp4"]
 
 

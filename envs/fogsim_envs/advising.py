@@ -55,17 +55,22 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         self._begin = begin
         self._overrides = (*size, *overrides)
         self._scenario = load(self._overrides)
-        self._active = self._scenario
         self._continuous = continuous
         self._weights = reward_weights or RewardWeights()
-        self._frames = build.periods(self._scenario).decision_frames
         self._simulation: Simulation | None = None
         self._step: Step | None = None
         self._panel = FramePanel()
         self.render_mode = render_mode
-        self.metadata = {**self.metadata, "render_fps": 1 / self._scenario.clocks.decision_period_s}
+        self._act_in(self._scenario)
         self.observation_space = cast("spaces.Space[Observation]", observation_space(build.camera(self._scenario)))
         self.action_space = action_space(continuous)
+
+    def _act_in(self, scenario: Scenario) -> None:
+        """Take up what a scenario says of clocks and safety, which an episode may change."""
+        self._active = scenario
+        self._frames = build.periods(scenario).decision_frames
+        self._standard = build.safety_standard(scenario)
+        self.metadata = {**self.metadata, "render_fps": 1 / scenario.clocks.decision_period_s}
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -78,7 +83,7 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
             raise InputError("overrides of reset() must not change the camera: the observation space is fixed")
         if scenario != self._active:
             self.close()
-            self._active = scenario
+            self._act_in(scenario)
         run_seed = int(self.np_random.integers(2**31))
         if self._simulation is None:
             self._simulation, self._step = self._begin(scenario, run_seed)
@@ -97,7 +102,7 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
             if self._step.ending is not None:
                 break
         after = self._step
-        terms = reward_terms(before, after, self._weights)
+        terms = reward_terms(before, after, self._weights, self._standard)
         truncated = after.ending is Ending.TIME
         terminated = after.ending is not None and not truncated
         info = {**_info(after), "reward_terms": terms}
@@ -116,7 +121,7 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
             return None
         if self._step is None:
             raise gymnasium.error.ResetNeeded("call reset() before render()")
-        return self._panel.draw(self._step, step_metrics(self._step))
+        return self._panel.draw(self._step, step_metrics(self._step, self._standard))
 
     def close(self) -> None:
         """End the simulation; closing twice is allowed."""

@@ -1,6 +1,7 @@
 """A camera in fog for any highway-env environment; the agent goes on driving by that environment's own actions."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import gymnasium
@@ -12,7 +13,7 @@ from fogsim.atmosphere import FieldAccess
 from fogsim.errors import InputError
 from fogsim.onboard import OnBoard
 from fogsim.randomness import spawn_streams
-from fogsim.scenario import build
+from fogsim.scenario import Scenario, build
 from fogsim.traffic.highway import (
     Fleet,
     is_highway_environment,
@@ -24,10 +25,23 @@ from fogsim.traffic.highway import (
 )
 from fogsim.traffic.setup import UNTOUCHED
 from fogsim.values import Command, RoadNetwork, SignMap, Step
-from fogsim_envs.highway import highway_config, highway_scenario
+from fogsim_envs.highway import clock_settings, highway_config, highway_scenario
 from fogsim_envs.spaces import LAMP_MODES, observation_space, observe
 
 _COMMAND = Command(lamps=LAMP_MODES[0])
+
+
+def _scenario(config: Mapping[str, Any], visibility: float, overrides: Sequence[str]) -> Scenario:
+    """Scenario whose camera takes a frame at the end of each of the environment's steps."""
+    step = 1.0 / config["simulation_frequency"]
+    period = step * max(1, config["simulation_frequency"] // config["policy_frequency"])
+    scenario = highway_scenario(config, visibility, [*clock_settings(step, period, period), *overrides])
+    if not math.isclose(scenario.clocks.camera_period_s, period):
+        raise InputError(
+            f"clocks.camera_period_s: there is a frame at the end of each step of the environment, {period:g} s by its "
+            f"config; leave this key out; got {scenario.clocks.camera_period_s!r}"
+        )
+    return scenario
 
 
 class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordConstructorArgs):
@@ -74,7 +88,7 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
         if not is_highway_environment(env.unwrapped):
             raise InputError(f"FogCameraWrapper: expected an environment of highway-env, got {env!r}")
         size = (f"camera.width={image_size[0]}", f"camera.height={image_size[1]}")
-        self._scenario = highway_scenario(highway_config(env.unwrapped), visibility, [*size, *overrides])
+        self._scenario = _scenario(highway_config(env.unwrapped), visibility, [*size, *overrides])
         self._drivers = drivers
         self._onboard = OnBoard(self._scenario)
         self._network: RoadNetwork | None = None

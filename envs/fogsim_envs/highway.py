@@ -1,5 +1,6 @@
 """The agent advises the ego of a highway-env environment."""
 
+import math
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
@@ -122,13 +123,23 @@ def highway_scenario(config: Mapping[str, Any], visibility: float, overrides: Se
             f"traffic.{key}: roads and vehicles are highway-env's own here, and the ego is called {EGO!r}; "
             f"leave this key out; got {getattr(traffic, key)!r}"
         )
+    step, asked = 1.0 / config["simulation_frequency"], scenario.clocks.traffic_step_s
+    if not math.isclose(asked, step):
+        raise InputError(
+            f"clocks.traffic_step_s: highway-env moves by 1 / simulation_frequency = {step:g} s, which its own config "
+            f"sets; leave this key out; got {asked!r}"
+        )
     return scenario
 
 
 def _clocks(config: Mapping[str, Any]) -> list[str]:
     step = 1.0 / config["simulation_frequency"]
     camera = step * max(1, round(CAMERA_PERIOD / step))
-    decision = camera * max(1, round(DECISION_PERIOD / camera))
+    return clock_settings(step, camera, camera * max(1, round(DECISION_PERIOD / camera)))
+
+
+def clock_settings(step: float, camera: float, decision: float) -> list[str]:
+    """Overrides that set the clocks [s]."""
     keys = ("traffic_step", "camera_period", "decision_period")
     return [f"clocks.{key}_s={time!r}" for key, time in zip(keys, (step, camera, decision), strict=True)]
 

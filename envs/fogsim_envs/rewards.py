@@ -2,11 +2,8 @@
 
 from dataclasses import dataclass
 
-from fogsim.kinematics import stopping_sight_distance
+from fogsim.metrics import DEFAULT_STANDARD, SafetyStandard, stopping_sight_distance
 from fogsim.values import Lamp, Step
-
-TTC_THRESHOLD = 3.0
-"""Times to collision below this count as conflicts [s] (SUMO's SSM device, Minderhoud & Bovy 2001)."""
 
 COMFORTABLE_DECELERATION = 2.0
 """Decelerations up to this are comfortable [m/s²] (ISO 15622: 2–3.5)."""
@@ -26,7 +23,7 @@ class RewardWeights:
     visibility_margin : float
         Against driving so fast that one cannot stop within the visibility.
     conflict : float
-        Against times to collision below 3 s.
+        Against times to collision below the standard's, 3 s.
     discomfort : float
         Against decelerations above 2 m/s².
     collision : float
@@ -43,7 +40,9 @@ class RewardWeights:
     lamps: float = 0.2
 
 
-def reward_terms(before: Step, after: Step, weights: RewardWeights) -> dict[str, float]:
+def reward_terms(
+    before: Step, after: Step, weights: RewardWeights, standard: SafetyStandard = DEFAULT_STANDARD
+) -> dict[str, float]:
     """Weighted terms of the reward for one decision period.
 
     Parameters
@@ -52,6 +51,8 @@ def reward_terms(before: Step, after: Step, weights: RewardWeights) -> dict[str,
         First and last step of the period.
     weights : RewardWeights
         The weights.
+    standard : SafetyStandard
+        Reaction time and deceleration of the stopping sight distance, and the time to collision that is a conflict.
 
     Returns
     -------
@@ -63,13 +64,13 @@ def reward_terms(before: Step, after: Step, weights: RewardWeights) -> dict[str,
     driven = after.route_position - before.route_position
     duration = max(after.time - before.time, 1e-9)
     sight = after.truth.visibility_ahead
-    needed = stopping_sight_distance(speed, reaction_time=2.0, deceleration=3.4)
+    needed = stopping_sight_distance(speed, standard.reaction_time, standard.deceleration)
     rear_fog = Lamp.REAR_FOG in after.command.lamps
     hit = any(ego in (c.collider, c.victim) for c in after.collisions)
     return {
         "progress": weights.progress * driven / (after.speed_limit * duration),
         "visibility_margin": -weights.visibility_margin * max(0.0, 1.0 - sight / needed) if needed > 0 else 0.0,
-        "conflict": -weights.conflict * _conflict(after, speed),
+        "conflict": -weights.conflict * _conflict(after, speed, standard.time_to_collision),
         "discomfort": -weights.discomfort
         * max(0.0, -float(after.traffic.acceleration[after.ego]) - COMFORTABLE_DECELERATION),
         "collision": -weights.collision * float(hit),
@@ -77,9 +78,9 @@ def reward_terms(before: Step, after: Step, weights: RewardWeights) -> dict[str,
     }
 
 
-def _conflict(step: Step, speed: float) -> float:
-    """How far the time to collision is below its threshold, 0 … 1."""
+def _conflict(step: Step, speed: float, threshold: float) -> float:
+    """How far the time to collision is below a threshold, 0 … 1."""
     if step.leader is None or speed <= step.leader.speed:
         return 0.0
     time_to_collision = max(step.leader.gap, 0.0) / (speed - step.leader.speed)
-    return max(0.0, 1.0 - time_to_collision / TTC_THRESHOLD)
+    return max(0.0, 1.0 - time_to_collision / threshold)

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
-from fogsim.kinematics import safe_speed
+from fogsim.kinematics import DECELERATION, REACTION_TIME, safe_speed
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Belief, SpeedAdvice
@@ -44,8 +44,8 @@ class StoppingSightDistance:
         If a parameter is out of the range in its annotation.
     """
 
-    reaction_time: Annotated[float, Range(0.0, 60.0, "s")] = 2.5
-    deceleration: Annotated[float, Range(0.1, 15.0, "m/s²")] = 3.4
+    reaction_time: Annotated[float, Range(0.0, 60.0, "s")] = REACTION_TIME
+    deceleration: Annotated[float, Range(0.1, 15.0, "m/s²")] = DECELERATION
     quantile: Annotated[float, Range(0.0, 1.0)] = 0.25
     sight_share: Annotated[float, Range(0.01, 1.0)] = 1.0
     rounding: Annotated[float, Range(0.01, 50.0, "m/s")] = 10.0 / KMH_PER_MPS

@@ -10,7 +10,12 @@ from fogsim.values import Camera, CameraPose
 
 
 def mounted_pose(
-    camera: Camera, front_bumper: NDArray[np.float64], heading: float, setback: float, grade: float = 0.0
+    camera: Camera,
+    front_bumper: NDArray[np.float64],
+    heading: float,
+    setback: float,
+    grade: float = 0.0,
+    body_pitch: float = 0.0,
 ) -> CameraPose:
     """Pose of a camera that is mounted behind a vehicle's front bumper, on its axis.
 
@@ -23,13 +28,19 @@ def mounted_pose(
     heading : float
         Direction of travel, counterclockwise from east [rad].
     setback : float
-        Distance of the optical centre behind the front bumper [m].
+        Distance of the optical centre behind the front bumper, along the road [m].
     grade : float
-        Upward inclination of the vehicle's body [rad]; it turns the camera, and is too small to move it.
+        Inclination of the road along the heading [rad], positive uphill. The vehicle stands on it with all that it
+        carries: the height of the mount is perpendicular to the road.
+    body_pitch : float
+        Upward inclination of the body on the road [rad]; it turns the camera, and is too small to move it.
     """
-    x = float(front_bumper[0]) - setback * math.cos(heading)
-    y = float(front_bumper[1]) - setback * math.sin(heading)
-    return CameraPose(position=(x, y, float(front_bumper[2]) + camera.mount_height), heading=heading, grade=grade)
+    forward, up = math.cos(grade), math.sin(grade)
+    along = setback * forward + camera.mount_height * up
+    x = float(front_bumper[0]) - along * math.cos(heading)
+    y = float(front_bumper[1]) - along * math.sin(heading)
+    z = float(front_bumper[2]) - setback * up + camera.mount_height * forward
+    return CameraPose(position=(x, y, z), heading=heading, grade=grade + body_pitch, road_grade=grade)
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +81,7 @@ class BodyPitch:
         self._grade = None
 
     def update(self, acceleration: float) -> float:
-        """Upward inclination of the body [rad]; braking makes it negative.
+        """Upward inclination of the body on the road [rad]; braking makes it negative.
 
         Parameters
         ----------

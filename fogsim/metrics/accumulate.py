@@ -22,7 +22,7 @@ METRICS: Registry[MetricFactory] = Registry(
         "motion": lambda _: Motion(),
         "collisions": lambda _: Collisions(),
         "conflict": lambda standard: Conflict(standard.time_to_collision),
-        "sight": lambda _: Sight(),
+        "sight": lambda standard: Sight(standard.reaction_time, standard.deceleration),
         "compliance": lambda standard: Compliance(standard.advice_tolerance),
         "comfort": lambda _: Comfort(),
         "belief": lambda _: BeliefError(),
@@ -62,6 +62,11 @@ class RunMetrics:
     names : iterable of str
         Metrics from `METRICS`; all of them by default.
 
+    Attributes
+    ----------
+    standard : SafetyStandard
+        The same.
+
     Raises
     ------
     UnknownNameError
@@ -69,7 +74,7 @@ class RunMetrics:
     """
 
     def __init__(self, standard: SafetyStandard = DEFAULT_STANDARD, names: Iterable[str] = METRICS) -> None:
-        self._standard = standard
+        self.standard = standard
         self._metrics = [METRICS[name](standard) for name in names]
         self._last: Step | None = None
 
@@ -89,7 +94,7 @@ class RunMetrics:
         elapsed = 0.0 if last is None else step.time - last.time
         if last is not None and not elapsed > 0:
             raise SimulationError(f"steps must follow in time, got {step.time!r} s after {last.time!r} s")
-        sample = Sample(step, elapsed, step_metrics(step, self._standard))
+        sample = Sample(step, elapsed, step_metrics(step, self.standard))
         for metric in self._metrics:
             metric.update(sample)
 

@@ -73,21 +73,35 @@ class Conflict:
 
 @dataclass(slots=True)
 class Sight:
-    """True visibility ahead against the distance in which the ego could stop."""
+    """True visibility ahead against the distance in which the ego could stop.
 
+    Attributes
+    ----------
+    reaction_time : float
+        Perception and reaction time in that distance [s].
+    deceleration : float
+        Deceleration in it [m/s²].
+    """
+
+    reaction_time: float
+    deceleration: float
     meanings: ClassVar[Mapping[str, str]] = {
         "minimum_visibility_m": "least true visibility ahead; none if the air was clear throughout",
         "minimum_visibility_margin_m": "least true visibility ahead minus stopping sight distance",
         "negative_margin_time_share": "share of the time in which the ego could not have stopped in sight",
+        "stopping_reaction_time_s": "reaction time in stopping sight distances: that of the advice, else 2.5 s",
+        "stopping_deceleration_mps2": "deceleration in the same: that of the advice, else 3.4 m/s²",
     }
     _least_visibility: float | None = None
     _least_margin: float | None = None
     _negative_time: float = 0.0
     _time: float = 0.0
+    _judged: bool = False
 
     def update(self, sample: Sample) -> None:
         """Take in one step."""
         margin = sample.derived["visibility_margin_m"]
+        self._judged = True
         self._least_visibility = _least(self._least_visibility, finite_or_none(sample.step.truth.visibility_ahead))
         self._least_margin = _least(self._least_margin, margin)
         self._time += sample.elapsed
@@ -100,6 +114,8 @@ class Sight:
             "minimum_visibility_m": self._least_visibility,
             "minimum_visibility_margin_m": self._least_margin,
             "negative_margin_time_share": share(self._negative_time, self._time),
+            "stopping_reaction_time_s": self.reaction_time if self._judged else None,
+            "stopping_deceleration_mps2": self.deceleration if self._judged else None,
         }
 
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fogsim.kinematics import DECELERATION, REACTION_TIME
+
 
 @dataclass(frozen=True, slots=True)
 class SafetyStandard:
@@ -16,17 +18,17 @@ class SafetyStandard:
     Attributes
     ----------
     reaction_time : float
-        Perception and reaction time in the stopping sight distance [s]; 2.5 s is AASHTO's design value.
+        Perception and reaction time in the stopping sight distance [s]: that of the advice, or AASHTO's design value.
     deceleration : float
-        Deceleration in the stopping sight distance [m/s²]; 3.4 m/s² is AASHTO's design value.
+        Deceleration in the stopping sight distance [m/s²]: that of the advice, or AASHTO's design value.
     time_to_collision : float
         Time to collision below which a driver counts as exposed [s]; 3 s is the default of SUMO's SSM device.
     advice_tolerance : float
         Speed above the advice that still counts as following it [m/s]; 1 km/h, what a speedometer can show.
     """
 
-    reaction_time: float = 2.5
-    deceleration: float = 3.4
+    reaction_time: float = REACTION_TIME
+    deceleration: float = DECELERATION
     time_to_collision: float = 3.0
     advice_tolerance: float = 1.0 / 3.6
 

@@ -12,6 +12,7 @@ from fogsim.camera import AutoExposure, BodyPitch, Metering, Photographer, Senso
 from fogsim.estimators import ESTIMATORS, Estimator
 from fogsim.fusion import FUSIONS, Fusion
 from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy
+from fogsim.metrics import SafetyStandard
 from fogsim.scenario.fog_build import fog_along
 from fogsim.scenario.schema import Scenario
 from fogsim.scenario.traffic_schema import AnyEvent, Brake, BreakDown, ChangeLane, LampsFail
@@ -230,6 +231,16 @@ def fusion(scenario: Scenario) -> Fusion:
 def adviser(scenario: Scenario) -> Adviser:
     """Speed adviser of a scenario."""
     return ADVISERS[scenario.advice.method](**scenario.advice.parameters)
+
+
+def safety_standard(scenario: Scenario) -> SafetyStandard:
+    """What a run is judged by: the reaction time and deceleration that its advice counts with, where it has them."""
+    advising, usual = adviser(scenario), SafetyStandard()
+    return dataclasses.replace(
+        usual,
+        reaction_time=getattr(advising, "reaction_time", usual.reaction_time),
+        deceleration=getattr(advising, "deceleration", usual.deceleration),
+    )
 
 
 def lighting_policy(scenario: Scenario) -> LightingPolicy:

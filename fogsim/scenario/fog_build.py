@@ -65,7 +65,7 @@ def _velocity(wind: Wind) -> tuple[float, float]:
 
 def _bank(bank: Bank, outside: float, route: NDArray[np.float64]) -> FogBank:
     """A bank between two places of the route: a slab across the straight line that joins them."""
-    station = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(route[:, :2], axis=0), axis=1))))
+    station = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(route, axis=0), axis=1))))
 
     def place(at: float) -> NDArray[np.float64]:
         inside = np.array([np.interp(at, station, route[:, axis]) for axis in (0, 1)])

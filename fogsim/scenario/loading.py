@@ -15,6 +15,7 @@ from fogsim.scenario.locating import SCENARIO_FILE, is_file, is_folder, scenario
 from fogsim.scenario.methods import MISTAKE
 from fogsim.scenario.overrides import apply_overrides
 from fogsim.scenario.schema import Scenario
+from fogsim.scenario.sumo_clock import uncountable_step
 from fogsim.scenario.traffic_schema import AnyEvent
 from fogsim.traffic.configuration import configured_files
 
@@ -149,6 +150,11 @@ def _checked(document: Document, overrides: Iterable[str], folder: Path, named_f
         scenario = Scenario.model_validate(data).model_copy(update={"directory": folder})
     except ValidationError as error:
         raise InputError(_all_told(document, error.errors(include_url=False), mistakes)) from error
+    # A simulation that runs already, or is none of SUMO's, keeps its own time.
+    uncountable = uncountable_step(scenario.clocks) if named_files else None
+    if uncountable:
+        key_path = ("clocks", "traffic_step_s")
+        mistakes[key_path] = f"{document.where(key_path)}: {dotted(key_path)}: {uncountable}"
     if mistakes:
         raise InputError("\n".join(mistakes.values()))
     _check_files(document, scenario)

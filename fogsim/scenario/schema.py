@@ -26,7 +26,7 @@ class Clocks(Section):
     """The three clocks; each is a whole multiple of the one before."""
 
     traffic_step_s: Positive = 0.1
-    """SUMO's step."""
+    """SUMO's step: whole milliseconds."""
 
     camera_period_s: Positive = 0.1
     """Time between two frames."""

@@ -46,7 +46,7 @@ class LampNumbers(NamedTuple):
 @kernel
 def find_lamps(
     position: NDArray[np.float64],
-    heading: NDArray[np.float64],
+    turned: NDArray[np.float64],
     size: NDArray[np.float64],
     lit: NDArray[np.int64],
     body: NDArray[np.int64],
@@ -63,8 +63,8 @@ def find_lamps(
     ----------
     position : (v, 3) float64
         Middles of the front bumpers of vehicles [m].
-    heading : (2, v) float64
-        Cosine and sine of their headings.
+    turned : (4, v) float64
+        Cosine and sine of their headings, and of their grades.
     size : (3, v) float64
         Length, width and height [m].
     lit, body : (v,) int64
@@ -87,9 +87,10 @@ def find_lamps(
         dx, dy, dz = eye[0] - position[row, 0], eye[1] - position[row, 1], eye[2] - position[row, 2]
         if abs(dx) + abs(dy) > farthest:
             continue
-        cosine, sine = heading[0, row], heading[1, row]
+        cosine, sine, level, rise = turned[0, row], turned[1, row], turned[2, row], turned[3, row]
         length, width, height = size[0, row], size[1, row], size[2, row]
-        ahead, aside = dx * cosine + dy * sine, dy * cosine - dx * sine
+        onward, aside = dx * cosine + dy * sine, dy * cosine - dx * sine
+        ahead, above = onward * level + dz * rise, dz * level - onward * rise
         for column in range(lamps.of_body.shape[1]):
             lamp = lamps.of_body[body[row], column]
             bits = lit[row] & lamps.mask[lamp]
@@ -98,13 +99,14 @@ def find_lamps(
             if lamp < 0 or bits == 0 or not before:
                 continue
             x, y, z = lamps.place[lamp, 0] * length, lamps.place[lamp, 1] * width, lamps.place[lamp, 2] * height
-            forward, left, up = ahead - x, aside - y, dz - z
+            forward, left, up = ahead - x, aside - y, above - z
             far = math.sqrt(forward * forward + left * left + up * up + 1e-12)
             facing = max(forward * lamps.forwards[lamp] / far, 0.0)
             one, square = found[count], facing * facing
-            one[0] = position[row, 0] + x * cosine - y * sine
-            one[1] = position[row, 1] + x * sine + y * cosine
-            one[2] = position[row, 2] + z
+            over = x * level - z * rise
+            one[0] = position[row, 0] + over * cosine - y * sine
+            one[1] = position[row, 1] + over * sine + y * cosine
+            one[2] = position[row, 2] + x * rise + z * level
             one[FORWARD], one[LEFT], one[UP] = forward, left, up
             one[INTENSITY] = lamps.intensity[lamp] * square * square if bits & signals else 0.0
             one[AREA] = lamps.area[lamp] * width * height * facing

@@ -113,13 +113,13 @@ def _of_vehicles(
     bodies = _numbers(body_names(state))
     most = len(bodies) * table.lamps.of_body.shape[1]
     found, lit = np.empty((most, FOUND)), np.empty((2, most), np.int64)
-    heading = np.stack((np.cos(state.heading), np.sin(state.heading)))
+    turned = np.stack((np.cos(state.heading), np.sin(state.heading), np.cos(state.grade), np.sin(state.grade)))
     size = np.stack((state.length, state.width, state.height))
     lamps = state.lamps.astype(np.int64)
     if skip is not None:
         lamps[skip] = 0
     position = np.ascontiguousarray(state.position, np.float64)
-    count = find_lamps(position, heading, size, lamps, bodies, eye, FARTHEST_VEHICLE, _SIGNALS, table.lamps, found, lit)
+    count = find_lamps(position, turned, size, lamps, bodies, eye, FARTHEST_VEHICLE, _SIGNALS, table.lamps, found, lit)
     found, lit = found[:count], lit[:, :count]
     _add_beams(found[:, INTENSITY], lit[1], (found[:, FORWARD], found[:, LEFT], found[:, UP]), beams)
     seen = np.flatnonzero(found[:, INTENSITY] > 1e-3)

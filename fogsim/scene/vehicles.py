@@ -34,7 +34,8 @@ def vehicle_batches(state: TrafficState, skip: int | None) -> tuple[Batch, ...]:
     # Sorted all at once, and taken apart by slices, which cost little.
     transforms, paint = np.zeros((len(rows), 4, 4), np.float32), np.empty((len(rows), 3), np.float32)
     lamps, size = np.empty(len(rows), np.int32), (state.length, state.width, state.height)
-    set_up(rows, state.position, state.heading, size, state.paint, state.lamps, transforms, paint, lamps)
+    turned = (state.heading, state.grade)
+    set_up(rows, state.position, turned, size, state.paint, state.lamps, transforms, paint, lamps)
     return tuple(Batch(name, transforms[own], paint[own], lamps[own], instance[own]) for name, own in shapes)
 
 
@@ -42,7 +43,7 @@ def vehicle_batches(state: TrafficState, skip: int | None) -> tuple[Batch, ...]:
 def set_up(
     rows: NDArray[np.int64],
     position: NDArray[np.float64],
-    heading: NDArray[np.float64],
+    turned: tuple[NDArray[np.float64], NDArray[np.float64]],
     size: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
     paint: NDArray[np.float64],
     lamps: NDArray[np.int32],
@@ -50,14 +51,25 @@ def set_up(
     paint_out: NDArray[np.float32],
     lamps_out: NDArray[np.int32],
 ) -> None:
-    """Transforms from a unit box, paint and lamps of some rows of a `TrafficState`."""
+    """Transforms from a unit box turned by heading and grade, paint and lamps of some rows of a `TrafficState`."""
     length, width, height = size
+    heading, grade = turned
     for i in range(len(rows)):
         row = rows[i]
         cosine, sine = math.cos(heading[row]), math.sin(heading[row])
-        transforms[i, 0, 0], transforms[i, 0, 1] = cosine * length[row], -sine * width[row]
-        transforms[i, 1, 0], transforms[i, 1, 1] = sine * length[row], cosine * width[row]
-        transforms[i, 2, 2], transforms[i, 3, 3] = height[row], 1.0
+        level, rise = math.cos(grade[row]), math.sin(grade[row])
+        ahead, upward = level * length[row], rise * height[row]
+        transforms[i, 0, 0], transforms[i, 0, 1], transforms[i, 0, 2] = (
+            cosine * ahead,
+            -sine * width[row],
+            -cosine * upward,
+        )
+        transforms[i, 1, 0], transforms[i, 1, 1], transforms[i, 1, 2] = (
+            sine * ahead,
+            cosine * width[row],
+            -sine * upward,
+        )
+        transforms[i, 2, 0], transforms[i, 2, 2], transforms[i, 3, 3] = rise * length[row], level * height[row], 1.0
         for axis in range(3):
             transforms[i, axis, 3], paint_out[i, axis] = position[row, axis], paint[row, axis]
         lamps_out[i] = lamps[row]

@@ -9,11 +9,8 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from fogsim.kinematics import safe_speed
+from fogsim.kinematics import DECELERATION, REACTION_TIME, safe_speed
 from fogsim.registry import Registry
-
-REACTION_TIME, DECELERATION = 2.5, 3.4
-"""Of the speed from which one can stop within what is visible (AASHTO) [s], [m/s²]."""
 
 UNAFFECTED_ABOVE = 200.0
 """Visibility above which drivers do not slow down [m]."""

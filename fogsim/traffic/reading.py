@@ -1,6 +1,7 @@
 """Reading SUMO's vehicles into arrays: what changes for those near the ego, what never changes once."""
 
 import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
@@ -45,6 +46,8 @@ class Moving(NamedTuple):
         Lane ids.
     signals : sequence of int
         SUMO's signal bits.
+    slope : (n,) float64
+        From the rear to the front bumper, positive uphill [°].
     """
 
     ids: tuple[str, ...]
@@ -54,6 +57,7 @@ class Moving(NamedTuple):
     acceleration: NDArray[np.float64]
     lane: tuple[str, ...]
     signals: Sequence[int]
+    slope: NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +106,8 @@ class VehicleReader:
         self._roster = Roster(api) if roster is None else roster
         self._nearness = Nearness(api, ego, radius, self._roster)
         self._getters = tuple(vehicle_getter(api, name) for name in _CHANGING)
+        self._slope = vehicle_getter(api, "getSlope")
+        self._level = math.nan
         self._leader = vehicle_getter(api, "getLeader")
         self._speed = vehicle_getter(api, "getSpeed")
         self._minimum_gap = vehicle_getter(api, "getMinGap")
@@ -130,6 +136,7 @@ class VehicleReader:
             lane=now.lane,
             lamps=lamps,
             paint=known.paint,
+            grade=np.radians(now.slope),
         )
 
     def _lamps(self, signals: Sequence[int]) -> NDArray[np.int32]:
@@ -152,7 +159,17 @@ class VehicleReader:
         # One array for all: for few vehicles making arrays costs more than asking.
         flat = itertools.chain(map(angle, ids), map(speed, ids), map(acceleration, ids))
         angles, speeds, accelerations = np.fromiter(flat, np.float64, 3 * len(ids)).reshape(3, -1)
-        return Moving(ids, position, angles, speeds, accelerations, tuple(map(lane, ids)), list(map(signals, ids)))
+        lanes, lit, slopes = tuple(map(lane, ids)), list(map(signals, ids)), self._slopes(ids, position[:, 2])
+        return Moving(ids, position, angles, speeds, accelerations, lanes, lit, slopes)
+
+    def _slopes(self, ids: Sequence[str], heights: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Slopes (n,) [°], which nobody is asked for while all stay on the level."""
+        if (heights == self._level).all():
+            return np.zeros(len(ids))
+        slopes = np.fromiter(map(self._slope, ids), np.float64, len(ids))
+        # Whoever leaves the level, or comes to it, is at another height first.
+        self._level = math.nan if slopes.any() or np.ptp(heights) else float(heights[0])
+        return slopes
 
     def _is_near(self, ids: Sequence[str], position: NDArray[np.float64]) -> NDArray[np.bool_]:
         offset = position - position[ids.index(self._ego)]

@@ -33,7 +33,7 @@ def check_step_length(api: Api, step_length: float) -> None:
         If its step is another.
     """
     found = api.simulation.getDeltaT()
-    if abs(found - step_length) > CLOCK_TICK / 2:
+    if abs(found - step_length) > 1e-3 * CLOCK_TICK:
         raise SimulationError(
             f"SUMO moves in steps of {found:g} s, but clocks.traffic_step_s is {step_length:g}: "
             f"start SUMO with --step-length {step_length:g}, or set clocks.traffic_step_s={found:g}"

@@ -15,7 +15,8 @@ _ANGLE = 0x43
 _ACCELERATION = 0x72
 _LANE = 0x51
 _SIGNALS = 0x5B
-_MOVING = (_POSITION_3D, _ANGLE, _SPEED, _ACCELERATION, _LANE, _SIGNALS)
+_SLOPE = 0x36
+_MOVING = (_POSITION_3D, _ANGLE, _SPEED, _ACCELERATION, _LANE, _SIGNALS, _SLOPE)
 
 _MARGIN = 50.0
 """SUMO gathers vehicles by the lanes near the ego; this much more radius leaves nobody out [m]."""
@@ -41,6 +42,7 @@ class SubscribedReader(VehicleReader):
             acceleration=np.array([rows[v][_ACCELERATION] for v in ids]),
             lane=tuple(rows[v][_LANE] for v in ids),
             signals=[rows[v][_SIGNALS] for v in ids],
+            slope=np.array([rows[v][_SLOPE] for v in ids]),
         )
 
     def _surroundings(self) -> Mapping[str, Mapping[int, Any]]:

@@ -128,9 +128,13 @@ class CameraPose:
     heading : float
         Direction of travel, counterclockwise from east [rad].
     grade : float
-        Upward inclination of the vehicle [rad], added to the camera's own pitch.
+        Upward inclination of the vehicle's body, that of the road under it and its own pitch on the road together
+        [rad]; the camera's own pitch is measured from it.
+    road_grade : float
+        Inclination of the road alone, in the direction of travel [rad]; positive uphill.
     """
 
     position: tuple[float, float, float]
     heading: float
     grade: float = 0.0
+    road_grade: float = 0.0

@@ -1,6 +1,6 @@
 """Where every vehicle is at one instant."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,9 @@ class TrafficState:
         Lit lamps, bits of `Lamp`.
     paint : (n, 3) float64
         Linear reflectance of the paint, 0 … 1.
+    grade : (n,) float64
+        Inclination along the heading of the road that a vehicle stands on, from its rear to its front bumper [rad];
+        positive uphill. Left out, everybody stands on the level.
     """
 
     time: float
@@ -49,6 +52,12 @@ class TrafficState:
     lane: tuple[str, ...]
     lamps: NDArray[np.int32]
     paint: NDArray[np.float64]
+    grade: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        """Put everybody on the level where no grade is given."""
+        if not len(self.grade):
+            object.__setattr__(self, "grade", np.zeros(len(self.ids)))
 
     def row(self, vehicle_id: str) -> int | None:
         """Row of a vehicle, or None if it is not on the road now."""

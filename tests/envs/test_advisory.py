@@ -100,6 +100,33 @@ def test_overrides_for_one_episode(env: gymnasium.Env[Any, Any]) -> None:
         env.reset(options={"overrides": ["camera.width=128"]})
 
 
+@pytest.mark.parametrize(
+    ("setting", "step"), [("clocks.camera_period_s=0.1", 0.5), ("clocks.decision_period_s=1", 1.0)]
+)
+def test_an_override_of_a_clock_does_what_it_says_and_nothing_else(
+    env: gymnasium.Env[Any, Any], setting: str, step: float
+) -> None:
+    """A step stays one decision period long, and in the next episode is as long as before."""
+    for options, length in (({"overrides": [setting]}, step), (None, 0.5)):
+        env.reset(seed=5, options=options)
+        assert env.step(np.array([12, 0]))[4]["time_s"] == pytest.approx(length)
+        assert env.unwrapped.metadata["render_fps"] == pytest.approx(1.0 / length)
+
+
+def test_the_reward_counts_with_the_reaction_time_of_the_advice(env: gymnasium.Env[Any, Any]) -> None:
+    """At 26 m/s one needs some 150 m or 330 m, of 100 m that are seen."""
+    margins = []
+    for reaction_time in (2.0, 9.0):
+        advice = f"advice={{method: stopping_sight_distance, parameters: {{reaction_time: {reaction_time}}}}}"
+        env.reset(seed=5, options={"overrides": ["fog.visibility_m=100", advice]})
+        info = env.step(np.array([12, 0]))[4]
+        speed = info["speed_mps"]
+        needed = speed * reaction_time + speed**2 / 6.8
+        margins.append(info["reward_terms"]["visibility_margin"])
+        assert margins[-1] == pytest.approx(-2.0 * (1.0 - 100.0 / needed), rel=1e-3)
+    assert margins[1] < margins[0] < 0.0
+
+
 def test_time_truncates() -> None:
     env = gymnasium.make(ID, image_size=(64, 48), overrides=("duration_s=2", "clocks.camera_period_s=0.5"))
     env.reset(seed=1)

@@ -62,6 +62,17 @@ def test_fog_is_seen_and_told(env: gymnasium.Env[Any, Any]) -> None:
     assert not foggy["signs_mask"].any()
 
 
+def test_the_step_is_highway_envs_own(env: gymnasium.Env[Any, Any]) -> None:
+    with pytest.raises(InputError, match=r"clocks\.traffic_step_s: highway-env moves by 1 / simulation_frequency"):
+        env.reset(options={"overrides": [f"clocks.traffic_step_s={1 / 30!r}"]})
+    plain = gymnasium.make("highway-v0", config=FEW)
+    with pytest.raises(InputError, match=r"clocks\.camera_period_s: there is a frame at the end of each step"):
+        FogCameraWrapper(
+            plain, image_size=(64, 48), overrides=["clocks.decision_period_s=9", "clocks.camera_period_s=3"]
+        )
+    plain.close()
+
+
 def test_episodes_replay_and_do_not_disturb_each_other() -> None:
     one, other = (gymnasium.make(ID, **SMALL) for _ in range(2))
     try:

@@ -5,8 +5,10 @@ from collections.abc import Iterable
 
 import pytest
 
+import fogsim
 from fogsim.errors import SimulationError, UnknownNameError
 from fogsim.metrics import METRICS, JsonValue, RunMetrics, SafetyStandard
+from fogsim.scenario import build
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Collision, Ending, Estimate, Leader, Step
 from tests.recorders.synthetic import belief, drive, estimate, make_step
@@ -37,6 +39,26 @@ def test_every_key_has_a_meaning_and_every_value_is_json() -> None:
 def test_a_run_without_steps_has_only_undefined_values_and_counts() -> None:
     for key, value in RunMetrics().summary().values.items():
         assert value in (None, 0, {}), key
+
+
+def test_the_summary_names_what_sight_was_judged_by() -> None:
+    """And judges by it: 20 m/s need 60 m at 1 s and 5 m/s², of 50 m that are seen."""
+    summary = summarise([make_step(0, speed=20.0, visibility_ahead=50.0)], reaction_time=1.0, deceleration=5.0)
+    assert (summary["stopping_reaction_time_s"], summary["stopping_deceleration_mps2"]) == (1.0, 5.0)
+    assert summary["minimum_visibility_margin_m"] == pytest.approx(-10.0)
+
+
+@pytest.mark.parametrize(
+    ("advice", "reaction_time", "deceleration"),
+    [
+        ("{method: stopping_sight_distance, parameters: {reaction_time: 1.5, deceleration: 4.5}}", 1.5, 4.5),
+        ("stopping_sight_distance", 2.5, 3.4),
+        ("none", 2.5, 3.4),
+    ],
+)
+def test_a_run_is_judged_by_what_its_advice_counts_with(advice: str, reaction_time: float, deceleration: float) -> None:
+    standard = build.safety_standard(fogsim.load_scenario("motorway_fog_bank", [f"advice={advice}"]))
+    assert (standard.reaction_time, standard.deceleration) == (reaction_time, deceleration)
 
 
 def test_distance_and_speed_with_uneven_steps() -> None:

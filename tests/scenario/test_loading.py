@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from fogsim.errors import InputError, UnknownNameError
-from fogsim.scenario import catalogue, load_scenario, override, resolved
+from fogsim.scenario import attached_scenario, catalogue, load_scenario, override, resolved
 from fogsim.scenario.overrides import apply_overrides, parse_override
 
 
@@ -42,6 +42,32 @@ def test_an_unknown_key_names_file_line_key_and_the_nearest(folder: Path) -> Non
     with pytest.raises(InputError) as error:
         load_scenario(file)
     assert str(error.value).startswith(f"{file}:{line}: camera.pich_deg: unknown key; did you mean 'pitch_deg'?")
+
+
+@pytest.mark.parametrize(
+    ("settings", "nearest"),
+    [
+        (["clocks.traffic_step_s=0.0125"], "0.01 or 0.02 s; got 0.0125"),
+        ([f"clocks.traffic_step_s={1 / 30!r}"], "0.025 or 0.05 s; got 0.0333"),
+        (["clocks.traffic_step_s=0.0004"], "nearest: 0.001 s; got 0.0004"),
+        ([f"clocks.{key}_s=0.0125" for key in ("traffic_step", "camera_period")], "0.012 or 0.013 s; got 0.0125"),
+    ],
+)
+def test_a_traffic_step_that_sumo_cannot_make_is_refused_with_the_nearest(settings: list[str], nearest: str) -> None:
+    with pytest.raises(InputError, match=r"clocks\.traffic_step_s: SUMO counts time in whole milliseconds") as error:
+        load_scenario("motorway_fog_bank", settings)
+    assert str(error.value).startswith(f"--set {settings[0]}")
+    assert nearest in str(error.value)
+
+
+@pytest.mark.parametrize("step", [0.001, 0.02, 0.1, 0.1 + 1e-12])
+def test_whole_milliseconds_are_taken(step: float) -> None:
+    assert load_scenario("motorway_fog_bank", [f"clocks.traffic_step_s={step!r}"]).clocks.traffic_step_s == step
+
+
+def test_a_simulation_that_runs_already_keeps_its_own_step() -> None:
+    clocks = [f"clocks.{key}_s={1 / 15!r}" for key in ("traffic_step", "camera_period", "decision_period")]
+    assert attached_scenario("ego", [*clocks, "fog.visibility_m=80"]).clocks.traffic_step_s == 1 / 15
 
 
 def test_an_unknown_key_inside_a_list(folder: Path) -> None:

@@ -58,6 +58,7 @@ def read_everything(api: Any, ego_lamps: Lamp, radius: float) -> TrafficState:
         lane=tuple(get.getLaneID(v) for v in ids),
         lamps=np.array(lamps, dtype=np.int32),
         paint=np.array([paint(v, get.getColor(v)) for v in ids]),
+        grade=np.array([np.radians(get.getSlope(v)) for v in ids]),
     )
 
 
@@ -82,6 +83,39 @@ def test_reading_those_near_gives_what_reading_everything_gives(link: LibsumoLin
         assert_same(state, read_everything(api, Lamp.LOW_BEAM, radius))
         met.update(state.ids)
     assert len(met) > len(state.ids)
+
+
+def test_slopes_are_read_wherever_the_road_is_not_level(link: LibsumoLink, tmp_path: Path) -> None:
+    """From the level into a sag."""
+    (tmp_path / "few.rou.xml").write_text(
+        '<routes><vType id="c" sigma="0"/><route id="r" edges="road"/>'
+        '<vehicle id="ego" type="c" route="r" depart="0" departPos="250" departSpeed="25"/>'
+        '<vehicle id="v" type="c" route="r" depart="0" departPos="280" departSpeed="25"/></routes>',
+        encoding="utf-8",
+    )
+    net = FOLDER.parent / "graded_motorway" / "graded.net.xml"
+    files = ("--net-file", str(net), "--route-files", str(tmp_path / "few.rou.xml"), "--step-length", "0.1")
+    api = link.begin([*files, "--no-step-log", "true"])
+    link.step()
+    reader = VehicleReader(api, "ego", 100.0)
+    asked: list[str] = []
+    original = reader._slope
+
+    def watched(vehicle: str) -> float:
+        asked.append(vehicle)
+        return float(original(vehicle))
+
+    reader._slope = watched
+    seen = []
+    for _ in range(150):
+        state = reader.state(Lamp.NONE)
+        assert_same(state, read_everything(api, Lamp.NONE, 100.0))
+        seen.append(float(state.grade[state.ids.index("ego")]))
+        link.step()
+    assert min(seen) == 0.0
+    assert max(seen) > 0.015
+    # On the level nobody is asked but at the first look.
+    assert len(asked) < 2 * len(seen) - 20
 
 
 def test_a_vehicle_far_away_is_not_asked_again_at_once(link: LibsumoLink) -> None:

@@ -87,6 +87,7 @@ class SumoTraffic:
         self._ego_lamps = Command().lamps
         self._ego_since = 0.0
         self._route: RouteProgress | None = None
+        self._mark = 0
         self._teleported = False
 
     @property
@@ -116,7 +117,7 @@ class SumoTraffic:
         if self._fog is not None:
             self.enter_fog(self._fog)
         self._ego_lamps = Command().lamps
-        self._route, self._teleported = None, False
+        self._route, self._mark, self._teleported = None, 0, False
         try:
             check_step_length(api, setup.step_length)
             self._warm_up(self._running)
@@ -171,6 +172,8 @@ class SumoTraffic:
     def obey(self, command: Command) -> None:
         """Put a command in force for the next step of a simulation that somebody else steps."""
         run = self._running
+        if self._link.shared:
+            run.roster.recount()
         self._ego_lamps = command.lamps
         run.control.carry_out(self._orders(run, command))
         self._prepare(run, command.advised_speeds)
@@ -217,6 +220,8 @@ class SumoTraffic:
     def _take_in(self, run: _Run) -> None:
         run.collisions.look()
         run.roster.look()
+        if self._link.shared:
+            run.roster.recount()
         self._teleported |= self._setup.ego in run.roster.beamed_away
         run.lanes.keep()
 
@@ -230,7 +235,9 @@ class SumoTraffic:
             # Where it comes back, if it does, has nothing to do with where it was.
             self._route = None
             return None
-        self._route = self._route or RouteProgress(run.api, ego)
+        new, self._mark = run.roster.newcomers(self._mark)
+        # Another vehicle may have come under the ego's name.
+        self._route = RouteProgress(run.api, ego) if self._route is None or ego in new else self._route
         route_position, route_length = self._route.now()
         state = run.lane_changes.smoothed(run.reader.state(self._ego_lamps))
         state = _with_dark(state, run.script.dark)

@@ -46,6 +46,7 @@ class TraciLink:
     """
 
     distant = True
+    shared = True
 
     def __init__(self, host: str = "localhost", port: int = 8813, order: int | None = None, retries: int = 40) -> None:
         self._host = host

@@ -10,6 +10,7 @@ import numpy as np
 
 from fogsim.errors import SimulationError
 from fogsim.traffic.collisions import CollisionWatch
+from fogsim.traffic.configuration import FIT_ARGUMENTS
 from fogsim.traffic.control import LaneKeeping, Order, SpeedControl
 from fogsim.traffic.driving import Drivers
 from fogsim.traffic.events import Script, Situation
@@ -286,7 +287,10 @@ def command_line(setup: TrafficSetup, seed: int) -> list[str]:
     seed : int
         Its seed.
     """
-    source = ["--net-file", str(setup.net)] if setup.config is None else ["--configuration-file", str(setup.config)]
+    if setup.config is None:
+        source = ["--net-file", str(setup.net)]
+    else:
+        source = ["--configuration-file", str(setup.config), *FIT_ARGUMENTS]
     arguments = [*source, "--step-length", repr(setup.step_length), "--seed", str(seed)]
     # OpenDRIVE files among them are the sign map's; SUMO cannot read them here.
     additional = tuple(path for path in setup.additional if not is_opendrive(path))

@@ -42,7 +42,7 @@ def main() -> None:
     """Run the command line; errors that a user can mend end in one message and exit code 2."""
     try:
         with interruptible(), warnings.catch_warnings():
-            warnings.showwarning = _tell
+            warnings.showwarning = lambda message, *_, **__: _tell(message)
             app()
     except KeyboardInterrupt:
         _err.print("interrupted")
@@ -55,7 +55,7 @@ def main() -> None:
         sys.exit(BAD_INPUT)
 
 
-def _tell(message: Warning | str, *_: object) -> None:
+def _tell(message: Warning | str) -> None:
     """Print a warning as one line, without the place in the code that Python adds."""
     _err.print(f"[yellow]warning:[/] {escape(str(message))}", soft_wrap=True)
 

@@ -22,7 +22,12 @@ DECISION_PERIOD = 0.5
 
 
 def connect(
-    scenario: Scenario, host: str = "localhost", port: int = 8813, order: int | None = None, retries: int = 40
+    scenario: Scenario,
+    host: str = "localhost",
+    port: int = 8813,
+    order: int | None = None,
+    retries: int = 40,
+    timeout: float = 60.0,
 ) -> Traffic:
     """Reach a SUMO or sumo-gui that the user has started with ``--remote-port``.
 
@@ -41,15 +46,23 @@ def connect(
         FogSim's place among several clients (SUMO's ``--num-clients``).
     retries : int
         How often to try again, every 0.25 s, while SUMO does not listen yet.
+    timeout : float
+        How long SUMO may leave one message unanswered [s]; ``inf`` for ever. Then it is given up with a
+        `SimulationError`. A step waits for all clients, and sumo-gui for its start button.
 
     Returns
     -------
     Traffic
         For `run` or `ClosedLoop`; nothing is connected before they start.
+
+    Raises
+    ------
+    InputError
+        If the timeout is not more than 0.
     """
     # SUMO may run in another folder.
     here = scenario.model_copy(update={"directory": scenario.directory.resolve()})
-    return traci_traffic(build.traffic_setup(here), TraciLink(host, port, order, retries))
+    return traci_traffic(build.traffic_setup(here), TraciLink(host, port, order, retries, timeout))
 
 
 def attach(

@@ -2,6 +2,7 @@
 
 import json
 import sys
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -40,7 +41,8 @@ _err = Console(stderr=True, highlight=False)
 def main() -> None:
     """Run the command line; errors that a user can mend end in one message and exit code 2."""
     try:
-        with interruptible():
+        with interruptible(), warnings.catch_warnings():
+            warnings.showwarning = lambda message, *_, **__: _tell(message)
             app()
     except KeyboardInterrupt:
         _err.print("interrupted")
@@ -51,6 +53,11 @@ def main() -> None:
     except OSError as error:
         _err.print(f"[bold red]error:[/] the operating system refused: {escape(str(error))}", soft_wrap=True)
         sys.exit(BAD_INPUT)
+
+
+def _tell(message: Warning | str) -> None:
+    """Print a warning as one line, without the place in the code that Python adds."""
+    _err.print(f"[yellow]warning:[/] {escape(str(message))}", soft_wrap=True)
 
 
 def _version(wanted: bool) -> None:

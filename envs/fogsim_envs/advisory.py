@@ -1,11 +1,12 @@
 """The agent advises the ego's speed and chooses its lamps."""
 
+import functools
 from collections.abc import Sequence
 from pathlib import Path
 
 from fogsim.scenario import Scenario, load_scenario, override
 from fogsim_envs.advising import AdvisingEnv
-from fogsim_envs.hosting import begin
+from fogsim_envs.hosting import TIMEOUT, begin, checked_timeout
 from fogsim_envs.rewards import RewardWeights
 
 
@@ -52,6 +53,7 @@ class FogAdvisoryEnv(AdvisingEnv):
     continuous : which action space
     reward_weights : `RewardWeights`
     render_mode : None or "rgb_array" (the camera frame beside a panel with estimate, truth, advice, speed and lamps)
+    timeout : how long a child process that runs the simulation may give no sign of life [s]; ``inf`` for ever
 
     ### Version history
     * v0: first version
@@ -66,13 +68,16 @@ class FogAdvisoryEnv(AdvisingEnv):
         continuous: bool = False,
         reward_weights: RewardWeights | None = None,
         render_mode: str | None = None,
+        timeout: float = TIMEOUT,
     ) -> None:
+        checked_timeout(timeout)
+
         def load(settings: Sequence[str]) -> Scenario:
             return override(scenario, settings) if isinstance(scenario, Scenario) else load_scenario(scenario, settings)
 
         super().__init__(
             load,
-            begin,
+            functools.partial(begin, timeout=timeout),
             overrides=overrides,
             image_size=image_size,
             continuous=continuous,

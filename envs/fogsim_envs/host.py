@@ -1,6 +1,9 @@
 """The child process of a hosted simulation: ``python -m fogsim_envs.host FD`` answers requests until the pipe ends."""
 
+import contextlib
 import sys
+import threading
+from collections.abc import Iterator
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -8,9 +11,15 @@ from fogsim.errors import FogSimError, SimulationError
 from fogsim.loop import ClosedLoop
 from fogsim.values import Step
 
+HEARTBEAT_PERIOD = 1.0
+"""Time between two signs of life while a request is worked on [s]."""
+
 
 def serve(connection: "Connection[Any, Any]") -> None:
-    """Answer requests, each a verb and its argument, with the result or the error.
+    """Answer requests, each a verb and its argument, with ``("done", result or error)``.
+
+    While one is worked on, which takes minutes where kernels are to be compiled, ``("working", None)`` is sent every
+    `HEARTBEAT_PERIOD`.
 
     Parameters
     ----------
@@ -23,20 +32,42 @@ def serve(connection: "Connection[Any, Any]") -> None:
         while True:
             verb, argument = connection.recv()
             try:
-                if verb == "open":
-                    loop, answer = ClosedLoop(argument), None
-                elif loop is None:
-                    answer = SimulationError("the host was asked for a run before it got a scenario")
-                else:
-                    answer = loop.start(argument) if verb == "start" else loop.advance(argument)
+                with _heartbeat(connection):
+                    if verb == "open":
+                        loop, answer = ClosedLoop(argument), None
+                    elif loop is None:
+                        answer = SimulationError("the host was asked for a run before it got a scenario")
+                    else:
+                        answer = loop.start(argument) if verb == "start" else loop.advance(argument)
             except FogSimError as error:
                 answer = error
-            connection.send(answer)
-    except EOFError:
+            connection.send(("done", answer))
+    except (EOFError, BrokenPipeError):
         return
     finally:
         if loop is not None:
             loop.close()
+
+
+@contextlib.contextmanager
+def _heartbeat(connection: "Connection[Any, Any]") -> Iterator[None]:
+    """Block in which another thread gives signs of life."""
+    done = threading.Event()
+
+    def beat() -> None:
+        # A parent that is gone is noticed by whoever sends the answer.
+        with contextlib.suppress(OSError):
+            while not done.wait(HEARTBEAT_PERIOD):
+                connection.send(("working", None))
+
+    thread = threading.Thread(target=beat, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        # Only one thread may send at a time.
+        done.set()
+        thread.join()
 
 
 if __name__ == "__main__":

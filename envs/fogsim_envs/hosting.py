@@ -4,7 +4,6 @@ libsumo holds one simulation in a process, but scripts hold several environments
 say. The first environment runs its simulation here; a further one runs it in a child process, and nobody notices.
 """
 
-import contextlib
 import os
 import subprocess
 import sys
@@ -12,12 +11,16 @@ from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from typing import Any, Protocol, cast
 
-from fogsim.errors import SimulationError, SimulationRunningError
+from fogsim.errors import InputError, SimulationError, SimulationRunningError
 from fogsim.loop import ClosedLoop
 from fogsim.scenario import Scenario
 from fogsim.values import Command, Step
 
+TIMEOUT = 60.0
+"""How long a child process may give no sign of life unless something else is asked for [s]."""
+
 _CLOSE_TIMEOUT = 10.0
+_LONGEST_TIMEOUT = 1e6
 
 
 class Simulation(Protocol):
@@ -33,29 +36,50 @@ class Simulation(Protocol):
         """End the simulation; closing twice is allowed."""
 
 
-def begin(scenario: Scenario, seed: int) -> tuple[Simulation, Step]:
-    """Start a scenario here, or in a child process if another simulation runs here."""
-    here = ClosedLoop(scenario)
-    try:
-        return here, here.start(seed)
-    except SimulationRunningError:
-        hosted = HostedLoop(scenario)
-        return hosted, hosted.start(seed)
-    except BaseException:
-        here.close()
-        raise
-
-
-class HostedLoop:
-    """A closed loop in a child process.
+def begin(scenario: Scenario, seed: int, timeout: float = TIMEOUT) -> tuple[Simulation, Step]:
+    """Start a scenario here, or in a child process if another simulation runs here.
 
     Parameters
     ----------
     scenario : Scenario
         The scenario.
+    seed : int
+        Seed of the first run.
+    timeout : float
+        How long a child process may give no sign of life [s], more than 0; ``inf`` for ever.
+    """
+    try:
+        return _begun(ClosedLoop(scenario), seed)
+    except SimulationRunningError:
+        return _begun(HostedLoop(scenario, timeout), seed)
+
+
+def _begun(simulation: Simulation, seed: int) -> tuple[Simulation, Step]:
+    try:
+        return simulation, simulation.start(seed)
+    except BaseException:
+        simulation.close()
+        raise
+
+
+class HostedLoop:
+    """A closed loop in a child process; one that is lost is replaced when a run is begun.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    timeout : float
+        How long the child may give no sign of life [s], more than 0; ``inf`` for ever. It gives one every second, also
+        while kernels are compiled.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, timeout: float = TIMEOUT) -> None:
+        self._scenario = scenario
+        self._timeout = checked_timeout(timeout)
+        self._open()
+
+    def _open(self) -> None:
         ours, theirs = Pipe()
         self._connection: Connection[Any, Any] = ours
         # A fresh interpreter, not a fork (which a GL context does not survive) and not multiprocessing's spawn (which
@@ -67,20 +91,43 @@ class HostedLoop:
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
         )
         theirs.close()
-        self._ask("open", scenario)
+        self._ask("open", self._scenario)
 
     def _ask(self, verb: str, argument: object) -> object:
         try:
             self._connection.send((verb, argument))
-            answer = self._connection.recv()
+            answer = self._hear()
         except (EOFError, OSError) as error:
+            self._abandon()
             raise SimulationError("the child process that ran the simulation has ended") from error
+        except BaseException:
+            # Whoever asks next must not get the answer to this.
+            self._abandon()
+            raise
         if isinstance(answer, BaseException):
             raise answer
         return answer
 
+    def _hear(self) -> object:
+        """Wait for an answer as long as there are signs of life."""
+        while self._connection.poll(self._timeout):
+            sign, answer = self._connection.recv()
+            if sign == "done":
+                return answer
+        raise SimulationError(
+            f"the child process that runs the simulation has given no sign of life for {self._timeout:g} s, and was "
+            "ended: it was stopped, or the computer has no time for it; the time is set by timeout=…"
+        )
+
+    def _abandon(self) -> None:
+        self._connection.close()
+        self._child.kill()
+        self._child.wait()
+
     def start(self, seed: int) -> Step:
         """Begin a run; see `fogsim.loop.ClosedLoop.start`."""
+        if self._connection.closed:
+            self._open()
         return cast("Step", self._ask("start", seed))
 
     def advance(self, command: Command) -> Step:
@@ -88,11 +135,27 @@ class HostedLoop:
         return cast("Step", self._ask("advance", command))
 
     def close(self) -> None:
-        """End the child process."""
-        with contextlib.suppress(OSError):
-            self._connection.close()
+        """End the child process; closing twice is allowed."""
+        self._connection.close()
         try:
             self._child.wait(_CLOSE_TIMEOUT)
         except subprocess.TimeoutExpired:
-            self._child.kill()
-            self._child.wait()
+            self._abandon()
+
+
+def checked_timeout(timeout: float) -> float | None:
+    """A time limit as the standard library takes it: None for ever.
+
+    Parameters
+    ----------
+    timeout : float
+        Time [s], more than 0; ``inf`` for ever.
+
+    Raises
+    ------
+    InputError
+        If it is no such time.
+    """
+    if not timeout > 0:
+        raise InputError(f"timeout: expected a time of more than 0 s, or inf for ever, got {timeout!r}")
+    return timeout if timeout < _LONGEST_TIMEOUT else None

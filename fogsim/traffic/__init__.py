@@ -1,6 +1,9 @@
 """Where every vehicle is, how it moves and how it obeys advice."""
 
+import warnings
+
 from fogsim.traffic.attached import AttachedTraffic, step_length
+from fogsim.traffic.configuration import left_out
 from fogsim.traffic.drivers import SPEED_CHOICES, Compliance, DriverSetup
 from fogsim.traffic.events import BrakeEvent, Event, LampFailureEvent, LaneChangeEvent, Trigger
 from fogsim.traffic.protocol import Traffic
@@ -18,7 +21,14 @@ def libsumo_traffic(setup: TrafficSetup) -> Traffic:
     ----------
     setup : TrafficSetup
         The simulation and its ego.
+
+    Warns
+    -----
+    UserWarning
+        If its configuration has options that cannot hold here and are left out.
     """
+    for option in left_out(setup.config) if setup.config else ():
+        warnings.warn(f"{setup.config}: {option}", stacklevel=2)
     return SumoTraffic(setup, LibsumoLink())
 
 

@@ -29,6 +29,8 @@ class AttachedLink:
         If it is libsumo, and no simulation has been started.
     """
 
+    shared = True
+
     def __init__(self, api: Api) -> None:
         if not hasattr(api, "simulationStep"):
             raise InputError(f"expected libsumo, traci or a connection of traci, got {api!r}")

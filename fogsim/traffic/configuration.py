@@ -1,5 +1,7 @@
-"""What a SUMO configuration file names, without starting SUMO."""
+"""What a SUMO configuration file names, without starting SUMO, and what of it cannot hold here."""
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -7,6 +9,27 @@ from fogsim.errors import InputError
 
 _NET = ("net-file", "net", "n")
 _ADDITIONAL = ("additional-files", "additional", "a")
+
+
+@dataclass(frozen=True, slots=True)
+class _Unfit:
+    """An option that does not go with FogSim: its names, its value that does, others that mean the same, and why."""
+
+    names: tuple[str, ...]
+    fit: str
+    as_good: tuple[str, ...]
+    why: str
+
+
+_UNFIT = (
+    _Unfit(
+        ("remote-port",), "0", ("",), "SUMO would listen on that port of all interfaces, and wait for a client for ever"
+    ),
+    _Unfit(("random", "abs-rand"), "false", ("", "0", "f", "no", "off", "-"), "a run must depend on its seed alone"),
+)
+
+FIT_ARGUMENTS = tuple(argument for unfit in _UNFIT for argument in (f"--{unfit.names[0]}", unfit.fit))
+"""Arguments of SUMO's command line, stronger than a configuration, in place of options that do not go with FogSim."""
 
 
 def configured_files(config: Path) -> tuple[Path, tuple[Path, ...]]:
@@ -22,17 +45,49 @@ def configured_files(config: Path) -> tuple[Path, tuple[Path, ...]]:
     InputError
         If it is no SUMO configuration or names no network.
     """
-    try:
-        root = ET.parse(config).getroot()  # noqa: S314 - the user's own file; expat fetches nothing
-    except (OSError, ET.ParseError) as error:
-        raise InputError(f"{config}: not a SUMO configuration: {error}") from error
+    root = _root(config)
     nets = _named(config, root, _NET)
     if not nets:
         raise InputError(f'{config}: the SUMO configuration names no network (<net-file value="…"/>)')
     return nets[0], _named(config, root, _ADDITIONAL)
 
 
+def left_out(config: Path) -> tuple[str, ...]:
+    """Options of a SUMO configuration that `FIT_ARGUMENTS` put out of force, each with the reason.
+
+    Parameters
+    ----------
+    config : Path
+        The ``.sumocfg`` file.
+
+    Raises
+    ------
+    InputError
+        If it is no SUMO configuration.
+    """
+    root = _root(config)
+    return tuple(
+        f"{unfit.names[0]}={value} is left out: {unfit.why}"
+        for unfit in _UNFIT
+        for value in _values(root, unfit.names)
+        if value.lower() not in (unfit.fit, *unfit.as_good)
+    )
+
+
+def _root(config: Path) -> ET.Element:
+    try:
+        return ET.parse(config).getroot()  # noqa: S314 - the user's own file; expat fetches nothing
+    except (OSError, ET.ParseError) as error:
+        raise InputError(f"{config}: not a SUMO configuration: {error}") from error
+
+
+def _values(root: ET.Element, options: tuple[str, ...]) -> Iterator[str]:
+    """Values of an option, which SUMO reads from either attribute, or from between the tags."""
+    for element in root.iter():
+        if element.tag in options:
+            yield (element.get("value") or element.get("v") or element.text or "").strip()
+
+
 def _named(config: Path, root: ET.Element, options: tuple[str, ...]) -> tuple[Path, ...]:
-    values = [element.get("value", "") for element in root.iter() if element.tag in options]
-    names = [name.strip() for value in values for name in value.split(",")]
+    names = [name.strip() for value in _values(root, options) for name in value.split(",")]
     return tuple(config.parent / name for name in names if name)

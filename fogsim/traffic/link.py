@@ -21,10 +21,16 @@ class SumoLink(Protocol):
     ----------
     distant : bool
         True where every call is a message to another process, so that few calls must do.
+    shared : bool
+        True where others may command the simulation too, and take vehicles away between two calls.
     """
 
     @property
     def distant(self) -> bool:
+        """See the class."""
+
+    @property
+    def shared(self) -> bool:
         """See the class."""
 
     def begin(self, arguments: Sequence[str]) -> Api:

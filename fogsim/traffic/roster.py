@@ -67,15 +67,22 @@ class Roster:
             self.check()
             return
         self.time = now
-        self._come(self._departed())
+        departed = self._departed()
+        # Who departs under the name of one on the road has come in place of one that was taken away by hand.
+        self._go(self.present.intersection(departed))
+        self._come(departed)
         # Who is beamed away and back in one step has ended up on the road.
         self._go(self.beamed_away)
         self._come(self._back())
         self._go(self._arrived())
         if now - self._checked >= CHECK_PERIOD:
             self._checked = now
-            if self._count() != len(self.present):
-                self.check()
+            self.recount()
+
+    def recount(self) -> None:
+        """Notice at once whom somebody has taken away by hand, of which SUMO says nothing; asks for all if any."""
+        if self._count() != len(self.present):
+            self.check()
 
     def check(self) -> None:
         """Ask for all names."""

@@ -1,4 +1,4 @@
-"""Reading SUMO's vehicles in one message, for simulations that run in another process."""
+"""Reading SUMO's vehicles in one message a step, for simulations that run in another process."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -23,13 +23,16 @@ _MARGIN = 50.0
 
 
 class SubscribedReader(VehicleReader):
-    """Reads vehicles by a subscription on the surroundings of the ego: SUMO sends them with each step's answer.
+    """Reads vehicles by subscribing to the surroundings of the ego, which SUMO tells at once.
 
-    The interface and the result are those of `VehicleReader`, whose getters cost a message each over a connection.
+    The subscription is for this instant alone: SUMO ends itself if one outlives its vehicle, and whoever else commands
+    the simulation may take the ego away before the next step. The interface and the result are those of
+    `VehicleReader`, whose getters cost a message each over a connection.
     """
 
     def _moving(self) -> Moving:
         rows = self._surroundings()
+        # Rows of a subscription of the user's own may be among them, with other variables.
         everybody = sorted(vehicle for vehicle, row in rows.items() if all(v in row for v in _MOVING))
         position = np.array([rows[v][_POSITION_3D] for v in everybody])
         near = self._is_near(everybody, position)
@@ -47,9 +50,6 @@ class SubscribedReader(VehicleReader):
 
     def _surroundings(self) -> Mapping[str, Mapping[int, Any]]:
         vehicle = self._api.vehicle
+        vehicle.subscribeContext(self._ego, _VEHICLES, self._radius + _MARGIN, _MOVING, end=self._roster.time)
         rows: Mapping[str, Mapping[int, Any]] = vehicle.getContextSubscriptionResults(self._ego)
-        # SUMO drops a subscription when the ego leaves the road, and may hold one of the user's with other variables.
-        if not all(variable in rows.get(self._ego, ()) for variable in _MOVING):
-            vehicle.subscribeContext(self._ego, _VEHICLES, self._radius + _MARGIN, _MOVING)
-            rows = vehicle.getContextSubscriptionResults(self._ego)
         return rows

@@ -37,6 +37,7 @@ class LibsumoLink:
     """SUMO inside this process, through libsumo; one at a time."""
 
     distant = False
+    shared = False
 
     def __init__(self) -> None:
         self._sumo: ModuleType | None = None

@@ -10,6 +10,7 @@ import numpy as np
 
 from fogsim.errors import SimulationError
 from fogsim.traffic.collisions import CollisionWatch
+from fogsim.traffic.configuration import FIT_ARGUMENTS
 from fogsim.traffic.control import LaneKeeping, Order, SpeedControl
 from fogsim.traffic.driving import Drivers
 from fogsim.traffic.events import Script, Situation
@@ -87,6 +88,7 @@ class SumoTraffic:
         self._ego_lamps = Command().lamps
         self._ego_since = 0.0
         self._route: RouteProgress | None = None
+        self._mark = 0
         self._teleported = False
 
     @property
@@ -116,7 +118,7 @@ class SumoTraffic:
         if self._fog is not None:
             self.enter_fog(self._fog)
         self._ego_lamps = Command().lamps
-        self._route, self._teleported = None, False
+        self._route, self._mark, self._teleported = None, 0, False
         try:
             check_step_length(api, setup.step_length)
             self._warm_up(self._running)
@@ -171,6 +173,8 @@ class SumoTraffic:
     def obey(self, command: Command) -> None:
         """Put a command in force for the next step of a simulation that somebody else steps."""
         run = self._running
+        if self._link.shared:
+            run.roster.recount()
         self._ego_lamps = command.lamps
         run.control.carry_out(self._orders(run, command))
         self._prepare(run, command.advised_speeds)
@@ -217,6 +221,8 @@ class SumoTraffic:
     def _take_in(self, run: _Run) -> None:
         run.collisions.look()
         run.roster.look()
+        if self._link.shared:
+            run.roster.recount()
         self._teleported |= self._setup.ego in run.roster.beamed_away
         run.lanes.keep()
 
@@ -230,7 +236,9 @@ class SumoTraffic:
             # Where it comes back, if it does, has nothing to do with where it was.
             self._route = None
             return None
-        self._route = self._route or RouteProgress(run.api, ego)
+        new, self._mark = run.roster.newcomers(self._mark)
+        # Another vehicle may have come under the ego's name.
+        self._route = RouteProgress(run.api, ego) if self._route is None or ego in new else self._route
         route_position, route_length = self._route.now()
         state = run.lane_changes.smoothed(run.reader.state(self._ego_lamps))
         state = _with_dark(state, run.script.dark)
@@ -279,7 +287,10 @@ def command_line(setup: TrafficSetup, seed: int) -> list[str]:
     seed : int
         Its seed.
     """
-    source = ["--net-file", str(setup.net)] if setup.config is None else ["--configuration-file", str(setup.config)]
+    if setup.config is None:
+        source = ["--net-file", str(setup.net)]
+    else:
+        source = ["--configuration-file", str(setup.config), *FIT_ARGUMENTS]
     arguments = [*source, "--step-length", repr(setup.step_length), "--seed", str(seed)]
     # OpenDRIVE files among them are the sign map's; SUMO cannot read them here.
     additional = tuple(path for path in setup.additional if not is_opendrive(path))

@@ -143,12 +143,21 @@ def test_validate_tells_the_good_from_the_bad(tmp_path: Path) -> None:
 
 
 def test_any_sumo_configuration_runs_with_a_chosen_ego(tmp_path: Path) -> None:
-    chosen = ("--sumocfg", TOWN, "--ego", "veh18", "--visibility", "120", "--out", str(tmp_path / "out"))
+    """Also one that would listen for clients and take its seed from the clock: it is told, and does neither."""
+    config = tmp_path / "mine.sumocfg"
+    own = '<remote-port value="8813"/><num-clients value="2"/><random value="true"/>'
+    text = Path(TOWN).read_text(encoding="utf-8").replace("grid.", f"{Path(TOWN).parent}/grid.")
+    config.write_text(text.replace("</configuration>", f"{own}</configuration>"), encoding="utf-8")
+    chosen = ("--sumocfg", str(config), "--ego", "veh18", "--visibility", "120", "--out", str(tmp_path / "out"))
     done = fogsim("run", *chosen, *SMALL[:4], "--set", "duration_s=600", "--no-video", "--no-report")
     assert done.returncode == 0, done.stderr
     assert "ended: arrived" in done.stdout
+    assert [line.split("=")[0] for line in done.stderr.splitlines() if line.startswith("warning:")] == [
+        f"warning: {config}: remote-port",
+        f"warning: {config}: random",
+    ]
     manifest = json.loads((tmp_path / "out" / "manifest.json").read_text(encoding="utf-8"))
-    assert manifest["scenario"]["traffic"]["config"] == "grid.sumocfg"
+    assert manifest["scenario"]["traffic"]["config"] == "mine.sumocfg"
     speed = parquet.read_table(tmp_path / "out" / "steps.parquet").column("speed_mps").to_numpy()
     assert speed.min() < 0.1  # red lights
     assert speed.max() > 10.0

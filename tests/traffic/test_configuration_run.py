@@ -76,6 +76,27 @@ def configuration(folder: Path, *options: str, routes: Path = GRID / "grid.trips
     return file
 
 
+def test_a_configuration_with_a_port_and_a_seed_of_its_own_runs_as_one_without(tmp_path: Path) -> None:
+    """It neither listens for a client nor asks the clock for random numbers."""
+
+    def states(simulation: Traffic) -> list[tuple[str, ...]]:
+        seen = []
+        simulation.start(1)
+        for _ in range(2):
+            snapshot = simulation.observe()
+            assert snapshot is not None
+            seen.append((*snapshot.state.ids, *map(str, snapshot.state.position[snapshot.ego])))
+            simulation.start(2)
+        simulation.close()
+        return seen
+
+    own = '<remote-port value="8813"/><num-clients value="2"/><random value="true"/>'
+    with pytest.warns(UserWarning, match=r"mine\.sumocfg: (remote-port=8813|random=true) is left out") as told:
+        listening = town(configuration(tmp_path, own))
+    assert len(told) == 2
+    assert states(listening) == states(town())
+
+
 def test_a_configuration_without_vehicles_is_told(tmp_path: Path) -> None:
     routes = tmp_path / "empty.rou.xml"
     routes.write_text("<routes/>", encoding="utf-8")

@@ -1,0 +1,115 @@
+"""Processes that run environments, and stand still or are gone."""
+
+import os
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+
+from fogsim.errors import InputError, SimulationError
+from fogsim.scenario import scenario_from_config
+from fogsim.values import Command
+from fogsim_envs import host
+from fogsim_envs.hosting import HostedLoop
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no signal there stops a process and lets it go on")
+
+TOWN = Path(__file__).resolve().parents[1] / "data" / "grid" / "grid.sumocfg"
+ID = "fogsim_envs:fogsim/FogAdvisory-v0"
+SMALL = {"image_size": (32, 24), "overrides": ("clocks.camera_period_s=0.5",)}
+
+
+@pytest.fixture(scope="module")
+def hosted() -> Iterator[HostedLoop]:
+    """A child that may be silent for 5 s: that is five of its signs of life."""
+    settings = ["fog.visibility_m=inf", "camera.width=32", "camera.height=24", "renderer=cpu"]
+    scenario = scenario_from_config(TOWN.resolve(), "veh0", settings)
+    loop = HostedLoop(scenario)
+    loop.start(1)
+    loop._timeout = 5.0
+    yield loop
+    loop.close()
+
+
+def test_a_child_that_is_stopped_is_told_and_ended_and_the_next_run_has_another(hosted: HostedLoop) -> None:
+    child = hosted._child
+    os.kill(child.pid, signal.SIGSTOP)
+    with pytest.raises(SimulationError, match="no sign of life for 5 s, and was ended: it was stopped"):
+        hosted.advance(Command())
+    assert child.returncode == -signal.SIGKILL
+    with pytest.raises(SimulationError, match="has ended"):
+        hosted.advance(Command())
+    hosted._timeout = None
+    assert hosted.start(2).index == 0
+    assert hosted._child is not child
+
+
+def test_a_child_that_is_killed_is_told(hosted: HostedLoop) -> None:
+    hosted._child.kill()
+    with pytest.raises(SimulationError, match="the child process that ran the simulation has ended"):
+        hosted.advance(Command())
+
+
+class _Pipe:
+    """Asks for one thing, and keeps what is said."""
+
+    def __init__(self) -> None:
+        self.said: list[tuple[str, Any]] = []
+        self._requests = iter([("open", None)])
+
+    def recv(self) -> tuple[str, Any]:
+        try:
+            return next(self._requests)
+        except StopIteration:
+            raise EOFError from None
+
+    def send(self, message: tuple[str, Any]) -> None:
+        self.said.append(message)
+
+
+def test_a_child_that_works_gives_signs_of_life(monkeypatch: pytest.MonkeyPatch) -> None:
+    pipe = _Pipe()
+
+    class Busy:
+        def __init__(self, _: None) -> None:
+            while len(pipe.said) < 3:
+                time.sleep(0.001)
+
+        def close(self) -> None:
+            pipe.said.append(("closed", None))
+
+    monkeypatch.setattr(host, "HEARTBEAT_PERIOD", 0.01)
+    monkeypatch.setattr(host, "ClosedLoop", Busy)
+    host.serve(pipe)  # type: ignore[arg-type]  # of a connection, only these two methods are used
+    assert pipe.said[:3] == [("working", None)] * 3
+    assert pipe.said[-2:] == [("done", None), ("closed", None)]
+
+
+@pytest.mark.parametrize(("fault", "message"), [("SIGSTOP", "have not answered for 3 s"), ("SIGKILL", "has ended")])
+def test_a_worker_of_a_vector_environment_that_is_lost_is_told(fault: str, message: str) -> None:
+    envs: Any = gymnasium.make_vec(ID, num_envs=1, **SMALL)
+    worker = envs.processes[0]
+    envs._timeout = 3.0
+    os.kill(worker.pid, getattr(signal, fault))
+    if fault == "SIGKILL":
+        worker.join()
+    with pytest.raises(SimulationError, match=message):
+        envs.reset(seed=1)
+    assert not worker.is_alive()
+    with pytest.raises(gymnasium.error.ClosedEnvironmentError):
+        envs.step(np.array([[0, 0]]))
+    envs.close()
+
+
+@pytest.mark.parametrize("timeout", [0.0, float("nan")])
+def test_a_limit_that_is_no_time_is_refused(timeout: float) -> None:
+    with pytest.raises(InputError, match="timeout: expected a time of more than 0 s"):
+        gymnasium.make(ID, timeout=timeout, **SMALL)
+    with pytest.raises(InputError, match="timeout: expected a time of more than 0 s"):
+        gymnasium.make_vec(ID, num_envs=1, timeout=timeout, **SMALL)

@@ -15,6 +15,7 @@ from fogsim.onboard import OnBoard
 from fogsim.randomness import spawn_streams
 from fogsim.scenario import Scenario, attached_scenario, build, override
 from fogsim.traffic import AttachedTraffic, TraciLink, Traffic, step_length, traci_traffic
+from fogsim.units import clock_time
 from fogsim.values import Command, Step
 
 DECISION_PERIOD = 0.5
@@ -208,7 +209,7 @@ class AttachedSession:
                 f"the simulation's time went back from {last:g} s to {now:g} s: attach again after loading it anew"
             )
         self._times = (began, now)
-        return now - began
+        return clock_time(now - began)
 
     def advise(self, step: Step, command: Command | None = None) -> Command:
         """Put a command in force for the next simulation step; to be called before each of them.

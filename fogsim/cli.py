@@ -34,6 +34,15 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+ScenarioName = Annotated[
+    str | None, typer.Argument(help="A scenario of the catalogue (fogsim list), a file or a folder.")
+]
+SumoConfiguration = Annotated[Path | None, typer.Option(help="A SUMO configuration, in place of a scenario.")]
+EgoId = Annotated[str | None, typer.Option(help="Id of the vehicle that is the ego.")]
+HomogeneousVisibility = Annotated[
+    float | None, typer.Option(help="Meteorological visibility of homogeneous fog in metres.", min=1e-3)
+]
+
 _out = Console(highlight=False)
 _err = Console(stderr=True, highlight=False)
 
@@ -77,14 +86,10 @@ def common(
 
 @app.command("run")
 def run_command(
-    scenario: Annotated[
-        str | None, typer.Argument(help="A scenario of the catalogue (fogsim list), a file or a folder.")
-    ] = None,
-    sumocfg: Annotated[Path | None, typer.Option(help="A SUMO configuration, in place of a scenario.")] = None,
-    ego: Annotated[str | None, typer.Option(help="Id of the vehicle that is the ego.")] = None,
-    visibility: Annotated[
-        float | None, typer.Option(help="Meteorological visibility of homogeneous fog in metres.", min=1e-3)
-    ] = None,
+    scenario: ScenarioName = None,
+    sumocfg: SumoConfiguration = None,
+    ego: EgoId = None,
+    visibility: HomogeneousVisibility = None,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same run, bit for bit.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Directory for the results. [runs/SCENARIO-seedN]")] = None,
     settings: Annotated[
@@ -188,7 +193,9 @@ class _SimulationProgress:
         rate = step.time / task.elapsed if task.elapsed else 0.0
         believed = f"V ≈ {step.belief.visibility:.0f} m"
         told = f"{step.time:.0f} of {self._duration:.0f} s, {rate:.1f}× real time, {believed}"
-        self._progress.update(self._task, completed=step.time, description=told)
+        # A run that is over is done, however much of its longest duration is left.
+        done = step.time if step.ending is None else self._duration
+        self._progress.update(self._task, completed=done, description=told)
 
     def __enter__(self) -> "_SimulationProgress":
         self._progress.start()
@@ -255,14 +262,14 @@ def signs_command(
 
 @app.command("dataset")
 def dataset_command(
-    scenario: Annotated[str, typer.Argument(help="A scenario of the catalogue (fogsim list), a file or a folder.")],
     out: Annotated[Path, typer.Option(help="Directory; one that was interrupted is continued.")],
     frames: Annotated[int, typer.Option(help="How many frames.")],
+    scenario: ScenarioName = None,
+    sumocfg: SumoConfiguration = None,
+    ego: EgoId = None,
     seed: Annotated[int, typer.Option(help="Seed of the first run; further runs have the next ones.")] = 0,
     every: Annotated[int, typer.Option(help="Take one frame of so many.")] = 1,
-    visibility: Annotated[
-        float | None, typer.Option(help="Meteorological visibility of homogeneous fog in metres.", min=1e-3)
-    ] = None,
+    visibility: HomogeneousVisibility = None,
     settings: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY.PATH=VALUE", help="Put a value in place of the file's.")
     ] = None,
@@ -270,7 +277,7 @@ def dataset_command(
     """Write frames with depth, masks and true transmission, and a COCO file with boxes and all that is known."""
     from fogsim.dataset import write_dataset  # noqa: PLC0415 - heavy; --help must be quick
 
-    loaded = _scenario(scenario, None, None, visibility, settings or ())
+    loaded = _scenario(scenario, sumocfg, ego, visibility, settings or ())
     progress = Progress(
         BarColumn(bar_width=20),
         TaskProgressColumn(),

@@ -160,14 +160,14 @@ class ClosedLoop:
             self._traffic.advance(command)
         snapshot, index = self._traffic.observe(), self._step.index + 1
         if snapshot is None:
-            time = index * self._periods.camera_period
+            time = self._periods.time(index)
             self._step = dataclasses.replace(self._step, index=index, time=time, ending=Ending.LEFT_NETWORK)
         else:
             self._step = self._finish(index, snapshot, command)
         return self._step
 
     def _finish(self, index: int, snapshot: TrafficSnapshot, command: Command) -> Step:
-        time = index * self._periods.camera_period
+        time = self._periods.time(index)
         return self._onboard.finish(index, time, snapshot, command, self._ending(index, snapshot))
 
     def _ending(self, index: int, snapshot: TrafficSnapshot) -> Ending | None:

@@ -14,6 +14,24 @@ KMH_PER_MPS = 3.6
 GRAVITY = 9.80665
 """Standard acceleration of free fall [m/s²]."""
 
+_CLOCK_DIGITS = 9
+
+
+def clock_time(seconds: float) -> float:
+    """Take the noise of binary fractions out of a time that was counted or added up: 3.8000000000000003 s is 3.8 s.
+
+    Parameters
+    ----------
+    seconds : float
+        Time [s].
+
+    Returns
+    -------
+    float
+        The nearest whole nanosecond [s]; steps of SUMO are whole milliseconds, those of highway-env may be 1/15 s.
+    """
+    return round(seconds, _CLOCK_DIGITS)
+
 
 def extinction_from_visibility(visibility: float) -> float:
     """Extinction coefficient of fog with a given meteorological visibility (Koschmieder; CIE 5 % contrast).

@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from fogsim.units import extinction_from_visibility, visibility_from_extinction
+from fogsim.units import clock_time, extinction_from_visibility, visibility_from_extinction
 
 
 def test_a_hundred_metres_of_visibility() -> None:
@@ -29,3 +29,8 @@ def test_impossible_visibility_is_refused(visibility: float) -> None:
 def test_impossible_extinction_is_refused(extinction: float) -> None:
     with pytest.raises(ValueError, match="negative"):
         visibility_from_extinction(extinction)
+
+
+def test_times_have_no_noise_of_binary_fractions() -> None:
+    assert [clock_time(0.1 * i) for i in range(1000)] == [i / 10 for i in range(1000)]
+    assert clock_time(1 / 15) == pytest.approx(1 / 15, abs=1e-9)

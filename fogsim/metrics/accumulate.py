@@ -11,6 +11,7 @@ from fogsim.metrics.safety import Collisions, Conflict, Sight
 from fogsim.metrics.step_metrics import DEFAULT_STANDARD, step_metrics
 from fogsim.metrics.surrogate import SafetyStandard
 from fogsim.registry import Registry
+from fogsim.units import clock_time
 from fogsim.values import Step
 
 MetricFactory = Callable[[SafetyStandard], Metric]
@@ -91,7 +92,7 @@ class RunMetrics:
         last, self._last = self._last, step
         if last is not None and last.index == step.index:
             return
-        elapsed = 0.0 if last is None else step.time - last.time
+        elapsed = 0.0 if last is None else clock_time(step.time - last.time)
         if last is not None and not elapsed > 0:
             raise SimulationError(f"steps must follow in time, got {step.time!r} s after {last.time!r} s")
         sample = Sample(step, elapsed, step_metrics(step, self.standard))

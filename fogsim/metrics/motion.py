@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from fogsim.metrics.metric import JsonValue, Sample, share
+from fogsim.units import clock_time
 
 
 @dataclass(slots=True)
@@ -39,7 +40,7 @@ class Motion:
         """Say how far and how fast the ego went."""
         distance = self._position - self._start
         return {
-            "duration_s": self._duration,
+            "duration_s": clock_time(self._duration),
             "distance_m": distance,
             "mean_speed_mps": share(distance, self._duration),
             "max_speed_mps": self._max_speed if self._steps else None,

@@ -11,6 +11,7 @@ from fogsim.metrics.surrogate import (
     time_headway,
     time_integrated_time_to_collision,
 )
+from fogsim.units import clock_time
 from fogsim.values import Collision
 
 
@@ -63,7 +64,7 @@ class Conflict:
         """Say how near a collision was."""
         return {
             "minimum_time_to_collision_s": self._least_time_to_collision,
-            "time_exposed_time_to_collision_s": self._exposed,
+            "time_exposed_time_to_collision_s": clock_time(self._exposed),
             "time_integrated_time_to_collision_s2": self._integrated,
             "max_drac_mps2": self._max_drac,
             "minimum_gap_m": self._least_gap,

@@ -28,7 +28,7 @@ from fogsim.traffic import (
     TrafficSetup,
     Trigger,
 )
-from fogsim.units import KMH_PER_MPS
+from fogsim.units import KMH_PER_MPS, clock_time
 from fogsim.values import Camera, FogField
 
 AIRLIGHT_EXPOSURE = 0.6
@@ -58,6 +58,10 @@ class Periods:
     traffic_steps: int
     decision_frames: int
     frames: int
+
+    def time(self, index: int) -> float:
+        """Time of a camera period since the run began [s]."""
+        return clock_time(index * self.camera_period)
 
 
 def periods(scenario: Scenario) -> Periods:

@@ -76,6 +76,13 @@ def test_distance_and_speed_with_uneven_steps() -> None:
     assert summary["steps"] == 3
 
 
+def test_times_add_up_without_noise() -> None:
+    steps = [make_step(i, time=i / 10, speed=25.0, leader=Leader("other", 5.0, 20.0)) for i in range(39)]
+    summary = summarise(steps, time_to_collision=4.0)
+    assert summary["duration_s"] == 3.8
+    assert summary["time_exposed_time_to_collision_s"] == 3.8
+
+
 def test_conflicts_are_weighted_with_the_time_between_steps() -> None:
     approach = [(20.0, 4.0), (10.0, 2.0), (5.0, 1.0)]
     steps = [

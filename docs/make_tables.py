@@ -1,6 +1,7 @@
 """Write those tables of the docs that come from the code: ``python docs/make_tables.py`` (a test holds them to it)."""
 
 import inspect
+import re
 import sys
 from pathlib import Path
 from typing import Any, get_args
@@ -9,10 +10,14 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from fogsim.advice import ADVISERS
 from fogsim.estimators import ESTIMATORS
+from fogsim.fusion import FUSIONS
+from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.metrics import RunMetrics
+from fogsim.parameters import accepted_parameters, mismatch
 from fogsim.recorders.table import table_columns
-from fogsim.scenario.methods import Method
+from fogsim.scenario.methods import GIVEN_BY_THE_LOOP, Method
 from fogsim.scenario.schema import Scenario
 from fogsim.scene import SIGN_KINDS
 
@@ -74,11 +79,35 @@ def methods() -> list[tuple[str, ...]]:
     return [(f"`{name}`", (inspect.getdoc(method) or "").partition("\n")[0]) for name, method in ESTIMATORS.items()]
 
 
+def parameters() -> list[tuple[str, ...]]:
+    """Parameters of every method that a scenario can name, with what they may be."""
+    rows = []
+    for registry in (ESTIMATORS, FUSIONS, ADVISERS, LIGHTING_POLICIES):
+        for name, method in registry.items():
+            meanings = _described(method)
+            for key, parameter in accepted_parameters(method, GIVEN_BY_THE_LOOP).items():
+                default = parameter.default
+                told = "none" if default is None else f"`{default:.4g}`" if type(default) is float else f"`{default}`"
+                allowed = mismatch(parameter.annotation, object()) or ""
+                rows.append((f"`{name}`", f"`{key}`", told, allowed, meanings[key]))
+    return rows
+
+
+def _described(method: object) -> dict[str, str]:
+    """Meaning of each parameter, from a docstring in numpydoc's form."""
+    text = re.search(r"\n(?:Parameters|Attributes)\n-+\n(.*?)(?=\n\n|\Z)", inspect.getdoc(method) or "", re.DOTALL)
+    meanings = {}
+    for names, told in re.findall(r"^(\S[^:]*) : [^\n]*\n((?: .*\n?)+)", text.group(1) if text else "", re.MULTILINE):
+        meanings |= dict.fromkeys(names.split(", "), " ".join(told.split()))
+    return meanings
+
+
 TABLES = {
     "estimate.md": {"methods": (("method", "what it reads"), methods)},
     "scenarios.md": {
         "signs": (("kind", "code", "meaning"), signs),
         "keys": (("key", "default", "meaning"), scenario_keys),
+        "parameters": (("method", "parameter", "default", "allowed", "meaning"), parameters),
     },
     "results.md": {
         "columns": (("column", "type", "meaning"), columns),

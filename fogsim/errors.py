@@ -3,6 +3,9 @@
 import difflib
 from collections.abc import Iterable
 
+LONGEST_SHOWN = 80
+"""Most characters of a user's value that a message repeats."""
+
 
 class FogSimError(Exception):
     """Base of every error that a user can cause or mend; the command line prints it and exits with 2."""
@@ -51,3 +54,10 @@ def suggest(name: str, known: Iterable[str]) -> str:
     listing = ", ".join(names) if names else "none"
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     return f"did you mean {near[0]!r}? Known: {listing}" if near else f"known: {listing}"
+
+
+def shown(value: object) -> str:
+    """A user's value as messages repeat it: `repr`, cut short in the middle if it is long."""
+    text = repr(value)
+    half = LONGEST_SHOWN // 2
+    return text if len(text) <= LONGEST_SHOWN else f"{text[:half]} … {text[-half:]}"

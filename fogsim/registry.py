@@ -4,7 +4,8 @@ import inspect
 from collections.abc import Callable, Iterator, Mapping
 from typing import TypeVar
 
-from fogsim.errors import InputError, UnknownNameError, suggest
+from fogsim.errors import InputError, UnknownNameError
+from fogsim.parameters import parameter_mistakes
 
 T = TypeVar("T")
 
@@ -80,11 +81,11 @@ def make(registry: Registry[Callable[..., T]], name: str, *arguments: object, **
     UnknownNameError
         If the registry has no such name.
     InputError
-        If the factory has no such parameter.
+        If the factory has no such parameter, or its annotations do not allow the value.
     """
     factory = registry[name]
-    allowed = parameters(factory)
-    for option in options:
-        if option not in allowed:
-            raise InputError(f"{registry.kind} {name!r} has no parameter {option!r}; {suggest(option, allowed)}")
+    by_place = list(inspect.signature(factory).parameters)[: len(arguments)]
+    mistakes = [f"{option}: {told}" for option, told in parameter_mistakes(factory, options, by_place)]
+    if mistakes:
+        raise InputError(f"{registry.kind} {name!r}: " + "; ".join(mistakes))
     return factory(*arguments, **options)

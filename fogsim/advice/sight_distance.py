@@ -2,12 +2,15 @@
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 from fogsim.kinematics import safe_speed
+from fogsim.parameters import Range, checked_parameters
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Belief, SpeedAdvice
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class StoppingSightDistance:
     """Advise the speed from which a driver can stop within what is visible.
@@ -34,16 +37,21 @@ class StoppingSightDistance:
     widest_belief : float
         Standard deviation of ln k above which a belief says too little to change the advice [-]: at the start, or
         while nothing but the rear of a truck is to be seen.
+
+    Raises
+    ------
+    InputError
+        If a parameter is out of the range in its annotation.
     """
 
-    reaction_time: float = 2.5
-    deceleration: float = 3.4
-    quantile: float = 0.25
-    sight_share: float = 1.0
-    rounding: float = 10.0 / KMH_PER_MPS
-    minimum: float = 20.0 / KMH_PER_MPS
-    hold: float = 3.0
-    widest_belief: float = 0.7
+    reaction_time: Annotated[float, Range(0.0, 60.0, "s")] = 2.5
+    deceleration: Annotated[float, Range(0.1, 15.0, "m/s²")] = 3.4
+    quantile: Annotated[float, Range(0.0, 1.0)] = 0.25
+    sight_share: Annotated[float, Range(0.01, 1.0)] = 1.0
+    rounding: Annotated[float, Range(0.01, 50.0, "m/s")] = 10.0 / KMH_PER_MPS
+    minimum: Annotated[float, Range(0.0, 100.0, "m/s")] = 20.0 / KMH_PER_MPS
+    hold: Annotated[float, Range(0.0, 3600.0, "s")] = 3.0
+    widest_belief: Annotated[float, Range(0.01, 10.0)] = 0.7
 
     def advise(self, belief: Belief, speed_limit: float, time: float, previous: SpeedAdvice) -> SpeedAdvice:
         """Advise a speed; see `Adviser.advise`. No advice (``inf``) where the limit itself is safe."""
@@ -79,6 +87,7 @@ class NoAdvice:
         return SpeedAdvice()
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class FixedSpeed:
     """Advise one speed, whatever the fog: a sign, or an ego that drives at a speed of the user's.
@@ -87,9 +96,14 @@ class FixedSpeed:
     ----------
     speed : float
         The speed [m/s].
+
+    Raises
+    ------
+    InputError
+        If the speed is out of the range in its annotation.
     """
 
-    speed: float = 50.0 / KMH_PER_MPS
+    speed: Annotated[float, Range(0.0, 140.0, "m/s")] = 50.0 / KMH_PER_MPS
 
     def advise(
         self,

@@ -4,16 +4,18 @@ import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 from fogsim.errors import InputError
 from fogsim.estimators.huang2015_lead import Huang2015Lead
 from fogsim.estimators.huang2015_rough import Huang2015Rough
 from fogsim.estimators.image_check import checked_image
+from fogsim.parameters import Range, checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import Observation
-from fogsim.vision.horizon import PITCH_DEVIATION
+from fogsim.vision.horizon import PITCH_DEVIATION, PitchDeviation
 
 MEASUREMENTS = 200
 """Measurements that are remembered."""
@@ -79,6 +81,7 @@ def mixture(values: Sequence[float], weights: Sequence[float], within: Sequence[
     return mean, math.sqrt(math.fsum(w * ((v - mean) ** 2 + s * s) for w, v, s in parts) / total)
 
 
+@checked_parameters
 class Huang2015:
     """Rough and accurate estimates as one, decaying over time and way (Huang 2015, section 5.2).
 
@@ -112,11 +115,11 @@ class Huang2015:
         camera: Camera,
         *,
         as_published: bool = False,
-        time_scale: float = 10.0,
-        way_scale: float = 200.0,
-        setback: float = 0.0,
-        blur: float = 0.0,
-        pitch_deviation: float = PITCH_DEVIATION,
+        time_scale: Annotated[float, Range(0.01, 1e9, "s")] = 10.0,
+        way_scale: Annotated[float, Range(0.01, 1e9, "m")] = 200.0,
+        setback: Annotated[float, Range(0.0, 20.0, "m")] = 0.0,
+        blur: Annotated[float, Range(0.0, 10.0, "px")] = 0.0,
+        pitch_deviation: PitchDeviation = PITCH_DEVIATION,
     ) -> None:
         for name, scale in (("time_scale", time_scale), ("way_scale", way_scale)):
             if not 0.0 < scale < math.inf:

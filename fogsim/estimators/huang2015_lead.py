@@ -1,6 +1,7 @@
 """Accurate visibility from pictures of the tracked vehicle ahead (Huang 2015, section 4.3)."""
 
 import math
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from fogsim.estimators.huang2015_ratios import (
 )
 from fogsim.estimators.huang2015_track import LeadTrack
 from fogsim.estimators.image_check import checked_image
+from fogsim.parameters import Range, checked_parameters
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import Observation
@@ -39,6 +41,7 @@ CURVE_STEP, CURVE_END = 5.0, 200.0
 """Ranges of the confidence curve in the diagnostics [m]."""
 
 
+@checked_parameters
 class Huang2015Lead:
     """Contrast of the tracked vehicle ahead against its range (Huang 2015, section 4.3).
 
@@ -82,9 +85,9 @@ class Huang2015Lead:
         camera: Camera,
         *,
         as_published: bool = False,
-        setback: float = 0.0,
-        blur: float = 0.0,
-        spacing: float | None = None,
+        setback: Annotated[float, Range(0.0, 20.0, "m")] = 0.0,
+        blur: Annotated[float, Range(0.0, 10.0, "px")] = 0.0,
+        spacing: Annotated[float, Range(0.1, 100.0, "m")] | None = None,
     ) -> None:
         if not 0.0 <= setback < 20.0:
             raise InputError(f"setback must be 0 … 20 m, got {setback!r}")

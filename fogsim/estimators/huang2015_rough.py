@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 
 from fogsim.estimators.image_check import checked_image
 from fogsim.estimators.zhu2015_road import fitted_fog, seen_road
+from fogsim.parameters import checked_parameters
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import Observation
 from fogsim.vision.edges import edge_map, smoothed
-from fogsim.vision.horizon import PITCH_DEVIATION, calibrated_horizon
+from fogsim.vision.horizon import PITCH_DEVIATION, PitchDeviation, calibrated_horizon
 from fogsim.vision.inflection import koschmieder
 from fogsim.vision.lane_lines import hough_lines, plain_vanishing_point
 from fogsim.vision.profile import path_lengths
@@ -39,6 +40,7 @@ DISAGREEMENT = math.radians(1.0)
 """Largest difference between the horizons of lane lines and of the calibration [rad]; the thesis names no number."""
 
 
+@checked_parameters
 class Huang2015Rough:
     """Inflection of the grown road's row medians (Huang 2015, section 4.2).
 
@@ -68,7 +70,9 @@ class Huang2015Rough:
 
     method = "huang2015_rough"
 
-    def __init__(self, camera: Camera, *, as_published: bool = False, pitch_deviation: float = PITCH_DEVIATION) -> None:
+    def __init__(
+        self, camera: Camera, *, as_published: bool = False, pitch_deviation: PitchDeviation = PITCH_DEVIATION
+    ) -> None:
         self._camera = camera
         self._as_published = as_published
         self._pitch_deviation = pitch_deviation

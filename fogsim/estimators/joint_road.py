@@ -2,18 +2,20 @@
 
 import math
 from collections import deque
+from typing import Annotated
 
 import numpy as np
 
 from fogsim.errors import InputError
 from fogsim.estimators.image_check import checked_count, checked_image
+from fogsim.parameters import Range, checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation
 from fogsim.vision.agreeing_strips import fit_own, with_neighbours
 from fogsim.vision.daylight import lit_by_lamps
-from fogsim.vision.horizon import PITCH_DEVIATION, Horizon, calibrated_horizon, levelled, weighed
+from fogsim.vision.horizon import PITCH_DEVIATION, Horizon, PitchDeviation, calibrated_horizon, levelled, weighed
 from fogsim.vision.joint_checks import no_road
 from fogsim.vision.joint_fit import JointFit, JointPrior
 from fogsim.vision.joint_prior import joint_prior
@@ -66,6 +68,7 @@ RANGE_MARGIN = 0.5
 """By how much a lead vehicle's foot may be nearer than its range says [m]."""
 
 
+@checked_parameters
 class JointRoad:
     """Joint fit of extinction, airlight, horizon and wandering albedo to strips of road and rows of sky.
 
@@ -97,7 +100,13 @@ class JointRoad:
 
     method = "joint_road"
 
-    def __init__(self, camera: Camera, *, pitch_deviation: float = PITCH_DEVIATION, frames: int = 1) -> None:
+    def __init__(
+        self,
+        camera: Camera,
+        *,
+        pitch_deviation: PitchDeviation = PITCH_DEVIATION,
+        frames: Annotated[int, Range(1, 10_000)] = 1,
+    ) -> None:
         if not (math.isfinite(pitch_deviation) and pitch_deviation > 0):
             raise InputError(f"pitch_deviation must be a positive angle in radians, got {pitch_deviation!r}")
         self._camera = camera

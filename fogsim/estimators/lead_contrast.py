@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,12 +11,13 @@ from fogsim.errors import InputError
 from fogsim.estimators.image_check import checked_count, checked_image
 from fogsim.estimators.lead_contrast_track import SPACING, ContrastTrack, Sight
 from fogsim.estimators.lead_ranges import LeadRanges
+from fogsim.parameters import Range, checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation
 from fogsim.vision.decay_fit import DecayFit, fit_decay
-from fogsim.vision.horizon import PITCH_DEVIATION
+from fogsim.vision.horizon import PITCH_DEVIATION, PitchDeviation
 from fogsim.vision.lead_daylight import RoadFall
 from fogsim.vision.lead_patch import HALF_BODY, LARGE
 from fogsim.vision.lead_scene import lead_scene
@@ -65,6 +67,7 @@ CLEAR = OPTICAL_DEPTH_AT_VISIBILITY / 500.0
 """Extinction that an unsure estimate must surely be below to say "little fog" [1/m]."""
 
 
+@checked_parameters
 class LeadContrast:
     """Mean contrast of the tracked vehicle ahead to the sky against its range (Duntley's law, c = C e^(−kd)).
 
@@ -104,11 +107,11 @@ class LeadContrast:
         self,
         camera: Camera,
         *,
-        setback: float = 1.7,
-        range_deviation: float = 0.25,
-        pitch_deviation: float = PITCH_DEVIATION,
-        window: float = 60.0,
-        frames: int = 64,
+        setback: Annotated[float, Range(0.0, 20.0, "m")] = 1.7,
+        range_deviation: Annotated[float, Range(0.0, 100.0, "m")] = 0.25,
+        pitch_deviation: PitchDeviation = PITCH_DEVIATION,
+        window: Annotated[float, Range(0.01, 1e6, "s")] = 60.0,
+        frames: Annotated[int, Range(MIN_SAMPLES, 10_000)] = 64,
     ) -> None:
         for name, value in (("setback", setback), ("range_deviation", range_deviation)):
             if not (math.isfinite(value) and value >= 0):

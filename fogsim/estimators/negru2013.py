@@ -3,6 +3,7 @@
 import math
 from collections import deque
 from dataclasses import replace
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,13 +11,14 @@ from numpy.typing import NDArray
 from fogsim.errors import InputError
 from fogsim.estimators.image_check import checked_count, checked_image
 from fogsim.estimators.negru2013_band import SeenBand, fog_slope, road_band, road_curve
+from fogsim.parameters import Range, checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import Observation
 from fogsim.vision.canny_deriche import CannyDeriche
 from fogsim.vision.edges import Edges
-from fogsim.vision.horizon import PITCH_DEVIATION, Horizon, calibrated_horizon, weighed
+from fogsim.vision.horizon import PITCH_DEVIATION, Horizon, PitchDeviation, calibrated_horizon, weighed
 from fogsim.vision.inflection import FogModel, best_inflection, printed_inflection
 from fogsim.vision.joint_checks import no_road
 from fogsim.vision.joint_fit import JointFit, fit_jointly
@@ -58,6 +60,7 @@ USUAL_HEIGHT = 1.3  # [m] of a camera, for which the lengths of the fit are mean
 MODEL_DEVIATION = 0.02  # [-] of k by what the model leaves out: dark corners, marks, a road that is not quite flat
 
 
+@checked_parameters
 class Negru2013:
     """Inflection point of the road's luminance curve (Negru & Nedevschi 2013, section IV).
 
@@ -110,9 +113,9 @@ class Negru2013:
         as_published: bool = False,
         printed_signs: bool = False,
         vanishing_point: bool = True,
-        horizon_frames: int = 500,
-        inflection_frames: int = 5,
-        pitch_deviation: float = PITCH_DEVIATION,
+        horizon_frames: Annotated[int, Range(1, 100_000)] = 500,
+        inflection_frames: Annotated[int, Range(1, 10_000)] = 5,
+        pitch_deviation: PitchDeviation = PITCH_DEVIATION,
     ) -> None:
         if not (math.isfinite(pitch_deviation) and pitch_deviation > 0):
             raise InputError(f"pitch_deviation must be a positive angle in radians, got {pitch_deviation!r}")

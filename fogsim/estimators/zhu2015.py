@@ -3,16 +3,18 @@
 import math
 from collections import deque
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.estimators.image_check import checked_image
 from fogsim.estimators.zhu2015_road import SeenRoad, fitted_fog, inflection_rows, seen_road
+from fogsim.parameters import Range, checked_parameters
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate, FogCategory, fog_category
 from fogsim.values.observation import Observation
-from fogsim.vision.horizon import PITCH_DEVIATION
+from fogsim.vision.horizon import PITCH_DEVIATION, PitchDeviation
 from fogsim.vision.road_image import CannotTellError
 
 FRAMES = 3
@@ -58,6 +60,7 @@ class _Reading:
     deviation: float
 
 
+@checked_parameters
 class Zhu2015:
     """Classes of fog from three frames (Zhu & Song 2015).
 
@@ -102,9 +105,9 @@ class Zhu2015:
         camera: Camera,
         *,
         as_published: bool = False,
-        growth: float = 6.0,
-        growth_share: float = 0.8,
-        pitch_deviation: float = PITCH_DEVIATION,
+        growth: Annotated[float, Range(0.0, 255.0)] = 6.0,
+        growth_share: Annotated[float, Range(0.0, 1.0)] = 0.8,
+        pitch_deviation: PitchDeviation = PITCH_DEVIATION,
     ) -> None:
         self._camera = camera
         self._as_published = as_published

@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
+from fogsim.parameters import Range, checked_parameters
 from fogsim.units import extinction_from_visibility
 from fogsim.values.belief import Belief
 from fogsim.values.estimate import Estimate
@@ -19,6 +21,7 @@ LOG_LOW, LOG_HIGH = (math.log(extinction_from_visibility(v)) for v in (FARTHEST,
 LOG_RANGE = LOG_HIGH - LOG_LOW
 
 
+@checked_parameters
 class GridFilter:
     """Bayes' rule over 240 cells of ln k between 10 km and 10 m of visibility.
 
@@ -47,23 +50,18 @@ class GridFilter:
     Raises
     ------
     InputError
-        If a parameter is out of range.
+        If a parameter is out of the range in its annotation.
     """
 
     def __init__(
         self,
-        drift: float = 0.05,
-        leap_rate: float = 0.05,
-        leap_scale: float = 1.0,
-        relative_floor: float = 0.05,
-        outlier_share: float = 0.07,
-        correlation_time: float = 0.5,
+        drift: Annotated[float, Range(1e-9, 100.0, "1/√s")] = 0.05,
+        leap_rate: Annotated[float, Range(0.0, 1000.0, "1/s")] = 0.05,
+        leap_scale: Annotated[float, Range(0.001, 1000.0)] = 1.0,
+        relative_floor: Annotated[float, Range(1e-4, 100.0)] = 0.05,
+        outlier_share: Annotated[float, Range(1e-12, 0.999)] = 0.07,
+        correlation_time: Annotated[float, Range(1e-3, 1e6, "s")] = 0.5,
     ) -> None:
-        _check(drift=drift, leap_scale=leap_scale, relative_floor=relative_floor, correlation_time=correlation_time)
-        if not (math.isfinite(leap_rate) and leap_rate >= 0.0):
-            raise InputError(f"grid_filter leap_rate must be finite and ≥ 0, got {leap_rate!r}")
-        if not 0.0 < outlier_share < 1.0:
-            raise InputError(f"grid_filter outlier_share must lie between 0 and 1, got {outlier_share!r}")
         self._drift, self._leap_rate, self._leap_scale = drift, leap_rate, leap_scale
         self._relative_floor, self._outlier_share = relative_floor, outlier_share
         self._correlation_time = correlation_time
@@ -156,9 +154,3 @@ class GridFilter:
         # An outlier is any ln k on the grid: 1 / (k LOG_RANGE) in k, and no more than that at k̂ = 0.
         outlier = 1.0 / (LOG_RANGE * max(measured, deviation))
         return np.asarray(np.log1p((1.0 - self._outlier_share) / self._outlier_share * density / outlier))
-
-
-def _check(**parameters: float) -> None:
-    for name, value in parameters.items():
-        if not (math.isfinite(value) and value > 0.0):
-            raise InputError(f"grid_filter {name} must be finite and positive, got {value!r}")

@@ -1,12 +1,15 @@
 """Lamps by the rules of the road."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
+from fogsim.parameters import Range, checked_parameters
 from fogsim.values import Belief, Lamp
 
 BY_DAY = Lamp.POSITION | Lamp.LOW_BEAM
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class FogLampRules:
     """Fog lamps by visibility, with hysteresis.
@@ -20,11 +23,16 @@ class FogLampRules:
         Visibility below which the lamps go on [m].
     hysteresis : float
         They go off when visibility exceeds the threshold by this share [-].
+
+    Raises
+    ------
+    InputError
+        If a parameter is out of the range in its annotation.
     """
 
-    rear_fog_below: float = 50.0
-    front_fog_below: float = 100.0
-    hysteresis: float = 0.2
+    rear_fog_below: Annotated[float, Range(0.0, 1e6, "m")] = 50.0
+    front_fog_below: Annotated[float, Range(0.0, 1e6, "m")] = 100.0
+    hysteresis: Annotated[float, Range(0.0, 10.0)] = 0.2
 
     def lamps(self, belief: Belief, previous: Lamp) -> Lamp:
         """Choose the lamps to light; see `LightingPolicy.lamps`."""

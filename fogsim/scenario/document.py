@@ -46,11 +46,15 @@ class Document:
         overrides : iterable of str
             ``key.path=value`` each, known to be well formed.
         """
-        set_by = {}
+        origins = dict(self.origins)
         for text in overrides:
             keys = text.partition("=")[0].strip().split(".")
-            set_by[tuple(int(key) if key.isdecimal() else key for key in keys)] = f"--set {text}"
-        return replace(self, origins={**self.origins, **set_by})
+            at = tuple(int(key) if key.isdecimal() else key for key in keys)
+            origins = {key: origin for key, origin in origins.items() if key[: len(at)] != at}
+            for length in range(1, len(at)):
+                origins.setdefault(at[:length], f"--set {text}")
+            origins[at] = f"--set {text}"
+        return replace(self, origins=origins)
 
 
 def read_document(path: Path) -> Document:

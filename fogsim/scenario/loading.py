@@ -12,6 +12,7 @@ from pydantic_core import ErrorDetails
 from fogsim.errors import InputError, suggest
 from fogsim.scenario.document import Document, KeyPath, dotted, read_document
 from fogsim.scenario.locating import SCENARIO_FILE, scenario_file
+from fogsim.scenario.methods import MISTAKE
 from fogsim.scenario.overrides import apply_overrides
 from fogsim.scenario.schema import Scenario
 from fogsim.scenario.traffic_schema import AnyEvent
@@ -133,7 +134,7 @@ def _checked(document: Document, overrides: Iterable[str], folder: Path, named_f
     try:
         scenario = Scenario.model_validate({**data, "directory": folder})
     except ValidationError as error:
-        mistakes = [_told(document, detail) for detail in error.errors()] + mistakes
+        mistakes = [_told(document, detail) for detail in _without_consequences(error.errors())] + mistakes
     if mistakes:
         raise InputError("\n".join(mistakes))
     _check_files(document, scenario)
@@ -148,6 +149,12 @@ def _unnamed_files(document: Document, data: dict[str, Any]) -> list[str]:
     what = "net with routes is required, or config (a SUMO configuration) in their place"
     where = document.where(("traffic",))
     return [f"{where}: traffic.{key}: this key is missing; {what}" for key in ("net", "routes") if not traffic.get(key)]
+
+
+def _without_consequences(details: Sequence[ErrorDetails]) -> list[ErrorDetails]:
+    """Mistakes that are not there for another's sake: a list whose entries are wrong is not too short."""
+    places = [detail["loc"] for detail in details]
+    return [d for d in details if not any(len(p) > len(d["loc"]) and p[: len(d["loc"])] == d["loc"] for p in places)]
 
 
 def _told(document: Document, detail: ErrorDetails) -> str:
@@ -165,6 +172,8 @@ def _told(document: Document, detail: ErrorDetails) -> str:
         return f"{where}.kind: this key is missing; it is required"
     if detail["type"] == "missing":
         return f"{where}: this key is missing; it is required"
+    if detail["type"] == MISTAKE:
+        return f"{where}: {detail['msg']}"
     message = detail["msg"].removeprefix("Value error, ")
     value = detail["input"]
     # A message about a whole block names the values that it is about itself.

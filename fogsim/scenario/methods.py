@@ -1,16 +1,20 @@
 """Named methods with parameters, checked against the constructors that they will be handed to."""
 
-import inspect
 from collections.abc import Callable
 from typing import Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from fogsim.errors import UnknownNameError, suggest
+from fogsim.errors import UnknownNameError
+from fogsim.parameters import parameter_mistakes
 from fogsim.registry import Registry
 
 GIVEN_BY_THE_LOOP = frozenset({"camera"})
 """Constructor arguments that the loop hands in, so no scenario sets them."""
+
+MISTAKE = "parameter"
+"""Type of the errors of parameters, whose messages say all."""
 
 
 class Method(BaseModel):
@@ -26,7 +30,7 @@ def method_of(registry: Registry[Callable[..., Any]]) -> BeforeValidator:
     """Validator of one registry's methods.
 
     A method may be written as its bare name; names that the registry does not know are refused, and so are parameters
-    that the method does not have or that are of a wrong type.
+    that the method does not have, and values that its annotations do not allow.
     """
 
     def check(value: object) -> object:
@@ -37,32 +41,18 @@ def method_of(registry: Registry[Callable[..., Any]]) -> BeforeValidator:
             except UnknownNameError as error:
                 # Only a plain ValueError is a message to pydantic's user.
                 raise ValueError(str(error)) from None
-            _check_parameters(factory, written.get("parameters") or {})
+            _check_parameters(factory, written.get("parameters"))
         return written
 
     return BeforeValidator(check)
 
 
 def _check_parameters(factory: Callable[..., Any], parameters: object) -> None:
-    model = parameters_model(factory)
-    try:
-        model.model_validate(parameters)
-    except ValidationError as error:
-        told = []
-        for detail in error.errors():
-            name = ".".join(map(str, detail["loc"]))
-            if detail["type"] == "extra_forbidden":
-                told.append(f"unknown parameter {name!r}; {suggest(name, model.model_fields)}")
-            else:
-                told.append(f"parameter {name!r}: {detail['msg']}; got {detail['input']!r}")
-        raise ValueError("; ".join(told)) from None
-
-
-def parameters_model(factory: Callable[..., Any]) -> type[BaseModel]:
-    """Schema of a factory's parameters, made from its signature."""
-    fields: dict[str, Any] = {
-        name: (parameter.annotation, ... if parameter.default is parameter.empty else parameter.default)
-        for name, parameter in inspect.signature(factory, eval_str=True).parameters.items()
-        if name not in GIVEN_BY_THE_LOOP
-    }
-    return create_model("Parameters", __config__=ConfigDict(extra="forbid"), **fields)
+    if not isinstance(parameters, dict | None):
+        return  # the model says what it must be
+    mistakes = [
+        InitErrorDetails(type=PydanticCustomError(MISTAKE, "{told}", {"told": told}), loc=("parameters", name), input=0)
+        for name, told in parameter_mistakes(factory, parameters or {}, GIVEN_BY_THE_LOOP)
+    ]
+    if mistakes:
+        raise ValidationError.from_exception_data("parameters", mistakes)

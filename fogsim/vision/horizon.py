@@ -2,16 +2,20 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.parameters import Range
 from fogsim.values.camera import Camera
 
 PITCH_DEVIATION = math.radians(0.1)
 """Standard deviation of a vehicle's pitch about its calibration [rad]: load, suspension, uneven road."""
+
+PitchDeviation = Annotated[float, Range(1e-6, 0.2, "rad")]
+"""Standard deviation of the pitch as methods are told it [rad]."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -67,9 +67,13 @@ def test_an_unknown_key_inside_a_list(folder: Path) -> None:
         (
             "reaction_time: 2.0",
             "reaction: 2.0",
-            r"advice: unknown parameter 'reaction'; did you mean 'reaction_time'\?",
+            r"\.yaml:\d+: advice\.parameters\.reaction: unknown parameter; did you mean 'reaction_time'\?",
         ),
-        ("reaction_time: 2.0", "reaction_time: fast", r"advice: parameter 'reaction_time': .*valid number.*got 'fast'"),
+        (
+            "reaction_time: 2.0",
+            "reaction_time: fast",
+            r"\.yaml:\d+: advice\.parameters\.reaction_time: must be a number 0 … 60 s, got 'fast'",
+        ),
         (
             "camera_period_s: 0.1",
             "camera_period_s: 0.25",
@@ -100,6 +104,12 @@ def test_a_missing_file_names_what_is_there(folder: Path) -> None:
     ) as e:
         load_scenario(file)
     assert "did you mean 'motorway.net.xml'?" in str(e.value)
+
+
+def test_no_second_message_follows_a_mistake(folder: Path) -> None:
+    with pytest.raises(InputError) as error:
+        load_scenario(spoil(folder, "[negru2013]", "[negru2014]"))
+    assert len(str(error.value).splitlines()) == 1
 
 
 def test_every_mistake_is_told_at_once(folder: Path) -> None:

@@ -14,6 +14,7 @@ from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation
 from fogsim.vision.agreeing_strips import fit_own, with_neighbours
+from fogsim.vision.daylight import lit_by_lamps
 from fogsim.vision.horizon import PITCH_DEVIATION, Horizon, PitchDeviation, calibrated_horizon, levelled, weighed
 from fogsim.vision.joint_checks import no_road
 from fogsim.vision.joint_fit import JointFit, JointPrior
@@ -145,12 +146,15 @@ class JointRoad:
         }
         if self._impossible:
             return Estimate.invalid(self.method, self._impossible, **found)
-        pixels = linear_pixels(levelled(image, self._camera), self._camera)
+        level = levelled(image, self._camera)
+        pixels = linear_pixels(level, self._camera)
         sky = sky_above(pixels, self._camera, 3.0 * self._horizon.standard_deviation + 2.0)
         if sky is None or sky.luminance < MIN_AIRLIGHT:
             return Estimate.invalid(
                 self.method, "too dark above the horizon, or no sky: this is a daytime method", **found
             )
+        if why := lit_by_lamps(level, self._camera):
+            return Estimate.invalid(self.method, why, **found)
         prior = joint_prior(sky, self._camera, self._seen_horizon(pixels))
         fit = self._fitted(pixels, sky, prior, _free_road(observation.lead))
         if isinstance(fit, str):

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
+from fogsim.vision.daylight import lit_by_lamps
 from fogsim.vision.horizon import Horizon, levelled
 from fogsim.vision.luminance import linear_luminance
 from fogsim.vision.median import median, quantile
@@ -94,8 +95,8 @@ def road_image(
     Raises
     ------
     CannotTellError
-        If the horizon is outside the image, the image too small, too dark or saturated, or the road not darker than
-        the airlight.
+        If the horizon is outside the image, the image too small, too dark or saturated, the road not darker than the
+        airlight, or lamps light it.
     """
     rows, cols = image.shape[:2]
     if not 1.0 <= horizon.row <= rows - 1:
@@ -112,7 +113,10 @@ def road_image(
     above = linear_luminance(sky, camera.response, camera.bits)
     airlight = quantile(above, 0.9)
     seed = median(luminance[-1])
-    return _checked(RoadImage(luminance, first, sky_end - first, airlight, seed, level, left))
+    road = _checked(RoadImage(luminance, first, sky_end - first, airlight, seed, level, left))
+    if why := lit_by_lamps(level, camera):
+        raise CannotTellError(why)
+    return road
 
 
 def _checked(road: RoadImage) -> RoadImage:

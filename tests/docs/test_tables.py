@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from pkgutil import resolve_name
 
@@ -46,14 +47,24 @@ def cells(row: str) -> int:
     return len(re.findall(r"(?<!\\)\|", row)) - 1
 
 
-def test_tables_are_up_to_date() -> None:
+@pytest.mark.parametrize("command", [("make_tables.py",), ("make_measured_tables.py", "readme", "night")])
+def test_tables_are_up_to_date(command: tuple[str, ...]) -> None:
+    script, *names = command
     done = subprocess.run(
-        [sys.executable, str(CHECKOUT / "docs" / "make_tables.py"), "--check"],
+        [sys.executable, str(CHECKOUT / "docs" / script), "--check", *names],
         capture_output=True,
         text=True,
         check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_measured_numbers_may_differ_by_one_in_the_last_digit(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(CHECKOUT / "docs"))
+    same = import_module("make_measured_tables").same
+    assert same("| 0.82 … 1.04 | 20 |", "| 0.83 … 1.04 | 19 |")
+    for other in ("| 0.84 … 1.04 | 20 |", "| 0.82 … 1.04 | < 20 |", "| 0.8 … 1.04 | 20 |", "| 0.82 … 1.04 | 20 | 1 |"):
+        assert not same("| 0.82 … 1.04 | 20 |", other)
 
 
 @every_page

@@ -1,35 +1,53 @@
-"""How far the night models of `fogsim.atmosphere` are from photons: prints the tables of docs/night.md.
+"""How far the night models of `fogsim.atmosphere` are from photons and from gallen2014: the tables of docs/night.md.
 
-python benchmarks/night_deviations.py
+Also how much less light a Henyey–Greenstein function with g = 0.85 sends back than the droplets do.
+
+    python benchmarks/night_deviations.py
+
+`python docs/make_measured_tables.py night` writes them into the page.
 """
 
 import math
+from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fogsim.atmosphere.glow import glow, narasimhan_nayar, scattered_once
 from fogsim.atmosphere.lamp_tables import lamp_table
-from fogsim.atmosphere.phase import Droplets, phase_function
+from fogsim.atmosphere.night_visibility import FogKind, high_beam_veil, visibility_distance
+from fogsim.atmosphere.phase import Droplets, henyey_greenstein, phase_function
 from fogsim.atmosphere.veil import FOLD_DISTANCE, INTERVALS, VeilRays, lit_air, ray_pieces, veil_along
-from fogsim.lighting.beams import high_beam, low_beam
+from fogsim.lighting.beams import high_beam, low_beam, scaled_beam
 from fogsim.units import extinction_from_visibility
+from fogsim.values import Beam
 
 DATA = Path(__file__).parents[1] / "tests" / "data"
 LAMPS = ((1.8, 0.6, -0.85), (1.8, -0.6, -0.85))
 SURE = 0.15
+"""Standard error of the photons below which they count, relative to them."""
+TARGET = -2.02
+"""Elevation of a point on the road 40 m ahead [degrees]."""
+BACK = math.radians(150.0)
+"""Scattering angle beyond which light of the own head lamps comes back."""
+
+Rows = list[tuple[str, ...]]
 
 
-def read(name):
+@cache
+def photons(name: str) -> NDArray[Any]:
     """A table of photons."""
     lines = [line for line in (DATA / name).read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
     return np.genfromtxt(lines, delimiter=",", names=True, dtype=None, encoding="utf-8")
 
 
-def modelled_veils(rows):
-    """The model's veil for each row of the photons' table."""
+def modelled_veils(rows: NDArray[Any]) -> Iterator[float]:
+    """The model's veil for each row of the photons' table [cd/m²]."""
     tables = {"low": lamp_table(low_beam()), "high": lamp_table(high_beam())}
-    known = {}
+    known: dict[tuple[Any, ...], Any] = {}
     for row in rows:
         key = (row["fog"], row["beam"], row["right"], row["up"])
         if key not in known:
@@ -42,31 +60,56 @@ def modelled_veils(rows):
         yield float(np.interp(node, np.arange(INTERVALS + 1), veil_along(known[key], k, k)[0]))
 
 
-def print_veils():
-    """Ratio of model to photons by visibility and direction."""
-    rows = read("monte_carlo_veil.csv")
+def rms_of_ln(ratio: NDArray[np.float64]) -> float:
+    """Root mean square of the logarithm of ratios."""
+    return math.sqrt(np.mean(np.log(ratio) ** 2))
+
+
+def veils() -> Rows:
+    """Ratio of model to photons by visibility: toward a target, anywhere, and how far either model is off."""
+    rows = photons("monte_carlo_veil.csv")
+    rows = rows[rows["all_error"] < SURE * rows["all"]]
     ratio = np.array(list(modelled_veils(rows))) / rows["all"]
-    sure = rows["all_error"] < SURE * rows["all"]
-    directions = list(dict.fromkeys((float(row["right"]), float(row["up"])) for row in rows))
-    print("| fog | beam | V_met | " + " | ".join(f"{r:g}°, {u:g}°" for r, u in directions) + " |")
-    print("|---|---|---|" + "---|" * len(directions))
-    for fog in dict.fromkeys(rows["fog"]):
-        for beam in ("low", "high"):
-            for visibility in dict.fromkeys(rows["visibility"]):
-                cells = []
-                for right, up in directions:
-                    here = (rows["fog"] == fog) & (rows["beam"] == beam) & (rows["visibility"] == visibility)
-                    here &= (rows["right"] == right) & (rows["up"] == up)
-                    cells.append(f"{ratio[here][0]:.2f}" if sure[here][0] else "–")
-                print(f"| {fog} | {beam} | {visibility:g} | " + " | ".join(cells) + " |")
+    table: Rows = []
+    for visibility in dict.fromkeys(rows["visibility"]):
+        here = rows["visibility"] == visibility
+        ahead = ratio[here & (rows["up"] == TARGET)]
+        anywhere = ratio[here]
+        ranges = [f"{some.min():.2f} … {some.max():.2f}" for some in (ahead, anywhere)]
+        once = rms_of_ln(rows["single"][here] / rows["all"][here])
+        table.append((f"{visibility:g}", *ranges, f"{rms_of_ln(anywhere):.2f}", f"{once:.2f}"))
+    return [
+        ("V_met [m]", "toward a target 40 m ahead", "anywhere", "rms of ln", "rms of ln, single scattering"),
+        *sorted(table, key=lambda row: float(row[0])),
+    ]
 
 
-def print_halos():
+def veils_of_gallen() -> Rows:
+    """gallen2014's veil of high beams and ours by photons' table and model, toward the same target [cd/m²]."""
+    rows = photons("monte_carlo_veil.csv")
+    rows = rows[rows["up"] == TARGET]
+    ours = np.array(list(modelled_veils(rows)))
+    heading: tuple[str, ...] = ("V_met [m]",)
+    table = {visibility: [f"{visibility:g}"] for visibility in (30.0, 50.0, 100.0, 200.0, 300.0, 500.0)}
+    for kind, droplets in (
+        (FogKind.RADIATION, Droplets.MODERATE_RADIATION),
+        (FogKind.ADVECTION, Droplets.HEAVY_ADVECTION),
+    ):
+        heading += (f"{kind}: eq. 9", "high", "high, single", "low", "low, single")
+        for visibility, cells in table.items():
+            cells.append(f"{high_beam_veil(visibility, kind):.3f}")
+            for beam, digits in (("high", 2), ("low", 3)):
+                here = (rows["visibility"] == visibility) & (rows["fog"] == droplets) & (rows["beam"] == beam)
+                (whole,), (once,) = ours[here], rows["single"][here]
+                cells += [f"{whole:.2f}", f"{once:.{digits}f}"]
+    return [heading, *map(tuple, table.values())]
+
+
+def glows() -> Rows:
     """Root mean square of ln(model / photons) below 70° by optical depth, for three models."""
-    rows = read("monte_carlo_halo.csv")
+    rows = photons("monte_carlo_halo.csv")
     rows = rows[rows["angle"] < 70]
-    print("| fog | T | FogSim | single scattering | Narasimhan & Nayar, q = 0.9 |")
-    print("|---|---|---|---|---|")
+    table: Rows = [("fog", "T", "FogSim", "single scattering", "Narasimhan & Nayar, q = 0.9")]
     for droplets in Droplets:
         for depth in dict.fromkeys(rows["optical_depth"]):
             some = rows[(rows["fog"] == droplets) & (rows["optical_depth"] == depth)]
@@ -75,15 +118,82 @@ def print_halos():
             if depth > 1:
                 # Far from the source their series is the flux of the source: 3 / (4 π) makes it so.
                 models.append(3 / (4 * math.pi) * narasimhan_nayar(depth, angle))
-            cells = [f"{math.sqrt(np.mean(np.log(model / some['all']) ** 2)):.2f}" for model in models]
-            print(f"| {droplets} | {depth:g} | " + " | ".join([*cells, "diverges"][:3]) + " |")
+            cells = [f"{rms_of_ln(model / some['all']):.2f}" for model in models]
+            table.append((str(droplets), f"{depth:g}", *[*cells, "diverges"][:3]))
+    return table
 
 
-def main():
-    """Print both."""
-    print_veils()
-    print()
-    print_halos()
+def turning_point(difference: Callable[[float], float], low: float = 20.0, high: float = 5000.0) -> float:
+    """Visibility at which a difference turns positive [m], `low` if it is so all along."""
+    if difference(low) > 0:
+        return low
+    for _ in range(40):
+        middle = math.sqrt(low * high)
+        low, high = (low, middle) if difference(middle) > 0 else (middle, high)
+    return high
+
+
+def equal_sight(low: Beam, kind: FogKind, veil_share: float) -> str:
+    """V_met at which high and low beams show equally far (gallen2014 eq. 11)."""
+    found = turning_point(
+        lambda v: visibility_distance(high_beam(), v, kind) - visibility_distance(low, v, kind, veil_share=veil_share)
+    )
+    return "< 20" if found <= 20.0 else f"{found:.0f}"
+
+
+def clear_low_sight(low: Beam, kind: FogKind) -> str:
+    """V_met at which high beams show as far as low beams do in clear air (gallen2014 eq. 12)."""
+    far = visibility_distance(low, math.inf)
+    return f"{turning_point(lambda v: visibility_distance(high_beam(), v, kind) - far):.0f}"
+
+
+def limits() -> Rows:
+    """What comes out of the paper's limits, with beams of several strengths."""
+    third = scaled_beam(low_beam(), 0.3)
+    several = [scaled_beam(low_beam(), strength) for strength in (1.0, 0.5, 0.25)]
+    return [
+        ("", "radiation", "advection", "paper"),
+        ("high beam × 1, low beam × 0.3, low beam's veil 0.1 of the high beam's", "", "", ""),
+        (
+            "V_met at which both beams show equally far (eq. 11)",
+            *(f"{equal_sight(third, kind, 0.1)} m" for kind in FogKind),
+            "100 m",
+        ),
+        (
+            "V_met at which high beams show as far as low beams in clear air (eq. 12)",
+            *(f"{clear_low_sight(third, kind)} m" for kind in FogKind),
+            "300 m",
+        ),
+        (
+            "low beam as measured in the US (× 1): eq. 12",
+            *(f"{clear_low_sight(low_beam(), kind)} m" for kind in FogKind),
+            "300 m",
+        ),
+        (
+            "one veil for both beams, low × 1 / 0.5 / 0.25: eq. 11",
+            *(" / ".join(equal_sight(one, kind, 1.0) for one in several) + " m" for kind in FogKind),
+            "100 m",
+        ),
+    ]
+
+
+def backscatter() -> Rows:
+    """Light scattered by more than 150°: droplets over Henyey & Greenstein, g = 0.85."""
+    angle = np.linspace(BACK, math.pi, 2001)
+    plain = np.trapezoid(henyey_greenstein(angle, 0.85) * np.sin(angle), angle)
+    ratios = [np.trapezoid(phase_function(one)(angle) * np.sin(angle), angle) / plain for one in Droplets]
+    return [
+        ("droplets", "light scattered by more than 150°, over that of Henyey & Greenstein"),
+        *((str(one), f"{ratio:.1f}") for one, ratio in zip(Droplets, ratios, strict=True)),
+    ]
+
+
+def main() -> None:
+    """Print them all."""
+    for table in (veils, veils_of_gallen, glows, limits, backscatter):
+        heading, *rows = table()
+        lines = [heading, tuple("---" for _ in heading), *rows]
+        print("\n".join("| " + " | ".join(cells) + " |" for cells in lines) + "\n")
 
 
 if __name__ == "__main__":

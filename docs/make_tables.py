@@ -123,8 +123,13 @@ def filled(text: str, marker: str, headings: tuple[str, ...], rows: list[tuple[s
     before, rest = text.split(begin, 1)
     after = rest.split(END, 1)[1]
     lines = [headings, tuple("---" for _ in headings), *rows]
-    table = "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
+    table = "\n".join("| " + " | ".join(map(_cell, cells)) + " |" for cells in lines)
     return f"{before}{begin}\n\n{table}\n\n{END}{after}"
+
+
+def _cell(text: str) -> str:
+    """Text that stays in one cell: in one line, with no pipe that would part it."""
+    return " ".join(text.split()).replace("|", r"\|")
 
 
 def pages() -> dict[Path, str]:

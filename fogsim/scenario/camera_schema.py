@@ -91,7 +91,7 @@ class CameraSection(Section):
     """Focal length, in place of the field of view."""
 
     principal_point_px: tuple[float, float] | None = None
-    """Principal point [u0, v0]; the middle of the image if not given."""
+    """Principal point [u0, v0]; if not given [width / 2, height / 2], half a pixel right of and below the middle."""
 
     mount_height_m: Positive = 1.38
     """Height of the camera above the road."""

@@ -1,19 +1,57 @@
-"""The docs say what the code says."""
+"""The docs say what the code says, and hang together: tables, links, and the files and names that they speak of."""
 
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
+from pkgutil import resolve_name
 
 import pytest
 
 CHECKOUT = Path(__file__).resolve().parents[2]
-PAGES = [CHECKOUT / "README.md", CHECKOUT / "CONTRIBUTING.md", *sorted((CHECKOUT / "docs").glob("*.md"))]
+PAGES = [
+    *(CHECKOUT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")),
+    *sorted((CHECKOUT / "docs").glob("*.md")),
+    *sorted((CHECKOUT / "scenarios").glob("*/README.md")),
+]
+
+every_page = pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(CHECKOUT)))
 
 
-def test_tables_are_up_to_date() -> None:
+def prose(page: Path) -> str:
+    """Text of a page without its fenced blocks."""
+    return re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+
+
+def anchors(page: Path) -> set[str]:
+    """Anchors that GitHub makes of a page's headings."""
+    titles = re.findall(r"^#+ (.+)$", prose(page), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).strip().replace(" ", "-") for title in titles}
+
+
+def tables(text: str) -> Iterator[list[str]]:
+    """Rows of each table: a table ends at an empty line, and only there."""
+    for paragraph in re.split(r"\n\s*\n", text):
+        lines = paragraph.splitlines()
+        first = next((number for number, line in enumerate(lines) if line.startswith("|")), None)
+        if first is not None:
+            yield lines[first:]
+
+
+def cells(row: str) -> int:
+    """How many cells a row has; a pipe parts them in code too, unless a backslash stands before it."""
+    assert row.startswith("|"), f"a row that is broken in two: {row!r}"
+    assert re.search(r"(?<!\\)\|$", row.rstrip()), f"a row that does not end: {row!r}"
+    return len(re.findall(r"(?<!\\)\|", row)) - 1
+
+
+@pytest.mark.parametrize("command", [("make_tables.py",), ("make_measured_tables.py", "readme", "night")])
+def test_tables_are_up_to_date(command: tuple[str, ...]) -> None:
+    script, *names = command
     done = subprocess.run(
-        [sys.executable, str(CHECKOUT / "docs" / "make_tables.py"), "--check"],
+        [sys.executable, str(CHECKOUT / "docs" / script), "--check", *names],
         capture_output=True,
         text=True,
         check=False,
@@ -21,15 +59,52 @@ def test_tables_are_up_to_date() -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_measured_numbers_may_differ_by_one_in_the_last_digit(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(CHECKOUT / "docs"))
+    same = import_module("make_measured_tables").same
+    assert same("| 0.82 … 1.04 | 20 |", "| 0.83 … 1.04 | 19 |")
+    for other in ("| 0.84 … 1.04 | 20 |", "| 0.82 … 1.04 | < 20 |", "| 0.8 … 1.04 | 20 |", "| 0.82 … 1.04 | 20 | 1 |"):
+        assert not same("| 0.82 … 1.04 | 20 |", other)
+
+
+@every_page
+def test_rows_of_a_table_have_the_same_cells(page: Path) -> None:
+    for heading, rule, *rows in tables(prose(page)):
+        assert re.fullmatch(r"\|( ?:?-+:? ?\|)+", rule), rule
+        assert {row: cells(row) for row in (rule, *rows) if cells(row) != cells(heading)} == {}
+
+
+def test_pipes_and_broken_rows_are_found() -> None:
+    assert cells(r"| a | \|V\| | `x \| y` |") == 3
+    assert cells("| a | |V| | b |") == 5
+    (rows,) = tables("text\n| a | b |\n|---|---|\n| 1 | below\nlamps |\n\nmore text\n")
+    with pytest.raises(AssertionError, match=r"broken in two|does not end"):
+        [cells(row) for row in rows]
+
+
+@every_page
 def test_links_lead_somewhere(page: Path) -> None:
-    targets = re.findall(r"\]\(([^)#]+)\)", page.read_text(encoding="utf-8"))
-    for target in targets:
-        if "://" not in target:
-            assert (page.parent / target).exists(), target
+    for link in re.findall(r"\]\(([^)\s]+)\)", prose(page)):
+        if "://" in link:
+            continue
+        target, _, anchor = link.partition("#")
+        file = page.parent / target if target else page
+        assert file.exists(), link
+        if anchor:
+            assert anchor in anchors(file), link
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
-def test_python_examples_are_python(page: Path) -> None:
-    for block in re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL):
-        compile(block, str(page), "exec")
+@every_page
+def test_files_that_are_named_exist(page: Path) -> None:
+    """What stands as code and begins like a path of the repository is one, seen from its root."""
+    named = re.findall(r"`(?:python )?((?:benchmarks|docs|envs|fogsim|tests|tools)/[\w./-]+)", prose(page))
+    environments = {"fogsim/FogAdvisory-v0", "fogsim/FogHighway-v0"}
+    assert [name for name in named if name not in environments and not (CHECKOUT / name).exists()] == []
+
+
+@every_page
+def test_names_of_the_package_exist(page: Path) -> None:
+    for name in re.findall(r"`((?:fogsim|fogsim_envs)(?:\.\w+)+)\b", prose(page)):
+        # Types of signs begin likewise, and are data.
+        if not name.startswith("fogsim.sign") and name != "fogsim.complete":
+            resolve_name(name)

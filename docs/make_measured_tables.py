@@ -1,0 +1,117 @@
+"""Write those tables of the docs that are measured: ``python docs/make_measured_tables.py [--check] [NAME …]``.
+
+Without names all of them (minutes, for zhu2015). ``--check`` writes nothing and says which are not up to date; the last
+digit may differ by one, as rounding on another processor may. Tables of benchmarks that take longer, or measure time,
+are written by these: ``python benchmarks/estimator_accuracy.py --docs``, and ``estimator_targets.py`` and
+``lead_accuracy.py`` likewise. The README's table is an excerpt of the first, so write it after that.
+"""
+
+import argparse
+import re
+import sys
+from collections.abc import Callable
+
+from make_tables import END, HERE, filled
+
+ROOT = HERE.parent
+sys.path.insert(0, str(ROOT / "benchmarks"))
+
+import night_deviations  # noqa: E402 - from the folder that was just named
+
+from fogsim.reproduce import REPRODUCTIONS  # noqa: E402 - stands after the benchmark's own import
+
+Rows = list[tuple[str, ...]]
+
+EXCERPT = {
+    "joint_road": "joint_road",
+    "negru2013": "negru2013, corrected",
+    "negru2013, as published": "negru2013, as published",
+}
+"""Methods of the README's table, by what the page on estimators calls them."""
+
+
+def readme() -> Rows:
+    """Errors of some methods with an untold vehicle ahead, as the page on estimators has them, to two digits."""
+    page = (HERE / "estimators.md").read_text(encoding="utf-8")
+    table = page.split("<!-- table: accuracy -->", 1)[1].split("\n\n")[2].splitlines()
+    heading, _, *rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table]
+    found = {row[0]: row[2:] for row in rows if row[1] == "untold"}
+    ranges = [cell.partition(" ")[0].replace("-", "–") for cell in heading[2:]]
+    return [
+        ("V_met [m]", *ranges),
+        *(
+            (name, *(" / ".join(map(_short, cell.split(" / "))) for cell in found[form]))
+            for form, name in EXCERPT.items()
+        ),
+    ]
+
+
+def _short(number: str) -> str:
+    return f"{float(number):.1f}" if float(number) < 9.95 else f"{float(number):.0f}"
+
+
+def zhu2015() -> Rows:
+    """What `fogsim reproduce zhu2015` prints."""
+    return list(REPRODUCTIONS["zhu2015"]().table)
+
+
+TABLES: dict[str, tuple[str, Callable[[], Rows]]] = {
+    "readme": ("README.md", readme),
+    "night-veils": ("docs/night.md", night_deviations.veils),
+    "night-gallen2014": ("docs/night.md", night_deviations.veils_of_gallen),
+    "night-glows": ("docs/night.md", night_deviations.glows),
+    "night-limits": ("docs/night.md", night_deviations.limits),
+    "night-backscatter": ("docs/night.md", night_deviations.backscatter),
+    "zhu2015": ("docs/estimators.md", zhu2015),
+}
+"""Page and rows of each table, by its name and marker."""
+
+
+def chosen(names: list[str]) -> list[str]:
+    """Names of tables, where a name stands for all that begin with it."""
+    for name in names:
+        if not any(known.startswith(name) for known in TABLES):
+            sys.exit(f"no table is called {name}; there are {', '.join(TABLES)}")
+    return [known for known in TABLES if not names or any(known.startswith(name) for name in names)]
+
+
+def same(kept: str, measured: str) -> bool:
+    """Whether two texts differ in no more than the last digits of their numbers, by one."""
+    number = r"\d+(?:\.\d+)?"
+    ours, theirs = re.findall(number, kept), re.findall(number, measured)
+    return re.split(number, kept) == re.split(number, measured) and all(
+        len(one.partition(".")[2]) == len(other.partition(".")[2])
+        and abs(round((float(one) - float(other)) * 10 ** len(one.partition(".")[2]))) <= 1
+        for one, other in zip(ours, theirs, strict=True)
+    )
+
+
+def kept_table(text: str, marker: str) -> str:
+    """The table that a page has."""
+    return text.split(f"<!-- table: {marker} -->", 1)[1].split(END, 1)[0]
+
+
+def main() -> int:
+    """Write the tables, or say which are not up to date."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(TABLES))
+    parser.add_argument("--check", action="store_true", help="write nothing, say which are not up to date")
+    arguments = parser.parse_args()
+    stale = []
+    for name in chosen(arguments.names):
+        page, measured = TABLES[name]
+        path = ROOT / page
+        heading, *rows = measured()
+        text = path.read_text(encoding="utf-8")
+        new = filled(text, name, heading, rows)
+        if not same(kept_table(text, name), kept_table(new, name)):
+            stale.append(f"{page}: the table {name} is not up to date: run python docs/make_measured_tables.py {name}")
+            if not arguments.check:
+                path.write_text(new, encoding="utf-8")
+    if arguments.check and stale:
+        print("\n".join(stale))  # noqa: T201 - the lines are the result
+    return int(bool(arguments.check and stale))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,118 @@
+"""What a reader of the pages has at hand: a SUMO simulation, photographs, a video, a scenario and a camera file."""
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sumo
+from flat_road import Road, photograph, scan
+from PIL import Image
+
+from fogsim.camera_file import load_calibration
+from fogsim.recorders.video import Encoder, encoder_command
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+PLUGIN = (CHECKOUT / "docs" / "plugin.md").read_text(encoding="utf-8")
+SCENARIOS = (CHECKOUT / "docs" / "scenarios.md").read_text(encoding="utf-8")
+VISIBILITY, SAMPLES = 80.0, 2
+
+TRIPS = """<routes>
+    <trip id="veh17" depart="0" departPos="50" from="B0A0" to="B0A0"/>
+    <trip id="veh18" depart="1" departPos="20" from="B0A0" to="B0A0" departSpeed="8"/>
+</routes>
+"""
+CAMERA = """width: 640
+height: 480
+focal_length_px: 576.9
+principal_point_px: [319.5, 239.5]
+mount_height_m: 1.38
+pitch_deg: 2.0
+response: srgb
+"""
+
+Run = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder of the user's, with my/town.sumocfg."""
+    shutil.copytree(CHECKOUT / "tests" / "data" / "grid", tmp_path / "my")
+    (tmp_path / "my" / "grid.sumocfg").rename(tmp_path / "my" / "town.sumocfg")
+    (tmp_path / "my" / "grid.trips.xml").write_text(TRIPS, encoding="utf-8")
+    return tmp_path
+
+
+@pytest.fixture
+def python(folder: Path) -> Run:
+    """Run Python code as a script of the user's, in that folder."""
+
+    def run(code: str, *arguments: str) -> "subprocess.CompletedProcess[str]":
+        command = [sys.executable, "-c", code, *arguments]
+        environment = {**os.environ, "COLUMNS": "200", "NO_COLOR": "1"}
+        return subprocess.run(
+            command, cwd=folder, capture_output=True, text=True, timeout=250, env=environment, check=False
+        )
+
+    return run
+
+
+@pytest.fixture
+def readers_folder(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """Makes a folder with what the text of a page speaks of."""
+
+    def make(page: str) -> Path:
+        made = shutil.copytree(folder, tmp_path_factory.mktemp("reader") / "home")
+        if "camera.yaml" in page:
+            (calibration,) = re.findall(r"```yaml\n(width: .*?)```", page, re.DOTALL) or (CAMERA,)
+            put_pictures(made, calibration)
+        if "my/scenario.yaml" in page:
+            put_scenario(made)
+        return made
+
+    return make
+
+
+def put_pictures(folder: Path, calibration: str) -> None:
+    """Put camera.yaml and what that camera sees in fog into a folder: photographs, a depth map, a video."""
+    (folder / "camera.yaml").write_text(calibration, encoding="utf-8")
+    camera = load_calibration(folder / "camera.yaml").camera
+    road = Road(VISIBILITY, camera=camera)
+    luminance, length = scan(road, 1, SAMPLES)
+    image = np.repeat(photograph(road, (luminance, length), 1)[..., None], 3, axis=2)
+    (folder / "drive").mkdir()
+    for name in ("photo.png", "photo.jpg", "day.png", "drive/0001.png", "drive/0002.png"):
+        Image.fromarray(image).save(folder / name)
+    np.save(folder / "depth.npy", np.minimum(length[::SAMPLES, ::SAMPLES], 1e4).astype(np.float32))
+    for name in ("drive.mp4", "video.mp4"):
+        encoder = Encoder(encoder_command(folder / name, 0.1, (camera.width, camera.height)))
+        encoder.write(image.tobytes())
+        encoder.finish()
+
+
+def put_scenario(folder: Path) -> None:
+    """Put my/scenario.yaml, as the page on scenario files prints it, into a folder."""
+    (text,) = re.findall(r"```yaml\n(.*?)```", SCENARIOS, re.DOTALL)
+    (folder / "my" / "scenario.yaml").write_text(text, encoding="utf-8")
+    shutil.copy(folder / "my" / "grid.net.xml", folder / "my" / "my.net.xml")
+    (folder / "my" / "my.rou.xml").write_text(TRIPS.replace("veh18", "ego"), encoding="utf-8")
+
+
+@pytest.fixture
+def listening(folder: Path, free_port: Callable[[], int]) -> Iterator[int]:
+    """Port of the SUMO that the page on the plug-in lets the user start."""
+    (line,) = re.findall(r"^    (sumo -c .*)$", PLUGIN, re.MULTILINE)
+    port = free_port()
+    arguments = shlex.split(line.replace("8813", str(port)))[1:]
+    program = Path(sumo.SUMO_HOME, "bin", "sumo")
+    with subprocess.Popen([program, *arguments], cwd=folder, stdout=subprocess.DEVNULL) as process:
+        try:
+            yield port
+        finally:
+            process.kill()

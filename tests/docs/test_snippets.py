@@ -1,0 +1,128 @@
+"""What the pages print runs as it is printed: every block of Python by itself, and the command lines.
+
+Stand-ins: a folder with the reader's own files for each page (see conftest.py), the port of a SUMO that is started, and
+for command lines a smaller camera, a shorter run and fewer frames than the page asks for. All runs in one process,
+since most of the time goes into its first frame.
+"""
+
+import json
+import re
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+from subprocess import CompletedProcess
+from typing import Any
+
+import pytest
+import typer
+
+from fogsim.cli import app
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+TEXTS = {
+    str(page.relative_to(CHECKOUT)): page.read_text(encoding="utf-8")
+    for page in (
+        *(CHECKOUT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")),
+        *sorted((CHECKOUT / "docs").glob("*.md")),
+        *sorted((CHECKOUT / "scenarios").glob("*/README.md")),
+    )
+}
+PYTHON = {page: re.findall(r"```python\n(.*?)```", text, re.DOTALL) for page, text in TEXTS.items()}
+LINES = {page: re.findall(r"^(?:    )?(fogsim .*)$", text, re.MULTILINE) for page, text in TEXTS.items()}
+"""Command lines that stand by themselves."""
+MENTIONS = {page: re.findall(r"`((?:fogsim|python) [^`]+)`", text) for page, text in TEXTS.items()}
+"""Those within the text, perhaps with words in place of values."""
+
+KNOWN: dict[str, Any] = typer.main.get_command(app).commands  # type: ignore[attr-defined]  # a group has commands
+LONG = ("reproduce",)
+"""Commands that take minutes are parsed only."""
+NOT_YET = {"test", "study"}
+"""Commands that README.md says are not there."""
+SHORT = ("--set", "camera.width=64", "--set", "camera.height=48", "--set", "duration_s=0.5")
+
+RUNNER = """
+import json, os, sys, traceback
+from fogsim.cli import main
+
+def command(line):
+    sys.argv = line
+    try:
+        main()
+    except SystemExit as end:
+        assert not end.code, f"exit code {end.code}"
+
+failed = False
+for page, folder, item in json.loads(sys.argv[1]):
+    os.chdir(folder)
+    for stream in (sys.stdout, sys.stderr):
+        print(f"== {page}: {item!r}", file=stream, flush=True)
+    try:
+        command(item) if isinstance(item, list) else exec(compile(item, page, "exec"), {"__name__": "__main__"})
+    except Exception:
+        failed = True
+        traceback.print_exc()
+    sys.stdout.flush()
+sys.exit(failed)
+"""
+
+Run = Callable[..., "CompletedProcess[str]"]
+
+
+def shortened(line: list[str]) -> list[str]:
+    """A command line that takes less time: what the page itself sets comes later and counts."""
+    name, rest = line[1], line[2:]
+    return {
+        "run": ["fogsim", name, *SHORT, "--no-video", "--no-report", *rest],
+        "dataset": ["fogsim", name, *SHORT, *rest, "--frames", "2", "--every", "1"],
+        "estimate": [*line, "--overwrite"],
+    }.get(name, line)
+
+
+def test_what_is_printed_runs(readers_folder: Callable[[str], Path], python: Run, listening: int) -> None:
+    items: list[tuple[str, str, str | list[str]]] = []
+    for page, text in TEXTS.items():
+        lines = [shlex.split(line, comments=True) for line in LINES[page]]
+        quick: list[str | list[str]] = [shortened(line) for line in lines if line[1] not in LONG]
+        quick += [block.replace("8813", str(listening)) for block in PYTHON[page]]
+        folder = str(readers_folder(text)) if quick else ""
+        items += [(page, folder, item) for item in quick]
+    done = python(RUNNER, json.dumps(items))
+    assert done.returncode == 0, done.stderr
+    printed = dict.fromkeys(TEXTS, "")
+    for part in re.split(r"^== ", done.stdout, flags=re.MULTILINE)[1:]:
+        page, _, found = part.partition(":")
+        printed[page] += found.partition("\n")[2]
+    for page in ("README.md", "docs/estimate.md"):
+        estimates = [float(one) for one in re.findall(r"^(?:.* )?([\d.]+) \([\d.]+, ", printed[page], re.MULTILINE)]
+        assert estimates, page
+        assert estimates == pytest.approx([80.0] * len(estimates), rel=0.05), page
+    loops = [
+        list(map(float, row)) for row in re.findall(r"^([\d.]+) ([\d.]+)\b", printed["docs/plugin.md"], re.MULTILINE)
+    ]
+    assert max(time for time, _ in loops) > 4.0
+    assert loops[-1][1] == pytest.approx(120.0, rel=0.3)
+
+
+@pytest.mark.parametrize("page", TEXTS)
+def test_command_lines_parse(page: str) -> None:
+    for line in LINES[page]:
+        _, name, *rest = shlex.split(line, comments=True)
+        KNOWN[name].make_context(name, rest)
+
+
+@pytest.mark.parametrize("page", TEXTS)
+def test_options_exist(page: str) -> None:
+    for line in MENTIONS[page]:
+        program, name, *rest = line.split()
+        options = {part.partition("=")[0] for part in rest if part.startswith("--")}
+        if name in NOT_YET:
+            assert name not in KNOWN
+        elif program == "fogsim":
+            assert options <= {name for one in KNOWN[name].params for name in (*one.opts, *one.secondary_opts)}, line
+        else:
+            assert options <= set(re.findall(r'"(--[\w-]+)"', (CHECKOUT / name).read_text(encoding="utf-8"))), line
+
+
+def test_a_wrong_option_is_found() -> None:
+    with pytest.raises(Exception, match="No such option"):
+        KNOWN["run"].make_context("run", ["motorway_fog_bank", "--sed", "1"])

@@ -1,7 +1,6 @@
 """FogSim: driving in fog, closed loop, from SUMO traffic over camera frames to speed advice and safety metrics."""
 
 from importlib import import_module
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -16,13 +15,33 @@ if TYPE_CHECKING:
     from fogsim.scenario import Scenario as Scenario
     from fogsim.scenario import catalogue as catalogue
     from fogsim.scenario import load_scenario as load_scenario
+    from fogsim.values import Belief as Belief
+    from fogsim.values import Camera as Camera
+    from fogsim.values import Command as Command
+    from fogsim.values import Estimate as Estimate
+    from fogsim.values import Frame as Frame
+    from fogsim.values import LeadMeasurement as LeadMeasurement
+    from fogsim.values import Observation as Observation
+    from fogsim.values import SignSighting as SignSighting
+    from fogsim.values import Step as Step
+
+    __version__: str
 
 from fogsim.errors import FogSimError, InputError, MissingDependencyError, SimulationError
-from fogsim.values import Belief, Camera, Command, Estimate, Frame, LeadMeasurement, Observation, SignSighting, Step
 
-__version__ = version("fogsim")
-
+_VALUES = (
+    "Belief",
+    "Camera",
+    "Command",
+    "Estimate",
+    "Frame",
+    "LeadMeasurement",
+    "Observation",
+    "SignSighting",
+    "Step",
+)
 _LAZY = {
+    **dict.fromkeys(_VALUES, "fogsim.values"),
     "ClosedLoop": "fogsim.loop",
     "attach": "fogsim.attached",
     "connect": "fogsim.attached",
@@ -34,7 +53,8 @@ _LAZY = {
     "transmission": "fogsim.dataset",
     "write_dataset": "fogsim.dataset",
 }
-"""Names that draw in heavier libraries, and the modules that they come from."""
+"""Names that draw in other libraries, and the modules that they come from: a signal that comes while they are imported
+must find the command line prepared for it."""
 
 __all__ = [
     "Belief",
@@ -68,6 +88,8 @@ def __getattr__(name: str) -> Any:
     """Import what a public name needs when it is first asked for."""
     if name == "estimators":
         return import_module("fogsim.estimators")
+    if name == "__version__":
+        return import_module("importlib.metadata").version("fogsim")
     if name in _LAZY:
         return getattr(import_module(_LAZY[name]), name)
     raise AttributeError(f"module 'fogsim' has no attribute {name!r}")

@@ -1,5 +1,15 @@
-"""``python -m fogsim`` is the command line."""
+"""``fogsim`` and ``python -m fogsim``: the command line, prepared for signals before its libraries are imported."""
 
-from fogsim.cli import main
+from fogsim.interruption import leave_on_signals
 
-main()
+
+def main() -> None:
+    """Run the command line."""
+    leave_on_signals()
+    from fogsim.cli import main as run_command_line  # noqa: PLC0415 - after signals are provided for
+
+    run_command_line()
+
+
+if __name__ == "__main__":
+    main()

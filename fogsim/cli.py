@@ -17,7 +17,7 @@ from fogsim import __version__
 from fogsim.cli_estimate import estimate_command
 from fogsim.cli_reproduce import reproduce_command
 from fogsim.errors import FogSimError, InputError
-from fogsim.interruption import interruptible
+from fogsim.interruption import ProgramSignals, exit_code, leave_on_signals
 from fogsim.values import Step
 
 if TYPE_CHECKING:
@@ -48,20 +48,38 @@ _err = Console(stderr=True, highlight=False)
 
 
 def main() -> None:
-    """Run the command line; errors that a user can mend end in one message and exit code 2."""
+    """Run the command line; errors that a user can mend end in one message and exit code 2, signals in one line."""
+    signals = ProgramSignals()
+    signals.listen()
+    code: object = 0
     try:
-        with interruptible(), warnings.catch_warnings():
+        code = _run_app()
+    except BaseException:
+        # Whatever an import or a library made of the exception that the signal raised.
+        if signals.last is None:
+            raise
+    if signals.last is not None:
+        leave_on_signals()
+        _err.print("interrupted")
+        code = exit_code(signals.last)
+    sys.exit(code)  # type: ignore[arg-type]  # what sys.exit was called with
+
+
+def _run_app() -> object:
+    """Run the command that was given, and return what it exits with."""
+    try:
+        with warnings.catch_warnings():
             warnings.showwarning = lambda message, *_, **__: _tell(message)
             app()
-    except KeyboardInterrupt:
-        _err.print("interrupted")
-        sys.exit(INTERRUPTED)
+    except SystemExit as end:
+        return end.code
     except FogSimError as error:
         _err.print(f"[bold red]error:[/] {escape(str(error))}", soft_wrap=True)
-        sys.exit(BAD_INPUT)
+        return BAD_INPUT
     except OSError as error:
         _err.print(f"[bold red]error:[/] the operating system refused: {escape(str(error))}", soft_wrap=True)
-        sys.exit(BAD_INPUT)
+        return BAD_INPUT
+    return 0
 
 
 def _tell(message: Warning | str) -> None:
@@ -116,13 +134,28 @@ def run_command(
             watch=progress.show,
         )
     _print_summary(result.summary.values)
-    ended = result.ending.value if result.ending else f"{result.status.value}; the results are partial and say so"
+    partial = "the results are partial and say so" if result.files else "before its first step; nothing was written"
+    ended = result.ending.value if result.ending else f"{result.status.value}; {partial}"
     _out.print(f"\nThe run ended: [bold]{ended}[/].")
     _out.print("Results:")
     for name in result.files:
         _out.print(f"  {escape(str(result.directory / name))}", soft_wrap=True)
     if result.ending is None:
         raise typer.Exit(INTERRUPTED)
+
+
+@app.command("recover")
+def recover_command(
+    directory: Annotated[Path, typer.Argument(help="Directory of a run that was killed.")],
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Let its results take the place of those of an earlier run.")
+    ] = False,
+) -> None:
+    """Make steps.parquet of the rows of a run that was killed."""
+    from fogsim.recorders import recover_run  # noqa: PLC0415 - heavy; --help must be quick
+
+    for name in recover_run(directory, overwrite):
+        _out.print(escape(str(directory / name)), soft_wrap=True)
 
 
 def _scenario(

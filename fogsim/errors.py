@@ -1,7 +1,8 @@
 """Errors that FogSim raises for its users: what was expected, what came, where, and what is allowed."""
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from pathlib import Path
 
 LONGEST_SHOWN = 80
 """Most characters of a user's value that a message repeats."""
@@ -25,6 +26,14 @@ class SimulationError(FogSimError, RuntimeError):
 
 class SimulationRunningError(SimulationError):
     """A simulation runs in this process already, and only one can."""
+
+
+class RecorderError(FogSimError, RuntimeError):
+    """Recorders of a run failed; the message names them, and where the others' results are."""
+
+    def __init__(self, failures: Mapping[str, str], directory: Path) -> None:
+        told = "; ".join(f"the recorder {name} failed: {reason}" for name, reason in failures.items())
+        super().__init__(f"{told}; what else was recorded is kept in {directory}")
 
 
 class UnknownNameError(InputError):

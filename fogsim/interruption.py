@@ -1,7 +1,136 @@
-"""Ctrl-C, whatever runs when it comes."""
+"""Signals that end a run: Ctrl-C (SIGINT), SIGTERM and SIGHUP, whatever runs when they come."""
 
 import contextlib
-from collections.abc import Iterator
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from types import FrameType, TracebackType
+from typing import Self
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""Signals that ask a program to end."""
+
+_Handler = Callable[[int, FrameType | None], object]
+
+
+def exit_code(signum: int) -> int:
+    """Exit code of a program that a signal has ended: 130 for SIGINT, 143 for SIGTERM, 129 for SIGHUP."""
+    return 128 + signum
+
+
+def leave_on_signals() -> None:
+    """Let signals end this process at once, in one line: for as long as there is nothing to be saved.
+
+    An exception would be raised in the middle of whatever is imported, which may take it for its own failure.
+    """
+    _handle_signals(_leave)
+
+
+def _leave(signum: int, _: FrameType | None) -> None:
+    os.write(2, b"interrupted\n")
+    os._exit(exit_code(signum))
+
+
+def _handle_signals(handler: _Handler) -> None:
+    for signum in SIGNALS:
+        # What is ignored from the start (by nohup, or in the background of a script) stays so.
+        if signal.getsignal(signum) is not signal.SIG_IGN:
+            signal.signal(signum, handler)
+
+
+class ProgramSignals:
+    """Signals as KeyboardInterrupt, for a program, from `listen` on.
+
+    Attributes
+    ----------
+    last : int or None
+        The signal that came last.
+    """
+
+    def __init__(self) -> None:
+        self.last: int | None = None
+
+    def listen(self) -> None:
+        """Begin; signals that are ignored stay so."""
+        _handle_signals(self._raise)
+
+    def _raise(self, signum: int, _: FrameType | None) -> None:
+        self.last = signum
+        raise KeyboardInterrupt
+
+
+class Interruption:
+    """Holds signals back, so that what is being written is finished, and lets them through where they do no harm.
+
+    It concerns signals for which this process has a handler of Python's (SIGINT has one always), in the main thread;
+    elsewhere none is raised. One that came last while it was held is handled at the end.
+    """
+
+    def __init__(self) -> None:
+        self._handlers: dict[int, _Handler] = {}
+        self._allowed = False
+        self._waiting: int | None = None
+
+    def __enter__(self) -> Self:
+        if threading.current_thread() is threading.main_thread():
+            found = {signum: signal.getsignal(signum) for signum in SIGNALS}
+            self._handlers = {signum: handler for signum, handler in found.items() if callable(handler)}
+            for signum in self._handlers:
+                signal.signal(signum, self._take)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for signum, handler in self._handlers.items():
+            signal.signal(signum, handler)
+        if error is None:
+            self._handle_waiting()
+
+    def _take(self, signum: int, frame: FrameType | None) -> None:
+        if self._allowed:
+            self._handlers[signum](signum, frame)
+        else:
+            self._waiting = signum
+
+    def _handle_waiting(self) -> None:
+        signum, self._waiting = self._waiting, None
+        if signum is not None:
+            self._handlers[signum](signum, None)
+
+    @contextlib.contextmanager
+    def allowed(self) -> Iterator[None]:
+        """Let signals through, one that waits at once.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            From the signal's handler, also where compiled code runs (`interruptible`).
+        """
+        with interruptible():
+            try:
+                self._allowed = True
+                self._handle_waiting()
+                yield
+            finally:
+                self._allowed = False
+
+    @contextlib.contextmanager
+    def held(self) -> Iterator[None]:
+        """Hold signals back for a while within `allowed`.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            At its end, from the handler of a signal that came.
+        """
+        self._allowed = False
+        try:
+            yield
+        finally:
+            self._allowed = True
+        self._handle_waiting()
 
 
 @contextlib.contextmanager

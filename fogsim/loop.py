@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Iterator
+from collections.abc import Generator
 from types import TracebackType
 from typing import Self
 
@@ -15,7 +15,7 @@ from fogsim.traffic import Traffic, libsumo_traffic
 from fogsim.values import Command, Ending, FogField, Step, TrafficSnapshot
 
 
-def run(scenario: Scenario, seed: int = 0, traffic: Traffic | None = None) -> Iterator[Step]:
+def run(scenario: Scenario, seed: int = 0, traffic: Traffic | None = None) -> Generator[Step, None, None]:
     """Run a scenario with its own advice and lighting policy.
 
     Parameters

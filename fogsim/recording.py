@@ -2,12 +2,12 @@
 
 import contextlib
 import dataclasses
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
-from fogsim.errors import InputError
-from fogsim.interruption import interruptible
+from fogsim.errors import InputError, RecorderError
+from fogsim.interruption import Interruption
 from fogsim.loop import run
 from fogsim.metrics import RunMetrics, RunSummary, step_metrics
 from fogsim.recorders import (
@@ -17,8 +17,6 @@ from fogsim.recorders import (
     RunDirectory,
     RunInformation,
     Status,
-    write_json,
-    write_manifest,
     write_sign_map,
 )
 from fogsim.scenario import Scenario, build, resolved
@@ -43,7 +41,7 @@ class RecordedRun:
     directory : Path
         Where the results are.
     files : tuple of str
-        Their names.
+        Their names; none if it was interrupted before its first step, and earlier results are there.
     """
 
     status: Status
@@ -65,10 +63,11 @@ def record_run(
 ) -> RecordedRun:
     """Run a scenario and write its results into a directory.
 
-    Of these files each is whole under its name; docs/results.md tells what is in them:
+    From the first step on they are written into its folder ``unfinished``. When the run is over they take the place of
+    what is there in one go; docs/results.md tells what is in them:
 
-    - ``manifest.json``, always: status, ending, seed, resolved scenario, versions, command line, times [UTC]. It is
-      written before the first step (status "running") and again at the end.
+    - ``manifest.json``, always: status, ending, seed, resolved scenario, versions, command line, process, times [UTC].
+      Its status is "running" from the first step to the end.
     - ``metrics.json``, always, at the end: `RunSummary`'s keys, which end in their units, and ``complete``.
     - ``steps.parquet``, by the recorder ``table``: a row for each step, columns in SI units and radians.
     - ``video.mp4``, by ``video``: a frame of 1024×480 px (H.264) for each step, at real speed.
@@ -83,7 +82,7 @@ def record_run(
     out : Path
         Directory for the results; it is made with its parents where it is not there.
     overwrite : bool
-        True to remove the results that are there, before anything is started; files that are not FogSim's stay.
+        True to replace the results that are there, once the run is over; files that are not FogSim's stay.
     recorders : iterable of str
         Which of `RECORDERS` write, each at most once; all by default.
     command_line : sequence of str
@@ -101,11 +100,13 @@ def record_run(
     Raises
     ------
     InputError
-        If `out` is a file, cannot be made, or holds results and must not be overwritten.
+        If `out` is a file, cannot be made, is written by another process, or holds results and must not be overwritten.
     UnknownNameError
         If there is no such recorder.
     MissingDependencyError
         If a video is to be written and there is no ffmpeg.
+    RecorderError
+        If a recorder fails, with its name; the others' files are kept, and the manifest's status is "failed".
     FogSimError
         If a part of the loop cannot start or fails on the way.
     ValueError, TypeError
@@ -114,56 +115,155 @@ def record_run(
     Notes
     -----
     Any error is raised again. One before the first step leaves none of the files and none of the directories that were
-    made for them; one after it leaves what was recorded until then, and a manifest of status "failed" with the error's
-    message.
+    made for them, and earlier results as they were; one after it leaves what was recorded until then, and a manifest of
+    status "failed" with the error's message.
     """
-    directory = RunDirectory(out, overwrite)
-    metrics = RunMetrics(build.safety_standard(scenario))
-    manifest = Manifest(Status.RUNNING, seed, resolved(scenario), datetime.now(UTC), command_line=command_line)
-    write_manifest(directory.manifest, manifest)
-    try:
-        opened = _open(recorders, scenario, seed, directory, metrics)
-    except Exception:
-        directory.discard()
-        raise
-    status, ending, message, begun = Status.FAILED, None, "", False
-    try:
-        with interruptible():
-            for step in run(scenario, seed):
-                begun = True
-                metrics.update(step)
-                derived = step_metrics(step, metrics.standard)
-                for recorder in opened:
-                    recorder.record(step, derived)
-                watch(step)
-                ending = step.ending
-        status = Status.COMPLETE
-    except KeyboardInterrupt:
-        status = Status.INTERRUPTED
-    except Exception as error:
-        message = f"{type(error).__name__}: {error}"
-        raise
-    finally:
-        # The stack runs every step from the last to the first, also when one of them fails.
-        with contextlib.ExitStack() as finishing:
-            if status is Status.FAILED and not begun:
-                finishing.callback(directory.discard)
+    with Interruption() as interruption, RunDirectory(out, overwrite) as directory:
+        manifest = Manifest(Status.RUNNING, seed, resolved(scenario), datetime.now(UTC), command_line=command_line)
+        metrics = RunMetrics(build.safety_standard(scenario))
+        recording = Recording(directory, manifest, _open(recorders, scenario, seed, directory, metrics), metrics)
+        status, ending, message = Status.FAILED, None, ""
+        try:
+            with interruption.allowed(), contextlib.closing(run(scenario, seed)) as steps:
+                for step in steps:
+                    recording.record(step)
+                    watch(step)
+                    ending = step.ending
+            status = Status.COMPLETE
+        except KeyboardInterrupt:
+            status = Status.INTERRUPTED
+            recording.begin_if_nothing_is_lost()
+        except RecorderError:
+            raise
+        except Exception as error:
+            message = f"{type(error).__name__}: {error}"
+            raise
+        finally:
             ended = dataclasses.replace(manifest, status=status, ending=ending, message=message)
-            finishing.callback(_write_ended, directory, ended)
-            complete = status is Status.COMPLETE
-            finishing.callback(write_json, directory.metrics, {"complete": complete, **metrics.summary().to_json()})
-            for recorder in opened:
-                finishing.callback(recorder.close, complete)
-    return RecordedRun(status, ending, metrics.summary(), directory.path, tuple(directory.files()))
+            status = recording.close(ended, interruption)
+    if recording.failures and not message:
+        raise RecorderError(recording.failures, directory.path)
+    return RecordedRun(status, ending, metrics.summary(), directory.path, tuple(recording.files))
 
 
-def _write_ended(directory: RunDirectory, manifest: Manifest) -> None:
-    write_manifest(directory.manifest, dataclasses.replace(manifest, ended=datetime.now(UTC), files=directory.files()))
+class Recording:
+    """Recorders of one run, from its first step to the time when their files take their places.
+
+    Parameters
+    ----------
+    directory : RunDirectory
+        Where the files go.
+    manifest : Manifest
+        What is known before the first step.
+    recorders : mapping from str to Recorder
+        Recorders by name.
+    metrics : RunMetrics
+        Metrics of the steps.
+
+    Attributes
+    ----------
+    failures : dict from str to str
+        Recorders that failed, and why.
+    files : list of str
+        Names of the files of the closed recording.
+    """
+
+    def __init__(
+        self, directory: RunDirectory, manifest: Manifest, recorders: Mapping[str, Recorder], metrics: RunMetrics
+    ) -> None:
+        self._directory = directory
+        self._manifest = manifest
+        self._recorders = recorders
+        self._metrics = metrics
+        self._begun = False
+        self.failures: dict[str, str] = {}
+        self.files: list[str] = []
+
+    def record(self, step: Step) -> None:
+        """Hand a step to metrics and recorders.
+
+        Raises
+        ------
+        RecorderError
+            If one fails.
+        """
+        if not self._begun:
+            self._begin()
+        self._metrics.update(step)
+        derived = step_metrics(step, self._metrics.standard)
+        for name, recorder in self._recorders.items():
+            try:
+                recorder.record(step, derived)
+            except Exception as error:
+                self.failures[name] = f"{type(error).__name__}: {error}"
+                raise RecorderError(self.failures, self._directory.path) from error
+
+    def _begin(self) -> None:
+        self._directory.begin(self._manifest.to_json())
+        self._begun = True
+
+    def begin_if_nothing_is_lost(self) -> None:
+        """Begin without a step, unless earlier results are there."""
+        if not (self._begun or self._directory.earlier or self._directory.unfinished.exists()):
+            self._begin()
+
+    def close(self, manifest: Manifest, interruption: Interruption) -> Status:
+        """Close all recorders, also when some fail, and write metrics and manifest; nothing if it was never begun.
+
+        Parameters
+        ----------
+        manifest : Manifest
+            How the run ended.
+        interruption : Interruption
+            What holds signals back; they are let through while a whole run's recorders are closed.
+
+        Returns
+        -------
+        Status
+            How it ended now.
+        """
+        if not self._begun:
+            return manifest.status
+        status = manifest.status
+        for name, recorder in reversed(list(self._recorders.items())):
+            status = self._close(name, recorder, status, interruption)
+        complete = status is Status.COMPLETE
+        with self._told("metrics"):
+            self._directory.write_metrics({"complete": complete, **self._metrics.summary().to_json()})
+        if self.failures and complete:
+            status = Status.FAILED
+        message = manifest.message or "; ".join(f"{name}: {reason}" for name, reason in self.failures.items())
+        ended = dataclasses.replace(
+            manifest, status=status, message=message, failed_recorders=self.failures, ended=datetime.now(UTC)
+        )
+        self._directory.finish(ended.to_json())
+        self.files = self._directory.files()
+        return status
+
+    def _close(self, name: str, recorder: Recorder, status: Status, interruption: Interruption) -> Status:
+        with self._told(name):
+            if status is Status.COMPLETE:
+                try:
+                    with interruption.allowed():
+                        recorder.close(complete=True)
+                        return status
+                except KeyboardInterrupt:
+                    status = Status.INTERRUPTED
+            recorder.close(complete=False)
+        return status
+
+    @contextlib.contextmanager
+    def _told(self, name: str) -> Iterator[None]:
+        """Remember why a recorder failed, where the reason is not known already."""
+        try:
+            yield
+        except Exception as error:  # noqa: BLE001 - a recorder may be anybody's, and must not cost the others their files
+            self.failures.setdefault(name, f"{type(error).__name__}: {error}")
 
 
 def _open(
     recorders: Iterable[str], scenario: Scenario, seed: int, directory: RunDirectory, metrics: RunMetrics
-) -> list[Recorder]:
+) -> dict[str, Recorder]:
     information = RunInformation(
         directory=directory,
         title=scenario.name,
@@ -174,7 +274,7 @@ def _open(
         summary=lambda: metrics.summary().values,
         meanings=metrics.summary().meanings,
     )
-    return [RECORDERS[name](information) for name in recorders]
+    return {name: RECORDERS[name](information) for name in recorders}
 
 
 def record_signs(scenario: Scenario, out: Path) -> SignMap:

@@ -7,7 +7,7 @@ import pytest
 from pyarrow import parquet
 
 import fogsim
-from fogsim.errors import FogSimError, SimulationError, UnknownNameError
+from fogsim.errors import FogSimError, RecorderError, SimulationError, UnknownNameError
 from fogsim.recorders import ReportRecorder
 from fogsim.recording import record_run
 from fogsim.scenario import Scenario
@@ -42,14 +42,18 @@ def test_one_recorder_that_cannot_finish_does_not_cost_the_others_their_files(
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(ReportRecorder, "close", full)
-    with pytest.raises(OSError, match="No space left"):
+    with pytest.raises(RecorderError, match=r"the recorder report failed: OSError: .*No space left.* is kept in"):
         record_run(short(), 1, tmp_path / "out")
     assert parquet.read_table(tmp_path / "out" / "steps.parquet").num_rows == 11
     metrics = json.loads((tmp_path / "out" / "metrics.json").read_text(encoding="utf-8"))
     assert metrics["complete"] is True
     # Judged by what the scenario's advice counts with.
     assert (metrics["stopping_reaction_time_s"], metrics["stopping_deceleration_mps2"]) == (2.0, 3.4)
-    assert status(tmp_path / "out")["files"] == ["manifest.json", "metrics.json", "steps.parquet", "video.mp4"]
+    manifest = status(tmp_path / "out")
+    assert manifest["files"] == ["manifest.json", "metrics.json", "steps.parquet", "video.mp4"]
+    assert manifest["status"] == "failed"
+    assert manifest["message"] == "report: OSError: [Errno 28] No space left on device"
+    assert manifest["failed_recorders"] == {"report": "OSError: [Errno 28] No space left on device"}
 
 
 @pytest.mark.parametrize("kept", [False, True])

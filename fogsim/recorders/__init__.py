@@ -4,8 +4,9 @@ from collections.abc import Callable
 
 from fogsim.recorders.files import write_json
 from fogsim.recorders.frame_panel import FramePanel
-from fogsim.recorders.manifest import Manifest, Status, versions, write_manifest
+from fogsim.recorders.manifest import Manifest, Status, versions
 from fogsim.recorders.protocol import DERIVED_QUANTITIES, Derived, Recorder, RunInformation
+from fogsim.recorders.recovery import recover_run
 from fogsim.recorders.report import ReportRecorder
 from fogsim.recorders.run_directory import RunDirectory
 from fogsim.recorders.sign_map import write_sign_map
@@ -41,8 +42,8 @@ __all__ = [
     "TableRecorder",
     "VideoRecorder",
     "encoder_report",
+    "recover_run",
     "versions",
     "write_json",
-    "write_manifest",
     "write_sign_map",
 ]

@@ -1,13 +1,17 @@
 """Writing files so that none is ever half written under its final name."""
 
+import contextlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from fogsim.errors import InputError
 
 PARTIAL_SUFFIX = ".part"
 """What the name of a file ends in until it is whole."""
+
+_LEAST_RESERVE = 2**18
+"""Room that a reserve keeps in any case [bytes]."""
 
 
 def partial_path(path: Path) -> Path:
@@ -20,10 +24,44 @@ def publish(path: Path) -> None:
     partial_path(path).replace(path)
 
 
+@contextlib.contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Let an error of the operating system (a full disk) name the file.
+
+    Raises
+    ------
+    OSError
+        The same error, with the file's name.
+    """
+    try:
+        yield
+    except OSError as error:
+        if error.errno is None or error.filename is not None:
+            raise
+        raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+def write_bytes(path: Path, data: bytes) -> None:
+    """Write a file, whole or not at all.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written; the message names the file.
+    """
+    part = partial_path(path)
+    try:
+        with naming(part):
+            part.write_bytes(data)
+            publish(path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a text file, whole or not at all."""
-    partial_path(path).write_text(text, encoding="utf-8")
-    publish(path)
+    write_bytes(path, text.encode("utf-8"))
 
 
 def write_json(path: Path, values: Mapping[str, object]) -> None:
@@ -41,3 +79,45 @@ def write_json(path: Path, values: Mapping[str, object]) -> None:
             f"{path.name} holds only text, finite numbers, true, false, null, lists and mappings: {error}"
         ) from error
     write_text(path, text + "\n")
+
+
+def refuse_existing(path: Path, overwrite: bool) -> None:
+    """Refuse to write a file that is there already.
+
+    Raises
+    ------
+    InputError
+        If it is there and must not be overwritten, or is no file.
+    """
+    if path.is_dir():
+        raise InputError(f"--out {path} is a folder; give the name of a file")
+    if path.exists() and not overwrite:
+        raise InputError(f"--out {path} is there already; give another name, or replace it with --overwrite")
+
+
+class Reserve:
+    """Room on the disk that is given back when it is needed, so that files can be closed on a disk that is full.
+
+    Parameters
+    ----------
+    path : Path
+        The file that takes the room.
+
+    Raises
+    ------
+    OSError
+        If there is not as much room; the message names the file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.grow(_LEAST_RESERVE)
+
+    def grow(self, size: int) -> None:
+        """Keep more room [bytes]; written, since a file with holes takes none."""
+        with naming(self._path), self._path.open("ab") as file:
+            file.write(bytes(size))
+
+    def release(self) -> None:
+        """Give the room back; twice does nothing."""
+        self._path.unlink(missing_ok=True)

@@ -2,13 +2,12 @@
 
 import platform
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from enum import StrEnum
 from importlib import metadata
-from pathlib import Path
 
-from fogsim.recorders.files import write_json
+from fogsim.recorders.process import WritingProcess
 from fogsim.values import Ending
 
 _DISTRIBUTIONS = ("fogsim", "numpy", "libsumo", "pyrender", "opencv-python-headless", "gymnasium")
@@ -21,6 +20,7 @@ class Status(StrEnum):
     COMPLETE = "complete"
     INTERRUPTED = "interrupted"
     FAILED = "failed"
+    DEAD = "dead"
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,10 +43,12 @@ class Manifest:
         Why the simulated run was over, None if it was cut short.
     command_line : sequence of str
         How it was started, empty if not from the command line.
-    files : sequence of str
-        Names of the files beside the manifest.
+    process : WritingProcess
+        Who writes.
     message : str
         What went wrong, if anything.
+    failed_recorders : mapping from str to str
+        Recorders that failed, and why.
     """
 
     status: Status
@@ -56,8 +58,25 @@ class Manifest:
     ended: datetime | None = None
     ending: Ending | None = None
     command_line: Sequence[str] = ()
-    files: Sequence[str] = ()
+    process: WritingProcess = field(default_factory=WritingProcess.this)
     message: str = ""
+    failed_recorders: Mapping[str, str] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, object]:
+        """What ``manifest.json`` says, without the names of files."""
+        return {
+            "status": self.status.value,
+            "message": self.message,
+            "failed_recorders": dict(self.failed_recorders),
+            "ending": None if self.ending is None else self.ending.value,
+            "seed": self.seed,
+            "started": _utc(self.started),
+            "ended": None if self.ended is None else _utc(self.ended),
+            "process": self.process.to_json(),
+            "command_line": list(self.command_line),
+            "versions": versions(),
+            "scenario": self.scenario,
+        }
 
 
 def versions() -> dict[str, str | None]:
@@ -71,38 +90,6 @@ def _version(distribution: str) -> str | None:
         return metadata.version(distribution)
     except metadata.PackageNotFoundError:
         return None
-
-
-def write_manifest(path: Path, manifest: Manifest) -> None:
-    """Write a manifest, whole or not at all.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    manifest : Manifest
-        What it says.
-
-    Raises
-    ------
-    InputError
-        If the scenario holds what JSON cannot.
-    """
-    write_json(
-        path,
-        {
-            "status": manifest.status.value,
-            "message": manifest.message,
-            "ending": None if manifest.ending is None else manifest.ending.value,
-            "seed": manifest.seed,
-            "started": _utc(manifest.started),
-            "ended": None if manifest.ended is None else _utc(manifest.ended),
-            "command_line": list(manifest.command_line),
-            "files": list(manifest.files),
-            "versions": versions(),
-            "scenario": manifest.scenario,
-        },
-    )
 
 
 def _utc(instant: datetime) -> str:

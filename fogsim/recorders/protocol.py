@@ -36,10 +36,12 @@ class Recorder(Protocol):
     def close(self, complete: bool) -> None:
         """Finish the file and give it its final name; closing twice does nothing.
 
+        KeyboardInterrupt may cut it off where `complete` is True; it is called once more then, with False.
+
         Parameters
         ----------
         complete : bool
-            False if the run was cut short: the file then says so.
+            False if the run was cut short: the file then says so, and is finished within a second.
         """
 
 

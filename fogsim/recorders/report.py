@@ -35,7 +35,6 @@ class ReportRecorder:
         """Write the report; it says so if the run was cut short."""
         if not self._open:
             return
-        self._open = False
         last = self._curves.time[-1] if self._curves.time else 0.0
         content = ReportContent(
             title=self._information.title,
@@ -43,11 +42,13 @@ class ReportRecorder:
             interrupted_at=None if complete else last,
             metrics=self._information.summary(),
             meanings=self._information.meanings,
-            figures=draw_figures(self._curves) if self._curves.time else [],
+            # Figures take longer than somebody waits who has pressed Ctrl-C.
+            figures=draw_figures(self._curves) if self._curves.time and complete else [],
             pictures=self._album.chosen(),
             footer=_footer(self._information.seed),
         )
         write_text(self._information.directory.report, render_report(content))
+        self._open = False
 
 
 def _footer(seed: int) -> Mapping[str, str]:

@@ -91,7 +91,7 @@ def render_report(content: ReportContent) -> str:
             _banner(content.interrupted_at),
             _summary_table(content.metrics, content.meanings),
             _methods_table(content.metrics, content.meanings),
-            _figures(content.figures),
+            _figures(content.figures, recorded=bool(content.pictures)),
             _pictures(content.pictures),
             _footer(content.footer),
             "</body>\n</html>\n",
@@ -141,9 +141,9 @@ def _method_rows(name: str, methods: Mapping[str, Mapping[str, object]], meaning
     return f'{heading}\n{table}\n<p class="note">{escape(meaning)}</p>'
 
 
-def _figures(figures: Sequence[tuple[str, bytes]]) -> str:
+def _figures(figures: Sequence[tuple[str, bytes]], *, recorded: bool) -> str:
     if not figures:
-        return "<p>No step was recorded.</p>"
+        return f"<p>{'Figures are of whole runs; the rows are a table.' if recorded else 'No step was recorded.'}</p>"
     return "<h2>Over time</h2>\n" + "\n".join(_figure(png, caption, caption) for caption, png in figures)
 
 

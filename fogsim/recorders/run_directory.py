@@ -1,9 +1,22 @@
 """The directory that the results of one run go to."""
 
+import json
+import shutil
+from collections.abc import Mapping
 from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
 
 from fogsim.errors import InputError
-from fogsim.recorders.files import partial_path
+from fogsim.recorders.files import Reserve, partial_path, write_json
+from fogsim.recorders.lock import WriterLock
+from fogsim.recorders.process import WritingProcess
+
+UNFINISHED = "unfinished"
+"""Folder in the directory that holds the results of a run until its end."""
+
+ROW_LOG = "steps.arrows"
+"""Rows in the unfinished folder, until they are made ``steps.parquet``."""
 
 _NAMES = {
     "manifest": "manifest.json",
@@ -12,37 +25,43 @@ _NAMES = {
     "video": "video.mp4",
     "report": "report.html",
 }
+_RESERVE = "reserve"
 
 
 class RunDirectory:
-    """The directory of one run and the names of the files in it.
+    """The directory of one run and the names of the files in it; it has one writer at a time.
+
+    Files are written into its folder ``unfinished``, which is there from the first step (`begin`) to the end of the run
+    (`finish`), when they take the place of earlier results in one go. Until then earlier results stay as they are.
 
     Parameters
     ----------
     path : Path
         The directory; it is made with its parents if it is not there.
     overwrite : bool
-        True to remove results of an earlier run: the files that FogSim writes, and never another.
+        True to replace results of an earlier run: the files that FogSim writes, and never another.
 
     Raises
     ------
     InputError
-        If the path is not a directory, cannot be made, or holds results and must not be overwritten.
+        If the path is not a directory, cannot be made, is written by another process, or holds results and must not be
+        overwritten.
     """
 
     def __init__(self, path: Path, overwrite: bool = False) -> None:
         self.path = Path(path)
         self._made = [folder for folder in (self.path, *self.path.parents) if not folder.exists()]
         self._make()
-        earlier = [name for name in self._own_files() if name.is_file()]
-        if earlier and not overwrite:
-            found = ", ".join(name.name for name in earlier)
-            raise InputError(
-                f"{self.path} holds results of an earlier run ({found}); "
-                "choose another directory with --out, or replace them with --overwrite"
-            )
-        for name in earlier:
-            name.unlink()
+        try:
+            self._lock = WriterLock(self.path)
+            try:
+                self._check(overwrite)
+            except BaseException:
+                self._lock.release()
+                raise
+        except BaseException:
+            self._unmake()
+            raise
 
     def _make(self) -> None:
         try:
@@ -52,44 +71,187 @@ class RunDirectory:
         except OSError as error:
             raise InputError(f"cannot make the directory {self.path} for the results: {error.strerror}") from error
 
-    def discard(self) -> None:
-        """Take everything away that FogSim has written here, and the directories that were made for it."""
-        for name in self._own_files():
-            name.unlink(missing_ok=True)
+    def _unmake(self) -> None:
+        """Remove the directories that were made, as far as nothing is in them."""
         for folder in self._made:
-            if any(folder.iterdir()):
+            if not folder.is_dir() or any(folder.iterdir()):
                 break
             folder.rmdir()
 
-    def _own_files(self) -> list[Path]:
+    def _check(self, overwrite: bool) -> None:
+        for name in (UNFINISHED, *_NAMES.values()):
+            there = self.path / name
+            if there.exists() and there.is_dir() != (name == UNFINISHED):
+                raise InputError(f"{there} is in the way of the results; choose another directory with --out")
+        refuse_living(self.unfinished)
+        if overwrite:
+            return
+        if self.unfinished.exists():
+            raise InputError(
+                f"{self.path} holds rows of a run that did not come to its end: {_told(self.unfinished)}. "
+                f"fogsim recover {self.path} makes them readable, --overwrite replaces them, --out goes elsewhere"
+            )
+        if self.earlier:
+            raise InputError(
+                f"{self.path} holds results of an earlier run ({', '.join(self.earlier)}); "
+                "choose another directory with --out, or replace them with --overwrite"
+            )
+
+    @property
+    def earlier(self) -> list[str]:
+        """Names of results that are there, of an earlier run until `finish`; also those that were left half written."""
         whole = [self.path / name for name in _NAMES.values()]
-        return whole + [partial_path(name) for name in whole]
+        return [name.name for name in whole + [partial_path(name) for name in whole] if name.is_file()]
+
+    @property
+    def unfinished(self) -> Path:
+        """Folder of what is being written."""
+        return self.path / UNFINISHED
+
+    def begin(self, manifest: Mapping[str, object]) -> None:
+        """Make the folder for what is written, in place of that of a run that was never finished.
+
+        Parameters
+        ----------
+        manifest : mapping
+            What is known of the run; JSON values only.
+
+        Raises
+        ------
+        OSError
+            If there is no room for it; nothing is lost then.
+        """
+        new = partial_path(self.unfinished)
+        shutil.rmtree(new, ignore_errors=True)
+        try:
+            new.mkdir()
+            Reserve(new / _RESERVE)
+            write_json(new / _NAMES["manifest"], manifest)
+        except BaseException:
+            shutil.rmtree(new, ignore_errors=True)
+            raise
+        shutil.rmtree(self.unfinished, ignore_errors=True)
+        new.rename(self.unfinished)
+
+    def write_metrics(self, metrics: Mapping[str, object]) -> None:
+        """Write ``metrics.json``; the room kept for it and the manifest is given back first."""
+        (self.unfinished / _RESERVE).unlink(missing_ok=True)
+        write_json(self.unfinished / _NAMES["metrics"], metrics)
+
+    def finish(self, manifest: Mapping[str, object]) -> None:
+        """Write the manifest and let the new results take the place of the earlier ones, none of which stays.
+
+        If rows are left that could not be made a table, the earlier results and the folder of the new ones stay.
+
+        Parameters
+        ----------
+        manifest : mapping
+            What it says; the names of the files are added.
+        """
+        finish_folder(self.path, manifest)
+
+    def close(self) -> None:
+        """Let others write; directories that were made stay if something is in them."""
+        self._lock.release()
+        self._unmake()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
 
     @property
     def manifest(self) -> Path:
         """What was run, with what, and how it ended."""
-        return self.path / _NAMES["manifest"]
+        return self.unfinished / _NAMES["manifest"]
 
     @property
     def metrics(self) -> Path:
         """Summary of the metrics."""
-        return self.path / _NAMES["metrics"]
+        return self.unfinished / _NAMES["metrics"]
 
     @property
     def table(self) -> Path:
         """One row a step."""
-        return self.path / _NAMES["table"]
+        return self.unfinished / _NAMES["table"]
 
     @property
     def video(self) -> Path:
         """What the camera saw, with a panel beside it."""
-        return self.path / _NAMES["video"]
+        return self.unfinished / _NAMES["video"]
 
     @property
     def report(self) -> Path:
         """Report to read."""
-        return self.path / _NAMES["report"]
+        return self.unfinished / _NAMES["report"]
 
     def files(self) -> list[str]:
-        """Names of the whole result files that are there now, sorted."""
-        return sorted(name for name in _NAMES.values() if (self.path / name).is_file())
+        """Names of the whole result files of a finished run, sorted."""
+        return whole_files(self.path)
+
+
+def whole_files(folder: Path) -> list[str]:
+    """Names of the whole result files in a folder, sorted."""
+    return sorted(name for name in _NAMES.values() if (folder / name).is_file())
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """Manifest in a folder; empty if there is none that can be read."""
+    try:
+        content = json.loads((folder / _NAMES["manifest"]).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}
+
+
+def finish_folder(path: Path, manifest: Mapping[str, object]) -> None:
+    """Finish a run directory: see `RunDirectory.finish`. When it is cut off, the next call completes it."""
+    folder = path / UNFINISHED
+    (folder / _RESERVE).unlink(missing_ok=True)
+    # What a call before this one has moved already is named by the manifest that it wrote.
+    names = {_NAMES["manifest"], *whole_files(folder), *_moved(folder)}
+    write_json(folder / _NAMES["manifest"], {**manifest, "files": sorted(names)})
+    if (folder / ROW_LOG).exists():
+        return
+    # Without a manifest the directory claims nothing while old files give way to new ones.
+    (path / _NAMES["manifest"]).unlink(missing_ok=True)
+    for name in _NAMES.values():
+        partial_path(path / name).unlink(missing_ok=True)
+        if name == _NAMES["manifest"]:
+            continue
+        if (folder / name).is_file():
+            (folder / name).replace(path / name)
+        elif name not in names:
+            (path / name).unlink(missing_ok=True)
+    (folder / _NAMES["manifest"]).replace(path / _NAMES["manifest"])
+    shutil.rmtree(folder)
+
+
+def _moved(folder: Path) -> list[str]:
+    listed = read_manifest(folder).get("files", [])
+    return [name for name in listed if name in _NAMES.values()] if isinstance(listed, list) else []
+
+
+def refuse_living(folder: Path) -> None:
+    """Refuse a folder of a process that lives: a second way to know it, should its lock have been removed."""
+    manifest = read_manifest(folder)
+    process = WritingProcess.from_json(manifest.get("process"))
+    if process is None or manifest.get("status") != "running" or process == WritingProcess.this():
+        return
+    if process.lives():
+        raise InputError(
+            f"{folder.parent}: process {process.id} is writing there; wait for its end, or choose another directory "
+            "with --out"
+        )
+
+
+def _told(folder: Path) -> str:
+    """Say what has become of the run of an unfinished folder."""
+    manifest = read_manifest(folder)
+    process = WritingProcess.from_json(manifest.get("process"))
+    if process is not None and manifest.get("status") == "running":
+        return f"process {process.id} has died in it"
+    return str(manifest.get("message") or manifest.get("status") or "nothing is known of it")

@@ -1,7 +1,9 @@
 """Every step as a row of a parquet table."""
 
+import io
 import json
 import math
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,12 +12,17 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from fogsim.recorders.files import partial_path, publish
+from fogsim.recorders.files import write_bytes
 from fogsim.recorders.protocol import DERIVED_QUANTITIES, Derived
+from fogsim.recorders.row_log import RowLog, read_rows
+from fogsim.recorders.run_directory import ROW_LOG
 from fogsim.values import Estimate, Leader, LeadMeasurement, Step
 
 ROWS_PER_GROUP = 1024
-"""Rows that are held in memory before they are written as one row group."""
+"""Rows of one row group."""
+
+LOG_PERIOD = 0.5
+"""Time between two writings of rows [s]: what a process that is killed loses at most, and what a full disk loses."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,61 +51,91 @@ class TableRecorder:
     """Writes ``steps.parquet``: one row a step, columns with units in their names.
 
     The metadata of its schema says ``fogsim.complete`` (``true`` or ``false``), ``fogsim.methods`` (comma-separated)
-    and ``fogsim.columns`` (JSON, one line on each column). Equal steps give equal bytes.
+    and ``fogsim.columns`` (JSON, one line on each column). Equal steps give equal bytes. Until it is closed, rows are
+    in ``steps.arrows`` beside it, at most `LOG_PERIOD` after they were recorded.
 
     Parameters
     ----------
     path : Path
-        The file.
+        The file; nothing is written before the first row.
     methods : sequence of str
         Estimators that get columns of their own.
+    clock : callable
+        Gives the time that passes [s].
     """
 
-    def __init__(self, path: Path, methods: Sequence[str]) -> None:
+    def __init__(self, path: Path, methods: Sequence[str], clock: Callable[[], float] = time.monotonic) -> None:
         self._path = path
         self._columns = table_columns(methods)
-        self._methods = tuple(methods)
-        self._schema = pa.schema([(column.name, column.kind) for column in self._columns])
-        # Without a stored copy of the schema readers take its metadata from the end of the file, which is written
-        # when it is known whether the run was complete.
-        self._writer = pq.ParquetWriter(partial_path(path), self._schema, compression="zstd", store_schema=False)
+        self._schema = pa.schema(
+            [(column.name, column.kind) for column in self._columns],
+            metadata={
+                "fogsim.methods": ",".join(methods),
+                "fogsim.columns": json.dumps({column.name: column.meaning for column in self._columns}),
+            },
+        )
+        self._clock = clock
+        self._log: RowLog | None = None
+        self._logged = -math.inf
         self._rows: list[list[object]] = []
-        self._last_index: int | None = None
         self._open = True
 
     def record(self, step: Step, derived: Derived) -> None:
         """Add a row; a step that comes once more, with its ending, takes the place of the one before."""
-        if step.index == self._last_index:
-            self._rows.pop()
-        elif len(self._rows) == ROWS_PER_GROUP:
-            self._flush()
-        self._last_index = step.index
         self._rows.append([column.value(step, derived) for column in self._columns])
+        now = self._clock()
+        if now - self._logged >= LOG_PERIOD:
+            self._flush()
+            self._logged = now
 
-    def _flush(self) -> None:
-        values = zip(*self._rows, strict=True)
-        arrays = [pa.array(column, type=field.type) for column, field in zip(values, self._schema, strict=True)]
-        group = pa.Table.from_arrays(arrays, schema=self._schema)
-        # Emptied first: a Ctrl-C while the group is written is raised after it, and must not write it twice.
-        self._rows = []
-        self._writer.write_table(group)
+    def _flush(self) -> RowLog:
+        if self._log is None:
+            self._log = RowLog(self._path.with_name(ROW_LOG), self._schema)
+        if self._rows:
+            values = zip(*self._rows, strict=True)
+            arrays = [pa.array(column, type=field.type) for column, field in zip(values, self._schema, strict=True)]
+            self._log.append(pa.RecordBatch.from_arrays(arrays, schema=self._schema))
+            # A Ctrl-C before this line has them written twice, which does no harm: the last of equal rows counts.
+            self._rows = []
+        return self._log
 
     def close(self, complete: bool) -> None:
-        """Write what is left and say whether the run was complete."""
+        """Make the table of the rows and say in it whether the run was complete."""
         if not self._open:
             return
+        if self._log is not None:
+            self._log.release_reserve()
+        log = self._flush()
+        log.release_reserve()
+        write_table(self._path, read_rows(log.path), complete)
+        log.remove()
         self._open = False
-        if self._rows:
-            self._flush()
-        self._writer.add_key_value_metadata(
-            {
-                "fogsim.complete": "true" if complete else "false",
-                "fogsim.methods": ",".join(self._methods),
-                "fogsim.columns": json.dumps({column.name: column.meaning for column in self._columns}),
-            }
-        )
-        self._writer.close()
-        publish(self._path)
+
+
+def write_table(path: Path, rows: Any, complete: bool) -> None:
+    """Write the rows of a log as a table, whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+        The parquet file.
+    rows : pyarrow.Table
+        The rows, with the metadata of a log.
+    complete : bool
+        Whether they are of a whole run.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written; the message names the file.
+    """
+    table = rows.replace_schema_metadata(None).combine_chunks()
+    file = io.BytesIO()
+    # Without a stored copy of the schema readers take its metadata from the end of the file.
+    with pq.ParquetWriter(file, table.schema, compression="zstd", store_schema=False) as writer:
+        writer.write_table(table, row_group_size=ROWS_PER_GROUP)
+        writer.add_key_value_metadata({"fogsim.complete": "true" if complete else "false", **rows.schema.metadata})
+    write_bytes(path, file.getvalue())
 
 
 def table_columns(methods: Sequence[str]) -> list[Column]:

@@ -13,6 +13,9 @@ from fogsim.recorders.frame_panel import FRAME_HEIGHT, FRAME_WIDTH, FramePanel
 from fogsim.recorders.protocol import Derived
 from fogsim.values import Step
 
+CLOSING_LIMIT = 5.0
+"""Time that the encoder gets to end when a run is cut short [s]; it takes a tenth of it."""
+
 
 class VideoRecorder:
     """Writes ``video.mp4`` (H.264, yuv420p): the camera's image with a panel of what is known and done.
@@ -45,12 +48,17 @@ class VideoRecorder:
             self._encoder = Encoder(self._command)
         self._encoder.write(frame)
 
-    def close(self, complete: bool) -> None:  # noqa: ARG002 - a video ends where the run ended, and needs no mark
+    def close(self, complete: bool) -> None:
         """Finish the video; after an interruption it holds what was recorded until then."""
-        encoder, self._encoder = self._encoder, None
-        if encoder is not None:
-            encoder.finish()
+        if self._encoder is None:
+            return
+        try:
+            self._encoder.finish(None if complete else CLOSING_LIMIT)
             publish(self._path)
+        except FogSimError:
+            self._encoder = None
+            raise
+        self._encoder = None
 
 
 class Encoder:
@@ -69,6 +77,7 @@ class Encoder:
         # encoder before it has written the index without which the video cannot be played.
         self._process = subprocess.Popen(  # noqa: S603 - imageio's own ffmpeg with arguments made here
             command,
+            bufsize=0,  # nothing is left to be written to an encoder that may have stopped
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=self._complaints,
@@ -84,20 +93,34 @@ class Encoder:
             If the encoder has ended, with what it said.
         """
         assert self._process.stdin is not None  # noqa: S101 - it was opened as a pipe
+        rest = memoryview(frame)
         try:
-            self._process.stdin.write(frame)
+            while rest:
+                rest = rest[self._process.stdin.write(rest) :]
         except OSError as error:
             raise FogSimError(f"the video encoder has ended: {self._said()}") from error
 
-    def finish(self) -> None:
+    def finish(self, limit: float | None = None) -> None:
         """Let the encoder write what it has and wait for its end.
+
+        Parameters
+        ----------
+        limit : float or None
+            Time that it gets before it is killed [s]; None for as long as it needs.
 
         Raises
         ------
         FogSimError
-            If it failed, with what it said.
+            If it failed, with what it said, or took longer.
         """
-        _, _ = self._process.communicate()
+        assert self._process.stdin is not None  # noqa: S101 - it was opened as a pipe
+        self._process.stdin.close()
+        try:
+            self._process.wait(limit)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+            raise FogSimError(f"the video encoder did not end within {limit:g} s, and was killed") from None
         said = self._said()
         self._complaints.close()
         if self._process.returncode != 0:

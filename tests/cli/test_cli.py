@@ -83,7 +83,7 @@ def test_an_interrupted_run_leaves_readable_results_that_say_they_are_partial(tm
         text=True,
         start_new_session=True,
     )
-    partial = out / "video.mp4.part"
+    partial = out / "unfinished" / "video.mp4.part"
     deadline = time.monotonic() + 120
     while not (partial.exists() and partial.stat().st_size > 0) and time.monotonic() < deadline:
         time.sleep(0.1)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from fogsim.errors import InputError
-from fogsim.recorders import Manifest, Status, versions, write_json, write_manifest
+from fogsim.recorders import Manifest, Status, versions, write_json
+from fogsim.recorders.process import WritingProcess
 from fogsim.values import Ending
 
 STARTED = datetime(2024, 11, 5, 7, 30, tzinfo=timezone(timedelta(hours=1)))
@@ -23,9 +24,10 @@ def test_a_manifest_says_what_was_run_and_how_it_ended(tmp_path: Path) -> None:
         ended=STARTED + timedelta(seconds=90),
         ending=Ending.ARRIVED,
         command_line=("fogsim", "run", "motorway_fog_bank"),
-        files=("steps.parquet",),
+        process=WritingProcess(4711, "here", "b-4", 12),
+        failed_recorders={"video": "no space"},
     )
-    write_manifest(tmp_path / "manifest.json", manifest)
+    write_json(tmp_path / "manifest.json", manifest.to_json())
     content = json.loads((tmp_path / "manifest.json").read_text(encoding="utf-8"))
     assert content["versions"] == versions()
     del content["versions"]
@@ -37,17 +39,18 @@ def test_a_manifest_says_what_was_run_and_how_it_ended(tmp_path: Path) -> None:
         "started": "2024-11-05T06:30:00+00:00",
         "ended": "2024-11-05T06:31:30+00:00",
         "command_line": ["fogsim", "run", "motorway_fog_bank"],
-        "files": ["steps.parquet"],
+        "failed_recorders": {"video": "no space"},
+        "process": {"id": 4711, "host": "here", "boot": "b-4", "start_time": 12},
         "scenario": {"name": "motorway_fog_bank", "camera": {"width": 640}},
     }
 
 
 def test_the_manifest_of_a_running_run_has_no_end_and_is_replaced_later(tmp_path: Path) -> None:
     path = tmp_path / "manifest.json"
-    write_manifest(path, Manifest(Status.RUNNING, 0, {}, datetime.now(UTC)))
+    write_json(path, Manifest(Status.RUNNING, 0, {}, datetime.now(UTC)).to_json())
     running = json.loads(path.read_text(encoding="utf-8"))
     assert (running["status"], running["ended"], running["ending"]) == ("running", None, None)
-    write_manifest(path, Manifest(Status.INTERRUPTED, 0, {}, STARTED, STARTED))
+    write_json(path, Manifest(Status.INTERRUPTED, 0, {}, STARTED, STARTED).to_json())
     assert json.loads(path.read_text(encoding="utf-8"))["status"] == "interrupted"
     assert [file.name for file in tmp_path.iterdir()] == ["manifest.json"]
 

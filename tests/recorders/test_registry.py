@@ -6,12 +6,14 @@ from tests.recorders.synthetic import METHODS, drive
 
 
 def test_every_registered_recorder_writes_its_file(tmp_path: Path) -> None:
-    directory = RunDirectory(tmp_path)
-    information = RunInformation(directory, "Bank", "", 0, METHODS, 0.2)
-    recorders = [make(information) for make in RECORDERS.values()]
-    for step in drive(10):
+    with RunDirectory(tmp_path) as directory:
+        directory.begin({})
+        information = RunInformation(directory, "Bank", "", 0, METHODS, 0.2)
+        recorders = [make(information) for make in RECORDERS.values()]
+        for step in drive(10):
+            for recorder in recorders:
+                recorder.record(step, step_metrics(step))
         for recorder in recorders:
-            recorder.record(step, step_metrics(step))
-    for recorder in recorders:
-        recorder.close(complete=True)
-    assert directory.files() == ["report.html", "steps.parquet", "video.mp4"]
+            recorder.close(complete=True)
+        directory.finish({})
+        assert directory.files() == ["manifest.json", "report.html", "steps.parquet", "video.mp4"]

@@ -50,17 +50,19 @@ class Page(HTMLParser):
 def report(path: Path, steps: list[Step], *, complete: bool = True, title: str = "Bank", description: str = "") -> str:
     metrics = RunMetrics()
     summary = metrics.summary
-    directory = RunDirectory(path)
-    information = RunInformation(
-        directory, title, description, 11, METHODS, 0.2, lambda: summary().to_json(), summary().meanings
-    )
-    recorder = ReportRecorder(information)
-    for step in steps:
-        metrics.update(step)
-        recorder.record(step, step_metrics(step))
-    recorder.close(complete)
-    assert directory.files() == ["report.html"]
-    return directory.report.read_text(encoding="utf-8")
+    with RunDirectory(path) as directory:
+        directory.begin({})
+        information = RunInformation(
+            directory, title, description, 11, METHODS, 0.2, lambda: summary().to_json(), summary().meanings
+        )
+        recorder = ReportRecorder(information)
+        for step in steps:
+            metrics.update(step)
+            recorder.record(step, step_metrics(step))
+        recorder.close(complete)
+        directory.finish({})
+        assert directory.files() == ["manifest.json", "report.html"]
+    return (path / "report.html").read_text(encoding="utf-8")
 
 
 def test_a_report_is_whole_and_loads_nothing(tmp_path: Path) -> None:

@@ -1,22 +1,32 @@
 import errno
+import json
 from pathlib import Path
 
 import pytest
 
 from fogsim.errors import InputError
-from fogsim.recorders import RunDirectory
+from fogsim.recorders import RunDirectory, recover_run, write_json
 
 
 def test_it_makes_the_directory_and_its_parents(tmp_path: Path) -> None:
-    directory = RunDirectory(tmp_path / "a" / "b")
-    assert (tmp_path / "a" / "b").is_dir()
-    assert directory.table == tmp_path / "a" / "b" / "steps.parquet"
-    assert directory.files() == []
+    with RunDirectory(tmp_path / "a" / "b") as directory:
+        directory.begin({})
+        assert directory.table == tmp_path / "a" / "b" / "unfinished" / "steps.parquet"
+        assert directory.table.parent.is_dir()
+        assert directory.files() == []
+
+
+def test_one_in_which_nothing_was_begun_is_taken_away(tmp_path: Path) -> None:
+    with RunDirectory(tmp_path / "a" / "b"):
+        pass
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_directory_with_other_files_is_fine(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("mine")
-    assert RunDirectory(tmp_path).files() == []
+    with RunDirectory(tmp_path) as directory:
+        assert directory.files() == []
+    assert [file.name for file in tmp_path.iterdir()] == ["notes.txt"]
 
 
 @pytest.mark.parametrize("name", ["manifest.json", "metrics.json", "steps.parquet", "video.mp4", "report.html"])
@@ -28,13 +38,49 @@ def test_results_are_not_overwritten_unasked(tmp_path: Path, name: str, suffix: 
     assert (tmp_path / (name + suffix)).read_text() == "earlier"
 
 
-def test_overwriting_removes_what_fogsim_writes_and_nothing_else(tmp_path: Path) -> None:
-    for name in ("manifest.json", "steps.parquet", "video.mp4.part"):
+def test_overwriting_replaces_what_fogsim_writes_and_nothing_else_at_the_end(tmp_path: Path) -> None:
+    for name in ("manifest.json", "steps.parquet", "video.mp4.part", "notes.txt"):
         (tmp_path / name).write_text("earlier")
-    (tmp_path / "notes.txt").write_text("mine")
-    (tmp_path / "video.mp4").mkdir()
-    RunDirectory(tmp_path, overwrite=True)
-    assert sorted(file.name for file in tmp_path.iterdir()) == ["notes.txt", "video.mp4"]
+    with RunDirectory(tmp_path, overwrite=True) as directory:
+        directory.begin({"status": "running"})
+        directory.report.write_text("new")
+        assert directory.earlier == ["manifest.json", "steps.parquet", "video.mp4.part"]
+        directory.finish({"status": "complete"})
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["manifest.json", "notes.txt", "report.html"]
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    assert manifest == {"status": "complete", "files": ["manifest.json", "report.html"]}
+
+
+def test_a_change_of_places_that_is_cut_off_is_completed_and_mixes_nothing(tmp_path: Path) -> None:
+    for name in ("manifest.json", "steps.parquet", "metrics.json", "video.mp4"):
+        (tmp_path / name).write_text("earlier")
+    with RunDirectory(tmp_path, overwrite=True) as directory:
+        directory.begin({"status": "running"})
+        for path in (directory.table, directory.metrics):
+            path.write_text("new")
+        # What is left when the process is killed in the middle of it.
+        write_json(
+            directory.manifest, {"status": "complete", "files": ["manifest.json", "metrics.json", "steps.parquet"]}
+        )
+        (tmp_path / "manifest.json").unlink()
+        directory.metrics.replace(tmp_path / "metrics.json")
+    with pytest.raises(InputError, match="fogsim recover"):
+        RunDirectory(tmp_path)
+    assert recover_run(tmp_path) == ["manifest.json", "metrics.json", "steps.parquet"]
+    assert {(tmp_path / name).read_text() for name in ("metrics.json", "steps.parquet")} == {"new"}
+    assert json.loads((tmp_path / "manifest.json").read_text())["status"] == "complete"
+    assert len(list(tmp_path.iterdir())) == 3
+
+
+@pytest.mark.parametrize("name", ["video.mp4", "unfinished"])
+def test_what_is_in_the_way_of_results_is_refused_before_a_run(tmp_path: Path, name: str) -> None:
+    if name == "unfinished":
+        (tmp_path / name).write_text("mine")
+    else:
+        (tmp_path / name).mkdir()
+    with pytest.raises(InputError, match=f"{name} is in the way"):
+        RunDirectory(tmp_path, overwrite=True)
+    assert [file.name for file in tmp_path.iterdir()] == [name]
 
 
 def test_a_file_in_its_place_is_refused(tmp_path: Path) -> None:

@@ -1,0 +1,69 @@
+"""Results of a run whose process has died."""
+
+import contextlib
+from datetime import UTC, datetime
+from pathlib import Path
+
+from fogsim.errors import InputError
+from fogsim.recorders.lock import WriterLock
+from fogsim.recorders.manifest import Status
+from fogsim.recorders.row_log import read_rows
+from fogsim.recorders.run_directory import (
+    ROW_LOG,
+    UNFINISHED,
+    finish_folder,
+    read_manifest,
+    refuse_living,
+    whole_files,
+)
+from fogsim.recorders.table import write_table
+
+
+def recover_run(path: Path, overwrite: bool = False) -> list[str]:
+    """Make readable what a run has left that was killed, or could not close its table.
+
+    Its rows become ``steps.parquet``, marked as partial, and its manifest says "dead"; video and report are lost.
+
+    Parameters
+    ----------
+    path : Path
+        The run's directory.
+    overwrite : bool
+        True to let the results take the place of those of an earlier run.
+
+    Returns
+    -------
+    list of str
+        Names of the result files.
+
+    Raises
+    ------
+    InputError
+        If nothing is to be recovered, the run is not over, or earlier results must not be overwritten.
+    """
+    folder = path / UNFINISHED
+    manifest = read_manifest(folder)
+    if not manifest:
+        raise InputError(f"{path} holds no run that did not come to its end")
+    with WriterLock(path):
+        refuse_living(folder)
+        dead = manifest["status"] == Status.RUNNING.value
+        earlier = whole_files(path)
+        # A run that was over had been told to replace them.
+        if dead and earlier and not overwrite:
+            raise InputError(
+                f"{path} holds results of an earlier run ({', '.join(earlier)}), which would give way; "
+                "copy what you need, and replace them with --overwrite"
+            )
+        log = folder / ROW_LOG
+        if log.exists():
+            # Without a head it is of a process that was killed as it began.
+            with contextlib.suppress(InputError):
+                write_table(folder / "steps.parquet", read_rows(log), complete=False)
+            log.unlink()
+        if dead:
+            message = "the process has died; rows are there until then"
+            ended = datetime.now(UTC).isoformat(timespec="seconds")
+            manifest |= {"status": Status.DEAD.value, "message": message, "ended": ended}
+        finish_folder(path, manifest)
+    return whole_files(path)

@@ -46,7 +46,7 @@ class Profile:
         change = float(self._grade[there] - self._grade[here])
         if abs(change) > CURVED:
             return "sag" if change > 0 else "crest"
-        return f"{100 * self._grade[here]:+.0f} %"
+        return f"{round(100 * self._grade[here]):+d} %"
 
 
 def found_in(step: Step) -> Iterator[tuple[str, Found | None]]:

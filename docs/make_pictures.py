@@ -11,6 +11,7 @@ from fogsim.metrics import step_metrics
 from fogsim.offline import FrameEstimates, Picture
 from fogsim.offline.overlay import Overlay
 from fogsim.recorders import FramePanel
+from fogsim.scenario import build
 
 OUT = Path(__file__).resolve().parent / "pictures"
 SHEET = (("inf", 30), ("400", 120), ("200", 120), ("100", 330), ("50", 100), ("30", 100))
@@ -37,9 +38,10 @@ def contact_sheet() -> Image.Image:
 
 def demo_frame(time: float) -> Image.Image:
     """A frame of the demo's video."""
-    panel = FramePanel()
-    for step in fogsim.run(fogsim.load_scenario("motorway_fog_bank"), seed=1):
-        drawn = panel.draw(step, step_metrics(step))
+    panel, scenario = FramePanel(), fogsim.load_scenario("motorway_fog_bank")
+    standard = build.safety_standard(scenario)
+    for step in fogsim.run(scenario, seed=1):
+        drawn = panel.draw(step, step_metrics(step, standard))
         if step.time >= time - 1e-9:
             return Image.fromarray(drawn)
     raise SystemExit(f"the demo ended before {time} s")

@@ -88,7 +88,8 @@ def attach(
     visibility : float
         Meteorological visibility of homogeneous fog [m].
     scenario : Scenario
-        Fog, light, camera, sensors, estimators and policies, in place of the defaults; its traffic is not started.
+        Fog, light, camera, sensors, estimators and policies, in place of the defaults; its traffic is not started, and
+        its clocks give way to the simulation's step, the decision period as far as that allows.
     net : str or Path
         SUMO network to draw; if not given, the file that the simulation says it has loaded.
     settings : iterable of str
@@ -113,7 +114,9 @@ def attach(
     """
     fog = [] if visibility is None else [f"fog.visibility_m={visibility!r}"]
     if scenario is not None:
-        scenario = override(scenario, [*fog, *settings])
+        # There is a frame at each step that the simulation makes, whatever the scenario's own would be.
+        clocks = _clocks(step_length(api), scenario.clocks.decision_period_s)
+        scenario = override(scenario, [*clocks, *fog, *settings])
         ego = ego or scenario.traffic.ego
     elif ego is None:
         raise InputError("attach: ego is missing: which vehicle is the ego?")
@@ -125,8 +128,8 @@ def attach(
     return AttachedSession(scenario, AttachedTraffic(setup, api), drivers, seed)
 
 
-def _clocks(step: float) -> list[str]:
-    decision = step * max(1, round(DECISION_PERIOD / step))
+def _clocks(step: float, decision_period: float = DECISION_PERIOD) -> list[str]:
+    decision = step * max(1, round(decision_period / step))
     return [f"clocks.{key}_s={t!r}" for key, t in zip(_CLOCKS, (step, step, decision), strict=True)]
 
 

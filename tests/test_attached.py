@@ -1,5 +1,6 @@
 """In a simulation that the user has started: over a connection, and in a loop that the user writes."""
 
+import itertools
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -92,6 +93,22 @@ def test_advice_is_the_users_own_and_the_ego_is_free_afterwards(libsumo: Any) ->
     assert libsumo.vehicle.getSpeed(EGO) > 6.0
     with pytest.raises(SimulationError, match="the session is closed"):
         session.observe()
+
+
+def test_clocks_of_a_scenario_give_way_to_the_simulations_step(libsumo: Any) -> None:
+    """The motorway's five frames of 0.1 s between two decisions would be 2.5 s here."""
+    scenario = fogsim.load_scenario("motorway_fog_bank", [*SMALL, "fog.visibility_m=30"])
+    session = fogsim.attach(libsumo, ego=EGO, scenario=scenario, drivers=False)
+    limits = []
+    for _ in range(76):
+        libsumo.simulationStep()
+        step = session.observe()
+        if step is not None:
+            limits.append(session.advise(step).advice)
+    session.close()
+    # Advice decides about its rise at each step, if it decides at each.
+    assert len(limits) > 3
+    assert all(step is not other for step, other in itertools.pairwise(limits))
 
 
 def conduct(api: Any, vehicle: str) -> tuple[Any, ...]:

@@ -50,6 +50,11 @@ def records(name: str, *arguments: str) -> list[dict[str, Any]]:
             {"growth_kib_per_renderer", "growth_kib_per_1000_frames"},
         ),
         ("air.py", ("--repeat", "2"), {"fog", "lamps", "changing", "width", "height", "ms_median", "ms_min", "ms_max"}),
+        (
+            "grades.py",
+            ("--visibility", "100", "--duration", "1"),
+            {"V_met", "road", "method", "frames", "valid", "bias", "median", "p95", "held"},
+        ),
         ("traffic.py", ("--vehicles", "20", "--seconds", "1"), {"vehicles", "ms_sumo", "ms_total", "ratio"}),
     ],
 )

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
 
+from fogsim.atmosphere import FieldAccess
 from fogsim.traffic import Compliance, DriverSetup, DriverSight, Traffic, TrafficSetup, libsumo_traffic
 from fogsim.traffic.drivers import (
     SPEED_CHOICES,
@@ -18,8 +19,10 @@ from fogsim.traffic.drivers import (
     unaffected,
     within_sight,
 )
-from fogsim.traffic.sumo_library import load_libsumo
-from fogsim.values import Collision, Command
+from fogsim.traffic.motion_bounds import MotionBounds
+from fogsim.traffic.pair_sight import PairSight
+from fogsim.traffic.sumo_library import LibsumoLink, load_libsumo
+from fogsim.values import Collision, Command, FogBank, FogField
 
 NET = Path(__file__).resolve().parents[2] / "scenarios" / "motorway_fog_bank" / "motorway.net.xml"
 EMERGENCY_DECELERATION = 9.0  # SUMO's default of a passenger car
@@ -146,6 +149,36 @@ def test_real_eyes_in_dense_fog_hit_and_in_thin_fog_stop(setup: TrafficSetup) ->
     eyes = replace(setup, sight=DriverSight(illuminance=10_000.0))
     assert len(collisions(eyes, k=3.0 / 30.0)[0]) == 1
     assert collisions(eyes, k=3.0 / 400.0)[0] == []
+
+
+@pytest.mark.parametrize("bank", [False, True])
+def test_on_a_grade_sight_is_the_closed_form_over_the_way_along_the_road(bank: bool, tmp_path: Path) -> None:
+    """τ = k d, as far uphill as on the level; in uneven fog along the line between both vehicles' places."""
+    far_off = FogBank((0.0, 1e6), (1.0, 0.0), 0.0, 100.0, 10.0, 0.01)
+    fog = FieldAccess(FogField(0.03, (1000.0,) * 3, (far_off,) if bank else ()))
+    routes = tmp_path / "two.rou.xml"
+    routes.write_text(
+        """<routes><vType id="c" length="5" minGap="2.5"/><route id="r" edges="road"/>
+        <vehicle id="lead" type="c" route="r" depart="0" departPos="1370" departSpeed="20"/>
+        <vehicle id="ego" type="c" route="r" depart="0" departPos="1300" departSpeed="20"/></routes>""",
+        encoding="utf-8",
+    )
+    net = NET.parents[1] / "graded_motorway" / "graded.net.xml"
+    link = LibsumoLink()
+    try:
+        api = link.begin(["--net-file", str(net), "--route-files", str(routes), "--no-step-log", "true"])
+        while len(api.vehicle.getIDList()) < 2:
+            link.step()
+        leader, gap = api.vehicle.getLeader("ego", 200.0)
+        front, ahead = (np.array(api.vehicle.getPosition3D(v)) for v in ("ego", leader))
+        way = float(np.linalg.norm(ahead - front)) - 5.0
+        assert gap + 2.5 == pytest.approx(way, abs=1e-3)
+        assert abs(front[2] - ahead[2]) > 2.5
+        sight = DriverSight(illuminance=10_000.0)
+        pairs = PairSight(api, fog, sight, MotionBounds(api.vehicle.getSpeed))
+        assert pairs._depths([("ego", leader, gap)], [gap + 2.5]) == pytest.approx([0.03 * way], rel=1e-4)
+    finally:
+        link.end()
 
 
 def leaves_its_lane(setup: TrafficSetup, sight: DriverSight | SeesFrom | None, model: str = "LC2013") -> bool:

@@ -11,6 +11,7 @@ from fogsim.traffic.appearance import body_kind, lamps_from_many_signals, lamps_
 from fogsim.traffic.bodies import Bodies
 from fogsim.traffic.nearness import Nearness
 from fogsim.traffic.reading import OTHERS_LAMPS, VehicleReader
+from fogsim.traffic.subscribed_reading import SubscribedReader
 from fogsim.traffic.sumo_library import LibsumoLink
 from fogsim.values import Lamp, TrafficState
 
@@ -106,10 +107,12 @@ def test_slopes_are_read_wherever_the_road_is_not_level(link: LibsumoLink, tmp_p
         return float(original(vehicle))
 
     reader._slope = watched
+    subscribed = SubscribedReader(api, "ego", 100.0)
     seen = []
     for _ in range(150):
         state = reader.state(Lamp.NONE)
         assert_same(state, read_everything(api, Lamp.NONE, 100.0))
+        assert_same(state, subscribed.state(Lamp.NONE))
         seen.append(float(state.grade[state.ids.index("ego")]))
         link.step()
     assert min(seen) == 0.0

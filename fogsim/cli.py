@@ -1,5 +1,6 @@
 """``fogsim …``: arguments, progress and exit codes, nothing else."""
 
+import contextlib
 import json
 import sys
 import warnings
@@ -17,7 +18,7 @@ from fogsim import __version__
 from fogsim.cli_estimate import estimate_command
 from fogsim.cli_reproduce import reproduce_command
 from fogsim.errors import FogSimError, InputError
-from fogsim.interruption import ProgramSignals, exit_code, leave_on_signals
+from fogsim.interruption import ProgramSignals, leave
 from fogsim.values import Step
 
 if TYPE_CHECKING:
@@ -59,9 +60,9 @@ def main() -> None:
         if signals.last is None:
             raise
     if signals.last is not None:
-        leave_on_signals()
-        _err.print("interrupted")
-        code = exit_code(signals.last)
+        with contextlib.suppress(OSError):
+            sys.stdout.flush()
+        leave(signals.last)
     sys.exit(code)  # type: ignore[arg-type]  # what sys.exit was called with
 
 
@@ -284,12 +285,13 @@ def signs_command(
     settings: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY.PATH=VALUE", help="Put a value in place of the file's.")
     ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it is there already.")] = False,
 ) -> None:
     """Write the signs of a scenario's road network, additional files and OpenDRIVE signals as GeoJSON."""
     from fogsim.recording import record_signs  # noqa: PLC0415 - heavy; --help must be quick
     from fogsim.scenario import load_scenario  # noqa: PLC0415 - heavy; --help must be quick
 
-    signs = record_signs(load_scenario(scenario, settings or ()), out).signs
+    signs = record_signs(load_scenario(scenario, settings or ()), out, overwrite=overwrite).signs
     _out.print(f"{len(signs)} sign{'' if len(signs) == 1 else 's'}: {escape(str(out))}", soft_wrap=True)
 
 
@@ -348,6 +350,7 @@ def fog_command(
         str | None, typer.Option(help="Its pixel value, or R,G,B; else the sky's median, or the brightest thousandth.")
     ] = None,
     depth_scale: Annotated[float | None, typer.Option(help="Metres in one unit of DEPTH.")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it is there already.")] = False,
 ) -> None:
     """Put homogeneous fog on an image from disk: Koschmieder's law on light and slant range."""
     from fogsim.camera_file import load_camera  # noqa: PLC0415 - heavy; --help must be quick
@@ -356,7 +359,9 @@ def fog_command(
     if depth_kind is None:
         raise InputError("--depth-kind is missing: planar or range? Data sets differ, and the wrong one goes unseen")
     light = None if airlight is None else _pixel_values(airlight)
-    used = fog_file(image, depth, depth_kind, visibility, load_camera(camera), out, light, depth_scale)
+    used = fog_file(
+        image, depth, depth_kind, visibility, load_camera(camera), out, light, depth_scale, overwrite=overwrite
+    )
     told = ", ".join(f"{value:.4g}" for value in used)
     _out.print(f"{escape(str(out))}: visibility {visibility:g} m, airlight {told}", soft_wrap=True)
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from fogsim.errors import InputError
 from fogsim.image_files import Pixels, read_distance, read_image, write_image
+from fogsim.output_files import refuse_existing
 from fogsim.response import exposure_of, respond
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera
@@ -103,6 +104,8 @@ def fog_file(
     out: Path,
     airlight: tuple[float, ...] | None = None,
     scale: float | None = None,
+    *,
+    overwrite: bool = False,
 ) -> NDArray[np.float64]:
     """Put homogeneous fog on an image file.
 
@@ -122,6 +125,8 @@ def fog_file(
         Pixel value of the airlight: one, or red, green and blue; None to take it from the image (`airlight_of`).
     scale : float or None
         Metres in one unit of the depth map.
+    overwrite : bool
+        True to replace a file that is there.
 
     Returns
     -------
@@ -131,10 +136,11 @@ def fog_file(
     Raises
     ------
     InputError
-        If anything does not fit.
+        If anything does not fit, or there is a file `out` that must not be replaced.
     """
     if out.exists() and any(given.exists() and out.samefile(given) for given in (image, depth)):
         raise InputError(f"--out {out} would replace what is read; give another name")
+    refuse_existing(out, overwrite)
     pixels = read_image(image)
     if pixels.shape[:2] != (camera.height, camera.width):
         rows, columns = pixels.shape[:2]

@@ -14,22 +14,20 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _Handler = Callable[[int, FrameType | None], object]
 
 
-def exit_code(signum: int) -> int:
-    """Exit code of a program that a signal has ended: 130 for SIGINT, 143 for SIGTERM, 129 for SIGHUP."""
-    return 128 + signum
-
-
 def leave_on_signals() -> None:
     """Let signals end this process at once, in one line: for as long as there is nothing to be saved.
 
     An exception would be raised in the middle of whatever is imported, which may take it for its own failure.
     """
-    _handle_signals(_leave)
+    _handle_signals(leave)
 
 
-def _leave(signum: int, _: FrameType | None) -> None:
-    os.write(2, b"interrupted\n")
-    os._exit(exit_code(signum))
+def leave(signum: int, _: FrameType | None = None) -> None:
+    """End the process at once, with one line and the exit code of a signal: 130 for SIGINT, 143 SIGTERM, 129 SIGHUP."""
+    # The terminal may be gone after SIGHUP.
+    with contextlib.suppress(OSError):
+        os.write(2, b"interrupted\n")
+    os._exit(128 + signum)
 
 
 def _handle_signals(handler: _Handler) -> None:

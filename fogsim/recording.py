@@ -10,6 +10,7 @@ from fogsim.errors import InputError, RecorderError
 from fogsim.interruption import Interruption
 from fogsim.loop import run
 from fogsim.metrics import RunMetrics, RunSummary, step_metrics
+from fogsim.output_files import refuse_existing
 from fogsim.recorders import (
     RECORDERS,
     Manifest,
@@ -277,7 +278,7 @@ def _open(
     return {name: RECORDERS[name](information) for name in recorders}
 
 
-def record_signs(scenario: Scenario, out: Path) -> SignMap:
+def record_signs(scenario: Scenario, out: Path, *, overwrite: bool = False) -> SignMap:
     """Write the sign map of a scenario as GeoJSON; no simulation is started.
 
     Parameters
@@ -286,12 +287,15 @@ def record_signs(scenario: Scenario, out: Path) -> SignMap:
         The scenario.
     out : Path
         The file.
+    overwrite : bool
+        True to replace one that is there.
 
     Raises
     ------
     InputError
-        If the network, or a sign of the additional files, cannot be read.
+        If the network, or a sign of the additional files, cannot be read, or the file is there.
     """
+    refuse_existing(out, overwrite)
     setup = build.traffic_setup(scenario)
     net_file, additional = setup.net, setup.additional
     if net_file is None and setup.config is not None:

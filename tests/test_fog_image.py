@@ -59,6 +59,7 @@ def run(folder: Path, **changed: object) -> NDArray[np.generic]:
         "visibility": 80.0,
         "camera": load_camera(folder / "camera.yaml"),
         "out": folder / "out.png",
+        "overwrite": True,
         "airlight": (255.0,),
     }
     fog_file(**{**given, **changed})  # type: ignore[arg-type]  # some are wrong on purpose

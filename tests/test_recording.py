@@ -38,7 +38,7 @@ def test_a_failing_run_leaves_what_was_recorded_and_says_why(tmp_path: Path) -> 
 def test_one_recorder_that_cannot_finish_does_not_cost_the_others_their_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def full(*_: object) -> None:
+    def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(ReportRecorder, "close", full)

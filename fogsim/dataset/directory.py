@@ -3,14 +3,16 @@
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from types import TracebackType
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.dataset.encoding import png
 from fogsim.errors import InputError
-from fogsim.recorders.files import PARTIAL_SUFFIX, partial_path, publish, write_json
+from fogsim.recorders.files import partial_path, write_bytes, write_json
+from fogsim.recorders.lock import LOCK_NAME, WriterLock
 
 IDENTITY = "dataset.json"
 ANNOTATIONS = "annotations.json"
@@ -23,7 +25,8 @@ _RECORDS = "records"
 class DatasetDirectory:
     """The directory of one data set, new or to be continued.
 
-    A frame is there when its record is, which is written after its images.
+    A frame is there when its record is, which is written after its images. It has one writer at a time, and replaces
+    no file but its own.
 
     Parameters
     ----------
@@ -35,28 +38,48 @@ class DatasetDirectory:
     Raises
     ------
     InputError
-        If the path is no directory, or holds something else than this data set.
+        If the path is no directory, is written by another process, or holds something else than this data set.
     """
 
     def __init__(self, path: Path, identity: Mapping[str, Any]) -> None:
         self.path = Path(path)
-        self._check(dict(identity))
+        if self.path.exists() and not self.path.is_dir():
+            raise InputError(f"a data set needs a directory, but {self.path} is a file")
+        self._make()
+        self._lock = WriterLock(self.path)
         try:
-            for folder in (*LAYERS, _RECORDS):
+            self._check(dict(identity))
+            # What is ours is told before anything is written.
+            write_json(self.path / IDENTITY, identity)
+            self._make(*LAYERS, _RECORDS)
+        except BaseException:
+            self._lock.release()
+            raise
+
+    def _make(self, *folders: str) -> None:
+        try:
+            for folder in folders or (".",):
                 (self.path / folder).mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(f"cannot make the directory {self.path} for the data set: {error.strerror}") from error
-        write_json(self.path / IDENTITY, identity)
+
+    def close(self) -> None:
+        """Let others write."""
+        self._lock.release()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
 
     def _check(self, identity: dict[str, Any]) -> None:
-        if not self.path.exists():
-            return
-        if not self.path.is_dir():
-            raise InputError(f"a data set needs a directory, but {self.path} is a file")
         if not (self.path / IDENTITY).is_file():
-            strangers = sorted(p.name for p in self.path.iterdir() if not p.name.endswith(PARTIAL_SUFFIX))
-            # An interruption before anything was written leaves empty folders.
-            if any(name not in LAYERS and name != _RECORDS for name in strangers):
+            there = sorted(p.name for p in self.path.iterdir())
+            strangers = [name for name in there if name not in (LOCK_NAME, partial_path(Path(IDENTITY)).name)]
+            if strangers:
                 raise InputError(
                     f"{self.path} holds files that are no data set of FogSim's ({strangers[0]}, …); "
                     "choose another directory with --out"
@@ -96,11 +119,19 @@ class DatasetDirectory:
             An image for each of `LAYERS`.
         record : mapping
             Its "image" and "annotations".
+
+        Raises
+        ------
+        InputError
+            If one of its files is there and is another: it is not of this data set, or was changed.
         """
         for layer in LAYERS:
-            path = self._layer(layer, number)
-            partial_path(path).write_bytes(png(layers[layer]))
-            publish(path)
+            path, data = self._layer(layer, number), png(layers[layer])
+            if path.exists() and path.read_bytes() != data:
+                raise InputError(
+                    f"{path} is there and is not what this data set has there; move it away to have it made again"
+                )
+            write_bytes(path, data)
         names = {_key(layer): self._layer(layer, number).relative_to(self.path).as_posix() for layer in LAYERS}
         write_json(self._record(number), {**record, "image": {**names, **record["image"]}})
 

@@ -6,16 +6,16 @@ import itertools
 from collections.abc import Callable, Generator, Iterator
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 from fogsim.dataset.annotations import coco, frame_record, object_records
 from fogsim.dataset.directory import DatasetDirectory
 from fogsim.dataset.encoding import DEPTH_UNIT, TRANSMISSION_UNIT, encoded_depth, encoded_transmission
 from fogsim.dataset.ground_truth import SemanticClass, depth, instance_mask, semantic_mask, transmission
+from fogsim.dataset.inputs import identity
 from fogsim.errors import InputError
-from fogsim.interruption import interruptible
+from fogsim.interruption import Interruption
 from fogsim.loop import AdvisedDriving, ClosedLoop
-from fogsim.scenario import Scenario, resolved
+from fogsim.scenario import Scenario
 from fogsim.values import Ending, Step
 
 
@@ -79,33 +79,34 @@ def write_dataset(
     Raises
     ------
     InputError
-        If a number is out of range, or the directory holds something else.
+        If a number is out of range, or the directory holds something else, or what was made with other inputs, or is
+        written by another process.
     FogSimError
         If a part of the loop cannot start or fails.
     """
     for name, value, least in (("frames", frames, 1), ("every", every, 1), ("seed", seed, 0)):
         if value < least:
             raise InputError(f"{name} must be at least {least}, got {value}")
-    directory = DatasetDirectory(Path(out), _identity(scenario, seed, every))
-    if more := directory.beyond(frames):
-        raise InputError(f"{directory.path} holds {more} frames already, more than the {frames} asked for")
-    written = 0
-    try:
-        with interruptible(), contextlib.closing(_missing(scenario, directory, frames, seed, every)) as missing:
-            for number, run_number, step in missing:
-                if step is not None:
-                    _write_frame(directory, number, step, run_number, seed)
-                    written += 1
-                watch(number + 1)
-    except KeyboardInterrupt:
-        pass
-    finally:
-        there = _write_annotations(directory, scenario, frames, seed, every)
+    with Interruption() as interruption, DatasetDirectory(Path(out), identity(scenario, seed, every)) as directory:
+        if more := directory.beyond(frames):
+            raise InputError(f"{directory.path} holds {more} frames already, more than the {frames} asked for")
+        written = 0
+        try:
+            with (
+                interruption.allowed(),
+                contextlib.closing(_missing(scenario, directory, frames, seed, every)) as missing,
+            ):
+                for number, run_number, step in missing:
+                    if step is not None:
+                        with interruption.held():
+                            _write_frame(directory, number, step, run_number, seed)
+                            written += 1
+                    watch(number + 1)
+        except KeyboardInterrupt:
+            pass
+        finally:
+            there = _write_annotations(directory, scenario, frames, seed, every)
     return WrittenDataset(directory.path, there, written, there == frames)
-
-
-def _identity(scenario: Scenario, seed: int, every: int) -> dict[str, Any]:
-    return {"fogsim": version("fogsim"), "seed": seed, "every": every, "scenario": resolved(scenario)}
 
 
 def _missing(

@@ -81,20 +81,6 @@ def write_json(path: Path, values: Mapping[str, object]) -> None:
     write_text(path, text + "\n")
 
 
-def refuse_existing(path: Path, overwrite: bool) -> None:
-    """Refuse to write a file that is there already.
-
-    Raises
-    ------
-    InputError
-        If it is there and must not be overwritten, or is no file.
-    """
-    if path.is_dir():
-        raise InputError(f"--out {path} is a folder; give the name of a file")
-    if path.exists() and not overwrite:
-        raise InputError(f"--out {path} is there already; give another name, or replace it with --overwrite")
-
-
 class Reserve:
     """Room on the disk that is given back when it is needed, so that files can be closed on a disk that is full.
 

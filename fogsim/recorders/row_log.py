@@ -34,12 +34,8 @@ class RowLog:
         self._reserve = Reserve(path.with_name(path.name + ".reserve"))
         self._whole = 0
         with naming(path):
-            self._file = path.open("wb", buffering=0)
-        try:
-            self._write(schema.serialize())
-        except BaseException:
-            self._file.close()
-            raise
+            path.touch()
+        self._write(schema.serialize())
 
     def append(self, batch: Any) -> None:
         """Write rows (a pyarrow.RecordBatch); they are safe from the end of the process when it returns.
@@ -54,16 +50,17 @@ class RowLog:
         self._write(data)
 
     def _write(self, data: Any) -> None:
-        # Whatever an interruption or a full disk has left of the rows before is written over.
-        self._file.seek(self._whole)
         rest = memoryview(data)
-        try:
-            with naming(self.path):
+        # Not kept open: how a recorder is left is not in its hands.
+        with naming(self.path), self.path.open("r+b", buffering=0) as file:
+            # Whatever an interruption has left of the rows before is written over.
+            file.seek(self._whole)
+            try:
                 while rest:
-                    rest = rest[self._file.write(rest) :]
-        except OSError:
-            self._file.truncate(self._whole)
-            raise
+                    rest = rest[file.write(rest) :]
+            except OSError:
+                file.truncate(self._whole)
+                raise
         self._whole += data.size
 
     def release_reserve(self) -> None:
@@ -72,7 +69,6 @@ class RowLog:
 
     def remove(self) -> None:
         """Remove the file; twice does nothing."""
-        self._file.close()
         self._reserve.release()
         self.path.unlink(missing_ok=True)
 

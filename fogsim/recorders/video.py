@@ -120,6 +120,7 @@ class Encoder:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+            self._complaints.close()
             raise FogSimError(f"the video encoder did not end within {limit:g} s, and was killed") from None
         said = self._said()
         self._complaints.close()

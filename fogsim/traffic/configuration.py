@@ -9,6 +9,7 @@ from fogsim.errors import InputError
 
 _NET = ("net-file", "net", "n")
 _ADDITIONAL = ("additional-files", "additional", "a")
+_FURTHER = ("route-files", "routes", "r", "weight-files", "weights", "w", "lane-weight-files", "load-state")
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +73,22 @@ def left_out(config: Path) -> tuple[str, ...]:
         for value in _values(root, unfit.names)
         if value.lower() not in (unfit.fit, *unfit.as_good)
     )
+
+
+def input_files(config: Path) -> tuple[Path, ...]:
+    """Every file that a SUMO configuration has the simulation read: network, routes, additional, weights, state.
+
+    Parameters
+    ----------
+    config : Path
+        The ``.sumocfg`` file; names in it are relative to its folder.
+
+    Raises
+    ------
+    InputError
+        If it is no SUMO configuration.
+    """
+    return _named(config, _root(config), (*_NET, *_ADDITIONAL, *_FURTHER))
 
 
 def _root(config: Path) -> ET.Element:

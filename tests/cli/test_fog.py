@@ -51,6 +51,17 @@ def test_a_black_image_at_the_visibility_has_95_percent_of_the_airlight(folder: 
     assert sorted(path.name for path in folder.iterdir()) == ["camera.yaml", "depth.npy", "image.png", "out.png"]
 
 
+def test_a_file_that_is_there_is_replaced_only_when_it_is_asked_for(folder: Path) -> None:
+    (folder / "out.png").write_text("of the user", encoding="utf-8")
+    given = ("--depth-kind", "range", "--visibility", "80", "--airlight", "240")
+    refused = fog(folder, *given)
+    assert refused.returncode == 2
+    assert "--out out.png is there already" in refused.stderr
+    assert (folder / "out.png").read_text(encoding="utf-8") == "of the user"
+    assert fog(folder, *given, "--overwrite").returncode == 0
+    assert cv2.imread(str(folder / "out.png")) is not None
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [

@@ -1,7 +1,11 @@
 """Data sets on disk: what they hold, that they can be continued, and what is refused."""
 
+import functools
+import hashlib
 import json
+import os
 import re
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +13,10 @@ import pytest
 
 import fogsim
 from fogsim.dataset import read_png
-from fogsim.dataset.directory import LAYERS
+from fogsim.dataset.directory import LAYERS, DatasetDirectory
+from fogsim.dataset.inputs import input_digests
 from fogsim.errors import InputError
-from fogsim.scenario import Scenario
+from fogsim.scenario import Scenario, scenario_from_config
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "dataset.md"
 FRAMES, EVERY = 5, 2
@@ -117,6 +122,58 @@ def test_another_data_set_is_refused(whole: Path) -> None:
     with pytest.raises(InputError, match="holds 5 frames already, more than the 3 asked for"):
         fogsim.write_dataset(small(), whole, 3, seed=4, every=EVERY)
     assert contents(whole) == before
+
+
+def test_a_data_set_is_not_continued_with_other_inputs(whole: Path, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(small().directory, tmp_path / "mine"))
+    settings = ("camera.width=96", "camera.height=72", "duration_s=0.5", "fog.visibility_m=120")
+    load = functools.partial(fogsim.load_scenario, str(folder), settings)
+    out = Path(shutil.copytree(whole, tmp_path / "data"))
+    assert fogsim.write_dataset(load(), out, FRAMES, seed=4, every=EVERY).written == 0
+    before = contents(out)
+    (routes,) = (folder / path for path in load().traffic.routes)
+    routes.write_text(routes.read_text(encoding="utf-8") + "<!-- changed -->", encoding="utf-8")
+    with pytest.raises(InputError, match=rf"holds another data set: inputs\.{routes.name} is .* there"):
+        fogsim.write_dataset(load(), out, FRAMES + 1, seed=4, every=EVERY)
+    assert contents(out) == before
+
+
+def test_its_manifest_names_every_input_and_version(whole: Path) -> None:
+    identity = json.loads((whole / "dataset.json").read_text(encoding="utf-8"))
+    scenario = small()
+    files = [scenario.traffic.net, *scenario.traffic.routes, *scenario.traffic.additional]
+    digests = {str(f): hashlib.sha256((scenario.directory / str(f)).read_bytes()).hexdigest() for f in files}
+    assert identity["inputs"] == digests
+    assert {"fogsim", "libsumo", "numpy", "python"} <= set(identity["versions"])
+
+
+def test_files_of_a_sumo_configuration_are_inputs() -> None:
+    grid = Path(__file__).resolve().parents[1] / "data" / "grid"
+    scenario = scenario_from_config(grid / "grid.sumocfg", "veh18", ["fog.visibility_m=120"])
+    assert sorted(input_digests(scenario)) == ["grid.net.xml", "grid.sumocfg", "grid.trips.xml"]
+
+
+@pytest.mark.parametrize("place", ["frames/000000.png", "records/000000.json", "annotations.json"])
+def test_files_of_others_in_folders_of_these_names_are_not_replaced(tmp_path: Path, place: str) -> None:
+    (tmp_path / place).parent.mkdir(exist_ok=True)
+    (tmp_path / place).write_text("mine", encoding="utf-8")
+    with pytest.raises(InputError, match="holds files that are no data set of FogSim's"):
+        fogsim.write_dataset(small(), tmp_path, 1)
+    assert contents(tmp_path) == {place: b"mine"}
+
+
+def test_a_foreign_file_in_the_place_of_a_missing_frame_is_not_replaced(whole: Path, tmp_path: Path) -> None:
+    out = Path(shutil.copytree(whole, tmp_path / "data"))
+    (out / "depth" / "000005.png").write_text("mine", encoding="utf-8")
+    with pytest.raises(InputError, match=r"depth/000005\.png is there and is not what this data set has there"):
+        fogsim.write_dataset(small(), out, FRAMES + 1, seed=4, every=EVERY)
+    assert (out / "depth" / "000005.png").read_text(encoding="utf-8") == "mine"
+
+
+def test_a_data_set_has_one_writer(tmp_path: Path) -> None:
+    with DatasetDirectory(tmp_path, {}), pytest.raises(InputError, match=f"process {os.getpid()} on .* is writing"):
+        DatasetDirectory(tmp_path, {})
+    DatasetDirectory(tmp_path, {}).close()
 
 
 def test_foreign_files_and_impossible_numbers_are_refused(tmp_path: Path) -> None:

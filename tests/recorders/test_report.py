@@ -101,6 +101,7 @@ def test_pictures_say_where_and_what_was_true_and_believed(tmp_path: Path) -> No
 def test_an_interrupted_run_says_when(tmp_path: Path) -> None:
     text = report(tmp_path, list(itertools.islice(drive(), 10)), complete=False)
     assert "PARTIAL: interrupted at t = 2.0 s" in Page(text).text
+    assert "Figures are of whole runs" in Page(text).text  # drawing them takes longer than somebody waits
 
 
 def test_a_run_without_steps_is_still_a_page(tmp_path: Path) -> None:

@@ -1,0 +1,39 @@
+"""Signals that come while libraries are imported."""
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PROGRAM = """
+import os, runpy, sys
+
+module, number, *sys.argv = sys.argv[1:]
+
+class Sender:
+    def find_spec(self, name, path=None, target=None):
+        if name == module:
+            os.kill(os.getpid(), int(number))
+
+sys.meta_path.insert(0, Sender())
+runpy.run_module("fogsim", run_name="__main__")
+"""
+"""FogSim's command line, which gets a signal when it begins to import a module."""
+
+
+@pytest.mark.parametrize(
+    ("module", "number", "command"),
+    [
+        ("rich.console", signal.SIGINT, ["--version"]),
+        ("numpy", signal.SIGHUP, ["--version"]),
+        ("numba", signal.SIGTERM, ["run", "motorway_fog_bank"]),
+        ("pyarrow", signal.SIGINT, ["run", "motorway_fog_bank"]),
+    ],
+)
+def test_they_end_in_one_line(tmp_path: Path, module: str, number: int, command: list[str]) -> None:
+    program = [sys.executable, "-c", PROGRAM, module, str(int(number)), "fogsim", *command]
+    done = subprocess.run(program, capture_output=True, text=True, timeout=120, check=False, cwd=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (128 + number, "", "interrupted\n")
+    assert not list(tmp_path.iterdir())

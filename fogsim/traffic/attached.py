@@ -94,7 +94,9 @@ class AttachedTraffic(SumoTraffic):
     def release(self) -> None:
         """Give every vehicle back what was changed about it."""
         with self._attached.watched():
-            self._release()
+            # In a simulation that was loaded since, others bear the same names.
+            if self._api.simulation.getTime() >= self._running.roster.time:
+                self._release()
 
 
 def step_length(api: Api) -> float:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Collection, Iterable, Mapping
 
+from fogsim.traffic.claims import LANE_CHANGE_MODE, SOLE_SESSION, Claims
 from fogsim.traffic.governor import governed_speed
 from fogsim.traffic.link import Api
 from fogsim.traffic.roster import Roster
@@ -64,12 +65,14 @@ class LaneKeeping:
         Which, as soon as they are on the road.
     roster : Roster
         Who is on the road.
+    session : str
+        Name of the session.
     """
 
-    def __init__(self, api: Api, vehicles: Iterable[str], roster: Roster) -> None:
-        self._vehicles = api.vehicle
+    def __init__(self, api: Api, vehicles: Iterable[str], roster: Roster, session: str = SOLE_SESSION) -> None:
         self._wanted = frozenset(vehicles)
-        self._modes: dict[str, int] = {}
+        self._modes = Claims(api, LANE_CHANGE_MODE, session)
+        self._kept: set[str] = set()
         self._roster = roster
         # Who is there already keeps the owner's lane changing.
         _, self._mark = roster.newcomers(0)
@@ -78,11 +81,11 @@ class LaneKeeping:
         """Take charge of those who are new on the road."""
         new, self._mark = self._roster.newcomers(self._mark)
         for vehicle in self._wanted.intersection(new) if new else ():
-            self._modes.setdefault(vehicle, self._vehicles.getLaneChangeMode(vehicle))
-            self._vehicles.setLaneChangeMode(vehicle, _NO_LANE_CHANGES)
+            self._modes.make(vehicle, _NO_LANE_CHANGES)
+            self._kept.add(vehicle)
 
     def release(self, present: Collection[str]) -> None:
         """Let those on the road change lanes again as they did before."""
-        for vehicle in self._modes.keys() & present:
-            self._vehicles.setLaneChangeMode(vehicle, self._modes[vehicle])
-        self._modes.clear()
+        for vehicle in self._kept.intersection(present):
+            self._modes.withdraw(vehicle)
+        self._kept.clear()

@@ -6,10 +6,9 @@ from enum import IntEnum, auto
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.traffic.claims import Claims
 from fogsim.traffic.driver_choice import nature
 from fogsim.traffic.drivers import DriverSetup
-from fogsim.traffic.getters import vehicle_getter
-from fogsim.traffic.link import Api
 
 
 class Column(IntEnum):
@@ -22,7 +21,7 @@ class Column(IntEnum):
     TOP_SPEED, HEADWAY
         Top speed [m/s] and wanted time headway [s] of the vehicle as it came.
     SPEED_SET, SPEED_WANTED
-        Top speed that it was given, and the one that it is on the way to [m/s].
+        Top speed that was claimed, and the one that it is on the way to [m/s].
     SHORTENED
         Factor by which its headway was shortened [-].
     EXTINCTION, CHOICE
@@ -45,17 +44,17 @@ class DriverTable:
 
     Parameters
     ----------
-    api : Api
-        The simulation.
     setup : DriverSetup
         What drivers are like.
     seed : int
         With a vehicle's id it gives its driver's nature, so that it depends on nothing else.
+    top_speeds, headways : Claims
+        The session's claims to them.
     """
 
-    def __init__(self, api: Api, setup: DriverSetup, seed: int) -> None:
-        self._top_speed = vehicle_getter(api, "getMaxSpeed")
-        self._headway = vehicle_getter(api, "getTau")
+    def __init__(self, setup: DriverSetup, seed: int, top_speeds: Claims, headways: Claims) -> None:
+        self._top_speeds = top_speeds
+        self._headways = headways
         self._setup = setup
         self._seed = seed
         self._row: dict[str, int] = {}
@@ -78,12 +77,19 @@ class DriverTable:
         """Write one column of some rows."""
         self._numbers[rows, column] = values
 
+    def welcome(self, vehicles: Sequence[str]) -> None:
+        """Fill rows anew for vehicles that have come, come back, or bear the id of one that was there."""
+        for vehicle in vehicles:
+            self._meet(vehicle)
+
     def _meet(self, vehicle: str) -> int:
-        row = len(self._row)
+        row = self._row.get(vehicle, len(self._row))
         if row == len(self._numbers):
             self._numbers = np.concatenate((self._numbers, np.empty_like(self._numbers)))
-        driver, top_speed = nature(self._setup, vehicle, self._seed), float(self._top_speed(vehicle))
-        headway = float(self._headway(vehicle))
+        for claims in (self._top_speeds, self._headways):
+            claims.withdraw(vehicle)
+        driver, top_speed = nature(self._setup, vehicle, self._seed), self._top_speeds.own(vehicle)
+        headway = self._headways.own(vehicle)
         self._numbers[row] = (
             *(driver.factor, driver.follows, top_speed, headway),
             *(top_speed, top_speed, 1.0, -1.0, np.inf),

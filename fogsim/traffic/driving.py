@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.traffic.claims import SOLE_SESSION, TIME_HEADWAY, TOP_SPEED, Claims
 from fogsim.traffic.driver_table import Column, DriverTable
 from fogsim.traffic.drivers import (
     CHOICE_PERIOD,
@@ -45,6 +46,8 @@ class Drivers:
         How hard they slow down to a lower speed that they want [m/s²].
     roster : Roster or None
         Who is on the road; None for one of its own.
+    session : str
+        Name of the session.
     """
 
     def __init__(
@@ -56,8 +59,9 @@ class Drivers:
         seed: int,
         deceleration: float,
         roster: Roster | None = None,
+        session: str = SOLE_SESSION,
     ) -> None:
-        self._vehicles = api.vehicle
+        self._api = api
         self._position = vehicle_getter(api, "getPosition3D")
         self._departure = vehicle_getter(api, "getDeparture")
         self._step = float(api.simulation.getDeltaT())
@@ -67,8 +71,10 @@ class Drivers:
         self._extinction = fog.minimum_extinction if fog.minimum_extinction == fog.maximum_extinction else None
         self._ego = ego
         self._roster = Roster(api) if roster is None else roster
-        self._table = DriverTable(api, setup, seed)
-        self._top_speeds = TopSpeeds(api, self._table, deceleration, self._roster.time)
+        top_speeds = Claims(api, TOP_SPEED, session)
+        self._headways = Claims(api, TIME_HEADWAY, session)
+        self._table = DriverTable(setup, seed, top_speeds, self._headways)
+        self._top_speeds = TopSpeeds(api, self._table, top_speeds, deceleration, self._roster.time)
         self._advised_since: dict[str, float] = {}
         self._next = 0.0
         self._mark = 0
@@ -98,6 +104,7 @@ class Drivers:
 
     def _welcome(self, new: Sequence[str], advised: Mapping[str, float]) -> None:
         """Let who is new choose; who enters has driven in that fog before, past the signs that give the advice."""
+        self._table.welcome(new)
         # Departures carry the time at which their step began. Who came otherwise was on the road already.
         since = self._roster.time - 1.5 * self._step
         entering = [v for v in new if self._departure(v) >= since]
@@ -149,7 +156,7 @@ class Drivers:
         for vehicle, row, extinction, known, headway in zip(ids, rows, *columns, strict=True):
             factor = perceived_distance_factor(visibility_from_extinction(extinction), self._setup.misjudgement)
             if abs(factor - known) > UNNOTICED_FACTOR:
-                self._vehicles.setTau(vehicle, float(headway) / factor)
+                self._headways.make(vehicle, float(headway) / factor)
                 table.put(Column.SHORTENED, int(row), factor)
 
     def _advised(self, vehicle: str, own: float, advised: float) -> float:
@@ -157,15 +164,22 @@ class Drivers:
         time = self._roster.time
         if time - self._advised_since.get(vehicle, time) < self._setup.compliance.delay:
             return own
-        own = min(own, float(self._vehicles.getAllowedSpeed(vehicle)))
-        return complied_speed(own, advised, self._setup.compliance.strength)
+        return complied_speed(min(own, self._allowed(vehicle)), advised, self._setup.compliance.strength)
+
+    def _allowed(self, vehicle: str) -> float:
+        """What the road allows a driver [m/s], whatever the top speed that the vehicle has been given."""
+        get = self._api.vehicle
+        allowed = float(get.getAllowedSpeed(vehicle))
+        if allowed < get.getMaxSpeed(vehicle):
+            return allowed
+        # The top speed is the lower one, and SUMO tells only that.
+        return float(self._api.lane.getMaxSpeed(get.getLaneID(vehicle)) * get.getSpeedFactor(vehicle))
 
     def release(self) -> None:
-        """Give every vehicle on the road the top speed and the headway back that it came with."""
+        """Withdraw from every vehicle on the road what was claimed of its top speed and headway."""
         ids = [v for v in self._roster.present if v != self._ego]
         rows = self._table.rows(ids)
         self._top_speeds.release(ids, rows)
-        headways = self._table.get(Column.HEADWAY, rows)
         for i in np.flatnonzero(self._table.get(Column.SHORTENED, rows) != 1.0).tolist():
-            self._vehicles.setTau(ids[i], float(headways[i]))
+            self._headways.withdraw(ids[i])
         self._table.put(Column.SHORTENED, rows, 1.0)

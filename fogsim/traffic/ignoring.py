@@ -2,14 +2,12 @@
 
 import contextlib
 
+from fogsim.traffic.claims import SOLE_SESSION, SPEED_GAIN, Claims, Notes
 from fogsim.traffic.link import Api
 from fogsim.traffic.traci_link import load_traci
 
 _IGNORED = "carFollowModel.ignoreIDs"
-_SPEED_GAIN = "laneChangeModel.lcSpeedGain"
-"""Eagerness to change lanes for speed (LC2013, SL2015)."""
-
-_NO_WISH = "0"
+_NO_WISH = 0.0
 
 
 class Ignoring:
@@ -22,29 +20,34 @@ class Ignoring:
     ----------
     api : Api
         The simulation.
+    session : str
+        Name of the session; a driver ignores whom any session lets it ignore.
     """
 
-    def __init__(self, api: Api) -> None:
+    def __init__(self, api: Api, session: str = SOLE_SESSION) -> None:
         self._vehicles = api.vehicle
         # A connection of traci has no errors of its own; both modules do.
         self._refusal: type[Exception] = getattr(api, "TraCIException", None) or load_traci().TraCIException
-        self._eagerness: dict[str, str] = {}
+        self._session = session
+        self._notes = Notes[str](api, "ignored")
+        self._eagerness = Claims(api, SPEED_GAIN, session)
 
     def ignore(self, follower: str, leader: str) -> None:
         """Let a follower ignore one vehicle."""
-        self._vehicles.setParameter(follower, _IGNORED, leader)
+        notes = self._notes.read(follower)
+        notes[self._session] = leader
+        self._tell(follower, notes)
         # A lane-change model without such a parameter (DK2008) keeps seeing through the fog.
-        if follower not in self._eagerness:
-            with contextlib.suppress(self._refusal):
-                self._eagerness[follower] = self._vehicles.getParameter(follower, _SPEED_GAIN)
-                self._vehicles.setParameter(follower, _SPEED_GAIN, _NO_WISH)
+        with contextlib.suppress(self._refusal):
+            self._eagerness.make(follower, _NO_WISH)
 
     def heed(self, follower: str) -> None:
-        """Let a follower ignore nobody, and change lanes as before."""
-        self._vehicles.setParameter(follower, _IGNORED, "")
-        if follower in self._eagerness:
-            self._vehicles.setParameter(follower, _SPEED_GAIN, self._eagerness.pop(follower))
+        """Let a follower ignore nobody whom this session had it ignore, and change lanes as before."""
+        notes = self._notes.read(follower)
+        if notes.pop(self._session, None) is not None:
+            self._tell(follower, notes)
+            self._eagerness.withdraw(follower)
 
-    def forget(self, follower: str) -> None:
-        """Forget a vehicle that has gone."""
-        self._eagerness.pop(follower, None)
+    def _tell(self, follower: str, notes: dict[str, str]) -> None:
+        self._vehicles.setParameter(follower, _IGNORED, " ".join(sorted(set(notes.values()))))
+        self._notes.write(follower, notes)

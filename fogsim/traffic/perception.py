@@ -14,6 +14,7 @@ that stays the same the decision is in every step the one that looking in every 
 import itertools
 from collections.abc import Iterable, Sequence
 
+from fogsim.traffic.claims import SOLE_SESSION
 from fogsim.traffic.getters import Getter, vehicle_getter
 from fogsim.traffic.ignoring import Ignoring
 from fogsim.traffic.link import Api
@@ -57,12 +58,20 @@ class Perception:
         Who is on the road; None for one of its own.
     distant : bool
         True where every call is a message to another process: leaders and speeds are subscribed to.
+    session : str
+        Name of the session.
     """
 
     def __init__(
-        self, api: Api, fog: FogAccess, sight: DriverSight, roster: Roster | None = None, distant: bool = False
+        self,
+        api: Api,
+        fog: FogAccess,
+        sight: DriverSight,
+        roster: Roster | None = None,
+        distant: bool = False,
+        session: str = SOLE_SESSION,
     ) -> None:
-        self._ignoring = Ignoring(api)
+        self._ignoring = Ignoring(api, session)
         sent = SubscribedPairs(api, REACH) if distant else None
         self._leader: Getter = vehicle_getter(api, "getLeader") if sent is None else sent.leader
         self._motion = MotionBounds(vehicle_getter(api, "getSpeed") if sent is None else sent.speed)
@@ -111,13 +120,16 @@ class Perception:
             self._forget(v for v in due if v not in roster.present)
             due = [v for v in due if v in roster.present]
         new, self._mark = roster.newcomers(self._mark)
+        self._forget(new)
+        # Who comes back from a teleport still ignores somebody.
+        for follower in roster.present.intersection(new) if new else ():
+            self._ignoring.heed(follower)
         return due + [v for v in schedule.not_waiting(new) if v in roster.present and v not in due] if new else due
 
     def _forget(self, gone: Iterable[str]) -> None:
         for follower in gone:
             self._ignored.pop(follower, None)
             self._emerging.pop(follower, None)
-            self._ignoring.forget(follower)
 
     def _decide_by_gap(self, due: Sequence[str]) -> list[Pair]:
         """Decide where the gap alone tells, and give back the rest."""

@@ -9,6 +9,7 @@ from typing import Concatenate, ParamSpec, TypeVar
 import numpy as np
 
 from fogsim.errors import SimulationError
+from fogsim.traffic.claims import new_session
 from fogsim.traffic.collisions import CollisionWatch
 from fogsim.traffic.configuration import FIT_ARGUMENTS
 from fogsim.traffic.control import LaneKeeping, Order, SpeedControl
@@ -47,6 +48,7 @@ class _Run:
     lanes: LaneKeeping
     collisions: CollisionWatch
     script: Script
+    session: str
     perception: Perception | None = None
     drivers: Drivers | None = None
 
@@ -102,7 +104,7 @@ class SumoTraffic:
         """Begin, or begin anew, and run until the ego is on the road; see `Traffic.start`."""
         setup = self._setup
         api = self._link.begin(command_line(setup, seed))
-        roster = Roster(api, self._link.distant)
+        roster, session = Roster(api, self._link.distant), new_session(api)
         reader = SubscribedReader if self._link.distant else VehicleReader
         self._run = _Run(
             api=api,
@@ -110,9 +112,10 @@ class SumoTraffic:
             reader=reader(api, setup.ego, setup.reading_radius, roster),
             lane_changes=LaneChangeSmoothing(),
             control=SpeedControl(api, setup.step_length),
-            lanes=LaneKeeping(api, setup.keep_lane, roster),
+            lanes=LaneKeeping(api, setup.keep_lane, roster, session),
             collisions=CollisionWatch(api),
             script=Script(setup.events),
+            session=session,
         )
         self._seed = seed
         if self._fog is not None:
@@ -145,13 +148,15 @@ class SumoTraffic:
         """Let drivers see only what this fog lets them see; see `Traffic.enter_fog`."""
         self._fog = fog
         if self._run is not None:
-            setup, api, roster = self._setup, self._run.api, self._run.roster
+            setup, api, roster, session = self._setup, self._run.api, self._run.roster, self._run.session
             self._run = replace(
                 self._run,
                 perception=None
                 if setup.sight is None
-                else Perception(api, fog, setup.sight, roster, self._link.distant),
-                drivers=Drivers(api, setup.drivers, fog, setup.ego, self._seed, setup.advice_deceleration, roster),
+                else Perception(api, fog, setup.sight, roster, self._link.distant, session),
+                drivers=Drivers(
+                    api, setup.drivers, fog, setup.ego, self._seed, setup.advice_deceleration, roster, session
+                ),
             )
 
     @_watched

@@ -10,6 +10,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.traffic.claims import Claims
 from fogsim.traffic.driver_table import Column, DriverTable
 from fogsim.traffic.getters import vehicle_getter
 from fogsim.traffic.governor import governed_speed
@@ -31,16 +32,19 @@ class TopSpeeds:
         The simulation.
     table : DriverTable
         What was last set.
+    claims : Claims
+        The session's claims to top speeds.
     deceleration : float
         How fast a top speed falls [m/s²], positive.
     now : float
         Simulated time [s].
     """
 
-    def __init__(self, api: Api, table: DriverTable, deceleration: float, now: float) -> None:
+    def __init__(self, api: Api, table: DriverTable, claims: Claims, deceleration: float, now: float) -> None:
         self._vehicles = api.vehicle
         self._speed = vehicle_getter(api, "getSpeed")
         self._table = table
+        self._claims = claims
         self._deceleration = deceleration
         self._moved_at = now
         self._falling: dict[str, int] = {}
@@ -106,11 +110,14 @@ class TopSpeeds:
                 del self._falling[vehicle]
 
     def _set(self, vehicle: str, row: int, speed: float) -> None:
-        self._vehicles.setMaxSpeed(vehicle, speed)
+        if speed < self._table.number(Column.TOP_SPEED, row):
+            self._claims.make(vehicle, speed)
+        else:
+            self._claims.withdraw(vehicle)
         self._table.put(Column.SPEED_SET, row, speed)
 
     def release(self, vehicles: Sequence[str], rows: NDArray[np.intp]) -> None:
-        """Give vehicles the top speeds back that they came with."""
+        """Withdraw all claims to the top speeds of vehicles."""
         self._falling.clear()
         own = self._table.get(Column.TOP_SPEED, rows)
         for i in np.flatnonzero(self._table.get(Column.SPEED_SET, rows) != own).tolist():

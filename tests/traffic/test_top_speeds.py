@@ -102,6 +102,18 @@ def test_who_is_advised_slows_down_as_gently_as_asked(drive: Any, model: str, ha
     assert speeds(traffic, 15.0)["first"][-1] == pytest.approx(FAST, abs=0.5)
 
 
+def test_advice_that_is_raised_lets_them_speed_up_again(drive: Any) -> None:
+    traffic, _ = drive(UNAFFECTED, 1.0)
+    speeds(traffic, 9.0, ADVISED)
+    assert speeds(traffic, 8.0, ADVISED + 6.0)["first"][-1] == pytest.approx(ADVISED + 6.0, abs=0.7)
+
+
+def test_who_follows_advice_half_way_goes_no_farther(drive: Any) -> None:
+    """However often it is given."""
+    traffic, _ = drive(replace(UNAFFECTED, compliance=Compliance(strength=0.5, delay=0.0)), 1.0)
+    assert speeds(traffic, 14.0, ADVISED)["first"][-1] == pytest.approx((FAST + ADVISED) / 2.0, abs=0.7)
+
+
 def test_fog_that_thickens_slows_down_as_gently(drive: Any) -> None:
     traffic, _ = drive(DriverSetup("within_sight", spread=0.0), 5.0)
     traffic.enter_fog(fog(30.0))

@@ -76,7 +76,7 @@ def run_command(
     sumocfg: Annotated[Path | None, typer.Option(help="A SUMO configuration, in place of a scenario.")] = None,
     ego: Annotated[str | None, typer.Option(help="Id of the vehicle that is the ego.")] = None,
     visibility: Annotated[
-        float | None, typer.Option(help="Meteorological visibility of homogeneous fog in metres.", min=1e-3)
+        float | None, typer.Option(help="Meteorological visibility of homogeneous fog in metres.", min=1.0)
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same run, bit for bit.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Directory for the results. [runs/SCENARIO-seedN]")] = None,
@@ -254,7 +254,7 @@ def dataset_command(
     seed: Annotated[int, typer.Option(help="Seed of the first run; further runs have the next ones.")] = 0,
     every: Annotated[int, typer.Option(help="Take one frame of so many.")] = 1,
     visibility: Annotated[
-        float | None, typer.Option(help="Meteorological visibility of homogeneous fog in metres.", min=1e-3)
+        float | None, typer.Option(help="Meteorological visibility of homogeneous fog in metres.", min=1.0)
     ] = None,
     settings: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY.PATH=VALUE", help="Put a value in place of the file's.")

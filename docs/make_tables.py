@@ -26,14 +26,17 @@ END = "<!-- end of table -->"
 
 
 def scenario_keys(model: type[BaseModel] = Scenario, prefix: str = "") -> list[tuple[str, ...]]:
-    """Key, default and meaning of every key of a scenario file; N stands for a place in a list."""
+    """Key, default, what is allowed, and meaning of every key of a scenario file; N stands for a place in a list."""
     rows: list[tuple[str, ...]] = []
+    schema = model.model_json_schema()
     for name, field in model.model_fields.items():
         if field.exclude:
             continue
         inner = [model for model in _models_in(field.annotation) if model is not Method]
         if not inner:
-            rows.append((f"`{prefix}{name}`", _default(field), field.description or ""))
+            allowed = _allowed(schema["properties"][name], schema.get("$defs", {}))
+            told = " ".join((field.description or "").split())
+            rows.append((f"`{prefix}{name}`", _default(field), allowed, told))
         place = ".N" if "tuple" in str(field.annotation) else ""
         for model_inside in inner:
             more = scenario_keys(model_inside, f"{prefix}{name}{place}.")
@@ -51,6 +54,26 @@ def _default(field: FieldInfo) -> str:
     if isinstance(value, tuple):
         return "`[" + ", ".join(str(getattr(v, "method", v)) for v in value) + "]`"
     return f"`{getattr(value, 'method', value)}`"
+
+
+def _allowed(schema: dict[str, Any], definitions: dict[str, Any]) -> str:
+    """What a value may be by its JSON schema, in words."""
+    if "$ref" in schema:
+        schema = definitions[schema["$ref"].rpartition("/")[2]]
+    if "anyOf" in schema:
+        parts = [part for part in schema["anyOf"] if part.get("type") != "null"]
+        return " or ".join(_allowed(part, definitions) for part in parts)
+    if "enum" in schema:
+        return ", ".join(f"`{value}`" for value in schema["enum"])
+    if "const" in schema:
+        return f"`{schema['const']}`"
+    if schema["type"] == "array":
+        inner = schema["items"] if "items" in schema else schema["prefixItems"][0]
+        return f"list of {_allowed(inner, definitions)}"
+    if "minimum" not in schema:
+        return {"boolean": "true, false", "string": schema.get("format", "text")}.get(schema["type"], "method")
+    kind = "whole, " if schema["type"] == "integer" else ""
+    return f"{kind}{schema['minimum']:.6g} … {schema['maximum']:.6g}" + (" or inf" if "or" in schema else "")
 
 
 def _models_in(annotation: Any) -> list[type[BaseModel]]:
@@ -88,8 +111,8 @@ def parameters() -> list[tuple[str, ...]]:
             for key, parameter in accepted_parameters(method, GIVEN_BY_THE_LOOP).items():
                 default = parameter.default
                 told = "none" if default is None else f"`{default:.4g}`" if type(default) is float else f"`{default}`"
-                allowed = mismatch(parameter.annotation, object()) or ""
-                rows.append((f"`{name}`", f"`{key}`", told, allowed, meanings[key]))
+                allowed = (mismatch(parameter.annotation, object()) or "").replace("a whole number", "whole,")
+                rows.append((f"`{name}`", f"`{key}`", told, allowed.removeprefix("a number "), meanings[key]))
     return rows
 
 
@@ -106,7 +129,7 @@ TABLES = {
     "estimate.md": {"methods": (("method", "what it reads"), methods)},
     "scenarios.md": {
         "signs": (("kind", "code", "meaning"), signs),
-        "keys": (("key", "default", "meaning"), scenario_keys),
+        "keys": (("key", "default", "allowed", "meaning"), scenario_keys),
         "parameters": (("method", "parameter", "default", "allowed", "meaning"), parameters),
     },
     "results.md": {

@@ -6,14 +6,14 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import Field, ValidationError
-from pydantic_core import ErrorDetails
 
-from fogsim.errors import InputError, suggest
-from fogsim.scenario.document import Document, KeyPath, dotted, read_document
-from fogsim.scenario.section import Positive, Section
+from fogsim.errors import InputError
+from fogsim.scenario.document import read_document
+from fogsim.scenario.mistakes import tell_mistakes
+from fogsim.scenario.section import Number, PixelPlace, Pixels, Section, Whole
 from fogsim.values import Camera, Response
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
+Coefficient = Annotated[Number, Field(ge=-100, le=100)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,31 +44,31 @@ class Calibration:
 class CameraFile(Section):
     """Keys of a camera file: pixels, metres and degrees, the units of its readers."""
 
-    width: Annotated[int, Field(ge=1, le=65_536)]
+    width: Annotated[Whole, Field(ge=1, le=16_384)]
     """Columns of the image."""
 
-    height: Annotated[int, Field(ge=1, le=65_536)]
+    height: Annotated[Whole, Field(ge=1, le=16_384)]
     """Rows of the image."""
 
-    focal_length_px: Positive
+    focal_length_px: Pixels
     """Focal length."""
 
-    principal_point_px: tuple[Finite, Finite]
+    principal_point_px: tuple[PixelPlace, PixelPlace]
     """Principal point [u0, v0]; pixel centres are whole numbers."""
 
-    mount_height_m: Positive
+    mount_height_m: Annotated[Number, Field(ge=0.05, le=1000)]
     """Height of the camera above the road."""
 
-    pitch_deg: Annotated[float, Field(gt=-90, lt=90)]
+    pitch_deg: Annotated[Number, Field(gt=-90, lt=90)]
     """Pitch; positive looks down."""
 
-    roll_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
+    roll_deg: Annotated[Number, Field(ge=-180, le=180)] = 0.0
     """Roll; positive turns the image's right side down."""
 
-    yaw_deg: Annotated[float, Field(gt=-60, lt=60)] = 0.0
+    yaw_deg: Annotated[Number, Field(gt=-60, lt=60)] = 0.0
     """Yaw; positive looks to the left of where the vehicle drives."""
 
-    distortion: tuple[Finite, Finite, Finite, Finite] | None = None
+    distortion: tuple[Coefficient, Coefficient, Coefficient, Coefficient] | None = None
     """Distortion of the lens [k1, k2, p1, p2] as OpenCV has it."""
 
     response: Response = Response.LINEAR
@@ -128,7 +128,7 @@ def load_calibration(path: Path) -> Calibration:
     try:
         keys = CameraFile.model_validate(document.data)
     except ValidationError as error:
-        raise InputError("\n".join(_told(document, detail) for detail in error.errors())) from error
+        raise InputError(tell_mistakes(document, CameraFile, error)) from error
     camera = Camera(
         width=keys.width,
         height=keys.height,
@@ -141,15 +141,3 @@ def load_calibration(path: Path) -> Calibration:
         bits=keys.bits,
     )
     return Calibration(camera, keys.distortion or (), math.radians(keys.yaw_deg))
-
-
-def _told(document: Document, detail: ErrorDetails) -> str:
-    """One mistake in one line."""
-    key_path: KeyPath = tuple(detail["loc"])
-    where = f"{document.where(key_path)}: {dotted(key_path)}"
-    if detail["type"] == "extra_forbidden":
-        return f"{where}: unknown key; {suggest(str(key_path[-1]), CameraFile.model_fields)}"
-    if detail["type"] == "missing":
-        return f"{where}: this key is missing; it is required"
-    message = detail["msg"]
-    return f"{where}: {message[0].lower()}{message[1:]}; got {detail['input']!r}"

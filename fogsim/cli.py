@@ -41,7 +41,7 @@ ScenarioName = Annotated[
 SumoConfiguration = Annotated[Path | None, typer.Option(help="A SUMO configuration, in place of a scenario.")]
 EgoId = Annotated[str | None, typer.Option(help="Id of the vehicle that is the ego.")]
 HomogeneousVisibility = Annotated[
-    float | None, typer.Option(help="Meteorological visibility of homogeneous fog in metres.", min=1e-3)
+    float | None, typer.Option(help="Meteorological visibility of homogeneous fog in metres.", min=1.0)
 ]
 
 _out = Console(highlight=False)

@@ -1,11 +1,11 @@
 """The block of a scenario file about the ego's camera."""
 
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from fogsim.camera import Metering
-from fogsim.scenario.section import NotNegative, Positive, Section, Share
+from fogsim.scenario.section import Distance, Luminance, Number, PixelPlace, Pixels, Section, Share, Time, Whole
 from fogsim.values import Response
 
 MOST_SAMPLES = 16_384
@@ -15,16 +15,16 @@ MOST_SAMPLES = 16_384
 class Told(Section):
     """How the calibration that the vehicle is told differs from the true one."""
 
-    pitch_error_deg: float = Field(default=0.0, gt=-10, lt=10)
+    pitch_error_deg: Number = Field(default=0.0, ge=-10, le=10)
     """Told minus true pitch."""
 
-    roll_error_deg: float = Field(default=0.0, gt=-10, lt=10)
+    roll_error_deg: Number = Field(default=0.0, ge=-10, le=10)
     """Told minus true roll."""
 
-    focal_length_error_percent: float = Field(default=0.0, gt=-50, lt=50)
+    focal_length_error_percent: Number = Field(default=0.0, ge=-50, le=50)
     """Told over true focal length, minus 1."""
 
-    mount_height_error_percent: float = Field(default=0.0, gt=-50, lt=50)
+    mount_height_error_percent: Number = Field(default=0.0, ge=-50, le=50)
     """Told over true height of the mount, minus 1."""
 
 
@@ -37,19 +37,19 @@ class Exposure(Section):
     metering: Metering = Metering.HIGHLIGHTS
     """What is held at the target: the 95th percentile of luminance (`highlights`) or its `log_average`."""
 
-    target_percent: float | None = Field(default=None, ge=1, le=100)
+    target_percent: Annotated[Number, Field(ge=1, le=100)] | None = None
     """Share of saturation at which it is held; if not given, 65 for highlights and 18 for the log average."""
 
-    time_constant_s: NotNegative = 0.5
+    time_constant_s: Time = 0.5
     """Time in which 63 % of a change of light is followed; 0 for the next frame."""
 
-    brightest_cdpm2: Positive = 100_000.0
+    brightest_cdpm2: Luminance = 100_000.0
     """Luminance that fills a pixel at the shortest exposure."""
 
-    ungained_cdpm2: Positive = 100.0
+    ungained_cdpm2: Luminance = 100.0
     """The same at the longest exposure; where that is too short the signal is amplified, and noisier."""
 
-    darkest_cdpm2: Positive = 4.0
+    darkest_cdpm2: Luminance = 4.0
     """The same at the longest exposure with the most gain."""
 
     @model_validator(mode="after")
@@ -65,44 +65,44 @@ class Exposure(Section):
 class BodySection(Section):
     """How the vehicle's body moves the camera, of which the estimators are told nothing."""
 
-    pitch_deg_per_mps2: float = Field(default=0.0, ge=0, le=2)
+    pitch_deg_per_mps2: Number = Field(default=0.0, ge=0, le=2)
     """Pitch, nose down, for each m/s² of deceleration; cars have about 0.1 to 0.3."""
 
-    time_constant_s: NotNegative = 0.2
+    time_constant_s: Time = 0.2
     """Lag with which the body follows."""
 
 
 class CameraSection(Section):
     """The ego's camera."""
 
-    width: int = Field(default=640, ge=16, le=8192)
+    width: Whole = Field(default=640, ge=16, le=8192)
     """Columns of the image."""
 
-    height: int = Field(default=480, ge=16, le=8192)
+    height: Whole = Field(default=480, ge=16, le=8192)
     """Rows of the image."""
 
-    samples: int = Field(default=1, ge=1, le=3)
+    samples: Whole = Field(default=1, ge=1, le=3)
     """Samples a pixel side: 2 draws and fogs four for each pixel and averages their light, at four times the cost."""
 
-    field_of_view_deg: float = Field(default=58.0, gt=1, lt=170)
+    field_of_view_deg: Number = Field(default=58.0, ge=1, le=170)
     """Horizontal field of view; sets the focal length, whatever the size of the image."""
 
-    focal_length_px: Positive | None = None
+    focal_length_px: Pixels | None = None
     """Focal length, in place of the field of view."""
 
-    principal_point_px: tuple[float, float] | None = None
+    principal_point_px: tuple[PixelPlace, PixelPlace] | None = None
     """Principal point [u0, v0]; if not given [width / 2, height / 2], half a pixel right of and below the middle."""
 
-    mount_height_m: Positive = 1.38
+    mount_height_m: Annotated[Number, Field(ge=0.05, le=100)] = 1.38
     """Height of the camera above the road."""
 
-    setback_m: NotNegative = 1.7
+    setback_m: Annotated[Distance, Field(le=100)] = 1.7
     """Distance of the camera behind the front bumper."""
 
-    pitch_deg: float = Field(default=2.0, gt=-45, lt=45)
+    pitch_deg: Number = Field(default=2.0, ge=-45, le=45)
     """Pitch; positive looks down."""
 
-    roll_deg: float = Field(default=0.0, gt=-45, lt=45)
+    roll_deg: Number = Field(default=0.0, ge=-45, le=45)
     """Roll; positive turns the image's right side down."""
 
     body: BodySection = BodySection()
@@ -117,13 +117,13 @@ class CameraSection(Section):
     exposure: Exposure = Exposure()
     """How the exposure is set."""
 
-    saturation_luminance_cdpm2: Positive | None = None
+    saturation_luminance_cdpm2: Luminance | None = None
     """Luminance that fills a pixel at a fixed exposure; if not given, the airlight fills 60 % of it."""
 
-    full_well_e: Positive = 10_000.0
+    full_well_e: Annotated[Number, Field(ge=1, le=1e9)] = 10_000.0
     """Electrons that fill a pixel; sets the photon noise."""
 
-    read_noise_e: NotNegative = 5.0
+    read_noise_e: Annotated[Number, Field(ge=0, le=1e6)] = 5.0
     """Standard deviation of the read noise in electrons."""
 
     response: Response = Response.SRGB

@@ -6,24 +6,22 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from fogsim.atmosphere import Droplets
-from fogsim.scenario.section import NotNegative, Positive, Section, Visibility
-
-Finite = Annotated[float, Field(allow_inf_nan=False)]
+from fogsim.scenario.section import Distance, Length, Moment, Number, Place, Section, Seed, SpeedKmh, Top, Visibility
 
 
 class Bank(Section):
     """A fog bank along the ego's route; start and end are where it is half as dense as inside."""
 
-    start_m: float
+    start_m: Place
     """Where it begins: half as dense as inside, along the ego's route."""
 
-    end_m: float
+    end_m: Place
     """Where it ends, likewise."""
 
     visibility_m: Visibility
     """Meteorological visibility inside."""
 
-    edge_m: Positive = 100.0
+    edge_m: Length = 100.0
     """Length of each soft edge."""
 
     @model_validator(mode="after")
@@ -40,42 +38,42 @@ class Bank(Section):
 class Patches(Section):
     """Random thick and thin places in the fog; the extinction coefficient keeps its mean."""
 
-    correlation_length_m: Positive
+    correlation_length_m: Annotated[Length, Field(ge=0.1)]
     """Distance at which thick and thin have little to do with each other any more (correlation 1/e)."""
 
-    correlation_height_m: Positive = 10.0
+    correlation_height_m: Annotated[Length, Field(ge=0.1)] = 10.0
     """The same, upwards."""
 
-    strength: Annotated[float, Field(ge=0, le=2)] = 0.6
+    strength: Annotated[Number, Field(ge=0, le=2)] = 0.6
     """Standard deviation of the logarithm of the extinction coefficient; 0.6 is from half to twice as thick."""
 
-    seed: Annotated[int, Field(ge=0)] = 0
+    seed: Seed = 0
     """Seed of the patches, which are the same for every seed of the run."""
 
 
 class Wind(Section):
     """Wind that banks and patches drift with."""
 
-    speed_kmh: NotNegative
+    speed_kmh: SpeedKmh
     """Its speed."""
 
-    from_deg: Annotated[float, Field(ge=0, le=360)]
+    from_deg: Annotated[Number, Field(ge=0, le=360)]
     """Where it comes from: 0 is north, 90 east."""
 
 
 class Change(Section):
     """The fog at one time; in between it changes linearly."""
 
-    at_s: Finite
+    at_s: Moment
     """Time since the ego's appearance; before the first and after the last of them the fog stays the same."""
 
-    density: NotNegative = 1.0
+    density: Annotated[Number, Field(ge=0, le=1000)] = 1.0
     """Factor of the extinction coefficient everywhere: 2 halves the visibility."""
 
-    base_m: Finite | None = None
+    base_m: Place | None = None
     """Height of the fog's base; to be given at all times or at none."""
 
-    top_m: Finite | None = None
+    top_m: Place | None = None
     """Height of the fog's top; to be given at all times or at none."""
 
 
@@ -91,19 +89,19 @@ class Fog(Section):
     banks: tuple[Bank, ...] = ()
     """Fog banks along the ego's route; they must not overlap."""
 
-    top_m: Visibility = 250.0
+    top_m: Top = 250.0
     """Height of the fog layer; this and all heights are above the lowest point of the ego's route."""
 
-    top_edge_m: NotNegative = 0.0
+    top_edge_m: Distance = 0.0
     """Thickness of its soft upper edge, centred on `top_m`."""
 
-    base_m: Finite | None = None
+    base_m: Place | None = None
     """Height below which there is no fog, for fog that has lifted; it rests on the ground if not given."""
 
-    base_edge_m: NotNegative = 0.0
+    base_edge_m: Distance = 0.0
     """Thickness of its soft lower edge, centred on `base_m`."""
 
-    scale_height_m: Positive | None = None
+    scale_height_m: Annotated[Length, Field(ge=0.1)] | None = None
     """Height over which ground fog thins by a factor e; it does not if not given."""
 
     patches: Patches | None = None
@@ -118,13 +116,13 @@ class Fog(Section):
     droplets: Droplets = Droplets.MODERATE_RADIATION
     """Sizes of the droplets, which set how fog scatters lamplight: large in advection fog, small in radiation fog."""
 
-    airlight_shading: Annotated[float, Field(ge=0, le=1)] = 0.0
+    airlight_shading: Annotated[Number, Field(ge=0, le=1)] = 0.0
     """Dimming of the airlight for each unit of optical depth overhead; 0.1 in real fog, 0 for an even airlight."""
 
-    forward_scatter: Annotated[float, Field(ge=0, le=0.3)] = 0.0
+    forward_scatter: Annotated[Number, Field(ge=0, le=0.3)] = 0.0
     """Weight of the blur that forward scattering puts on what is seen through much fog by day."""
 
-    forward_scatter_deg: Annotated[float, Field(gt=0, le=10)] = 1.0
+    forward_scatter_deg: Annotated[Number, Field(ge=0.01, le=10)] = 1.0
     """Width of that blur (standard deviation)."""
 
     @model_validator(mode="after")

@@ -2,21 +2,20 @@
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
-from pydantic import BaseModel, ValidationError
-from pydantic_core import ErrorDetails
+from pydantic import ValidationError
 
 from fogsim.errors import InputError, nearest, shown, suggest
 from fogsim.scenario.document import Document, KeyPath, dotted, read_document
 from fogsim.scenario.locating import SCENARIO_FILE, is_file, is_folder, scenario_file
-from fogsim.scenario.methods import MISTAKE
+from fogsim.scenario.mistakes import tell_mistakes
 from fogsim.scenario.overrides import apply_overrides
 from fogsim.scenario.schema import Scenario
 from fogsim.scenario.sumo_clock import uncountable_step
-from fogsim.scenario.traffic_schema import AnyEvent
+from fogsim.scenario.traffic_schema import Traffic
 from fogsim.traffic.configuration import configured_files
 
 LONG_RUN = 600.0
@@ -24,18 +23,6 @@ LONG_RUN = 600.0
 
 DAY = 86_400.0
 """Simulated time within which the ego of a simulation of the user's own must appear [s]."""
-
-MOST_TOLD = 50
-"""Most mistakes of a file that are told one by one."""
-
-WORDED = {
-    "model_type": "must be a block of keys",
-    "dict_type": "must be a block of keys",
-    "tuple_type": "must be a list",
-    "too_short": "must have at least one entry",
-    "path_type": "must be a path",
-}
-"""Messages of pydantic in the words of a file's reader."""
 
 
 def load_scenario(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Scenario:
@@ -145,114 +132,34 @@ def _checked(document: Document, overrides: Iterable[str], folder: Path, named_f
     overrides = tuple(overrides)
     data = apply_overrides(document.data, overrides)
     document = document.overridden(overrides)
-    mistakes = _unnamed_files(document, data) if named_files else {}
+    mistakes = _unnamed_files(document, data) if named_files else []
     try:
         scenario = Scenario.model_validate(data).model_copy(update={"directory": folder})
     except ValidationError as error:
-        raise InputError(_all_told(document, error.errors(include_url=False), mistakes)) from error
+        raise InputError(tell_mistakes(document, Scenario, error, mistakes)) from error
     # A simulation that runs already, or is none of SUMO's, keeps its own time.
     uncountable = uncountable_step(scenario.clocks) if named_files else None
     if uncountable:
         key_path = ("clocks", "traffic_step_s")
-        mistakes[key_path] = f"{document.where(key_path)}: {dotted(key_path)}: {uncountable}"
+        mistakes.append(f"{document.where(key_path)}: {dotted(key_path)}: {uncountable}")
     if mistakes:
-        raise InputError("\n".join(mistakes.values()))
+        raise InputError("\n".join(mistakes))
     _check_files(document, scenario)
     return scenario
 
 
-def _unnamed_files(document: Document, data: dict[str, Any]) -> dict[KeyPath, str]:
+def _unnamed_files(document: Document, data: dict[str, Any]) -> list[str]:
     """Say which files a scenario does not name, and must; the schema knows no keys of which either one or others do."""
     traffic = data.get("traffic")
-    if not isinstance(traffic, dict) or traffic.get("config") is not None:
-        return {}
+    if not isinstance(traffic, dict):
+        return []
+    # A key whose name is misspelt is told as such, and not as missing.
+    meant = {nearest(key, Traffic.model_fields): value for key, value in traffic.items()}
+    if meant.get("config") is not None:
+        return []
     what = "net with routes is required, or config (a SUMO configuration) in their place"
-    places = [("traffic", key) for key in ("net", "routes") if traffic.get(key) in (None, "", [])]
-    return {place: f"{document.where(place)}: {dotted(place)}: this key is missing; {what}" for place in places}
-
-
-def _all_told(document: Document, details: Sequence[ErrorDetails], unnamed: Mapping[KeyPath, str]) -> str:
-    """Every mistake in a line of its own, without those that are there for another's sake.
-
-    A list whose entries are wrong is not too short, and a key whose name is misspelt is not missing.
-    """
-    blocks = {detail["loc"][:length] for detail in details for length in range(len(detail["loc"]))}
-    own = [detail for detail in details if detail["loc"] not in blocks]
-    misspelt = {_meant(detail["loc"]) for detail in own[:MOST_TOLD] if detail["type"] == "extra_forbidden"}
-    told = [_told(document, d) for d in own[:MOST_TOLD] if d["type"] != "missing" or d["loc"] not in misspelt]
-    if ("traffic", "config") not in misspelt:
-        told += [message for place, message in unnamed.items() if place not in misspelt]
-    if len(own) > MOST_TOLD:
-        told.append(f"{document.path}: and {len(own) - MOST_TOLD} more mistakes")
-    return "\n".join(told)
-
-
-def _meant(location: KeyPath) -> KeyPath:
-    """Location of the key that an unknown one was probably meant to be, or of itself."""
-    return (*location[:-1], nearest(str(location[-1]), _known_keys(location[:-1])) or location[-1])
-
-
-def _told(document: Document, detail: ErrorDetails) -> str:
-    """One mistake in one line."""
-    location: KeyPath = tuple(detail["loc"])
-    key_path = _without_kinds(location)
-    where = f"{document.where(key_path)}: {dotted(key_path) or 'scenario'}"
-    if detail["type"] == "extra_forbidden":
-        return f"{where}: unknown key; {suggest(str(key_path[-1]), _known_keys(location[:-1]))}"
-    if detail["type"] == "union_tag_invalid":
-        context = detail["ctx"]
-        allowed = [kind.strip(" '") for kind in str(context["expected_tags"]).split(",")]
-        return f"{where}.kind: unknown kind {shown(context['tag'])}; {suggest(str(context['tag']), allowed)}"
-    if detail["type"] == "union_tag_not_found":
-        return f"{where}.kind: this key is missing; it is required"
-    if detail["type"] == "missing":
-        return f"{where}: this key is missing; it is required"
-    if detail["type"] == MISTAKE:
-        return f"{where}: {detail['msg']}"
-    message = WORDED.get(detail["type"], detail["msg"].removeprefix("Value error, "))
-    value = detail["input"]
-    if isinstance(value, dict | BaseModel):
-        # A message about a whole block names the values that it is about itself.
-        got = "; got a block of keys" if detail["type"].endswith("_type") else ""
-    else:
-        got = f"; got {shown(value)}"
-    return f"{where}: {message[0].lower()}{message[1:]}{got}"
-
-
-def _without_kinds(location: KeyPath) -> KeyPath:
-    """Key path of a mistake: pydantic puts the kind of a list's entry behind its place, where files have no key."""
-    kinds = _kinds()
-    return tuple(
-        key
-        for key, before in zip(location, (None, *location), strict=False)
-        if not (isinstance(before, int) and key in kinds)
-    )
-
-
-def _kinds() -> dict[str, type[BaseModel]]:
-    """Models of list entries by their kind."""
-    models = (*get_args(get_args(AnyEvent)[0]),)
-    return {str(get_args(model.model_fields["kind"].annotation)[0]): model for model in models}
-
-
-def _known_keys(location: Sequence[str | int]) -> list[str]:
-    """Keys that the schema allows at a location."""
-    model: Any = Scenario
-    for before, key in zip((None, *location), location, strict=False):
-        if isinstance(key, int):
-            continue
-        if isinstance(before, int) and key in _kinds():
-            model = _kinds()[str(key)]
-        else:
-            model = _model_in(model.model_fields[key].annotation)
-    return [name for name, field in model.model_fields.items() if not field.exclude]
-
-
-def _model_in(annotation: object) -> Any:
-    """First model class inside an annotation such as ``tuple[Bank, ...]``."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    return next((model for part in get_args(annotation) if (model := _model_in(part)) is not None), None)
+    places = [("traffic", key) for key in ("net", "routes") if meant.get(key) in (None, "", [])]
+    return [f"{document.where(place)}: {dotted(place)}: this key is missing; {what}" for place in places]
 
 
 def _check_files(document: Document, scenario: Scenario) -> None:

@@ -18,20 +18,20 @@ from fogsim.render import RENDERERS
 from fogsim.scenario.camera_schema import CameraSection
 from fogsim.scenario.fog_schema import Fog
 from fogsim.scenario.methods import Method, method_of
-from fogsim.scenario.section import NotNegative, Positive, Section
+from fogsim.scenario.section import Distance, Flag, Length, Number, Period, Section, Seed, Text
 from fogsim.scenario.traffic_schema import DriversSection, Traffic
 
 
 class Clocks(Section):
     """The three clocks; each is a whole multiple of the one before."""
 
-    traffic_step_s: Positive = 0.1
+    traffic_step_s: Annotated[Period, Field(le=10)] = 0.1
     """SUMO's step: whole milliseconds."""
 
-    camera_period_s: Positive = 0.1
+    camera_period_s: Annotated[Period, Field(le=3600)] = 0.1
     """Time between two frames."""
 
-    decision_period_s: Positive = 0.5
+    decision_period_s: Annotated[Period, Field(le=3600)] = 0.5
     """Time between two decisions on advice and lamps."""
 
     @model_validator(mode="after")
@@ -49,7 +49,7 @@ class Clocks(Section):
 class Light(Section):
     """Daylight."""
 
-    illuminance_lx: NotNegative = 10_000.0
+    illuminance_lx: Annotated[Number, Field(ge=0, le=200_000)] = 10_000.0
     """Horizontal illuminance of the overcast sky: 10 000 by day, 1 … 100 in twilight, 0.01 … 0.1 at night. Below 1000
     lamps light the road and the fog."""
 
@@ -57,13 +57,13 @@ class Light(Section):
 class Lead(Section):
     """The radar that tracks the vehicle ahead."""
 
-    reach_m: Positive = 200.0
+    reach_m: Length = 200.0
     """Distance up to which it tracks a vehicle."""
 
-    distance_deviation_m: NotNegative = 0.25
+    distance_deviation_m: Annotated[Distance, Field(le=1000)] = 0.25
     """Standard deviation of its distance."""
 
-    speed_deviation_mps: NotNegative = 0.1
+    speed_deviation_mps: Annotated[Number, Field(ge=0, le=140)] = 0.1
     """Standard deviation of its relative speed."""
 
 
@@ -73,23 +73,23 @@ class Sensors(Section):
     lead: Lead = Lead()
     """The radar."""
 
-    sign_reach_m: Positive = 250.0
+    sign_reach_m: Length = 250.0
     """Distance up to which the map tells of signs ahead."""
 
 
 class Scenario(Section):
     """A whole scenario."""
 
-    name: str = Field(pattern=r"^[A-Za-z0-9_.-]+$")
+    name: str = Field(pattern=r"^[A-Za-z0-9_.-]+$", max_length=100)
     """Name; letters, digits, `_`, `.` and `-`."""
 
-    description: str = ""
+    description: Text = ""
     """What it is about, for lists and reports."""
 
-    duration_s: Positive = 120.0
+    duration_s: Period = 120.0
     """Longest simulated time."""
 
-    end_on_collision: bool = True
+    end_on_collision: Flag = True
     """Whether a collision of the ego ends the run."""
 
     clocks: Clocks = Clocks()
@@ -113,10 +113,10 @@ class Scenario(Section):
     renderer: Annotated[str, Field(default="auto")]
     """`auto` or a renderer's name."""
 
-    street_lamps: bool = False
+    street_lamps: Flag = False
     """Whether lamps stand along the roads, about every 35 m."""
 
-    scenery_seed: int = Field(default=0, ge=0)
+    scenery_seed: Seed = 0
     """Seed of trees and posts, which are the same for every seed of the run."""
 
     sensors: Sensors = Sensors()

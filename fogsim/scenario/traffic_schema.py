@@ -6,23 +6,36 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from fogsim.errors import UnknownNameError
-from fogsim.scenario.section import NotNegative, Positive, Section, Share
+from fogsim.scenario.section import (
+    Deceleration,
+    Distance,
+    Flag,
+    Id,
+    Length,
+    Number,
+    Period,
+    Section,
+    Share,
+    SpeedKmh,
+    Time,
+    Whole,
+)
 from fogsim.traffic import SPEED_CHOICES, AfterCollision
 
 
 class Event(Section):
     """Something that a vehicle is made to do, once, when one of its conditions holds."""
 
-    vehicle: str
+    vehicle: Id
     """Id of the vehicle."""
 
-    at_position_m: NotNegative | None = None
+    at_position_m: Distance | None = None
     """It begins when the vehicle has driven this far."""
 
-    at_time_s: NotNegative | None = None
+    at_time_s: Time | None = None
     """It begins at this time after the ego's appearance."""
 
-    at_gap_to_ego_m: Positive | None = None
+    at_gap_to_ego_m: Length | None = None
     """It begins when the vehicle is this near to the ego."""
 
     @model_validator(mode="after")
@@ -38,13 +51,13 @@ class Brake(Event):
     kind: Literal["brake"]
     """`brake`: brake, hold the lower speed, and drive on."""
 
-    to_speed_kmh: NotNegative = 0.0
+    to_speed_kmh: SpeedKmh = 0.0
     """Speed that it brakes to; 0 is a standstill."""
 
-    deceleration_mps2: Positive = 4.0
+    deceleration_mps2: Deceleration = 4.0
     """How hard it brakes, within its vehicle type's own limit."""
 
-    hold_s: NotNegative = 30.0
+    hold_s: Time = 30.0
     """How long it keeps that speed, from the beginning of the braking."""
 
 
@@ -54,10 +67,10 @@ class BreakDown(Event):
     kind: Literal["break_down"]
     """`break_down`: come to a standstill and stay there."""
 
-    deceleration_mps2: Positive = 3.0
+    deceleration_mps2: Deceleration = 3.0
     """How hard it brakes."""
 
-    lamps: bool = True
+    lamps: Flag = True
     """Whether its lamps stay lit."""
 
 
@@ -67,10 +80,10 @@ class ChangeLane(Event):
     kind: Literal["change_lane"]
     """`change_lane`: change lane, whoever is there (cut in)."""
 
-    lanes: int = Field(ge=-4, le=4)
+    lanes: Whole = Field(ge=-4, le=4)
     """How many lanes to the left; negative to the right."""
 
-    stay_s: Positive = 60.0
+    stay_s: Period = 60.0
     """How long it stays there."""
 
 
@@ -99,19 +112,19 @@ class Traffic(Section):
     additional: tuple[Path, ...] = ()
     """SUMO additional files; POIs of type `fogsim.sign.KIND` in them are signs."""
 
-    ego: str = "ego"
+    ego: Id = "ego"
     """Id of the ego vehicle in the route files."""
 
-    keep_lane: tuple[str, ...] = ()
+    keep_lane: tuple[Id, ...] = ()
     """Vehicles that never change lane."""
 
-    warm_up_limit_s: Positive = 600.0
+    warm_up_limit_s: Period = 600.0
     """Simulated time within which the ego must appear; the run begins when it does."""
 
-    advice_deceleration_mps2: Positive = 2.0
+    advice_deceleration_mps2: Deceleration = 2.0
     """How hard an advised vehicle slows down to the advice."""
 
-    reading_radius_m: Positive = 1000.0
+    reading_radius_m: Annotated[Length, Field(ge=1)] = 1000.0
     """Vehicles farther from the ego than this are not read and not drawn."""
 
     events: tuple[AnyEvent, ...] = ()
@@ -120,7 +133,7 @@ class Traffic(Section):
     after_collision: AfterCollision = AfterCollision.STOP
     """What becomes of vehicles that have collided: `stop` (they stand and block the lane) or `remove`."""
 
-    stop_before_end_m: NotNegative = 60.0
+    stop_before_end_m: Distance = 60.0
     """The ego has arrived when it is this near to the end of its route."""
 
     @model_validator(mode="after")
@@ -146,29 +159,29 @@ class ComplianceSection(Section):
     strength: Share = 1.0
     """How far they go from their own speed towards the advised one."""
 
-    delay_s: NotNegative = 2.0
+    delay_s: Time = 2.0
     """Time before they do."""
 
 
 class DriversSection(Section):
     """The drivers of all vehicles but, for speed, the ego."""
 
-    see_through_fog: bool = False
+    see_through_fog: Flag = False
     """True for SUMO's own drivers, who see their leader through any fog."""
 
-    reaction_time_s: NotNegative = 1.0
+    reaction_time_s: Annotated[Time, Field(le=60)] = 1.0
     """Time from the first sight of a leader that was hidden to the first reaction."""
 
-    headlamp_reach_m: Positive = 55.0
+    headlamp_reach_m: Annotated[Length, Field(ge=1, le=1000)] = 55.0
     """Distance at which an unlit vehicle is seen in the headlamps at night in clear air."""
 
     speed_choice: str = "too_fast"
     """How fast they drive in fog by themselves."""
 
-    speed_spread: NotNegative = 0.1
+    speed_spread: Annotated[Number, Field(ge=0, le=1)] = 0.1
     """Standard deviation of the logarithm of a driver's own factor on that speed."""
 
-    distance_misjudgement: NotNegative = 0.0
+    distance_misjudgement: Annotated[Number, Field(ge=0, le=10)] = 0.0
     """By which share they take distances for longer in dense fog, and so follow closer; 0.3 to 0.6 at night."""
 
     compliance: ComplianceSection = ComplianceSection()

@@ -206,7 +206,7 @@ def written(folder: Path, keys: str) -> Calibration:
         ("distortion: [0.1, 0.2]\n", r"camera.yaml:7: distortion.* missing"),
         ("distortion: [0.1, 0.2, 0, 0, 0.3]\n", r"camera.yaml:7: distortion: .*4 items.* got \[0.1"),
         ("distortion: [.nan, 0, 0, 0]\n", r"camera.yaml:7: distortion.*finite number; got nan"),
-        ("distortion: 0.1\n", r"camera.yaml:7: distortion: .*tuple; got 0.1"),
+        ("distortion: 0.1\n", r"camera.yaml:7: distortion: must be a list; got 0.1"),
         ("distorsion: [0, 0, 0, 0]\n", "did you mean 'distortion'"),
         ("yaw_deg: 90\n", r"camera.yaml:7: yaw_deg: .*less than 60; got 90"),
         ("yaw_deg: .inf\n", "yaw_deg"),

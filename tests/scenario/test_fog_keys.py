@@ -66,9 +66,12 @@ def test_the_resolved_scenario_says_it_all_again() -> None:
 @pytest.mark.parametrize(
     ("setting", "told"),
     [
-        ("visibility_m=0", "fog.visibility_m: input should be greater than 0; got 0"),
-        ("visibility_m=.nan", "fog.visibility_m: input should be greater than 0; got nan"),
-        ("patches={correlation_length_m: 0}", "fog.patches.correlation_length_m: input should be greater than 0"),
+        ("visibility_m=0", "fog.visibility_m: input should be greater than or equal to 1; got 0"),
+        ("visibility_m=.nan", "fog.visibility_m: input should be greater than or equal to 1; got nan"),
+        (
+            "patches={correlation_length_m: 0}",
+            "fog.patches.correlation_length_m: input should be greater than or eq",
+        ),
         ("patches={correlation_length_m: 50, strength: 3}", "fog.patches.strength: input should be less than or eq"),
         ("patches={correlation_lenght_m: 50}", "did you mean 'correlation_length_m'"),
         ("changes=[{at_s: 5}, {at_s: 5}]", "fog: at_s of changes must increase, got 5 and then 5"),
@@ -76,7 +79,7 @@ def test_the_resolved_scenario_says_it_all_again() -> None:
         ("changes=[{at_s: 5, top_m: 9}, {at_s: 6}]", "top_m must be given in all changes or in none, got it in 1 of 2"),
         ("changes=[{at_s: 5, top_m: .nan}]", "fog.changes.0.top_m"),
         ("base_m=300", "top_m must lie above base_m, soft edges included, got 250 and 300"),
-        ("scale_height_m=0", "fog.scale_height_m: input should be greater than 0"),
+        ("scale_height_m=0", "fog.scale_height_m: input should be greater than or equal to 0.1"),
         ("wind={speed_kmh: 5}", "fog.wind.from_deg: this key is missing"),
         ("banks=[{start_m: 500, end_m: 300, visibility_m: 40}]", "start_m must be less than end_m, got 500 and 300"),
         ("airlight_shading=-0.1", "fog.airlight_shading: input should be greater than or equal to 0"),

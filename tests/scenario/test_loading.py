@@ -81,12 +81,35 @@ def test_an_unknown_key_inside_a_list(folder: Path) -> None:
     [
         ("width: 640", "width: many", r"camera\.width: input should be a valid integer.*got 'many'"),
         ("width: 640", "width: 0", r"camera\.width: input should be greater than or equal to 16; got 0"),
-        ("duration_s: 200", "duration_s: -1", r"duration_s: input should be greater than 0; got -1"),
+        ("duration_s: 200", "duration_s: -1", r"duration_s: input should be greater than or equal to 0\.001; got -1"),
+        ("duration_s: 200", "duration_s: yes", r"duration_s: input should be a valid number; got True"),
+        ("duration_s: 200", "duration_s: '200'", r"duration_s: input should be a valid number; got '200'"),
+        ("duration_s: 200", "duration_s: 1:30", r"duration_s: input should be a valid number; got '1:30'"),
+        ("duration_s: 200", "duration_s: 2026-11-22", r"duration_s: input should be a valid number; got '2026-11-22'"),
+        (
+            "duration_s: 200",
+            "duration_s: 1e308",
+            r"duration_s: .*less than or equal to 1000000; got 1e\+308",
+        ),
+        ("width: 640", "width: yes", r"camera\.width: input should be a valid integer; got True"),
+        ("width: 640", "width: 640.0", r"camera\.width: input should be a valid integer; got 640\.0"),
+        ("pitch_deg: 2", "pitch_deg: no", r"camera\.pitch_deg: input should be a valid number; got False"),
+        (
+            "outside_visibility_m: 2000",
+            "outside_visibility_m: 2e6",
+            r"must be at most 1e\+06 m, or inf; got 2000000",
+        ),
+        (
+            "duration_s: 200",
+            "duration_s: 200\nstreet_lamps: 1",
+            r"street_lamps: .*valid boolean; got 1",
+        ),
+        ("ego: ego", "ego: ''", r"traffic\.ego: .* at least 1 character; got ''"),
         ("duration_s: 200", "duration_s: .nan", r"duration_s: .*got nan"),
         ("response: srgb", "response: log", r"camera\.response: .*'linear', 'gamma' or 'srgb'; got 'log'"),
         ("end_m: 2500", "end_m: 1000", r"fog\.banks\.0: start_m must be less than end_m, got 1300 and 1000"),
         ("edge_m: 300", "edge_m: 3000", r"fog\.banks\.0: edge_m must not be longer than the bank"),
-        ("visibility_m: 60", "visibility_m: 0", r"fog\.banks\.0\.visibility_m: input should be greater than 0; got 0"),
+        ("visibility_m: 60", "visibility_m: 0", r"fog\.banks\.0\.visibility_m: .* greater than or equal to 1; got 0"),
         ("outside_visibility_m: 2000", "visibility_m: 2000", r"fog: give either visibility_m .* not both"),
         ("[negru2013]", "[negru2014]", r"estimators\.0: unknown estimator 'negru2014'; did you mean 'negru2013'\?"),
         ("fusion: grid_filter", "fusion: kalman", r"fusion: unknown fusion 'kalman'; known: grid_filter"),
@@ -202,7 +225,9 @@ def test_an_unknown_override_is_told_like_an_unknown_key() -> None:
     assert str(error.value).startswith(
         "--set fog.visibilty_m=80: fog.visibilty_m: unknown key; did you mean 'visibility_m'?"
     )
-    with pytest.raises(InputError, match=r"^--set fog\.banks\.0\.edge_m=-1: fog\.banks\.0\.edge_m: .*greater than 0"):
+    with pytest.raises(
+        InputError, match=r"^--set fog\.banks\.0\.edge_m=-1: fog\.banks\.0\.edge_m: .*greater than or equal"
+    ):
         load_scenario("motorway_fog_bank", ["fog.banks.0.edge_m=-1"])
 
 

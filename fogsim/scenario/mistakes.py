@@ -1,0 +1,116 @@
+"""What the check of a file has found, in lines that name file, line, key, value and what is allowed."""
+
+from collections.abc import Sequence
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from fogsim.errors import nearest, shown, suggest
+from fogsim.scenario.document import Document, KeyPath, dotted
+from fogsim.scenario.methods import MISTAKE
+from fogsim.scenario.traffic_schema import AnyEvent
+
+MOST_TOLD = 50
+"""Most mistakes of a file that are told one by one."""
+
+WORDED = {
+    "model_type": "must be a block of keys",
+    "dict_type": "must be a block of keys",
+    "tuple_type": "must be a list",
+    "too_short": "must have at least one entry",
+    "path_type": "must be a path",
+}
+"""Messages of pydantic in the words of a file's reader."""
+
+
+def tell_mistakes(
+    document: Document, model: type[BaseModel], error: ValidationError, further: Sequence[str] = ()
+) -> str:
+    """Every mistake in a line of its own, without those that are there for another's sake.
+
+    A list whose entries are wrong is not too short, and a key whose name is misspelt is not missing.
+
+    Parameters
+    ----------
+    document : Document
+        What was checked.
+    model : type
+        Its schema.
+    error : ValidationError
+        What was found.
+    further : sequence of str
+        Lines about what else was found.
+    """
+    details = error.errors(include_url=False)
+    blocks = {detail["loc"][:length] for detail in details for length in range(len(detail["loc"]))}
+    own = [detail for detail in details if detail["loc"] not in blocks]
+    unknown = [detail["loc"] for detail in own[:MOST_TOLD] if detail["type"] == "extra_forbidden"]
+    meant = {(*place[:-1], nearest(str(place[-1]), _known_keys(model, place[:-1]))) for place in unknown}
+    told = [_told(document, model, d) for d in own[:MOST_TOLD] if d["type"] != "missing" or d["loc"] not in meant]
+    if len(own) > MOST_TOLD:
+        told.append(f"{document.path}: and {len(own) - MOST_TOLD} more mistakes")
+    return "\n".join([*told, *further])
+
+
+def _told(document: Document, model: type[BaseModel], detail: ErrorDetails) -> str:
+    """One mistake in one line."""
+    location: KeyPath = tuple(detail["loc"])
+    key_path = _without_kinds(location)
+    where = f"{document.where(key_path)}: {dotted(key_path) or 'scenario'}"
+    if detail["type"] == "extra_forbidden":
+        return f"{where}: unknown key; {suggest(str(key_path[-1]), _known_keys(model, location[:-1]))}"
+    if detail["type"] == "union_tag_invalid":
+        context = detail["ctx"]
+        allowed = [kind.strip(" '") for kind in str(context["expected_tags"]).split(",")]
+        return f"{where}.kind: unknown kind {shown(context['tag'])}; {suggest(str(context['tag']), allowed)}"
+    if detail["type"] == "union_tag_not_found":
+        return f"{where}.kind: this key is missing; it is required"
+    if detail["type"] == "missing":
+        return f"{where}: this key is missing; it is required"
+    if detail["type"] == MISTAKE:
+        return f"{where}: {detail['msg']}"
+    message = WORDED.get(detail["type"], detail["msg"].removeprefix("Value error, "))
+    value = detail["input"]
+    if isinstance(value, dict | BaseModel):
+        # A message about a whole block names the values that it is about itself.
+        got = "; got a block of keys" if detail["type"].endswith("_type") else ""
+    else:
+        got = f"; got {shown(value)}"
+    return f"{where}: {message[0].lower()}{message[1:]}{got}"
+
+
+def _without_kinds(location: KeyPath) -> KeyPath:
+    """Key path of a mistake: pydantic puts the kind of a list's entry behind its place, where files have no key."""
+    kinds = _kinds()
+    return tuple(
+        key
+        for key, before in zip(location, (None, *location), strict=False)
+        if not (isinstance(before, int) and key in kinds)
+    )
+
+
+def _kinds() -> dict[str, type[BaseModel]]:
+    """Models of list entries by their kind."""
+    models = (*get_args(get_args(AnyEvent)[0]),)
+    return {str(get_args(model.model_fields["kind"].annotation)[0]): model for model in models}
+
+
+def _known_keys(root: type[BaseModel], location: Sequence[str | int]) -> list[str]:
+    """Keys that a schema allows at a location."""
+    model: Any = root
+    for before, key in zip((None, *location), location, strict=False):
+        if isinstance(key, int):
+            continue
+        if isinstance(before, int) and key in _kinds():
+            model = _kinds()[str(key)]
+        else:
+            model = _model_in(model.model_fields[key].annotation)
+    return [name for name, field in model.model_fields.items() if not field.exclude]
+
+
+def _model_in(annotation: object) -> Any:
+    """First model class inside an annotation such as ``tuple[Bank, ...]``."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next((model for part in get_args(annotation) if (model := _model_in(part)) is not None), None)

@@ -9,7 +9,7 @@ from typing import Annotated
 from fogsim.errors import InputError
 from fogsim.estimators.huang2015_lead import Huang2015Lead
 from fogsim.estimators.huang2015_rough import Huang2015Rough
-from fogsim.estimators.image_check import checked_image
+from fogsim.estimators.image_check import ObservationCheck
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
@@ -124,7 +124,7 @@ class Huang2015:
         for name, scale in (("time_scale", time_scale), ("way_scale", way_scale)):
             if not 0.0 < scale < math.inf:
                 raise InputError(f"{name} must be positive and finite, got {scale!r}")
-        self._camera = camera
+        self._check = ObservationCheck(camera)
         self._rough = Huang2015Rough(camera, as_published=as_published, pitch_deviation=pitch_deviation)
         self._lead = Huang2015Lead(camera, as_published=as_published, setback=setback, blur=blur)
         self._as_published = as_published
@@ -133,6 +133,7 @@ class Huang2015:
 
     def reset(self) -> None:
         """Forget all measurements and the vehicle ahead."""
+        self._check.reset()
         self._rough.reset()
         self._lead.reset()
         self._measurements: deque[Measurement] = deque(maxlen=MEASUREMENTS)
@@ -157,10 +158,10 @@ class Huang2015:
         Raises
         ------
         InputError
-            If the image is not of the camera's bit depth, not grey or colour, or not of the told camera's size, the
-            range is NaN, or time or speed are not finite.
+            If camera, image or time do not fit (see `fogsim.estimators.image_check`), the range is NaN, or the
+            speed is not finite.
         """
-        checked_image(observation.image, self._camera)
+        self._check.image_of(observation)
         self._advance(observation)
         rough, accurate = self._rough.update(observation), self._lead.update(observation)
         self._remember(rough, 0)
@@ -179,8 +180,8 @@ class Huang2015:
 
     def _advance(self, observation: Observation) -> None:
         time, speed = observation.time, observation.speed
-        if not (math.isfinite(time) and math.isfinite(speed)):
-            raise InputError(f"an observation's time [s] and speed [m/s] must be finite, got {time!r} and {speed!r}")
+        if not math.isfinite(speed):
+            raise InputError(f"an observation's speed [m/s] must be finite, got {speed!r}")
         if self._time is not None:
             self._way += max(speed, 0.0) * max(time - self._time, 0.0)
         self._time = time

@@ -16,7 +16,7 @@ from fogsim.estimators.huang2015_ratios import (
     ratio_table,
 )
 from fogsim.estimators.huang2015_track import LeadTrack
-from fogsim.estimators.image_check import checked_image
+from fogsim.estimators.image_check import ObservationCheck
 from fogsim.parameters import Range, checked_parameters
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
@@ -98,13 +98,14 @@ class Huang2015Lead:
         if not 0.1 <= self._spacing <= 100.0:
             raise InputError(f"spacing must be 0.1 … 100 m, got {spacing!r}")
         self._blur = blur
-        self._camera = camera
+        self._camera, self._check = camera, ObservationCheck(camera)
         self._as_published = as_published
         self._setback = setback
         self.reset()
 
     def reset(self) -> None:
         """Forget the vehicle ahead."""
+        self._check.reset()
         self._track = self._new_track()
         self._missed = 0
         self._tracks = 0
@@ -137,10 +138,9 @@ class Huang2015Lead:
         Raises
         ------
         InputError
-            If the image is not of the camera's bit depth, not grey or colour, or not of the told camera's size, or the
-            range is NaN.
+            If camera, image or time do not fit (see `fogsim.estimators.image_check`), or the range is NaN.
         """
-        image = checked_image(observation.image, self._camera)
+        image = self._check.image_of(observation)
         if observation.lead is None:
             self._miss()
             return Estimate.invalid(self.method, "no vehicle is tracked ahead")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.estimators.image_check import checked_image
+from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.zhu2015_road import fitted_fog, seen_road
 from fogsim.parameters import checked_parameters
 from fogsim.values.camera import Camera
@@ -73,12 +73,13 @@ class Huang2015Rough:
     def __init__(
         self, camera: Camera, *, as_published: bool = False, pitch_deviation: PitchDeviation = PITCH_DEVIATION
     ) -> None:
-        self._camera = camera
+        self._camera, self._check = camera, ObservationCheck(camera)
         self._as_published = as_published
         self._pitch_deviation = pitch_deviation
 
     def reset(self) -> None:
-        """Forget nothing: every frame stands alone."""
+        """Let time begin anew: every frame stands alone."""
+        self._check.reset()
 
     def update(self, observation: Observation) -> Estimate:
         """Estimate the fog from one image.
@@ -97,9 +98,9 @@ class Huang2015Rough:
         Raises
         ------
         InputError
-            If the image is not of the camera's bit depth, not grey or colour, or not of the told camera's size.
+            If camera, image or time do not fit (see `fogsim.estimators.image_check`).
         """
-        image = checked_image(observation.image, self._camera)
+        image = self._check.image_of(observation)
         try:
             if self._as_published:
                 return self._published(image)

@@ -1,10 +1,62 @@
-"""The one thing that estimators demand of an image."""
+"""What estimators demand of observations."""
+
+import math
+from numbers import Real
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
 from fogsim.values.camera import Camera
+from fogsim.values.image import Frame
+from fogsim.values.observation import Observation
+
+
+class ObservationCheck:
+    """What every method demands of its observations: the told camera's images, in the order of time.
+
+    Parameters
+    ----------
+    camera : Camera
+        The calibration as the vehicle was told it.
+    """
+
+    def __init__(self, camera: Camera) -> None:
+        self._camera = camera
+        self._time = -math.inf
+
+    def reset(self) -> None:
+        """Let time begin anew."""
+        self._time = -math.inf
+
+    def image_of(self, observation: Observation) -> NDArray[np.uint8] | NDArray[np.uint16]:
+        """Image of an observation that can follow the earlier ones; a bare image has neither time nor camera.
+
+        Raises
+        ------
+        InputError
+            If the frame's camera is not the told one, its time is not finite or before that of an earlier frame, or its
+            image is none of the camera (see `checked_image`). What is refused leaves no trace.
+        """
+        frame = observation.frame
+        if not isinstance(frame, Frame):
+            return checked_image(frame, self._camera)
+        if frame.camera != self._camera:
+            raise InputError(f"the frame's camera must be the told one, {self._camera}, got {frame.camera}")
+        image, time = checked_image(frame.image, self._camera), _checked_time(frame.time)
+        if time < self._time:
+            raise InputError(
+                f"the time of a frame must not be before that of an earlier one, {self._time:g} s, got {time:g} s; "
+                "call reset() where another drive begins"
+            )
+        self._time = time
+        return image
+
+
+def _checked_time(time: object) -> float:
+    if isinstance(time, bool) or not isinstance(time, Real) or not math.isfinite(time):
+        raise InputError(f"the time of a frame must be a finite number of seconds, got {time!r}")
+    return float(time)
 
 
 def checked_image(image: object, camera: Camera) -> NDArray[np.uint8] | NDArray[np.uint16]:

@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 
 from fogsim.errors import InputError
-from fogsim.estimators.image_check import checked_count, checked_image
+from fogsim.estimators.image_check import ObservationCheck, checked_count
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
@@ -109,7 +109,7 @@ class JointRoad:
     ) -> None:
         if not (math.isfinite(pitch_deviation) and pitch_deviation > 0):
             raise InputError(f"pitch_deviation must be a positive angle in radians, got {pitch_deviation!r}")
-        self._camera = camera
+        self._camera, self._check = camera, ObservationCheck(camera)
         self._horizon = calibrated_horizon(camera, pitch_deviation)
         self._impossible = _impossible(camera)
         self._geometry = strip_geometry(camera, max(1.0, self._horizon.standard_deviation))
@@ -117,6 +117,7 @@ class JointRoad:
 
     def reset(self) -> None:
         """Forget all earlier frames."""
+        self._check.reset()
         self._earlier.clear()
 
     def update(self, observation: Observation) -> Estimate:
@@ -137,9 +138,9 @@ class JointRoad:
         Raises
         ------
         InputError
-            If the image is not of the camera's bit depth, not grey or colour, or not of the told camera's size.
+            If camera, image or time do not fit (see `fogsim.estimators.image_check`).
         """
-        image = checked_image(observation.image, self._camera)
+        image = self._check.image_of(observation)
         found: dict[str, object] = {
             "horizon_row": self._camera.horizon_row,
             "told_horizon_row": self._camera.horizon_row,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
-from fogsim.estimators.image_check import checked_count, checked_image
+from fogsim.estimators.image_check import ObservationCheck, checked_count
 from fogsim.estimators.lead_contrast_track import SPACING, ContrastTrack, Sight
 from fogsim.estimators.lead_ranges import LeadRanges
 from fogsim.parameters import Range, checked_parameters
@@ -120,12 +120,17 @@ class LeadContrast:
             if not (math.isfinite(value) and value > 0):
                 raise InputError(f"{name} must be positive and finite, got {value!r}")
         self._camera, self._setback = camera, setback
+        self._check = ObservationCheck(camera)
         self._range_deviation, self._pitch_deviation = range_deviation, pitch_deviation
         self._track = ContrastTrack(pitch_deviation, window, checked_count("frames", frames, MIN_SAMPLES))
         self.reset()
 
     def reset(self) -> None:
         """Forget the track."""
+        self._check.reset()
+        self._forget()
+
+    def _forget(self) -> None:
         self._track.forget()
         self._ranges = LeadRanges(self._range_deviation)
         self._missed = 0
@@ -148,9 +153,9 @@ class LeadContrast:
         Raises
         ------
         InputError
-            If the image is not of the camera's bit depth, not grey or colour, or not of the told camera's size.
+            If camera, image or time do not fit (see `fogsim.estimators.image_check`).
         """
-        image = checked_image(observation.image, self._camera)
+        image = self._check.image_of(observation)
         found: dict[str, object] = {"horizon_row": self._camera.horizon_row}
         lead = observation.lead
         if lead is None or not (math.isfinite(lead.distance) and lead.distance >= 0):
@@ -178,7 +183,7 @@ class LeadContrast:
         self._missed += 1
         seen = self._track.sights[-1].time if self._track.sights else time
         if self._missed >= LOST and abs(time - seen) >= (GAP if time else 0.0):
-            self.reset()
+            self._forget()
 
     def _surprise(self, lead: LeadMeasurement, time: float) -> float:
         """How far the range is from where the same vehicle can be [m]; a certain other vehicle begins anew."""
@@ -188,7 +193,7 @@ class LeadContrast:
         expected = earlier.distance + earlier.relative_speed * (time - before)
         jump, surprise = abs(lead.distance - earlier.distance), abs(lead.distance - expected)
         if jump > JUMP and surprise > SURPRISE:
-            self.reset()
+            self._forget()
             return 0.0
         return min(jump, surprise)
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
-from fogsim.estimators.image_check import checked_count, checked_image
+from fogsim.estimators.image_check import ObservationCheck, checked_count
 from fogsim.estimators.negru2013_band import SeenBand, fog_slope, road_band, road_curve
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
@@ -119,6 +119,7 @@ class Negru2013:
     ) -> None:
         if not (math.isfinite(pitch_deviation) and pitch_deviation > 0):
             raise InputError(f"pitch_deviation must be a positive angle in radians, got {pitch_deviation!r}")
+        self._check = ObservationCheck(camera)
         # The fit takes the distances of a camera of the usual height: flat roads scale with it.
         self._camera, self._usual = camera, replace(camera, mount_height=USUAL_HEIGHT)
         self._told = calibrated_horizon(camera, pitch_deviation)
@@ -130,6 +131,7 @@ class Negru2013:
 
     def reset(self) -> None:
         """Forget the vanishing points and inflections of earlier frames."""
+        self._check.reset()
         self._points.clear()
         self._models.clear()
 
@@ -150,9 +152,9 @@ class Negru2013:
         Raises
         ------
         InputError
-            If the image is not of the camera's bit depth, not grey or colour, or not of the told camera's size.
+            If camera, image or time do not fit (see `fogsim.estimators.image_check`).
         """
-        image = checked_image(observation.image, self._camera)
+        image = self._check.image_of(observation)
         diagnostics: dict[str, object] = {"horizon_row": self._camera.horizon_row}
         try:
             road, pixels = self._road(image)

@@ -23,10 +23,10 @@ class Estimator(Protocol):
         Raises
         ------
         InputError
-            If the image is not one of the told camera.
+            If camera, image or time do not fit (see `fogsim.estimators.image_check`).
         """
         ...
 
     def reset(self) -> None:
-        """Forget all earlier observations."""
+        """Forget all earlier observations; their time may begin anew."""
         ...

@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.estimators.image_check import checked_image
+from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.zhu2015_road import SeenRoad, fitted_fog, inflection_rows, seen_road
 from fogsim.linear_algebra import matrix_product
 from fogsim.parameters import Range, checked_parameters
@@ -110,7 +110,7 @@ class Zhu2015:
         growth_share: Annotated[float, Range(0.0, 1.0)] = 0.8,
         pitch_deviation: PitchDeviation = PITCH_DEVIATION,
     ) -> None:
-        self._camera = camera
+        self._camera, self._check = camera, ObservationCheck(camera)
         self._as_published = as_published
         self._growth = (growth, growth_share)
         self._pitch_deviation = pitch_deviation
@@ -120,6 +120,7 @@ class Zhu2015:
 
     def reset(self) -> None:
         """Forget all frames and the state."""
+        self._check.reset()
         self._readings.clear()
         self._classes.clear()
         self._state = None
@@ -142,9 +143,9 @@ class Zhu2015:
         Raises
         ------
         InputError
-            If the image is not of the camera's bit depth, not grey or colour, or not of the told camera's size.
+            If camera, image or time do not fit (see `fogsim.estimators.image_check`).
         """
-        image = checked_image(observation.image, self._camera)
+        image = self._check.image_of(observation)
         diagnostics: dict[str, object] = {"state": self._state, "horizon_row": self._camera.horizon_row}
         try:
             growth = self._growth if self._as_published else None

@@ -10,6 +10,7 @@ import pytest
 
 from fogsim.errors import FogSimError, InputError
 from fogsim.estimators import ESTIMATORS, make
+from fogsim.registry import parameters
 from fogsim.values import Camera, Estimate, Frame, LeadMeasurement, Observation, SignSighting
 
 METHODS = sorted(ESTIMATORS)
@@ -41,7 +42,8 @@ def observation(image, index: int = 0, **changes) -> Observation:
 
 def estimates(method: str, image, camera: Camera = CAMERA) -> list[Estimate]:
     estimator = make(method, camera)
-    return [estimator.update(observation(image, index)) for index in range(len(RANGES))]
+    frames = [Frame(PERIOD * index, image, camera) for index in range(len(RANGES))]
+    return [estimator.update(observation(image, index, frame=frame)) for index, frame in enumerate(frames)]
 
 
 def numbers(value: object) -> Iterator[float]:
@@ -214,7 +216,7 @@ def test_an_image_of_the_wrong_kind_is_told_and_leaves_no_trace(method, name, se
 @pytest.mark.parametrize("method", METHODS)
 def test_values_beyond_the_bit_depth_are_told(method):
     with pytest.raises(InputError, match=r"10 bits must have values 0 … 1023, got one of 1024"):
-        make(method, dataclasses.replace(CAMERA, bits=10)).update(observation(np.full((ROWS, COLS), 1024, np.uint16)))
+        make(method, dataclasses.replace(CAMERA, bits=10)).update(Observation(np.full((ROWS, COLS), 1024, np.uint16)))
 
 
 def sound_or_told(method: str, frames, *changes) -> list[Estimate]:
@@ -263,21 +265,60 @@ def test_an_odd_sign_is_refused_or_made_nothing_of(method, field, value, sequenc
     sound_or_told(method, sequence, *[{"signs": (sign,)}] * len(sequence))
 
 
-TIMES = {
-    "backwards": [0.0, 0.4, 0.8, 0.4, 0.0, -0.4, -0.8],
-    "at a stand": [5.0] * 7,
-    "with a leap": [0.0, 0.4, 1e12, 1e12, -1e12, 0.8, 1.2],
-    "once no number": [0.0, 0.4, math.nan, 1.2, 1.6, 2.0, 2.4],
-    "once endless": [0.0, 0.4, math.inf, 1.2, 1.6, 2.0, 2.4],
-    "never a number": [math.nan] * 7,
-}
+WRONG_TIMES = (
+    (PERIOD, r"before that of an earlier one, 0\.8 s, got 0\.4 s; call reset\(\)"),
+    (math.nan, "finite number of seconds, got nan"),
+    (math.inf, "finite number of seconds, got inf"),
+    (-math.inf, "finite number of seconds, got -inf"),
+    (None, "finite number of seconds, got None"),
+    ("3", "finite number of seconds, got '3'"),
+)
 
 
-@pytest.mark.parametrize("name", TIMES)
 @pytest.mark.parametrize("method", METHODS)
-def test_time_may_do_as_it_likes(method, name, sequence):
-    changes = [{"frame": Frame(time, frame, CAMERA)} for time, frame in zip(TIMES[name], sequence, strict=True)]
-    found = sound_or_told(method, sequence, *changes)
-    if name in ("backwards", "once no number", "once endless"):
-        # It does not silence a method for good.
-        assert found[-1].valid == sound_or_told(method, sequence, *[{}] * len(sequence))[-1].valid
+def test_a_time_that_no_clock_shows_is_told_and_leaves_no_trace(method, sequence):
+    undisturbed, disturbed = make(method, CAMERA), make(method, CAMERA)
+    for index, image in enumerate(sequence):
+        a, b = (one.update(observation(image, index)) for one in (undisturbed, disturbed))
+        assert (a.valid, a.extinction, a.standard_deviation) == (b.valid, b.extinction, b.standard_deviation)
+        if index == 2:
+            for time, told in WRONG_TIMES:
+                with pytest.raises(InputError, match=told):
+                    disturbed.update(observation(image, frame=Frame(time, image, CAMERA)))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_time_may_stand_and_begins_anew_after_a_reset(method, sequence):
+    estimator = make(method, CAMERA)
+    for time in (5.0, 5.0):
+        check_sound(estimator.update(observation(sequence[0], frame=Frame(time, sequence[0], CAMERA))), method)
+    estimator.reset()
+    check_sound(estimator.update(observation(sequence[0])), method)
+
+
+@pytest.mark.parametrize(
+    "changes", [{"pitch": 0.03}, {"response": "srgb"}, {"principal_point": (160.0, 119.5)}, {"bits": 10}], ids=str
+)
+@pytest.mark.parametrize("method", METHODS)
+def test_a_frame_of_another_camera_is_told(method, changes):
+    other = Frame(0.0, GREY, dataclasses.replace(CAMERA, **changes))
+    with pytest.raises(InputError, match="camera must be the told one"):
+        make(method, CAMERA).update(observation(GREY, frame=other))
+
+
+ODD_VALUES = ["x", None, [1.0], math.nan, math.inf, -math.inf, -1.0, 1e300, 1j]
+ODD_PARAMETERS = [
+    (method, name, value)
+    for method in METHODS
+    for name, default in parameters(ESTIMATORS[method]).items()
+    for value in ODD_VALUES
+    if value != default
+]
+
+
+@pytest.mark.parametrize(("method", "name", "value"), ODD_PARAMETERS, ids=repr)
+def test_a_parameter_that_is_none_is_told(method, name, value):
+    """By the registry and by the class itself: with the parameter's name and what came."""
+    for build in (make, lambda _, camera, **options: ESTIMATORS[method](camera, **options)):
+        with pytest.raises(InputError, match=rf"{name}\b.* must be .*got {re.escape(repr(value))}"):
+            build(method, CAMERA, **{name: value})

@@ -61,7 +61,7 @@ TABLES: dict[str, tuple[str, Callable[[], Rows]]] = {
     "night-gallen2014": ("docs/night.md", night_deviations.veils_of_gallen),
     "night-glows": ("docs/night.md", night_deviations.glows),
     "night-limits": ("docs/night.md", night_deviations.limits),
-    "night-backscatter": ("docs/night.md", night_deviations.backscatter),
+    "night-directions": ("docs/night.md", night_deviations.directions),
     "zhu2015": ("docs/estimators.md", zhu2015),
 }
 """Page and rows of each table, by its name and marker."""

@@ -11,8 +11,8 @@ camera's own low beam and everyone's lamps light it. The camera drives on by 2.5
 start. Repetitions of all cases alternate, and each record has the median of the repetitions' medians, the fastest
 frame, and each stage's median; on a machine that does other work too, only the fastest says something.
 
-    python benchmarks/frames.py [--json] [--renderer cpu ...] [--light night ...] [--size 640x480 ...] [--frames 60]
-        [--repeat 5]
+    python benchmarks/frames.py [--json] [--renderer cpu ...] [--light night ...] [--size 640x480 ...]
+        [--samples 2 ...] [--frames 60] [--repeat 5]
 """
 
 import argparse
@@ -48,16 +48,16 @@ SIZES = {  # length, width and height [m]
 }
 KINDS = ("car", "car", "truck", "car", "van", "car", "bus", "car", "car", "motorcycle")
 LIGHTS = {"day": 10_000.0, "night": 0.5}  # [lx]
-Key = tuple[str, str, str]
-"""Renderer, light and size of a case."""
+Key = tuple[str, str, str, int]
+"""Renderer, light, size and samples a pixel side of a case."""
 
 STAGES = ("scene", "render", "air", "camera")
 
 
-def scenario(renderer: str, light: str, size: str) -> Scenario:
-    """The scenario with homogeneous fog and a camera of a given size."""
+def scenario(renderer: str, light: str, size: str, samples: int) -> Scenario:
+    """The scenario with homogeneous fog and a camera of a given size and antialiasing."""
     width, height = size.split("x")
-    camera = (f"camera.width={width}", f"camera.height={height}")
+    camera = (f"camera.width={width}", f"camera.height={height}", f"camera.samples={samples}")
     lit = ("fog={visibility_m: 100}", f"light.illuminance_lx={LIGHTS[light]}", f"renderer={renderer}")
     return fogsim.load_scenario("motorway_fog_bank", [*camera, *lit])
 
@@ -139,8 +139,8 @@ class Case:
 
     Parameters
     ----------
-    key : tuple of str
-        Renderer, light and size.
+    key : Key
+        Renderer, light, size, and samples a pixel side.
     network : RoadNetwork
         The roads.
     """
@@ -193,7 +193,7 @@ def measure(cases: dict[Key, Case], frames: int, repeat: int) -> Iterator[dict[s
 
 def record(key: Key, runs: list[NDArray[np.float64]]) -> dict[str, Any]:
     """One record: repetitions (frames, stages) [ms] of a case."""
-    renderer, light, size = key
+    renderer, light, size, samples = key
     width, height = map(int, size.split("x"))
     whole, stages = [run.sum(axis=1) for run in runs], np.median(np.concatenate(runs), axis=0)
     return {
@@ -201,6 +201,7 @@ def record(key: Key, runs: list[NDArray[np.float64]]) -> dict[str, Any]:
         "light": light,
         "width": width,
         "height": height,
+        "samples": samples,
         "ms_median": round(statistics.median(float(np.median(one)) for one in whole), 3),
         "ms_min": round(float(min(one.min() for one in whole)), 3),
     } | {f"ms_{name}": round(float(value), 3) for name, value in zip(STAGES, stages, strict=True)}
@@ -213,12 +214,16 @@ def main() -> None:
     parser.add_argument("--renderer", action="append", choices=list(RENDERERS), help="default: all")
     parser.add_argument("--light", action="append", choices=LIGHTS, help="default: all")
     parser.add_argument("--size", action="append", help="camera WIDTHxHEIGHT (default 160x120 and 640x480)")
+    parser.add_argument("--samples", action="append", type=int, help="samples a pixel side (default 1)")
     parser.add_argument("--frames", type=int, default=60, help="frames a repetition")
     parser.add_argument("--repeat", type=int, default=5, help="repetitions")
     arguments = parser.parse_args()
     keys = list(
         itertools.product(
-            arguments.renderer or list(RENDERERS), arguments.light or LIGHTS, arguments.size or ["160x120", "640x480"]
+            arguments.renderer or list(RENDERERS),
+            arguments.light or LIGHTS,
+            arguments.size or ["160x120", "640x480"],
+            arguments.samples or [1],
         )
     )
     network = read_network()
@@ -231,11 +236,17 @@ def main() -> None:
         print(json.dumps(records, indent=2))
         return
     print(f"{shared['triangles']} triangles, {VEHICLES} vehicles, {SIGNS} signs; milliseconds a frame")
-    print(f"{'renderer':10}{'light':7}{'size':>9}{'median':>9}{'min':>9}" + "".join(f"{name:>9}" for name in STAGES))
+    print(
+        f"{'renderer':10}{'light':7}{'size':>9}{'samples':>9}{'median':>9}{'min':>9}"
+        + "".join(f"{name:>9}" for name in STAGES)
+    )
     for one in records:
         size = f"{one['width']}x{one['height']}"
         figures = [one[f"ms_{name}"] for name in ("median", "min", *STAGES)]
-        print(f"{one['renderer']:10}{one['light']:7}{size:>9}" + "".join(f"{value:9.2f}" for value in figures))
+        print(
+            f"{one['renderer']:10}{one['light']:7}{size:>9}{one['samples']:9}"
+            + "".join(f"{value:9.2f}" for value in figures)
+        )
 
 
 if __name__ == "__main__":

@@ -33,6 +33,7 @@ TARGET = -2.02
 """Elevation of a point on the road 40 m ahead [degrees]."""
 BACK = math.radians(150.0)
 """Scattering angle beyond which light of the own head lamps comes back."""
+AHEAD = math.radians(5.0)
 
 Rows = list[tuple[str, ...]]
 
@@ -177,20 +178,26 @@ def limits() -> Rows:
     ]
 
 
-def backscatter() -> Rows:
-    """Light scattered by more than 150°: droplets over Henyey & Greenstein, g = 0.85."""
-    angle = np.linspace(BACK, math.pi, 2001)
-    plain = np.trapezoid(henyey_greenstein(angle, 0.85) * np.sin(angle), angle)
-    ratios = [np.trapezoid(phase_function(one)(angle) * np.sin(angle), angle) / plain for one in Droplets]
-    return [
-        ("droplets", "light scattered by more than 150°, over that of Henyey & Greenstein"),
-        *((str(one), f"{ratio:.1f}") for one, ratio in zip(Droplets, ratios, strict=True)),
-    ]
+def scattered_between(phase: Callable[[NDArray[np.float64]], NDArray[np.float64]], low: float, high: float) -> float:
+    """Share of scattered light that is turned by angles between two [rad]."""
+    angle = np.linspace(low, high, 2001)
+    return float(2.0 * math.pi * np.trapezoid(phase(angle) * np.sin(angle), angle))
+
+
+def directions() -> Rows:
+    """Light that goes straight on and that comes back; the latter also over Henyey & Greenstein's, g = 0.85."""
+    plain = scattered_between(lambda angle: henyey_greenstein(angle, 0.85), BACK, math.pi)
+    table: Rows = [("droplets", "turned by less than 5° [%]", "by more than 150° [%]", "over Henyey & Greenstein's")]
+    for droplets in Droplets:
+        phase = phase_function(droplets)
+        ahead, back = scattered_between(phase, 0.0, AHEAD), scattered_between(phase, BACK, math.pi)
+        table.append((str(droplets), f"{100 * ahead:.0f}", f"{100 * back:.1f}", f"{back / plain:.1f}"))
+    return table
 
 
 def main() -> None:
     """Print them all."""
-    for table in (veils, veils_of_gallen, glows, limits, backscatter):
+    for table in (veils, veils_of_gallen, glows, limits, directions):
         heading, *rows = table()
         lines = [heading, tuple("---" for _ in heading), *rows]
         print("\n".join("| " + " | ".join(cells) + " |" for cells in lines) + "\n")

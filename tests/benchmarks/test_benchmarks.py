@@ -35,6 +35,11 @@ def records(name: str, *arguments: str) -> list[dict[str, Any]]:
             {"method", "visibility", "median_pct", "p95_pct", "valid_share", "ms"},
         ),
         (
+            "told_calibration.py",
+            ("--cameras", "1", "--scenes", "1", "--visibilities", "100", "--methods", "negru2013"),
+            {"error", "method", "visibility", "marks", "valid_share", "median_pct", "median_size_pct", "p95_size_pct"},
+        ),
+        (
             "lead_accuracy.py",
             ("--cameras", "1", "--vehicles", "1", "--step", "10", "--methods", "huang2015_lead"),
             {"method", "visibility", "airlight", "camera", "vehicle", "median_pct", "p95_pct", "coverage", "ms"},
@@ -42,7 +47,7 @@ def records(name: str, *arguments: str) -> list[dict[str, Any]]:
         (
             "frames.py",
             ("--size", "64x48", "--frames", "2", "--repeat", "1"),
-            {"renderer", "light", "width", "height", "ms_median", "ms_min", "ms_render"},
+            {"renderer", "light", "width", "height", "samples", "ms_median", "ms_min", "ms_render"},
         ),
         (
             "renderers.py",

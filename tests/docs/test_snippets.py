@@ -96,6 +96,9 @@ def test_what_is_printed_runs(readers_folder: Callable[[str], Path], python: Run
         estimates = [float(one) for one in re.findall(r"^(?:.* )?([\d.]+) \([\d.]+, ", printed[page], re.MULTILINE)]
         assert estimates, page
         assert estimates == pytest.approx([80.0] * len(estimates), rel=0.05), page
+    told = [json.loads(line) for line in printed["docs/estimate.md"].splitlines() if line.startswith("{")]
+    (example,) = re.findall(r"```json\n(.*?)```", TEXTS["docs/estimate.md"], re.DOTALL)
+    assert {tuple(one) for one in told} == {tuple(json.loads(example))}
     loops = [
         list(map(float, row)) for row in re.findall(r"^([\d.]+) ([\d.]+)\b", printed["docs/plugin.md"], re.MULTILINE)
     ]

@@ -49,7 +49,6 @@ def test_an_unknown_key_names_file_line_key_and_the_nearest(folder: Path) -> Non
     [
         (["clocks.traffic_step_s=0.0125"], "0.01 or 0.02 s; got 0.0125"),
         ([f"clocks.traffic_step_s={1 / 30!r}"], "0.025 or 0.05 s; got 0.0333"),
-        (["clocks.traffic_step_s=0.0004"], "nearest: 0.001 s; got 0.0004"),
         ([f"clocks.{key}_s=0.0125" for key in ("traffic_step", "camera_period")], "0.012 or 0.013 s; got 0.0125"),
     ],
 )
@@ -58,6 +57,11 @@ def test_a_traffic_step_that_sumo_cannot_make_is_refused_with_the_nearest(settin
         load_scenario("motorway_fog_bank", settings)
     assert str(error.value).startswith(f"--set {settings[0]}")
     assert nearest in str(error.value)
+
+
+def test_a_traffic_step_below_sumo_s_tick_is_refused_with_the_least() -> None:
+    with pytest.raises(InputError, match=r"clocks\.traffic_step_s: .* greater than or equal to 0\.001; got 0\.0004"):
+        load_scenario("motorway_fog_bank", ["clocks.traffic_step_s=0.0004"])
 
 
 @pytest.mark.parametrize("step", [0.001, 0.02, 0.1, 0.1 + 1e-12])

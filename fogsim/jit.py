@@ -15,9 +15,12 @@ from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any, TypeVar, cast
 
-import numba
 import numpy as np
 from numba.core import event
+
+# Where Intel's vector functions are installed, numba would take them, and they round otherwise than the C library does.
+os.environ["NUMBA_DISABLE_INTEL_SVML"] = "1"
+import numba
 
 F = TypeVar("F", bound=Callable[..., Any])
 

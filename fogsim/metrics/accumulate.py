@@ -49,8 +49,18 @@ class RunSummary:
     meanings: Mapping[str, str]
 
     def to_json(self) -> dict[str, JsonValue]:
-        """Give the values as a dict that JSON can hold without NaN or infinity."""
-        return dict(self.values)
+        """Give the values as a dict that JSON can hold without NaN or infinity, numbers in the digits that they have.
+
+        Processors differ in the last bits of exponentials and logarithms, and nobody measures to the tenth digit.
+        """
+        return {key: _written(value) for key, value in self.values.items()}
+
+
+def _written(value: JsonValue) -> JsonValue:
+    """A value with numbers to 9 significant digits, and no more than 9 after the point."""
+    if isinstance(value, Mapping):
+        return {key: _written(part) for key, part in value.items()}
+    return round(float(f"{value:.9g}"), 9) + 0.0 if isinstance(value, float) else value
 
 
 class RunMetrics:

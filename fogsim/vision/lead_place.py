@@ -3,11 +3,11 @@
 import math
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.vision.lead_patch import INDEPENDENT, LeadPicture, cell_of, grid, resampled
+from fogsim.vision.match_kernels import correlations
 
 Floats = NDArray[np.float64]
 
@@ -75,8 +75,7 @@ def placed(
     seen = _before_road(seen, lateral, reference)
     if float(template.std()) < 1e-4:
         return None
-    match = cv2.matchTemplate(seen.astype(np.float32), template.astype(np.float32), cv2.TM_CCOEFF_NORMED)
-    found = np.clip(np.nan_to_num(match.astype(np.float64), nan=0.0, posinf=0.0, neginf=0.0), 0.0, 0.9999)
+    found = np.clip(correlations(np.ascontiguousarray(seen), np.ascontiguousarray(template)), 0.0, 0.9999)
     known = 0.5 * (wide[1][:, None] / pitch) ** 2 + 0.5 * (wide[0] / aside) ** 2
     cost = 0.5 * template.size / INDEPENDENT * np.log1p(-(found**2)) + known
     row, col = np.unravel_index(int(np.argmin(cost)), cost.shape)

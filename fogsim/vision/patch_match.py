@@ -3,11 +3,11 @@
 import math
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.linear_algebra import inverse_of, matrix_product
+from fogsim.vision.match_kernels import correlations
 from fogsim.vision.patch import Patch, PixelGrid, Placement, pixel_grid, seen_as
 
 Floats = NDArray[np.float64]
@@ -116,14 +116,12 @@ def coarse_placement(near: Patch, far: Patch, prior: PlacementPrior) -> Placemen
     grid = pixel_grid(near, far, prior.placement)
     if grid is None:
         return None
-    template = seen_as(near, grid, prior.placement).astype(np.float32)
+    template = seen_as(near, grid, prior.placement)
     if far.luminance.shape[0] < template.shape[0] or far.luminance.shape[1] < template.shape[1]:
         return None
     if float(template.std()) < 1e-3:
         return None
-    image = far.luminance.astype(np.float32)
-    matched = np.nan_to_num(cv2.matchTemplate(image, template, cv2.TM_CCOEFF_NORMED), nan=0.0, posinf=0.0, neginf=0.0)
-    correlation = np.clip(matched.astype(np.float64), 0.0, 0.9999)
+    correlation = np.clip(correlations(np.ascontiguousarray(far.luminance), template), 0.0, 0.9999)
     down = np.arange(correlation.shape[0]) - grid.rows[0]
     across = np.arange(correlation.shape[1]) - grid.cols[0]
     expected = 0.5 * (down[:, None] / prior.row_deviation) ** 2 + 0.5 * (across / prior.column_deviation) ** 2

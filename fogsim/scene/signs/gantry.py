@@ -83,7 +83,8 @@ class _Pieces:
         """Where legs stand to the right and left of a sign over a carriageway [m]; None if no lane is below it."""
         ahead = np.array([np.cos(sign.heading), np.sin(sign.heading)])
         left, half = self._crossed(sign, ahead)
-        order = np.argsort(left)
+        # Lanes of junctions lie one on the other: rounding must not say which comes first.
+        order = np.argsort(np.round(left, 6), kind="stable")
         left, half = left[order], half[order]
         over = np.flatnonzero(np.abs(left) < half)
         if not len(over):

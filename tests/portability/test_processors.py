@@ -1,0 +1,106 @@
+"""Shapes, frames, decisions and metrics are the same whatever processor the libraries beneath believe they run on.
+
+``tools/fingerprint.py`` is run by processes that are told to use other kernels of OpenBLAS, none of numpy's AVX-512,
+numba's code for any x86-64, or the C library's functions without FMA. Of OpenBLAS's kernels, those are taken that this
+processor can run: always three.
+"""
+
+import json
+import os
+import platform
+import runpy
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+TOOL = Path(__file__).parents[2] / "tools" / "fingerprint.py"
+CORE_TYPES = {"SkylakeX": "avx512bw", "Haswell": "avx2", "Sandybridge": "avx", "Nehalem": "sse4_2", "Prescott": "sse3"}
+"""OpenBLAS's kernels, and the instructions that they need."""
+
+pytestmark = [
+    pytest.mark.skipif(platform.machine() not in {"x86_64", "AMD64"}, reason="variants are those of x86-64"),
+    pytest.mark.timeout(1800),
+]
+
+
+def _core_types() -> list[str]:
+    """The newest, the second and the oldest kernels of OpenBLAS that this processor can run."""
+    cpuinfo = Path("/proc/cpuinfo")
+    flags = set(cpuinfo.read_text().replace("pni", "sse3").split()) if cpuinfo.exists() else {"avx", "sse4_2", "sse3"}
+    able = [core for core, needed in CORE_TYPES.items() if needed in flags]
+    return [able[0], able[1], able[-2]] if len(able) > 3 else able
+
+
+def _numpy_features() -> str:
+    """What numpy may be told not to use: its AVX-512 or, where there is none, all that it has found."""
+    found = np.show_config(mode="dicts")["SIMD Extensions"]["found"]
+    newest = [name for name in found if name.startswith("AVX512") or name == "X86_V4"]
+    return " ".join(newest or found)
+
+
+VARIANTS: Mapping[str, Mapping[str, str]] = {
+    **{f"OpenBLAS for {core}": {"OPENBLAS_CORETYPE": core} for core in _core_types()},
+    "numpy without AVX-512": {"NPY_DISABLE_CPU_FEATURES": _numpy_features()},
+    "C library without FMA": {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA"},
+}
+GENERIC = ("numba for any processor", "numba for any processor, at the same time")
+
+Answers = Mapping[str, "Future[Any]"]
+
+
+@pytest.fixture(scope="module")
+def answers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Answers]:
+    """What each process says; those two start first, together, that compile every kernel into one empty folder."""
+    kernels = {"NUMBA_CPU_NAME": "generic", "NUMBA_CACHE_DIR": str(tmp_path_factory.mktemp("kernels"))}
+    asked = {**dict.fromkeys(GENERIC, kernels), "here": {}, **VARIANTS}
+    with ThreadPoolExecutor(max_workers=2) as pool:
+        yield {name: pool.submit(_ask, environment) for name, environment in asked.items()}
+
+
+def _ask(environment: Mapping[str, str]) -> Any:
+    told = subprocess.run(
+        [sys.executable, TOOL], env={**os.environ, **environment}, capture_output=True, text=True, check=False
+    )
+    if told.returncode:
+        raise AssertionError(f"{environment} ends with {told.returncode}: {told.stderr[-2000:]}")
+    return json.loads(told.stdout)
+
+
+@pytest.fixture(scope="module")
+def differences() -> Callable[[Any, Any], Iterator[str]]:
+    """The tool's comparison."""
+    found: Callable[[Any, Any], Iterator[str]] = runpy.run_path(str(TOOL))["differences"]
+    return found
+
+
+def test_three_kinds_of_kernels_are_tried() -> None:
+    assert len(_core_types()) == 3
+
+
+@pytest.mark.parametrize("variant", [*VARIANTS, *GENERIC])
+def test_a_processor_changes_nothing(
+    answers: Answers, differences: Callable[[Any, Any], Iterator[str]], variant: str
+) -> None:
+    assert not list(differences(answers["here"].result(), answers[variant].result()))
+
+
+def test_what_is_compared_is_a_drive_in_fog_with_advice(answers: Answers) -> None:
+    drives = answers["here"].result()["drives"]
+    assert all(len(set(drive["frames"])) == len(drive["frames"]) == 11 for drive in drives.values())
+    assert drives["day"]["decisions"][0] != drives["day"]["decisions"][-1]
+    assert len(answers["here"].result()["shapes"]) > 150
+
+
+def test_a_difference_is_told(answers: Answers, differences: Callable[[Any, Any], Iterator[str]]) -> None:
+    here = answers["here"].result()
+    other = json.loads(json.dumps(here))
+    other["drives"]["night"]["frames"][3] = "another"
+    other["drives"]["day"]["numbers"]["0 route"] += 1e-6
+    told = list(differences(here, other))
+    assert [line.split(":")[0] for line in told] == ["/drives/day/numbers/0 route", "/drives/night/frames/3"]

@@ -1,15 +1,20 @@
 """Signals that end a run: Ctrl-C (SIGINT), SIGTERM and SIGHUP, whatever runs when they come."""
 
 import contextlib
+import math
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from types import FrameType, TracebackType
 from typing import Self
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """Signals that ask a program to end."""
+
+ENDING_TIME = 3.0
+"""Time within which a second signal does not cut off what the first one has ended [s]."""
 
 _Handler = Callable[[int, FrameType | None], object]
 
@@ -38,12 +43,12 @@ def _handle_signals(handler: _Handler) -> None:
 
 
 class ProgramSignals:
-    """Signals as KeyboardInterrupt, for a program, from `listen` on.
+    """The first signal as KeyboardInterrupt, for a program, from `listen` on; the next ends the program at once.
 
     Attributes
     ----------
     last : int or None
-        The signal that came last.
+        The signal that came.
     """
 
     def __init__(self) -> None:
@@ -54,6 +59,8 @@ class ProgramSignals:
         _handle_signals(self._raise)
 
     def _raise(self, signum: int, _: FrameType | None) -> None:
+        if self.last is not None:
+            leave(self.last)
         self.last = signum
         raise KeyboardInterrupt
 
@@ -62,13 +69,14 @@ class Interruption:
     """Holds signals back, so that what is being written is finished, and lets them through where they do no harm.
 
     It concerns signals for which this process has a handler of Python's (SIGINT has one always), in the main thread;
-    elsewhere none is raised. One that came last while it was held is handled at the end.
+    elsewhere none is raised. One that is held is handled at the end, the last of several.
     """
 
     def __init__(self) -> None:
         self._handlers: dict[int, _Handler] = {}
         self._allowed = False
         self._waiting: int | None = None
+        self._raised = -math.inf
 
     def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():
@@ -87,7 +95,9 @@ class Interruption:
             self._handle_waiting()
 
     def _take(self, signum: int, frame: FrameType | None) -> None:
-        if self._allowed:
+        # Who is impatient presses twice, and what the first one ends must be able to end.
+        if self._allowed and time.monotonic() - self._raised > ENDING_TIME:
+            self._raised = time.monotonic()
             self._handlers[signum](signum, frame)
         else:
             self._waiting = signum

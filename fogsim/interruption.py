@@ -16,6 +16,9 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 ENDING_TIME = 3.0
 """Time within which a second signal does not cut off what the first one has ended [s]."""
 
+_PATIENCE = 1.0
+"""Time after which a signal whose exception was lost, as in a destructor, raises it again [s]."""
+
 _Handler = Callable[[int, FrameType | None], object]
 
 
@@ -77,6 +80,7 @@ class Interruption:
         self._allowed = False
         self._waiting: int | None = None
         self._raised = -math.inf
+        self._has_alarm = False
 
     def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():
@@ -84,11 +88,18 @@ class Interruption:
             self._handlers = {signum: handler for signum, handler in found.items() if callable(handler)}
             for signum in self._handlers:
                 signal.signal(signum, self._take)
+            # Whoever has an alarm of their own keeps it.
+            self._has_alarm = signal.getsignal(signal.SIGALRM) is signal.SIG_DFL
+            if self._has_alarm:
+                signal.signal(signal.SIGALRM, self._raise_again)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if self._has_alarm:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            signal.signal(signal.SIGALRM, signal.SIG_DFL)
         for signum, handler in self._handlers.items():
             signal.signal(signum, handler)
         if error is None:
@@ -98,9 +109,15 @@ class Interruption:
         # Who is impatient presses twice, and what the first one ends must be able to end.
         if self._allowed and time.monotonic() - self._raised > ENDING_TIME:
             self._raised = time.monotonic()
+            if self._has_alarm:
+                signal.setitimer(signal.ITIMER_REAL, _PATIENCE, _PATIENCE)
             self._handlers[signum](signum, frame)
         else:
             self._waiting = signum
+
+    def _raise_again(self, _: int, __: FrameType | None) -> None:
+        if self._allowed:
+            raise KeyboardInterrupt
 
     def _handle_waiting(self) -> None:
         signum, self._waiting = self._waiting, None

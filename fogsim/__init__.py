@@ -10,6 +10,10 @@ if TYPE_CHECKING:
     from fogsim.dataset import semantic_mask as semantic_mask
     from fogsim.dataset import transmission as transmission
     from fogsim.dataset import write_dataset as write_dataset
+    from fogsim.errors import FogSimError as FogSimError
+    from fogsim.errors import InputError as InputError
+    from fogsim.errors import MissingDependencyError as MissingDependencyError
+    from fogsim.errors import SimulationError as SimulationError
     from fogsim.loop import ClosedLoop as ClosedLoop
     from fogsim.loop import run as run
     from fogsim.scenario import Scenario as Scenario
@@ -27,8 +31,7 @@ if TYPE_CHECKING:
 
     __version__: str
 
-from fogsim.errors import FogSimError, InputError, MissingDependencyError, SimulationError
-
+_ERRORS = ("FogSimError", "InputError", "MissingDependencyError", "SimulationError")
 _VALUES = (
     "Belief",
     "Camera",
@@ -41,6 +44,7 @@ _VALUES = (
     "Step",
 )
 _LAZY = {
+    **dict.fromkeys(_ERRORS, "fogsim.errors"),
     **dict.fromkeys(_VALUES, "fogsim.values"),
     "ClosedLoop": "fogsim.loop",
     "attach": "fogsim.attached",

@@ -1,15 +1,23 @@
 """Signals that end a run: Ctrl-C (SIGINT), SIGTERM and SIGHUP, whatever runs when they come."""
 
 import contextlib
+import math
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from types import FrameType, TracebackType
 from typing import Self
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """Signals that ask a program to end."""
+
+ENDING_TIME = 3.0
+"""Time within which a second signal does not cut off what the first one has ended [s]."""
+
+_PATIENCE = 1.0
+"""Time after which a signal whose exception was lost, as in a destructor, raises it again [s]."""
 
 _Handler = Callable[[int, FrameType | None], object]
 
@@ -38,12 +46,12 @@ def _handle_signals(handler: _Handler) -> None:
 
 
 class ProgramSignals:
-    """Signals as KeyboardInterrupt, for a program, from `listen` on.
+    """The first signal as KeyboardInterrupt, for a program, from `listen` on; the next ends the program at once.
 
     Attributes
     ----------
     last : int or None
-        The signal that came last.
+        The signal that came.
     """
 
     def __init__(self) -> None:
@@ -54,6 +62,8 @@ class ProgramSignals:
         _handle_signals(self._raise)
 
     def _raise(self, signum: int, _: FrameType | None) -> None:
+        if self.last is not None:
+            leave(self.last)
         self.last = signum
         raise KeyboardInterrupt
 
@@ -62,13 +72,15 @@ class Interruption:
     """Holds signals back, so that what is being written is finished, and lets them through where they do no harm.
 
     It concerns signals for which this process has a handler of Python's (SIGINT has one always), in the main thread;
-    elsewhere none is raised. One that came last while it was held is handled at the end.
+    elsewhere none is raised. One that is held is handled at the end, the last of several.
     """
 
     def __init__(self) -> None:
         self._handlers: dict[int, _Handler] = {}
         self._allowed = False
         self._waiting: int | None = None
+        self._raised = -math.inf
+        self._has_alarm = False
 
     def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():
@@ -76,21 +88,36 @@ class Interruption:
             self._handlers = {signum: handler for signum, handler in found.items() if callable(handler)}
             for signum in self._handlers:
                 signal.signal(signum, self._take)
+            # Whoever has an alarm of their own keeps it.
+            self._has_alarm = signal.getsignal(signal.SIGALRM) is signal.SIG_DFL
+            if self._has_alarm:
+                signal.signal(signal.SIGALRM, self._raise_again)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if self._has_alarm:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            signal.signal(signal.SIGALRM, signal.SIG_DFL)
         for signum, handler in self._handlers.items():
             signal.signal(signum, handler)
         if error is None:
             self._handle_waiting()
 
     def _take(self, signum: int, frame: FrameType | None) -> None:
-        if self._allowed:
+        # Who is impatient presses twice, and what the first one ends must be able to end.
+        if self._allowed and time.monotonic() - self._raised > ENDING_TIME:
+            self._raised = time.monotonic()
+            if self._has_alarm:
+                signal.setitimer(signal.ITIMER_REAL, _PATIENCE, _PATIENCE)
             self._handlers[signum](signum, frame)
         else:
             self._waiting = signum
+
+    def _raise_again(self, _: int, __: FrameType | None) -> None:
+        if self._allowed:
+            raise KeyboardInterrupt
 
     def _handle_waiting(self) -> None:
         signum, self._waiting = self._waiting, None

@@ -125,7 +125,7 @@ def record_run(
         recording = Recording(directory, manifest, _open(recorders, scenario, seed, directory, metrics), metrics)
         status, ending, message = Status.FAILED, None, ""
         try:
-            with interruption.allowed(), contextlib.closing(run(scenario, seed)) as steps:
+            with contextlib.closing(run(scenario, seed)) as steps, interruption.allowed():
                 for step in steps:
                     recording.record(step)
                     watch(step)

@@ -93,8 +93,8 @@ def write_dataset(
         written = 0
         try:
             with (
-                interruption.allowed(),
                 contextlib.closing(_missing(scenario, directory, frames, seed, every)) as missing,
+                interruption.allowed(),
             ):
                 for number, run_number, step in missing:
                     if step is not None:

@@ -7,6 +7,7 @@ step that is next stands beside it. The answer is a list of exit codes.
 
 import json
 import os
+import signal
 import sys
 import tempfile
 import time
@@ -15,6 +16,7 @@ from typing import Any
 
 import fogsim.recording
 from fogsim import cli
+from fogsim.interruption import SIGNALS, leave_on_signals
 from fogsim.recorders import RECORDERS, TableRecorder
 from fogsim.recorders.protocol import RunInformation
 from fogsim.recording import record_run
@@ -35,6 +37,8 @@ def _command(command: dict[str, Any]) -> None:
     os.dup2(log, 2)
     seen = Path(command["log"]).with_suffix(".seen")
     fogsim.recording.run = lambda _scenario, _seed: drawn_run(pause=0.002, seen=seen, hold=command["hold"])
+    leave_on_signals()
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
     sys.argv = ["fogsim", *command["arguments"]]
     try:
         cli.main()
@@ -47,6 +51,8 @@ def _command(command: dict[str, Any]) -> None:
 
 def _attempt(commands: list[dict[str, Any]]) -> list[int]:
     children = []
+    # None is lost before a child has come to where the program begins.
+    signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
     for command in commands:
         child = os.fork()
         if child == 0:

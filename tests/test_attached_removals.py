@@ -81,6 +81,38 @@ def test_another_vehicle_that_is_removed_is_not_seen_any_more(api: Any) -> None:
             session.advise(step)
 
 
+@pytest.mark.parametrize("place", [("B0A0", 20.0), ("C0B0", 90.0)])
+def test_an_ego_that_is_moved_by_hand_is_where_it_was_put(api: Any, place: tuple[str, float]) -> None:
+    """SUMO counts the way driven anew from where it puts a vehicle, as if its route began there."""
+    api.route.add("mine", ["C0B0", "B0A0"])
+    api.vehicle.add("mine", "mine")
+    with fogsim.attach(api, ego="mine", visibility=120.0, settings=SMALL) as session:
+        until_the_ego_drives(api, session)
+        api.vehicle.moveTo("mine", f"{place[0]}_0", place[1])
+        api.simulationStep()
+        moved = session.observe()
+        assert moved is not None
+    before = api.simulation.getDistanceRoad("C0B0", 0.0, place[0], 0.0, isDriving=True)
+    assert moved.route_position == pytest.approx(before + api.vehicle.getLanePosition("mine"), abs=0.1)
+
+
+def test_a_vehicle_that_bears_the_id_of_another_has_its_own_body(api: Any) -> None:
+    api.vehicletype.copy("DEFAULT_VEHTYPE", "long")
+    api.vehicletype.setLength("long", 12.0)
+    api.route.add("mine", ["C0B0", "B0A0"])
+    api.vehicle.add("mine", "mine")
+    with fogsim.attach(api, ego="mine", visibility=120.0, settings=SMALL) as session:
+        step: Step | None = until_the_ego_drives(api, session)
+        assert step is not None
+        assert step.traffic.length[step.ego] == 5.0
+        api.vehicle.remove("mine")
+        api.vehicle.add("mine", "mine", typeID="long")
+        api.simulationStep()
+        step = session.observe()
+        assert step is not None
+        assert step.traffic.length[step.ego] == 12.0
+
+
 def test_an_ego_that_is_put_back_begins_its_route_anew(api: Any) -> None:
     api.route.add("mine", ["C0B0", "B0A0"])
     api.vehicle.add("mine", "mine")

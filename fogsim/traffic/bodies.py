@@ -36,6 +36,11 @@ class Bodies:
         kinds = self._kinds
         return tuple([kinds[row] for row in rows]), self._numbers[rows]
 
+    def forget(self, vehicles: Sequence[str]) -> None:
+        """Forget vehicles whose ids others may bear now."""
+        for vehicle in vehicles:
+            self._row.pop(vehicle, None)
+
     def _meet(self, vehicle: str) -> int:
         get, row = self._api.vehicle, len(self._kinds)
         if row == len(self._numbers):

@@ -1,6 +1,6 @@
 """What each of some drivers sees of the vehicle ahead, and how long that is sure to stay so."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -59,6 +59,12 @@ class PairSight:
         self._get_minimum_gap = vehicle_getter(api, "getMinGap")
         self._contrasts: dict[str, float] = {}
         self._minimum_gaps: dict[str, float] = {}
+
+    def forget(self, vehicles: Iterable[str]) -> None:
+        """Forget vehicles whose ids others may bear now."""
+        for vehicle in vehicles:
+            self._contrasts.pop(vehicle, None)
+            self._minimum_gaps.pop(vehicle, None)
 
     def look(self, pairs: Sequence[Pair], own_lamps: OwnLamps, horizon: float) -> list[tuple[bool, float]]:
         """Whether each leader is seen, and for how long that is sure to stay so [s].

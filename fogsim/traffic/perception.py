@@ -121,6 +121,7 @@ class Perception:
             due = [v for v in due if v in roster.present]
         new, self._mark = roster.newcomers(self._mark)
         self._forget(new)
+        self._pairs.forget(new)
         # Who comes back from a teleport still ignores somebody.
         for follower in roster.present.intersection(new) if new else ():
             self._ignoring.heed(follower)

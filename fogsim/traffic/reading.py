@@ -111,12 +111,15 @@ class VehicleReader:
         self._leader = vehicle_getter(api, "getLeader")
         self._speed = vehicle_getter(api, "getSpeed")
         self._minimum_gap = vehicle_getter(api, "getMinGap")
+        self._mark = 0
         self._known: _Known | None = None
         self._signals: tuple[Sequence[int], NDArray[np.int32]] = ([], np.zeros(0, dtype=np.int32))
 
     def state(self, ego_lamps: Lamp) -> TrafficState:
         """Vehicles near the ego; see `Reader.state`."""
         self._roster.look()
+        new, self._mark = self._roster.newcomers(self._mark)
+        self._bodies.forget(new)
         now = self._moving()
         known = self._knowledge(now.ids)
         ego = known.ego

@@ -1,14 +1,20 @@
 """How far along its route a vehicle is."""
 
 import itertools
+import math
 from collections.abc import Sequence
 
 from fogsim.traffic.getters import getter
 from fogsim.traffic.link import Api
 
+UNNOTICED_MOVE = 5.0
+"""Driven and straight way between two looks may differ by this much more than a bend explains [m]."""
+
 
 class RouteProgress:
-    """Place of a vehicle along its route, junctions included; follows a route that changes on the way.
+    """Place of a vehicle along its route, junctions included.
+
+    Follows a route that changes on the way, and a vehicle that is moved by hand, whose odometer SUMO sets anew.
 
     Parameters
     ----------
@@ -23,6 +29,7 @@ class RouteProgress:
         self._vehicle = vehicle
         self._current_route = getter(api, "vehicle", "getRouteID")
         self._distance = getter(api, "vehicle", "getDistance")
+        self._seen_at: tuple[float, float, float] | None = None
         self._begin()
 
     def _begin(self) -> None:
@@ -61,8 +68,24 @@ class RouteProgress:
             inner = next((link[4] for link in get.getLinks(inner)), "")
         return length
 
-    def now(self) -> tuple[float, float]:
-        """How far along the route the front bumper is, and the route's length [m]."""
-        if self._current_route(self._vehicle) != self._route_id:
+    def now(self, here: Sequence[float]) -> tuple[float, float]:
+        """How far along the route the front bumper is, and the route's length [m].
+
+        Parameters
+        ----------
+        here : sequence of float
+            Position of the front bumper [m].
+        """
+        driven = self._distance(self._vehicle)
+        if self._current_route(self._vehicle) != self._route_id or self._has_jumped(driven, here):
             self._begin()
-        return self._offset + self._distance(self._vehicle), self._length
+        return self._offset + driven, self._length
+
+    def _has_jumped(self, driven: float, here: Sequence[float]) -> bool:
+        """True if the way since the last look is none that is driven."""
+        x, y = float(here[0]), float(here[1])
+        last, self._seen_at = self._seen_at, (driven, x, y)
+        if last is None:
+            return False
+        way, straight = driven - last[0], math.hypot(x - last[1], y - last[2])
+        return not straight - UNNOTICED_MOVE <= way <= 2.0 * straight + UNNOTICED_MOVE

@@ -244,10 +244,10 @@ class SumoTraffic:
         new, self._mark = run.roster.newcomers(self._mark)
         # Another vehicle may have come under the ego's name.
         self._route = RouteProgress(run.api, ego) if self._route is None or ego in new else self._route
-        route_position, route_length = self._route.now()
-        state = run.lane_changes.smoothed(run.reader.state(self._ego_lamps))
-        state = _with_dark(state, run.script.dark)
+        state = run.reader.state(self._ego_lamps)
         row = state.ids.index(ego)
+        route_position, route_length = self._route.now(state.position[row])
+        state = _with_dark(run.lane_changes.smoothed(state), run.script.dark)
         return TrafficSnapshot(
             state=state,
             ego=row,

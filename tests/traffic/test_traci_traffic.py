@@ -13,6 +13,7 @@ import traci
 
 from fogsim.atmosphere import FieldAccess
 from fogsim.errors import SimulationError
+from fogsim.scenario import build, scenario_from_config
 from fogsim.traffic import DriverSetup, DriverSight, TraciLink, Traffic, TrafficSetup, libsumo_traffic, traci_traffic
 from fogsim.traffic.link import Api, SumoLink
 from fogsim.traffic.reading import Reader, VehicleReader
@@ -21,6 +22,7 @@ from fogsim.traffic.sumo_library import LibsumoLink
 from fogsim.traffic.sumo_traffic import command_line
 from fogsim.values import Command, FogField, Lamp, SpeedAdvice, TrafficSnapshot, TrafficState
 
+GRID = Path(__file__).resolve().parents[1] / "data" / "grid" / "grid.sumocfg"
 FOLDER = Path(__file__).resolve().parents[2] / "scenarios" / "motorway_fog_bank"
 SETUP = TrafficSetup(
     net=FOLDER / "motorway.net.xml",
@@ -175,6 +177,43 @@ def test_one_of_two_clients_in_their_order(sumo_process: Callable, in_process: l
     assert not thread.is_alive()
     for here, there in zip(in_process, seen, strict=True):
         assert equal(here.state, there.state)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_another_client_may_take_the_ego_away(sumo_process: Callable, order: int) -> None:
+    """Before or after FogSim's own messages of the same step."""
+    town = build.traffic_setup(scenario_from_config(GRID, "veh0", ["fog.visibility_m=75"]))
+    with sumo_process(["-c", str(GRID), "--step-length", "0.1", "--no-step-log"], clients=2) as (port, _):
+        other = TraciLink(HOST, port, order=3 - order)
+        done = threading.Event()
+
+        def take_away() -> None:
+            api = other.begin(())
+            with contextlib.suppress(SimulationError), other.watched():
+                while not done.is_set():
+                    if "veh0" in api.vehicle.getIDList() and api.vehicle.getDistance("veh0") > 40.0:
+                        api.vehicle.remove("veh0")
+                    other.step()
+            other.end()
+
+        thread = threading.Thread(target=take_away, daemon=True)
+        thread.start()
+        traffic = traci_traffic(town, TraciLink(HOST, port, order=order))
+        traffic.enter_fog(FieldAccess(FogField(0.04, (3000.0, 3000.0, 3000.0))))
+        try:
+            traffic.start(1)
+            seen = []
+            while traffic.observe() is not None:
+                seen.append(traffic.observe())
+                traffic.advance(Command(SpeedAdvice(18.0)))
+            for _ in range(3):
+                traffic.advance(Command(SpeedAdvice(18.0)))
+                assert traffic.observe() is None
+        finally:
+            done.set()
+            traffic.close()
+            thread.join(10)
+    assert 5 < len(seen) < 100
 
 
 def test_a_sumo_that_ends_on_the_way_is_told(sumo_process: Callable) -> None:

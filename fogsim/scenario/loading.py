@@ -169,14 +169,18 @@ def _check_files(document: Document, scenario: Scenario) -> None:
     ]
     named += [(("traffic", "routes", i), p) for i, p in enumerate(traffic.routes)]
     named += [(("traffic", "additional", i), p) for i, p in enumerate(traffic.additional)]
-    for key_path, path in named:
-        if not is_file(scenario.directory / path):
-            folder = (scenario.directory / path).parent
-            pattern = "*.sumocfg" if key_path[-1] == "config" else "*.xml"
-            there = sorted(p.name for p in folder.glob(pattern)) if is_folder(folder) else []
-            raise InputError(
-                f"{document.where(key_path)}: {dotted(key_path)}: there is no file {shown(str(path))} in "
-                f"{scenario.directory}; {suggest(path.name, there)}"
-            )
+    missing = [(key_path, path) for key_path, path in named if not is_file(scenario.directory / path)]
+    if missing:
+        raise InputError("\n".join(_no_file(document, scenario.directory, *one) for one in missing))
     if traffic.config is not None:
         configured_files(scenario.directory / traffic.config)
+
+
+def _no_file(document: Document, directory: Path, key_path: KeyPath, path: Path) -> str:
+    folder = (directory / path).parent
+    pattern = "*.sumocfg" if key_path[-1] == "config" else "*.xml"
+    there = sorted(p.name for p in folder.glob(pattern)) if is_folder(folder) else []
+    return (
+        f"{document.where(key_path)}: {dotted(key_path)}: there is no file {shown(str(path))} in "
+        f"{directory}; {suggest(path.name, there)}"
+    )

@@ -109,7 +109,7 @@ def test_an_interrupted_run_leaves_readable_results_that_say_they_are_partial(tm
     [
         (["run", "motorway_fog_bnk"], "did you mean 'motorway_fog_bank'?"),
         (["run", "motorway_fog_bank", "--set", "fog.visibilty_m=80"], "fog.visibilty_m: unknown key"),
-        (["run", "motorway_fog_bank", "--set", "fog.visibility_m=-80"], "greater than 0; got -80"),
+        (["run", "motorway_fog_bank", "--set", "fog.visibility_m=-80"], "greater than or equal to 1; got -80"),
         (["run", "motorway_fog_bank", "--set", "traffic.net=none.net.xml"], "there is no file 'none.net.xml'"),
         (["run", "motorway_fog_bank", "--set", "nonsense"], "expected key.path=value"),
         (["run", "nowhere/scenario.yaml"], "there is no such scenario file"),
@@ -136,9 +136,10 @@ def test_validate_tells_the_good_from_the_bad(tmp_path: Path) -> None:
     assert fogsim("validate", str(folder), "motorway_fog_bank").returncode == 0
     bad = folder / "scenario.yaml"
     bad.write_text(bad.read_text(encoding="utf-8").replace("lux", "").replace("width: 640", "width: -1"), "utf-8")
-    done = fogsim("validate", str(folder), "motorway_fog_bank")
+    done = fogsim("validate", str(folder), "nowhere.yaml", "/dev/zero", "motorway_fog_bank")
     assert done.returncode == 2
-    assert "camera.width" in done.stderr
+    for told in ("camera.width", "nowhere.yaml: there is no such scenario file", "/dev/zero: cannot be read"):
+        assert told in done.stderr
     assert "fine: motorway_fog_bank" in done.stdout
 
 

@@ -159,6 +159,15 @@ def test_a_missing_file_names_what_is_there(folder: Path) -> None:
     assert "did you mean 'motorway.net.xml'?" in str(e.value)
 
 
+def test_every_missing_file_is_told(folder: Path) -> None:
+    spoil(folder, "net: motorway.net.xml", "net: motorvay.net.xml")
+    with pytest.raises(InputError) as error:
+        load_scenario(spoil(folder, "[signs.add.xml]", "[signs.ad.xml, signs.add.xml]"))
+    net, signs = str(error.value).splitlines()
+    assert "traffic.net: there is no file 'motorvay.net.xml'" in net
+    assert "traffic.additional.0: there is no file 'signs.ad.xml'" in signs
+
+
 def test_no_second_message_follows_a_mistake(folder: Path) -> None:
     with pytest.raises(InputError) as error:
         load_scenario(spoil(folder, "[negru2013]", "[negru2014]"))

@@ -1,0 +1,275 @@
+"""Every key of the schema with every wrong value: refused with its name, or the scenario runs, without a warning.
+
+Keys come from the schema itself and from the methods' signatures, so that new ones are tried as well. To search longer,
+``FOGSIM_FUZZ=5000 pytest tests/scenario/test_fuzz.py`` tries so many sets of keys and runs every value that is allowed.
+"""
+
+import contextlib
+import copy
+import json
+import math
+import os
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple, get_args
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from pydantic import BaseModel
+
+from fogsim.advice import ADVISERS
+from fogsim.errors import FogSimError, InputError
+from fogsim.estimators import ESTIMATORS
+from fogsim.fusion import FUSIONS
+from fogsim.lighting import LIGHTING_POLICIES
+from fogsim.loop import AdvisedDriving, ClosedLoop
+from fogsim.parameters import Range, accepted_parameters
+from fogsim.scenario import Scenario, load_scenario
+from fogsim.scenario.methods import GIVEN_BY_THE_LOOP, Method
+from fogsim.scene import build as scene_build
+
+FUZZ = int(os.environ.get("FOGSIM_FUZZ", "0"))
+"""How many sets of keys are tried in a long search; 0 for a short one."""
+
+LANES = "".join(
+    f'<lane id="road_{i}" index="{i}" speed="30" length="400" shape="0,{y} 400,{y}"/>'
+    for i, y in ((0, -4.8), (1, -1.6))
+)
+FILES = {
+    "road.net.xml": f"""<net version="1.20"><edge id="road" from="a" to="b" priority="1">{LANES}</edge>
+<junction id="a" type="dead_end" x="0" y="0" incLanes="" intLanes="" shape="0,0 0,-6.4"/>
+<junction id="b" type="dead_end" x="400" y="0" incLanes="road_0 road_1" intLanes="" shape="400,-6.4 400,0"/></net>""",
+    "road.rou.xml": """<routes><vType id="car" vClass="passenger"/><route id="r" edges="road"/>
+<vehicle id="lead" type="car" route="r" depart="0" departLane="1" departPos="60" departSpeed="10"/>
+<vehicle id="ego" type="car" route="r" depart="0" departLane="1" departPos="30" departSpeed="10"/></routes>""",
+}
+"""A straight road of two lanes, the ego, and a vehicle ahead."""
+
+PLAIN: dict[str, Any] = {
+    "name": "tiny",
+    "traffic": {"net": "road.net.xml", "routes": ["road.rou.xml"]},
+    "fog": {"visibility_m": 80.0},
+    "camera": {"width": 32, "height": 24},
+    "renderer": "cpu",
+}
+EVENT = {"vehicle": "lead", "at_time_s": 0.0}
+EXAMPLES: dict[str, Any] = {
+    "fog.banks": [{"start_m": 50.0, "end_m": 300.0, "visibility_m": 60.0}],
+    "fog.outside_visibility_m": 500.0,
+    "fog.patches": {"correlation_length_m": 20.0},
+    "fog.wind": {"speed_kmh": 10.0, "from_deg": 90.0},
+    "fog.changes": [{"at_s": 0.0}, {"at_s": 5.0}],
+    "traffic.events": [
+        {"kind": "brake", **EVENT},
+        {"kind": "break_down", **EVENT},
+        {"kind": "change_lane", "lanes": -1, **EVENT},
+        {"kind": "lamps_fail", **EVENT},
+    ],
+}
+"""Blocks that have required keys, and are there only where one of their keys is tried."""
+
+METHODS = {"estimators": ESTIMATORS, "fusion": FUSIONS, "advice": ADVISERS, "lighting": LIGHTING_POLICIES}
+
+MISSING = object()
+WRONG: list[Any] = [
+    MISSING, None, True, False, "", "x", "5", "inf", "2026-11-22", [], [1], {}, {"x": 1}, math.nan, math.inf, -math.inf,
+    0, -1, 7, 0.5, 1e308, -1e308, 1e-300, 5e-324, 10**30,
+]  # fmt: skip
+
+Path_ = tuple[str | int, ...]
+
+
+class Key(NamedTuple):
+    """A key that is tried: where it is, the ends of its range, and how a tried value is written there."""
+
+    path: Path_
+    ends: tuple[Any, ...] = ()
+    method: str = ""
+
+    @property
+    def name(self) -> str:
+        return ".".join(map(str, (*self.path, *([self.method] if self.method else []))))
+
+
+def models_in(annotation: Any) -> list[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for part in get_args(annotation) for model in models_in(part)]
+
+
+def ends_of(schema: dict[str, Any], definitions: dict[str, Any]) -> tuple[Any, ...]:
+    """Both ends of a range, or what can be chosen."""
+    if "$ref" in schema:
+        schema = definitions[schema["$ref"].rpartition("/")[2]]
+    inner = [end for part in schema.get("anyOf", ()) for end in ends_of(part, definitions)]
+    return (*inner, *schema.get("enum", ()), *(schema[end] for end in ("minimum", "maximum") if end in schema))
+
+
+def keys(model: type[BaseModel] = Scenario, at: Path_ = ()) -> Iterator[Key]:
+    schema = model.model_json_schema()
+    for name, field in model.model_fields.items():
+        if field.exclude:
+            continue
+        path = (*at, name)
+        yield Key(path, ends_of(schema["properties"][name], schema.get("$defs", {})))
+        inner = models_in(field.annotation)
+        if Method in inner:
+            for method, factory in METHODS[name].items():
+                for parameter, its in accepted_parameters(factory, GIVEN_BY_THE_LOOP).items():
+                    allowed = [part for part in get_args(its.annotation) if isinstance(part, Range)]
+                    ends = tuple(end for one in allowed for end in (one.least, one.most))
+                    place = (*path, 0) if name == "estimators" else path
+                    yield Key((*place, "parameters", parameter), ends, method)
+        elif "tuple" in str(field.annotation):
+            for number, one in enumerate(inner):
+                yield from keys(one, (*path, number))
+        else:
+            for one in inner:
+                yield from keys(one, path)
+
+
+KEYS = list(keys())
+
+
+def written(key: Key, value: Any, data: dict[str, Any]) -> None:
+    """Put a value into plain data, and the examples of the blocks around it."""
+    dotted = ".".join(map(str, key.path))
+    for block, example in EXAMPLES.items():
+        if dotted.startswith(f"{block}."):
+            put(data, tuple(block.split(".")), copy.deepcopy(example), default=True)
+    if dotted.startswith("fog.banks."):
+        put(data, ("fog", "outside_visibility_m"), 500.0, default=True)
+        data["fog"].pop("visibility_m", None)
+    if key.method:
+        block = {"method": key.method, "parameters": {key.path[-1]: value} if value is not MISSING else {}}
+        data[key.path[0]] = [block] if key.path[0] == "estimators" else block
+    else:
+        put(data, key.path, value)
+
+
+def put(data: Any, path: Path_, value: Any, *, default: bool = False) -> None:
+    for key in path[:-1]:
+        data = data[key] if isinstance(data, list) else data.setdefault(key, {})
+    if default and isinstance(data, dict) and path[-1] in data:
+        return
+    if value is not MISSING:
+        data[path[-1]] = value
+    elif isinstance(data, dict):
+        data.pop(path[-1], None)
+
+
+def yaml_of(value: Any) -> str:
+    """JSON, which is YAML, with YAML's own words for what JSON has no word for."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return ".nan" if math.isnan(value) else ".inf" if value > 0 else "-.inf"
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{json.dumps(key)}: {yaml_of(one)}" for key, one in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(yaml_of, value)) + "]"
+    return json.dumps(value)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder: Path = tmp_path_factory.mktemp("tiny")
+    for name, text in FILES.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    return folder
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _one_tree_of_a_kind() -> Iterator[None]:
+    """Making trees takes most of the time until the first frame, and no key but a seed changes them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(scene_build, "tree_shapes", partial(scene_build.tree_shapes, kinds=1))
+        yield
+
+
+def loaded(folder: Path, text: str) -> Scenario | None:
+    """The scenario; None if it is refused, as it must be: in lines that say where."""
+    file = folder / "scenario.yaml"
+    file.write_text(text, encoding="utf-8")
+    try:
+        return load_scenario(file)
+    except InputError as error:
+        told = str(error).splitlines()
+    assert told
+    assert all(line.isprintable() and line.startswith(str(file)) for line in told)
+    return None
+
+
+def take_two_steps(scenario: Scenario) -> None:
+    camera = scenario.camera
+    if camera.width * camera.height * camera.samples**2 > 300_000:
+        return  # large pictures take their time, and are tried elsewhere
+    # An ego that is not on the road, say, is told when the traffic begins.
+    with contextlib.suppress(FogSimError), ClosedLoop(scenario) as loop:
+        policy, step = AdvisedDriving(scenario), loop.start(seed=1)
+        for _ in range(2):
+            if step.ending is None:
+                step = loop.advance(policy.decide(step))
+
+
+def test_every_block_of_the_schema_is_tried() -> None:
+    def blocks(model: type[BaseModel]) -> set[type[BaseModel]]:
+        inner = {one for field in model.model_fields.values() for one in models_in(field.annotation)}
+        return {model}.union(*map(blocks, inner))
+
+    tried = {key.path for key in KEYS}
+    assert all(any(path[-1] == name for path in tried) for block in blocks(Scenario) - {Method} for name in
+               block.model_fields if not block.model_fields[name].exclude)  # fmt: skip
+
+
+@pytest.mark.parametrize("key", KEYS, ids=lambda key: key.name)
+def test_wrong_values_are_refused_or_run(folder: Path, key: Key) -> None:
+    for value in (*WRONG, *key.ends):
+        data = copy.deepcopy(PLAIN)
+        written(key, value, data)
+        scenario = loaded(folder, yaml_of(data))
+        if scenario is not None and FUZZ and key.path != ("renderer",):
+            take_two_steps(scenario)
+
+
+@pytest.mark.parametrize("key", KEYS, ids=lambda key: key.name)
+def test_no_key_stands_twice(folder: Path, key: Key) -> None:
+    data, once = copy.deepcopy(PLAIN), f'"{key.path[-1]}": 1'
+    written(key, 1, data)
+    (folder / "scenario.yaml").write_text(yaml_of(data).replace(once, f"{once}, {once}"), encoding="utf-8")
+    with pytest.raises(InputError, match=rf"{key.path[-1]}: this key stands twice"):
+        load_scenario(folder / "scenario.yaml")
+
+
+@st.composite
+def sets_of_keys(draw: st.DrawFn) -> dict[str, Any]:
+    """A scenario in which some keys have values that are most often allowed, and extreme."""
+    data = copy.deepcopy(PLAIN)
+    for key in draw(st.lists(st.sampled_from(KEYS), min_size=1, max_size=6, unique=True)):
+        choices = [st.sampled_from(key.ends)] if key.ends else [st.sampled_from([True, False, 0, 1, "ego", "lead"])]
+        if len(key.ends) == 2 and all(isinstance(end, float | int) for end in key.ends):
+            least, most = key.ends
+            whole = isinstance(least, int) and isinstance(most, int)
+            choices.append(st.integers(least, most) if whole else st.floats(least, most))
+        choices.append(st.sampled_from([MISSING, 0, 1e-300, math.inf, "none", "all", *WRONG]))
+        # A block that was set to something else has no keys to set any more.
+        try:
+            written(key, draw(st.one_of(choices)), data)
+        except (TypeError, AttributeError, KeyError, IndexError):
+            continue
+    data["renderer"] = "cpu"
+    return data
+
+
+@settings(
+    max_examples=FUZZ or 40,
+    derandomize=not FUZZ,
+    deadline=None,
+    database=None,
+    suppress_health_check=list(HealthCheck),
+)
+@given(data=sets_of_keys())
+def test_what_is_allowed_runs(folder: Path, data: dict[str, Any]) -> None:
+    scenario = loaded(folder, yaml_of(data))
+    if scenario is not None:
+        take_two_steps(scenario)

@@ -13,6 +13,9 @@ from fogsim.scenario.mistakes import tell_mistakes
 from fogsim.scenario.section import Number, PixelPlace, Pixels, Section, Whole
 from fogsim.values import Camera, Response
 
+MADE_TO_BE_LOOKED_AT = 8
+"""Bit depth of images whose values are for the eye; sensors' own, of more bits, are proportional to light."""
+
 Coefficient = Annotated[Number, Field(ge=-100, le=100)]
 
 
@@ -29,11 +32,30 @@ class Calibration:
         Brown's coefficients of the lens k1, k2, p1, p2 as OpenCV has them [-]; empty for a pinhole.
     yaw : float
         Angle of the optical axis to the left of the vehicle's axis [rad].
+    remarks : tuple of str
+        What was assumed because the file does not say it.
     """
 
     camera: Camera
     distortion: tuple[float, ...] = ()
     yaw: float = 0.0
+    remarks: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse a camera that does not see where its vehicle drives.
+
+        Raises
+        ------
+        InputError
+            If the yaw turns the vehicle's axis out of the image.
+        """
+        u0, focal = self.camera.principal_point[0], self.camera.focal_length
+        least, most = math.atan(-u0 / focal), math.atan((self.camera.width - 1 - u0) / focal)
+        if self.yaw != 0.0 and not least <= self.yaw <= most:
+            raise InputError(
+                f"yaw_deg must lie within {math.degrees(least):.1f} … {math.degrees(most):.1f} for this width, focal "
+                f"length and principal point, or the way ahead is not in the image; got {math.degrees(self.yaw):g}"
+            )
 
     @property
     def is_straight(self) -> bool:
@@ -71,8 +93,9 @@ class CameraFile(Section):
     distortion: tuple[Coefficient, Coefficient, Coefficient, Coefficient] | None = None
     """Distortion of the lens [k1, k2, p1, p2] as OpenCV has it."""
 
-    response: Response = Response.LINEAR
-    """Curve from light to pixel values: `linear`, `gamma` (2.2) or `srgb`."""
+    response: Response | None = None
+    """Curve from light to pixel values: `linear`, `gamma` (2.2) or `srgb`; left out, `srgb` for 8 bits and `linear` for
+    more."""
 
     bits: Literal[8, 10, 12] = 8
     """Bit depth of the pixel values; images of 16 bits without it use the whole range."""
@@ -97,7 +120,24 @@ def load_camera(path: Path) -> Camera:
         If the file cannot be read, a key does not fit (one line for each mistake), or there is a yaw or a distortion,
         which a `Camera` cannot hold: see `load_calibration`.
     """
-    calibration = load_calibration(path)
+    return straight_camera(load_calibration(path), path)
+
+
+def straight_camera(calibration: Calibration, path: Path) -> Camera:
+    """Camera of a calibration whose images need no straightening.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        What was read.
+    path : Path
+        The file that it was read from.
+
+    Raises
+    ------
+    InputError
+        If there is a yaw or a distortion.
+    """
     if not calibration.is_straight:
         raise InputError(
             f"{path}: distortion and yaw_deg are undone by `fogsim estimate` alone (in Python load_calibration); "
@@ -129,6 +169,8 @@ def load_calibration(path: Path) -> Calibration:
         keys = CameraFile.model_validate(document.data)
     except ValidationError as error:
         raise InputError(tell_mistakes(document, CameraFile, error)) from error
+    assumed = Response.SRGB if keys.bits == MADE_TO_BE_LOOKED_AT else Response.LINEAR
+    remark = f"{path}: response is not given: {assumed.value} is assumed, as images of {keys.bits} bits mostly have"
     camera = Camera(
         width=keys.width,
         height=keys.height,
@@ -137,7 +179,11 @@ def load_calibration(path: Path) -> Calibration:
         mount_height=keys.mount_height_m,
         pitch=math.radians(keys.pitch_deg),
         roll=math.radians(keys.roll_deg),
-        response=keys.response,
+        response=keys.response or assumed,
         bits=keys.bits,
     )
-    return Calibration(camera, keys.distortion or (), math.radians(keys.yaw_deg))
+    try:
+        remarks = () if keys.response else (remark,)
+        return Calibration(camera, keys.distortion or (), math.radians(keys.yaw_deg), remarks)
+    except InputError as error:
+        raise InputError(f"{document.where(('yaw_deg',))}: {error}") from error

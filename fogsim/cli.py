@@ -10,21 +10,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
-from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from fogsim import __version__
-from fogsim.cli_estimate import estimate_command
+from fogsim.cli_estimate import BAD_INPUT, estimate_command, tell_remarks
 from fogsim.cli_reproduce import reproduce_command
 from fogsim.errors import FogSimError, InputError
 from fogsim.interruption import ProgramSignals, leave
+from fogsim.printing import escape
 from fogsim.values import Step
 
 if TYPE_CHECKING:
     from fogsim.scenario import Scenario
 
-BAD_INPUT = 2
 INTERRUPTED = 130
 
 app = typer.Typer(
@@ -353,15 +352,16 @@ def fog_command(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it is there already.")] = False,
 ) -> None:
     """Put homogeneous fog on an image from disk: Koschmieder's law on light and slant range."""
-    from fogsim.camera_file import load_camera  # noqa: PLC0415 - heavy; --help must be quick
+    from fogsim.camera_file import load_calibration, straight_camera  # noqa: PLC0415 - heavy; --help must be quick
     from fogsim.fog_image import fog_file  # noqa: PLC0415 - heavy; --help must be quick
 
     if depth_kind is None:
         raise InputError("--depth-kind is missing: planar or range? Data sets differ, and the wrong one goes unseen")
     light = None if airlight is None else _pixel_values(airlight)
-    used = fog_file(
-        image, depth, depth_kind, visibility, load_camera(camera), out, light, depth_scale, overwrite=overwrite
-    )
+    calibration = load_calibration(camera)
+    tell_remarks(calibration)
+    pinhole = straight_camera(calibration, camera)
+    used = fog_file(image, depth, depth_kind, visibility, pinhole, out, light, depth_scale, overwrite=overwrite)
     told = ", ".join(f"{value:.4g}" for value in used)
     _out.print(f"{escape(str(out))}: visibility {visibility:g} m, airlight {told}", soft_wrap=True)
 

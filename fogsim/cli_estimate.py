@@ -8,15 +8,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
-from rich.markup import escape
 
 from fogsim.cli_progress import progress_bar
 from fogsim.errors import InputError
+from fogsim.printing import escape, printable
 
 if TYPE_CHECKING:
+    from fogsim.camera_file import Calibration
     from fogsim.offline import FrameEstimates, OverlayFile, Source
 
 _err = Console(stderr=True, highlight=False)
+
+BAD_INPUT = 2
 
 
 def estimate_command(
@@ -91,8 +94,9 @@ def _estimate(
         table_heading,
     )
 
-    methods = chosen_methods(names)
+    methods, unusable = chosen_methods(names), list[str]()
     calibration = load_calibration(camera_file)
+    tell_remarks(calibration)
     source, camera = straightened(find_source(images, sequence=sequence, rate=rate), calibration)
     with contextlib.ExitStack() as stack:
         drawn = overlay and stack.enter_context(OverlayFile(overlay, source, camera, methods, overwrite=overwrite))
@@ -102,9 +106,21 @@ def _estimate(
             _say(table_heading(source, methods))
         for result in estimates_of(source, camera, methods):
             _show(result, source, methods, as_json, drawn or None)
+            unusable += [result.picture.error] if result.picture.error else []
             progress.advance(task)
     if overlay is not None:
         _err.print(f"overlay: {escape(str(overlay))}", soft_wrap=True)
+    if unusable:
+        _err.print(f"[bold red]error:[/] {len(unusable)} of the images could not be used:", soft_wrap=True)
+        for told in unusable:
+            _err.print(f"  {escape(told, in_one_line=True)}", soft_wrap=True)
+        raise typer.Exit(BAD_INPUT)
+
+
+def tell_remarks(calibration: "Calibration") -> None:
+    """Say on stderr what a camera file leaves open."""
+    for remark in calibration.remarks:
+        _err.print(f"[yellow]assumed:[/] {escape(remark, in_one_line=True)}", soft_wrap=True)
 
 
 def _show(
@@ -113,9 +129,9 @@ def _show(
     from fogsim.offline import record_lines, table_rows  # noqa: PLC0415 - heavy; --help must be quick
 
     if result.picture.error:
-        _err.print(f"[yellow]passed over:[/] {escape(result.picture.error)}", soft_wrap=True)
+        _err.print(f"[yellow]passed over:[/] {escape(result.picture.error, in_one_line=True)}", soft_wrap=True)
     for line in record_lines(result) if as_json else table_rows(source, methods, result):
-        _say(line)
+        _say(printable(line, in_one_line=True))
     if drawn is not None:
         drawn.add(result)
 
@@ -144,6 +160,6 @@ def _guess(
         horizon_row=horizon_row,
     )
     write_camera(camera_file, guess, overwrite=overwrite)
-    typer.echo(f"{camera_file}:\n\n{camera_text(guess)}", nl=False)
+    typer.echo(f"{printable(str(camera_file))}:\n\n{camera_text(guess)}", nl=False)
     for warning in guess.warnings:
         _err.print(f"[yellow]uncertain:[/] {escape(warning)}", soft_wrap=True)

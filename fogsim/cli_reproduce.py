@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
 from fogsim.cli_progress import progress_bar
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.interruption import interruptible
+from fogsim.printing import escape
 
 if TYPE_CHECKING:
     from fogsim.reproduce import Evaluation, Reproduction

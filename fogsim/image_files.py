@@ -1,17 +1,24 @@
 """Images and depth maps on disk."""
 
+import io
 import math
+import warnings
+import zipfile
 from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image, UnidentifiedImageError
 
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.values import Camera
 
 DEPTH_KINDS = ("planar", "range")
 """What a depth map may hold: distance along the optical axis, or along the viewing ray."""
+
+CHECKED_FORMATS = ("JPEG", "PNG", "BMP", "PPM")
+"""Pillow's names of formats of which OpenCV may show as much as there is of a file."""
 
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -36,10 +43,33 @@ def _decoded(path: Path) -> NDArray[np.generic]:
         data = np.fromfile(path, dtype=np.uint8)
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
-    image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+    if not data.size:
+        raise InputError(f"{path}: the file is empty")
+    _refuse_damaged(path, data.tobytes())
+    try:
+        image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
+    except (cv2.error, MemoryError):
+        image = None
     if image is None:
         raise InputError(f"{path}: this is no image that can be read (PNG, TIFF, JPEG, …)")
     return np.asarray(image)
+
+
+def _refuse_damaged(path: Path, data: bytes) -> None:
+    """Refuse what OpenCV would fill up, or take all memory for, without a word."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            image = Image.open(io.BytesIO(data))
+            if image.format in CHECKED_FORMATS:
+                image.load()
+    except UnidentifiedImageError:
+        # OpenCV knows formats that Pillow does not.
+        return
+    except Image.DecompressionBombError as error:
+        raise InputError(f"{path}: by its header the image is larger than any camera's: {error}") from error
+    except (OSError, SyntaxError, ValueError, EOFError, MemoryError) as error:
+        raise InputError(f"{path}: the image is damaged or cut off: {error}") from error
 
 
 def read_distance(path: Path, kind: str, scale: float | None, camera: Camera) -> NDArray[np.float64]:
@@ -70,7 +100,7 @@ def read_distance(path: Path, kind: str, scale: float | None, camera: Camera) ->
         raise UnknownNameError("depth kind", kind, DEPTH_KINDS)
     if scale is not None and not (scale > 0 and math.isfinite(scale)):
         raise InputError(f"--depth-scale must be a positive number of metres, got {scale!r}")
-    depth = _numbers(path) if path.suffix == ".npy" else _steps(path, scale)
+    depth = _numbers(path) if path.suffix.lower() == ".npy" else _steps(path, scale)
     if depth.shape != (camera.height, camera.width):
         raise InputError(
             f"{path}: expected a depth map of {camera.height} rows and {camera.width} columns as the camera has, "
@@ -83,9 +113,11 @@ def read_distance(path: Path, kind: str, scale: float | None, camera: Camera) ->
 
 def _numbers(path: Path) -> NDArray[np.float64]:
     try:
-        loaded = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        reason = (getattr(error, "strerror", None) or str(error)).splitlines()[0]
+        # A file of our own: numpy leaves one open where an archive is none.
+        with path.open("rb") as file:
+            loaded = np.load(file, allow_pickle=False)
+    except (OSError, ValueError, EOFError, MemoryError, zipfile.BadZipFile) as error:
+        reason = (getattr(error, "strerror", None) or str(error) or "too little memory").splitlines()[0]
         raise InputError(f"{path}: cannot be read as an array of numbers: {reason}") from error
     if not isinstance(loaded, np.ndarray) or loaded.dtype.kind not in "fiu":
         raise InputError(f"{path}: expected an array of numbers, got {getattr(loaded, 'dtype', type(loaded).__name__)}")

@@ -92,10 +92,12 @@ def guess_camera(
         If neither height nor field of view is given, a value is impossible, images differ in size or none can be
         read, or no vanishing point is found and no horizon is given.
     """
-    _check(mount_height, field_of_view, horizon_row)
+    _check(mount_height, field_of_view)
     pictures = list(_spread(source))
     first = pictures[0]
     rows, cols = first.shape[:2]
+    if horizon_row is not None and not 0.0 <= horizon_row <= rows - 1:
+        raise InputError(f"--horizon-row must be a row of the images, 0 … {rows - 1}, got {horizon_row!r}")
     eight = first.dtype == np.uint8
     response = Response.SRGB if eight else Response.LINEAR
     focal, focal_reason, warnings = _focal_length(source, cols, rows, field_of_view)
@@ -119,7 +121,7 @@ def guess_camera(
     return CameraGuess(camera, reasons, tuple(warnings))
 
 
-def _check(mount_height: float | None, field_of_view: float | None, horizon_row: float | None) -> None:
+def _check(mount_height: float | None, field_of_view: float | None) -> None:
     if mount_height is None and field_of_view is None:
         raise InputError("--guess-camera needs --mount-height (metres above the road) or --field-of-view, better both")
     if mount_height is not None and not 0.1 <= mount_height <= 20.0:
@@ -129,8 +131,6 @@ def _check(mount_height: float | None, field_of_view: float | None, horizon_row:
         raise InputError(
             f"--field-of-view must lie within 1 … 170 degrees, from the left to the right edge, got {told:g}"
         )
-    if horizon_row is not None and not math.isfinite(horizon_row):
-        raise InputError(f"--horizon-row must be a row of the image, got {horizon_row!r}")
 
 
 def _spread(source: Source) -> Iterator[Pixels]:

@@ -16,6 +16,9 @@ from fogsim.recorders.video import ffmpeg_program
 
 _DURATION = re.compile(r"Duration: (\d+):(\d+):(\d+(?:\.\d+)?)")
 _RATE = re.compile(r"Video:.*?(\d+(?:\.\d+)?k?) (?:fps|tbr)")
+MOST_MISSING = 0.5
+"""Time by which a whole video's pictures may end before its header says, as where its sound lasts longer [s]."""
+
 _HEADER_LINES = 3  # P6, size, largest value: https://netpbm.sourceforge.net/doc/ppm.html as ffmpeg writes it
 
 
@@ -87,16 +90,24 @@ class VideoFile:
         return (self.path,)
 
     def pictures(self) -> Iterator[Picture]:
-        """Read the frames; where the file is damaged, ffmpeg mends or leaves out what it can."""
+        """Read the frames; where the file is damaged, ffmpeg mends or leaves out what it can.
+
+        Of one that ends before its time the last has no image, and how many frames are missing as its ``error``.
+        """
+        read = 0
         with subprocess.Popen(  # noqa: S603 - imageio's own ffmpeg with arguments made here
             _command(self.path), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
         ) as process:
             assert process.stdout is not None  # noqa: S101 - it was opened as a pipe
             try:
-                for index, image in enumerate(_frames(process.stdout)):
-                    yield Picture(index, index * self.period, image)
+                for image in _frames(process.stdout):
+                    yield Picture(read, read * self.period, image)
+                    read += 1
             finally:
                 process.kill()
+        if self.duration and self.count - read > max(MOST_MISSING / self.period, 2):
+            told = f"{self.path}: the video is cut off or damaged: {read} of {self.count} frames could be read"
+            yield Picture(read, read * self.period, None, told)
 
 
 def _number(text: str) -> float:

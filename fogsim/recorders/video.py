@@ -152,7 +152,7 @@ def encoder_command(path: Path, frame_period: float, size: tuple[int, int] = (FR
     rate = Fraction(1.0 / frame_period).limit_denominator(1001)
     source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(rate), "-i", "-"]
     coding = ["-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-pix_fmt", "yuv420p"]
-    sink = ["-movflags", "+faststart", "-f", "mp4", str(path)]
+    sink = ["-movflags", "+faststart", "-f", "mp4", f"file:{path}"]
     return [ffmpeg_program(), "-y", "-loglevel", "error", *source, *coding, *sink]
 
 

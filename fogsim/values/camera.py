@@ -50,7 +50,9 @@ class Camera:
     roll : float
         Rotation about the optical axis [rad]; positive turns the image's right side down.
     response : Response
-        Curve from exposure to pixel value.
+        Curve from exposure to pixel value. The default takes values for light itself, as those of sensors and of this
+        package's own arithmetic are; photographs and videos of 8 bits mostly have ``srgb``, which a camera file and a
+        scenario therefore default to.
     bits : int
         Bit depth of the pixel values, which are 0 … 2^bits − 1: 8, 10 or 12.
     """

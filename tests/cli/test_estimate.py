@@ -121,7 +121,7 @@ def test_all_methods_speak_in_turn(estimate) -> None:
 def test_a_broken_image_among_good_ones_is_told_and_passed_over(estimate, folder: Path) -> None:
     (folder / "drive" / "1.png").write_bytes(b"broken")
     code, out, err = estimate("drive", "--camera", "camera.yaml", "--method", "negru2013", "--json")
-    assert code == 0
+    assert code == 2
     first, second, third = (json.loads(line) for line in out.splitlines())
     assert set(second) == {"frame", "error"}
     assert second["frame"] == "drive/1.png"
@@ -173,11 +173,17 @@ def test_a_guessed_camera_is_written_and_good_to_use(estimate, folder: Path) -> 
         (("drive", "--camera", "new.yaml", "--guess-camera"), "needs --mount-height"),
         (("drive", "--camera", "camera.yaml", "--overlay", "a.avi"), "ends in .mp4"),
         (("drive", "--camera", "camera.yaml", "--rate", "-1"), "--rate must be"),
+        (("drive", "--camera", "aside.yaml"), "aside.yaml:8: yaw_deg must lie within -29.0 … 28.9"),
+        (
+            ("drive", "--camera", "new.yaml", "--guess-camera", "--mount-height", "1.4", "--horizon-row", "99999"),
+            "--horizon-row must be a row of the images, 0 … 239, got 99999.0",
+        ),
     ],
 )
 def test_mistakes_end_with_exit_code_2(estimate, folder: Path, arguments: tuple[str, ...], told: str) -> None:
     (folder / "typo.yaml").write_text(CAMERA_YAML.replace("width", "widht"), encoding="utf-8")
     (folder / "large.yaml").write_text(CAMERA_YAML.replace("320", "640"), encoding="utf-8")
+    (folder / "aside.yaml").write_text(CAMERA_YAML + "yaw_deg: 55\n", encoding="utf-8")
     (folder / "empty").mkdir()
     (folder / "empty.mp4").write_bytes(b"")
     before = {path.name for path in folder.iterdir()}
@@ -213,3 +219,27 @@ def test_black_images_are_not_valid(estimate, folder: Path) -> None:
         record = json.loads(line)
         assert record["valid"] is False
         assert [record[key] for key in sorted(KEYS - {"frame", "method", "valid"})] == [None] * 6
+
+
+def test_a_response_that_is_not_given_is_srgb_and_said(estimate, folder: Path) -> None:
+    """The frames are sRGB: taken for linear, 80 m would be read as less than 70 m."""
+    (folder / "short.yaml").write_text(CAMERA_YAML.replace("response: srgb\n", ""), encoding="utf-8")
+    told = estimate("drive", "--camera", "camera.yaml", "--method", "joint_road", "--json")
+    assumed = estimate("drive", "--camera", "short.yaml", "--method", "joint_road", "--json")
+    assert assumed[:2] == told[:2]
+    assert "assumed" not in told[2]
+    assert "short.yaml: response is not given: srgb is assumed, as images of 8 bits" in assumed[2]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="such names are none there")
+@pytest.mark.parametrize(
+    "name", [b"run:1", b"2026-11-22T01:14:00", b"-x", b"caf\xe9", b"a\x1b[31m\nb", b"[red]"], ids=str
+)
+def test_odd_names_of_images_and_outputs_work_and_are_printed_escaped(estimate, folder: Path, name: bytes) -> None:
+    image, overlay = os.fsdecode(b"drive/" + name + b".png"), os.fsdecode(name + b".mp4")
+    (folder / "drive" / "1.png").rename(image)
+    code, out, err = estimate(image, "--camera", "camera.yaml", "--method", "negru2013", "--overlay", overlay)
+    assert code == 0, err
+    assert len(out.splitlines()) == 2
+    assert (out + err).replace("\n", "").isprintable()
+    assert {path.name for path in folder.iterdir()} == {"camera.yaml", "drive", overlay}

@@ -1,0 +1,193 @@
+"""Images, videos and depth maps that are broken: told in one line, passed over, and nothing else is lost."""
+
+import io
+import json
+import pickle
+import struct
+import subprocess
+import sys
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from fogsim import cli
+from fogsim.errors import InputError
+from fogsim.image_files import read_distance, read_image
+from fogsim.offline import find_source
+from fogsim.recorders.video import ffmpeg_program
+from fogsim.values import Camera
+
+ROWS, COLS = 60, 80
+CAMERA = Camera(COLS, ROWS, 70.0, (39.5, 29.5), 1.3)
+CAMERA_YAML = """\
+width: 80
+height: 60
+focal_length_px: 70
+principal_point_px: [39.5, 29.5]
+mount_height_m: 1.3
+pitch_deg: 0
+"""
+
+
+def picture(kind: str) -> bytes:
+    """A noisy image, encoded."""
+    buffer = io.BytesIO()
+    Image.fromarray(np.random.default_rng(0).integers(0, 255, (ROWS, COLS), np.uint8)).save(buffer, kind)
+    return buffer.getvalue()
+
+
+def chunk(kind: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+
+def header_of(size: int) -> bytes:
+    """A PNG that says to be of so many rows and columns, and has nothing in it."""
+    header = struct.pack(">IIBBBBB", size, size, 8, 2, 0, 0, 0)
+    parts = chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(b"")) + chunk(b"IEND", b"")
+    return b"\x89PNG\r\n\x1a\n" + parts
+
+
+def with_an_error(data: bytes) -> bytes:
+    middle = len(data) // 2
+    return data[:middle] + bytes([data[middle] ^ 255]) + data[middle + 1 :]
+
+
+BROKEN: dict[str, bytes] = {
+    "empty.png": b"",
+    "text.png": b"no image",
+    "header.png": header_of(60_000),
+    "hollow.png": header_of(80),
+    "flipped.png": with_an_error(picture("PNG")),
+    **{f"cut.{end}": picture(kind)[:-1000] for end, kind in (("png", "PNG"), ("bmp", "BMP"), ("pgm", "PPM"))},
+    "cut.jpg": picture("JPEG")[:-1000],
+    "float.tif": b"",
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "300")
+    (tmp_path / "camera.yaml").write_text(CAMERA_YAML, encoding="utf-8")
+    return tmp_path
+
+
+@pytest.fixture
+def fogsim(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple]:
+    """Run a command in this process: gives exit code, stdout and stderr."""
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["fogsim", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        told = capsys.readouterr()
+        return int(ended.value.code or 0), told.out, told.err
+
+    return run
+
+
+@pytest.mark.parametrize("as_json", [True, False])
+def test_a_folder_goes_on_past_broken_images_and_lists_them_at_the_end(fogsim, folder: Path, as_json: bool) -> None:
+    (folder / "drive").mkdir()
+    for name, data in BROKEN.items():
+        (folder / "drive" / name).write_bytes(data)
+    Image.fromarray(np.zeros((ROWS, COLS), np.float32)).save(folder / "drive" / "float.tif")
+    for name in ("0.png", "z.png"):
+        (folder / "drive" / name).write_bytes(picture("PNG"))
+    options = ("--camera", "camera.yaml", "--method", "negru2013", *(["--json"] if as_json else []))
+    code, out, err = fogsim("estimate", "drive", *options)
+    assert code == 2
+    assert "Traceback" not in err
+    last = err[err.index("error: 10 of the images could not be used:") :].splitlines()
+    assert sorted(line.split(":")[0].strip() for line in last[1:]) == sorted(f"drive/{name}" for name in BROKEN)
+    if as_json:
+        records = [json.loads(line) for line in out.splitlines()]
+        assert len(records) == len(BROKEN) + 2
+        assert [record["frame"] for record in records if "method" in record] == ["drive/0.png", "drive/z.png"]
+
+
+@pytest.mark.parametrize("name", [name for name in BROKEN if name != "float.tif"])
+def test_what_is_broken_is_told_in_one_line(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_bytes(BROKEN[name])
+    with pytest.raises(InputError, match=name) as told:
+        read_image(tmp_path / name)
+    assert len(str(told.value).splitlines()) == 1
+
+
+def test_the_end_of_a_video_that_is_cut_off_is_told(fogsim, folder: Path) -> None:
+    """An index at the file's beginning announces all of its frames."""
+    source = ["-f", "lavfi", "-i", "testsrc=size=80x60:rate=10:duration=6"]
+    whole = folder / "whole.mp4"
+    subprocess.run(
+        [ffmpeg_program(), "-loglevel", "error", *source, "-g", "5", "-movflags", "+faststart", str(whole)], check=True
+    )
+    (folder / "cut.mp4").write_bytes(whole.read_bytes()[: whole.stat().st_size // 2])
+    pictures = list(find_source(whole).pictures())
+    assert len(pictures) == 60
+    assert not pictures[-1].error
+    code, out, err = fogsim("estimate", "cut.mp4", "--camera", "camera.yaml", "--method", "negru2013", "--json")
+    assert code == 2
+    records = [json.loads(line) for line in out.splitlines()]
+    read = len(records) - 1
+    assert 5 < read < 55
+    told = f"cut.mp4: the video is cut off or damaged: {read} of 60 frames could be read"
+    assert records[-1] == {"frame": read, "error": told}
+    assert told in err
+
+
+def saved(value: object, **options: bool) -> bytes:
+    buffer = io.BytesIO()
+    np.save(buffer, value, **options)
+    return buffer.getvalue()
+
+
+DEPTHS: dict[str, bytes] = {
+    "objects": saved(np.array([[None, {}]], dtype=object), allow_pickle=True),
+    "pickle": pickle.dumps({"depth": 3}),
+    "text": b"1.0 2.0 3.0\n",
+    "nothing": b"",
+    "records": saved(np.zeros((ROWS, COLS), dtype=[("depth", float)])),
+    "words": saved(np.full((ROWS, COLS), "far")),
+    "complex": saved(np.ones((ROWS, COLS), complex)),
+    "shape": saved(np.ones((COLS, ROWS))),
+    "number": saved(np.float64(3.0)),
+    "cut": saved(np.ones((ROWS, COLS)))[:-100],
+    "archive": b"PK\x03\x04 and no more",
+    "endless": saved(np.ones((2, 2))).replace(b"(2, 2)", b"(2**60,)"),
+    "negative": saved(np.full((ROWS, COLS), -1.0)),
+    "nan": saved(np.full((ROWS, COLS), np.nan)),
+}
+
+
+@pytest.mark.parametrize("name", DEPTHS)
+def test_a_depth_map_that_is_none_is_told_in_one_line(tmp_path: Path, name: str) -> None:
+    path = tmp_path / f"{name}.npy"
+    path.write_bytes(DEPTHS[name])
+    with pytest.raises(InputError, match=path.name) as told:
+        read_distance(path, "planar", None, CAMERA)
+    assert len(str(told.value).splitlines()) == 1
+
+
+def test_a_depth_map_larger_than_memory_is_told(tmp_path: Path) -> None:
+    header = "{'descr': '<f8', 'fortran_order': False, 'shape': (4611686018427387904,), }"
+    path = tmp_path / "huge.npy"
+    path.write_bytes(b"\x93NUMPY\x01\x00" + struct.pack("<H", 118) + header.ljust(117).encode() + b"\n")
+    with pytest.raises(InputError, match=r"huge\.npy: cannot be read"):
+        read_distance(path, "planar", None, CAMERA)
+
+
+def test_fog_with_a_depth_map_that_is_none_writes_nothing(fogsim, folder: Path) -> None:
+    (folder / "photo.png").write_bytes(picture("PNG"))
+    (folder / "depth.npy").write_bytes(DEPTHS["objects"])
+    before = sorted(folder.iterdir())
+    out = ("--visibility", "100", "--depth-kind", "range", "--out", "fogged.png")
+    code, _, err = fogsim("fog", "photo.png", "--depth", "depth.npy", "--camera", "camera.yaml", *out)
+    assert code == 2
+    assert "depth.npy: cannot be read as an array of numbers" in err
+    assert "response is not given: srgb is assumed" in err
+    assert "Traceback" not in err
+    assert sorted(folder.iterdir()) == before

@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help check demo test lint types contracts ci clean
+.PHONY: help check demo test lint types contracts ci figures clean
 
 help: ## Show what can be made
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -45,6 +45,11 @@ contracts: $(VENV)/.installed-test ## Check which stage may import which
 	@$(BIN)/lint-imports
 
 ci: lint types contracts test ## Everything that .ci/run checks
+
+figures: $(VENV)/.installed-test ## Measure the accuracies in the docs' tables anew (an hour or two)
+	@for name in estimator_accuracy estimator_targets lead_accuracy; do \
+		$(BIN)/python benchmarks/$$name.py --docs >/dev/null || exit 1; done
+	@$(BIN)/python docs/make_measured_tables.py
 
 clean: ## Remove the environment, results and caches
 	rm -rf $(VENV) runs dist build .mypy_cache .ruff_cache .pytest_cache

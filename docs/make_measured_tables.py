@@ -1,9 +1,9 @@
 """Write those tables of the docs that are measured: ``python docs/make_measured_tables.py [--check] [NAME …]``.
 
 Without names all of them (minutes, for zhu2015). ``--check`` writes nothing and says which are not up to date; the last
-digit may differ by one, as rounding on another processor may. Tables of benchmarks that take longer, or measure time,
-are written by these: ``python benchmarks/estimator_accuracy.py --docs``, and ``estimator_targets.py`` and
-``lead_accuracy.py`` likewise. The README's table is an excerpt of the first, so write it after that.
+digit may differ by one, as rounding on another processor may. Three benchmarks write their own tables:
+``python benchmarks/estimator_accuracy.py --docs``, ``estimator_targets.py``, ``lead_accuracy.py``. The README has an
+excerpt of the first, so write it after that. ``make figures`` does all of it in order.
 """
 
 import argparse

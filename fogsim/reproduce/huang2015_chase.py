@@ -45,6 +45,8 @@ class Followed:
         Reflectance of its paint, red first [-].
     left : float
         How far its middle is left of the camera [m].
+    name : str
+        Its id, which chooses among the shapes that its size leaves open.
     """
 
     kind: str = "car"
@@ -53,6 +55,7 @@ class Followed:
     height: float = 1.5
     paint: tuple[float, float, float] = (0.2, 0.2, 0.2)
     left: float = 0.1
+    name: str = "followed"
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +113,7 @@ def drawn(renderer: Renderer, camera: Camera, vehicle: Followed | None, ahead: f
 def _standing(vehicle: Followed, rear: float) -> TrafficState:
     return TrafficState(
         time=0.0,
-        ids=("followed",),
+        ids=(vehicle.name,),
         types=(vehicle.kind,),
         position=np.array([[rear + vehicle.length, vehicle.left, 0.0]]),
         heading=np.zeros(1),

@@ -17,6 +17,7 @@ import pytest
 import typer
 
 from fogsim.cli import app
+from fogsim.scenario import load_scenario
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 TEXTS = {
@@ -124,6 +125,14 @@ def test_options_exist(page: str) -> None:
             assert options <= {name for one in KNOWN[name].params for name in (*one.opts, *one.secondary_opts)}, line
         else:
             assert options <= set(re.findall(r'"(--[\w-]+)"', (CHECKOUT / name).read_text(encoding="utf-8"))), line
+
+
+@pytest.mark.parametrize("page", [page for page in TEXTS if page.startswith("scenarios/")])
+def test_settings_that_a_scenario_speaks_of_are_its_keys(page: str) -> None:
+    settings = re.findall(r"--set\s([\w.]+=[\w.-]+)", TEXTS[page])
+    assert settings
+    for setting in settings:
+        load_scenario(str(CHECKOUT / Path(page).parent), [setting])
 
 
 def test_a_wrong_option_is_found() -> None:

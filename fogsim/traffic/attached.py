@@ -11,6 +11,7 @@ from fogsim.traffic.setup import TrafficSetup
 from fogsim.traffic.sumo_library import load_libsumo
 from fogsim.traffic.sumo_traffic import SumoTraffic
 from fogsim.traffic.traci_link import load_traci
+from fogsim.values import Command
 
 
 class AttachedLink:
@@ -86,6 +87,13 @@ class AttachedTraffic(SumoTraffic):
             present = self._api.vehicle.getIDList()
         self._seen.update(present)
         return self._ego in present
+
+    def obey(self, command: Command) -> None:
+        """Put a command in force for the next step; see `SumoTraffic.obey`."""
+        # The owner may have taken a vehicle away since the look.
+        with self._attached.watched():
+            self._running.roster.recount()
+        super().obey(command)
 
     def absence(self) -> str:
         """Say that the ego has not been on the road so far, and who has."""

@@ -178,8 +178,6 @@ class SumoTraffic:
     def obey(self, command: Command) -> None:
         """Put a command in force for the next step of a simulation that somebody else steps."""
         run = self._running
-        if self._link.shared:
-            run.roster.recount()
         self._ego_lamps = command.lamps
         run.control.carry_out(self._orders(run, command))
         self._prepare(run, command.advised_speeds)
@@ -227,6 +225,7 @@ class SumoTraffic:
         run.collisions.look()
         run.roster.look()
         if self._link.shared:
+            # SUMO has let the other clients do what they do in this step before it answers.
             run.roster.recount()
         self._teleported |= self._setup.ego in run.roster.beamed_away
         run.lanes.keep()

@@ -212,7 +212,6 @@ _EGO_COLUMNS = (
     Column("x_m", pa.float64(), "east, middle of the front bumper", _position(0)),
     Column("y_m", pa.float64(), "north, middle of the front bumper", _position(1)),
     Column("heading_rad", pa.float64(), "counterclockwise from east", _ego("heading")),
-    Column("grade_rad", pa.float64(), "inclination of the road under the ego; positive uphill", _ego("grade")),
     Column("speed_mps", pa.float64(), "speed of the ego", _ego("speed")),
     Column("acceleration_mps2", pa.float64(), "acceleration of the ego", _ego("acceleration")),
     Column("speed_limit_mps", pa.float64(), "speed limit", lambda step, _: step.speed_limit),

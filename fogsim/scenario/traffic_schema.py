@@ -22,8 +22,8 @@ class Event(Section):
     at_time_s: NotNegative | None = None
     """It begins at this time after the ego's appearance."""
 
-    at_gap_to_ego_m: Positive | None = None
-    """It begins when the vehicle is this near to the ego."""
+    at_gap_to_ego_m: Annotated[float, Field(ge=-10_000, le=10_000, allow_inf_nan=False)] | None = None
+    """It begins when the gap to the ego, bumper to bumper, comes to this: positive ahead of the ego, negative behind it."""
 
     @model_validator(mode="after")
     def _begins(self) -> Self:

@@ -18,14 +18,19 @@ class Trigger:
     at_time : float or None
         Time since the ego appeared [s].
     at_gap_to_ego : float or None
-        Straight distance between the vehicle's and the ego's front bumpers [m]; nearer counts too.
+        Gap to the ego along the road, from bumper to bumper [m]: positive for a vehicle ahead of the ego, negative for
+        one behind it, 0 for one beside it. It holds when the gap comes to this value or passes it, from either side,
+        and for a vehicle that is nearer on the same side already when both are first on the road.
+    name : str
+        What the event is called in messages.
     """
 
     at_position: float | None = None
     at_time: float | None = None
     at_gap_to_ego: float | None = None
+    name: str = ""
 
-    def fires(self, time: float, driven: float, gap: float) -> bool:
+    def fires(self, time: float, driven: float, gap: float | None, earlier_gap: float | None) -> bool:
         """Tell whether the event begins.
 
         Parameters
@@ -34,14 +39,21 @@ class Trigger:
             Time since the ego appeared [s]; negative before.
         driven : float
             Distance that the vehicle has driven [m].
-        gap : float
-            Its distance from the ego [m]; ``inf`` without an ego.
+        gap, earlier_gap : float or None
+            Its gap to the ego now and in the step before, as of `signed_gap` [m]; None where there was none.
         """
         return (
             (self.at_position is not None and driven >= self.at_position)
             or (self.at_time is not None and time >= self.at_time)
-            or (self.at_gap_to_ego is not None and gap <= self.at_gap_to_ego)
+            or (self.at_gap_to_ego is not None and gap is not None and _reaches(self.at_gap_to_ego, gap, earlier_gap))
         )
+
+
+def _reaches(wanted: float, gap: float, earlier: float | None) -> bool:
+    """Tell whether a gap has come to a wanted one, or is nearer on the same side at the first look [m]."""
+    if earlier is not None:
+        return min(earlier, gap) <= wanted <= max(earlier, gap)
+    return 0.0 < gap / wanted <= 1.0 if wanted else gap == 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,13 +135,13 @@ class Situation:
     driven : callable
         Distance that a vehicle has driven [m].
     gap_to_ego : callable
-        Distance of a vehicle from the ego [m].
+        Gap of a vehicle to the ego along the road, as of `fogsim.traffic.gaps.signed_gap` [m]; None if there is none.
     """
 
     time: float
     present: set[str]
     driven: Callable[[str], float]
-    gap_to_ego: Callable[[str], float]
+    gap_to_ego: Callable[[str], float | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,6 +173,7 @@ class Script:
         self._waiting: list[Event] = list(events)
         self._braking: dict[BrakeEvent, float] = {}
         self._dark: set[str] = set()
+        self._gaps: dict[str, float | None] = {}
 
     @property
     def dark(self) -> frozenset[str]:
@@ -181,7 +194,10 @@ class Script:
         )
 
     def _begin(self, situation: Situation) -> list[Event]:
-        begun = [event for event in self._waiting if self._is_due(event, situation)]
+        measured = {event.vehicle for event in self._waiting if event.trigger.at_gap_to_ego is not None}
+        gaps = {v: situation.gap_to_ego(v) for v in sorted(measured & situation.present)}
+        begun = [event for event in self._waiting if self._is_due(event, situation, gaps.get(event.vehicle))]
+        self._gaps = gaps
         for event in begun:
             self._waiting.remove(event)
             if isinstance(event, BrakeEvent):
@@ -190,10 +206,10 @@ class Script:
                 self._dark.add(event.vehicle)
         return begun
 
-    def _is_due(self, event: Event, situation: Situation) -> bool:
+    def _is_due(self, event: Event, situation: Situation, gap: float | None) -> bool:
         vehicle = event.vehicle
         return vehicle in situation.present and event.trigger.fires(
-            situation.time, situation.driven(vehicle), situation.gap_to_ego(vehicle)
+            situation.time, situation.driven(vehicle), gap, self._gaps.get(vehicle)
         )
 
     def _orders(self, situation: Situation) -> dict[str, Order]:

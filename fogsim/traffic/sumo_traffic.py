@@ -1,7 +1,6 @@
 """Traffic by SUMO, wherever it runs."""
 
 import functools
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Concatenate, ParamSpec, TypeVar
@@ -15,6 +14,7 @@ from fogsim.traffic.configuration import FIT_ARGUMENTS
 from fogsim.traffic.control import LaneKeeping, Order, SpeedControl
 from fogsim.traffic.driving import Drivers
 from fogsim.traffic.events import Script, Situation
+from fogsim.traffic.gaps import GapToEgo
 from fogsim.traffic.lane_changes import LaneChangeSmoothing
 from fogsim.traffic.link import Api, SumoLink
 from fogsim.traffic.network import read_net, road_network
@@ -202,10 +202,8 @@ class SumoTraffic:
     def _situation(self, run: _Run, present: set[str]) -> Situation:
         vehicle, ego = run.api.vehicle, self._setup.ego
 
-        def gap_to_ego(other: str) -> float:
-            if ego not in present or other not in present:
-                return math.inf
-            return math.dist(vehicle.getPosition(other), vehicle.getPosition(ego))
+        def gap_to_ego(other: str) -> float | None:
+            return GapToEgo(run.api, ego).measure(other) if ego in present else None
 
         time = run.api.simulation.getTime() - self._ego_since
         return Situation(time, present, vehicle.getDistance, gap_to_ego)

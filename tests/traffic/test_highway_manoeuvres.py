@@ -102,7 +102,8 @@ def test_a_gap_to_the_ego_begins_it() -> None:
     for snapshot in drive(traffic, 60.0):
         positions = snapshot.state.position
         if snapshot.state.acceleration[of(snapshot, "lead")] < -3.5:
-            gap = math.dist(positions[snapshot.ego], positions[of(snapshot, "lead")])
+            length = float(snapshot.state.length[of(snapshot, "lead")])
+            gap = math.dist(positions[snapshot.ego], positions[of(snapshot, "lead")]) - length
             break
     else:
         pytest.fail("it never braked")

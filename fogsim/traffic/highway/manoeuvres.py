@@ -9,9 +9,9 @@ from highway_env.vehicle.controller import ControlledVehicle
 from fogsim.errors import InputError, suggest
 from fogsim.traffic.control import Order
 from fogsim.traffic.events import Event, LaneChangeEvent, Script, Situation
+from fogsim.traffic.gaps import signed_gap
 from fogsim.traffic.governor import governed_speed
 from fogsim.traffic.highway.fleet import LEAD, Fleet, acceleration
-from fogsim.traffic.highway.reading import front_bumper
 
 
 class Manoeuvres:
@@ -77,9 +77,8 @@ class Manoeuvres:
     def _situation(self, vehicles: Mapping[str, Any]) -> Situation:
         ego = self._fleet.ego
 
-        def gap_to_ego(name: str) -> float:
-            there = ego in vehicles.values()
-            return math.dist(front_bumper(vehicles[name]), front_bumper(ego)) if there else math.inf
+        def gap_to_ego(name: str) -> float | None:
+            return _gap(vehicles[name], ego) if ego in vehicles.values() else None
 
         return Situation(self._fleet.time, set(vehicles), lambda name: self._driven.get(name, 0.0), gap_to_ego)
 
@@ -104,6 +103,16 @@ class Manoeuvres:
                 del self._keeping_lane[name]
                 if name in vehicles:
                     vehicles[name].enable_lane_change = own
+
+
+def _gap(vehicle: Any, ego: Any) -> float | None:
+    """Gap to the ego along the ego's lane, whichever lane the vehicle is on [m]; None if it drives the other way."""
+    if float(vehicle.direction @ ego.direction) <= 0.0:
+        return None
+    # The library measures from middle to middle.
+    apart = float(ego.lane_distance_to(vehicle)) + 0.5 * (vehicle.LENGTH - ego.LENGTH)
+    ahead, behind = (apart, None) if apart >= 0.0 else (None, -apart)
+    return signed_gap(ahead, behind, vehicle.LENGTH, ego.LENGTH)
 
 
 def _held(vehicle: Any, target: float, deceleration: float, step_length: float) -> float:

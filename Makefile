@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help check demo test lint types contracts ci clean
+.PHONY: help check demo test portability lint types contracts ci clean
 
 help: ## Show what can be made
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -27,8 +27,11 @@ $(VENV)/.installed-test: $(VENV)/.installed
 demo: $(VENV)/.installed ## Run the demo scenario; results go to runs/demo/
 	@$(BIN)/fogsim run motorway_fog_bank --seed 1 --out runs/demo --overwrite
 
-test: $(VENV)/.installed-test ## Run the whole test suite
-	@$(BIN)/python -m pytest -n auto --dist worksteal
+test: $(VENV)/.installed-test ## Run the whole test suite but for portability
+	@$(BIN)/python -m pytest -n auto --dist worksteal --ignore tests/portability
+
+portability: $(VENV)/.installed-test ## Check that other processors' kernels change nothing (compiles all anew)
+	@$(BIN)/python -m pytest tests/portability
 
 lint: $(VENV)/.installed-test ## Check style
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check .
@@ -39,7 +42,7 @@ types: $(VENV)/.installed-test ## Check types
 contracts: $(VENV)/.installed-test ## Check which stage may import which
 	@$(BIN)/lint-imports
 
-ci: lint types contracts test ## Everything that .ci/run checks
+ci: lint types contracts test portability ## Everything that .ci/run checks
 
 clean: ## Remove the environment, results and caches
 	rm -rf $(VENV) runs dist build .mypy_cache .ruff_cache .pytest_cache

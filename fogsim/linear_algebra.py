@@ -4,6 +4,7 @@ BLAS and LAPACK, which numpy's ``@`` and most of `numpy.linalg` call, round as i
 Here every operation is one of IEEE 754, in an order that only the shapes decide.
 """
 
+import math
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,7 @@ def matrix_product(left: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
     if right.ndim == 1:
         return np.asarray((left * right).sum(axis=-1))
     kind = np.result_type(left, right)
-    rows = np.ascontiguousarray(left, kind).reshape(-1, left.shape[-1])
+    rows = np.ascontiguousarray(left, kind).reshape(math.prod(left.shape[:-1]), left.shape[-1])
     out = np.zeros((len(rows), right.shape[1]), kind)
     _add_product(rows, np.ascontiguousarray(right, kind), out)
     return out.reshape(*left.shape[:-1], right.shape[1])

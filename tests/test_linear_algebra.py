@@ -13,7 +13,16 @@ RNG = np.random.default_rng(3)
 
 
 @pytest.mark.parametrize(
-    ("left", "right"), [((4,), (4,)), ((3, 4), (4,)), ((4,), (4, 2)), ((5, 4), (4, 3)), ((2, 5, 3), (3, 3))]
+    ("left", "right"),
+    [
+        ((4,), (4,)),
+        ((3, 4), (4,)),
+        ((4,), (4, 2)),
+        ((5, 4), (4, 3)),
+        ((2, 5, 3), (3, 3)),
+        ((0,), (0, 3)),
+        ((0, 3), (3, 3)),
+    ],
 )
 def test_a_product_is_that_of_matrices(left: tuple[int, ...], right: tuple[int, ...]) -> None:
     a, b = RNG.normal(size=left), RNG.normal(size=right)

@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help check demo test lint types contracts ci figures clean
+.PHONY: help check demo test portability lint types contracts ci figures clean
 
 help: ## Show what can be made
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -32,8 +32,11 @@ $(VENV)/.compiled: $(VENV)/.installed-test
 demo: $(VENV)/.installed ## Run the demo scenario; results go to runs/demo/
 	@$(BIN)/fogsim run motorway_fog_bank --seed 1 --out runs/demo --overwrite
 
-test: $(VENV)/.installed-test $(VENV)/.compiled ## Run the whole test suite
-	@$(BIN)/python -m pytest -n auto --dist worksteal
+test: $(VENV)/.installed-test $(VENV)/.compiled ## Run the whole test suite but for portability
+	@$(BIN)/python -m pytest -n auto --dist worksteal --ignore tests/portability
+
+portability: $(VENV)/.installed-test ## Check that other processors' kernels change nothing (compiles all anew)
+	@$(BIN)/python -m pytest tests/portability
 
 lint: $(VENV)/.installed-test ## Check style
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check .
@@ -44,7 +47,7 @@ types: $(VENV)/.installed-test ## Check types
 contracts: $(VENV)/.installed-test ## Check which stage may import which
 	@$(BIN)/lint-imports
 
-ci: lint types contracts test ## Everything that .ci/run checks
+ci: lint types contracts test portability ## Everything that .ci/run checks
 
 figures: $(VENV)/.installed-test ## Measure the accuracies in the docs' tables anew (an hour or two)
 	@for name in estimator_accuracy estimator_targets lead_accuracy; do \

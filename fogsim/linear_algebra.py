@@ -4,6 +4,7 @@ BLAS and LAPACK, which numpy's ``@`` and most of `numpy.linalg` call, round as i
 Here every operation is one of IEEE 754, in an order that only the shapes decide.
 """
 
+import math
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ LEAST_PIVOT = 1e-14
 
 
 def matrix_product(left: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
-    """Product of two small matrices, of a matrix and a vector, or of two vectors, as ``left @ right``.
+    """Product of two matrices, of a matrix and a vector, or of two vectors, as ``left @ right``.
 
     Parameters
     ----------
@@ -27,7 +28,21 @@ def matrix_product(left: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
     """
     if right.ndim == 1:
         return np.asarray((left * right).sum(axis=-1))
-    return np.asarray((left[..., None] * right).sum(axis=-2))
+    kind = np.result_type(left, right)
+    rows = np.ascontiguousarray(left, kind).reshape(math.prod(left.shape[:-1]), left.shape[-1])
+    out = np.zeros((len(rows), right.shape[1]), kind)
+    _add_product(rows, np.ascontiguousarray(right, kind), out)
+    return out.reshape(*left.shape[:-1], right.shape[1])
+
+
+@kernel
+def _add_product(left: NDArray[Any], right: NDArray[Any], out: NDArray[Any]) -> None:
+    for i in range(left.shape[0]):
+        for k in range(left.shape[1]):
+            share = left[i, k]
+            if share != 0.0:
+                for j in range(right.shape[1]):
+                    out[i, j] += share * right[k, j]
 
 
 @kernel
@@ -77,19 +92,6 @@ def times(matrix: NDArray[np.float64], vector: NDArray[np.float64]) -> NDArray[n
     for i in range(len(matrix)):
         for j in range(len(vector)):
             out[i] += matrix[i, j] * vector[j]
-    return out
-
-
-@kernel
-def dense_product(left: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Product (n, m) of two matrices (n, l) and (l, m) that are too large for `matrix_product`."""
-    out = np.zeros((left.shape[0], right.shape[1]))
-    for i in range(left.shape[0]):
-        for k in range(left.shape[1]):
-            share = left[i, k]
-            if share != 0.0:
-                for j in range(right.shape[1]):
-                    out[i, j] += share * right[k, j]
     return out
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.linear_algebra import dense_product
+from fogsim.linear_algebra import matrix_product
 
 Floats = NDArray[np.float64]
 
@@ -121,8 +121,7 @@ def seen_as(near: Patch, grid: PixelGrid, at: Placement) -> Floats:
     """Near patch as the far camera would see it without fog."""
     rows = box_weights(near.luminance.shape[0], near.row, grid.rows, at.row, at.scale, near.blur)
     cols = box_weights(near.luminance.shape[1], near.column, grid.cols, at.column, at.scale, near.blur)
-    upright = dense_product(rows, np.ascontiguousarray(near.luminance))
-    return np.asarray(dense_product(upright, np.ascontiguousarray(cols.T)), np.float64)
+    return matrix_product(matrix_product(rows, near.luminance), cols.T)
 
 
 def shrunk(patch: Patch, scale: float) -> Patch:

@@ -1,9 +1,11 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from fogsim.scene import vehicle_batches
 from fogsim.scene.bodies import BODIES, body_of, body_shapes
-from fogsim.scene.bodies.lamp_patches import lamp_patches
+from fogsim.scene.bodies.lamp_patches import lamp_patches, lamp_quads
 from fogsim.scene.bodies.parts import LIT_AREAS
 from fogsim.values import Lamp, Surface, TrafficState
 
@@ -136,3 +138,15 @@ def test_an_empty_road_has_no_batches(state: TrafficState) -> None:
     )
     assert vehicle_batches(empty, None) == ()
     assert Lamp.NONE == 0
+
+
+@pytest.mark.parametrize("kind", BODIES)
+def test_a_hair_aside_gives_a_body_no_other_lamps(kind: str) -> None:
+    """Lamps in the middle are neither left nor right, wherever rounding has put their centres."""
+    middle, *moved = (
+        lamp_quads(replace(SHAPES[kind], positions=SHAPES[kind].positions + np.float32((0.0, aside, 0.0))))
+        for aside in (0.0, 1e-6, -1e-6)
+    )
+    for quads in moved:
+        assert np.array_equal(quads.faces, middle.faces)
+        np.testing.assert_allclose(quads.positions, middle.positions, atol=2e-6)

@@ -117,12 +117,15 @@ class Interruption:
     def _take(self, signum: int, frame: FrameType | None) -> None:
         # Who is impatient presses twice, and what the first one ends must be able to end.
         if self._allowed and time.monotonic() - self._raised > ENDING_TIME:
-            self._raised = time.monotonic()
-            if self._alarm is not None:
-                signal.setitimer(signal.ITIMER_REAL, _PATIENCE, _PATIENCE)
-            self._handlers[signum](signum, frame)
+            self._let_through(signum, frame)
         else:
             self._waiting = signum
+
+    def _let_through(self, signum: int, frame: FrameType | None) -> None:
+        self._raised = time.monotonic()
+        if self._alarm is not None and self._allowed:
+            signal.setitimer(signal.ITIMER_REAL, _PATIENCE, _PATIENCE)
+        self._handlers[signum](signum, frame)
 
     def _raise_again(self, _: int, __: FrameType | None) -> None:
         if self._allowed:
@@ -131,7 +134,7 @@ class Interruption:
     def _handle_waiting(self) -> None:
         signum, self._waiting = self._waiting, None
         if signum is not None:
-            self._handlers[signum](signum, None)
+            self._let_through(signum, None)
 
     @contextlib.contextmanager
     def allowed(self) -> Iterator[None]:
@@ -140,15 +143,20 @@ class Interruption:
         Raises
         ------
         KeyboardInterrupt
-            From the signal's handler, also where compiled code runs (`interruptible`).
+            From the signal's handler, also where a library has made another error of it (`interruptible`).
         """
-        with interruptible():
-            try:
+        before = self._raised
+        try:
+            with interruptible():
                 self._allowed = True
                 self._handle_waiting()
                 yield
-            finally:
-                self._allowed = False
+        except Exception as error:
+            if self._raised != before:
+                raise KeyboardInterrupt from error
+            raise
+        finally:
+            self._allowed = False
 
     @contextlib.contextmanager
     def held(self) -> Iterator[None]:

@@ -16,8 +16,8 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 ENDING_TIME = 3.0
 """Time within which a second signal does not cut off what the first one has ended [s]."""
 
-_PATIENCE = 1.0
-"""Time after which a signal whose exception was lost, as in a destructor, raises it again [s]."""
+_PATIENCE = 1.5
+"""Time after which a signal whose exception was lost, as in a destructor, comes again [s]."""
 
 _Handler = Callable[[int, FrameType | None], object]
 
@@ -48,6 +48,8 @@ def _handle_signals(handler: _Handler) -> None:
 class ProgramSignals:
     """The first signal as KeyboardInterrupt, for a program, from `listen` on; the next ends the program at once.
 
+    So does the first one where its exception is lost, or what it ends takes too long; `Interruption` gives more time.
+
     Attributes
     ----------
     last : int or None
@@ -59,12 +61,18 @@ class ProgramSignals:
 
     def listen(self) -> None:
         """Begin; signals that are ignored stay so."""
+        signal.signal(signal.SIGALRM, self._lost)
         _handle_signals(self._raise)
+
+    def _lost(self, _: int, __: FrameType | None) -> None:
+        if self.last is not None:
+            leave(self.last)
 
     def _raise(self, signum: int, _: FrameType | None) -> None:
         if self.last is not None:
             leave(self.last)
         self.last = signum
+        signal.setitimer(signal.ITIMER_REAL, _PATIENCE, _PATIENCE)
         raise KeyboardInterrupt
 
 
@@ -80,7 +88,7 @@ class Interruption:
         self._allowed = False
         self._waiting: int | None = None
         self._raised = -math.inf
-        self._has_alarm = False
+        self._alarm: _Handler | signal.Handlers | int | None = None
 
     def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():
@@ -88,18 +96,19 @@ class Interruption:
             self._handlers = {signum: handler for signum, handler in found.items() if callable(handler)}
             for signum in self._handlers:
                 signal.signal(signum, self._take)
+            alarm = signal.getsignal(signal.SIGALRM)
             # Whoever has an alarm of their own keeps it.
-            self._has_alarm = signal.getsignal(signal.SIGALRM) is signal.SIG_DFL
-            if self._has_alarm:
+            if alarm is signal.SIG_DFL or isinstance(getattr(alarm, "__self__", None), ProgramSignals):
+                self._alarm = alarm
                 signal.signal(signal.SIGALRM, self._raise_again)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._has_alarm:
+        if self._alarm is not None:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
-            signal.signal(signal.SIGALRM, signal.SIG_DFL)
+            signal.signal(signal.SIGALRM, self._alarm)
         for signum, handler in self._handlers.items():
             signal.signal(signum, handler)
         if error is None:
@@ -108,12 +117,15 @@ class Interruption:
     def _take(self, signum: int, frame: FrameType | None) -> None:
         # Who is impatient presses twice, and what the first one ends must be able to end.
         if self._allowed and time.monotonic() - self._raised > ENDING_TIME:
-            self._raised = time.monotonic()
-            if self._has_alarm:
-                signal.setitimer(signal.ITIMER_REAL, _PATIENCE, _PATIENCE)
-            self._handlers[signum](signum, frame)
+            self._let_through(signum, frame)
         else:
             self._waiting = signum
+
+    def _let_through(self, signum: int, frame: FrameType | None) -> None:
+        self._raised = time.monotonic()
+        if self._alarm is not None and self._allowed:
+            signal.setitimer(signal.ITIMER_REAL, _PATIENCE, _PATIENCE)
+        self._handlers[signum](signum, frame)
 
     def _raise_again(self, _: int, __: FrameType | None) -> None:
         if self._allowed:
@@ -122,7 +134,7 @@ class Interruption:
     def _handle_waiting(self) -> None:
         signum, self._waiting = self._waiting, None
         if signum is not None:
-            self._handlers[signum](signum, None)
+            self._let_through(signum, None)
 
     @contextlib.contextmanager
     def allowed(self) -> Iterator[None]:
@@ -131,15 +143,20 @@ class Interruption:
         Raises
         ------
         KeyboardInterrupt
-            From the signal's handler, also where compiled code runs (`interruptible`).
+            From the signal's handler, also where a library has made another error of it (`interruptible`).
         """
-        with interruptible():
-            try:
+        before = self._raised
+        try:
+            with interruptible():
                 self._allowed = True
                 self._handle_waiting()
                 yield
-            finally:
-                self._allowed = False
+        except Exception as error:
+            if self._raised != before:
+                raise KeyboardInterrupt from error
+            raise
+        finally:
+            self._allowed = False
 
     @contextlib.contextmanager
     def held(self) -> Iterator[None]:

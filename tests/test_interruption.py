@@ -89,6 +89,17 @@ def test_an_exception_that_is_lost_is_raised_again(monkeypatch: pytest.MonkeyPat
     assert lost == [True]
 
 
+def test_an_error_that_a_library_has_made_of_a_signal_is_an_interruption() -> None:
+    with Interruption() as signals:
+        with pytest.raises(KeyboardInterrupt), signals.allowed():  # noqa: PT012 - signals come between statements
+            try:
+                press()
+            except KeyboardInterrupt as error:
+                raise OSError("the library's own") from error
+        with pytest.raises(OSError, match="another"), signals.allowed():
+            raise OSError("another")
+
+
 def test_another_thread_has_no_signals_to_hold() -> None:
     done = []
 

@@ -34,7 +34,7 @@ def test_an_interrupted_command_says_so_and_the_same_one_continues_it(tmp_path: 
     stdout, stderr = process.communicate(timeout=60)
     assert process.returncode == 130, stderr
     assert "Traceback" not in stderr
-    assert "the same command continues it" in stdout
+    assert "the same command continues it" in stdout, stderr
     partial = json.loads((out / "annotations.json").read_text(encoding="utf-8"))
     there = len(partial["images"])
     assert there >= 3

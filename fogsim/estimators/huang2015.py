@@ -117,7 +117,7 @@ class Huang2015:
         as_published: bool = False,
         time_scale: Annotated[float, Range(0.01, 1e9, "s")] = 10.0,
         way_scale: Annotated[float, Range(0.01, 1e9, "m")] = 200.0,
-        setback: Annotated[float, Range(0.0, 20.0, "m")] = 0.0,
+        setback: Annotated[float, Range(0.0, 10.0, "m")] = 0.0,
         blur: Annotated[float, Range(0.0, 10.0, "px")] = 0.0,
         pitch_deviation: PitchDeviation = PITCH_DEVIATION,
     ) -> None:

@@ -85,7 +85,7 @@ class Huang2015Lead:
         camera: Camera,
         *,
         as_published: bool = False,
-        setback: Annotated[float, Range(0.0, 20.0, "m")] = 0.0,
+        setback: Annotated[float, Range(0.0, 10.0, "m")] = 0.0,
         blur: Annotated[float, Range(0.0, 10.0, "px")] = 0.0,
         spacing: Annotated[float, Range(0.1, 100.0, "m")] | None = None,
     ) -> None:

@@ -107,7 +107,7 @@ class LeadContrast:
         self,
         camera: Camera,
         *,
-        setback: Annotated[float, Range(0.0, 20.0, "m")] = 1.7,
+        setback: Annotated[float, Range(0.0, 10.0, "m")] = 1.7,
         range_deviation: Annotated[float, Range(0.0, 100.0, "m")] = 0.25,
         pitch_deviation: PitchDeviation = PITCH_DEVIATION,
         window: Annotated[float, Range(0.01, 1e6, "s")] = 60.0,

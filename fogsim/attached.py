@@ -13,6 +13,7 @@ from fogsim.errors import InputError, SimulationError
 from fogsim.loop import AdvisedDriving
 from fogsim.onboard import OnBoard
 from fogsim.randomness import spawn_streams
+from fogsim.returned import checked_command
 from fogsim.scenario import Scenario, attached_scenario, build, override
 from fogsim.traffic import AttachedTraffic, TraciLink, Traffic, step_length, traci_traffic
 from fogsim.units import clock_time
@@ -231,7 +232,7 @@ class AttachedSession:
         Command
             What is in force.
         """
-        self._command = self._policy.decide(step) if command is None else command
+        self._command = self._policy.decide(step) if command is None else checked_command(command)
         self._traffic.obey(self._command)
         return self._command
 

@@ -10,6 +10,7 @@ from fogsim.atmosphere import FogNow
 from fogsim.errors import SimulationError
 from fogsim.onboard import OnBoard
 from fogsim.randomness import spawn_streams
+from fogsim.returned import checked_advice, checked_command, checked_lamps
 from fogsim.scenario import Scenario, build
 from fogsim.traffic import Traffic, libsumo_traffic
 from fogsim.values import Command, Ending, FogField, Step, TrafficSnapshot
@@ -56,6 +57,7 @@ class AdvisedDriving:
     """
 
     def __init__(self, scenario: Scenario) -> None:
+        self._scenario = scenario
         self._adviser = build.adviser(scenario)
         self._lighting = build.lighting_policy(scenario)
         self._frames = build.periods(scenario).decision_frames
@@ -66,11 +68,13 @@ class AdvisedDriving:
         if step.index % self._frames:
             return step.command
         previous = step.command
-        advice = self._adviser.advise(step.belief, step.speed_limit, step.time, previous.advice)
+        advised = self._adviser.advise(step.belief, step.speed_limit, step.time, previous.advice)
+        advice = checked_advice(self._scenario.advice.method, advised)
+        lamps = self._lighting.lamps(step.belief, previous.lamps)
         others = step.traffic.ids if self._to_all and math.isfinite(advice.speed) else ()
         return Command(
             advice=advice,
-            lamps=self._lighting.lamps(step.belief, previous.lamps),
+            lamps=checked_lamps(self._scenario.lighting.method, lamps),
             advised_speeds=dict.fromkeys(others, advice.speed),
         )
 
@@ -148,11 +152,14 @@ class ClosedLoop:
 
         Raises
         ------
+        InputError
+            If the command is none, or a speed in it is nan or negative.
         SimulationError
             If the run has not been started or is over.
         """
         if self._step is None or self._step.ending is not None:
             raise SimulationError("the run has not been started or is over: call start() before advance()")
+        checked_command(command)
         for number in range(self._periods.traffic_steps):
             if self._drivers_fog is not None:
                 part = number / self._periods.traffic_steps

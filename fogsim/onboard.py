@@ -10,6 +10,7 @@ from fogsim.camera import mounted_pose
 from fogsim.errors import SimulationError
 from fogsim.outlook import Outlook
 from fogsim.randomness import Streams
+from fogsim.returned import checked_belief, checked_estimate
 from fogsim.scenario import Scenario, build
 from fogsim.sensors import measure_lead, signs_ahead
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
@@ -110,7 +111,10 @@ class OnBoard:
         image = self._photographer.take(radiance, self._streams.camera)
         frame = Frame(time, image, self._told_camera)
         observation = self._observe(frame, snapshot, outlook.signs, self._streams)
-        estimates = tuple(estimator.update(observation) for estimator in self._estimators)
+        estimates = tuple(
+            checked_estimate(section.method, estimator.update(observation))
+            for section, estimator in zip(self._scenario.estimators, self._estimators, strict=True)
+        )
         return Step(
             index=index,
             time=time,
@@ -124,7 +128,7 @@ class OnBoard:
             view=view,
             observation=observation,
             estimates=estimates,
-            belief=self._fusion.update(estimates, time),
+            belief=checked_belief(self._scenario.fusion.method, self._fusion.update(estimates, time)),
             command=command,
             ending=ending,
         )

@@ -11,6 +11,7 @@ from fogsim.metrics.safety import Collisions, Conflict, Sight
 from fogsim.metrics.step_metrics import DEFAULT_STANDARD, step_metrics
 from fogsim.metrics.surrogate import SafetyStandard
 from fogsim.registry import Registry
+from fogsim.returned import checked_values
 from fogsim.units import clock_time
 from fogsim.values import Step
 
@@ -86,7 +87,7 @@ class RunMetrics:
 
     def __init__(self, standard: SafetyStandard = DEFAULT_STANDARD, names: Iterable[str] = METRICS) -> None:
         self.standard = standard
-        self._metrics = [METRICS[name](standard) for name in names]
+        self._metrics = {name: METRICS[name](standard) for name in names}
         self._last: Step | None = None
 
     def update(self, step: Step) -> None:
@@ -106,7 +107,7 @@ class RunMetrics:
         if last is not None and not elapsed > 0:
             raise SimulationError(f"steps must follow in time, got {step.time!r} s after {last.time!r} s")
         sample = Sample(step, elapsed, step_metrics(step, self.standard))
-        for metric in self._metrics:
+        for metric in self._metrics.values():
             metric.update(sample)
 
     def summary(self) -> RunSummary:
@@ -114,7 +115,7 @@ class RunMetrics:
         ending = None if self._last is None else self._last.ending
         values: dict[str, JsonValue] = {"ending": None if ending is None else ending.value}
         meanings = {"ending": "why the run was over; none if it was cut short"}
-        for metric in self._metrics:
-            values.update(metric.result())
+        for name, metric in self._metrics.items():
+            values.update(checked_values(name, metric.result()))
             meanings.update(metric.meanings)
         return RunSummary(values, meanings)

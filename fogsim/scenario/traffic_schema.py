@@ -36,7 +36,7 @@ class Event(Section):
     """It begins at this time after the ego's appearance."""
 
     at_gap_to_ego_m: Annotated[Number, Field(ge=-10_000, le=10_000)] | None = None
-    """It begins when the gap to the ego, bumper to bumper, comes to this: positive ahead of it, negative behind."""
+    """It begins when the gap to the ego, bumper to bumper, comes to this: positive ahead, negative behind."""
 
     @model_validator(mode="after")
     def _begins(self) -> Self:

@@ -96,9 +96,10 @@ def test_a_vehicle_that_breaks_down_stops_and_stays() -> None:
 
 
 def test_a_gap_to_the_ego_begins_it() -> None:
-    traffic, environment = traffic_of([BrakeEvent("lead", Trigger(at_gap_to_ego=30.0), to_speed=5.0)])
+    traffic, environment = traffic_of([BrakeEvent("lead", Trigger(at_gap_to_ego=60.0), to_speed=5.0)])
     traffic.start(1)
     environment.vehicle.target_speed = 30.0
+    environment.road.vehicles[1].position[0] += 60.0  # it is farther away than that when it begins
     for snapshot in drive(traffic, 60.0):
         positions = snapshot.state.position
         if snapshot.state.acceleration[of(snapshot, "lead")] < -3.5:
@@ -108,7 +109,7 @@ def test_a_gap_to_the_ego_begins_it() -> None:
     else:
         pytest.fail("it never braked")
     traffic.close()
-    assert gap == pytest.approx(30.0, abs=1.0)
+    assert gap == pytest.approx(60.0, abs=1.0)
 
 
 def test_lamps_that_fail_are_dark() -> None:

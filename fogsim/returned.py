@@ -1,0 +1,197 @@
+"""What methods of the user's return, checked before it goes on: an error names method, field and value."""
+
+import math
+from collections.abc import Mapping
+from numbers import Real
+from typing import Any, TypeVar
+
+import numpy as np
+
+from fogsim.errors import InputError
+from fogsim.values import Belief, Command, Estimate, Lamp, SpeedAdvice
+
+T = TypeVar("T")
+
+_SUM_TOLERANCE = 1e-6
+"""How far the probabilities of a belief may be from adding up to 1."""
+
+
+def checked_estimate(method: str, value: object) -> Estimate:
+    """What an estimator has returned.
+
+    Parameters
+    ----------
+    method : str
+        Name by which the scenario knows the estimator.
+    value : object
+        What its `update` has returned.
+
+    Raises
+    ------
+    InputError
+        If it is no `Estimate` of that method, or a valid one whose extinction or standard deviation is not a finite
+        number of at least 0.
+    """
+    who = f"estimator {method!r}: update()"
+    estimate = _of_type(who, value, Estimate)
+    if estimate.method != method:
+        raise InputError(f"{who}: method must be its name in the registry, {method!r}; got {estimate.method!r}")
+    if estimate.valid not in (True, False):
+        raise InputError(f"{who}: valid must be True or False, got {estimate.valid!r}")
+    if not isinstance(estimate.diagnostics, Mapping):
+        raise InputError(f"{who}: diagnostics must be a mapping, got {estimate.diagnostics!r}")
+    if estimate.valid:
+        _check_number(who, "extinction", estimate.extinction, " [1/m]; say Estimate.invalid where it cannot tell")
+        _check_number(who, "standard_deviation", estimate.standard_deviation, " [1/m]")
+    return estimate
+
+
+def checked_belief(method: str, value: object) -> Belief:
+    """What a fusion has returned.
+
+    Parameters
+    ----------
+    method : str
+        Name of the fusion.
+    value : object
+        What its `update` has returned.
+
+    Raises
+    ------
+    InputError
+        If it is no `Belief`, or its arrays are not a distribution over ascending, finite ln k.
+    """
+    who = f"fusion {method!r}: update()"
+    belief = _of_type(who, value, Belief)
+    for name in ("log_extinction", "probability"):
+        array = getattr(belief, name)
+        if not isinstance(array, np.ndarray) or array.ndim != 1 or array.dtype.kind != "f" or not len(array):
+            shown = f"shape {array.shape} of {array.dtype}" if isinstance(array, np.ndarray) else repr(array)
+            raise InputError(f"{who}: {name} must be an array (n,) of floats, got {shown}")
+    cells, probability = belief.log_extinction, belief.probability
+    if len(cells) != len(probability):
+        raise InputError(
+            f"{who}: log_extinction and probability must be of one length, got {len(cells)} and {len(probability)}"
+        )
+    if not (math.isfinite(cells[0]) and math.isfinite(cells[-1]) and bool(np.all(cells[1:] > cells[:-1]))):
+        raise InputError(f"{who}: log_extinction must be finite and ascending, got {cells!r}")
+    least, total = float(probability.min()), float(probability.sum())
+    if not (least >= 0.0 and abs(total - 1.0) <= _SUM_TOLERANCE):
+        raise InputError(
+            f"{who}: probability must be at least 0 and add up to 1, got from {least:.6g} on and a sum of {total:.6g}"
+        )
+    return belief
+
+
+def checked_advice(method: str, value: object) -> SpeedAdvice:
+    """What an adviser has returned.
+
+    Parameters
+    ----------
+    method : str
+        Name of the adviser.
+    value : object
+        What its `advise` has returned.
+
+    Raises
+    ------
+    InputError
+        If it is no `SpeedAdvice` with a speed of at least 0, `inf` for none.
+    """
+    who = f"adviser {method!r}: advise()"
+    advice = _of_type(who, value, SpeedAdvice)
+    _check_speed(who, "speed", advice.speed)
+    if advice.raise_since is not None and not (_is_number(advice.raise_since) and math.isfinite(advice.raise_since)):
+        raise InputError(f"{who}: raise_since must be a finite time [s] or None, got {advice.raise_since!r}")
+    return advice
+
+
+def checked_lamps(method: str, value: object) -> Lamp:
+    """What a lighting policy has returned.
+
+    Parameters
+    ----------
+    method : str
+        Name of the policy.
+    value : object
+        What its `lamps` has returned.
+
+    Raises
+    ------
+    InputError
+        If it is no `Lamp`.
+    """
+    return _of_type(f"lighting policy {method!r}: lamps()", value, Lamp)
+
+
+def checked_command(value: object) -> Command:
+    """A command that the user's own policy has made.
+
+    Raises
+    ------
+    InputError
+        If it is no `Command`, or a speed in it is nan or negative.
+    """
+    command = _of_type("the command", value, Command)
+    _of_type("the command's advice", command.advice, SpeedAdvice)
+    _of_type("the command's lamps", command.lamps, Lamp)
+    _check_speed("the command", "advice.speed", command.advice.speed)
+    for vehicle, speed in command.advised_speeds.items():
+        _check_speed("the command", f"advised_speeds[{vehicle!r}]", speed)
+    return command
+
+
+def checked_values(metric: str, value: object) -> Mapping[str, Any]:
+    """What a metric has returned.
+
+    Parameters
+    ----------
+    metric : str
+        Its name in the registry.
+    value : object
+        What its `result` has returned.
+
+    Raises
+    ------
+    InputError
+        If it is no mapping of names to None, words, finite numbers, and such mappings.
+    """
+    who = f"metric {metric!r}: result()"
+    if not isinstance(value, Mapping):
+        raise InputError(f"{who} must return a mapping of keys to values, got {value!r}")
+    for key, entry in value.items():
+        _check_entry(who, key, entry)
+    return value
+
+
+def _check_entry(who: str, key: object, entry: object) -> None:
+    if not isinstance(key, str):
+        raise InputError(f"{who}: keys must be words, got {key!r}")
+    if isinstance(entry, Mapping):
+        for inner, value in entry.items():
+            _check_entry(who, f"{key}.{inner}", value)
+    elif isinstance(entry, float | int):
+        if not math.isfinite(entry):
+            raise InputError(f"{who}: {key} must be a finite number, or None where it is undefined; got {entry!r}")
+    elif entry is not None and not isinstance(entry, str):
+        raise InputError(f"{who}: {key} must be None, a word, a finite number or a mapping of such; got {entry!r}")
+
+
+def _of_type(who: str, value: object, kind: type[T]) -> T:
+    if not isinstance(value, kind):
+        raise InputError(f"{who} must be of type fogsim.values.{kind.__name__}, got {value!r}")
+    return value
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def _check_number(who: str, field: str, value: float, hint: str) -> None:
+    if not (_is_number(value) and math.isfinite(value) and value >= 0.0):
+        raise InputError(f"{who}: {field} must be a finite number of at least 0{hint}; got {value!r}")
+
+
+def _check_speed(who: str, field: str, speed: float) -> None:
+    if not (_is_number(speed) and speed >= 0.0):
+        raise InputError(f"{who}: {field} must be at least 0 [m/s], or inf for no advice; got {speed!r}")

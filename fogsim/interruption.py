@@ -4,6 +4,7 @@ import contextlib
 import math
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -18,6 +19,8 @@ ENDING_TIME = 3.0
 
 _PATIENCE = 1.5
 """Time after which a signal whose exception was lost, as in a destructor, comes again [s]."""
+
+_AT_ONCE = 0.01
 
 _Handler = Callable[[int, FrameType | None], object]
 
@@ -62,7 +65,15 @@ class ProgramSignals:
     def listen(self) -> None:
         """Begin; signals that are ignored stay so."""
         signal.signal(signal.SIGALRM, self._lost)
+        sys.unraisablehook = self._note_unraisable
         _handle_signals(self._raise)
+
+    def _note_unraisable(self, unraisable: "sys.UnraisableHookArgs") -> None:
+        """Have a signal come again at once whose exception a destructor or a library could not hand on."""
+        if self.last is None or not issubclass(unraisable.exc_type, KeyboardInterrupt):
+            sys.__unraisablehook__(unraisable)
+        else:
+            signal.setitimer(signal.ITIMER_REAL, _AT_ONCE, _PATIENCE)
 
     def _lost(self, _: int, __: FrameType | None) -> None:
         if self.last is not None:

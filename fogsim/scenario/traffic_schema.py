@@ -137,6 +137,13 @@ class Traffic(Section):
     """The ego has arrived when it is this near to the end of its route."""
 
     @model_validator(mode="after")
+    def _no_gap_to_itself(self) -> Self:
+        for place, event in enumerate(self.events):
+            if event.vehicle == self.ego and event.at_gap_to_ego_m is not None:
+                raise ValueError(f"events.{place}.at_gap_to_ego_m: {event.vehicle!r} is the ego itself")
+        return self
+
+    @model_validator(mode="after")
     def _one_source(self) -> Self:
         beside = [key for key in ("net", "routes", "additional") if getattr(self, key)]
         if self.config is not None and beside:

@@ -213,11 +213,13 @@ class Script:
         )
 
     def _orders(self, situation: Situation) -> dict[str, Order]:
-        orders = {}
+        orders: dict[str, Order] = {}
         for event, since in list(self._braking.items()):
             over = situation.time - since >= event.hold
             if event.vehicle in situation.present:
-                orders[event.vehicle] = (math.inf if over else event.to_speed, event.deceleration)
+                order = (math.inf if over else event.to_speed, event.deceleration)
+                # Of several that hold a vehicle at once the lowest speed counts, and none frees it from another.
+                orders[event.vehicle] = min(order, orders.get(event.vehicle, order), key=lambda o: o[0])
             if over or event.vehicle not in situation.present:
                 del self._braking[event]
         return orders

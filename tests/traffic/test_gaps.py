@@ -8,6 +8,8 @@ from pathlib import Path
 import libsumo
 import pytest
 
+from fogsim.errors import InputError
+from fogsim.scenario import load_scenario
 from fogsim.traffic import BrakeEvent, LampFailureEvent, Trigger, libsumo_traffic
 from fogsim.traffic.events import Script, Situation
 from fogsim.traffic.gaps import GapToEgo, signed_gap
@@ -107,3 +109,19 @@ def test_lamps_fail_at_sixty_metres_from_bumper_to_bumper() -> None:
     finally:
         traffic.close()
     assert gaps[-1] == pytest.approx(60.0, abs=1.5)
+
+
+def test_of_two_events_that_brake_a_vehicle_the_lower_speed_counts_until_both_are_over() -> None:
+    events = [
+        BrakeEvent("a", Trigger(at_time=1.0), to_speed=5.0, hold=4.0),
+        BrakeEvent("a", Trigger(at_time=0.0), to_speed=10.0, hold=9.0),
+    ]
+    script = Script(events)
+    wanted = [script.play(Situation(t, {"a"}, lambda _: 0.0, lambda _: None)).orders.get("a") for t in range(11)]
+    assert [o and o[0] for o in wanted] == [10.0, *[5.0] * 4, *[10.0] * 4, math.inf, None]
+
+
+def test_the_ego_has_no_gap_to_itself() -> None:
+    event = "traffic.events=[{kind: lamps_fail, vehicle: ego, at_gap_to_ego_m: 5}]"
+    with pytest.raises(InputError, match=r"events\.0\.at_gap_to_ego_m: 'ego' is the ego itself"):
+        load_scenario("motorway_fog_bank", [event])

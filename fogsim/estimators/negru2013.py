@@ -178,7 +178,7 @@ class Negru2013:
             return road, linear_pixels(road.level, self._camera)
         # A band may lie in the middle only: the verges would but cost time.
         centre, reach = self._camera.principal_point[0], max(MIDDLE * self._camera.width, LEAST_MIDDLE)
-        columns = max(round(centre - reach), 0), min(round(centre + reach) + 1, self._camera.width)
+        columns = max(math.ceil(centre - reach), 0), min(math.floor(centre + reach) + 1, self._camera.width)
         road = road_image(image, self._camera, self._told, columns)
         pixels = linear_pixels(road.level, self._camera)
         lowest = above_bonnet(pixels, self._camera, road.airlight)

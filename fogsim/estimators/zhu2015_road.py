@@ -161,7 +161,8 @@ def _hide(region: NDArray[np.uint8], road: RoadImage, camera: Camera, free: floa
         return
     foot = math.ceil(camera.horizon_row + camera.row_distance / free) - road.first_row
     half = HALF_VEHICLE * camera.focal_length / free
-    left, right = max(int(camera.principal_point[0] - half), 0), max(int(camera.principal_point[0] + half) + 1, 0)
+    middle = camera.principal_point[0]
+    left, right = max(math.ceil(middle - half), 0), max(math.floor(middle + half) + 1, 0)
     region[: max(foot, 0), left:right] = 0
 
 

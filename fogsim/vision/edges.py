@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.vision import kernels
-from fogsim.vision.median import median, row_medians
+from fogsim.vision.median import columns_apart, median, row_medians
 
 Image = NDArray[np.float32]
 
@@ -120,11 +120,16 @@ class EdgeDetector:
         slope = np.zeros(luminance.shape[0], np.float32)
         if fog_slope is not None:
             # Fog over a dark road brightens upward, so dI/dv is negative.
-            slope = np.clip(row_medians(down[:, :: self._of_row]), -fog_slope, 0.0).astype(np.float32)
+            some = down[:, columns_apart(down.shape[1], self._of_row)]
+            slope = np.clip(row_medians(some), -fog_slope, 0.0).astype(np.float32)
         kernels.levelled_gradient(across, down, slope, self._steps, *self._fixed)
         high = max(EDGE_FACTOR * _median_size(self._gradient, self._of_road), MIN_GRADIENT)
         low_step, high_step = 0.5 * high * self._steps, high * self._steps
         cv2.Canny(*self._fixed, low_step, high_step, edges=self._pixels, L2gradient=True)
+        # Of two neighbours of equal gradient OpenCV takes the left one: of a mirrored image the other one.
+        mirrored = [np.ascontiguousarray(fixed[:, ::-1]) for fixed in (-self._fixed[0], self._fixed[1])]
+        found = cv2.Canny(mirrored[0], mirrored[1], low_step, high_step, L2gradient=True)
+        np.bitwise_or(self._pixels, found[:, ::-1], out=self._pixels)
         return Edges(self._pixels, high, self._gradient)
 
     def _make_room(self, shape: tuple[int, ...]) -> None:
@@ -160,5 +165,5 @@ def _sobel(image: Image, across: Image, down: Image) -> None:
 
 def _median_size(gradient: Gradient, step: int) -> float:
     """Median size of the gradient in the lower half."""
-    lower = slice(gradient.across.shape[0] // 2, None, step)
-    return median(np.hypot(gradient.across[lower, ::step], gradient.down[lower, ::step]))
+    lower, columns = slice(gradient.across.shape[0] // 2, None, step), columns_apart(gradient.across.shape[1], step)
+    return median(np.hypot(gradient.across[lower, columns], gradient.down[lower, columns]))

@@ -1,7 +1,7 @@
 """Where the horizon is in the image, and how surely."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import cv2
@@ -84,6 +84,13 @@ def levelled(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera) -> N
     """
     if camera.roll == 0.0:
         return image
+    if camera.roll < 0.0:
+        # OpenCV rounds coordinates downward: so a mirrored image is the mirror image of what an image becomes.
+        u0, v0 = camera.principal_point
+        other = replace(camera, roll=-camera.roll, principal_point=(camera.width - 1 - u0, v0))
+        turned: NDArray[Any] = np.ascontiguousarray(image[:, ::-1])
+        upright: NDArray[Any] = np.ascontiguousarray(levelled(turned, other)[:, ::-1])
+        return upright
     # Positive roll turns the right side down, and OpenCV counts angles counterclockwise: the same angle undoes it.
     turn = cv2.getRotationMatrix2D(camera.principal_point, math.degrees(camera.roll), 1.0)
     size = (camera.width, camera.height)

@@ -150,16 +150,21 @@ def column_tops(region: NDArray[np.uint8], hole: int) -> NDArray[np.int64]:
 def best_run(tops: NDArray[np.int64], top: int, enough: int, centre: float) -> tuple[int, int]:
     """First column and width of the widest run of columns that reach up to row `top` or higher.
 
-    Width beyond `enough` does not count; of equals the run nearest to column `centre` is taken.
+    Width beyond `enough` does not count; of equals the run nearest to column `centre` is taken, of equally near ones
+    the wider one, and then the one whose columns reach higher.
     """
-    best_start, best_width, best_offset, start = 0, 0, np.inf, 0
+    best_start, best_width, best_offset, best_reach, start = 0, 0, np.inf, 0, 0
     for col in range(tops.size + 1):
         if col < tops.size and tops[col] <= top:
             continue
         counted = min(col - start, enough)
         offset = max(start - centre, centre - (col - 1), 0.0)
-        if counted > min(best_width, enough) or (counted == min(best_width, enough) and offset < best_offset):
-            best_start, best_width, best_offset = start, col - start, offset
+        better, equal = counted > min(best_width, enough), counted == min(best_width, enough)
+        if better or (equal and offset <= best_offset):
+            reach = tops[start:col].sum()
+            nearer = better or offset < best_offset
+            if nearer or col - start > best_width or (col - start == best_width and reach < best_reach):
+                best_start, best_width, best_offset, best_reach = start, col - start, offset, reach
         start = col + 1
     return best_start, best_width
 

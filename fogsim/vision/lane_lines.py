@@ -96,12 +96,13 @@ def hough_lines(
     lower = np.ascontiguousarray(edges[first_row:])
     threshold = max(LEAST_PIXELS, lower.shape[0] // 12)
     found = []
+    # OpenCV's angle is that of the normal: 0 for an upright line, π/2 for one along the rows.
+    low, high = 0.5 * math.pi - steepest_angle, 0.5 * math.pi - lowest_angle
     for side in HALVES:
-        # OpenCV's angle is that of the normal: 0 for an upright line, π/2 for one along the rows.
-        low, high = 0.5 * math.pi - steepest_angle, 0.5 * math.pi - lowest_angle
-        span = (low, high) if side > 0 else (math.pi - high, math.pi - low)
+        # Its cells are not the same to both sides: the lines of the other half are sought in the mirrored image.
+        half = lower if side > 0 else np.ascontiguousarray(lower[:, ::-1])
         peaks: NDArray[Any] | None = cv2.HoughLinesWithAccumulator(
-            lower, 1.0, math.radians(1.0), threshold, min_theta=span[0], max_theta=span[1]
+            half, 1.0, math.radians(1.0), threshold, min_theta=low, max_theta=high
         )
         for radius, angle, votes in [] if peaks is None else peaks.reshape(-1, 3)[:most]:
             cosine, sine = math.cos(float(angle)), math.sin(float(angle))
@@ -109,6 +110,8 @@ def hough_lines(
                 continue
             slope = -sine / cosine
             offset = float(radius) / cosine - slope * first_row
+            if side < 0:
+                slope, offset = -slope, edges.shape[1] - 1 - offset
             found.append(LaneLine(slope, offset, int(votes), 0.0, 0.0))
     return found
 

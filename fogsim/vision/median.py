@@ -1,9 +1,27 @@
 """Medians and quantiles of few numbers, without the checks of numpy's, which take longer than the search."""
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+
+@lru_cache(maxsize=32)
+def columns_apart(width: int, step: int) -> NDArray[np.int64]:
+    """Columns some way apart, from both sides of an image inward: of a mirrored image the same pixels.
+
+    Parameters
+    ----------
+    width : int
+        Columns of the image.
+    step : int
+        Columns from one to the next.
+    """
+    left = np.arange(0, (width + 1) // 2, step, dtype=np.int64)
+    columns = np.unique(np.concatenate((left, width - 1 - left)))
+    columns.flags.writeable = False
+    return columns
 
 
 def median(values: NDArray[np.floating[Any]]) -> float:

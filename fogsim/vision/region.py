@@ -90,5 +90,9 @@ def crossing_band(
     if width == 0:
         return None
     kept = min(width, max_width)
-    left = min(max(round(centre - 0.5 * (kept - 1)), first), first + width - kept)
+    left = centre - 0.5 * (kept - 1)
+    if first < left < first + width - kept and left % 1.0 == 0.5:
+        # Between two columns: one less lies in the middle.
+        kept, left = kept - 1, left + 0.5
+    left = min(max(round(left), first), first + width - kept)
     return Band(left, left + kept - 1, top, bottom)

@@ -11,7 +11,7 @@ from fogsim.values.camera import Camera
 from fogsim.vision.daylight import lit_by_lamps
 from fogsim.vision.horizon import Horizon, levelled
 from fogsim.vision.luminance import linear_luminance
-from fogsim.vision.median import median, quantile
+from fogsim.vision.median import columns_apart, median, quantile
 
 MIN_COLS, MIN_ROWS = 32, 16
 """[px] A road narrower than this, or lower below its horizon, shows no curve."""
@@ -109,7 +109,7 @@ def road_image(
     left, right = columns or (0, cols)
     luminance = linear_luminance(level[first:, left:right], camera.response, camera.bits)
     top = min(first, max(0, sky_end - round(SKY_HEIGHT * camera.focal_length)))
-    sky: NDArray[Any] = np.ascontiguousarray(level[top:sky_end:2, ::4])
+    sky: NDArray[Any] = np.ascontiguousarray(level[top:sky_end:2, columns_apart(cols, 4)])
     above = linear_luminance(sky, camera.response, camera.bits)
     airlight = quantile(above, 0.9)
     seed = median(luminance[-1])

@@ -170,13 +170,13 @@ def vote(
     table = cells.reshape(KINDS * offsets.size, slopes.size)
     bound, place = np.full(table.shape[0], np.iinfo(np.int16).max, np.int16), np.zeros(table.shape[0], np.int64)
     for line in range(most):
-        best = int(np.argmax(bound))
+        best = _middle_argmax(bound, offsets.size)
         while True:
-            place[best] = np.argmax(table[best])
+            place[best] = _middle_argmax(table[best], slopes.size)
             if table[best, place[best]] == bound[best]:
                 break
             bound[best] = table[best, place[best]]
-            best = int(np.argmax(bound))
+            best = _middle_argmax(bound, offsets.size)
         if bound[best] < least:
             return lines[:line].copy(), kinds[:line].copy()
         which = best // offsets.size
@@ -189,6 +189,21 @@ def vote(
                 free[i] = False
                 _cast(cells[which], across[i], below[i], offsets, slopes, -1)
     return lines, kinds
+
+
+@kernel
+def _middle_argmax(values: NDArray[np.int16], size: int) -> int:
+    """Place of the largest of numbers that come in groups of `size`: of equals that nearest to its group's middle.
+
+    Mirrored images then have mirrored lines.
+    """
+    best, most, aside = 0, values[0] - 1, 0
+    for i in range(values.size):
+        if values[i] >= most:
+            here = abs(2 * (i % size) - size + 1)
+            if values[i] > most or here < aside:
+                best, most, aside = i, values[i], here
+    return best
 
 
 @kernel

@@ -43,13 +43,16 @@ def lying(place: NDArray[np.float64], step: int) -> NDArray[np.bool_]:
     for i in range(count):
         while below < count and place[below, 1] <= place[i, 1]:
             below += 1
+        nearest, near = -1, np.inf
         for j in range(below, count):
-            if place[j, 1] > place[i, 1] + (1 + MISSED) * step:
+            apart = abs(place[j, 0] - place[i, 0])
+            if place[j, 1] > (place[i, 1] + (1 + MISSED) * step if nearest < 0 else place[nearest, 1]):
                 break
-            if first[j] == j and abs(place[j, 0] - place[i, 0]) <= NEXT:
-                first[j], last[first[i]] = first[i], j
-                points[first[i]] += 1
-                break
+            if first[j] == j and apart <= NEXT and apart < near:
+                nearest, near = j, apart
+        if nearest >= 0:
+            first[nearest], last[first[i]] = first[i], nearest
+            points[first[i]] += 1
     free = np.ones(count, np.bool_)
     for i in range(count):
         top, foot = first[i], last[first[i]]

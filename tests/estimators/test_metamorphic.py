@@ -1,4 +1,4 @@
-"""What holds for every registered method whatever the picture: scale, mirror, crop, tilt, gain, pixel depth, memory.
+"""What holds for every registered method whatever the picture: scale, crop, tilt, gain, pixel depth, memory.
 
 A new method is tested by itself, because the registry is what is iterated. It must be able to tell from the drive of
 this file (day, flat road with marks, a tracked vehicle that draws away, V = 100 m), or be named in `NOT_BY_DAY`.
@@ -130,14 +130,6 @@ def test_visibility_scales_with_the_mount_height(drive, method):
         return
     assert double.valid
     assert double.visibility == pytest.approx(2 * single.visibility, rel=0.05)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_mirroring_changes_nothing(drive, reference, method):
-    """Left for right: the same pixels, another order of candidates (bands, lines, seeds) of equal right: 3 %."""
-    found = last(method, [image[:, ::-1] for image in drive()])
-    assert found.valid
-    assert found.visibility == pytest.approx(reference[method].visibility, rel=0.03)
 
 
 @pytest.mark.parametrize("method", METHODS)

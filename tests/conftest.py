@@ -1,6 +1,7 @@
 """What tests of several folders use."""
 
 import contextlib
+import signal
 import socket
 import subprocess
 import sys
@@ -43,3 +44,9 @@ def sumo_process(free_port: Callable[[], int]) -> SumoProcess:
                 process.kill()
 
     return start
+
+
+def pytest_configure() -> None:
+    """Give children their Ctrl-C back: a job in the background of a shell's script starts with it ignored."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)

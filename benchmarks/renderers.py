@@ -47,8 +47,8 @@ def soak(renderer: str, renderers: int, frames: int) -> dict[str, Any]:
     """One record."""
     network = read_network()
     scene = build_scene(network, signs_beside(network.route), np.random.default_rng(1))
-    cameras = [build.camera(scenario(renderer, "day", size)) for size in SIZES]
-    cases = [Case((renderer, "day", size), network) for size in SIZES]
+    cameras = [build.camera(scenario(renderer, "day", size, 1)) for size in SIZES]
+    cases = [Case((renderer, "day", size, 1), network) for size in SIZES]
     vehicles, pose = vehicle_batches(cases[0].traffic[0], 0), cases[0].poses[0]
 
     def make_and_close(_: int) -> None:

@@ -47,6 +47,11 @@ def sumo_process(free_port: Callable[[], int]) -> SumoProcess:
 
 
 def pytest_configure() -> None:
-    """Give children their Ctrl-C back: a job in the background of a shell's script starts with it ignored."""
+    """Let signals reach children also where they are ignored here: in the background of a script, and by nohup.
+
+    What is ignored is so in children too; a handler is not, even one that does nothing.
+    """
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+    if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+        signal.signal(signal.SIGHUP, lambda *_: None)

@@ -167,8 +167,7 @@ def test_any_sumo_configuration_runs_with_a_chosen_ego(tmp_path: Path) -> None:
 def test_an_ego_that_a_configuration_does_not_have_is_told(tmp_path: Path) -> None:
     done = fogsim("run", "--sumocfg", TOWN, "--ego", "18", "--visibility", "120", cwd=tmp_path)
     assert done.returncode == 2
-    assert "the ego '18' did not appear" in done.stderr
-    assert "veh18" in done.stderr
+    assert "traffic.ego: there is no vehicle '18' in grid.trips.xml; did you mean 'veh18'?" in done.stderr
     assert "Traceback" not in done.stderr
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from fogsim.traffic.configuration import configured_demand
 from fogsim.traffic.xml_stream import UNREADABLE, read_elements
 
-MOST_BYTES = 200_000_000
+MOST_BYTES = 50_000_000
 """Bytes of files, unpacked, after which nothing is claimed about a demand."""
 
 MOST_NAMES = 10_000
@@ -177,6 +177,8 @@ class _DemandReader:
         self._drive(self._named_routes.get(attributes.get("route", "")))
 
     def _take_route(self, attributes: Mapping[str, str]) -> None:
+        if "id" not in attributes and not self._inside[0]:
+            return
         edges = tuple(attributes.get("edges", "").split())
         if edges and "repeat" not in attributes:
             if "id" in attributes:

@@ -117,7 +117,7 @@ def attach(
     if scenario is not None:
         # There is a frame at each step that the simulation makes, whatever the scenario's own would be.
         clocks = _clocks(step_length(api), scenario.clocks.decision_period_s)
-        scenario = override(scenario, [*clocks, *fog, *settings])
+        scenario = override(scenario, [*clocks, *fog, *settings], others_add_vehicles=True)
         ego = ego or scenario.traffic.ego
     elif ego is None:
         raise InputError("attach: ego is missing: which vehicle is the ego?")

@@ -62,7 +62,8 @@ def test_a_scenario_that_cannot_start_leaves_nothing_of_its_own(tmp_path: Path, 
     if kept:
         out.mkdir(parents=True)
         (out / "notes.txt").write_text("of the user", encoding="utf-8")
-    scenario = fogsim.load_scenario("motorway_fog_bank", ["traffic.ego=nobody", "traffic.warm_up_limit_s=2"])
+    settings = ["traffic.ego=nobody", "traffic.warm_up_limit_s=2"]
+    scenario = fogsim.load_scenario("motorway_fog_bank", settings, others_add_vehicles=True)
     with pytest.raises(SimulationError, match="nobody"):
         record_run(scenario, 1, out)
     assert [path.name for path in tmp_path.rglob("*")] == (["runs", "out", "notes.txt"] if kept else [])

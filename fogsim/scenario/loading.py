@@ -9,6 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from fogsim.errors import InputError, nearest, shown, suggest
+from fogsim.scenario.demand_check import demand_mistakes
 from fogsim.scenario.document import Document, KeyPath, dotted, read_document
 from fogsim.scenario.locating import SCENARIO_FILE, is_file, is_folder, scenario_file
 from fogsim.scenario.mistakes import tell_mistakes
@@ -25,7 +26,9 @@ DAY = 86_400.0
 """Simulated time within which the ego of a simulation of the user's own must appear [s]."""
 
 
-def load_scenario(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Scenario:
+def load_scenario(
+    name_or_path: str | Path, overrides: Iterable[str] = (), *, others_add_vehicles: bool = False
+) -> Scenario:
     """Load and check a scenario.
 
     Parameters
@@ -34,6 +37,8 @@ def load_scenario(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Sc
         A name in the catalogue, a scenario file, or a folder that holds ``scenario.yaml``.
     overrides : iterable of str
         ``key.path=value`` each, put in place of the file's values.
+    others_add_vehicles : bool
+        True if vehicles may come that are not in the route files, as in a simulation that has other clients.
 
     Returns
     -------
@@ -46,10 +51,12 @@ def load_scenario(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Sc
         If anything does not fit; one line for each mistake, with file, line, key path, value and what is allowed.
     """
     path = scenario_file(name_or_path)
-    return _checked(read_document(path), overrides, path.parent)
+    return _checked(read_document(path), overrides, path.parent, closed_demand=not others_add_vehicles)
 
 
-def scenario_from_config(config: Path, ego: str, overrides: Iterable[str] = ()) -> Scenario:
+def scenario_from_config(
+    config: Path, ego: str, overrides: Iterable[str] = (), *, others_add_vehicles: bool = False
+) -> Scenario:
     """Make a scenario of a SUMO configuration.
 
     Parameters
@@ -60,6 +67,8 @@ def scenario_from_config(config: Path, ego: str, overrides: Iterable[str] = ()) 
         Id of the vehicle that becomes the ego.
     overrides : iterable of str
         ``key.path=value`` each; the fog must be among them.
+    others_add_vehicles : bool
+        As of `load_scenario`.
 
     Raises
     ------
@@ -67,7 +76,8 @@ def scenario_from_config(config: Path, ego: str, overrides: Iterable[str] = ()) 
         If anything does not fit.
     """
     traffic = {"config": config.name, "ego": ego, "warm_up_limit_s": DAY}
-    return _checked(Document(config, _bare(config.stem, traffic), {}), overrides, config.parent)
+    document = Document(config, _bare(config.stem, traffic), {})
+    return _checked(document, overrides, config.parent, closed_demand=not others_add_vehicles)
 
 
 def attached_scenario(ego: str, overrides: Iterable[str]) -> Scenario:
@@ -93,7 +103,7 @@ def _bare(name: str, traffic: dict[str, Any]) -> dict[str, Any]:
     return {"name": re.sub(r"[^A-Za-z0-9_.-]", "_", name), "duration_s": LONG_RUN, "traffic": traffic}
 
 
-def override(scenario: Scenario, overrides: Iterable[str]) -> Scenario:
+def override(scenario: Scenario, overrides: Iterable[str], *, others_add_vehicles: bool = False) -> Scenario:
     """Copy of a scenario with single keys changed.
 
     Parameters
@@ -102,6 +112,8 @@ def override(scenario: Scenario, overrides: Iterable[str]) -> Scenario:
         The scenario.
     overrides : iterable of str
         ``key.path=value`` each.
+    others_add_vehicles : bool
+        As of `load_scenario`.
 
     Raises
     ------
@@ -109,7 +121,7 @@ def override(scenario: Scenario, overrides: Iterable[str]) -> Scenario:
         If the changed scenario does not fit.
     """
     document = Document(scenario.directory / SCENARIO_FILE, resolved(scenario), {})
-    return _checked(document, overrides, scenario.directory)
+    return _checked(document, overrides, scenario.directory, closed_demand=not others_add_vehicles)
 
 
 def resolved(scenario: Scenario) -> dict[str, Any]:
@@ -126,7 +138,13 @@ def _without_infinities(value: Any) -> Any:
     return "inf" if value == math.inf else value
 
 
-def _checked(document: Document, overrides: Iterable[str], folder: Path, named_files: bool = True) -> Scenario:
+def _checked(
+    document: Document,
+    overrides: Iterable[str],
+    folder: Path,
+    named_files: bool = True,
+    closed_demand: bool = True,
+) -> Scenario:
     if isinstance(overrides, str):
         raise InputError(f"overrides must be a list of key.path=value each, got the text {shown(overrides)}")
     overrides = tuple(overrides)
@@ -145,6 +163,9 @@ def _checked(document: Document, overrides: Iterable[str], folder: Path, named_f
     if mistakes:
         raise InputError("\n".join(mistakes))
     _check_files(document, scenario)
+    unknown = demand_mistakes(document, scenario) if named_files and closed_demand else []
+    if unknown:
+        raise InputError("\n".join(unknown))
     return scenario
 
 

@@ -3,9 +3,11 @@
 import warnings
 
 from fogsim.traffic.attached import AttachedTraffic, step_length
-from fogsim.traffic.configuration import left_out
+from fogsim.traffic.configuration import configured_files, left_out
+from fogsim.traffic.demand import Demand, VehicleRoute, read_configured_demand, read_demand
 from fogsim.traffic.drivers import SPEED_CHOICES, Compliance, DriverSetup
 from fogsim.traffic.events import BrakeEvent, Event, LampFailureEvent, LaneChangeEvent, Trigger
+from fogsim.traffic.net_edges import NetEdges, read_net_edges
 from fogsim.traffic.protocol import Traffic
 from fogsim.traffic.setup import AfterCollision, TrafficSetup
 from fogsim.traffic.sight import DriverSight, FogAccess
@@ -51,17 +53,24 @@ __all__ = [
     "AttachedTraffic",
     "BrakeEvent",
     "Compliance",
+    "Demand",
     "DriverSetup",
     "DriverSight",
     "Event",
     "FogAccess",
     "LampFailureEvent",
     "LaneChangeEvent",
+    "NetEdges",
     "TraciLink",
     "Traffic",
     "TrafficSetup",
     "Trigger",
+    "VehicleRoute",
+    "configured_files",
     "libsumo_traffic",
+    "read_configured_demand",
+    "read_demand",
+    "read_net_edges",
     "step_length",
     "traci_traffic",
 ]

@@ -9,7 +9,10 @@ from fogsim.errors import InputError
 
 _NET = ("net-file", "net", "n")
 _ADDITIONAL = ("additional-files", "additional", "a")
-_FURTHER = ("route-files", "routes", "r", "weight-files", "weights", "w", "lane-weight-files", "load-state")
+_ROUTES = ("route-files", "routes", "r")
+_FURTHER = (*_ROUTES, "weight-files", "weights", "w", "lane-weight-files", "load-state")
+_OPENING = ("load-state", "scale")
+_REROUTING = "device.rerouting"
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +54,46 @@ def configured_files(config: Path) -> tuple[Path, tuple[Path, ...]]:
     if not nets:
         raise InputError(f'{config}: the SUMO configuration names no network (<net-file value="…"/>)')
     return nets[0], _named(config, root, _ADDITIONAL)
+
+
+@dataclass(frozen=True, slots=True)
+class ConfiguredDemand:
+    """Where the vehicles of a SUMO configuration come from.
+
+    Attributes
+    ----------
+    files : tuple of Path
+        Additional files and route files, in the order in which SUMO reads them.
+    is_open : bool
+        Whether there may be vehicles that those files do not name: of a saved state, or copies of a scaled demand.
+    reroutes : bool
+        Whether vehicles look for other ways than those written.
+    """
+
+    files: tuple[Path, ...]
+    is_open: bool
+    reroutes: bool
+
+
+def configured_demand(config: Path) -> ConfiguredDemand:
+    """Where the vehicles of a SUMO configuration come from.
+
+    Parameters
+    ----------
+    config : Path
+        The ``.sumocfg`` file; names in it are relative to its folder.
+
+    Raises
+    ------
+    InputError
+        If it is no SUMO configuration.
+    """
+    root = _root(config)
+    return ConfiguredDemand(
+        files=(*_named(config, root, _ADDITIONAL), *_named(config, root, _ROUTES)),
+        is_open=any(_values(root, _OPENING)),
+        reroutes=any(element.tag.startswith(_REROUTING) for element in root.iter()),
+    )
 
 
 def left_out(config: Path) -> tuple[str, ...]:

@@ -143,6 +143,19 @@ def test_validate_tells_the_good_from_the_bad(tmp_path: Path) -> None:
     assert "fine: motorway_fog_bank" in done.stdout
 
 
+def test_validate_tells_all_that_the_sumo_files_do_not_have(tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(catalogue()["motorway_fog_bank"].parent, tmp_path / "mine"))
+    bad, text = folder / "scenario.yaml", (folder / "scenario.yaml").read_text(encoding="utf-8")
+    for right, wrong in (("ego: ego", "ego: egoo"), ("vehicle: lead", "vehicle: leed")):
+        assert right in text
+        text = text.replace(right, wrong)
+    bad.write_text(text, encoding="utf-8")
+    done = fogsim("validate", str(folder))
+    assert done.returncode == 2
+    for told in ("traffic.ego: there is no vehicle 'egoo'", "traffic.events.0.vehicle: there is no vehicle 'leed'"):
+        assert told in done.stderr
+
+
 def test_any_sumo_configuration_runs_with_a_chosen_ego(tmp_path: Path) -> None:
     """Also one that would listen for clients and take its seed from the clock: it is told, and does neither."""
     config = tmp_path / "mine.sumocfg"
@@ -167,8 +180,7 @@ def test_any_sumo_configuration_runs_with_a_chosen_ego(tmp_path: Path) -> None:
 def test_an_ego_that_a_configuration_does_not_have_is_told(tmp_path: Path) -> None:
     done = fogsim("run", "--sumocfg", TOWN, "--ego", "18", "--visibility", "120", cwd=tmp_path)
     assert done.returncode == 2
-    assert "the ego '18' did not appear" in done.stderr
-    assert "veh18" in done.stderr
+    assert "traffic.ego: there is no vehicle '18' in grid.trips.xml; did you mean 'veh18'?" in done.stderr
     assert "Traceback" not in done.stderr
 
 

@@ -16,7 +16,7 @@ PAGE = (CHECKOUT / "docs" / "plugin.md").read_text(encoding="utf-8")
 Run = Callable[..., "CompletedProcess[str]"]
 
 MISTAKES = [
-    ('"veh18"', '"veh81"', r"SimulationError: the ego 'veh81' did not appear within .*: veh18, veh17"),
+    ('"veh18"', '"veh81"', r"InputError: my/town.sumocfg: traffic.ego: .*no vehicle 'veh81' .*mean 'veh18'"),
     ("town.sumocfg", "toun.sumocfg", r"InputError: my/toun.sumocfg: .*no file 'toun.sumocfg' .*mean 'town.sumocfg'"),
 ]
 

@@ -1,0 +1,129 @@
+"""Whether a scenario's vehicles, roads and fog banks are those of its SUMO files."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from fogsim.errors import nearest, shown, suggest
+from fogsim.scenario.document import Document, KeyPath, dotted
+from fogsim.scenario.schema import Scenario
+from fogsim.scenario.traffic_schema import ChangeLane
+from fogsim.traffic import (
+    Demand,
+    NetEdges,
+    VehicleRoute,
+    configured_files,
+    read_configured_demand,
+    read_demand,
+    read_net_edges,
+)
+
+MOST_SHOWN = 10
+"""Most names that a message lists."""
+
+
+def demand_mistakes(document: Document, scenario: Scenario) -> list[str]:
+    """Say what of a scenario its route files and network can't have, each in one line.
+
+    Nothing is claimed where vehicles may come from elsewhere, ways are not written out, or files are very large.
+
+    Parameters
+    ----------
+    document : Document
+        Where its keys stand.
+    scenario : Scenario
+        The scenario, whose files are there.
+
+    Raises
+    ------
+    InputError
+        If ``traffic.config`` is no SUMO configuration.
+    """
+    named = dict(_named_vehicles(scenario))
+    demand = _demand(scenario, frozenset(named.values()))
+    told = {at: _unknown_vehicle(vehicle, demand) for at, vehicle in named.items() if demand.lacks(vehicle)}
+    edges = _edges(scenario, demand)
+    if edges is not None:
+        places = {vehicle: at for at, vehicle in reversed(named.items())}
+        unfit = {places[v]: _unfit_way(v, demand.routes[v], edges) for v in named.values() if v in demand.routes}
+        told |= {at: text for at, text in unfit.items() if text}
+        told |= _wide_changes(scenario, demand, edges)
+        told |= _banks_beyond(scenario, demand.routes.get(scenario.traffic.ego), edges)
+    return [f"{document.where(at)}: {dotted(at)}: {text}" for at, text in told.items()]
+
+
+def _named_vehicles(scenario: Scenario) -> Iterator[tuple[KeyPath, str]]:
+    traffic = scenario.traffic
+    yield ("traffic", "ego"), traffic.ego
+    yield from ((("traffic", "keep_lane", i), vehicle) for i, vehicle in enumerate(traffic.keep_lane))
+    yield from ((("traffic", "events", i, "vehicle"), event.vehicle) for i, event in enumerate(traffic.events))
+
+
+def _demand(scenario: Scenario, wanted: frozenset[str]) -> Demand:
+    traffic, folder = scenario.traffic, scenario.directory
+    if traffic.config is not None:
+        return read_configured_demand(folder / traffic.config, wanted)
+    return read_demand((folder / path for path in (*traffic.additional, *traffic.routes)), wanted)
+
+
+def _edges(scenario: Scenario, demand: Demand) -> NetEdges | None:
+    """Edges of the network, if anything is to be said about them."""
+    traffic, folder = scenario.traffic, scenario.directory
+    if not demand.routes and not any(isinstance(event, ChangeLane) for event in traffic.events):
+        return None
+    net = configured_files(folder / traffic.config)[0] if traffic.config else folder / (traffic.net or Path())
+    way = demand.routes.get(traffic.ego)
+    return read_net_edges(net, () if way is None else way.edges)
+
+
+def _unknown_vehicle(vehicle: str, demand: Demand) -> str:
+    files = ", ".join(file.name for file in demand.files[:MOST_SHOWN])
+    return f"there is no vehicle {shown(vehicle)} in {files}; {_suggested(vehicle, demand.names)}"
+
+
+def _unfit_way(vehicle: str, way: VehicleRoute, edges: NetEdges) -> str | None:
+    who = f"the vehicle {shown(vehicle)} of {way.file.name}"
+    unknown = [edge for edge in way.edges if edge not in edges.lanes and not edge.startswith(":")]
+    if unknown:
+        edge = unknown[0]
+        return f"{who} drives on edge {shown(edge)}, which the net does not have; {_suggested(edge, edges.lanes)}"
+    there = edges.lanes.get(way.edges[0])
+    if there is not None and way.depart_lane is not None and way.depart_lane >= there:
+        return (
+            f"{who} departs on lane {way.depart_lane} of edge {shown(way.edges[0])}, which has lanes 0 to {there - 1}"
+        )
+    return None
+
+
+def _wide_changes(scenario: Scenario, demand: Demand, edges: NetEdges) -> dict[KeyPath, str]:
+    """Changes over more lanes than any road on the vehicle's way has."""
+    told: dict[KeyPath, str] = {}
+    for i, event in enumerate(scenario.traffic.events):
+        way = demand.routes.get(event.vehicle)
+        on = [edge for edge in (way.edges if way else edges.lanes) if edge in edges.lanes]
+        widest = max((edges.lanes[edge] for edge in on), default=None)
+        if isinstance(event, ChangeLane) and widest is not None and abs(event.lanes) >= widest:
+            where = f"on the way of {shown(event.vehicle)}" if way else "of the net"
+            told["traffic", "events", i, "lanes"] = (
+                f"the widest road {where} has lanes 0 to {widest - 1}; got {event.lanes}"
+            )
+    return told
+
+
+def _banks_beyond(scenario: Scenario, way: VehicleRoute | None, edges: NetEdges) -> Mapping[KeyPath, str]:
+    """Banks that begin beyond the end of the ego's route, where no wind brings them in."""
+    if way is None or scenario.fog.wind is not None or not all(edges.axes.get(edge) for edge in way.edges):
+        return {}
+    length = edges.route_length(way.edges)
+    return {
+        ("fog", "banks", i, "start_m"): f"the bank lies beyond the ego's route, which is {length:.0f} m long; "
+        f"got {bank.start_m:g}"
+        for i, bank in enumerate(scenario.fog.banks)
+        if bank.start_m - bank.edge_m > length
+    }
+
+
+def _suggested(name: str, known: tuple[str, ...] | Mapping[str, int]) -> str:
+    """The nearest of many names, and some of the others."""
+    near = nearest(name, known)
+    some = [*([near] if near else []), *(one for one in known if one != near)][:MOST_SHOWN]
+    return suggest(name, some) + (f", … ({len(known)} in all)" if len(known) > len(some) else "")

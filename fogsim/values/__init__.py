@@ -13,6 +13,7 @@ from fogsim.values.road import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea, 
 from fogsim.values.scene import Batch, Mesh, Scene, Surface
 from fogsim.values.step import Ending, Step, Truth
 from fogsim.values.traffic import Collision, Leader, TrafficSnapshot, TrafficState
+from fogsim.values.unplayed import Reason, Unplayed, UnplayedEvent
 
 __all__ = [
     "Batch",
@@ -43,6 +44,7 @@ __all__ = [
     "Mesh",
     "Observation",
     "PavedArea",
+    "Reason",
     "Response",
     "RoadNetwork",
     "Scene",
@@ -56,6 +58,8 @@ __all__ = [
     "TrafficSnapshot",
     "TrafficState",
     "Truth",
+    "Unplayed",
+    "UnplayedEvent",
     "View",
     "fog_category",
 ]

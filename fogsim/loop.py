@@ -52,12 +52,27 @@ def run(scenario: Scenario, seed: int = 0, traffic: Traffic | None = None) -> Ge
         while step.ending is None:
             step = loop.advance(policy.decide(step))
             yield step
-    if step.unplayed and (step.ending in _WHOLE_WAY or step.unplayed.is_final):
-        warnings.warn(f"{scenario.name}: not played: {step.unplayed}", UnplayedWarning, stacklevel=2)
+    warn_of_unplayed(scenario, step)
 
 
-_WHOLE_WAY = (Ending.ARRIVED, Ending.LEFT_NETWORK)
-"""Endings after which a run has no more to come."""
+def warn_of_unplayed(scenario: Scenario, last: Step) -> None:
+    """Warn of what was not played in a run that is over, if a longer one would not have played it either.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What was run.
+    last : Step
+        The last step.
+
+    Warns
+    -----
+    UnplayedWarning
+        If the ego came to the end of its way, or an event's vehicle had left before, or a lane was not there.
+    """
+    came_to_end = last.ending in (Ending.ARRIVED, Ending.LEFT_NETWORK)
+    if last.unplayed and (came_to_end or last.unplayed.is_final):
+        warnings.warn(f"{scenario.name}: not played: {last.unplayed}", UnplayedWarning, stacklevel=3)
 
 
 class AdvisedDriving:

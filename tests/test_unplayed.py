@@ -1,12 +1,15 @@
 """A run tells at its end what of its script was not played."""
 
 import contextlib
+import json
 from pathlib import Path
 
 import pytest
 
 import fogsim
+from fogsim.cli import app
 from fogsim.errors import UnplayedWarning
+from fogsim.recording import record_run
 from fogsim.scenario import Scenario, scenario_from_config
 from fogsim.values import Ending, Reason
 
@@ -45,3 +48,26 @@ def test_a_run_that_arrives_warns_of_all_that_was_not_played() -> None:
 def test_a_run_that_its_user_ends_warns_of_nothing() -> None:
     with contextlib.closing(fogsim.run(town(f"traffic.events=[{TOO_FAR}]"), seed=1)) as steps:
         assert not next(steps).unplayed
+
+
+def test_a_recorded_run_is_whole_before_it_warns(tmp_path: Path) -> None:
+    with pytest.raises(UnplayedWarning):  # warnings are errors here
+        record_run(town(f"traffic.events=[{TOO_FAR}]", "traffic.keep_lane=[veh99]"), 1, tmp_path, recorders=["report"])
+    manifest = json.loads((tmp_path / "manifest.json").read_text(encoding="utf-8"))
+    event = f"traffic.events.0 (change_lane of {EGO} at_time_s=0): there was no such lane"
+    assert (manifest["status"], manifest["message"]) == ("complete", "")
+    assert (manifest["events_not_fired"], manifest["vehicles_never_seen"]) == ([event], ["veh99"])
+    report = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert f"Not played: {event}" in report
+    assert "Not played: vehicle &#x27;veh99&#x27; was never on the road" in report
+
+
+def test_the_command_tells_each_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    small = [part for setting in SMALL[:2] for part in ("--set", setting)]
+    arguments = ["run", "--sumocfg", str(GRID), "--ego", EGO, "--visibility", "120", "--out", str(tmp_path), *small]
+    events = f"traffic.events=[{TOO_FAR}, {LATE}]"
+    app([*arguments, "--set", "duration_s=1", "--set", events, "--no-video", "--no-report"], standalone_mode=False)
+    told = capsys.readouterr()
+    assert told.out.count("not played: ") == 2
+    assert f"not played: traffic.events.1 (brake of {EGO} at_time_s=300): its time, position or gap was" in told.out
+    assert "no such lane" not in told.err

@@ -51,7 +51,12 @@ class Unplayed:
         return bool(self.events or self.vehicles)
 
     def __str__(self) -> str:
-        return "; ".join([*map(str, self.events), *(f"vehicle {v!r} was never on the road" for v in self.vehicles)])
+        return "; ".join(self.lines)
+
+    @property
+    def lines(self) -> list[str]:
+        """One line on each event and each vehicle."""
+        return [*map(str, self.events), *(f"vehicle {v!r} was never on the road" for v in self.vehicles)]
 
     @property
     def is_final(self) -> bool:

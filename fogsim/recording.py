@@ -20,6 +20,7 @@ from fogsim.recorders import (
     Status,
     write_sign_map,
 )
+from fogsim.returned import checked_recorder
 from fogsim.scenario import Scenario, build, resolved
 from fogsim.traffic.configuration import configured_files
 from fogsim.traffic.network import read_net
@@ -104,7 +105,8 @@ def record_run(
     Raises
     ------
     InputError
-        If `out` is a file, cannot be made, is written by another process, or holds results and must not be overwritten.
+        If `out` is a file, cannot be made, is written by another process, or holds results and must not be overwritten,
+        or if a recorder of the user's own lacks a method.
     UnknownNameError
         If there is no such recorder.
     MissingDependencyError
@@ -289,7 +291,7 @@ def _open(
         summary=lambda: metrics.summary().values,
         meanings=metrics.summary().meanings,
     )
-    return {name: RECORDERS[name](information) for name in recorders}
+    return {name: checked_recorder(name, RECORDERS[name](information)) for name in recorders}
 
 
 def record_signs(scenario: Scenario, out: Path, *, overwrite: bool = False) -> SignMap:

@@ -1,7 +1,7 @@
 """Traffic by SUMO, wherever it runs."""
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Concatenate, ParamSpec, TypeVar
 
@@ -262,9 +262,12 @@ class SumoTraffic:
 
     def unplayed(self) -> Unplayed:
         """What of the script has not been played; see `Traffic.unplayed`."""
+        return self._unplayed(())
+
+    def _unplayed(self, seen_before: Iterable[str]) -> Unplayed:
         run = self._running
         seen, _ = run.roster.newcomers(0)
-        return run.script.unplayed(frozenset(seen), run.roster.present, self._setup.keep_lane)
+        return run.script.unplayed({*seen, *seen_before}, run.roster.present, self._setup.keep_lane)
 
     def _release(self) -> None:
         """Give every vehicle on the road back what was changed about it: it drives and sees by itself again."""

@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from fogsim.atmosphere import FogNow
-from fogsim.errors import InputError, SimulationError
+from fogsim.errors import InputError, SimulationError, UnplayedWarning
 from fogsim.loop import AdvisedDriving
 from fogsim.onboard import OnBoard
 from fogsim.randomness import spawn_streams
@@ -153,6 +153,9 @@ class AttachedSession:
     """
 
     def __init__(self, scenario: Scenario, traffic: AttachedTraffic, drivers: bool, seed: int) -> None:
+        self._name = scenario.name
+        # A scenario for another ego gives fog and camera; whom else it names drives in another simulation.
+        self._tells_unplayed = scenario.traffic.ego == traffic.ego
         self._traffic = traffic
         self._drivers = drivers
         self._seed = seed
@@ -246,7 +249,16 @@ class AttachedSession:
         -----
         UserWarning
             If the ego was never on the road: its id may be wrong.
+        UnplayedWarning
+            If events were not played, or vehicles of the script were never there; not if an error ended the session, or
+            the scenario is one for another ego.
         """
+        tells = self._tells_unplayed and self._started and not self._closed
+        self._end()
+        if tells and (unplayed := self._traffic.unplayed()):
+            warnings.warn(f"{self._name}: not played: {unplayed}", UnplayedWarning, stacklevel=2)
+
+    def _end(self) -> None:
         if not self._closed and not self._started and self._looked:
             warnings.warn(self._traffic.absence(), stacklevel=2)
         if not self._closed and self._started:
@@ -262,4 +274,7 @@ class AttachedSession:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.close()
+        if error is None:
+            self.close()
+        else:
+            self._end()

@@ -16,7 +16,7 @@ from rich.table import Table
 from fogsim import __version__
 from fogsim.cli_estimate import BAD_INPUT, estimate_command, tell_remarks
 from fogsim.cli_reproduce import reproduce_command
-from fogsim.errors import FogSimError, InputError
+from fogsim.errors import FogSimError, InputError, UnplayedWarning
 from fogsim.interruption import ProgramSignals, leave
 from fogsim.printing import escape
 from fogsim.values import Step
@@ -123,7 +123,9 @@ def run_command(
     loaded = _scenario(scenario, sumocfg, ego, visibility, settings or ())
     recorders = ["table", *(["video"] if video else []), *(["report"] if report else [])]
     directory = out or Path("runs", f"{loaded.name}-seed{seed}")
-    with _SimulationProgress(loaded.duration_s) as progress:
+    with warnings.catch_warnings(), _SimulationProgress(loaded.duration_s) as progress:
+        # The summary names all of it.
+        warnings.simplefilter("ignore", UnplayedWarning)
         result = record_run(
             loaded,
             seed,
@@ -137,6 +139,8 @@ def run_command(
     partial = "the results are partial and say so" if result.files else "before its first step; nothing was written"
     ended = result.ending.value if result.ending else f"{result.status.value}; {partial}"
     _out.print(f"\nThe run ended: [bold]{ended}[/].")
+    for line in result.unplayed.lines:
+        _out.print(f"[yellow]not played:[/] {escape(line)}", soft_wrap=True)
     _out.print("Results:")
     for name in result.files:
         _out.print(f"  {escape(str(result.directory / name))}", soft_wrap=True)

@@ -28,6 +28,10 @@ class SimulationRunningError(SimulationError):
     """A simulation runs in this process already, and only one can."""
 
 
+class UnplayedWarning(UserWarning):
+    """Events of a scenario were not played, or vehicles that it names were never there."""
+
+
 class RecorderError(FogSimError, RuntimeError):
     """Recorders of a run failed; the message names them, and where the others' results are."""
 

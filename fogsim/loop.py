@@ -2,12 +2,13 @@
 
 import dataclasses
 import math
+import warnings
 from collections.abc import Generator
 from types import TracebackType
 from typing import Self
 
 from fogsim.atmosphere import FogNow
-from fogsim.errors import SimulationError
+from fogsim.errors import SimulationError, UnplayedWarning
 from fogsim.onboard import OnBoard
 from fogsim.randomness import spawn_streams
 from fogsim.returned import checked_advice, checked_command, checked_lamps
@@ -37,6 +38,12 @@ def run(scenario: Scenario, seed: int = 0, traffic: Traffic | None = None) -> Ge
     ------
     FogSimError
         If a part of the loop cannot start; see `ClosedLoop.start`.
+
+    Warns
+    -----
+    UnplayedWarning
+        After the last step, if something of the script was not played and a longer run would not have played it
+        either; `Step.unplayed` of the last step has all that was not played.
     """
     policy = AdvisedDriving(scenario)
     with ClosedLoop(scenario, traffic) as loop:
@@ -45,6 +52,27 @@ def run(scenario: Scenario, seed: int = 0, traffic: Traffic | None = None) -> Ge
         while step.ending is None:
             step = loop.advance(policy.decide(step))
             yield step
+    warn_of_unplayed(scenario, step)
+
+
+def warn_of_unplayed(scenario: Scenario, last: Step) -> None:
+    """Warn of what was not played in a run that is over, if a longer one would not have played it either.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What was run.
+    last : Step
+        The last step.
+
+    Warns
+    -----
+    UnplayedWarning
+        If the ego came to the end of its way, or an event's vehicle had left before, or a lane was not there.
+    """
+    came_to_end = last.ending in (Ending.ARRIVED, Ending.LEFT_NETWORK)
+    if last.unplayed and (came_to_end or last.unplayed.is_final):
+        warnings.warn(f"{scenario.name}: not played: {last.unplayed}", UnplayedWarning, stacklevel=3)
 
 
 class AdvisedDriving:
@@ -125,7 +153,7 @@ class ClosedLoop:
         snapshot = self._traffic.observe()
         if snapshot is None:
             raise SimulationError("the ego left the road as soon as it had appeared")
-        self._step = self._finish(0, snapshot, Command())
+        self._step = self._closing(self._finish(0, snapshot, Command()))
         return self._step
 
     def _enter_fog(self, fog: FogField, seed: int) -> FogNow:
@@ -168,10 +196,15 @@ class ClosedLoop:
         snapshot, index = self._traffic.observe(), self._step.index + 1
         if snapshot is None:
             time = self._periods.time(index)
-            self._step = dataclasses.replace(self._step, index=index, time=time, ending=Ending.LEFT_NETWORK)
+            step = dataclasses.replace(self._step, index=index, time=time, ending=Ending.LEFT_NETWORK)
         else:
-            self._step = self._finish(index, snapshot, command)
+            step = self._finish(index, snapshot, command)
+        self._step = self._closing(step)
         return self._step
+
+    def _closing(self, step: Step) -> Step:
+        """The step that ends a run tells what was not played."""
+        return step if step.ending is None else dataclasses.replace(step, unplayed=self._traffic.unplayed())
 
     def _finish(self, index: int, snapshot: TrafficSnapshot, command: Command) -> Step:
         time = self._periods.time(index)

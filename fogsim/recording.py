@@ -8,7 +8,7 @@ from pathlib import Path
 
 from fogsim.errors import InputError, RecorderError
 from fogsim.interruption import Interruption
-from fogsim.loop import run
+from fogsim.loop import run, warn_of_unplayed
 from fogsim.metrics import RunMetrics, RunSummary, step_metrics
 from fogsim.output_files import refuse_existing
 from fogsim.recorders import (
@@ -20,11 +20,12 @@ from fogsim.recorders import (
     Status,
     write_sign_map,
 )
+from fogsim.returned import checked_recorder
 from fogsim.scenario import Scenario, build, resolved
 from fogsim.traffic.configuration import configured_files
 from fogsim.traffic.network import read_net
 from fogsim.traffic.signs import geographic_position, sign_map
-from fogsim.values import Ending, SignMap, Step
+from fogsim.values import NOTHING_UNPLAYED, Ending, SignMap, Step, Unplayed
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -43,6 +44,8 @@ class RecordedRun:
         Where the results are.
     files : tuple of str
         Their names; none if it was interrupted before its first step, and earlier results are there.
+    unplayed : Unplayed
+        What of the script was not played; empty if it was interrupted.
     """
 
     status: Status
@@ -50,6 +53,7 @@ class RecordedRun:
     summary: RunSummary
     directory: Path
     files: tuple[str, ...]
+    unplayed: Unplayed = NOTHING_UNPLAYED
 
 
 def record_run(
@@ -101,7 +105,8 @@ def record_run(
     Raises
     ------
     InputError
-        If `out` is a file, cannot be made, is written by another process, or holds results and must not be overwritten.
+        If `out` is a file, cannot be made, is written by another process, or holds results and must not be overwritten,
+        or if a recorder of the user's own lacks a method.
     UnknownNameError
         If there is no such recorder.
     MissingDependencyError
@@ -113,6 +118,11 @@ def record_run(
     ValueError, TypeError
         If the seed is negative or no integer.
 
+    Warns
+    -----
+    UnplayedWarning
+        When all is written, as of `run`.
+
     Notes
     -----
     Any error is raised again. One before the first step leaves none of the files and none of the directories that were
@@ -123,13 +133,16 @@ def record_run(
         manifest = Manifest(Status.RUNNING, seed, resolved(scenario), datetime.now(UTC), command_line=command_line)
         metrics = RunMetrics(build.safety_standard(scenario))
         recording = Recording(directory, manifest, _open(recorders, scenario, seed, directory, metrics), metrics)
-        status, ending, message = Status.FAILED, None, ""
+        status, last, message = Status.FAILED, None, ""
         try:
             with contextlib.closing(run(scenario, seed)) as steps, interruption.allowed():
                 for step in steps:
                     recording.record(step)
                     watch(step)
-                    ending = step.ending
+                    last = step
+                    if step.ending is not None:
+                        # Whoever takes warnings for errors is not to lose a run that is over by one of the loop's.
+                        break
             status = Status.COMPLETE
         except KeyboardInterrupt:
             status = Status.INTERRUPTED
@@ -140,11 +153,14 @@ def record_run(
             message = f"{type(error).__name__}: {error}"
             raise
         finally:
-            ended = dataclasses.replace(manifest, status=status, ending=ending, message=message)
+            ending, unplayed = (None, NOTHING_UNPLAYED) if last is None else (last.ending, last.unplayed)
+            ended = dataclasses.replace(manifest, status=status, ending=ending, message=message, unplayed=unplayed)
             status = recording.close(ended, interruption)
     if recording.failures and not message:
         raise RecorderError(recording.failures, directory.path)
-    return RecordedRun(status, ending, metrics.summary(), directory.path, tuple(recording.files))
+    if last is not None and status is Status.COMPLETE:
+        warn_of_unplayed(scenario, last)
+    return RecordedRun(status, ending, metrics.summary(), directory.path, tuple(recording.files), unplayed)
 
 
 class Recording:
@@ -275,7 +291,7 @@ def _open(
         summary=lambda: metrics.summary().values,
         meanings=metrics.summary().meanings,
     )
-    return {name: RECORDERS[name](information) for name in recorders}
+    return {name: checked_recorder(name, RECORDERS[name](information)) for name in recorders}
 
 
 def record_signs(scenario: Scenario, out: Path, *, overwrite: bool = False) -> SignMap:

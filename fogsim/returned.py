@@ -164,6 +164,29 @@ def checked_values(metric: str, value: object) -> Mapping[str, Any]:
     return value
 
 
+def checked_recorder(name: str, value: T) -> T:
+    """What a factory of recorders has made.
+
+    Parameters
+    ----------
+    name : str
+        Name of the recorder in the registry.
+    value : object
+        What the factory has returned.
+
+    Raises
+    ------
+    InputError
+        If it lacks a method of `fogsim.recorders.Recorder`.
+    """
+    missing = [f"{method}()" for method in ("record", "close") if not callable(getattr(value, method, None))]
+    if missing:
+        raise InputError(
+            f"recorder {name!r}: its factory must return an object with {' and '.join(missing)}; got {value!r}"
+        )
+    return value
+
+
 def _check_entry(who: str, key: object, entry: object) -> None:
     if not isinstance(key, str):
         raise InputError(f"{who}: keys must be words, got {key!r}")

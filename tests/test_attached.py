@@ -10,7 +10,7 @@ import pytest
 import traci
 
 import fogsim
-from fogsim.errors import InputError, SimulationError
+from fogsim.errors import InputError, SimulationError, UnplayedWarning
 from fogsim.randomness import spawn_streams
 from fogsim.scenario import build
 from fogsim.traffic.sumo_library import load_libsumo
@@ -270,3 +270,20 @@ def test_lane_changing_is_given_back_to_who_was_kept_in_lane(libsumo: Any) -> No
     assert get.getLaneChangeMode(later) == 0 != before[later]
     session.close()
     assert {v: get.getLaneChangeMode(v) for v in present} == before
+
+
+def test_a_session_tells_at_its_end_what_was_not_played(libsumo: Any) -> None:
+    late = f"traffic.events=[{{kind: brake, vehicle: {EGO}, at_time_s: 900}}]"
+    settings = (*SMALL, late, "traffic.keep_lane=[veh99]")
+    libsumo.simulationStep(40.0)
+
+    def attached(failing: bool = False) -> None:
+        with fogsim.attach(libsumo, ego=EGO, visibility=120.0, settings=settings) as session:
+            session.observe()
+            if failing:
+                raise KeyError
+
+    with pytest.warns(UnplayedWarning, match=r"events\.0 \(brake of veh18 .*not reached; vehicle 'veh99' was never on"):
+        attached()
+    with pytest.raises(KeyError):
+        attached(failing=True)

@@ -17,6 +17,7 @@ from fogsim.returned import (
     checked_command,
     checked_estimate,
     checked_lamps,
+    checked_recorder,
     checked_values,
 )
 from fogsim.scenario import load_scenario
@@ -116,3 +117,13 @@ def test_the_rooms_that_ask_methods_check_them(monkeypatch: pytest.MonkeyPatch) 
         monkeypatch.setattr(driving, part, type("Mine", (), {method: staticmethod(answers[part])})())
         with pytest.raises(InputError, match=r"stopping_sight_distance|fog_lamp_rules"):
             driving.decide(step)
+
+
+def test_recorders() -> None:
+    class Half:
+        def record(self) -> None: ...
+
+    with pytest.raises(InputError, match=r"^recorder 'mine': its factory must return an object with close\(\); got <"):
+        checked_recorder("mine", Half())
+    with pytest.raises(InputError, match=r"with record\(\) and close\(\); got None$"):
+        checked_recorder("mine", None)

@@ -8,7 +8,7 @@ from enum import StrEnum
 from importlib import metadata
 
 from fogsim.recorders.process import WritingProcess
-from fogsim.values import Ending
+from fogsim.values import NOTHING_UNPLAYED, Ending, Unplayed
 
 _DISTRIBUTIONS = ("fogsim", "numpy", "libsumo", "pyrender", "opencv-python-headless", "gymnasium")
 
@@ -41,6 +41,8 @@ class Manifest:
         Wall-clock time at the end.
     ending : Ending or None
         Why the simulated run was over, None if it was cut short.
+    unplayed : Unplayed
+        What of the script was not played, empty if it was cut short.
     command_line : sequence of str
         How it was started, empty if not from the command line.
     process : WritingProcess
@@ -57,6 +59,7 @@ class Manifest:
     started: datetime
     ended: datetime | None = None
     ending: Ending | None = None
+    unplayed: Unplayed = NOTHING_UNPLAYED
     command_line: Sequence[str] = ()
     process: WritingProcess = field(default_factory=WritingProcess.this)
     message: str = ""
@@ -69,6 +72,8 @@ class Manifest:
             "message": self.message,
             "failed_recorders": dict(self.failed_recorders),
             "ending": None if self.ending is None else self.ending.value,
+            "events_not_fired": [str(event) for event in self.unplayed.events],
+            "vehicles_never_seen": list(self.unplayed.vehicles),
             "seed": self.seed,
             "started": _utc(self.started),
             "ended": None if self.ended is None else _utc(self.ended),

@@ -24,12 +24,14 @@ class ReportRecorder:
         self._information = information
         self._curves = Curves(estimates={method: [] for method in information.methods})
         self._album = Album()
+        self._not_played: list[str] = []
         self._open = True
 
     def record(self, step: Step, derived: Derived) -> None:
         """Remember a step."""
         self._curves.add(step, derived)
         self._album.add(step)
+        self._not_played = step.unplayed.lines
 
     def close(self, complete: bool) -> None:
         """Write the report; it says so if the run was cut short."""
@@ -40,6 +42,7 @@ class ReportRecorder:
             title=self._information.title,
             description=self._information.description,
             interrupted_at=None if complete else last,
+            not_played=self._not_played,
             metrics=self._information.summary(),
             meanings=self._information.meanings,
             # Figures take longer than somebody waits who has pressed Ctrl-C.

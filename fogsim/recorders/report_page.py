@@ -57,6 +57,8 @@ class ReportContent:
         Name and description of the scenario.
     interrupted_at : float or None
         Instant at which the run was cut short [s], None if it was complete.
+    not_played : sequence of str
+        What of the script was not played, a line each.
     metrics : mapping from str to object
         Summary of the run; a key ends in its unit, and a mapping under ``estimators`` has one entry per method.
     meanings : mapping from str to str
@@ -72,6 +74,7 @@ class ReportContent:
     title: str
     description: str
     interrupted_at: float | None
+    not_played: Sequence[str]
     metrics: Mapping[str, object]
     meanings: Mapping[str, str]
     figures: Sequence[tuple[str, bytes]]
@@ -89,6 +92,7 @@ def render_report(content: ReportContent) -> str:
             f"<title>{title} – FogSim</title>\n<style>{_STYLE}</style>\n</head>\n<body>",
             f'<h1>{title}</h1>\n<p class="lead">{escape(content.description)}</p>',
             _banner(content.interrupted_at),
+            *(f'<p class="note">Not played: {escape(line)}</p>' for line in content.not_played),
             _summary_table(content.metrics, content.meanings),
             _methods_table(content.metrics, content.meanings),
             _figures(content.figures, recorded=bool(content.pictures)),

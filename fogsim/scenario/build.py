@@ -75,6 +75,9 @@ def periods(scenario: Scenario) -> Periods:
     )
 
 
+_CONDITIONS = ("at_position_m", "at_time_s", "at_gap_to_ego_m")
+
+
 def traffic_setup(scenario: Scenario) -> TrafficSetup:
     """What the traffic stage needs to know."""
     traffic, folder = scenario.traffic, scenario.directory
@@ -88,7 +91,7 @@ def traffic_setup(scenario: Scenario) -> TrafficSetup:
         warm_up_limit=traffic.warm_up_limit_s,
         advice_deceleration=traffic.advice_deceleration_mps2,
         reading_radius=traffic.reading_radius_m,
-        events=tuple(event for written in traffic.events for event in events(written)),
+        events=tuple(event for place, written in enumerate(traffic.events) for event in events(written, place)),
         sight=driver_sight(scenario),
         drivers=driver_setup(scenario),
         after_collision=traffic.after_collision,
@@ -96,10 +99,13 @@ def traffic_setup(scenario: Scenario) -> TrafficSetup:
     )
 
 
-def events(written: AnyEvent) -> tuple[Event, ...]:
-    """What an event of a scenario file stands for."""
+def events(written: AnyEvent, place: int) -> tuple[Event, ...]:
+    """What an event of a scenario file, at a place in its list, stands for."""
     vehicle = written.vehicle
-    trigger = Trigger(written.at_position_m, written.at_time_s, written.at_gap_to_ego_m)
+    conditions = {key: value for key in _CONDITIONS if (value := getattr(written, key)) is not None}
+    told = " or ".join(f"{key}={value:g}" for key, value in conditions.items())
+    name = f"traffic.events.{place} ({written.kind} of {vehicle} {told})"
+    trigger = Trigger(written.at_position_m, written.at_time_s, written.at_gap_to_ego_m, name)
     match written:
         case Brake():
             speed = written.to_speed_kmh / KMH_PER_MPS

@@ -11,7 +11,7 @@ from fogsim.traffic.setup import TrafficSetup
 from fogsim.traffic.sumo_library import load_libsumo
 from fogsim.traffic.sumo_traffic import SumoTraffic
 from fogsim.traffic.traci_link import load_traci
-from fogsim.values import Command
+from fogsim.values import Command, Unplayed
 
 
 class AttachedLink:
@@ -68,6 +68,11 @@ class AttachedTraffic(SumoTraffic):
     api : module or traci.Connection
         libsumo, traci, or one connection of traci, with a simulation that runs.
 
+    Attributes
+    ----------
+    ego : str
+        Id of the ego.
+
     Raises
     ------
     SimulationError
@@ -77,7 +82,7 @@ class AttachedTraffic(SumoTraffic):
     def __init__(self, setup: TrafficSetup, api: Api) -> None:
         self._attached = AttachedLink(api)
         self._api = api
-        self._ego = setup.ego
+        self.ego = setup.ego
         self._seen: set[str] = set()
         super().__init__(replace(setup, step_length=step_length(api)), self._attached)
 
@@ -86,7 +91,7 @@ class AttachedTraffic(SumoTraffic):
         with self._attached.watched():
             present = self._api.vehicle.getIDList()
         self._seen.update(present)
-        return self._ego in present
+        return self.ego in present
 
     def obey(self, command: Command) -> None:
         """Put a command in force for the next step; see `SumoTraffic.obey`."""
@@ -95,9 +100,13 @@ class AttachedTraffic(SumoTraffic):
             self._running.roster.recount()
         super().obey(command)
 
+    def unplayed(self) -> Unplayed:
+        """What of the script has not been played; see `Traffic.unplayed`."""
+        return self._unplayed(self._seen)
+
     def absence(self) -> str:
         """Say that the ego has not been on the road so far, and who has."""
-        return f"the ego {self._ego!r} did not appear while FogSim was attached; {those_seen(self._ego, self._seen)}"
+        return f"the ego {self.ego!r} did not appear while FogSim was attached; {those_seen(self.ego, self._seen)}"
 
     def release(self) -> None:
         """Give every vehicle back what was changed about it."""

@@ -1,10 +1,11 @@
 """Scripted manoeuvres: what vehicles are made to do, and when."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 from fogsim.traffic.control import Order
+from fogsim.values import Reason, Unplayed, UnplayedEvent
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,12 +137,15 @@ class Situation:
         Distance that a vehicle has driven [m].
     gap_to_ego : callable
         Gap of a vehicle to the ego along the road, as of `fogsim.traffic.gaps.signed_gap` [m]; None if there is none.
+    has_lane : callable
+        Whether a vehicle could go so many lanes to the left, negative to the right, where it is.
     """
 
     time: float
     present: set[str]
     driven: Callable[[str], float]
     gap_to_ego: Callable[[str], float | None]
+    has_lane: Callable[[str, int], bool]
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,7 +174,9 @@ class Script:
     """
 
     def __init__(self, events: Iterable[Event]) -> None:
-        self._waiting: list[Event] = list(events)
+        self._events = tuple(events)
+        self._waiting: list[Event] = list(self._events)
+        self._without_lane: set[LaneChangeEvent] = set()
         self._braking: dict[BrakeEvent, float] = {}
         self._dark: set[str] = set()
         self._gaps: dict[str, float | None] = {}
@@ -190,8 +196,36 @@ class Script:
         begun = self._begin(situation) if self._waiting else []
         return Doings(
             orders=self._orders(situation) if self._braking else {},
-            lane_changes=tuple(event for event in begun if isinstance(event, LaneChangeEvent)),
+            lane_changes=self._lane_changes(begun, situation),
         )
+
+    def unplayed(self, seen: Collection[str], present: Collection[str], others: Iterable[str] = ()) -> Unplayed:
+        """Tell what has not been played so far.
+
+        Parameters
+        ----------
+        seen : collection of str
+            Vehicles that have been on the road, at any time.
+        present : collection of str
+            Those that are on it now.
+        others : iterable of str
+            Vehicles that are expected beside those of the events.
+        """
+
+        def why(event: Event) -> Reason:
+            if event in self._without_lane:
+                return Reason.NO_LANE
+            if event.vehicle in present:
+                return Reason.NOT_REACHED
+            return Reason.LEFT if event.vehicle in seen else Reason.NEVER_SEEN
+
+        missed = [event for event in self._events if event in self._waiting or event in self._without_lane]
+        # What stands for one event of a scenario bears one name, and is told once.
+        told = dict.fromkeys(
+            UnplayedEvent(event.trigger.name or f"event of {event.vehicle}", why(event)) for event in missed
+        )
+        expected = {*others, *(event.vehicle for event in self._events)}
+        return Unplayed(tuple(told), tuple(sorted(expected.difference(seen))))
 
     def _begin(self, situation: Situation) -> list[Event]:
         measured = {event.vehicle for event in self._waiting if event.trigger.at_gap_to_ego is not None}
@@ -205,6 +239,13 @@ class Script:
             elif isinstance(event, LampFailureEvent):
                 self._dark.add(event.vehicle)
         return begun
+
+    def _lane_changes(self, begun: Iterable[Event], situation: Situation) -> tuple[LaneChangeEvent, ...]:
+        """Lane changes among events that begin, without those for which there is no lane."""
+        changes = [event for event in begun if isinstance(event, LaneChangeEvent)]
+        possible = tuple(event for event in changes if situation.has_lane(event.vehicle, event.lanes))
+        self._without_lane.update(set(changes).difference(possible))
+        return possible
 
     def _is_due(self, event: Event, situation: Situation, gap: float | None) -> bool:
         vehicle = event.vehicle

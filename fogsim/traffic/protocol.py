@@ -3,7 +3,7 @@
 from typing import Protocol
 
 from fogsim.traffic.sight import FogAccess
-from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot
+from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot, Unplayed
 
 
 class Traffic(Protocol):
@@ -34,6 +34,9 @@ class Traffic(Protocol):
 
     def observe(self) -> TrafficSnapshot | None:
         """Tell where everybody is and what has happened since the last call; None once the ego has left."""
+
+    def unplayed(self) -> Unplayed:
+        """Tell what of the script has not been played since the start; before `close`."""
 
     def close(self) -> None:
         """End the simulation; closing twice is allowed."""

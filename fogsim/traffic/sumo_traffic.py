@@ -1,7 +1,7 @@
 """Traffic by SUMO, wherever it runs."""
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Concatenate, ParamSpec, TypeVar
 
@@ -28,7 +28,7 @@ from fogsim.traffic.setup import AfterCollision, TrafficSetup
 from fogsim.traffic.sight import FogAccess
 from fogsim.traffic.signs import sign_map
 from fogsim.traffic.subscribed_reading import SubscribedReader
-from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot, TrafficState
+from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot, TrafficState, Unplayed
 
 _NOBODY: Mapping[str, float] = {}
 _FOR_EVER = "1e6"
@@ -205,8 +205,13 @@ class SumoTraffic:
         def gap_to_ego(other: str) -> float | None:
             return GapToEgo(run.api, ego).measure(other) if ego in present else None
 
+        def has_lane(other: str, lanes: int) -> bool:
+            edge, lane = str(vehicle.getRoadID(other)), int(vehicle.getLaneIndex(other)) + lanes
+            # Lanes of a junction tell nothing of those behind it, where SUMO makes the change.
+            return lane >= 0 and (edge.startswith(":") or lane < int(run.api.edge.getLaneNumber(edge)))
+
         time = run.api.simulation.getTime() - self._ego_since
-        return Situation(time, present, vehicle.getDistance, gap_to_ego)
+        return Situation(time, present, vehicle.getDistance, gap_to_ego, has_lane)
 
     def _step(self, run: _Run) -> None:
         self._prepare(run, _NOBODY)
@@ -254,6 +259,15 @@ class SumoTraffic:
             leader=run.reader.leader(),
             collisions=run.collisions.tell(),
         )
+
+    def unplayed(self) -> Unplayed:
+        """What of the script has not been played; see `Traffic.unplayed`."""
+        return self._unplayed(())
+
+    def _unplayed(self, seen_before: Iterable[str]) -> Unplayed:
+        run = self._running
+        seen, _ = run.roster.newcomers(0)
+        return run.script.unplayed({*seen, *seen_before}, run.roster.present, self._setup.keep_lane)
 
     def _release(self) -> None:
         """Give every vehicle on the road back what was changed about it: it drives and sees by itself again."""

@@ -13,8 +13,10 @@ from fogsim.values.road import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea, 
 from fogsim.values.scene import Batch, Mesh, Scene, Surface
 from fogsim.values.step import Ending, Step, Truth
 from fogsim.values.traffic import Collision, Leader, TrafficSnapshot, TrafficState
+from fogsim.values.unplayed import NOTHING_UNPLAYED, Reason, Unplayed, UnplayedEvent
 
 __all__ = [
+    "NOTHING_UNPLAYED",
     "Batch",
     "Beam",
     "Belief",
@@ -43,6 +45,7 @@ __all__ = [
     "Mesh",
     "Observation",
     "PavedArea",
+    "Reason",
     "Response",
     "RoadNetwork",
     "Scene",
@@ -56,6 +59,8 @@ __all__ = [
     "TrafficSnapshot",
     "TrafficState",
     "Truth",
+    "Unplayed",
+    "UnplayedEvent",
     "View",
     "fog_category",
 ]

@@ -13,6 +13,7 @@ from fogsim.values.image import View
 from fogsim.values.observation import Observation
 from fogsim.values.road import SignMap
 from fogsim.values.traffic import Collision, Leader, TrafficState
+from fogsim.values.unplayed import NOTHING_UNPLAYED, Unplayed
 
 
 class Ending(StrEnum):
@@ -99,6 +100,8 @@ class Step:
         What was in force while the traffic moved to this instant.
     ending : Ending or None
         Why the run is over, None while it goes on.
+    unplayed : Unplayed
+        What of the script has not been played, on the step that ends a run; empty on all others.
     """
 
     index: int
@@ -116,3 +119,4 @@ class Step:
     belief: Belief
     command: Command
     ending: Ending | None
+    unplayed: Unplayed = NOTHING_UNPLAYED

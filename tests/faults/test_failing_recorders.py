@@ -10,8 +10,8 @@ from pyarrow import parquet
 
 import fogsim
 from fogsim import recording
-from fogsim.errors import RecorderError
-from fogsim.recorders import ReportRecorder, video
+from fogsim.errors import InputError, RecorderError
+from fogsim.recorders import RECORDERS, ReportRecorder, video
 from fogsim.recording import RecordedRun, record_run
 from fogsim.values import Step
 from tests.faults.steps import drawn_run
@@ -120,3 +120,12 @@ def test_ctrl_c_twice_while_a_run_is_closed_tears_nothing(tmp_path: Path, monkey
     assert manifest(tmp_path)["status"] == "interrupted"
     assert manifest(tmp_path)["files"] == ["manifest.json", "metrics.json", "report.html", "steps.parquet"]
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_recorder_without_a_method_is_named_before_the_run_begins(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(RECORDERS._entries, "mine", lambda _: object())
+    with pytest.raises(InputError, match=r"^recorder 'mine': its factory must return .* record\(\) and close\(\)"):
+        record(tmp_path / "out", recorders=("table", "mine"))
+    assert not (tmp_path / "out").exists()

@@ -10,7 +10,7 @@ import pytest
 from fogsim.errors import InputError
 from fogsim.recorders import Manifest, Status, versions, write_json
 from fogsim.recorders.process import WritingProcess
-from fogsim.values import Ending
+from fogsim.values import Ending, Reason, Unplayed, UnplayedEvent
 
 STARTED = datetime(2024, 11, 5, 7, 30, tzinfo=timezone(timedelta(hours=1)))
 
@@ -26,6 +26,7 @@ def test_a_manifest_says_what_was_run_and_how_it_ended(tmp_path: Path) -> None:
         command_line=("fogsim", "run", "motorway_fog_bank"),
         process=WritingProcess(4711, "here", "b-4", 12),
         failed_recorders={"video": "no space"},
+        unplayed=Unplayed((UnplayedEvent("traffic.events.0", Reason.LEFT),), ("truck7",)),
     )
     write_json(tmp_path / "manifest.json", manifest.to_json())
     content = json.loads((tmp_path / "manifest.json").read_text(encoding="utf-8"))
@@ -35,6 +36,8 @@ def test_a_manifest_says_what_was_run_and_how_it_ended(tmp_path: Path) -> None:
         "status": "complete",
         "message": "",
         "ending": "arrived",
+        "events_not_fired": ["traffic.events.0: the vehicle left the road before"],
+        "vehicles_never_seen": ["truck7"],
         "seed": 3,
         "started": "2024-11-05T06:30:00+00:00",
         "ended": "2024-11-05T06:31:30+00:00",

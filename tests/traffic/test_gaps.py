@@ -40,7 +40,7 @@ def fired_at(wanted: float, gaps: Sequence[float | None]) -> int | None:
     """Step in which an event begins."""
     script = Script([LampFailureEvent("a", Trigger(at_gap_to_ego=wanted))])
     for step, gap in enumerate(gaps):
-        script.play(Situation(float(step), {"a"}, lambda _: 0.0, lambda _, gap=gap: gap))  # type: ignore[misc]  # bound
+        script.play(Situation(float(step), {"a"}, lambda _: 0.0, lambda _, gap=gap: gap, lambda *_: True))  # type: ignore[misc]  # bound
         if script.dark:
             return step
     return None
@@ -117,7 +117,8 @@ def test_of_two_events_that_brake_a_vehicle_the_lower_speed_counts_until_both_ar
         BrakeEvent("a", Trigger(at_time=0.0), to_speed=10.0, hold=9.0),
     ]
     script = Script(events)
-    wanted = [script.play(Situation(t, {"a"}, lambda _: 0.0, lambda _: None)).orders.get("a") for t in range(11)]
+    situations = [Situation(t, {"a"}, lambda _: 0.0, lambda _: None, lambda *_: True) for t in range(11)]
+    wanted = [script.play(situation).orders.get("a") for situation in situations]
     assert [o and o[0] for o in wanted] == [10.0, *[5.0] * 4, *[10.0] * 4, math.inf, None]
 
 

@@ -12,7 +12,7 @@ from fogsim.traffic.highway.drivers import HighwayDrivers
 from fogsim.traffic.highway.fleet import Fleet
 from fogsim.traffic.highway.manoeuvres import Manoeuvres
 from fogsim.traffic.sight import FogAccess
-from fogsim.values import Command
+from fogsim.values import Command, Unplayed
 
 
 class Conduct:
@@ -48,6 +48,10 @@ class Conduct:
     def enter_fog(self, fog: FogAccess) -> None:
         """Let the drivers choose their speeds in a fog."""
         self._drivers.fog = fog
+
+    def unplayed(self, keep_lane: Sequence[str]) -> Unplayed:
+        """Tell what has not been played so far; see `Manoeuvres.unplayed`."""
+        return (self._manoeuvres or Manoeuvres(self._fleet, ())).unplayed(keep_lane)
 
     def __call__(self) -> None:
         """Decide for everybody on the road."""

@@ -57,6 +57,10 @@ class Fleet:
         """
         return self._names.setdefault(vehicle, f"{type(vehicle).__name__} {len(self._names)}")
 
+    def known(self) -> frozenset[str]:
+        """Ids of all vehicles that have been on the road."""
+        return frozenset(self._names.values())
+
     def present(self) -> dict[str, Any]:
         """Vehicles on the road by their ids."""
         return {self.name(vehicle): vehicle for vehicle in self.environment.road.vehicles}

@@ -12,6 +12,7 @@ from fogsim.traffic.events import Event, LaneChangeEvent, Script, Situation
 from fogsim.traffic.gaps import signed_gap
 from fogsim.traffic.governor import governed_speed
 from fogsim.traffic.highway.fleet import LEAD, Fleet, acceleration
+from fogsim.values import Unplayed
 
 
 class Manoeuvres:
@@ -74,13 +75,23 @@ class Manoeuvres:
             vehicle = vehicles[name]
             vehicle.action["acceleration"] = _held(vehicle, target, deceleration, self._fleet.step_length)
 
+    def unplayed(self, keep_lane: Sequence[str]) -> Unplayed:
+        """Tell what has not been played so far, and which vehicles of `keep_lane` are not there either."""
+        present = self._fleet.present()
+        return self._script.unplayed(self._fleet.known(), present, keep_lane)
+
     def _situation(self, vehicles: Mapping[str, Any]) -> Situation:
         ego = self._fleet.ego
 
         def gap_to_ego(name: str) -> float | None:
             return _gap(vehicles[name], ego) if ego in vehicles.values() else None
 
-        return Situation(self._fleet.time, set(vehicles), lambda name: self._driven.get(name, 0.0), gap_to_ego)
+        def has_lane(name: str, lanes: int) -> bool:
+            vehicle = vehicles[name]
+            return not isinstance(vehicle, ControlledVehicle) or _lane_over(vehicle, lanes) != vehicle.lane_index
+
+        driven = self._driven
+        return Situation(self._fleet.time, set(vehicles), lambda name: driven.get(name, 0.0), gap_to_ego, has_lane)
 
     def _change_lane(self, vehicle: Any, event: LaneChangeEvent) -> None:
         """Aim for another lane, as far over as there are lanes, and stay there: MOBIL would call it off."""
@@ -88,10 +99,7 @@ class Manoeuvres:
             raise InputError(
                 f"traffic.events: {event.vehicle!r} cannot change lane: a {type(vehicle).__name__} steers for no lane"
             )
-        start, end, index = vehicle.lane_index
-        lanes = len(vehicle.road.network.graph[start][end])
-        # highway-env counts lanes from the left.
-        vehicle.target_lane_index = (start, end, min(max(index - event.lanes, 0), lanes - 1))
+        vehicle.target_lane_index = _lane_over(vehicle, event.lanes)
         if hasattr(vehicle, "enable_lane_change"):
             _, own = self._keeping_lane.get(event.vehicle, (0.0, vehicle.enable_lane_change))
             self._keeping_lane[event.vehicle] = (self._fleet.time + event.stay, own)
@@ -103,6 +111,13 @@ class Manoeuvres:
                 del self._keeping_lane[name]
                 if name in vehicles:
                     vehicles[name].enable_lane_change = own
+
+
+def _lane_over(vehicle: Any, lanes: int) -> tuple[str, str, int]:
+    """Lane so many to the left of a vehicle's, negative to the right, as far over as there are lanes."""
+    start, end, index = vehicle.lane_index
+    # highway-env counts lanes from the left.
+    return start, end, min(max(index - lanes, 0), len(vehicle.road.network.graph[start][end]) - 1)
 
 
 def _gap(vehicle: Any, ego: Any) -> float | None:

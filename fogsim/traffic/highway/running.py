@@ -17,7 +17,7 @@ from fogsim.traffic.highway.perception import let_drivers_meet
 from fogsim.traffic.highway.reading import read_snapshot
 from fogsim.traffic.setup import UNTOUCHED, AfterCollision
 from fogsim.traffic.sight import DriverSight, FogAccess
-from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot
+from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot, Unplayed
 
 
 def is_highway_environment(environment: object) -> bool:
@@ -166,6 +166,11 @@ class HighwayTraffic:
         """
         fleet, watch, _ = self._running()
         return read_snapshot(fleet, self.network()[0].route, watch.tell(), self._reading_radius)
+
+    def unplayed(self) -> Unplayed:
+        """What of the script has not been played; see `Traffic.unplayed`."""
+        _, _, conduct = self._running()
+        return conduct.unplayed(self._keep_lane)
 
     def _running(self) -> tuple[Fleet, CollisionWatch, Conduct]:
         if self._fleet is None or self._watch is None or self._conduct is None:

@@ -41,7 +41,7 @@ def _core_types() -> list[str]:
 
 def _numpy_features() -> str:
     """What numpy may be told not to use: its AVX-512 or, where there is none, all that it has found."""
-    found = np.show_config(mode="dicts")["SIMD Extensions"]["found"]
+    found = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
     newest = [name for name in found if name.startswith("AVX512") or name == "X86_V4"]
     return " ".join(newest or found)
 

@@ -35,6 +35,15 @@ def test_a_failing_run_leaves_what_was_recorded_and_says_why(tmp_path: Path) -> 
     assert parquet.read_table(tmp_path / "out" / "steps.parquet").num_rows == 5
 
 
+def test_the_metrics_of_a_run_are_its_summary_to_the_last_digit_and_the_same_again(tmp_path: Path) -> None:
+    texts = []
+    for out in (tmp_path / "one", tmp_path / "again"):
+        summary = record_run(short(), 1, out, recorders=("table",)).summary
+        texts.append((out / "metrics.json").read_text(encoding="utf-8"))
+        assert json.loads(texts[-1]) == {"complete": True, **summary.to_json()}
+    assert texts[0] == texts[1]
+
+
 def test_one_recorder_that_cannot_finish_does_not_cost_the_others_their_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

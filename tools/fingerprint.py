@@ -4,9 +4,10 @@
     python tools/fingerprint.py --compare here.json there.json
 
 Shapes and scenes are told as hashes; a short drive by day and one by night as hashes of what was drawn and of the
-frames' bytes, as decisions, as the text of metrics.json, and as numbers, which must agree to 1e-9 of their size.
-With --compare the differences are listed, and the exit code is 1 if there are any. Frames are drawn by FogSim's own
-renderer; what OpenGL draws is its driver's.
+frames' bytes, as decisions, as the text of metrics.json, and as numbers, which must agree to 1e-9 of their size; and
+so is what every method of the day makes of a vehicle that drives away. Only some of these, and in another order, are
+printed where they are named: python tools/fingerprint.py night shapes. With --compare the differences are listed, and
+the exit code is 1 if there are any. Frames are drawn by FogSim's own renderer; what OpenGL draws is its driver's.
 """
 
 import argparse
@@ -16,19 +17,24 @@ import json
 import math
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import fogsim
+from fogsim.estimators import ESTIMATORS, make
 from fogsim.metrics import RunMetrics
 from fogsim.recorders import write_json
+from fogsim.render import make_renderer
+from fogsim.reproduce.huang2015_chase import Chase, Followed
+from fogsim.reproduce.scenes import ILLUMINANCE, straight_road
 from fogsim.scenario import build
 from fogsim.scene import SIGN_KINDS, build_scene
 from fogsim.traffic.network import read_net, road_network
-from fogsim.values import RoadNetwork, Sign, SignMap, Step
+from fogsim.values import Camera, Estimate, RoadNetwork, Sign, SignMap, Step
 
 TOLERANCE, NOTHING = 1e-9, 1e-12
 TOWN = Path(__file__).resolve().parents[1] / "tests" / "data" / "grid" / "grid.net.xml"
@@ -37,8 +43,11 @@ COMMON = (
     "renderer=cpu",
     "camera.width=160",
     "camera.height=120",
-    "estimators=[negru2013, zhu2015, huang2015, huang2015_rough, huang2015_lead, joint_road, lead_contrast]",
+    f"estimators=[{', '.join(ESTIMATORS)}]",
 )
+CHASED = Camera(240, 180, 216.0, (119.5, 89.5), mount_height=1.3, pitch=0.03)
+RANGES = tuple(12.0 + 3.0 * number for number in range(9))
+VISIBILITY = 100.0
 DRIVES = {
     "day": (
         "motorway_fog_bank",
@@ -91,14 +100,33 @@ def drive(name: str) -> dict[str, Any]:
     return told
 
 
+def chase() -> dict[str, Any]:
+    """What every method says of a vehicle that drives away in fog."""
+    told: dict[str, Any] = {"frames": [], "valid": {name: [] for name in ESTIMATORS}, "numbers": {}}
+    estimators = [make(name, CHASED) for name in ESTIMATORS]
+    scene = build_scene(straight_road(), SignMap(()), np.random.default_rng(0))
+    chased = Chase(CHASED, Followed()).seen(
+        make_renderer("cpu", scene, illuminance=ILLUMINANCE),
+        dict.fromkeys(RANGES, (VISIBILITY,)),
+        np.random.default_rng(1),
+    )
+    for ahead, seen in chased:
+        observation = seen[VISIBILITY]
+        told["frames"].append(_hash(observation.frame.image))
+        for one in (estimator.update(observation) for estimator in estimators):
+            told["valid"][one.method].append(one.valid)
+            told["numbers"] |= {f"{ahead:g} m, {key}": value for key, value in _told(one)}
+    return told
+
+
 def _decisions(step: Step) -> str:
     valid = " ".join(f"{estimate.method} {estimate.valid}" for estimate in step.estimates)
     return f"{step.command.advice.speed!r} {int(step.command.lamps)} {len(step.traffic.ids)} {valid}"
 
 
 def _numbers(step: Step) -> Iterator[tuple[str, float]]:
-    yield from ((f"{one.method} k", one.extinction) for one in step.estimates)
-    yield from ((f"{one.method} deviation", one.standard_deviation) for one in step.estimates)
+    for estimate in step.estimates:
+        yield from _told(estimate)
     yield "believed deviation", step.belief.log_standard_deviation
     yield "believed visibility", step.belief.visibility
     yield "route", step.route_position
@@ -106,6 +134,11 @@ def _numbers(step: Step) -> Iterator[tuple[str, float]]:
         for name in ("position", "heading", "speed", "acceleration"):
             for place, value in enumerate(np.ravel(getattr(step.traffic, name)[row]).tolist()):
                 yield f"{vehicle} {name} {place}", value
+
+
+def _told(estimate: Estimate) -> Iterator[tuple[str, float]]:
+    yield f"{estimate.method} k", estimate.extinction
+    yield f"{estimate.method} deviation", estimate.standard_deviation
 
 
 def _digest(value: Any) -> str:
@@ -138,15 +171,25 @@ def differences(here: Any, there: Any, where: str = "") -> Iterator[str]:
         yield f"{where}: {here!r} here, {there!r} there"
 
 
+PARTS: Mapping[str, Callable[[], Any]] = {
+    "shapes": shapes,
+    **{name: partial(drive, name) for name in DRIVES},
+    "chase": chase,
+}
+
+
 def main() -> int:
     """Print, or compare."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; all of them by default")
     parser.add_argument("--compare", type=Path, nargs=2, metavar="FILE")
-    files = parser.parse_args().compare
-    if files is None:
-        print(json.dumps({"shapes": shapes(), "drives": {name: drive(name) for name in DRIVES}}, indent=1))  # noqa: T201 - the result
+    told = parser.parse_args()
+    if unknown := set(told.parts) - set(PARTS):
+        parser.error(f"expected parts out of {', '.join(PARTS)}, got {', '.join(sorted(unknown))}")
+    if told.compare is None:
+        print(json.dumps({part: PARTS[part]() for part in told.parts or PARTS}, indent=1))  # noqa: T201 - the result
         return 0
-    found = list(differences(*(json.loads(file.read_text()) for file in files)))
+    found = list(differences(*(json.loads(file.read_text()) for file in told.compare)))
     print("\n".join(found) or "the same")  # noqa: T201 - the result
     return 1 if found else 0
 

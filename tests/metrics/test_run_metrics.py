@@ -7,7 +7,7 @@ import pytest
 
 import fogsim
 from fogsim.errors import SimulationError, UnknownNameError
-from fogsim.metrics import METRICS, JsonValue, RunMetrics, SafetyStandard
+from fogsim.metrics import METRICS, JsonValue, RunMetrics, RunSummary, SafetyStandard
 from fogsim.scenario import build
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Collision, Ending, Estimate, Leader, Step
@@ -34,6 +34,41 @@ def test_every_key_has_a_meaning_and_every_value_is_json() -> None:
     summary = metrics.summary()
     assert set(summary.values) == set(summary.meanings)
     assert json.loads(json.dumps(summary.to_json(), allow_nan=False)) == summary.to_json()
+
+
+@pytest.mark.parametrize(
+    ("value", "written"),
+    [
+        (123456.78949, 123456.789),
+        (0.30000000000000004, 0.3),
+        (1.0 / 3.0, 0.333333333),
+        (12345678949.0, 12345678900.0),
+        (0.00012345678949, 0.000123457),
+        (-2.5, -2.5),
+        (7, 7),
+        (1234567891234, 1234567891234),
+        (True, True),
+        (None, None),
+        ("arrived", "arrived"),
+    ],
+)
+def test_numbers_are_written_to_nine_digits(value: JsonValue, written: JsonValue) -> None:
+    """Also in the mappings of methods; integers and what is no number stay as they are."""
+    told = RunSummary({"outer": value, "methods": {"one": {"inner": value}}}, {}).to_json()
+    assert told == {"outer": written, "methods": {"one": {"inner": written}}}
+    assert type(told["outer"]) is type(value)
+
+
+@pytest.mark.parametrize("value", [-0.0, -1e-17, 4e-10])
+def test_what_is_nothing_has_no_sign(value: float) -> None:
+    assert str(RunSummary({"key": value}, {}).to_json()["key"]) == "0.0"
+
+
+def test_the_last_bits_of_a_number_are_not_written() -> None:
+    """What processors disagree about: here both sides of a value in the last place."""
+    value = 36.98765432181
+    nearby = (value, math.nextafter(value, 0.0), math.nextafter(value, math.inf))
+    assert {json.dumps(RunSummary({"key": one}, {}).to_json()) for one in nearby} == {'{"key": 36.9876543}'}
 
 
 def test_a_run_without_steps_has_only_undefined_values_and_counts() -> None:

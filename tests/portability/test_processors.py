@@ -11,13 +11,15 @@ import platform
 import runpy
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+
+from fogsim.estimators import ESTIMATORS
 
 TOOL = Path(__file__).parents[2] / "tools" / "fingerprint.py"
 CORE_TYPES = {"SkylakeX": "avx512bw", "Haswell": "avx2", "Sandybridge": "avx", "Nehalem": "sse4_2", "Prescott": "sse3"}
@@ -39,7 +41,7 @@ def _core_types() -> list[str]:
 
 def _numpy_features() -> str:
     """What numpy may be told not to use: its AVX-512 or, where there is none, all that it has found."""
-    found = np.show_config(mode="dicts")["SIMD Extensions"]["found"]
+    found = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
     newest = [name for name in found if name.startswith("AVX512") or name == "X86_V4"]
     return " ".join(newest or found)
 
@@ -49,7 +51,19 @@ VARIANTS: Mapping[str, Mapping[str, str]] = {
     "numpy without AVX-512": {"NPY_DISABLE_CPU_FEATURES": _numpy_features()},
     "C library without FMA": {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA"},
 }
-GENERIC = ("numba for any processor", "numba for any processor, at the same time")
+PARTS = ("shapes", "day", "night", "chase")
+GENERIC = {
+    "numba for any processor": ("shapes", "day", "chase"),
+    "numba for any processor, at the same time": ("night",),
+}
+"""Two processes that together tell all; the kernels of drawing are those that both compile at once."""
+
+ROUNDED = """
+import hashlib, math, numpy as np
+x = np.random.default_rng(0).normal(size=(200, 200))
+for y in (x @ x, np.concatenate((np.exp(x), np.exp(x.astype("f4")))), np.array([math.exp(v) for v in x.ravel()])):
+    print(hashlib.sha256(y.tobytes()).hexdigest())
+"""
 
 Answers = Mapping[str, "Future[Any]"]
 
@@ -58,18 +72,24 @@ Answers = Mapping[str, "Future[Any]"]
 def answers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Answers]:
     """What each process says; those two start first, together, that compile every kernel into one empty folder."""
     kernels = {"NUMBA_CPU_NAME": "generic", "NUMBA_CACHE_DIR": str(tmp_path_factory.mktemp("kernels"))}
-    asked = {**dict.fromkeys(GENERIC, kernels), "here": {}, **VARIANTS}
     with ThreadPoolExecutor(max_workers=2) as pool:
-        yield {name: pool.submit(_ask, environment) for name, environment in asked.items()}
+        generic = {name: pool.submit(_fingerprint, kernels, parts) for name, parts in GENERIC.items()}
+        others = {name: pool.submit(_fingerprint, setting) for name, setting in {"here": {}, **VARIANTS}.items()}
+        yield generic | others
 
 
-def _ask(environment: Mapping[str, str]) -> Any:
+def _fingerprint(setting: Mapping[str, str], parts: Sequence[str] = PARTS) -> Any:
+    return json.loads(_said(setting, TOOL, *parts))
+
+
+def _said(setting: Mapping[str, str], *arguments: str | Path) -> str:
+    """What Python prints where the environment is changed so."""
     told = subprocess.run(
-        [sys.executable, TOOL], env={**os.environ, **environment}, capture_output=True, text=True, check=False
+        [sys.executable, *arguments], env={**os.environ, **setting}, capture_output=True, text=True, check=False
     )
     if told.returncode:
-        raise AssertionError(f"{environment} ends with {told.returncode}: {told.stderr[-2000:]}")
-    return json.loads(told.stdout)
+        raise AssertionError(f"{setting} ends with {told.returncode}: {told.stderr[-2000:]}")
+    return told.stdout
 
 
 @pytest.fixture(scope="module")
@@ -83,24 +103,42 @@ def test_three_kinds_of_kernels_are_tried() -> None:
     assert len(_core_types()) == 3
 
 
+def test_variants_do_vary() -> None:
+    """What they are set against is not the same for all: products of BLAS, exponentials of numpy and of C."""
+    said = {name: _said(setting, "-c", ROUNDED).split() for name, setting in VARIANTS.items()}
+    products, exponentials, of_c = zip(*said.values(), strict=True)
+    assert len(set(products[:3])) > 1
+    assert len(set(exponentials)) > 1
+    assert len(set(of_c)) > 1
+
+
 @pytest.mark.parametrize("variant", [*VARIANTS, *GENERIC])
 def test_a_processor_changes_nothing(
     answers: Answers, differences: Callable[[Any, Any], Iterator[str]], variant: str
 ) -> None:
-    assert not list(differences(answers["here"].result(), answers[variant].result()))
+    here = answers["here"].result()
+    parts = GENERIC.get(variant, PARTS)
+    assert not list(differences({part: here[part] for part in parts}, answers[variant].result()))
 
 
 def test_what_is_compared_is_a_drive_in_fog_with_advice(answers: Answers) -> None:
-    drives = answers["here"].result()["drives"]
-    assert all(len(set(drive["frames"])) == len(drive["frames"]) == 11 for drive in drives.values())
-    assert drives["day"]["decisions"][0] != drives["day"]["decisions"][-1]
-    assert len(answers["here"].result()["shapes"]) > 150
+    here = answers["here"].result()
+    assert all(len(set(here[drive]["frames"])) == len(here[drive]["frames"]) == 11 for drive in ("day", "night"))
+    assert here["day"]["decisions"][0] != here["day"]["decisions"][-1]
+    assert len(here["shapes"]) > 150
+
+
+def test_every_method_of_the_day_sees_the_fog_in_what_is_compared(answers: Answers) -> None:
+    valid = answers["here"].result()["chase"]["valid"]
+    assert list(valid) == list(ESTIMATORS)
+    assert all(sum(frames) >= 5 for frames in valid.values())
 
 
 def test_a_difference_is_told(answers: Answers, differences: Callable[[Any, Any], Iterator[str]]) -> None:
     here = answers["here"].result()
     other = json.loads(json.dumps(here))
-    other["drives"]["night"]["frames"][3] = "another"
-    other["drives"]["day"]["numbers"]["0 route"] += 1e-6
+    other["night"]["frames"][3] = "another"
+    other["day"]["numbers"]["0 route"] += 1e-6
+    other["day"]["metrics"][2] = "another"
     told = list(differences(here, other))
-    assert [line.split(":")[0] for line in told] == ["/drives/day/numbers/0 route", "/drives/night/frames/3"]
+    assert [line.split(":")[0] for line in told] == ["/day/metrics/2", "/day/numbers/0 route", "/night/frames/3"]

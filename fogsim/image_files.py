@@ -46,10 +46,14 @@ def _decoded(path: Path) -> NDArray[np.generic]:
     if not data.size:
         raise InputError(f"{path}: the file is empty")
     _refuse_damaged(path, data.tobytes())
+    # OpenCV would print lines of its own about what is told below.
+    level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:
         image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
     except (cv2.error, MemoryError):
         image = None
+    finally:
+        cv2.utils.logging.setLogLevel(level)
     if image is None:
         raise InputError(f"{path}: this is no image that can be read (PNG, TIFF, JPEG, …)")
     return np.asarray(image)

@@ -122,3 +122,9 @@ def test_a_checked_class_keeps_its_signature_and_its_own_errors() -> None:
         Own()
     with pytest.raises(InputError, match=r"^Own: size must be a whole number, got 'a{39} … a{39}'$"):
         Own("a" * 500)
+
+
+@pytest.mark.parametrize("method", ["negru2013", "joint_road", "lead_contrast"])
+def test_whole_numbers_of_numpy_are_whole_numbers(method: str) -> None:
+    for name in accepted_parameters(ESTIMATORS[method], {"camera"}).keys() & {"frames", "inflection_frames"}:
+        ESTIMATORS[method](CAMERA, **{name: np.int64(7)})

@@ -1,6 +1,7 @@
 """What a recorded run leaves when something goes wrong."""
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -94,3 +95,15 @@ def test_mistakes_that_stop_a_run_before_its_first_step_leave_nothing(
     with pytest.raises(kind):
         record_run(**{"scenario": short(), "seed": 1, "out": tmp_path / "new" / "out", **mistake})
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", [b"run:1", b"2026-11-22T01:14:00", b"-x", b"run\xff"])
+def test_odd_names_of_directories_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: bytes) -> None:
+    monkeypatch.chdir(tmp_path)
+    out = Path(os.fsdecode(name))
+    scenario = fogsim.load_scenario("motorway_fog_bank", ["camera.width=64", "camera.height=48", "duration_s=0.2"])
+    record_run(scenario, 1, out, recorders=("table",), command_line=("fogsim", "run", "--out", str(out)))
+    assert [os.fsencode(entry.name) for entry in tmp_path.iterdir()] == [name]
+    assert status(out)["command_line"] == ["fogsim", "run", "--out", str(out)]
+    with (out / "steps.parquet").open("rb") as table:
+        assert parquet.read_table(table).num_rows == 3

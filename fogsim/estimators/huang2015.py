@@ -121,9 +121,6 @@ class Huang2015:
         blur: Annotated[float, Range(0.0, 10.0, "px")] = 0.0,
         pitch_deviation: PitchDeviation = PITCH_DEVIATION,
     ) -> None:
-        for name, scale in (("time_scale", time_scale), ("way_scale", way_scale)):
-            if not 0.0 < scale < math.inf:
-                raise InputError(f"{name} must be positive and finite, got {scale!r}")
         self._check = ObservationCheck(camera)
         self._rough = Huang2015Rough(camera, as_published=as_published, pitch_deviation=pitch_deviation)
         self._lead = Huang2015Lead(camera, as_published=as_published, setback=setback, blur=blur)

@@ -128,7 +128,9 @@ def placed(picture: Picture, sighting: Sighting, at: Placement) -> Picture:
         Where the vehicle is in the picture.
     """
     small = replace(picture.sighting.patch, column=at.column, row=at.row)
-    column, row = (moved(place, 1.0 / picture.scale) for place in (at.column, at.row))
+    sizes = zip(small.luminance.shape, sighting.patch.luminance.shape, strict=True)
+    places = zip((at.row, at.column), sizes, strict=True)
+    row, column = (moved(place, 1.0 / picture.scale, *size) for place, size in places)
     variance = window_variance(replace(sighting.patch, column=column, row=row))
     return replace(picture, sighting=replace(picture.sighting, patch=small), variance=variance)
 

@@ -89,14 +89,8 @@ class Huang2015Lead:
         blur: Annotated[float, Range(0.0, 10.0, "px")] = 0.0,
         spacing: Annotated[float, Range(0.1, 100.0, "m")] | None = None,
     ) -> None:
-        if not 0.0 <= setback < 20.0:
-            raise InputError(f"setback must be 0 … 20 m, got {setback!r}")
-        if not 0.0 <= blur <= 10.0:
-            raise InputError(f"blur must be 0 … 10 px, got {blur!r}")
         usual = PUBLISHED_SPACING if as_published else SPACING
         self._spacing = usual if spacing is None else spacing
-        if not 0.1 <= self._spacing <= 100.0:
-            raise InputError(f"spacing must be 0.1 … 100 m, got {spacing!r}")
         self._blur = blur
         self._camera, self._check = camera, ObservationCheck(camera)
         self._as_published = as_published

@@ -89,25 +89,3 @@ def checked_image(image: object, camera: Camera) -> NDArray[np.uint8] | NDArray[
     if camera.bits > 8 and image.max() > most:
         raise InputError(f"an image of {camera.bits} bits must have values 0 … {most}, got one of {image.max()}")
     return image
-
-
-def checked_count(name: str, value: object, least: int) -> int:
-    """Return a number unchanged if it is whole and large enough.
-
-    Parameters
-    ----------
-    name : str
-        What it is called.
-    value : object
-        The number.
-    least : int
-        Smallest that is allowed.
-
-    Raises
-    ------
-    InputError
-        If it is not.
-    """
-    if isinstance(value, bool) or not isinstance(value, int) or value < least:
-        raise InputError(f"{name} must be a whole number ≥ {least}, got {value!r}")
-    return value

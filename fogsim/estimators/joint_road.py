@@ -6,8 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
-from fogsim.errors import InputError
-from fogsim.estimators.image_check import ObservationCheck, checked_count
+from fogsim.estimators.image_check import ObservationCheck
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
@@ -95,7 +94,7 @@ class JointRoad:
     Raises
     ------
     InputError
-        If `frames` is not a whole number ≥ 1 or the deviation is not positive.
+        If a parameter is out of range.
     """
 
     method = "joint_road"
@@ -107,13 +106,11 @@ class JointRoad:
         pitch_deviation: PitchDeviation = PITCH_DEVIATION,
         frames: Annotated[int, Range(1, 10_000)] = 1,
     ) -> None:
-        if not (math.isfinite(pitch_deviation) and pitch_deviation > 0):
-            raise InputError(f"pitch_deviation must be a positive angle in radians, got {pitch_deviation!r}")
         self._camera, self._check = camera, ObservationCheck(camera)
         self._horizon = calibrated_horizon(camera, pitch_deviation)
         self._impossible = _impossible(camera)
         self._geometry = strip_geometry(camera, max(1.0, self._horizon.standard_deviation))
-        self._earlier: deque[tuple[StripCurves, Sky]] = deque(maxlen=checked_count("frames", frames, 1) - 1)
+        self._earlier: deque[tuple[StripCurves, Sky]] = deque(maxlen=int(frames) - 1)
 
     def reset(self) -> None:
         """Forget all earlier frames."""

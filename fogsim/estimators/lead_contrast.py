@@ -7,8 +7,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.errors import InputError
-from fogsim.estimators.image_check import ObservationCheck, checked_count
+from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.lead_contrast_track import SPACING, ContrastTrack, Sight
 from fogsim.estimators.lead_ranges import LeadRanges
 from fogsim.parameters import Range, checked_parameters
@@ -113,16 +112,10 @@ class LeadContrast:
         window: Annotated[float, Range(0.01, 1e6, "s")] = 60.0,
         frames: Annotated[int, Range(MIN_SAMPLES, 10_000)] = 64,
     ) -> None:
-        for name, value in (("setback", setback), ("range_deviation", range_deviation)):
-            if not (math.isfinite(value) and value >= 0):
-                raise InputError(f"{name} must be a length in metres and not negative, got {value!r}")
-        for name, value in (("pitch_deviation", pitch_deviation), ("window", window)):
-            if not (math.isfinite(value) and value > 0):
-                raise InputError(f"{name} must be positive and finite, got {value!r}")
         self._camera, self._setback = camera, setback
         self._check = ObservationCheck(camera)
         self._range_deviation, self._pitch_deviation = range_deviation, pitch_deviation
-        self._track = ContrastTrack(pitch_deviation, window, checked_count("frames", frames, MIN_SAMPLES))
+        self._track = ContrastTrack(pitch_deviation, window, int(frames))
         self.reset()
 
     def reset(self) -> None:

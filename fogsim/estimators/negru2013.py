@@ -8,8 +8,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.errors import InputError
-from fogsim.estimators.image_check import ObservationCheck, checked_count
+from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.negru2013_band import SeenBand, fog_slope, road_band, road_curve
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
@@ -101,7 +100,7 @@ class Negru2013:
     Raises
     ------
     InputError
-        If a number of frames is not a whole number ≥ 1, or the deviation is not positive.
+        If a parameter is out of range.
     """
 
     method = "negru2013"
@@ -117,8 +116,6 @@ class Negru2013:
         inflection_frames: Annotated[int, Range(1, 10_000)] = 5,
         pitch_deviation: PitchDeviation = PITCH_DEVIATION,
     ) -> None:
-        if not (math.isfinite(pitch_deviation) and pitch_deviation > 0):
-            raise InputError(f"pitch_deviation must be a positive angle in radians, got {pitch_deviation!r}")
         self._check = ObservationCheck(camera)
         # The fit takes the distances of a camera of the usual height: flat roads scale with it.
         self._camera, self._usual = camera, replace(camera, mount_height=USUAL_HEIGHT)
@@ -126,8 +123,8 @@ class Negru2013:
         self._as_published, self._looks_for_lines = as_published, vanishing_point
         self._model = printed_inflection if printed_signs else best_inflection
         self._detector = CannyDeriche()
-        self._points: deque[VanishingPoint] = deque(maxlen=checked_count("horizon_frames", horizon_frames, 1))
-        self._models: deque[FogModel] = deque(maxlen=checked_count("inflection_frames", inflection_frames, 1))
+        self._points: deque[VanishingPoint] = deque(maxlen=int(horizon_frames))
+        self._models: deque[FogModel] = deque(maxlen=int(inflection_frames))
 
     def reset(self) -> None:
         """Forget the vanishing points and inflections of earlier frames."""

@@ -77,7 +77,7 @@ def road_band(road: RoadImage, edges: Edges, slope: NDArray[np.float32], camera:
     region = grow_region(blurred, edges.pixels, steps, SIMILARITY * road.contrast + edges.threshold)
     cols, centre = camera.width, camera.principal_point[0] - road.first_column
     band = crossing_band(
-        region, centre, min_width=max(3, cols // 80), max_width=max(5, cols // 24), hole=max(2, cols // 128)
+        region, blurred, centre, min_width=max(3, cols // 80), max_width=max(5, cols // 24), hole=max(2, cols // 128)
     )
     if band is None or band.bottom - band.top < MIN_ROWS // 2:
         raise CannotTellError("no vertical band crosses the road's region")

@@ -60,8 +60,8 @@ def write_bytes(path: Path, data: bytes) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file, whole or not at all."""
-    write_bytes(path, text.encode("utf-8"))
+    """Write a text file, whole or not at all; what is no Unicode of file names is escaped, in JSON as JSON has it."""
+    write_bytes(path, text.encode("utf-8", "backslashreplace"))
 
 
 def write_json(path: Path, values: Mapping[str, object]) -> None:

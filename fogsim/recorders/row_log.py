@@ -89,7 +89,8 @@ def read_rows(path: Path) -> Any:
         If it is no log.
     """
     batches = []
-    with pa.OSFile(str(path)) as file:
+    # Opened here, for Arrow takes no name that is not UTF-8.
+    with path.open("rb") as file:
         try:
             reader = pa.ipc.open_stream(file)
         except pa.ArrowInvalid as error:

@@ -147,13 +147,16 @@ def column_tops(region: NDArray[np.uint8], hole: int) -> NDArray[np.int64]:
 
 
 @kernel
-def best_run(tops: NDArray[np.int64], top: int, enough: int, centre: float) -> tuple[int, int]:
+def best_run(
+    tops: NDArray[np.int64], top: int, enough: int, centre: float, light: NDArray[np.float64]
+) -> tuple[int, int]:
     """First column and width of the widest run of columns that reach up to row `top` or higher.
 
     Width beyond `enough` does not count; of equals the run nearest to column `centre` is taken, of equally near ones
-    the wider one, and then the one whose columns reach higher.
+    the wider one, then the one whose columns reach higher, and then the one of least `light` (cols,): neither side
+    comes first.
     """
-    best_start, best_width, best_offset, best_reach, start = 0, 0, np.inf, 0, 0
+    best_start, best_width, best_offset, best_reach, best_light, start = 0, 0, np.inf, 0, np.inf, 0
     for col in range(tops.size + 1):
         if col < tops.size and tops[col] <= top:
             continue
@@ -161,19 +164,20 @@ def best_run(tops: NDArray[np.int64], top: int, enough: int, centre: float) -> t
         offset = max(start - centre, centre - (col - 1), 0.0)
         better, equal = counted > min(best_width, enough), counted == min(best_width, enough)
         if better or (equal and offset <= best_offset):
-            reach = tops[start:col].sum()
+            reach, seen = tops[start:col].sum(), light[start:col].sum()
             nearer = better or offset < best_offset
-            if nearer or col - start > best_width or (col - start == best_width and reach < best_reach):
-                best_start, best_width, best_offset, best_reach = start, col - start, offset, reach
+            higher = reach < best_reach or (reach == best_reach and seen < best_light)
+            if nearer or col - start > best_width or (col - start == best_width and higher):
+                best_start, best_width, best_offset, best_reach, best_light = start, col - start, offset, reach, seen
         start = col + 1
     return best_start, best_width
 
 
 @kernel
 def highest_band(
-    tops: NDArray[np.int64], bottom: int, min_width: int, enough: int, centre: float
+    tops: NDArray[np.int64], bottom: int, min_width: int, enough: int, centre: float, light: NDArray[np.float64]
 ) -> tuple[int, int, int]:
-    """Highest row that at least `min_width` neighbouring columns reach, and the best run of such columns.
+    """Highest row that at least `min_width` neighbouring columns reach, and the best run of them (see `best_run`).
 
     Returns
     -------
@@ -184,7 +188,7 @@ def highest_band(
     for top in np.unique(tops):
         if top >= bottom:
             break
-        start, width = best_run(tops, top, enough, centre)
+        start, width = best_run(tops, top, enough, centre, light)
         if width >= min_width:
             return top, start, width
     return bottom, 0, 0

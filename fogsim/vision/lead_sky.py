@@ -38,12 +38,18 @@ def airlight_beside(light: NDArray[np.float32], about: float, noise: float, axis
     float
         In the unit of the luminance.
     """
-    columns = [block for block in np.array_split(np.arange(light.shape[1]), BLOCKS) if block.size]
-    free = [block for block in columns if abs(float(block.mean()) - axis) > hidden]
+    columns = _blocks(light.shape[1])
+    free = [block for block in columns if abs(0.5 * (block.start + block.stop - 1) - axis) > hidden]
     seen = free if len(free) >= BLOCKS // 3 else columns
-    means = [_mean(light[:, block[0] : block[-1] + 1], about, noise) for block in seen]
+    means = [_mean(light[:, block], about, noise) for block in seen]
     bright = [mean for mean in means if mean is not None]
     return float(np.percentile(bright, BRIGHT_BLOCKS)) if bright else about
+
+
+def _blocks(width: int) -> list[slice]:
+    """Blocks of columns that are the same from either side: they share a column where its middle is their border."""
+    blocks = [slice(width * i // BLOCKS, -(-width * (i + 1) // BLOCKS)) for i in range(BLOCKS)]
+    return [block for block in blocks if block.stop > block.start]
 
 
 def _mean(part: NDArray[np.float32], about: float, noise: float) -> float | None:

@@ -185,7 +185,7 @@ def _alone(pair: tuple[float, int, int], step: Floats, scale: float, floor: floa
     score, left, right = pair
     reach = ALONE * scale - 0.5 * (right - left)
     gap = max(round(0.12 * scale), 2)
-    before = np.abs(step[max(math.floor(left - reach), 0) : max(left - gap, 0)])
+    before = np.abs(step[max(math.floor(left - reach), 0) : max(left - gap + 1, 0)])
     behind = np.abs(step[right + gap : max(math.ceil(right + reach), 0) + 1])
     other = max(float(before.max(initial=0.0)), float(behind.max(initial=0.0)))
     own = min(abs(step[left]), abs(step[right]))

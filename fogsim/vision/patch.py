@@ -144,11 +144,12 @@ def shrunk(patch: Patch, scale: float) -> Patch:
     # Pixels are means over 1 already; what is left to widen them to 1/scale.
     half = 0.5 * math.sqrt(scale**-2 - 1.0)
     luminance = _box_means(_box_means(patch.luminance, scale, half).T, scale, half).T
+    rows, cols = patch.luminance.shape
     return replace(
         patch,
         luminance=np.ascontiguousarray(luminance),
-        column=moved(patch.column, scale),
-        row=moved(patch.row, scale),
+        column=moved(patch.column, scale, cols, luminance.shape[1]),
+        row=moved(patch.row, scale, rows, luminance.shape[0]),
         half_width=patch.half_width * scale,
         half_height=patch.half_height * scale,
         blur=patch.blur * scale,
@@ -158,7 +159,8 @@ def shrunk(patch: Patch, scale: float) -> Patch:
 def _box_means(values: Floats, scale: float, half: float) -> Floats:
     """Means of rows over boxes about the middles of fewer, larger rows, cut off at the border."""
     total = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
-    middle = (np.arange(max(math.floor(values.shape[0] * scale), 1)) + 0.5) / scale
+    count = max(math.floor(values.shape[0] * scale), 1)
+    middle = 0.5 * values.shape[0] + (np.arange(count) - 0.5 * (count - 1)) / scale
     low, high = np.maximum(middle - half, 0.0), np.minimum(middle + half, float(values.shape[0]))
 
     def upto(edge: Floats) -> Floats:
@@ -169,6 +171,6 @@ def _box_means(values: Floats, scale: float, half: float) -> Floats:
     return np.asarray((upto(high) - upto(low)) / (high - low)[:, None])
 
 
-def moved(position: float, scale: float) -> float:
-    """Row or column of a point once the pixels are larger; they count from the middle of the first [px]."""
-    return (position + 0.5) * scale - 0.5
+def moved(position: float, scale: float, before: int, after: int) -> float:
+    """Row or column of a point once so many pixels have become others of another size about the same middle [px]."""
+    return (position - 0.5 * (before - 1)) * scale + 0.5 * (after - 1)

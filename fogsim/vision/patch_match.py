@@ -15,8 +15,8 @@ Floats = NDArray[np.float64]
 STEPS = 5
 """Gauss–Newton steps of a registration."""
 
-NUDGE = 0.05
-"""Step of the numerical derivatives by the position [px]."""
+NUDGE, RESIZE = 0.05, 0.01
+"""Steps of the numerical derivatives by the position [px] and by the logarithm of the scale [-]."""
 
 OUTLIER = 4.0
 """Residual beyond which a pixel shows something that has changed (a lit lamp), in robust standard deviations [-]."""
@@ -217,13 +217,17 @@ def _step(near: Patch, grid: PixelGrid, at: Placement, prior: PlacementPrior, no
         return None
     used, slope, near_mean, mean, scale = line
     residual = (grid.far - mean - slope * (shown - near_mean))[used]
-    moved = (
-        replace(at, column=at.column + NUDGE),
-        replace(at, row=at.row + NUDGE),
-        replace(at, scale=at.scale * math.exp(0.01)),
-    )
-    jacobian = np.stack([slope * (seen_as(near, grid, m) - shown)[used] for m in moved], axis=1)
-    jacobian /= (NUDGE, NUDGE, 0.01)
+    # From either side, so that a mirrored picture is placed alike.
+    moved = [
+        (
+            replace(at, column=at.column + sign * NUDGE),
+            replace(at, row=at.row + sign * NUDGE),
+            replace(at, scale=at.scale * math.exp(sign * RESIZE)),
+        )
+        for sign in (1.0, -1.0)
+    ]
+    change = [seen_as(near, grid, more) - seen_as(near, grid, less) for more, less in zip(*moved, strict=True)]
+    jacobian = np.stack([slope * one[used] for one in change], axis=1) / (2.0 * np.array([NUDGE, NUDGE, RESIZE]))
     # What slope and mean can take up is no displacement.
     jacobian -= jacobian.mean(axis=0)
     apart = shown[used] - shown[used].mean()

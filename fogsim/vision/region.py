@@ -58,18 +58,26 @@ def grow_region(
 
 
 def crossing_band(
-    region: NDArray[np.uint8], centre: float, min_width: int, max_width: int, hole: int = 2
+    region: NDArray[np.uint8],
+    luminance: NDArray[np.float32],
+    centre: float,
+    min_width: int,
+    max_width: int,
+    hole: int = 2,
 ) -> Band | None:
     """Widest vertical band inside a region that crosses it from its bottom to its top.
 
     The road narrows toward the vanishing point: far away the sides of a wide band lie on the verge, whose reflectance
     is another, and what lies far from the vanishing point is verge altogether. So the band is cut to a largest width,
-    and of several that reach it the one nearest to the vanishing point's column is taken.
+    and of several that reach it the one nearest to the vanishing point's column is taken; of two that are alike in all
+    that, the darker one, which shows more of the fog.
 
     Parameters
     ----------
     region : (rows, cols) uint8
         Non-zero inside the region.
+    luminance : (rows, cols) float32
+        Linear luminance.
     centre : float
         Column of the vanishing point [px].
     min_width : int
@@ -86,7 +94,8 @@ def crossing_band(
     """
     bottom = region.shape[0] - 1
     tops = kernels.column_tops(region, hole)
-    top, first, width = kernels.highest_band(tops, bottom, min_width, max_width, float(centre))
+    light = luminance.sum(axis=0, dtype=np.float64)
+    top, first, width = kernels.highest_band(tops, bottom, min_width, max_width, float(centre), light)
     if width == 0:
         return None
     kept = min(width, max_width)

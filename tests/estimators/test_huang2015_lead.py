@@ -354,9 +354,10 @@ def test_the_window_is_where_the_vehicle_is():
 def test_another_vehicle_begins_another_track():
     chase = Chase(visibility=100.0)
     estimator = make("huang2015_lead", chase.camera)
-    for seen in (*chased(chase, 0, AWAY), *chased(chase, 1, np.array([25.0]))):
-        found = estimator.update(seen)
-    assert not found.valid
+    for seen in chased(chase, 0, AWAY):
+        estimator.update(seen)
+    (seen,) = chased(chase, 1, np.array([25.0]))
+    assert not estimator.update(replace(seen, frame=replace(seen.frame, time=float(AWAY.size)))).valid
     assert estimator.tracks == 2
     assert estimator.update(Observation(seen.image)).diagnostics["reason"] == "no vehicle is tracked ahead"
 

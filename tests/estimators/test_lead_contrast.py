@@ -265,8 +265,9 @@ def test_losing_the_vehicle_and_reset_forget_the_track():
     for later in range(14, 21):
         lost = replace(observations[0].frame, time=float(later))
         assert not estimator.update(Observation(lost)).valid
-    assert not estimator.update(observations[0]).valid
-    for observation in observations:
+    once_more = [replace(seen, frame=replace(seen.frame, time=seen.time + 21.0)) for seen in observations]
+    assert not estimator.update(once_more[0]).valid
+    for observation in once_more[1:]:
         estimator.update(observation)
     estimator.reset()
     assert not estimator.update(observations[0]).valid

@@ -191,3 +191,12 @@ def test_fog_with_a_depth_map_that_is_none_writes_nothing(fogsim, folder: Path) 
     assert "response is not given: srgb is assumed" in err
     assert "Traceback" not in err
     assert sorted(folder.iterdir()) == before
+
+
+def test_a_tiff_that_is_cut_off_makes_no_library_print(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    whole, path = io.BytesIO(), tmp_path / "cut.tif"
+    Image.fromarray(np.random.default_rng(0).integers(0, 255, (60, 80, 3), dtype=np.uint8)).save(whole, "TIFF")
+    path.write_bytes(whole.getvalue()[: len(whole.getvalue()) // 2])
+    with pytest.raises(InputError, match=r"cut\.tif: "):
+        read_image(path)
+    assert capfd.readouterr() == ("", "")

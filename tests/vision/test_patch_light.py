@@ -1,5 +1,7 @@
 """Pictures made smaller, and the light that two pictures of one thing share."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -74,10 +76,20 @@ def test_a_smaller_picture_shows_the_same_at_the_same_place(scale):
     ramp = np.add.outer(2.0 * np.arange(80.0), 3.0 * np.arange(120.0))
     small = shrunk(patch(ramp), scale)
     row, col = small.luminance.shape[0] // 2, small.luminance.shape[1] // 2
-    there = [moved(place, 1.0 / scale) for place in (row, col)]
+    rows, cols = small.luminance.shape
+    there = moved(row, 1.0 / scale, rows, 80), moved(col, 1.0 / scale, cols, 120)
     assert small.luminance[row, col] == pytest.approx(2.0 * there[0] + 3.0 * there[1], abs=0.5)
-    assert moved(small.column, 1.0 / scale) == pytest.approx(59.5)
+    assert moved(small.column, 1.0 / scale, small.luminance.shape[1], 120) == pytest.approx(59.5)
     assert small.half_width == pytest.approx(58.0 * scale)
+
+
+@pytest.mark.parametrize("scale", [0.9, 0.5, 0.31])
+def test_a_mirrored_picture_is_shrunk_to_the_mirror_image(scale):
+    noisy = patch(np.random.default_rng(1).normal(100.0, 8.0, (40, 47)))
+    small, other = shrunk(noisy, scale), shrunk(replace(noisy, luminance=noisy.luminance[:, ::-1], column=5.0), scale)
+    np.testing.assert_allclose(other.luminance, small.luminance[:, ::-1], rtol=1e-12)
+    there = shrunk(replace(noisy, column=41.0), scale).column
+    assert other.column == pytest.approx(small.luminance.shape[1] - 1 - there)
 
 
 def test_shrinking_averages_noise_away():

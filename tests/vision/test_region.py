@@ -10,6 +10,7 @@ from fogsim.vision.profile import band_profile
 from fogsim.vision.region import Band, crossing_band, grow_region
 
 CAMERA = Camera(640, 480, 577.0, (319.5, 239.5), 1.38, np.radians(2.0))
+EVEN = np.ones((50, 60), np.float32)
 
 
 def test_region_fills_a_smooth_ramp_and_stops_at_a_step():
@@ -43,26 +44,35 @@ def test_band_is_the_widest_that_reaches_the_top():
     region[20:, 5:50] = 1
     region[3:, 8:14] = 1
     region[3:, 30:42] = 1
-    assert crossing_band(region, 29.5, min_width=3, max_width=60) == Band(30, 41, 3, 49)
+    assert crossing_band(region, EVEN, 29.5, min_width=3, max_width=60) == Band(30, 41, 3, 49)
 
 
 def test_of_wide_bands_the_one_near_the_centre_is_cut_out():
     region = np.ones((50, 60), np.uint8)
     region[:, 20:24] = 0
-    assert crossing_band(region, 29.5, min_width=3, max_width=10) == Band(25, 34, 0, 49)
+    assert crossing_band(region, EVEN, 29.5, min_width=3, max_width=10) == Band(25, 34, 0, 49)
+
+
+def test_of_two_bands_alike_but_for_their_side_the_darker_is_taken():
+    region, luminance = np.ones((50, 60), np.uint8), EVEN.copy()
+    region[:, 25:35] = 0
+    luminance[:, 40] = 2.0
+    left, right = Band(15, 24, 0, 49), Band(35, 44, 0, 49)
+    assert crossing_band(region, luminance, 29.5, min_width=3, max_width=10) == left
+    assert crossing_band(region, np.ascontiguousarray(luminance[:, ::-1]), 29.5, min_width=3, max_width=10) == right
 
 
 def test_short_gaps_are_stepped_over_and_long_ones_end_the_band():
     region = np.ones((50, 20), np.uint8)
     region[30:32] = 0
-    assert crossing_band(region, 9.5, 3, 20, hole=2).top == 0
-    assert crossing_band(region, 9.5, 3, 20, hole=1).top == 32
+    assert crossing_band(region, EVEN[:, :20], 9.5, 3, 20, hole=2).top == 0
+    assert crossing_band(region, EVEN[:, :20], 9.5, 3, 20, hole=1).top == 32
 
 
 def test_no_band_without_a_bottom():
     region = np.ones((50, 20), np.uint8)
     region[40:] = 0
-    assert crossing_band(region, 9.5, 3, 20) is None
+    assert crossing_band(region, EVEN[:, :20], 9.5, 3, 20) is None
 
 
 def test_profile_is_indifferent_to_narrow_marks():

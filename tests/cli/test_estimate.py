@@ -85,8 +85,9 @@ def test_json_is_all_there_is_on_stdout_and_the_same_each_time(folder: Path) -> 
         assert record["visibility_m"] == pytest.approx(80.0, rel=0.05)
         assert record["visibility_low_m"] < record["visibility_m"] < record["visibility_high_m"]
         assert record["category"] == "dense"
-        # The road's lines have a say of a fraction of a pixel in where the horizon is.
-        assert record["horizon_row"] == pytest.approx(told_horizon(2.0), abs=0.5)
+    # The road's lines, which noise moves in each frame, have a say of a fraction of a pixel in where the horizon is.
+    horizon_row = np.median([record["horizon_row"] for record in told])
+    assert horizon_row == pytest.approx(told_horizon(2.0), abs=0.25)
 
 
 def told_horizon(pitch_deg: float) -> float:

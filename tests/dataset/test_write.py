@@ -199,4 +199,4 @@ def test_the_example_of_the_docs_runs(tmp_path: Path, monkeypatch: pytest.Monkey
     assert isinstance(distance, np.ndarray)
     # The fourth frame is the run's step 15, the last one of the loop its step 20.
     assert written.shape == distance.shape
-    assert len(list((tmp_path / "frames" / "frames").iterdir())) == 4
+    assert len(list((tmp_path / "small_frames" / "frames").iterdir())) == 4

@@ -7,6 +7,7 @@ from typing import Any
 from highway_env.vehicle.controller import ControlledVehicle
 
 from fogsim.errors import InputError, suggest
+from fogsim.linear_algebra import matrix_product
 from fogsim.traffic.control import Order
 from fogsim.traffic.events import Event, LaneChangeEvent, Script, Situation
 from fogsim.traffic.gaps import signed_gap
@@ -122,7 +123,7 @@ def _lane_over(vehicle: Any, lanes: int) -> tuple[str, str, int]:
 
 def _gap(vehicle: Any, ego: Any) -> float | None:
     """Gap to the ego along the ego's lane, whichever lane the vehicle is on [m]; None if it drives the other way."""
-    if float(vehicle.direction @ ego.direction) <= 0.0:
+    if float(matrix_product(vehicle.direction, ego.direction)) <= 0.0:
         return None
     # The library measures from middle to middle.
     apart = float(ego.lane_distance_to(vehicle)) + 0.5 * (vehicle.LENGTH - ego.LENGTH)

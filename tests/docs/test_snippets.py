@@ -35,8 +35,8 @@ MENTIONS = {page: re.findall(r"`((?:fogsim|python) [^`]+)`", text) for page, tex
 """Those within the text, perhaps with words in place of values."""
 
 KNOWN: dict[str, Any] = typer.main.get_command(app).commands  # type: ignore[attr-defined]  # a group has commands
-LONG = ("reproduce",)
-"""Commands that take minutes are parsed only."""
+PARSED_ONLY = ("reproduce", "recover")
+"""Commands that take minutes, or that need a run that was killed (tests/faults has some)."""
 NOT_YET = {"test", "study"}
 """Commands that README.md says are not there."""
 SHORT = ("--set", "camera.width=64", "--set", "camera.height=48", "--set", "duration_s=0.5")
@@ -83,7 +83,7 @@ def test_what_is_printed_runs(readers_folder: Callable[[str], Path], python: Run
     items: list[tuple[str, str, str | list[str]]] = []
     for page, text in TEXTS.items():
         lines = [shlex.split(line, comments=True) for line in LINES[page]]
-        quick: list[str | list[str]] = [shortened(line) for line in lines if line[1] not in LONG]
+        quick: list[str | list[str]] = [shortened(line) for line in lines if line[1] not in PARSED_ONLY]
         quick += [block.replace("8813", str(listening)) for block in PYTHON[page]]
         folder = str(readers_folder(text)) if quick else ""
         items += [(page, folder, item) for item in quick]

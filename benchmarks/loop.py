@@ -3,8 +3,11 @@
 The environment runs the motorway scenario in its fog bank, with a camera frame rendered, fogged, exposed and read by
 the estimator every camera period (0.1 s) and a decision every 0.5 s. Shares come from a profile of a second run.
 With --peer, highway-env's highway-fast-v0 (which draws no camera) is measured alternately in the same process.
+With --against, another checkout of FogSim (with its own .venv) and this one take each step in turn, in two processes,
+so that what else the machine does slows both: their ratio holds where speeds do not. Against itself it shows the noise.
 
-    python benchmarks/loop.py [--json] [--peer] [--size 160x120 --size 640x480] [--steps 60] [--repeat 3]
+    python benchmarks/loop.py [--json] [--peer | --against DIRECTORY] [--size 160x120 --size 640x480]
+                              [--steps 60] [--repeat 3]
 """
 
 import argparse
@@ -12,8 +15,11 @@ import cProfile
 import json
 import pstats
 import statistics
+import subprocess
+import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -108,6 +114,64 @@ def measure(size: str, steps: int, repeat: int, peer: gymnasium.Env[Any, Any] | 
     return record
 
 
+def answer(size: str) -> None:
+    """Take a step, or begin anew, for each line that comes in, and print how long it took [s]."""
+    env, cruise = make_env(size), np.array([7, 1])
+    env.reset(seed=1)
+    env.step(cruise)
+    for line in sys.stdin:
+        started = time.perf_counter()
+        if line.startswith("step"):
+            env.step(cruise)
+        else:
+            env.reset(seed=1)
+        print(time.perf_counter() - started, flush=True)
+
+
+def duration(process: "subprocess.Popen[str]", task: str) -> float:
+    """Time that another process takes for a task [s]."""
+    if process.stdin is None or process.stdout is None:
+        raise ValueError("the process must have been started with pipes")
+    process.stdin.write(task + "\n")
+    process.stdin.flush()
+    return float(process.stdout.readline())
+
+
+def compare(size: str, steps: int, repeat: int, other: Path) -> dict[str, Any]:
+    """One record of this checkout's time for a step over another's."""
+    here = Path(__file__).resolve()
+    processes = [
+        subprocess.Popen(
+            [checkout / ".venv/bin/python", here, "--answer", size],
+            cwd=checkout,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
+        for checkout in (here.parents[1], other)
+    ]
+    times = np.zeros((repeat, steps, 2))
+    for repetition in times:
+        for process in processes:
+            duration(process, "begin")
+        for index, step in enumerate(repetition):
+            for who in (0, 1) if index % 2 else (1, 0):
+                step[who] = duration(processes[who], "step")
+    for process in processes:
+        process.communicate()
+    ratio, fastest = times[..., 0] / times[..., 1], times.min(axis=0).sum(axis=0)
+    return {
+        "env": ENV_ID,
+        "camera": size,
+        "against": str(other),
+        "time_ratio": round(float(np.median(ratio)), 3),
+        "time_ratio_25": round(float(np.quantile(ratio, 0.25)), 3),
+        "time_ratio_75": round(float(np.quantile(ratio, 0.75)), 3),
+        "time_ratio_fastest": round(float(fastest[0] / fastest[1]), 3),
+    }
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -116,17 +180,27 @@ def main() -> None:
     parser.add_argument("--size", action="append", help="camera WIDTHxHEIGHT (default 160x120 and 640x480)")
     parser.add_argument("--steps", type=int, default=60, help="environment steps a repetition")
     parser.add_argument("--repeat", type=int, default=3, help="repetitions")
+    parser.add_argument("--against", type=Path, metavar="DIRECTORY", help="compare with another checkout, step by step")
+    parser.add_argument("--answer", metavar="SIZE", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
+    if arguments.answer:
+        answer(arguments.answer)
+        return
+    if arguments.against and not (arguments.against / ".venv/bin/python").exists():
+        parser.error(f"--against must be a checkout that is installed in its .venv, got {arguments.against}")
     peer = None
     if arguments.peer:
         import highway_env  # noqa: F401, PLC0415 - registers the peer
 
         peer = gymnasium.make(PEER_ID)
     sizes = arguments.size or ["160x120", "640x480"]
-    records = [measure(size, arguments.steps, arguments.repeat, peer) for size in sizes]
+    if arguments.against:
+        records = [compare(size, arguments.steps, arguments.repeat, arguments.against.resolve()) for size in sizes]
+    else:
+        records = [measure(size, arguments.steps, arguments.repeat, peer) for size in sizes]
     if arguments.json:
         flat = [
-            {k: v for k, v in r.items() if k != "share"} | {f"share_{k}": v for k, v in r["share"].items()}
+            {k: v for k, v in r.items() if k != "share"} | {f"share_{k}": v for k, v in r.get("share", {}).items()}
             for r in records
         ]
         print(json.dumps(flat, indent=2))

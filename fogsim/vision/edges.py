@@ -2,13 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.vision import kernels
+from fogsim.vision import canny_kernels, kernels
 from fogsim.vision.median import columns_apart, median, row_medians
 
 Image = NDArray[np.float32]
@@ -77,8 +76,6 @@ class EdgeDetector:
         Writes the derivatives of its first argument, across and down, into its second and third.
     of_row, of_road : int
         Every which column a row's median gradient is of, and every which row and column the road's [px].
-    steps : float
-        Fixed-point steps per grey level in the 16-bit gradients that Canny's search takes.
     """
 
     def __init__(
@@ -87,9 +84,8 @@ class EdgeDetector:
         *,
         of_row: int = 32,
         of_road: int = 6,
-        steps: float = 128.0,
     ) -> None:
-        self._derivatives, self._of_row, self._of_road, self._steps = derivatives, of_row, of_road, steps
+        self._derivatives, self._of_row, self._of_road = derivatives, of_row, of_road
         self._shape: tuple[int, ...] = ()
 
     def __call__(self, luminance: Image, fog_slope: Image | None) -> Edges:
@@ -120,23 +116,18 @@ class EdgeDetector:
         slope = np.zeros(luminance.shape[0], np.float32)
         if fog_slope is not None:
             # Fog over a dark road brightens upward, so dI/dv is negative.
-            some = down[:, columns_apart(down.shape[1], self._of_row)]
-            slope = np.clip(row_medians(some), -fog_slope, 0.0).astype(np.float32)
-        kernels.levelled_gradient(across, down, slope, self._steps, *self._fixed)
-        high = max(EDGE_FACTOR * _median_size(self._gradient, self._of_road), MIN_GRADIENT)
-        low_step, high_step = 0.5 * high * self._steps, high * self._steps
-        cv2.Canny(*self._fixed, low_step, high_step, edges=self._pixels, L2gradient=True)
-        # Of two neighbours of equal gradient OpenCV takes the left one: of a mirrored image the other one.
-        mirrored = [np.ascontiguousarray(fixed[:, ::-1]) for fixed in (-self._fixed[0], self._fixed[1])]
-        found = cv2.Canny(mirrored[0], mirrored[1], low_step, high_step, L2gradient=True)
-        np.bitwise_or(self._pixels, found[:, ::-1], out=self._pixels)
+            medians = row_medians(columns_apart(down, self._of_row))
+            slope = np.clip(medians, -fog_slope, 0.0).astype(np.float32)
+        canny_kernels.squared_lengths(across, down, slope, self._squares)
+        high = max(EDGE_FACTOR * _median_size(self._squares, self._of_road), MIN_GRADIENT)
+        canny_kernels.trace_edges(across, down, self._squares, 0.5 * high, high, self._pixels)
         return Edges(self._pixels, high, self._gradient)
 
     def _make_room(self, shape: tuple[int, ...]) -> None:
         if shape != self._shape:
             self._shape = shape
             self._gradient = Gradient(np.empty(shape, np.float32), np.empty(shape, np.float32))
-            self._fixed: tuple[NDArray[Any], NDArray[Any]] = (np.empty(shape, np.int16), np.empty(shape, np.int16))
+            self._squares: Image = np.zeros((shape[0] + 2, shape[1] + 2), np.float32)
             self._pixels: NDArray[np.uint8] = np.empty(shape, np.uint8)
 
 
@@ -155,7 +146,7 @@ def edge_map(blurred: Image, fog_slope: Image) -> Edges:
     Edges
         See `EdgeDetector`.
     """
-    return EdgeDetector(_sobel, of_row=8, of_road=4, steps=32.0)(blurred, fog_slope)
+    return EdgeDetector(_sobel, of_row=8, of_road=4)(blurred, fog_slope)
 
 
 def _sobel(image: Image, across: Image, down: Image) -> None:
@@ -163,7 +154,7 @@ def _sobel(image: Image, across: Image, down: Image) -> None:
     cv2.Sobel(image, cv2.CV_32F, 0, 1, dst=down, scale=0.125, borderType=cv2.BORDER_REPLICATE)
 
 
-def _median_size(gradient: Gradient, step: int) -> float:
-    """Median size of the gradient in the lower half."""
-    lower, columns = slice(gradient.across.shape[0] // 2, None, step), columns_apart(gradient.across.shape[1], step)
-    return median(np.hypot(gradient.across[lower, columns], gradient.down[lower, columns]))
+def _median_size(squares: Image, step: int) -> float:
+    """Median size of the gradient in the lower half, of whose squares there is a border of one pixel."""
+    inside = squares[1:-1, 1:-1]
+    return median(np.sqrt(columns_apart(inside[len(inside) // 2 :: step], step)))

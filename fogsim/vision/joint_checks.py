@@ -72,7 +72,7 @@ def is_ramp(curves: StripCurves, geometry: StripGeometry, camera: Camera) -> boo
     if int(seen.sum()) < 3:
         return False
     table = linear_table(camera.response, camera.bits)
-    values = np.interp(curves.luminance[0][seen], table, np.linspace(0.0, 255.0, table.size))
+    values = np.interp(curves.luminance[0][seen], table, np.arange(table.size)) * (255.0 / (table.size - 1))
     rows = geometry.below[seen] - geometry.below[seen].mean()
     slope = float(matrix_product(rows, values)) / float(matrix_product(rows, rows))
     rest = values - values.mean() - slope * rows

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.linear_algebra import matrix_product
 from fogsim.vision import albedo_filter, joint_kernels, joint_search
 from fogsim.vision.sky import UNTOLD_DARKENING
 from fogsim.vision.strip_geometry import StripGeometry
@@ -256,14 +255,12 @@ def _average(found: list[_Refined]) -> JointFit:
     weight = np.exp(-0.5 * (costs - costs.min()))
     weight /= weight.sum()
     thetas = np.array([f.theta for f in found])
-    mean = matrix_product(weight, thetas)
-    variance = float(
-        matrix_product(weight, np.array([f.covariance[0, 0] for f in found]) + (thetas[:, 0] - mean[0]) ** 2)
-    )
+    mean = (weight[:, None] * thetas).sum(axis=0)
+    variances = np.array([f.covariance[0, 0] for f in found]) + (thetas[:, 0] - mean[0]) ** 2
     best = found[int(np.argmax(weight))]
     return JointFit(
         extinction=float(mean[0]),
-        extinction_deviation=math.sqrt(variance),
+        extinction_deviation=math.sqrt((weight * variances).sum()),
         airlight=float(mean[1]),
         shift=float(mean[2]),
         road=best.road,

@@ -103,32 +103,6 @@ def grow_upward(
 
 
 @kernel
-def levelled_gradient(
-    across: NDArray[np.float32],
-    down: NDArray[np.float32],
-    slope: NDArray[np.float32],
-    steps: float,
-    fixed_across: NDArray[np.int16],
-    fixed_down: NDArray[np.int16],
-) -> None:
-    """Take each row's (rows,) slope from the downward gradient, in place; write both gradients in fixed point.
-
-    What is steeper than 16 bits hold is an edge all the same, so it is cut off.
-    """
-    rows, cols = across.shape
-    unit, most = np.float32(steps), np.float32(32767.0)
-    for row in range(rows):
-        ramp = slope[row]
-        source, target = across[row], fixed_across[row]
-        for col in range(cols):
-            target[col] = np.int16(np.rint(min(max(source[col] * unit, -most), most)))
-        source, target = down[row], fixed_down[row]
-        for col in range(cols):
-            source[col] -= ramp
-            target[col] = np.int16(np.rint(min(max(source[col] * unit, -most), most)))
-
-
-@kernel
 def column_tops(region: NDArray[np.uint8], hole: int) -> NDArray[np.int64]:
     """Row to which each column of a (rows, cols) uint8 region reaches unbroken from the bottom.
 
@@ -148,34 +122,49 @@ def column_tops(region: NDArray[np.uint8], hole: int) -> NDArray[np.int64]:
 
 @kernel
 def best_run(
-    tops: NDArray[np.int64], top: int, enough: int, centre: float, light: NDArray[np.float64]
+    tops: NDArray[np.int64], top: int, enough: int, centre: float, luminance: NDArray[np.float32]
 ) -> tuple[int, int]:
     """First column and width of the widest run of columns that reach up to row `top` or higher.
 
     Width beyond `enough` does not count; of equals the run nearest to column `centre` is taken, of equally near ones
-    the wider one, then the one whose columns reach higher, and then the one of least `light` (cols,): neither side
-    comes first.
+    the wider one, then the one whose columns reach higher, and then the one of least `luminance` (rows, cols): neither
+    side comes first.
     """
-    best_start, best_width, best_offset, best_reach, best_light, start = 0, 0, np.inf, 0, np.inf, 0
+    best_start, best_width, best_offset, start = 0, 0, np.inf, 0
     for col in range(tops.size + 1):
         if col < tops.size and tops[col] <= top:
             continue
-        counted = min(col - start, enough)
+        width, counted = col - start, min(col - start, enough)
         offset = max(start - centre, centre - (col - 1), 0.0)
         better, equal = counted > min(best_width, enough), counted == min(best_width, enough)
-        if better or (equal and offset <= best_offset):
-            reach, seen = tops[start:col].sum(), light[start:col].sum()
-            nearer = better or offset < best_offset
-            higher = reach < best_reach or (reach == best_reach and seen < best_light)
-            if nearer or col - start > best_width or (col - start == best_width and higher):
-                best_start, best_width, best_offset, best_reach, best_light = start, col - start, offset, reach, seen
+        nearer = better or (equal and offset < best_offset)
+        alike = equal and offset == best_offset
+        if (
+            nearer
+            or (alike and width > best_width)
+            or (alike and width == best_width > 0 and _comes_first(tops, luminance, start, best_start, width))
+        ):
+            best_start, best_width, best_offset = start, width, offset
         start = col + 1
     return best_start, best_width
 
 
 @kernel
+def _comes_first(tops: NDArray[np.int64], luminance: NDArray[np.float32], start: int, other: int, width: int) -> bool:
+    """Whether a run's columns reach higher than those of another of its width, or as high and are darker."""
+    reach, others = tops[start : start + width].sum(), tops[other : other + width].sum()
+    if reach != others:
+        return bool(reach < others)
+    light = 0.0
+    for row in range(len(luminance)):
+        for col in range(width):
+            light += luminance[row, start + col] - luminance[row, other + col]
+    return light < 0.0
+
+
+@kernel
 def highest_band(
-    tops: NDArray[np.int64], bottom: int, min_width: int, enough: int, centre: float, light: NDArray[np.float64]
+    tops: NDArray[np.int64], bottom: int, min_width: int, enough: int, centre: float, luminance: NDArray[np.float32]
 ) -> tuple[int, int, int]:
     """Highest row that at least `min_width` neighbouring columns reach, and the best run of them (see `best_run`).
 
@@ -188,7 +177,7 @@ def highest_band(
     for top in np.unique(tops):
         if top >= bottom:
             break
-        start, width = best_run(tops, top, enough, centre, light)
+        start, width = best_run(tops, top, enough, centre, luminance)
         if width >= min_width:
             return top, start, width
     return bottom, 0, 0

@@ -94,8 +94,7 @@ def crossing_band(
     """
     bottom = region.shape[0] - 1
     tops = kernels.column_tops(region, hole)
-    light = luminance.sum(axis=0, dtype=np.float64)
-    top, first, width = kernels.highest_band(tops, bottom, min_width, max_width, float(centre), light)
+    top, first, width = kernels.highest_band(tops, bottom, min_width, max_width, float(centre), luminance)
     if width == 0:
         return None
     kept = min(width, max_width)

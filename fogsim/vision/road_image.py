@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,8 +108,7 @@ def road_image(
     left, right = columns or (0, cols)
     luminance = linear_luminance(level[first:, left:right], camera.response, camera.bits)
     top = min(first, max(0, sky_end - round(SKY_HEIGHT * camera.focal_length)))
-    sky: NDArray[Any] = np.ascontiguousarray(level[top:sky_end:2, columns_apart(cols, 4)])
-    above = linear_luminance(sky, camera.response, camera.bits)
+    above = linear_luminance(columns_apart(level[top:sky_end:2], 4), camera.response, camera.bits)
     airlight = quantile(above, 0.9)
     seed = median(luminance[-1])
     road = _checked(RoadImage(luminance, first, sky_end - first, airlight, seed, level, left))

@@ -197,12 +197,12 @@ def _middle_argmax(values: NDArray[np.int16], size: int) -> int:
 
     Mirrored images then have mirrored lines.
     """
-    best, most, aside = 0, values[0] - 1, 0
+    most, best, aside = values.max(), 0, 2 * size
     for i in range(values.size):
-        if values[i] >= most:
+        if values[i] == most:
             here = abs(2 * (i % size) - size + 1)
-            if values[i] > most or here < aside:
-                best, most, aside = i, values[i], here
+            if here < aside:
+                best, aside = i, here
     return best
 
 

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from fogsim.errors import InputError as InputError
     from fogsim.errors import MissingDependencyError as MissingDependencyError
     from fogsim.errors import SimulationError as SimulationError
+    from fogsim.errors import UnplayedWarning as UnplayedWarning
     from fogsim.loop import ClosedLoop as ClosedLoop
     from fogsim.loop import run as run
     from fogsim.scenario import Scenario as Scenario
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 
     __version__: str
 
-_ERRORS = ("FogSimError", "InputError", "MissingDependencyError", "SimulationError")
+_ERRORS = ("FogSimError", "InputError", "MissingDependencyError", "SimulationError", "UnplayedWarning")
 _VALUES = (
     "Belief",
     "Camera",

@@ -138,6 +138,7 @@ def _info(step: Step) -> dict[str, Any]:
         "speed_mps": float(step.traffic.speed[step.ego]),
         "collisions": len(step.collisions),
         "ending": None if step.ending is None else step.ending.value,
+        "unplayed": step.unplayed.lines,
         "truth": {
             "extinction_per_m": step.truth.extinction,
             "visibility_m": step.truth.visibility,

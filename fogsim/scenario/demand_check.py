@@ -47,7 +47,7 @@ def demand_mistakes(document: Document, scenario: Scenario) -> list[str]:
         unfit = {places[v]: _unfit_way(v, demand.routes[v], edges) for v in named.values() if v in demand.routes}
         told |= {at: text for at, text in unfit.items() if text}
         told |= _wide_changes(scenario, demand, edges)
-        told |= _banks_beyond(scenario, demand.routes.get(scenario.traffic.ego), edges)
+        told |= _banks_aside(scenario, demand.routes.get(scenario.traffic.ego), edges)
     return [f"{document.where(at)}: {dotted(at)}: {text}" for at, text in told.items()]
 
 
@@ -109,17 +109,19 @@ def _wide_changes(scenario: Scenario, demand: Demand, edges: NetEdges) -> dict[K
     return told
 
 
-def _banks_beyond(scenario: Scenario, way: VehicleRoute | None, edges: NetEdges) -> Mapping[KeyPath, str]:
-    """Banks that begin beyond the end of the ego's route, where no wind brings them in."""
+def _banks_aside(scenario: Scenario, way: VehicleRoute | None, edges: NetEdges) -> Mapping[KeyPath, str]:
+    """Banks wholly before the start or beyond the end of the ego's route, where no wind brings them in."""
     if way is None or scenario.fog.wind is not None or not all(edges.axes.get(edge) for edge in way.edges):
         return {}
-    length = edges.route_length(way.edges)
-    return {
-        ("fog", "banks", i, "start_m"): f"the bank lies beyond the ego's route, which is {length:.0f} m long; "
-        f"got {bank.start_m:g}"
-        for i, bank in enumerate(scenario.fog.banks)
-        if bank.start_m - bank.edge_m > length
-    }
+    length, told = edges.route_length(way.edges), {}
+    for i, bank in enumerate(scenario.fog.banks):
+        if bank.start_m - bank.edge_m > length:
+            told["fog", "banks", i, "start_m"] = (
+                f"the bank lies beyond the ego's route, which is {length:.0f} m long; got {bank.start_m:g}"
+            )
+        elif bank.end_m + bank.edge_m < 0.0:
+            told["fog", "banks", i, "end_m"] = f"the bank lies before the ego's route, from 0 m on; got {bank.end_m:g}"
+    return told
 
 
 def _suggested(name: str, known: tuple[str, ...] | Mapping[str, int]) -> str:

@@ -127,12 +127,15 @@ def test_the_reward_counts_with_the_reaction_time_of_the_advice(env: gymnasium.E
     assert margins[1] < margins[0] < 0.0
 
 
-def test_time_truncates() -> None:
-    env = gymnasium.make(ID, image_size=(64, 48), overrides=("duration_s=2", "clocks.camera_period_s=0.5"))
+def test_time_truncates_and_tells_what_has_not_been_played() -> None:
+    late = "traffic.events=[{kind: brake, vehicle: lead, at_time_s: 300}]"
+    env = gymnasium.make(ID, image_size=(64, 48), overrides=("duration_s=2", "clocks.camera_period_s=0.5", late))
     env.reset(seed=1)
-    ends = [env.step(np.array([12, 0]))[2:4] for _ in range(4)]
+    steps = [env.step(np.array([12, 0])) for _ in range(4)]
     env.close()
-    assert ends == [(False, False)] * 3 + [(False, True)]
+    assert [step[2:4] for step in steps] == [(False, False)] * 3 + [(False, True)]
+    assert [len(step[4]["unplayed"]) for step in steps] == [0, 0, 0, 1]
+    assert steps[-1][4]["unplayed"][0].startswith("traffic.events.0 (brake of lead at_time_s=300): its time")
 
 
 def test_rendering_shows_the_frame_beside_a_panel() -> None:

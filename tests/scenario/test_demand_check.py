@@ -73,13 +73,17 @@ def test_who_has_other_clients_may_name_anybody() -> None:
         override(scenario, ["duration_s=3"])
 
 
-def test_a_bank_beyond_the_route_is_told_with_the_routes_length() -> None:
+def test_a_bank_beside_the_route_is_told_with_the_routes_length() -> None:
     # The route is 5501 m long, and a bank's soft edge reaches out by half of its length.
     near = "fog.banks.0={start_m: 5550, end_m: 6500, visibility_m: 60}"
     far = "fog.banks.0={start_m: 5650, end_m: 6500, visibility_m: 60}"
     assert load_scenario("motorway_fog_bank", [near]).fog.banks[0].start_m == 5550
     assert mistakes("motorway_fog_bank", far) == [
         f"--set {far}: fog.banks.0.start_m: the bank lies beyond the ego's route, which is 5501 m long; got 5650"
+    ]
+    early = "fog.banks.0={start_m: -900, end_m: -200, visibility_m: 60}"
+    assert mistakes("motorway_fog_bank", early) == [
+        f"--set {early}: fog.banks.0.end_m: the bank lies before the ego's route, from 0 m on; got -200"
     ]
     drifting = load_scenario("motorway_fog_bank", [far, "fog.wind={speed_kmh: 20, from_deg: 70}"])
     assert drifting.fog.banks[0].start_m == 5650

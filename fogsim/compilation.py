@@ -2,16 +2,17 @@
 
 import logging
 import multiprocessing
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.estimators import ESTIMATORS
+from fogsim.estimators import ESTIMATORS, Estimator
 from fogsim.jit import processors
 from fogsim.loop import run
+from fogsim.parameters import accepted_parameters
 from fogsim.scenario import load_scenario
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, Frame, LeadMeasurement, Observation
@@ -19,6 +20,10 @@ from fogsim.values import Camera, Frame, LeadMeasurement, Observation
 _SIZES = ((160, 120), (640, 480))
 """Pictures that are estimated: methods choose what they do by size [px]."""
 
+
+_BY_DAY = ((), ("camera.samples=2", "fog.patches={correlation_length_m: 20}", "fog.forward_scatter=0.1"),)
+_BY_NIGHT = ((), ("street_lamps=true", "fog.patches={correlation_length_m: 20}", "camera.lens_glare=0.05"))
+"""What is set in one drive after the other, since it is drawn by kernels of its own."""
 
 _SKY = 1e6
 """Distance of the sky in those pictures [m]."""
@@ -40,7 +45,7 @@ def compile_kernels() -> Iterator[str]:
     with ProcessPoolExecutor(min(2, processors()), multiprocessing.get_context("spawn"), _be_quiet) as pool:
         # The estimators share hardly a kernel with the drawing; drawing by night shares many with drawing by day.
         pending: dict[Future[None], str] = {
-            pool.submit(_drive, "motorway_fog_bank"): "drives by day",
+            pool.submit(_drive, "motorway_fog_bank", _BY_DAY): "drives by day",
             pool.submit(_estimate_visibility): "estimators",
         }
         while pending:
@@ -48,7 +53,7 @@ def compile_kernels() -> Iterator[str]:
                 done.result()
                 ready = pending.pop(done)
                 if ready == "drives by day":
-                    pending[pool.submit(_drive, "night_motorway_fog")] = "drives by night"
+                    pending[pool.submit(_drive, "night_motorway_fog", _BY_NIGHT)] = "drives by night"
                 yield ready
 
 
@@ -57,23 +62,31 @@ def _be_quiet() -> None:
     logging.getLogger("fogsim").setLevel(logging.ERROR)
 
 
-def _drive(scenario: str) -> None:
-    """Draw the first frames of a scenario, with an estimator that needs the fewest kernels."""
+def _drive(scenario: str, drives: Sequence[Sequence[str]]) -> None:
+    """Draw the first frames of a scenario with each of some settings, with an estimator that needs few kernels."""
     published = "estimators=[{method: negru2013, parameters: {as_published: true}}]"
-    for _ in islice(run(load_scenario(scenario, [published]), seed=1), 3):
-        pass
+    for overrides in drives:
+        for _ in islice(run(load_scenario(scenario, [published, *overrides]), seed=1), 3):
+            pass
 
 
 def _estimate_visibility() -> None:
-    """Let every daytime method read pictures of a foggy road with a vehicle ahead that drives away."""
+    """Let every daytime method, also as published, read pictures of a foggy road with a vehicle ahead that leaves."""
     for width, height in _SIZES:
         camera = Camera(width, height, 0.9 * width, (width / 2, height / 2), 1.4, pitch=0.03)
-        for name in ESTIMATORS:
-            estimator = ESTIMATORS[name](camera=camera)
-            for index in range(4):
-                distance = 25.0 + 5.0 * index
-                frame = Frame(0.1 * index, _foggy_road(camera, distance), camera)
-                estimator.update(Observation(frame, 20.0, LeadMeasurement(distance, 5.0), ()))
+        for factory in ESTIMATORS.values():
+            published = [{"as_published": True}] if "as_published" in accepted_parameters(factory) else []
+            for parameters in ({}, *published):
+                _read(factory(camera=camera, **parameters), camera)
+
+
+def _read(estimator: Estimator, camera: Camera) -> None:
+    """Let a method read pictures in colour and, in the end, in grey."""
+    for index in range(4):
+        distance = 25.0 + 5.0 * index
+        image = _foggy_road(camera, distance)
+        frame = Frame(0.1 * index, image if index < 3 else np.ascontiguousarray(image[:, :, 0]), camera)
+        estimator.update(Observation(frame, 20.0, LeadMeasurement(distance, 5.0), ()))
 
 
 def _foggy_road(camera: Camera, lead: float, visibility: float = 120.0) -> NDArray[np.uint8]:

@@ -7,10 +7,14 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from subprocess import CompletedProcess
 
 import pytest
 import sumo
 
+from fogsim import cli
+
+Command = Callable[..., "CompletedProcess[str]"]
 SumoProcess = Callable[..., contextlib.AbstractContextManager[tuple[int, "subprocess.Popen[bytes]"]]]
 
 
@@ -44,6 +48,22 @@ def sumo_process(free_port: Callable[[], int]) -> SumoProcess:
                 process.kill()
 
     return start
+
+
+@pytest.fixture
+def command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Command:
+    """Run a command line in this process, in a folder or here: one of its own would spend its time on imports."""
+
+    def run(*arguments: str, cwd: Path | None = None) -> "CompletedProcess[str]":
+        monkeypatch.setattr(sys, "argv", ["fogsim", *arguments])
+        monkeypatch.setenv("COLUMNS", "300")
+        capsys.readouterr()
+        with contextlib.chdir(cwd or "."), pytest.raises(SystemExit) as ended:
+            cli.main()
+        told = capsys.readouterr()
+        return CompletedProcess(arguments, int(ended.value.code or 0), told.out, told.err)
+
+    return run
 
 
 def pytest_configure() -> None:

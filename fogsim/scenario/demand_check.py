@@ -113,7 +113,8 @@ def _banks_aside(scenario: Scenario, way: VehicleRoute | None, edges: NetEdges) 
     """Banks wholly before the start or beyond the end of the ego's route, where no wind brings them in."""
     if way is None or scenario.fog.wind is not None or not all(edges.axes.get(edge) for edge in way.edges):
         return {}
-    length, told = edges.route_length(way.edges), {}
+    length = edges.route_length(way.edges)
+    told: dict[KeyPath, str] = {}
     for i, bank in enumerate(scenario.fog.banks):
         if bank.start_m - bank.edge_m > length:
             told["fog", "banks", i, "start_m"] = (

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import imageio.v3 as imageio
@@ -15,6 +16,7 @@ from pyarrow import parquet
 
 from fogsim.scenario import catalogue
 
+Command = Callable[..., "subprocess.CompletedProcess[str]"]
 FOGSIM = (sys.executable, "-m", "fogsim")
 SMALL = ("--set", "camera.width=160", "--set", "camera.height=120", "--set", "duration_s=3")
 TOWN = str(Path(__file__).resolve().parents[1] / "data" / "grid" / "grid.sumocfg")
@@ -66,8 +68,8 @@ def test_the_same_seed_writes_the_same_bytes_in_a_fresh_process(finished: Path, 
         assert (finished / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
 
 
-def test_results_are_not_overwritten_unasked(finished: Path) -> None:
-    refused = fogsim("run", "motorway_fog_bank", "--out", str(finished), *SMALL)
+def test_results_are_not_overwritten_unasked(finished: Path, command: Command) -> None:
+    refused = command("run", "motorway_fog_bank", "--out", str(finished), *SMALL)
     assert refused.returncode == 2
     assert "--overwrite" in refused.stderr
     assert "Traceback" not in refused.stderr
@@ -123,34 +125,36 @@ def test_an_interrupted_run_leaves_readable_results_that_say_they_are_partial(tm
         (["run", "--sumocfg", "no.sumocfg", "--ego", "a", "--visibility", "80"], "there is no file 'no.sumocfg'"),
     ],
 )
-def test_bad_input_ends_in_one_message_and_writes_nothing(arguments: list[str], message: str, tmp_path: Path) -> None:
-    done = fogsim(*arguments, cwd=tmp_path)
+def test_bad_input_ends_in_one_message_and_writes_nothing(
+    arguments: list[str], message: str, tmp_path: Path, command: Command
+) -> None:
+    done = command(*arguments, cwd=tmp_path)
     assert done.returncode == 2
     assert message in done.stderr
     assert "Traceback" not in done.stderr
     assert not list(tmp_path.iterdir())
 
 
-def test_validate_tells_the_good_from_the_bad(tmp_path: Path) -> None:
+def test_validate_tells_the_good_from_the_bad(tmp_path: Path, command: Command) -> None:
     folder = Path(shutil.copytree(catalogue()["motorway_fog_bank"].parent, tmp_path / "mine"))
-    assert fogsim("validate", str(folder), "motorway_fog_bank").returncode == 0
+    assert command("validate", str(folder), "motorway_fog_bank").returncode == 0
     bad = folder / "scenario.yaml"
     bad.write_text(bad.read_text(encoding="utf-8").replace("lux", "").replace("width: 640", "width: -1"), "utf-8")
-    done = fogsim("validate", str(folder), "nowhere.yaml", "/dev/zero", "motorway_fog_bank")
+    done = command("validate", str(folder), "nowhere.yaml", "/dev/zero", "motorway_fog_bank")
     assert done.returncode == 2
     for told in ("camera.width", "nowhere.yaml: there is no such scenario file", "/dev/zero: cannot be read"):
         assert told in done.stderr
     assert "fine: motorway_fog_bank" in done.stdout
 
 
-def test_validate_tells_all_that_the_sumo_files_do_not_have(tmp_path: Path) -> None:
+def test_validate_tells_all_that_the_sumo_files_do_not_have(tmp_path: Path, command: Command) -> None:
     folder = Path(shutil.copytree(catalogue()["motorway_fog_bank"].parent, tmp_path / "mine"))
     bad, text = folder / "scenario.yaml", (folder / "scenario.yaml").read_text(encoding="utf-8")
     for right, wrong in (("ego: ego", "ego: egoo"), ("vehicle: lead", "vehicle: leed")):
         assert right in text
         text = text.replace(right, wrong)
     bad.write_text(text, encoding="utf-8")
-    done = fogsim("validate", str(folder))
+    done = command("validate", str(folder))
     assert done.returncode == 2
     for told in ("traffic.ego: there is no vehicle 'egoo'", "traffic.events.0.vehicle: there is no vehicle 'leed'"):
         assert told in done.stderr
@@ -177,23 +181,23 @@ def test_any_sumo_configuration_runs_with_a_chosen_ego(tmp_path: Path) -> None:
     assert speed.max() > 10.0
 
 
-def test_an_ego_that_a_configuration_does_not_have_is_told(tmp_path: Path) -> None:
-    done = fogsim("run", "--sumocfg", TOWN, "--ego", "18", "--visibility", "120", cwd=tmp_path)
+def test_an_ego_that_a_configuration_does_not_have_is_told(tmp_path: Path, command: Command) -> None:
+    done = command("run", "--sumocfg", TOWN, "--ego", "18", "--visibility", "120", cwd=tmp_path)
     assert done.returncode == 2
     assert "traffic.ego: there is no vehicle '18' in grid.trips.xml; did you mean 'veh18'?" in done.stderr
     assert "Traceback" not in done.stderr
 
 
-def test_list_names_scenarios_and_methods() -> None:
-    done = fogsim("list")
+def test_list_names_scenarios_and_methods(command: Command) -> None:
+    done = command("list")
     assert done.returncode == 0
     for name in ("motorway_fog_bank", "negru2013", "grid_filter", "stopping_sight_distance", "fog_lamp_rules"):
         assert name in done.stdout
 
 
-def test_signs_are_written_as_geojson(tmp_path: Path) -> None:
+def test_signs_are_written_as_geojson(tmp_path: Path, command: Command) -> None:
     out = tmp_path / "new" / "signs.geojson"
-    done = fogsim("signs", "motorway_fog_bank", "--out", str(out))
+    done = command("signs", "motorway_fog_bank", "--out", str(out))
     assert done.returncode == 0, done.stderr
     assert "9 signs" in done.stdout
     content = json.loads(out.read_text(encoding="utf-8"))
@@ -208,6 +212,6 @@ def test_doctor_finds_everything_here() -> None:
     assert "missing" not in done.stdout
 
 
-def test_version_and_help() -> None:
-    assert fogsim("--version").stdout.startswith("fogsim ")
-    assert "KEY.PATH=VALUE" in fogsim("run", "--help").stdout
+def test_version_and_help(command: Command) -> None:
+    assert command("--version").stdout.startswith("fogsim ")
+    assert "KEY.PATH=VALUE" in command("run", "--help").stdout

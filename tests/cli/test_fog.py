@@ -1,13 +1,14 @@
-"""``fogsim fog`` in a process of its own."""
+"""``fogsim fog``."""
 
-import os
-import subprocess
-import sys
+from collections.abc import Callable
 from pathlib import Path
+from subprocess import CompletedProcess
 
 import cv2
 import numpy as np
 import pytest
+
+Fog = Callable[..., "CompletedProcess[str]"]
 
 CAMERA_YAML = """\
 width: 40
@@ -20,20 +21,6 @@ response: linear
 """
 
 
-def fog(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    given = ["image.png", "--depth", "depth.npy", "--camera", "camera.yaml", "--out", "out.png", *arguments]
-    environment = {**os.environ, "COLUMNS": "200", "NO_COLOR": "1"}
-    return subprocess.run(
-        [sys.executable, "-m", "fogsim", "fog", *given],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        env=environment,
-        check=False,
-        cwd=folder,
-    )
-
-
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     (tmp_path / "camera.yaml").write_text(CAMERA_YAML, encoding="utf-8")
@@ -42,7 +29,16 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_a_black_image_at_the_visibility_has_95_percent_of_the_airlight(folder: Path) -> None:
+@pytest.fixture
+def fog(command: Callable[..., "CompletedProcess[str]"]) -> Fog:
+    def run(folder: Path, *arguments: str) -> "CompletedProcess[str]":
+        given = ["image.png", "--depth", "depth.npy", "--camera", "camera.yaml", "--out", "out.png", *arguments]
+        return command("fog", *given, cwd=folder)
+
+    return run
+
+
+def test_a_black_image_at_the_visibility_has_95_percent_of_the_airlight(folder: Path, fog: Fog) -> None:
     done = fog(folder, "--depth-kind", "range", "--visibility", "80", "--airlight", "240,200,100")
     assert done.returncode == 0, done.stderr
     assert "airlight 240, 200, 100" in done.stdout
@@ -51,7 +47,7 @@ def test_a_black_image_at_the_visibility_has_95_percent_of_the_airlight(folder: 
     assert sorted(path.name for path in folder.iterdir()) == ["camera.yaml", "depth.npy", "image.png", "out.png"]
 
 
-def test_a_file_that_is_there_is_replaced_only_when_it_is_asked_for(folder: Path) -> None:
+def test_a_file_that_is_there_is_replaced_only_when_it_is_asked_for(folder: Path, fog: Fog) -> None:
     (folder / "out.png").write_text("of the user", encoding="utf-8")
     given = ("--depth-kind", "range", "--visibility", "80", "--airlight", "240")
     refused = fog(folder, *given)
@@ -72,7 +68,9 @@ def test_a_file_that_is_there_is_replaced_only_when_it_is_asked_for(folder: Path
         (("--visibility", "80", "--depth-kind", "range", "--depth", "none.npy"), "none.npy: cannot be read"),
     ],
 )
-def test_mistakes_end_in_one_line_and_exit_code_2(folder: Path, arguments: tuple[str, ...], told: str) -> None:
+def test_mistakes_end_in_one_line_and_exit_code_2(
+    folder: Path, arguments: tuple[str, ...], told: str, fog: Fog
+) -> None:
     done = fog(folder, *arguments)
     assert done.returncode == 2
     assert told in done.stderr

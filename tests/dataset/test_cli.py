@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -54,8 +55,10 @@ def test_an_interrupted_command_says_so_and_the_same_one_continues_it(tmp_path: 
         (["--frames", "3", "--set", "camera.samples=9"], "camera.samples: input should be less than or equal to 3"),
     ],
 )
-def test_bad_input_ends_in_one_message_and_writes_nothing(arguments: list[str], message: str, tmp_path: Path) -> None:
-    done = fogsim("--out", str(tmp_path / "out"), *arguments)
+def test_bad_input_ends_in_one_message_and_writes_nothing(
+    arguments: list[str], message: str, tmp_path: Path, command: Callable[..., "subprocess.CompletedProcess[str]"]
+) -> None:
+    done = command("dataset", "motorway_fog_bank", "--out", str(tmp_path / "out"), *arguments)
     assert done.returncode == 2
     assert message in done.stderr
     assert "Traceback" not in done.stderr

@@ -21,7 +21,10 @@ _SIZES = ((160, 120), (640, 480))
 """Pictures that are estimated: methods choose what they do by size [px]."""
 
 
-_BY_DAY = ((), ("camera.samples=2", "fog.patches={correlation_length_m: 20}", "fog.forward_scatter=0.1"),)
+_BY_DAY = (
+    (),
+    ("camera.samples=2", "fog.patches={correlation_length_m: 20}", "fog.forward_scatter=0.1"),
+)
 _BY_NIGHT = ((), ("street_lamps=true", "fog.patches={correlation_length_m: 20}", "camera.lens_glare=0.05"))
 """What is set in one drive after the other, since it is drawn by kernels of its own."""
 

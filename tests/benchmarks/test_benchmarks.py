@@ -28,7 +28,7 @@ def records(name: str, *arguments: str) -> list[dict[str, Any]]:
     ("name", "arguments", "keys"),
     [
         ("loop.py", ("--size", "64x48", "--steps", "3", "--repeat", "1"), {"env", "camera", "vehicles", "steps_per_s"}),
-        ("resets.py", ("--resets", "5"), {"ms_median", "growth_kib_per_reset"}),
+        ("resets.py", ("--resets", "3"), {"ms_median", "growth_kib_per_reset"}),
         (
             "estimator_accuracy.py",
             ("--cameras", "1", "--scenes", "1", "--draws", "1"),

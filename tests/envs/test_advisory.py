@@ -3,6 +3,7 @@
 import math
 import warnings
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -16,6 +17,8 @@ from fogsim.errors import InputError
 from fogsim_envs.spaces import ADVISED_SPEEDS, LAMP_MODES, command_of
 
 ID = "fogsim/FogAdvisory-v0"
+ROAD = str(Path(__file__).resolve().parents[1] / "data" / "road")
+"""A scenario in which the ego is there at once: the motorway fills for three minutes first."""
 SMALL = {"image_size": (64, 48), "overrides": ("clocks.camera_period_s=0.5",)}
 
 
@@ -28,7 +31,7 @@ def env() -> Iterator[gymnasium.Env[Any, Any]]:
 
 @pytest.mark.parametrize("continuous", [False, True])
 def test_gymnasiums_checker_finds_nothing(continuous: bool, caplog: pytest.LogCaptureFixture) -> None:
-    env = gymnasium.make(ID, continuous=continuous, render_mode="rgb_array", **SMALL)
+    env = gymnasium.make(ID, scenario=ROAD, continuous=continuous, render_mode="rgb_array", **SMALL)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(env.unwrapped)
@@ -78,7 +81,7 @@ def test_truth_is_not_in_the_observation(env: gymnasium.Env[Any, Any]) -> None:
 
 
 def test_two_environments_in_one_process_do_not_disturb_each_other() -> None:
-    one, other = (gymnasium.make(ID, **SMALL) for _ in range(2))
+    one, other = (gymnasium.make(ID, scenario=ROAD, **SMALL) for _ in range(2))
     try:
         alone = [one.reset(seed=9)[0], *(one.step(np.array([6, 0]))[0] for _ in range(3))]
         first = one.reset(seed=9)[0]
@@ -103,14 +106,14 @@ def test_overrides_for_one_episode(env: gymnasium.Env[Any, Any]) -> None:
 @pytest.mark.parametrize(
     ("setting", "step"), [("clocks.camera_period_s=0.1", 0.5), ("clocks.decision_period_s=1", 1.0)]
 )
-def test_an_override_of_a_clock_does_what_it_says_and_nothing_else(
-    env: gymnasium.Env[Any, Any], setting: str, step: float
-) -> None:
+def test_an_override_of_a_clock_does_what_it_says_and_nothing_else(setting: str, step: float) -> None:
     """A step stays one decision period long, and in the next episode is as long as before."""
+    env = gymnasium.make(ID, scenario=ROAD, **SMALL)
     for options, length in (({"overrides": [setting]}, step), (None, 0.5)):
         env.reset(seed=5, options=options)
         assert env.step(np.array([12, 0]))[4]["time_s"] == pytest.approx(length)
         assert env.unwrapped.metadata["render_fps"] == pytest.approx(1.0 / length)
+    env.close()
 
 
 def test_the_reward_counts_with_the_reaction_time_of_the_advice(env: gymnasium.Env[Any, Any]) -> None:

@@ -9,12 +9,14 @@ import copy
 import json
 import math
 import os
+import shutil
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
 import pytest
+import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pydantic import BaseModel
@@ -33,27 +35,8 @@ from fogsim.scene import build as scene_build
 FUZZ = int(os.environ.get("FOGSIM_FUZZ", "0"))
 """How many sets of keys are tried in a long search; 0 for a short one."""
 
-LANES = "".join(
-    f'<lane id="road_{i}" index="{i}" speed="30" length="400" shape="0,{y} 400,{y}"/>'
-    for i, y in ((0, -4.8), (1, -1.6))
-)
-FILES = {
-    "road.net.xml": f"""<net version="1.20"><edge id="road" from="a" to="b" priority="1">{LANES}</edge>
-<junction id="a" type="dead_end" x="0" y="0" incLanes="" intLanes="" shape="0,0 0,-6.4"/>
-<junction id="b" type="dead_end" x="400" y="0" incLanes="road_0 road_1" intLanes="" shape="400,-6.4 400,0"/></net>""",
-    "road.rou.xml": """<routes><vType id="car" vClass="passenger"/><route id="r" edges="road"/>
-<vehicle id="lead" type="car" route="r" depart="0" departLane="1" departPos="60" departSpeed="10"/>
-<vehicle id="ego" type="car" route="r" depart="0" departLane="1" departPos="30" departSpeed="10"/></routes>""",
-}
-"""A straight road of two lanes, the ego, and a vehicle ahead."""
-
-PLAIN: dict[str, Any] = {
-    "name": "tiny",
-    "traffic": {"net": "road.net.xml", "routes": ["road.rou.xml"]},
-    "fog": {"visibility_m": 80.0},
-    "camera": {"width": 32, "height": 24},
-    "renderer": "cpu",
-}
+ROAD = Path(__file__).resolve().parents[1] / "data" / "road"
+PLAIN: dict[str, Any] = yaml.safe_load((ROAD / "scenario.yaml").read_text(encoding="utf-8"))
 EVENT = {"vehicle": "lead", "at_time_s": 0.0}
 EXAMPLES: dict[str, Any] = {
     "fog.banks": [{"start_m": 50.0, "end_m": 300.0, "visibility_m": 60.0}],
@@ -179,8 +162,8 @@ def yaml_of(value: Any) -> str:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder: Path = tmp_path_factory.mktemp("tiny")
-    for name, text in FILES.items():
-        (folder / name).write_text(text, encoding="utf-8")
+    for name in ("road.net.xml", "road.rou.xml"):
+        shutil.copy(ROAD / name, folder)
     return folder
 
 

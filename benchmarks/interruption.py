@@ -35,7 +35,7 @@ def interrupted(number: signal.Signals, moment: float) -> dict[str, Any]:
             start_new_session=True,
         )
         time.sleep(moment)
-        where = "run" if list(out.glob("unfinished/steps.parquet*")) else "before the run"
+        where = "run" if (out / "unfinished" / "steps.arrows").exists() else "before the run"
         started = time.perf_counter()
         process.send_signal(number)
         code = process.wait(timeout=120)

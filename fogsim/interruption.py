@@ -51,7 +51,8 @@ def _handle_signals(handler: _Handler) -> None:
 class ProgramSignals:
     """The first signal as KeyboardInterrupt, for a program, from `listen` on; the next ends the program at once.
 
-    So does the first one where its exception is lost, or what it ends takes too long; `Interruption` gives more time.
+    So does the first one while a module is imported, which may take the exception for its own failure, or where the
+    exception is lost, or what it ends takes too long; `Interruption` gives more time, and lets imports finish.
 
     Attributes
     ----------
@@ -79,12 +80,23 @@ class ProgramSignals:
         if self.last is not None:
             leave(self.last)
 
-    def _raise(self, signum: int, _: FrameType | None) -> None:
+    def _raise(self, signum: int, frame: FrameType | None) -> None:
         if self.last is not None:
             leave(self.last)
+        if _imports(frame):
+            leave(signum)
         self.last = signum
         signal.setitimer(signal.ITIMER_REAL, _PATIENCE, _PATIENCE)
         raise KeyboardInterrupt
+
+
+def _imports(frame: FrameType | None) -> bool:
+    """Whether a module is being imported by a frame or one of those that called it."""
+    while frame is not None:
+        if frame.f_code.co_filename.startswith("<frozen importlib"):
+            return True
+        frame = frame.f_back
+    return False
 
 
 class Interruption:
@@ -125,18 +137,19 @@ class Interruption:
         if error is None:
             self._handle_waiting()
 
-    def _take(self, signum: int, frame: FrameType | None) -> None:
+    def _take(self, signum: int, _: FrameType | None) -> None:
         # Who is impatient presses twice, and what the first one ends must be able to end.
         if self._allowed and time.monotonic() - self._raised > ENDING_TIME:
-            self._let_through(signum, frame)
+            self._let_through(signum)
         else:
             self._waiting = signum
 
-    def _let_through(self, signum: int, frame: FrameType | None) -> None:
+    def _let_through(self, signum: int) -> None:
         self._raised = time.monotonic()
         if self._alarm is not None and self._allowed:
             signal.setitimer(signal.ITIMER_REAL, _PATIENCE, _PATIENCE)
-        self._handlers[signum](signum, frame)
+        # Without the frame, for there is something to save, whatever is imported.
+        self._handlers[signum](signum, None)
 
     def _raise_again(self, _: int, __: FrameType | None) -> None:
         if self._allowed:
@@ -145,7 +158,7 @@ class Interruption:
     def _handle_waiting(self) -> None:
         signum, self._waiting = self._waiting, None
         if signum is not None:
-            self._let_through(signum, None)
+            self._let_through(signum)
 
     @contextlib.contextmanager
     def allowed(self) -> Iterator[None]:

@@ -17,9 +17,9 @@ import numpy as np
 
 from fogsim.atmosphere import Air
 from fogsim.lighting import own_head_lamps
-from fogsim.pinhole import ray_from_pixel
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, CameraPose, FogBank, FogChange, FogField, Lamp, Lights, LightSources, View
+from fogsim.values.pinhole import ray_from_pixel
 
 POSE = CameraPose((0.0, 0.0, 1.38), 0.0)
 AIRLIGHT = (3000.0, 3000.0, 3000.0)

@@ -26,7 +26,7 @@ import fogsim
 from fogsim.atmosphere import FieldAccess
 from fogsim.scenario import build
 from fogsim.traffic import BrakeEvent, Traffic, Trigger, libsumo_traffic
-from fogsim.traffic.drivers import within_sight
+from fogsim.traffic.drivers.speed_choice import within_sight
 from fogsim.values import Collision, Command, SpeedAdvice
 
 SECONDS, FILLING, STANDING = 240, 120, 90

@@ -17,7 +17,7 @@ from fogsim.camera import Sensor, expose, mounted_pose
 from fogsim.render import make_renderer
 from fogsim.scenario import build
 from fogsim.scene import build_scene, vehicle_batches
-from fogsim.traffic.network import read_net, road_network
+from fogsim.traffic.road.network import read_net, road_network
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, CameraPose, FogField, LaneMarking, LeadMeasurement, SignMap, TrafficState, View
 

@@ -29,11 +29,11 @@ from numpy.typing import NDArray
 
 import fogsim
 from fogsim.camera import mounted_pose
-from fogsim.outlook import Outlook
+from fogsim.ego.view_rendering import Outlook
 from fogsim.render import RENDERERS
 from fogsim.scenario import Scenario, build
 from fogsim.scene import build_scene, vehicle_batches
-from fogsim.traffic.network import read_net, road_network
+from fogsim.traffic.road.network import read_net, road_network
 from fogsim.values import Lamp, RoadNetwork, Sign, SignMap, TrafficState
 
 ROUTE = ("approach", "bank", "exit")

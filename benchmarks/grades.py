@@ -17,7 +17,7 @@ import numpy as np
 
 import fogsim
 from fogsim.scenario import build
-from fogsim.traffic.network import read_net, road_network
+from fogsim.traffic.road.network import read_net, road_network
 from fogsim.values import Step
 
 SCENARIO = "graded_motorway"

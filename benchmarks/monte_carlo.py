@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 from numba import njit
 
-from fogsim.beam import luminous_intensity
 from fogsim.lighting.beams import high_beam, low_beam
 from fogsim.units import extinction_from_visibility
+from fogsim.values.luminous_intensity import luminous_intensity
 
 PHASES = Path(__file__).parents[1] / "fogsim" / "atmosphere" / "data" / "phase_functions.csv"
 FOGS = ("heavy_advection", "moderate_advection", "heavy_radiation", "moderate_radiation")

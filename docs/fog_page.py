@@ -19,17 +19,17 @@ from numpy.typing import NDArray
 from staging import LIT, PICTURES, Shot, Vehicle, network, photograph, scenario
 
 from fogsim.atmosphere import Air, Droplets, airlight_from_illuminance, extinction, field_at
-from fogsim.atmosphere.glare import veiling_luminance
-from fogsim.atmosphere.lamp_tables import lamp_table
-from fogsim.atmosphere.night_visibility import (
+from fogsim.atmosphere.lamps.lamp_tables import lamp_table
+from fogsim.atmosphere.lamps.phase_function import henyey_greenstein, phase_function
+from fogsim.atmosphere.lamps.veil import FOLD_DISTANCE, INTERVALS, VeilRays, lit_air, ray_pieces, veil_along
+from fogsim.atmosphere.visibility.disability_glare import veiling_luminance
+from fogsim.atmosphere.visibility.night_visibility import (
     FogKind,
     high_beam_veil,
     target_visibility_level,
     visibility_distance,
 )
-from fogsim.atmosphere.phase import henyey_greenstein, phase_function
-from fogsim.atmosphere.veil import FOLD_DISTANCE, INTERVALS, VeilRays, lit_air, ray_pieces, veil_along
-from fogsim.atmosphere.visibility_level import threshold
+from fogsim.atmosphere.visibility.visibility_level import threshold
 from fogsim.lighting.beams import high_beam, low_beam, scaled_beam
 from fogsim.render import make_renderer
 from fogsim.scenario import build

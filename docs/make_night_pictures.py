@@ -14,11 +14,11 @@ from PIL import Image
 
 import fogsim
 from fogsim.atmosphere import Droplets
-from fogsim.atmosphere.glow import glow, narasimhan_nayar, scattered_once
-from fogsim.atmosphere.lamp_tables import lamp_table
-from fogsim.atmosphere.night_visibility import FogKind, high_beam_veil, visibility_distance
-from fogsim.atmosphere.phase import phase_function
-from fogsim.atmosphere.veil import FOLD_DISTANCE, INTERVALS, VeilRays, lit_air, ray_pieces, veil_along
+from fogsim.atmosphere.lamps.glow import glow, narasimhan_nayar, scattered_once
+from fogsim.atmosphere.lamps.lamp_tables import lamp_table
+from fogsim.atmosphere.lamps.phase_function import phase_function
+from fogsim.atmosphere.lamps.veil import FOLD_DISTANCE, INTERVALS, VeilRays, lit_air, ray_pieces, veil_along
+from fogsim.atmosphere.visibility.night_visibility import FogKind, high_beam_veil, visibility_distance
 from fogsim.lighting.beams import high_beam, low_beam, scaled_beam
 from fogsim.loop import ClosedLoop
 from fogsim.units import extinction_from_visibility

@@ -15,9 +15,9 @@ from PIL import Image, ImageDraw, ImageFont
 
 import fogsim
 from fogsim.camera import mounted_pose
-from fogsim.outlook import Outlook
+from fogsim.ego.view_rendering import Outlook
 from fogsim.scenario import Scenario, build
-from fogsim.traffic.network import read_net, road_network
+from fogsim.traffic.road.network import read_net, road_network
 from fogsim.values import CameraPose, Lamp, Lane, LaneMarking, RoadNetwork, Sign, SignMap, TrafficState
 
 CHECKOUT = Path(__file__).resolve().parents[1]

@@ -5,8 +5,6 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from fogsim import estimators as estimators
-    from fogsim.attached import attach as attach
-    from fogsim.attached import connect as connect
     from fogsim.dataset import semantic_mask as semantic_mask
     from fogsim.dataset import transmission as transmission
     from fogsim.dataset import write_dataset as write_dataset
@@ -17,6 +15,8 @@ if TYPE_CHECKING:
     from fogsim.errors import UnplayedWarning as UnplayedWarning
     from fogsim.loop import ClosedLoop as ClosedLoop
     from fogsim.loop import run as run
+    from fogsim.plugin import attach as attach
+    from fogsim.plugin import connect as connect
     from fogsim.scenario import Scenario as Scenario
     from fogsim.scenario import catalogue as catalogue
     from fogsim.scenario import load_scenario as load_scenario
@@ -48,8 +48,8 @@ _LAZY = {
     **dict.fromkeys(_ERRORS, "fogsim.errors"),
     **dict.fromkeys(_VALUES, "fogsim.values"),
     "ClosedLoop": "fogsim.loop",
-    "attach": "fogsim.attached",
-    "connect": "fogsim.attached",
+    "attach": "fogsim.plugin",
+    "connect": "fogsim.plugin",
     "Scenario": "fogsim.scenario",
     "catalogue": "fogsim.scenario",
     "load_scenario": "fogsim.scenario",

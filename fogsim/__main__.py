@@ -6,7 +6,7 @@ from fogsim.interruption import leave_on_signals
 def main() -> None:
     """Run the command line."""
     leave_on_signals()
-    from fogsim.cli import main as run_command_line  # noqa: PLC0415 - after signals are provided for
+    from fogsim.cli.app import main as run_command_line  # noqa: PLC0415 - after signals are provided for
 
     run_command_line()
 

@@ -8,13 +8,13 @@ from types import TracebackType
 from typing import Self
 
 from fogsim.atmosphere import FogNow
+from fogsim.ego.equipment import OnBoard
 from fogsim.errors import SimulationError, UnplayedWarning
-from fogsim.onboard import OnBoard
 from fogsim.randomness import spawn_streams
-from fogsim.returned import checked_advice, checked_command, checked_lamps
 from fogsim.scenario import Scenario, build
 from fogsim.traffic import Traffic, libsumo_traffic
 from fogsim.values import Command, Ending, FogField, Step, TrafficSnapshot
+from fogsim.values.result_checks import checked_advice, checked_command, checked_lamps
 
 
 def run(scenario: Scenario, seed: int = 0, traffic: Traffic | None = None) -> Generator[Step, None, None]:

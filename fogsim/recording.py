@@ -7,10 +7,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from fogsim.errors import InputError, RecorderError
+from fogsim.files.existing import refuse_existing
 from fogsim.interruption import Interruption
 from fogsim.loop import run, warn_of_unplayed
 from fogsim.metrics import RunMetrics, RunSummary, step_metrics
-from fogsim.output_files import refuse_existing
 from fogsim.recorders import (
     RECORDERS,
     Manifest,
@@ -20,12 +20,12 @@ from fogsim.recorders import (
     Status,
     write_sign_map,
 )
-from fogsim.returned import checked_recorder
 from fogsim.scenario import Scenario, build, resolved
-from fogsim.traffic.configuration import configured_files
-from fogsim.traffic.network import read_net
-from fogsim.traffic.signs import geographic_position, sign_map
+from fogsim.traffic.road.configuration import configured_files
+from fogsim.traffic.road.network import read_net
+from fogsim.traffic.road.signs import geographic_position, sign_map
 from fogsim.values import NOTHING_UNPLAYED, Ending, SignMap, Step, Unplayed
+from fogsim.values.result_checks import checked_recorder
 
 
 @dataclasses.dataclass(frozen=True, slots=True)

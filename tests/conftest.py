@@ -12,7 +12,7 @@ from subprocess import CompletedProcess
 import pytest
 import sumo
 
-from fogsim import cli
+from fogsim.cli import app
 
 Command = Callable[..., "CompletedProcess[str]"]
 SumoProcess = Callable[..., contextlib.AbstractContextManager[tuple[int, "subprocess.Popen[bytes]"]]]
@@ -59,7 +59,7 @@ def command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
         monkeypatch.setenv("COLUMNS", "300")
         capsys.readouterr()
         with contextlib.chdir(cwd or "."), pytest.raises(SystemExit) as ended:
-            cli.main()
+            app.main()
         told = capsys.readouterr()
         return CompletedProcess(arguments, int(ended.value.code or 0), told.out, told.err)
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from fogsim.atmosphere import fogged_radiance
-from fogsim.pinhole import ray_from_pixel
 from fogsim.render import make_renderer
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, CameraPose, FogField, Mesh, Scene, Surface
+from fogsim.values.pinhole import ray_from_pixel
 
 CAMERA = Camera(320, 240, 600.0, (160, 120), mount_height=1.4)
 POSE = CameraPose((0.0, 0.0, 1.4), heading=0.0)

@@ -10,9 +10,8 @@ import pytest
 
 import fogsim
 from fogsim.camera import mounted_pose
-from fogsim.onboard import OnBoard, fog_truth
-from fogsim.outlook import Outlook
-from fogsim.pinhole import camera_axes
+from fogsim.ego.equipment import OnBoard, fog_truth
+from fogsim.ego.view_rendering import Outlook
 from fogsim.randomness import spawn_streams
 from fogsim.scenario import build, catalogue
 from fogsim.values import (
@@ -29,6 +28,7 @@ from fogsim.values import (
     TrafficSnapshot,
     TrafficState,
 )
+from fogsim.values.pinhole import camera_axes
 
 GRADES = (-0.04, -0.02, 0.02, 0.04)
 SETTINGS = ("renderer=cpu", "camera.width=320", "camera.height=240", "camera.read_noise_e=0")

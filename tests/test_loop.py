@@ -66,7 +66,7 @@ def test_in_homogeneous_fog_the_belief_follows_the_truth_and_advice_follows_the_
 def test_estimators_never_see_the_truth(monkeypatch: pytest.MonkeyPatch) -> None:
     """Deleting the truth from every step changes no estimate, belief or command."""
     honest = list(fogsim.run(small("fog.visibility_m=80"), seed=1))
-    monkeypatch.setattr("fogsim.onboard.fog_truth", lambda *_: None)
+    monkeypatch.setattr("fogsim.ego.equipment.fog_truth", lambda *_: None)
     blind = list(fogsim.run(small("fog.visibility_m=80"), seed=1))
     for a, b in zip(honest, blind, strict=True):
         assert b.truth is None

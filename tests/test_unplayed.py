@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import fogsim
-from fogsim.cli import app
+from fogsim.cli.app import app
 from fogsim.errors import UnplayedWarning
 from fogsim.recording import record_run
 from fogsim.scenario import Scenario, scenario_from_config

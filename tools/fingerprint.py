@@ -33,7 +33,7 @@ from fogsim.reproduce.huang2015_chase import Chase, Followed
 from fogsim.reproduce.scenes import ILLUMINANCE, straight_road
 from fogsim.scenario import build
 from fogsim.scene import SIGN_KINDS, build_scene
-from fogsim.traffic.network import read_net, road_network
+from fogsim.traffic.road.network import read_net, road_network
 from fogsim.values import Camera, Estimate, RoadNetwork, Sign, SignMap, Step
 
 TOLERANCE, NOTHING = 1e-9, 1e-12

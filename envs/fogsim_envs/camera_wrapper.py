@@ -10,8 +10,8 @@ from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
 
 from fogsim.atmosphere import FieldAccess
+from fogsim.ego.equipment import OnBoard
 from fogsim.errors import InputError
-from fogsim.onboard import OnBoard
 from fogsim.randomness import spawn_streams
 from fogsim.scenario import Scenario, build
 from fogsim.traffic.highway import (

@@ -1,16 +1,16 @@
 """Pure physics of light in fog: extinction, optical depth, airlight, lamplight, and what is visible in it."""
 
-from fogsim.atmosphere.access import FieldAccess, FogNow
 from fogsim.atmosphere.air import Air
-from fogsim.atmosphere.daylight import airlight_from_illuminance
-from fogsim.atmosphere.frustum import FrustumGrid, frustum_grid, radiance_through_grid
-from fogsim.atmosphere.glare import veiling_luminance
-from fogsim.atmosphere.koschmieder import fogged_radiance
-from fogsim.atmosphere.medium import field_at
-from fogsim.atmosphere.night_visibility import FogKind, Observer, Pavement, visibility_distance
-from fogsim.atmosphere.optical_depth import extinction, optical_depth, optical_depth_along
-from fogsim.atmosphere.phase import Droplets
-from fogsim.atmosphere.visibility_level import visibility_level
+from fogsim.atmosphere.fog.airlight import airlight_from_illuminance
+from fogsim.atmosphere.fog.extinction import field_at
+from fogsim.atmosphere.fog.field_access import FieldAccess, FogNow
+from fogsim.atmosphere.fog.frustum import FrustumGrid, frustum_grid, radiance_through_grid
+from fogsim.atmosphere.fog.koschmieder import fogged_radiance
+from fogsim.atmosphere.fog.optical_depth import extinction, optical_depth, optical_depth_along
+from fogsim.atmosphere.lamps.phase_function import Droplets
+from fogsim.atmosphere.visibility.disability_glare import veiling_luminance
+from fogsim.atmosphere.visibility.night_visibility import FogKind, Observer, Pavement, visibility_distance
+from fogsim.atmosphere.visibility.visibility_level import visibility_level
 
 __all__ = [
     "Air",

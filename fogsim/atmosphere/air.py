@@ -5,12 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.daytime import daytime_radiance, transmission
-from fogsim.atmosphere.halos import Halos
-from fogsim.atmosphere.lamplight import OwnLamplight
-from fogsim.atmosphere.medium import field_at
-from fogsim.atmosphere.phase import Droplets
-from fogsim.atmosphere.streetlight import StreetLight
+from fogsim.atmosphere.fog.daytime import daytime_radiance, transmission
+from fogsim.atmosphere.fog.extinction import field_at
+from fogsim.atmosphere.lamps.halos import Halos
+from fogsim.atmosphere.lamps.lamplight import OwnLamplight
+from fogsim.atmosphere.lamps.phase_function import Droplets
+from fogsim.atmosphere.lamps.streetlight import StreetLight
 from fogsim.values import Camera, CameraPose, FogField, HeadLamp, Lights, View
 
 _UNLIT = Lights.none()

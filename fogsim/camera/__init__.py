@@ -4,8 +4,8 @@ from fogsim.camera.exposure import Pixels, Sensor, expose
 from fogsim.camera.glare import LensGlare
 from fogsim.camera.metering import AutoExposure, Metering
 from fogsim.camera.mount import BodyPitch, Suspension, mounted_pose
-from fogsim.camera.photographer import Photographer
 from fogsim.camera.sampling import averaged, middle_samples, supersampled
+from fogsim.camera.sensor import Photographer
 
 __all__ = [
     "AutoExposure",

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from fogsim.camera.kernels import develop
 from fogsim.jit import Bands
-from fogsim.response import respond
 from fogsim.values import Response
+from fogsim.values.camera_response import respond
 
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 """Pixel values: of 8 bits, or of 10 or 12 in 16."""

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from fogsim.dataset.encoding import png
 from fogsim.errors import InputError
-from fogsim.recorders.files import partial_path, write_bytes, write_json
-from fogsim.recorders.lock import LOCK_NAME, WriterLock
+from fogsim.files.atomic import partial_path, write_bytes, write_json
+from fogsim.files.writer_lock import LOCK_NAME, WriterLock
 
 IDENTITY = "dataset.json"
 ANNOTATIONS = "annotations.json"

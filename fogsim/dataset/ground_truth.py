@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from fogsim.atmosphere import Air
 from fogsim.errors import InputError
 from fogsim.linear_algebra import matrix_product
-from fogsim.pinhole import ray_from_pixel
 from fogsim.values import Step, Truth, View
+from fogsim.values.pinhole import ray_from_pixel
 
 FIRST_VEHICLE = 16
 """Ids in `View.instance` from which on they are vehicles: this plus the row in the traffic state."""

@@ -7,7 +7,7 @@ from typing import Any
 from fogsim.errors import InputError
 from fogsim.recorders import versions
 from fogsim.scenario import Scenario, build, resolved
-from fogsim.traffic.configuration import input_files
+from fogsim.traffic.road.configuration import input_files
 
 
 def identity(scenario: Scenario, seed: int, every: int) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import Observation
-from fogsim.vision.horizon import PITCH_DEVIATION, PitchDeviation
+from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation
 
 MEASUREMENTS = 200
 """Measurements that are remembered."""

@@ -4,11 +4,11 @@ import math
 from dataclasses import dataclass, replace
 
 from fogsim.estimators.huang2015_sighting import MIDDLE, TOP, Sighting
-from fogsim.vision.clipped_sky import darker_by
-from fogsim.vision.patch import Patch, Placement, moved, shrunk
-from fogsim.vision.patch_light import SharedLight, shared_light
-from fogsim.vision.patch_match import PlacementPrior, Regression, register
-from fogsim.vision.road_image import CannotTellError
+from fogsim.vision.light.clipped_sky import darker_by
+from fogsim.vision.region.road_image import CannotTellError
+from fogsim.vision.vehicle.patch import Patch, Placement, moved, shrunk
+from fogsim.vision.vehicle.patch_light import SharedLight, shared_light
+from fogsim.vision.vehicle.patch_match import PlacementPrior, Regression, register
 
 RANGE_DEVIATION = 0.3
 """Standard deviation of the told range [m]."""

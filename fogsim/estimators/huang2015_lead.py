@@ -21,7 +21,7 @@ from fogsim.parameters import Range, checked_parameters
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import Observation
-from fogsim.vision.road_image import CannotTellError
+from fogsim.vision.region.road_image import CannotTellError
 
 Floats = NDArray[np.float64]
 

@@ -12,13 +12,13 @@ from fogsim.parameters import checked_parameters
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import Observation
-from fogsim.vision.edges import edge_map, smoothed
-from fogsim.vision.horizon import PITCH_DEVIATION, PitchDeviation, calibrated_horizon
-from fogsim.vision.inflection import koschmieder
-from fogsim.vision.lane_lines import hough_lines, plain_vanishing_point
-from fogsim.vision.profile import path_lengths
-from fogsim.vision.road_growth import GrowthLimits, grown_road, row_medians
-from fogsim.vision.road_image import CannotTellError, RoadImage, road_image
+from fogsim.vision.lines.edges import edge_map, smoothed
+from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation, calibrated_horizon
+from fogsim.vision.lines.lane_lines import hough_lines, plain_vanishing_point
+from fogsim.vision.region.inflection import koschmieder
+from fogsim.vision.region.profile import path_lengths
+from fogsim.vision.region.road_growth import GrowthLimits, grown_road, row_medians
+from fogsim.vision.region.road_image import CannotTellError, RoadImage, road_image
 
 STEP = 3.0
 """Largest difference between a pixel and its seed in the row below, and to the bottom row's median for each row

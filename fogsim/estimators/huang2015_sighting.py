@@ -7,15 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
-from fogsim.vision.clipped_sky import Clipping, clipping
-from fogsim.vision.horizon import PITCH_DEVIATION, levelled
-from fogsim.vision.lead_daylight import RoadFall, check_road, road_before, road_fall
-from fogsim.vision.lead_scene import steepness
-from fogsim.vision.lead_sky import airlight_beside, hidden_beside
-from fogsim.vision.lead_window import WIDTHS, LeadWindow, lead_region
-from fogsim.vision.luminance import linear_luminance
-from fogsim.vision.patch import Patch
-from fogsim.vision.road_image import MIN_AIRLIGHT, CannotTellError
+from fogsim.vision.light.clipped_sky import Clipping, clipping
+from fogsim.vision.light.luminance import linear_luminance
+from fogsim.vision.lines.horizon import PITCH_DEVIATION, levelled
+from fogsim.vision.region.road_image import MIN_AIRLIGHT, CannotTellError
+from fogsim.vision.vehicle.lead_daylight import RoadFall, check_road, road_before, road_fall
+from fogsim.vision.vehicle.lead_scene import steepness
+from fogsim.vision.vehicle.lead_sky import airlight_beside, hidden_beside
+from fogsim.vision.vehicle.lead_window import WIDTHS, LeadWindow, lead_region
+from fogsim.vision.vehicle.patch import Patch
 
 HALF_WIDTH, MIDDLE, HALF_HEIGHT = 0.42, 0.42, 0.32
 """The part of a rear that is compared, in widths of the vehicle: half its width, its middle above the foot, and half

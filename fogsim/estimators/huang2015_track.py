@@ -22,9 +22,9 @@ from fogsim.estimators.huang2015_sighting import Crop, sighting_of, vehicle_crop
 from fogsim.estimators.lead_ranges import LeadRanges
 from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
-from fogsim.vision.lead_daylight import RoadFall
-from fogsim.vision.lead_window import LeadWindow, find_lead
-from fogsim.vision.road_image import CannotTellError
+from fogsim.vision.region.road_image import CannotTellError
+from fogsim.vision.vehicle.lead_daylight import RoadFall
+from fogsim.vision.vehicle.lead_window import LeadWindow, find_lead
 
 FOLLOWED = 0.4
 """Share of a new place that the expectation for the next frame takes over: pitch of the moment is no trend [-]."""

@@ -12,17 +12,16 @@ from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation
-from fogsim.vision.agreeing_strips import fit_own, with_neighbours
-from fogsim.vision.daylight import lit_by_lamps
-from fogsim.vision.horizon import PITCH_DEVIATION, Horizon, PitchDeviation, calibrated_horizon, levelled, weighed
-from fogsim.vision.joint_checks import no_road
-from fogsim.vision.joint_fit import JointFit, JointPrior
-from fogsim.vision.joint_prior import joint_prior
-from fogsim.vision.linear_pixels import LinearPixels, linear_pixels
-from fogsim.vision.road_lines import meeting_lines
-from fogsim.vision.sky import Sky, sky_above
-from fogsim.vision.strip_geometry import StripGeometry, strip_geometry
-from fogsim.vision.strips import (
+from fogsim.vision.light.daylight import lit_by_lamps
+from fogsim.vision.light.linear_pixels import LinearPixels, linear_pixels
+from fogsim.vision.lines.horizon import PITCH_DEVIATION, Horizon, PitchDeviation, calibrated_horizon, levelled, weighed
+from fogsim.vision.lines.road_lines import meeting_lines
+from fogsim.vision.strips.agreeing_strips import fit_own, with_neighbours
+from fogsim.vision.strips.joint_checks import no_road
+from fogsim.vision.strips.joint_fit import JointFit, JointPrior
+from fogsim.vision.strips.joint_prior import joint_prior
+from fogsim.vision.strips.sky import Sky, sky_above
+from fogsim.vision.strips.strip_curves import (
     StripCurves,
     above_bonnet,
     mean_curves,
@@ -30,6 +29,7 @@ from fogsim.vision.strips import (
     without_clipped,
     without_rows_below,
 )
+from fogsim.vision.strips.strip_geometry import StripGeometry, strip_geometry
 
 MIN_COLS, MIN_ROWS = 32, 16
 """A road narrower than this, or lower below its horizon, shows no curve [px]."""

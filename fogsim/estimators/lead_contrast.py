@@ -15,12 +15,12 @@ from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation
-from fogsim.vision.decay_fit import DecayFit, fit_decay
-from fogsim.vision.horizon import PITCH_DEVIATION, PitchDeviation
-from fogsim.vision.lead_daylight import RoadFall
-from fogsim.vision.lead_patch import HALF_BODY, LARGE
-from fogsim.vision.lead_scene import lead_scene
-from fogsim.vision.road_image import CannotTellError
+from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation
+from fogsim.vision.region.road_image import CannotTellError
+from fogsim.vision.vehicle.decay_fit import DecayFit, fit_decay
+from fogsim.vision.vehicle.lead_daylight import RoadFall
+from fogsim.vision.vehicle.lead_patch import HALF_BODY, LARGE
+from fogsim.vision.vehicle.lead_scene import lead_scene
 
 MIN_SAMPLES = 4
 """Fewest ranges for a fit."""

@@ -4,11 +4,11 @@ import math
 from collections import deque
 from dataclasses import dataclass, replace
 
-from fogsim.vision.lead_patch import Fading, LeadPicture, compared
-from fogsim.vision.lead_place import Surroundings, placed
-from fogsim.vision.lead_scene import LeadScene
-from fogsim.vision.lead_window import LeadWindow
-from fogsim.vision.road_image import CannotTellError
+from fogsim.vision.region.road_image import CannotTellError
+from fogsim.vision.vehicle.lead_patch import Fading, LeadPicture, compared
+from fogsim.vision.vehicle.lead_place import Surroundings, placed
+from fogsim.vision.vehicle.lead_scene import LeadScene
+from fogsim.vision.vehicle.lead_window import LeadWindow
 
 SPACING = 1.0
 """Change of range that makes a new picture worth keeping [m]; between, a picture only shows where the vehicle is."""

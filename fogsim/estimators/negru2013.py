@@ -15,18 +15,19 @@ from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import Observation
-from fogsim.vision.canny_deriche import CannyDeriche
-from fogsim.vision.edges import Edges
-from fogsim.vision.horizon import PITCH_DEVIATION, Horizon, PitchDeviation, calibrated_horizon, weighed
-from fogsim.vision.inflection import FogModel, best_inflection, printed_inflection
-from fogsim.vision.joint_checks import no_road
-from fogsim.vision.joint_fit import JointFit, fit_jointly
-from fogsim.vision.joint_prior import joint_prior
-from fogsim.vision.median import median
-from fogsim.vision.profile import RoadCurve, band_profile
-from fogsim.vision.road_image import MIN_CONTRAST, MIN_ROWS, SATURATED, CannotTellError, RoadImage, road_image
-from fogsim.vision.road_lines import meeting_lines
-from fogsim.vision.strips import (
+from fogsim.vision.light.medians import median
+from fogsim.vision.lines.canny_deriche import CannyDeriche
+from fogsim.vision.lines.edges import Edges
+from fogsim.vision.lines.horizon import PITCH_DEVIATION, Horizon, PitchDeviation, calibrated_horizon, weighed
+from fogsim.vision.lines.road_lines import meeting_lines
+from fogsim.vision.lines.vanishing import VanishingPoint, vanishing_point
+from fogsim.vision.region.inflection import FogModel, best_inflection, printed_inflection
+from fogsim.vision.region.profile import RoadCurve, band_profile
+from fogsim.vision.region.road_image import MIN_CONTRAST, MIN_ROWS, SATURATED, CannotTellError, RoadImage, road_image
+from fogsim.vision.strips.joint_checks import no_road
+from fogsim.vision.strips.joint_fit import JointFit, fit_jointly
+from fogsim.vision.strips.joint_prior import joint_prior
+from fogsim.vision.strips.strip_curves import (
     LinearPixels,
     above_bonnet,
     band_geometry,
@@ -35,7 +36,6 @@ from fogsim.vision.strips import (
     strip_curves,
     without_clipped,
 )
-from fogsim.vision.vanishing import VanishingPoint, vanishing_point
 
 MAX_ASIDE = 0.1
 """Share of the image's width by which a clear road may lie beside the vanishing column [-]."""

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
-from fogsim.vision.edges import Edges, smoothed
-from fogsim.vision.horizon import Horizon
-from fogsim.vision.inflection import steepest_slope
-from fogsim.vision.profile import RoadCurve, path_lengths
-from fogsim.vision.region import Band, crossing_band, grow_region
-from fogsim.vision.road_image import MIN_ROWS, SATURATED, CannotTellError, RoadImage
-from fogsim.vision.strips import LinearPixels
+from fogsim.vision.lines.edges import Edges, smoothed
+from fogsim.vision.lines.horizon import Horizon
+from fogsim.vision.region.inflection import steepest_slope
+from fogsim.vision.region.profile import RoadCurve, path_lengths
+from fogsim.vision.region.road_image import MIN_ROWS, SATURATED, CannotTellError, RoadImage
+from fogsim.vision.region.road_region import Band, crossing_band, grow_region
+from fogsim.vision.strips.strip_curves import LinearPixels
 
 SIMILARITY = 0.25  # [-] steepest fog, in contrasts of road to airlight a row; a silhouette takes at least 0.34
 

@@ -15,8 +15,8 @@ from fogsim.parameters import Range, checked_parameters
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate, FogCategory, fog_category
 from fogsim.values.observation import Observation
-from fogsim.vision.horizon import PITCH_DEVIATION, PitchDeviation
-from fogsim.vision.road_image import CannotTellError
+from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation
+from fogsim.vision.region.road_image import CannotTellError
 
 FRAMES = 3
 """Frames whose inflections are averaged, and equal classes that make a state."""

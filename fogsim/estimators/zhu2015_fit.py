@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
-from fogsim.vision.agreeing_strips import MODEL_DEVIATION, fit_agreeing
-from fogsim.vision.horizon import Horizon
-from fogsim.vision.joint_checks import no_road
-from fogsim.vision.joint_fit import JointFit, JointPrior
-from fogsim.vision.road_image import CannotTellError
-from fogsim.vision.strips import (
+from fogsim.vision.lines.horizon import Horizon
+from fogsim.vision.region.road_image import CannotTellError
+from fogsim.vision.strips.agreeing_strips import MODEL_DEVIATION, fit_agreeing
+from fogsim.vision.strips.joint_checks import no_road
+from fogsim.vision.strips.joint_fit import JointFit, JointPrior
+from fogsim.vision.strips.strip_curves import (
     LinearPixels,
     Sky,
     StripCurves,

@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 from fogsim.estimators.zhu2015_fit import fitted_strips
 from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
-from fogsim.vision.edges import Edges, edge_map, smoothed
-from fogsim.vision.horizon import Horizon, calibrated_horizon, levelled
-from fogsim.vision.inflection import steepest_slope
-from fogsim.vision.lane_lines import (
+from fogsim.vision.lines.edges import Edges, edge_map, smoothed
+from fogsim.vision.lines.horizon import Horizon, calibrated_horizon, levelled
+from fogsim.vision.lines.lane_lines import (
     CLEAR_OF_VANISHING_POINT,
     LaneLine,
     VanishingPoint,
@@ -21,10 +20,11 @@ from fogsim.vision.lane_lines import (
     refined_lines,
     vanishing_point,
 )
-from fogsim.vision.region import grow_region
-from fogsim.vision.road_growth import GrowthLimits, grown_road, region_tops
-from fogsim.vision.road_image import CannotTellError, RoadImage, road_image
-from fogsim.vision.strips import LinearPixels, linear_pixels
+from fogsim.vision.region.inflection import steepest_slope
+from fogsim.vision.region.road_growth import GrowthLimits, grown_road, region_tops
+from fogsim.vision.region.road_image import CannotTellError, RoadImage, road_image
+from fogsim.vision.region.road_region import grow_region
+from fogsim.vision.strips.strip_curves import LinearPixels, linear_pixels
 
 LOWEST_ANGLE = math.radians(10.0)
 """Angle to the rows below which a line is no lane line (zhu2015 section 3.2) [rad]."""

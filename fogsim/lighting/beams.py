@@ -7,9 +7,9 @@ from importlib.resources import files
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.beam import checked_beam, luminous_intensity
 from fogsim.errors import InputError
 from fogsim.values import Beam
+from fogsim.values.luminous_intensity import checked_beam, luminous_intensity
 
 ECE_LEVEL = 0.40
 """Intensity below the cut-off of the ECE-style beam relative to the US median low beam [-]: 0.3 … 0.45."""

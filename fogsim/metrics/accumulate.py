@@ -11,9 +11,9 @@ from fogsim.metrics.safety import Collisions, Conflict, Sight
 from fogsim.metrics.step_metrics import DEFAULT_STANDARD, step_metrics
 from fogsim.metrics.surrogate import SafetyStandard
 from fogsim.registry import Registry
-from fogsim.returned import checked_values
 from fogsim.units import clock_time
 from fogsim.values import Step
+from fogsim.values.result_checks import checked_values
 
 MetricFactory = Callable[[SafetyStandard], Metric]
 """Makes a metric that has seen nothing yet."""

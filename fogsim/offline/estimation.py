@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from fogsim.camera_file import Calibration
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.estimators import ESTIMATORS, Estimator, make
-from fogsim.image_files import Pixels
+from fogsim.offline.camera_file import Calibration
 from fogsim.offline.find import find_source
+from fogsim.offline.image_files import Pixels
 from fogsim.offline.source import Picture, Source
 from fogsim.offline.straighten import straightened
 from fogsim.values import Camera, Estimate, Frame, Observation
@@ -68,8 +68,8 @@ def estimate_images(
     inputs : path or sequence of paths
         One video, or image files, folders and patterns; see `find_source`.
     camera : Camera or Calibration
-        Their calibration (`fogsim.camera_file.load_calibration` reads it from a file). Images of a lens that distorts
-        or of a camera with yaw are straightened first; the result's pictures are the straightened ones.
+        Their calibration (`fogsim.offline.load_calibration` reads it from a file). Images of a lens that distorts or of
+        a camera with yaw are straightened first; the result's pictures are the straightened ones.
     methods : str or sequence of str
         Names in `fogsim.estimators.ESTIMATORS`, or "all".
     sequence : bool or None

@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image, UnidentifiedImageError
 
 from fogsim.errors import InputError
-from fogsim.image_files import Pixels
+from fogsim.offline.image_files import Pixels
 from fogsim.offline.meeting_lines import MeetingPoint, meeting_point
 from fogsim.offline.source import Picture, Source
 from fogsim.values import Camera, Response

@@ -4,8 +4,8 @@ import math
 from pathlib import Path
 
 from fogsim.errors import InputError
+from fogsim.files.atomic import write_text
 from fogsim.offline.guess import CameraGuess
-from fogsim.recorders.files import write_text
 
 
 def camera_text(guess: CameraGuess) -> str:

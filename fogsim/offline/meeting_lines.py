@@ -7,10 +7,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.image_files import Pixels
 from fogsim.linear_algebra import inverse_of, matrix_product
+from fogsim.offline.image_files import Pixels
 from fogsim.values import Response
-from fogsim.vision.luminance import linear_luminance
+from fogsim.vision.light.luminance import linear_luminance
 
 Floats = NDArray[np.float64]
 

@@ -7,14 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from fogsim.image_files import Pixels
 from fogsim.offline.estimation import FrameEstimates
+from fogsim.offline.image_files import Pixels
 from fogsim.offline.wording import interval_text, metres
 from fogsim.recorders.camera_picture import scale_image
 from fogsim.recorders.method_colours import method_colours
 from fogsim.recorders.style import GROUND, MUTED, TEXT, Colour, font
-from fogsim.response import eight_bit
 from fogsim.values import Camera, Estimate
+from fogsim.values.camera_response import eight_bit
 
 WIDEST, NARROWEST = 1280, 640
 """Columns that an image is scaled to if it has more or fewer [px]."""

@@ -6,10 +6,10 @@ from types import TracebackType
 from typing import Self
 
 from fogsim.errors import InputError
+from fogsim.files.atomic import partial_path, publish
 from fogsim.offline.estimation import FrameEstimates
 from fogsim.offline.overlay import Overlay
 from fogsim.offline.source import Source
-from fogsim.recorders.files import partial_path, publish
 from fogsim.recorders.video import Encoder, encoder_command
 from fogsim.values import Camera
 

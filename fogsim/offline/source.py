@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Protocol
 
 from fogsim.errors import InputError
-from fogsim.image_files import Pixels, read_image
+from fogsim.offline.image_files import Pixels, read_image
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,13 +10,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.camera_file import Calibration
 from fogsim.errors import InputError
-from fogsim.image_files import Pixels
 from fogsim.linear_algebra import matrix_product
+from fogsim.offline.camera_file import Calibration
+from fogsim.offline.image_files import Pixels
 from fogsim.offline.source import Picture, Source
-from fogsim.pinhole import camera_axes
 from fogsim.values import Camera, CameraPose
+from fogsim.values.pinhole import camera_axes
 
 Floats = NDArray[np.float64]
 Maps = tuple[NDArray[np.int16], NDArray[np.uint16]]

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from fogsim.recorders.files import write_json
+from fogsim.files.atomic import write_json
 from fogsim.recorders.frame_panel import FramePanel
 from fogsim.recorders.manifest import Manifest, Status, versions
 from fogsim.recorders.protocol import DERIVED_QUANTITIES, Derived, Recorder, RunInformation

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from fogsim.recorders.style import AMBER, BELIEF, GROUND, Colour, font
-from fogsim.response import eight_bit
 from fogsim.values import Estimate, Frame, Observation, Step
+from fogsim.values.camera_response import eight_bit
 
 WIDTH, HEIGHT = 640, 480
 _ROWS: dict[str, tuple[str, Colour]] = {

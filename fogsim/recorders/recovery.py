@@ -5,9 +5,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from fogsim.errors import InputError
-from fogsim.recorders.lock import WriterLock
+from fogsim.files.row_log import read_rows
+from fogsim.files.writer_lock import WriterLock
 from fogsim.recorders.manifest import Status
-from fogsim.recorders.row_log import read_rows
 from fogsim.recorders.run_directory import (
     ROW_LOG,
     UNFINISHED,

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from fogsim.recorders.files import write_text
+from fogsim.files.atomic import write_text
 from fogsim.recorders.manifest import versions
 from fogsim.recorders.protocol import Derived, RunInformation
 from fogsim.recorders.report_data import Album, Curves

@@ -8,9 +8,9 @@ from types import TracebackType
 from typing import Any, Self
 
 from fogsim.errors import InputError
-from fogsim.recorders.files import Reserve, partial_path, write_json
-from fogsim.recorders.lock import WriterLock
-from fogsim.recorders.process import WritingProcess
+from fogsim.files.atomic import Reserve, partial_path, write_json
+from fogsim.files.writer_lock import WriterLock
+from fogsim.files.writing_process import WritingProcess
 
 UNFINISHED = "unfinished"
 """Folder in the directory that holds the results of a run until its end."""

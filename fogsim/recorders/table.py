@@ -12,9 +12,9 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from fogsim.recorders.files import write_bytes
+from fogsim.files.atomic import write_bytes
+from fogsim.files.row_log import RowLog, read_rows
 from fogsim.recorders.protocol import DERIVED_QUANTITIES, Derived
-from fogsim.recorders.row_log import RowLog, read_rows
 from fogsim.recorders.run_directory import ROW_LOG
 from fogsim.values import Estimate, Leader, LeadMeasurement, Step
 

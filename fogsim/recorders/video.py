@@ -8,7 +8,7 @@ from pathlib import Path
 import imageio_ffmpeg
 
 from fogsim.errors import FogSimError, MissingDependencyError
-from fogsim.recorders.files import partial_path, publish
+from fogsim.files.atomic import partial_path, publish
 from fogsim.recorders.frame_panel import FRAME_HEIGHT, FRAME_WIDTH, FramePanel
 from fogsim.recorders.protocol import Derived
 from fogsim.values import Step

@@ -13,7 +13,7 @@ __all__ = ["RENDERERS", "RenderError", "Renderer", "best_renderer", "gl_report",
 
 def _pyrender(scene: Scene, illuminance: float) -> Renderer:
     # OpenGL is loaded by the process that draws, when it first draws: not by every one that imports FogSim.
-    from fogsim.render.gl.rasteriser import GLRasteriser  # noqa: PLC0415
+    from fogsim.render.opengl.rasteriser import GLRasteriser  # noqa: PLC0415
     from fogsim.render.renderer import SceneRenderer  # noqa: PLC0415
 
     return SceneRenderer(scene, illuminance, GLRasteriser)
@@ -65,6 +65,6 @@ def gl_report() -> str:
     MissingDependencyError
         If OpenGL or EGL is not there or does not work.
     """
-    from fogsim.render.gl.context import context  # noqa: PLC0415 - OpenGL is loaded only where it is used
+    from fogsim.render.opengl.context import context  # noqa: PLC0415 - OpenGL is loaded only where it is used
 
     return context().description

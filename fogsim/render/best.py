@@ -17,7 +17,7 @@ def best_renderer() -> tuple[str, str]:
     """
     if not _may_have_card():
         return "cpu", "OpenGL would be drawn by software: there is no graphics card (/dev/dri/render*, /dev/nvidia*)"
-    from fogsim.render.gl.context import context  # noqa: PLC0415 - OpenGL is loaded only where it is asked for
+    from fogsim.render.opengl.context import context  # noqa: PLC0415 - OpenGL is loaded only where it is asked for
 
     try:
         found = context()

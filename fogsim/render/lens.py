@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.linear_algebra import matrix_product
-from fogsim.pinhole import camera_axes, ray_from_pixel
 from fogsim.values.camera import Camera, CameraPose
+from fogsim.values.pinhole import camera_axes, ray_from_pixel
 
 Wide = NDArray[np.float64]
 

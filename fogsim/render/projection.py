@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.linear_algebra import matrix_product
-from fogsim.pinhole import camera_axes, ray_from_pixel
 from fogsim.render.drawing import NEAR
 from fogsim.values.camera import Camera, CameraPose
+from fogsim.values.pinhole import camera_axes, ray_from_pixel
 
 
 def clip_from_camera(camera: Camera) -> NDArray[np.float64]:

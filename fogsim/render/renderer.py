@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
-from fogsim.render.choice import Chosen, cells_of, choose, copies_of, shapes_of, with_room
+from fogsim.render.culling import Chosen, cells_of, choose, copies_of, shapes_of, with_room
 from fogsim.render.drawing import RECORD, Drawing, MeshTable, Rasteriser
 from fogsim.render.ground import Ground, split_ground
 from fogsim.render.lens import lens_of

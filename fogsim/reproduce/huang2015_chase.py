@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere import fogged_radiance
 from fogsim.camera import Sensor, expose
-from fogsim.pinhole import ray_from_pixel
 from fogsim.render import Renderer, make_renderer
 from fogsim.reproduce.scenes import AIRLIGHT, ILLUMINANCE, straight_road
 from fogsim.scene import build_scene, vehicle_batches
@@ -26,6 +25,7 @@ from fogsim.values import (
     TrafficState,
     View,
 )
+from fogsim.values.pinhole import ray_from_pixel
 
 OWN_SPEED, FASTER = 20.0, 5.0
 """Own speed, and by how much the vehicle ahead is faster [m/s] (huang2015 section 4.3.2)."""

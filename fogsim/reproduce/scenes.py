@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere import fogged_radiance
 from fogsim.camera import Sensor, expose
-from fogsim.pinhole import ray_from_pixel
 from fogsim.render import make_renderer
 from fogsim.scene import build_scene, vehicle_batches
 from fogsim.values import (
@@ -24,6 +23,7 @@ from fogsim.values import (
     TrafficState,
     View,
 )
+from fogsim.values.pinhole import ray_from_pixel
 
 ILLUMINANCE = 10_000.0  # [lx] an overcast day
 AIRLIGHT = 3000.0  # [cd/m²] near E/π, that of a white horizontal surface under it

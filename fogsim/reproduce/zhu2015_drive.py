@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere import fogged_radiance
 from fogsim.camera import Sensor, expose
-from fogsim.pinhole import ray_from_pixel
 from fogsim.render import Renderer, make_renderer
 from fogsim.reproduce.scenes import AIRLIGHT, ILLUMINANCE, standing_cars, straight_road
 from fogsim.scene import build_scene, vehicle_batches
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, CameraPose, FogField, LeadMeasurement, Observation, SignMap, View
+from fogsim.values.pinhole import ray_from_pixel
 
 Floats = NDArray[np.float64]
 

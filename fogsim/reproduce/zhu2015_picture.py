@@ -9,8 +9,8 @@ from fogsim.estimators.zhu2015_road import SeenRoad, seen_road
 from fogsim.recorders.style import font
 from fogsim.reproduce.zhu2015_drive import Moment, observed
 from fogsim.values import Camera, Observation
-from fogsim.vision.horizon import PITCH_DEVIATION
-from fogsim.vision.road_growth import row_medians
+from fogsim.vision.lines.horizon import PITCH_DEVIATION
+from fogsim.vision.region.road_growth import row_medians
 
 PICTURED = (60.0, 200.0, 600.0, float("inf"))
 """Visibilities of the picture [m], one of each class."""

@@ -17,7 +17,7 @@ from fogsim.scenario.overrides import apply_overrides
 from fogsim.scenario.schema import Scenario
 from fogsim.scenario.sumo_clock import uncountable_step
 from fogsim.scenario.traffic_schema import Traffic
-from fogsim.traffic.configuration import configured_files
+from fogsim.traffic.road.configuration import configured_files
 
 LONG_RUN = 600.0
 """Longest run of a simulation that is the user's own [s]."""

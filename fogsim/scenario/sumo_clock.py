@@ -3,7 +3,7 @@
 import math
 
 from fogsim.scenario.schema import Clocks
-from fogsim.traffic.running import CLOCK_TICK
+from fogsim.traffic.sumo.loaded_files import CLOCK_TICK
 
 _ROUNDING = 1e-6  # of a tick: what writing a number in decimals may cost
 

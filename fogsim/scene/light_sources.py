@@ -7,7 +7,6 @@ from functools import cache, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.beam import luminous_intensity
 from fogsim.scene.bodies import BODIES
 from fogsim.scene.bodies.lamp_patches import Patch, lamp_patches
 from fogsim.scene.bodies.parts import LIT_AREAS
@@ -16,6 +15,7 @@ from fogsim.scene.street_lamps import HEIGHT, SIZE
 from fogsim.scene.vehicles import body_names
 from fogsim.values.lamps import Lamp
 from fogsim.values.light import Beam, LightSources, StreetLighting
+from fogsim.values.luminous_intensity import luminous_intensity
 from fogsim.values.scene import Surface
 from fogsim.values.traffic import TrafficState
 

@@ -2,18 +2,18 @@
 
 import warnings
 
-from fogsim.traffic.attached import AttachedTraffic, step_length
-from fogsim.traffic.configuration import configured_files, left_out
-from fogsim.traffic.demand import Demand, VehicleRoute, read_configured_demand, read_demand
-from fogsim.traffic.drivers import SPEED_CHOICES, Compliance, DriverSetup
-from fogsim.traffic.events import BrakeEvent, Event, LampFailureEvent, LaneChangeEvent, Trigger
-from fogsim.traffic.net_edges import NetEdges, read_net_edges
+from fogsim.traffic.drivers.events import BrakeEvent, Event, LampFailureEvent, LaneChangeEvent, Trigger
+from fogsim.traffic.drivers.sight import DriverSight, FogAccess
+from fogsim.traffic.drivers.speed_choice import SPEED_CHOICES, Compliance, DriverSetup
 from fogsim.traffic.protocol import Traffic
+from fogsim.traffic.road.configuration import configured_files, left_out
+from fogsim.traffic.road.demand import Demand, VehicleRoute, read_configured_demand, read_demand
+from fogsim.traffic.road.net_edges import NetEdges, read_net_edges
 from fogsim.traffic.setup import AfterCollision, TrafficSetup
-from fogsim.traffic.sight import DriverSight, FogAccess
-from fogsim.traffic.sumo_library import LibsumoLink
+from fogsim.traffic.sumo.library import LibsumoLink
+from fogsim.traffic.sumo.traci_link import TraciLink
 from fogsim.traffic.sumo_traffic import SumoTraffic
-from fogsim.traffic.traci_link import TraciLink
+from fogsim.traffic.user_simulation import AttachedTraffic, step_length
 
 
 def libsumo_traffic(setup: TrafficSetup) -> Traffic:

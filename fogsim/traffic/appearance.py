@@ -76,6 +76,9 @@ _SIGNALS = (
     (1 << 6, int(Lamp.HIGH_BEAM)),
 )
 
+OTHERS_LAMPS = Lamp.POSITION | Lamp.LOW_BEAM
+"""Lamps that other drivers light in fog, as the law of most countries asks by day."""
+
 
 def body_kind(vehicle_class: str, shape: str = "", length: float = 0.0) -> str:
     """Body kind of a SUMO vehicle.

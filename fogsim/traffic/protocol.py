@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from fogsim.traffic.sight import FogAccess
+from fogsim.traffic.drivers.sight import FogAccess
 from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot, Unplayed
 
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
-from fogsim.traffic.drivers import DriverSetup
-from fogsim.traffic.events import Event
-from fogsim.traffic.sight import DriverSight
+from fogsim.traffic.drivers.events import Event
+from fogsim.traffic.drivers.sight import DriverSight
+from fogsim.traffic.drivers.speed_choice import DriverSetup
 
 UNTOUCHED = DriverSetup(speed_choice="unaffected", spread=0.0)
 """Drivers as the user's own simulation has them."""

@@ -8,26 +8,26 @@ from typing import Concatenate, ParamSpec, TypeVar
 import numpy as np
 
 from fogsim.errors import SimulationError
-from fogsim.traffic.claims import new_session
-from fogsim.traffic.collisions import CollisionWatch
-from fogsim.traffic.configuration import FIT_ARGUMENTS
-from fogsim.traffic.control import LaneKeeping, Order, SpeedControl
-from fogsim.traffic.driving import Drivers
-from fogsim.traffic.events import Script, Situation
-from fogsim.traffic.gaps import GapToEgo
-from fogsim.traffic.lane_changes import LaneChangeSmoothing
-from fogsim.traffic.link import Api, SumoLink
-from fogsim.traffic.network import read_net, road_network
-from fogsim.traffic.opendrive import is_opendrive
-from fogsim.traffic.perception import Perception
-from fogsim.traffic.reading import Reader, VehicleReader
-from fogsim.traffic.roster import Roster
-from fogsim.traffic.route import RouteProgress
-from fogsim.traffic.running import check_step_length, loaded_additional, loaded_net, those_seen
+from fogsim.traffic.drivers.events import Order, Script, Situation
+from fogsim.traffic.drivers.sight import FogAccess
+from fogsim.traffic.road.configuration import FIT_ARGUMENTS
+from fogsim.traffic.road.network import read_net, road_network
+from fogsim.traffic.road.opendrive import is_opendrive
+from fogsim.traffic.road.signs import sign_map
 from fogsim.traffic.setup import AfterCollision, TrafficSetup
-from fogsim.traffic.sight import FogAccess
-from fogsim.traffic.signs import sign_map
-from fogsim.traffic.subscribed_reading import SubscribedReader
+from fogsim.traffic.sumo.claims import new_session
+from fogsim.traffic.sumo.collisions import CollisionWatch
+from fogsim.traffic.sumo.control import LaneKeeping, SpeedControl
+from fogsim.traffic.sumo.gaps import GapToEgo
+from fogsim.traffic.sumo.lane_changes import LaneChangeSmoothing
+from fogsim.traffic.sumo.link import Api, SumoLink
+from fogsim.traffic.sumo.loaded_files import check_step_length, loaded_additional, loaded_net, those_seen
+from fogsim.traffic.sumo.roster import Roster
+from fogsim.traffic.sumo.route import RouteProgress
+from fogsim.traffic.sumo.subscribed_reader import SubscribedReader
+from fogsim.traffic.sumo.vehicle_reader import Reader, VehicleReader
+from fogsim.traffic.sumo_drivers.perception import Perception
+from fogsim.traffic.sumo_drivers.speed_setting import Drivers
 from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot, TrafficState, Unplayed
 
 _NOBODY: Mapping[str, float] = {}

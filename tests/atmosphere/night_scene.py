@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from fogsim.pinhole import ray_from_pixel
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, CameraPose, FogField, LightSources, View
+from fogsim.values.pinhole import ray_from_pixel
 
 CAMERA = Camera(160, 120, 144.2, (79.5, 59.5), 1.5, 0.035)
 POSE = CameraPose((0.0, 0.0, 1.5), 0.0)

@@ -3,8 +3,8 @@ import pytest
 
 from fogsim.camera import Sensor, expose
 from fogsim.camera.exposure import response_table
-from fogsim.response import exposure_of, respond
 from fogsim.values import Response
+from fogsim.values.camera_response import exposure_of, respond
 
 SENSOR = Sensor(saturation_luminance=5000.0, full_well=10_000.0, read_noise=5.0)
 

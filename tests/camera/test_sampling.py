@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fogsim.camera import averaged, middle_samples, supersampled
-from fogsim.pinhole import ray_from_pixel
 from fogsim.values import Camera, CameraPose, View
+from fogsim.values.pinhole import ray_from_pixel
 
 CAMERA = Camera(16, 12, 15.0, (7.3, 5.9), mount_height=1.4, pitch=0.03, roll=0.1)
 POSE = CameraPose((1.0, 2.0, 1.4), heading=0.4)

@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 import fogsim
-from fogsim import cli
+from fogsim.cli import app
 
 HEIGHT, WIDTH = 240, 320
 CAMERA_YAML = """\
@@ -58,7 +58,7 @@ def estimate(folder, monkeypatch, capsys):
     def run(*arguments: str) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["fogsim", "estimate", *arguments])
         with pytest.raises(SystemExit) as ended:
-            cli.main()
+            app.main()
         told = capsys.readouterr()
         return int(ended.value.code or 0), told.out, told.err
 

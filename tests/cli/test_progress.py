@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from fogsim import cli
+from fogsim.cli import app
 from fogsim.errors import InputError
 from fogsim.values import Ending
 from tests.recorders.synthetic import make_step
@@ -15,7 +15,7 @@ TOWN = str(Path(__file__).resolve().parents[1] / "data" / "grid" / "grid.sumocfg
 
 @pytest.mark.parametrize(("ending", "share"), [(None, 25.0), (Ending.ARRIVED, 100.0), (Ending.TIME, 100.0)])
 def test_the_bar_of_a_run_that_is_over_is_full(ending: Ending | None, share: float) -> None:
-    progress = cli._SimulationProgress(200.0)
+    progress = app._SimulationProgress(200.0)
     progress.show(make_step(500, time=50.0, ending=ending))
     (task,) = progress._progress.tasks
     assert task.percentage == pytest.approx(share)
@@ -26,7 +26,7 @@ def test_a_data_set_of_a_sumo_configuration(tmp_path: Path) -> None:
     chosen = ["--sumocfg", TOWN, "--ego", "veh18", "--visibility", "120"]
     small = ["--set", "camera.width=64", "--set", "camera.height=48"]
     done = CliRunner().invoke(
-        cli.app, ["dataset", *chosen, *small, "--out", str(tmp_path / "out"), "--frames", "1"], catch_exceptions=False
+        app.app, ["dataset", *chosen, *small, "--out", str(tmp_path / "out"), "--frames", "1"], catch_exceptions=False
     )
     assert done.exit_code == 0, done.output
     assert (tmp_path / "out" / "frames" / "000000.png").is_file()
@@ -44,5 +44,5 @@ def test_a_data_set_of_a_sumo_configuration(tmp_path: Path) -> None:
 def test_a_data_set_of_nothing_or_of_two_things_is_refused(arguments: list[str], message: str, tmp_path: Path) -> None:
     out = tmp_path / "out"
     with pytest.raises(InputError, match=message):
-        CliRunner().invoke(cli.app, ["dataset", *arguments, "--out", str(out), "--frames", "1"], catch_exceptions=False)
+        CliRunner().invoke(app.app, ["dataset", *arguments, "--out", str(out), "--frames", "1"], catch_exceptions=False)
     assert not out.exists()

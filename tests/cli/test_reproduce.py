@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from fogsim import cli, cli_reproduce
+from fogsim.cli import app
+from fogsim.cli import reproduce as reproduce_module
 from fogsim.reproduce import REPRODUCTIONS, Reproduction
 from tests.test_interruption import raise_as_numba_does
 
@@ -27,11 +28,11 @@ def reproduce(monkeypatch, capsys):
 
     def run(evaluation, *, terminal: bool) -> tuple[int, str, str]:
         drawn = io.StringIO()
-        monkeypatch.setattr(cli_reproduce, "_err", Console(file=drawn, force_terminal=terminal, width=100))
+        monkeypatch.setattr(reproduce_module, "_err", Console(file=drawn, force_terminal=terminal, width=100))
         monkeypatch.setattr(REPRODUCTIONS, "_entries", {"negru2013": evaluation})
         monkeypatch.setattr(sys, "argv", ["fogsim", "reproduce", "negru2013", "--json"])
         with pytest.raises(SystemExit) as ended:
-            cli.main()
+            app.main()
         return int(ended.value.code or 0), capsys.readouterr().out, drawn.getvalue()
 
     return run

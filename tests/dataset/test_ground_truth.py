@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import fogsim
-from fogsim.atmosphere import optical_depth
+from fogsim.atmosphere.fog import optical_depth
 from fogsim.dataset import (
     SemanticClass,
     decoded_depth,
@@ -24,8 +24,8 @@ from fogsim.dataset import (
 from fogsim.dataset.annotations import object_records
 from fogsim.dataset.encoding import png
 from fogsim.errors import InputError
-from fogsim.pinhole import ray_from_pixel
 from fogsim.values import Camera, CameraPose, FogField, Sign, SignMap, Step, Truth, View
+from fogsim.values.pinhole import ray_from_pixel
 from tests.recorders.synthetic import make_step
 
 BANK = (

@@ -15,7 +15,7 @@ import sumo
 from flat_road import Road, photograph, scan
 from PIL import Image
 
-from fogsim.camera_file import load_calibration
+from fogsim.offline.camera_file import load_calibration
 from fogsim.recorders.video import Encoder, encoder_command
 
 CHECKOUT = Path(__file__).resolve().parents[2]

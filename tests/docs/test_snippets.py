@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 import typer
 
-from fogsim.cli import app
+from fogsim.cli.app import app
 from fogsim.scenario import load_scenario
 
 CHECKOUT = Path(__file__).resolve().parents[2]
@@ -43,7 +43,7 @@ SHORT = ("--set", "camera.width=64", "--set", "camera.height=48", "--set", "dura
 
 RUNNER = """
 import json, os, sys, traceback
-from fogsim.cli import main
+from fogsim.cli.app import main
 
 def command(line):
     sys.argv = line

@@ -79,7 +79,7 @@ def test_the_drive_tells_each_method_apart(as_it_is: list[Step]) -> None:
 
 
 def test_deleting_the_truth_changes_nothing(as_it_is: list[Step], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fogsim.onboard.fog_truth", lambda *_: None)
+    monkeypatch.setattr("fogsim.ego.equipment.fog_truth", lambda *_: None)
     blind = drive()
     assert all(step.truth is None for step in blind)
     check_same(as_it_is, blind)
@@ -87,7 +87,7 @@ def test_deleting_the_truth_changes_nothing(as_it_is: list[Step], monkeypatch: p
 
 def test_a_false_truth_changes_nothing(as_it_is: list[Step], monkeypatch: pytest.MonkeyPatch) -> None:
     """Another fog, visibility, calibration, place, distances, instances and leader than what was drawn and measured."""
-    from fogsim.outlook import Outlook
+    from fogsim.ego.view_rendering import Outlook
     from fogsim.sensors import measure_lead
 
     rng = np.random.default_rng(4)
@@ -109,8 +109,8 @@ def test_a_false_truth_changes_nothing(as_it_is: list[Step], monkeypatch: pytest
     def measure_another(leader, *arguments):
         return measure_lead(leader and dataclasses.replace(leader, vehicle_id=f"v{rng.integers(99)}"), *arguments)
 
-    monkeypatch.setattr("fogsim.onboard.fog_truth", false_truth)
-    monkeypatch.setattr("fogsim.onboard.measure_lead", measure_another)
+    monkeypatch.setattr("fogsim.ego.equipment.fog_truth", false_truth)
+    monkeypatch.setattr("fogsim.ego.equipment.measure_lead", measure_another)
     monkeypatch.setattr(Outlook, "see", see_falsely)
     misled = drive()
     assert misled[3].truth.visibility != as_it_is[3].truth.visibility
@@ -196,7 +196,7 @@ def test_no_chain_of_imports_leads_to_the_truth(imports: grimp.ImportGraph, hone
 
 
 def test_the_check_of_imports_finds_what_it_looks_for(imports: grimp.ImportGraph) -> None:
-    assert imports.find_shortest_chains("fogsim.outlook", "fogsim.render", as_packages=True)
+    assert imports.find_shortest_chains("fogsim.ego.view_rendering", "fogsim.render", as_packages=True)
     assert unseen_names("from fogsim.values import Camera, Truth") == {"Truth"}
 
 

@@ -14,11 +14,11 @@ from fogsim.estimators.huang2015_ratios import (
     variance_ratio_extinction,
 )
 from fogsim.estimators.huang2015_sighting import vehicle_crop
-from fogsim.response import respond
 from fogsim.values import Camera, Frame, LeadMeasurement, Observation, Response
+from fogsim.values.camera_response import respond
 from fogsim.values.estimate import NORMAL_90_PERCENT
-from fogsim.vision.lead_daylight import RoadFall, road_fall
-from fogsim.vision.lead_window import find_lead
+from fogsim.vision.vehicle.lead_daylight import RoadFall, road_fall
+from fogsim.vision.vehicle.lead_window import find_lead
 
 LN20 = np.log(20.0)
 

@@ -7,8 +7,8 @@ import pytest
 
 from fogsim.errors import InputError
 from fogsim.estimators import make
-from fogsim.response import respond
 from fogsim.values import Camera, Frame, LeadMeasurement, Observation, Response
+from fogsim.values.camera_response import respond
 
 LN20 = np.log(20.0)
 CAMERA = Camera(512, 384, 560.0, (255.5, 191.5), 1.35, np.radians(1.5))

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import fogsim.recording
-from fogsim import cli
+from fogsim.cli import app
 from fogsim.interruption import SIGNALS, leave_on_signals
 from fogsim.recorders import RECORDERS, TableRecorder
 from fogsim.recorders.protocol import RunInformation
@@ -41,7 +41,7 @@ def _command(command: dict[str, Any]) -> None:
     signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
     sys.argv = ["fogsim", *command["arguments"]]
     try:
-        cli.main()
+        app.main()
     except SystemExit as end:
         sys.stdout.flush()
         sys.stderr.flush()

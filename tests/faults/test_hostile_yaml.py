@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from fogsim.camera_file import load_calibration
 from fogsim.errors import InputError
+from fogsim.offline.camera_file import load_calibration
 from fogsim.scenario import load_scenario
 from fogsim.scenario.plain_yaml import DEEPEST, MOST_BYTES, MOST_NODES, parse_yaml
 

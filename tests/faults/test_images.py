@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fogsim import cli
+from fogsim.cli import app
 from fogsim.errors import InputError
-from fogsim.image_files import read_distance, read_image
 from fogsim.offline import find_source
+from fogsim.offline.image_files import read_distance, read_image
 from fogsim.recorders.video import ffmpeg_program
 from fogsim.values import Camera
 
@@ -83,7 +83,7 @@ def fogsim(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
     def run(*arguments: str) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["fogsim", *arguments])
         with pytest.raises(SystemExit) as ended:
-            cli.main()
+            app.main()
         told = capsys.readouterr()
         return int(ended.value.code or 0), told.out, told.err
 

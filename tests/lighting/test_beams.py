@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.beam import checked_beam, luminous_intensity
 from fogsim.errors import InputError
 from fogsim.lighting.beams import (
     ECE_LEVEL,
@@ -18,6 +17,7 @@ from fogsim.lighting.beams import (
     scaled_beam,
 )
 from fogsim.values import Beam
+from fogsim.values.luminous_intensity import checked_beam, luminous_intensity
 
 TABLE = "# a comment\nup\\right,-1,0,1\n-1,10,20,30\n0,40,50,60\n"
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fogsim.camera_file import load_camera
 from fogsim.errors import InputError
 from fogsim.offline import camera_text, estimate_images, find_source, guess_camera, write_camera
+from fogsim.offline.camera_file import load_camera
 from fogsim.values import Response
 
 HEIGHT = 1.38

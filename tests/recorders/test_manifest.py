@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from fogsim.errors import InputError
+from fogsim.files.writing_process import WritingProcess
 from fogsim.recorders import Manifest, Status, versions, write_json
-from fogsim.recorders.process import WritingProcess
 from fogsim.values import Ending, Reason, Unplayed, UnplayedEvent
 
 STARTED = datetime(2024, 11, 5, 7, 30, tzinfo=timezone(timedelta(hours=1)))

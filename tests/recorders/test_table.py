@@ -10,9 +10,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from fogsim.errors import InputError
+from fogsim.files.row_log import read_rows
 from fogsim.metrics import step_metrics
 from fogsim.recorders import TableRecorder
-from fogsim.recorders.row_log import read_rows
 from fogsim.recorders.table import ROWS_PER_GROUP
 from fogsim.values import Collision, Ending, Estimate, Lamp, Leader, LeadMeasurement, Step
 from tests.recorders.synthetic import METHODS, drive, estimate, make_step

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fogsim.scene import build_scene
-from fogsim.traffic.network import read_net, road_network
+from fogsim.traffic.road.network import read_net, road_network
 from fogsim.values import Camera, CameraPose, Lamp, RoadNetwork, Scene, Sign, SignMap, TrafficState
 
 NET = Path(__file__).parents[2] / "scenarios" / "motorway_fog_bank" / "motorway.net.xml"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fogsim import jit
-from fogsim.atmosphere.koschmieder import fogged_radiance
+from fogsim.atmosphere.fog.koschmieder import fogged_radiance
 from fogsim.camera.exposure import Sensor, expose
 from fogsim.jit import Bands
 from fogsim.render import make_renderer

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from fogsim.errors import InputError
-from fogsim.pinhole import camera_axes, ray_from_pixel
 from fogsim.render import RENDERERS, Renderer, RenderError, best_renderer, make_renderer
-from fogsim.render.choice import shapes_of
 from fogsim.render.cpu.rasteriser import CPURasteriser
+from fogsim.render.culling import shapes_of
 from fogsim.render.drawing import NEAR, RECORD, Drawing, MeshTable
 from fogsim.render.shading.surfaces import retroreflection
 from fogsim.scene import vehicle_batches
 from fogsim.values import Batch, Camera, CameraPose, Lamp, Mesh, Scene, Surface
+from fogsim.values.pinhole import camera_axes, ray_from_pixel
 
 CAMERA = Camera(320, 240, 288.0, (160.0, 120.0), 1.38, pitch=math.radians(2.0))
 AHEAD = CameraPose((0.0, 0.0, 1.38), heading=0.0)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from fogsim.pinhole import camera_axes
 from fogsim.render.cpu.rasteriser import CPURasteriser
 from fogsim.render.drawing import NEAR, RECORD, Drawing, MeshTable
 from fogsim.render.solids import in_solids
 from fogsim.values import Camera, CameraPose, Mesh, Surface
+from fogsim.values.pinhole import camera_axes
 
 CAMERA = Camera(120, 90, 80.0, (60.0, 45.0), 1.0, roll=0.1)
 POSE = CameraPose((0.0, 0.0, 0.0), 0.0)

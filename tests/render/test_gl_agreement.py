@@ -11,7 +11,7 @@ import pytest
 from fogsim.errors import MissingDependencyError
 from fogsim.render import Renderer, gl_report, make_renderer
 from fogsim.scene import build_scene, vehicle_batches
-from fogsim.traffic.network import read_net, road_network
+from fogsim.traffic.road.network import read_net, road_network
 from fogsim.values import Batch, Camera, CameraPose, Lamp, Mesh, Scene, Sign, SignMap, TrafficState, View
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from fogsim.errors import MissingDependencyError
-from fogsim.pinhole import camera_axes
 from fogsim.render import RenderError
 from fogsim.render.cpu.rasteriser import CPURasteriser
 from fogsim.render.drawing import NEAR, NOTHING, RECORD, Drawing, MeshTable
-from fogsim.render.gl.context import context
-from fogsim.render.gl.packing import COMMAND, COPY, corners, packed
-from fogsim.render.gl.rasteriser import GLRasteriser
+from fogsim.render.opengl.context import context
+from fogsim.render.opengl.packing import COMMAND, COPY, corners, packed
+from fogsim.render.opengl.rasteriser import GLRasteriser
 from fogsim.values import Camera, CameraPose, Mesh
+from fogsim.values.pinhole import camera_axes
 
 CAMERA = Camera(160, 120, 144.25, (80.0, 60.0), 1.38, pitch=math.radians(2.0))
 POSE = CameraPose((3.0, -2.0, 1.38), heading=0.7)

@@ -3,9 +3,9 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.pinhole import camera_axes, ray_from_pixel
 from fogsim.render.projection import clip_from_camera, highest_terrain_row
 from fogsim.values import Camera, CameraPose
+from fogsim.values.pinhole import camera_axes, ray_from_pixel
 
 CAMERA = Camera(640, 480, 577.0, (310.0, 250.0), 1.38, pitch=0.05, roll=0.04)
 POSE = CameraPose((3.0, 4.0, 1.38), heading=0.7, grade=0.01)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from fogsim import cli_reproduce
+from fogsim.cli import reproduce as reproduce_module
 from fogsim.estimators.huang2015_ratios import image_confidence
 from fogsim.reproduce import REPRODUCTIONS, Reproduction
 from fogsim.reproduce import huang2015_printed as printed
@@ -113,8 +113,8 @@ def test_the_chase_shows_each_range_once_in_every_fog_wanted() -> None:
 
 
 def test_the_command_prints_all_tables(done, capsys, monkeypatch) -> None:
-    monkeypatch.setattr(cli_reproduce._out, "_width", 200)
-    cli_reproduce._show(done, as_json=False)
+    monkeypatch.setattr(reproduce_module._out, "_width", 200)
+    reproduce_module._show(done, as_json=False)
     told = capsys.readouterr().out
     for table in done.told:
         assert table.title in told

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fogsim import cli
+from fogsim.cli import app
 from fogsim.reproduce import REPRODUCTIONS, Reproduction
 from fogsim.reproduce.negru2013 import CAMERA, EXTINCTIONS, SCENES
 from fogsim.reproduce.scenes import foggy_image, views
@@ -74,7 +74,7 @@ def command(monkeypatch, capsys, done):
     def run(*arguments: str) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["fogsim", "reproduce", *arguments])
         with pytest.raises(SystemExit) as ended:
-            cli.main()
+            app.main()
         told = capsys.readouterr()
         return int(ended.value.code or 0), told.out, told.err
 

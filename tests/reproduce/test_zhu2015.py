@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fogsim import cli
+from fogsim.cli import app
 from fogsim.errors import InputError
 from fogsim.estimators.zhu2015 import zhu_category
 from fogsim.reproduce import REPRODUCTIONS, Reproduction
@@ -135,7 +135,7 @@ def test_the_command_prints_table_and_records(monkeypatch, capsys, done) -> None
     for arguments in (["zhu2015"], ["zhu2015", "--json"]):
         monkeypatch.setattr(sys, "argv", ["fogsim", "reproduce", *arguments])
         with pytest.raises(SystemExit) as ended:
-            cli.main()
+            app.main()
         assert not ended.value.code
     out = capsys.readouterr().out
     assert "thick fog" in out

@@ -3,7 +3,7 @@ import math
 import pytest
 
 from fogsim.traffic.appearance import LARGE_SECTION, PAINTS, body_kind, lamps_from_signals, paint, section
-from fogsim.traffic.governor import governed_speed
+from fogsim.traffic.drivers.deceleration import governed_speed
 from fogsim.values import Lamp
 
 

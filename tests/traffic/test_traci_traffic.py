@@ -15,10 +15,10 @@ from fogsim.atmosphere import FieldAccess
 from fogsim.errors import SimulationError
 from fogsim.scenario import build, scenario_from_config
 from fogsim.traffic import DriverSetup, DriverSight, TraciLink, Traffic, TrafficSetup, libsumo_traffic, traci_traffic
-from fogsim.traffic.link import Api, SumoLink
-from fogsim.traffic.reading import Reader, VehicleReader
-from fogsim.traffic.subscribed_reading import SubscribedReader
-from fogsim.traffic.sumo_library import LibsumoLink
+from fogsim.traffic.sumo.library import LibsumoLink
+from fogsim.traffic.sumo.link import Api, SumoLink
+from fogsim.traffic.sumo.subscribed_reader import SubscribedReader
+from fogsim.traffic.sumo.vehicle_reader import Reader, VehicleReader
 from fogsim.traffic.sumo_traffic import command_line
 from fogsim.values import Command, FogField, Lamp, SpeedAdvice, TrafficSnapshot, TrafficState
 

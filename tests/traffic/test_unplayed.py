@@ -9,7 +9,7 @@ import pytest
 
 from fogsim.scenario import build, scenario_from_config
 from fogsim.traffic import BrakeEvent, Event, LampFailureEvent, LaneChangeEvent, Traffic, Trigger, libsumo_traffic
-from fogsim.traffic.events import Script, Situation
+from fogsim.traffic.drivers.events import Script, Situation
 from fogsim.traffic.highway import HighwayTraffic
 from fogsim.values import Command, Reason, Unplayed, UnplayedEvent
 

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import Bands
-from fogsim.render.cpu.kernels import rasterise
-from fogsim.render.cpu.selection import Triangles, Work
+from fogsim.render.cpu.rasteriser_kernels import rasterise
+from fogsim.render.cpu.triangles import Triangles, Work
 from fogsim.render.drawing import NEAR, Drawing, MeshTable
 from fogsim.render.lens import lens_of
 from fogsim.values.camera import Camera, CameraPose

@@ -12,8 +12,8 @@ from fogsim.render.shading.layout import Copies, Light, Meshes, Numbers, Picture
 from fogsim.render.shading.memory import Memory
 from fogsim.render.shading.noise import Noise, tiles
 from fogsim.render.shading.objects import shade_objects, shade_sky
+from fogsim.render.shading.pixel_spans import find_runs
 from fogsim.render.shading.road import shade_road
-from fogsim.render.shading.runs import find_runs
 from fogsim.render.shading.surfaces import know, know_background
 from fogsim.render.shading.terrain import shade_terrain
 from fogsim.render.shading.texture import Row, memory_for_row

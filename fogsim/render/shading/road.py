@@ -5,10 +5,10 @@ import numpy as np
 from fogsim.jit import kernel
 from fogsim.render.lens import Lens
 from fogsim.render.shading import layout
+from fogsim.render.shading.ground_spans import next_stretch
 from fogsim.render.shading.layout import Picture, Runs
 from fogsim.render.shading.lines import LINE_WIDTH, columns_near, dashed_share
 from fogsim.render.shading.noise import Noise
-from fogsim.render.shading.stretches import next_stretch
 from fogsim.render.shading.texture import ASPHALT, Row, weave
 
 DEPTH, ALONG, ACROSS, WHITE = layout.DEPTH, layout.ALONG, layout.ACROSS, layout.WHITE

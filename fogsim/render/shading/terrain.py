@@ -7,9 +7,9 @@ import numpy as np
 from fogsim.jit import kernel
 from fogsim.render.lens import Lens
 from fogsim.render.shading import layout
+from fogsim.render.shading.ground_spans import next_stretch
 from fogsim.render.shading.layout import Picture, Runs
 from fogsim.render.shading.noise import Noise
-from fogsim.render.shading.stretches import next_stretch
 from fogsim.render.shading.texture import GRASS, Row, weave
 
 DEPTH, WHITE, COLOUR, TERRAIN = layout.DEPTH, layout.WHITE, layout.COLOUR, layout.TERRAIN

@@ -1,11 +1,11 @@
 """highway-env as a second traffic simulation; nothing else of FogSim knows that library."""
 
-from fogsim.traffic.highway.conduct import Conduct, take_over
+from fogsim.traffic.highway.behaviour import Conduct, take_over
 from fogsim.traffic.highway.fleet import EGO, LEAD, Fleet
 from fogsim.traffic.highway.network import road_network, same_roads
 from fogsim.traffic.highway.perception import let_drivers_meet
-from fogsim.traffic.highway.reading import read_snapshot
-from fogsim.traffic.highway.running import HighwayTraffic, is_highway_environment
+from fogsim.traffic.highway.snapshot import read_snapshot
+from fogsim.traffic.highway.traffic import HighwayTraffic, is_highway_environment
 
 __all__ = [
     "EGO",

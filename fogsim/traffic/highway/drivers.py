@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from highway_env.vehicle.behavior import IDMVehicle
 
-from fogsim.traffic.driver_choice import Nature, nature, wanted_speed
-from fogsim.traffic.drivers import CHOICE_PERIOD, DriverSetup, perceived_distance_factor
+from fogsim.traffic.drivers.individual import Nature, nature, wanted_speed
+from fogsim.traffic.drivers.sight import FogAccess
+from fogsim.traffic.drivers.speed_choice import CHOICE_PERIOD, DriverSetup, perceived_distance_factor
 from fogsim.traffic.highway.fleet import Fleet
 from fogsim.traffic.highway.network import speed_limit
-from fogsim.traffic.highway.reading import front_bumper
-from fogsim.traffic.sight import FogAccess
+from fogsim.traffic.highway.snapshot import front_bumper
 from fogsim.units import visibility_from_extinction
 from fogsim.values import Command
 

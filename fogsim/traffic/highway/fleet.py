@@ -2,8 +2,7 @@
 
 from typing import Any
 
-from fogsim.traffic.appearance import SUMO_DEFAULT_COLOUR, paint
-from fogsim.traffic.reading import OTHERS_LAMPS
+from fogsim.traffic.appearance import OTHERS_LAMPS, SUMO_DEFAULT_COLOUR, paint
 from fogsim.values import Command, Lamp
 
 EGO = "ego"

@@ -8,10 +8,8 @@ from highway_env.vehicle.controller import ControlledVehicle
 
 from fogsim.errors import InputError, suggest
 from fogsim.linear_algebra import matrix_product
-from fogsim.traffic.control import Order
-from fogsim.traffic.events import Event, LaneChangeEvent, Script, Situation
-from fogsim.traffic.gaps import signed_gap
-from fogsim.traffic.governor import governed_speed
+from fogsim.traffic.drivers.deceleration import governed_speed
+from fogsim.traffic.drivers.events import Event, LaneChangeEvent, Order, Script, Situation, signed_gap
 from fogsim.traffic.highway.fleet import LEAD, Fleet, acceleration
 from fogsim.values import Unplayed
 

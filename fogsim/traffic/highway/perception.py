@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from fogsim.traffic.drivers.sight import EYE_HEIGHT, DriverSight, FogAccess, inherent_contrast, rear_intensity
 from fogsim.traffic.highway.fleet import Fleet
-from fogsim.traffic.highway.reading import front_bumper, rear_bumper
-from fogsim.traffic.perception import EYE_HEIGHT
-from fogsim.traffic.sight import DriverSight, FogAccess, inherent_contrast, rear_intensity
+from fogsim.traffic.highway.snapshot import front_bumper, rear_bumper
 
 
 def let_drivers_meet(fog: FogAccess, fleet: Fleet, sight: DriverSight) -> None:

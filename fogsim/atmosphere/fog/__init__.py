@@ -1,0 +1,1 @@
+"""Daylight through fog: extinction, optical depth, transmittance and airlight."""

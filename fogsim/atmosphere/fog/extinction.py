@@ -1,0 +1,139 @@
+"""A fog field at one time, as the arrays that compiled kernels read."""
+
+import dataclasses
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.atmosphere.fog.extinction_noise import CELLS, patch_factors
+from fogsim.values import FogBank, FogField
+
+EXTINCTION, BASE, BASE_EDGE, TOP, TOP_EDGE, GROUND, DECAY = range(7)
+"""Places of the numbers in `Medium.layer`."""
+
+_TURN = 0.5
+"""Angle between the patches' grid and the world's axes [rad], so that no road meets the same patches over and over."""
+
+
+class Medium(NamedTuple):
+    """A field without time.
+
+    Attributes
+    ----------
+    layer : (7,) float64
+        Extinction outside the banks [1/m], height of base, thickness of its edge, height of top, thickness of its edge,
+        ground [m] and 1 / scale height [1/m].
+    banks : (n, 8) float64
+        Origin (x, y), axis (x, y), start, end, edge [m], extra extinction [1/m].
+    frame : (6,) float64
+        From places to cells of the patches: cells per metre horizontally and vertically, cosine and sine of the grid's
+        turn, drift (x, y) [m].
+    factors : (z, y, x) float32
+        Factors of the patches on their periodic grid; one cell where there are none.
+    """
+
+    layer: NDArray[np.float64]
+    banks: NDArray[np.float64]
+    frame: NDArray[np.float64]
+    factors: NDArray[np.float32]
+
+
+def field_at(field: FogField, time: float) -> FogField:
+    """The field at a time, which no longer changes.
+
+    Parameters
+    ----------
+    field : FogField
+        The field.
+    time : float
+        Time since the run began [s].
+
+    Returns
+    -------
+    FogField
+        With banks and patches drifted, and density, base and top of the time; the same object if nothing changes.
+    """
+    if not field.changes and field.wind == (0.0, 0.0):
+        return field
+    density, base, top = _state(field, time)
+    drift = (field.wind[0] * time, field.wind[1] * time)
+    patches = field.patches
+    if patches is not None:
+        offset = (patches.offset[0] + drift[0], patches.offset[1] + drift[1])
+        patches = dataclasses.replace(patches, offset=offset)
+    return dataclasses.replace(
+        field,
+        extinction=field.extinction * density,
+        banks=tuple(_moved(bank, drift, density) for bank in field.banks),
+        base=base,
+        top=top,
+        patches=patches,
+        wind=(0.0, 0.0),
+        changes=(),
+    )
+
+
+def _state(field: FogField, time: float) -> tuple[float, float, float]:
+    """Density, base and top at a time."""
+    if not field.changes:
+        return 1.0, field.base, field.top
+    times = [change.time for change in field.changes]
+
+    def now(values: list[float]) -> float:
+        # An endless height is the same at all times, and has no way to be interpolated.
+        return values[0] if math.isinf(values[0]) else float(np.interp(time, times, values))
+
+    return (
+        now([change.density for change in field.changes]),
+        now([change.base for change in field.changes]),
+        now([change.top for change in field.changes]),
+    )
+
+
+def _moved(bank: FogBank, drift: tuple[float, float], density: float) -> FogBank:
+    return dataclasses.replace(
+        bank,
+        origin=(bank.origin[0] + drift[0], bank.origin[1] + drift[1]),
+        extra_extinction=bank.extra_extinction * density,
+    )
+
+
+@lru_cache(maxsize=8)
+def medium_of(field: FogField) -> Medium:
+    """Arrays of a field that does not change with time (see `field_at`).
+
+    Parameters
+    ----------
+    field : FogField
+        The field.
+    """
+    frame, factors = np.zeros(6), np.ones((1, 1, 1), dtype=np.float32)
+    patches = field.patches
+    if patches is not None and patches.strength > 0:
+        cosine, sine = math.cos(_TURN), math.sin(_TURN)
+        cells = (CELLS / patches.correlation_length, CELLS / patches.correlation_height)
+        frame = np.array((*cells, cosine, sine, *patches.offset))
+        factors = patch_factors(patches.strength, patches.seed)
+    heights = (field.base, field.base_edge, field.top, field.top_edge, field.ground)
+    layer = np.array((field.extinction, *heights, 1.0 / field.scale_height))
+    banks = [(*b.origin, *b.axis, b.start, b.end, b.edge, b.extra_extinction) for b in field.banks]
+    return Medium(layer, np.array(banks, dtype=np.float64).reshape(-1, 8), frame, factors)
+
+
+def is_plain(field: FogField) -> bool:
+    """Tell whether nothing but banks and a sharp top makes a field uneven."""
+    return (
+        (field.patches is None or field.patches.strength == 0)
+        and math.isinf(field.scale_height)
+        and math.isinf(field.base)
+        and field.top_edge == 0
+        and field.airlight_shading == 0
+    )
+
+
+def is_even_up_to(field: FogField, height: float) -> bool:
+    """Tell whether fog is the same everywhere below a height [m]."""
+    return is_plain(field) and not field.banks and height <= field.top

@@ -1,0 +1,162 @@
+"""Optical depth on the rays of a frustum grid, and its way to the pixels between them."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.atmosphere.fog.extinction import BASE, BASE_EDGE, DECAY, TOP, TOP_EDGE, Medium
+from fogsim.atmosphere.fog.koschmieder_kernels import ENDLESS, mix, three_times, transmissions
+from fogsim.atmosphere.fog.optical_depth_kernels import extinctions_on_ray
+from fogsim.jit import kernel
+
+OPAQUE = 60.0
+"""Optical depth beyond which nothing is told apart [-]."""
+
+_OUT_OF_FOG = 1e-9
+
+
+@kernel
+def _split_at_sharp_edges(
+    eye: NDArray[np.float64],
+    direction: NDArray[np.float64],
+    distances: NDArray[np.float64],
+    medium: Medium,
+    pieces: NDArray[np.float64],
+) -> None:
+    """Put right the optical depths of those intervals in which a ray crosses a sharp base or top."""
+    halves, values = np.empty(2), np.empty(2)
+    for middle, edge in ((BASE, BASE_EDGE), (TOP, TOP_EDGE)):
+        rise = medium.layer[middle] - eye[2]
+        if medium.layer[edge] > 0.0 or math.isinf(rise) or rise * direction[2] <= 0.0:
+            continue
+        crossing = rise / direction[2]
+        if crossing < distances[distances.shape[0] - 2]:
+            n = np.searchsorted(distances, crossing)
+            halves[0], halves[1] = 0.5 * (distances[n - 1] + crossing), 0.5 * (crossing + distances[n])
+            extinctions_on_ray(eye, direction, halves, medium, values)
+            pieces[n] = values[0] * (crossing - distances[n - 1]) + values[1] * (distances[n] - crossing)
+
+
+@kernel
+def grid_depths(
+    eye: NDArray[np.float64],
+    directions: NDArray[np.float64],
+    distances: NDArray[np.float64],
+    medium: Medium,
+    extinction: NDArray[np.float32],
+    depth: NDArray[np.float32],
+) -> None:
+    """Extinction and optical depth at the nodes (n) of each ray (m, 3), by Simpson's rule between nodes.
+
+    The last node stands for the end of the ray, wherever that is.
+    """
+    last = distances.shape[0] - 1
+    at, values, pieces = np.empty(2 * last - 1), np.empty(2 * last - 1), np.zeros(last + 1)
+    for n in range(last):
+        at[2 * n] = distances[n]
+        if n < last - 1:
+            at[2 * n + 1] = 0.5 * (distances[n] + distances[n + 1])
+    top, decay = medium.layer[TOP], medium.layer[DECAY]
+    for m in range(directions.shape[0]):
+        extinctions_on_ray(eye, directions[m], at, medium, values)
+        for n in range(1, last):
+            mean = (values[2 * n - 2] + 4.0 * values[2 * n - 1] + values[2 * n]) / 6.0
+            pieces[n] = mean * (distances[n] - distances[n - 1])
+        _split_at_sharp_edges(eye, directions[m], distances, medium, pieces)
+        rise = max(directions[m, 2], _OUT_OF_FOG)
+        rest = max(top - eye[2] - distances[last - 1] * directions[m, 2], 0.0) / rise
+        if decay > 0.0:
+            rest = min(rest, 1.0 / (decay * rise))
+        pieces[last] = values[2 * last - 2] * min(rest, ENDLESS)
+        total = 0.0
+        for n in range(last + 1):
+            total += pieces[n]
+            extinction[m, n] = values[2 * min(n, last - 1)]
+            depth[m, n] = min(total, OPAQUE)
+
+
+@kernel
+def _between(low: NDArray[np.float32], high: NDArray[np.float32], share: np.float32, out: NDArray[np.float32]) -> None:
+    for i in range(out.shape[0]):
+        out[i] = low[i] + (high[i] - low[i]) * share
+
+
+@kernel
+def grid_pixels(
+    radiance: NDArray[np.float32],
+    distance: NDArray[np.float32],
+    rows: NDArray[np.float32],
+    left: NDArray[np.int64],
+    right_share: NDArray[np.float32],
+    distances: NDArray[np.float32],
+    interval: NDArray[np.int64],
+    fold: np.float32,
+    depth: NDArray[np.float32],
+    source: NDArray[np.float32],
+    airlight: NDArray[np.float32],
+    out: NDArray[np.float32],
+) -> None:
+    """Fog every pixel of an image (rows, cols · 3) by what lies on the grid's rays.
+
+    L = L0 T + L∞ (1 − T) + S, τ and S interpolated linearly between four rays and two nodes. `rows` are the image rows
+    of the grid; `left` (cols) and `right_share` place each column between two of the grid's. `interval` gives for
+    d / (d + fold), in even steps over 0 … 1, the node before a distance d. `depth` is (grid rows, grid cols · nodes),
+    `source` (grid rows, grid cols · nodes · 3) or of no columns where there is none.
+    """
+    columns, nodes, bins = distance.shape[1], distances.shape[0], interval.shape[0]
+    above, scattered = np.empty(depth.shape[1], np.float32), np.empty(source.shape[1], np.float32)
+    row_depth, transmission = np.empty(columns, np.float32), np.empty(columns, np.float32)
+    power = np.empty(columns, np.int32)
+    in_channels, light = np.empty(3 * columns, np.float32), np.empty(3 * columns, np.float32)
+    node, share = np.empty(columns, np.int64), np.empty(columns, np.float32)
+    reach, place = np.empty(columns, np.float32), np.empty(columns, np.int32)
+    per_metre = np.empty(nodes - 1, np.float32)
+    for n in range(nodes - 1):
+        per_metre[n] = np.float32(1.0) / (distances[n + 1] - distances[n])
+    for j in range(3 * columns):
+        light[j] = airlight[j % 3]
+    upper = 0
+    for v in range(distance.shape[0]):
+        while upper < rows.shape[0] - 2 and rows[upper + 1] <= v:
+            upper += 1
+        down = (np.float32(v) - rows[upper]) / (rows[upper + 1] - rows[upper])
+        _between(depth[upper], depth[upper + 1], down, above)
+        for u in range(columns):
+            reach[u] = min(distance[v, u], np.float32(ENDLESS))
+            place[u] = np.int32(reach[u] / (reach[u] + fold) * np.float32(bins))
+        for u in range(columns):
+            n = interval[place[u]]
+            f = min((reach[u] - distances[n]) * per_metre[n], np.float32(1.0))
+            a = left[u] * nodes + n
+            b = a + nodes
+            near = above[a] + (above[b] - above[a]) * right_share[u]
+            far = above[a + 1] + (above[b + 1] - above[a + 1]) * right_share[u]
+            row_depth[u] = max(near + (far - near) * f, np.float32(0.0))
+            node[u], share[u] = n, f
+        transmissions(row_depth, power, transmission)
+        three_times(transmission, in_channels)
+        mix(radiance[v], in_channels, light, out[v])
+        if source.shape[1] > 0:
+            _between(source[upper], source[upper + 1], down, scattered)
+            _add_source(scattered, left, right_share, node, share, nodes, out[v])
+
+
+@kernel
+def _add_source(
+    scattered: NDArray[np.float32],
+    left: NDArray[np.int64],
+    right_share: NDArray[np.float32],
+    node: NDArray[np.int64],
+    share: NDArray[np.float32],
+    nodes: int,
+    out: NDArray[np.float32],
+) -> None:
+    """Add what is scattered into each pixel of a row."""
+    for u in range(node.shape[0]):
+        a = 3 * (left[u] * nodes + node[u])
+        b = a + 3 * nodes
+        for c in range(3):
+            near = scattered[a + c] + (scattered[b + c] - scattered[a + c]) * right_share[u]
+            far = scattered[a + 3 + c] + (scattered[b + 3 + c] - scattered[a + 3 + c]) * right_share[u]
+            out[3 * u + c] += near + (far - near) * share[u]

@@ -1,0 +1,166 @@
+"""Glow about a lamp in fog: light that droplets scatter out of its way and into the eye.
+
+Light that an isotropic point source of intensity I at a distance R sends past the eye is scattered once into a line of
+sight at an angle γ from the source with the radiance
+
+    L(γ) = ∫ k p(Θ) I e^(−k (s + r)) / s² dr = I / R² · P₁(γ, T),        T = k R.
+
+In fog more than T ≈ 1 away most light is scattered several times, at small angles each. As in the veil of own lamps,
+light that was scattered a little is not lost but goes on, spread: the glow is the sum of three such integrals,
+
+    P = P₁[p, η₁] + (P₁[p₂, η₂] − P₁[p₂, η₁]) + (P₁[p₃, η₃] − P₁[p₃, η₂]),
+
+each with its part η of the extinction and with phase functions p₂, p₃ that are blurred ever wider. 1 − η₁ is what the
+droplets scatter by less than a degree. For T → 0 that is single scattering. The other four numbers were fitted to
+photons (`benchmarks/monte_carlo.py halo`); the docs have the deviations, and those of Narasimhan & Nayar's series.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fogsim.atmosphere.lamps.phase_function import Droplets, PhaseFunction, blurred, phase_function
+
+SPREADS = (0.42, 0.91)
+"""Widths by which the phase functions p₂ and p₃ are blurred [rad]."""
+
+LOSS_ONCE_SPREAD = 0.70
+"""η₂: part of the extinction that light suffers which was spread a little [-]."""
+
+LOSS_OF_DIFFUSE_LIGHT = 1.5
+"""η₃ / (1 − g): light that was spread widely is lost by what droplets turn round, as in diffusion theory [-]."""
+
+FORWARD = math.radians(1.0)
+"""Scattering angle below which light is not lost at all [rad]."""
+
+FOLD_CHORD = 0.15
+"""Chord that is placed half-way in the table's direction of angles [-]."""
+
+_CHORDS = 144
+_DEPTHS = np.geomspace(0.02, 16.0, 30)
+_STEPS = 240
+
+
+def scattered_once(
+    depth: ArrayLike, angle: ArrayLike, phase: PhaseFunction, loss: float = 1.0, steps: int = _STEPS
+) -> NDArray[np.float64]:
+    """P₁: radiance scattered once about a point source, times R² over its intensity [-].
+
+    The line of sight is walked by the angle at which it is seen from the source, which makes the integrand flat.
+
+    Parameters
+    ----------
+    depth : array_like
+        Optical depth T = k R to the source [-], positive; broadcasts with `angle`.
+    angle : array_like
+        Angle γ of the line of sight from the direction of the source [rad], in 0 … π without its ends.
+    phase : PhaseFunction
+        Of the droplets.
+    loss : float
+        Part of the extinction that light suffers on its way [-].
+    steps : int
+        Steps of the integral.
+    """
+    t, gamma = np.broadcast_arrays(np.asarray(depth, dtype=np.float64), np.asarray(angle, dtype=np.float64))
+    t, gamma = t[..., None], gamma[..., None]
+    even = (np.arange(steps) + 0.5) / steps
+    # The scattering angle runs from γ at the eye to π at infinity, in steps that are small where γ may be in the peak.
+    scattering = gamma + (math.pi - gamma) * even**3
+    sine = np.sin(gamma)
+    way = t * sine / np.sin(scattering)
+    to_eye = t * (np.cos(gamma) - sine * np.cos(scattering) / np.sin(scattering))
+    lit = phase(scattering) * np.exp(-loss * (way + to_eye))
+    return np.asarray((lit * 3.0 * even**2).mean(axis=-1) * ((math.pi - gamma) * t / sine)[..., 0])
+
+
+def glow(depth: ArrayLike, angle: ArrayLike, droplets: Droplets) -> NDArray[np.float64]:
+    """P: radiance scattered about a lamp, times R² over its intensity [-]; see the module.
+
+    Parameters
+    ----------
+    depth : array_like
+        Optical depth T = k R to the lamp [-], positive; broadcasts with `angle`.
+    angle : array_like
+        Angle of the line of sight from the lamp's direction [rad], in 0 … π without its ends.
+    droplets : Droplets
+        What the fog is made of.
+    """
+    phase = phase_function(droplets)
+    first = 1.0 - forward_share(phase)
+    total = scattered_once(depth, angle, phase, first)
+    last = LOSS_OF_DIFFUSE_LIGHT * (1.0 - mean_cosine(phase))
+    for spread, loss in zip(SPREADS, (LOSS_ONCE_SPREAD, last), strict=True):
+        wide = blurred(phase, spread)
+        more = scattered_once(depth, angle, wide, loss) - scattered_once(depth, angle, wide, first)
+        total = total + np.maximum(more, 0.0)
+        first = min(first, loss)
+    return total
+
+
+def mean_cosine(phase: PhaseFunction) -> float:
+    """Mean cosine g of the scattering angle."""
+    theta = np.linspace(0.0, math.pi, 20001)
+    return float(2.0 * math.pi * np.trapezoid(phase(theta) * np.sin(theta) * np.cos(theta), theta))
+
+
+def forward_share(phase: PhaseFunction, angle: float = FORWARD) -> float:
+    """Share of light that droplets scatter by less than an angle [rad]."""
+    theta = np.linspace(0.0, angle, 400)
+    return float(2.0 * math.pi * np.trapezoid(phase(theta) * np.sin(theta), theta))
+
+
+def narasimhan_nayar(depth: float, angle: ArrayLike, asymmetry: float = 0.9, terms: int = 200) -> NDArray[np.float64]:
+    """Glow by the series of Narasimhan & Nayar (2003), "Shedding light on the weather", times T² (eqs. 5.25–5.28).
+
+    For comparison: FogSim does not draw with it. It knows no single scattering and diverges for T ≤ 1.
+
+    Parameters
+    ----------
+    depth : float
+        Optical depth T to the source [-], more than 1.
+    angle : array_like
+        Angle of the line of sight from the source's direction [rad].
+    asymmetry : float
+        Henyey & Greenstein's parameter q of the droplets, 0.85 … 0.9 in fog.
+    terms : int
+        Terms of the series.
+
+    Raises
+    ------
+    ValueError
+        If the optical depth is not above 1.
+    """
+    if not depth > 1.0:
+        raise ValueError(f"the series of Narasimhan and Nayar converges for optical depths above 1, got {depth!r}")
+    m = np.arange(1, terms + 2, dtype=np.float64)
+    powers = np.exp(-(2 * m + 1) / m * (1 - asymmetry ** (m - 1)) * depth - (m - 1) * math.log(depth))
+    coefficients = np.concatenate(([powers[0]], powers[:-1] + powers[1:]))
+    return np.asarray(np.polynomial.legendre.legval(np.cos(np.asarray(angle, dtype=np.float64)), coefficients))
+
+
+@dataclass(frozen=True, slots=True)
+class GlowTable:
+    """Glow over optical depth and angle.
+
+    Attributes
+    ----------
+    log_depth : (t,) float64
+        ln T of the rows, evenly spaced.
+    log_glow : (t, c) float64
+        ln(P c / T), over chords c = 2 sin(γ/2) that lie evenly over c / (c + FOLD_CHORD).
+    """
+
+    log_depth: NDArray[np.float64]
+    log_glow: NDArray[np.float64]
+
+
+@cache
+def glow_table(droplets: Droplets) -> GlowTable:
+    """Table of the glow in fog of given droplets; computing it takes a fraction of a second."""
+    folded = (np.arange(_CHORDS) / (_CHORDS - 1)) * (1.98 / (1.98 + FOLD_CHORD))
+    chord = np.maximum(FOLD_CHORD * folded / (1.0 - folded), 1e-4)
+    values = glow(_DEPTHS[:, None], 2.0 * np.arcsin(chord / 2.0), droplets)
+    return GlowTable(np.log(_DEPTHS), np.log(np.maximum(values, 1e-12) * chord / _DEPTHS[:, None]))

@@ -1,0 +1,290 @@
+"""Halos of lamps, drawn: wide ones on coarse images, cores and tiny lamps on the full one."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.atmosphere.fog.koschmieder_kernels import between, three_times
+from fogsim.atmosphere.lamps.halo_lamps import (
+    AHEAD,
+    BEHIND,
+    COLOUR,
+    DEPTH,
+    PIXELS,
+    PLACE_U,
+    PLACE_V,
+    RANGE,
+    SHOWN,
+    STRENGTH,
+    TOWARDS,
+)
+from fogsim.atmosphere.lamps.halo_profiles import CORE_SIZE, HIDDEN_SHARE, WIDE_FOLD, WIDE_SIZE, lamp_profile
+from fogsim.jit import kernel
+
+_LAST_WIDE = np.float32(WIDE_SIZE - 1.001)
+_FOLD = np.float32(WIDE_FOLD)
+_TWO, _ONE, _ZERO = np.float32(2.0), np.float32(1.0), np.float32(0.0)
+_LEAST = np.float32(1e-20)
+_NEXT = np.uint32(1)
+_FIRST, _SECOND, _THREE = np.uint64(1), np.uint64(2), np.uint64(3)
+_RED, _GREEN, _BLUE = np.float32(0.2126), np.float32(0.7152), np.float32(0.0722)  # luminance of channels (BT.709)
+
+
+@kernel
+def add_wide(
+    directions: NDArray[np.float32],
+    lamps: NDArray[np.float64],
+    table: NDArray[np.float32],
+    log_depth: NDArray[np.float64],
+    faintest: float,
+    out: NDArray[np.float32],
+) -> None:
+    """Sum wide glows on the coarsest image: (4, m), three channels, and their luminance times 1 / R [1/m].
+
+    `directions` (3, m) are unit vectors. Glows that are nowhere brighter than `faintest` are left out.
+    """
+    red, green, blue, near = out[0], out[1], out[2], out[3]
+    count = red.shape[0]
+    place, profile = np.empty(count, np.float32), np.empty(WIDE_SIZE, np.float32)
+    x, y, z = directions[0], directions[1], directions[2]
+    for lamp in lamps:
+        lamp_profile(table, lamp, HIDDEN_SHARE, log_depth, profile)
+        if profile[0] < faintest:
+            continue
+        lx, ly, lz = np.float32(lamp[TOWARDS]), np.float32(lamp[TOWARDS + 1]), np.float32(lamp[TOWARDS + 2])
+        for p in range(count):
+            square = max(_TWO - _TWO * (x[p] * lx + y[p] * ly + z[p] * lz), _ZERO)
+            place[p] = square / (square + _FOLD) * _LAST_WIDE
+        r, g, b = np.float32(lamp[COLOUR]), np.float32(lamp[COLOUR + 1]), np.float32(lamp[COLOUR + 2])
+        n = (_RED * r + _GREEN * g + _BLUE * b) / np.float32(lamp[RANGE])
+        for p in range(count):
+            entry = np.uint32(place[p])
+            place[p] = profile[entry] + (profile[entry + _NEXT] - profile[entry]) * (place[p] - np.float32(entry))
+        for p in range(count):
+            red[p] += place[p] * r
+            green[p] += place[p] * g
+            blue[p] += place[p] * b
+            near[p] += place[p] * n
+
+
+@kernel
+def refine(coarsest: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+    """The coarsest image (4, rows, cols) stretched to the coarse one, linearly between its corners."""
+    rows, columns = out.shape[1], out.shape[2]
+    for v in range(rows):
+        place = v * (coarsest.shape[1] - 1) / (rows - 1)
+        upper = min(int(place), coarsest.shape[1] - 2)
+        down = np.float32(place - upper)
+        for u in range(columns):
+            along = u * (coarsest.shape[2] - 1) / (columns - 1)
+            left = min(int(along), coarsest.shape[2] - 2)
+            aside = np.float32(along - left)
+            for c in range(4):
+                low = coarsest[c, upper, left] + (coarsest[c, upper, left + 1] - coarsest[c, upper, left]) * aside
+                high = coarsest[c, upper + 1, left]
+                high += (coarsest[c, upper + 1, left + 1] - coarsest[c, upper + 1, left]) * aside
+                out[c, v, u] = low + (high - low) * down
+
+
+@kernel
+def add_middles(
+    directions: NDArray[np.float32],
+    cell: NDArray[np.float64],
+    reach: float,
+    lamps: NDArray[np.float64],
+    table: NDArray[np.float32],
+    log_depth: NDArray[np.float64],
+    faintest: float,
+    out: NDArray[np.float32],
+) -> None:
+    """Add to the coarse image (4, rows, cols) what the coarsest lacks within `reach` of the lamps [rad].
+
+    `cell` holds the width and height of a cell [px] and `reach` on the axis, in cells.
+    """
+    rows, columns = out.shape[1], out.shape[2]
+    profile, scale = np.empty(CORE_SIZE, np.float32), np.float32((CORE_SIZE - 1.0) / reach)
+    last = np.float32(CORE_SIZE - 1.001)
+    for lamp in lamps:
+        lamp_profile(table, lamp, 0.0, log_depth, profile)
+        if lamp[AHEAD] <= BEHIND or profile[0] < faintest:
+            continue
+        lx, ly, lz = np.float32(lamp[TOWARDS]), np.float32(lamp[TOWARDS + 1]), np.float32(lamp[TOWARDS + 2])
+        r, g, b = np.float32(lamp[COLOUR]), np.float32(lamp[COLOUR + 1]), np.float32(lamp[COLOUR + 2])
+        n = (_RED * r + _GREEN * g + _BLUE * b) / np.float32(lamp[RANGE])
+        u0, v0, half = lamp[PLACE_U] / cell[0], lamp[PLACE_V] / cell[1], cell[2] / lamp[AHEAD] ** 2 + 1.0
+        for v in range(max(0, math.ceil(v0 - half)), min(rows, math.floor(v0 + half) + 1)):
+            for u in range(max(0, math.ceil(u0 - half)), min(columns, math.floor(u0 + half) + 1)):
+                p = v * columns + u
+                cosine = directions[0, p] * lx + directions[1, p] * ly + directions[2, p] * lz
+                place = np.sqrt(max(_TWO - _TWO * cosine, _ZERO)) * scale
+                if place < last:
+                    entry = np.uint32(place)
+                    light = profile[entry] + (profile[entry + _NEXT] - profile[entry]) * (place - np.float32(entry))
+                    out[0, v, u] += light * r
+                    out[1, v, u] += light * g
+                    out[2, v, u] += light * b
+                    out[3, v, u] += light * n
+
+
+@kernel
+def mean_nearness(coarse: NDArray[np.float32]) -> None:
+    """Make of luminance over range in the last channel of a coarse image (4, m) the mean 1 / R [1/m]."""
+    for p in range(coarse.shape[1]):
+        coarse[3, p] /= max(_RED * coarse[0, p] + _GREEN * coarse[1, p] + _BLUE * coarse[2, p], _LEAST)
+
+
+@kernel
+def _stretch(
+    coarse: NDArray[np.float32],
+    first: int,
+    coarse_columns: int,
+    light: NDArray[np.float32],
+    near: NDArray[np.float32],
+) -> None:
+    """One row of the coarse image, which begins at `first`, stretched to the width of the image."""
+    columns = near.shape[0]
+    for u in range(columns):
+        place = np.float32(u) * np.float32(coarse_columns - 1) / np.float32(max(columns - 1, 1))
+        cell = min(int(place), coarse_columns - 2)
+        a, aside = first + cell, place - np.float32(cell)
+        for c in range(3):
+            light[3 * u + c] = coarse[c, a] + (coarse[c, a + 1] - coarse[c, a]) * aside
+        near[u] = coarse[3, a] + (coarse[3, a + 1] - coarse[3, a]) * aside
+
+
+@kernel
+def _add_product(light: NDArray[np.float32], seen: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+    for j in range(out.shape[0]):
+        out[j] += light[j] * seen[j]
+
+
+@kernel
+def add_stretched(
+    coarse: NDArray[np.float32], coarse_columns: int, distance: NDArray[np.float32], out: NDArray[np.float32]
+) -> None:
+    """Add the coarse image (4, m) to an image (rows, cols · 3).
+
+    Light is scattered into a line of sight about evenly up to its lamp, so of the glow of a lamp at R what is seen
+    before a surface at d is the share min(1, d / R).
+    """
+    rows, columns = distance.shape
+    coarse_rows, ready = coarse.shape[1] // coarse_columns, -1
+    lights, nears = np.empty((2, 3 * columns), np.float32), np.empty((2, columns), np.float32)
+    light, near = np.empty(3 * columns, np.float32), np.empty(columns, np.float32)
+    seen = np.empty(3 * columns, np.float32)
+    for v in range(rows):
+        place = np.float32(v) * np.float32(coarse_rows - 1) / np.float32(max(rows - 1, 1))
+        upper = min(int(place), coarse_rows - 2)
+        while ready < upper + 1:
+            ready += 1
+            _stretch(coarse, ready * coarse_columns, coarse_columns, lights[ready % 2], nears[ready % 2])
+        share, top = place - np.float32(upper), upper % 2
+        between(lights[top], lights[1 - top], share, light)
+        between(nears[top], nears[1 - top], share, near)
+        for u in range(columns):
+            near[u] = min(_ONE, distance[v, u] * near[u])
+        three_times(near, seen)
+        _add_product(light, seen, out[v])
+
+
+@kernel
+def add_cores(
+    lamps: NDArray[np.float64],
+    bright: NDArray[np.bool_],
+    reach: float,
+    profiles: NDArray[np.float32],
+    distance: NDArray[np.float32],
+    out: NDArray[np.float32],
+) -> None:
+    """Add to an image (rows, cols · 3) the cores of glows within a reach of the lamps [px]."""
+    rows, columns = distance.shape
+    scale, last = np.float32((CORE_SIZE - 1.001) / reach), np.float32(CORE_SIZE - 1.001)
+    place = np.empty(columns, np.float32)
+    for i in range(lamps.shape[0]):
+        if not bright[i]:
+            continue
+        u0, v0, near, profile = lamps[i, PLACE_U], lamps[i, PLACE_V], np.float32(1.0 / lamps[i, RANGE]), profiles[i]
+        red, green = np.float32(lamps[i, COLOUR]), np.float32(lamps[i, COLOUR + 1])
+        blue = np.float32(lamps[i, COLOUR + 2])
+        for v in range(max(0, math.ceil(v0 - reach)), min(rows, math.floor(v0 + reach) + 1)):
+            half = math.sqrt(max(reach**2 - (v - v0) ** 2, 0.0))
+            first, after = max(0, math.ceil(u0 - half)), min(columns, math.floor(u0 + half) + 1)
+            if after <= first:
+                continue
+            begin, size = np.uint64(first), np.uint64(after - first)
+            height, start = np.float32((v - v0) ** 2), np.float32(first - u0)
+            for n in range(size):
+                across = start + np.float32(np.int32(n))
+                place[n] = min(np.sqrt(height + across * across) * scale, last)
+            for n in range(size):
+                entry = np.uint32(place[n])
+                place[n] = profile[entry] + (profile[entry + _NEXT] - profile[entry]) * (place[n] - np.float32(entry))
+            for n in range(size):
+                u = begin + n
+                light = place[n] * min(_ONE, distance[v, u] * near)
+                out[v, _THREE * u] += light * red
+                out[v, _THREE * u + _FIRST] += light * green
+                out[v, _THREE * u + _SECOND] += light * blue
+
+
+@kernel
+def _drawn_about(radiance: NDArray[np.float32], columns: int, u0: int, v0: int) -> float:
+    """Sum of the luminance of the sixteen pixels about a place."""
+    drawn = 0.0
+    for v in range(max(0, v0 - 1), min(radiance.shape[0], v0 + 3)):
+        for u in range(max(0, u0 - 1), min(columns, u0 + 3)):
+            drawn += _RED * radiance[v, 3 * u] + _GREEN * radiance[v, 3 * u + 1] + _BLUE * radiance[v, 3 * u + 2]
+    return drawn
+
+
+@kernel
+def add_points(
+    lamps: NDArray[np.float64],
+    focal: float,
+    largest: float,
+    faintest: float,
+    radiance: NDArray[np.float32],
+    out: NDArray[np.float32],
+) -> None:
+    """Add what a renderer lost of lamps that cover fewer pixels than `largest`.
+
+    What of the luminance that a lamp should show without fog `radiance` (rows, cols · 3) holds already about the lamp,
+    shared with its neighbours, is not added again. Of a lamp behind something the part that is hidden is left out. The
+    light goes to the four pixels about the place.
+    """
+    rows, columns = out.shape[0], out.shape[1] // 3
+    for i in range(lamps.shape[0]):
+        lamp = lamps[i]
+        inside = -1 < lamp[PLACE_U] < columns and -1 < lamp[PLACE_V] < rows and lamp[AHEAD] > BEHIND
+        if not inside or lamp[PIXELS] >= largest or lamp[SHOWN] == 0.0:
+            continue
+        # Sum over pixels of the luminance [cd/m²].
+        expected = lamp[STRENGTH] * focal**2 / lamp[AHEAD] ** 3
+        transmission = math.exp(-lamp[DEPTH]) * lamp[SHOWN]
+        if expected * transmission < faintest:
+            continue
+        u0, v0 = math.floor(lamp[PLACE_U]), math.floor(lamp[PLACE_V])
+        drawn, around = _drawn_about(radiance, columns, u0, v0), 0.0
+        for j in range(lamps.shape[0]):
+            if abs(lamps[j, PLACE_U] - lamp[PLACE_U]) < 2.5 and abs(lamps[j, PLACE_V] - lamp[PLACE_V]) < 2.5:
+                around += lamps[j, STRENGTH] * focal**2 / max(lamps[j, AHEAD], BEHIND) ** 3
+        missing = expected * max(0.0, 1.0 - drawn / around) * transmission
+        right, below = lamp[PLACE_U] - u0, lamp[PLACE_V] - v0
+        for corner in range(4):
+            u, v = u0 + corner % 2, v0 + corner // 2
+            if 0 <= u < columns and 0 <= v < rows:
+                part = missing * (right if corner % 2 else 1.0 - right) * (below if corner // 2 else 1.0 - below)
+                for c in range(3):
+                    out[v, 3 * u + c] += part * lamp[COLOUR + c]
+
+
+@kernel
+def mean_light(image: NDArray[np.float32], step: int) -> float:
+    """Mean of an image's green channel (rows, cols · 3), by each `step`-th row and column."""
+    total, count = 0.0, 0
+    for v in range(step // 2, image.shape[0], step):
+        for u in range(step // 2, image.shape[1] // 3, step):
+            total += image[v, 3 * u + 1]
+            count += 1
+    return total / max(count, 1)

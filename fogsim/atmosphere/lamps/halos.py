@@ -1,0 +1,220 @@
+"""Lamps of others as the camera sees them in fog: their glow, and their direct light where a renderer loses it."""
+
+import math
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.atmosphere.fog.extinction import is_even_up_to
+from fogsim.atmosphere.fog.optical_depth import optical_depth
+from fogsim.atmosphere.lamps.glow import FOLD_CHORD, glow_table
+from fogsim.atmosphere.lamps.halo_kernels import (
+    add_cores,
+    add_middles,
+    add_points,
+    add_stretched,
+    add_wide,
+    mean_light,
+    mean_nearness,
+    refine,
+)
+from fogsim.atmosphere.lamps.halo_lamps import COLUMNS, DEPTH, RANGE, fuse_lamps, judge_lamps, place_lamps
+from fogsim.atmosphere.lamps.halo_profiles import CORE_SIZE, WIDE_SIZE, core_profiles, profile_tables
+from fogsim.atmosphere.lamps.phase_function import Droplets
+from fogsim.values import Camera, CameraPose, FogField, LightSources, View
+from fogsim.values.pinhole import camera_axes
+
+COARSE_PIXELS = 8
+"""Pixels between two of the coarse image; it has 40 … 80 cells across, and the coarsest half as many."""
+
+FARTHEST = 16.0
+"""Optical depth at which a lamp has faded from sight; it begins to fade at three quarters of that [-]."""
+
+SMALL = 2.25
+"""Lamps that cover fewer pixels than this are completed [px²]."""
+
+FAINTEST = 1e-5
+"""What is fainter than this share of the image's mean is not drawn: a hundredth of what 8 bits and noise can show."""
+
+_SOFT_CELLS = 1.4
+_REACH_CELLS = 4.0
+_SAME_CORE = 1.0  # lamps nearer to each other are drawn as one [px]
+_SAME_GLOW = 0.5  # the same for glows without their cores, in cells
+_DEPTHS = 96
+
+
+@dataclass(frozen=True, slots=True)
+class _Plan:
+    """What the halos in a camera's images have in common.
+
+    Attributes
+    ----------
+    cell : (3,) float64
+        Width and height of a cell of the coarse image [px], and the reach of what the coarsest lacks, in cells.
+    shape, half_shape : tuple of int
+        Rows and columns of the coarse and the coarsest image.
+    directions, half_directions : (3, m) float32
+        Their directions in the camera's axes.
+    soft, reach : float
+        Radius within which glow is flat on the coarse image, and that of what the coarsest lacks [rad].
+    wide, middle : (depths, entries) float32
+        Profiles on the coarsest image, and of what is missing there.
+    """
+
+    cell: NDArray[np.float64]
+    shape: tuple[int, int]
+    half_shape: tuple[int, int]
+    directions: NDArray[np.float32]
+    half_directions: NDArray[np.float32]
+    soft: float
+    reach: float
+    wide: NDArray[np.float32]
+    middle: NDArray[np.float32]
+
+
+class Halos:
+    """Draws lamps of other vehicles and of streets in fog.
+
+    Parameters
+    ----------
+    droplets : Droplets
+        What the fog is made of: sets the shape of the glow.
+    """
+
+    def __init__(self, droplets: Droplets = Droplets.MODERATE_RADIATION) -> None:
+        self._droplets = Droplets(droplets)
+        self._plans: dict[Camera, _Plan] = {}
+
+    def prepare(self, camera: Camera) -> None:
+        """Compute beforehand what depends on camera and droplets alone."""
+        self._plan(camera)
+
+    def add(
+        self,
+        radiance: NDArray[np.float32],
+        view: View,
+        camera: Camera,
+        pose: CameraPose,
+        fog: FogField,
+        sources: LightSources,
+    ) -> None:
+        """Add glow and lost direct light of lamps to an image.
+
+        Parameters
+        ----------
+        radiance : (rows, cols, 3) float32
+            Radiance at the camera [cd/m²]; added to in place, C-contiguous.
+        view : View
+            What is seen; lamps that it shows are complete already.
+        camera, pose : Camera, CameraPose
+            The camera.
+        fog : FogField
+            The fog at one time.
+        sources : LightSources
+            The lamps.
+        """
+        distance = np.ascontiguousarray(view.distance, dtype=np.float32)
+        lamps = _seen(camera, pose, fog, sources, distance)
+        if not len(lamps):
+            return
+        rows, columns = distance.shape
+        image = radiance.reshape(rows, 3 * columns)
+        faintest = FAINTEST * mean_light(image, 16)
+        if np.any(lamps[:, DEPTH] > 0):
+            self._add_glow(image, distance, camera, lamps, faintest)
+        drawn = np.ascontiguousarray(view.radiance, dtype=np.float32).reshape(rows, 3 * columns)
+        add_points(lamps, camera.focal_length, SMALL, faintest, drawn, image)
+
+    def _add_glow(
+        self,
+        image: NDArray[np.float32],
+        distance: NDArray[np.float32],
+        camera: Camera,
+        lamps: NDArray[np.float64],
+        faintest: float,
+    ) -> None:
+        plan, (log_depth, lines) = self._plan(camera), _fine_table(self._droplets)
+        lamps, glows = _fused(lamps, _SAME_CORE), _fused(lamps, _SAME_GLOW * float(plan.cell[0]))
+        coarsest = np.zeros((4, *plan.half_shape), np.float32)
+        coarse = np.empty((4, *plan.shape), np.float32)
+        add_wide(plan.half_directions, glows, plan.wide, log_depth, faintest, coarsest.reshape(4, -1))
+        refine(coarsest, coarse)
+        add_middles(plan.directions, plan.cell, plan.reach, glows, plan.middle, log_depth, faintest, coarse)
+        flat = coarse.reshape(4, -1)
+        mean_nearness(flat)
+        add_stretched(flat, plan.shape[1], distance, image)
+        core, bright = np.empty((len(lamps), CORE_SIZE), np.float32), np.empty(len(lamps), np.bool_)
+        pixel, reach = 1.0 / camera.focal_length, _REACH_CELLS * float(plan.cell[0])
+        core_profiles(lamps, lines, log_depth, FOLD_CHORD, plan.soft, reach, pixel, faintest, core, bright)
+        add_cores(lamps, bright, reach, core, distance, image)
+
+    def _plan(self, camera: Camera) -> _Plan:
+        if camera not in self._plans:
+            self._plans = {camera: _plan(camera, self._droplets)}
+        return self._plans[camera]
+
+
+@cache
+def _fine_table(droplets: Droplets) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Logarithm of T in steps so fine that glow is linear between them, and glow times chord there."""
+    table = glow_table(droplets)
+    log_depth = np.linspace(table.log_depth[0], table.log_depth[-1], _DEPTHS)
+    columns = [np.interp(log_depth, table.log_depth, column) for column in table.log_glow.T]
+    return log_depth, np.ascontiguousarray(np.exp(np.stack(columns, axis=1) + log_depth[:, None]))
+
+
+def _fused(lamps: NDArray[np.float64], apart: float) -> NDArray[np.float64]:
+    fused = np.empty_like(lamps)
+    return fused[: fuse_lamps(lamps, apart, fused)]
+
+
+def _seen(
+    camera: Camera, pose: CameraPose, fog: FogField, sources: LightSources, distance: NDArray[np.float32]
+) -> NDArray[np.float64]:
+    """Table of the lamps that shine toward the camera from before it."""
+    eye, axes = np.array(pose.position, dtype=np.float64), camera_axes(camera, pose)
+    count = len(sources.intensity)
+    lamps, chosen = np.empty((count, COLUMNS)), np.empty(count, np.int64)
+    position, lens = np.ascontiguousarray(sources.position), np.array((camera.focal_length, *camera.principal_point))
+    chosen = chosen[: place_lamps(position, sources.intensity, eye, axes, lens, lamps, chosen)]
+    places = position[chosen]
+    if len(places) and is_even_up_to(fog, max(pose.position[2], float(places[:, 2].max()))):
+        depth = fog.extinction * lamps[: len(chosen), RANGE]
+    else:
+        depth = optical_depth(fog, eye, places)
+    light = (sources.intensity, sources.colour, sources.area)
+    return lamps[: judge_lamps(*light, chosen, depth, FARTHEST, camera.focal_length, distance, lamps)]
+
+
+def _plan(camera: Camera, droplets: Droplets) -> _Plan:
+    cells = min(max(round(camera.width / COARSE_PIXELS), 40), 80) // 2
+    rows = max(1, math.ceil(cells * camera.height / camera.width))
+    angle = camera.width / (2 * cells) / camera.focal_length
+    _, lines = _fine_table(droplets)
+    wide, middle = np.empty((_DEPTHS, WIDE_SIZE), np.float32), np.empty((_DEPTHS, CORE_SIZE), np.float32)
+    soft, reach = _SOFT_CELLS * angle, 2.0 * _REACH_CELLS * angle
+    profile_tables(lines, FOLD_CHORD, soft, 2.0 * soft, reach, wide, middle)
+    shape, half_shape = (2 * rows + 1, 2 * cells + 1), (rows + 1, cells + 1)
+    return _Plan(
+        cell=np.array(((camera.width - 1) / (2 * cells), (camera.height - 1) / (2 * rows), 2.0 * _REACH_CELLS)),
+        shape=shape,
+        half_shape=half_shape,
+        directions=_directions(camera, shape),
+        half_directions=_directions(camera, half_shape),
+        soft=soft,
+        reach=reach,
+        wide=wide,
+        middle=middle,
+    )
+
+
+def _directions(camera: Camera, shape: tuple[int, int]) -> NDArray[np.float32]:
+    """Unit vectors in the camera's axes (3, rows · cols), from corner to corner of the image."""
+    u0, v0 = camera.principal_point
+    right = (np.linspace(0, camera.width - 1, shape[1]) - u0) / camera.focal_length
+    down = (np.linspace(0, camera.height - 1, shape[0]) - v0) / camera.focal_length
+    plane = np.broadcast_arrays(right, down[:, None], np.ones((1, 1)))
+    rays = np.stack([part.reshape(-1) for part in plane])
+    return np.ascontiguousarray(rays / np.linalg.norm(rays, axis=0), dtype=np.float32)

@@ -1,0 +1,206 @@
+"""Light of the own head lamps: on what the camera sees, and in the fog between."""
+
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.atmosphere.fog.extinction import is_even_up_to, medium_of
+from fogsim.atmosphere.fog.frustum_kernels import grid_depths
+from fogsim.atmosphere.lamps.lamp_tables import lamp_table
+from fogsim.atmosphere.lamps.lamplight_kernels import add_own_light
+from fogsim.atmosphere.lamps.phase_function import Droplets
+from fogsim.atmosphere.lamps.plane_pieces import piece_length
+from fogsim.atmosphere.lamps.veil import (
+    FOLD_DISTANCE,
+    INTERVALS,
+    LitAir,
+    VeilRays,
+    lit_air,
+    node_distances,
+    veil_along,
+    veil_rays,
+)
+from fogsim.linear_algebra import matrix_product
+from fogsim.values import Beam, Camera, CameraPose, FogField, HeadLamp, View
+from fogsim.values.pinhole import camera_axes, ray_from_pixel
+
+_AT_REST = CameraPose((0.0, 0.0, 0.0), 0.0)
+_MIRROR = np.diag((1.0, -1.0, 1.0))
+"""Tables of beams count to the right, the vehicle's axes to the left."""
+
+_REMEMBERED = 16
+
+_HIGHEST = 50.0
+"""Height above the camera up to which own lamps light the fog [m]."""
+
+K = TypeVar("K")
+V = TypeVar("V")
+
+
+@dataclass(frozen=True, slots=True)
+class _Group:
+    """Lamps of one colour, ready for drawing."""
+
+    lamps: tuple[HeadLamp, ...]
+    places: NDArray[np.float32]
+    tables: NDArray[np.float32]
+    colour: NDArray[np.float32]
+    air: LitAir
+
+
+@dataclass(slots=True)
+class _Memory:
+    """What was computed and may be wanted again: it saves time and changes nothing."""
+
+    tables: list[tuple[Beam, NDArray[np.float32]]] = field(default_factory=list)
+    rays: dict[Camera, tuple[VeilRays, NDArray[np.float32]]] = field(default_factory=dict)
+    groups: dict[tuple[object, ...], _Group] = field(default_factory=dict)
+    veils: dict[tuple[int, float], tuple[_Group, NDArray[np.float32]]] = field(default_factory=dict)
+
+
+class OwnLamplight:
+    """Draws the light of the lamps of the camera's own vehicle.
+
+    Parameters
+    ----------
+    droplets : Droplets
+        What the fog is made of: sets the phase function.
+    """
+
+    def __init__(self, droplets: Droplets = Droplets.MODERATE_RADIATION) -> None:
+        self._droplets = Droplets(droplets)
+        self._memory = _Memory()
+
+    def prepare(self, camera: Camera, lamps: tuple[HeadLamp, ...]) -> None:
+        """Compute beforehand what depends on camera, lamps and droplets alone."""
+        self._groups(camera, lamps)
+
+    def add(
+        self,
+        radiance: NDArray[np.float32],
+        view: View,
+        camera: Camera,
+        pose: CameraPose,
+        fog: FogField,
+        lamps: tuple[HeadLamp, ...],
+    ) -> None:
+        """Add the lamps' light on surfaces, R E e^(−τ), and their veil to an image.
+
+        Parameters
+        ----------
+        radiance : (rows, cols, 3) float32
+            Radiance at the camera [cd/m²]; added to in place, C-contiguous.
+        view : View
+            What is seen, with its response to the lamps' light.
+        camera, pose : Camera, CameraPose
+            The camera.
+        fog : FogField
+            The fog at one time.
+        lamps : tuple of HeadLamp
+            Lit lamps.
+
+        Raises
+        ------
+        InputError
+            If a beam has holes.
+        """
+        rows, columns = view.distance.shape
+        response = np.zeros((0, columns, 3), np.float32) if view.lamp_response is None else view.lamp_response
+        rays, ray_map = self._rays(camera)
+        mean, local = _extinction_on(rays, camera, pose, fog)
+        for group in self._groups(camera, lamps):
+            add_own_light(
+                np.ascontiguousarray(view.distance, dtype=np.float32),
+                np.ascontiguousarray(response, dtype=np.float32).reshape(len(response), 3 * columns),
+                ray_map,
+                piece_length(camera.focal_length),
+                group.places,
+                group.tables,
+                group.colour,
+                rays.shape[1],
+                np.uint32(INTERVALS + 1),
+                np.float32(FOLD_DISTANCE),
+                self._veil(group, mean, local).reshape(-1, rays.shape[1] * (INTERVALS + 1)),
+                mean if mean.size == 1 else mean.reshape(rays.shape[0], -1),
+                radiance.reshape(rows, 3 * columns),
+            )
+
+    def _rays(self, camera: Camera) -> tuple[VeilRays, NDArray[np.float32]]:
+        """Rays of the veil, and the map from pixels to rays by (forward, right, up)."""
+        if camera not in self._memory.rays:
+            ray_map = matrix_product(_MIRROR, ray_from_pixel(camera, _AT_REST))
+            _keep(self._memory.rays, camera, (veil_rays(camera), ray_map.astype(np.float32)))
+        return self._memory.rays[camera]
+
+    def _table(self, beam: Beam) -> NDArray[np.float32]:
+        for known, table in self._memory.tables:
+            if known is beam:
+                return table
+        table = lamp_table(beam)
+        self._memory.tables = [*self._memory.tables[1 - _REMEMBERED :], (beam, table)]
+        return table
+
+    def _groups(self, camera: Camera, lamps: tuple[HeadLamp, ...]) -> list[_Group]:
+        colours = dict.fromkeys(lamp.colour for lamp in lamps)
+        return [self._group(camera, tuple(lamp for lamp in lamps if lamp.colour == colour)) for colour in colours]
+
+    def _group(self, camera: Camera, lamps: tuple[HeadLamp, ...]) -> _Group:
+        key = (camera, *((id(lamp.beam), lamp.offset, lamp.colour) for lamp in lamps))
+        known = self._memory.groups.get(key)
+        # An identity may have passed from a beam that is gone to another one.
+        if known is not None and all(a.beam is b.beam for a, b in zip(known.lamps, lamps, strict=True)):
+            return known
+        places = list(dict.fromkeys(lamp.offset for lamp in lamps))
+        # Lamps in one housing shine together.
+        tables = [
+            np.stack([self._table(lamp.beam) for lamp in lamps if lamp.offset == place]).sum(axis=0) for place in places
+        ]
+        group = _Group(
+            lamps=lamps,
+            places=matrix_product(np.array(places, dtype=np.float32), _MIRROR.astype(np.float32)),
+            tables=np.stack([table[0] for table in tables]),
+            colour=np.array(lamps[0].colour, dtype=np.float32),
+            air=lit_air(self._rays(camera)[0], list(zip(places, tables, strict=True)), self._droplets),
+        )
+        _keep(self._memory.groups, key, group)
+        return group
+
+    def _veil(self, group: _Group, mean: NDArray[np.float32], local: NDArray[np.float32]) -> NDArray[np.float32]:
+        if mean.size > 1:
+            return veil_along(group.air, local, mean)
+        if mean[0, 0] == 0:
+            return np.zeros((0, INTERVALS + 1), np.float32)
+        key = (id(group), float(mean[0, 0]))
+        if key not in self._memory.veils:
+            _keep(self._memory.veils, key, (group, veil_along(group.air, local, mean)))
+        return self._memory.veils[key][1]
+
+
+def _keep(memory: dict[K, V], key: K, value: V) -> None:
+    """Remember a value, and forget the oldest where there are many."""
+    while len(memory) >= _REMEMBERED:
+        del memory[next(iter(memory))]
+    memory[key] = value
+
+
+def _extinction_on(
+    rays: VeilRays, camera: Camera, pose: CameraPose, fog: FogField
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Mean extinction coefficient to each node, and that in the interval before it; one number where fog is even."""
+    if is_even_up_to(fog, pose.position[2] + _HIGHEST):
+        everywhere = np.full((1, 1), fog.extinction, np.float32)
+        return everywhere, everywhere
+    distances = node_distances()
+    to_world = matrix_product(camera_axes(camera, pose).T, camera_axes(camera, _AT_REST))
+    shape = (len(rays.directions), len(distances))
+    extinction, depth = np.empty(shape, np.float32), np.empty(shape, np.float32)
+    directions = np.ascontiguousarray(matrix_product(rays.directions.astype(np.float64), to_world.T))
+    grid_depths(np.array(pose.position), directions, distances, medium_of(fog), extinction, depth)
+    lengths = distances.astype(np.float32)
+    local = np.diff(depth, axis=1) / np.diff(lengths)
+    mean = np.empty_like(depth)
+    mean[:, 0] = extinction[:, 0]
+    mean[:, 1:] = depth[:, 1:] / lengths[1:]
+    return mean, local

@@ -1,0 +1,135 @@
+"""Street lamps light the road, and what stands near them."""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.atmosphere.fog.extinction import is_even_up_to
+from fogsim.atmosphere.fog.optical_depth import extinction
+from fogsim.atmosphere.lamps.plane_pieces import piece_length
+from fogsim.atmosphere.lamps.streetlight_kernels import add_lamps, light_streets
+from fogsim.atmosphere.lamps.veil import LOSS_OF_SPREAD_LIGHT
+from fogsim.values import Camera, CameraPose, FogField, StreetLighting, View
+from fogsim.values.pinhole import ray_from_pixel
+
+CELL = 2.0
+"""Side of the map's cells [m]."""
+
+REACH = 48.0
+"""Distance along the ground beyond which a lamp lights nothing [m]; there it gives less than 0.02 lx."""
+
+_CELLS = 320
+_STAY = 64.0  # the map moves on when the camera has left its middle by so much [m]
+_CHANGED = 0.002  # change of extinction beyond which the map is made anew [1/m]
+_WHITEST = 0.95  # reflectance above which a surface must be a lamp
+_COSINES = np.linspace(0.0, 1.0, 129)
+
+
+@dataclass(frozen=True, slots=True)
+class _Map:
+    """Light on the ground about a place.
+
+    Attributes
+    ----------
+    lamps : StreetLighting
+        What lights it.
+    middle : (2,) float64
+        Where its middle is [m].
+    extinction : (n,) float64
+        That at each lamp [1/m].
+    illuminance, tops : (cells, cells) float32
+        Horizontal illuminance [lx] and height of the nearest lamp [m], rows to the north, columns to the east.
+    """
+
+    lamps: StreetLighting
+    middle: NDArray[np.float64]
+    extinction: NDArray[np.float64]
+    illuminance: NDArray[np.float32]
+    tops: NDArray[np.float32]
+
+
+class StreetLight:
+    """Adds the light of street lamps to drawn scenes.
+
+    Fog takes light from a lamp's way to the ground and gives back most of it near by: so of the extinction only the
+    part counts that the veil's spread light suffers. For lamps at 8 m that is 0.4 % at V_met = 1 km, 7 % at 100 m below
+    the lamp, where without what is scattered it would be 21 %.
+    """
+
+    def __init__(self) -> None:
+        self._map: _Map | None = None
+        self._lit = np.empty((0, 0, 3), np.float32)
+
+    def on(self, view: View, camera: Camera, pose: CameraPose, fog: FogField, lamps: StreetLighting) -> View:
+        """A drawn scene with the lamps' light.
+
+        Parameters
+        ----------
+        view : View
+            The scene as drawn in the sky's light; it is not changed.
+        camera, pose : Camera, CameraPose
+            The camera.
+        fog : FogField
+            The fog at one time.
+        lamps : StreetLighting
+            The lamps and the sky's light.
+
+        Returns
+        -------
+        View
+            Its radiance is valid until the next call.
+        """
+        if not len(lamps.position) or lamps.sky_illuminance <= 0:
+            return view
+        ground = self._about(pose, fog, lamps)
+        if self._lit.shape != view.radiance.shape:
+            self._lit = np.empty(view.radiance.shape, np.float32)
+        rows, columns = view.distance.shape
+        eye = np.array(pose.position[:2])
+        start = (*((eye - ground.middle) / CELL + 0.5 * (_CELLS - 1)), 1.0 / CELL)
+        light_streets(
+            np.ascontiguousarray(view.radiance, dtype=np.float32).reshape(rows, 3 * columns),
+            np.ascontiguousarray(view.distance, dtype=np.float32),
+            ray_from_pixel(camera, pose).astype(np.float32),
+            piece_length(camera.focal_length),
+            np.array(start, dtype=np.float32),
+            np.float32(pose.position[2]),
+            ground.illuminance,
+            ground.tops,
+            np.array(lamps.colour, dtype=np.float32) / np.float32(lamps.sky_illuminance),
+            np.float32(_WHITEST * lamps.sky_illuminance / math.pi),
+            self._lit.reshape(rows, 3 * columns),
+        )
+        return dataclasses.replace(view, radiance=self._lit)
+
+    def _about(self, pose: CameraPose, fog: FogField, lamps: StreetLighting) -> _Map:
+        """The map about the camera, made anew only if the camera, the lamps or the fog have moved."""
+        eye, known = np.array(pose.position[:2]), self._map
+        if known is not None and known.lamps is lamps and np.abs(eye - known.middle).max() < _STAY:
+            middle = known.middle
+        else:
+            middle, known = eye, None
+        near = lamps.position[np.abs(lamps.position[:, :2] - middle).max(axis=1) < 0.5 * _CELLS * CELL + REACH]
+        dense = _extinction_at(fog, near - (0.0, 0.0, 0.5 * lamps.height))
+        if known is None or np.any(np.abs(dense - known.extinction) > _CHANGED):
+            known = self._map = _map_of(lamps, middle, near, dense)
+        return known
+
+
+def _extinction_at(fog: FogField, places: NDArray[np.float64]) -> NDArray[np.float64]:
+    if len(places) and is_even_up_to(fog, float(places[:, 2].max())):
+        return np.full(len(places), fog.extinction)
+    return extinction(fog, places)
+
+
+def _map_of(
+    lamps: StreetLighting, middle: NDArray[np.float64], near: NDArray[np.float64], dense: NDArray[np.float64]
+) -> _Map:
+    illuminance, tops = np.zeros((_CELLS, _CELLS), np.float32), np.zeros((_CELLS, _CELLS), np.float32)
+    intensity = np.interp(np.arccos(_COSINES), lamps.angle, lamps.intensity)
+    origin, lost = middle - 0.5 * (_CELLS - 1) * CELL, LOSS_OF_SPREAD_LIGHT * dense
+    add_lamps(near, lost, lamps.height, intensity, REACH, origin, CELL, illuminance, tops)
+    return _Map(lamps, middle, dense, illuminance, tops)

@@ -1,0 +1,153 @@
+"""Light of street lamps on the ground, as a map, and from the map on what pixels see."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.atmosphere.fog.koschmieder_kernels import bilinear, each_channel, three_times
+from fogsim.atmosphere.lamps.plane_pieces import choose_pixels, row_points, spread
+from fogsim.jit import kernel
+
+_ZERO, _ONE = np.float32(0.0), np.float32(1.0)
+_FARTHEST = np.float32(500.0)  # half the diagonal of a map, and more
+
+
+@kernel
+def add_lamps(
+    lamps: NDArray[np.float64],
+    extinction: NDArray[np.float64],
+    height: float,
+    intensity: NDArray[np.float64],
+    farthest: float,
+    origin: NDArray[np.float64],
+    cell: float,
+    illuminance: NDArray[np.float32],
+    tops: NDArray[np.float32],
+) -> None:
+    """Add lamps (n, 3) to a map of horizontal illuminance [lx], and set how high the nearest lamp hangs [m].
+
+    `extinction` holds what each lamp's light loses a metre [1/m], `intensity` values over the cosine of the angle from
+    straight down in even steps from 0 to 1 [cd]. `origin` is where the middle of the map's first corner is.
+    """
+    rows, columns = illuminance.shape
+    last = intensity.shape[0] - 1.001
+    nearest = np.full((rows, columns), np.float32(np.inf))
+    for i in range(lamps.shape[0]):
+        x0, y0 = (lamps[i, 0] - origin[0]) / cell, (lamps[i, 1] - origin[1]) / cell
+        reach = farthest / cell
+        for row in range(max(0, math.ceil(y0 - reach)), min(rows, math.floor(y0 + reach) + 1)):
+            for column in range(max(0, math.ceil(x0 - reach)), min(columns, math.floor(x0 + reach) + 1)):
+                square = cell**2 * ((column - x0) ** 2 + (row - y0) ** 2)
+                if square >= farthest**2:
+                    continue
+                way = math.sqrt(square + height**2)
+                cosine = height / way
+                place = min(cosine * (intensity.shape[0] - 1), last)
+                n = int(place)
+                candela = intensity[n] + (intensity[n + 1] - intensity[n]) * (place - n)
+                edge = 1.0 - square / farthest**2
+                light = candela * cosine / way**2 * math.exp(-extinction[i] * way) * min(1.0, 4.0 * edge)
+                illuminance[row, column] += np.float32(light)
+                if square < nearest[row, column]:
+                    nearest[row, column], tops[row, column] = np.float32(square), np.float32(lamps[i, 2])
+
+
+@kernel
+def _any_near(distance: NDArray[np.float32]) -> bool:
+    """Whether a row sees anything that a lamp of the map may light."""
+    near = False
+    for u in range(distance.shape[0]):
+        near |= distance[u] < _FARTHEST
+    return near
+
+
+@kernel
+def _read_map(
+    count: np.uint64,
+    points: NDArray[np.float32],
+    start: NDArray[np.float32],
+    eye_height: np.float32,
+    illuminance: NDArray[np.float32],
+    tops: NDArray[np.float32],
+    light: NDArray[np.float32],
+) -> bool:
+    """Illuminance of what chosen pixels see, none above the lamps; whether there is any.
+
+    `points` (3, n) are from the eye, `start` and `eye_height` as for `light_streets`.
+    """
+    last_row, last_column = np.float32(illuminance.shape[0] - 1.001), np.float32(illuminance.shape[1] - 1.001)
+    east, north, up, per_cell = points[0], points[1], points[2], start[2]
+    any_light = False
+    for n in range(count):
+        x, y = start[0] + east[n] * per_cell, start[1] + north[n] * per_cell
+        light[n] = _ZERO
+        if not (_ZERO <= x < last_column and _ZERO <= y < last_row):
+            continue
+        value = bilinear(illuminance, y, x)
+        if value > _ZERO:
+            top = tops[np.uint32(y), np.uint32(x)]
+            light[n] = value * min(max(top - (eye_height + up[n]), _ZERO), _ONE)
+            any_light = True
+    return any_light
+
+
+@kernel
+def _light_row(
+    radiance: NDArray[np.float32],
+    light: NDArray[np.float32],
+    factor: NDArray[np.float32],
+    most: np.float32,
+    out: NDArray[np.float32],
+) -> None:
+    for j in range(out.shape[0]):
+        out[j] = radiance[j] + min(radiance[j], most) * light[j] * factor[j]
+
+
+@kernel
+def light_streets(
+    radiance: NDArray[np.float32],
+    distance: NDArray[np.float32],
+    ray_map: NDArray[np.float32],
+    step: int,
+    start: NDArray[np.float32],
+    eye_height: np.float32,
+    illuminance: NDArray[np.float32],
+    tops: NDArray[np.float32],
+    factor: NDArray[np.float32],
+    most: np.float32,
+    out: NDArray[np.float32],
+) -> None:
+    """Radiance of an image (rows, cols · 3) by the sky's light and that of street lamps.
+
+    Surfaces return the lamps' light as they do the sky's: `factor` (3) is the lamps' colour per illuminance of the sky
+    [1/lx]. What is brighter than `most` shines by itself and returns no more than that [cd/m²]. `ray_map` takes
+    (u, v, 1) to a ray in the world; on plane surfaces light is read at each `step`-th pixel. `start` is the eye's place
+    on the map and the cells per metre.
+    """
+    columns = distance.shape[1]
+    points, light, few = (
+        np.empty((3, columns), np.float32),
+        np.empty(columns, np.float32),
+        np.empty(columns, np.float32),
+    )
+    length, inverse = np.empty(columns, np.float32), np.empty(columns, np.float32)
+    pixel, chosen = np.empty(columns, np.float32), np.empty(columns, np.float32)
+    bent, first, even = np.empty(columns, np.uint8), np.empty(columns, np.uint64), np.empty(columns, np.bool_)
+    lit, channels = np.empty(3 * columns, np.float32), np.empty(3 * columns, np.float32)
+    each_channel(factor, channels)
+    for v in range(distance.shape[0]):
+        any_light = False
+        if _any_near(distance[v]):
+            for u in range(columns):
+                length[u] = min(distance[v, u], _FARTHEST)
+            n = choose_pixels(length, step, inverse, bent, pixel, chosen, first, even)
+            row_points(n, ray_map, v, pixel, chosen, points)
+            any_light = _read_map(n, points, start, eye_height, illuminance, tops, few)
+        if any_light:
+            spread(few, step, first, even, light)
+            three_times(light, lit)
+            _light_row(radiance[v], lit, channels, most, out[v])
+        else:
+            for j in range(3 * columns):
+                out[v, j] = radiance[v, j]

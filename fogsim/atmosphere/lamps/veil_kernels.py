@@ -1,0 +1,120 @@
+"""Fog lit by own lamps, along rays: how much light meets each place, and how much of it comes back to the eye."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.atmosphere.fog.koschmieder_kernels import transmissions
+from fogsim.atmosphere.lamps.lamp_tables import BLURS, FIRST_BLUR, FOLD, PHASE_SIZE, SIZE
+from fogsim.jit import kernel
+
+_LAST_CELL = SIZE - 1.001
+_LAST_BLUR = BLURS - 1.001
+_HALF = 0.5 * (SIZE - 1)
+
+
+@kernel
+def _intensity(table: NDArray[np.float32], forward: float, right: float, up: float, blur: float) -> float:
+    """Intensity toward a place ahead of a lamp, blurred by an angle [cd]."""
+    column = min((right / (FOLD * forward + abs(right)) + 1.0) * _HALF, _LAST_CELL)
+    row = min((up / (FOLD * forward + abs(up)) + 1.0) * _HALF, _LAST_CELL)
+    level = blur / FIRST_BLUR
+    if level > 1.0:
+        level = min(1.0 + math.log2(level), _LAST_BLUR)
+    i, j, n = int(row), int(column), int(level)
+    down, aside, between = row - i, column - j, level - n
+    total = 0.0
+    for m in range(2):
+        low = table[n + m, i, j] + (table[n + m, i, j + 1] - table[n + m, i, j]) * aside
+        high = table[n + m, i + 1, j] + (table[n + m, i + 1, j + 1] - table[n + m, i + 1, j]) * aside
+        total += (between if m else 1.0 - between) * (low + (high - low) * down)
+    return total
+
+
+@kernel
+def light_air(
+    directions: NDArray[np.float32],
+    at: NDArray[np.float64],
+    length: NDArray[np.float64],
+    offset: NDArray[np.float64],
+    table: NDArray[np.float32],
+    phase: NDArray[np.float32],
+    spread_phase: NDArray[np.float32],
+    lamp_size: float,
+    hidden: float,
+    spread: float,
+    straight: NDArray[np.float32],
+    turned: NDArray[np.float32],
+    path: NDArray[np.float32],
+) -> None:
+    """Add a lamp's light on pieces of rays that is scattered to the eye: Σ p(Θ) I / s² Δr [cd/m² per extinction].
+
+    `directions` (m, 3) and `offset` are in the vehicle's axes (forward, left, up); pieces are at `at` (n) and `length`
+    (n) long. `straight` and `turned` (m, n) take the light of the beam as it is and as it is spread by scattering at
+    small angles; `path` takes its way from the lamp to the piece, weighted by it.
+    """
+    for m in range(directions.shape[0]):
+        ux, uy, uz = directions[m, 0], directions[m, 1], directions[m, 2]
+        for n in range(at.shape[0]):
+            forward = at[n] * ux - offset[0]
+            if forward <= 0.0:
+                continue
+            left, up = at[n] * uy - offset[1], at[n] * uz - offset[2]
+            square = forward * forward + left * left + up * up
+            s = math.sqrt(square)
+            cosine = -(forward * ux + left * uy + up * uz) / s
+            place = min(math.sqrt(max(0.5 + 0.5 * cosine, 0.0)) * (PHASE_SIZE - 1), PHASE_SIZE - 1.001)
+            i = int(place)
+            share = place - i
+            # Seen from near, a lamp is a disc: its beam is blurred by the disc's angle.
+            near = lamp_size / s
+            falling = length[n] / (square + hidden * hidden)
+            once = (phase[i] + (phase[i + 1] - phase[i]) * share) * _intensity(table, forward, -left, up, near)
+            wide = math.sqrt(near * near + spread * spread)
+            again = (spread_phase[i] + (spread_phase[i + 1] - spread_phase[i]) * share) * _intensity(
+                table, forward, -left, up, wide
+            )
+            straight[m, n] += once * falling
+            turned[m, n] += again * falling
+            path[m, n] += (once + again) * falling * s
+
+
+@kernel
+def gather_light(
+    straight: NDArray[np.float32],
+    turned: NDArray[np.float32],
+    path: NDArray[np.float32],
+    extinction: NDArray[np.float32],
+    mean: NDArray[np.float32],
+    loss: np.float32,
+    veil: NDArray[np.float32],
+) -> None:
+    """Light that comes back to the eye from the ray up to each node, cumulated (m, nodes) [cd/m²].
+
+    `path` (m, n) is the way of light from lamp to eye; `extinction` and `mean` (m or 1, intervals or 1) are the
+    extinction coefficient in each interval between nodes, and its mean from the eye to there [1/m]. `loss` is the part
+    of the extinction that spread light suffers; straight light suffers twice that.
+    """
+    pieces, intervals = path.shape[1], veil.shape[1] - 1
+    each = pieces // intervals
+    depth, kept = np.empty(pieces, np.float32), np.empty(pieces, np.float32)
+    power = np.empty(pieces, np.int32)
+    uniform_rays, uniform_way = extinction.shape[0] == 1, extinction.shape[1] == 1
+    for m in range(path.shape[0]):
+        ray = 0 if uniform_rays else m
+        for i in range(intervals):
+            k = mean[ray, 0 if uniform_way else i]
+            for n in range(i * each, (i + 1) * each):
+                depth[n] = loss * k * path[m, n]
+        transmissions(depth, power, kept)
+        total = np.float32(0.0)
+        veil[m, 0] = total
+        for i in range(intervals):
+            k = extinction[ray, 0 if uniform_way else i]
+            light = np.float32(0.0)
+            for n in range(i * each, (i + 1) * each):
+                straight_kept = kept[n] * kept[n]
+                light += straight[m, n] * straight_kept + turned[m, n] * (kept[n] - straight_kept)
+            total += k * light
+            veil[m, i + 1] = total

@@ -1,0 +1,1 @@
+"""How far one sees: contrast thresholds of the eye, signals at night, glare."""

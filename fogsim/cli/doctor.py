@@ -1,0 +1,93 @@
+"""What works on this machine, what does not, and how to get it."""
+
+import platform
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+
+from fogsim.errors import FogSimError
+
+PACKAGES = (
+    "fogsim",
+    "libsumo",
+    "pyrender",
+    "PyOpenGL",
+    "numpy",
+    "numba",
+    "opencv-python-headless",
+    "gymnasium",
+    "highway-env",
+    "pyarrow",
+    "imageio-ffmpeg",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """The result of one check.
+
+    Attributes
+    ----------
+    subject : str
+        What was checked.
+    works : bool
+        True if FogSim can use it.
+    detail : str
+        Version, or what is wrong and how to mend it.
+    """
+
+    subject: str
+    works: bool
+    detail: str
+
+
+def examine() -> list[Finding]:
+    """Check Python, packages, SUMO, the renderers and the video encoder."""
+    findings = [Finding("Python", True, f"{platform.python_version()} on {platform.platform()}")]
+    findings += [_package(name) for name in PACKAGES]
+    findings += [_try("SUMO", _sumo), _try("renderer pyrender", _gl), _try("renderer cpu", _cpu)]
+    findings += [_try("renderer auto", _auto), _try("video encoder", _ffmpeg)]
+    return findings
+
+
+def _package(name: str) -> Finding:
+    try:
+        return Finding(name, True, version(name))
+    except PackageNotFoundError:
+        return Finding(name, False, f"not installed: pip install {name}")
+
+
+def _try(subject: str, check: Callable[[], str]) -> Finding:
+    try:
+        return Finding(subject, True, check())
+    except FogSimError as error:
+        return Finding(subject, False, str(error))
+
+
+def _sumo() -> str:
+    from fogsim.traffic.sumo.library import load_libsumo  # noqa: PLC0415 - only when asked
+
+    return f"{load_libsumo().getVersion()[1]} in process"
+
+
+def _gl() -> str:
+    from fogsim.render import gl_report  # noqa: PLC0415 - only when asked
+
+    return gl_report()
+
+
+def _cpu() -> str:
+    return f"numba {version('numba')}; needs no OpenGL"
+
+
+def _auto() -> str:
+    from fogsim.render import best_renderer  # noqa: PLC0415 - only when asked
+
+    name, reason = best_renderer()
+    return f"draws with {name}: {reason}"
+
+
+def _ffmpeg() -> str:
+    from fogsim.recorders import encoder_report  # noqa: PLC0415 - only when asked
+
+    return encoder_report()

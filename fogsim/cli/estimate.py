@@ -1,0 +1,165 @@
+"""``fogsim estimate``: arguments, progress and exit codes, nothing else."""
+
+import contextlib
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+
+from fogsim.cli.printing import escape, printable
+from fogsim.cli.progress import progress_bar
+from fogsim.errors import InputError
+
+if TYPE_CHECKING:
+    from fogsim.offline import FrameEstimates, OverlayFile, Source
+    from fogsim.offline.camera_file import Calibration
+
+_err = Console(stderr=True, highlight=False)
+
+BAD_INPUT = 2
+
+
+def estimate_command(
+    images: Annotated[
+        list[str],
+        typer.Argument(metavar="IMAGES|VIDEO", help="Image files, folders, patterns like 'a/*.png', or a video."),
+    ],
+    camera: Annotated[Path, typer.Option(help="camera.yaml: the calibration; --guess-camera writes it.")],
+    method: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME|all", help="A method (fogsim list); may be repeated. Default: all."),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object a line and method on stdout.")] = False,
+    overlay: Annotated[
+        Path | None, typer.Option(help="Draw what was found over the images: .mp4, or .png for one image.")
+    ] = None,
+    sequence: Annotated[
+        bool | None,
+        typer.Option(
+            "--sequence/--stills", help="Images follow one another, or each stands alone. Default: by their names."
+        ),
+    ] = None,
+    rate: Annotated[float | None, typer.Option(help="Images of a sequence in a second. Default: 10.")] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace an overlay or a guessed camera file.")
+    ] = False,
+    guess_camera: Annotated[
+        bool, typer.Option("--guess-camera", help="Write the camera file from the images, and stop.")
+    ] = False,
+    mount_height: Annotated[float | None, typer.Option(help="For a guess: metres from the road to the lens.")] = None,
+    field_of_view: Annotated[
+        float | None, typer.Option(help="For a guess: degrees from the image's left edge to its right.")
+    ] = None,
+    horizon_row: Annotated[
+        float | None, typer.Option(help="For a guess: row of the horizon, in place of the lines of the road.")
+    ] = None,
+) -> None:
+    """Estimate the visibility in your own images or video (docs/estimate.md)."""
+    from fogsim.offline import find_source  # noqa: PLC0415 - heavy; --help must be quick
+
+    if guess_camera:
+        source = find_source(images, sequence=sequence, rate=rate)
+        _guess(source, camera, overwrite, mount_height, field_of_view, horizon_row)
+        return
+    for option, value in (
+        ("--mount-height", mount_height),
+        ("--field-of-view", field_of_view),
+        ("--horizon-row", horizon_row),
+    ):
+        if value is not None:
+            raise InputError(f"{option} goes with --guess-camera; else the camera file has it")
+    _estimate(images, camera, method or ["all"], as_json, overlay, sequence, rate, overwrite)
+
+
+def _estimate(
+    images: list[str],
+    camera_file: Path,
+    names: list[str],
+    as_json: bool,
+    overlay: Path | None,
+    sequence: bool | None,
+    rate: float | None,
+    overwrite: bool,
+) -> None:
+    from fogsim.offline import (  # noqa: PLC0415 - heavy; --help must be quick
+        OverlayFile,
+        chosen_methods,
+        estimates_of,
+        find_source,
+        straightened,
+        table_heading,
+    )
+    from fogsim.offline.camera_file import load_calibration  # noqa: PLC0415 - heavy; --help must be quick
+
+    methods, unusable = chosen_methods(names), list[str]()
+    calibration = load_calibration(camera_file)
+    tell_remarks(calibration)
+    source, camera = straightened(find_source(images, sequence=sequence, rate=rate), calibration)
+    with contextlib.ExitStack() as stack:
+        drawn = overlay and stack.enter_context(OverlayFile(overlay, source, camera, methods, overwrite=overwrite))
+        progress = stack.enter_context(progress_bar(_err))
+        task = progress.add_task(source.description, total=source.count)
+        if not as_json:
+            _say(table_heading(source, methods))
+        for result in estimates_of(source, camera, methods):
+            _show(result, source, methods, as_json, drawn or None)
+            unusable += [result.picture.error] if result.picture.error else []
+            progress.advance(task)
+    if overlay is not None:
+        _err.print(f"overlay: {escape(str(overlay))}", soft_wrap=True)
+    if unusable:
+        _err.print(f"[bold red]error:[/] {len(unusable)} of the images could not be used:", soft_wrap=True)
+        for told in unusable:
+            _err.print(f"  {escape(told, in_one_line=True)}", soft_wrap=True)
+        raise typer.Exit(BAD_INPUT)
+
+
+def tell_remarks(calibration: "Calibration") -> None:
+    """Say on stderr what a camera file leaves open."""
+    for remark in calibration.remarks:
+        _err.print(f"[yellow]assumed:[/] {escape(remark, in_one_line=True)}", soft_wrap=True)
+
+
+def _show(
+    result: "FrameEstimates", source: "Source", methods: tuple[str, ...], as_json: bool, drawn: "OverlayFile | None"
+) -> None:
+    from fogsim.offline import record_lines, table_rows  # noqa: PLC0415 - heavy; --help must be quick
+
+    if result.picture.error:
+        _err.print(f"[yellow]passed over:[/] {escape(result.picture.error, in_one_line=True)}", soft_wrap=True)
+    for line in record_lines(result) if as_json else table_rows(source, methods, result):
+        _say(printable(line, in_one_line=True))
+    if drawn is not None:
+        drawn.add(result)
+
+
+def _say(line: str) -> None:
+    # Through sys.stdout as it is now: on a terminal rich has put itself there, to move its bar out of the way.
+    sys.stdout.write(line + "\n")
+    sys.stdout.flush()
+
+
+def _guess(
+    source: "Source",
+    camera_file: Path,
+    overwrite: bool,
+    mount_height: float | None,
+    field_of_view: float | None,
+    horizon_row: float | None,
+) -> None:
+    from fogsim.offline import camera_text, guess_camera, refuse_existing, write_camera  # noqa: PLC0415 - heavy; --help must be quick
+
+    refuse_existing(camera_file, overwrite=overwrite)
+    guess = guess_camera(
+        source,
+        mount_height=mount_height,
+        field_of_view=None if field_of_view is None else math.radians(field_of_view),
+        horizon_row=horizon_row,
+    )
+    write_camera(camera_file, guess, overwrite=overwrite)
+    typer.echo(f"{printable(str(camera_file))}:\n\n{camera_text(guess)}", nl=False)
+    for warning in guess.warnings:
+        _err.print(f"[yellow]uncertain:[/] {escape(warning)}", soft_wrap=True)

@@ -1,0 +1,186 @@
+"""What rides in the ego: from a snapshot of the traffic to a finished step."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from fogsim.atmosphere import extinction, field_at, optical_depth_along
+from fogsim.camera import mounted_pose
+from fogsim.ego.view_rendering import Outlook
+from fogsim.errors import SimulationError
+from fogsim.randomness import Streams
+from fogsim.scenario import Scenario, build
+from fogsim.sensors import measure_lead, signs_ahead
+from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
+from fogsim.values import (
+    Camera,
+    CameraPose,
+    Command,
+    Ending,
+    FogField,
+    Frame,
+    Observation,
+    RoadNetwork,
+    SignMap,
+    Step,
+    TrafficSnapshot,
+    TrafficState,
+    Truth,
+)
+from fogsim.values.result_checks import checked_belief, checked_estimate
+
+_SIGHT_LINE = np.geomspace(1.0, 20_000.0, 400)
+"""Distances ahead at which the optical depth is looked up to find how far one sees [m]."""
+
+
+class OnBoard:
+    """The ego's camera, sensors, estimators and belief, in the fog of a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario; of its traffic, nothing is used.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._scenario = scenario
+        self._camera = build.camera(scenario)
+        self._photographer = build.photographer(scenario)
+        self._body = build.body_pitch(scenario)
+        self._lead_sensor = build.lead_sensor(scenario)
+        self._told_camera = build.told_camera(scenario)
+        self._estimators = build.estimators(scenario, self._told_camera)
+        self._fusion = build.fusion(scenario)
+        self._outlook: Outlook | None = None
+        self._streams: Streams | None = None
+
+    def begin(self, streams: Streams, network: Callable[[], tuple[RoadNetwork, SignMap]]) -> Outlook:
+        """Forget earlier runs.
+
+        Parameters
+        ----------
+        streams : Streams
+            Random numbers of this run.
+        network : callable
+            Gives roads and signs; asked the first time only.
+
+        Raises
+        ------
+        MissingDependencyError
+            If no renderer works here.
+        """
+        if self._outlook is None:
+            self._outlook = Outlook(self._scenario, *network())
+        for estimator in self._estimators:
+            estimator.reset()
+        self._fusion.reset()
+        self._photographer.reset()
+        self._body.reset()
+        self._streams = streams
+        return self._outlook
+
+    def finish(
+        self, index: int, time: float, snapshot: TrafficSnapshot, command: Command, ending: Ending | None
+    ) -> Step:
+        """See, measure, estimate and believe: everything between the traffic and the next decision.
+
+        Parameters
+        ----------
+        index : int
+            Number of the camera period.
+        time : float
+            Simulated time since the run began [s].
+        snapshot : TrafficSnapshot
+            The traffic now.
+        command : Command
+            What was in force until now.
+        ending : Ending or None
+            Why the run is over.
+
+        Raises
+        ------
+        SimulationError
+            If `begin` has not been called, or it is closed.
+        """
+        if self._outlook is None or self._streams is None:
+            raise SimulationError("the run has not been started, or is closed")
+        outlook, state, ego = self._outlook, snapshot.state, snapshot.ego
+        pose = self._pose(state, ego)
+        view, radiance = outlook.see(state, ego, pose, time)
+        image = self._photographer.take(radiance, self._streams.camera)
+        frame = Frame(time, image, self._told_camera)
+        observation = self._observe(frame, snapshot, outlook.signs, self._streams)
+        estimates = tuple(
+            checked_estimate(section.method, estimator.update(observation))
+            for section, estimator in zip(self._scenario.estimators, self._estimators, strict=True)
+        )
+        return Step(
+            index=index,
+            time=time,
+            traffic=state,
+            ego=ego,
+            route_position=snapshot.route_position,
+            speed_limit=snapshot.speed_limit,
+            leader=snapshot.leader,
+            collisions=snapshot.collisions,
+            truth=fog_truth(field_at(outlook.fog, time), pose, self._camera, outlook.signs),
+            view=view,
+            observation=observation,
+            estimates=estimates,
+            belief=checked_belief(self._scenario.fusion.method, self._fusion.update(estimates, time)),
+            command=command,
+            ending=ending,
+        )
+
+    def _pose(self, state: TrafficState, ego: int) -> CameraPose:
+        body_pitch = self._body.update(float(state.acceleration[ego]))
+        heading, setback = float(state.heading[ego]), self._scenario.camera.setback_m
+        grade = float(state.grade[ego])
+        return mounted_pose(self._camera, state.position[ego], heading, setback, grade, body_pitch)
+
+    def _observe(self, frame: Frame, snapshot: TrafficSnapshot, signs: SignMap, streams: Streams) -> Observation:
+        state, ego = snapshot.state, snapshot.ego
+        speed, reach = float(state.speed[ego]), self._scenario.sensors.sign_reach_m
+        return Observation(
+            frame=frame,
+            speed=speed,
+            lead=measure_lead(snapshot.leader, speed, self._lead_sensor, streams.sensors),
+            signs=signs_ahead(signs, state.position[ego], float(state.heading[ego]), reach),
+        )
+
+    def close(self) -> None:
+        """Free the renderer; closing twice is allowed."""
+        if self._outlook is not None:
+            self._outlook.close()
+        self._outlook, self._streams = None, None
+
+
+def fog_truth(fog: FogField, pose: CameraPose, camera: Camera, signs: SignMap) -> Truth:
+    """The fog at a camera, and as far as it sees along its heading, parallel to the road under it.
+
+    Parameters
+    ----------
+    fog : FogField
+        The fog now.
+    pose : CameraPose
+        Where the camera is.
+    camera : Camera
+        Its true calibration.
+    signs : SignMap
+        The signs that stand in the world.
+    """
+    eye, level = np.array(pose.position), math.cos(pose.road_grade)
+    direction = np.array([math.cos(pose.heading) * level, math.sin(pose.heading) * level, math.sin(pose.road_grade)])
+    depth = optical_depth_along(fog, eye, direction, _SIGHT_LINE)
+    # Optical depth grows along the line, so the distance at which it reaches ln 20 is found by interpolation.
+    reached = depth[-1] >= OPTICAL_DEPTH_AT_VISIBILITY
+    sight = float(np.interp(OPTICAL_DEPTH_AT_VISIBILITY, depth, _SIGHT_LINE))
+    return Truth(
+        extinction=float(extinction(fog, eye)),
+        extinction_ahead=OPTICAL_DEPTH_AT_VISIBILITY / sight if reached else 0.0,
+        camera=camera,
+        pose=pose,
+        fog=fog,
+        signs=signs,
+    )

@@ -1,0 +1,106 @@
+"""Rows in a file that can be read however the process ends that writes it."""
+
+import contextlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from fogsim.errors import InputError
+from fogsim.files.atomic import Reserve, naming
+
+
+class RowLog:
+    """A file in Arrow's streaming format, which has no end that must be written to be read.
+
+    It keeps as much room on the disk as it takes itself, for the table that is made of it.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    schema : pyarrow.Schema
+        Its columns.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written; the message names the file.
+    """
+
+    def __init__(self, path: Path, schema: Any) -> None:
+        self.path = path
+        self._reserve = Reserve(path.with_name(path.name + ".reserve"))
+        self._whole = 0
+        with naming(path):
+            path.touch()
+        self._write(schema.serialize())
+
+    def append(self, batch: Any) -> None:
+        """Write rows (a pyarrow.RecordBatch); they are safe from the end of the process when it returns.
+
+        Raises
+        ------
+        OSError
+            If the disk is full; none of the rows is in the file then, and it stays readable.
+        """
+        data = batch.serialize()
+        self._reserve.grow(data.size)
+        self._write(data)
+
+    def _write(self, data: Any) -> None:
+        rest = memoryview(data)
+        # Not kept open: how a recorder is left is not in its hands.
+        with naming(self.path), self.path.open("r+b", buffering=0) as file:
+            # Whatever an interruption has left of the rows before is written over.
+            file.seek(self._whole)
+            try:
+                while rest:
+                    rest = rest[file.write(rest) :]
+            except OSError:
+                file.truncate(self._whole)
+                raise
+        self._whole += data.size
+
+    def release_reserve(self) -> None:
+        """Give back the room that was kept."""
+        self._reserve.release()
+
+    def remove(self) -> None:
+        """Remove the file; twice does nothing."""
+        self._reserve.release()
+        self.path.unlink(missing_ok=True)
+
+
+def read_rows(path: Path) -> Any:
+    """Rows of a log, also of one that was cut off in the middle of a row.
+
+    Of a row that was written more than once (by its column ``index``) the last one counts.
+
+    Returns
+    -------
+    pyarrow.Table
+        In the order of ``index``.
+
+    Raises
+    ------
+    InputError
+        If it is no log.
+    """
+    batches = []
+    # Opened here, for Arrow takes no name that is not UTF-8.
+    with path.open("rb") as file:
+        try:
+            reader = pa.ipc.open_stream(file)
+        except pa.ArrowInvalid as error:
+            raise InputError(f"{path} holds no rows that can be read: {error}") from error
+        # What cannot be read is the end of a log that was cut off.
+        with contextlib.suppress(pa.ArrowInvalid, OSError):
+            for batch in reader:
+                batches.append(batch)  # noqa: PERF402 - those before the end count too
+        table = pa.Table.from_batches(batches, schema=reader.schema)
+    index = table["index"].to_numpy()
+    least_behind = np.minimum.accumulate(index[::-1])[::-1]
+    last = np.append(index[:-1] < least_behind[1:], True)[: len(index)]
+    return table.filter(pa.array(last))

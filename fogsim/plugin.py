@@ -1,0 +1,280 @@
+"""FogSim in simulations that the user has started: over a connection, or in a loop of the user's own."""
+
+import contextlib
+import dataclasses
+import warnings
+from collections.abc import Iterable
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from fogsim.atmosphere import FogNow
+from fogsim.ego.equipment import OnBoard
+from fogsim.errors import InputError, SimulationError, UnplayedWarning
+from fogsim.loop import AdvisedDriving
+from fogsim.randomness import spawn_streams
+from fogsim.scenario import Scenario, attached_scenario, build, override
+from fogsim.traffic import AttachedTraffic, TraciLink, Traffic, step_length, traci_traffic
+from fogsim.units import clock_time
+from fogsim.values import Command, Step
+from fogsim.values.result_checks import checked_command
+
+DECISION_PERIOD = 0.5
+"""Time between two decisions, as far as the simulation's step allows [s]."""
+
+
+def connect(
+    scenario: Scenario,
+    host: str = "localhost",
+    port: int = 8813,
+    order: int | None = None,
+    retries: int = 40,
+    timeout: float = 60.0,
+) -> Traffic:
+    """Reach a SUMO or sumo-gui that the user has started with ``--remote-port``.
+
+    The simulation is taken as it is, whatever files and seed it was started with; only to begin a second run, the
+    scenario's own files are loaded.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The ego, the clocks (SUMO's ``--step-length`` must be the scenario's) and how vehicles obey.
+    host : str
+        Where SUMO runs.
+    port : int
+        Its ``--remote-port``.
+    order : int or None
+        FogSim's place among several clients (SUMO's ``--num-clients``).
+    retries : int
+        How often to try again, every 0.25 s, while SUMO does not listen yet.
+    timeout : float
+        How long SUMO may leave one message unanswered [s]; ``inf`` for ever. Then it is given up with a
+        `SimulationError`. A step waits for all clients, and sumo-gui for its start button.
+
+    Returns
+    -------
+    Traffic
+        For `run` or `ClosedLoop`; nothing is connected before they start.
+
+    Raises
+    ------
+    InputError
+        If the timeout is not more than 0.
+    """
+    # SUMO may run in another folder.
+    here = scenario.model_copy(update={"directory": scenario.directory.resolve()})
+    return traci_traffic(build.traffic_setup(here), TraciLink(host, port, order, retries, timeout))
+
+
+def attach(
+    api: Any,
+    *,
+    ego: str | None = None,
+    visibility: float | None = None,
+    scenario: Scenario | None = None,
+    net: str | Path | None = None,
+    settings: Iterable[str] = (),
+    drivers: bool = True,
+    seed: int = 0,
+) -> "AttachedSession":
+    """Attach an ego with a camera to a SUMO simulation that runs already.
+
+    Parameters
+    ----------
+    api : module or traci.Connection
+        ``libsumo`` or ``traci`` after ``start``, or one connection of traci.
+    ego : str
+        Id of the ego; if not given, the scenario's.
+    visibility : float
+        Meteorological visibility of homogeneous fog [m].
+    scenario : Scenario
+        Fog, light, camera, sensors, estimators and policies, in place of the defaults; its traffic is not started, and
+        its clocks give way to the simulation's step, the decision period as far as that allows.
+    net : str or Path
+        SUMO network to draw; if not given, the file that the simulation says it has loaded.
+    settings : iterable of str
+        ``key.path=value`` each, as after ``--set``.
+    drivers : bool
+        Whether the other drivers, too, see only what the fog lets them see, and choose their speeds in it; this is put
+        in force by `AttachedSession.advise`. False leaves them as they are.
+    seed : int
+        Seed of the sensors' noise and of the drivers' differences.
+
+    Returns
+    -------
+    AttachedSession
+        The session; nothing is drawn until its `observe`.
+
+    Raises
+    ------
+    InputError
+        If the ego or the fog is missing, a setting does not fit, or `api` is something else.
+    SimulationError
+        If no simulation runs there.
+    """
+    fog = [] if visibility is None else [f"fog.visibility_m={visibility!r}"]
+    if scenario is not None:
+        # There is a frame at each step that the simulation makes, whatever the scenario's own would be.
+        clocks = _clocks(step_length(api), scenario.clocks.decision_period_s)
+        scenario = override(scenario, [*clocks, *fog, *settings], others_add_vehicles=True)
+        ego = ego or scenario.traffic.ego
+    elif ego is None:
+        raise InputError("attach: ego is missing: which vehicle is the ego?")
+    else:
+        scenario = attached_scenario(ego, [*_clocks(step_length(api)), *fog, *settings])
+    setup = dataclasses.replace(
+        build.traffic_setup(scenario), ego=ego, net=None if net is None else Path(net), additional=(), config=None
+    )
+    return AttachedSession(scenario, AttachedTraffic(setup, api), drivers, seed)
+
+
+def _clocks(step: float, decision_period: float = DECISION_PERIOD) -> list[str]:
+    decision = step * max(1, round(decision_period / step))
+    return [f"clocks.{key}_s={t!r}" for key, t in zip(_CLOCKS, (step, step, decision), strict=True)]
+
+
+_CLOCKS = ("traffic_step", "camera_period", "decision_period")
+
+
+class AttachedSession:
+    """An ego in somebody else's simulation; see `attach`.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    traffic : AttachedTraffic
+        The simulation.
+    drivers : bool
+        Whether the other drivers meet the fog too.
+    seed : int
+        Seed of the sensors' noise and of the drivers' differences.
+    """
+
+    def __init__(self, scenario: Scenario, traffic: AttachedTraffic, drivers: bool, seed: int) -> None:
+        self._name = scenario.name
+        # A scenario for another ego gives fog and camera; whom else it names drives in another simulation.
+        self._tells_unplayed = scenario.traffic.ego == traffic.ego
+        self._traffic = traffic
+        self._drivers = drivers
+        self._seed = seed
+        self._onboard = OnBoard(scenario)
+        self._policy = AdvisedDriving(scenario)
+        self._command = Command()
+        self._times: tuple[float, float] | None = None
+        self._index = 0
+        self._drivers_fog: FogNow | None = None
+        self._started = False
+        self._looked = False
+        self._closed = False
+
+    def observe(self) -> Step | None:
+        """Take in what the last simulation step has brought; to be called after each.
+
+        Returns
+        -------
+        Step or None
+            The finished instant, its time counted from the first; None while the ego is not on the road. An ego that
+            is teleported is off the road at least once.
+
+        Raises
+        ------
+        SimulationError
+            If the simulation is lost, or the session is closed.
+        MissingDependencyError
+            If no renderer works here.
+        """
+        if self._closed:
+            raise SimulationError("the session is closed")
+        self._looked = True
+        if self._started:
+            self._traffic.look()
+        elif self._traffic.ego_is_there():
+            self._traffic.start(self._seed)
+            self._started = True
+            fog = self._onboard.begin(spawn_streams(self._seed), self._traffic.network).fog
+            if self._drivers:
+                self._drivers_fog = FogNow(fog)
+                self._traffic.enter_fog(self._drivers_fog)
+        else:
+            return None
+        snapshot = self._traffic.observe()
+        if snapshot is None:
+            return None
+        time = self._elapsed(snapshot.state.time)
+        if self._drivers_fog is not None:
+            self._drivers_fog.set_time(time)
+        step = self._onboard.finish(self._index, time, snapshot, self._command, None)
+        self._index += 1
+        return step
+
+    def _elapsed(self, now: float) -> float:
+        began, last = (now, now) if self._times is None else self._times
+        if now < last:
+            raise SimulationError(
+                f"the simulation's time went back from {last:g} s to {now:g} s: attach again after loading it anew"
+            )
+        self._times = (began, now)
+        return clock_time(now - began)
+
+    def advise(self, step: Step, command: Command | None = None) -> Command:
+        """Put a command in force for the next simulation step; to be called before each of them.
+
+        The other drivers' sight in the fog, their choice of speed and scripted events are put in force here too.
+
+        Parameters
+        ----------
+        step : Step
+            What was observed last.
+        command : Command or None
+            Advice and lamps; None asks the scenario's own policies, which decide once a decision period.
+
+        Returns
+        -------
+        Command
+            What is in force.
+        """
+        self._command = self._policy.decide(step) if command is None else checked_command(command)
+        self._traffic.obey(self._command)
+        return self._command
+
+    def close(self) -> None:
+        """Let drivers drive and see by themselves again and free the renderer; the simulation goes on.
+
+        Every vehicle gets back what was changed about it: top speed, time headway, lane-change mode, the ego's own
+        speed, and sight of its leader.
+
+        Warns
+        -----
+        UserWarning
+            If the ego was never on the road: its id may be wrong.
+        UnplayedWarning
+            If events were not played, or vehicles of the script were never there; not if an error ended the session, or
+            the scenario is one for another ego.
+        """
+        tells = self._tells_unplayed and self._started and not self._closed
+        self._end()
+        if tells and (unplayed := self._traffic.unplayed()):
+            warnings.warn(f"{self._name}: not played: {unplayed}", UnplayedWarning, stacklevel=2)
+
+    def _end(self) -> None:
+        if not self._closed and not self._started and self._looked:
+            warnings.warn(self._traffic.absence(), stacklevel=2)
+        if not self._closed and self._started:
+            # Nobody is left to be held in a simulation that has ended first.
+            with contextlib.suppress(SimulationError):
+                self._traffic.release()
+        self._closed = True
+        self._onboard.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is None:
+            self.close()
+        else:
+            self._end()

@@ -1,0 +1,183 @@
+"""Visibility of triangles in homogeneous coordinates, without clipping.
+
+With the corners of a triangle in camera axes as the columns of M, the rows of M⁻¹ times the viewing ray (x, y, 1) of a
+pixel give three numbers eᵢ that are linear in the pixel's coordinates: all are positive where the triangle covers the
+pixel, their sum is 1/z, and corners may lie behind the camera (Olano & Greer, "Triangle Scan Conversion using 2D
+Homogeneous Coordinates", 1997).
+"""
+
+from typing import Any
+
+import numpy as np
+
+from fogsim.jit import kernel
+from fogsim.render.cpu.occlusion import gather, key
+from fogsim.render.cpu.triangles import Array, Index, Triangles, Wide, Work, project, set_up, sift
+
+_SMALL = 64  # boxes of no more pixels are looked at before their triangle is drawn
+_LANES = 8
+_EMPTY = 0xFFFFFFFF  # nothing, infinitely far away
+
+Point = tuple[float, float, float]
+Edges = tuple[float, float, float, float, float, float, float, float, float, float, float, float]
+"""Coefficients over column, row and 1 of the three eᵢ, positive inside, and of 1/z [1/m]."""
+
+
+@kernel
+def rasterise(
+    triangles: Triangles,
+    mesh: Index,
+    record: Array,
+    first: Index,
+    axes: Wide,
+    lens: Wide,
+    near: float,
+    picture: Index,
+    columns: int,
+    top: int,
+    bottom: int,
+    work: Work,
+) -> None:
+    """Find the nearest triangle of each pixel of some rows.
+
+    Parameters
+    ----------
+    triangles : Triangles
+        All meshes.
+    mesh, first
+        As in `Drawing`.
+    record : (c, 17) float32
+        The records of a `Drawing`; the first twelve numbers are the transform.
+    axes : (3, 3) float64
+        Axes of the camera in the world as rows.
+    lens : (3,) float64
+        Focal length and principal point [px].
+    near : float
+        Depth before which nothing is seen [m].
+    picture : (rows, columns + at least 7) int64
+        Is set to what is seen: in the lower half its slot, −1 for nothing, in the upper half the bits of its 1/z as a
+        32-bit float, which sort like the float. Of two surfaces the greater number is the nearer one.
+    columns : int
+        Width of the picture [px]; what lies behind it is not set.
+    top, bottom : int
+        First row, and the one after the last.
+    work : Work
+        Memory to work in, with room for the largest mesh.
+    """
+    picture[top:bottom] = _EMPTY
+    # Handing an array to a function costs as much as drawing a triangle, so the functions below take many copies each.
+    size, begin = (top, bottom, columns), 0
+    while begin < len(mesh):
+        count, begin = gather(triangles, mesh, record, begin, axes, lens, near, picture, size, work)
+        copies = work.copy[:count]
+        project(triangles, mesh, record, copies, axes, lens, near, work.corners)
+        count = sift(triangles, mesh, first, copies, size, work)
+        count = set_up(count, lens, near, size, work)
+        _fill(work, count, lens, near, picture)
+
+
+@kernel
+def _edges(p: Point, q: Point, r: Point, focal: float, u0: float, v0: float) -> Edges:
+    """Set up a triangle; of one that is seen edge on, nothing is inside.
+
+    What two triangles that share an edge find for it is the same but for the sign, to the last bit, so that no pixel
+    falls between them.
+    """
+    ax, ay, az = q[1] * r[2] - q[2] * r[1], q[2] * r[0] - q[0] * r[2], q[0] * r[1] - q[1] * r[0]
+    bx, by, bz = r[1] * p[2] - r[2] * p[1], r[2] * p[0] - r[0] * p[2], r[0] * p[1] - r[1] * p[0]
+    cx, cy, cz = p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]
+    determinant = p[0] * ax + p[1] * ay + p[2] * az
+    if determinant == 0.0:
+        return (0.0, 0.0, -1.0, 0.0, 0.0, -1.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0)
+    sign = 1.0 if determinant > 0.0 else -1.0
+    per_focal = sign / focal
+    ax, ay, bx, by, cx, cy = (
+        ax * per_focal,
+        ay * per_focal,
+        bx * per_focal,
+        by * per_focal,
+        cx * per_focal,
+        cy * per_focal,
+    )
+    az, bz, cz = sign * az - ax * u0 - ay * v0, sign * bz - bx * u0 - by * v0, sign * cz - cx * u0 - cy * v0
+    scale = 1.0 / abs(determinant)
+    zx, zy, zz = (ax + bx + cx) * scale, (ay + by + cy) * scale, (az + bz + cz) * scale
+    return (ax, ay, az, bx, by, bz, cx, cy, cz, zx, zy, zz)
+
+
+@kernel
+def _fill(work: Work, count: int, lens: Wide, near: float, picture: Index) -> None:
+    """Draw the pixels of triangles, row by row between their edges."""
+    points, box, slots, focal, u0, v0 = work.points, work.box, work.slot, lens[0], lens[1], lens[2]
+    for t in range(count):
+        top, bottom, left, right = int(box[t, 0]), int(box[t, 1]), int(box[t, 2]), int(box[t, 3])
+        least = min(points[t, 2], points[t, 5], points[t, 8])
+        crossing = least <= near
+        if not crossing and right - left < _LANES:
+            # Most small triangles are hidden by what has been drawn already, and to see that is cheap.
+            limit, hidden = key(np.float32(1.0001) / least, 0), True
+            beside, over = np.uint64(left), np.int64(right - left)
+            for v in range(np.uint64(top), np.uint64(bottom + 1)):
+                shown = 0
+                for i in range(np.uint64(_LANES)):
+                    shown |= (picture[v, beside + i] <= limit) & (np.int64(i) <= over)
+                hidden = shown == 0
+                if not hidden:
+                    break
+            if hidden:
+                continue
+        p = (np.float64(points[t, 0]), np.float64(points[t, 1]), np.float64(points[t, 2]))
+        q = (np.float64(points[t, 3]), np.float64(points[t, 4]), np.float64(points[t, 5]))
+        r = (np.float64(points[t, 6]), np.float64(points[t, 7]), np.float64(points[t, 8]))
+        ax, ay, az, bx, by, bz, cx, cy, cz, zx, zy, zz = _edges(p, q, r, focal, u0, v0)
+        # Of two triangles that share an edge, one begins where the other ends: both find the same place for it.
+        a1, a0, a3, a2 = _bounds(ax, ay, az)
+        b1, b0, b3, b2 = _bounds(bx, by, bz)
+        c1, c0, c3, c2 = _bounds(cx, cy, cz)
+        d1, d0, d3, d2 = _bounds(-zx, -zy, 1.0 / near - zz) if crossing else (0.0, -np.inf, 0.0, np.inf)
+        if ax == 0.0 or bx == 0.0 or cx == 0.0:
+            top, bottom = _rows(top, bottom, ax, ay, az)
+            top, bottom = _rows(top, bottom, bx, by, bz)
+            top, bottom = _rows(top, bottom, cx, cy, cz)
+        first, last, number, step = float(left), float(right), slots[t], np.float32(zx)
+        for v in range(np.uint64(top), np.uint64(bottom + 1)):
+            row = float(v)
+            low = max(a1 * row + a0, b1 * row + b0, c1 * row + c0, d1 * row + d0)
+            high = min(a3 * row + a2, b3 * row + b2, c3 * row + c2, d3 * row + d2)
+            low, high = np.ceil(max(low, first)), np.floor(min(high, last))
+            # A row of few pixels is drawn as one of eight, some of them masked, and so is an empty one: to guess how
+            # often a short loop turns costs the processor more. Comparisons are such that NaN makes a row empty.
+            span = high - low if high >= low else -1.0
+            low = low if low < last else last
+            begin, end = np.uint64(low), np.int64(span)
+            lanes: Any = max(end + 1, _LANES)
+            start = np.float32(zx * low + zy * row + zz)
+            # Unsigned numbers tell the compiler that no index counts from the end.
+            for i in range(np.uint64(lanes)):
+                found = key(start + step * np.float32(np.int32(i)), number)
+                found = found if np.int64(i) <= end else 0
+                before = picture[v, begin + i]
+                picture[v, begin + i] = found if found > before else before
+
+
+@kernel
+def _bounds(x: float, y: float, rest: float) -> tuple[float, float, float, float]:
+    """Where x · u + y · v + rest is not negative: least u as slope over v and value at 0, and greatest u likewise."""
+    inverse = -1.0 / x
+    if x > 0.0:
+        return y * inverse, rest * inverse, 0.0, np.inf
+    if x < 0.0:
+        return 0.0, -np.inf, y * inverse, rest * inverse
+    return 0.0, -np.inf, 0.0, np.inf
+
+
+@kernel
+def _rows(top: int, bottom: int, x: float, y: float, rest: float) -> tuple[int, int]:
+    """Rows from top to bottom in which x · u + y · v + rest is not negative, if it does not depend on the column."""
+    if x != 0.0:
+        return top, bottom
+    if y > 0.0:
+        return int(min(max(top, np.ceil(-rest / y)), bottom + 1.0)), bottom
+    if y < 0.0:
+        return top, int(max(min(bottom, np.floor(-rest / y)), top - 1.0))
+    return (top, bottom) if rest >= 0.0 else (top, top - 1)

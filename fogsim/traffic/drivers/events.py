@@ -1,0 +1,293 @@
+"""Scripted manoeuvres: what vehicles are made to do, and when."""
+
+import math
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass
+
+from fogsim.values import Reason, Unplayed, UnplayedEvent
+
+Order = tuple[float, float]
+"""Target speed [m/s], ``inf`` to free the vehicle, and the deceleration to reach it with [m/s²]."""
+
+
+def signed_gap(ahead: float | None, behind: float | None, length: float, ego_length: float) -> float | None:
+    """Gap of a vehicle to the ego, from the ways between their front bumpers.
+
+    Parameters
+    ----------
+    ahead : float or None
+        Way along the road from the ego's front bumper to the vehicle's, at least 0 [m]; None if there is none.
+    behind : float or None
+        Way from the vehicle's front bumper to the ego's, likewise.
+    length, ego_length : float
+        Lengths of the two [m].
+
+    Returns
+    -------
+    float or None
+        Positive for a vehicle ahead of the ego: from the ego's front bumper to its rear bumper [m]. Negative for one
+        behind it: minus the gap from its front bumper to the ego's rear bumper. 0 while they are beside one another.
+        None if no way leads from one to the other.
+    """
+    # On a road that leads in a circle there are both ways: the shorter one counts.
+    if ahead is not None and (behind is None or ahead <= behind):
+        return max(ahead - length, 0.0)
+    return None if behind is None else min(ego_length - behind, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Trigger:
+    """When an event begins: as soon as one of the conditions that are given holds.
+
+    Attributes
+    ----------
+    at_position : float or None
+        Distance that the vehicle has driven since it departed [m].
+    at_time : float or None
+        Time since the ego appeared [s].
+    at_gap_to_ego : float or None
+        Gap to the ego along the road, from bumper to bumper [m]: positive for a vehicle ahead of the ego, negative for
+        one behind it, 0 for one beside it. It holds when the gap comes to this value or passes it, from either side,
+        and for a vehicle that is nearer on the same side already when both are first on the road.
+    name : str
+        What the event is called in messages.
+    """
+
+    at_position: float | None = None
+    at_time: float | None = None
+    at_gap_to_ego: float | None = None
+    name: str = ""
+
+    def fires(self, time: float, driven: float, gap: float | None, earlier_gap: float | None) -> bool:
+        """Tell whether the event begins.
+
+        Parameters
+        ----------
+        time : float
+            Time since the ego appeared [s]; negative before.
+        driven : float
+            Distance that the vehicle has driven [m].
+        gap, earlier_gap : float or None
+            Its gap to the ego now and in the step before, as of `signed_gap` [m]; None where there was none.
+        """
+        return (
+            (self.at_position is not None and driven >= self.at_position)
+            or (self.at_time is not None and time >= self.at_time)
+            or (self.at_gap_to_ego is not None and gap is not None and _reaches(self.at_gap_to_ego, gap, earlier_gap))
+        )
+
+
+def _reaches(wanted: float, gap: float, earlier: float | None) -> bool:
+    """Tell whether a gap has come to a wanted one, or is nearer on the same side at the first look [m]."""
+    if earlier is not None:
+        return min(earlier, gap) <= wanted <= max(earlier, gap)
+    return 0.0 < gap / wanted <= 1.0 if wanted else gap == 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class BrakeEvent:
+    """A vehicle brakes, holds the lower speed, and drives on.
+
+    Attributes
+    ----------
+    vehicle : str
+        Its id.
+    trigger : Trigger
+        When.
+    to_speed : float
+        Speed that it brakes to [m/s]; 0 is a standstill.
+    deceleration : float
+        Deceleration while braking [m/s²], positive; the vehicle's own limit applies too.
+    hold : float
+        Time from the beginning of the braking until it drives on [s]; ``inf`` for a breakdown.
+    """
+
+    vehicle: str
+    trigger: Trigger
+    to_speed: float = 0.0
+    deceleration: float = 4.0
+    hold: float = math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class LaneChangeEvent:
+    """A vehicle changes lane, whoever is there: it cuts in.
+
+    Attributes
+    ----------
+    vehicle : str
+        Its id.
+    trigger : Trigger
+        When.
+    lanes : int
+        How many lanes to the left; negative to the right.
+    stay : float
+        Time for which it stays there [s].
+    """
+
+    vehicle: str
+    trigger: Trigger
+    lanes: int
+    stay: float = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class LampFailureEvent:
+    """All lamps of a vehicle go dark.
+
+    Attributes
+    ----------
+    vehicle : str
+        Its id.
+    trigger : Trigger
+        When.
+    """
+
+    vehicle: str
+    trigger: Trigger
+
+
+Event = BrakeEvent | LaneChangeEvent | LampFailureEvent
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """What triggers look at.
+
+    Attributes
+    ----------
+    time : float
+        Time since the ego appeared [s].
+    present : set of str
+        Vehicles on the road.
+    driven : callable
+        Distance that a vehicle has driven [m].
+    gap_to_ego : callable
+        Gap of a vehicle to the ego along the road, as of `signed_gap` [m]; None if there is none.
+    has_lane : callable
+        Whether a vehicle could go so many lanes to the left, negative to the right, where it is.
+    """
+
+    time: float
+    present: set[str]
+    driven: Callable[[str], float]
+    gap_to_ego: Callable[[str], float | None]
+    has_lane: Callable[[str, int], bool]
+
+
+@dataclass(frozen=True, slots=True)
+class Doings:
+    """What the script wants of this step.
+
+    Attributes
+    ----------
+    orders : mapping from vehicle id to Order
+        Speeds to bring vehicles to.
+    lane_changes : tuple of LaneChangeEvent
+        Lane changes that begin now.
+    """
+
+    orders: Mapping[str, Order]
+    lane_changes: tuple[LaneChangeEvent, ...]
+
+
+class Script:
+    """Plays events; remembers which have begun.
+
+    Parameters
+    ----------
+    events : iterable of Event
+        What is scripted.
+    """
+
+    def __init__(self, events: Iterable[Event]) -> None:
+        self._events = tuple(events)
+        self._waiting: list[Event] = list(self._events)
+        self._without_lane: set[LaneChangeEvent] = set()
+        self._braking: dict[BrakeEvent, float] = {}
+        self._dark: set[str] = set()
+        self._gaps: dict[str, float | None] = {}
+
+    @property
+    def dark(self) -> frozenset[str]:
+        """Vehicles whose lamps have failed."""
+        return frozenset(self._dark)
+
+    @property
+    def is_idle(self) -> bool:
+        """True if nothing waits and nobody brakes, so that `play` would do nothing."""
+        return not (self._waiting or self._braking)
+
+    def play(self, situation: Situation) -> Doings:
+        """Begin what is due and go on with what has begun."""
+        begun = self._begin(situation) if self._waiting else []
+        return Doings(
+            orders=self._orders(situation) if self._braking else {},
+            lane_changes=self._lane_changes(begun, situation),
+        )
+
+    def unplayed(self, seen: Collection[str], present: Collection[str], others: Iterable[str] = ()) -> Unplayed:
+        """Tell what has not been played so far.
+
+        Parameters
+        ----------
+        seen : collection of str
+            Vehicles that have been on the road, at any time.
+        present : collection of str
+            Those that are on it now.
+        others : iterable of str
+            Vehicles that are expected beside those of the events.
+        """
+
+        def why(event: Event) -> Reason:
+            if event in self._without_lane:
+                return Reason.NO_LANE
+            if event.vehicle in present:
+                return Reason.NOT_REACHED
+            return Reason.LEFT if event.vehicle in seen else Reason.NEVER_SEEN
+
+        missed = [event for event in self._events if event in self._waiting or event in self._without_lane]
+        # What stands for one event of a scenario bears one name, and is told once.
+        told = dict.fromkeys(
+            UnplayedEvent(event.trigger.name or f"event of {event.vehicle}", why(event)) for event in missed
+        )
+        expected = {*others, *(event.vehicle for event in self._events)}
+        return Unplayed(tuple(told), tuple(sorted(expected.difference(seen))))
+
+    def _begin(self, situation: Situation) -> list[Event]:
+        measured = {event.vehicle for event in self._waiting if event.trigger.at_gap_to_ego is not None}
+        gaps = {v: situation.gap_to_ego(v) for v in sorted(measured & situation.present)}
+        begun = [event for event in self._waiting if self._is_due(event, situation, gaps.get(event.vehicle))]
+        self._gaps = gaps
+        for event in begun:
+            self._waiting.remove(event)
+            if isinstance(event, BrakeEvent):
+                self._braking[event] = situation.time
+            elif isinstance(event, LampFailureEvent):
+                self._dark.add(event.vehicle)
+        return begun
+
+    def _lane_changes(self, begun: Iterable[Event], situation: Situation) -> tuple[LaneChangeEvent, ...]:
+        """Lane changes among events that begin, without those for which there is no lane."""
+        changes = [event for event in begun if isinstance(event, LaneChangeEvent)]
+        possible = tuple(event for event in changes if situation.has_lane(event.vehicle, event.lanes))
+        self._without_lane.update(set(changes).difference(possible))
+        return possible
+
+    def _is_due(self, event: Event, situation: Situation, gap: float | None) -> bool:
+        vehicle = event.vehicle
+        return vehicle in situation.present and event.trigger.fires(
+            situation.time, situation.driven(vehicle), gap, self._gaps.get(vehicle)
+        )
+
+    def _orders(self, situation: Situation) -> dict[str, Order]:
+        orders: dict[str, Order] = {}
+        for event, since in list(self._braking.items()):
+            over = situation.time - since >= event.hold
+            if event.vehicle in situation.present:
+                order = (math.inf if over else event.to_speed, event.deceleration)
+                # Of several that hold a vehicle at once the lowest speed counts, and none frees it from another.
+                orders[event.vehicle] = min(order, orders.get(event.vehicle, order), key=lambda o: o[0])
+            if over or event.vehicle not in situation.present:
+                del self._braking[event]
+        return orders

@@ -1,0 +1,73 @@
+"""What highway-env's drivers do beside following their leader.
+
+Its environments let their road decide for everybody (``act``) in each simulation step; here the road decides after the
+drivers have chosen their speeds, and before the script has its way. IDM and MOBIL stay as they are.
+"""
+
+from collections.abc import Sequence
+
+from fogsim.traffic.drivers.events import Event
+from fogsim.traffic.drivers.sight import FogAccess
+from fogsim.traffic.drivers.speed_choice import DriverSetup
+from fogsim.traffic.highway.drivers import HighwayDrivers
+from fogsim.traffic.highway.fleet import Fleet
+from fogsim.traffic.highway.manoeuvres import Manoeuvres
+from fogsim.values import Command, Unplayed
+
+
+class Conduct:
+    """Stands in for the method ``act`` of one road.
+
+    Parameters
+    ----------
+    fleet : Fleet
+        The vehicles.
+    setup : DriverSetup
+        How drivers choose their speed in fog and follow advice.
+    events : sequence of Event
+        What is scripted.
+    seed : int
+        Seed of the drivers' differences.
+    advice_deceleration : float
+        How hard vehicles slow down to a speed that they have chosen or are advised [m/s²].
+
+    Raises
+    ------
+    InputError
+        If the script names a vehicle that is not there.
+    """
+
+    def __init__(
+        self, fleet: Fleet, setup: DriverSetup, events: Sequence[Event], seed: int, advice_deceleration: float
+    ) -> None:
+        self.command = Command()
+        self._fleet = fleet
+        self._drivers = HighwayDrivers(fleet, setup, seed, advice_deceleration)
+        self._manoeuvres = Manoeuvres(fleet, events) if events else None
+
+    def enter_fog(self, fog: FogAccess) -> None:
+        """Let the drivers choose their speeds in a fog."""
+        self._drivers.fog = fog
+
+    def unplayed(self, keep_lane: Sequence[str]) -> Unplayed:
+        """Tell what has not been played so far; see `Manoeuvres.unplayed`."""
+        return (self._manoeuvres or Manoeuvres(self._fleet, ())).unplayed(keep_lane)
+
+    def __call__(self) -> None:
+        """Decide for everybody on the road."""
+        road = self._fleet.environment.road
+        self._drivers.update(self.command)
+        orders = {} if self._manoeuvres is None else self._manoeuvres.begin()
+        type(road).act(road)
+        if self._manoeuvres is not None:
+            self._manoeuvres.hold(orders)
+
+
+def take_over(
+    fleet: Fleet, setup: DriverSetup, events: Sequence[Event], seed: int, advice_deceleration: float
+) -> Conduct:
+    """Let the drivers of an environment choose speeds and play a script, until its next reset; see `Conduct`."""
+    conduct = Conduct(fleet, setup, events, seed, advice_deceleration)
+    # On this one road, not in the library: other environments of the process go on as they are.
+    fleet.environment.road.act = conduct
+    return conduct

@@ -1,0 +1,202 @@
+"""highway-env as the traffic of a closed loop."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from highway_env.envs.common.abstract import AbstractEnv
+from highway_env.vehicle.behavior import IDMVehicle
+
+from fogsim.errors import InputError, SimulationError, suggest
+from fogsim.traffic.drivers.events import Event
+from fogsim.traffic.drivers.sight import DriverSight, FogAccess
+from fogsim.traffic.drivers.speed_choice import DriverSetup
+from fogsim.traffic.highway.behaviour import Conduct, take_over
+from fogsim.traffic.highway.collisions import CollisionWatch
+from fogsim.traffic.highway.fleet import LEAD, Fleet
+from fogsim.traffic.highway.network import planned_route, road_network, same_roads, speed_limit
+from fogsim.traffic.highway.perception import let_drivers_meet
+from fogsim.traffic.highway.snapshot import read_snapshot
+from fogsim.traffic.setup import UNTOUCHED, AfterCollision
+from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot, Unplayed
+
+
+def is_highway_environment(environment: object) -> bool:
+    """Tell whether something is one of highway-env's environments."""
+    return isinstance(environment, AbstractEnv)
+
+
+class HighwayTraffic:
+    """A `Traffic` of one highway-env environment, whose vehicles move by its own models.
+
+    The ego keeps its lane and follows its leader by IDM, as the others do. Of the environment, roads and vehicles are
+    used, not its rewards, its endings or what it does once a policy step (intersections let new vehicles in there).
+
+    Parameters
+    ----------
+    environment : highway_env.envs.common.abstract.AbstractEnv
+        The environment without wrappers; it is the traffic's from now on.
+    sight : DriverSight or None
+        Eyes of the drivers; None if they see through the fog.
+    reading_radius : float
+        Vehicles farther from the ego than this are not read [m].
+    advice_deceleration : float
+        How hard vehicles slow down to a speed that they are advised or choose [m/s²].
+    drivers : DriverSetup
+        How drivers choose their speed in fog and follow advice; the ego's follows its advice as it is.
+    events : sequence of Event
+        What is scripted; vehicles are named as in `Fleet.name`, the one ahead of the ego at the beginning `LEAD`.
+    keep_lane : sequence of str
+        Vehicles that never change lane.
+    after_collision : AfterCollision
+        What becomes of vehicles that have collided; the ego stays in any case.
+
+    Raises
+    ------
+    InputError
+        If it is no environment of highway-env.
+    """
+
+    def __init__(
+        self,
+        environment: Any,
+        sight: DriverSight | None,
+        reading_radius: float = 1000.0,
+        advice_deceleration: float = 2.0,
+        drivers: DriverSetup = UNTOUCHED,
+        events: Sequence[Event] = (),
+        keep_lane: Sequence[str] = (),
+        after_collision: AfterCollision = AfterCollision.STOP,
+    ) -> None:
+        if not is_highway_environment(environment):
+            raise InputError(f"expected an environment of highway-env without wrappers, got {environment!r}")
+        self._environment = environment
+        self._sight = sight
+        self._reading_radius = reading_radius
+        self._advice_deceleration = advice_deceleration
+        self._drivers = drivers
+        self._events = tuple(events)
+        self._keep_lane = tuple(keep_lane)
+        self._after_collision = after_collision
+        self._fog: FogAccess | None = None
+        self._fleet: Fleet | None = None
+        self._watch: CollisionWatch | None = None
+        self._conduct: Conduct | None = None
+        self._network: RoadNetwork | None = None
+
+    @property
+    def step_length(self) -> float:
+        """Length of a simulation step [s]."""
+        return float(1.0 / self._environment.config["simulation_frequency"])
+
+    def start(self, seed: int) -> None:
+        """Reset the environment.
+
+        Parameters
+        ----------
+        seed : int
+            Seed of the environment and of the drivers' differences.
+
+        Raises
+        ------
+        InputError
+            If the script names a vehicle that is not there.
+        SimulationError
+            If the environment has no vehicle to control, or has built other roads than before.
+        """
+        self._environment.reset(seed=seed)
+        if self._environment.vehicle is None:
+            raise SimulationError(f"{type(self._environment).__name__} has no controlled vehicle to become the ego")
+        self._fleet = Fleet(self._environment, _driver_for(self._environment))
+        self._watch = CollisionWatch(self._fleet)
+        self._conduct = take_over(self._fleet, self._drivers, self._events, seed, self._advice_deceleration)
+        self._hold_in_lane(self._fleet)
+        network = road_network(self._environment.road, self._fleet.ego)
+        if self._network is not None and not same_roads(self._network, network):
+            raise SimulationError(
+                f"{type(self._environment).__name__} builds other roads at every reset, but they are drawn once: "
+                "set its config so that the roads stay the same"
+            )
+        self._network = network
+        self._meet_fog()
+
+    def enter_fog(self, fog: FogAccess) -> None:
+        """Let drivers see only what this fog lets them see, from now on and in every later run."""
+        self._fog = fog
+        self._meet_fog()
+
+    def _meet_fog(self) -> None:
+        if self._fleet is None or self._conduct is None or self._fog is None:
+            return
+        self._conduct.enter_fog(self._fog)
+        if self._sight is not None:
+            let_drivers_meet(self._fog, self._fleet, self._sight)
+
+    def _hold_in_lane(self, fleet: Fleet) -> None:
+        vehicles = fleet.present()
+        for name in self._keep_lane:
+            if name not in vehicles and name != LEAD:
+                raise InputError(f"traffic.keep_lane: there is no vehicle {name!r}; {suggest(name, vehicles)}")
+            if isinstance(vehicles.get(name), IDMVehicle):
+                vehicles[name].enable_lane_change = False
+
+    def network(self) -> tuple[RoadNetwork, SignMap]:
+        """Roads, and no signs: highway-env has none; after `start`."""
+        if self._network is None:
+            raise SimulationError("the traffic has not been started, or is closed")
+        return self._network, SignMap()
+
+    def advance(self, command: Command) -> None:
+        """Move by one simulation step with a command in force."""
+        fleet, watch, conduct = self._running()
+        fleet.ego_lamps = command.lamps
+        conduct.command = command
+        fleet.environment.road.act()
+        fleet.environment.road.step(self.step_length)
+        fleet.environment.steps += 1
+        fleet.environment.time += self.step_length
+        watch.look(self.step_length)
+        if self._after_collision is AfterCollision.REMOVE:
+            road = fleet.environment.road
+            road.vehicles = [v for v in road.vehicles if v is fleet.ego or not v.crashed]
+
+    def observe(self) -> TrafficSnapshot | None:
+        """Tell where everybody is and what has happened since the last call; None once the ego has left.
+
+        The impact speed of a collision is the length of the difference of both velocities.
+        """
+        fleet, watch, _ = self._running()
+        return read_snapshot(fleet, self.network()[0].route, watch.tell(), self._reading_radius)
+
+    def unplayed(self) -> Unplayed:
+        """What of the script has not been played; see `Traffic.unplayed`."""
+        _, _, conduct = self._running()
+        return conduct.unplayed(self._keep_lane)
+
+    def _running(self) -> tuple[Fleet, CollisionWatch, Conduct]:
+        if self._fleet is None or self._watch is None or self._conduct is None:
+            raise SimulationError("the traffic has not been started, or is closed")
+        return self._fleet, self._watch, self._conduct
+
+    def close(self) -> None:
+        """End the simulation; closing twice is allowed."""
+        self._environment.close()
+        self._fleet, self._watch, self._conduct, self._network = None, None, None, None
+
+
+def _driver_for(environment: Any) -> Any:
+    """Put a driver who keeps the lane and follows by IDM into the controlled vehicle."""
+    passive, vehicles = environment.vehicle, environment.road.vehicles
+    driver = IDMVehicle(
+        environment.road,
+        passive.position,
+        passive.heading,
+        passive.speed,
+        # Vehicles that agents steer by themselves have neither a target nor a plan.
+        target_lane_index=getattr(passive, "target_lane_index", None),
+        target_speed=getattr(passive, "target_speed", speed_limit(passive.lane)),
+        route=planned_route(passive),
+        enable_lane_change=False,
+    )
+    vehicles[vehicles.index(passive)] = driver
+    environment.controlled_vehicles[0] = driver
+    return driver

@@ -1,0 +1,206 @@
+"""Which vehicles a simulation can have, as its route and additional files say, without starting SUMO."""
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from fogsim.traffic.road.configuration import configured_demand
+from fogsim.traffic.road.xml_stream import UNREADABLE, read_elements
+
+MOST_BYTES = 50_000_000
+"""Bytes of files, unpacked, after which nothing is claimed about a demand."""
+
+MOST_NAMES = 10_000
+"""Most ids that are kept to tell the nearest of them."""
+
+_OPENING = frozenset(("include", "calibrator", "personTrip"))
+"""Elements that bring vehicles whose ids are not in sight."""
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleRoute:
+    """The way of a vehicle whose edges are written out.
+
+    Attributes
+    ----------
+    edges : tuple of str
+        Ids of its edges.
+    depart_lane : int or None
+        Lane of the first edge on which it departs, counted from 0; None if SUMO chooses it.
+    file : Path
+        Where the vehicle stands.
+    """
+
+    edges: tuple[str, ...]
+    depart_lane: int | None
+    file: Path
+
+
+@dataclass(frozen=True, slots=True)
+class Demand:
+    """What route and additional files say about some vehicles.
+
+    Attributes
+    ----------
+    files : tuple of Path
+        The files.
+    found : frozenset of str
+        Those of the wanted vehicles that can come.
+    names : tuple of str
+        Ids of vehicles in the order of the files, at most `MOST_NAMES`; of a flow, its first and its last one.
+    routes : mapping from vehicle id to VehicleRoute
+        Ways of wanted vehicles, where they are written out and nothing changes them.
+    is_open : bool
+        True if vehicles may come that are not in sight, so that nothing can be said about those who were not found.
+    """
+
+    files: tuple[Path, ...]
+    found: frozenset[str]
+    names: tuple[str, ...]
+    routes: Mapping[str, VehicleRoute]
+    is_open: bool
+
+    def lacks(self, vehicle: str) -> bool:
+        """True if a wanted vehicle can never come."""
+        return not self.is_open and vehicle not in self.found
+
+
+def read_configured_demand(config: Path, wanted: Iterable[str]) -> Demand:
+    """Look for some vehicles in the files of a SUMO configuration.
+
+    Parameters
+    ----------
+    config : Path
+        The ``.sumocfg`` file.
+    wanted : iterable of str
+        Ids of the vehicles.
+
+    Raises
+    ------
+    InputError
+        If it is no SUMO configuration.
+    """
+    configured = configured_demand(config)
+    if configured.is_open:
+        return Demand(configured.files, frozenset(), (), {}, is_open=True)
+    return read_demand(configured.files, wanted, reroutes=configured.reroutes)
+
+
+def read_demand(
+    files: Iterable[Path], wanted: Iterable[str], most_bytes: int = MOST_BYTES, *, reroutes: bool = False
+) -> Demand:
+    """Look for some vehicles in route and additional files.
+
+    Parameters
+    ----------
+    files : iterable of Path
+        The files in the order in which SUMO reads them: additional files first.
+    wanted : iterable of str
+        Ids of the vehicles.
+    most_bytes : int
+        Bytes, unpacked, after which the demand counts as open.
+    reroutes : bool
+        Whether vehicles look for other ways than those written.
+    """
+    files, reader, left = tuple(files), _DemandReader(frozenset(wanted), reroutes), most_bytes
+    for file in files:
+        reader.file = file
+        try:
+            left -= read_elements(file, reader, left)
+        except UNREADABLE:
+            # SUMO tells what is wrong with it when it starts.
+            reader.is_open = True
+        if reader.is_done:
+            break
+        if left <= 0:
+            reader.is_open = True
+            break
+    return reader.demand(files)
+
+
+class _DemandReader:
+    """Looks for wanted vehicles among elements."""
+
+    def __init__(self, wanted: frozenset[str], reroutes: bool) -> None:
+        self.file = Path()
+        self.is_open = False
+        self._wanted = wanted
+        self._reroutes = reroutes
+        self._found: set[str] = set()
+        self._names: list[str] = []
+        self._named_routes: dict[str, tuple[str, ...]] = {}
+        self._routes: dict[str, VehicleRoute] = {}
+        self._inside: tuple[tuple[str, ...], int | None] = ((), None)
+
+    @property
+    def is_done(self) -> bool:
+        return self.is_open or (self._found == self._wanted and not self._inside[0])
+
+    def demand(self, files: tuple[Path, ...]) -> Demand:
+        routes = {} if self._reroutes or self.is_open else self._routes
+        return Demand(files, frozenset(self._found), tuple(self._names), routes, self.is_open)
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        if tag in {"vehicle", "trip"}:
+            self._take(attributes, (attributes.get("id", ""),))
+        elif tag == "flow":
+            self._take_flow(attributes)
+        elif tag == "route":
+            self._take_route(attributes)
+        elif tag == "routeDistribution":
+            # One of its routes is drawn.
+            self._inside = ((), None)
+        elif tag in _OPENING or (tag == "vType" and "scale" in attributes):
+            self.is_open = True
+        elif tag == "rerouter" or attributes.get("key") == "has.rerouting.device":
+            self._reroutes = True
+
+    def end(self, tag: str) -> None:
+        if tag in {"vehicle", "trip", "flow"}:
+            self._inside = ((), None)
+
+    def _take_flow(self, attributes: Mapping[str, str]) -> None:
+        flow, written = attributes.get("id", ""), attributes.get("number", "")
+        number = int(written) if _is_number(written) else None
+        names = (f"{flow}.0",) if number in {None, 1} else (f"{flow}.0", f"{flow}.{(number or 1) - 1}")
+        self._take(attributes, () if number == 0 else names, _flown(flow, number, self._wanted))
+
+    def _take(
+        self, attributes: Mapping[str, str], names: tuple[str, ...], vehicles: Collection[str] | None = None
+    ) -> None:
+        if len(self._names) < MOST_NAMES:
+            self._names += names
+        here = tuple(v for v in (names if vehicles is None else vehicles) if v in self._wanted)
+        self._found.update(here)
+        lane = attributes.get("departLane", "")
+        self._inside = (here, int(lane) if _is_number(lane) and "departEdge" not in attributes else None)
+        self._drive(self._named_routes.get(attributes.get("route", "")))
+
+    def _take_route(self, attributes: Mapping[str, str]) -> None:
+        if "id" not in attributes and not self._inside[0]:
+            return
+        edges = tuple(attributes.get("edges", "").split())
+        if edges and "repeat" not in attributes:
+            if "id" in attributes:
+                self._named_routes[attributes["id"]] = edges
+            self._drive(edges)
+
+    def _drive(self, edges: tuple[str, ...] | None) -> None:
+        vehicles, lane = self._inside
+        if edges:
+            self._routes.update({v: VehicleRoute(edges, lane, self.file) for v in vehicles})
+
+
+def _flown(flow: str, number: int | None, wanted: Collection[str]) -> tuple[str, ...]:
+    """Those of some vehicles that a flow makes, each of which it calls by its own id and a number from 0 on."""
+    made = []
+    for vehicle in wanted:
+        name, _, place = vehicle.rpartition(".")
+        is_one = name == flow and _is_number(place) and str(int(place)) == place
+        if is_one and (number is None or int(place) < number):
+            made.append(vehicle)
+    return tuple(made)
+
+
+def _is_number(text: str) -> bool:
+    return text.isascii() and text.isdigit() and len(text) < 10

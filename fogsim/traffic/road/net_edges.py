@@ -1,0 +1,100 @@
+"""Edges of a SUMO network as its file lists them, for checks that must not wait for the whole network."""
+
+import itertools
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from fogsim.traffic.road.xml_stream import UNREADABLE, read_elements
+
+MOST_BYTES = 50_000_000
+"""Bytes of a network file, unpacked, after which it is not looked at."""
+
+Point = tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class NetEdges:
+    """Edges that vehicles drive on.
+
+    Attributes
+    ----------
+    lanes : mapping from edge id to int
+        How many lanes each has.
+    axes : mapping from edge id to sequence of points
+        Middle lane [m] of each edge that was asked for.
+    """
+
+    lanes: Mapping[str, int]
+    axes: Mapping[str, Sequence[Point]]
+
+    def route_length(self, route: Sequence[str]) -> float:
+        """Length of the axis that fog is laid along [m]: middle lanes of a route's edges, end to end.
+
+        Raises
+        ------
+        KeyError
+            If the axis of one of them was not asked for.
+        """
+        points = [point for edge in route for point in self.axes[edge]]
+        return sum(math.dist(one, other) for one, other in itertools.pairwise(points))
+
+
+def read_net_edges(net: Path, wanted: Collection[str], most_bytes: int = MOST_BYTES) -> NetEdges | None:
+    """List the edges of a network.
+
+    Parameters
+    ----------
+    net : Path
+        SUMO network file.
+    wanted : collection of str
+        Edges whose axes are asked for.
+    most_bytes : int
+        Bytes, unpacked, after which it is given up.
+
+    Returns
+    -------
+    NetEdges or None
+        None if the file is too large, or no network; the latter is told when it is drawn.
+    """
+    reader = _EdgeReader(wanted)
+    try:
+        size = read_elements(net, reader, most_bytes)
+    except UNREADABLE:
+        return None
+    if not reader.lanes or (size == most_bytes and not reader.is_done):
+        return None
+    axes = {edge: shapes[len(shapes) // 2] for edge, shapes in reader.shapes.items() if shapes}
+    return NetEdges(reader.lanes, axes)
+
+
+class _EdgeReader:
+    """Counts lanes of edges."""
+
+    def __init__(self, wanted: Collection[str]) -> None:
+        self.is_done = False
+        self.lanes: dict[str, int] = {}
+        self.shapes: dict[str, list[list[Point]]] = {edge: [] for edge in wanted}
+        self._edge = ""
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        if tag == "edge":
+            is_road = attributes.get("function", "normal") in {"normal", "connector"}
+            self._edge = attributes.get("id", "") if is_road else ""
+        elif tag == "lane" and self._edge:
+            self.lanes[self._edge] = self.lanes.get(self._edge, 0) + 1
+            if self._edge in self.shapes:
+                self.shapes[self._edge].append(_points(attributes.get("shape", "")))
+        elif tag == "connection":
+            # All edges stand before the connections between them.
+            self.is_done = True
+
+    def end(self, tag: str) -> None:
+        pass
+
+
+def _points(shape: str) -> list[Point]:
+    """Points of a shape [m]; those without a height lie at 0."""
+    points = [tuple(map(float, point.split(","))) for point in shape.split()]
+    return [(*point, 0.0) if len(point) == 2 else point for point in points]

@@ -1,0 +1,146 @@
+"""Signals of OpenDRIVE files: traffic signs at s, t beside a road's reference line (ASAM OpenDRIVE 1.x)."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+from fogsim.errors import InputError
+from fogsim.traffic.road.plan_view import PlanView, plan_view
+from fogsim.units import KMH_PER_MPS
+from fogsim.values import Sign
+
+GERMAN_SPEED_LIMIT = "274"
+"""Number of the maximum-speed sign in the German catalogue (VzKat), which OpenDRIVE files commonly use."""
+
+HEIGHT = 2.6
+"""Height of the middle of a sign that tells no height [m]."""
+DIAMETER = 0.9
+"""Diameter of a sign that tells no size [m]."""
+
+_METRES_PER_SECOND = {"": 1 / KMH_PER_MPS, "km/h": 1 / KMH_PER_MPS, "mph": 0.44704, "m/s": 1.0}
+"""Units of a signal's speed; without one it is km/h."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Road:
+    """What a signal's place depends on: the file for messages, the road's line and its elevation."""
+
+    where: str
+    line: PlanView
+    elevation: tuple[tuple[float, float, float, float, float], ...]
+
+    def height(self, s: float) -> float:
+        """Elevation of the reference line [m], a cubic in s from the last record that begins before it."""
+        begun = [record for record in self.elevation if record[0] <= s]
+        if not begun:
+            return 0.0
+        start, a, b, c, d = begun[-1]
+        u = s - start
+        return a + u * (b + u * (c + u * d))
+
+
+def is_opendrive(path: Path) -> bool:
+    """Tell whether a file is OpenDRIVE, by its name."""
+    return path.suffix.lower() == ".xodr"
+
+
+def opendrive_signs(path: Path, net_offset: tuple[float, float] = (0.0, 0.0)) -> list[Sign]:
+    """Signs that the static signals of an OpenDRIVE file stand for; dynamic ones (traffic lights) are left out.
+
+    Signals of type 274 or whose name begins with "speed" are speed limits (their value, by unit; for type 274 the
+    subtype in km/h where there is no value, as the catalogue of 2017 numbers them). Every other, and a speed sign that
+    tells no speed, is of kind ``xodr.TYPE`` with its value as it stands, 0 without one.
+
+    Parameters
+    ----------
+    path : Path
+        OpenDRIVE file.
+    net_offset : tuple of float
+        What the conversion to a SUMO network added to x and y [m] (``netOffset`` in the net).
+
+    Raises
+    ------
+    InputError
+        If the file is not OpenDRIVE, or a signal has no usable place.
+    """
+    try:
+        root = ET.parse(path).getroot()  # noqa: S314 - the user's own file; expat fetches nothing
+    except (OSError, ET.ParseError) as error:
+        raise InputError(f"{path}: not an OpenDRIVE file: {error}") from error
+    if root.tag != "OpenDRIVE":
+        raise InputError(f"{path}: not an OpenDRIVE file: expected <OpenDRIVE> at its top, got <{root.tag}>")
+    return [sign for road in root.iter("road") for sign in _road_signs(path, road, net_offset)]
+
+
+def _road_signs(path: Path, element: ET.Element, net_offset: tuple[float, float]) -> Iterator[Sign]:
+    signals = [s for s in element.iterfind("signals/signal") if s.get("dynamic", "no") != "yes"]
+    if not signals:
+        return
+    where = f"{path}: road {element.get('id', '?')!r}"
+    try:
+        line = plan_view(element.iterfind("planView/geometry"))
+        records = element.iterfind("elevationProfile/elevation")
+        elevation = tuple(tuple(float(e.get(key, "0")) for key in ("s", "a", "b", "c", "d")) for e in records)
+    except ValueError as error:
+        raise InputError(f"{where}: {error}") from None
+    left_hand = element.get("rule", "RHT") == "LHT"
+    road = _Road(where, line, elevation)  # type: ignore[arg-type]  # each record has its five numbers
+    for signal in signals:
+        yield _sign(road, signal, net_offset, left_hand)
+
+
+def _sign(road: _Road, signal: ET.Element, net_offset: tuple[float, float], left_hand: bool) -> Sign:
+    where = f"{road.where}: signal {signal.get('id', '?')!r}"
+    try:
+        s, t = float(signal.attrib["s"]), float(signal.attrib["t"])
+        x, y, along = road.line.at(s)
+        size = max(_number(signal, "width"), _number(signal, "height"))
+        above = float(signal.attrib["zOffset"]) + 0.5 * size if "zOffset" in signal.attrib else HEIGHT
+        kind, value = _meaning(signal)
+        turn = _number(signal, "hOffset")
+    except KeyError as error:
+        raise InputError(f"{where}: a signal needs the attribute {error}") from None
+    except ValueError as error:
+        raise InputError(f"{where}: {error}") from None
+    position = (
+        x - t * math.sin(along) + net_offset[0],
+        y + t * math.cos(along) + net_offset[1],
+        road.height(s) + above,
+    )
+    heading = along + turn + (0.0 if _faces_along(signal, t, left_hand) else math.pi)
+    return Sign(f"xodr.{signal.get('id', '')}", kind, value, position, heading, size or DIAMETER)
+
+
+def _faces_along(signal: ET.Element, t: float, left_hand: bool) -> bool:
+    """Whether it speaks to those who drive along the reference line; where it says both, the side tells."""
+    orientation = signal.get("orientation", "none")
+    return orientation == "+" or (orientation != "-" and (t > 0 if left_hand else t <= 0))
+
+
+def _meaning(signal: ET.Element) -> tuple[str, float]:
+    """Kind and value of a signal."""
+    code, name = signal.get("type", ""), signal.get("name", "").lower()
+    value = _number(signal, "value")
+    if code == GERMAN_SPEED_LIMIT and value <= 0 and signal.get("subtype", "").isdecimal():
+        value = float(signal.get("subtype", ""))
+    if (code == GERMAN_SPEED_LIMIT or name.startswith("speed")) and value > 0:
+        unit = signal.get("unit", "")
+        if unit not in _METRES_PER_SECOND:
+            allowed = ", ".join(filter(None, _METRES_PER_SECOND))
+            raise ValueError(f"expected the speed's unit to be one of {allowed}, got {unit!r}")
+        return "speed_limit", value * _METRES_PER_SECOND[unit]
+    # Files write -1 for "no value".
+    return f"xodr.{code or 'unknown'}", max(value, 0.0)
+
+
+def _number(signal: ET.Element, key: str) -> float:
+    text = signal.get(key, "").strip()
+    try:
+        number = float(text or "0")
+    except ValueError:
+        raise ValueError(f"expected a number for {key}, got {text!r}") from None
+    if not math.isfinite(number):
+        raise ValueError(f"expected a finite number for {key}, got {text!r}")
+    return number

@@ -1,0 +1,1 @@
+"""A SUMO simulation: how it is reached, what is read of it, what is set in it."""

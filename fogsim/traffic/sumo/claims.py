@@ -1,0 +1,149 @@
+"""Setting what others may set too: attributes of SUMO's vehicles, which several sessions of FogSim claim at once.
+
+What each session wants of a vehicle, and what the vehicle had by itself, is kept with the vehicle in SUMO, in
+parameters whose keys begin with ``fogsim.``: there all sessions of a simulation find it, those of other processes too,
+and it ends with the vehicle.
+"""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from fogsim.traffic.sumo.link import Api
+
+SOLE_SESSION = "1"
+"""Name of a session that has its simulation for itself."""
+
+_SESSIONS = "fogsim.sessions"
+_OWN = "own"
+_Value = TypeVar("_Value")
+
+
+@dataclass(frozen=True, slots=True)
+class Attribute:
+    """What of a vehicle is set.
+
+    Attributes
+    ----------
+    name : str
+        Its name.
+    read : callable
+        From SUMO's domain of vehicles and a vehicle's id to the value.
+    write : callable
+        Sets a vehicle's value.
+    """
+
+    name: str
+    read: Callable[[Api, str], float]
+    write: Callable[[Api, str, float], None]
+
+
+TOP_SPEED = Attribute("maxSpeed", lambda get, v: float(get.getMaxSpeed(v)), lambda set_, v, x: set_.setMaxSpeed(v, x))
+"""Top speed [m/s]."""
+
+TIME_HEADWAY = Attribute("tau", lambda get, v: float(get.getTau(v)), lambda set_, v, x: set_.setTau(v, x))
+"""Wanted time headway [s]."""
+
+LANE_CHANGE_MODE = Attribute(
+    "laneChangeMode",
+    lambda get, v: float(get.getLaneChangeMode(v)),
+    lambda set_, v, x: set_.setLaneChangeMode(v, int(x)),
+)
+"""Bits of why a vehicle may change lane."""
+
+_SPEED_GAIN = "laneChangeModel.lcSpeedGain"
+
+SPEED_GAIN = Attribute(
+    "lcSpeedGain",
+    lambda get, v: float(get.getParameter(v, _SPEED_GAIN)),
+    lambda set_, v, x: set_.setParameter(v, _SPEED_GAIN, repr(x)),
+)
+"""Eagerness to change lanes for speed (LC2013, SL2015) [-]."""
+
+
+def new_session(api: Api) -> str:
+    """Name of a new session of a simulation, which no other session of it has."""
+    number = int(api.simulation.getParameter("", _SESSIONS) or 0) + 1
+    api.simulation.setParameter("", _SESSIONS, str(number))
+    return str(number)
+
+
+class Notes(Generic[_Value]):
+    """What sessions have noted about vehicles under one key, by session.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    name : str
+        What it is about.
+    """
+
+    def __init__(self, api: Api, name: str) -> None:
+        self._vehicles = api.vehicle
+        self._key = f"fogsim.{name}"
+
+    def read(self, vehicle: str) -> dict[str, _Value]:
+        """Notes about a vehicle, by session."""
+        text = self._vehicles.getParameter(vehicle, self._key)
+        notes: dict[str, _Value] = json.loads(text) if text else {}
+        return notes
+
+    def write(self, vehicle: str, notes: dict[str, _Value]) -> None:
+        """Replace the notes about a vehicle."""
+        self._vehicles.setParameter(vehicle, self._key, json.dumps(notes) if notes else "")
+
+
+class Claims:
+    """One session's claims to one attribute of vehicles.
+
+    The lowest claim of all sessions holds, unless the vehicle's own value is lower. A value that somebody else has set
+    meanwhile is the vehicle's own from then on.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    attribute : Attribute
+        What is claimed.
+    session : str
+        Name of the session.
+    """
+
+    def __init__(self, api: Api, attribute: Attribute, session: str) -> None:
+        self._vehicles = api.vehicle
+        self._attribute = attribute
+        self._session = session
+        self._notes = Notes[float](api, attribute.name)
+
+    def own(self, vehicle: str) -> float:
+        """The value that a vehicle has without any claim."""
+        return self._known(vehicle)[1][_OWN]
+
+    def _known(self, vehicle: str) -> tuple[float, dict[str, float]]:
+        """The value in force, and all claims with the vehicle's own value."""
+        now, notes = self._attribute.read(self._vehicles, vehicle), self._notes.read(vehicle)
+        if not notes or now != min(notes.values()):
+            notes[_OWN] = now
+        return now, notes
+
+    def make(self, vehicle: str, value: float) -> None:
+        """Claim that the attribute be no higher than a value."""
+        now, notes = self._known(vehicle)
+        notes[self._session] = value
+        self._put_in_force(vehicle, now, notes)
+
+    def withdraw(self, vehicle: str) -> None:
+        """Withdraw the claim to a vehicle, if there is one: what others claim, or its own value, comes into force."""
+        # Before anything else is asked: mostly there is none.
+        if self._session in self._notes.read(vehicle):
+            now, notes = self._known(vehicle)
+            del notes[self._session]
+            self._put_in_force(vehicle, now, notes)
+
+    def _put_in_force(self, vehicle: str, now: float, notes: dict[str, float]) -> None:
+        value = min(notes.values())
+        if value != now:
+            self._attribute.write(self._vehicles, vehicle, value)
+        self._notes.write(vehicle, notes if len(notes) > 1 else {})

@@ -1,0 +1,108 @@
+"""The libsumo library: imported on first use, and asked whether a simulation runs in this process already."""
+
+import contextlib
+import io
+import os
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from types import ModuleType
+
+from fogsim.errors import MissingDependencyError, SimulationError, SimulationRunningError
+from fogsim.traffic.sumo.link import Api, told_errors
+
+
+def load_libsumo() -> ModuleType:
+    """Import libsumo without the lines that it prints on the way.
+
+    Raises
+    ------
+    MissingDependencyError
+        If libsumo or a library of the system that it needs is missing.
+    """
+    try:
+        # libsumo prints a remark about other packages' versions to stdout, which may carry JSON of ours.
+        with contextlib.redirect_stdout(io.StringIO()):
+            import libsumo  # noqa: PLC0415 - importing fogsim must not load SUMO
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"libsumo cannot be loaded ({error}); install it with: pip install libsumo, "
+            "and on Debian/Ubuntu: sudo apt-get install libgl1 libxrender1 libatomic1"
+        ) from error
+    module: ModuleType = libsumo
+    return module
+
+
+class LibsumoLink:
+    """SUMO inside this process, through libsumo; one at a time."""
+
+    distant = False
+    shared = False
+
+    def __init__(self) -> None:
+        self._sumo: ModuleType | None = None
+
+    def begin(self, arguments: Sequence[str]) -> Api:
+        """Start SUMO here, or load it anew; see `SumoLink.begin`.
+
+        Raises
+        ------
+        SimulationRunningError
+            If another simulation runs in this process.
+        SimulationError
+            If SUMO refuses its input; the message holds SUMO's own words.
+        """
+        sumo = load_libsumo()
+        if sumo.isLoaded() and self._sumo is None:
+            raise SimulationRunningError(
+                "another SUMO simulation runs in this process, and libsumo can hold only one: close the other one "
+                "first, or run this one in its own process (gymnasium.make_vec and AsyncVectorEnv do that for "
+                "environments)"
+            )
+        with captured_stderr() as words:
+            try:
+                if self._sumo is None:
+                    sumo.start(["sumo", *arguments])
+                else:
+                    sumo.load(list(arguments))
+            except sumo.TraCIException as error:
+                failure = error
+            else:
+                self._sumo = sumo
+                return sumo
+        self._sumo = sumo
+        self.end()
+        said = " ".join(line.strip() for line in words if line.strip()) or str(failure)
+        raise SimulationError(f"SUMO cannot load the scenario: {said}")
+
+    def step(self) -> None:
+        """Move the simulation by one step; see `SumoLink.step`."""
+        if self._sumo is not None:
+            self._sumo.simulationStep()
+
+    def end(self) -> None:
+        """End the simulation; see `SumoLink.end`."""
+        if self._sumo is not None and self._sumo.isLoaded():
+            self._sumo.close()
+        self._sumo = None
+
+    def watched(self) -> contextlib.AbstractContextManager[None]:
+        """Turn what libsumo refuses into an error of ours; see `SumoLink.watched`."""
+        return told_errors(self._sumo or load_libsumo(), "in this process")
+
+
+@contextlib.contextmanager
+def captured_stderr() -> Iterator[list[str]]:
+    """Collect what native code writes to the process's stderr; the list is filled on leaving."""
+    lines: list[str] = []
+    sys.stderr.flush()
+    saved = os.dup(2)
+    with tempfile.TemporaryFile() as file:
+        os.dup2(file.fileno(), 2)
+        try:
+            yield lines
+        finally:
+            os.dup2(saved, 2)
+            os.close(saved)
+            file.seek(0)
+            lines += file.read().decode(errors="replace").splitlines()

@@ -1,0 +1,63 @@
+"""What a running simulation says of itself."""
+
+import difflib
+from collections.abc import Collection
+from pathlib import Path
+
+from fogsim.errors import SimulationError
+from fogsim.traffic.sumo.link import Api
+
+CLOCK_TICK = 1e-3
+"""Resolution of SUMO's clock [s]."""
+
+SHOWN = 8
+"""Vehicles that a message names."""
+
+
+def those_seen(ego: str, seen: Collection[str]) -> str:
+    """Say which vehicles there were instead of an ego that was not, those with a similar id first."""
+    if not seen:
+        return "no vehicle at all did: are there vehicles in its route or additional files?"
+    near = difflib.get_close_matches(ego, sorted(seen), n=3, cutoff=0.5)
+    some = [*near, *sorted(set(seen).difference(near))[: SHOWN - len(near)]]
+    others = f" and {len(seen) - len(some)} more" if len(seen) > len(some) else ""
+    return f"those that did: {', '.join(some)}{others}"
+
+
+def check_step_length(api: Api, step_length: float) -> None:
+    """Hold a simulation to the step that FogSim counts with.
+
+    Raises
+    ------
+    SimulationError
+        If its step is another.
+    """
+    found = api.simulation.getDeltaT()
+    if abs(found - step_length) > 1e-3 * CLOCK_TICK:
+        raise SimulationError(
+            f"SUMO moves in steps of {found:g} s, but clocks.traffic_step_s is {step_length:g}: "
+            f"start SUMO with --step-length {step_length:g}, or set clocks.traffic_step_s={found:g}"
+        )
+
+
+def loaded_net(api: Api) -> Path:
+    """Network file that a running simulation has loaded.
+
+    Raises
+    ------
+    SimulationError
+        If there is no such file here, as SUMO may have been started in another folder or on another machine.
+    """
+    path = Path(api.simulation.getOption("net-file"))
+    if not path.is_file():
+        raise SimulationError(
+            f"SUMO says that its network is {str(path)!r}, and there is no such file as seen from {Path.cwd()}: "
+            "name the file (net)"
+        )
+    return path
+
+
+def loaded_additional(api: Api) -> tuple[Path, ...]:
+    """Additional files of a running simulation, as far as they are here to be read."""
+    names = api.simulation.getOption("additional-files").split(",")
+    return tuple(path for name in names if (path := Path(name.strip())).is_file())

@@ -1,0 +1,208 @@
+"""SUMO in another process, which the user has started, over a TraCI connection."""
+
+import contextlib
+import socket
+import time
+from collections.abc import Sequence
+from types import ModuleType
+
+from fogsim.errors import InputError, MissingDependencyError, SimulationError
+from fogsim.traffic.sumo.link import Api, told_errors
+
+WAIT = 0.25
+"""Time between two attempts to connect [s]."""
+
+TIMEOUT = 60.0
+"""How long SUMO may leave one message unanswered unless something else is asked for [s]."""
+
+LONGEST_TIMEOUT = 1e6
+"""From here on a time is for ever [s]: sockets cannot count much longer ones."""
+
+
+def load_traci() -> ModuleType:
+    """Import traci.
+
+    Raises
+    ------
+    MissingDependencyError
+        If it is not installed.
+    """
+    try:
+        import traci  # noqa: PLC0415 - importing fogsim must not load SUMO's packages
+    except ImportError as error:
+        raise MissingDependencyError(f"traci cannot be loaded ({error}); install it with: pip install traci") from error
+    module: ModuleType = traci
+    return module
+
+
+class TraciLink:
+    """One client of a SUMO or sumo-gui that runs with ``--remote-port``.
+
+    The simulation is taken as it is at the first `begin`, whatever its arguments; a later one loads the arguments.
+
+    Parameters
+    ----------
+    host : str
+        Where SUMO runs.
+    port : int
+        Its ``--remote-port``.
+    order : int or None
+        This client's place among several (SUMO's ``--num-clients``); each needs another one.
+    retries : int
+        How often to try again, every 0.25 s, while SUMO does not listen yet.
+    timeout : float
+        How long SUMO may leave one message unanswered [s], more than 0; ``inf`` for ever. A step waits for all clients.
+
+    Raises
+    ------
+    InputError
+        If the timeout is no such time.
+    """
+
+    distant = True
+    shared = True
+
+    def __init__(
+        self,
+        host: str = "localhost",
+        port: int = 8813,
+        order: int | None = None,
+        retries: int = 40,
+        timeout: float = TIMEOUT,
+    ) -> None:
+        if not timeout > 0:
+            raise InputError(f"timeout: expected a time of more than 0 s, or inf for ever, got {timeout!r}")
+        self._timeout = timeout
+        self._host = host
+        self._port = port
+        self._order = order
+        self._retries = retries
+        self._connection: Api = None
+
+    @property
+    def _where(self) -> str:
+        return f"at {self._host}:{self._port}"
+
+    def begin(self, arguments: Sequence[str]) -> Api:
+        """Connect, or load the simulation anew; see `SumoLink.begin`.
+
+        Raises
+        ------
+        SimulationError
+            If SUMO cannot be reached, refuses or falls silent, or other clients would lose their simulation by loading
+            another.
+        """
+        if self._connection is None:
+            self._connection = self._connect()
+        else:
+            with self.watched():
+                self._load(arguments)
+        return self._connection
+
+    def _connect(self) -> Api:
+        traci, begun = load_traci(), time.monotonic()
+        # A host that swallows what is sent to it lets each attempt last for minutes.
+        longest = max(self._timeout, self._retries * WAIT)
+        for attempt in range(self._retries + 1):
+            try:
+                # Its own retries would print to stdout.
+                connection = traci.connect(port=self._port, numRetries=0, host=self._host)
+                break
+            except (traci.FatalTraCIError, OSError) as error:
+                if attempt == self._retries or time.monotonic() - begun > longest:
+                    raise SimulationError(self._silence(attempt + 1, time.monotonic() - begun, error)) from error
+                time.sleep(WAIT)
+        connection._socket = _LimitedSocket(connection._socket, self._timeout, self._where)
+        if self._order is not None:
+            with self.watched():
+                connection.setOrder(self._order)
+        return connection
+
+    def _silence(self, asked: int, waited: float, error: Exception) -> str:
+        """Say that nobody has answered, for how long, and what to do."""
+        # traci's own words only count the tries of one attempt, which is always one.
+        why = f" ({error})" if isinstance(error, OSError) else ""
+        return (
+            f"no SUMO answers {self._where}{why}, asked {asked} times within {waited:.1f} s: start it with "
+            f"--remote-port {self._port}, and --num-clients if it is to have several clients"
+        )
+
+    def _load(self, arguments: Sequence[str]) -> None:
+        clients = int(self._connection.simulation.getOption("num-clients"))
+        if clients > 1:
+            raise SimulationError(
+                f"SUMO {self._where} has {clients} clients, and beginning anew would take the simulation away from the "
+                "others: start SUMO again for another run"
+            )
+        # Loaded anew, a sumo-gui would wait for its button to be pressed, and forget whether to close at the end.
+        closes = self._connection.simulation.getOption("quit-on-end") == "true"
+        self._connection.load([*arguments, "--start", *(("--quit-on-end",) if closes else ())])
+
+    def step(self) -> None:
+        """Move by one step, when all other clients have asked for it too; see `SumoLink.step`."""
+        self._connection.simulationStep()
+
+    def end(self) -> None:
+        """Leave the simulation; SUMO ends when its last client has left. See `SumoLink.end`."""
+        connection, self._connection = self._connection, None
+        if connection is not None:
+            _hang_up(connection)
+
+    def watched(self) -> contextlib.AbstractContextManager[None]:
+        """Turn the loss of the connection into an error of ours; see `SumoLink.watched`."""
+        return told_errors(load_traci(), self._where)
+
+
+class _LimitedSocket:
+    """A socket of traci's that tells a silent SUMO by an error of ours; traci takes silence for a closed connection.
+
+    Parameters
+    ----------
+    connected : socket.socket
+        The socket.
+    timeout : float
+        How long to wait [s].
+    where : str
+        Where the simulation runs, for the message.
+    """
+
+    def __init__(self, connected: socket.socket, timeout: float, where: str) -> None:
+        self._socket = connected
+        self._timeout = timeout
+        self._where = where
+        connected.settimeout(timeout if timeout < LONGEST_TIMEOUT else None)
+
+    def recv(self, size: int) -> bytes:
+        """Wait for up to `size` bytes."""
+        try:
+            return self._socket.recv(size)
+        except TimeoutError as error:
+            raise self._given_up() from error
+
+    def send(self, message: bytes) -> None:
+        """Send a whole message; with a time limit, a plain ``send`` may stop half-way."""
+        try:
+            self._socket.sendall(message)
+        except TimeoutError as error:
+            raise self._given_up() from error
+
+    def _given_up(self) -> SimulationError:
+        # An answer that comes yet would be taken for that to the next message, the farewell too.
+        self._socket.close()
+        return SimulationError(
+            f"SUMO {self._where} has not answered for {self._timeout:g} s: it is stopped, or it waits for its start "
+            "button or another client, or needs longer; the time is set by connect(…, timeout=…)"
+        )
+
+    def close(self) -> None:
+        """Close the socket; closing twice is allowed."""
+        self._socket.close()
+
+
+def _hang_up(connection: Api) -> None:
+    # On an error of sending, traci leaves the socket open and keeps nothing that would close it.
+    connected = connection._socket
+    with contextlib.suppress(load_traci().FatalTraCIError, OSError, SimulationError):
+        connection.close(False)
+    if connected is not None:
+        connected.close()

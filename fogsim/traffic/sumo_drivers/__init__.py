@@ -1,0 +1,1 @@
+"""SUMO's drivers: whom they see, and how fast they go."""

@@ -1,0 +1,128 @@
+"""A SUMO simulation that its owner has started, steps and ends."""
+
+import contextlib
+from collections.abc import Sequence
+from dataclasses import replace
+
+from fogsim.errors import InputError, SimulationError
+from fogsim.traffic.setup import TrafficSetup
+from fogsim.traffic.sumo.library import load_libsumo
+from fogsim.traffic.sumo.link import Api, told_errors
+from fogsim.traffic.sumo.loaded_files import those_seen
+from fogsim.traffic.sumo.traci_link import load_traci
+from fogsim.traffic.sumo_traffic import SumoTraffic
+from fogsim.values import Command, Unplayed
+
+
+class AttachedLink:
+    """A simulation that runs already, and is neither stepped nor ended by this link.
+
+    Parameters
+    ----------
+    api : module or traci.Connection
+        libsumo, traci, or one connection of traci.
+
+    Raises
+    ------
+    InputError
+        If it is something else.
+    SimulationError
+        If it is libsumo, and no simulation has been started.
+    """
+
+    shared = True
+
+    def __init__(self, api: Api) -> None:
+        if not hasattr(api, "simulationStep"):
+            raise InputError(f"expected libsumo, traci or a connection of traci, got {api!r}")
+        self._api = api
+        # A connection of traci does not say what it is; both modules do.
+        inside = bool(getattr(api, "isLibsumo", bool)())
+        self.distant = not inside
+        self._library = load_libsumo() if inside else load_traci()
+        if inside and not api.isLoaded():
+            raise SimulationError("no simulation runs in libsumo: call libsumo.start first")
+
+    def begin(self, arguments: Sequence[str]) -> Api:  # noqa: ARG002 - the simulation has its own
+        """Take the simulation as it is; see `SumoLink.begin`."""
+        return self._api
+
+    def step(self) -> None:
+        """Do nothing: the simulation's owner steps it."""
+
+    def end(self) -> None:
+        """Do nothing: the simulation is its owner's."""
+
+    def watched(self) -> contextlib.AbstractContextManager[None]:
+        """Turn the loss of the simulation into an error of ours; see `SumoLink.watched`."""
+        return told_errors(self._library, "to which FogSim is attached")
+
+
+class AttachedTraffic(SumoTraffic):
+    """SUMO traffic whose steps its owner commands: `obey` before each, `look` after it.
+
+    Parameters
+    ----------
+    setup : TrafficSetup
+        The ego and how vehicles obey; of the simulation's files, only a network that is named is used.
+    api : module or traci.Connection
+        libsumo, traci, or one connection of traci, with a simulation that runs.
+
+    Attributes
+    ----------
+    ego : str
+        Id of the ego.
+
+    Raises
+    ------
+    SimulationError
+        If no simulation runs there.
+    """
+
+    def __init__(self, setup: TrafficSetup, api: Api) -> None:
+        self._attached = AttachedLink(api)
+        self._api = api
+        self.ego = setup.ego
+        self._seen: set[str] = set()
+        super().__init__(replace(setup, step_length=step_length(api)), self._attached)
+
+    def ego_is_there(self) -> bool:
+        """True while the ego is on the road."""
+        with self._attached.watched():
+            present = self._api.vehicle.getIDList()
+        self._seen.update(present)
+        return self.ego in present
+
+    def obey(self, command: Command) -> None:
+        """Put a command in force for the next step; see `SumoTraffic.obey`."""
+        # The owner may have taken a vehicle away since the look.
+        with self._attached.watched():
+            self._running.roster.recount()
+        super().obey(command)
+
+    def unplayed(self) -> Unplayed:
+        """What of the script has not been played; see `Traffic.unplayed`."""
+        return self._unplayed(self._seen)
+
+    def absence(self) -> str:
+        """Say that the ego has not been on the road so far, and who has."""
+        return f"the ego {self.ego!r} did not appear while FogSim was attached; {those_seen(self.ego, self._seen)}"
+
+    def release(self) -> None:
+        """Give every vehicle back what was changed about it."""
+        with self._attached.watched():
+            # In a simulation that was loaded since, others bear the same names.
+            if self._api.simulation.getTime() >= self._running.roster.time:
+                self._release()
+
+
+def step_length(api: Api) -> float:
+    """Step of a simulation that runs [s].
+
+    Raises
+    ------
+    SimulationError
+        If none does.
+    """
+    with AttachedLink(api).watched():
+        return float(api.simulation.getDeltaT())

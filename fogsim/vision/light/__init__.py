@@ -1,0 +1,1 @@
+"""From pixel values to linear luminance, and whether it is daylight."""

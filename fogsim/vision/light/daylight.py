@@ -1,0 +1,129 @@
+"""Whether the sky lights the road, as daytime methods need, or lamps do."""
+
+import functools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.jit import kernel
+from fogsim.values.camera import Camera
+from fogsim.vision.light.luminance import linear_luminance
+from fogsim.vision.light.medians import columns_apart, median, quantile
+
+Pixels = NDArray[np.uint8] | NDArray[np.uint16]
+
+BRIGHT_SHARE = 0.75
+"""Share of the sky that is no brighter than what counts as its brightness: woods and glows may cover the rest [-]."""
+
+SKY_ELEVATIONS, SKY_ROWS, SKY_STEP = (0.12, 0.25), 12, 4
+"""Between which angles above the horizon that is looked at [rad], for lamps light the fog along the horizon most, in
+how many rows, and in every which column [px]."""
+
+NEAREST, FARTHEST, ROAD_ROWS = 6.0, 12.0, 9
+"""Between which distances the road is looked at, the farther one being at least half as much again as the nearest that
+is seen [m], and in how many rows."""
+
+HALF_LANE, ASIDE = 1.2, (4.0, 7.0)
+"""Half the width of the own lane's middle, and the strips beside it that low beams light least [m]."""
+
+LAMP, LAMPS_SHARE, DARK_SKY = 250.0, 0.004, 140.0
+"""Luminance of what may be a lamp in the sky, least share of the sky's pixels that lamps cover [-], and most luminance
+that the sky has in the median where lamps stand out of it [linear grey levels]."""
+
+BEAM = 1.15
+"""Luminance of the own lane over that of both sides from which on it may be a beam's [-]."""
+
+
+Strip = tuple[NDArray[np.int64], NDArray[np.int64]]
+
+
+@dataclass(frozen=True, slots=True)
+class _View:
+    """Where a camera sees the sky and the near road.
+
+    Attributes
+    ----------
+    rows : (n + ROAD_ROWS,) int64
+        Rows of the sky, from the top down, and of the road, from near to far.
+    lane, left, right : ((rows of the road,) int64, (rows of the road,) int64)
+        First column of a strip of the road and that after its last, the same where the strip is not seen.
+    """
+
+    rows: NDArray[np.int64]
+    lane: Strip
+    left: Strip
+    right: Strip
+
+
+def lit_by_lamps(level: Pixels, camera: Camera) -> str:
+    """Say what shows that lamps light the road; empty if the sky may.
+
+    What the sky alone lights is never brighter than the sky, however bright its surface and however dense the fog: a
+    perfectly white road has the mean luminance of the sky, and air along the way at most that of the sky behind it.
+    Oncoming lamps brighten the fog along the horizon, so the sky is measured above that. Street lamps brighten the sky,
+    too; but they stand out of it, and own lamps still light the own lane more than what lies beside it.
+
+    Parameters
+    ----------
+    level : (rows, cols) or (rows, cols, 3) uint8 or uint16
+        A level image, its horizon inside.
+    camera : Camera
+        The told calibration.
+    """
+    view = _view_of(camera)
+    luminance = linear_luminance(level[view.rows], camera.response, camera.bits)
+    sky, road = columns_apart(luminance[:-ROAD_ROWS], SKY_STEP), luminance[-ROAD_ROWS:]
+    lane = _row_medians(road, *view.lane)
+    if median(lane) > quantile(sky, BRIGHT_SHARE):
+        return "the road is brighter than the sky, so lamps light it: this is a daytime method"
+    shining = float(np.count_nonzero(sky >= LAMP)) >= LAMPS_SHARE * sky.size and median(sky) < DARK_SKY
+    if shining and _has_beam(lane, _row_medians(road, *view.left), _row_medians(road, *view.right)):
+        return "lamps light the sky and the road: this is a daytime method"
+    return ""
+
+
+@functools.lru_cache(maxsize=8)
+def _view_of(camera: Camera) -> _View:
+    last = camera.height - 1
+    nearest = max(camera.row_distance / max(last - camera.horizon_row, 1.0), NEAREST)
+    distance = np.geomspace(nearest, max(FARTHEST, 1.5 * nearest), ROAD_ROWS)
+    rows = np.minimum(np.rint(camera.horizon_row + camera.row_distance / distance).astype(np.int64), last)
+    sides = ((-HALF_LANE, HALF_LANE), (-ASIDE[1], -ASIDE[0]), ASIDE)
+    seen = np.concatenate((_sky_rows(camera), np.maximum(rows, 0)))
+    return _View(seen, *(_strip(distance, camera, *side) for side in sides))
+
+
+def _sky_rows(camera: Camera) -> NDArray[np.int64]:
+    """Rows well above the horizon; the upper half of what is above it where the image ends below them."""
+    low, high = (camera.horizon_row - angle * camera.focal_length for angle in SKY_ELEVATIONS)
+    top = max(math.floor(high), 0)
+    bottom = max(math.floor(low), math.floor(0.5 * (top + camera.horizon_row)))
+    return np.unique(np.linspace(top, max(bottom, top), SKY_ROWS).astype(np.int64))
+
+
+def _strip(distance: NDArray[np.float64], camera: Camera, left: float, right: float) -> Strip:
+    """Columns of a strip between two sides [m, positive to the right] of which at least a half is seen."""
+    middle, scale = camera.principal_point[0], camera.focal_length / distance
+    first = np.maximum(np.ceil(middle + left * scale), 0.0)
+    last = np.minimum(np.floor(middle + right * scale), camera.width - 1.0)
+    seen = (np.floor(middle + right * scale) - first >= 0.5 * (right - left) * scale) & (first < camera.width)
+    return first.astype(np.int64), np.where(seen, last + 1.0, first).astype(np.int64)
+
+
+@kernel
+def _row_medians(road: NDArray[np.float32], first: NDArray[np.int64], end: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Median of each row (rows, cols) from its first column to before its end, NaN where there are none."""
+    found = np.full(len(road), np.nan)
+    for row in range(len(road)):
+        if first[row] < end[row]:
+            found[row] = np.median(road[row, first[row] : end[row]])
+    return found
+
+
+def _has_beam(lane: NDArray[np.float64], left: NDArray[np.float64], right: NDArray[np.float64]) -> bool:
+    """Whether the own lane is brighter than both of its sides."""
+    beside = np.maximum(left, right)
+    seen = np.isfinite(lane / np.maximum(beside, 1e-3))
+    return bool(seen.any() and median(lane[seen] / np.maximum(beside[seen], 1e-3)) > BEAM)

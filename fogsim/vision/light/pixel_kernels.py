@@ -1,0 +1,73 @@
+"""Compiled luminance of pixels: looked up, weighed and added.
+
+Every kernel is called with the dtypes named in its docstring and C-contiguous arrays, so that it compiles once.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.jit import kernel
+
+Pixels = NDArray[np.uint8] | NDArray[np.uint16]
+
+RED, GREEN, BLUE = np.float32(0.2126), np.float32(0.7152), np.float32(0.0722)
+
+
+@kernel
+def grey_luminance(image: Pixels, table: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Look every pixel up: (rows, cols) uint8 or uint16 and (2^bits,) float32 to (rows, cols) float32."""
+    rows, cols = image.shape
+    out = np.empty((rows, cols), np.float32)
+    for row in range(rows):
+        for col in range(cols):
+            out[row, col] = table[image[row, col]]
+    return out
+
+
+@kernel
+def colour_luminance(image: Pixels, table: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Look every channel up and weigh them: (rows, cols, 3) uint8 or uint16 to (rows, cols) float32."""
+    rows, cols, _ = image.shape
+    red, green, blue = table * RED, table * GREEN, table * BLUE
+    out = np.empty((rows, cols), np.float32)
+    for row in range(rows):
+        for col in range(cols):
+            pixel = image[row, col]
+            out[row, col] = red[pixel[0]] + green[pixel[1]] + blue[pixel[2]]
+    return out
+
+
+@kernel
+def light(pixels: NDArray[np.uint8] | NDArray[np.uint16], tables: NDArray[np.float32], row: int, col: int) -> float:
+    """Luminance of a pixel [linear grey levels]."""
+    total = np.float32(0.0)
+    for channel in range(pixels.shape[2]):
+        total += tables[channel, pixels[row, col, channel]]
+    return float(total)
+
+
+@kernel
+def row_light(
+    pixels: NDArray[np.uint8] | NDArray[np.uint16],
+    tables: NDArray[np.float32],
+    row: int,
+    line: NDArray[np.float32],
+) -> None:
+    """Luminance of all pixels of a row; `line` (cols,) is written [linear grey levels]."""
+    seen = pixels[row]
+    if pixels.shape[2] == 3:
+        red, green, blue = tables[0], tables[1], tables[2]
+        for col in range(line.size):
+            line[col] = red[seen[col, 0]] + green[seen[col, 1]] + blue[seen[col, 2]]
+    else:
+        for col in range(line.size):
+            line[col] = tables[0, seen[col, 0]]
+
+
+@kernel
+def even_column(j: int, count: int, left: float, right: float) -> int:
+    """Column of the j-th of `count` samples evenly between two sides [px]; those of a mirrored image are mirrored."""
+    apart = (min(j, count - 1 - j) + 0.5) * (right - left) / count
+    return math.floor(left + apart + 0.5) if 2 * j < count else math.ceil(right - apart - 0.5)

@@ -1,0 +1,1 @@
+"""Edges, lines along the road, the vanishing point and the horizon."""

@@ -1,0 +1,104 @@
+"""Luminance by row: the curve that fog draws on the road."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.vision.light.medians import row_medians
+from fogsim.vision.region import region_kernels
+from fogsim.vision.region.road_region import Band
+
+MAX_BLOCKS = 48  # columns that a row's median is taken over; more cost time and gain nothing
+
+
+def band_profile(luminance: NDArray[np.float32], band: Band) -> NDArray[np.float64]:
+    """Median luminance of each row of a band.
+
+    A wide band is first averaged over equal blocks of columns: that keeps the median's indifference to marks and
+    other narrow things, and loses less to noise than a median of single pixels.
+
+    Parameters
+    ----------
+    luminance : (rows, cols) float32
+        Linear luminance.
+    band : Band
+        Where to look.
+
+    Returns
+    -------
+    (n,) float64
+        Rows ``band.top`` … ``band.bottom`` from the top down.
+    """
+    width = band.right - band.left + 1
+    block = -(-width // MAX_BLOCKS)
+    count = width // block
+    left = band.left + (width - count * block) // 2
+    strip = luminance[band.top : band.bottom + 1, left : left + count * block]
+    if block > 1:
+        strip = strip.reshape(strip.shape[0], count, block).mean(axis=2, dtype=np.float64)
+    return row_medians(strip)
+
+
+def decreasing(profile: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Smooth a profile such that it never rises from the top down, and falls wherever its neighbourhood does.
+
+    Isotonic regression, then the binomial 1-2-1, which keeps the order and rounds the steps off.
+
+    Parameters
+    ----------
+    profile : (n,) float64
+        Luminance by row from the top down.
+    """
+    ordered: NDArray[np.float64] = region_kernels.isotonic_decreasing(np.ascontiguousarray(profile))
+    padded = np.concatenate([ordered[:1], ordered, ordered[-1:]])
+    return 0.25 * padded[:-2] + 0.5 * padded[1:-1] + 0.25 * padded[2:]
+
+
+@dataclass(frozen=True, slots=True)
+class RoadCurve:
+    """The luminance of the road by row, with what the flat world says about the rows.
+
+    Attributes
+    ----------
+    below_horizon : (n,) float64
+        v − v_h of each row, ascending [px]; not positive for rows of sky.
+    luminance : (n,) float64
+        Linear luminance of each row.
+    distance : (n,) float64
+        Length of the fog path to each row's road [m]; ``inf`` for rows of sky.
+    weight : (n,) float64
+        1, or 0 for rows that say nothing (saturated).
+    row_distance : float
+        λ of the camera [px·m].
+    """
+
+    below_horizon: NDArray[np.float64]
+    luminance: NDArray[np.float64]
+    distance: NDArray[np.float64]
+    weight: NDArray[np.float64]
+    row_distance: float
+
+
+def path_lengths(
+    below_horizon: NDArray[np.float64], row_distance: float, slant: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Distance from the optical centre to the road by row.
+
+    Parameters
+    ----------
+    below_horizon : (n,) float64
+        v − v_h [px].
+    row_distance : float
+        λ of the camera [px·m]; λ / (v − v_h) is the depth along the optical axis (negru2013 eq. 11).
+    slant : (n,) float64
+        Ratio of the length along the ray to that depth, ≥ 1.
+
+    Returns
+    -------
+    (n,) float64
+        Distances [m]; ``inf`` at and above the horizon.
+    """
+    distance = np.full(below_horizon.shape, np.inf)
+    np.divide(row_distance * slant, below_horizon, out=distance, where=below_horizon > 0)
+    return distance

@@ -1,0 +1,150 @@
+"""Compiled growth of regions, the widest band that crosses one, and monotone fits.
+
+Every kernel is called with the dtypes named in its docstring and C-contiguous arrays, so that it compiles once.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.jit import kernel
+
+
+@kernel
+def grow_upward(
+    luminance: NDArray[np.float32],
+    edges: NDArray[np.uint8],
+    steps: NDArray[np.float32],
+    seed: float,
+    seed_tolerance: float,
+) -> NDArray[np.uint8]:
+    """Grow a region from the bottom row upward; see `fogsim.vision.region.road_region.grow_region`.
+
+    Growth only ever goes to the row above, so one sweep from the bottom does what a queue would.
+    """
+    rows, cols = luminance.shape
+    region = np.zeros((rows, cols), np.uint8)
+    for col in range(cols):
+        near_seed = abs(luminance[rows - 1, col] - seed) <= seed_tolerance
+        region[rows - 1, col] = near_seed and edges[rows - 1, col] == 0
+    drift = seed_tolerance
+    nowhere = np.float32(np.inf)
+    # What lies below and belongs to the region, with a border; infinite where nothing does: one comparison tells both.
+    lower = np.full(cols + 2, nowhere, np.float32)
+    for col in range(cols):
+        lower[col + 1] = luminance[rows - 1, col] if region[rows - 1, col] != 0 else nowhere
+    joined = np.full(cols + 2, nowhere, np.float32)
+    for row in range(rows - 2, -1, -1):
+        step = steps[row]
+        drift += step
+        line, marked, target = luminance[row], edges[row], region[row]
+        first, last = np.float32(seed - drift), np.float32(seed + drift)
+        before, under, behind, inside = lower[:cols], lower[1 : cols + 1], lower[2:], joined[1 : cols + 1]
+        for col in range(cols):
+            value = line[col]
+            apart = min(abs(value - before[col]), abs(value - under[col]), abs(value - behind[col]))
+            inside[col] = value if (apart <= step) & (value >= first) & (value <= last) else nowhere
+        for col in range(cols):
+            if marked[col] != 0:
+                inside[col] = nowhere
+            target[col] = inside[col] != nowhere
+        lower, joined = joined, lower
+    return region
+
+
+@kernel
+def column_tops(region: NDArray[np.uint8], hole: int) -> NDArray[np.int64]:
+    """Row to which each column of a (rows, cols) uint8 region reaches unbroken from the bottom.
+
+    Gaps of up to `hole` pixels are stepped over; a column that does not start at the bottom gets `rows`.
+    """
+    rows, cols = region.shape
+    tops, filled = np.full(cols, rows, np.int32), np.empty(cols, np.int32)
+    for row in range(rows - 1, -1, -1):
+        line, here, reach = region[row], np.int32(row), np.int32(row + hole + 1)
+        # Without a branch and with numbers of one size, so that the loop runs in vector registers.
+        for col in range(cols):
+            filled[col] = line[col]
+        for col in range(cols):
+            tops[col] = here if (tops[col] <= reach) & (filled[col] != 0) else tops[col]
+    return tops.astype(np.int64)
+
+
+@kernel
+def best_run(
+    tops: NDArray[np.int64], top: int, enough: int, centre: float, luminance: NDArray[np.float32]
+) -> tuple[int, int]:
+    """First column and width of the widest run of columns that reach up to row `top` or higher.
+
+    Width beyond `enough` does not count; of equals the run nearest to column `centre` is taken, of equally near ones
+    the wider one, then the one whose columns reach higher, and then the one of least `luminance` (rows, cols): neither
+    side comes first.
+    """
+    best_start, best_width, best_offset, start = 0, 0, np.inf, 0
+    for col in range(tops.size + 1):
+        if col < tops.size and tops[col] <= top:
+            continue
+        width, counted = col - start, min(col - start, enough)
+        offset = max(start - centre, centre - (col - 1), 0.0)
+        better, equal = counted > min(best_width, enough), counted == min(best_width, enough)
+        nearer = better or (equal and offset < best_offset)
+        alike = equal and offset == best_offset
+        if (
+            nearer
+            or (alike and width > best_width)
+            or (alike and width == best_width > 0 and _comes_first(tops, luminance, start, best_start, width))
+        ):
+            best_start, best_width, best_offset = start, width, offset
+        start = col + 1
+    return best_start, best_width
+
+
+@kernel
+def _comes_first(tops: NDArray[np.int64], luminance: NDArray[np.float32], start: int, other: int, width: int) -> bool:
+    """Whether a run's columns reach higher than those of another of its width, or as high and are darker."""
+    reach, others = tops[start : start + width].sum(), tops[other : other + width].sum()
+    if reach != others:
+        return bool(reach < others)
+    light = 0.0
+    for row in range(len(luminance)):
+        for col in range(width):
+            light += luminance[row, start + col] - luminance[row, other + col]
+    return light < 0.0
+
+
+@kernel
+def highest_band(
+    tops: NDArray[np.int64], bottom: int, min_width: int, enough: int, centre: float, luminance: NDArray[np.float32]
+) -> tuple[int, int, int]:
+    """Highest row that at least `min_width` neighbouring columns reach, and the best run of them (see `best_run`).
+
+    Returns
+    -------
+    tuple of int
+        Top row, first column, width; the width is 0 where no band is wide enough.
+    """
+    # Only where a column ends can a band appear that was not there a row higher.
+    for top in np.unique(tops):
+        if top >= bottom:
+            break
+        start, width = best_run(tops, top, enough, centre, luminance)
+        if width >= min_width:
+            return top, start, width
+    return bottom, 0, 0
+
+
+@kernel
+def isotonic_decreasing(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Nearest sequence in least squares that never rises: pool adjacent violators on (n,) float64."""
+    count = values.size
+    means = np.empty(count)
+    sizes = np.empty(count, np.int64)
+    blocks = 0
+    for value in values:
+        means[blocks], sizes[blocks] = value, 1
+        blocks += 1
+        while blocks > 1 and means[blocks - 2] < means[blocks - 1]:
+            total = sizes[blocks - 2] + sizes[blocks - 1]
+            means[blocks - 2] += (means[blocks - 1] - means[blocks - 2]) * sizes[blocks - 1] / total
+            sizes[blocks - 2] = total
+            blocks -= 1
+    return np.repeat(means[:blocks], sizes[:blocks])

@@ -1,0 +1,155 @@
+"""A daytime image from a little above the horizon down, checked for what methods of the road's luminance need."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.values.camera import Camera
+from fogsim.vision.light.daylight import lit_by_lamps
+from fogsim.vision.light.luminance import linear_luminance
+from fogsim.vision.light.medians import columns_apart, median, quantile
+from fogsim.vision.lines.horizon import Horizon, levelled
+
+MIN_COLS, MIN_ROWS = 32, 16
+"""[px] A road narrower than this, or lower below its horizon, shows no curve."""
+
+MIN_AIRLIGHT = 6.0
+"""Darker than this above the horizon is no day [linear grey levels]."""
+
+MIN_CONTRAST = 6.0
+"""Least contrast of road and airlight; below it quantisation hides the curve [linear grey levels]."""
+
+SATURATED = 250.0
+"""Luminance that is clipped, or so near that noise is [linear grey levels]."""
+
+SKY_SHARE = 0.05
+"""Share of the image's height above the horizon that is taken along [-]."""
+
+SKY_HEIGHT = 0.12
+"""How far above the horizon the airlight is looked for [rad]: over a wood that stands along the horizon."""
+
+SKY_CORE = 0.02
+"""Half-width of the luminances that count as sky, relative to its bright part [-]."""
+
+
+class CannotTellError(Exception):
+    """No mistake of anyone's: the honest answer to some images, which an estimator turns into an invalid estimate."""
+
+
+@dataclass(frozen=True, slots=True)
+class RoadImage:
+    """The part of an image from a little above the horizon to its bottom row.
+
+    Attributes
+    ----------
+    luminance : (rows, cols) float32
+        Linear grey levels.
+    first_row : int
+        Row of the whole image that is row 0 here.
+    sky_rows : int
+        Rows here that lie above the horizon.
+    airlight, road : float
+        First guesses: the bright part of what lies above the horizon, and the median of the bottom row.
+    level : (all rows, cols) or (all rows, cols, 3) uint8 or uint16
+        The whole image without roll.
+    first_column : int
+        Column of the whole image that is column 0 here.
+    """
+
+    luminance: NDArray[np.float32]
+    first_row: int
+    sky_rows: int
+    airlight: float
+    road: float
+    level: NDArray[np.uint8] | NDArray[np.uint16]
+    first_column: int = 0
+
+    @property
+    def contrast(self) -> float:
+        """Airlight less road [linear grey levels]."""
+        return self.airlight - self.road
+
+
+def road_image(
+    image: NDArray[np.uint8] | NDArray[np.uint16],
+    camera: Camera,
+    horizon: Horizon,
+    columns: tuple[int, int] | None = None,
+) -> RoadImage:
+    """Cut, level and linearise an image.
+
+    Parameters
+    ----------
+    image : (rows, cols) or (rows, cols, 3) uint8 or uint16
+        An image of the camera.
+    camera : Camera
+        The told calibration.
+    horizon : Horizon
+        Where the calibration has the horizon.
+    columns : (int, int) or None
+        First column and that after the last to be cut out; None for all.
+
+    Raises
+    ------
+    CannotTellError
+        If the horizon is outside the image, the image too small, too dark or saturated, the road not darker than the
+        airlight, or lamps light it.
+    """
+    rows, cols = image.shape[:2]
+    if not 1.0 <= horizon.row <= rows - 1:
+        raise CannotTellError(f"the horizon (row {horizon.row:.1f}) is outside the image")
+    if rows - 1 - horizon.row < MIN_ROWS or cols < MIN_COLS:
+        raise CannotTellError("the image is too small to show a curve")
+    sky_end = math.ceil(horizon.row)
+    first = max(0, sky_end - 4 - round(SKY_SHARE * rows))
+    level = levelled(image, camera)
+    left, right = columns or (0, cols)
+    luminance = linear_luminance(level[first:, left:right], camera.response, camera.bits)
+    top = min(first, max(0, sky_end - round(SKY_HEIGHT * camera.focal_length)))
+    above = linear_luminance(columns_apart(level[top:sky_end:2], 4), camera.response, camera.bits)
+    airlight = quantile(above, 0.9)
+    seed = median(luminance[-1])
+    road = _checked(RoadImage(luminance, first, sky_end - first, airlight, seed, level, left))
+    if why := lit_by_lamps(level, camera):
+        raise CannotTellError(why)
+    return road
+
+
+def _checked(road: RoadImage) -> RoadImage:
+    if road.airlight < MIN_AIRLIGHT:
+        raise CannotTellError("too dark above the horizon: this is a daytime method")
+    if road.road >= SATURATED:
+        raise CannotTellError("the road is saturated")
+    if road.contrast < max(MIN_CONTRAST, 0.05 * road.airlight):
+        raise CannotTellError("the road is nearly as bright as the airlight, or brighter")
+    return road
+
+
+def sky_profile(road: RoadImage, margin: int) -> NDArray[np.float64]:
+    """Luminance of the rows of sky, what stands before it left out.
+
+    Each row's mean of what lies near its bright part (its 70th percentile), over the middle two thirds.
+
+    Parameters
+    ----------
+    road : RoadImage
+        The image.
+    margin : int
+        Rows above the horizon that are left out.
+
+    Returns
+    -------
+    (n,) float64
+        From the top down; empty if there are no such rows.
+    """
+    side = road.luminance.shape[1] // 6
+    rows = road.luminance[: max(road.sky_rows - margin, 0), side:-side]
+    # A pixel's own value, so that at least that pixel is near it.
+    bright = np.percentile(rows, 70, axis=1, method="lower") if rows.size else np.zeros(0)
+    found = []
+    for row, level in zip(rows, bright, strict=True):
+        core = row[np.abs(row - level) <= max(SKY_CORE * float(level), 3.0)]
+        found.append(float(core.mean(dtype=np.float64)))
+    return np.array(found)

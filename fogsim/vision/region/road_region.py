@@ -1,0 +1,106 @@
+"""The road's region in the image, and the widest vertical band that crosses it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.vision.light.medians import median
+from fogsim.vision.region import region_kernels
+
+
+@dataclass(frozen=True, slots=True)
+class Band:
+    """A vertical band of an image; rows and columns are counted in the image that it was found in.
+
+    Attributes
+    ----------
+    left, right : int
+        First and last column [px].
+    top, bottom : int
+        First and last row [px].
+    """
+
+    left: int
+    right: int
+    top: int
+    bottom: int
+
+
+def grow_region(
+    luminance: NDArray[np.float32], edges: NDArray[np.uint8], steps: NDArray[np.float32], seed_tolerance: float
+) -> NDArray[np.uint8]:
+    """Grow the road's region upward from its bottom row (negru2013 section IV.B.b after Hautière 2006).
+
+    Seeds are the pixels of the bottom row near that row's median. From each pixel of the region the three pixels
+    above it join if they are not edges, differ from the pixel below by no more than fog and noise allow there, and from
+    the seed by no more than the sum of that on the way.
+
+    Parameters
+    ----------
+    luminance : (rows, cols) float32
+        Smoothed linear luminance.
+    edges : (rows, cols) uint8
+        Non-zero on edges.
+    steps : (rows,) float32
+        Largest difference of each row to the one below [linear grey levels].
+    seed_tolerance : float
+        Largest difference of a seed from the median of the bottom row [linear grey levels].
+
+    Returns
+    -------
+    (rows, cols) uint8
+        1 inside the region.
+    """
+    seed = median(luminance[-1])
+    region: NDArray[np.uint8] = region_kernels.grow_upward(luminance, edges, steps, seed, float(seed_tolerance))
+    return region
+
+
+def crossing_band(
+    region: NDArray[np.uint8],
+    luminance: NDArray[np.float32],
+    centre: float,
+    min_width: int,
+    max_width: int,
+    hole: int = 2,
+) -> Band | None:
+    """Widest vertical band inside a region that crosses it from its bottom to its top.
+
+    The road narrows toward the vanishing point: far away the sides of a wide band lie on the verge, whose reflectance
+    is another, and what lies far from the vanishing point is verge altogether. So the band is cut to a largest width,
+    and of several that reach it the one nearest to the vanishing point's column is taken; of two that are alike in all
+    that, the darker one, which shows more of the fog.
+
+    Parameters
+    ----------
+    region : (rows, cols) uint8
+        Non-zero inside the region.
+    luminance : (rows, cols) float32
+        Linear luminance.
+    centre : float
+        Column of the vanishing point [px].
+    min_width : int
+        Narrowest band that counts [px]; the region's top is where it gets narrower than this.
+    max_width : int
+        Width beyond which a band is cut [px].
+    hole : int
+        Length of gaps in a column that do not end it [px].
+
+    Returns
+    -------
+    Band or None
+        None if no band of that width starts at the bottom row.
+    """
+    bottom = region.shape[0] - 1
+    tops = region_kernels.column_tops(region, hole)
+    top, first, width = region_kernels.highest_band(tops, bottom, min_width, max_width, float(centre), luminance)
+    if width == 0:
+        return None
+    kept = min(width, max_width)
+    left = centre - 0.5 * (kept - 1)
+    if first < left < first + width - kept and left % 1.0 == 0.5:
+        # Between two columns: one less lies in the middle.
+        kept, left = kept - 1, left + 0.5
+    left = min(max(round(left), first), first + width - kept)
+    return Band(left, left + kept - 1, top, bottom)

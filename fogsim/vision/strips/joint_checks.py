@@ -1,0 +1,80 @@
+"""What shows that strips of an image are no road in fog, though the joint fit finds some fog that fits them."""
+
+import numpy as np
+
+from fogsim.linear_algebra import matrix_product
+from fogsim.values.camera import Camera
+from fogsim.vision.light.linear_table import linear_table
+from fogsim.vision.light.medians import median
+from fogsim.vision.strips.joint_fit import JointFit
+from fogsim.vision.strips.strip_curves import StripCurves, StripGeometry
+
+MAX_SCATTER = 0.22
+"""Scatter across the own lane relative to its contrast to the airlight, beyond which it is no road [-]: marks, shadows
+and texture make at most 0.15, boards, stripes and writing at least 0.3."""
+
+STRAIGHT, LEAST_RISE = 0.018, 10.0
+"""Deviation from a straight line, relative to that line's rise, below which a curve is a ramp [-], and least rise for
+that to be told [pixel values of 8 bits]. Fog of whatever density leaves at least 0.028: its curve is hollow near the
+camera and level at the horizon."""
+
+
+def no_road(fit: JointFit, curves: StripCurves, geometry: StripGeometry, camera: Camera) -> str:
+    """Say why strips can be no road in fog; empty if they can.
+
+    Parameters
+    ----------
+    fit : JointFit
+        The fit of the curves.
+    curves : StripCurves
+        Luminance by bin.
+    geometry : StripGeometry
+        Where the bins are.
+    camera : Camera
+        The told calibration.
+    """
+    if is_scattered(fit, curves, geometry):
+        return "what is ahead is too patchy for a road"
+    return "it brightens evenly from row to row, as no fog does" if is_ramp(curves, geometry, camera) else ""
+
+
+def is_scattered(fit: JointFit, curves: StripCurves, geometry: StripGeometry) -> bool:
+    """Whether single pixels across the own lane differ as much among themselves as road and airlight do.
+
+    Parameters
+    ----------
+    fit : JointFit
+        The fit of the curves.
+    curves : StripCurves
+        Luminance by bin.
+    geometry : StripGeometry
+        Where the bins are.
+    """
+    near = fit.used[0] & (fit.extinction * geometry.distance < 1.5)
+    if not near.any():
+        return False
+    return median(curves.scatter[0][near]) > MAX_SCATTER * (fit.airlight - fit.road)
+
+
+def is_ramp(curves: StripCurves, geometry: StripGeometry, camera: Camera) -> bool:
+    """Whether the own lane's pixel values rise evenly from row to row, as drawn backgrounds do and fog does not.
+
+    Parameters
+    ----------
+    curves : StripCurves
+        Luminance by bin.
+    geometry : StripGeometry
+        Where the bins are.
+    camera : Camera
+        The told calibration.
+    """
+    seen = curves.variance[0] > 0
+    if int(seen.sum()) < 3:
+        return False
+    table = linear_table(camera.response, camera.bits)
+    values = np.interp(curves.luminance[0][seen], table, np.arange(table.size)) * (255.0 / (table.size - 1))
+    rows = geometry.below[seen] - geometry.below[seen].mean()
+    slope = float(matrix_product(rows, values)) / float(matrix_product(rows, rows))
+    rest = values - values.mean() - slope * rows
+    rise = -slope * float(np.ptp(rows))
+    return rise > LEAST_RISE and float(np.sqrt(np.mean(rest**2))) < STRAIGHT * rise

@@ -1,0 +1,62 @@
+"""What sky and horizon say about the fog before the road is looked at."""
+
+import math
+from statistics import NormalDist
+
+from fogsim.values.camera import Camera
+from fogsim.vision.light.linear_table import linear_table
+from fogsim.vision.lines.horizon import Horizon
+from fogsim.vision.strips.joint_fit import JointPrior
+from fogsim.vision.strips.sky import SATURATED_SHARE, Sky
+
+SKY_DEVIATION = 0.005
+"""Relative deviation of the airlight at the horizon from the sky above it [-]."""
+
+OVEREXPOSURE = 0.15
+"""How far a sky without any unsaturated pixel may lie above saturation, as a deviation [-]."""
+
+HALF, MOSTLY = 0.5, 0.98
+"""Shares of saturated pixels beyond which a sky may be brighter, and beyond which it tells no more than that [-]."""
+
+
+def joint_prior(sky: Sky, camera: Camera, horizon: Horizon) -> JointPrior:
+    """Prior of airlight and horizon for `fogsim.vision.strips.joint_fit.fit_jointly`.
+
+    Parameters
+    ----------
+    sky : Sky
+        The sky above the horizon; where it is saturated it is brighter than it looks.
+    camera : Camera
+        The told calibration, from whose horizon the prior's shift counts.
+    horizon : Horizon
+        What is known of the horizon.
+    """
+    airlight, below, above = _airlight(sky, camera)
+    return JointPrior(
+        airlight=airlight,
+        below=below,
+        above=above,
+        shift=horizon.row - camera.horizon_row,
+        shift_deviation=horizon.standard_deviation,
+        darkening=sky.darkening,
+        darkening_deviation=sky.darkening_deviation,
+    )
+
+
+def _airlight(sky: Sky, camera: Camera) -> tuple[float, float, float]:
+    """Brightness of the airlight, and its deviations downward and upward [linear grey levels]."""
+    deviation, upward = (math.hypot(SKY_DEVIATION * sky.luminance, apart) for apart in (sky.deviation, sky.upward))
+    if not sky.is_clipped:
+        return sky.luminance, deviation, upward
+    table = linear_table(camera.response, camera.bits)
+    level = float(table[-1] - table[-2]) * (2**camera.bits / 256.0)
+    if sky.saturated > MOSTLY:
+        return 255.0 + level, 2.0 * level, OVEREXPOSURE * 255.0
+    if sky.saturated < SATURATED_SHARE:
+        # One of the colours is clipped: there is more light than the others show.
+        return sky.luminance + level, deviation + level, deviation + 4.0 * level
+    # Noise carries some of the sky's pixels below saturation: the share of the others tells how bright it is.
+    airlight = 255.0 - 0.5 * level + 1.3 * level * NormalDist().inv_cdf(sky.saturated)
+    # Noise that is added after clipping tells nothing of what was clipped.
+    above = OVEREXPOSURE * 255.0 if sky.saturated > HALF else deviation + level
+    return airlight, deviation + level, above

@@ -1,0 +1,156 @@
+"""The sky above the horizon: its brightness there, and how much the lens darkens its corners."""
+
+import functools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.values.camera import Camera
+from fogsim.vision.light.linear_pixels import LinearPixels
+from fogsim.vision.light.medians import median
+from fogsim.vision.strips import sky_kernels
+
+Floats = NDArray[np.float64]
+
+SATURATED_SHARE = 0.02
+"""Share of the sky's pixels at the largest value from which on its brightness is not what its mean says [-]."""
+
+
+UNTOLD_DARKENING = 0.3
+"""Standard deviation of a lens's darkening where the sky does not show it [-]: most pictures are corrected."""
+
+UNEVEN, LEAST_SEEN, MOST_DARKENING = 0.02, 0.7, 1.5
+"""Deviation of a lens's darkening by skies that are brighter in the middle, least share of a sky's pixels that must
+show it, and most that it can be [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sky:
+    """The sky above the horizon.
+
+    Attributes
+    ----------
+    luminance : float
+        At the horizon, of its bright part [linear grey levels].
+    deviation, upward : float
+        Standard deviation of its luminance at the horizon, downward and upward [linear grey levels].
+    noise : float
+        Deviation of single pixels [linear grey levels].
+    saturated, clipped : float
+        Shares of its pixels of which all channels, and of which some, have the largest value [-].
+    darkening, darkening_deviation : float
+        How much of what a simple lens takes from pixels off its axis (1 − cos⁴) this one takes, and the standard
+        deviation of that [-].
+    """
+
+    luminance: float
+    deviation: float
+    upward: float
+    noise: float
+    saturated: float
+    clipped: float
+    darkening: float = 0.0
+    darkening_deviation: float = UNTOLD_DARKENING
+
+    @property
+    def is_clipped(self) -> bool:
+        """Whether the sky may be brighter than it looks."""
+        return self.clipped > SATURATED_SHARE
+
+
+SKY_ROWS = 24
+"""Rows of sky that are looked at."""
+
+SKY_HEIGHT = 0.2
+"""How far above the horizon sky is looked at [rad]; as far as the image goes if that is less."""
+
+DARKER = 0.012
+"""Darkening from a row to the next below beyond which it is no longer sky that is seen, as a share [-]."""
+
+UNSEEN, CLOSE = 0.3, 0.01
+"""Deviation of the sky's luminance for each radian that is hidden above the horizon [1/rad], but for so much [rad]."""
+
+MOST_HIDDEN = 0.14
+"""Angle above the horizon up to which something may hide all of the sky, beyond which it is no road that lies ahead but
+a wall or a wood [rad]."""
+
+PATCHY, SCATTERED, BRIGHTER = 0.35, 0.004, 0.3
+"""Share of a row that is alike, and relative scatter of the rows, beyond which trees may be taken for sky; by how much
+the sky may be brighter then, as a deviation [-]."""
+
+
+def sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
+    """Look at the sky in the middle two thirds of the image above the horizon.
+
+    Parameters
+    ----------
+    image : LinearPixels
+        The image.
+    camera : Camera
+        The told calibration.
+    margin : float
+        Rows above the horizon that are left out [px].
+
+    Returns
+    -------
+    Sky or None
+        None if there are no such rows, or something high hides the sky all along them.
+    """
+    bottom = min(math.floor(camera.horizon_row - margin), camera.height - 1)
+    top = max(0, math.floor(camera.horizon_row - SKY_HEIGHT * camera.focal_length))
+    if bottom - top < 1:
+        return None
+    rows = even_rows(top, bottom, SKY_ROWS)
+    side = camera.width // 6
+    noise = sky_kernels.pixel_noise(image.pixels, image.tables, rows)
+    bright, share = sky_kernels.sky_rows(image.pixels, image.tables, rows, side, camera.width - side, max(noise, 0.3))
+    height = (camera.horizon_row - rows.astype(np.float64)) / camera.focal_length
+    darker = max(DARKER, 2.0 * noise / max(float(bright.max()), 1e-9))
+    level, _, scatter, lowest = sky_kernels.level_at_horizon(bright, height, darker)
+    if lowest > MOST_HIDDEN:
+        return None
+    saturated, clipped = sky_kernels.saturation(image.pixels, image.tables.shape[1] - 1, rows, side)
+    # Where the sky is clipped it looks the same though a lens darkens it.
+    free = np.flatnonzero(height >= lowest)[::-2] if clipped <= SATURATED_SHARE else np.zeros(0, np.int64)
+    bowl = _bowl(image, camera, rows[free], bright[free], noise)
+    if bowl is None:
+        bowl = _Bowl(level, scatter, 0.0, UNTOLD_DARKENING)
+    level, scatter = bowl.level, bowl.deviation
+    unseen = UNSEEN * max(float(lowest) - margin / camera.focal_length - CLOSE, 0.0) * level
+    deviation = math.hypot(scatter, unseen)
+    # What looks everywhere different is a wood rather than a sky, which is no darker than that.
+    covered = median(share) < PATCHY and scatter > SCATTERED * level
+    upward = BRIGHTER * level if covered else deviation
+    return Sky(level, deviation, upward, noise, saturated, clipped, bowl.darkening, bowl.darkening_deviation)
+
+
+@dataclass(frozen=True, slots=True)
+class _Bowl:
+    """Brightness at the horizon straight ahead and darkening of the lens, with their standard deviations."""
+
+    level: float
+    deviation: float
+    darkening: float
+    darkening_deviation: float
+
+
+def _bowl(image: LinearPixels, camera: Camera, rows: NDArray[np.int64], bright: Floats, noise: float) -> _Bowl | None:
+    """Sky of even slopes behind a lens; None where it does not fill most of its rows, or is black."""
+    if rows.size < 2 or float(np.median(bright)) <= 0.0:
+        return None
+    axis = np.array([*camera.principal_point, camera.horizon_row, camera.focal_length])
+    found, covariance, seen = sky_kernels.sky_bowl(image.pixels, image.tables, rows, axis, bright, noise)
+    level = float(found[0])
+    if seen < LEAST_SEEN or level <= 0.0:
+        return None
+    darkening = min(max(float(found[3]) / level, 0.0), MOST_DARKENING)
+    deviation = min(math.hypot(UNEVEN, math.sqrt(covariance[3, 3]) / level), UNTOLD_DARKENING)
+    return _Bowl(level, math.sqrt(covariance[0, 0]), darkening, deviation)
+
+
+@functools.lru_cache(maxsize=64)
+def even_rows(first: int, last: int, count: int) -> NDArray[np.int64]:
+    """Up to so many rows from the first to the last, evenly and downward; they belong to all who ask."""
+    return np.unique(np.linspace(first, last, count).astype(np.int64))

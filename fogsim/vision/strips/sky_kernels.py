@@ -1,0 +1,240 @@
+"""Compiled statistics of rows of sky, read straight from the pixels that they need."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.jit import kernel
+from fogsim.linear_algebra import inverse_of, times
+from fogsim.vision.light.pixel_kernels import even_column, light
+from fogsim.vision.light.sort_kernels import sort_few
+from fogsim.vision.strips.strip_kernels import MOST_SAMPLES
+
+SKY_SHARE, SKY_WIDTH = 7, 0.012
+"""Part of a row (one in so many) that sky must fill to be found, and half the width of its luminances, relative [-]."""
+
+LEAST_SKY_ROWS = 4
+"""Rows of sky before it can end downward."""
+
+LEAST_SKY_HEIGHT, STEEPEST_SKY = 0.04, 0.8
+"""Height that rows must span to show how the sky brightens upward [rad], and most that it does [1/rad]."""
+
+
+@kernel
+def sky_rows(
+    pixels: NDArray[np.uint8] | NDArray[np.uint16],
+    tables: NDArray[np.float32],
+    rows: NDArray[np.int64],
+    left: int,
+    right: int,
+    floor: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Brightness of the bright part of each row: of the sky, where trees and vehicles stand before it.
+
+    Starts near the row's brightest and moves to the mean of what lies near, so that what is darker may cover most of
+    the row. The second of the two arrays is the share of the row that is as bright.
+    """
+    bright, share = np.zeros(rows.size), np.zeros(rows.size)
+    count = min(MOST_SAMPLES, right - left)
+    samples, ordered = np.empty(count, np.float32), np.empty(count, np.float32)
+    for i in range(rows.size):
+        for j in range(count):
+            samples[j] = light(pixels, tables, rows[i], even_column(j, count, left - 0.5, right - 0.5))
+        sort_few(samples, ordered)
+        centre, kept = float(ordered[count - 1 - count // SKY_SHARE]), 0
+        reach = max(2.5 * floor, SKY_WIDTH * centre)
+        for _ in range(4):
+            total, kept = 0.0, 0
+            for value in ordered:
+                if abs(float(value) - centre) <= reach:
+                    total += float(value)
+                    kept += 1
+            centre = total / kept
+        bright[i], share[i] = centre, kept / count
+    return bright, share
+
+
+@kernel
+def level_at_horizon(
+    bright: NDArray[np.float64], height: NDArray[np.float64], step: float
+) -> tuple[float, float, float, float]:
+    """Brightness of the sky at the horizon, from that of rows above it (Theil and Sen's robust straight line).
+
+    Where rows darken downward by more than `step` from one to the next, something stands before the sky, and the rows
+    below say nothing.
+
+    Parameters
+    ----------
+    bright : (n,) float64
+        Brightness of rows, the highest first.
+    height : (n,) float64
+        Their height above the horizon.
+    step : float
+        Darkening that is no sky's, as a share.
+
+    Returns
+    -------
+    tuple of float
+        Brightness at height 0, slope, robust deviation of the rows from the line, height of the lowest row in use.
+    """
+    drops = np.zeros(bright.size)
+    count = 1
+    for i in range(1, bright.size):
+        usual = max(float(np.median(drops[1:i])), 0.0) if i > 1 else 0.0
+        drops[i] = bright[i - 1] - bright[i]
+        twice = bright[max(i - 2, 0)] - bright[i]
+        least = step * bright[i - 1]
+        if count >= LEAST_SKY_ROWS and (drops[i] > least + 2.0 * usual or twice > 1.5 * least + 4.0 * usual):
+            break
+        count = i + 1
+    slopes = np.zeros(count * (count - 1) // 2 + 1)
+    number = 0
+    for i in range(count):
+        for j in range(i):
+            slopes[number] = (bright[i] - bright[j]) / (height[i] - height[j])
+            number += 1
+    middle, slope = float(np.median(bright[:count])), 0.0
+    if height[0] - height[count - 1] > LEAST_SKY_HEIGHT:
+        slope = min(max(float(np.median(slopes[:number])), -STEEPEST_SKY * middle), STEEPEST_SKY * middle)
+    rest = bright[:count] - slope * height[:count]
+    level = float(np.median(rest))
+    return level, slope, 1.4826 * float(np.median(np.abs(rest - level))), height[count - 1]
+
+
+@kernel
+def pixel_noise(
+    pixels: NDArray[np.uint8] | NDArray[np.uint16], tables: NDArray[np.float32], rows: NDArray[np.int64]
+) -> float:
+    """Robust deviation of single pixels on rows, from the differences of neighbours [linear grey levels]."""
+    cols = pixels.shape[1]
+    per_row = max((cols - 1) // 2, 1)
+    step = max(per_row // 32, 1)
+    apart = np.empty(rows.size * (per_row // step + 1))
+    count = 0
+    for row in rows:
+        for col in range(((cols - 2) % (2 * step)) // 2, cols - 1, 2 * step):
+            if count < apart.size:
+                apart[count] = abs(light(pixels, tables, row, col) - light(pixels, tables, row, col + 1))
+                count += 1
+    # The root of the mean square of the lower three quarters stands for all: medians of whole numbers jump.
+    ordered = np.sort(apart[:count])
+    kept = max((3 * count) // 4, 1)
+    square = 0.0
+    for i in range(kept):
+        square += ordered[i] * ordered[i]
+    # For a normal difference of deviation √2 σ, the lower three quarters have a mean square of 0.3692 · 2 σ².
+    return math.sqrt(square / kept / (2.0 * 0.3692))
+
+
+@kernel
+def saturation(
+    pixels: NDArray[np.uint8] | NDArray[np.uint16], largest: int, rows: NDArray[np.int64], side: int
+) -> tuple[float, float]:
+    """Shares of rows' pixels with all and with some channels saturated, but for `side` columns at either end."""
+    cols, channels = pixels.shape[1], pixels.shape[2]
+    every, some = 0, 0
+    for row in rows:
+        for col in range(side, cols - side):
+            count = 0
+            for channel in range(channels):
+                count += pixels[row, col, channel] == largest
+            every += count == channels
+            some += count > 0
+    total = max(rows.size * (cols - 2 * side), 1)
+    return every / total, some / total
+
+
+PLANE_SCALES = (0.06, 0.02, 0.006, 0.006)
+"""Deviations beyond which a pixel weighs little in each iteration of the fit of a bowl, relative to the sky [-]."""
+
+TILT, BRIGHTENING, BOWL = 0.3, 1.5, 0.5
+"""Standard deviations of a sky's slopes sideways and upward, and of its fall toward the corners, before it is looked
+at, relative to it [-]."""
+
+BOWL_COLS = 32
+"""Pixels of each row that are looked at."""
+
+ALIKE = 4.0
+"""How many of those pixels err together, since a sky is not quite even [-]."""
+
+
+@kernel
+def sky_bowl(
+    pixels: NDArray[np.uint8] | NDArray[np.uint16],
+    tables: NDArray[np.float32],
+    rows: NDArray[np.int64],
+    axis: NDArray[np.float64],
+    bright: NDArray[np.float64],
+    noise: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Sky as L = a + b x + c y − d (1 − cos⁴ of the angle to the camera's axis), by least squares in Cauchy's norm.
+
+    Parameters
+    ----------
+    pixels, tables
+        See `pixel_noise`.
+    rows : (n,) int64
+        Rows that show sky.
+    axis : (4,) float64
+        Principal point's column and row, the horizon's row, focal length [px].
+    bright : (n,) float64
+        Brightness of the bright part of each row [linear grey levels].
+    noise : float
+        Deviation of single pixels [linear grey levels].
+
+    Returns
+    -------
+    tuple of (4,) and (4, 4) float64 and float
+        a, b, c, d, their covariance, and the share of pixels that lie near.
+    """
+    cols, count = pixels.shape[1], BOWL_COLS
+    level = float(np.median(bright))
+    height = (axis[2] - rows) / axis[3]
+    found = np.array([level, 0.0, 0.0, 0.0])
+    covariance: NDArray[np.float64] = np.eye(4)
+    seen, place = np.empty((rows.size, count)), np.empty(count)
+    for j in range(count):
+        col = even_column(j, count, -0.5, cols - 0.5)
+        place[j] = (col - axis[0]) / axis[3]
+        for i in range(rows.size):
+            seen[i, j] = light(pixels, tables, rows[i], col)
+    number = 0
+    for relative in PLANE_SCALES:
+        spread = (relative * level) ** 2 + (2.0 * noise) ** 2
+        normal, right = np.zeros((4, 4)), np.zeros(4)
+        normal[0, 0] = 1e-6
+        for a, deviation in ((1, TILT), (2, BRIGHTENING), (3, BOWL)):
+            normal[a, a] = spread / (deviation * level) ** 2
+        number, squares = 0, 0.0
+        for i in range(rows.size):
+            y = (axis[1] - rows[i]) / axis[3]
+            for j in range(count):
+                off = 1.0 - 1.0 / (1.0 + place[j] * place[j] + y * y) ** 2
+                rest = seen[i, j] - found[0] - found[1] * place[j] - found[2] * height[i] + found[3] * off
+                if rest * rest < 4.0 * spread:
+                    number += 1
+                    squares += rest * rest
+                weight = 1.0 / (1.0 + rest * rest / spread) ** 2
+                p1, p2, p3 = place[j], height[i], -off
+                normal[0, 0] += weight
+                normal[0, 1] += weight * p1
+                normal[0, 2] += weight * p2
+                normal[0, 3] += weight * p3
+                normal[1, 1] += weight * p1 * p1
+                normal[1, 2] += weight * p1 * p2
+                normal[1, 3] += weight * p1 * p3
+                normal[2, 2] += weight * p2 * p2
+                normal[2, 3] += weight * p2 * p3
+                normal[3, 3] += weight * p3 * p3
+                right[0] += weight * seen[i, j]
+                right[1] += weight * seen[i, j] * p1
+                right[2] += weight * seen[i, j] * p2
+                right[3] += weight * seen[i, j] * p3
+        for a in range(4):
+            for b in range(a):
+                normal[a, b] = normal[b, a]
+        inverse = inverse_of(normal)
+        found = times(inverse, right)
+        covariance = inverse * (ALIKE * max(squares / max(number, 1), noise * noise))
+    return found, covariance, number / seen.size

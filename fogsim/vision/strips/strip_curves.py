@@ -1,0 +1,169 @@
+"""Luminance of strips of road, bin by bin: what the joint fit of fog looks at."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.values.camera import Camera
+from fogsim.vision.light.linear_pixels import LinearPixels, Pixels, linear_pixels
+from fogsim.vision.light.linear_table import linear_table
+from fogsim.vision.light.medians import median
+from fogsim.vision.strips import strip_kernels
+from fogsim.vision.strips.sky import Sky, even_rows, sky_above
+from fogsim.vision.strips.strip_geometry import StripGeometry, band_geometry, strip_geometry
+
+__all__ = [
+    "LinearPixels",
+    "Pixels",
+    "Sky",
+    "StripCurves",
+    "StripGeometry",
+    "above_bonnet",
+    "band_geometry",
+    "linear_pixels",
+    "mean_curves",
+    "sky_above",
+    "strip_curves",
+    "strip_geometry",
+    "without_clipped",
+    "without_rows_below",
+]
+
+Floats = NDArray[np.float64]
+
+GRAIN = 0.5
+"""Size of pieces of road whose albedo counts as independent beside the patches [m]."""
+
+HALF_VEHICLE = 1.3
+"""Half the width that a tracked vehicle ahead may hide, its offset in the lane included [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class StripCurves:
+    """Luminance of each strip by bin.
+
+    Attributes
+    ----------
+    luminance : (strips, n) float64
+        Mean of the core of each bin [linear grey levels].
+    variance : (strips, n) float64
+        Its variance apart from what patches and drift of the albedo do; 0 where there is no datum.
+    scatter : (strips, n) float64
+        Mean distance of all single pixels from the bin's median, marks and the like included [linear grey levels].
+    """
+
+    luminance: Floats
+    variance: Floats
+    scatter: Floats
+
+
+def strip_curves(
+    image: LinearPixels,
+    geometry: StripGeometry,
+    noise: float,
+    camera: Camera,
+    free: float = math.inf,
+    known: StripCurves | None = None,
+) -> StripCurves:
+    """Read the strips.
+
+    Parameters
+    ----------
+    image : LinearPixels
+        The image.
+    geometry : StripGeometry
+        Where to look.
+    noise : float
+        Deviation of single pixels [linear grey levels].
+    camera : Camera
+        The told calibration.
+    free : float
+        Depth up to which the own lane is free; a vehicle ahead hides what is behind [m].
+    known : StripCurves or None
+        What was read of a road that is free further on: only what the vehicle hides is read again.
+    """
+    vehicle = np.array([math.inf, -math.inf, -math.inf])
+    if math.isfinite(free):
+        reach, u0 = HALF_VEHICLE * camera.focal_length / free, camera.principal_point[0]
+        vehicle = np.array([u0 - reach, u0 + reach, camera.horizon_row + camera.row_distance / free])
+    if known is None:
+        out = np.zeros((len(geometry.left), 3, geometry.first.size))
+    else:
+        out = np.stack([known.luminance, known.variance, known.scatter], axis=1)
+    rows, table = np.stack([geometry.first, geometry.last]), linear_table(camera.response, camera.bits)
+    metres = (geometry.right - geometry.left) * (geometry.distance / camera.focal_length)
+    pieces = np.maximum(metres / GRAIN, 1.0) * np.maximum(geometry.extent / GRAIN, 1.0)
+    for strip, values in enumerate(out):
+        sides = np.stack([geometry.left[strip], geometry.right[strip]])
+        where = (rows, sides, pieces[strip], vehicle)
+        strip_kernels.strip_bins(image.pixels, image.tables, table, *where, noise, values, known is not None)
+    return StripCurves(out[:, 0], out[:, 1], out[:, 2])
+
+
+BONNET_SHARE, BONNET_ROWS = 0.3, 60
+"""Share of the road's rows that the own bonnet may cover, and how many of them are looked at."""
+
+BONNET_STEP, BONNET_OUTLIER = 0.03, 6.0
+"""Least step of luminance at the bonnet's edge, relative to the airlight, and in median changes over as many rows."""
+
+
+def above_bonnet(image: LinearPixels, camera: Camera, airlight: float) -> int:
+    """Lowest row that shows road, not the own vehicle's bonnet or dashboard.
+
+    Parameters
+    ----------
+    image : LinearPixels
+        A level image.
+    camera : Camera
+        The told calibration.
+    airlight : float
+        Luminance of the sky [linear grey levels].
+    """
+    bottom = camera.height - 1
+    top = math.floor(bottom - BONNET_SHARE * (bottom - camera.horizon_row))
+    rows = even_rows(bottom, top, BONNET_ROWS)[::-1]
+    if rows.size < 8:
+        return bottom
+    level = strip_kernels.middle_levels(image.pixels, image.tables, rows)
+    # Three rows each side of a gap of two, since a bonnet's edge is bent.
+    mean = (level[:-2] + level[1:-1] + level[2:]) / 3.0
+    change = mean[5:] - mean[:-5]
+    apart = np.abs(change - median(change))
+    steps = np.flatnonzero(apart > max(BONNET_STEP * airlight, BONNET_OUTLIER * median(apart)))
+    return int(rows[min(steps[-1] + 6, rows.size - 1)]) if steps.size else bottom
+
+
+def mean_curves(frames: tuple[tuple[StripCurves, Sky], ...]) -> StripCurves:
+    """Average the curves of successive frames at the last one's exposure, which the sky shows.
+
+    Parameters
+    ----------
+    frames : tuple of (StripCurves, Sky)
+        Oldest first.
+    """
+    if len(frames) == 1:
+        return frames[0][0]
+    gains = np.array([frames[-1][1].luminance / sky.luminance for _, sky in frames])[:, None, None]
+    luminance = gains * np.stack([curves.luminance for curves, _ in frames])
+    variance = gains**2 * np.stack([curves.variance for curves, _ in frames])
+    seen = variance > 0
+    count = np.maximum(seen.sum(axis=0), 1)
+    mean = np.where(seen, luminance, 0.0).sum(axis=0) / count
+    scatter = np.where(seen, gains * np.stack([curves.scatter for curves, _ in frames]), 0.0).sum(axis=0) / count
+    return StripCurves(mean, np.where(seen, variance, 0.0).sum(axis=0) / count**2, scatter)
+
+
+CLIPPED = 0.95 * 255.0
+"""Brighter than this a row has lost some of its light where the sky is clipped [linear grey levels]."""
+
+
+def without_clipped(curves: StripCurves) -> StripCurves:
+    """Leave out bins so bright that their noise, or one of their colours, is clipped."""
+    return replace(curves, variance=np.where(curves.luminance > CLIPPED, 0.0, curves.variance))
+
+
+def without_rows_below(curves: StripCurves, geometry: StripGeometry, lowest: int) -> StripCurves:
+    """Leave out bins that reach below a row."""
+    return replace(curves, variance=np.where(geometry.last > lowest, 0.0, curves.variance))

@@ -1,0 +1,157 @@
+"""Strips of road along the vehicle's axis: where they lie in the image of a camera on a flat road."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.values.camera import Camera
+from fogsim.vision.strips import strip_kernels
+
+Floats = NDArray[np.float64]
+
+LANES = ((-1.4, 1.4), (-4.9, -2.1), (2.1, 4.9))
+"""Sides of the strips to the right of the vehicle's axis [m]: the own lane's middle, and those of its neighbours."""
+
+HALF_ROAD = 2.5
+"""How far to either side of the vehicle's axis a band is surely road [m]."""
+
+WHOLE_ROWS = 28.0
+"""Rows below the horizon up to which every row is a bin of its own [px]; from there bins grow with the distance."""
+
+
+@dataclass(frozen=True, slots=True)
+class StripGeometry:
+    """Where the strips lie in the image of a camera on a flat road, nearest bin of rows first.
+
+    Attributes
+    ----------
+    first, last : (n,) int64
+        Rows of each bin.
+    below, half : (n,) float64
+        Middle of each bin below the told horizon, and half its height [px].
+    distance, extent : (n,) float64
+        Depth of each bin along the road, and how much road it covers [m].
+    left, right : (strips, n) float64
+        Columns between which each strip lies.
+    path : (strips, n) float64
+        λ times the slant: over the rows below the horizon, the length of the ray [px·m].
+    off_axis : (strips, n) float64
+        1 − cos⁴ of the rays' angle to the camera's axis: the share of light that a simple lens takes [-].
+    """
+
+    first: NDArray[np.int64]
+    last: NDArray[np.int64]
+    below: Floats
+    half: Floats
+    distance: Floats
+    extent: Floats
+    left: Floats
+    right: Floats
+    path: Floats
+    off_axis: Floats
+
+    @property
+    def rows(self) -> Floats:
+        """(n,) float64: height of each bin [px]."""
+        return 2.0 * self.half
+
+    def only(self, strips: list[int]) -> "StripGeometry":
+        """Some of the strips.
+
+        Parameters
+        ----------
+        strips : list of int
+            Which.
+        """
+        left, right, path, off_axis = (values[strips] for values in (self.left, self.right, self.path, self.off_axis))
+        return replace(self, left=left, right=right, path=path, off_axis=off_axis)
+
+
+def strip_geometry(camera: Camera, nearest: float, lanes: tuple[tuple[float, float], ...] = LANES) -> StripGeometry:
+    """Lay strips over the image of a camera.
+
+    Parameters
+    ----------
+    camera : Camera
+        The told calibration; its roll is taken as undone.
+    nearest : float
+        Rows below the horizon from which the road is looked at [px].
+    lanes : tuple of (float, float)
+        Sides of each strip to the right of the vehicle's axis [m].
+    """
+    first, last = _row_bins(camera, nearest, camera.height - 1)
+    below: Floats = 0.5 * (first + last).astype(np.float64) - camera.horizon_row
+    u0 = camera.principal_point[0]
+    # A lateral offset x at depth z, seen from a camera that looks down, is α x / z columns off the axis.
+    across = camera.focal_length / camera.row_distance * below
+    sides = np.array(lanes)
+    left, right = u0 + sides[:, :1] * across, u0 + sides[:, 1:] * across
+    left, right = _inside(left, right, camera.width)
+    return _laid(first, last, left, right, camera)
+
+
+def band_geometry(camera: Camera, nearest: float, columns: tuple[int, int], rows: tuple[int, int]) -> StripGeometry:
+    """Take a vertical band of the image, as far as it is road, for the only strip.
+
+    Parameters
+    ----------
+    camera : Camera
+        The told calibration; its roll is taken as undone.
+    nearest : float
+        Rows below the horizon from which the road is looked at [px].
+    columns, rows : (int, int)
+        First and last of the band.
+    """
+    first, last = _row_bins(camera, max(nearest, rows[0] - camera.horizon_row), rows[1])
+    below: Floats = 0.5 * (first + last).astype(np.float64) - camera.horizon_row
+    u0, focal = camera.principal_point[0], camera.focal_length
+    # Far away even a narrow band is wider than the road.
+    reach = HALF_ROAD * focal / camera.row_distance * below[None, :]
+    left, right = np.maximum(columns[0] - 0.5, u0 - reach), np.minimum(columns[1] + 0.5, u0 + reach)
+    return _laid(first, last, left, right, camera)
+
+
+def _laid(
+    first: NDArray[np.int64], last: NDArray[np.int64], left: Floats, right: Floats, camera: Camera
+) -> StripGeometry:
+    """Strips between columns on bins of rows."""
+    below: Floats = 0.5 * (first + last).astype(np.float64) - camera.horizon_row
+    half: Floats = 0.5 * (last - first + 1).astype(np.float64)
+    square = _squared_tangent(left, right, below, camera)
+    return StripGeometry(
+        first=first,
+        last=last,
+        below=below,
+        half=half,
+        distance=camera.row_distance / below,
+        extent=camera.row_distance * 2.0 * half / np.maximum(below**2 - half**2, 1e-9),
+        left=left,
+        right=right,
+        path=camera.row_distance * _across(np.sqrt(1.0 + square)),
+        off_axis=_across(1.0 - (1.0 + square) ** -2),
+    )
+
+
+def _inside(left: Floats, right: Floats, width: int) -> tuple[Floats, Floats]:
+    """Cut strips to the image; of what is mostly outside nothing is left."""
+    low, high = np.clip(left, -0.5, width - 0.5), np.clip(right, -0.5, width - 0.5)
+    return low, np.where(high - low < 0.3 * (right - left), low, high)
+
+
+def _squared_tangent(left: Floats, right: Floats, below: Floats, camera: Camera) -> Floats:
+    """(3, strips, n) float64: squared tangent of the angle to the axis, at the sides and in the middle of strips."""
+    y = (below + camera.horizon_row - camera.principal_point[1]) / camera.focal_length
+    x = (np.stack([left, 0.5 * (left + right), right]) - camera.principal_point[0]) / camera.focal_length
+    return np.asarray(x**2 + y**2)
+
+
+def _across(values: Floats) -> Floats:
+    """Mean across strips by Simpson's rule: near, a lane is wide."""
+    return np.asarray((values[0] + 4.0 * values[1] + values[2]) / 6.0)
+
+
+def _row_bins(camera: Camera, nearest: float, bottom: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    top = max(math.ceil(camera.horizon_row + nearest), 0)
+    return strip_kernels.row_bins(camera.horizon_row, top, bottom, WHOLE_ROWS)

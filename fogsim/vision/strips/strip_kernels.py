@@ -1,0 +1,167 @@
+"""Compiled row statistics of strips of road and of rows of sky, read straight from the pixels that they need."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.jit import kernel
+from fogsim.vision.light.pixel_kernels import even_column, light
+from fogsim.vision.light.sort_kernels import median_of_few
+
+MOST_SAMPLES = 64
+"""Pixels that one row's statistic is made of; more cost time and gain little beside the road's own texture."""
+
+LEAST_DEVIATION = 0.1
+"""Least deviation of a bin's mean: what quantisation leaves [linear grey levels]."""
+
+QUIET, SMOOTHED = 0.3, 1.0
+"""Pixel noise, in levels, below which an image was compressed, and the deviation that this leaves in a mean [-]."""
+
+KEPT = 2.5
+"""Half-width of the core of a row, in its robust standard deviations: marks and other narrow things lie outside."""
+
+
+@kernel
+def row_bins(horizon: float, top: int, bottom: int, whole_rows: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """First and last row of bins from the bottom up to a top row; their height grows with their rows below the horizon.
+
+    Parameters
+    ----------
+    horizon : float
+        Row of the horizon [px].
+    top, bottom : int
+        First and last row.
+    whole_rows : float
+        Rows below the horizon up to which every row is a bin of its own [px].
+    """
+    first, last = np.empty(max(bottom - top + 1, 0), np.int64), np.empty(max(bottom - top + 1, 0), np.int64)
+    row, count = bottom, 0
+    while row >= top:
+        height = max(int((row - horizon) / whole_rows), 1)
+        first[count], last[count] = max(row - height + 1, top), row
+        row -= height
+        count += 1
+    return first[:count].copy(), last[:count].copy()
+
+
+@kernel
+def _core(samples: NDArray[np.float32], ordered: NDArray[np.float32], floor: float) -> tuple[float, float, float]:
+    """Mean and deviation of what lies near the median of samples; mean distance of all from it.
+
+    `ordered` is as many numbers of room.
+    """
+    count, middle = samples.size, median_of_few(samples, ordered)
+    # The nearest half of sorted samples is a run of them: take ends away, the farther first, until it is left.
+    low, high, apart = 0, count - 1, np.float32(0.0)
+    for _ in range(count - count // 2):
+        below, above = middle - ordered[low], ordered[high] - middle
+        apart = max(below, above)
+        if below > above:
+            low += 1
+        else:
+            high -= 1
+    reach = KEPT * max(1.4826 * float(apart), floor)
+    total, square, kept, away = 0.0, 0.0, 0, 0.0
+    for value in ordered:
+        offset = float(value) - middle
+        away += abs(offset)
+        if abs(offset) <= reach:
+            total += offset
+            square += offset * offset
+            kept += 1
+    mean = total / kept
+    return middle + mean, math.sqrt(max(square / kept - mean * mean, 0.0)), away / count
+
+
+@kernel
+def strip_bins(
+    pixels: NDArray[np.uint8] | NDArray[np.uint16],
+    tables: NDArray[np.float32],
+    table: NDArray[np.float32],
+    rows: NDArray[np.int64],
+    sides: NDArray[np.float64],
+    pieces: NDArray[np.float64],
+    vehicle: NDArray[np.float64],
+    noise: float,
+    out: NDArray[np.float64],
+    again: bool,
+) -> None:
+    """Luminance of the core of each bin of rows of one strip, its variance, and the scatter of the whole bin.
+
+    Parameters
+    ----------
+    pixels : (rows, cols, channels) uint8 or uint16
+        The image.
+    tables : (channels, levels) float32
+        Linear grey levels that each channel adds.
+    table : (levels,) float32
+        Linear grey levels of all channels together.
+    rows : (2, n) int64
+        First and last row of each bin.
+    sides : (2, n) float64
+        Columns between which the strip lies on each bin.
+    pieces : (n,) float64
+        Pieces of road in each bin whose albedo counts as independent.
+    vehicle : (3,) float64
+        Columns between which a vehicle hides the road, and the row of its foot, from which on upward it does.
+    noise : float
+        Deviation of single pixels [linear grey levels].
+    out : (3, n) float64
+        Luminance, variance (0 where there is no datum) and scatter; is written.
+    again : bool
+        Read only bins that the vehicle hides, if only in part, and that have a datum.
+    """
+    cols = pixels.shape[1]
+    samples, ordered = np.empty(MOST_SAMPLES, np.float32), np.empty(MOST_SAMPLES, np.float32)
+    for i in range(rows.shape[1]):
+        low, width, height = sides[0, i], sides[1, i] - sides[0, i], rows[1, i] - rows[0, i] + 1
+        hides = rows[0, i] <= vehicle[2]
+        beside = sides[1, i] < vehicle[0] - 1.0 or low > vehicle[1] + 1.0
+        if again and (not hides or beside or out[1, i] <= 0.0):
+            continue
+        out[:, i] = 0.0
+        if width < 2.0:
+            continue
+        # An even number: the middle one of an odd number would lie between two columns.
+        pairs = int(min(width * height, float(MOST_SAMPLES))) // 2
+        wanted, step, row, taken = 2 * pairs, 0.5 * width / pairs, rows[0, i], 0
+        for j in range(pairs):
+            # Rows of the bin in turn, columns evenly from both sides inward: a mirrored image gives the same.
+            apart = (j + 0.5) * step + 0.5
+            for col in (math.floor(low + apart), math.ceil(sides[1, i] - apart)):
+                if not (hides and vehicle[0] <= col <= vehicle[1]):
+                    samples[taken] = light(pixels, tables, row, min(max(col, 0), cols - 1))
+                    taken += 1
+            row = row + 1 if row < rows[1, i] else rows[0, i]
+        if taken < 2 or taken < 0.25 * wanted:
+            continue
+        mean, deviation, scatter = _core(samples[:taken], ordered[:taken], max(noise, 2.0 * LEAST_DEVIATION))
+        texture = max(deviation**2 - noise**2, 0.0) / min(float(taken), pieces[i])
+        out[0, i], out[2, i] = mean, scatter
+        out[1, i] = noise**2 / taken + texture + LEAST_DEVIATION**2 + _coarseness(mean, deviation, noise, table)
+
+
+@kernel
+def _coarseness(mean: float, deviation: float, noise: float, table: NDArray[np.float32]) -> float:
+    """Variance of means by rounding to levels, and by compression, which does away with noise and faint gradients."""
+    place = min(max(int(np.searchsorted(table, mean)) - 1, 0), table.size - 2)
+    level = max(float(table[place + 1] - table[place]), 1e-6)
+    # Rounding does not average out where nothing dithers it: 1/√12 of a level without noise, nothing from half on.
+    rounding = math.exp(-4.0 * (math.pi * deviation / level) ** 2) / 12.0
+    quiet = max(1.0 - noise / (QUIET * level), 0.0)
+    return level**2 * (rounding + (SMOOTHED * quiet) ** 2)
+
+
+@kernel
+def middle_levels(
+    pixels: NDArray[np.uint8] | NDArray[np.uint16], tables: NDArray[np.float32], rows: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Median of the middle third of each row (n,) [linear grey levels]."""
+    cols, samples, ordered = pixels.shape[1], np.empty(24, np.float32), np.empty(24, np.float32)
+    left, right, out = cols // 3 - 0.5, cols - cols // 3 - 0.5, np.empty(rows.size)
+    for i in range(rows.size):
+        for j in range(samples.size):
+            samples[j] = light(pixels, tables, rows[i], even_column(j, samples.size, left, right))
+        out[i] = median_of_few(samples, ordered)
+    return out

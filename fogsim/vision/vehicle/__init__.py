@@ -1,0 +1,1 @@
+"""The vehicle ahead: where it is in the image, and its contrast."""

@@ -1,0 +1,151 @@
+"""Whether the road before the vehicle ahead is lit by the sky, as methods of its contrast need, or by lamps."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.values.camera import Camera
+from fogsim.vision.region.road_image import CannotTellError
+
+Floats = NDArray[np.float32]
+
+BRIGHT_ROAD = 1.1
+"""Luminance of the road before the vehicle over that of the sky, from which on there is no daylight, or no road [-]."""
+
+GAP = 0.3
+"""How far above the vehicle's foot, as heights, the road that is looked at ends before it: its shadow [m]."""
+
+HALF_STRIP = 0.6
+"""Half the width of that strip of road as a thing of this size has at the vehicle [m]."""
+
+NEAREST, FARTHEST, FARTHER, ROWS = 4.0, 18.0, 1.8, 9
+"""Nearest and farthest road on which the light of own lamps is looked for [m], the least ratio of the two, and how many
+rows are read there."""
+
+SHADOW = 4.0
+"""Length of the road before the vehicle ahead that it may darken, or its lamps light [m]."""
+
+LEAST_CONTRAST = 0.03
+"""Contrast of a row of road to the sky that still tells how it falls [-]."""
+
+UNEVEN, SHARE = 0.1, 0.1
+"""By how much the logarithm of that contrast may fall less than the fog says: where the road's reflectance changes [-],
+and relative to the fall itself, where the road is not flat [-]."""
+
+
+def road_before(camera: Camera, depth: float) -> tuple[slice, slice]:
+    """Every fourth row, and the columns, of the road between the camera and a vehicle ahead in a level image.
+
+    Parameters
+    ----------
+    camera : Camera
+        The told calibration.
+    depth : float
+        From the camera to the vehicle's rear [m].
+    """
+    scale = camera.focal_length / depth
+    first = min(math.ceil(camera.horizon_row + camera.row_distance / depth + GAP * scale), camera.height - 3)
+    middle, half = camera.principal_point[0], max(HALF_STRIP * scale, 4.0)
+    cols = slice(max(math.floor(middle - half), 0), max(min(math.ceil(middle + half) + 1, camera.width), 0))
+    return slice(max(first, 0), camera.height, 4), cols
+
+
+def check_road(road: NDArray[np.float32], sky: float) -> None:
+    """Refuse a road that is brighter than the sky: head lamps light it, or the image is upside-down.
+
+    What they light is the vehicle, too, and the fog before it, which then has no airlight of the sky's: contrast to the
+    sky no longer falls as Duntley's law has it.
+
+    Parameters
+    ----------
+    road : (rows, cols) float32
+        Luminance of the road before the vehicle, as `road_before` has it; nothing is refused where it is empty.
+    sky : float
+        Luminance of the sky in the same unit.
+
+    Raises
+    ------
+    CannotTellError
+        If it is.
+    """
+    if road.size and float(np.median(road)) > BRIGHT_ROAD * sky:
+        raise CannotTellError("the road is brighter than the sky: this is a daytime method")
+
+
+@dataclass(frozen=True, slots=True)
+class RoadFall:
+    """How the road's contrast to the sky falls near the camera.
+
+    Attributes
+    ----------
+    fall : float
+        Logarithm of the near over the far contrast [-]; by day k times `apart`, whatever the road's reflectance.
+    apart : float
+        Way from the near to the far row [m].
+    """
+
+    fall: float
+    apart: float
+
+    def is_lit(self, extinction: float, deviation: float) -> bool:
+        """Whether it falls by so much less than in fog by day that lamps must light what is near.
+
+        Parameters
+        ----------
+        extinction, deviation : float
+            What the vehicle's contrast says, and its standard deviation [1/m].
+        """
+        missing = (extinction - 2.0 * deviation) * self.apart - self.fall
+        return missing > UNEVEN + SHARE * extinction * self.apart
+
+
+def road_fall(luminance_of: Callable[[slice, slice], Floats], camera: Camera, depth: float, sky: float) -> RoadFall:
+    """Measure how the contrast of the road's nearest metres to the sky falls.
+
+    By day (A − L)/A = (1 − R/A) e^(−kd) on a road of one reflectance. Head lamps make the nearest metres brightest, so
+    it falls less or even grows, at illuminances where the road is still darker than the sky.
+
+    Parameters
+    ----------
+    luminance_of : callable
+        Linear luminance of rows and columns of the level image.
+    camera : Camera
+        The told calibration.
+    depth : float
+        From the camera to the vehicle's rear, ``inf`` where there is none [m].
+    sky : float
+        Luminance of the sky in the same unit.
+
+    Returns
+    -------
+    RoadFall
+        Over no way where too little of the road is seen; then nothing is lit.
+    """
+    nearest = max(camera.row_distance / max(camera.height - 1.0 - camera.horizon_row, 1.0), NEAREST)
+    farthest = min(FARTHEST, depth - SHADOW)
+    if farthest < FARTHER * nearest:
+        return RoadFall(0.0, 0.0)
+    at = np.linspace(nearest, farthest, ROWS)
+    contrast = np.array([1.0 - _median(luminance_of(*_row(camera, d)), sky) / sky for d in at])
+    seen = contrast > LEAST_CONTRAST
+    if int(seen.sum()) < ROWS // 2:
+        return RoadFall(0.0, 0.0)
+    first, second = np.triu_indices(int(seen.sum()), 1)
+    level, way = np.log(contrast[seen]), at[seen]
+    # The median of all slopes leaves out marks, a bonnet, a shadow.
+    slope = float(np.median((level[second] - level[first]) / (way[second] - way[first])))
+    return RoadFall(-slope * (farthest - nearest), farthest - nearest)
+
+
+def _row(camera: Camera, distance: float) -> tuple[slice, slice]:
+    row = min(round(camera.horizon_row + camera.row_distance / distance), camera.height - 1)
+    middle, half = camera.principal_point[0], max(HALF_STRIP * camera.focal_length / distance, 4.0)
+    cols = slice(max(math.floor(middle - half), 0), max(min(math.ceil(middle + half) + 1, camera.width), 0))
+    return slice(max(row, 0), max(row, 0) + 1), cols
+
+
+def _median(pixels: Floats, otherwise: float) -> float:
+    return float(np.median(pixels)) if pixels.size else otherwise

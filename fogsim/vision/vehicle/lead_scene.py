@@ -1,0 +1,217 @@
+"""The part of a daytime image in which the vehicle ahead must be, as contrast to the sky."""
+
+import math
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.values.camera import Camera
+from fogsim.vision.light.clipped_sky import Clipping, clipping
+from fogsim.vision.light.linear_table import linear_table
+from fogsim.vision.lines.horizon import levelled
+from fogsim.vision.region.road_image import CannotTellError
+from fogsim.vision.strips.strip_curves import LinearPixels, Pixels, Sky, linear_pixels, sky_above
+from fogsim.vision.vehicle.lead_daylight import RoadFall, check_road, road_before, road_fall
+from fogsim.vision.vehicle.lead_patch import LeadPicture
+from fogsim.vision.vehicle.lead_sky import airlight_beside, hidden_beside
+from fogsim.vision.vehicle.lead_window import LeadWindow, find_lead, lead_region
+
+MIN_AIRLIGHT = 6.0
+"""Sky darker than this is no day [linear grey levels]."""
+
+MOST_NOISE = 0.1
+"""Noise of a sky relative to its luminance beyond which it is none [-]."""
+
+SKY_CORE, SKY_SHARE = 0.08, 0.25
+"""Relative half-width of the luminances that count as sky, and how much of the middle of the image above the horizon
+must have them [-]."""
+
+SKY_HEIGHT = 0.06
+"""How far above the horizon the airlight is read [rad]; less where the image ends."""
+
+LEAST_WIDTH = 3.0
+"""Narrowest vehicle that is looked at [px]."""
+
+
+@dataclass(frozen=True, slots=True)
+class LeadScene:
+    """Where in an image the vehicle ahead is looked for.
+
+    Attributes
+    ----------
+    camera : Camera
+        The told calibration.
+    depth : float
+        From the camera to the vehicle's rear [m].
+    luminance : (rows, cols) float32
+        The part of the image [linear grey levels].
+    origin : tuple of int
+        Column and row of the whole image that its first pixel is.
+    sky : Sky
+        The airlight.
+    noise : float
+        Deviation of its single pixels [linear grey levels].
+    road : RoadFall
+        How the contrast of the nearest road falls.
+    clipping : float
+        Deviation of single channels of the sky's pixels where some are clipped, otherwise 0 [linear grey levels].
+    """
+
+    camera: Camera
+    depth: float
+    luminance: NDArray[np.float32]
+    origin: tuple[int, int]
+    sky: Sky
+    noise: float
+    road: RoadFall
+    clipping: float
+
+    @property
+    def scale(self) -> float:
+        """Pixels in a metre at the vehicle [px/m]."""
+        return self.camera.focal_length / self.depth
+
+    def found(self) -> LeadPicture:
+        """Find a vehicle that has not been seen before.
+
+        Raises
+        ------
+        CannotTellError
+            If none stands out.
+        """
+        window = find_lead(self.luminance, self.origin, self.camera, self.depth, self.noise)
+        if window is None or window.width < LEAST_WIDTH:
+            raise CannotTellError("no vehicle stands out where the range says that there is one")
+        return self.picture(LeadWindow(window.column, self._road_row, window.width), self.scale)
+
+    def expected(self, aside: float, width: float) -> LeadPicture:
+        """Picture of a vehicle of known width [m] expected so far to the right of the axis [m]."""
+        column = self.camera.principal_point[0] + aside * self.scale
+        return self.picture(LeadWindow(column, self._road_row, width * self.scale), self.scale)
+
+    def picture(self, window: LeadWindow, scale: float) -> LeadPicture:
+        """Picture of what stands at a place in the image, at a number of pixels in a metre."""
+        contrast = 1.0 - self.luminance.astype(np.float64) / self.sky.luminance
+        return LeadPicture(
+            contrast=contrast,
+            noise=self.noise / self.sky.luminance,
+            column=window.column - self.origin[0],
+            foot=window.foot - self.origin[1],
+            scale=scale,
+            width=window.width / scale,
+            clipped=(255.0 / self.sky.luminance - 1.0, self.clipping / self.sky.luminance),
+        )
+
+    def window(self, picture: LeadPicture) -> LeadWindow:
+        """Place in the image of a picture of this scene."""
+        column, foot = picture.column + self.origin[0], picture.foot + self.origin[1]
+        return LeadWindow(column, foot, picture.width * picture.scale)
+
+    def aside(self, picture: LeadPicture) -> float:
+        """How far the vehicle is to the right of the axis [m]."""
+        return (picture.column + self.origin[0] - self.camera.principal_point[0]) / self.scale
+
+    def lift(self, picture: LeadPicture) -> float:
+        """How far above where the told pitch has it the vehicle is [rad]."""
+        return (self._road_row - picture.foot - self.origin[1]) / self.camera.focal_length
+
+    @property
+    def _road_row(self) -> float:
+        return self.camera.horizon_row + self.camera.row_distance / self.depth
+
+
+def lead_scene(image: Pixels, camera: Camera, depth: float, pitch_deviation: float) -> LeadScene:
+    """Cut out of a frame where a vehicle can be.
+
+    Parameters
+    ----------
+    image : (rows, cols) or (rows, cols, 3) uint8 or uint16
+        An image of the camera.
+    camera : Camera
+        The told calibration.
+    depth : float
+        From the camera to the vehicle's rear [m].
+    pitch_deviation : float
+        Standard deviation of the true pitch about the told one [rad].
+
+    Raises
+    ------
+    CannotTellError
+        If no vehicle can be seen there, or this is no road by day.
+    """
+    if abs(camera.roll) > math.pi / 4:
+        raise CannotTellError("the camera lies on its side or is upside-down")
+    if not 1.0 < depth < math.inf:
+        raise CannotTellError(f"a range of {depth:.1f} m is none of a vehicle ahead")
+    pixels = linear_pixels(levelled(image, camera), camera)
+    sky, lost = _daylight(pixels, camera, 3.0 * pitch_deviation * camera.focal_length + 2.0, depth)
+    region = lead_region(camera, depth)
+    if region is None:
+        raise CannotTellError("the vehicle ahead is too small in the image, or outside it")
+    luminance = _luminance(pixels, *region)
+    check_road(_luminance(pixels, *road_before(camera, depth)), sky.luminance)
+    return LeadScene(
+        camera=camera,
+        depth=depth,
+        luminance=luminance,
+        origin=(region[1].start, region[0].start),
+        sky=sky,
+        noise=max(sky.noise * steepness(luminance, sky.luminance, camera), 0.3 * 255.0 / 2**camera.bits),
+        road=road_fall(partial(_luminance, pixels), camera, depth, sky.luminance),
+        clipping=lost.spread,
+    )
+
+
+def _luminance(pixels: LinearPixels, rows: slice, cols: slice) -> NDArray[np.float32]:
+    part = pixels.pixels[rows, cols]
+    # Channel by channel, for a look-up of all at once is slower.
+    total = pixels.tables[0][part[:, :, 0]]
+    for channel in range(1, part.shape[2]):
+        total = total + pixels.tables[channel][part[:, :, channel]]
+    light: NDArray[Any] = total
+    return light
+
+
+def _daylight(pixels: LinearPixels, camera: Camera, margin: float, depth: float) -> tuple[Sky, Clipping]:
+    """Sky by day with what clipping takes of it, or the reason why this is none."""
+    sky = sky_above(pixels, camera, margin)
+    if sky is None or sky.luminance < MIN_AIRLIGHT:
+        raise CannotTellError("too dark above the horizon, or no sky: this is a daytime method")
+    if sky.saturated > 0.9:
+        raise CannotTellError("the sky is saturated")
+    bottom = min(max(math.floor(camera.horizon_row - margin), 1), camera.height)
+    rows = slice(max(bottom - max(math.ceil(SKY_HEIGHT * camera.focal_length), 4), 0), bottom)
+    light = _luminance(pixels, rows, slice(camera.width // 6, camera.width - camera.width // 6))
+    core = np.abs(light - sky.luminance) <= SKY_CORE * sky.luminance + 4.0 * sky.noise
+    if sky.noise > MOST_NOISE * sky.luminance or not core.size or float(core.mean()) < SKY_SHARE:
+        raise CannotTellError("what is above the horizon is no sky")
+    hidden = hidden_beside(camera.focal_length, depth)
+    axis = camera.principal_point[0] - camera.width // 6
+    luminance = airlight_beside(light, sky.luminance, sky.noise, axis, hidden)
+    clear = np.abs(light - luminance) <= 4.0 * max(sky.noise, 1.0)
+    lost = clipping(pixels.pixels[rows, camera.width // 6 : camera.width - camera.width // 6][clear], camera)
+    # What clipping takes from the sky, its noise shows; then it is no longer clipped.
+    clipped = 0.0 if lost.noise > 0.0 else sky.clipped
+    return replace(sky, luminance=luminance + lost.loss, noise=max(sky.noise, lost.noise), clipped=clipped), lost
+
+
+def steepness(luminance: NDArray[np.float32], sky: float, camera: Camera) -> float:
+    """How much larger noise is on a vehicle than on the sky once the response is undone, as noise is of the signal.
+
+    Parameters
+    ----------
+    luminance : (rows, cols) float32
+        The vehicle [linear grey levels].
+    sky : float
+        Luminance of the sky [linear grey levels].
+    camera : Camera
+        The told calibration.
+    """
+    table = linear_table(camera.response, camera.bits)
+    slope = np.gradient(table.astype(np.float64))
+    here, there = (int(np.searchsorted(table, level)) for level in (float(np.median(luminance)), sky))
+    most = table.size - 1
+    return float(slope[min(here, most)] / slope[min(there, most)])

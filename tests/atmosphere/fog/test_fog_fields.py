@@ -1,0 +1,169 @@
+"""Layers, ground fog, patches, wind and change over time: extinction and optical depth."""
+
+import dataclasses
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from fogsim.atmosphere import FieldAccess, FogNow, extinction, field_at, optical_depth_along
+from fogsim.atmosphere.fog import optical_depth
+from fogsim.atmosphere.fog.extinction_noise import CELLS, patch_factors
+from fogsim.errors import InputError
+from fogsim.values import FogBank, FogChange, FogField, FogPatches
+from tests.atmosphere.fields import AIRLIGHT, BANK, PATCHES, UNEVEN, brute_force
+
+GROUND_FOG = FogField(0.05, AIRLIGHT, scale_height=4.0)
+
+
+def test_ground_fog_has_its_closed_form() -> None:
+    # τ = k h (e^(−z₁/h) − e^(−z₂/h)) / sin γ
+    start, end = np.array([5.0, 6.0, 1.2]), np.array([85.0, 6.0, 9.5])
+    slope = (end[2] - start[2]) / np.linalg.norm(end - start)
+    expected = 0.05 * 4.0 * (math.exp(-1.2 / 4.0) - math.exp(-9.5 / 4.0)) / slope
+    assert optical_depth(GROUND_FOG, start, end) == pytest.approx(expected, rel=1e-6)
+    level = np.array([85.0, 6.0, 1.2])
+    assert optical_depth(GROUND_FOG, start, level) == pytest.approx(80.0 * 0.05 * math.exp(-0.3), rel=1e-6)
+
+
+def test_ground_fog_upwards_without_end_is_its_scale_height_thick() -> None:
+    assert optical_depth(GROUND_FOG, (0, 0, 0), (0, 0, 1e5)) == pytest.approx(0.05 * 4.0, rel=1e-6)
+
+
+def test_a_soft_layer_weighs_as_much_as_a_sharp_one() -> None:
+    soft = FogField(0.04, AIRLIGHT, base=10.0, base_edge=6.0, top=40.0, top_edge=20.0)
+    assert optical_depth(soft, (0, 0, 0), (30, 0, 100)) == pytest.approx(0.04 * 30.0 * math.hypot(0.3, 1.0), rel=1e-9)
+    assert extinction(soft, (0, 0, 6.9)) == 0.0
+    assert extinction(soft, (0, 0, 10.0)) == pytest.approx(0.02)
+    assert extinction(soft, (0, 0, 25.0)) == pytest.approx(0.04)
+    assert extinction(soft, (0, 0, 50.1)) == 0.0
+
+
+@pytest.mark.parametrize("name", UNEVEN)
+def test_optical_depth_against_brute_force(name: str) -> None:
+    rng = np.random.default_rng(5)
+    starts, ends = (rng.uniform((-100, -100, 0), (300, 200, 30), (20, 3)) for _ in range(2))
+    slow = np.array([brute_force(UNEVEN[name], a, b, 50_000) for a, b in zip(starts, ends, strict=True)])
+    assert np.allclose(optical_depth(UNEVEN[name], starts, ends), slow, rtol=2e-3, atol=1e-4)
+
+
+@pytest.mark.parametrize("name", UNEVEN)
+def test_optical_depth_along_a_line_is_that_between_its_ends(name: str) -> None:
+    start, direction = np.array([0.0, 5.0, 1.5]), np.array([0.8, 0.6, 0.0])
+    distances = np.geomspace(1.0, 2000.0, 60)
+    along = optical_depth_along(UNEVEN[name], start, direction, distances)
+    between = optical_depth(UNEVEN[name], start, start + distances[:, None] * direction)
+    assert np.allclose(along, between, rtol=5e-3, atol=1e-4)
+
+
+def test_the_product_of_sideways_and_upward_profiles_would_be_wrong() -> None:
+    # Near the eye the line is low and outside the bank, farther off it is high and inside: K(x) h(z) cannot know.
+    field, start, end = UNEVEN["bank of ground fog"], np.array([0.0, 0.0, 1.0]), np.array([240.0, 70.0, 40.0])
+    flat = dataclasses.replace(field, scale_height=math.inf)
+    upright = dataclasses.replace(field, banks=())
+    product = float(optical_depth(flat, start, end) * optical_depth(upright, start, end))
+    product /= 0.002 * float(np.linalg.norm(end - start))
+    true = float(optical_depth(field, start, end))
+    assert true == pytest.approx(float(brute_force(field, start, end, 50_000)), rel=1e-4)
+    assert product > 1.5 * true
+
+
+def test_patches_keep_the_mean_and_have_their_strength_and_correlation() -> None:
+    factors = patch_factors(0.8, 7).astype(np.float64)
+    log = np.log(factors)
+    assert factors.min() > 0
+    assert factors.mean() == pytest.approx(1.0, abs=1e-5)
+    assert log.std() == pytest.approx(0.8, rel=1e-3)
+    shifted = np.roll(log, CELLS, axis=2)
+    # One correlation length away the correlation is 1/e, within what a finite sample can show.
+    assert np.corrcoef(log.ravel(), shifted.ravel())[0, 1] == pytest.approx(math.exp(-1.0), abs=0.05)
+    assert np.corrcoef(log.ravel(), np.roll(log, 3 * CELLS, axis=1).ravel())[0, 1] == pytest.approx(0.0, abs=0.08)
+
+
+def test_patches_differ_by_seed_and_repeat_with_it() -> None:
+    places = np.random.default_rng(0).uniform(0, 500, (50, 3))
+    one, other = (extinction(FogField(0.01, AIRLIGHT, patches=FogPatches(40.0, 8.0, 0.8, s)), places) for s in (1, 2))
+    again = extinction(FogField(0.01, AIRLIGHT, patches=FogPatches(40.0, 8.0, 0.8, 1)), places)
+    assert np.array_equal(one, again)
+    assert not np.allclose(one, other, rtol=0.1)
+
+
+def test_patches_without_strength_are_even() -> None:
+    field = FogField(0.01, AIRLIGHT, patches=FogPatches(40.0, 8.0, 0.0))
+    assert optical_depth(field, (0, 0, 0), (300, 0, 5)) == pytest.approx(0.01 * math.hypot(300, 5))
+
+
+def test_wind_carries_banks_and_patches() -> None:
+    field = FogField(0.004, AIRLIGHT, (BANK,), patches=PATCHES, wind=(3.0, -2.0))
+    places = np.random.default_rng(1).uniform((0, 0, 0), (400, 200, 20), (40, 3))
+    drifted = places + 7.5 * np.array([3.0, -2.0, 0.0])
+    assert np.allclose(extinction(field, drifted, time=7.5), extinction(field, places), rtol=1e-6)
+    assert not np.allclose(extinction(field, places, time=7.5), extinction(field, places), rtol=0.05)
+
+
+def test_fog_thickens_and_lifts_over_time() -> None:
+    changes = (FogChange(10.0, 1.0, -2.0, 50.0), FogChange(30.0, 3.0, 8.0, 90.0))
+    field = FogField(0.01, AIRLIGHT, base=-2.0, top=50.0, changes=changes)
+    low, high = (0.0, 0.0, 1.0), (0.0, 0.0, 70.0)
+    assert [float(extinction(field, low, time)) for time in (0.0, 10.0)] == pytest.approx([0.01, 0.01])
+    assert float(extinction(field, low, 15.0)) == pytest.approx(0.015)
+    assert float(extinction(field, low, 20.0)) == 0.0  # the base is at 3 m
+    assert [float(extinction(field, high, time)) for time in (10.0, 25.0, 99.0)] == pytest.approx([0.0, 0.025, 0.03])
+
+
+def test_a_field_that_does_not_change_is_its_own_state() -> None:
+    assert field_at(GROUND_FOG, 12.0) is GROUND_FOG
+
+
+def test_access_answers_for_its_time_and_bounds_all_times() -> None:
+    changes = (FogChange(0.0, 1.0, -math.inf, 250.0), FogChange(60.0, 2.0, -math.inf, 250.0))
+    access = FieldAccess(FogField(0.01, AIRLIGHT, (BANK,), top=250.0, patches=PATCHES, changes=changes))
+    a, b = np.array([0.0, 0.0, 1.0]), np.array([90.0, 40.0, 1.0])
+    assert access.at(60.0).optical_depth(a, b) == pytest.approx(2.0 * access.optical_depth(a, b))
+    assert access.optical_depth(a, b, time=30.0) == pytest.approx(1.5 * access.optical_depth(a, b))
+    places = np.random.default_rng(2).uniform((-500, -500, 0), (900, 900, 100), (2000, 3))
+    for time in (0.0, 60.0):
+        k = access.extinction(places, time)
+        assert access.minimum_extinction <= k.min()
+        assert k.max() <= access.maximum_extinction
+
+
+def test_fog_now_is_the_fog_of_the_time_that_was_set() -> None:
+    field = FogField(0.004, AIRLIGHT, (BANK,), patches=PATCHES, wind=(3.0, -2.0))
+    now, a, b = FogNow(field), np.array([0.0, 0.0, 1.0]), np.array([90.0, 40.0, 1.0])
+    for time in (0.0, 12.5):
+        now.set_time(time)
+        assert now.optical_depth(a, b) == optical_depth(field, a, b, time)
+        assert now.extinction(b) == extinction(field, b, time)
+    assert now.maximum_extinction == FieldAccess(field).maximum_extinction
+    assert now.minimum_extinction == FieldAccess(field).minimum_extinction
+
+
+def test_ground_fog_is_not_surely_anywhere() -> None:
+    assert FieldAccess(GROUND_FOG).minimum_extinction == 0.0
+    assert FieldAccess(UNEVEN["lifted"]).minimum_extinction == 0.0
+
+
+@pytest.mark.parametrize(
+    ("make", "told"),
+    [
+        (lambda: FogBank((0.0, 0.0), (1.0, 0.0), 200.0, 100.0, 10.0, 0.01), "end beyond its start"),
+        (lambda: FogBank((0.0, 0.0), (1.0, 0.0), 0.0, 100.0, 0.0, 0.01), "edge"),
+        (lambda: FogPatches(0.0, 5.0, 0.5), "correlation_length"),
+        (lambda: FogPatches(20.0, math.nan, 0.5), "correlation_height"),
+        (lambda: FogPatches(20.0, 5.0, 2.5), "strength"),
+        (lambda: FogField(-0.01, AIRLIGHT), "extinction"),
+        (lambda: FogField(math.nan, AIRLIGHT), "extinction"),
+        (lambda: FogField(0.01, (1.0, -1.0, 1.0)), "airlight"),
+        (lambda: FogField(0.01, AIRLIGHT, scale_height=0.0), "scale height"),
+        (lambda: FogField(0.01, AIRLIGHT, base=20.0, top=10.0), "above its base"),
+        (
+            lambda: FogField(0.01, AIRLIGHT, changes=(FogChange(5.0, 1.0, 0.0, 9.0), FogChange(5.0, 1.0, 0.0, 9.0))),
+            "increase",
+        ),
+    ],
+)
+def test_impossible_fields_are_refused(make: Callable[[], object], told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        make()

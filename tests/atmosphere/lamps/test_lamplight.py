@@ -1,0 +1,123 @@
+"""Own lamps drawn: light on the road by the formula, the veil without spots, and fog of every kind."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from fogsim.atmosphere.air import Air
+from fogsim.atmosphere.lamps.lamplight import OwnLamplight
+from fogsim.errors import InputError
+from fogsim.lighting.beams import low_beam
+from fogsim.lighting.head_lamps import own_head_lamps
+from fogsim.values import Beam, FogBank, HeadLamp, Lamp, Lights, LightSources
+from fogsim.values.luminous_intensity import luminous_intensity
+from tests.atmosphere.night_scene import CAMERA, POSE, RESPONSE, fog, rays, road_view
+
+LOW = own_head_lamps(Lamp.LOW_BEAM, CAMERA.mount_height)
+
+
+def drawn(field, own=LOW, view=None, pose=POSE, painter=None):
+    seen = view or road_view()
+    out = np.zeros_like(seen.radiance)
+    (painter or OwnLamplight()).add(out, seen, CAMERA, pose, field, own)
+    return out
+
+
+def road_light(extinction):
+    """Radiance of the road by the formula, one lamp after the other."""
+    seen = np.isfinite(road_view().distance)
+    distance = np.where(seen, road_view().distance.astype(float), 1.0)
+    place = rays() * distance[..., None]
+    total = np.zeros(distance.shape)
+    for lamp in LOW:
+        forward, left, up = np.moveaxis(place - np.array(lamp.offset), -1, 0)
+        s = np.sqrt(forward**2 + left**2 + up**2)
+        intensity = luminous_intensity(lamp.beam, np.arctan2(-left, forward), np.arcsin(up / s))
+        total += RESPONSE * intensity / s**2 * np.exp(-extinction * (s + distance))
+    return np.where(seen, total, 0.0)
+
+
+def test_clear_air_has_lit_road_and_no_veil():
+    out = drawn(fog(math.inf))
+    near = (road_view().distance > 4.0) & (road_view().distance < 120.0)
+    assert out[near][:, 0] == pytest.approx(road_light(0.0)[near], rel=0.06)
+    assert out[~np.isfinite(road_view().distance)].max() == 0.0
+
+
+@pytest.mark.parametrize("visibility", [50, 200])
+def test_road_is_attenuated_both_ways(visibility):
+    field, painter = fog(visibility), OwnLamplight()
+    lit = drawn(field, painter=painter)
+    veil = drawn(field, view=dataclasses.replace(road_view(), lamp_response=None), painter=painter)
+    near = (road_view().distance > 4.0) & (road_view().distance < 60.0)
+    assert (lit - veil)[near][:, 0] == pytest.approx(road_light(field.extinction)[near], rel=0.06, abs=1e-5)
+
+
+@pytest.mark.parametrize("visibility", [50, 200])
+def test_veil_has_no_spots_and_no_edges(visibility):
+    veil = drawn(fog(visibility), view=dataclasses.replace(road_view(), lamp_response=None))[..., 0]
+    # From pixel to pixel nothing jumps, not even where the line of sight passes next to a lamp.
+    assert np.abs(np.diff(veil, axis=0)).max() < 0.12 * veil.max()
+    assert np.abs(np.diff(veil, axis=1)).max() < 0.12 * veil.max()
+    assert veil.max() < 40 * veil[58, 80]
+
+
+def test_veil_hardly_changes_when_fog_hardly_changes():
+    painter = OwnLamplight()
+    before, after = (drawn(fog(visibility), painter=painter) for visibility in (100.0, 100.1))
+    assert after == pytest.approx(before, rel=5e-3)
+    assert np.array_equal(drawn(fog(100.0), painter=painter), before)
+
+
+def test_uneven_fog_that_is_even_looks_even():
+    field = fog(100)
+    bank = FogBank((0.0, 0.0), (1.0, 0.0), 10.0, 40.0, 5.0, 1e-9)
+    assert drawn(dataclasses.replace(field, banks=(bank,))) == pytest.approx(drawn(field), rel=0.02, abs=1e-5)
+
+
+def test_bank_ahead_shines_only_ahead():
+    bank = FogBank((0.0, 0.0), (1.0, 0.0), 30.0, 90.0, 4.0, 0.06)
+    veil = drawn(dataclasses.replace(fog(math.inf), banks=(bank,)), view=None)
+    road, sky = road_view().distance, veil[50, 80, 0]
+    before = (road > 4.0) & (road < 25.0)
+    assert veil[before][:, 0] == pytest.approx(road_light(0.0)[before], rel=0.06)
+    assert 0.0 < sky < drawn(fog(50))[50, 80, 0]
+
+
+def test_turning_vehicle_sees_the_same_by_its_own_lamps():
+    turned = dataclasses.replace(POSE, heading=1.0)
+    assert drawn(fog(100), pose=turned) == pytest.approx(drawn(fog(100)), rel=1e-4, abs=1e-6)
+
+
+def test_lamps_in_one_housing_and_colours_add():
+    red = tuple(dataclasses.replace(lamp, colour=(1.0, 0.2, 0.1)) for lamp in LOW)
+    single = drawn(fog(100))
+    assert drawn(fog(100), LOW + LOW) == pytest.approx(2 * single, rel=1e-5)
+    assert drawn(fog(100), LOW + red)[..., 1] == pytest.approx(1.2 * single[..., 1], rel=1e-5)
+
+
+def test_beam_with_a_hole_is_refused():
+    intensity = low_beam().intensity.copy()
+    intensity[3, 4] = np.nan
+    broken = HeadLamp(LOW[0].offset, Beam(low_beam().azimuth, low_beam().elevation, intensity))
+    with pytest.raises(InputError, match=r"row 3, column 4"):
+        drawn(fog(100), (broken,))
+
+
+def test_air_adds_lamplight_to_twilight():
+    field = dataclasses.replace(fog(100), airlight=(3.0, 3.0, 3.0))
+    air, view = Air(field), road_view()
+    lights = Lights(LOW, LightSources.none())
+    by_day = air.radiance(view, CAMERA, POSE)
+    assert air.radiance(view, CAMERA, POSE, lights) - by_day == pytest.approx(drawn(field), abs=2e-6)
+
+
+def test_preparing_changes_nothing():
+    field, lights = fog(100), Lights(LOW, LightSources.none())
+    prepared, fresh = Air(field), Air(field)
+    prepared.prepare(CAMERA, [LOW])
+    assert np.array_equal(
+        prepared.radiance(road_view(), CAMERA, POSE, lights), fresh.radiance(road_view(), CAMERA, POSE, lights)
+    )

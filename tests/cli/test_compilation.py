@@ -1,0 +1,50 @@
+"""Compiling is announced, and what is compiled ahead is what a run needs."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from fogsim import Camera, Frame, Observation
+from fogsim.cli.compilation import _foggy_road
+from fogsim.estimators import ESTIMATORS
+
+COMPILE = """
+import numpy as np
+import fogsim.jit
+from fogsim.vision.light.sort_kernels import median_of_few
+fogsim.jit._PATIENCE = 0.0
+numbers = np.arange(5, dtype=np.float32)
+for kind in (np.float32, np.float64, np.int64):
+    median_of_few(numbers.astype(kind), np.empty(5, kind))
+"""
+
+
+def test_a_first_run_says_once_that_it_compiles(tmp_path: Path) -> None:
+    """On stderr, since stdout is for results; a process that finds everything compiled says nothing."""
+    told = []
+    for _ in range(2):
+        done = subprocess.run(
+            [sys.executable, "-c", COMPILE],
+            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert done.stdout == ""
+        told.append(done.stderr)
+    assert told[0].count("compiling for this processor") == 1
+    assert told[1] == ""
+
+
+@pytest.mark.parametrize("method", ["negru2013", "joint_road"])
+@pytest.mark.parametrize("size", [(160, 120), (640, 480)])
+def test_methods_can_read_the_picture_that_they_are_compiled_with(method: str, size: tuple[int, int]) -> None:
+    """A method that turned it down at once would not be compiled."""
+    width, height = size
+    camera = Camera(width, height, 0.9 * width, (width / 2, height / 2), 1.4, pitch=0.03)
+    estimate = ESTIMATORS[method](camera=camera).update(Observation(Frame(0.0, _foggy_road(camera, 40.0), camera)))
+    assert estimate.valid
+    assert estimate.visibility == pytest.approx(120.0, rel=0.15)

@@ -1,0 +1,76 @@
+"""The same world wherever it lies, and around the ego wherever it drives."""
+
+import numpy as np
+import pytest
+
+import fogsim
+from fogsim.camera import mounted_pose
+from fogsim.ego.view_rendering import Outlook
+from fogsim.scenario import build
+from fogsim.values import Lane, LaneMarking, RoadNetwork, SignMap, TrafficState
+
+SETTINGS = ("renderer=cpu", "camera.width=80", "camera.height=60", "fog={visibility_m: 200}")
+
+
+def road(start: tuple[float, float], length: float, name: str) -> Lane:
+    line = np.array([[*start, 0.0], [start[0] + length, start[1], 0.0]])
+    return Lane(name, name, line, 3.5, 25.0, LaneMarking.SOLID, LaneMarking.SOLID, outermost=True)
+
+
+def two_cars(x: float, y: float) -> TrafficState:
+    return TrafficState(
+        time=0.0,
+        ids=("ego", "other"),
+        types=("car", "car"),
+        position=np.array([[x, y, 0.0], [x + 27.3, y + 0.4, 0.0]]),
+        heading=np.zeros(2),
+        speed=np.full(2, 20.0),
+        acceleration=np.zeros(2),
+        length=np.full(2, 4.5),
+        width=np.full(2, 1.8),
+        height=np.full(2, 1.5),
+        lane=("", ""),
+        lamps=np.zeros(2, np.int32),
+        paint=np.full((2, 3), 0.4),
+    )
+
+
+def seen(outlook: Outlook, scenario: fogsim.Scenario, state: TrafficState) -> tuple[np.ndarray, np.ndarray]:
+    pose = mounted_pose(build.camera(scenario), state.position[0], 0.0, scenario.camera.setback_m)
+    view, radiance = outlook.see(state, 0, pose, 0.0)
+    return view.instance.copy(), radiance.copy()
+
+
+@pytest.fixture(scope="module")
+def scenario() -> fogsim.Scenario:
+    return fogsim.load_scenario("motorway_fog_bank", list(SETTINGS))
+
+
+def test_a_million_metres_from_the_origin_the_picture_is_the_same(scenario: fogsim.Scenario) -> None:
+    pictures = []
+    for x, y in ((0.0, 0.0), (1.0e6, 5.5e6)):
+        lane = road((x, y), 900.0, "a")
+        outlook = Outlook(scenario, RoadNetwork((lane,), lane.centreline), SignMap())
+        pictures.append(seen(outlook, scenario, two_cars(x + 100.13, y + 0.17)))
+        outlook.close()
+    assert (pictures[0][0] >= 16).sum() > 10
+    assert np.mean(pictures[0][0] == pictures[1][0]) > 0.999
+    # The grain of asphalt and grass lies elsewhere, and trees are the same.
+    assert pictures[1][1].mean() == pytest.approx(pictures[0][1].mean(), rel=0.01)
+
+
+def test_where_the_ego_leaves_its_route_there_is_a_road_too(scenario: fogsim.Scenario) -> None:
+    lanes = road((0.0, 0.0), 900.0, "a"), road((0.0, 9000.0), 900.0, "b")
+    outlook = Outlook(scenario, RoadNetwork(lanes, lanes[0].centreline), SignMap())
+    shares = [np.mean(seen(outlook, scenario, two_cars(100.0, y))[0] == 2) for y in (0.0, 9000.0, 0.0)]
+    assert shares[0] > 0.2
+    assert shares[1:] == pytest.approx([shares[0]] * 2, abs=0.02)
+    outlook.close()
+
+
+def test_a_closed_outlook_says_so(scenario: fogsim.Scenario) -> None:
+    lane = road((0.0, 0.0), 100.0, "a")
+    outlook = Outlook(scenario, RoadNetwork((lane,), lane.centreline), SignMap())
+    outlook.close()
+    with pytest.raises(fogsim.FogSimError, match="closed"):
+        seen(outlook, scenario, two_cars(10.0, 0.0))

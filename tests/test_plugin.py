@@ -1,0 +1,289 @@
+"""In a simulation that the user has started: over a connection, and in a loop that the user writes."""
+
+import itertools
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import traci
+
+import fogsim
+from fogsim.errors import InputError, SimulationError, UnplayedWarning
+from fogsim.randomness import spawn_streams
+from fogsim.scenario import build
+from fogsim.traffic.sumo.library import load_libsumo
+from fogsim.traffic.sumo_traffic import command_line
+from fogsim.values import Command, SpeedAdvice, Step
+
+GRID = Path(__file__).resolve().parent / "data" / "grid"
+ARGUMENTS = ["-c", str(GRID / "grid.sumocfg"), "--step-length", "0.5", "--no-step-log", "--seed", "1"]
+SMALL = ("camera.width=96", "camera.height=72")
+EGO = "veh18"  # departs at 36 s and drives through the whole town
+
+
+@pytest.fixture
+def libsumo() -> Iterator[Any]:
+    library = load_libsumo()
+    library.start(["sumo", *ARGUMENTS])
+    yield library
+    library.close()
+
+
+@pytest.fixture
+def connection(sumo_process: Callable) -> Iterator[Any]:
+    with sumo_process(ARGUMENTS) as (port, _):
+        connection = traci.connect(port, numRetries=100, host="127.0.0.1", waitBetweenRetries=0.1)
+        yield connection
+        connection.close()
+
+
+def users_loop(api: Any, steps: int, **options: Any) -> list[Step | None]:
+    """What a user writes."""
+    seen = []
+    with fogsim.attach(api, ego=EGO, visibility=120.0, settings=SMALL, **options) as session:
+        for _ in range(steps):
+            api.simulationStep()
+            step = session.observe()
+            if step is not None:
+                session.advise(step)
+            seen.append(step)
+    return seen
+
+
+def test_steps_come_while_the_ego_is_on_the_road(libsumo: Any) -> None:
+    seen = users_loop(libsumo, 100)
+    on_the_road = [step for step in seen if step is not None]
+    assert seen[:72] == [None] * 72
+    assert [s.index for s in on_the_road] == list(range(len(on_the_road)))
+    assert on_the_road[-1].time == pytest.approx(0.5 * (len(on_the_road) - 1))
+    assert on_the_road[-1].traffic.time == pytest.approx(50.0)
+    assert on_the_road[-1].traffic.ids[on_the_road[-1].ego] == EGO
+    assert on_the_road[-1].truth.visibility == pytest.approx(120.0)
+    assert on_the_road[-1].observation.image.shape == (72, 96, 3)
+    assert libsumo.simulation.getTime() == pytest.approx(50.0)  # its owner's still
+
+
+def test_traci_shows_the_same_as_libsumo(libsumo: Any, connection: Any) -> None:
+    for one, other in zip(users_loop(libsumo, 90), users_loop(connection, 90), strict=True):
+        assert (one is None) == (other is None)
+        if one is not None and other is not None:
+            assert one.traffic.ids == other.traffic.ids
+            assert np.array_equal(one.traffic.position, other.traffic.position)
+            assert np.array_equal(one.observation.image, other.observation.image)
+            assert one.command == other.command
+
+
+def test_advice_is_the_users_own_and_the_ego_is_free_afterwards(libsumo: Any) -> None:
+    session = fogsim.attach(libsumo, ego=EGO, visibility=120.0, settings=SMALL, drivers=False)
+    speeds = []
+    for _ in range(88):
+        libsumo.simulationStep()
+        step = session.observe()
+        if step is not None:
+            speeds.append(float(step.traffic.speed[step.ego]))
+            session.advise(step, Command(SpeedAdvice(4.0)))
+    assert len(speeds) > 10
+    assert speeds[-1] <= 4.0 + 1e-6
+    session.close()
+    session.close()
+    for _ in range(10):
+        libsumo.simulationStep()
+    assert libsumo.vehicle.getSpeed(EGO) > 6.0
+    with pytest.raises(SimulationError, match="the session is closed"):
+        session.observe()
+
+
+def test_clocks_of_a_scenario_give_way_to_the_simulations_step(libsumo: Any) -> None:
+    """The motorway's five frames of 0.1 s between two decisions would be 2.5 s here."""
+    scenario = fogsim.load_scenario("motorway_fog_bank", [*SMALL, "fog.visibility_m=30"])
+    session = fogsim.attach(libsumo, ego=EGO, scenario=scenario, drivers=False)
+    limits = []
+    for _ in range(76):
+        libsumo.simulationStep()
+        step = session.observe()
+        if step is not None:
+            limits.append(session.advise(step).advice)
+    session.close()
+    # Advice decides about its rise at each step, if it decides at each.
+    assert len(limits) > 3
+    assert all(step is not other for step, other in itertools.pairwise(limits))
+
+
+def conduct(api: Any, vehicle: str) -> tuple[Any, ...]:
+    """What FogSim may change about a vehicle."""
+    get = api.vehicle
+    return (
+        get.getMaxSpeed(vehicle),
+        get.getSpeedFactor(vehicle),
+        get.getTau(vehicle),
+        get.getSpeedMode(vehicle),
+        get.getLaneChangeMode(vehicle),
+        float(get.getParameter(vehicle, "laneChangeModel.lcSpeedGain")),
+    )
+
+
+def test_every_vehicle_gets_back_what_was_changed(libsumo: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In dense fog with careful, misjudging drivers next to none is left as it was; afterwards all are."""
+    # SUMO does not tell whom a driver ignores; so what it was told last counts.
+    ignored: dict[str, str] = {}
+    tell = libsumo.vehicle.setParameter
+
+    def told(vehicle: str, key: str, value: str) -> None:
+        if key == "carFollowModel.ignoreIDs":
+            ignored[vehicle] = value
+        tell(vehicle, key, value)
+
+    monkeypatch.setattr(libsumo.vehicle, "setParameter", told)
+    settings = (*SMALL, "drivers.speed_choice=within_sight", "drivers.distance_misjudgement=0.5")
+    session = fogsim.attach(libsumo, ego=EGO, visibility=20.0, settings=settings)
+    before: dict[str, tuple[Any, ...]] = {}
+    changed: set[int] = set()
+    for _ in range(150):
+        libsumo.simulationStep()
+        for vehicle in libsumo.simulation.getDepartedIDList():
+            before[vehicle] = conduct(libsumo, vehicle)
+        step = session.observe()
+        if step is not None:
+            session.advise(step, Command(SpeedAdvice(4.0)))
+        present = libsumo.vehicle.getIDList()
+        for part in range(len(before[EGO]) if EGO in before else 0):
+            changed.update(part for v in present if conduct(libsumo, v)[part] != before[v][part])
+    blind = {v for v in present if ignored.get(v)}
+    assert len(blind) > 3
+    session.close()
+    assert not {v for v in present if ignored.get(v)}
+    assert {0, 2, 5} <= changed  # top speeds, headways, and wishes to change lanes
+    assert EGO in present
+    assert {v: conduct(libsumo, v) for v in present} == {v: before[v] for v in present}
+
+
+def test_a_session_that_only_looks_changes_nothing(libsumo: Any) -> None:
+    def positions(look: bool) -> list[Any]:
+        libsumo.load(ARGUMENTS)
+        session = fogsim.attach(libsumo, ego=EGO, visibility=40.0, settings=SMALL)
+        found = []
+        for _ in range(110):
+            libsumo.simulationStep()
+            if look:
+                session.observe()
+            found.append([libsumo.vehicle.getPosition(v) for v in libsumo.vehicle.getIDList()])
+        session.close()
+        return found
+
+    assert positions(look=True) == positions(look=False)
+
+
+def test_an_ego_that_leaves_is_none_again(libsumo: Any) -> None:
+    seen = users_loop(libsumo, 300)
+    there = [step is not None for step in seen]
+    assert there.count(True) > 50
+    assert not there[0]
+    assert not there[-1]
+    assert sum(a != b for a, b in zip(there[1:], there[:-1], strict=True)) == 2
+
+
+def test_a_scenario_gives_fog_and_camera(libsumo: Any) -> None:
+    scenario = fogsim.load_scenario("motorway_fog_bank", [*SMALL, "fog.visibility_m=50"])
+    session = fogsim.attach(libsumo, ego=EGO, scenario=scenario, net=GRID / "grid.net.xml")
+    step = None
+    while step is None:
+        libsumo.simulationStep()
+        step = session.observe()
+    session.close()
+    assert step.truth.visibility == pytest.approx(50.0)
+
+
+def test_what_attach_cannot_do_without(libsumo: Any) -> None:
+    with pytest.raises(InputError, match="ego is missing"):
+        fogsim.attach(libsumo, visibility=100.0)
+    with pytest.raises(InputError, match="fog: this key is missing"):
+        fogsim.attach(libsumo, ego=EGO)
+
+
+def test_what_is_no_simulation() -> None:
+    with pytest.raises(SimulationError, match=r"call libsumo\.start first"):
+        fogsim.attach(load_libsumo(), ego=EGO, visibility=100.0)
+    with pytest.raises(SimulationError, match="Not connected"):
+        fogsim.attach(traci, ego=EGO, visibility=100.0)
+    with pytest.raises(InputError, match="expected libsumo, traci or a connection of traci, got 'sumo'"):
+        fogsim.attach("sumo", ego=EGO, visibility=100.0)
+
+
+def test_a_simulation_that_is_loaded_anew_is_another(libsumo: Any) -> None:
+    session = fogsim.attach(libsumo, ego="veh0", visibility=100.0, settings=SMALL)
+    for _ in range(5):
+        libsumo.simulationStep()
+        session.observe()
+    libsumo.load(ARGUMENTS)
+    libsumo.simulationStep()
+    with pytest.raises(SimulationError, match=r"time went back from 2\.5 s to 0\.5 s: attach again"):
+        session.observe()
+    session.close()
+
+
+def test_a_simulation_that_is_lost(connection: Any) -> None:
+    session = fogsim.attach(connection, ego="veh0", visibility=100.0, settings=SMALL)
+    connection.simulationStep()
+    assert session.observe() is not None
+    connection.close()
+    with pytest.raises(SimulationError, match="SUMO to which FogSim is attached is lost"):
+        session.observe()
+    session.close()
+
+
+def test_a_run_over_a_connection_is_the_run_in_process(sumo_process: Callable) -> None:
+    scenario = fogsim.load_scenario("motorway_fog_bank", [*SMALL, "fog.visibility_m=inf", "duration_s=1"])
+    here = list(fogsim.run(scenario, seed=3))
+    arguments = command_line(build.traffic_setup(scenario), spawn_streams(3).traffic_seed)
+    with sumo_process(arguments) as (port, _):
+        there = list(fogsim.run(scenario, 3, fogsim.connect(scenario, "127.0.0.1", port)))
+    assert len(there) == 11
+    for one, other in zip(here, there, strict=True):
+        assert np.array_equal(one.observation.image, other.observation.image)
+        assert np.array_equal(one.traffic.position, other.traffic.position)
+
+
+def test_a_connection_that_is_lost_on_the_way_is_one_error(sumo_process: Callable) -> None:
+    scenario = fogsim.load_scenario("motorway_fog_bank", [*SMALL, "fog.visibility_m=80"])
+    arguments = command_line(build.traffic_setup(scenario), 1)
+    with sumo_process(arguments) as (port, process):
+        steps = fogsim.run(scenario, 3, fogsim.connect(scenario, "127.0.0.1", port))
+        next(steps)
+        process.kill()
+        process.wait(10)
+        with pytest.raises(SimulationError, match=rf"SUMO at 127\.0\.0\.1:{port} is lost"):
+            next(steps)
+
+
+def test_lane_changing_is_given_back_to_who_was_kept_in_lane(libsumo: Any) -> None:
+    """Who comes after the ego is kept in its lane until the session ends; who was there before is left alone."""
+    later, get = "veh22", libsumo.vehicle
+    session = fogsim.attach(libsumo, ego=EGO, visibility=120.0, settings=(*SMALL, f"traffic.keep_lane=[veh3, {later}]"))
+    while later not in get.getIDList():
+        libsumo.simulationStep()
+        present = get.getIDList()
+        before = {v: get.getLaneChangeMode(v) for v in present}
+        session.observe()
+    assert EGO in present
+    assert get.getLaneChangeMode(later) == 0 != before[later]
+    session.close()
+    assert {v: get.getLaneChangeMode(v) for v in present} == before
+
+
+def test_a_session_tells_at_its_end_what_was_not_played(libsumo: Any) -> None:
+    late = f"traffic.events=[{{kind: brake, vehicle: {EGO}, at_time_s: 900}}]"
+    settings = (*SMALL, late, "traffic.keep_lane=[veh99]")
+    libsumo.simulationStep(40.0)
+
+    def attached(failing: bool = False) -> None:
+        with fogsim.attach(libsumo, ego=EGO, visibility=120.0, settings=settings) as session:
+            session.observe()
+            if failing:
+                raise KeyError
+
+    with pytest.warns(UnplayedWarning, match=r"events\.0 \(brake of veh18 .*not reached; vehicle 'veh99' was never on"):
+        attached()
+    with pytest.raises(KeyError):
+        attached(failing=True)

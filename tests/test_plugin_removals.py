@@ -1,0 +1,127 @@
+"""Vehicles that the user's own loop takes away, in simulations to which FogSim is attached."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import traci
+
+import fogsim
+from fogsim.plugin import AttachedSession
+from fogsim.traffic.sumo.library import load_libsumo
+from fogsim.values import Step
+
+GRID = Path(__file__).resolve().parent / "data" / "grid"
+ARGUMENTS = ["-c", str(GRID / "grid.sumocfg"), "--step-length", "0.5", "--no-step-log", "--seed", "1"]
+SMALL = ("camera.width=32", "camera.height=24")
+EGO = "veh3"
+
+
+@pytest.fixture(params=["libsumo", "traci"])
+def api(request: pytest.FixtureRequest, sumo_process: Callable) -> Iterator[Any]:
+    if request.param == "libsumo":
+        library = load_libsumo()
+        library.start(["sumo", *ARGUMENTS])
+        yield library
+        library.close()
+        return
+    with sumo_process(ARGUMENTS) as (port, _):
+        connection = traci.connect(port, numRetries=100, host="127.0.0.1", waitBetweenRetries=0.1)
+        yield connection
+        connection.close()
+
+
+def until_the_ego_drives(api: Any, session: AttachedSession) -> Step:
+    for _ in range(100):
+        api.simulationStep()
+        step = session.observe()
+        if step is not None:
+            session.advise(step)
+            if step.time >= 2.0:
+                return step
+    pytest.fail("the ego never came")
+
+
+@pytest.mark.parametrize("at", ["after the advice", "before the look", "before the advice"])
+def test_an_ego_that_is_removed_is_none_and_the_simulation_goes_on(api: Any, at: str) -> None:
+    with fogsim.attach(api, ego=EGO, visibility=120.0, settings=SMALL) as session:
+        step = until_the_ego_drives(api, session)
+        if at == "after the advice":
+            api.vehicle.remove(EGO)
+        api.simulationStep()
+        if at == "before the look":
+            api.vehicle.remove(EGO)
+        if at == "before the advice":
+            step = session.observe()
+            assert step is not None
+            api.vehicle.remove(EGO)
+            session.advise(step)
+        for _ in range(3):
+            assert session.observe() is None
+            api.simulationStep()
+    api.simulationStep()
+    assert api.vehicle.getIDCount() > 0
+
+
+def test_another_vehicle_that_is_removed_is_not_seen_any_more(api: Any) -> None:
+    with fogsim.attach(api, ego=EGO, visibility=30.0, settings=SMALL) as session:
+        step = until_the_ego_drives(api, session)
+        while len(step.traffic.ids) < 4:
+            api.simulationStep()
+            step = session.observe() or step
+            session.advise(step)
+        gone = next(v for v in step.traffic.ids if v != EGO)
+        api.vehicle.remove(gone)
+        for _ in range(3):
+            api.simulationStep()
+            step = session.observe()
+            assert step is not None
+            assert gone not in step.traffic.ids
+            session.advise(step)
+
+
+@pytest.mark.parametrize("place", [("B0A0", 20.0), ("C0B0", 90.0)])
+def test_an_ego_that_is_moved_by_hand_is_where_it_was_put(api: Any, place: tuple[str, float]) -> None:
+    """SUMO counts the way driven anew from where it puts a vehicle, as if its route began there."""
+    api.route.add("mine", ["C0B0", "B0A0"])
+    api.vehicle.add("mine", "mine")
+    with fogsim.attach(api, ego="mine", visibility=120.0, settings=SMALL) as session:
+        until_the_ego_drives(api, session)
+        api.vehicle.moveTo("mine", f"{place[0]}_0", place[1])
+        api.simulationStep()
+        moved = session.observe()
+        assert moved is not None
+    before = api.simulation.getDistanceRoad("C0B0", 0.0, place[0], 0.0, isDriving=True)
+    assert moved.route_position == pytest.approx(before + api.vehicle.getLanePosition("mine"), abs=0.1)
+
+
+def test_a_vehicle_that_bears_the_id_of_another_has_its_own_body(api: Any) -> None:
+    api.vehicletype.copy("DEFAULT_VEHTYPE", "long")
+    api.vehicletype.setLength("long", 12.0)
+    api.route.add("mine", ["C0B0", "B0A0"])
+    api.vehicle.add("mine", "mine")
+    with fogsim.attach(api, ego="mine", visibility=120.0, settings=SMALL) as session:
+        step: Step | None = until_the_ego_drives(api, session)
+        assert step is not None
+        assert step.traffic.length[step.ego] == 5.0
+        api.vehicle.remove("mine")
+        api.vehicle.add("mine", "mine", typeID="long")
+        api.simulationStep()
+        step = session.observe()
+        assert step is not None
+        assert step.traffic.length[step.ego] == 12.0
+
+
+def test_an_ego_that_is_put_back_begins_its_route_anew(api: Any) -> None:
+    api.route.add("mine", ["C0B0", "B0A0"])
+    api.vehicle.add("mine", "mine")
+    with fogsim.attach(api, ego="mine", visibility=120.0, settings=SMALL) as session:
+        until_the_ego_drives(api, session)
+        api.vehicle.remove("mine")
+        api.vehicle.add("mine", "mine", departPos="60")
+        after = None
+        while after is None:
+            api.simulationStep()
+            after = session.observe()
+    assert after.route_position == pytest.approx(60.0, abs=6.0)

@@ -1,0 +1,154 @@
+"""Several sessions of FogSim in one simulation, and settings of the user's own beside them."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import traci
+
+import fogsim
+from fogsim.plugin import AttachedSession
+from fogsim.traffic.sumo.library import load_libsumo
+from fogsim.values import Command
+
+GRID = Path(__file__).resolve().parent / "data" / "grid"
+ARGUMENTS = ["-c", str(GRID / "grid.sumocfg"), "--step-length", "0.5", "--no-step-log", "--seed", "1"]
+SMALL = ("camera.width=32", "camera.height=24")
+ADVISED = ("drivers.compliance.reached_share=1", "drivers.compliance.rate=1", "drivers.compliance.delay_s=0")
+MISJUDGING = ("drivers.speed_choice=within_sight", "drivers.distance_misjudgement=0.5")
+EGO, OTHER_EGO = "veh0", "veh1"
+
+
+@pytest.fixture(params=["libsumo", "traci"])
+def api(request: pytest.FixtureRequest, sumo_process: Callable) -> Iterator[Any]:
+    if request.param == "libsumo":
+        library = load_libsumo()
+        library.start(["sumo", *ARGUMENTS])
+        yield library
+        library.close()
+        return
+    with sumo_process(ARGUMENTS) as (port, _):
+        connection = traci.connect(port, numRetries=100, host="127.0.0.1", waitBetweenRetries=0.1)
+        yield connection
+        connection.close()
+
+
+def session(api: Any, ego: str, *settings: str, visibility: float = 120.0) -> AttachedSession:
+    return fogsim.attach(api, ego=ego, visibility=visibility, settings=(*SMALL, *settings))
+
+
+def advise(one: AttachedSession, speed: float | None) -> None:
+    """What a user does after a step, with advice for everybody if there is any."""
+    step = one.observe()
+    if step is not None:
+        one.advise(step, Command(advised_speeds={} if speed is None else dict.fromkeys(step.traffic.ids, speed)))
+
+
+def drive(api: Any, steps: int, *told: tuple[AttachedSession, float | None]) -> None:
+    for _ in range(steps):
+        api.simulationStep()
+        for one, speed in told:
+            advise(one, speed)
+
+
+def conduct(api: Any, vehicle: str) -> tuple[float, ...]:
+    get = api.vehicle
+    gain = float(get.getParameter(vehicle, "laneChangeModel.lcSpeedGain"))
+    return get.getMaxSpeed(vehicle), get.getTau(vehicle), get.getLaneChangeMode(vehicle), gain
+
+
+def top_speeds(api: Any) -> dict[str, float]:
+    return {v: api.vehicle.getMaxSpeed(v) for v in api.vehicle.getIDList() if v not in (EGO, OTHER_EGO)}
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_the_lower_advice_holds_until_its_session_is_closed(api: Any, first: int) -> None:
+    """And whoever is closed first, everybody has the own top speed at the end."""
+    drive(api, 10)
+    sessions = [session(api, EGO, *ADVISED), session(api, OTHER_EGO, *ADVISED)]
+    speeds = [4.0, 8.0]
+    drive(api, 30, *zip(sessions, speeds, strict=True))
+    assert set(top_speeds(api).values()) == {4.0}
+    sessions[first].close()
+    assert set(top_speeds(api).values()) == {speeds[1 - first]}
+    drive(api, 4, (sessions[1 - first], speeds[1 - first]))
+    assert set(top_speeds(api).values()) == {speeds[1 - first]}
+    sessions[1 - first].close()
+    assert min(top_speeds(api).values()) > 50.0
+
+
+def test_all_that_two_sessions_change_is_given_back(api: Any) -> None:
+    before: dict[str, tuple[float, ...]] = {}
+    one, other = (session(api, ego, *MISJUDGING, visibility=20.0) for ego in (EGO, OTHER_EGO))
+    changed: set[int] = set()
+    for number in range(70):
+        api.simulationStep()
+        for vehicle in api.simulation.getDepartedIDList():
+            before[vehicle] = conduct(api, vehicle)
+        if number < 50:
+            advise(one, None)
+        if number == 50:
+            one.close()
+        advise(other, None)
+        if number % 10 == 9:
+            now = {v: conduct(api, v) for v in api.vehicle.getIDList()}
+            changed.update(part for v in now for part in range(4) if now[v][part] != before[v][part])
+    other.close()
+    assert changed >= {0, 1, 3}
+    assert {v: conduct(api, v) for v in api.vehicle.getIDList()} == {v: before[v] for v in api.vehicle.getIDList()}
+
+
+def test_what_the_user_sets_meanwhile_stays(api: Any) -> None:
+    drive(api, 10)
+    one = session(api, EGO, *ADVISED)
+    drive(api, 20, (one, 4.0))
+    vehicle, another = sorted(top_speeds(api))[:2]
+    api.vehicle.setMaxSpeed(vehicle, 20.0)
+    drive(api, 2, (one, 5.0))
+    assert api.vehicle.getMaxSpeed(vehicle) == 5.0
+    api.vehicle.setMaxSpeed(another, 12.0)
+    one.close()
+    assert (api.vehicle.getMaxSpeed(vehicle), api.vehicle.getMaxSpeed(another)) == (20.0, 12.0)
+
+
+def test_a_session_of_another_simulation_gives_nothing_back_here() -> None:
+    libsumo = load_libsumo()
+    libsumo.start(["sumo", *ARGUMENTS])
+    try:
+        one = session(libsumo, EGO, *ADVISED)
+        drive(libsumo, 20, (one, 4.0))
+        libsumo.load(ARGUMENTS)
+        drive(libsumo, 8)
+        other = session(libsumo, OTHER_EGO, *ADVISED)
+        drive(libsumo, 6, (other, 4.0))
+        assert set(top_speeds(libsumo).values()) == {4.0}
+        one.close()
+        assert set(top_speeds(libsumo).values()) == {4.0}
+        other.close()
+    finally:
+        libsumo.close()
+
+
+def test_a_session_may_outlive_its_simulation() -> None:
+    libsumo = load_libsumo()
+    libsumo.start(["sumo", *ARGUMENTS])
+    one = session(libsumo, EGO, *ADVISED)
+    drive(libsumo, 5, (one, 4.0))
+    libsumo.close()
+    one.close()
+
+
+def test_a_vehicle_that_bears_the_id_of_another_is_met_anew(api: Any) -> None:
+    api.route.add("mine", ["C0B0", "B0A0"])
+    api.vehicle.add("mine", "mine")
+    one = session(api, EGO, *ADVISED)
+    drive(api, 10, (one, 4.0))
+    assert api.vehicle.getMaxSpeed("mine") == 4.0
+    api.vehicle.remove("mine")
+    api.vehicle.add("mine", "mine")
+    api.vehicle.setMaxSpeed("mine", 21.0)
+    drive(api, 10, (one, 4.0))
+    assert api.vehicle.getMaxSpeed("mine") == 4.0
+    one.close()
+    assert api.vehicle.getMaxSpeed("mine") == 21.0

@@ -1,0 +1,183 @@
+"""highway-env's drivers: the speeds that they choose in fog, how they follow advice, what they misjudge."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+import highway_env  # noqa: F401 - registers its environments
+import numpy as np
+import pytest
+
+from fogsim.atmosphere import FieldAccess, airlight_from_illuminance
+from fogsim.kinematics import safe_speed
+from fogsim.traffic import Compliance, DriverSetup
+from fogsim.traffic.drivers.individual import nature, wanted_speed
+from fogsim.traffic.highway import HighwayTraffic
+from fogsim.units import extinction_from_visibility
+from fogsim.values import Command, FogField
+
+DAY = 10_000.0
+FAST = 30.0
+MPH = 0.44704
+# Far apart, so that nobody is held up by anybody.
+CONFIG = {"vehicles_count": 12, "lanes_count": 4, "vehicles_density": 0.3}
+
+
+def fog_of(visibility: float) -> FieldAccess:
+    return FieldAccess(FogField(extinction_from_visibility(visibility), airlight_from_illuminance(DAY)))
+
+
+class Road:
+    """Vehicles that drive 30 m/s by themselves, in fog or none."""
+
+    def __init__(self, setup: DriverSetup, visibility: float = math.inf, seed: int = 3) -> None:
+        self.environment: Any = gymnasium.make("highway-v0", config=CONFIG).unwrapped
+        self.traffic = HighwayTraffic(self.environment, None, drivers=setup)
+        if math.isfinite(visibility):
+            self.traffic.enter_fog(fog_of(visibility))
+        self.traffic.start(seed)
+        for vehicle in self.others:
+            vehicle.target_speed = FAST
+
+    @property
+    def others(self) -> Sequence[Any]:
+        return [v for v in self.environment.road.vehicles if v is not self.environment.vehicle]
+
+    @property
+    def ids(self) -> list[str]:
+        snapshot = self.traffic.observe()
+        assert snapshot is not None
+        return [v for v in snapshot.state.ids if v != "ego"]
+
+    def drive(self, seconds: float, command: Command | None = None) -> "Road":
+        for _ in range(round(seconds / self.traffic.step_length)):
+            self.traffic.advance(command or Command())
+        return self
+
+    def targets(self) -> list[float]:
+        return [float(v.target_speed) for v in self.others]
+
+    def speeds(self) -> list[float]:
+        return [float(v.speed) for v in self.others]
+
+
+def exact(choice: str = "unaffected", **compliance: float) -> DriverSetup:
+    return DriverSetup(choice, spread=0.0, compliance=Compliance(**compliance))
+
+
+def test_uninformed_drivers_are_faster_than_their_sight_allows() -> None:
+    safe = safe_speed(100.0, 2.5, 3.4)
+    # (−2.5 + √(2.5² + 2 · 100 / 3.4)) · 3.4
+    assert safe == pytest.approx(18.93, abs=0.01)
+    too_fast = Road(exact("too_fast"), 100.0).drive(15.0).speeds()
+    assert max(too_fast) == pytest.approx(1.4 * safe, abs=0.3)
+    assert min(too_fast) > safe
+    careful = Road(exact("within_sight"), 100.0).drive(15.0).speeds()
+    assert max(careful) == pytest.approx(safe, abs=0.3)
+
+
+def test_the_unaffected_drive_as_in_clear_air() -> None:
+    def positions(setup: DriverSetup, visibility: float) -> Any:
+        return [v.position for v in Road(setup, visibility).drive(10.0).others]
+
+    in_clear_air = positions(exact(), math.inf)
+    assert np.array_equal(positions(exact(), 100.0), in_clear_air)
+    assert np.array_equal(positions(exact("too_fast"), 250.0), in_clear_air)
+    assert not np.array_equal(positions(exact("too_fast"), 100.0), in_clear_air)
+
+
+def test_they_slow_down_gently_and_speed_up_where_the_fog_ends() -> None:
+    road = Road(exact("within_sight"), 10_000.0).drive(15.0)
+    road.traffic.enter_fog(fog_of(60.0))
+    hardest = 0.0
+    for _ in range(300):
+        road.drive(road.traffic.step_length)
+        hardest = min(hardest, *(v.action["acceleration"] for v in road.others))
+    assert max(road.speeds()) == pytest.approx(safe_speed(60.0, 2.5, 3.4), abs=0.3)
+    # Some follow one another, so that IDM itself brakes a little harder.
+    assert -3.0 < hardest < -1.8
+    road.traffic.enter_fog(fog_of(10_000.0))
+    assert road.drive(1.0).targets() == [FAST] * len(road.others)
+
+
+def test_every_driver_has_a_factor_of_their_own() -> None:
+    setup = DriverSetup("too_fast", spread=0.2)
+    targets = Road(setup, 60.0).drive(25.0).targets()
+    assert len(set(targets)) > 6
+    drawn = [nature(setup, f"vehicle {i}", 1).factor for i in range(2000)]
+    assert np.mean(np.log(drawn)) == pytest.approx(0.0, abs=0.02)
+    assert np.std(np.log(drawn)) == pytest.approx(0.2, rel=0.05)
+
+
+def advised(road: Road, speed: float = 15.0) -> Command:
+    return Command(advised_speeds=dict.fromkeys(road.ids, speed))
+
+
+@pytest.mark.parametrize("nobody", [{"rate": 0.0}, {"reached_share": 0.0}, {"strength": 0.0}])
+def test_advice_that_nobody_follows_changes_no_target_speed(nobody: dict[str, float]) -> None:
+    road = Road(exact(**nobody))
+    assert road.drive(10.0, advised(road)).targets() == [FAST] * len(road.others)
+
+
+def test_advice_that_all_follow_sets_every_target_speed() -> None:
+    road = Road(exact(rate=1.0, strength=1.0))
+    assert road.drive(20.0, advised(road)).targets() == pytest.approx([15.0] * len(road.others))
+    # And who is no longer advised drives as before.
+    assert road.drive(1.5).targets() == [FAST] * len(road.others)
+
+
+def test_those_whom_it_reaches_and_who_follow_are_the_share_that_is_asked_for() -> None:
+    setup = exact(reached_share=0.5, rate=0.8)
+    road = Road(setup)
+    followers = [nature(setup, name, 3).follows for name in road.ids]
+    assert 0 < sum(followers) < len(followers)
+    targets = road.drive(20.0, advised(road)).targets()
+    assert targets == pytest.approx([15.0 if follows else FAST for follows in followers])
+    shares = [nature(setup, f"vehicle {i}", 1).follows for i in range(4000)]
+    assert np.mean(shares) == pytest.approx(0.4, abs=0.02)
+
+
+def test_the_field_result_that_advice_of_30_mph_gave_61() -> None:
+    setup = exact(strength=4.0 / 35.0)
+    driver = nature(setup, "any", 1)
+    assert wanted_speed(setup, driver, 65.0 * MPH, math.inf, 30.0 * MPH, 60.0) == pytest.approx(61.0 * MPH)
+    road = Road(setup)
+    for vehicle in road.others:
+        vehicle.target_speed = 65.0 * MPH
+    assert road.drive(20.0, advised(road, 30.0 * MPH)).targets() == pytest.approx([61.0 * MPH] * len(road.others))
+
+
+def test_advice_is_followed_after_the_delay() -> None:
+    road = Road(exact(delay=4.0))
+    command = advised(road)
+    assert road.drive(3.8, command).targets() == [FAST] * len(road.others)
+    assert max(road.drive(1.4, command).targets()) < FAST
+
+
+def test_advice_never_makes_anybody_faster() -> None:
+    road = Road(exact("within_sight"), 60.0).drive(20.0)
+    own = road.targets()
+    assert road.drive(6.0, advised(road, 28.0)).targets() == pytest.approx(own)
+
+
+def test_who_misjudges_distances_keeps_a_shorter_headway() -> None:
+    setup = DriverSetup("unaffected", spread=0.0, misjudgement=0.6)
+    road = Road(setup, 30.0).drive(1.0)
+    # IDM's wanted headway is 1.5 s.
+    assert [v.TIME_WANTED for v in road.others] == pytest.approx([1.5 / 1.6] * len(road.others))
+    road.traffic.enter_fog(fog_of(150.0))
+    assert [v.TIME_WANTED for v in road.drive(1.5).others] == pytest.approx([1.5] * len(road.others))
+    assert road.environment.vehicle.TIME_WANTED == 1.5
+
+
+def test_the_same_seed_gives_the_same_run_and_another_other_drivers() -> None:
+    setup = DriverSetup("too_fast", 0.2, Compliance(rate=0.5))
+
+    def run(seed: int) -> Any:
+        road = Road(setup, 60.0, seed)
+        return np.array([(*v.position, v.speed) for v in road.drive(12.0, advised(road, 12.0)).others])
+
+    assert np.array_equal(run(5), run(5))
+    assert not np.array_equal(run(5), run(6))
+    assert nature(setup, "lead", 5) != nature(setup, "lead", 6)

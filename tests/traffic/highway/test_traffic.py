@@ -1,0 +1,289 @@
+"""highway-env as the traffic: geometry, drivers in fog, replay."""
+
+import copy
+import math
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from highway_env.road.lane import CircularLane, LineType, SineLane, StraightLane
+from highway_env.road.road import Road
+from highway_env.road.road import RoadNetwork as HighwayRoads
+from highway_env.vehicle.behavior import IDMVehicle
+from highway_env.vehicle.kinematics import Vehicle
+
+from fogsim.atmosphere import FieldAccess, airlight_from_illuminance
+from fogsim.errors import InputError, SimulationError
+from fogsim.traffic import DriverSight
+from fogsim.traffic.drivers.sight import inherent_contrast
+from fogsim.traffic.highway import HighwayTraffic, road_network
+from fogsim.units import extinction_from_visibility
+from fogsim.values import Collision, Command, FogField, Lamp, LaneMarking, SpeedAdvice, TrafficSnapshot
+
+DAY = 10_000.0
+EMPTY = {"vehicles_count": 0, "initial_lane_id": 2}
+
+
+def traffic_on(config: dict[str, Any], environment: str = "highway-v0") -> tuple[HighwayTraffic, Any]:
+    made = gymnasium.make(f"highway_env:{environment}", config=config).unwrapped
+    return HighwayTraffic(made, DriverSight(DAY)), made
+
+
+def seen(traffic: HighwayTraffic) -> TrafficSnapshot:
+    snapshot = traffic.observe()
+    assert snapshot is not None
+    return snapshot
+
+
+def fog_of(visibility: float) -> FieldAccess:
+    return FieldAccess(FogField(extinction_from_visibility(visibility), airlight_from_illuminance(DAY)))
+
+
+def network_of(*lanes: tuple[str, str, Any]) -> Any:
+    roads = HighwayRoads()
+    for start, end, lane in lanes:
+        roads.add_lane(start, end, lane)
+    road = Road(roads)
+    return road_network(road, Vehicle(road, lanes[0][2].position(0.0, 0.0)))
+
+
+def beside(vehicle: Any, ahead: float, right: float) -> Any:
+    return vehicle.position + np.array((ahead, right))
+
+
+def test_a_straight_road_with_y_up() -> None:
+    traffic, environment = traffic_on(EMPTY)
+    traffic.start(1)
+    network, signs = traffic.network()
+    traffic.close()
+    assert signs.signs == ()
+    assert [lane.lane_id for lane in network.lanes] == ["0>1_0", "0>1_1", "0>1_2", "0>1_3"]
+    for index, lane in enumerate(network.lanes):
+        assert lane.centreline == pytest.approx(np.array([(0.0, -4.0 * index, 0.0), (10_000.0, -4.0 * index, 0.0)]))
+        assert (lane.width, lane.speed_limit) == (4.0, 30.0)
+    dashed, solid = LaneMarking.DASHED, LaneMarking.SOLID
+    assert [(lane.left, lane.right) for lane in network.lanes] == [
+        (solid, dashed), (dashed, dashed), (dashed, dashed), (dashed, solid),
+    ]  # fmt: skip
+    assert [lane.outermost for lane in network.lanes] == [False, False, False, True]
+    assert network.route == pytest.approx(network.lanes[2].centreline)
+    assert environment.vehicle.lane_index == ("0", "1", 2)
+
+
+def test_front_bumpers_and_headings() -> None:
+    traffic, environment = traffic_on(EMPTY)
+    traffic.start(1)
+    ego = environment.vehicle
+    # On highway-env's screen y points down: this one drives down the screen, which is to the south.
+    other = Vehicle(environment.road, (ego.position[0] + 50.0, ego.position[1]), heading=math.pi / 2, speed=7.0)
+    other.action["acceleration"] = -3.0
+    environment.road.vehicles.append(other)
+    snapshot = seen(traffic)
+    traffic.close()
+    state, row = snapshot.state, 1 - snapshot.ego
+    assert state.position[snapshot.ego] == pytest.approx((ego.position[0] + 2.5, -8.0, 0.0))
+    assert state.position[row] == pytest.approx((ego.position[0] + 50.0, -8.0 - 2.5, 0.0))
+    assert state.heading == pytest.approx([0.0, -math.pi / 2])
+    assert (state.speed[row], state.acceleration[row], state.length[row], state.width[row]) == (7.0, -3.0, 5.0, 2.0)
+    assert state.lamps[row] & Lamp.STOP
+    assert not state.lamps[snapshot.ego] & Lamp.STOP
+    assert snapshot.route_position == pytest.approx(ego.position[0] + 2.5)
+    assert snapshot.route_length == pytest.approx(10_000.0)
+    assert snapshot.speed_limit == 30.0
+    assert snapshot.leader is not None
+    assert (snapshot.leader.vehicle_id, snapshot.leader.gap) == (state.ids[row], pytest.approx(45.0))
+
+
+def test_curves_keep_their_shape() -> None:
+    quarter = CircularLane((0.0, 0.0), 20.0, 0.0, math.pi / 2, line_types=(LineType.CONTINUOUS, LineType.NONE))
+    network = network_of(("a", "b", quarter))
+    line = network.lanes[0].centreline
+    assert np.hypot(line[:, 0], line[:, 1]) == pytest.approx(np.full(len(line), 20.0))
+    assert line[0] == pytest.approx((20.0, 0.0, 0.0))
+    assert line[-1] == pytest.approx((0.0, -20.0, 0.0), abs=1e-9)
+    assert np.linalg.norm(np.diff(line, axis=0), axis=1).max() <= 2.0
+    assert (network.lanes[0].left, network.lanes[0].right) == (LaneMarking.SOLID, LaneMarking.NONE)
+    wave = SineLane((0.0, 0.0), (100.0, 0.0), amplitude=3.0, pulsation=2 * math.pi / 100.0, phase=0.0)
+    line = network_of(("a", "b", wave)).lanes[0].centreline
+    assert line[:, 1] == pytest.approx(-3.0 * np.sin(2 * math.pi * line[:, 0] / 100.0))
+
+
+def test_the_route_leads_across_joints() -> None:
+    first, second = StraightLane((0.0, 0.0), (100.0, 0.0)), StraightLane((100.0, 0.0), (100.0, 80.0))
+    route = network_of(("a", "b", first), ("b", "c", second)).route
+    assert route == pytest.approx(np.array([(0.0, 0.0, 0.0), (100.0, 0.0, 0.0), (100.0, -80.0, 0.0)]))
+
+
+def collisions_of_a_driver(visibility: float) -> tuple[list[Collision], float]:
+    """Drive at 25 m/s towards a stopped car 200 m ahead; gives the collisions and the distance at which it shows."""
+    traffic, environment = traffic_on(EMPTY)
+    traffic.start(1)
+    ego, road = environment.vehicle, environment.road
+    stopped = Vehicle(road, beside(ego, 200.0, 4.0))
+    driver = IDMVehicle(road, beside(ego, 0.0, 4.0), speed=25.0, target_speed=25.0, enable_lane_change=False)
+    road.vehicles += [driver, stopped]
+    traffic.enter_fog(fog_of(visibility))
+    hits: list[Collision] = []
+    for _ in range(15 * 15):
+        traffic.advance(Command())
+        hits += seen(traffic).collisions
+    contrast = inherent_contrast(tuple(seen(traffic).state.paint[2]))
+    traffic.close()
+    assert driver.speed < 1.0
+    return hits, math.log(contrast / 0.05) / extinction_from_visibility(visibility)
+
+
+def test_drivers_stop_in_clear_air() -> None:
+    assert collisions_of_a_driver(10_000.0)[0] == []
+    assert collisions_of_a_driver(300.0)[0] == []
+
+
+@pytest.mark.parametrize("visibility", [30.0, 45.0, 60.0])
+def test_in_fog_they_hit_what_they_see_too_late(visibility: float) -> None:
+    (hit,), shows = collisions_of_a_driver(visibility)
+    assert hit.collider.startswith("IDMVehicle")
+    assert hit.victim.startswith("Vehicle")
+    # After the reaction time of 1 s, IDM brakes at its limit, 6 m/s².
+    braking = max(0.0, shows - 25.0 * 1.0)
+    assert hit.impact_speed == pytest.approx(math.sqrt(25.0**2 - 2 * 6.0 * braking), abs=1.0)
+
+
+def test_collisions_are_those_that_the_library_knows() -> None:
+    traffic, environment = traffic_on({"vehicles_count": 12, "lanes_count": 2})
+    traffic.enter_fog(fog_of(30.0))
+    traffic.start(4)
+    vehicles = environment.road.vehicles
+    for first in vehicles[-2:]:
+        first.target_speed = 0.01
+    hits: list[Collision] = []
+    for _ in range(200):
+        traffic.advance(Command())
+        hits += seen(traffic).collisions
+    names = seen(traffic).state.ids
+    traffic.close()
+    crashed = {name for name, vehicle in zip(names, vehicles, strict=True) if vehicle.crashed}
+    assert len(crashed) > 2
+    assert {name for hit in hits for name in (hit.collider, hit.victim)} == crashed
+    assert len({frozenset((hit.collider, hit.victim)) for hit in hits}) == len(hits)
+
+
+def test_the_egos_driver_is_as_blind_as_the_others() -> None:
+    def ends_in_collision(visibility: float) -> bool:
+        traffic, environment = traffic_on(EMPTY)
+        traffic.enter_fog(fog_of(visibility))
+        traffic.start(1)
+        ego = environment.vehicle
+        environment.road.vehicles.append(Vehicle(environment.road, beside(ego, 200.0, 0.0)))
+        hits = []
+        for _ in range(12 * 15):
+            traffic.advance(Command())
+            hits += seen(traffic).collisions
+        traffic.close()
+        return any("ego" in (hit.collider, hit.victim) for hit in hits)
+
+    assert ends_in_collision(40.0)
+    assert not ends_in_collision(10_000.0)
+
+
+def test_fog_of_one_environment_stays_there() -> None:
+    foggy, in_fog = traffic_on(EMPTY)
+    clear, in_clear_air = traffic_on(EMPTY)
+    foggy.start(1)
+    clear.start(1)
+    foggy.enter_fog(fog_of(30.0))
+    for environment in (in_fog, in_clear_air):
+        road, ego = environment.road, environment.vehicle
+        road.vehicles.append(Vehicle(road, beside(ego, 100.0, 0.0)))
+    assert in_fog.road.neighbour_vehicles(in_fog.vehicle)[0] is None
+    assert in_clear_air.road.neighbour_vehicles(in_clear_air.vehicle)[0] is not None
+    # What is hidden from the driver is still there for the snapshot.
+    assert seen(foggy).leader is not None
+    foggy.close()
+    clear.close()
+
+
+def test_a_copied_environment_keeps_its_fog() -> None:
+    """Planners copy highway-env's environments; a copy's drivers must look at the copy's vehicles."""
+    traffic, environment = traffic_on(EMPTY)
+    traffic.start(1)
+    traffic.enter_fog(fog_of(60.0))
+    copied = copy.deepcopy(environment)
+    far, near = (Vehicle(copied.road, beside(copied.vehicle, ahead, 0.0)) for ahead in (150.0, 20.0))
+    copied.road.vehicles.append(far)
+    assert copied.road.neighbour_vehicles(copied.vehicle)[0] is None
+    copied.road.vehicles.append(near)
+    assert copied.road.neighbour_vehicles(copied.vehicle)[0] is near
+    assert len(environment.road.vehicles) == 1
+    traffic.close()
+
+
+def test_advice_sets_the_speed_gently_and_lets_go() -> None:
+    traffic, _ = traffic_on(EMPTY)
+    traffic.start(1)
+    slow = Command(SpeedAdvice(15.0), Lamp.POSITION | Lamp.REAR_FOG)
+    speeds, hardest = [], 0.0
+    for command in [slow] * 300 + [Command()] * 300:
+        traffic.advance(command)
+        snapshot = seen(traffic)
+        speeds.append(snapshot.state.speed[0])
+        hardest = min(hardest, snapshot.state.acceleration[0])
+        assert snapshot.state.lamps[0] & ~Lamp.STOP == command.lamps
+    traffic.close()
+    assert speeds[299] == pytest.approx(15.0, abs=0.3)
+    assert hardest == pytest.approx(-2.0, abs=0.05)
+    assert speeds[-1] == pytest.approx(25.0, abs=0.5)
+
+
+def test_others_follow_advice_of_their_own() -> None:
+    traffic, environment = traffic_on({"vehicles_count": 1})
+    traffic.start(1)
+    other = next(v for v in seen(traffic).state.ids if v != "ego")
+    for _ in range(300):
+        traffic.advance(Command(advised_speeds={other: 10.0}))
+    vehicle = environment.road.vehicles[1]
+    traffic.close()
+    assert vehicle.speed == pytest.approx(10.0, abs=0.3)
+
+
+def test_the_same_seed_replays_exactly() -> None:
+    traffic, _ = traffic_on({"vehicles_count": 12})
+    traffic.enter_fog(fog_of(80.0))
+
+    def run(seed: int) -> TrafficSnapshot:
+        traffic.start(seed)
+        for _ in range(45):
+            traffic.advance(Command())
+        return seen(traffic)
+
+    one, again, other = run(7), run(7), run(8)
+    traffic.close()
+    assert one.state.time == pytest.approx(3.0)
+    assert one.state.ids == again.state.ids
+    assert np.array_equal(one.state.position, again.state.position)
+    assert np.array_equal(one.state.speed, again.state.speed)
+    assert not np.array_equal(one.state.position, other.state.position)
+
+
+def test_an_ego_that_is_removed_is_gone() -> None:
+    traffic, environment = traffic_on(EMPTY)
+    traffic.start(1)
+    environment.road.vehicles.remove(environment.vehicle)
+    assert traffic.observe() is None
+    traffic.close()
+
+
+def test_misuse() -> None:
+    with pytest.raises(InputError, match="environment of highway-env"):
+        HighwayTraffic(gymnasium.make("CartPole-v1"), None)
+    traffic, environment = traffic_on(EMPTY)
+    with pytest.raises(SimulationError, match="not been started"):
+        traffic.advance(Command())
+    traffic.start(1)
+    environment.configure({"lanes_count": 5})
+    with pytest.raises(SimulationError, match="other roads"):
+        traffic.start(2)
+    traffic.close()
+    traffic.close()
+    with pytest.raises(SimulationError, match="closed"):
+        traffic.network()

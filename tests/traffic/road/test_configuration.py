@@ -1,0 +1,52 @@
+from pathlib import Path
+
+import pytest
+
+from fogsim.errors import InputError
+from fogsim.traffic.road.configuration import FIT_ARGUMENTS, configured_files, left_out
+
+
+def config(folder: Path, content: str) -> Path:
+    path = folder / "a.sumocfg"
+    path.write_text(content, encoding="utf-8")
+    return path
+
+
+def test_files_are_relative_to_the_configuration(tmp_path: Path) -> None:
+    path = config(
+        tmp_path,
+        '<configuration><input><net-file value="nets/a.net.xml"/><additional-files value="b.add.xml, /c.add.xml"/>'
+        "</input></configuration>",
+    )
+    assert configured_files(path) == (tmp_path / "nets/a.net.xml", (tmp_path / "b.add.xml", Path("/c.add.xml")))
+
+
+def test_short_names_and_no_additional_files(tmp_path: Path) -> None:
+    assert configured_files(config(tmp_path, '<configuration><n value="a.net.xml"/></configuration>')) == (
+        tmp_path / "a.net.xml",
+        (),
+    )
+
+
+@pytest.mark.parametrize(
+    ("content", "message"), [("<configuration", "not a SUMO configuration"), ("<configuration/>", "names no network")]
+)
+def test_what_is_no_configuration(tmp_path: Path, content: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        configured_files(config(tmp_path, content))
+
+
+def test_options_that_cannot_hold_here_are_told_with_the_reason(tmp_path: Path) -> None:
+    path = config(
+        tmp_path,
+        '<configuration><traci_server><remote-port value="8813"/></traci_server><random v="true"/></configuration>',
+    )
+    port, random = left_out(path)
+    assert port.startswith("remote-port=8813 is left out: SUMO would listen")
+    assert random == "random=true is left out: a run must depend on its seed alone"
+    assert FIT_ARGUMENTS == ("--remote-port", "0", "--random", "false")
+
+
+@pytest.mark.parametrize("text", ['<remote-port value="0"/>', '<random value="False"/>', "<random/>"])
+def test_options_that_hold_as_they_are_need_no_word(tmp_path: Path, text: str) -> None:
+    assert left_out(config(tmp_path, f"<configuration>{text}</configuration>")) == ()

@@ -1,0 +1,125 @@
+import gzip
+from pathlib import Path
+
+import pytest
+
+from fogsim.traffic.road.demand import Demand, VehicleRoute, read_configured_demand, read_demand
+
+VEHICLES = """<routes><route id="r" edges="a b"/>
+<vehicle id="ego" route="r" depart="0" departLane="1"/><trip id="t" depart="1" from="a" to="c"/>
+<vehicle id="own" depart="2"><route edges="b c"/></vehicle>
+<flow id="f" begin="0" end="9" number="3" route="r"/><flow id="g" begin="0" end="9" probability="0.1" from="a" to="b"/>
+</routes>"""
+
+
+def demand_of(folder: Path, text: str, *wanted: str, **options: int) -> Demand:
+    file = folder / "a.rou.xml"
+    file.write_text(text, encoding="utf-8")
+    return read_demand([file], wanted, **options)
+
+
+@pytest.mark.parametrize("vehicle", ["ego", "t", "own", "f.0", "f.2", "g.0", "g.123456"])
+def test_who_can_come(tmp_path: Path, vehicle: str) -> None:
+    demand = demand_of(tmp_path, VEHICLES, vehicle)
+    assert demand.found == {vehicle}
+    assert not demand.lacks(vehicle)
+
+
+@pytest.mark.parametrize("vehicle", ["egoo", "EGO", "r", "f", "f.3", "f.00", "f.01", "f.-1", "f.", "f.1.0", ".0", "g"])
+def test_who_can_never_come(tmp_path: Path, vehicle: str) -> None:
+    demand = demand_of(tmp_path, VEHICLES, "ego", vehicle)
+    assert demand.lacks(vehicle)
+    assert not demand.lacks("ego")
+    assert demand.names == ("ego", "t", "own", "f.0", "f.2", "g.0")
+
+
+def test_ways_that_are_written_out(tmp_path: Path) -> None:
+    file = tmp_path / "a.rou.xml"
+    demand = demand_of(tmp_path, VEHICLES, "ego", "own", "t", "f.1")
+    assert demand.routes == {
+        "ego": VehicleRoute(("a", "b"), 1, file),
+        "own": VehicleRoute(("b", "c"), None, file),
+        "f.1": VehicleRoute(("a", "b"), None, file),
+    }
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '<routes><rerouter id="x"/><route id="r" edges="a"/><vehicle id="ego" route="r" depart="0"/></routes>',
+        '<routes><route id="r" edges="a" repeat="2"/><vehicle id="ego" route="r" depart="0"/></routes>',
+        '<routes><vehicle id="ego" depart="0"><routeDistribution><route id="r" edges="a" probability="1"/>'
+        '<route id="s" edges="b" probability="1"/></routeDistribution></vehicle></routes>',
+    ],
+)
+def test_ways_that_can_be_others_are_not_claimed(tmp_path: Path, text: str) -> None:
+    demand = demand_of(tmp_path, text, "ego")
+    assert demand.found == {"ego"}
+    assert not demand.routes
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '<routes><include href="b.rou.xml"/></routes>',
+        '<additional><calibrator id="c" lane="a_0" pos="0"><flow begin="0" end="9" vehsPerHour="9"/></calibrator>'
+        "</additional>",
+        '<routes><person id="p" depart="0"><personTrip from="a" to="b" modes="car"/></person></routes>',
+        '<routes><vType id="car" scale="2"/></routes>',
+        "<routes><vehicle",
+        '<?xml version="1.0" encoding="no-such"?><routes/>',
+        "",
+    ],
+)
+def test_nothing_is_claimed_where_vehicles_may_come_from_elsewhere(tmp_path: Path, text: str) -> None:
+    assert not demand_of(tmp_path, text, "ego").lacks("ego")
+
+
+def test_files_that_are_not_there_claim_nothing(tmp_path: Path) -> None:
+    for name in ("none.rou.xml", "$HOME/a.rou.xml", "x" * 5000):
+        assert not read_demand([tmp_path / name], ["ego"]).lacks("ego")
+    assert not read_demand([tmp_path], ["ego"]).lacks("ego")
+
+
+def test_packed_files(tmp_path: Path) -> None:
+    file = tmp_path / "a.rou.xml.gz"
+    file.write_bytes(gzip.compress(VEHICLES.encode()))
+    demand = read_demand([file], ["ego", "egoo"])
+    assert not demand.lacks("ego")
+    assert demand.lacks("egoo")
+    file.write_bytes(file.read_bytes()[:100])
+    assert not read_demand([file], ["egoo"]).lacks("egoo")
+
+
+def test_a_large_file_is_not_read_to_its_end(tmp_path: Path) -> None:
+    text = VEHICLES + " " * 300_000
+    assert demand_of(tmp_path, text, "egoo", most_bytes=1_000_000).lacks("egoo")
+    assert not demand_of(tmp_path, text, "egoo", most_bytes=100_000).lacks("egoo")
+
+
+@pytest.mark.parametrize(
+    ("option", "lacks"),
+    [("", True), ('<load-state value="s.xml"/>', False), ('<scale value="1.5"/>', False), ("<seed v='3'/>", True)],
+)
+def test_vehicles_of_a_configuration(tmp_path: Path, option: str, lacks: bool) -> None:
+    (tmp_path / "a.rou.xml").write_text(VEHICLES, encoding="utf-8")
+    (tmp_path / "b.add.xml").write_text('<additional><vehicle id="late" depart="9"/></additional>', encoding="utf-8")
+    config = tmp_path / "a.sumocfg"
+    config.write_text(
+        f'<configuration><net-file value="a.net.xml"/><route-files value="a.rou.xml"/><a v="b.add.xml"/>{option}'
+        "</configuration>",
+        encoding="utf-8",
+    )
+    demand = read_configured_demand(config, ["ego", "late", "egoo"])
+    assert demand.lacks("egoo") is lacks
+    assert not demand.lacks("ego")
+    assert not demand.lacks("late")
+
+
+def test_ways_that_a_configuration_lets_change_are_not_claimed(tmp_path: Path) -> None:
+    (tmp_path / "a.rou.xml").write_text(VEHICLES, encoding="utf-8")
+    config = tmp_path / "a.sumocfg"
+    rerouting = '<device.rerouting.probability value="1"/>'
+    for option, routes in (("", 1), (rerouting, 0)):
+        config.write_text(f'<configuration><r value="a.rou.xml"/>{option}</configuration>', encoding="utf-8")
+        assert len(read_configured_demand(config, ["ego"]).routes) == routes

@@ -1,0 +1,138 @@
+import gzip
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fogsim.errors import InputError
+from fogsim.traffic.road.network import read_net, road_network
+from fogsim.traffic.road.signs import sign_map
+from fogsim.values import LaneEnd, LaneKind, LaneMarking
+
+FOLDER = Path(__file__).resolve().parents[3] / "scenarios" / "motorway_fog_bank"
+NET = FOLDER / "motorway.net.xml"
+
+
+def test_lanes_of_the_motorway() -> None:
+    network = road_network(read_net(NET), ["approach", "bank", "exit"])
+    lanes = {lane.lane_id: lane for lane in network.lanes}
+    right, middle, left = (lanes[f"bank_{i}"] for i in range(3))
+    assert (right.right, right.left) == (LaneMarking.SOLID, LaneMarking.DASHED)
+    assert (middle.right, middle.left) == (LaneMarking.DASHED, LaneMarking.DASHED)
+    assert (left.right, left.left) == (LaneMarking.DASHED, LaneMarking.SOLID)
+    assert right.outermost
+    assert not middle.outermost
+    assert right.speed_limit == pytest.approx(110 / 3.6, abs=0.01)
+    assert np.linalg.norm(right.centreline[0] - middle.centreline[0]) == pytest.approx(3.75, abs=0.02)
+
+
+def test_the_route_runs_along_the_middle_lanes_without_jumps() -> None:
+    route = road_network(read_net(NET), ["approach", "bank", "exit"]).route
+    steps = np.linalg.norm(np.diff(route, axis=0), axis=1)
+    assert steps.sum() == pytest.approx(5500.0, rel=0.005)
+    assert steps.min() > 0
+    assert steps.max() < 25.0
+
+
+def test_what_is_no_network(tmp_path: Path) -> None:
+    file = tmp_path / "broken.net.xml"
+    file.write_text("<net><edge", encoding="utf-8")
+    with pytest.raises(InputError, match="not a SUMO network"):
+        read_net(file)
+    file.write_text('<net version="1.20"></net>', encoding="utf-8")
+    with pytest.raises(InputError, match="has no edges"):
+        read_net(file)
+
+
+GRID = Path(__file__).resolve().parents[2] / "data" / "grid" / "grid.net.xml"
+
+
+def test_a_town_has_junctions_stop_lines_and_double_lines_between_directions() -> None:
+    network = road_network(read_net(GRID), ["A0B0"])
+    lanes = {lane.lane_id: lane for lane in network.lanes}
+    assert len([area for area in network.areas if area.area_id in {"A0", "B0", "C0", "A1", "B1", "C1"}]) == 6
+    right, left = lanes["A0B0_0"], lanes["A0B0_1"]
+    assert (right.right, right.left, left.left) == (LaneMarking.SOLID, LaneMarking.DASHED, LaneMarking.DOUBLE)
+    assert right.end == left.end == LaneEnd.STOP
+    away = next(lane for lane in network.lanes if lane.lane_id == "A0left0_0")
+    assert away.end is LaneEnd.OPEN
+    inside = [lane for lane in network.lanes if lane.lane_id.startswith(":")]
+    assert {lane.kind for lane in inside} == {LaneKind.JUNCTION}
+    assert {lane.left for lane in inside} == {LaneMarking.NONE}
+
+
+@pytest.mark.parametrize(("lane", "count"), [("e_0", 0), ("f_0", 1)])
+def test_a_lane_without_a_shape_is_named(tmp_path: Path, lane: str, count: int) -> None:
+    file = tmp_path / "bare.net.xml"
+    shape = {0: "", 1: ' shape="0,0"'}[count]
+    edge = lane.removesuffix("_0")
+    file.write_text(
+        '<net version="1.20"><location netOffset="0,0" convBoundary="0,0,1,1" origBoundary="0,0,1,1" '
+        f'projParameter="!"/><edge id="{edge}" from="a" to="b">'
+        f'<lane id="{lane}" index="0" speed="10" length="10"{shape}/></edge>'
+        '<junction id="a" type="dead_end" x="0" y="0" incLanes="" intLanes=""/>'
+        f'<junction id="b" type="dead_end" x="1" y="0" incLanes="{lane}" intLanes=""/></net>',
+        encoding="utf-8",
+    )
+    with pytest.raises(InputError, match=rf"lane '{lane}' of edge '{edge}'.*shape.*got {count}"):
+        road_network(read_net(file), [edge])
+
+
+def test_where_vehicles_keep_to_the_left_lines_lie_the_other_way_round(tmp_path: Path) -> None:
+    text = GRID.read_text(encoding="utf-8").replace("<net ", '<net lefthand="true" ', 1)
+    file = tmp_path / "left.net.xml.gz"
+    file.write_bytes(gzip.compress(text.encode()))
+    usual, left = (
+        {lane.lane_id: lane for lane in road_network(read_net(path), ["A0B0"]).lanes} for path in (GRID, file)
+    )
+    assert set(usual) == set(left)
+    for name in ("A0B0_0", "A0B0_1"):
+        assert (left[name].left, left[name].right) == (usual[name].right, usual[name].left)
+        assert left[name].outermost is not usual[name].outermost
+
+
+def test_signs_stand_on_the_side_that_vehicles_keep_to(tmp_path: Path) -> None:
+    usual, file = NET.read_text(encoding="utf-8"), tmp_path / "left.net.xml"
+    file.write_text(usual.replace("<net ", '<net lefthand="true" ', 1), encoding="utf-8")
+    there, here = (sign_map(read_net(path), ()).signs for path in (NET, file))
+    assert there
+    for one, other in zip(there, here, strict=True):
+        to_the_left = np.array([-np.sin(one.heading), np.cos(one.heading)])
+        apart = np.array(other.position[:2]) - one.position[:2]
+        assert apart @ to_the_left > 5.0
+
+
+def test_a_lane_of_no_length_has_no_sign(tmp_path: Path) -> None:
+    lane = '<edge id="{0}" from="{1}" to="{2}"><lane id="{0}_0" index="0" speed="{3}" length="9" shape="{4}"/></edge>'
+    edges = lane.format("a", "n", "m", 10, "0,0 0,0 9,0"), lane.format("b", "m", "n", 20, "9,0 9,0")
+    nodes = "".join(
+        f'<junction id="{name}" type="dead_end" x="{x}" y="0" incLanes="" intLanes="" shape=""/>'
+        for name, x in (("n", 0), ("m", 9))
+    )
+    file = tmp_path / "small.net.xml"
+    file.write_text(f'<net version="1.20">{"".join(edges)}{nodes}</net>', encoding="utf-8")
+    (sign,) = sign_map(read_net(file), ()).signs
+    assert sign.sign_id == "limit.a"
+    assert np.isfinite(sign.position).all()
+    assert sign.heading == 0.0
+
+
+def test_a_sign_stands_on_no_other_road(tmp_path: Path) -> None:
+    lane = '<edge id="{0}" from="{1}" to="{2}"><lane id="{0}_0" index="0" speed="{3}" length="99" shape="{4}"/></edge>'
+    # A slip road on the right of the road whose limit changes where they part.
+    edges = (
+        lane.format("a", "l", "n", 30, "-99,0 0,0"),
+        lane.format("b", "n", "m", 20, "0,0 99,0"),
+        lane.format("c", "n", "k", 30, "0,-5.5 99,-5.5"),
+    )
+    nodes = "".join(
+        f'<junction id="{name}" type="dead_end" x="{x}" y="0" incLanes="" intLanes="" shape=""/>'
+        for name, x in (("l", -99), ("n", 0), ("m", 99), ("k", 99))
+    )
+    joins = '<connection from="a" to="{}" fromLane="0" toLane="0" dir="s" state="M"/>'
+    text = f'<net version="1.20">{"".join(edges)}{nodes}{joins.format("b")}{joins.format("c")}</net>'
+    file = tmp_path / "slip.net.xml"
+    file.write_text(text, encoding="utf-8")
+    sign = next(sign for sign in sign_map(read_net(file), ()).signs if sign.sign_id == "limit.b")
+    assert sign.position[1] < -1.6
+    assert abs(sign.position[1] + 5.5) > 1.6

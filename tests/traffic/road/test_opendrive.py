@@ -1,0 +1,136 @@
+import math
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+
+from fogsim.errors import InputError
+from fogsim.traffic.road.opendrive import opendrive_signs
+from fogsim.traffic.road.plan_view import PlanView, plan_view
+
+CURVE = (
+    '<geometry s="0" x="10" y="20" hdg="0" length="100"><line/></geometry>'
+    '<geometry s="100" x="110" y="20" hdg="0" length="50"><spiral curvStart="0" curvEnd="0.005"/></geometry>'
+    '<geometry s="150" x="159.922" y="22.078" hdg="0.125" length="80"><arc curvature="0.005"/></geometry>'
+)
+
+
+def line(geometries: str) -> PlanView:
+    return plan_view(ET.fromstring(f"<planView>{geometries}</planView>"))  # noqa: S314 - text of this test
+
+
+def file(folder: Path, signals: str, geometries: str = CURVE, more: str = "") -> Path:
+    path = folder / "roads.xodr"
+    path.write_text(
+        f'<OpenDRIVE><header revMajor="1"/><road id="7" length="230"><planView>{geometries}</planView>{more}'
+        f"<signals>{signals}</signals></road></OpenDRIVE>",
+        encoding="utf-8",
+    )
+    return path
+
+
+def test_a_quarter_circle() -> None:
+    arc = f'<geometry s="0" x="1" y="2" hdg="0" length="{50 * math.pi}"><arc curvature="0.01"/></geometry>'
+    assert line(arc).at(50 * math.pi) == pytest.approx((101.0, 102.0, math.pi / 2))
+    right = arc.replace('"0.01"', '"-0.01"')
+    assert line(right).at(50 * math.pi) == pytest.approx((101.0, -98.0, -math.pi / 2))
+
+
+def test_a_spiral_is_the_clothoid() -> None:
+    """Fresnel integrals at 1: C = 0.7798934004, S = 0.4382591474 (Abramowitz & Stegun, table 7.7)."""
+    scale = 80.0  # x = scale C(s / scale) where the curvature grows by π / scale² each metre
+    end = math.pi / scale
+    spiral = f'<geometry s="0" x="0" y="0" hdg="0" length="80"><spiral curvStart="0" curvEnd="{end}"/></geometry>'
+    x, y, heading = line(spiral).at(80.0)
+    assert (x / scale, y / scale) == pytest.approx((0.7798934004, 0.4382591474), abs=1e-10)
+    assert heading == pytest.approx(math.pi / 2)
+
+
+def test_a_spiral_without_change_of_curvature_is_an_arc() -> None:
+    arc = '<geometry s="0" x="3" y="4" hdg="1" length="90"><arc curvature="0.02"/></geometry>'
+    almost = arc.replace('<arc curvature="0.02"/>', '<spiral curvStart="0.02" curvEnd="0.0200000001"/>')
+    assert line(almost).at(77.0) == pytest.approx(line(arc).at(77.0), abs=1e-5)
+
+
+def test_the_line_has_no_jumps_between_its_pieces() -> None:
+    whole = line(CURVE)
+    places = np.array([whole.at(s) for s in np.arange(0.0, 230.1, 0.5)])
+    steps = np.hypot(*np.diff(places[:, :2], axis=0).T)
+    assert steps == pytest.approx(0.5, abs=1e-2)
+    assert np.diff(places[:, 2]).max() == pytest.approx(0.0025, rel=0.01)
+
+
+def test_a_signal_stands_to_the_right_and_speaks_to_those_who_drive_along(tmp_path: Path) -> None:
+    signal = (
+        '<signal id="s" s="40" t="-6" zOffset="2" orientation="+" type="274" value="80" unit="km/h" '
+        'width="0.6" height="0.6"/>'
+    )
+    elevation = '<elevationProfile><elevation s="0" a="5" b="0.01" c="0" d="0"/></elevationProfile>'
+    (sign,) = opendrive_signs(file(tmp_path, signal, more=elevation), net_offset=(1000.0, -10.0))
+    assert (sign.sign_id, sign.kind, sign.diameter) == ("xodr.s", "speed_limit", 0.6)
+    assert sign.value == pytest.approx(80 / 3.6)
+    assert sign.position == pytest.approx((10 + 40 + 1000, 20 - 6 - 10, 5 + 0.4 + 2 + 0.3))
+    assert sign.heading == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize(
+    ("t", "orientation", "heading"),
+    [("-6", "none", 0.0), ("6", "none", math.pi), ("-6", "-", math.pi), ("6", "+", 0.0)],
+)
+def test_whom_a_signal_speaks_to(tmp_path: Path, t: str, orientation: str, heading: float) -> None:
+    (sign,) = opendrive_signs(
+        file(tmp_path, f'<signal id="s" s="40" t="{t}" orientation="{orientation}" type="274" value="80"/>')
+    )
+    assert sign.heading == pytest.approx(heading)
+
+
+@pytest.mark.parametrize(
+    ("attributes", "kind", "value"),
+    [
+        ('type="274" value="-1" subtype="60"', "speed_limit", 60 / 3.6),
+        ('type="R2-1" name="SpeedLimit" value="65" unit="mph"', "speed_limit", 65 * 0.44704),
+        ('type="274" value="30" unit="m/s"', "speed_limit", 30.0),
+        ('type="276"', "xodr.276", 0.0),
+        ('type="274" value="-1" subtype="-1"', "xodr.274", 0.0),
+        ('type="262" value="7.5" unit="t"', "xodr.262", 7.5),
+    ],
+)
+def test_what_a_signal_says(tmp_path: Path, attributes: str, kind: str, value: float) -> None:
+    (sign,) = opendrive_signs(file(tmp_path, f'<signal id="s" s="40" t="-6" {attributes}/>'))
+    assert sign.kind == kind
+    assert sign.value == pytest.approx(value)
+
+
+def test_lights_that_change_are_no_signs(tmp_path: Path) -> None:
+    assert opendrive_signs(file(tmp_path, '<signal id="s" s="4" t="-6" dynamic="yes" type="1000001"/>')) == []
+
+
+POLYNOMIAL = '<geometry s="0" x="0" y="0" hdg="0" length="230"><paramPoly3 aU="0"/></geometry>'
+
+
+@pytest.mark.parametrize(
+    ("signals", "geometries", "message"),
+    [
+        ('<signal id="a" s="400" t="1"/>', CURVE, r"road '7': signal 'a': expected s on the road, 0 … 230 m, got 400"),
+        ('<signal id="a" s="40"/>', CURVE, "needs the attribute 't'"),
+        ('<signal id="a" s="40" t="1"/>', POLYNOMIAL, "on a paramPoly3; places on line, arc and spiral are known"),
+        ('<signal id="a" s="40" t="1"/>', "", "the road has no geometry"),
+        ('<signal id="a" s="40" t="1" value="fast"/>', CURVE, "expected a number for value, got 'fast'"),
+        ('<signal id="a" s="4" t="1" type="274" value="9" unit="kn"/>', CURVE, "expected the speed's unit to be one"),
+        ('<signal id="a" s="4" t="1"/>', CURVE.replace('hdg="0"', ""), "<geometry> needs the attribute 'hdg'"),
+    ],
+)
+def test_signals_that_cannot_be_placed(tmp_path: Path, signals: str, geometries: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        opendrive_signs(file(tmp_path, signals, geometries))
+
+
+def test_what_is_no_opendrive_file(tmp_path: Path) -> None:
+    path = tmp_path / "a.xodr"
+    path.write_text("<net/>", encoding="utf-8")
+    with pytest.raises(InputError, match="expected <OpenDRIVE> at its top, got <net>"):
+        opendrive_signs(path)
+    path.write_text("<OpenDRIVE", encoding="utf-8")
+    with pytest.raises(InputError, match="not an OpenDRIVE file"):
+        opendrive_signs(path)

@@ -1,0 +1,207 @@
+"""SUMO's vehicles change lane in one step; the camera sees them glide."""
+
+import itertools
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from fogsim.traffic import AttachedTraffic, TraciLink, TrafficSetup
+from fogsim.traffic.sumo.lane_changes import DURATION, LaneChangeSmoothing
+from fogsim.traffic.sumo.library import LibsumoLink
+from fogsim.traffic.sumo.vehicle_reader import VehicleReader
+from fogsim.traffic.sumo_traffic import command_line
+from fogsim.values import Command, Lamp, SpeedAdvice, TrafficState
+
+FOLDER = Path(__file__).resolve().parents[3] / "scenarios" / "motorway_fog_bank"
+SETUP = TrafficSetup(
+    net=FOLDER / "motorway.net.xml",
+    routes=(FOLDER / "motorway.rou.xml",),
+    additional=(),
+    ego="ego",
+    step_length=0.1,
+    keep_lane=(),
+    warm_up_limit=600.0,
+    advice_deceleration=2.0,
+    reading_radius=800.0,
+)
+LARGEST_STEP = 0.2
+"""Farther than this nobody is to move sideways within 0.1 s [m]."""
+
+
+@pytest.fixture
+def link() -> Iterator[LibsumoLink]:
+    link = LibsumoLink()
+    yield link
+    link.end()
+
+
+def to_the_left(
+    before: NDArray[np.float64], now: NDArray[np.float64], heading: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    moved = now - before
+    return np.asarray(moved[..., 1] * np.cos(heading) - moved[..., 0] * np.sin(heading))
+
+
+def steps_to_the_side(states: list[tuple[TrafficState, TrafficState]]) -> tuple[NDArray[np.float64], ...]:
+    """Sideways movements of everybody between states that follow each other, as shown and as SUMO has them."""
+    shown_steps, true_steps = [], []
+    for (last, last_true), (now, now_true) in itertools.pairwise(states):
+        both = [(last.ids.index(v), i) for i, v in enumerate(now.ids) if v in last.ids]
+        old, new = (list(rows) for rows in zip(*both, strict=True))
+        heading = now_true.heading[new]
+        shown_steps.append(to_the_left(last.position[old], now.position[new], heading))
+        true_steps.append(to_the_left(last_true.position[old], now_true.position[new], heading))
+    return np.concatenate(shown_steps), np.concatenate(true_steps)
+
+
+def assert_smooth(states: list[tuple[TrafficState, TrafficState]]) -> None:
+    shown, true = np.abs(steps_to_the_side(states))
+    assert np.count_nonzero(true > 3.0) >= 10
+    assert shown.max() < LARGEST_STEP
+    for state, unmoved in states:
+        for name in ("ids", "lane", "speed", "acceleration", "lamps"):
+            assert np.array_equal(getattr(state, name), getattr(unmoved, name)), name
+
+
+def attached_run(api: Any, steps: int) -> list[tuple[TrafficState, TrafficState]]:
+    """Shown and true states in a simulation that its owner steps."""
+    while "ego" not in api.vehicle.getIDList():
+        api.simulationStep()
+    traffic = AttachedTraffic(SETUP, api)
+    traffic.start(1)
+    truth = VehicleReader(api, "ego", SETUP.reading_radius)
+    states = []
+    for _ in range(steps):
+        traffic.obey(Command(SpeedAdvice(28.0)))
+        api.simulationStep()
+        traffic.look()
+        snapshot = traffic.observe()
+        assert snapshot is not None
+        states.append((snapshot.state, truth.state(Command().lamps)))
+    traffic.release()
+    return states
+
+
+def test_nobody_jumps_and_everybody_ends_in_sumos_lane(link: LibsumoLink) -> None:
+    states = attached_run(link.begin(command_line(SETUP, 1)), 500)
+    assert_smooth(states)
+    arrived = 0
+    longest = round(DURATION / SETUP.step_length) + 3
+    for i in range(longest, len(states)):
+        now, true = states[i]
+        for row, vehicle in enumerate(now.ids):
+            past = [s.lane[r] for s, _ in states[i - longest : i + 1] if (r := s.row(vehicle)) is not None]
+            indices = [lane.rpartition("_")[2] for lane in past]
+            if len(past) > longest and len(set(indices[1:])) == 1:
+                assert np.array_equal(now.position[row], true.position[row])
+                assert now.heading[row] == true.heading[row]
+                arrived += indices[0] != indices[1]
+    assert arrived >= 10
+
+
+def test_nobody_jumps_over_a_connection(sumo_process: Callable) -> None:
+    with sumo_process(command_line(SETUP, 1)) as (port, _):
+        distant = TraciLink("127.0.0.1", port)
+        assert_smooth(attached_run(distant.begin(()), 250))
+        distant.end()
+
+
+def test_without_changes_of_lane_states_are_untouched(link: LibsumoLink) -> None:
+    api = link.begin(command_line(SETUP, 1))
+    while "ego" not in api.vehicle.getIDList():
+        step_without_changes(api)
+    smoothing, reader = LaneChangeSmoothing(), VehicleReader(api, "ego", 800.0)
+    lanes: set[str] = set()
+    for _ in range(300):
+        step_without_changes(api)
+        state = reader.state(Lamp.NONE)
+        assert smoothing.smoothed(state) is state
+        lanes.update(state.lane)
+    # From edge to edge, that is, but never to the side.
+    assert len(lanes) > 3
+
+
+def step_without_changes(api: Any) -> None:
+    for vehicle in api.simulation.getDepartedIDList():
+        api.vehicle.setLaneChangeMode(vehicle, 0)
+    api.simulationStep()
+
+
+def ego_at(time: float, x: float, y: float, lane: str, heading: float = 0.0) -> TrafficState:
+    one = np.ones(1)
+    return TrafficState(
+        time=time,
+        ids=("ego",),
+        types=("car",),
+        position=np.array([[x, y, 0.0]]),
+        heading=heading * one,
+        speed=20.0 * one,
+        acceleration=0.0 * one,
+        length=4.5 * one,
+        width=1.8 * one,
+        height=1.5 * one,
+        lane=(lane,),
+        lamps=np.zeros(1, dtype=np.int32),
+        paint=np.full((1, 3), 0.5),
+    )
+
+
+def test_the_egos_pose_follows_a_smoothstep() -> None:
+    smoothing = LaneChangeSmoothing()
+    smoothing.smoothed(ego_at(0.0, 0.0, -3.0, "road_0"))
+    begun = smoothing.smoothed(ego_at(0.1, 2.0, 0.0, "road_1"))
+    assert (begun.position[0].tolist(), begun.heading[0]) == ([2.0, -3.0, 0.0], 0.0)
+    half = smoothing.smoothed(ego_at(0.1 + 0.5 * DURATION, 32.0, 0.0, "road_1"))
+    assert half.position[0, 1] == pytest.approx(-1.5)
+    # Fastest in the middle, where a smoothstep rises by 1.5 times its mean.
+    assert half.heading[0] == pytest.approx(np.arctan2(1.5 * 3.0 / DURATION, 20.0))
+    end = ego_at(0.1 + DURATION, 62.0, 0.0, "road_1")
+    assert smoothing.smoothed(end) is end
+
+
+def test_who_changes_back_on_the_way_neither_jumps_nor_turns_at_once() -> None:
+    smoothing, shown = LaneChangeSmoothing(), []
+    for k in range(100):
+        lane = 1 if 10 <= k < 25 else 0
+        shown.append(smoothing.smoothed(ego_at(0.1 * k, 2.0 * k, 3.5 * lane, f"road_{lane}")))
+    y = np.array([state.position[0, 1] for state in shown])
+    assert np.abs(np.diff(y)).max() < LARGEST_STEP
+    assert np.abs(np.diff(y, 2)).max() < 0.05
+    assert 1.0 < y.max() < 3.5
+    assert y[-1] == 0.0
+
+
+def test_two_lanes_at_once_take_longer() -> None:
+    smoothing, y = LaneChangeSmoothing(), []
+    for k in range(80):
+        lane = 2 if k >= 10 else 0
+        y.append(float(smoothing.smoothed(ego_at(0.1 * k, 2.0 * k, 3.5 * lane, f"road_{lane}")).position[0, 1]))
+    assert np.abs(np.diff(y)).max() < LARGEST_STEP
+    assert y[-1] == 7.0
+
+
+def test_bends_and_moves_by_hand_are_no_changes_of_lane() -> None:
+    smoothing = LaneChangeSmoothing()
+    smoothing.smoothed(ego_at(0.0, 0.0, 0.0, "road_0"))
+    # A quarter of a circle with a radius of 20 m, to the next edge.
+    turned = ego_at(1.5, 20.0, 20.0, "side_0", heading=np.pi / 2)
+    assert smoothing.smoothed(turned) is turned
+    carried = ego_at(1.6, 500.0, 25.0, "road_1", heading=np.pi / 2)
+    assert smoothing.smoothed(carried) is carried
+    lifted = ego_at(1.7, 500.0 - 30.0, 27.0, "road_5", heading=np.pi / 2)
+    assert smoothing.smoothed(lifted) is lifted
+
+
+def test_who_leaves_on_the_way_is_forgotten() -> None:
+    smoothing = LaneChangeSmoothing()
+    smoothing.smoothed(ego_at(0.0, 0.0, 0.0, "road_0"))
+    smoothing.smoothed(ego_at(0.1, 2.0, 3.5, "road_1"))
+    other = replace(ego_at(0.2, 4.0, 3.5, "road_1"), ids=("other",))
+    assert smoothing.smoothed(other) is other
+    back = ego_at(0.3, 6.0, 3.5, "road_1")
+    assert smoothing.smoothed(back) is back

@@ -1,0 +1,296 @@
+"""Drivers in a real SUMO: who sees late hits, who sees early stops."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike, NDArray
+
+from fogsim.atmosphere import FieldAccess
+from fogsim.traffic import Compliance, DriverSetup, DriverSight, Traffic, TrafficSetup, libsumo_traffic
+from fogsim.traffic.drivers.speed_choice import (
+    SPEED_CHOICES,
+    complied_speed,
+    perceived_distance_factor,
+    too_fast,
+    unaffected,
+    within_sight,
+)
+from fogsim.traffic.sumo.library import LibsumoLink, load_libsumo
+from fogsim.traffic.sumo.motion_bounds import MotionBounds
+from fogsim.traffic.sumo_drivers.pair_sight import PairSight
+from fogsim.values import Collision, Command, FogBank, FogField
+
+NET = Path(__file__).resolve().parents[3] / "scenarios" / "motorway_fog_bank" / "motorway.net.xml"
+EMERGENCY_DECELERATION = 9.0  # SUMO's default of a passenger car
+ROUTES = """<routes>
+  <vType id="c" vClass="passenger" sigma="0" speedDev="0" length="4.6" maxSpeed="33.8" collisionMinGapFactor="0"/>
+  <route id="r" edges="approach bank exit"/>
+  <vehicle id="wreck" type="c" route="r" depart="0" departPos="800" departSpeed="0" departLane="1" color="0,0,0">
+    <stop lane="approach_1" startPos="790" endPos="801" duration="10000"/>
+  </vehicle>
+  <vehicle id="ego" type="c" route="r" depart="0" departPos="100" departSpeed="33.8" departLane="1"/>
+</routes>"""
+
+
+SLOW_LEADER = """<routes>
+  <vType id="c" vClass="passenger" sigma="0" speedDev="0"/>
+  <vType id="s" vClass="passenger" sigma="0" speedDev="0" maxSpeed="8"/>
+  <route id="r" edges="approach bank exit"/>
+  <vehicle id="slow" type="s" route="r" depart="0" departPos="300" departSpeed="8" departLane="0"/>
+  <vehicle id="ego" type="c" route="r" depart="0" departPos="60" departSpeed="30" departLane="0"/>
+</routes>"""
+
+
+@dataclass(frozen=True)
+class Fog:
+    """Homogeneous fog."""
+
+    k: float
+
+    @property
+    def maximum_extinction(self) -> float:
+        return self.k
+
+    @property
+    def minimum_extinction(self) -> float:
+        return self.k
+
+    def extinction(self, points: ArrayLike) -> NDArray[np.float64]:
+        return np.full(np.shape(points)[:-1], self.k)
+
+    def optical_depth(self, start: ArrayLike, end: ArrayLike) -> NDArray[np.float64]:
+        return self.k * np.linalg.norm(np.subtract(end, start), axis=-1)
+
+
+@dataclass(frozen=True)
+class SeesFrom:
+    """Eyes that see everything from a fixed distance on, whatever the fog."""
+
+    distance: float
+    reaction_time: float = 0.0
+    illuminance: float = 0.0
+
+    def sure_distance(self, *_: float) -> float:
+        return self.distance - 10.0
+
+    def hidden_distance(self, *_: float) -> float:
+        return self.distance + 10.0
+
+    def body_limit(self, distance: float, _: float) -> float:
+        return math.inf if distance <= self.distance else -math.inf
+
+    def lamp_limit(self, *_: float) -> float:
+        return -math.inf
+
+
+@pytest.fixture
+def setup(tmp_path: Path) -> TrafficSetup:
+    routes = tmp_path / "wreck.rou.xml"
+    routes.write_text(ROUTES, encoding="utf-8")
+    return TrafficSetup(
+        net=NET,
+        routes=(routes,),
+        additional=(),
+        ego="ego",
+        step_length=0.05,
+        keep_lane=("ego", "wreck"),
+        warm_up_limit=10.0,
+        advice_deceleration=2.0,
+        reading_radius=2000.0,
+    )
+
+
+def collisions(setup: TrafficSetup, k: float = 0.05, steps: int = 800) -> tuple[list[Collision], float]:
+    """Collisions of a drive towards the wreck, and the ego's speed at the end [m/s]."""
+    traffic = libsumo_traffic(setup)
+    traffic.enter_fog(Fog(k))
+    hits: list[Collision] = []
+    try:
+        traffic.start(1)
+        for _ in range(steps):
+            traffic.advance(Command())
+            snapshot = traffic.observe()
+            assert snapshot is not None
+            hits += snapshot.collisions
+            speed = float(snapshot.state.speed[snapshot.ego])
+    finally:
+        traffic.close()
+    return hits, speed
+
+
+@pytest.mark.parametrize(("sight", "reaction"), [(50.0, 0.0), (40.0, 0.0), (80.0, 1.0)])
+def test_who_sees_too_late_hits_at_the_speed_that_physics_gives(
+    setup: TrafficSetup, sight: float, reaction: float
+) -> None:
+    """v² = v₀² − 2 a (d − v₀ t), with SUMO's emergency deceleration."""
+    ((hit,), _) = collisions(replace(setup, sight=SeesFrom(sight, reaction)), steps=800)
+    expected = np.sqrt(33.8**2 - 2 * EMERGENCY_DECELERATION * (sight - 33.8 * reaction))
+    assert hit.impact_speed == pytest.approx(expected, abs=1.0)
+    assert {hit.collider, hit.victim} == {"ego", "wreck"}
+
+
+def test_who_sees_in_time_stops(setup: TrafficSetup) -> None:
+    hits, speed = collisions(replace(setup, sight=SeesFrom(100.0)))
+    assert hits == []
+    assert speed == pytest.approx(0.0, abs=0.01)
+
+
+def test_stock_drivers_see_through_any_fog(setup: TrafficSetup) -> None:
+    hits, speed = collisions(setup, k=0.3)
+    assert hits == []
+    assert speed == pytest.approx(0.0, abs=0.01)
+
+
+def test_real_eyes_in_dense_fog_hit_and_in_thin_fog_stop(setup: TrafficSetup) -> None:
+    eyes = replace(setup, sight=DriverSight(illuminance=10_000.0))
+    assert len(collisions(eyes, k=3.0 / 30.0)[0]) == 1
+    assert collisions(eyes, k=3.0 / 400.0)[0] == []
+
+
+@pytest.mark.parametrize("bank", [False, True])
+def test_on_a_grade_sight_is_the_closed_form_over_the_way_along_the_road(bank: bool, tmp_path: Path) -> None:
+    """τ = k d, as far uphill as on the level; in uneven fog along the line between both vehicles' places."""
+    far_off = FogBank((0.0, 1e6), (1.0, 0.0), 0.0, 100.0, 10.0, 0.01)
+    fog = FieldAccess(FogField(0.03, (1000.0,) * 3, (far_off,) if bank else ()))
+    routes = tmp_path / "two.rou.xml"
+    routes.write_text(
+        """<routes><vType id="c" length="5" minGap="2.5"/><route id="r" edges="road"/>
+        <vehicle id="lead" type="c" route="r" depart="0" departPos="1370" departSpeed="20"/>
+        <vehicle id="ego" type="c" route="r" depart="0" departPos="1300" departSpeed="20"/></routes>""",
+        encoding="utf-8",
+    )
+    net = NET.parents[1] / "graded_motorway" / "graded.net.xml"
+    link = LibsumoLink()
+    try:
+        api = link.begin(["--net-file", str(net), "--route-files", str(routes), "--no-step-log", "true"])
+        while len(api.vehicle.getIDList()) < 2:
+            link.step()
+        leader, gap = api.vehicle.getLeader("ego", 200.0)
+        front, ahead = (np.array(api.vehicle.getPosition3D(v)) for v in ("ego", leader))
+        way = float(np.linalg.norm(ahead - front)) - 5.0
+        assert gap + 2.5 == pytest.approx(way, abs=1e-3)
+        assert abs(front[2] - ahead[2]) > 2.5
+        sight = DriverSight(illuminance=10_000.0)
+        pairs = PairSight(api, fog, sight, MotionBounds(api.vehicle.getSpeed))
+        assert pairs._depths([("ego", leader, gap)], [gap + 2.5]) == pytest.approx([0.03 * way], rel=1e-4)
+    finally:
+        link.end()
+
+
+def leaves_its_lane(setup: TrafficSetup, sight: DriverSight | SeesFrom | None, model: str = "LC2013") -> bool:
+    """Whether the ego, free to overtake, leaves the rightmost lane before it is 45 m from a slow vehicle there."""
+    setup.routes[0].write_text(SLOW_LEADER.replace("<vType", f'<vType laneChangeModel="{model}"'), encoding="utf-8")
+    traffic = libsumo_traffic(replace(setup, sight=sight, keep_lane=("slow",)))
+    traffic.enter_fog(Fog(0.05))
+    try:
+        traffic.start(1)
+        while True:
+            traffic.advance(Command())
+            snapshot = traffic.observe()
+            assert snapshot is not None
+            if not snapshot.state.lane[snapshot.ego].endswith("_0"):
+                return True
+            if snapshot.leader is not None and snapshot.leader.gap < 45.0:
+                return False
+    finally:
+        traffic.close()
+
+
+def test_who_does_not_see_a_leader_does_not_overtake_it(setup: TrafficSetup) -> None:
+    """SUMO's lane changing sees a slow leader through fog by itself."""
+    assert leaves_its_lane(setup, None)
+    assert leaves_its_lane(setup, SeesFrom(400.0))
+    assert not leaves_its_lane(setup, SeesFrom(40.0))
+
+
+def test_a_lane_change_model_that_cannot_be_told_keeps_seeing(setup: TrafficSetup) -> None:
+    assert leaves_its_lane(setup, SeesFrom(40.0), model="DK2008")
+
+
+def test_after_a_collision_both_stand_and_block_the_lane_or_vanish(setup: TrafficSetup) -> None:
+    blind = replace(setup, sight=SeesFrom(20.0))
+    hits, speed = collisions(blind)
+    assert len(hits) == 1
+    assert speed == pytest.approx(0.0, abs=0.01)
+
+
+@pytest.fixture
+def crowd(setup: TrafficSetup) -> Iterator[Traffic]:
+    """The motorway's own traffic in fog of 60 m, drivers as the test sets them."""
+    folder = NET.parent
+    busy = replace(
+        setup,
+        routes=(folder / "motorway.rou.xml",),
+        warm_up_limit=600.0,
+        drivers=DriverSetup("within_sight", spread=0.0, compliance=Compliance(rate=0.5)),
+    )
+    traffic = libsumo_traffic(busy)
+    traffic.enter_fog(Fog(3.0 / 60.0))
+    yield traffic
+    traffic.close()
+
+
+def test_drivers_choose_a_speed_in_fog_and_only_those_who_comply_follow_advice(crowd: Traffic) -> None:
+    crowd.start(1)
+    snapshot = crowd.observe()
+    assert snapshot is not None
+    others = [v for v in snapshot.state.ids if v != "ego"]
+    chosen = within_sight(60.0)
+    speeds = snapshot.state.speed[[snapshot.state.row(v) for v in others]]
+    assert np.median(speeds) == pytest.approx(chosen, abs=1.0)
+    for _ in range(600):
+        crowd.advance(Command(advised_speeds=dict.fromkeys(others, 7.0)))
+    after = crowd.observe()
+    assert after is not None
+    rows = [row for v in others if (row := after.state.row(v)) is not None]
+    slow = float(np.mean(after.state.speed[rows] < 8.0))
+    assert 0.25 < slow < 0.95  # half comply, and some of the others are held up behind them
+
+
+def test_speed_choices() -> None:
+    assert unaffected(30.0) == np.inf
+    assert within_sight(50.0) * 3.6 == pytest.approx(42.5, abs=0.05)
+    assert too_fast(200.0) == np.inf
+    assert too_fast(100.0) == pytest.approx(1.4 * within_sight(100.0))
+    assert {"unaffected", "too_fast", "within_sight"} <= set(SPEED_CHOICES)
+
+
+def test_distances_seem_longer_in_dense_fog() -> None:
+    """Cavallo, Colomb & Doré 2001: up to 60 % at night in the densest fog."""
+    assert perceived_distance_factor(20.0, 0.6) == pytest.approx(1.6)
+    assert perceived_distance_factor(90.0, 0.6) == pytest.approx(1.3)
+    assert perceived_distance_factor(500.0, 0.6) == 1.0
+
+
+def mean_headway(setup: TrafficSetup, misjudgement: float) -> float:
+    """Mean time headway that drivers want in fog of 30 m [s]."""
+    drivers = DriverSetup("unaffected", spread=0.0, misjudgement=misjudgement)
+    routes = (NET.parent / "motorway.rou.xml",)
+    traffic = libsumo_traffic(replace(setup, routes=routes, warm_up_limit=600.0, drivers=drivers, step_length=0.1))
+    traffic.enter_fog(Fog(0.1))
+    try:
+        traffic.start(1)
+        snapshot = traffic.observe()
+        assert snapshot is not None
+        vehicles = load_libsumo().vehicle
+        return float(np.mean([vehicles.getTau(v) for v in snapshot.state.ids if v != "ego"]))
+    finally:
+        traffic.close()
+
+
+def test_who_misjudges_distances_follows_closer(setup: TrafficSetup) -> None:
+    assert mean_headway(setup, 0.6) == pytest.approx(mean_headway(setup, 0.0) / 1.6, rel=0.02)
+
+
+def test_drivers_advised_30_mph_who_drive_61_can_be_represented() -> None:
+    """The field result: advice of 30 mph, mean speed 61 mph; with 65 mph unadvised that is a strength of 4 in 35."""
+    mph = 0.44704
+    strength = (65 - 61) / (65 - 30)
+    assert complied_speed(65 * mph, 30 * mph, strength) == pytest.approx(61 * mph)
+    assert complied_speed(65 * mph, 30 * mph, 1.0) == pytest.approx(30 * mph)
+    assert complied_speed(65 * mph, 30 * mph, 0.0) == pytest.approx(65 * mph)
+    assert complied_speed(20 * mph, 30 * mph, 1.0) == pytest.approx(20 * mph)  # nobody is advised to go faster

@@ -1,0 +1,141 @@
+"""Looking only when sight could have changed decides in every step as looking in every step does."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fogsim.atmosphere import FieldAccess
+from fogsim.traffic import DriverSight
+from fogsim.traffic.appearance import OTHERS_LAMPS, lamps_from_signals, paint
+from fogsim.traffic.drivers.sight import EYE_HEIGHT, inherent_contrast, rear_intensity
+from fogsim.traffic.sumo.library import LibsumoLink
+from fogsim.traffic.sumo.roster import Roster
+from fogsim.traffic.sumo.schedule import Schedule
+from fogsim.traffic.sumo_drivers.perception import LONGEST_PAUSE, REACH, Perception
+from fogsim.values import FogBank, FogField, Lamp
+
+FOLDER = Path(__file__).resolve().parents[3] / "scenarios" / "motorway_fog_bank"
+STEP = 0.1
+ARGUMENTS = (
+    *("--net-file", str(FOLDER / "motorway.net.xml"), "--route-files", str(FOLDER / "motorway.rou.xml")),
+    *("--step-length", str(STEP), "--seed", "5", "--no-step-log", "true", "--no-warnings", "true"),
+)
+EVEN = FogField(0.04, (3000.0, 3000.0, 3000.0))
+BANKS = FogField(
+    0.01,
+    (3000.0, 3000.0, 3000.0),
+    banks=tuple(FogBank((0.0, 0.0), (1.0, 0.0), x, x + 150.0, 60.0, 0.05) for x in range(200, 3000, 300)),
+)
+
+
+@pytest.fixture
+def link() -> Iterator[LibsumoLink]:
+    link = LibsumoLink()
+    yield link
+    link.end()
+
+
+def is_seen(api: Any, fog: FieldAccess, sight: DriverSight, pair: tuple[str, str, float], lamps: Lamp) -> bool:
+    """One driver's sight, straight from the laws."""
+    follower, leader, gap = pair
+    eyes, rear = ([x, y, z + EYE_HEIGHT] for x, y, z in map(api.vehicle.getPosition3D, (follower, leader)))
+    distance = max(gap + api.vehicle.getMinGap(follower), 0.1)
+    length = sum((b - a) ** 2 for a, b in zip(eyes, rear, strict=True)) ** 0.5
+    end = [a + (b - a) * distance / length for a, b in zip(eyes, rear, strict=True)]
+    depth = fog.optical_depth([eyes], [end])
+    lit = int(lamps if leader == "ego" else OTHERS_LAMPS) | lamps_from_signals(api.vehicle.getSignals(leader))
+    contrast = inherent_contrast(paint(leader, api.vehicle.getColor(leader)))
+    seen = sight.sees_body([distance], depth, [contrast]) | sight.sees_lamp([distance], depth, [rear_intensity(lit)])
+    return bool(seen[0])
+
+
+@pytest.mark.parametrize("field", [EVEN, BANKS], ids=["even", "banks"])
+@pytest.mark.parametrize("illuminance", [10_000.0, 0.1], ids=["day", "night"])
+def test_scheduled_looks_decide_as_looks_in_every_step(link: LibsumoLink, field: FogField, illuminance: float) -> None:
+    """For every leader that has been the leader for as long as a look may wait."""
+    api, fog = link.begin(ARGUMENTS), FieldAccess(field)
+    for _ in range(600):
+        link.step()
+    sight = DriverSight(illuminance, reaction_time=0.0)
+    perception = Perception(api, fog, sight)
+    steady: dict[str, tuple[str, int]] = {}
+    compared, changes, before = 0, 0, perception.ignored
+    for step in range(400):
+        link.step()
+        lamps = Lamp.REAR_FOG if step % 100 > 50 else Lamp.NONE
+        perception.update("ego", lamps, frozenset())
+        ignored = perception.ignored
+        changes += len(ignored.items() ^ before.items())
+        before = ignored
+        for follower in api.vehicle.getIDList():
+            leader, gap = api.vehicle.getLeader(follower, REACH) or ("", 0.0)
+            known, since = steady.get(follower, ("", step))
+            steady[follower] = (leader, since if known == leader else step)
+            if leader and (step - steady[follower][1]) * STEP > LONGEST_PAUSE:
+                compared += 1
+                seen = is_seen(api, fog, sight, (follower, leader, gap), lamps)
+                assert seen == (ignored.get(follower) != leader), (step, follower, leader, gap)
+    assert compared > 5000
+    assert changes > 20
+
+
+def test_a_look_costs_only_those_who_are_due(link: LibsumoLink) -> None:
+    api = link.begin(ARGUMENTS)
+    for _ in range(600):
+        link.step()
+    perception = Perception(api, FieldAccess(EVEN), DriverSight(10_000.0))
+    asked: list[str] = []
+    original = perception._leader
+
+    def watched(vehicle: str, reach: float) -> Any:
+        asked.append(vehicle)
+        return original(vehicle, reach)
+
+    perception._leader = watched
+    present = 0
+    for _ in range(100):
+        link.step()
+        perception.update("ego", Lamp.NONE, frozenset())
+        present += api.vehicle.getIDCount()
+    assert set(api.vehicle.getIDList()) <= set(asked)
+    assert len(asked) < 0.5 * present
+
+
+def test_the_roster_is_who_is_on_the_road(link: LibsumoLink) -> None:
+    api = link.begin(ARGUMENTS)
+    roster = Roster(api)
+    mark, came = 0, set()
+    for step in range(900):
+        link.step()
+        # A step in a hundred is missed, and once somebody is taken away.
+        if step % 100:
+            roster.look()
+            new, mark = roster.newcomers(mark)
+            came.update(new)
+            assert roster.present == set(api.vehicle.getIDList())
+        if step == 450:
+            api.vehicle.remove(min(roster.present))
+    assert roster.present < came
+    assert roster.departures > 0
+
+
+def test_who_is_scheduled_is_due_in_time_and_once() -> None:
+    schedule = Schedule(0.1, 3.0)
+    schedule.put(["now"], 3.0)
+    schedule.put(["soon"], 3.27)
+    schedule.put(["later"], 3.74)
+    seen = {}
+    for step in range(1, 12):
+        time = 3.0 + 0.1 * step
+        for vehicle in schedule.due(time):
+            seen[vehicle] = time
+    assert seen["now"] == pytest.approx(3.1)
+    assert seen["soon"] == pytest.approx(3.2)
+    assert 3.1 < seen["later"] <= 3.74
+    schedule.put(["a", "b"], 4.5)
+    assert schedule.not_waiting(["c", "a", "c"]) == ["c"]
+    assert schedule.due(9.0) == ["a", "b"]
+    assert schedule.not_waiting(["a", "c"]) == ["a", "c"]
+    assert schedule.due(10.0) == []

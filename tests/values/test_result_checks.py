@@ -1,0 +1,129 @@
+"""What methods of the user's return is checked and named."""
+
+import dataclasses
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from fogsim.errors import InputError
+from fogsim.fusion import make as make_fusion
+from fogsim.loop import AdvisedDriving
+from fogsim.metrics import METRICS, RunMetrics
+from fogsim.scenario import load_scenario
+from fogsim.values import Command, Estimate, Lamp, SpeedAdvice
+from fogsim.values.result_checks import (
+    checked_advice,
+    checked_belief,
+    checked_command,
+    checked_estimate,
+    checked_lamps,
+    checked_recorder,
+    checked_values,
+)
+from tests.recorders.synthetic import make_step
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        (None, r"^estimator 'mine': update\(\) must be of type fogsim\.values\.Estimate, got None"),
+        (0.03, "must be of type"),
+        (Estimate("mine", math.nan, 0.1), r"extinction must be a finite number of at least 0 .*; got nan"),
+        (Estimate("mine", -0.1, 0.1), "extinction must be .*; got -0.1"),
+        (Estimate("mine", math.inf, 0.1), "extinction must be .*; got inf"),
+        (Estimate("mine", "thick", 0.1), "extinction must be .*; got 'thick'"),  # type: ignore[arg-type]  # wrong
+        (Estimate("mine", 0.1, math.nan), "standard_deviation must be .*; got nan"),
+        (Estimate("mine", 0.1, math.inf), "standard_deviation must be .*; got inf"),
+        (Estimate("mine", 0.1, 0.1, valid=None), "valid must be True or False"),  # type: ignore[arg-type]  # wrong
+        (Estimate("other", 0.1, 0.1), "method must be its name in the registry, 'mine'; got 'other'"),
+    ],
+)
+def test_estimates(value: object, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        checked_estimate("mine", value)
+
+
+def test_what_cannot_tell_need_not_have_numbers() -> None:
+    for estimate in (Estimate.invalid("mine", "dark"), Estimate("mine", np.float32(0.1), 0)):  # type: ignore[arg-type]  # a number
+        assert checked_estimate("mine", estimate) is estimate
+
+
+def test_beliefs() -> None:
+    good = make_fusion("grid_filter").update([], 0.0)
+    assert checked_belief("mine", good) is good
+    half, backward = 0.5 * good.probability, good.log_extinction[::-1]
+    unknown = np.full(len(half), math.nan)
+    for change, message in (
+        ({"probability": half}, "add up to 1, got .* a sum of 0.5$"),
+        ({"probability": unknown}, "probability must be at least 0"),
+        ({"probability": None}, r"probability must be an array \(n,\) of floats, got None"),
+        ({"probability": good.probability[1:]}, "must be of one length"),
+        ({"log_extinction": backward}, "ascending"),
+        ({"log_extinction": unknown}, "finite"),
+    ):
+        with pytest.raises(InputError, match=message):
+            checked_belief("mine", dataclasses.replace(good, **change))  # type: ignore[arg-type]  # wrong on purpose
+    with pytest.raises(
+        InputError, match=r"^fusion 'mine': update\(\) must be of type fogsim\.values\.Belief, got None"
+    ):
+        checked_belief("mine", None)
+
+
+@pytest.mark.parametrize("speed", [math.nan, -1.0, None, "fast", True])
+def test_advice(speed: float) -> None:
+    with pytest.raises(InputError, match=r"^adviser 'mine': advise\(\): speed must be at least 0"):
+        checked_advice("mine", SpeedAdvice(speed))
+    with pytest.raises(InputError, match=r"the command: advice\.speed must"):
+        checked_command(Command(SpeedAdvice(speed)))
+    with pytest.raises(InputError, match=r"advised_speeds\['a'\] must"):
+        checked_command(Command(advised_speeds={"a": speed}))
+    assert checked_command(Command()) == Command()
+
+
+def test_lamps() -> None:
+    assert checked_lamps("mine", Lamp.NONE) is Lamp.NONE
+    for wrong in (None, 3, "low"):
+        with pytest.raises(
+            InputError, match=r"^lighting policy 'mine': lamps\(\) must be of type fogsim\.values\.Lamp"
+        ):
+            checked_lamps("mine", wrong)
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        (None, "must return a mapping"),
+        ({"speed_mps": math.nan}, "speed_mps must be a finite number, or None .*; got nan"),
+        ({"a": {"b": math.inf}}, r"a\.b must be a finite number"),
+        ({"a": [1.0]}, "a must be None, a word"),
+    ],
+)
+def test_metrics(value: object, message: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(InputError, match=message):
+        checked_values("mine", value)
+    monkeypatch.setattr(type(METRICS["motion"](None)), "result", lambda _: value)  # type: ignore[arg-type]  # unused
+    with pytest.raises(InputError, match=f"^metric 'motion': .*{message}"):
+        RunMetrics(names=["motion"]).summary()
+
+
+def test_the_rooms_that_ask_methods_check_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    scenario = load_scenario("motorway_fog_bank")
+    driving = AdvisedDriving(scenario)
+    step = make_step(0, time=0.0)
+    answers: dict[str, Callable[..., object]] = {"_adviser": lambda *_: None, "_lighting": lambda *_: None}
+    for part, method in (("_lighting", "lamps"), ("_adviser", "advise")):
+        monkeypatch.setattr(driving, part, type("Mine", (), {method: staticmethod(answers[part])})())
+        with pytest.raises(InputError, match=r"stopping_sight_distance|fog_lamp_rules"):
+            driving.decide(step)
+
+
+def test_recorders() -> None:
+    class Half:
+        def record(self) -> None: ...
+
+    with pytest.raises(InputError, match=r"^recorder 'mine': its factory must return an object with close\(\); got <"):
+        checked_recorder("mine", Half())
+    with pytest.raises(InputError, match=r"with record\(\) and close\(\); got None$"):
+        checked_recorder("mine", None)

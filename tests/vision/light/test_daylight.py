@@ -1,0 +1,81 @@
+"""Whether lamps light the road: by night always said, by day never."""
+
+from collections import Counter
+from dataclasses import replace
+from itertools import islice
+
+import numpy as np
+import pytest
+from country import draw as draw_country
+from country import random_country
+from flat_road import Road, photograph, scan
+from windscreen import draw, small_scenes
+
+import fogsim
+from fogsim.estimators import ESTIMATORS, make
+from fogsim.values import Camera, Observation, Step
+from fogsim.vision.light.daylight import lit_by_lamps
+from fogsim.vision.lines.horizon import levelled
+
+SMALL = ("camera.width=320", "camera.height=240", "clocks.camera_period_s=4", "clocks.decision_period_s=4")
+CAMERA = Camera(320, 240, 288.0, (159.5, 119.5), 1.38, np.radians(2.0))
+
+
+def drive(*settings: str) -> list[Step]:
+    """The night scenario in frames 4 s apart, with every method."""
+    methods = ", ".join(f"{{method: {name}}}" for name in sorted(ESTIMATORS))
+    scenario = fogsim.load_scenario("night_motorway_fog", [*SMALL, f"estimators=[{methods}]", *settings])
+    return list(fogsim.run(scenario, seed=1))
+
+
+def test_by_night_every_daytime_method_says_that_it_cannot_tell() -> None:
+    """Glow of oncoming lamps along the horizon and the lit lane below it look like an airlight and its inflection."""
+    steps = drive("duration_s=24")
+    reasons: Counter[str] = Counter()
+    for step in steps:
+        assert not any(estimate.valid for estimate in step.estimates)
+        reasons.update(str(estimate.diagnostics["reason"]) for estimate in step.estimates)
+    assert sum(n for reason, n in reasons.items() if "lamps" in reason) > len(steps)
+    # Nothing was measured, so nothing is believed beyond what was before.
+    assert steps[-1].belief.visibility == pytest.approx(steps[0].belief.visibility)
+
+
+@pytest.mark.parametrize("light", [(), ("street_lamps=true",), ("light.illuminance_lx=1",)], ids=str)
+@pytest.mark.parametrize("visibility", [100])
+def test_a_road_that_lamps_light_is_told(light: tuple[str, ...], visibility: int) -> None:
+    for step in drive("duration_s=4", f"fog.visibility_m={visibility}", *light):
+        assert "lamps" in lit_by_lamps(step.observation.image, step.observation.frame.camera)
+
+
+@pytest.mark.parametrize("visibility", [8.0, 25.0, 100.0, 1000.0])
+@pytest.mark.parametrize("asphalt", [10.0, 60.0, 190.0])
+def test_by_day_no_road_is_taken_for_one_that_lamps_light(visibility: float, asphalt: float) -> None:
+    """Black or nearly as bright as the sky, and in whatever fog."""
+    road = Road(camera=CAMERA, visibility=visibility, asphalt=asphalt, terrain=20.0)
+    assert not lit_by_lamps(photograph(road, scan(road, 0, 2), 0), CAMERA)
+
+
+def test_by_day_neither_woods_nor_lenses_nor_bonnets_are_taken_for_lamps() -> None:
+    pictures = [(draw(scene, seed, over=1), told) for seed, scene, told in islice(small_scenes(5000), 8)]
+    country = [(seed, *random_country(seed)) for seed in range(300, 308)]
+    pictures += [(draw_country(scene, seed, over=1), told) for seed, scene, told in country]
+    assert [index for index, (image, told) in enumerate(pictures) if lit_by_lamps(levelled(image, told), told)] == []
+
+
+def test_a_lit_lane_below_a_glow_is_told_and_a_mirrored_one_too() -> None:
+    """Pictures that FogSim did not draw: a beam on the road, its sides dark, and a bright haze along the horizon."""
+    row, col = np.indices((240, 320))
+    below = row - CAMERA.horizon_row
+    beam = 120.0 * np.exp(-0.5 * ((col - 159.5) / (0.6 * np.maximum(below, 1.0) + 20.0)) ** 2)
+    glow = 250.0 * np.exp(-np.hypot(below, 0.3 * (col - 120.0)) / 14.0) + 8.0
+    image = np.clip(np.where(below > 0, beam + 3.0, glow), 0, 255).astype(np.uint8)
+    mirrored = replace(CAMERA, principal_point=(319.0 - 159.5, 119.5))
+    assert lit_by_lamps(image, CAMERA) == lit_by_lamps(image[:, ::-1], mirrored) != ""
+    for method in ("negru2013", "joint_road", "zhu2015", "huang2015_rough"):
+        assert not make(method, CAMERA).update(Observation(image)).valid
+
+
+@pytest.mark.parametrize("height", [20, 40, 239])
+def test_an_image_that_shows_little_of_sky_or_road_is_no_trouble(height: int) -> None:
+    camera = replace(CAMERA, height=height, principal_point=(159.5, 2.0), pitch=0.0)
+    assert lit_by_lamps(np.full((height, 320), 90, np.uint8), camera) == ""

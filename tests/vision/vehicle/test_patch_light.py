@@ -1,0 +1,99 @@
+"""Pictures made smaller, and the light that two pictures of one thing share."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fogsim.vision.vehicle.patch import Patch, Placement, moved, shrunk
+from fogsim.vision.vehicle.patch_light import shared_light
+
+SKY = 200.0
+
+
+def rear(rows: int = 40, cols: int = 48) -> np.ndarray:
+    """A bright body with a dark window."""
+    light = np.full((rows, cols), 130.0)
+    light[6:18, 6:-6] = 20.0
+    return light
+
+
+def patch(luminance: np.ndarray) -> Patch:
+    rows, cols = luminance.shape
+    return Patch(luminance, 0.5 * (cols - 1), 0.5 * (rows - 1), 0.5 * cols - 2.0, 0.5 * rows - 2.0)
+
+
+def fogged(luminance: np.ndarray, left: float) -> np.ndarray:
+    return SKY - left * (SKY - luminance)
+
+
+def fallen(near: np.ndarray, far: np.ndarray, noise: float = 0.5) -> float:
+    there = patch(far)
+    light = shared_light(patch(near), there, Placement(there.column, there.row, 1.0), (SKY, SKY), noise)
+    assert light is not None
+    assert light.deviation > 0.0
+    return (1.0 - light.far) / (1.0 - light.near)
+
+
+@pytest.mark.parametrize("left", [0.9, 0.3, 0.05])
+def test_contrast_to_the_sky_falls_by_one_factor(left):
+    assert fallen(rear(), fogged(rear(), left)) == pytest.approx(left, rel=1e-6)
+
+
+def test_another_exposure_changes_nothing():
+    there = patch(0.5 * fogged(rear(), 0.4))
+    light = shared_light(patch(rear()), there, Placement(there.column, there.row, 1.0), (SKY, 0.5 * SKY), 0.5)
+    assert (1.0 - light.far) / (1.0 - light.near) == pytest.approx(0.4)
+
+
+def test_lit_lamps_and_repainted_parts_do_not_count():
+    far = fogged(rear(), 0.5)
+    far[22:26, 6:12] = far[22:26, -12:-6] = 250.0
+    assert fallen(rear(), far) == pytest.approx(0.5, rel=0.005)
+
+
+def test_bright_paint_that_shines_differently_counts_little():
+    near, far = rear(), rear()
+    far[far > 100.0] *= 1.08
+    # A plain mean would take the sheen for a fifth less contrast.
+    assert (SKY - far).mean() / (SKY - near).mean() < 0.92
+    assert fallen(near, fogged(far, 0.5)) == pytest.approx(0.5, rel=0.03)
+
+
+def test_noise_does_not_bias_what_hardly_shows():
+    rng = np.random.default_rng(0)
+    found = [fallen(rear(), fogged(rear(), 0.02) + rng.normal(0.0, 4.0, (40, 48)), 4.0) for _ in range(200)]
+    assert np.mean(found) == pytest.approx(0.02, abs=3.0 * np.std(found) / np.sqrt(200))
+
+
+def test_nothing_is_said_of_what_is_as_bright_as_the_sky():
+    same = patch(np.full((40, 48), SKY))
+    assert shared_light(same, same, Placement(same.column, same.row, 1.0), (SKY, SKY), 0.5) is None
+
+
+@pytest.mark.parametrize("scale", [0.9, 0.5, 0.31])
+def test_a_smaller_picture_shows_the_same_at_the_same_place(scale):
+    ramp = np.add.outer(2.0 * np.arange(80.0), 3.0 * np.arange(120.0))
+    small = shrunk(patch(ramp), scale)
+    row, col = small.luminance.shape[0] // 2, small.luminance.shape[1] // 2
+    rows, cols = small.luminance.shape
+    there = moved(row, 1.0 / scale, rows, 80), moved(col, 1.0 / scale, cols, 120)
+    assert small.luminance[row, col] == pytest.approx(2.0 * there[0] + 3.0 * there[1], abs=0.5)
+    assert moved(small.column, 1.0 / scale, small.luminance.shape[1], 120) == pytest.approx(59.5)
+    assert small.half_width == pytest.approx(58.0 * scale)
+
+
+@pytest.mark.parametrize("scale", [0.9, 0.5, 0.31])
+def test_a_mirrored_picture_is_shrunk_to_the_mirror_image(scale):
+    noisy = patch(np.random.default_rng(1).normal(100.0, 8.0, (40, 47)))
+    small, other = shrunk(noisy, scale), shrunk(replace(noisy, luminance=noisy.luminance[:, ::-1], column=5.0), scale)
+    np.testing.assert_allclose(other.luminance, small.luminance[:, ::-1], rtol=1e-12)
+    there = shrunk(replace(noisy, column=41.0), scale).column
+    assert other.column == pytest.approx(small.luminance.shape[1] - 1 - there)
+
+
+def test_shrinking_averages_noise_away():
+    noisy = patch(np.random.default_rng(0).normal(100.0, 8.0, (200, 240)))
+    inner = shrunk(noisy, 0.25).luminance[2:-2, 2:-2]
+    assert inner.std() == pytest.approx(8.0 * 0.25, rel=0.1)
+    assert shrunk(noisy, 1.0) is noisy

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import fogsim
-from fogsim.atmosphere.fog import optical_depth
+from fogsim.atmosphere import optical_depth
 from fogsim.dataset import (
     SemanticClass,
     decoded_depth,

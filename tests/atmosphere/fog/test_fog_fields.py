@@ -7,8 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fogsim.atmosphere import FieldAccess, FogNow, extinction, field_at, optical_depth_along
-from fogsim.atmosphere.fog import optical_depth
+from fogsim.atmosphere import FieldAccess, FogNow, extinction, field_at, optical_depth, optical_depth_along
 from fogsim.atmosphere.fog.extinction_noise import CELLS, patch_factors
 from fogsim.errors import InputError
 from fogsim.values import FogBank, FogChange, FogField, FogPatches

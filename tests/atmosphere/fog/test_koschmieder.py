@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.atmosphere import airlight_from_illuminance, fogged_radiance
-from fogsim.atmosphere.fog import optical_depth
+from fogsim.atmosphere import airlight_from_illuminance, fogged_radiance, optical_depth
 from fogsim.units import CONTRAST_THRESHOLD, extinction_from_visibility
 from fogsim.values import Camera, CameraPose, FogBank, FogField, View
 from fogsim.values.pinhole import ray_from_pixel

@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.atmosphere import fogged_radiance
-from fogsim.atmosphere.fog import optical_depth
+from fogsim.atmosphere import fogged_radiance, optical_depth
 from fogsim.atmosphere.fog.koschmieder_kernels import transmissions
 from fogsim.values import Camera, CameraPose, FogBank, FogField, View
 from fogsim.values.pinhole import ray_from_pixel

@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.atmosphere import extinction
-from fogsim.atmosphere.fog import optical_depth
+from fogsim.atmosphere import extinction, optical_depth
 from fogsim.units import extinction_from_visibility
 from fogsim.values import FogBank, FogField
 

@@ -18,7 +18,7 @@ from fogsim.render import make_renderer
 from fogsim.scenario import build
 from fogsim.scene import build_scene, vehicle_batches
 from fogsim.traffic.road.network import read_net, road_network
-from fogsim.units import extinction_from_visibility
+from fogsim.units import LUMINANCE_WEIGHTS, extinction_from_visibility
 from fogsim.values import Camera, CameraPose, FogField, LaneMarking, LeadMeasurement, SignMap, TrafficState, View
 
 CAMERAS = (
@@ -144,5 +144,5 @@ def photograph(
     view, pose = seen
     field = dataclasses.replace(fog, extinction=extinction_from_visibility(visibility), banks=())
     radiance = Air(field).radiance(view, by, pose)
-    saturation = float(np.dot((0.2126, 0.7152, 0.0722), field.airlight)) * 255.0 / levels
+    saturation = float(np.dot(LUMINANCE_WEIGHTS, field.airlight)) * 255.0 / levels
     return expose(radiance, Sensor(saturation), by.response, rng)

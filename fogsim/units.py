@@ -1,6 +1,7 @@
 """Physical constants and the conversions that are made at the edges of FogSim, each written once."""
 
 import math
+from collections.abc import Sequence
 
 CONTRAST_THRESHOLD = 0.05
 """Contrast at which a black target is just visible [-] (CIE e-ILV 772 and WMO, "meteorological optical range")."""
@@ -14,7 +15,22 @@ KMH_PER_MPS = 3.6
 GRAVITY = 9.80665
 """Standard acceleration of free fall [m/s²]."""
 
+LUMINANCE_WEIGHTS = (0.2126, 0.7152, 0.0722)
+"""Shares of linear red, green and blue in luminance [-] (ITU-R BT.709)."""
+
 _CLOCK_DIGITS = 9
+
+
+def luminance_of(colour: Sequence[float]) -> float:
+    """Luminance of one colour, in the unit of its channels.
+
+    Parameters
+    ----------
+    colour : (3,) sequence of float
+        Linear red, green and blue.
+    """
+    red, green, blue = LUMINANCE_WEIGHTS
+    return red * colour[0] + green * colour[1] + blue * colour[2]
 
 
 def clock_time(seconds: float) -> float:

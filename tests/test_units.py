@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from fogsim.units import clock_time, extinction_from_visibility, visibility_from_extinction
+from fogsim.units import clock_time, extinction_from_visibility, luminance_of, visibility_from_extinction
 
 
 def test_a_hundred_metres_of_visibility() -> None:
@@ -34,3 +34,9 @@ def test_impossible_extinction_is_refused(extinction: float) -> None:
 def test_times_have_no_noise_of_binary_fractions() -> None:
     assert [clock_time(0.1 * i) for i in range(1000)] == [i / 10 for i in range(1000)]
     assert clock_time(1 / 15) == pytest.approx(1 / 15, abs=1e-9)
+
+
+def test_luminance_of_white_and_of_the_primaries() -> None:
+    assert luminance_of((0.7, 0.7, 0.7)) == pytest.approx(0.7)
+    primaries = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+    assert [luminance_of(primary) for primary in primaries] == [0.2126, 0.7152, 0.0722]  # ITU-R BT.709

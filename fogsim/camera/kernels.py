@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
+from fogsim.units import LUMINANCE_WEIGHTS
 
 _MEAN, _FIRST, _THIRD, _FIFTH = 510.0, 6.5477767300336385e-3, 1.2394842240073496e-9, 2.7005539623815466e-14
 """What makes the sum of four evenly distributed bytes, less its mean, a normal deviate: an odd polynomial fitted to the
@@ -16,6 +17,8 @@ BLOCK = 1024
 
 MOST_EXPOSURE = np.float32(4.0)
 """Exposure to which light is clipped before the noise, relative to saturation: beyond any doubt that it saturates."""
+
+_RED, _GREEN, _BLUE = (np.float32(share) for share in LUMINANCE_WEIGHTS)
 
 
 @kernel
@@ -108,12 +111,10 @@ def block_means(fine: NDArray[np.float32], side: int, out: NDArray[np.float32]) 
 
 @kernel
 def luminance_samples(radiance: NDArray[np.float32], stride: int, out: NDArray[np.float32]) -> None:
-    """Luminance (ITU-R BT.709) of every stride-th pixel of every stride-th row, from the middle of the first block."""
+    """Luminance of every stride-th pixel of every stride-th row, from the middle of the first block."""
     rows, cols = out.shape
     for row in range(rows):
         line = radiance[row * stride + stride // 2]
         for col in range(cols):
             pixel = line[col * stride + stride // 2]
-            out[row, col] = (
-                np.float32(0.2126) * pixel[0] + np.float32(0.7152) * pixel[1] + np.float32(0.0722) * pixel[2]
-            )
+            out[row, col] = _RED * pixel[0] + _GREEN * pixel[1] + _BLUE * pixel[2]

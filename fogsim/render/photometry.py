@@ -1,7 +1,7 @@
 """How bright things are: overcast daylight and lamps.
 
 Radiance is given per colour channel in cd/m², scaled so that a grey surface has its luminance in every channel; the
-luminance of a coloured light is 0.2126 R + 0.7152 G + 0.0722 B (ITU-R BT.709).
+luminance of a coloured light is `fogsim.units.luminance_of` it.
 """
 
 import math
@@ -10,11 +10,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.units import luminance_of
 from fogsim.values.lamps import Lamp
 from fogsim.values.scene import Surface
-
-LUMINANCE_WEIGHTS = (0.2126, 0.7152, 0.0722)
-"""Share of each linear channel in luminance [-] (ITU-R BT.709)."""
 
 SKY_TINT = (0.988, 1.0, 1.035)
 """Colour of the overcast sky, of luminance 1."""
@@ -62,7 +60,7 @@ def lamp_radiance(surface: Surface) -> NDArray[np.float64]:
     if surface not in LAMPS:
         return np.zeros(3)
     _, luminance, colour = LAMPS[surface]
-    return luminance * np.array(colour) / float(np.multiply(colour, LUMINANCE_WEIGHTS).sum())
+    return luminance * np.array(colour) / luminance_of(colour)
 
 
 def lighting_bits(surface: Surface) -> int:

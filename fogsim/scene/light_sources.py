@@ -13,6 +13,7 @@ from fogsim.scene.bodies.parts import LIT_AREAS
 from fogsim.scene.lamp_kernels import AREA, FORWARD, FOUND, INTENSITY, LEFT, UP, LampNumbers, find_lamps
 from fogsim.scene.street_lamps import HEIGHT, SIZE
 from fogsim.scene.vehicles import body_names
+from fogsim.units import luminance_of
 from fogsim.values.lamps import Lamp
 from fogsim.values.light import Beam, LightSources, StreetLighting
 from fogsim.values.luminous_intensity import luminous_intensity
@@ -27,7 +28,6 @@ FARTHEST_STREET_LAMP = 400.0
 
 _RED, _AMBER = (1.0, 0.03, 0.015), (1.0, 0.36, 0.015)
 _WHITE, _WARM = (1.0, 0.97, 0.90), (1.0, 0.90, 0.72)
-_WEIGHTS = (0.2126, 0.7152, 0.0722)  # share of each linear channel in luminance (ITU-R BT.709)
 
 SIGNAL_LAMPS: Mapping[tuple[Surface, bool], tuple[Lamp, float, tuple[float, float, float]]] = {
     (Surface.LAMP_POSITION_REAR, False): (Lamp.POSITION, 8.0, _RED),
@@ -181,7 +181,7 @@ def street_lighting(heads: NDArray[np.float64], sky_illuminance: float) -> Stree
 
 
 def _luminance_one(colour: tuple[float, float, float]) -> NDArray[np.float64]:
-    return np.array(colour) / float(np.multiply(colour, _WEIGHTS).sum())
+    return np.array(colour) / luminance_of(colour)
 
 
 @cache

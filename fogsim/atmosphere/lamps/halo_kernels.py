@@ -21,6 +21,7 @@ from fogsim.atmosphere.lamps.halo_lamps import (
 )
 from fogsim.atmosphere.lamps.halo_profiles import CORE_SIZE, HIDDEN_SHARE, WIDE_FOLD, WIDE_SIZE, lamp_profile
 from fogsim.jit import kernel
+from fogsim.units import LUMINANCE_WEIGHTS
 
 _LAST_WIDE = np.float32(WIDE_SIZE - 1.001)
 _FOLD = np.float32(WIDE_FOLD)
@@ -28,7 +29,7 @@ _TWO, _ONE, _ZERO = np.float32(2.0), np.float32(1.0), np.float32(0.0)
 _LEAST = np.float32(1e-20)
 _NEXT = np.uint32(1)
 _FIRST, _SECOND, _THREE = np.uint64(1), np.uint64(2), np.uint64(3)
-_RED, _GREEN, _BLUE = np.float32(0.2126), np.float32(0.7152), np.float32(0.0722)  # luminance of channels (BT.709)
+_RED, _GREEN, _BLUE = (np.float32(share) for share in LUMINANCE_WEIGHTS)
 
 
 @kernel

@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fogsim.units import CONTRAST_THRESHOLD
+from fogsim.units import CONTRAST_THRESHOLD, luminance_of
 from fogsim.values import Lamp
 
 REAR_LAMPS = ((int(Lamp.REAR_FOG), 200.0), (int(Lamp.STOP), 100.0), (int(Lamp.POSITION), 8.0))
@@ -223,5 +223,5 @@ def inherent_contrast(paint: tuple[float, float, float]) -> float:
     paint : tuple of float
         Linear reflectance, 0 … 1.
     """
-    reflectance = (0.2126 * paint[0] + 0.7152 * paint[1] + 0.0722 * paint[2]) * 2.0 / 3.0
+    reflectance = luminance_of(paint) * 2.0 / 3.0
     return max(0.0, 1.0 - VERTICAL_ILLUMINANCE * reflectance / AIRLIGHT_REFLECTANCE)

@@ -7,6 +7,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.units import LUMINANCE_WEIGHTS
 from fogsim.values.camera import Camera
 from fogsim.values.camera_response import exposure_of
 from fogsim.vision.light.linear_table import linear_table
@@ -20,7 +21,6 @@ LOWER = 0.3
 ROUNDS = 16
 """Rounds of the search for the light behind a clipped mean: each halves its error at least."""
 
-_WEIGHTS = (0.2126, 0.7152, 0.0722)  # of linear channels in luminance (ITU-R BT.709)
 _NORMAL = NormalDist()
 
 
@@ -57,7 +57,7 @@ def clipping(pixels: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera) -> 
         The told calibration.
     """
     channels = pixels.reshape(pixels.shape[0], -1)
-    weights = _WEIGHTS if channels.shape[1] == 3 else (1.0,)
+    weights = LUMINANCE_WEIGHTS if channels.shape[1] == 3 else (1.0,)
     loss = variance = spread = 0.0
     for index, weight in enumerate(weights):
         lost, noise = _censored(channels[:, index], camera)

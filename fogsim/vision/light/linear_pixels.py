@@ -6,13 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.units import LUMINANCE_WEIGHTS
 from fogsim.values.camera import Camera
 from fogsim.vision.light.linear_table import linear_table
 
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
-
-CHANNEL_WEIGHTS = (0.2126, 0.7152, 0.0722)
-"""Weights of red, green and blue in luminance (ITU-R BT.709) [-]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +40,6 @@ def linear_pixels(image: Pixels, camera: Camera) -> LinearPixels:
         The told calibration.
     """
     table = linear_table(camera.response, camera.bits)
-    weights = np.array(CHANNEL_WEIGHTS if image.ndim == 3 else (1.0,), np.float32)
+    weights = np.array(LUMINANCE_WEIGHTS if image.ndim == 3 else (1.0,), np.float32)
     pixels: NDArray[Any] = np.ascontiguousarray(image if image.ndim == 3 else image[:, :, None])
     return LinearPixels(pixels, weights[:, None] * table)

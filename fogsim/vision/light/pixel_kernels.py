@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
+from fogsim.units import LUMINANCE_WEIGHTS
 
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 
-RED, GREEN, BLUE = np.float32(0.2126), np.float32(0.7152), np.float32(0.0722)
+_RED, _GREEN, _BLUE = (np.float32(share) for share in LUMINANCE_WEIGHTS)
 
 
 @kernel
@@ -30,7 +31,7 @@ def grey_luminance(image: Pixels, table: NDArray[np.float32]) -> NDArray[np.floa
 def colour_luminance(image: Pixels, table: NDArray[np.float32]) -> NDArray[np.float32]:
     """Look every channel up and weigh them: (rows, cols, 3) uint8 or uint16 to (rows, cols) float32."""
     rows, cols, _ = image.shape
-    red, green, blue = table * RED, table * GREEN, table * BLUE
+    red, green, blue = table * _RED, table * _GREEN, table * _BLUE
     out = np.empty((rows, cols), np.float32)
     for row in range(rows):
         for col in range(cols):

@@ -1,10 +1,14 @@
-"""What works on this machine, what does not, and how to get it."""
+"""``fogsim doctor``: what works on this machine, what does not, and how to get it."""
 
 import platform
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 
+import typer
+from rich.table import Table
+
+from fogsim.cli.printing import escape, stdout
 from fogsim.errors import FogSimError
 
 PACKAGES = (
@@ -41,6 +45,17 @@ class Finding:
     detail: str
 
 
+def doctor_command() -> None:
+    """Say what works on this machine, what is missing, and how to get it."""
+    findings = examine()
+    table = Table(box=None, show_header=False, pad_edge=False)
+    for finding in findings:
+        table.add_row("[green]fine[/]" if finding.works else "[red]missing[/]", finding.subject, escape(finding.detail))
+    stdout.print(table)
+    if not all(finding.works for finding in findings):
+        raise typer.Exit(1)
+
+
 def examine() -> list[Finding]:
     """Check Python, packages, SUMO, the renderers and the video encoder."""
     findings = [Finding("Python", True, f"{platform.python_version()} on {platform.platform()}")]
@@ -65,13 +80,13 @@ def _try(subject: str, check: Callable[[], str]) -> Finding:
 
 
 def _sumo() -> str:
-    from fogsim.traffic.sumo.library import load_libsumo  # noqa: PLC0415 - only when asked
+    from fogsim.traffic.sumo.library import load_libsumo
 
     return f"{load_libsumo().getVersion()[1]} in process"
 
 
 def _gl() -> str:
-    from fogsim.render import gl_report  # noqa: PLC0415 - only when asked
+    from fogsim.render import gl_report
 
     return gl_report()
 
@@ -81,13 +96,13 @@ def _cpu() -> str:
 
 
 def _auto() -> str:
-    from fogsim.render import best_renderer  # noqa: PLC0415 - only when asked
+    from fogsim.render import best_renderer
 
     name, reason = best_renderer()
     return f"draws with {name}: {reason}"
 
 
 def _ffmpeg() -> str:
-    from fogsim.recorders import encoder_report  # noqa: PLC0415 - only when asked
+    from fogsim.recorders import encoder_report
 
     return encoder_report()

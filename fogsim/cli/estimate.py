@@ -1,4 +1,4 @@
-"""``fogsim estimate``: arguments, progress and exit codes, nothing else."""
+"""``fogsim estimate``: the visibility in a person's own images and videos."""
 
 import contextlib
 import math
@@ -7,19 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
-from fogsim.cli.printing import escape, printable
+from fogsim.cli.printing import BAD_INPUT, escape, print_error, print_remarks, printable, stderr
 from fogsim.cli.progress import progress_bar
 from fogsim.errors import InputError
 
 if TYPE_CHECKING:
     from fogsim.offline import FrameEstimates, OverlayFile, Source
-    from fogsim.offline.camera_file import Calibration
-
-_err = Console(stderr=True, highlight=False)
-
-BAD_INPUT = 2
 
 
 def estimate_command(
@@ -58,7 +52,7 @@ def estimate_command(
     ] = None,
 ) -> None:
     """Estimate the visibility in your own images or video (docs/estimate.md)."""
-    from fogsim.offline import find_source  # noqa: PLC0415 - heavy; --help must be quick
+    from fogsim.offline import find_source
 
     if guess_camera:
         source = find_source(images, sequence=sequence, rate=rate)
@@ -84,7 +78,7 @@ def _estimate(
     rate: float | None,
     overwrite: bool,
 ) -> None:
-    from fogsim.offline import (  # noqa: PLC0415 - heavy; --help must be quick
+    from fogsim.offline import (
         OverlayFile,
         chosen_methods,
         estimates_of,
@@ -92,15 +86,15 @@ def _estimate(
         straightened,
         table_heading,
     )
-    from fogsim.offline.camera_file import load_calibration  # noqa: PLC0415 - heavy; --help must be quick
+    from fogsim.offline.camera_file import load_calibration
 
     methods, unusable = chosen_methods(names), list[str]()
     calibration = load_calibration(camera_file)
-    tell_remarks(calibration)
+    print_remarks("assumed", calibration.remarks)
     source, camera = straightened(find_source(images, sequence=sequence, rate=rate), calibration)
     with contextlib.ExitStack() as stack:
         drawn = overlay and stack.enter_context(OverlayFile(overlay, source, camera, methods, overwrite=overwrite))
-        progress = stack.enter_context(progress_bar(_err))
+        progress = stack.enter_context(progress_bar(stderr))
         task = progress.add_task(source.description, total=source.count)
         if not as_json:
             _say(table_heading(source, methods))
@@ -109,27 +103,21 @@ def _estimate(
             unusable += [result.picture.error] if result.picture.error else []
             progress.advance(task)
     if overlay is not None:
-        _err.print(f"overlay: {escape(str(overlay))}", soft_wrap=True)
+        stderr.print(f"overlay: {escape(overlay)}", soft_wrap=True)
     if unusable:
-        _err.print(f"[bold red]error:[/] {len(unusable)} of the images could not be used:", soft_wrap=True)
-        for told in unusable:
-            _err.print(f"  {escape(told, in_one_line=True)}", soft_wrap=True)
+        print_error(f"{len(unusable)} of the images could not be used:")
+        for reason in unusable:
+            stderr.print(f"  {escape(reason, in_one_line=True)}", soft_wrap=True)
         raise typer.Exit(BAD_INPUT)
-
-
-def tell_remarks(calibration: "Calibration") -> None:
-    """Say on stderr what a camera file leaves open."""
-    for remark in calibration.remarks:
-        _err.print(f"[yellow]assumed:[/] {escape(remark, in_one_line=True)}", soft_wrap=True)
 
 
 def _show(
     result: "FrameEstimates", source: "Source", methods: tuple[str, ...], as_json: bool, drawn: "OverlayFile | None"
 ) -> None:
-    from fogsim.offline import record_lines, table_rows  # noqa: PLC0415 - heavy; --help must be quick
+    from fogsim.offline import record_lines, table_rows
 
     if result.picture.error:
-        _err.print(f"[yellow]passed over:[/] {escape(result.picture.error, in_one_line=True)}", soft_wrap=True)
+        print_remarks("passed over", (result.picture.error,))
     for line in record_lines(result) if as_json else table_rows(source, methods, result):
         _say(printable(line, in_one_line=True))
     if drawn is not None:
@@ -150,7 +138,7 @@ def _guess(
     field_of_view: float | None,
     horizon_row: float | None,
 ) -> None:
-    from fogsim.offline import camera_text, guess_camera, refuse_existing, write_camera  # noqa: PLC0415 - heavy; --help must be quick
+    from fogsim.offline import camera_text, guess_camera, refuse_existing, write_camera
 
     refuse_existing(camera_file, overwrite=overwrite)
     guess = guess_camera(
@@ -161,5 +149,4 @@ def _guess(
     )
     write_camera(camera_file, guess, overwrite=overwrite)
     typer.echo(f"{printable(str(camera_file))}:\n\n{camera_text(guess)}", nl=False)
-    for warning in guess.warnings:
-        _err.print(f"[yellow]uncertain:[/] {escape(warning)}", soft_wrap=True)
+    print_remarks("uncertain", guess.warnings)

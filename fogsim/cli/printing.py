@@ -1,6 +1,21 @@
-"""Text that a user's files can have a say in, made safe for terminals."""
+"""What the commands print, where, and with which exit codes; text that a user's files can have a say in is made safe.
 
+Results go to stdout, all else to stderr.
+"""
+
+from collections.abc import Iterable
+
+from rich.console import Console
 from rich.markup import escape as escape_markup
+
+BAD_INPUT = 2
+"""Exit code of bad input."""
+
+INTERRUPTED = 130
+"""Exit code after Ctrl-C."""
+
+stdout = Console(highlight=False)
+stderr = Console(stderr=True, highlight=False)
 
 
 def printable(text: str, *, in_one_line: bool = False) -> str:
@@ -22,6 +37,41 @@ def printable(text: str, *, in_one_line: bool = False) -> str:
     )
 
 
-def escape(text: str, *, in_one_line: bool = False) -> str:
-    """`printable` text that is no markup for rich either."""
-    return escape_markup(printable(text, in_one_line=in_one_line))
+def escape(text: object, *, in_one_line: bool = False) -> str:
+    """`printable` text that is no markup for rich either.
+
+    Parameters
+    ----------
+    text : object
+        Any text, or what ``str`` makes text of.
+    in_one_line : bool
+        Escape ends of lines, too.
+    """
+    return escape_markup(printable(str(text), in_one_line=in_one_line))
+
+
+def print_error(error: object) -> None:
+    """Print an error on stderr.
+
+    Parameters
+    ----------
+    error : object
+        The error, or its message.
+    """
+    stderr.print(f"[bold red]error:[/] {escape(error)}", soft_wrap=True)
+
+
+def print_remarks(label: str, remarks: Iterable[object], *, in_one_line: bool = True) -> None:
+    """Print remarks on stderr.
+
+    Parameters
+    ----------
+    label : str
+        What they are: "warning", "assumed".
+    remarks : iterable of object
+        Their texts.
+    in_one_line : bool
+        Escape ends of lines in each.
+    """
+    for remark in remarks:
+        stderr.print(f"[yellow]{label}:[/] {escape(remark, in_one_line=in_one_line)}", soft_wrap=True)

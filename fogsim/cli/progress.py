@@ -1,21 +1,79 @@
-"""The progress bar of commands that work through a known number of steps."""
+"""The progress bars of all commands."""
 
 import sys
+from types import TracebackType
+from typing import Self
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
+from fogsim.values import Step
 
-def progress_bar(console: Console) -> Progress:
-    """Bar, share, description and time left; nothing of it stays, and nothing is drawn where there is no terminal.
+STARTING = "starting; a first run compiles for some seconds"
+"""Description of a bar before the first step."""
+
+
+def progress_bar(console: Console, *, stays: bool = False) -> Progress:
+    """Bar, share, description and time left.
 
     Parameters
     ----------
     console : Console
         Where it is drawn: that of stderr, since stdout is for results.
+    stays : bool
+        Whether it stays when it is full, and is printed once where there is no terminal; else nothing of it remains,
+        and nothing is drawn where there is no terminal.
     """
     # rich would lead stdout to its own console, which is stderr: fine on a terminal, and wrong for a pipe or a file.
     to_terminal = sys.stdout.isatty()
-    columns = (BarColumn(bar_width=20), TaskProgressColumn(), TextColumn("{task.description}"), TimeRemainingColumn())
-    shown = console.is_terminal
-    return Progress(*columns, console=console, transient=True, redirect_stdout=to_terminal, disable=not shown)
+    columns = (
+        BarColumn(bar_width=20),
+        TaskProgressColumn(),
+        TextColumn("{task.description}"),
+        TimeRemainingColumn(),
+        TextColumn("left"),
+    )
+    hidden = not stays and not console.is_terminal
+    return Progress(*columns, console=console, transient=not stays, redirect_stdout=to_terminal, disable=hidden)
+
+
+class SimulationProgress:
+    """A bar over simulated time, with how fast it passes and what is believed.
+
+    Parameters
+    ----------
+    console : Console
+        Where it is drawn.
+    duration : float
+        Longest simulated time [s].
+    """
+
+    def __init__(self, console: Console, duration: float) -> None:
+        self._duration = duration
+        self._progress = progress_bar(console, stays=True)
+        self._task = self._progress.add_task(STARTING, total=duration)
+
+    def show(self, step: Step) -> None:
+        """Move the bar.
+
+        Parameters
+        ----------
+        step : Step
+            The step that is finished.
+        """
+        task = self._progress.tasks[self._task]
+        rate = step.time / task.elapsed if task.elapsed else 0.0
+        believed = f"V ≈ {step.belief.visibility:.0f} m"
+        description = f"{step.time:.0f} of {self._duration:.0f} s, {rate:.1f}× real time, {believed}"
+        # A run that is over is done, however much of its longest duration is left.
+        done = step.time if step.ending is None else self._duration
+        self._progress.update(self._task, completed=done, description=description)
+
+    def __enter__(self) -> Self:
+        self._progress.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._progress.stop()

@@ -1,4 +1,4 @@
-"""``fogsim reproduce``: arguments, progress and exit codes, nothing else."""
+"""``fogsim reproduce``: papers' evaluations run again."""
 
 import json
 from pathlib import Path
@@ -8,7 +8,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from fogsim.cli.printing import escape
+from fogsim.cli.printing import INTERRUPTED, escape, stderr, stdout
 from fogsim.cli.progress import progress_bar
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.interruption import interruptible
@@ -16,12 +16,7 @@ from fogsim.interruption import interruptible
 if TYPE_CHECKING:
     from fogsim.reproduce import Evaluation, Reproduction
 
-_out = Console(highlight=False)
-_err = Console(stderr=True, highlight=False)
-
 _UNBROKEN = 200  # wider than any table [characters]
-
-_INTERRUPTED = 130
 
 ALL = "all"
 """Stands for every paper."""
@@ -33,7 +28,7 @@ def reproduce_command(
     as_json: Annotated[bool, typer.Option("--json", help="Flat records, one a line, in place of the tables.")] = False,
 ) -> None:
     """Run a paper's evaluation again on FogSim's frames; its figures stand beside ours."""
-    from fogsim.reproduce import REPRODUCTIONS  # noqa: PLC0415 - heavy; --help must be quick
+    from fogsim.reproduce import REPRODUCTIONS
 
     if paper != ALL and paper not in REPRODUCTIONS:
         raise UnknownNameError("paper", paper, [*REPRODUCTIONS, ALL])
@@ -49,7 +44,7 @@ def reproduce_command(
 def _evaluated(name: str, evaluation: "Evaluation") -> "Reproduction":
     """Run an evaluation under a bar; Ctrl-C ends the command in one line."""
     steps = "0 steps"
-    with progress_bar(_err) as progress:
+    with progress_bar(stderr) as progress:
         task = progress.add_task(f"{name}: a first run compiles for some seconds", total=None)
 
         def watch(done: int, total: int) -> None:
@@ -62,8 +57,8 @@ def _evaluated(name: str, evaluation: "Evaluation") -> "Reproduction":
                 return evaluation(watch=watch)
         except KeyboardInterrupt:
             progress.stop()
-            _err.print(f"interrupted: {name} after {steps}; nothing of it is told or written", soft_wrap=True)
-            raise typer.Exit(_INTERRUPTED) from None
+            stderr.print(f"interrupted: {name} after {steps}; nothing of it is told or written", soft_wrap=True)
+            raise typer.Exit(INTERRUPTED) from None
 
 
 def _show(done: "Reproduction", *, as_json: bool) -> None:
@@ -72,24 +67,24 @@ def _show(done: "Reproduction", *, as_json: bool) -> None:
             typer.echo(json.dumps(record, allow_nan=False))
         return
     # Files and pipes have no width that rows must be broken for.
-    wide = _out if _out.is_terminal else Console(highlight=False, width=_UNBROKEN)
+    wide = stdout if stdout.is_terminal else Console(highlight=False, width=_UNBROKEN)
     for told in done.told:
         heading, *rows = told.rows
         table = Table(*map(escape, heading), box=None, pad_edge=False)
         for row in rows:
             table.add_row(*map(escape, row))
-        _out.print(f"[italic]{escape(told.title)}[/]", soft_wrap=True)
+        stdout.print(f"[italic]{escape(told.title)}[/]", soft_wrap=True)
         wide.print(table)
         if done.tables:
-            _out.print()
+            stdout.print()
     for note in done.notes:
-        _out.print(f"- {escape(note)}", soft_wrap=True)
+        stdout.print(f"- {escape(note)}", soft_wrap=True)
 
 
 def _save(done: "Reproduction", folder: Path) -> None:
-    from fogsim.offline.image_files import write_image  # noqa: PLC0415 - heavy; --help must be quick
+    from fogsim.offline.image_files import write_image
 
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{done.paper}.png"
     write_image(path, done.picture[:, :, ::-1])
-    _err.print(f"picture: {escape(str(path))}", soft_wrap=True)
+    stderr.print(f"picture: {escape(path)}", soft_wrap=True)

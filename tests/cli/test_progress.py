@@ -6,6 +6,8 @@ import pytest
 from typer.testing import CliRunner
 
 from fogsim.cli import app
+from fogsim.cli.printing import stderr
+from fogsim.cli.progress import SimulationProgress
 from fogsim.errors import InputError
 from fogsim.values import Ending
 from tests.recorders.synthetic import make_step
@@ -15,7 +17,7 @@ TOWN = str(Path(__file__).resolve().parents[1] / "data" / "grid" / "grid.sumocfg
 
 @pytest.mark.parametrize(("ending", "share"), [(None, 25.0), (Ending.ARRIVED, 100.0), (Ending.TIME, 100.0)])
 def test_the_bar_of_a_run_that_is_over_is_full(ending: Ending | None, share: float) -> None:
-    progress = app._SimulationProgress(200.0)
+    progress = SimulationProgress(stderr, 200.0)
     progress.show(make_step(500, time=50.0, ending=ending))
     (task,) = progress._progress.tasks
     assert task.percentage == pytest.approx(share)

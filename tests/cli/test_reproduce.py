@@ -28,7 +28,7 @@ def reproduce(monkeypatch, capsys):
 
     def run(evaluation, *, terminal: bool) -> tuple[int, str, str]:
         drawn = io.StringIO()
-        monkeypatch.setattr(reproduce_module, "_err", Console(file=drawn, force_terminal=terminal, width=100))
+        monkeypatch.setattr(reproduce_module, "stderr", Console(file=drawn, force_terminal=terminal, width=100))
         monkeypatch.setattr(REPRODUCTIONS, "_entries", {"negru2013": evaluation})
         monkeypatch.setattr(sys, "argv", ["fogsim", "reproduce", "negru2013", "--json"])
         with pytest.raises(SystemExit) as ended:

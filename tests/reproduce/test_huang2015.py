@@ -113,7 +113,7 @@ def test_the_chase_shows_each_range_once_in_every_fog_wanted() -> None:
 
 
 def test_the_command_prints_all_tables(done, capsys, monkeypatch) -> None:
-    monkeypatch.setattr(reproduce_module._out, "_width", 200)
+    monkeypatch.setattr(reproduce_module.stdout, "_width", 200)
     reproduce_module._show(done, as_json=False)
     told = capsys.readouterr().out
     for table in done.told:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from fogsim import Camera, Frame, Observation
-from fogsim.cli.compilation import _foggy_road
+from fogsim.cli.compile import _foggy_road
 from fogsim.estimators import ESTIMATORS
 
 COMPILE = """

@@ -1,25 +1,24 @@
-"""Compile the kernels ahead of the first run, in several processes at once."""
+"""``fogsim compile``: the kernels ahead of the first run, in several processes at once."""
 
 import logging
 import multiprocessing
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from itertools import islice
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.estimators import ESTIMATORS, Estimator
-from fogsim.jit import processors
-from fogsim.loop import run
-from fogsim.parameters import accepted_parameters
-from fogsim.scenario import load_scenario
+from fogsim.cli.printing import stderr, stdout
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, Frame, LeadMeasurement, Observation
 
+if TYPE_CHECKING:
+    from fogsim.estimators import Estimator
+
 _SIZES = ((160, 120), (640, 480))
 """Pictures that are estimated: methods choose what they do by size [px]."""
-
 
 _BY_DAY = (
     (),
@@ -30,6 +29,13 @@ _BY_NIGHT = ((), ("street_lamps=true", "fog.patches={correlation_length_m: 20}",
 
 _SKY = 1e6
 """Distance of the sky in those pictures [m]."""
+
+
+def compile_command() -> None:
+    """Compile ahead what a first run would, on all cores; the result is kept on disk."""
+    with stderr.status("compiling for this processor, about a minute"):
+        for ready in compile_kernels():
+            stdout.print(f"compiled: {ready}")
 
 
 def compile_kernels() -> Iterator[str]:
@@ -45,6 +51,8 @@ def compile_kernels() -> Iterator[str]:
     FogSimError
         If a part of the loop does not work here.
     """
+    from fogsim.jit import processors
+
     with ProcessPoolExecutor(min(2, processors()), multiprocessing.get_context("spawn"), _be_quiet) as pool:
         # The estimators share hardly a kernel with the drawing; drawing by night shares many with drawing by day.
         pending: dict[Future[None], str] = {
@@ -67,6 +75,9 @@ def _be_quiet() -> None:
 
 def _drive(scenario: str, drives: Sequence[Sequence[str]]) -> None:
     """Draw the first frames of a scenario with each of some settings, with an estimator that needs few kernels."""
+    from fogsim.loop import run
+    from fogsim.scenario import load_scenario
+
     published = "estimators=[{method: negru2013, parameters: {as_published: true}}]"
     for overrides in drives:
         for _ in islice(run(load_scenario(scenario, [published, *overrides]), seed=1), 3):
@@ -75,6 +86,9 @@ def _drive(scenario: str, drives: Sequence[Sequence[str]]) -> None:
 
 def _estimate_visibility() -> None:
     """Let every daytime method, also as published, read pictures of a foggy road with a vehicle ahead that leaves."""
+    from fogsim.estimators import ESTIMATORS
+    from fogsim.parameters import accepted_parameters
+
     for width, height in _SIZES:
         camera = Camera(width, height, 0.9 * width, (width / 2, height / 2), 1.4, pitch=0.03)
         for factory in ESTIMATORS.values():
@@ -83,7 +97,7 @@ def _estimate_visibility() -> None:
                 _read(factory(camera=camera, **parameters), camera)
 
 
-def _read(estimator: Estimator, camera: Camera) -> None:
+def _read(estimator: "Estimator", camera: Camera) -> None:
     """Let a method read pictures in colour and, in the end, in grey."""
     for index in range(4):
         distance = 25.0 + 5.0 * index

@@ -1,0 +1,48 @@
+"""``fogsim dataset``: frames with their ground truth."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fogsim.cli.printing import INTERRUPTED, escape, stderr, stdout
+from fogsim.cli.progress import STARTING, progress_bar
+from fogsim.cli.scenario_options import (
+    EgoId,
+    HomogeneousVisibility,
+    ScenarioName,
+    Settings,
+    SumoConfiguration,
+    chosen_scenario,
+)
+
+
+def dataset_command(
+    out: Annotated[Path, typer.Option(help="Directory; one that was interrupted is continued.")],
+    frames: Annotated[int, typer.Option(help="How many frames.")],
+    scenario: ScenarioName = None,
+    sumocfg: SumoConfiguration = None,
+    ego: EgoId = None,
+    seed: Annotated[int, typer.Option(help="Seed of the first run; further runs have the next ones.")] = 0,
+    every: Annotated[int, typer.Option(help="Take one frame of so many.")] = 1,
+    visibility: HomogeneousVisibility = None,
+    settings: Settings = None,
+) -> None:
+    """Write frames with depth, masks and true transmission, and a COCO file with boxes and all that is known."""
+    from fogsim.dataset import write_dataset
+
+    loaded = chosen_scenario(scenario, sumocfg, ego, visibility, settings)
+    with progress_bar(stderr, stays=True) as progress:
+        task = progress.add_task(STARTING, total=frames)
+        done = write_dataset(
+            loaded,
+            out,
+            frames,
+            seed=seed,
+            every=every,
+            watch=lambda n: progress.update(task, completed=n, description=f"{n} of {frames} frames"),
+        )
+    stdout.print(f"{done.frames} frames, {done.written} of them new: {escape(done.directory)}", soft_wrap=True)
+    if not done.complete:
+        stdout.print("Interrupted; the same command continues it.")
+        raise typer.Exit(INTERRUPTED)

@@ -1,0 +1,66 @@
+"""Arguments and options that several commands share, and the scenario that they stand for."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from fogsim.errors import InputError
+
+if TYPE_CHECKING:
+    from fogsim.scenario import Scenario
+
+SCENARIO_HELP = "A scenario of the catalogue (fogsim list), a file or a folder."
+
+ScenarioName = Annotated[str | None, typer.Argument(help=SCENARIO_HELP)]
+SumoConfiguration = Annotated[Path | None, typer.Option(help="A SUMO configuration, in place of a scenario.")]
+EgoId = Annotated[str | None, typer.Option(help="Id of the vehicle that is the ego.")]
+HomogeneousVisibility = Annotated[
+    float | None, typer.Option(help="Meteorological visibility of homogeneous fog in metres.", min=1.0)
+]
+Settings = Annotated[
+    list[str] | None, typer.Option("--set", metavar="KEY.PATH=VALUE", help="Put a value in place of the file's.")
+]
+
+
+def chosen_scenario(
+    name: str | None, sumocfg: Path | None, ego: str | None, visibility: float | None, settings: Sequence[str] | None
+) -> "Scenario":
+    """Scenario of a name or of a SUMO configuration: exactly one of them.
+
+    Parameters
+    ----------
+    name : str or None
+        Of the catalogue, a file or a folder.
+    sumocfg : Path or None
+        The SUMO configuration.
+    ego : str or None
+        Id of the ego; the SUMO configuration needs one.
+    visibility : float or None
+        Meteorological visibility of homogeneous fog [m]; the SUMO configuration needs it, or a fog in the settings.
+    settings : sequence of str or None
+        ``key.path=value`` each.
+
+    Raises
+    ------
+    InputError
+        If neither or both are given, something is missing, or the scenario cannot be loaded.
+    """
+    from fogsim.scenario import load_scenario, scenario_from_config
+
+    settings = settings or ()
+    fog = [] if visibility is None else [f"fog.visibility_m={visibility!r}"]
+    if sumocfg is not None and name is None:
+        if ego is None:
+            raise InputError(f"--sumocfg {sumocfg}: --ego is missing: which vehicle is the ego?")
+        if not fog and not any(setting.startswith("fog.") for setting in settings):
+            raise InputError(f"--sumocfg {sumocfg}: --visibility is missing, or a fog by --set fog.…")
+        return scenario_from_config(sumocfg, ego, [*fog, *settings])
+    if name is not None and sumocfg is None:
+        if name.endswith(".sumocfg"):
+            raise InputError(f"{name} is a SUMO configuration, not a scenario: run it with --sumocfg {name} --ego ID")
+        return load_scenario(name, [*fog, *([] if ego is None else [f"traffic.ego={json.dumps(ego)}"]), *settings])
+    given = "neither" if name is None else f"both: {name} and --sumocfg {sumocfg}"
+    raise InputError(f"expected either a scenario or --sumocfg FILE, got {given}")

@@ -1,0 +1,46 @@
+"""``fogsim list`` and ``fogsim validate``: which scenarios and methods there are, and what is wrong with a file."""
+
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from fogsim.cli.printing import BAD_INPUT, escape, print_error, stdout
+from fogsim.errors import FogSimError
+
+
+def list_command() -> None:
+    """List scenarios and the methods that a scenario can name."""
+    from fogsim.advice import ADVISERS
+    from fogsim.estimators import ESTIMATORS
+    from fogsim.fusion import FUSIONS
+    from fogsim.lighting import LIGHTING_POLICIES
+    from fogsim.render import RENDERERS
+    from fogsim.scenario import catalogue, load_scenario
+
+    table = Table(title="Scenarios", title_justify="left", box=None, pad_edge=False)
+    table.add_column("name", style="bold", no_wrap=True)
+    table.add_column("description")
+    for name in catalogue():
+        table.add_row(name, load_scenario(name).description)
+    stdout.print(table)
+    stdout.print()
+    for registry in (ESTIMATORS, FUSIONS, ADVISERS, LIGHTING_POLICIES, RENDERERS):
+        stdout.print(f"[bold]{registry.kind}[/]: {', '.join(registry)}")
+
+
+def validate_command(files: Annotated[list[str], typer.Argument(help="Scenario files, folders or names.")]) -> None:
+    """Check scenario files; every mistake is named with file, line, key, value and what is allowed."""
+    from fogsim.scenario import load_scenario
+
+    bad = 0
+    for file in files:
+        try:
+            scenario = load_scenario(file)
+        except FogSimError as error:
+            bad += 1
+            print_error(error)
+        else:
+            stdout.print(f"[green]fine:[/] {escape(file)} ({escape(scenario.name)})", soft_wrap=True)
+    if bad:
+        raise typer.Exit(BAD_INPUT)

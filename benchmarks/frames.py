@@ -1,7 +1,7 @@
 """Time of a camera frame: from where the vehicles are to an 8-bit image, in fog and with noise.
 
 What is timed is what the closed loop does for a frame: `Outlook.see` (vehicles to batches and lit lamps to lights,
-drawing to radiance, distance and ids, fog and lamplight) and `Photographer.take` (exposure with photon and read noise,
+drawing to radiance, distance and ids, fog and lamplight) and `CameraSensor.take` (exposure with photon and read noise,
 response curve and quantisation). Traffic and estimators are not in it. Of the stages, "render" is the drawing, "air"
 fog and lamplight, "camera" the taking, and "scene" what is left.
 
@@ -149,7 +149,7 @@ class Case:
         described = scenario(*key)
         camera, setback = build.camera(described), described.camera.setback_m
         self._outlook = Outlook(described, network, signs_beside(network.route))
-        self._photographer, self._rng = build.photographer(described), np.random.default_rng(1)
+        self._camera_sensor, self._rng = build.camera_sensor(described), np.random.default_rng(1)
         self.traffic = [traffic_at(network.route, STEP * number) for number in range(ROUND)]
         self.poses = [mounted_pose(camera, one.position[0], float(one.heading[0]), setback) for one in self.traffic]
         self._render = self._outlook._renderer = Timed(self._outlook._renderer, "render")
@@ -162,7 +162,7 @@ class Case:
         started = time.perf_counter()
         _, radiance = self._outlook.see(self.traffic[number], 0, self.poses[number], 0.1 * number)
         seen = time.perf_counter()
-        self._photographer.take(radiance, self._rng)
+        self._camera_sensor.take(radiance, self._rng)
         render, air = self._render.spent, self._air.spent
         return [seen - started - render - air, render, air, time.perf_counter() - seen]
 

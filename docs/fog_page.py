@@ -109,7 +109,7 @@ def koschmieder() -> Figure:
         right.plot(line, airlight[1] * (1 - np.exp(-k * line)), color=colour)
         right.plot(distances, measured, "o", color=colour, ms=4)
         if visibility == 100.0:
-            image = build.photographer(described).take(radiance, np.random.default_rng(1))
+            image = build.camera_sensor(described).take(radiance, np.random.default_rng(1))
             show(left, image[150:330], "black targets at 10 … 200 m, V_met 100 m")
     middle.axhline(0.05, color="black", lw=0.8, ls=":")
     middle.set(yscale="log", xlabel="distance [m]", ylabel="contrast of black targets", ylim=(1e-3, 1.1))

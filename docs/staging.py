@@ -1,7 +1,7 @@
 """Pictures for the docs, staged without SUMO: place, vehicles, signs, light and fog, seen as the closed loop sees them.
 
 What is called is what `fogsim run` calls for a frame: `Outlook.see` draws the scene and puts the air before it, the
-scenario's photographer exposes it.
+scenario's camera sensor exposes it.
 """
 
 import math
@@ -157,7 +157,7 @@ def photograph(shot: Shot, renderer: str = "cpu", size: tuple[int, int] = (480, 
         _, radiance = outlook.see(state, 0, pose, shot.time)
     finally:
         outlook.close()
-    image = build.photographer(described).take(radiance, np.random.default_rng(1)).astype(np.uint8)
+    image = build.camera_sensor(described).take(radiance, np.random.default_rng(1)).astype(np.uint8)
     return Taken(image, radiance, described, pose)
 
 

@@ -2,11 +2,10 @@
 
 from fogsim.atmosphere.air import Air
 from fogsim.atmosphere.fog.airlight import airlight_from_illuminance
-from fogsim.atmosphere.fog.extinction import field_at
-from fogsim.atmosphere.fog.field_access import FieldAccess, FogNow
 from fogsim.atmosphere.fog.frustum import FrustumGrid, frustum_grid, radiance_through_grid
 from fogsim.atmosphere.fog.koschmieder import fogged_radiance
-from fogsim.atmosphere.fog.optical_depth import extinction, optical_depth, optical_depth_along
+from fogsim.atmosphere.fog.medium import field_at
+from fogsim.atmosphere.fog.optical_depth import FieldAccess, FogNow, extinction, optical_depth, optical_depth_along
 from fogsim.atmosphere.lamps.phase_function import Droplets
 from fogsim.atmosphere.visibility.disability_glare import veiling_luminance
 from fogsim.atmosphere.visibility.night_visibility import FogKind, Observer, Pavement, visibility_distance

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.fog.daytime import daytime_radiance, transmission
-from fogsim.atmosphere.fog.extinction import field_at
+from fogsim.atmosphere.fog.koschmieder import daytime_radiance, transmittance
+from fogsim.atmosphere.fog.medium import field_at
 from fogsim.atmosphere.lamps.halos import Halos
 from fogsim.atmosphere.lamps.lamplight import OwnLamplight
 from fogsim.atmosphere.lamps.phase_function import Droplets
@@ -92,8 +92,8 @@ class Air:
             self._halos.add(radiance, view, camera, pose, field, lights.others)
         return radiance
 
-    def transmission(self, view: View, camera: Camera, pose: CameraPose, time: float = 0.0) -> NDArray[np.float32]:
-        """Transmission T = e^(−τ) up to what each pixel shows.
+    def transmittance(self, view: View, camera: Camera, pose: CameraPose, time: float = 0.0) -> NDArray[np.float32]:
+        """Transmittance T = e^(−τ) up to what each pixel shows.
 
         Parameters
         ----------
@@ -105,4 +105,7 @@ class Air:
         (rows, cols) float32
             0 … 1; for the sky, that of the whole path to the fog's end.
         """
-        return transmission(view, field_at(self._field, time), camera, pose)
+        return transmittance(view, field_at(self._field, time), camera, pose)
+
+    transmission = transmittance
+    """The name that `transmittance` had up to version 0.1."""

@@ -1,15 +1,18 @@
 """Where the camera is, its samples, glare, exposure, noise, response and quantisation."""
 
-from fogsim.camera.exposure import Pixels, Sensor, expose
+from fogsim.camera.exposure import AutoExposure, Metering, Pixels, Sensor, expose
 from fogsim.camera.glare import LensGlare
-from fogsim.camera.metering import AutoExposure, Metering
 from fogsim.camera.mount import BodyPitch, Suspension, mounted_pose
 from fogsim.camera.sampling import averaged, middle_samples, supersampled
-from fogsim.camera.sensor import Photographer
+from fogsim.camera.sensor import CameraSensor
+
+Photographer = CameraSensor
+"""The name that `CameraSensor` had up to version 0.1."""
 
 __all__ = [
     "AutoExposure",
     "BodyPitch",
+    "CameraSensor",
     "LensGlare",
     "Metering",
     "Photographer",

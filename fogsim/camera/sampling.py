@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.camera.kernels import block_means
+from fogsim.camera.exposure_kernels import block_means
 from fogsim.values import Camera, View
 
 

@@ -3,14 +3,21 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.camera.exposure import Pixels, Sensor, expose
+from fogsim.camera.exposure import (
+    AutoExposure,
+    Pixels,
+    Sensor,
+    expose,
+    followed,
+    metered_luminance,
+    sensor_at,
+    wanted_saturation,
+)
 from fogsim.camera.glare import LensGlare
-from fogsim.camera.metering import AutoExposure, followed, metered_luminance, sensor_at, wanted_saturation
-from fogsim.camera.shading import lens_shading
 from fogsim.values import Camera
 
 
-class Photographer:
+class CameraSensor:
     """Takes the pictures of one run; what it remembers from one to the next is the exposure.
 
     Parameters
@@ -81,3 +88,29 @@ class Photographer:
         # What this picture shows sets the exposure of the next.
         self._saturation = followed(now, wanted, self._auto, self._period)
         return sensor_at(self._sensor, now, self._auto)
+
+
+def lens_shading(camera: Camera, strength: float) -> NDArray[np.float32]:
+    """Light that each pixel gets, relative to the optical axis: 1 − strength · (1 − cos⁴ θ).
+
+    cos⁴ of the angle θ to the optical axis is the natural vignetting of a thin lens; designs of lenses and correction
+    in the camera take part of it back.
+
+    Parameters
+    ----------
+    camera : Camera
+        The true calibration.
+    strength : float
+        0 for none, 1 for all of it.
+
+    Returns
+    -------
+    (rows, cols) float32
+        Greater than 0, 1 on the axis.
+    """
+    u0, v0 = camera.principal_point
+    across = (np.arange(camera.width) - u0) / camera.focal_length
+    along = (np.arange(camera.height) - v0) / camera.focal_length
+    # cos² θ = 1 / (1 + tan² θ)
+    fourth = (1.0 + across**2 + along[:, None] ** 2) ** -2
+    return (1.0 - strength * (1.0 - fourth)).astype(np.float32)

@@ -86,7 +86,7 @@ def transmission(step: Step) -> NDArray[np.float32]:
     truth = step.truth
     if truth.fog is None or truth.camera is None or truth.pose is None:
         raise InputError("the true transmission is known only of steps that a camera in a loop has made")
-    return Air(truth.fog).transmission(step.view, truth.camera, truth.pose)
+    return Air(truth.fog).transmittance(step.view, truth.camera, truth.pose)
 
 
 def semantic_mask(step: Step) -> NDArray[np.uint8]:

@@ -46,7 +46,7 @@ class OnBoard:
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
         self._camera = build.camera(scenario)
-        self._photographer = build.photographer(scenario)
+        self._camera_sensor = build.camera_sensor(scenario)
         self._body = build.body_pitch(scenario)
         self._lead_sensor = build.lead_sensor(scenario)
         self._told_camera = build.told_camera(scenario)
@@ -75,7 +75,7 @@ class OnBoard:
         for estimator in self._estimators:
             estimator.reset()
         self._fusion.reset()
-        self._photographer.reset()
+        self._camera_sensor.reset()
         self._body.reset()
         self._streams = streams
         return self._outlook
@@ -108,7 +108,7 @@ class OnBoard:
         outlook, state, ego = self._outlook, snapshot.state, snapshot.ego
         pose = self._pose(state, ego)
         view, radiance = outlook.see(state, ego, pose, time)
-        image = self._photographer.take(radiance, self._streams.camera)
+        image = self._camera_sensor.take(radiance, self._streams.camera)
         frame = Frame(time, image, self._told_camera)
         observation = self._observe(frame, snapshot, outlook.signs, self._streams)
         estimates = tuple(

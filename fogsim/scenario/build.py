@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fogsim.advice import ADVISERS, Adviser
 from fogsim.atmosphere import airlight_from_illuminance
-from fogsim.camera import AutoExposure, BodyPitch, Metering, Photographer, Sensor, Suspension
+from fogsim.camera import AutoExposure, BodyPitch, CameraSensor, Metering, Sensor, Suspension
 from fogsim.estimators import ESTIMATORS, Estimator
 from fogsim.fusion import FUSIONS, Fusion
 from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy
@@ -168,12 +168,12 @@ def told_camera(scenario: Scenario) -> Camera:
     )
 
 
-def photographer(scenario: Scenario) -> Photographer:
+def camera_sensor(scenario: Scenario) -> CameraSensor:
     """What takes the pictures of the ego's camera."""
     section = scenario.camera
     auto = auto_exposure(scenario) if section.automatic else None
     period = scenario.clocks.camera_period_s
-    return Photographer(camera(scenario), sensor(scenario), auto, section.lens_shading, period, section.lens_glare)
+    return CameraSensor(camera(scenario), sensor(scenario), auto, section.lens_shading, period, section.lens_glare)
 
 
 def sensor(scenario: Scenario) -> Sensor:

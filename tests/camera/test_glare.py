@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.camera import AutoExposure, LensGlare, Metering, Photographer, Sensor
+from fogsim.camera import AutoExposure, CameraSensor, LensGlare, Metering, Sensor
 from fogsim.camera.glare import BRIGHT, SPREADS
 from fogsim.values import Camera, Response
 
@@ -128,12 +128,12 @@ def test_a_small_picture_shows_the_glow_of_a_large_one() -> None:
         assert found[60, 80 + distance, 0] == pytest.approx(wide[60, 80 + distance, 0], rel=0.15)
 
 
-def test_the_photographer_scatters_at_its_exposure() -> None:
+def test_the_camera_sensor_scatters_at_its_exposure() -> None:
     auto = AutoExposure(Metering.HIGHLIGHTS, 0.65, time_constant=0.5, brightest=1e5, ungained=100.0, darkest=4.0)
     sensor = Sensor(SATURATION, 1e9, 0.0)
 
     def taken(picture: np.ndarray, exposure: AutoExposure | None, *glare: float) -> np.ndarray:
-        return Photographer(camera(), sensor, exposure, 0.0, 0.1, *glare).take(picture, np.random.default_rng(0))
+        return CameraSensor(camera(), sensor, exposure, 0.0, 0.1, *glare).take(picture, np.random.default_rng(0))
 
     night = with_lamp()
     assert np.array_equal(taken(night, auto), taken(night, auto, 0.0))

@@ -4,8 +4,8 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.camera import AutoExposure, Metering, Photographer, Sensor
-from fogsim.camera.metering import followed, metered_luminance, sensor_at, wanted_saturation
+from fogsim.camera import AutoExposure, CameraSensor, Metering, Sensor
+from fogsim.camera.exposure import followed, metered_luminance, sensor_at, wanted_saturation
 from fogsim.values import Camera, Response
 
 SENSOR = Sensor(saturation_luminance=5000.0, full_well=10_000.0, read_noise=5.0)
@@ -17,9 +17,9 @@ def picture(luminance: float) -> np.ndarray:
     return np.full((120, 160, 3), luminance, dtype=np.float32)
 
 
-def levels(photographer: Photographer, *luminances: float) -> list[float]:
+def levels(sensor: CameraSensor, *luminances: float) -> list[float]:
     rng = np.random.default_rng(0)
-    return [float(photographer.take(picture(v), rng).mean()) for v in luminances]
+    return [float(sensor.take(picture(v), rng).mean()) for v in luminances]
 
 
 def test_the_log_average_is_the_geometric_mean() -> None:
@@ -54,26 +54,26 @@ def test_black_is_metered_as_the_camera_s_darkest() -> None:
 
 def test_the_first_picture_is_well_exposed_and_so_is_every_steady_one() -> None:
     for luminance in (50.0, 3000.0, 40_000.0):
-        found = levels(Photographer(CAMERA, SENSOR, AUTO, 0.0, 0.1), luminance, luminance, luminance)
+        found = levels(CameraSensor(CAMERA, SENSOR, AUTO, 0.0, 0.1), luminance, luminance, luminance)
         assert found == pytest.approx([0.65 * 255] * 3, abs=0.3)
 
 
 def test_exposure_follows_a_change_of_light_in_its_logarithm() -> None:
     """After n frames e^(−n Δt / τ) of the change in stops is left; the frame of the change itself comes too early."""
-    found = levels(Photographer(CAMERA, SENSOR, AUTO, 0.0, 0.1), *[3000.0] * 3, *[1500.0] * 20)
+    found = levels(CameraSensor(CAMERA, SENSOR, AUTO, 0.0, 0.1), *[3000.0] * 3, *[1500.0] * 20)
     left = [2.0 ** -math.exp(-0.1 * n / 0.5) for n in range(20)]
     assert found[3:] == pytest.approx([0.65 * 255 * share for share in left], abs=0.3)
 
 
 def test_sudden_light_saturates_until_the_exposure_has_followed() -> None:
-    found = levels(Photographer(CAMERA, SENSOR, AUTO, 0.0, 0.1), 300.0, *[3000.0] * 40)
+    found = levels(CameraSensor(CAMERA, SENSOR, AUTO, 0.0, 0.1), 300.0, *[3000.0] * 40)
     assert found[1] == 255
     assert found[-1] == pytest.approx(0.65 * 255, abs=0.3)
 
 
 def test_no_time_constant_follows_by_the_next_frame() -> None:
     at_once = AutoExposure(Metering.HIGHLIGHTS, 0.5, 0.0, 1e5, 100.0, 4.0)
-    found = levels(Photographer(CAMERA, SENSOR, at_once, 0.0, 0.1), 1000.0, 500.0, 500.0)
+    found = levels(CameraSensor(CAMERA, SENSOR, at_once, 0.0, 0.1), 1000.0, 500.0, 500.0)
     assert found == pytest.approx([127.5, 63.75, 127.5], abs=0.3)
 
 
@@ -93,7 +93,7 @@ def test_gain_makes_noise_and_exposure_time_does_not() -> None:
     assert gained.full_well == pytest.approx(0.05 * SENSOR.full_well)
     rng = np.random.default_rng(1)
     day, night = (
-        Photographer(CAMERA, SENSOR, AUTO, 0.0, 0.1).take(picture(v), rng).astype(float) for v in (2000.0, 3.25)
+        CameraSensor(CAMERA, SENSOR, AUTO, 0.0, 0.1).take(picture(v), rng).astype(float) for v in (2000.0, 3.25)
     )
     assert night.mean() == pytest.approx(day.mean(), abs=0.3)
     # σ² of the exposure 0.65 with 10 000 and with 500 electrons (EMVA 1288), plus 1/12 for quantisation.
@@ -103,14 +103,14 @@ def test_gain_makes_noise_and_exposure_time_does_not() -> None:
 
 
 def test_a_run_forgets_the_one_before() -> None:
-    photographer = Photographer(CAMERA, SENSOR, AUTO, 0.0, 0.1)
-    first = levels(photographer, 100.0, 5000.0)
-    photographer.reset()
-    assert levels(photographer, 100.0, 5000.0) == first
+    sensor = CameraSensor(CAMERA, SENSOR, AUTO, 0.0, 0.1)
+    first = levels(sensor, 100.0, 5000.0)
+    sensor.reset()
+    assert levels(sensor, 100.0, 5000.0) == first
 
 
 def test_a_fixed_exposure_does_not_follow() -> None:
-    found = levels(Photographer(CAMERA, SENSOR, None, 0.0, 0.1), 1000.0, 2000.0, 1000.0)
+    found = levels(CameraSensor(CAMERA, SENSOR, None, 0.0, 0.1), 1000.0, 2000.0, 1000.0)
     assert found == pytest.approx([51.0, 102.0, 51.0], abs=0.3)
 
 
@@ -119,8 +119,8 @@ def test_lens_shading_is_the_fourth_power_of_the_cosine() -> None:
     fourth = (1 + (80 / 150) ** 2) ** -2
     middles, borders = [], []
     for strength in (0.0, 0.5, 1.0):
-        photographer = Photographer(CAMERA, Sensor(5000.0, 1e9, 0.0), None, strength, 0.1)
-        row = photographer.take(picture(4000.0), np.random.default_rng(0))[60, :, 0].astype(float)
+        sensor = CameraSensor(CAMERA, Sensor(5000.0, 1e9, 0.0), None, strength, 0.1)
+        row = sensor.take(picture(4000.0), np.random.default_rng(0))[60, :, 0].astype(float)
         middles.append(row[80])
         borders.append(row[0])
     assert middles == pytest.approx([204.0] * 3, abs=0.6)

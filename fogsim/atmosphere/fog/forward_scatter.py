@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.fog.forward_scatter_kernels import blur_rows, exchange
+from fogsim.jit import kernel
 
 _COARSEST = 2.0
 """The image is averaged to pixels of at most one such part of the blur's width before it is blurred."""
@@ -16,11 +16,13 @@ _REACH = 4.0
 _DARK = 1e-12
 """Radiance that is none [cd/m²]; numbers near the smallest that exist are very slow."""
 
+_NONE, _HALF = np.float32(0.0), np.float32(0.5)
+
 
 def add_forward_scatter(
     radiance: NDArray[np.float32],
     airlight: tuple[float, float, float],
-    transmission: NDArray[np.float32],
+    transmittance: NDArray[np.float32],
     weight: float,
     width: float,
 ) -> None:
@@ -37,7 +39,7 @@ def add_forward_scatter(
         Radiance at the camera [cd/m²]; added to in place.
     airlight : tuple of float
         L∞ per channel [cd/m²].
-    transmission : (rows, cols) float32
+    transmittance : (rows, cols) float32
         T.
     weight : float
         w, 0 … 0.3.
@@ -52,7 +54,7 @@ def add_forward_scatter(
     across_first, blurred = np.empty_like(small), np.empty_like(small)
     blur_rows(small, weights, across_first)
     blur_rows(across_first.transpose(1, 0, 2), weights, blurred.transpose(1, 0, 2))
-    exchange(radiance, difference, transmission, blurred, block, np.float32(weight))
+    exchange(radiance, difference, transmittance, blurred, block, np.float32(weight))
 
 
 def _block_means(image: NDArray[np.float32], block: int) -> NDArray[np.float32]:
@@ -77,3 +79,49 @@ def pixel_width(angle: float, focal_length: float) -> float:
         Focal length [px].
     """
     return max(focal_length * math.tan(angle), 0.5)
+
+
+@kernel
+def blur_rows(image: NDArray[np.float32], weights: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+    """Convolve each row of an image (rows, cols, 3); what the weights miss at the edges is shared among the rest."""
+    columns, reach = image.shape[1], weights.shape[0] // 2
+    for u in range(columns):
+        first, last = max(0, u - reach), min(columns, u + reach + 1)
+        whole = np.float32(0.0)
+        for n in range(first, last):
+            whole += weights[n - u + reach]
+        for v in range(image.shape[0]):
+            for c in range(3):
+                total = np.float32(0.0)
+                for n in range(first, last):
+                    total += weights[n - u + reach] * image[v, n, c]
+                out[v, u, c] = total / whole
+
+
+@kernel
+def exchange(
+    radiance: NDArray[np.float32],
+    difference: NDArray[np.float32],
+    transmittance: NDArray[np.float32],
+    blurred: NDArray[np.float32],
+    block: int,
+    weight: np.float32,
+) -> None:
+    """Exchange a share w (1 − T) of a difference for its blur, of which each block (rows, cols, 3) has a value."""
+    rows, columns = blurred.shape[0], blurred.shape[1]
+    part = np.float32(1.0) / np.float32(block)
+    for v in range(transmittance.shape[0]):
+        down = min(max((np.float32(v) + _HALF) * part - _HALF, _NONE), np.float32(rows - 1))
+        upper = min(int(down), max(rows - 2, 0))
+        lower = min(upper + 1, rows - 1)
+        b = down - np.float32(upper)
+        for u in range(transmittance.shape[1]):
+            across = min(max((np.float32(u) + _HALF) * part - _HALF, _NONE), np.float32(columns - 1))
+            left = min(int(across), max(columns - 2, 0))
+            right = min(left + 1, columns - 1)
+            a = across - np.float32(left)
+            share = weight * (np.float32(1.0) - transmittance[v, u])
+            for c in range(3):
+                above = blurred[upper, left, c] + (blurred[upper, right, c] - blurred[upper, left, c]) * a
+                below = blurred[lower, left, c] + (blurred[lower, right, c] - blurred[lower, left, c]) * a
+                radiance[v, u, c] += share * (above + (below - above) * b - difference[v, u, c])

@@ -1,13 +1,17 @@
-"""Fog on a grid of the camera's view: rays at some pixels, nodes along each, and everything else between them."""
+"""Fog on a grid of the camera's view: rays at some pixels, nodes along each, and everything else between them.
+
+Nodes are where the fog is uneven and still to be seen.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.fog.extinction import medium_of
-from fogsim.atmosphere.fog.frustum_kernels import grid_depths, grid_pixels
-from fogsim.atmosphere.fog.node_distances import node_distances
+from fogsim.atmosphere.fog.frustum_kernels import fog_rows_by_grid, grid_depths
+from fogsim.atmosphere.fog.koschmieder_kernels import ENDLESS
+from fogsim.atmosphere.fog.medium import Medium, medium_of
+from fogsim.atmosphere.fog.optical_depth_kernels import extinctions_on_ray
 from fogsim.linear_algebra import matrix_product
 from fogsim.values import Camera, CameraPose, FogField, View
 from fogsim.values.pinhole import ray_from_pixel
@@ -20,6 +24,20 @@ FINER = 4
 
 _WIDER = 1.6
 """How much farther apart the rays are across the image, where fog changes less than with height."""
+
+NODES = 32
+"""Nodes along a ray, with the eye and the end of the ray."""
+
+FARTHEST = 20_000.0
+"""What is farther than this and not endless is taken to be here [m]."""
+
+_PROBES = np.concatenate(([0.0], np.geomspace(0.5, 0.9 * FARTHEST, 128)))
+_SEEN = 7.0
+"""Optical depth behind which a thousandth of the contrast is left [-]."""
+_FOG_LEFT = 1e-3
+"""Optical depth ahead that matters no more [-]."""
+_EVEN_SHARE = 0.3
+"""Share of the nodes that is spread whatever the fog, evenly in the logarithm of the distance."""
 
 _BINS = 2048
 _FOLD = 100.0
@@ -80,7 +98,7 @@ def frustum_grid(
     if distances is None:
         # Rows are dense where the fog is seen edge-on, and so are the probes.
         probes = directions[:: max(1, len(rows) // 14), :: max(1, (len(columns) - 1) // 2)]
-        distances = node_distances(eye, probes, medium)
+        distances = _node_distances(eye, probes, medium)
     shape = (len(rows), len(columns), len(distances))
     extinction, depth = np.empty(shape, np.float32), np.empty(shape, np.float32)
     flat = (shape[0] * shape[1], shape[2])
@@ -122,6 +140,31 @@ def _directions(
     return np.asarray(rays / np.sqrt(np.einsum("rci,rci->rc", rays, rays))[..., None])
 
 
+def _node_distances(eye: NDArray[np.float64], directions: NDArray[np.float64], medium: Medium) -> NDArray[np.float64]:
+    """Distances of nodes [m] such that linear interpolation of τ between them errs about equally everywhere.
+
+    The error of the transmittance T in an interval Δ is T |dk/dr| Δ² / 8, so that nodes should be as dense as
+    √(T |dk/dr|), of which some probing rays, `directions`, give the largest. They ascend from 0; the last two are
+    `FARTHEST` and `ENDLESS`.
+    """
+    probes = np.ascontiguousarray(directions.reshape(-1, 3))
+    k = np.empty((len(probes), len(_PROBES)))
+    for direction, values in zip(probes, k, strict=True):
+        extinctions_on_ray(eye, direction, _PROBES, medium, values)
+    step = np.diff(_PROBES)
+    pieces = 0.5 * (k[:, 1:] + k[:, :-1]) * step
+    depth = np.cumsum(pieces, axis=1)
+    matters = (depth - pieces < _SEEN) & (depth[:, -1:] - depth + pieces > _FOG_LEFT)
+    last = max(10, int(np.flatnonzero(matters.any(axis=0)).max(initial=0)) + 1)
+    slope = np.abs(np.diff(k, axis=1)) / step * np.exp(-depth) * matters
+    uneven = np.sqrt(slope.max(axis=0))[:last] * step[:last]
+    even = step[:last] / (_PROBES[1 : last + 1] + 5.0)
+    weight = _EVEN_SHARE * even / even.sum() + (1.0 - _EVEN_SHARE) * uneven / max(uneven.sum(), 1e-30)
+    growth = np.concatenate(([0.0], np.cumsum(weight)))
+    inner = np.interp(np.linspace(0.0, growth[-1], NODES - 2), growth, _PROBES[: last + 1])
+    return np.append(inner, (FARTHEST, ENDLESS))
+
+
 def radiance_through_grid(
     view: View,
     grid: FrustumGrid,
@@ -154,7 +197,7 @@ def radiance_through_grid(
     width = grid.columns[left + 1] - grid.columns[left]
     middles = (np.arange(_BINS) + 0.5) / _BINS
     interval = np.searchsorted(grid.distances, _FOLD * middles / (1.0 - middles), side="right") - 1
-    grid_pixels(
+    fog_rows_by_grid(
         radiance.reshape(rows, 3 * columns),
         np.ascontiguousarray(view.distance, dtype=np.float32),
         grid.rows,

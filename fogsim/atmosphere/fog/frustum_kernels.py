@@ -5,8 +5,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.fog.extinction import BASE, BASE_EDGE, DECAY, TOP, TOP_EDGE, Medium
-from fogsim.atmosphere.fog.koschmieder_kernels import ENDLESS, mix, three_times, transmissions
+from fogsim.atmosphere.fog.koschmieder_kernels import (
+    ENDLESS,
+    add_airlight,
+    interpolate_rows,
+    repeat_channels,
+    transmittances,
+)
+from fogsim.atmosphere.fog.medium import BASE, BASE_EDGE, DECAY, TOP, TOP_EDGE, Medium
 from fogsim.atmosphere.fog.optical_depth_kernels import extinctions_on_ray
 from fogsim.jit import kernel
 
@@ -77,13 +83,7 @@ def grid_depths(
 
 
 @kernel
-def _between(low: NDArray[np.float32], high: NDArray[np.float32], share: np.float32, out: NDArray[np.float32]) -> None:
-    for i in range(out.shape[0]):
-        out[i] = low[i] + (high[i] - low[i]) * share
-
-
-@kernel
-def grid_pixels(
+def fog_rows_by_grid(
     radiance: NDArray[np.float32],
     distance: NDArray[np.float32],
     rows: NDArray[np.float32],
@@ -106,7 +106,7 @@ def grid_pixels(
     """
     columns, nodes, bins = distance.shape[1], distances.shape[0], interval.shape[0]
     above, scattered = np.empty(depth.shape[1], np.float32), np.empty(source.shape[1], np.float32)
-    row_depth, transmission = np.empty(columns, np.float32), np.empty(columns, np.float32)
+    row_depth, transmittance = np.empty(columns, np.float32), np.empty(columns, np.float32)
     power = np.empty(columns, np.int32)
     in_channels, light = np.empty(3 * columns, np.float32), np.empty(3 * columns, np.float32)
     node, share = np.empty(columns, np.int64), np.empty(columns, np.float32)
@@ -121,7 +121,7 @@ def grid_pixels(
         while upper < rows.shape[0] - 2 and rows[upper + 1] <= v:
             upper += 1
         down = (np.float32(v) - rows[upper]) / (rows[upper + 1] - rows[upper])
-        _between(depth[upper], depth[upper + 1], down, above)
+        interpolate_rows(depth[upper], depth[upper + 1], down, above)
         for u in range(columns):
             reach[u] = min(distance[v, u], np.float32(ENDLESS))
             place[u] = np.int32(reach[u] / (reach[u] + fold) * np.float32(bins))
@@ -134,11 +134,11 @@ def grid_pixels(
             far = above[a + 1] + (above[b + 1] - above[a + 1]) * right_share[u]
             row_depth[u] = max(near + (far - near) * f, np.float32(0.0))
             node[u], share[u] = n, f
-        transmissions(row_depth, power, transmission)
-        three_times(transmission, in_channels)
-        mix(radiance[v], in_channels, light, out[v])
+        transmittances(row_depth, power, transmittance)
+        repeat_channels(transmittance, in_channels)
+        add_airlight(radiance[v], in_channels, light, out[v])
         if source.shape[1] > 0:
-            _between(source[upper], source[upper + 1], down, scattered)
+            interpolate_rows(source[upper], source[upper + 1], down, scattered)
             _add_source(scattered, left, right_share, node, share, nodes, out[v])
 
 

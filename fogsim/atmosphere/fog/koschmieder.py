@@ -1,11 +1,74 @@
-"""A drawn scene seen through fog by day."""
+"""A drawn scene seen through fog by day: Koschmieder's law in closed form where the fog has one, else on a grid."""
+
+import dataclasses
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.fog.koschmieder_kernels import fog_pixels
+from fogsim.atmosphere.fog.airlight import airlight_source
+from fogsim.atmosphere.fog.forward_scatter import add_forward_scatter, pixel_width
+from fogsim.atmosphere.fog.frustum import frustum_grid, radiance_through_grid
+from fogsim.atmosphere.fog.koschmieder_kernels import fog_rows
+from fogsim.atmosphere.fog.medium import has_closed_form
 from fogsim.jit import Bands
-from fogsim.values import FogBank, FogField, View
+from fogsim.values import Camera, CameraPose, FogBank, FogField, View
+from fogsim.values.pinhole import ray_from_pixel
+
+
+def daytime_radiance(view: View, field: FogField, camera: Camera, pose: CameraPose) -> NDArray[np.float32]:
+    """Radiance at a camera, L = L0 T + L∞ (1 − T), with the field's forward scattering.
+
+    Parameters
+    ----------
+    view : View
+        The scene without air.
+    field : FogField
+        The fog, at one time (see `field_at`).
+    camera, pose
+        The camera.
+
+    Returns
+    -------
+    (rows, cols, 3) float32
+        Linear radiance [cd/m²].
+    """
+    radiance = _through_fog(view, field, camera, pose)
+    if field.forward_scatter > 0:
+        width = pixel_width(field.forward_scatter_width, camera.focal_length)
+        share = transmittance(view, field, camera, pose)
+        add_forward_scatter(radiance, field.airlight, share, field.forward_scatter, width)
+    return radiance
+
+
+def transmittance(view: View, field: FogField, camera: Camera, pose: CameraPose) -> NDArray[np.float32]:
+    """Transmittance T = e^(−τ) up to what each pixel shows; for the sky, of the whole path to the fog's end.
+
+    Parameters
+    ----------
+    view : View
+        Distances are taken from it.
+    field : FogField
+        The fog, at one time.
+    camera, pose
+        The camera.
+
+    Returns
+    -------
+    (rows, cols) float32
+        0 … 1.
+    """
+    # A white scene in fog that adds no light of its own is seen as its transmittance.
+    white = dataclasses.replace(view, radiance=np.ones_like(view.radiance), lamp_response=None)
+    dark = dataclasses.replace(field, airlight=(0.0, 0.0, 0.0))
+    return np.ascontiguousarray(_through_fog(white, dark, camera, pose)[..., 0])
+
+
+def _through_fog(view: View, field: FogField, camera: Camera, pose: CameraPose) -> NDArray[np.float32]:
+    """Closed form where it holds, from below the fog's top and through even fog or banks; else the grid."""
+    if has_closed_form(field) and pose.position[2] <= field.top:
+        return fogged_radiance(view, field, pose.position, ray_from_pixel(camera, pose))
+    grid = frustum_grid(field, camera, pose)
+    return radiance_through_grid(view, grid, field.airlight, airlight_source(field, grid))
 
 
 def fogged_radiance(
@@ -40,7 +103,7 @@ def fogged_radiance(
     banks, airlight = _bank_rows(field.banks, eye), np.array(field.airlight, dtype=np.float32)
 
     def fog(_: int, top: int, bottom: int) -> None:
-        fog_pixels(lines, distance, rays, headroom, extinction, banks, airlight, top, bottom, fogged)
+        fog_rows(lines, distance, rays, headroom, extinction, banks, airlight, top, bottom, fogged)
 
     Bands().work(fog, rows, columns)
     return out

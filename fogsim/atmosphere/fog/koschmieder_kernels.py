@@ -1,6 +1,6 @@
 """The per-pixel loops of Koschmieder's law, row by row so that they run on vector units.
 
-A row's optical depths are gathered first, then turned into transmissions, then mixed with the airlight: each step is a
+A row's optical depths are gathered first, then turned into transmittances, then mixed with the airlight: each step is a
 plain loop over float32 that compiles to vector instructions, which a call of the exponential function would prevent.
 """
 
@@ -25,7 +25,7 @@ _NEXT = np.uint32(1)
 
 
 @kernel
-def transmissions(depth: NDArray[np.float32], power: NDArray[np.int32], out: NDArray[np.float32]) -> None:
+def transmittances(depth: NDArray[np.float32], power: NDArray[np.int32], out: NDArray[np.float32]) -> None:
     """e^(−τ) for a row of optical depths, to 2·10⁻⁷; exactly 1 for 0. `depth` is used up, `power` is scratch.
 
     2^y is split at the whole number i above y: the power 2^i is written straight into a float's exponent.
@@ -42,7 +42,7 @@ def transmissions(depth: NDArray[np.float32], power: NDArray[np.int32], out: NDA
 
 
 @kernel
-def three_times(values: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+def repeat_channels(values: NDArray[np.float32], out: NDArray[np.float32]) -> None:
     """Each value of a row for each of three interleaved channels."""
     for u in range(values.shape[0]):
         out[3 * u] = values[u]
@@ -51,14 +51,16 @@ def three_times(values: NDArray[np.float32], out: NDArray[np.float32]) -> None:
 
 
 @kernel
-def each_channel(colour: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+def fill_channels(colour: NDArray[np.float32], out: NDArray[np.float32]) -> None:
     """A colour (3) in each of a row's pixels of three interleaved channels."""
     for j in range(out.shape[0]):
         out[j] = colour[j % 3]
 
 
 @kernel
-def between(low: NDArray[np.float32], high: NDArray[np.float32], share: np.float32, out: NDArray[np.float32]) -> None:
+def interpolate_rows(
+    low: NDArray[np.float32], high: NDArray[np.float32], share: np.float32, out: NDArray[np.float32]
+) -> None:
     """A row that lies between two rows of a coarser grid, at a share of the way from the lower to the higher."""
     for j in range(out.shape[0]):
         out[j] = low[j] + (high[j] - low[j]) * share
@@ -76,25 +78,25 @@ def bilinear(table: NDArray[np.float32], row: np.float32, column: np.float32) ->
 
 
 @kernel
-def mix(
+def add_airlight(
     radiance: NDArray[np.float32],
-    transmission: NDArray[np.float32],
+    transmittance: NDArray[np.float32],
     airlight: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:
     """L = L0 T + L∞ (1 − T) over a row of interleaved channels: L0 exactly where T is 1."""
     for j in range(out.shape[0]):
-        out[j] = radiance[j] * transmission[j] + airlight[j] * (_ONE - transmission[j])
+        out[j] = radiance[j] * transmittance[j] + airlight[j] * (_ONE - transmittance[j])
 
 
 @kernel
-def _ramp(station: np.float32, edge: np.float32) -> np.float32:
+def _smoothstep(station: np.float32, edge: np.float32) -> np.float32:
     t = min(max(station / edge + np.float32(0.5), np.float32(0.0)), _ONE)
     return t * t * (np.float32(3.0) - np.float32(2.0) * t)
 
 
 @kernel
-def _ramp_integral(station: np.float32, edge: np.float32) -> np.float32:
+def _smoothstep_integral(station: np.float32, edge: np.float32) -> np.float32:
     t = min(max(station / edge + np.float32(0.5), np.float32(0.0)), _ONE)
     beyond = max(station - np.float32(0.5) * edge, np.float32(0.0))
     return edge * t * t * t * (_ONE - np.float32(0.5) * t) + beyond
@@ -110,20 +112,20 @@ def _add_bank(
     `towards` the change of the station with distance.
     """
     start, end, edge, extra = bank[0], bank[1], bank[2], bank[3]
-    here = _ramp_integral(start, edge) - _ramp_integral(end, edge)
+    here = _smoothstep_integral(start, edge) - _smoothstep_integral(end, edge)
     for u in range(depth.shape[0]):
         span = towards[u] * length[u]
-        difference = _ramp_integral(start + span, edge) - _ramp_integral(end + span, edge) - here
+        difference = _smoothstep_integral(start + span, edge) - _smoothstep_integral(end + span, edge) - here
         # Across the axis the station hardly changes: there the profile half-way is the mean.
         half = np.float32(0.5) * span
-        middle = _ramp(start + half, edge) - _ramp(end + half, edge)
+        middle = _smoothstep(start + half, edge) - _smoothstep(end + half, edge)
         along = abs(span) > _ALONG
         share = difference / (span if along else _ONE)
         depth[u] += extra * length[u] * (share if along else middle)
 
 
 @kernel
-def fog_pixels(
+def fog_rows(
     radiance: NDArray[np.float32],
     distance: NDArray[np.float32],
     ray_map: NDArray[np.float32],
@@ -143,7 +145,7 @@ def fog_pixels(
     """
     columns = distance.shape[1]
     length, towards = np.empty(columns, np.float32), np.empty(columns, np.float32)
-    depth, transmission = np.empty(columns, np.float32), np.empty(columns, np.float32)
+    depth, transmittance = np.empty(columns, np.float32), np.empty(columns, np.float32)
     power = np.empty(columns, np.int32)
     in_channels, light = np.empty(3 * columns, np.float32), np.empty(3 * columns, np.float32)
     for j in range(3 * columns):
@@ -168,6 +170,6 @@ def fog_pixels(
                 z = first_z + right_z * np.float32(u)
                 towards[u] = (x * bank[0] + y * bank[1]) / math.sqrt(x * x + y * y + z * z)
             _add_bank(bank[2:], towards, length, depth)
-        transmissions(depth, power, transmission)
-        three_times(transmission, in_channels)
-        mix(radiance[v], in_channels, light, out[v])
+        transmittances(depth, power, transmittance)
+        repeat_channels(transmittance, in_channels)
+        add_airlight(radiance[v], in_channels, light, out[v])

@@ -1,9 +1,13 @@
 """Extinction along a line of sight: the one optical depth that camera, drivers, lamps and metrics share."""
 
+import dataclasses
+import math
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fogsim.atmosphere.fog.extinction import field_at, medium_of
+from fogsim.atmosphere.fog.medium import field_at, medium_of
 from fogsim.atmosphere.fog.optical_depth_kernels import MOST_PIECES, depths_along, depths_between, extinctions
 from fogsim.values import FogField
 
@@ -48,7 +52,7 @@ def optical_depth(field: FogField, start: ArrayLike, end: ArrayLike, time: float
     Returns
     -------
     (...) float64
-        τ ≥ 0; the transmission is exp(−τ).
+        τ ≥ 0; the transmittance is exp(−τ).
     """
     from_, to = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     shape = np.broadcast_shapes(from_.shape, to.shape)
@@ -104,3 +108,103 @@ def optical_depth_along(
         np.empty((2, 4 * MOST_PIECES)),
     )
     return depths
+
+
+@dataclass(frozen=True, slots=True)
+class FieldAccess:
+    """Extinction and optical depth of one field.
+
+    Attributes
+    ----------
+    field : FogField
+        The fog.
+    time : float
+        The time that is meant where a question names none [s].
+    """
+
+    field: FogField
+    time: float = 0.0
+
+    def at(self, time: float) -> "FieldAccess":
+        """The same fog at another time; its bounds still hold for all times.
+
+        Parameters
+        ----------
+        time : float
+            Time since the run began [s].
+        """
+        return dataclasses.replace(self, time=time)
+
+    @property
+    def maximum_extinction(self) -> float:
+        """Extinction coefficient that is exceeded nowhere and never [1/m]; banks do not overlap."""
+        field = self.field
+        densest = field.extinction + max((0.0, *(bank.extra_extinction for bank in field.banks)))
+        return densest * max((c.density for c in field.changes), default=1.0) * float(self._factors.max())
+
+    @property
+    def minimum_extinction(self) -> float:
+        """Extinction coefficient that is reached always and everywhere below the fog's top [1/m].
+
+        0 for fog that thins with height or has lifted, since a road may lead out of it. Banks do not overlap.
+        """
+        field = self.field
+        bases = (field.base, *(change.base for change in field.changes))
+        if math.isfinite(field.scale_height) or max(bases) > -math.inf:
+            return 0.0
+        thinnest = field.extinction + min((0.0, *(bank.extra_extinction for bank in field.banks)))
+        return thinnest * min((c.density for c in field.changes), default=1.0) * float(self._factors.min())
+
+    @property
+    def _factors(self) -> NDArray[np.float32]:
+        return medium_of(field_at(self.field, 0.0)).factors
+
+    def extinction(self, points: ArrayLike, time: float | None = None) -> NDArray[np.float64]:
+        """Extinction coefficient at points (..., 3) [1/m]; see `fogsim.atmosphere.extinction`."""
+        return extinction(self.field, points, self.time if time is None else time)
+
+    def optical_depth(self, start: ArrayLike, end: ArrayLike, time: float | None = None) -> NDArray[np.float64]:
+        """Optical depth between points (..., 3) [-]; see `fogsim.atmosphere.fog.optical_depth`."""
+        return optical_depth(self.field, start, end, self.time if time is None else time)
+
+
+class FogNow:
+    """A field as it is now, for those who ask about the fog and keep no time; whoever keeps the time sets it.
+
+    Parameters
+    ----------
+    field : FogField
+        The fog over time.
+    """
+
+    def __init__(self, field: FogField) -> None:
+        self._always = FieldAccess(field)
+        self._now = field_at(field, 0.0)
+
+    def set_time(self, time: float) -> None:
+        """Let it be a time from here on.
+
+        Parameters
+        ----------
+        time : float
+            Time since the run began [s].
+        """
+        self._now = field_at(self._always.field, time)
+
+    @property
+    def maximum_extinction(self) -> float:
+        """Extinction coefficient that is exceeded nowhere and never [1/m]."""
+        return self._always.maximum_extinction
+
+    @property
+    def minimum_extinction(self) -> float:
+        """Extinction coefficient that is reached always and everywhere [1/m]; see `FieldAccess`."""
+        return self._always.minimum_extinction
+
+    def extinction(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Extinction coefficient at points (..., 3) now [1/m]."""
+        return extinction(self._now, points)
+
+    def optical_depth(self, start: ArrayLike, end: ArrayLike) -> NDArray[np.float64]:
+        """Optical depth between points (..., 3) now [-]."""
+        return optical_depth(self._now, start, end)

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.fog.extinction import BASE, BASE_EDGE, DECAY, EXTINCTION, GROUND, TOP, TOP_EDGE, Medium
+from fogsim.atmosphere.fog.medium import BASE, BASE_EDGE, DECAY, EXTINCTION, GROUND, TOP, TOP_EDGE, Medium
 from fogsim.jit import kernel
 
 MOST_PIECES = 400
@@ -26,7 +26,7 @@ _WEIGHTS = np.array((0.17392742256872692, 0.32607257743127307, 0.326072577431273
 
 
 @kernel
-def soft_step(value: float, middle: float, edge: float) -> float:
+def smoothstep(value: float, middle: float, edge: float) -> float:
     """Smoothstep from 0 to 1 over an edge; a plain step where the edge has no length."""
     if edge <= 0.0:
         return 1.0 if value > middle else 0.0
@@ -56,7 +56,7 @@ def _patch_factor(across: float, along: float, up: float, factors: NDArray[np.fl
 @kernel
 def _height_profile(z: float, base: float, base_edge: float, top: float, top_edge: float) -> float:
     """Share of the extinction that is left at a height between base and top, 0 … 1."""
-    return soft_step(z, base, base_edge) - soft_step(z, top, top_edge)
+    return smoothstep(z, base, base_edge) - smoothstep(z, top, top_edge)
 
 
 @kernel
@@ -84,7 +84,7 @@ def extinctions_on_ray(
         first, last, edge, extra = banks[b, 4], banks[b, 5], banks[b, 6], banks[b, 7]
         for i in range(at.shape[0]):
             station = here + rate * at[i]
-            values[i] += extra * (soft_step(station, first, edge) - soft_step(station, last, edge))
+            values[i] += extra * (smoothstep(station, first, edge) - smoothstep(station, last, edge))
     for i in range(at.shape[0]):
         values[i] *= _height_profile(z + dz * at[i], base, base_edge, top, top_edge)
     if decay > 0.0:
@@ -139,7 +139,7 @@ def _edges_crossed(
 
 
 @kernel
-def unevenness(towards: NDArray[np.float64], medium: Medium) -> float:
+def _pieces_per_metre(towards: NDArray[np.float64], medium: Medium) -> float:
     """Pieces in a metre into which a line must be cut between edges, for scale height and patches [1/m]."""
     pieces: float = 0.5 * abs(towards[2]) * medium.layer[DECAY]
     if medium.factors.size > 1:
@@ -186,7 +186,7 @@ def depths_along(
     cuts = np.empty(8 + 4 * medium.banks.shape[0])
     total, here, next_cut = 0.0, 0.0, 0
     count = _edges_crossed(start, towards, distances[-1], medium, cuts)
-    pieces = unevenness(towards, medium)
+    pieces = _pieces_per_metre(towards, medium)
     for i in range(distances.shape[0]):
         while next_cut < count and cuts[next_cut] < distances[i]:
             total += _piece_depth(start, towards, here, cuts[next_cut], pieces, medium, scratch)

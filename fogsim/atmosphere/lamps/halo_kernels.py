@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.fog.koschmieder_kernels import between, three_times
+from fogsim.atmosphere.fog.koschmieder_kernels import interpolate_rows, repeat_channels
 from fogsim.atmosphere.lamps.halo_lamps import (
     AHEAD,
     BEHIND,
@@ -33,7 +33,7 @@ _RED, _GREEN, _BLUE = (np.float32(share) for share in LUMINANCE_WEIGHTS)
 
 
 @kernel
-def add_wide(
+def add_wide_glows(
     directions: NDArray[np.float32],
     lamps: NDArray[np.float64],
     table: NDArray[np.float32],
@@ -70,7 +70,7 @@ def add_wide(
 
 
 @kernel
-def refine(coarsest: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+def upsample_grid(coarsest: NDArray[np.float32], out: NDArray[np.float32]) -> None:
     """The coarsest image (4, rows, cols) stretched to the coarse one, linearly between its corners."""
     rows, columns = out.shape[1], out.shape[2]
     for v in range(rows):
@@ -89,7 +89,7 @@ def refine(coarsest: NDArray[np.float32], out: NDArray[np.float32]) -> None:
 
 
 @kernel
-def add_middles(
+def add_middle_glows(
     directions: NDArray[np.float32],
     cell: NDArray[np.float64],
     reach: float,
@@ -129,14 +129,14 @@ def add_middles(
 
 
 @kernel
-def mean_nearness(coarse: NDArray[np.float32]) -> None:
+def divide_by_luminance(coarse: NDArray[np.float32]) -> None:
     """Make of luminance over range in the last channel of a coarse image (4, m) the mean 1 / R [1/m]."""
     for p in range(coarse.shape[1]):
         coarse[3, p] /= max(_RED * coarse[0, p] + _GREEN * coarse[1, p] + _BLUE * coarse[2, p], _LEAST)
 
 
 @kernel
-def _stretch(
+def _upsample_row(
     coarse: NDArray[np.float32],
     first: int,
     coarse_columns: int,
@@ -161,7 +161,7 @@ def _add_product(light: NDArray[np.float32], seen: NDArray[np.float32], out: NDA
 
 
 @kernel
-def add_stretched(
+def add_upsampled(
     coarse: NDArray[np.float32], coarse_columns: int, distance: NDArray[np.float32], out: NDArray[np.float32]
 ) -> None:
     """Add the coarse image (4, m) to an image (rows, cols · 3).
@@ -179,18 +179,18 @@ def add_stretched(
         upper = min(int(place), coarse_rows - 2)
         while ready < upper + 1:
             ready += 1
-            _stretch(coarse, ready * coarse_columns, coarse_columns, lights[ready % 2], nears[ready % 2])
+            _upsample_row(coarse, ready * coarse_columns, coarse_columns, lights[ready % 2], nears[ready % 2])
         share, top = place - np.float32(upper), upper % 2
-        between(lights[top], lights[1 - top], share, light)
-        between(nears[top], nears[1 - top], share, near)
+        interpolate_rows(lights[top], lights[1 - top], share, light)
+        interpolate_rows(nears[top], nears[1 - top], share, near)
         for u in range(columns):
             near[u] = min(_ONE, distance[v, u] * near[u])
-        three_times(near, seen)
+        repeat_channels(near, seen)
         _add_product(light, seen, out[v])
 
 
 @kernel
-def add_cores(
+def add_glow_cores(
     lamps: NDArray[np.float64],
     bright: NDArray[np.bool_],
     reach: float,
@@ -240,7 +240,7 @@ def _drawn_about(radiance: NDArray[np.float32], columns: int, u0: int, v0: int) 
 
 
 @kernel
-def add_points(
+def add_direct_light(
     lamps: NDArray[np.float64],
     focal: float,
     largest: float,
@@ -262,15 +262,15 @@ def add_points(
             continue
         # Sum over pixels of the luminance [cd/m²].
         expected = lamp[STRENGTH] * focal**2 / lamp[AHEAD] ** 3
-        transmission = math.exp(-lamp[DEPTH]) * lamp[SHOWN]
-        if expected * transmission < faintest:
+        transmittance = math.exp(-lamp[DEPTH]) * lamp[SHOWN]
+        if expected * transmittance < faintest:
             continue
         u0, v0 = math.floor(lamp[PLACE_U]), math.floor(lamp[PLACE_V])
         drawn, around = _drawn_about(radiance, columns, u0, v0), 0.0
         for j in range(lamps.shape[0]):
             if abs(lamps[j, PLACE_U] - lamp[PLACE_U]) < 2.5 and abs(lamps[j, PLACE_V] - lamp[PLACE_V]) < 2.5:
                 around += lamps[j, STRENGTH] * focal**2 / max(lamps[j, AHEAD], BEHIND) ** 3
-        missing = expected * max(0.0, 1.0 - drawn / around) * transmission
+        missing = expected * max(0.0, 1.0 - drawn / around) * transmittance
         right, below = lamp[PLACE_U] - u0, lamp[PLACE_V] - v0
         for corner in range(4):
             u, v = u0 + corner % 2, v0 + corner // 2
@@ -281,7 +281,7 @@ def add_points(
 
 
 @kernel
-def mean_light(image: NDArray[np.float32], step: int) -> float:
+def mean_luminance(image: NDArray[np.float32], step: int) -> float:
     """Mean of an image's green channel (rows, cols · 3), by each `step`-th row and column."""
     total, count = 0.0, 0
     for v in range(step // 2, image.shape[0], step):

@@ -26,7 +26,7 @@ _SAME_RANGE = 0.15  # share by which ranges of lamps may differ that are drawn a
 
 
 @kernel
-def place_lamps(
+def project_lamps(
     position: NDArray[np.float64],
     intensity: NDArray[np.float64],
     eye: NDArray[np.float64],
@@ -82,7 +82,7 @@ def _shown(distance: NDArray[np.float32], u: float, v: float, nearest: float) ->
 
 
 @kernel
-def judge_lamps(
+def select_lamps(
     intensity: NDArray[np.float64],
     colour: NDArray[np.float64],
     area: NDArray[np.float64],
@@ -114,7 +114,7 @@ def judge_lamps(
 
 
 @kernel
-def fuse_lamps(lamps: NDArray[np.float64], apart: float, fused: NDArray[np.float64]) -> int:
+def merge_lamps(lamps: NDArray[np.float64], apart: float, fused: NDArray[np.float64]) -> int:
     """Draw together lamps that are less than `apart` from each other on the image [px], at like ranges; their count.
 
     What is left for them is the sum of their strengths, at the middle of their light.

@@ -7,20 +7,20 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.fog.extinction import is_even_up_to
+from fogsim.atmosphere.fog.medium import is_uniform_below
 from fogsim.atmosphere.fog.optical_depth import optical_depth
 from fogsim.atmosphere.lamps.glow import FOLD_CHORD, glow_table
 from fogsim.atmosphere.lamps.halo_kernels import (
-    add_cores,
-    add_middles,
-    add_points,
-    add_stretched,
-    add_wide,
-    mean_light,
-    mean_nearness,
-    refine,
+    add_direct_light,
+    add_glow_cores,
+    add_middle_glows,
+    add_upsampled,
+    add_wide_glows,
+    divide_by_luminance,
+    mean_luminance,
+    upsample_grid,
 )
-from fogsim.atmosphere.lamps.halo_lamps import COLUMNS, DEPTH, RANGE, fuse_lamps, judge_lamps, place_lamps
+from fogsim.atmosphere.lamps.halo_lamps import COLUMNS, DEPTH, RANGE, merge_lamps, project_lamps, select_lamps
 from fogsim.atmosphere.lamps.halo_profiles import CORE_SIZE, WIDE_SIZE, core_profiles, profile_tables
 from fogsim.atmosphere.lamps.phase_function import Droplets
 from fogsim.values import Camera, CameraPose, FogField, LightSources, View
@@ -116,16 +116,16 @@ class Halos:
             The lamps.
         """
         distance = np.ascontiguousarray(view.distance, dtype=np.float32)
-        lamps = _seen(camera, pose, fog, sources, distance)
+        lamps = _lamps_in_view(camera, pose, fog, sources, distance)
         if not len(lamps):
             return
         rows, columns = distance.shape
         image = radiance.reshape(rows, 3 * columns)
-        faintest = FAINTEST * mean_light(image, 16)
+        faintest = FAINTEST * mean_luminance(image, 16)
         if np.any(lamps[:, DEPTH] > 0):
             self._add_glow(image, distance, camera, lamps, faintest)
         drawn = np.ascontiguousarray(view.radiance, dtype=np.float32).reshape(rows, 3 * columns)
-        add_points(lamps, camera.focal_length, SMALL, faintest, drawn, image)
+        add_direct_light(lamps, camera.focal_length, SMALL, faintest, drawn, image)
 
     def _add_glow(
         self,
@@ -136,19 +136,19 @@ class Halos:
         faintest: float,
     ) -> None:
         plan, (log_depth, lines) = self._plan(camera), _fine_table(self._droplets)
-        lamps, glows = _fused(lamps, _SAME_CORE), _fused(lamps, _SAME_GLOW * float(plan.cell[0]))
+        lamps, glows = _merged(lamps, _SAME_CORE), _merged(lamps, _SAME_GLOW * float(plan.cell[0]))
         coarsest = np.zeros((4, *plan.half_shape), np.float32)
         coarse = np.empty((4, *plan.shape), np.float32)
-        add_wide(plan.half_directions, glows, plan.wide, log_depth, faintest, coarsest.reshape(4, -1))
-        refine(coarsest, coarse)
-        add_middles(plan.directions, plan.cell, plan.reach, glows, plan.middle, log_depth, faintest, coarse)
+        add_wide_glows(plan.half_directions, glows, plan.wide, log_depth, faintest, coarsest.reshape(4, -1))
+        upsample_grid(coarsest, coarse)
+        add_middle_glows(plan.directions, plan.cell, plan.reach, glows, plan.middle, log_depth, faintest, coarse)
         flat = coarse.reshape(4, -1)
-        mean_nearness(flat)
-        add_stretched(flat, plan.shape[1], distance, image)
+        divide_by_luminance(flat)
+        add_upsampled(flat, plan.shape[1], distance, image)
         core, bright = np.empty((len(lamps), CORE_SIZE), np.float32), np.empty(len(lamps), np.bool_)
         pixel, reach = 1.0 / camera.focal_length, _REACH_CELLS * float(plan.cell[0])
         core_profiles(lamps, lines, log_depth, FOLD_CHORD, plan.soft, reach, pixel, faintest, core, bright)
-        add_cores(lamps, bright, reach, core, distance, image)
+        add_glow_cores(lamps, bright, reach, core, distance, image)
 
     def _plan(self, camera: Camera) -> _Plan:
         if camera not in self._plans:
@@ -165,12 +165,12 @@ def _fine_table(droplets: Droplets) -> tuple[NDArray[np.float64], NDArray[np.flo
     return log_depth, np.ascontiguousarray(np.exp(np.stack(columns, axis=1) + log_depth[:, None]))
 
 
-def _fused(lamps: NDArray[np.float64], apart: float) -> NDArray[np.float64]:
+def _merged(lamps: NDArray[np.float64], apart: float) -> NDArray[np.float64]:
     fused = np.empty_like(lamps)
-    return fused[: fuse_lamps(lamps, apart, fused)]
+    return fused[: merge_lamps(lamps, apart, fused)]
 
 
-def _seen(
+def _lamps_in_view(
     camera: Camera, pose: CameraPose, fog: FogField, sources: LightSources, distance: NDArray[np.float32]
 ) -> NDArray[np.float64]:
     """Table of the lamps that shine toward the camera from before it."""
@@ -178,14 +178,14 @@ def _seen(
     count = len(sources.intensity)
     lamps, chosen = np.empty((count, COLUMNS)), np.empty(count, np.int64)
     position, lens = np.ascontiguousarray(sources.position), np.array((camera.focal_length, *camera.principal_point))
-    chosen = chosen[: place_lamps(position, sources.intensity, eye, axes, lens, lamps, chosen)]
+    chosen = chosen[: project_lamps(position, sources.intensity, eye, axes, lens, lamps, chosen)]
     places = position[chosen]
-    if len(places) and is_even_up_to(fog, max(pose.position[2], float(places[:, 2].max()))):
+    if len(places) and is_uniform_below(fog, max(pose.position[2], float(places[:, 2].max()))):
         depth = fog.extinction * lamps[: len(chosen), RANGE]
     else:
         depth = optical_depth(fog, eye, places)
     light = (sources.intensity, sources.colour, sources.area)
-    return lamps[: judge_lamps(*light, chosen, depth, FARTHEST, camera.focal_length, distance, lamps)]
+    return lamps[: select_lamps(*light, chosen, depth, FARTHEST, camera.focal_length, distance, lamps)]
 
 
 def _plan(camera: Camera, droplets: Droplets) -> _Plan:

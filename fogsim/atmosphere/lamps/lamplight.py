@@ -6,8 +6,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.fog.extinction import is_even_up_to, medium_of
 from fogsim.atmosphere.fog.frustum_kernels import grid_depths
+from fogsim.atmosphere.fog.medium import is_uniform_below, medium_of
 from fogsim.atmosphere.lamps.lamp_tables import lamp_table
 from fogsim.atmosphere.lamps.lamplight_kernels import add_own_light
 from fogsim.atmosphere.lamps.phase_function import Droplets
@@ -189,7 +189,7 @@ def _extinction_on(
     rays: VeilRays, camera: Camera, pose: CameraPose, fog: FogField
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Mean extinction coefficient to each node, and that in the interval before it; one number where fog is even."""
-    if is_even_up_to(fog, pose.position[2] + _HIGHEST):
+    if is_uniform_below(fog, pose.position[2] + _HIGHEST):
         everywhere = np.full((1, 1), fog.extinction, np.float32)
         return everywhere, everywhere
     distances = node_distances()

@@ -5,11 +5,11 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere.fog.koschmieder_kernels import (
     ENDLESS,
-    between,
     bilinear,
-    each_channel,
-    three_times,
-    transmissions,
+    fill_channels,
+    interpolate_rows,
+    repeat_channels,
+    transmittances,
 )
 from fogsim.atmosphere.lamps.lamp_tables import FOLD, SIZE
 from fogsim.atmosphere.lamps.plane_pieces import choose_pixels, row_points, spread
@@ -141,7 +141,7 @@ def _light_row(
     power: NDArray[np.int32],
     light: NDArray[np.float32],
 ) -> None:
-    """Light of all lamps on what chosen pixels see, times its transmission to the eye [lx]."""
+    """Light of all lamps on what chosen pixels see, times its transmittance to the eye [lx]."""
     forward, right, up = points[0], points[1], points[2]
     column, row, weight, kept = scratch[0], scratch[1], scratch[2], scratch[3]
     for u in range(count):
@@ -153,7 +153,7 @@ def _light_row(
         _add_intensity(count, tables[i], row, column, weight, light)
     for u in range(count):
         weight[u] = np.float32(2.0) * mean[u] * length[u]
-    transmissions(weight[:count], power, kept)
+    transmittances(weight[:count], power, kept)
     for u in range(count):
         light[u] *= kept[u]
 
@@ -239,7 +239,7 @@ def add_own_light(
     no_response, n = np.zeros(3 * columns, np.float32), np.uint64(columns)
     pixel, chosen, left, aside, first, even = _rows_of_choice(columns, cells, int(nodes))
     few_scattered, few_light, scattered, light, veiled, shone = _rows_of_light(columns)
-    each_channel(colour, channels)
+    fill_channels(colour, channels)
     if step == 1:
         # Every pixel is chosen, so that what is found for the chosen ones is every pixel's.
         chosen, scattered, light = length, few_scattered, few_light
@@ -255,18 +255,18 @@ def add_own_light(
         place = np.float32(v) * np.float32(grid_rows - 1) / np.float32(max(distance.shape[0] - 1, 1))
         upper = min(int(place), grid_rows - 2)
         if not clear:
-            between(veil[upper], veil[upper + 1], place - np.float32(upper), profiles)
+            interpolate_rows(veil[upper], veil[upper + 1], place - np.float32(upper), profiles)
             _read_row(n, profiles, nodes, left, aside, node, few_scattered)
             if step > 1:
                 spread(few_scattered, step, first, even, scattered)
-            three_times(scattered, veiled)
+            repeat_channels(scattered, veiled)
         if lit:
             if not uniform:
-                between(attenuation[upper], attenuation[upper + 1], place - np.float32(upper), profiles)
+                interpolate_rows(attenuation[upper], attenuation[upper + 1], place - np.float32(upper), profiles)
                 _read_row(n, profiles, nodes, left, aside, node, mean)
             row_points(n, ray_map, v, pixel, chosen, points)
             _light_row(n, points, chosen, mean, lamps, tables, scratch, power, few_light)
             if step > 1:
                 spread(few_light, step, first, even, light)
-            three_times(light, shone)
+            repeat_channels(light, shone)
         _add_row(channels, veiled, shone, response[v] if lit else no_response, out[v])

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.fog.extinction import is_even_up_to
+from fogsim.atmosphere.fog.medium import is_uniform_below
 from fogsim.atmosphere.fog.optical_depth import extinction
 from fogsim.atmosphere.lamps.plane_pieces import piece_length
-from fogsim.atmosphere.lamps.streetlight_kernels import add_lamps, light_streets
+from fogsim.atmosphere.lamps.streetlight_kernels import add_lamp_illuminance, add_street_light
 from fogsim.atmosphere.lamps.veil import LOSS_OF_SPREAD_LIGHT
 from fogsim.values import Camera, CameraPose, FogField, StreetLighting, View
 from fogsim.values.pinhole import ray_from_pixel
@@ -90,7 +90,7 @@ class StreetLight:
         rows, columns = view.distance.shape
         eye = np.array(pose.position[:2])
         start = (*((eye - ground.middle) / CELL + 0.5 * (_CELLS - 1)), 1.0 / CELL)
-        light_streets(
+        add_street_light(
             np.ascontiguousarray(view.radiance, dtype=np.float32).reshape(rows, 3 * columns),
             np.ascontiguousarray(view.distance, dtype=np.float32),
             ray_from_pixel(camera, pose).astype(np.float32),
@@ -120,7 +120,7 @@ class StreetLight:
 
 
 def _extinction_at(fog: FogField, places: NDArray[np.float64]) -> NDArray[np.float64]:
-    if len(places) and is_even_up_to(fog, float(places[:, 2].max())):
+    if len(places) and is_uniform_below(fog, float(places[:, 2].max())):
         return np.full(len(places), fog.extinction)
     return extinction(fog, places)
 
@@ -131,5 +131,5 @@ def _map_of(
     illuminance, tops = np.zeros((_CELLS, _CELLS), np.float32), np.zeros((_CELLS, _CELLS), np.float32)
     intensity = np.interp(np.arccos(_COSINES), lamps.angle, lamps.intensity)
     origin, lost = middle - 0.5 * (_CELLS - 1) * CELL, LOSS_OF_SPREAD_LIGHT * dense
-    add_lamps(near, lost, lamps.height, intensity, REACH, origin, CELL, illuminance, tops)
+    add_lamp_illuminance(near, lost, lamps.height, intensity, REACH, origin, CELL, illuminance, tops)
     return _Map(lamps, middle, dense, illuminance, tops)

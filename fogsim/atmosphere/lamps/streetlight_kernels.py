@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.fog.koschmieder_kernels import bilinear, each_channel, three_times
+from fogsim.atmosphere.fog.koschmieder_kernels import bilinear, fill_channels, repeat_channels
 from fogsim.atmosphere.lamps.plane_pieces import choose_pixels, row_points, spread
 from fogsim.jit import kernel
 
@@ -14,7 +14,7 @@ _FARTHEST = np.float32(500.0)  # half the diagonal of a map, and more
 
 
 @kernel
-def add_lamps(
+def add_lamp_illuminance(
     lamps: NDArray[np.float64],
     extinction: NDArray[np.float64],
     height: float,
@@ -74,7 +74,7 @@ def _read_map(
 ) -> bool:
     """Illuminance of what chosen pixels see, none above the lamps; whether there is any.
 
-    `points` (3, n) are from the eye, `start` and `eye_height` as for `light_streets`.
+    `points` (3, n) are from the eye, `start` and `eye_height` as for `add_street_light`.
     """
     last_row, last_column = np.float32(illuminance.shape[0] - 1.001), np.float32(illuminance.shape[1] - 1.001)
     east, north, up, per_cell = points[0], points[1], points[2], start[2]
@@ -105,7 +105,7 @@ def _light_row(
 
 
 @kernel
-def light_streets(
+def add_street_light(
     radiance: NDArray[np.float32],
     distance: NDArray[np.float32],
     ray_map: NDArray[np.float32],
@@ -135,7 +135,7 @@ def light_streets(
     pixel, chosen = np.empty(columns, np.float32), np.empty(columns, np.float32)
     bent, first, even = np.empty(columns, np.uint8), np.empty(columns, np.uint64), np.empty(columns, np.bool_)
     lit, channels = np.empty(3 * columns, np.float32), np.empty(3 * columns, np.float32)
-    each_channel(factor, channels)
+    fill_channels(factor, channels)
     for v in range(distance.shape[0]):
         any_light = False
         if _any_near(distance[v]):
@@ -146,7 +146,7 @@ def light_streets(
             any_light = _read_map(n, points, start, eye_height, illuminance, tops, few)
         if any_light:
             spread(few, step, first, even, light)
-            three_times(light, lit)
+            repeat_channels(light, lit)
             _light_row(radiance[v], lit, channels, most, out[v])
         else:
             for j in range(3 * columns):

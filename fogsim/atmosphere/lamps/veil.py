@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere.lamps.lamp_tables import phase_table
 from fogsim.atmosphere.lamps.phase_function import Droplets, blurred, phase_function
-from fogsim.atmosphere.lamps.veil_kernels import gather_light, light_air
+from fogsim.atmosphere.lamps.veil_kernels import add_scattered_light, integrate_veil
 from fogsim.linear_algebra import matrix_product
 from fogsim.values import Camera, CameraPose
 from fogsim.values.pinhole import camera_axes
@@ -138,7 +138,7 @@ def lit_air(
     phase = phase_function(droplets)
     tables = phase_table(phase), phase_table(blurred(phase, PHASE_SPREAD))
     for offset, table in lamps:
-        light_air(
+        add_scattered_light(
             rays.directions,
             rays.at,
             rays.length,
@@ -168,5 +168,5 @@ def veil_along(air: LitAir, extinction: NDArray[np.float32], mean: NDArray[np.fl
         Extinction coefficient in each interval between nodes, and its mean from the eye to there [1/m].
     """
     veil = np.empty((len(air.path), INTERVALS + 1), np.float32)
-    gather_light(air.straight, air.turned, air.path, extinction, mean, np.float32(LOSS_OF_SPREAD_LIGHT), veil)
+    integrate_veil(air.straight, air.turned, air.path, extinction, mean, np.float32(LOSS_OF_SPREAD_LIGHT), veil)
     return veil

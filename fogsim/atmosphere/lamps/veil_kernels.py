@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.fog.koschmieder_kernels import transmissions
+from fogsim.atmosphere.fog.koschmieder_kernels import transmittances
 from fogsim.atmosphere.lamps.lamp_tables import BLURS, FIRST_BLUR, FOLD, PHASE_SIZE, SIZE
 from fogsim.jit import kernel
 
@@ -33,7 +33,7 @@ def _intensity(table: NDArray[np.float32], forward: float, right: float, up: flo
 
 
 @kernel
-def light_air(
+def add_scattered_light(
     directions: NDArray[np.float32],
     at: NDArray[np.float64],
     length: NDArray[np.float64],
@@ -81,7 +81,7 @@ def light_air(
 
 
 @kernel
-def gather_light(
+def integrate_veil(
     straight: NDArray[np.float32],
     turned: NDArray[np.float32],
     path: NDArray[np.float32],
@@ -107,7 +107,7 @@ def gather_light(
             k = mean[ray, 0 if uniform_way else i]
             for n in range(i * each, (i + 1) * each):
                 depth[n] = loss * k * path[m, n]
-        transmissions(depth, power, kept)
+        transmittances(depth, power, kept)
         total = np.float32(0.0)
         veil[m, 0] = total
         for i in range(intervals):

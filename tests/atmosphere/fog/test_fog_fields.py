@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fogsim.atmosphere import FieldAccess, FogNow, extinction, field_at, optical_depth, optical_depth_along
-from fogsim.atmosphere.fog.extinction_noise import CELLS, patch_factors
+from fogsim.atmosphere.fog.medium import PATCH_CELLS, patch_factors
 from fogsim.errors import InputError
 from fogsim.values import FogBank, FogChange, FogField, FogPatches
 from tests.atmosphere.fields import AIRLIGHT, BANK, PATCHES, UNEVEN, brute_force
@@ -74,10 +74,10 @@ def test_patches_keep_the_mean_and_have_their_strength_and_correlation() -> None
     assert factors.min() > 0
     assert factors.mean() == pytest.approx(1.0, abs=1e-5)
     assert log.std() == pytest.approx(0.8, rel=1e-3)
-    shifted = np.roll(log, CELLS, axis=2)
+    shifted = np.roll(log, PATCH_CELLS, axis=2)
     # One correlation length away the correlation is 1/e, within what a finite sample can show.
     assert np.corrcoef(log.ravel(), shifted.ravel())[0, 1] == pytest.approx(math.exp(-1.0), abs=0.05)
-    assert np.corrcoef(log.ravel(), np.roll(log, 3 * CELLS, axis=1).ravel())[0, 1] == pytest.approx(0.0, abs=0.08)
+    assert np.corrcoef(log.ravel(), np.roll(log, 3 * PATCH_CELLS, axis=1).ravel())[0, 1] == pytest.approx(0.0, abs=0.08)
 
 
 def test_patches_differ_by_seed_and_repeat_with_it() -> None:

@@ -1,4 +1,4 @@
-"""The blur of forward scattering by day, and the true transmission that it does not touch."""
+"""The blur of forward scattering by day, and the true transmittance that it does not touch."""
 
 import dataclasses
 
@@ -24,9 +24,9 @@ def test_an_edge_in_fog_is_softer_and_what_is_far_from_it_is_as_before() -> None
     view = step_edge(60.0)
     sharp, soft = (Air(field).radiance(view, CAMERA, POSE)[120, :, 1] for field in (EVEN, BLURRED))
     assert np.allclose(soft[[5, 100, 220, 315]], sharp[[5, 100, 220, 315]], rtol=1e-5)
-    transmission = np.exp(-EVEN.extinction * 60.0)
+    transmittance = np.exp(-EVEN.extinction * 60.0)
     # Directly at the edge the blur is half of the bright side.
-    lost = 0.3 * (1 - transmission) * 0.5 * 1000.0 * transmission
+    lost = 0.3 * (1 - transmittance) * 0.5 * 1000.0 * transmittance
     assert np.isclose(sharp[160] - soft[160], lost, rtol=0.1)
     assert np.isclose(soft[159] - sharp[159], lost, rtol=0.1)
     assert np.all(np.diff(soft) >= -1e-2)
@@ -60,5 +60,5 @@ def test_without_fog_between_nothing_is_blurred() -> None:
 
 def test_transmission_knows_no_blur() -> None:
     view = step_edge(60.0)
-    assert np.allclose(Air(BLURRED).transmission(view, CAMERA, POSE), np.exp(-EVEN.extinction * 60.0), atol=1e-6)
-    assert np.all(Air(dataclasses.replace(EVEN, extinction=0.0)).transmission(view, CAMERA, POSE) == 1.0)
+    assert np.allclose(Air(BLURRED).transmittance(view, CAMERA, POSE), np.exp(-EVEN.extinction * 60.0), atol=1e-6)
+    assert np.all(Air(dataclasses.replace(EVEN, extinction=0.0)).transmittance(view, CAMERA, POSE) == 1.0)

@@ -37,7 +37,7 @@ def black_road(camera: Camera, pose: CameraPose) -> View:
     return View(np.zeros((*shape, 3), np.float32), distance.astype(np.float32), np.zeros(shape, np.int32))
 
 
-def transmission(radiance: NDArray[np.float32]) -> NDArray[np.float64]:
+def transmittance(radiance: NDArray[np.float32]) -> NDArray[np.float64]:
     return 1.0 - radiance[..., 1].astype(np.float64) / AIRLIGHT[1]
 
 
@@ -55,7 +55,7 @@ def slow_transmission(field: FogField, view: View, camera: Camera, pose: CameraP
 @pytest.mark.parametrize("name", UNEVEN)
 def test_whole_frames_against_brute_force(name: str) -> None:
     view = black_road(CAMERA, POSE)
-    seen = transmission(Air(UNEVEN[name]).radiance(view, CAMERA, POSE))[6::12, 6::12]
+    seen = transmittance(Air(UNEVEN[name]).radiance(view, CAMERA, POSE))[6::12, 6::12]
     slow = slow_transmission(UNEVEN[name], view, CAMERA, POSE, 12)
     assert np.sqrt(np.mean(np.square(seen - slow))) <= 0.005
 
@@ -64,7 +64,7 @@ def test_whole_frames_against_brute_force(name: str) -> None:
 def test_small_frames_with_a_rolled_camera_against_brute_force(name: str) -> None:
     camera, pose = dataclasses.replace(SMALL, roll=0.15), CameraPose((30.0, 20.0, 1.38), 0.9, grade=0.04)
     view = black_road(camera, pose)
-    seen = transmission(Air(UNEVEN[name]).radiance(view, camera, pose))[2::4, 2::4]
+    seen = transmittance(Air(UNEVEN[name]).radiance(view, camera, pose))[2::4, 2::4]
     slow = slow_transmission(UNEVEN[name], view, camera, pose, 4)
     assert np.sqrt(np.mean(np.square(seen - slow))) <= 0.005
 
@@ -74,7 +74,7 @@ def test_the_grid_agrees_with_the_closed_form(field: FogField) -> None:
     view = black_road(CAMERA, POSE)
     through_grid = radiance_through_grid(view, frustum_grid(field, CAMERA, POSE), field.airlight)
     exact = fogged_radiance(view, field, POSE.position, ray_from_pixel(CAMERA, POSE))
-    assert np.sqrt(np.mean(np.square(transmission(through_grid) - transmission(exact)))) <= 0.002
+    assert np.sqrt(np.mean(np.square(transmittance(through_grid) - transmittance(exact)))) <= 0.002
 
 
 def test_grid_depths_are_optical_depths() -> None:
@@ -102,7 +102,7 @@ def test_a_source_on_the_grid_comes_to_the_pixels() -> None:
 def test_a_camera_above_the_fog_sees_into_it() -> None:
     field, pose = FogField(0.05, AIRLIGHT, top=10.0), CameraPose((0.0, 0.0, 30.0), 0.0)
     view = black_road(SMALL, pose)
-    seen = transmission(Air(field).radiance(view, SMALL, pose))
+    seen = transmittance(Air(field).radiance(view, SMALL, pose))
     down = rays(SMALL, pose)[..., 2]
     level = np.abs(down) < 0.3
     expected = np.exp(-0.05 * np.where(down < 0, (view.distance - 20.0 / np.maximum(-down, 1e-9)).clip(0.0), 0.0))
@@ -126,9 +126,9 @@ def test_fog_moves_with_time() -> None:
         field, wind=(0.0, 0.0), changes=(FogChange(0.0, 1.0, -math.inf, 250.0), FogChange(9.0, 4.0, -math.inf, 250.0))
     )
     view = black_road(SMALL, POSE)
-    start, later = (transmission(Air(field).radiance(view, SMALL, POSE, time=t)) for t in (0.0, 4.0))
+    start, later = (transmittance(Air(field).radiance(view, SMALL, POSE, time=t)) for t in (0.0, 4.0))
     assert np.abs(start - later).max() > 0.05
-    assert transmission(Air(denser).radiance(view, SMALL, POSE, time=9.0)).mean() < start.mean()
+    assert transmittance(Air(denser).radiance(view, SMALL, POSE, time=9.0)).mean() < start.mean()
 
 
 def test_shaded_airlight_is_darker_where_fog_is_deep_and_the_field_s_own_on_the_ground() -> None:

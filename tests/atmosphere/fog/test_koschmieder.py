@@ -33,8 +33,8 @@ def test_a_black_target_at_the_visibility_shows_five_percent_contrast(visibility
 def test_closed_form_of_homogeneous_fog() -> None:
     field = FogField(0.02, AIRLIGHT)
     seen = fogged_radiance(view(500.0, 70.0), field, POSE.position, ray_from_pixel(CAMERA, POSE))
-    transmission = math.exp(-0.02 * 70.0)
-    assert np.allclose(seen, 500.0 * transmission + np.array(AIRLIGHT) * (1 - transmission), rtol=1e-6)
+    transmittance = math.exp(-0.02 * 70.0)
+    assert np.allclose(seen, 500.0 * transmittance + np.array(AIRLIGHT) * (1 - transmittance), rtol=1e-6)
 
 
 def test_clear_air_changes_nothing() -> None:
@@ -71,8 +71,8 @@ def test_sky_is_seen_through_the_layer_only() -> None:
     field = FogField(0.01, AIRLIGHT, top=11.38)
     seen = fogged_radiance(view(5000.0, math.inf), field, POSE.position, ray_from_pixel(CAMERA, POSE))
     top_left = ray_from_pixel(CAMERA, POSE) @ (0.0, 0.0, 1.0)
-    transmission = math.exp(-0.01 * 10.0 * np.linalg.norm(top_left) / top_left[2])
-    assert seen[0, 0, 1] == pytest.approx(5000.0 * transmission + 3000.0 * (1 - transmission), rel=1e-5)
+    transmittance = math.exp(-0.01 * 10.0 * np.linalg.norm(top_left) / top_left[2])
+    assert seen[0, 0, 1] == pytest.approx(5000.0 * transmittance + 3000.0 * (1 - transmittance), rel=1e-5)
 
 
 def test_airlight_of_an_overcast_day() -> None:

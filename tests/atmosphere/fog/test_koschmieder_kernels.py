@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fogsim.atmosphere import fogged_radiance, optical_depth
-from fogsim.atmosphere.fog.koschmieder_kernels import transmissions
+from fogsim.atmosphere.fog.koschmieder_kernels import transmittances
 from fogsim.values import Camera, CameraPose, FogBank, FogField, View
 from fogsim.values.pinhole import ray_from_pixel
 
@@ -16,7 +16,7 @@ CAMERA = Camera(160, 120, 144.0, (80, 60), 1.38, 0.035)
 
 def exponential(depth: np.ndarray) -> np.ndarray:
     out = np.empty(depth.shape, np.float32)
-    transmissions(depth.astype(np.float32), np.empty(depth.shape, np.int32), out)
+    transmittances(depth.astype(np.float32), np.empty(depth.shape, np.int32), out)
     return out
 
 
@@ -42,8 +42,8 @@ def test_a_frame_is_the_closed_form_within_a_quarter_of_a_12_bit_step(visibility
     k = math.log(20.0) / visibility
     pose = CameraPose((0.0, 0.0, 1.38), 0.4)
     seen = fogged_radiance(scene, FogField(k, AIRLIGHT), pose.position, ray_from_pixel(CAMERA, pose))
-    transmission = np.exp(-k * distance.astype(np.float64))[..., None]
-    exact = scene.radiance * transmission + np.array(AIRLIGHT) * (1.0 - transmission)
+    transmittance = np.exp(-k * distance.astype(np.float64))[..., None]
+    exact = scene.radiance * transmittance + np.array(AIRLIGHT) * (1.0 - transmittance)
     assert np.abs(seen - exact).max() < 0.25 * 5000.0 / 4095.0
 
 

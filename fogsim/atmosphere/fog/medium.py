@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.fog.extinction_noise import CELLS, patch_factors
 from fogsim.values import FogBank, FogField
 
 EXTINCTION, BASE, BASE_EDGE, TOP, TOP_EDGE, GROUND, DECAY = range(7)
@@ -16,6 +15,12 @@ EXTINCTION, BASE, BASE_EDGE, TOP, TOP_EDGE, GROUND, DECAY = range(7)
 
 _TURN = 0.5
 """Angle between the patches' grid and the world's axes [rad], so that no road meets the same patches over and over."""
+
+PATCH_CELLS = 5
+"""Cells of the patches' grid in one correlation length: between them, linear interpolation loses little."""
+
+PATCH_SHAPE = (32, 128, 128)
+"""Cells (z, y, x) of that grid before the pattern repeats: 25 correlation lengths horizontally, 6 vertically."""
 
 
 class Medium(NamedTuple):
@@ -58,7 +63,7 @@ def field_at(field: FogField, time: float) -> FogField:
     """
     if not field.changes and field.wind == (0.0, 0.0):
         return field
-    density, base, top = _state(field, time)
+    density, base, top = _layer_at(field, time)
     drift = (field.wind[0] * time, field.wind[1] * time)
     patches = field.patches
     if patches is not None:
@@ -76,7 +81,7 @@ def field_at(field: FogField, time: float) -> FogField:
     )
 
 
-def _state(field: FogField, time: float) -> tuple[float, float, float]:
+def _layer_at(field: FogField, time: float) -> tuple[float, float, float]:
     """Density, base and top at a time."""
     if not field.changes:
         return 1.0, field.base, field.top
@@ -101,6 +106,38 @@ def _moved(bank: FogBank, drift: tuple[float, float], density: float) -> FogBank
     )
 
 
+@lru_cache(maxsize=4)
+def patch_factors(strength: float, seed: int) -> NDArray[np.float32]:
+    """Log-normal factors with mean 1 over a periodic grid.
+
+    Their logarithm is white noise through a Gaussian filter, so that it is Gaussian with the correlation
+    e^(−(Δ/`PATCH_CELLS`)²) over Δ cells.
+
+    Parameters
+    ----------
+    strength : float
+        Standard deviation of the logarithm [-].
+    seed : int
+        Seed of the noise.
+
+    Returns
+    -------
+    (32, 128, 128) float32
+        Positive factors over (z, y, x); read-only.
+    """
+    white = np.random.default_rng(seed).standard_normal(PATCH_SHAPE, dtype=np.float32)
+    squares = [np.square(2.0 * np.pi * np.fft.fftfreq(n)) for n in PATCH_SHAPE[:2]]
+    squares.append(np.square(2.0 * np.pi * np.fft.rfftfreq(PATCH_SHAPE[2])))
+    wave_number_squared = squares[0][:, None, None] + squares[1][:, None] + squares[2]
+    # The spectrum of e^(−(Δ/c)²) is e^(−(c κ/2)²); the filter of amplitudes is its root.
+    amplitude = np.exp(-wave_number_squared * PATCH_CELLS**2 / 8.0)
+    smooth = np.fft.irfftn(np.fft.rfftn(white) * amplitude, s=PATCH_SHAPE, axes=(0, 1, 2))
+    factors = np.exp(strength * (smooth - smooth.mean()) / smooth.std())
+    factors = np.ascontiguousarray(factors / factors.mean(), dtype=np.float32)
+    factors.setflags(write=False)
+    return factors
+
+
 @lru_cache(maxsize=8)
 def medium_of(field: FogField) -> Medium:
     """Arrays of a field that does not change with time (see `field_at`).
@@ -114,7 +151,7 @@ def medium_of(field: FogField) -> Medium:
     patches = field.patches
     if patches is not None and patches.strength > 0:
         cosine, sine = math.cos(_TURN), math.sin(_TURN)
-        cells = (CELLS / patches.correlation_length, CELLS / patches.correlation_height)
+        cells = (PATCH_CELLS / patches.correlation_length, PATCH_CELLS / patches.correlation_height)
         frame = np.array((*cells, cosine, sine, *patches.offset))
         factors = patch_factors(patches.strength, patches.seed)
     heights = (field.base, field.base_edge, field.top, field.top_edge, field.ground)
@@ -123,7 +160,7 @@ def medium_of(field: FogField) -> Medium:
     return Medium(layer, np.array(banks, dtype=np.float64).reshape(-1, 8), frame, factors)
 
 
-def is_plain(field: FogField) -> bool:
+def has_closed_form(field: FogField) -> bool:
     """Tell whether nothing but banks and a sharp top makes a field uneven."""
     return (
         (field.patches is None or field.patches.strength == 0)
@@ -134,6 +171,6 @@ def is_plain(field: FogField) -> bool:
     )
 
 
-def is_even_up_to(field: FogField, height: float) -> bool:
+def is_uniform_below(field: FogField, height: float) -> bool:
     """Tell whether fog is the same everywhere below a height [m]."""
-    return is_plain(field) and not field.banks and height <= field.top
+    return has_closed_form(field) and not field.banks and height <= field.top

@@ -50,7 +50,7 @@ def build_scene(network: RoadNetwork, signs: SignMap, rng: np.random.Generator, 
     Returns
     -------
     Scene
-        Some shapes have a simple stand-in, named with the ending ":far", for when they are small in the picture.
+        Shapes have levels of detail for when they are small in the picture (see `LEVELS_OF_DETAIL`).
 
     Raises
     ------

@@ -14,8 +14,7 @@ from fogsim.scene.relief import Relief
 from fogsim.scene.road import TOWN
 from fogsim.scene.roadside import placed, stations
 from fogsim.scene.solids import GLASS, Material, merge, polygon, quad
-from fogsim.scene.trees import FAR, TINY
-from fogsim.values.scene import Batch, Mesh
+from fogsim.values.scene import FAR, TINY, Batch, Mesh
 
 HOUSE_RADIUS = 9.0
 """Nothing else stands nearer to the middle of a house [m]."""
@@ -34,7 +33,7 @@ _Z = np.array([0.0, 0.0, 1.0])
 
 
 def house_shapes() -> dict[str, Mesh]:
-    """Shapes of houses, fronts to −y, with their stand-ins."""
+    """Shapes of houses, fronts to −y, with their levels of detail."""
     shapes: dict[str, Mesh] = {}
     for number, (width, depth, eaves, rise, wall, roof) in enumerate(_KINDS):
         size = (width, depth, eaves, rise)
@@ -152,6 +151,6 @@ def house_places(batches: Sequence[Batch]) -> Points:
 
 
 def shapes_in_use(shapes: Mapping[str, Mesh], batches: Sequence[Batch]) -> dict[str, Mesh]:
-    """Those shapes, with their stand-ins, that batches refer to."""
+    """Those shapes, with their levels of detail, that batches refer to."""
     used = {batch.shape for batch in batches}
     return {name: shape for name, shape in shapes.items() if name.split(":", maxsplit=1)[0] in used}

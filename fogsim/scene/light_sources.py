@@ -7,9 +7,7 @@ from functools import cache, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.scene.bodies import BODIES
-from fogsim.scene.bodies.lamp_patches import Patch, lamp_patches
-from fogsim.scene.bodies.parts import LIT_AREAS
+from fogsim.scene.bodies import LIT_AREAS, BodyLamp, bodies
 from fogsim.scene.lamp_kernels import AREA, FORWARD, FOUND, INTENSITY, LEFT, UP, LampNumbers, find_lamps
 from fogsim.scene.street_lamps import HEIGHT, SIZE
 from fogsim.scene.vehicles import body_names
@@ -189,16 +187,16 @@ def _lamps() -> _Lamps:
     """Lamps of all bodies, where their surfaces are."""
     rows: list[tuple[NDArray[np.float64], float, int, float, NDArray[np.float64], float]] = []
     members: list[list[int]] = []
-    for body in BODIES.values():
+    for body in bodies().values():
         _, width, height = body.size
         first = len(rows)
-        for patch in lamp_patches(body.near()):
-            rows += _rows_of(patch, width * height)
+        for lamp in body.lamps:
+            rows += _rows_of(lamp, width * height)
         members.append(list(range(first, len(rows))))
     most = max(map(len, members))
     place, area, mask, intensity, colour, forwards = zip(*rows, strict=True)
     return _Lamps(
-        number={name: number for number, name in enumerate(BODIES)},
+        number={name: number for number, name in enumerate(bodies())},
         colour=np.array(colour),
         lamps=LampNumbers(
             place=np.array(place),
@@ -212,19 +210,19 @@ def _lamps() -> _Lamps:
 
 
 def _rows_of(
-    patch: Patch, box_area: float
+    body_lamp: BodyLamp, box_area: float
 ) -> list[tuple[NDArray[np.float64], float, int, float, NDArray[np.float64], float]]:
     """A lamp, and below a head lamp the front fog lamp."""
-    known = SIGNAL_LAMPS.get((patch.surface, patch.front))
+    known = SIGNAL_LAMPS.get((body_lamp.surface, body_lamp.front))
     if known is None:
         return []
     lamp, intensity, colour = known
-    forwards = 1.0 if patch.front else -1.0
+    forwards = 1.0 if body_lamp.front else -1.0
     tint = _luminance_one(colour)
-    share = min(patch.area * box_area / LIT_AREAS[patch.surface], 1.0)
-    if patch.surface is not Surface.LAMP_HEAD:
-        return [(patch.centre, patch.area, int(lamp), share * intensity, tint, forwards)]
+    share = min(body_lamp.area * box_area / LIT_AREAS[body_lamp.surface], 1.0)
+    if body_lamp.surface is not Surface.LAMP_HEAD:
+        return [(body_lamp.centre, body_lamp.area, int(lamp), share * intensity, tint, forwards)]
     lit = int(lamp | Lamp.LOW_BEAM | Lamp.HIGH_BEAM)
-    below = patch.centre * np.array([1.0, _FOG_INSET, _FOG_HEIGHT])
-    head = (patch.centre, patch.area, lit, share * intensity, tint, forwards)
+    below = body_lamp.centre * np.array([1.0, _FOG_INSET, _FOG_HEIGHT])
+    head = (body_lamp.centre, body_lamp.area, lit, share * intensity, tint, forwards)
     return [head, (below, _FOG_AREA / box_area, int(Lamp.FRONT_FOG), 0.0, tint, forwards)]

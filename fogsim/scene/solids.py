@@ -1,12 +1,11 @@
 """Small meshes to build with: patches, polygons, boxes, cylinders, blobs, and how to put them together."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import product
 
 import numpy as np
-import trimesh
 from numpy.typing import ArrayLike, NDArray
 
 from fogsim.linear_algebra import matrix_product
@@ -35,14 +34,7 @@ class Material:
     surface: Surface = Surface.MATT
 
 
-PAINT = Material((0.5, 0.5, 0.5), Surface.PAINT)
 GLASS = Material((0.035, 0.045, 0.055))
-TYRE = Material((0.025, 0.025, 0.027))
-BLACK_PLASTIC = Material((0.03, 0.03, 0.032))
-UNDERBODY = Material((0.012, 0.012, 0.013))
-STEEL = Material((0.33, 0.34, 0.35))
-WHITE = Material((0.62, 0.62, 0.60))
-CHROME = Material((0.40, 0.41, 0.42))
 
 
 def mesh(
@@ -196,48 +188,42 @@ def _turn(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]
     return np.asarray((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
 
 
-def from_trimesh(solid: trimesh.Trimesh, material: Material, instance: int = ROADSIDE) -> Mesh:
-    """Facetted mesh of a trimesh solid: every triangle has its own normal."""
-    return _facetted(np.asarray(solid.triangles, np.float64), material, instance)
+def facetted(triangles: NDArray[np.float64], material: Material) -> Mesh:
+    """Mesh of triangles that each have their own normal.
 
-
-def _facetted(triangles: NDArray[np.float64], material: Material, instance: int = ROADSIDE) -> Mesh:
-    """Mesh of triangles (n, 3, 3), counterclockwise as seen from outside, each with its own normal."""
+    Parameters
+    ----------
+    triangles : (n, 3, 3) float64
+        Corners, counterclockwise as seen from outside [m].
+    material : Material
+        Its material.
+    """
     a, b, c = triangles.transpose(1, 0, 2)
     normals = np.repeat(np.cross(b - a, c - a), 3, axis=0)
-    return mesh(triangles, np.arange(3 * len(triangles)).reshape(-1, 3), normals, material, instance=instance)
+    return mesh(triangles, np.arange(3 * len(triangles)).reshape(-1, 3), normals, material)
 
 
-def box(low: ArrayLike, high: ArrayLike, material: Material, instance: int = ROADSIDE) -> Mesh:
-    """Box between two opposite corners, facetted."""
-    corners = np.stack((np.asarray(low, float), np.asarray(high, float)))
-    return from_trimesh(trimesh.creation.box(bounds=np.sort(corners, axis=0)), material, instance)
+_BOX_CORNERS = np.array(list(product((0.0, 1.0), repeat=3)))
+_BOX_FACES = np.array(
+    [
+        *((1, 3, 0), (4, 1, 0), (0, 3, 2), (2, 4, 0), (1, 7, 3), (5, 1, 4)),
+        *((5, 7, 1), (3, 7, 2), (6, 4, 2), (2, 7, 6), (6, 5, 4), (7, 5, 6)),
+    ]
+)
 
 
-def cylinder(start: ArrayLike, end: ArrayLike, radius: float, material: Material, *, sides: int = 12) -> Mesh:
-    """Closed facetted cylinder between the middles of its two ends."""
-    # trimesh's own is turned by singular vectors, which LAPACK rounds as the processor has it.
-    ends = np.stack((np.asarray(start, float), np.asarray(end, float)))
-    along = (ends[1] - ends[0]) / math.dist(*ends)
-    across, angle = _perpendicular(along), np.linspace(0.0, 2 * np.pi, sides, endpoint=False)[:, None]
-    rim = radius * (np.cos(angle) * across + np.sin(angle) * np.cross(along, across))
-    below, above = ends[:, None] + rim
-    next_below, next_above = np.roll(below, -1, axis=0), np.roll(above, -1, axis=0)
-    low, high = (np.broadcast_to(end, rim.shape) for end in ends)
-    triangles = (
-        (below, next_below, next_above),
-        (below, next_above, above),
-        (low, next_below, below),
-        (high, above, next_above),
-    )
-    return _facetted(np.concatenate([np.stack(corners, axis=1) for corners in triangles]), material)
+def box(low: ArrayLike, high: ArrayLike, material: Material) -> Mesh:
+    """Box, facetted.
 
-
-def _perpendicular(along: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit vector at right angles to a unit vector: where Householder's reflection of that to x takes z."""
-    x, y, z = along.tolist()
-    share = math.copysign(1.0 / (1.0 + abs(x)), x)
-    return np.array([z, share * y * z, share * z * z - math.copysign(1.0, x)])
+    Parameters
+    ----------
+    low, high : (3,)
+        Two opposite corners [m].
+    material : Material
+        Its material.
+    """
+    start, end = np.sort(np.stack((np.asarray(low, float), np.asarray(high, float))), axis=0)
+    return facetted(_BOX_CORNERS[_BOX_FACES] * (end - start) + start, material)
 
 
 def disc(
@@ -277,21 +263,10 @@ def merge(parts: Sequence[Mesh]) -> Mesh:
     offsets = np.cumsum([0, *(len(part.positions) for part in parts)])
     names = ("positions", "normals", "reflectance", "surface", "road", "instance")
     if not parts:
-        return mesh(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), PAINT)
+        return mesh(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), GLASS)
     arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
     faces = [part.faces + np.uint32(offset) for part, offset in zip(parts, offsets, strict=False)]
     return Mesh(**arrays, faces=np.concatenate(faces))
-
-
-def mirrored(part: Mesh) -> Mesh:
-    """Mirror image on the other side of the plane y = 0."""
-    flip = np.array([1, -1, 1], np.float32)
-    return replace(part, positions=part.positions * flip, normals=part.normals * flip, faces=part.faces[:, ::-1].copy())
-
-
-def both_sides(part: Mesh) -> Mesh:
-    """Join a part with its mirror image."""
-    return merge((part, mirrored(part)))
 
 
 def moved(part: Mesh, matrix: NDArray[np.float64]) -> Mesh:

@@ -12,8 +12,7 @@ from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.polyline import Points, arc_length
 from fogsim.scene.roadside import placed, stations, tube
 from fogsim.scene.solids import Material, box, merge
-from fogsim.scene.trees import FAR, TINY
-from fogsim.values.scene import Batch, Mesh, Scene, Surface
+from fogsim.values.scene import FAR, TINY, Batch, Mesh, Scene, Surface
 
 STREET_LAMP = "street_lamp"
 """Name of the shape of a lamp with its pole."""
@@ -33,7 +32,7 @@ _GLOW = Material((0.55, 0.55, 0.53), Surface.LAMP_STREET)
 
 
 def street_lamp_shapes() -> dict[str, Mesh]:
-    """Shape of a lamp whose arm reaches along y, with its stand-ins."""
+    """Shape of a lamp whose arm reaches along y, with its levels of detail."""
     head = box((-0.16, _ARM - 0.38, HEIGHT), (0.16, _ARM + 0.38, HEIGHT + 0.1), _POLE)
     (length, width, depth), glow = SIZE, _GLOW
     lamp = box((-width / 2, _ARM - length / 2, HEIGHT - depth), (width / 2, _ARM + length / 2, HEIGHT), glow)

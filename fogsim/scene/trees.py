@@ -3,23 +3,34 @@
 from dataclasses import replace
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from fogsim.scene.solids import Material, grid, grid_faces, merge, mesh
-from fogsim.values.scene import Mesh
+from fogsim.values.scene import LEVELS_OF_DETAIL, Mesh
 
 BARK = Material((0.055, 0.042, 0.032))
-
-MIDDLE, FAR, TINY, SPECK = STAND_INS = (":middle", ":far", ":tiny", ":speck")
-"""Endings of the names of a shape's stand-ins for when it is small in the picture, each simpler than the one before."""
-
 
 _OCTAHEDRON = (
     np.array([(1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)], np.float64),
     np.array([(0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4), (1, 0, 5), (2, 1, 5), (3, 2, 5), (0, 3, 5)]),
 )
-"""Corners and triangles."""
+_A, _B = np.array([1.0, (1.0 + 5.0**0.5) / 2.0]) / (1.0 + ((1.0 + 5.0**0.5) / 2.0) ** 2) ** 0.5
+_ICOSAHEDRON = (
+    np.array(
+        [
+            *((-_A, _B, 0), (_A, _B, 0), (-_A, -_B, 0), (_A, -_B, 0), (0, -_A, _B), (0, _A, _B)),
+            *((0, -_A, -_B), (0, _A, -_B), (_B, 0, -_A), (_B, 0, _A), (-_B, 0, -_A), (-_B, 0, _A)),
+        ]
+    ),
+    np.array(
+        [
+            *((0, 11, 5), (0, 5, 1), (0, 1, 7), (0, 7, 10), (0, 10, 11), (1, 5, 9), (5, 11, 4), (11, 10, 2)),
+            *((10, 7, 6), (7, 1, 8), (3, 9, 4), (3, 4, 2), (3, 2, 6), (3, 6, 8), (3, 8, 9), (4, 9, 5)),
+            *((2, 4, 11), (6, 2, 10), (8, 6, 7), (9, 8, 1)),
+        ]
+    ),
+)
+"""Corners, on the unit sphere, and triangles."""
 
 
 def conifer(rng: np.random.Generator, level: int = 0) -> Mesh:
@@ -30,11 +41,11 @@ def conifer(rng: np.random.Generator, level: int = 0) -> Mesh:
     rng : numpy Generator
         What makes it this tree.
     level : int
-        0 in full, 1 … 4 the stand-ins in the order of `STAND_INS`.
+        0 in full, 1 … 4 the simpler ones in the order of `LEVELS_OF_DETAIL`.
     """
     whorls, branches, long = ((11, 11, 0.24), (8, 8, 0.28), (5, 5, 0.36), (2, 3, 0.7), (1, 2, 1.0))[level]
     colour = np.array([0.030, 0.052, 0.028]) * rng.uniform(0.8, 1.2) + np.array([0.006, 0.004, 0.0]) * rng.random()
-    # Stand-ins have less of the bright tips.
+    # Levels of detail have less of the bright tips.
     colour *= (1.0, 1.015, 1.035, 1.06, 1.12)[level]
     spread = rng.uniform(0.17, 0.24)
     parts = [_trunk(0.2, 0.016)] if level < 3 else []
@@ -81,10 +92,10 @@ def broad_leaved(rng: np.random.Generator, level: int = 0) -> Mesh:
     rng : numpy Generator
         What makes it this tree.
     level : int
-        0 in full, 1 … 4 the stand-ins in the order of `STAND_INS`.
+        0 in full, 1 … 4 the simpler ones in the order of `LEVELS_OF_DETAIL`.
     """
     colour = np.array([0.044, 0.066, 0.026]) * rng.uniform(0.75, 1.25) + np.array([0.014, 0.006, 0.0]) * rng.random()
-    # Stand-ins have less of the bright leaves and of the ragged outline.
+    # Levels of detail have less of the bright leaves and of the ragged outline.
     colour *= (1.0, 1.035, 1.065, 1.09, 1.03)[level]
     width = rng.uniform(0.22, 0.30) * (1.0, 1.0, 1.01, 1.13, 1.42)[level]
     middle, size = np.array([0.0, 0.0, 0.60]), np.array([1.15 * width, 1.15 * width, 0.33])
@@ -111,11 +122,7 @@ def _blob(
     leaves: int,
     coarse: bool = False,
 ) -> list[Mesh]:
-    if coarse:
-        direction, faces = _OCTAHEDRON
-    else:
-        ball = trimesh.creation.icosphere(subdivisions=0)
-        direction, faces = np.asarray(ball.vertices, np.float64), ball.faces
+    direction, faces = _OCTAHEDRON if coarse else _ICOSAHEDRON
     points = centre + direction * size * rng.uniform(0.85, 1.15, (len(direction), 1))
     light = _crown_light(direction, points) * rng.uniform(0.8, 1.2, len(points))
     parts = [mesh(points, faces, direction, Material((0, 0, 0)), reflectance=light[:, None] * colour)]
@@ -156,7 +163,7 @@ def woodland(rng: np.random.Generator, level: int = 0) -> Mesh:
     rng : numpy Generator
         What makes it this wood.
     level : int
-        0 in full, 1 … 4 the stand-ins in the order of `STAND_INS`.
+        0 in full, 1 … 4 the simpler ones in the order of `LEVELS_OF_DETAIL`.
     """
     columns = (30, 24, 16, 7, 4)[level]
     green = np.array([0.040, 0.057, 0.027]) * rng.uniform(0.8, 1.2)
@@ -177,7 +184,7 @@ def woodland(rng: np.random.Generator, level: int = 0) -> Mesh:
 
 
 def tree_shapes(rng: np.random.Generator, kinds: int = 5) -> dict[str, Mesh]:
-    """Shapes of all trees by name, each with its simple stand-ins for the distance.
+    """Shapes of all trees by name, each with its levels of detail.
 
     Parameters
     ----------
@@ -191,6 +198,6 @@ def tree_shapes(rng: np.random.Generator, kinds: int = 5) -> dict[str, Mesh]:
         for i in range(kinds):
             # All levels get the same random numbers first, so colour and spread agree.
             seed = int(rng.integers(2**31))
-            for level, ending in enumerate(("", *STAND_INS)):
+            for level, ending in enumerate(("", *LEVELS_OF_DETAIL)):
                 shapes[f"{name}_{i}{ending}"] = grow(np.random.default_rng(seed), level)
     return shapes

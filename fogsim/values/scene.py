@@ -7,6 +7,9 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+MIDDLE, FAR, TINY, SPECK = LEVELS_OF_DETAIL = (":middle", ":far", ":tiny", ":speck")
+"""Endings of the names of a shape's levels of detail for when it is small in the picture, the finest first."""
+
 
 class Surface(IntEnum):
     """How a vertex's surface gets its radiance.

@@ -12,9 +12,8 @@ from fogsim.scene.signs.gantry import Gantry, gantries, gantry_mesh
 from fogsim.scene.signs.kinds import SIGN_KINDS, SignKind, face_of, shape_name
 from fogsim.scene.signs.symbols import SIGN
 from fogsim.scene.solids import Material, merge
-from fogsim.scene.trees import FAR, TINY
 from fogsim.values.road import Sign
-from fogsim.values.scene import Batch, Mesh
+from fogsim.values.scene import FAR, TINY, Batch, Mesh
 
 __all__ = ["SIGN", "SIGN_KINDS", "Gantry", "SignKind", "gantries", "gantry_mesh", "sign_batches", "sign_shapes"]
 

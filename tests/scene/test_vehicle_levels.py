@@ -1,4 +1,4 @@
-"""Stand-ins of vehicles beside the bodies that they stand for, as the cpu renderer draws them in clear air."""
+"""Levels of detail of vehicles beside their bodies in full, as the cpu renderer draws them in clear air."""
 
 import math
 from collections.abc import Callable
@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from fogsim.render import Renderer, make_renderer
-from fogsim.scene.bodies import BODIES, body_shapes
+from fogsim.scene.bodies import bodies, body_shapes
 from fogsim.values import Batch, Camera, CameraPose, Mesh, Scene
 
 ILLUMINANCE = 1e4
@@ -32,7 +32,7 @@ Seen = Callable[[str, str, str, str, float], tuple[int, NDArray[np.float32]]]
 
 @pytest.fixture(scope="module")
 def renderer() -> Renderer:
-    # A renderer would itself draw stand-ins, so here each level has a name without an ending.
+    # A renderer would itself choose levels, so here each level has a name without an ending.
     renamed = {name.replace(":", " "): shape for name, shape in body_shapes().items()}
     none, points, faces = np.zeros(0, np.int32), np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint32)
     ground = Mesh(points, points, points, none, np.zeros((0, 4), np.float32), none, faces)
@@ -45,7 +45,7 @@ def seen(renderer: Renderer) -> Seen:
 
     @cache
     def look(name: str, level: str, paint: str, side: str, distance: float) -> tuple[int, NDArray[np.float32]]:
-        length, width, height = BODIES[name].size
+        length, width, height = bodies()[name].size
         heading, across = HEADINGS[side], 0.5 * length if side == "left" else width
         focal = TALL / 3 * distance / across
         camera = Camera(TALL, TALL, focal, (TALL / 2, TALL * (0.75 if height > 2 else 0.6)), 1.3)
@@ -70,8 +70,8 @@ def seen(renderer: Renderer) -> Seen:
 @pytest.mark.parametrize("distance", [30.0, 60.0, 120.0])
 @pytest.mark.parametrize("side", ["rear", "front"])
 @pytest.mark.parametrize("level", [":far", ":tiny"])
-@pytest.mark.parametrize("name", BODIES)
-def test_a_stand_in_has_the_outline_and_the_mean_contrast_of_its_body(
+@pytest.mark.parametrize("name", bodies())
+def test_a_level_has_the_outline_and_the_mean_contrast_of_its_body(
     name: str, level: str, side: str, distance: float, seen: Seen
 ) -> None:
     # Nearer than they are made for, what is far back in a long body has another size; a front shows more of that. A
@@ -84,15 +84,15 @@ def test_a_stand_in_has_the_outline_and_the_mean_contrast_of_its_body(
 
 
 def test_a_speck_has_about_the_outline_and_the_mean_contrast_of_its_body(seen: Seen) -> None:
-    for name, side, paint in product(BODIES, ("rear", "front"), PAINTS):
+    for name, side, paint in product(bodies(), ("rear", "front"), PAINTS):
         (area, contrast), (whole_area, whole) = (seen(name, one, paint, side, 120.0) for one in (":speck", ""))
         assert area == pytest.approx(whole_area, rel=0.08)
         assert contrast == pytest.approx(whole, abs=0.045), (name, side, paint)
 
 
 @pytest.mark.parametrize("level", [":far", ":tiny"])
-@pytest.mark.parametrize("name", BODIES)
-def test_a_stand_in_has_the_contrast_of_its_body_from_the_left(name: str, level: str, seen: Seen) -> None:
+@pytest.mark.parametrize("name", bodies())
+def test_a_level_has_the_contrast_of_its_body_from_the_left(name: str, level: str, seen: Seen) -> None:
     for paint in PAINTS:
         (area, contrast), (whole_area, whole) = (seen(name, one, paint, "left", 60.0) for one in (level, ""))
         assert area == pytest.approx(whole_area, rel=0.03)

@@ -5,7 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.scene.bodies.parts import (
+from fogsim.scene.solids import GLASS, Material, box, grid, merge, quad
+from fogsim.values.scene import Mesh
+from vehicle_bodies.parts import (
     BACK,
     FOG_LAMP,
     HEAD_LAMP,
@@ -24,8 +26,7 @@ from fogsim.scene.bodies.parts import (
     side_panel,
     wheels,
 )
-from fogsim.scene.solids import BLACK_PLASTIC, CHROME, GLASS, PAINT, Material, both_sides, box, grid, merge, quad
-from fogsim.values.scene import Mesh
+from vehicle_bodies.solids import BLACK_PLASTIC, CHROME, PAINT, both_sides
 
 # x, half width, lower edge, belt, half width at the belt, crown [m]
 _BODY = np.array(

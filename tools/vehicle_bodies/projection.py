@@ -17,7 +17,7 @@ _LEVEL, _UPWARDS = 0.56, 0.44  # light on an upright surface under an overcast s
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class Projection:
     """A shape from one side, in a grid of rows (upwards) and columns.
 
     Attributes
@@ -75,8 +75,8 @@ def _perspective(side: str, depth: Wide, size: Size) -> tuple[Wide, float, float
     return 1.0 + depth * size[0] / _AWAY, 0.5, _EYE / size[2]
 
 
-def seen_from(side: str, shape: Mesh, size: Size, fine: int = 1) -> Seen:
-    """Look at a shape: from 50 m behind or before it, or without perspective from another side.
+def project_shape(side: str, shape: Mesh, size: Size, fine: int = 1) -> Projection:
+    """SideView at a shape: from 50 m behind or before it, or without perspective from another side.
 
     Parameters
     ----------
@@ -103,12 +103,12 @@ def seen_from(side: str, shape: Mesh, size: Size, fine: int = 1) -> Seen:
     layers = np.concatenate((normals, paint[:, None], own), axis=1)
     depth, layered = np.full((rows, columns), np.inf), np.zeros((rows, columns, layers.shape[1]))
     _draw(points, np.ascontiguousarray(layers), shape.faces.astype(np.int64), depth, layered)
-    return Seen(depth, layered[..., :3], layered[..., 3], layered[..., 4:])
+    return Projection(depth, layered[..., :3], layered[..., 3], layered[..., 4:])
 
 
 @kernel
-def totals(depth: Wide, normal: Wide, paint: Wide, own: Wide) -> tuple[float, float, float, float, float]:
-    """Sums over a `Seen`: samples that are covered, light on paint, and light of what is not (three channels)."""
+def sum_light(depth: Wide, normal: Wide, paint: Wide, own: Wide) -> tuple[float, float, float, float, float]:
+    """Sums over a `Projection`: samples that are covered, light on paint, and light of what is not (three channels)."""
     area, light, red, green, blue = 0.0, 0.0, 0.0, 0.0, 0.0
     for row in range(depth.shape[0]):
         for column in range(depth.shape[1]):

@@ -4,7 +4,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from fogsim.scene.bodies.parts import (
+from fogsim.scene.solids import GLASS, Material, box, merge
+from fogsim.values.scene import Mesh
+from vehicle_bodies.parts import (
     FOG_LAMP,
     HEAD_LAMP,
     LEFT_INDICATOR,
@@ -21,8 +23,7 @@ from fogsim.scene.bodies.parts import (
     side_panel,
     wheels,
 )
-from fogsim.scene.solids import BLACK_PLASTIC, GLASS, PAINT, Material, both_sides, box, merge
-from fogsim.values.scene import Mesh
+from vehicle_bodies.solids import BLACK_PLASTIC, PAINT, both_sides
 
 _SEAM = Material((0.05, 0.05, 0.05))
 

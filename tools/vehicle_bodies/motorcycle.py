@@ -1,9 +1,10 @@
 """A motorcycle with its rider, 2.2 × 0.8 × 1.6 m."""
 
 import numpy as np
-import trimesh
 
-from fogsim.scene.bodies.parts import (
+from fogsim.scene.solids import Material, box
+from fogsim.values.scene import Mesh
+from vehicle_bodies.parts import (
     FOG_LAMP,
     HEAD_LAMP,
     LEFT_INDICATOR,
@@ -16,8 +17,7 @@ from fogsim.scene.bodies.parts import (
     panel_back,
     panel_front,
 )
-from fogsim.scene.solids import BLACK_PLASTIC, STEEL, TYRE, Material, both_sides, box, cylinder, from_trimesh
-from fogsim.values.scene import Mesh
+from vehicle_bodies.solids import BLACK_PLASTIC, STEEL, TYRE, ball, both_sides, cylinder
 
 _LEATHER = Material((0.035, 0.035, 0.04))
 _HELMET = Material((0.4, 0.4, 0.4))
@@ -35,14 +35,12 @@ def motorcycle() -> Mesh:
         [2.00, 0.14, 0.70, 0.90, 0.10, 0.02],
     ]
     torso = [[0.88, 0.17, 0.88, 1.38, 0.19, 0.03], [1.35, 0.20, 0.80, 1.30, 0.18, 0.05]]
-    helmet = trimesh.creation.icosphere(subdivisions=1, radius=0.14)
-    helmet.apply_translation((0.92, 0.0, 1.46))
     rider = (
         hull(np.array(torso), _LEATHER),
         both_sides(cylinder((1.05, 0.20, 1.25), (0.62, 0.34, 1.02), 0.055, _LEATHER, sides=limbs)),
         both_sides(cylinder((1.25, 0.18, 0.85), (0.85, 0.26, 0.72), 0.085, _LEATHER, sides=limbs)),
         both_sides(cylinder((0.85, 0.26, 0.72), (1.20, 0.22, 0.30), 0.065, _LEATHER, sides=limbs)),
-        from_trimesh(helmet, _HELMET),
+        ball((0.92, 0.0, 1.46), 0.14, _HELMET),
     )
     lamps = (
         panel_back(2.06, (-0.09, 0.09), (0.80, 0.85), POSITION_LAMP),

@@ -3,7 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.scene.bodies.parts import (
+from fogsim.scene.solids import GLASS, Material, box, merge
+from fogsim.values.scene import Mesh, Surface
+from vehicle_bodies.parts import (
     FOG_LAMP,
     HEAD_LAMP,
     LEFT_INDICATOR,
@@ -19,8 +21,7 @@ from fogsim.scene.bodies.parts import (
     side_panel,
     wheels,
 )
-from fogsim.scene.solids import BLACK_PLASTIC, GLASS, PAINT, STEEL, UNDERBODY, Material, both_sides, box, merge
-from fogsim.values.scene import Mesh, Surface
+from vehicle_bodies.solids import BLACK_PLASTIC, PAINT, STEEL, UNDERBODY, both_sides
 
 _SEAM = Material((0.05, 0.05, 0.05))
 _CONTOUR = Material((0.45, 0.05, 0.04), Surface.SHEETING)

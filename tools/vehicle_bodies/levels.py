@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.scene.bodies.lamp_patches import lamp_quads, used
-from fogsim.scene.bodies.parts import contact_shadow
-from fogsim.scene.bodies.runs import BEHIND, Look, Run, runs_of, within
-from fogsim.scene.bodies.seen import ROWS, Seen, Size, placed, seen_from, totals, upwards_of
-from fogsim.scene.bodies.zones import zones_of
-from fogsim.scene.solids import PAINT, Material, grid_faces, merge, mesh, mirrored
+from fogsim.scene.solids import Material, grid_faces, merge, mesh
 from fogsim.values.scene import Mesh, Surface
+from vehicle_bodies.lamp_patches import drop_unused, lamp_quads
+from vehicle_bodies.parts import contact_shadow
+from vehicle_bodies.projection import ROWS, Projection, Size, placed, project_shape, sum_light, upwards_of
+from vehicle_bodies.solids import PAINT, mirrored
+from vehicle_bodies.spans import BEHIND, SideView, Span, divide_into_zones, find_spans, within
 
 Wide = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -57,7 +57,7 @@ class _Gain:
     own: Wide
 
 
-def stand_ins(shape: Mesh, size: Size, details: Sequence[Detail], shadow: float) -> list[Mesh]:
+def levels_of_detail(shape: Mesh, size: Size, details: Sequence[Detail], shadow: float) -> list[Mesh]:
     """Stand-ins of a body, with its lamps and plates.
 
     Parameters
@@ -72,26 +72,26 @@ def stand_ins(shape: Mesh, size: Size, details: Sequence[Detail], shadow: float)
         Half the breadth of the darkness under it [units of its width].
     """
     body, kept = _without_shadow(shape), merge((lamp_quads(shape), _sheeting(shape)))
-    looks = {side: _look(side, body, kept, size) for side in _SIDES}
-    top, rest = seen_from("top", body, size), merge((kept, _shadow(size, shadow)))
+    looks = {side: _side_view(side, body, kept, size) for side in _SIDES}
+    top, rest = project_shape("top", body, size), merge((kept, _shadow(size, shadow)))
     wanted = {side: _totals(side, shape, size) for side in _SIDES}
     return [_matched(looks, wanted, top, detail, rest, size) for detail in details]
 
 
 def _matched(
-    looks: Mapping[str, Look],
+    looks: Mapping[str, SideView],
     wanted: Mapping[str, Sequence[float]],
-    top: Seen,
+    top: Projection,
     detail: Detail,
     rest: Mesh,
     size: Size,
 ) -> Mesh:
     """Stand-in that covers as much as the body from each side, with as much light: built, looked at and corrected."""
     left = looks["left"].seen
-    runs: dict[str, list[Run]] = {}
+    runs: dict[str, list[Span]] = {}
     for side, look in looks.items():
-        zones = zones_of(side, look.seen, left, size, detail.zones[side])
-        own = [run for zone in zones for run in runs_of(look, zone, detail.little)]
+        zones = divide_into_zones(side, look.seen, left, size, detail.zones[side])
+        own = [run for zone in zones for run in find_spans(look, zone, detail.little)]
         runs[side] = own if side != "left" else [within(run, looks["rear"].seen) for run in own]
     gains = dict.fromkeys(looks, _Gain(1.0, 1.0, np.ones(3)))
     rest = merge((_tops(top, runs["left"], runs["rear"]), rest))
@@ -102,7 +102,7 @@ def _matched(
 
 
 def _built(
-    runs: Mapping[str, Sequence[Run]],
+    runs: Mapping[str, Sequence[Span]],
     gains: Mapping[str, _Gain],
     rest: Mesh,
     size: Size,
@@ -115,7 +115,7 @@ def _built(
 
 
 def _corrected(gain: _Gain, want: Sequence[float], got: Sequence[float]) -> _Gain:
-    """Factors that would have given the area and the light (see `totals`) that the body has."""
+    """Factors that would have given the area and the light (see `sum_light`) that the body has."""
     area, paint, *own = np.array(want) / np.maximum(got, 1e-9)
     # Broader panels have more light, too.
     return _Gain(
@@ -126,24 +126,24 @@ def _corrected(gain: _Gain, want: Sequence[float], got: Sequence[float]) -> _Gai
 
 
 def _totals(side: str, shape: Mesh, size: Size) -> tuple[float, ...]:
-    seen = seen_from(side, shape, size, _FINE)
-    return totals(seen.depth, seen.normal, seen.paint, seen.own)
+    seen = project_shape(side, shape, size, _FINE)
+    return sum_light(seen.depth, seen.normal, seen.paint, seen.own)
 
 
-def _look(side: str, body: Mesh, kept: Mesh, size: Size) -> Look:
-    seen = seen_from(side, body, size)
-    return Look(side, seen, _over(side, kept, seen, size))
+def _side_view(side: str, body: Mesh, kept: Mesh, size: Size) -> SideView:
+    seen = project_shape(side, body, size)
+    return SideView(side, seen, _over(side, kept, seen, size))
 
 
 def _without_shadow(shape: Mesh) -> Mesh:
     """The shape without what lies on the road."""
     low, upwards = shape.positions[:, 2] < _ON_ROAD, shape.normals[:, 2] > 1.0 - 1e-6
-    return used(replace(shape, faces=shape.faces[~(low & upwards)[shape.faces].all(axis=1)]))
+    return drop_unused(replace(shape, faces=shape.faces[~(low & upwards)[shape.faces].all(axis=1)]))
 
 
-def _over(side: str, kept: Mesh, seen: Seen, size: Size) -> Seen:
+def _over(side: str, kept: Mesh, seen: Projection, size: Size) -> Projection:
     """What is kept, where it is not hidden by the shape itself."""
-    over = seen_from(side, kept, size)
+    over = project_shape(side, kept, size)
     shown = over.depth <= seen.depth + _NEAR
     hidden = np.where(shown, over.depth, np.inf)
     return replace(over, depth=hidden, own=over.own * shown[..., None])
@@ -152,10 +152,10 @@ def _over(side: str, kept: Mesh, seen: Seen, size: Size) -> Seen:
 def _sheeting(shape: Mesh) -> Mesh:
     """Plates and other sheeting, which sends lamplight back."""
     own = shape.surface[shape.faces[:, 0]] == Surface.SHEETING
-    return used(replace(shape, faces=shape.faces[own]))
+    return drop_unused(replace(shape, faces=shape.faces[own]))
 
 
-def _panels(side: str, run: Run, gain: _Gain, size: Size) -> list[Mesh]:
+def _panels(side: str, run: Span, gain: _Gain, size: Size) -> list[Mesh]:
     """Panels of a run: one of what is not paint, and behind it one of paint."""
     (start, end), broader = run.split, replace(run, breadth=run.breadth * gain.breadth)
     split = 0.0 < end - start < 1.0
@@ -189,7 +189,7 @@ def _normals(side: str, mean: Wide, upwards: float, size: Size) -> Wide:
     return np.asarray(both / np.linalg.norm(both, axis=1, keepdims=True))
 
 
-def _panel(side: str, run: Run, part: tuple[float, float], material: Material, normals: Wide, size: Size) -> Mesh:
+def _panel(side: str, run: Span, part: tuple[float, float], material: Material, normals: Wide, size: Size) -> Mesh:
     """Part of a run, between two shares of its breadth."""
     across = run.middle[:, None] + (np.array(part) - 0.5) * run.breadth[:, None]
     up = np.repeat(np.array(run.zone)[:, None] / ROWS, 2, axis=1)
@@ -197,7 +197,7 @@ def _panel(side: str, run: Run, part: tuple[float, float], material: Material, n
     return mesh(points, grid_faces(2, 2), np.repeat(normals, 2, axis=0), material)
 
 
-def _tops(top: Seen, long: Sequence[Run], wide: Sequence[Run]) -> Mesh:
+def _tops(top: Projection, long: Sequence[Span], wide: Sequence[Span]) -> Mesh:
     """Level tops of the zones seen from the rear that reach farther than those above them."""
     parts: list[Mesh] = []
     area = 0.0
@@ -211,7 +211,7 @@ def _tops(top: Seen, long: Sequence[Run], wide: Sequence[Run]) -> Mesh:
     return merge(parts)
 
 
-def _upper_edge(runs: Sequence[Run], row: int) -> tuple[float, float]:
+def _upper_edge(runs: Sequence[Span], row: int) -> tuple[float, float]:
     """Ends of what lies below a row's lower edge, from one side (0 … 1)."""
     ends = []
     for run in runs:
@@ -223,7 +223,7 @@ def _upper_edge(runs: Sequence[Run], row: int) -> tuple[float, float]:
     return (min(ends), max(ends)) if ends else (0.5, 0.5)
 
 
-def _top(x: tuple[float, float], y: tuple[float, float], height: float, top: Seen, own: Mask) -> Mesh:
+def _top(x: tuple[float, float], y: tuple[float, float], height: float, top: Projection, own: Mask) -> Mesh:
     right, left = np.array([x, x]), np.array([y, y]).T
     points = placed("top", right, left, np.full((2, 2), 1.0 - height), (1.0, 1.0, 1.0))
     material = PAINT

@@ -1,4 +1,4 @@
-"""Where the lamps of a shape are, and their few-triangle stand-ins for the distance."""
+"""Where the lamps of a shape are, and rectangles that take their place in levels of detail."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -146,10 +146,10 @@ def with_lit_areas(body: Mesh, areas: Mapping[Surface, float]) -> Mesh:
     lamps = np.isin(body.surface, LAMP_SURFACES)
     core += 0.006 * body.normals
     lit = replace(body, positions=core.astype(np.float32), faces=body.faces[lamps[body.faces[:, 0]]])
-    return merge((replace(body, surface=lens), used(lit)))
+    return merge((replace(body, surface=lens), drop_unused(lit)))
 
 
-def used(part: Mesh) -> Mesh:
+def drop_unused(part: Mesh) -> Mesh:
     """The mesh without the vertices that no triangle has."""
     used, renumbered = np.unique(part.faces, return_inverse=True)
     return Mesh(

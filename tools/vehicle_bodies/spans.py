@@ -1,30 +1,32 @@
-"""Runs: the parts without a gap of a zone of a body, from one side, and how light what they show is."""
+"""Division of a body into zones of height, and of these into spans without a gap, as seen from one side."""
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.linear_algebra import matrix_product
-from fogsim.scene.bodies.seen import COLUMNS, Mask, Seen, Wide, light_of
+from vehicle_bodies.projection import COLUMNS, ROWS, Mask, Projection, Size, Wide, light_of
 
 _NARROW = 0.03  # runs of columns and gaps between them, and edges of panels, that are left out [units of the box]
 _UNEVEN = 0.06  # how far a surface may lie from a straight line [units of the box]
+_LEAST = 4  # rows of a zone
 BEHIND = 0.003  # how far panels stay behind lamps and plates [units of the box]
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class SideView:
     """A body from one side: all of it but its shadow, and of that what its stand-ins keep."""
 
     side: str
-    seen: Seen
-    over: Seen
+    seen: Projection
+    over: Projection
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class Span:
     """Part of a zone without a gap, from one side.
 
     Attributes
@@ -53,7 +55,7 @@ class Run:
     normals: tuple[Wide, Wide]
 
 
-def runs_of(look: Look, zone: tuple[int, int], little: float) -> list[Run]:
+def find_spans(look: SideView, zone: tuple[int, int], little: float) -> list[Span]:
     """Runs of columns of a zone that are covered for the most part, each with the samples nearest to it."""
     covered = look.seen.covered[zone[0] : zone[1]]
     columns = covered.sum(axis=0)
@@ -74,10 +76,10 @@ def runs_of(look: Look, zone: tuple[int, int], little: float) -> list[Run]:
     away = np.array([np.maximum(first - middles, middles - last) for first, last in spans])
     nearest = np.argmin(away, axis=0)
     alone = len(spans) == 1
-    return [_run(look, zone, covered & (nearest == number), alone, little) for number in range(len(spans))]
+    return [_fitted_span(look, zone, covered & (nearest == number), alone, little) for number in range(len(spans))]
 
 
-def _run(look: Look, zone: tuple[int, int], inside: Mask, alone: bool, little: float) -> Run:
+def _fitted_span(look: SideView, zone: tuple[int, int], inside: Mask, alone: bool, little: float) -> Span:
     """A run of samples; if it is not alone, it is upright lest it should meet the next one."""
     z: Wide = np.arange(len(inside), dtype=np.float64) + 0.5
     count = inside.sum(axis=1)
@@ -92,7 +94,7 @@ def _run(look: Look, zone: tuple[int, int], inside: Mask, alone: bool, little: f
     before = look.over.depth[rows][inside & look.over.covered[rows]]
     if len(before):
         depth = np.maximum(depth, before.max() + BEHIND)
-    return Run(zone, middle, breadth, np.clip(depth, 0.0, 1.0), *_materials(look, zone, inside, little))
+    return Span(zone, middle, breadth, np.clip(depth, 0.0, 1.0), *_materials(look, zone, inside, little))
 
 
 def _depth(samples: Wide, z: Wide, count: NDArray[np.int64], height: int) -> Wide:
@@ -104,7 +106,7 @@ def _depth(samples: Wide, z: Wide, count: NDArray[np.int64], height: int) -> Wid
     return line
 
 
-def within(run: Run, rear: Seen) -> Run:
+def within(run: Span, rear: Projection) -> Span:
     """The run of a flank no farther out at its edges than the body is broad there, lest it should show from behind."""
     breadth = rear.covered.mean(axis=1)
     edges = (breadth[run.zone[0] : run.zone[0] + 3].max(), breadth[run.zone[1] - 3 : run.zone[1]].max())
@@ -121,9 +123,9 @@ def _line(z: Wide, values: Wide, weights: NDArray[Any], height: int) -> Wide:
 
 
 def _materials(
-    look: Look, zone: tuple[int, int], inside: Mask, little: float
+    look: SideView, zone: tuple[int, int], inside: Mask, little: float
 ) -> tuple[tuple[float, float], Wide, float, tuple[Wide, Wide]]:
-    """Split, colour, light and normals of a run (see `Run`) with which it shows the light of the body there."""
+    """Split, colour, light and normals of a run (see `Span`) with which it shows the light of the body there."""
     rows = slice(*zone)
     kept, normal = look.over.depth[rows] < np.inf, look.seen.normal[rows]
     free, paint = inside & ~kept, inside & (look.seen.paint[rows] > 0.5)
@@ -158,3 +160,59 @@ def _place(side: str, free: Mask, own: Mask, share: float, little: float) -> tup
     if best < _NARROW:
         return 0.0, share
     return (1.0 - share, 1.0) if best + share > 1.0 - _NARROW else (float(best), float(best + share))
+
+
+def divide_into_zones(side: str, seen: Projection, left: Projection, size: Size, count: int) -> list[tuple[int, int]]:
+    """First rows of the zones of a body, and the rows after their last, from below.
+
+    The sum of squares that straight lines through outlines and mean materials leave is the least.
+
+    Parameters
+    ----------
+    side : str
+        From where it is seen: "rear", "front" or "left".
+    seen, left : Projection
+        The body from there, and from the left.
+    size : tuple of float
+        Its length, width and height [m].
+    count : int
+        Number of zones.
+    """
+    materials = seen.paint.sum(axis=1) / np.maximum(seen.covered.sum(axis=1), 1)
+    cost = _cost(_outlines(side, seen, left, size), straight=True) + _cost(materials[:, None], straight=False)
+    best, cut = cost[0].copy(), np.zeros((count, ROWS + 1), np.int64)
+    for zone in range(1, count):
+        total = best[:, None] + cost
+        cut[zone], best = np.argmin(total, axis=0), np.min(total, axis=0)
+    edges = [ROWS]
+    for zone in range(count - 1, -1, -1):
+        edges.append(int(cut[zone, edges[-1]]))
+    edges.reverse()
+    return [(low, high) for low, high in pairwise(edges) if high > low]
+
+
+def _outlines(side: str, seen: Projection, left: Projection, size: Size) -> Wide:
+    """Breadth of each row, and its ends (only that one from where the body is seen) in its widths (rows, 2 or 3)."""
+    rear, front = np.argmax(left.covered, axis=1), np.argmax(left.covered[:, ::-1], axis=1)
+    ends = {"rear": (rear,), "front": (front,), "left": (rear, front)}[side]
+    weight = (1.0 if side == "left" else 2.0) * seen.covered.mean(axis=1)
+    return np.column_stack((weight, *(0.5 * size[0] / size[1] / COLUMNS * end for end in ends)))
+
+
+def _cost(values: Wide, *, straight: bool) -> Wide:
+    """Sum of squares left in rows i … j − 1 (ROWS + 1, ROWS + 1), infinite where those are too few."""
+    z = np.arange(ROWS) / ROWS
+
+    def between(column: Wide) -> Wide:
+        total = np.concatenate((np.zeros((1, *column.shape[1:])), np.cumsum(column, axis=0)))
+        return np.asarray(total[None, :] - total[:, None])
+
+    n = np.maximum(np.arange(ROWS + 1)[None, :] - np.arange(ROWS + 1)[:, None], 1)
+    y, yy = between(values), between(values**2)
+    left = yy - y**2 / n[..., None]
+    if straight:
+        spread = between(z**2) - between(z) ** 2 / n
+        slope = between(z[:, None] * values) - between(z)[..., None] * y / n[..., None]
+        left = left - slope**2 / np.maximum(spread, 1e-9)[..., None]
+    rows = np.arange(ROWS + 1)[None, :] - np.arange(ROWS + 1)[:, None]
+    return np.where(rows >= _LEAST, np.maximum(left, 0.0).sum(axis=2), np.inf)

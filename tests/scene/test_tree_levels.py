@@ -1,4 +1,4 @@
-"""Stand-ins of trees beside the trees that they stand for."""
+"""Levels of detail of trees beside the trees in full."""
 
 import math
 
@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from fogsim.render import make_renderer
-from fogsim.scene.trees import STAND_INS, tree_shapes
+from fogsim.scene.trees import tree_shapes
 from fogsim.values import Batch, Camera, CameraPose, Mesh, Scene
+from fogsim.values.scene import LEVELS_OF_DETAIL
 
 CAMERA = Camera(200, 200, 1000.0, (100.0, 100.0), 1.0)
 SHAPES = tree_shapes(np.random.default_rng(3))
@@ -16,7 +17,7 @@ SHAPES = tree_shapes(np.random.default_rng(3))
 @pytest.fixture(scope="module")
 def seen() -> dict[str, tuple[float, float]]:
     """Area [px] and radiance of every level, the mean of kinds and sides."""
-    # A renderer would itself draw stand-ins, so here each level has a name without an ending.
+    # A renderer would itself choose levels, so here each level has a name without an ending.
     renamed = {name.replace(":", " "): shape for name, shape in SHAPES.items()}
     nothing = np.zeros(0, np.int32)
     ground = Mesh(
@@ -25,7 +26,7 @@ def seen() -> dict[str, tuple[float, float]]:
     renderer = make_renderer("cpu", Scene(ground, renamed, ()), 1e4)
     found = {}
     for kind in ("conifer", "broad_leaved", "woodland"):
-        for level in ("", *STAND_INS):
+        for level in ("", *LEVELS_OF_DETAIL):
             views = []
             for number, turn in ((number, turn) for number in range(5) for turn in np.arange(8.0)):
                 # Woods are looked at from their front.
@@ -48,8 +49,8 @@ def seen() -> dict[str, tuple[float, float]]:
 
 
 @pytest.mark.parametrize("kind", ["conifer", "broad_leaved", "woodland"])
-@pytest.mark.parametrize("level", STAND_INS)
-def test_stand_ins_cover_the_same_area_with_the_same_light(
+@pytest.mark.parametrize("level", LEVELS_OF_DETAIL)
+def test_levels_of_detail_cover_the_same_area_with_the_same_light(
     kind: str, level: str, seen: dict[str, tuple[float, float]]
 ) -> None:
     (area, radiance), (whole_area, whole_radiance) = seen[kind + level], seen[kind]
@@ -58,8 +59,8 @@ def test_stand_ins_cover_the_same_area_with_the_same_light(
 
 
 @pytest.mark.parametrize("kind", ["conifer", "broad_leaved", "woodland"])
-def test_each_stand_in_is_simpler_than_the_one_before(kind: str) -> None:
-    counts = [len(SHAPES[f"{kind}_0{level}"].faces) for level in ("", *STAND_INS)]
+def test_each_level_is_simpler_than_the_one_before(kind: str) -> None:
+    counts = [len(SHAPES[f"{kind}_0{level}"].faces) for level in ("", *LEVELS_OF_DETAIL)]
     assert counts == sorted(counts, reverse=True)
     assert len(set(counts)) == len(counts)
     assert counts[-1] <= 8

@@ -10,23 +10,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fogsim.scene.bodies.lamp_patches import with_lit_areas
-from fogsim.scene.solids import (
-    PAINT,
-    TYRE,
-    UNDERBODY,
-    Material,
-    both_sides,
-    disc,
-    grid,
-    grid_faces,
-    merge,
-    mesh,
-    mirrored,
-    polygon,
-    quad,
-)
+from fogsim.scene.bodies import LIT_AREAS
+from fogsim.scene.solids import Material, disc, grid, grid_faces, merge, mesh, polygon, quad
 from fogsim.values.scene import Mesh, Surface
+from vehicle_bodies.lamp_patches import with_lit_areas
+from vehicle_bodies.solids import PAINT, TYRE, UNDERBODY, both_sides, mirrored
 
 LEFT, UP, BACK = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
 
@@ -176,17 +164,6 @@ def contact_shadow(length: float, half_width: float, *, fine: bool = True) -> Me
     depth = np.multiply.outer(along, across / 0.75)
     reflectance = np.repeat((0.058 - 0.048 * depth).reshape(-1, 1), 3, axis=1)
     return grid(points, UNDERBODY, UP, reflectance=reflectance)
-
-
-LIT_AREAS = {
-    Surface.LAMP_POSITION_REAR: 62e-4,
-    Surface.LAMP_STOP: 59e-4,
-    Surface.LAMP_REAR_FOG: 100e-4,
-    Surface.LAMP_INDICATOR_LEFT: 133e-4,
-    Surface.LAMP_INDICATOR_RIGHT: 133e-4,
-    Surface.LAMP_HEAD: 200e-4,
-}
-"""Luminous area of each lamp [m²]: with its intensity, the luminance that its surface has when it is lit."""
 
 
 def finished(parts: Sequence[Mesh], length: float, half_width: float) -> Mesh:

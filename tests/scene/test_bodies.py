@@ -1,0 +1,116 @@
+"""Shapes of vehicles: the data, and the models that they are made from."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from fogsim.scene.bodies import LIT_AREAS, bodies, body_of, body_shapes
+from fogsim.values import Surface
+from make_bodies import FILE, pack_bodies
+from vehicle_bodies.lamp_patches import lamp_patches, lamp_quads
+
+SHAPES = body_shapes()
+ENDINGS = ("", ":far", ":tiny", ":speck")
+
+
+def test_the_data_are_what_the_tool_makes_to_the_bit() -> None:
+    made = pack_bodies()
+    with np.load(FILE) as packed:
+        assert packed.files == list(made)
+        for name, array in made.items():
+            assert (packed[name].dtype, packed[name].shape) == (array.dtype, array.shape)
+            assert packed[name].tobytes() == array.tobytes(), f"{name}: run tools/make_bodies.py"
+
+
+def test_the_data_are_small() -> None:
+    assert FILE.stat().st_size < 150_000
+
+
+def test_shapes_cannot_be_changed_and_are_read_once() -> None:
+    for name, shape in body_shapes().items():
+        assert shape is SHAPES[name]
+        for field in fields(shape):
+            array = getattr(shape, field.name)
+            assert array.flags.c_contiguous
+            assert not array.flags.writeable
+
+
+def test_every_vehicle_has_a_shape_with_all_its_levels() -> None:
+    assert list(SHAPES) == [name + ending for name in bodies() for ending in ENDINGS]
+    sizes = [(3.9, 1.4), (4.5, 1.5), (5.0, 1.5), (4.6, 1.8), (7.1, 2.4), (8.5, 3.6), (16.5, 4.0)]
+    chosen = {
+        body_of(f"v{number}", kind, length, height)
+        for kind in ("car", "van", "truck", "bus", "motorcycle")
+        for length, height in sizes
+        for number in range(20)
+    }
+    assert chosen == set(bodies())
+
+
+def test_lamps_lie_on_the_surfaces_of_their_shapes() -> None:
+    for name, body in bodies().items():
+        shape = SHAPES[name]
+        for lamp in body.lamps:
+            own = shape.positions[shape.surface == lamp.surface]
+            assert np.all(own.min(axis=0) - 1e-6 <= lamp.centre)
+            assert np.all(lamp.centre <= own.max(axis=0) + 1e-6)
+            assert lamp.front == (lamp.centre[0] > -0.5)
+            assert 0.0 < lamp.area < 0.05
+
+
+@pytest.mark.parametrize("name", bodies())
+def test_little_is_drawn_of_what_is_far(name: str) -> None:
+    near, far, tiny, speck = (len(SHAPES[name + ending].faces) for ending in ("", ":far", ":tiny", ":speck"))
+    assert near < 800
+    assert far < 165
+    assert tiny < 120
+    assert speck < 90
+
+
+@pytest.mark.parametrize("name", bodies())
+def test_plates_send_light_back(name: str) -> None:
+    shape = SHAPES[name]
+    plates = shape.positions[shape.surface == Surface.SHEETING]
+    assert plates[:, 0].min() < -0.95
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("name", bodies())
+def test_lit_surfaces_have_the_areas_of_lamps(name: str, ending: str) -> None:
+    _, width, height = bodies()[name].size
+    for patch in lamp_patches(SHAPES[name + ending]):
+        area = patch.area * width * height
+        assert area < 1.06 * LIT_AREAS[patch.surface]
+        if name != "motorcycle" and patch.surface is not Surface.LAMP_STOP:
+            assert area > 0.35 * LIT_AREAS[patch.surface]
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("kind", bodies())
+def test_every_body_has_every_lamp_where_it_belongs(kind: str, ending: str) -> None:
+    shape = SHAPES[kind + ending]
+    for surface, rear in (
+        (Surface.LAMP_POSITION_REAR, True),
+        (Surface.LAMP_STOP, True),
+        (Surface.LAMP_REAR_FOG, True),
+        (Surface.LAMP_HEAD, False),
+    ):
+        place = shape.positions[shape.surface == surface]
+        assert len(place)
+        assert (place[:, 0].mean() < -0.8) == rear
+        assert place[:, 1].mean() == pytest.approx(0.0, abs=1e-5)
+    assert shape.positions[shape.surface == Surface.LAMP_INDICATOR_LEFT, 1].min() > 0
+    assert shape.positions[shape.surface == Surface.LAMP_INDICATOR_RIGHT, 1].max() < 0
+
+
+@pytest.mark.parametrize("kind", bodies())
+def test_a_hair_aside_gives_a_body_no_other_lamps(kind: str) -> None:
+    """Lamps in the middle are neither left nor right, wherever rounding has put their centres."""
+    middle, *moved = (
+        lamp_quads(replace(SHAPES[kind], positions=SHAPES[kind].positions + np.float32((0.0, aside, 0.0))))
+        for aside in (0.0, 1e-6, -1e-6)
+    )
+    for quads in moved:
+        assert np.array_equal(quads.faces, middle.faces)
+        np.testing.assert_allclose(quads.positions, middle.positions, atol=2e-6)

@@ -1,4 +1,4 @@
-"""Follow three walks of the data through the code: the files whose functions run, in the order in which they are entered.
+"""Follow three walks of the data: the files whose functions run, in the order in which they are entered.
 
     python tools/walks.py            # the files of each walk
     python tools/walks.py --json     # their names by walk
@@ -57,7 +57,7 @@ def entered(work: Callable[[], Any], rooms: tuple[str, ...], begin: str = "", en
         if counting:
             for path in (code.co_filename, *kernel_files(code, frame.f_globals)):
                 file = path.removeprefix(HERE)
-                if file.split(os.sep)[0].removesuffix(".py") in rooms:
+                if Path(file).parts[0].removesuffix(".py") in rooms:
                     found.setdefault(file)
         counting = counting and code.co_name != end
 

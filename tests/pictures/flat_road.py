@@ -4,6 +4,7 @@ Tests and `benchmarks/estimator_targets.py` draw with it. Of fogsim it knows the
 """
 
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -38,10 +39,12 @@ class Road:
 
 def ground(road: Road, ahead: np.ndarray, left: np.ndarray, seed: int) -> np.ndarray:
     """Luminance of the ground without fog."""
-    asphalt = road.asphalt * (1.0 + road.patch_contrast * patches(ahead, left, seed) + road.drift * drift(ahead, seed))
-    out = np.where(
-        np.abs(left) < 5.4, asphalt, road.terrain * (1.0 + 3 * road.patch_contrast * patches(ahead, left, seed + 7))
-    )
+    out = np.empty(ahead.shape)
+    paved = np.abs(left) < 5.4
+    at = ahead[paved], left[paved]
+    out[paved] = road.asphalt * (1.0 + road.patch_contrast * patches(*at, seed) + road.drift * drift(at[0], seed))
+    at = ahead[~paved], left[~paved]
+    out[~paved] = road.terrain * (1.0 + 3 * road.patch_contrast * patches(*at, seed + 7))
     if road.marks:
         solid = np.abs(np.abs(left) - 5.25) < 0.075
         dashed = (np.abs(np.abs(left) - 1.75) < 0.075) & ((ahead % 12.0) < 4.0)
@@ -83,7 +86,8 @@ def seen(road: Road, rows: np.ndarray, cols: np.ndarray, seed: int) -> tuple[np.
     hits = down > 1e-9
     depth = np.where(hits, camera.mount_height / np.where(hits, down, 1.0), 0.0)
     ahead, left = depth * forward, -depth * x
-    intrinsic = ground(road, ahead, left, seed)
+    intrinsic = np.zeros(depth.shape)
+    intrinsic[hits] = ground(road, ahead[hits], left[hits], seed)
     length = np.where(hits, depth * np.sqrt(x**2 + forward**2 + down**2), np.inf)
     if road.lead_distance is not None:
         plane = road.lead_distance / forward
@@ -117,6 +121,12 @@ def encode(linear: np.ndarray, response: Response) -> np.ndarray:
 
 def scan(road: Road, seed: int, samples: int) -> tuple[np.ndarray, np.ndarray]:
     """What `seen` tells at as many points of each pixel, squared: fog, noise and exposure are not in it."""
+    linear = replace(road.camera, response=Response.LINEAR)
+    return _scanned(road.but(visibility=0.0, airlight=0.0, sky=0.0, noise=0.0, camera=linear), seed, samples)
+
+
+@lru_cache(maxsize=12)
+def _scanned(road: Road, seed: int, samples: int) -> tuple[np.ndarray, np.ndarray]:
     camera = road.camera
     offsets = (np.arange(samples) + 0.5) / samples - 0.5
     rows = (np.arange(camera.height)[:, None] + offsets).ravel()

@@ -25,9 +25,9 @@ from fogsim.estimators.zhu2015 import zhu_category
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import Camera, LeadMeasurement, Observation, Response
 from fogsim.values.estimate import NORMAL_90_PERCENT
+from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.lines.horizon import Horizon, calibrated_horizon, levelled
 from fogsim.vision.lines.road_lines import meeting_lines
-from fogsim.vision.strips.strip_curves import linear_pixels
 
 CAMERAS = (
     Camera(688, 515, 700.0, (343.5, 257.0), 1.3, math.radians(2.0)),

@@ -17,8 +17,8 @@ from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation, calibra
 from fogsim.vision.lines.lane_lines import hough_lines, plain_vanishing_point
 from fogsim.vision.region.inflection import koschmieder
 from fogsim.vision.region.profile import path_lengths
-from fogsim.vision.region.road_growth import GrowthLimits, grown_road, row_medians
 from fogsim.vision.region.road_image import CannotTellError, RoadImage, road_image
+from fogsim.vision.region.road_region import constant_limits, grow_region, region_medians
 
 STEP = 3.0
 """Largest difference between a pixel and its seed in the row below, and to the bottom row's median for each row
@@ -143,13 +143,11 @@ def _grown_medians(road: RoadImage, camera: Camera) -> tuple[_Medians, float]:
     """Row medians of the region, and the row of the horizon."""
     blurred = smoothed(road.luminance)
     edges = edge_map(blurred, np.zeros(blurred.shape[0], np.float32))
-    region = grown_road(blurred, edges.pixels, GrowthLimits(STEP, STEP, FROM_MEDIAN))
-    whole = np.zeros(blurred.shape[0], np.int64)
-    everything = whole + blurred.shape[1]
-    rows = row_medians(road.luminance, region, whole, everything)
+    region = grow_region(blurred, edges.pixels, constant_limits(blurred.shape[0], STEP, STEP, FROM_MEDIAN))
+    rows = region_medians(road.luminance, region)
     region[np.abs(road.luminance - rows.luminance[:, None]) > FROM_MEDIAN] = 0
-    rows = row_medians(road.luminance, region, whole, everything)
-    seen = rows.count > 0
+    rows = region_medians(road.luminance, region)
+    seen = rows.number > 0
     if int(seen.sum()) <= ROWS_APART:
         raise CannotTellError("the region grows over fewer rows than the method compares")
     medians = _Medians((np.flatnonzero(seen) + road.first_row).astype(np.float64), rows.luminance[seen])

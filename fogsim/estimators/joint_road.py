@@ -13,7 +13,8 @@ from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation
 from fogsim.vision.light.daylight import lit_by_lamps
-from fogsim.vision.light.linear_pixels import LinearPixels, linear_pixels
+from fogsim.vision.light.luminance import linear_pixels
+from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.lines.horizon import PITCH_DEVIATION, Horizon, PitchDeviation, calibrated_horizon, levelled, weighed
 from fogsim.vision.lines.road_lines import meeting_lines
 from fogsim.vision.strips.agreeing_strips import fit_own, with_neighbours

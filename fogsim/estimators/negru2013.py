@@ -15,7 +15,9 @@ from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import Observation
+from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.medians import median
+from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.lines.canny_deriche import CannyDeriche
 from fogsim.vision.lines.edges import Edges
 from fogsim.vision.lines.horizon import PITCH_DEVIATION, Horizon, PitchDeviation, calibrated_horizon, weighed
@@ -27,15 +29,9 @@ from fogsim.vision.region.road_image import MIN_CONTRAST, MIN_ROWS, SATURATED, C
 from fogsim.vision.strips.joint_checks import no_road
 from fogsim.vision.strips.joint_fit import JointFit, fit_jointly
 from fogsim.vision.strips.joint_prior import joint_prior
-from fogsim.vision.strips.strip_curves import (
-    LinearPixels,
-    above_bonnet,
-    band_geometry,
-    linear_pixels,
-    sky_above,
-    strip_curves,
-    without_clipped,
-)
+from fogsim.vision.strips.sky import sky_above
+from fogsim.vision.strips.strip_curves import above_bonnet, strip_curves, without_clipped
+from fogsim.vision.strips.strip_geometry import band_geometry
 
 MAX_ASIDE = 0.1
 """Share of the image's width by which a clear road may lie beside the vanishing column [-]."""

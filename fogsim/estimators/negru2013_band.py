@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
+from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.lines.edges import Edges, smoothed
 from fogsim.vision.lines.horizon import Horizon
 from fogsim.vision.region.inflection import steepest_slope
 from fogsim.vision.region.profile import RoadCurve, path_lengths
 from fogsim.vision.region.road_image import MIN_ROWS, SATURATED, CannotTellError, RoadImage
-from fogsim.vision.region.road_region import Band, crossing_band, grow_region
-from fogsim.vision.strips.strip_curves import LinearPixels
+from fogsim.vision.region.road_region import Band, crossing_band, cumulative_limits, grow_region
 
 SIMILARITY = 0.25  # [-] steepest fog, in contrasts of road to airlight a row; a silhouette takes at least 0.34
 
@@ -74,7 +74,8 @@ def road_band(road: RoadImage, edges: Edges, slope: NDArray[np.float32], camera:
         If no vertical band crosses the road's region.
     """
     blurred, steps = smoothed(road.luminance), slope + np.float32(edges.threshold)
-    region = grow_region(blurred, edges.pixels, steps, SIMILARITY * road.contrast + edges.threshold)
+    limits = cumulative_limits(steps, SIMILARITY * road.contrast + edges.threshold)
+    region = grow_region(blurred, edges.pixels, limits)
     cols, centre = camera.width, camera.principal_point[0] - road.first_column
     band = crossing_band(
         region, blurred, centre, min_width=max(3, cols // 80), max_width=max(5, cols // 24), hole=max(2, cols // 128)

@@ -8,21 +8,15 @@ from numpy.typing import NDArray
 
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
+from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.lines.horizon import Horizon
 from fogsim.vision.region.road_image import CannotTellError
 from fogsim.vision.strips.agreeing_strips import MODEL_DEVIATION, fit_agreeing
 from fogsim.vision.strips.joint_checks import no_road
 from fogsim.vision.strips.joint_fit import JointFit, JointPrior
-from fogsim.vision.strips.strip_curves import (
-    LinearPixels,
-    Sky,
-    StripCurves,
-    StripGeometry,
-    sky_above,
-    strip_curves,
-    strip_geometry,
-    without_clipped,
-)
+from fogsim.vision.strips.sky import Sky, sky_above
+from fogsim.vision.strips.strip_curves import StripCurves, strip_curves, without_clipped
+from fogsim.vision.strips.strip_geometry import StripGeometry, strip_geometry
 
 COVERED = 0.6
 """Share of a bin that the region must hold for it to be road [-]."""

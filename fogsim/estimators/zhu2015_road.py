@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from fogsim.estimators.zhu2015_fit import fitted_strips
 from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
+from fogsim.vision.light.luminance import linear_pixels
+from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.lines.edges import Edges, edge_map, smoothed
 from fogsim.vision.lines.horizon import Horizon, calibrated_horizon, levelled
 from fogsim.vision.lines.lane_lines import (
@@ -21,10 +23,9 @@ from fogsim.vision.lines.lane_lines import (
     vanishing_point,
 )
 from fogsim.vision.region.inflection import steepest_slope
-from fogsim.vision.region.road_growth import GrowthLimits, grown_road, region_tops
+from fogsim.vision.region.region_kernels import region_tops
 from fogsim.vision.region.road_image import CannotTellError, RoadImage, road_image
-from fogsim.vision.region.road_region import grow_region
-from fogsim.vision.strips.strip_curves import LinearPixels, linear_pixels
+from fogsim.vision.region.road_region import constant_limits, cumulative_limits, grow_region
 
 LOWEST_ANGLE = math.radians(10.0)
 """Angle to the rows below which a line is no lane line (zhu2015 section 3.2) [rad]."""
@@ -116,13 +117,15 @@ def seen_road(
     if growth is not None:
         lines = hough_lines(edges.pixels, first, LOWEST_ANGLE)
         point = plain_vanishing_point(lines)
-        region = grown_road(blurred, edges.pixels, GrowthLimits(growth[0], growth[0] * growth[1], growth[0]))
+        limits = constant_limits(blurred.shape[0], growth[0], growth[0] * growth[1], growth[0])
+        region = grow_region(blurred, edges.pixels, limits)
     else:
         lines = _sure_lines(edges, blurred, road, camera, told)
         expected = (camera.principal_point[0], told.row - road.first_row)
         point = vanishing_point(lines, expected, max(5.0 * told.standard_deviation, 2.0))
         steps = (slope + edges.threshold).astype(np.float32)
-        region = grow_region(blurred, edges.pixels, steps, SIMILARITY * road.contrast + edges.threshold)
+        limits = cumulative_limits(steps, SIMILARITY * road.contrast + edges.threshold)
+        region = grow_region(blurred, edges.pixels, limits)
         _hide(region, road, camera, free)
     horizon = told if point is None else _combined(told, point, road.first_row, plain=growth is not None)
     where = None if point is None else (point.column, point.row + road.first_row)

@@ -10,7 +10,7 @@ from fogsim.recorders.style import font
 from fogsim.reproduce.zhu2015_drive import Moment, observed
 from fogsim.values import Camera, Observation
 from fogsim.vision.lines.horizon import PITCH_DEVIATION
-from fogsim.vision.region.road_growth import row_medians
+from fogsim.vision.region.road_region import region_medians
 
 PICTURED = (60.0, 200.0, 600.0, float("inf"))
 """Visibilities of the picture [m], one of each class."""
@@ -88,7 +88,6 @@ def _draw_lines_and_curve(draw: ImageDraw.ImageDraw, road: SeenRoad, bottom: int
     ends = (road.horizon.row - first, float(bottom - first))
     for line in road.lines:
         draw.line([(line.column(row), row + first) for row in ends], fill=RED, width=2)
-    left = np.zeros(road.region.shape[0], np.int64)
-    medians = row_medians(road.image.luminance, road.region, left, left + road.region.shape[1])
-    rows = np.flatnonzero(medians.count)
+    medians = region_medians(road.image.luminance, road.region)
+    rows = np.flatnonzero(medians.number)
     draw.line([(float(medians.luminance[row]), float(row + first)) for row in rows], fill=YELLOW, width=2)

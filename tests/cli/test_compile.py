@@ -14,7 +14,7 @@ from fogsim.estimators import ESTIMATORS
 COMPILE = """
 import numpy as np
 import fogsim.jit
-from fogsim.vision.light.sort_kernels import median_of_few
+from fogsim.vision.light.medians import median_of_few
 fogsim.jit._PATIENCE = 0.0
 numbers = np.arange(5, dtype=np.float32)
 for kind in (np.float32, np.float64, np.int64):

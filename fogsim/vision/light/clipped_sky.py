@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from statistics import NormalDist
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fogsim.units import LUMINANCE_WEIGHTS
 from fogsim.values.camera import Camera
 from fogsim.values.camera_response import exposure_of
-from fogsim.vision.light.linear_table import linear_table
+from fogsim.vision.light.luminance import linear_table
+from fogsim.vision.light.pixel_kernels import Pixels
 
 LEAST, MOST = 0.002, 0.98
 """Shares of clipped pixels below which nothing is missing, and above which what is missing cannot be told [-]."""
@@ -43,7 +43,7 @@ class Clipping:
     spread: float
 
 
-def clipping(pixels: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera) -> Clipping:
+def clipping(pixels: Pixels, camera: Camera) -> Clipping:
     """Loss of light by clipping, from how many pixels are clipped and how far the others lie below.
 
     Noise about a light near the largest value is cut off on one side. Of a normal law μ, σ the shares p₁ and p₂ below
@@ -94,7 +94,7 @@ def darker_by(fall: float, headroom: float, spread: float) -> tuple[float, float
     return true, fall - true
 
 
-def _censored(values: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera) -> tuple[float, float]:
+def _censored(values: Pixels, camera: Camera) -> tuple[float, float]:
     """By how much the mean of one channel is too low, and its noise."""
     top = 2**camera.bits - 1
     upto = np.cumsum(np.bincount(values, minlength=top + 1)) / max(values.size, 1)

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
 from fogsim.values.camera import Camera
 from fogsim.vision.light.luminance import linear_luminance
-from fogsim.vision.light.medians import columns_apart, median, quantile
-
-Pixels = NDArray[np.uint8] | NDArray[np.uint16]
+from fogsim.vision.light.medians import columns_apart, median, quantile, span_medians
+from fogsim.vision.light.pixel_kernels import Pixels
 
 BRIGHT_SHARE = 0.75
 """Share of the sky that is no brighter than what counts as its brightness: woods and glows may cover the rest [-]."""
@@ -48,7 +46,7 @@ class _View:
     rows : (n + ROAD_ROWS,) int64
         Rows of the sky, from the top down, and of the road, from near to far.
     lane, left, right : ((rows of the road,) int64, (rows of the road,) int64)
-        First column of a strip of the road and that after its last, the same where the strip is not seen.
+        First and last column of a strip of the road, the last before the first where the strip is not seen.
     """
 
     rows: NDArray[np.int64]
@@ -75,11 +73,11 @@ def lit_by_lamps(level: Pixels, camera: Camera) -> str:
     view = _view_of(camera)
     luminance = linear_luminance(level[view.rows], camera.response, camera.bits)
     sky, road = columns_apart(luminance[:-ROAD_ROWS], SKY_STEP), luminance[-ROAD_ROWS:]
-    lane = _row_medians(road, *view.lane)
+    lane = _row_medians(road, view.lane)
     if median(lane) > quantile(sky, BRIGHT_SHARE):
         return "the road is brighter than the sky, so lamps light it: this is a daytime method"
     shining = float(np.count_nonzero(sky >= LAMP)) >= LAMPS_SHARE * sky.size and median(sky) < DARK_SKY
-    if shining and _has_beam(lane, _row_medians(road, *view.left), _row_medians(road, *view.right)):
+    if shining and _has_beam(lane, _row_medians(road, view.left), _row_medians(road, view.right)):
         return "lamps light the sky and the road: this is a daytime method"
     return ""
 
@@ -109,17 +107,13 @@ def _strip(distance: NDArray[np.float64], camera: Camera, left: float, right: fl
     first = np.maximum(np.ceil(middle + left * scale), 0.0)
     last = np.minimum(np.floor(middle + right * scale), camera.width - 1.0)
     seen = (np.floor(middle + right * scale) - first >= 0.5 * (right - left) * scale) & (first < camera.width)
-    return first.astype(np.int64), np.where(seen, last + 1.0, first).astype(np.int64)
+    return first.astype(np.int64), np.where(seen, last, first - 1.0).astype(np.int64)
 
 
-@kernel
-def _row_medians(road: NDArray[np.float32], first: NDArray[np.int64], end: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Median of each row (rows, cols) from its first column to before its end, NaN where there are none."""
-    found = np.full(len(road), np.nan)
-    for row in range(len(road)):
-        if first[row] < end[row]:
-            found[row] = np.median(road[row, first[row] : end[row]])
-    return found
+def _row_medians(road: NDArray[np.float32], strip: Strip) -> NDArray[np.float64]:
+    """Median of each row (rows, cols) of a strip, NaN where it is not seen."""
+    found = span_medians(road, np.ones(road.shape, np.uint8), *strip, road.shape[1], 1)
+    return np.where(found.number > 0, found.luminance, np.nan)
 
 
 def _has_beam(lane: NDArray[np.float64], left: NDArray[np.float64], right: NDArray[np.float64]) -> bool:

@@ -1,19 +1,58 @@
-"""Linear luminance of an image."""
+"""From pixel values to linear luminance: the inverse of the camera's response, and the weights of the colours."""
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
-from fogsim.values.camera import Response
+from fogsim.units import LUMINANCE_WEIGHTS
+from fogsim.values.camera import Camera, Response
+from fogsim.values.camera_response import exposure_of
 from fogsim.vision.light import pixel_kernels
-from fogsim.vision.light.linear_table import linear_table
+from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels
 
 
-def linear_luminance(
-    image: NDArray[np.uint8] | NDArray[np.uint16], response: Response, bits: int = 8
-) -> NDArray[np.float32]:
+@lru_cache(maxsize=3 * len(Response))
+def linear_table(response: Response, bits: int = 8) -> NDArray[np.float32]:
+    """Light behind each pixel value, in linear grey levels that are the same for every bit depth.
+
+    Parameters
+    ----------
+    response : Response
+        The assumed response of the camera.
+    bits : int
+        Its bit depth.
+
+    Returns
+    -------
+    (2^bits,) float32
+        Linear grey levels 0 … 255, read-only; the first is 0 and the last 255. sRGB: IEC 61966-2-1.
+    """
+    share = np.arange(2**bits, dtype=np.float64) / (2**bits - 1)
+    table: NDArray[np.float32] = (255.0 * exposure_of(share, response)).astype(np.float32)
+    table.flags.writeable = False
+    return table
+
+
+def linear_pixels(image: Pixels, camera: Camera) -> LinearPixels:
+    """Pair an image with the inverse of its camera's response; no pixel is touched.
+
+    Parameters
+    ----------
+    image : (rows, cols) or (rows, cols, 3) uint8 or uint16
+        An image of the camera.
+    camera : Camera
+        The assumed calibration.
+    """
+    table = linear_table(camera.response, camera.bits)
+    weights = np.array(LUMINANCE_WEIGHTS if image.ndim == 3 else (1.0,), np.float32)
+    pixels: NDArray[Any] = np.ascontiguousarray(image if image.ndim == 3 else image[:, :, None])
+    return LinearPixels(pixels, weights[:, None] * table)
+
+
+def linear_luminance(image: Pixels, response: Response, bits: int = 8) -> NDArray[np.float32]:
     """Undo a camera's response and weigh the colours to luminance (ITU-R BT.709).
 
     Parameters
@@ -21,7 +60,7 @@ def linear_luminance(
     image : (rows, cols) or (rows, cols, 3) uint8, or uint16 for more than 8 bits
         Pixel values 0 … 2^bits − 1, red first.
     response : Response
-        The told curve of the camera.
+        The assumed response of the camera.
     bits : int
         Its bit depth.
 

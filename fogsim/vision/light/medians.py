@@ -1,9 +1,17 @@
 """Medians and quantiles of few numbers, without the checks of numpy's, which take longer than the search."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from fogsim.jit import kernel
+
+MOST_SAMPLES = 64
+"""Pixels that one row's statistic is made of; more cost time and gain little beside the road's own texture."""
+
+FEWEST_SAMPLES = 3
+"""Fewest pixels of a row of a region that make a median."""
 
 
 def columns_apart(image: NDArray[Any], step: int) -> NDArray[Any]:
@@ -75,3 +83,93 @@ def row_medians(values: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
     if values.shape[1] % 2:
         return ordered[:, half].astype(np.float64)
     return np.asarray(0.5 * (ordered[:, half - 1].astype(np.float64) + ordered[:, half]))
+
+
+class SpanMedians(NamedTuple):
+    """Medians of spans of an image's rows.
+
+    Attributes
+    ----------
+    luminance : (rows,) float64
+        0 where there are too few pixels.
+    number : (rows,) int64
+        Pixels that the median is of; 0 where there are too few.
+    """
+
+    luminance: NDArray[np.float64]
+    number: NDArray[np.int64]
+
+
+@kernel
+def span_medians(
+    luminance: NDArray[np.float32],
+    region: NDArray[np.uint8],
+    left: NDArray[np.int64],
+    right: NDArray[np.int64],
+    most: int,
+    fewest: int,
+) -> SpanMedians:
+    """Median of each row's pixels that lie in a region and between two columns.
+
+    Parameters
+    ----------
+    luminance : (rows, cols) float32
+        Linear luminance.
+    region : (rows, cols) uint8
+        Non-zero inside the region.
+    left, right : (rows,) int64
+        First and last column of each row; they may lie outside the image.
+    most : int
+        Pixels of a span, evenly over it, that a median is of, or up to twice as many.
+    fewest : int
+        Fewest pixels that make a median.
+    """
+    rows, cols = luminance.shape
+    medians, counts = np.zeros(rows), np.zeros(rows, np.int64)
+    found = np.empty(cols, np.float32)
+    for row in range(rows):
+        first, last = max(left[row], 0), min(right[row], cols - 1)
+        count = 0
+        for col in range(first, last + 1, max((last - first + 1) // most, 1)):
+            if region[row, col] != 0:
+                found[count] = luminance[row, col]
+                count += 1
+        if count >= fewest:
+            medians[row], counts[row] = np.median(found[:count]), count
+    return SpanMedians(medians, counts)
+
+
+@kernel
+def sort_few(values: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+    """Sort a few dozen numbers, which quicksort is slow for, by counting for each those that come before it.
+
+    Parameters
+    ----------
+    values : (n,) float32
+        The numbers.
+    out : (n,) float32
+        The same in ascending order; is written.
+    """
+    # 32 bits, as the numbers have: else half as many fit into a register.
+    for i in range(values.size):
+        value, before = values[i], np.int32(0)
+        for j in range(values.size):
+            before += np.int32(values[j] < value)
+        for j in range(i):
+            before += np.int32(values[j] == value)
+        out[before] = value
+
+
+@kernel
+def median_of_few(values: NDArray[np.float32], ordered: NDArray[np.float32]) -> float:
+    """Median of a few dozen numbers.
+
+    Parameters
+    ----------
+    values : (n,) float32
+        The numbers.
+    ordered : (n,) float32
+        The same in ascending order; is written.
+    """
+    sort_few(values, ordered)
+    return 0.5 * (float(ordered[(values.size - 1) // 2]) + float(ordered[values.size // 2]))

@@ -4,6 +4,7 @@ Every kernel is called with the dtypes named in its docstring and C-contiguous a
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +17,37 @@ Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 _RED, _GREEN, _BLUE = (np.float32(share) for share in LUMINANCE_WEIGHTS)
 
 
+class LinearPixels(NamedTuple):
+    """An image with what makes light of its values, see `fogsim.vision.light.luminance.linear_pixels`.
+
+    Attributes
+    ----------
+    pixels : (rows, cols, channels) uint8 or uint16
+        Contiguous.
+    tables : (channels, levels) float32
+        Linear grey levels that each channel adds.
+    """
+
+    pixels: Pixels
+    tables: NDArray[np.float32]
+
+
 @kernel
 def grey_luminance(image: Pixels, table: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Look every pixel up: (rows, cols) uint8 or uint16 and (2^bits,) float32 to (rows, cols) float32."""
+    """Look every pixel up.
+
+    Parameters
+    ----------
+    image : (rows, cols) uint8 or uint16
+        Pixel values.
+    table : (2^bits,) float32
+        Linear grey levels of each value.
+
+    Returns
+    -------
+    (rows, cols) float32
+        Luminance [linear grey levels].
+    """
     rows, cols = image.shape
     out = np.empty((rows, cols), np.float32)
     for row in range(rows):
@@ -29,7 +58,20 @@ def grey_luminance(image: Pixels, table: NDArray[np.float32]) -> NDArray[np.floa
 
 @kernel
 def colour_luminance(image: Pixels, table: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Look every channel up and weigh them: (rows, cols, 3) uint8 or uint16 to (rows, cols) float32."""
+    """Look every channel up and weigh them.
+
+    Parameters
+    ----------
+    image : (rows, cols, 3) uint8 or uint16
+        Pixel values, red first.
+    table : (2^bits,) float32
+        Linear grey levels of each value.
+
+    Returns
+    -------
+    (rows, cols) float32
+        Luminance [linear grey levels].
+    """
     rows, cols, _ = image.shape
     red, green, blue = table * _RED, table * _GREEN, table * _BLUE
     out = np.empty((rows, cols), np.float32)
@@ -41,22 +83,35 @@ def colour_luminance(image: Pixels, table: NDArray[np.float32]) -> NDArray[np.fl
 
 
 @kernel
-def light(pixels: NDArray[np.uint8] | NDArray[np.uint16], tables: NDArray[np.float32], row: int, col: int) -> float:
-    """Luminance of a pixel [linear grey levels]."""
+def pixel_luminance(image: LinearPixels, row: int, col: int) -> float:
+    """Luminance of a pixel [linear grey levels].
+
+    Parameters
+    ----------
+    image : LinearPixels
+        The image.
+    row, col : int
+        Which pixel.
+    """
     total = np.float32(0.0)
-    for channel in range(pixels.shape[2]):
-        total += tables[channel, pixels[row, col, channel]]
+    for channel in range(image.pixels.shape[2]):
+        total += image.tables[channel, image.pixels[row, col, channel]]
     return float(total)
 
 
 @kernel
-def row_light(
-    pixels: NDArray[np.uint8] | NDArray[np.uint16],
-    tables: NDArray[np.float32],
-    row: int,
-    line: NDArray[np.float32],
-) -> None:
-    """Luminance of all pixels of a row; `line` (cols,) is written [linear grey levels]."""
+def row_luminance(pixels: Pixels, tables: NDArray[np.float32], row: int, line: NDArray[np.float32]) -> None:
+    """Luminance of all pixels of a row.
+
+    Parameters
+    ----------
+    pixels, tables
+        See `LinearPixels`.
+    row : int
+        Which row.
+    line : (cols,) float32
+        Their luminance [linear grey levels]; is written.
+    """
     seen = pixels[row]
     if pixels.shape[2] == 3:
         red, green, blue = tables[0], tables[1], tables[2]
@@ -69,6 +124,14 @@ def row_light(
 
 @kernel
 def even_column(j: int, count: int, left: float, right: float) -> int:
-    """Column of the j-th of `count` samples evenly between two sides [px]; those of a mirrored image are mirrored."""
+    """Column of one of several samples evenly between two sides [px]; those of a mirrored image are mirrored.
+
+    Parameters
+    ----------
+    j, count : int
+        Which sample of how many.
+    left, right : float
+        The sides [px].
+    """
     apart = (min(j, count - 1 - j) + 0.5) * (right - left) / count
     return math.floor(left + apart + 0.5) if 2 * j < count else math.ceil(right - apart - 0.5)

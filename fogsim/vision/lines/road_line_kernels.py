@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from fogsim.jit import kernel
 from fogsim.linear_algebra import inverse_of, times
-from fogsim.vision.light.pixel_kernels import row_light
-from fogsim.vision.light.sort_kernels import median_of_few
+from fogsim.vision.light.medians import median_of_few
+from fogsim.vision.light.pixel_kernels import row_luminance
 
 RISING, FALLING, RIDGE = 0, 1, 2
 """Kinds of points: edges to the brighter and to the darker side, and the middle of a narrow bright stripe."""
@@ -78,7 +78,7 @@ def row_points(
     edge, sign = np.empty(MOST_A_ROW), np.empty(MOST_A_ROW, np.int64)
     count = 0
     for row in rows:
-        row_light(pixels, tables, row, line)
+        row_luminance(pixels, tables, row, line)
         for col in range(cols - 2 * REACH):
             inner[col] = (
                 w1 * (r1[col] - l1[col])

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
-from fogsim.vision.light.linear_pixels import LinearPixels
+from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.lines import road_line_kernels
 from fogsim.vision.lines.horizon import Horizon
 from fogsim.vision.lines.uprights import lying

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.jit import kernel
 from fogsim.vision.light.medians import row_medians
-from fogsim.vision.region import region_kernels
 from fogsim.vision.region.road_region import Band
 
 MAX_BLOCKS = 48  # columns that a row's median is taken over; more cost time and gain nothing
@@ -50,9 +50,27 @@ def decreasing(profile: NDArray[np.float64]) -> NDArray[np.float64]:
     profile : (n,) float64
         Luminance by row from the top down.
     """
-    ordered: NDArray[np.float64] = region_kernels.isotonic_decreasing(np.ascontiguousarray(profile))
+    ordered: NDArray[np.float64] = _isotonic_decreasing(np.ascontiguousarray(profile))
     padded = np.concatenate([ordered[:1], ordered, ordered[-1:]])
     return 0.25 * padded[:-2] + 0.5 * padded[1:-1] + 0.25 * padded[2:]
+
+
+@kernel
+def _isotonic_decreasing(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Nearest sequence in least squares that never rises: pool adjacent violators on (n,) float64."""
+    count = values.size
+    means = np.empty(count)
+    sizes = np.empty(count, np.int64)
+    blocks = 0
+    for value in values:
+        means[blocks], sizes[blocks] = value, 1
+        blocks += 1
+        while blocks > 1 and means[blocks - 2] < means[blocks - 1]:
+            total = sizes[blocks - 2] + sizes[blocks - 1]
+            means[blocks - 2] += (means[blocks - 1] - means[blocks - 2]) * sizes[blocks - 1] / total
+            sizes[blocks - 2] = total
+            blocks -= 1
+    return np.repeat(means[:blocks], sizes[:blocks])
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,9 @@
-"""Compiled growth of regions, the widest band that crosses one, and monotone fits.
+"""Compiled growth of regions, and the widest band that crosses one.
 
 Every kernel is called with the dtypes named in its docstring and C-contiguous arrays, so that it compiles once.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,24 +11,45 @@ from numpy.typing import NDArray
 from fogsim.jit import kernel
 
 
+class GrowthLimits(NamedTuple):
+    """What a pixel may differ by to join a region that grows upward, see `fogsim.vision.region.road_region`.
+
+    Attributes
+    ----------
+    steps : (rows,) float32
+        From a neighbour in the row below [linear grey levels].
+    from_seed : (rows,) float64
+        From the seed [linear grey levels].
+    """
+
+    steps: NDArray[np.float32]
+    from_seed: NDArray[np.float64]
+
+
 @kernel
 def grow_upward(
-    luminance: NDArray[np.float32],
-    edges: NDArray[np.uint8],
-    steps: NDArray[np.float32],
-    seed: float,
-    seed_tolerance: float,
+    luminance: NDArray[np.float32], edges: NDArray[np.uint8], limits: GrowthLimits, seed: float
 ) -> NDArray[np.uint8]:
     """Grow a region from the bottom row upward; see `fogsim.vision.region.road_region.grow_region`.
 
     Growth only ever goes to the row above, so one sweep from the bottom does what a queue would.
+
+    Parameters
+    ----------
+    luminance : (rows, cols) float32
+        Smoothed linear luminance.
+    edges : (rows, cols) uint8
+        Non-zero on edges.
+    limits : GrowthLimits
+        What a pixel may differ by to join.
+    seed : float
+        Luminance of the seeds [linear grey levels].
     """
     rows, cols = luminance.shape
     region = np.zeros((rows, cols), np.uint8)
     for col in range(cols):
-        near_seed = abs(luminance[rows - 1, col] - seed) <= seed_tolerance
+        near_seed = abs(luminance[rows - 1, col] - seed) <= limits.from_seed[rows - 1]
         region[rows - 1, col] = near_seed and edges[rows - 1, col] == 0
-    drift = seed_tolerance
     nowhere = np.float32(np.inf)
     # What lies below and belongs to the region, with a border; infinite where nothing does: one comparison tells both.
     lower = np.full(cols + 2, nowhere, np.float32)
@@ -34,10 +57,9 @@ def grow_upward(
         lower[col + 1] = luminance[rows - 1, col] if region[rows - 1, col] != 0 else nowhere
     joined = np.full(cols + 2, nowhere, np.float32)
     for row in range(rows - 2, -1, -1):
-        step = steps[row]
-        drift += step
+        step, apart_most = limits.steps[row], limits.from_seed[row]
         line, marked, target = luminance[row], edges[row], region[row]
-        first, last = np.float32(seed - drift), np.float32(seed + drift)
+        first, last = np.float32(seed - apart_most), np.float32(seed + apart_most)
         before, under, behind, inside = lower[:cols], lower[1 : cols + 1], lower[2:], joined[1 : cols + 1]
         for col in range(cols):
             value = line[col]
@@ -52,10 +74,46 @@ def grow_upward(
 
 
 @kernel
-def column_tops(region: NDArray[np.uint8], hole: int) -> NDArray[np.int64]:
-    """Row to which each column of a (rows, cols) uint8 region reaches unbroken from the bottom.
+def region_tops(region: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """Topmost row of each column of a region that has one.
 
-    Gaps of up to `hole` pixels are stepped over; a column that does not start at the bottom gets `rows`.
+    Parameters
+    ----------
+    region : (rows, cols) uint8
+        Non-zero inside the region.
+
+    Returns
+    -------
+    (n,) int64
+        From left to right; fewer than `cols` if some columns have none.
+    """
+    rows, cols = region.shape
+    tops = np.empty(cols, np.int64)
+    count = 0
+    for col in range(cols):
+        for row in range(rows):
+            if region[row, col] != 0:
+                tops[count] = row
+                count += 1
+                break
+    return tops[:count]
+
+
+@kernel
+def column_tops(region: NDArray[np.uint8], hole: int) -> NDArray[np.int64]:
+    """Row to which each column of a region reaches unbroken from the bottom.
+
+    Parameters
+    ----------
+    region : (rows, cols) uint8
+        Non-zero inside the region.
+    hole : int
+        Length of gaps that are stepped over [px].
+
+    Returns
+    -------
+    (cols,) int64
+        `rows` for a column that does not start at the bottom.
     """
     rows, cols = region.shape
     tops, filled = np.full(cols, rows, np.int32), np.empty(cols, np.int32)
@@ -70,7 +128,7 @@ def column_tops(region: NDArray[np.uint8], hole: int) -> NDArray[np.int64]:
 
 
 @kernel
-def best_run(
+def _best_run(
     tops: NDArray[np.int64], top: int, enough: int, centre: float, luminance: NDArray[np.float32]
 ) -> tuple[int, int]:
     """First column and width of the widest run of columns that reach up to row `top` or higher.
@@ -115,7 +173,20 @@ def _comes_first(tops: NDArray[np.int64], luminance: NDArray[np.float32], start:
 def highest_band(
     tops: NDArray[np.int64], bottom: int, min_width: int, enough: int, centre: float, luminance: NDArray[np.float32]
 ) -> tuple[int, int, int]:
-    """Highest row that at least `min_width` neighbouring columns reach, and the best run of them (see `best_run`).
+    """Highest row that neighbouring columns reach, and the best run of them.
+
+    Parameters
+    ----------
+    tops : (cols,) int64
+        Row to which each column reaches, see `column_tops`.
+    bottom : int
+        Last row.
+    min_width, enough : int
+        Fewest columns that count, and how many are as good as more.
+    centre : float
+        Column near which the run should be [px].
+    luminance : (rows, cols) float32
+        Of runs alike in all else, the darker is taken.
 
     Returns
     -------
@@ -126,25 +197,7 @@ def highest_band(
     for top in np.unique(tops):
         if top >= bottom:
             break
-        start, width = best_run(tops, top, enough, centre, luminance)
+        start, width = _best_run(tops, top, enough, centre, luminance)
         if width >= min_width:
             return top, start, width
     return bottom, 0, 0
-
-
-@kernel
-def isotonic_decreasing(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Nearest sequence in least squares that never rises: pool adjacent violators on (n,) float64."""
-    count = values.size
-    means = np.empty(count)
-    sizes = np.empty(count, np.int64)
-    blocks = 0
-    for value in values:
-        means[blocks], sizes[blocks] = value, 1
-        blocks += 1
-        while blocks > 1 and means[blocks - 2] < means[blocks - 1]:
-            total = sizes[blocks - 2] + sizes[blocks - 1]
-            means[blocks - 2] += (means[blocks - 1] - means[blocks - 2]) * sizes[blocks - 1] / total
-            sizes[blocks - 2] = total
-            blocks -= 1
-    return np.repeat(means[:blocks], sizes[:blocks])

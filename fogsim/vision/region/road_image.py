@@ -30,9 +30,6 @@ SKY_SHARE = 0.05
 SKY_HEIGHT = 0.12
 """How far above the horizon the airlight is looked for [rad]: over a wood that stands along the horizon."""
 
-SKY_CORE = 0.02
-"""Half-width of the luminances that count as sky, relative to its bright part [-]."""
-
 
 class CannotTellError(Exception):
     """No mistake of anyone's: the honest answer to some images, which an estimator turns into an invalid estimate."""
@@ -125,31 +122,3 @@ def _checked(road: RoadImage) -> RoadImage:
     if road.contrast < max(MIN_CONTRAST, 0.05 * road.airlight):
         raise CannotTellError("the road is nearly as bright as the airlight, or brighter")
     return road
-
-
-def sky_profile(road: RoadImage, margin: int) -> NDArray[np.float64]:
-    """Luminance of the rows of sky, what stands before it left out.
-
-    Each row's mean of what lies near its bright part (its 70th percentile), over the middle two thirds.
-
-    Parameters
-    ----------
-    road : RoadImage
-        The image.
-    margin : int
-        Rows above the horizon that are left out.
-
-    Returns
-    -------
-    (n,) float64
-        From the top down; empty if there are no such rows.
-    """
-    side = road.luminance.shape[1] // 6
-    rows = road.luminance[: max(road.sky_rows - margin, 0), side:-side]
-    # A pixel's own value, so that at least that pixel is near it.
-    bright = np.percentile(rows, 70, axis=1, method="lower") if rows.size else np.zeros(0)
-    found = []
-    for row, level in zip(rows, bright, strict=True):
-        core = row[np.abs(row - level) <= max(SKY_CORE * float(level), 3.0)]
-        found.append(float(core.mean(dtype=np.float64)))
-    return np.array(found)

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.vision.light.medians import median
+from fogsim.vision.light.medians import FEWEST_SAMPLES, MOST_SAMPLES, SpanMedians, median, span_medians
 from fogsim.vision.region import region_kernels
+from fogsim.vision.region.region_kernels import GrowthLimits
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,14 +28,45 @@ class Band:
     bottom: int
 
 
-def grow_region(
-    luminance: NDArray[np.float32], edges: NDArray[np.uint8], steps: NDArray[np.float32], seed_tolerance: float
-) -> NDArray[np.uint8]:
-    """Grow the road's region upward from its bottom row (negru2013 section IV.B.b after Hautière 2006).
+def cumulative_limits(steps: NDArray[np.float32], seed_tolerance: float) -> GrowthLimits:
+    """Limits that follow from what fog and noise allow between rows (negru2013 section IV.B.b after Hautière 2006).
+
+    A pixel may differ from the seed by no more than the sum of the steps on the way.
+
+    Parameters
+    ----------
+    steps : (rows,) float32
+        Largest difference of each row to the one below [linear grey levels].
+    seed_tolerance : float
+        Largest difference of a seed from the median of the bottom row [linear grey levels].
+    """
+    upward = np.concatenate(([seed_tolerance], steps[-2::-1].astype(np.float64)))
+    return GrowthLimits(steps, np.ascontiguousarray(np.cumsum(upward)[::-1]))
+
+
+def constant_limits(rows: int, step: float, per_row: float, seed_tolerance: float) -> GrowthLimits:
+    """Limits that are the same in every row (zhu2015 eqs. 8 to 11, huang2015's first three constraints).
+
+    Parameters
+    ----------
+    rows : int
+        Rows of the image.
+    step : float
+        Largest difference from a neighbour in the row below [linear grey levels].
+    per_row : float
+        Largest difference from the seed for each row of distance from it [linear grey levels].
+    seed_tolerance : float
+        Largest difference of a seed from the median of the bottom row [linear grey levels].
+    """
+    from_seed = seed_tolerance + per_row * np.arange(rows - 1, -1, -1, dtype=np.float64)
+    return GrowthLimits(np.full(rows, step, np.float32), from_seed)
+
+
+def grow_region(luminance: NDArray[np.float32], edges: NDArray[np.uint8], limits: GrowthLimits) -> NDArray[np.uint8]:
+    """Grow the road's region upward from its bottom row.
 
     Seeds are the pixels of the bottom row near that row's median. From each pixel of the region the three pixels
-    above it join if they are not edges, differ from the pixel below by no more than fog and noise allow there, and from
-    the seed by no more than the sum of that on the way.
+    above it join if they are not edges and differ from the pixel below, and from the seed, by no more than allowed.
 
     Parameters
     ----------
@@ -42,19 +74,29 @@ def grow_region(
         Smoothed linear luminance.
     edges : (rows, cols) uint8
         Non-zero on edges.
-    steps : (rows,) float32
-        Largest difference of each row to the one below [linear grey levels].
-    seed_tolerance : float
-        Largest difference of a seed from the median of the bottom row [linear grey levels].
+    limits : GrowthLimits
+        See `cumulative_limits` and `constant_limits`.
 
     Returns
     -------
     (rows, cols) uint8
         1 inside the region.
     """
-    seed = median(luminance[-1])
-    region: NDArray[np.uint8] = region_kernels.grow_upward(luminance, edges, steps, seed, float(seed_tolerance))
-    return region
+    return region_kernels.grow_upward(luminance, edges, limits, median(luminance[-1]))
+
+
+def region_medians(luminance: NDArray[np.float32], region: NDArray[np.uint8]) -> SpanMedians:
+    """Median of each row's pixels that lie in a region.
+
+    Parameters
+    ----------
+    luminance : (rows, cols) float32
+        Linear luminance.
+    region : (rows, cols) uint8
+        Non-zero inside the region.
+    """
+    left = np.zeros(region.shape[0], np.int64)
+    return span_medians(luminance, region, left, left + region.shape[1], MOST_SAMPLES, FEWEST_SAMPLES)
 
 
 def crossing_band(

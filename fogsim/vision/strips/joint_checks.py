@@ -4,10 +4,11 @@ import numpy as np
 
 from fogsim.linear_algebra import matrix_product
 from fogsim.values.camera import Camera
-from fogsim.vision.light.linear_table import linear_table
+from fogsim.vision.light.luminance import linear_table
 from fogsim.vision.light.medians import median
 from fogsim.vision.strips.joint_fit import JointFit
-from fogsim.vision.strips.strip_curves import StripCurves, StripGeometry
+from fogsim.vision.strips.strip_curves import StripCurves
+from fogsim.vision.strips.strip_geometry import StripGeometry
 
 MAX_SCATTER = 0.22
 """Scatter across the own lane relative to its contrast to the airlight, beyond which it is no road [-]: marks, shadows

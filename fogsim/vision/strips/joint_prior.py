@@ -4,7 +4,7 @@ import math
 from statistics import NormalDist
 
 from fogsim.values.camera import Camera
-from fogsim.vision.light.linear_table import linear_table
+from fogsim.vision.light.luminance import linear_table
 from fogsim.vision.lines.horizon import Horizon
 from fogsim.vision.strips.joint_fit import JointPrior
 from fogsim.vision.strips.sky import SATURATED_SHARE, Sky

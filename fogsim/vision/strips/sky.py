@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
-from fogsim.vision.light.linear_pixels import LinearPixels
 from fogsim.vision.light.medians import median
+from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.strips import sky_kernels
 
 Floats = NDArray[np.float64]
@@ -104,30 +104,30 @@ def sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
         return None
     rows = even_rows(top, bottom, SKY_ROWS)
     side = camera.width // 6
-    noise = sky_kernels.pixel_noise(image.pixels, image.tables, rows)
-    bright, share = sky_kernels.sky_rows(image.pixels, image.tables, rows, side, camera.width - side, max(noise, 0.3))
+    noise = sky_kernels.pixel_noise(image, rows)
+    bright, share = sky_kernels.sky_rows(image, rows, side, camera.width - side, max(noise, 0.3))
     height = (camera.horizon_row - rows.astype(np.float64)) / camera.focal_length
     darker = max(DARKER, 2.0 * noise / max(float(bright.max()), 1e-9))
     level, _, scatter, lowest = sky_kernels.level_at_horizon(bright, height, darker)
     if lowest > MOST_HIDDEN:
         return None
-    saturated, clipped = sky_kernels.saturation(image.pixels, image.tables.shape[1] - 1, rows, side)
+    saturated, clipped = sky_kernels.saturation(image, rows, side)
     # Where the sky is clipped it looks the same though a lens darkens it.
     free = np.flatnonzero(height >= lowest)[::-2] if clipped <= SATURATED_SHARE else np.zeros(0, np.int64)
-    bowl = _bowl(image, camera, rows[free], bright[free], noise)
-    if bowl is None:
-        bowl = _Bowl(level, scatter, 0.0, UNTOLD_DARKENING)
-    level, scatter = bowl.level, bowl.deviation
+    shading = _shading(image, camera, rows[free], bright[free], noise)
+    if shading is None:
+        shading = _Shading(level, scatter, 0.0, UNTOLD_DARKENING)
+    level, scatter = shading.level, shading.deviation
     unseen = UNSEEN * max(float(lowest) - margin / camera.focal_length - CLOSE, 0.0) * level
     deviation = math.hypot(scatter, unseen)
     # What looks everywhere different is a wood rather than a sky, which is no darker than that.
     covered = median(share) < PATCHY and scatter > SCATTERED * level
     upward = BRIGHTER * level if covered else deviation
-    return Sky(level, deviation, upward, noise, saturated, clipped, bowl.darkening, bowl.darkening_deviation)
+    return Sky(level, deviation, upward, noise, saturated, clipped, shading.darkening, shading.darkening_deviation)
 
 
 @dataclass(frozen=True, slots=True)
-class _Bowl:
+class _Shading:
     """Brightness at the horizon straight ahead and darkening of the lens, with their standard deviations."""
 
     level: float
@@ -136,18 +136,20 @@ class _Bowl:
     darkening_deviation: float
 
 
-def _bowl(image: LinearPixels, camera: Camera, rows: NDArray[np.int64], bright: Floats, noise: float) -> _Bowl | None:
+def _shading(
+    image: LinearPixels, camera: Camera, rows: NDArray[np.int64], bright: Floats, noise: float
+) -> _Shading | None:
     """Sky of even slopes behind a lens; None where it does not fill most of its rows, or is black."""
     if rows.size < 2 or float(np.median(bright)) <= 0.0:
         return None
     axis = np.array([*camera.principal_point, camera.horizon_row, camera.focal_length])
-    found, covariance, seen = sky_kernels.sky_bowl(image.pixels, image.tables, rows, axis, bright, noise)
+    found, covariance, seen = sky_kernels.sky_shading(image, rows, axis, bright, noise)
     level = float(found[0])
     if seen < LEAST_SEEN or level <= 0.0:
         return None
     darkening = min(max(float(found[3]) / level, 0.0), MOST_DARKENING)
     deviation = min(math.hypot(UNEVEN, math.sqrt(covariance[3, 3]) / level), UNTOLD_DARKENING)
-    return _Bowl(level, math.sqrt(covariance[0, 0]), darkening, deviation)
+    return _Shading(level, math.sqrt(covariance[0, 0]), darkening, deviation)
 
 
 @functools.lru_cache(maxsize=64)

@@ -7,9 +7,8 @@ from numpy.typing import NDArray
 
 from fogsim.jit import kernel
 from fogsim.linear_algebra import inverse_of, times
-from fogsim.vision.light.pixel_kernels import even_column, light
-from fogsim.vision.light.sort_kernels import sort_few
-from fogsim.vision.strips.strip_kernels import MOST_SAMPLES
+from fogsim.vision.light.medians import MOST_SAMPLES, sort_few
+from fogsim.vision.light.pixel_kernels import LinearPixels, even_column, pixel_luminance
 
 SKY_SHARE, SKY_WIDTH = 7, 0.012
 """Part of a row (one in so many) that sky must fill to be found, and half the width of its luminances, relative [-]."""
@@ -23,8 +22,7 @@ LEAST_SKY_HEIGHT, STEEPEST_SKY = 0.04, 0.8
 
 @kernel
 def sky_rows(
-    pixels: NDArray[np.uint8] | NDArray[np.uint16],
-    tables: NDArray[np.float32],
+    image: LinearPixels,
     rows: NDArray[np.int64],
     left: int,
     right: int,
@@ -33,14 +31,30 @@ def sky_rows(
     """Brightness of the bright part of each row: of the sky, where trees and vehicles stand before it.
 
     Starts near the row's brightest and moves to the mean of what lies near, so that what is darker may cover most of
-    the row. The second of the two arrays is the share of the row that is as bright.
+    the row.
+
+    Parameters
+    ----------
+    image : LinearPixels
+        The image.
+    rows : (n,) int64
+        Which rows.
+    left, right : int
+        First column that is looked at, and that after the last.
+    floor : float
+        Least deviation of what counts as equally bright [linear grey levels].
+
+    Returns
+    -------
+    tuple of (n,) float64
+        Brightness [linear grey levels], and the share of each row that is as bright.
     """
     bright, share = np.zeros(rows.size), np.zeros(rows.size)
     count = min(MOST_SAMPLES, right - left)
     samples, ordered = np.empty(count, np.float32), np.empty(count, np.float32)
     for i in range(rows.size):
         for j in range(count):
-            samples[j] = light(pixels, tables, rows[i], even_column(j, count, left - 0.5, right - 0.5))
+            samples[j] = pixel_luminance(image, rows[i], even_column(j, count, left - 0.5, right - 0.5))
         sort_few(samples, ordered)
         centre, kept = float(ordered[count - 1 - count // SKY_SHARE]), 0
         reach = max(2.5 * floor, SKY_WIDTH * centre)
@@ -103,11 +117,17 @@ def level_at_horizon(
 
 
 @kernel
-def pixel_noise(
-    pixels: NDArray[np.uint8] | NDArray[np.uint16], tables: NDArray[np.float32], rows: NDArray[np.int64]
-) -> float:
-    """Robust deviation of single pixels on rows, from the differences of neighbours [linear grey levels]."""
-    cols = pixels.shape[1]
+def pixel_noise(image: LinearPixels, rows: NDArray[np.int64]) -> float:
+    """Robust deviation of single pixels, from the differences of neighbours [linear grey levels].
+
+    Parameters
+    ----------
+    image : LinearPixels
+        The image.
+    rows : (n,) int64
+        Which rows are looked at.
+    """
+    cols = image.pixels.shape[1]
     per_row = max((cols - 1) // 2, 1)
     step = max(per_row // 32, 1)
     apart = np.empty(rows.size * (per_row // step + 1))
@@ -115,7 +135,7 @@ def pixel_noise(
     for row in rows:
         for col in range(((cols - 2) % (2 * step)) // 2, cols - 1, 2 * step):
             if count < apart.size:
-                apart[count] = abs(light(pixels, tables, row, col) - light(pixels, tables, row, col + 1))
+                apart[count] = abs(pixel_luminance(image, row, col) - pixel_luminance(image, row, col + 1))
                 count += 1
     # The root of the mean square of the lower three quarters stands for all: medians of whole numbers jump.
     ordered = np.sort(apart[:count])
@@ -128,10 +148,19 @@ def pixel_noise(
 
 
 @kernel
-def saturation(
-    pixels: NDArray[np.uint8] | NDArray[np.uint16], largest: int, rows: NDArray[np.int64], side: int
-) -> tuple[float, float]:
-    """Shares of rows' pixels with all and with some channels saturated, but for `side` columns at either end."""
+def saturation(image: LinearPixels, rows: NDArray[np.int64], side: int) -> tuple[float, float]:
+    """Shares of pixels with all, and with some channels saturated.
+
+    Parameters
+    ----------
+    image : LinearPixels
+        The image.
+    rows : (n,) int64
+        Which rows are looked at.
+    side : int
+        Columns that are left out at either end.
+    """
+    pixels, largest = image.pixels, image.tables.shape[1] - 1
     cols, channels = pixels.shape[1], pixels.shape[2]
     every, some = 0, 0
     for row in rows:
@@ -145,14 +174,14 @@ def saturation(
     return every / total, some / total
 
 
-PLANE_SCALES = (0.06, 0.02, 0.006, 0.006)
-"""Deviations beyond which a pixel weighs little in each iteration of the fit of a bowl, relative to the sky [-]."""
+SHADING_SCALES = (0.06, 0.02, 0.006, 0.006)
+"""Deviations beyond which a pixel weighs little in each iteration of the fit of a sky's shading, relative to it [-]."""
 
-TILT, BRIGHTENING, BOWL = 0.3, 1.5, 0.5
+TILT, BRIGHTENING, VIGNETTING = 0.3, 1.5, 0.5
 """Standard deviations of a sky's slopes sideways and upward, and of its fall toward the corners, before it is looked
 at, relative to it [-]."""
 
-BOWL_COLS = 32
+SHADING_COLS = 32
 """Pixels of each row that are looked at."""
 
 ALIKE = 4.0
@@ -160,20 +189,15 @@ ALIKE = 4.0
 
 
 @kernel
-def sky_bowl(
-    pixels: NDArray[np.uint8] | NDArray[np.uint16],
-    tables: NDArray[np.float32],
-    rows: NDArray[np.int64],
-    axis: NDArray[np.float64],
-    bright: NDArray[np.float64],
-    noise: float,
+def sky_shading(
+    image: LinearPixels, rows: NDArray[np.int64], axis: NDArray[np.float64], bright: NDArray[np.float64], noise: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     """Sky as L = a + b x + c y − d (1 − cos⁴ of the angle to the camera's axis), by least squares in Cauchy's norm.
 
     Parameters
     ----------
-    pixels, tables
-        See `pixel_noise`.
+    image : LinearPixels
+        The image.
     rows : (n,) int64
         Rows that show sky.
     axis : (4,) float64
@@ -188,53 +212,69 @@ def sky_bowl(
     tuple of (4,) and (4, 4) float64 and float
         a, b, c, d, their covariance, and the share of pixels that lie near.
     """
-    cols, count = pixels.shape[1], BOWL_COLS
+    cols, count = image.pixels.shape[1], SHADING_COLS
     level = float(np.median(bright))
-    height = (axis[2] - rows) / axis[3]
+    height, above_axis = (axis[2] - rows) / axis[3], (axis[1] - rows) / axis[3]
     found = np.array([level, 0.0, 0.0, 0.0])
     covariance: NDArray[np.float64] = np.eye(4)
-    seen, place = np.empty((rows.size, count)), np.empty(count)
+    seen, aside = np.empty((rows.size, count)), np.empty(count)
     for j in range(count):
         col = even_column(j, count, -0.5, cols - 0.5)
-        place[j] = (col - axis[0]) / axis[3]
+        aside[j] = (col - axis[0]) / axis[3]
         for i in range(rows.size):
-            seen[i, j] = light(pixels, tables, rows[i], col)
+            seen[i, j] = pixel_luminance(image, rows[i], col)
     number = 0
-    for relative in PLANE_SCALES:
+    for relative in SHADING_SCALES:
         spread = (relative * level) ** 2 + (2.0 * noise) ** 2
         normal, right = np.zeros((4, 4)), np.zeros(4)
         normal[0, 0] = 1e-6
-        for a, deviation in ((1, TILT), (2, BRIGHTENING), (3, BOWL)):
+        for a, deviation in ((1, TILT), (2, BRIGHTENING), (3, VIGNETTING)):
             normal[a, a] = spread / (deviation * level) ** 2
-        number, squares = 0, 0.0
-        for i in range(rows.size):
-            y = (axis[1] - rows[i]) / axis[3]
-            for j in range(count):
-                off = 1.0 - 1.0 / (1.0 + place[j] * place[j] + y * y) ** 2
-                rest = seen[i, j] - found[0] - found[1] * place[j] - found[2] * height[i] + found[3] * off
-                if rest * rest < 4.0 * spread:
-                    number += 1
-                    squares += rest * rest
-                weight = 1.0 / (1.0 + rest * rest / spread) ** 2
-                p1, p2, p3 = place[j], height[i], -off
-                normal[0, 0] += weight
-                normal[0, 1] += weight * p1
-                normal[0, 2] += weight * p2
-                normal[0, 3] += weight * p3
-                normal[1, 1] += weight * p1 * p1
-                normal[1, 2] += weight * p1 * p2
-                normal[1, 3] += weight * p1 * p3
-                normal[2, 2] += weight * p2 * p2
-                normal[2, 3] += weight * p2 * p3
-                normal[3, 3] += weight * p3 * p3
-                right[0] += weight * seen[i, j]
-                right[1] += weight * seen[i, j] * p1
-                right[2] += weight * seen[i, j] * p2
-                right[3] += weight * seen[i, j] * p3
-        for a in range(4):
-            for b in range(a):
-                normal[a, b] = normal[b, a]
+        number, squares = _add_sky(seen, aside, height, above_axis, found, spread, normal, right)
         inverse = inverse_of(normal)
         found = times(inverse, right)
         covariance = inverse * (ALIKE * max(squares / max(number, 1), noise * noise))
     return found, covariance, number / seen.size
+
+
+@kernel
+def _add_sky(
+    seen: NDArray[np.float64],
+    aside: NDArray[np.float64],
+    height: NDArray[np.float64],
+    above_axis: NDArray[np.float64],
+    found: NDArray[np.float64],
+    spread: float,
+    normal: NDArray[np.float64],
+    right: NDArray[np.float64],
+) -> tuple[int, float]:
+    """Add pixels to the normal equations of a sky's shading; returns how many lie near, and their squares."""
+    number, squares = 0, 0.0
+    for i in range(height.size):
+        y = above_axis[i]
+        for j in range(aside.size):
+            off = 1.0 - 1.0 / (1.0 + aside[j] * aside[j] + y * y) ** 2
+            rest = seen[i, j] - found[0] - found[1] * aside[j] - found[2] * height[i] + found[3] * off
+            if rest * rest < 4.0 * spread:
+                number += 1
+                squares += rest * rest
+            weight = 1.0 / (1.0 + rest * rest / spread) ** 2
+            p1, p2, p3 = aside[j], height[i], -off
+            normal[0, 0] += weight
+            normal[0, 1] += weight * p1
+            normal[0, 2] += weight * p2
+            normal[0, 3] += weight * p3
+            normal[1, 1] += weight * p1 * p1
+            normal[1, 2] += weight * p1 * p2
+            normal[1, 3] += weight * p1 * p3
+            normal[2, 2] += weight * p2 * p2
+            normal[2, 3] += weight * p2 * p3
+            normal[3, 3] += weight * p3 * p3
+            right[0] += weight * seen[i, j]
+            right[1] += weight * seen[i, j] * p1
+            right[2] += weight * seen[i, j] * p2
+            right[3] += weight * seen[i, j] * p3
+    for a in range(4):
+        for b in range(a):
+            normal[a, b] = normal[b, a]
+    return number, squares

@@ -7,29 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
-from fogsim.vision.light.linear_pixels import LinearPixels, Pixels, linear_pixels
-from fogsim.vision.light.linear_table import linear_table
+from fogsim.vision.light.luminance import linear_table
 from fogsim.vision.light.medians import median
+from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.strips import strip_kernels
-from fogsim.vision.strips.sky import Sky, even_rows, sky_above
-from fogsim.vision.strips.strip_geometry import StripGeometry, band_geometry, strip_geometry
-
-__all__ = [
-    "LinearPixels",
-    "Pixels",
-    "Sky",
-    "StripCurves",
-    "StripGeometry",
-    "above_bonnet",
-    "band_geometry",
-    "linear_pixels",
-    "mean_curves",
-    "sky_above",
-    "strip_curves",
-    "strip_geometry",
-    "without_clipped",
-    "without_rows_below",
-]
+from fogsim.vision.strips.sky import Sky, even_rows
+from fogsim.vision.strips.strip_geometry import StripGeometry
 
 Floats = NDArray[np.float64]
 
@@ -96,9 +79,8 @@ def strip_curves(
     metres = (geometry.right - geometry.left) * (geometry.distance / camera.focal_length)
     pieces = np.maximum(metres / GRAIN, 1.0) * np.maximum(geometry.extent / GRAIN, 1.0)
     for strip, values in enumerate(out):
-        sides = np.stack([geometry.left[strip], geometry.right[strip]])
-        where = (rows, sides, pieces[strip], vehicle)
-        strip_kernels.strip_bins(image.pixels, image.tables, table, *where, noise, values, known is not None)
+        bins = strip_kernels.StripBins(rows, np.stack([geometry.left[strip], geometry.right[strip]]), pieces[strip])
+        strip_kernels.strip_bins(image, table, bins, vehicle, noise, values, known is not None)
     return StripCurves(out[:, 0], out[:, 1], out[:, 2])
 
 
@@ -126,7 +108,7 @@ def above_bonnet(image: LinearPixels, camera: Camera, airlight: float) -> int:
     rows = even_rows(bottom, top, BONNET_ROWS)[::-1]
     if rows.size < 8:
         return bottom
-    level = strip_kernels.middle_levels(image.pixels, image.tables, rows)
+    level = strip_kernels.middle_levels(image, rows)
     # Three rows each side of a gap of two, since a bonnet's edge is bent.
     mean = (level[:-2] + level[1:-1] + level[2:]) / 3.0
     change = mean[5:] - mean[:-5]

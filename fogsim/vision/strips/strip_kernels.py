@@ -1,16 +1,14 @@
 """Compiled row statistics of strips of road and of rows of sky, read straight from the pixels that they need."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
-from fogsim.vision.light.pixel_kernels import even_column, light
-from fogsim.vision.light.sort_kernels import median_of_few
-
-MOST_SAMPLES = 64
-"""Pixels that one row's statistic is made of; more cost time and gain little beside the road's own texture."""
+from fogsim.vision.light.medians import MOST_SAMPLES, median_of_few
+from fogsim.vision.light.pixel_kernels import LinearPixels, even_column, pixel_luminance
 
 LEAST_DEVIATION = 0.1
 """Least deviation of a bin's mean: what quantisation leaves [linear grey levels]."""
@@ -20,6 +18,24 @@ QUIET, SMOOTHED = 0.3, 1.0
 
 KEPT = 2.5
 """Half-width of the core of a row, in its robust standard deviations: marks and other narrow things lie outside."""
+
+
+class StripBins(NamedTuple):
+    """Where the bins of one strip of road are.
+
+    Attributes
+    ----------
+    rows : (2, n) int64
+        First and last row of each bin.
+    sides : (2, n) float64
+        Columns between which the strip lies on each bin.
+    pieces : (n,) float64
+        Pieces of road in each bin whose albedo counts as independent.
+    """
+
+    rows: NDArray[np.int64]
+    sides: NDArray[np.float64]
+    pieces: NDArray[np.float64]
 
 
 @kernel
@@ -76,12 +92,9 @@ def _core(samples: NDArray[np.float32], ordered: NDArray[np.float32], floor: flo
 
 @kernel
 def strip_bins(
-    pixels: NDArray[np.uint8] | NDArray[np.uint16],
-    tables: NDArray[np.float32],
+    image: LinearPixels,
     table: NDArray[np.float32],
-    rows: NDArray[np.int64],
-    sides: NDArray[np.float64],
-    pieces: NDArray[np.float64],
+    bins: StripBins,
     vehicle: NDArray[np.float64],
     noise: float,
     out: NDArray[np.float64],
@@ -91,18 +104,12 @@ def strip_bins(
 
     Parameters
     ----------
-    pixels : (rows, cols, channels) uint8 or uint16
+    image : LinearPixels
         The image.
-    tables : (channels, levels) float32
-        Linear grey levels that each channel adds.
     table : (levels,) float32
         Linear grey levels of all channels together.
-    rows : (2, n) int64
-        First and last row of each bin.
-    sides : (2, n) float64
-        Columns between which the strip lies on each bin.
-    pieces : (n,) float64
-        Pieces of road in each bin whose albedo counts as independent.
+    bins : StripBins
+        Where to look.
     vehicle : (3,) float64
         Columns between which a vehicle hides the road, and the row of its foot, from which on upward it does.
     noise : float
@@ -112,7 +119,7 @@ def strip_bins(
     again : bool
         Read only bins that the vehicle hides, if only in part, and that have a datum.
     """
-    cols = pixels.shape[1]
+    cols, rows, sides = image.pixels.shape[1], bins.rows, bins.sides
     samples, ordered = np.empty(MOST_SAMPLES, np.float32), np.empty(MOST_SAMPLES, np.float32)
     for i in range(rows.shape[1]):
         low, width, height = sides[0, i], sides[1, i] - sides[0, i], rows[1, i] - rows[0, i] + 1
@@ -131,13 +138,13 @@ def strip_bins(
             apart = (j + 0.5) * step + 0.5
             for col in (math.floor(low + apart), math.ceil(sides[1, i] - apart)):
                 if not (hides and vehicle[0] <= col <= vehicle[1]):
-                    samples[taken] = light(pixels, tables, row, min(max(col, 0), cols - 1))
+                    samples[taken] = pixel_luminance(image, row, min(max(col, 0), cols - 1))
                     taken += 1
             row = row + 1 if row < rows[1, i] else rows[0, i]
         if taken < 2 or taken < 0.25 * wanted:
             continue
         mean, deviation, scatter = _core(samples[:taken], ordered[:taken], max(noise, 2.0 * LEAST_DEVIATION))
-        texture = max(deviation**2 - noise**2, 0.0) / min(float(taken), pieces[i])
+        texture = max(deviation**2 - noise**2, 0.0) / min(float(taken), bins.pieces[i])
         out[0, i], out[2, i] = mean, scatter
         out[1, i] = noise**2 / taken + texture + LEAST_DEVIATION**2 + _coarseness(mean, deviation, noise, table)
 
@@ -154,14 +161,21 @@ def _coarseness(mean: float, deviation: float, noise: float, table: NDArray[np.f
 
 
 @kernel
-def middle_levels(
-    pixels: NDArray[np.uint8] | NDArray[np.uint16], tables: NDArray[np.float32], rows: NDArray[np.int64]
-) -> NDArray[np.float64]:
-    """Median of the middle third of each row (n,) [linear grey levels]."""
-    cols, samples, ordered = pixels.shape[1], np.empty(24, np.float32), np.empty(24, np.float32)
+def middle_levels(image: LinearPixels, rows: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Median luminance of the middle third of rows [linear grey levels].
+
+    Parameters
+    ----------
+    image : LinearPixels
+        The image.
+    rows : (n,) int64
+        Which rows.
+    """
+    cols = image.pixels.shape[1]
+    samples, ordered = np.empty(24, np.float32), np.empty(24, np.float32)
     left, right, out = cols // 3 - 0.5, cols - cols // 3 - 0.5, np.empty(rows.size)
     for i in range(rows.size):
         for j in range(samples.size):
-            samples[j] = light(pixels, tables, rows[i], even_column(j, samples.size, left, right))
+            samples[j] = pixel_luminance(image, rows[i], even_column(j, samples.size, left, right))
         out[i] = median_of_few(samples, ordered)
     return out

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
 from fogsim.vision.light.clipped_sky import Clipping, clipping
-from fogsim.vision.light.linear_table import linear_table
+from fogsim.vision.light.luminance import linear_pixels, linear_table
+from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels
 from fogsim.vision.lines.horizon import levelled
 from fogsim.vision.region.road_image import CannotTellError
-from fogsim.vision.strips.strip_curves import LinearPixels, Pixels, Sky, linear_pixels, sky_above
+from fogsim.vision.strips.sky import Sky, sky_above
 from fogsim.vision.vehicle.lead_daylight import RoadFall, check_road, road_before, road_fall
 from fogsim.vision.vehicle.lead_patch import LeadPicture
 from fogsim.vision.vehicle.lead_sky import airlight_beside, hidden_beside

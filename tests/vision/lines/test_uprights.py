@@ -5,10 +5,10 @@ import pytest
 from flat_road import Road, photograph, scan
 
 from fogsim.values import Camera, Response
+from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.lines.horizon import calibrated_horizon
 from fogsim.vision.lines.road_lines import meeting_lines
 from fogsim.vision.lines.uprights import lying
-from fogsim.vision.strips.strip_curves import linear_pixels
 
 STEP = 3
 

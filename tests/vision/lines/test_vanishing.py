@@ -3,11 +3,11 @@ import pytest
 from stripes import CENTRE, ROW, road_lines
 
 from fogsim.values import Camera
+from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.lines.canny_deriche import CannyDeriche
 from fogsim.vision.lines.horizon import Horizon
 from fogsim.vision.lines.road_lines import meeting_lines
 from fogsim.vision.lines.vanishing import vanishing_point
-from fogsim.vision.strips.strip_curves import linear_pixels
 
 
 def published(image, guess=(325.0, 64.0)):

@@ -5,18 +5,28 @@ from fogsim.values import Camera
 from fogsim.vision.lines.edges import edge_map, smoothed
 from fogsim.vision.lines.horizon import calibrated_horizon, levelled
 from fogsim.vision.region.inflection import steepest_slope
-from fogsim.vision.region.profile import band_profile
-from fogsim.vision.region.region_kernels import isotonic_decreasing
-from fogsim.vision.region.road_region import Band, crossing_band, grow_region
+from fogsim.vision.region.road_region import (
+    Band,
+    constant_limits,
+    crossing_band,
+    cumulative_limits,
+    grow_region,
+    region_medians,
+)
 
 CAMERA = Camera(640, 480, 577.0, (319.5, 239.5), 1.38, np.radians(2.0))
 EVEN = np.ones((50, 60), np.float32)
 
 
+def even(image):
+    """Limits of 5 grey levels a row."""
+    return cumulative_limits(np.full(image.shape[0], 5.0, np.float32), 5.0)
+
+
 def test_region_fills_a_smooth_ramp_and_stops_at_a_step():
     image = np.repeat(np.linspace(120, 60, 60, dtype=np.float32)[:, None], 40, axis=1)
     image[:10] += 50
-    region = grow_region(image, np.zeros(image.shape, np.uint8), np.full(image.shape[0], 5.0, np.float32), 5.0)
+    region = grow_region(image, np.zeros(image.shape, np.uint8), even(image))
     assert region[10:].all()
     assert not region[:10].any()
 
@@ -24,7 +34,7 @@ def test_region_fills_a_smooth_ramp_and_stops_at_a_step():
 def test_region_does_not_enter_edges_and_goes_round_them():
     image, edges = np.full((40, 40), 80.0, np.float32), np.zeros((40, 40), np.uint8)
     edges[20, 10:20] = 255
-    region = grow_region(image, edges, np.full(image.shape[0], 5.0, np.float32), 5.0)
+    region = grow_region(image, edges, even(image))
     assert not region[20, 10:20].any()
     # Growth is one column a row at most: behind the edge a triangle stays dark.
     assert not region[19, 12:18].any()
@@ -34,9 +44,34 @@ def test_region_does_not_enter_edges_and_goes_round_them():
 def test_seeds_are_near_the_median_only():
     image = np.full((20, 40), 80.0, np.float32)
     image[:, 30:] = 200.0
-    region = grow_region(image, np.zeros(image.shape, np.uint8), np.full(image.shape[0], 5.0, np.float32), 5.0)
+    region = grow_region(image, np.zeros(image.shape, np.uint8), even(image))
     assert region[:, :30].all()
     assert not region[:, 30:].any()
+
+
+def test_equal_steps_are_the_constant_limits_of_the_papers():
+    summed, constant = even(EVEN), constant_limits(50, 5.0, 5.0, 5.0)
+    assert summed.from_seed.tolist() == constant.from_seed.tolist() == [250.0 - 5.0 * row for row in range(50)]
+    assert summed.steps.tolist() == constant.steps.tolist()
+
+
+def test_a_slope_joins_step_by_step_only_as_far_as_the_seed_allows():
+    image = np.repeat(np.linspace(157, 60, 98, dtype=np.float32)[:, None], 40, axis=1)
+    edges = np.zeros(image.shape, np.uint8)
+    # A grey level a row, of which half a level a row is allowed: with 10 for the seed 20 rows join.
+    region = grow_region(image, edges, constant_limits(98, 1.0, 0.5, 10.0))
+    assert region.any(axis=1).sum() == 21
+    assert not grow_region(image, edges, constant_limits(98, 0.9, 1.0, 10.0))[:-1].any()
+
+
+def test_medians_are_those_of_the_regions_pixels():
+    image = np.random.default_rng(1).uniform(0.0, 255.0, (5, 60)).astype(np.float32)
+    region = np.zeros(image.shape, np.uint8)
+    region[1, 10:13], region[2, 5:56:5], region[3], region[4, :2] = 1, 1, 1, 1
+    found = region_medians(image, region)
+    expected = [0.0, np.median(image[1, 10:13]), np.median(image[2, 5:56:5]), np.median(image[3]), 0.0]
+    assert found.luminance == pytest.approx(expected)
+    assert found.number.tolist() == [0, 3, 11, 60, 0]
 
 
 def test_band_is_the_widest_that_reaches_the_top():
@@ -73,17 +108,6 @@ def test_no_band_without_a_bottom():
     region = np.ones((50, 20), np.uint8)
     region[40:] = 0
     assert crossing_band(region, EVEN[:, :20], 9.5, 3, 20) is None
-
-
-def test_profile_is_indifferent_to_narrow_marks():
-    image = np.repeat(np.linspace(200, 60, 50, dtype=np.float32)[:, None], 90, axis=1)
-    marked = image.copy()
-    marked[:, 40:43] = 255
-    assert band_profile(marked, Band(0, 89, 0, 49)) == pytest.approx(image[:, 0])
-
-
-def test_isotonic_regression_pools_violators():
-    assert isotonic_decreasing(np.array([5.0, 3.0, 4.0, 1.0, 2.0, 3.0])) == pytest.approx([5, 3.5, 3.5, 2, 2, 2])
 
 
 def test_fog_draws_no_edges_but_a_mark_does():

@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 
 from fogsim.errors import InputError
-from fogsim.values import Response
+from fogsim.values import Camera, Response
 from fogsim.values.camera_response import exposure_of
-from fogsim.vision.light.linear_table import linear_table
-from fogsim.vision.light.luminance import linear_luminance
+from fogsim.vision.light.luminance import linear_luminance, linear_pixels, linear_table
+from fogsim.vision.light.pixel_kernels import even_column, pixel_luminance, row_luminance
 
 
 @pytest.mark.parametrize("response", list(Response))
@@ -60,3 +60,22 @@ def test_more_bits_are_the_same_light(response, bits):
 def test_a_type_that_the_bit_depth_does_not_have_is_an_error():
     with pytest.raises(InputError, match="12 bits must have dtype uint16, got uint8"):
         linear_luminance(np.zeros((2, 2), np.uint8), Response.LINEAR, 12)
+
+
+@pytest.mark.parametrize("shape", [(6, 9), (6, 9, 3)])
+def test_pixels_looked_up_one_by_one_and_row_by_row_have_the_images_luminance(shape):
+    camera = Camera(9, 6, 10.0, (4.0, 2.5), 1.3, 0.0, response=Response.SRGB)
+    image = np.random.default_rng(3).integers(0, 256, shape, dtype=np.uint8)
+    paired, line = linear_pixels(image, camera), np.empty(9, np.float32)
+    for row, expected in enumerate(linear_luminance(image, camera.response)):
+        row_luminance(*paired, row, line)
+        assert line == pytest.approx(expected, rel=1e-6)
+        assert [pixel_luminance(paired, row, col) for col in range(9)] == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("count", [1, 5, 24])
+def test_even_columns_are_a_mirror_image_of_themselves(count):
+    columns = [even_column(j, count, -0.5, 319.5) for j in range(count)]
+    assert columns == sorted(columns)
+    left = columns[: count // 2]
+    assert [319 - col for col in left[::-1]] == columns[count - count // 2 :]

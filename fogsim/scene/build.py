@@ -9,18 +9,17 @@ from numpy.typing import NDArray
 from fogsim.errors import InputError
 from fogsim.scene.bodies import body_shapes
 from fogsim.scene.chainage import Chainage
-from fogsim.scene.crosslines import cross_lines
-from fogsim.scene.edges import Edge, edge_meshes, guard_rail, lane_edge, runs
+from fogsim.scene.edges import Edge, edge_meshes, guard_rail, lane_edge
 from fogsim.scene.houses import house_places, house_shapes, houses, shapes_in_use
 from fogsim.scene.junctions import Areas, area_mesh, free_borders, walkable
 from fogsim.scene.lane_index import LaneIndex
-from fogsim.scene.polyline import Points, cleaned, parallel, refined
-from fogsim.scene.relief import Relief
-from fogsim.scene.road import FAST, LONGEST, footway_mesh, free_edges, lane_mesh, terrain
+from fogsim.scene.polyline import Points, cleaned, parallel, refined, true_spans
+from fogsim.scene.road import FAST, LONGEST, footway_mesh, free_edges, lane_mesh, transverse_markings
 from fogsim.scene.roadside import placed, post_shapes, stations, trees
 from fogsim.scene.signs import gantries, gantry_mesh, sign_batches, sign_shapes
 from fogsim.scene.solids import merge
 from fogsim.scene.street_lamps import lamp_posts, street_lamp_shapes
+from fogsim.scene.terrain import Terrain, plain_mesh
 from fogsim.scene.trees import tree_shapes
 from fogsim.values.road import Lane, LaneKind, RoadNetwork, SignMap
 from fogsim.values.scene import Batch, Mesh, Scene
@@ -61,7 +60,7 @@ def build_scene(network: RoadNetwork, signs: SignMap, rng: np.random.Generator, 
     driven = [lane for lane in lanes if lane.kind in {LaneKind.CARRIAGEWAY, LaneKind.JUNCTION}]
     if not driven:
         raise InputError(f"a scene needs at least one lane with a length, got {len(network.lanes)} lanes without")
-    index, relief = LaneIndex(lanes), Relief(lanes)
+    index, terrain = LaneIndex(lanes), Terrain(lanes)
     areas = Areas(network.areas)
     # Lanes across a junction show only where its area does not reach; some stick out of it in bends.
     across = [lane for lane in lanes if lane.kind is LaneKind.JUNCTION and areas.cover(lane.centreline)]
@@ -71,24 +70,24 @@ def build_scene(network: RoadNetwork, signs: SignMap, rng: np.random.Generator, 
     borders = _borders(network, lanes, index)
     pavement, furniture, posts = _pavement(network, [*lanes, *bulging], driven), _Furniture(index), list[Batch]()
     for lane, edge in borders:
-        pavement += edge_meshes(edge, relief, index)
+        pavement += edge_meshes(edge, terrain, index)
         if lane is not None and lane.speed_limit >= FAST:
             rails, standing = furniture.along(edge)
             pavement += rails
             posts += standing
     bridges = gantries(signs.signs, driven)
     hanging = [sign for gantry in bridges for sign in gantry.signs]
-    land = relief.mesh()
-    parts = [terrain(lanes, relief.plain), *pavement, *(gantry_mesh(gantry, relief) for gantry in bridges)]
+    land = terrain.mesh()
+    parts = [plain_mesh(lanes, terrain.plain), *pavement, *(gantry_mesh(gantry, terrain) for gantry in bridges)]
     shapes = {**body_shapes(), **post_shapes(), **tree_shapes(rng), **sign_shapes(signs.signs)}
     edges = [edge for lane, edge in borders if lane is not None]
     if street_lamps:
         shapes |= street_lamp_shapes()
         posts += lamp_posts(edges, index)
-    built = houses(edges, index, relief, rng)
+    built = houses(edges, index, terrain, rng)
     shapes |= shapes_in_use(house_shapes(), built)
-    growing = trees([(edge.side, edge.line) for edge in edges], index, house_places(built), shapes, relief, rng)
-    scenery = _joined([*posts, *sign_batches(signs.signs, hanging, relief), *built, *growing])
+    growing = trees([(edge.side, edge.line) for edge in edges], index, house_places(built), shapes, terrain, rng)
+    scenery = _joined([*posts, *sign_batches(signs.signs, hanging, terrain), *built, *growing])
     return Scene(ground=merge(parts if land is None else [*parts, land]), shapes=shapes, scenery=scenery)
 
 
@@ -110,18 +109,18 @@ def _pavement(network: RoadNetwork, lanes: Sequence[Lane], driven: Sequence[Lane
         *(lane_mesh(lane, chainage) for lane in seen),
         *(footway_mesh(line, (-half, half)) for line, half in _kept_off(footways, LaneIndex(driven))),
         *(area for area in paved if area is not None),
-        *cross_lines(lanes),
+        *transverse_markings(lanes),
     ]
 
 
 def _kept_off(footways: Sequence[Lane], driven: LaneIndex) -> Iterator[tuple[Points, float]]:
-    """Stretches of footways where no road lies across them, each with half its width [m]."""
+    """Spans of footways where no road lies across them, each with half its width [m]."""
     for lane in footways:
         line, half = refined(cleaned(lane.centreline), LONGEST), lane.width / 2
         least = min(half, 0.8) - _ASTRAY
         if np.any(driven.clearance(refined(line, _LOOK), same_level=2.5) < least):
             line = refined(line, _LOOK)
-        for start, end in runs(driven.clearance(line, same_level=2.5) >= least):
+        for start, end in true_spans(driven.clearance(line, same_level=2.5) >= least, least=2):
             yield line[start:end], half
 
 
@@ -159,7 +158,7 @@ class _Furniture:
         side, distance = edge.side, edge.inner + edge.shoulder + _RAIL_BEHIND_SHOULDER
         free = self._index.clearance(parallel(edge.line, side * (distance + 0.2)), same_level=2.5) >= 0.4
         rails, batches = list[Mesh](), list[Batch]()
-        for start, end in runs(free):
+        for start, end in true_spans(free, least=2):
             line = edge.line[start:end]
             posts, heading = stations(line, _POST_SPACING, side * (distance + 0.15))
             delineators, direction = stations(line, _DELINEATOR_SPACING, side * (distance + 0.35))

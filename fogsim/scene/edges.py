@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.scene.lane_index import LaneIndex
-from fogsim.scene.polyline import Points, arc_length, left_normals, parallel, refined
-from fogsim.scene.relief import Relief
+from fogsim.scene.polyline import Points, arc_length, left_normals, parallel, refined, true_spans
 from fogsim.scene.road import FAST, KERB, LINE_CODE, LONGEST, TOWN, footway_mesh, strip
 from fogsim.scene.solids import Material, grid, mesh
+from fogsim.scene.terrain import Terrain
 from fogsim.values.road import Lane, LaneKind, LaneMarking
 from fogsim.values.scene import Mesh, Surface
 
@@ -123,14 +123,14 @@ def shoulder_width(speed_limit: float, side: int) -> float:
     return 2.5 if side < 0 else 1.0
 
 
-def edge_meshes(edge: Edge, relief: Relief, index: LaneIndex, along: NDArray[np.float64] | None = None) -> list[Mesh]:
+def edge_meshes(edge: Edge, terrain: Terrain, index: LaneIndex, along: NDArray[np.float64] | None = None) -> list[Mesh]:
     """Shoulder and gravel verge or kerb and footway, and what leads from there down to the land.
 
     Parameters
     ----------
     edge : Edge
         The free side.
-    relief : Relief
+    terrain : Terrain
         The land.
     index : LaneIndex
         All lanes: where one passes below, the road lies on a bridge.
@@ -141,14 +141,14 @@ def edge_meshes(edge: Edge, relief: Relief, index: LaneIndex, along: NDArray[np.
     paved = edge.inner + np.minimum(edge.shoulder, edge.room)
     if edge.speed_limit <= TOWN:
         footway = footway_mesh(edge.line, (edge.side * edge.inner, edge.side * paved))
-        return [*([footway] if edge.shoulder > 0 else []), *_down(edge, paved, KERB, relief, index)]
+        return [*([footway] if edge.shoulder > 0 else []), *_down(edge, paved, KERB, terrain, index)]
     outer = edge.inner + edge.room
     rows = [
         parallel(edge.line, edge.side * (paved - 0.02), -_SHOULDER_DROP - 0.001),
         parallel(edge.line, edge.side * outer, -0.06),
     ]
     verge = grid(np.stack(rows, axis=1), GRAVEL, (0, 0, 1))
-    return [_shoulder(edge, paved, distance), verge, *_down(edge, outer, -0.06, relief, index)]
+    return [_shoulder(edge, paved, distance), verge, *_down(edge, outer, -0.06, terrain, index)]
 
 
 def _shoulder(edge: Edge, paved: NDArray[np.float64], along: NDArray[np.float64]) -> Mesh:
@@ -166,23 +166,25 @@ def _shoulder(edge: Edge, paved: NDArray[np.float64], along: NDArray[np.float64]
     )
 
 
-def _down(edge: Edge, distance: NDArray[np.float64], lift: float, relief: Relief, index: LaneIndex) -> list[Mesh]:
+def _down(edge: Edge, distance: NDArray[np.float64], lift: float, terrain: Terrain, index: LaneIndex) -> list[Mesh]:
     """Embankment from distances beside the line down to the land, or the side of a bridge."""
     line = edge.line
-    if np.max(line[:, 2] - relief.height(line)) > 3.0:
+    if np.max(line[:, 2] - terrain.height(line)) > 3.0:
         line = refined(line, 6.0)
         distance = np.interp(arc_length(line), arc_length(edge.line), distance)
     top = parallel(line, edge.side * distance, lift)
-    deep = np.maximum(top[:, 2] - relief.height(top), 0.0)
+    deep = np.maximum(top[:, 2] - terrain.height(top), 0.0)
     foot = parallel(line, edge.side * (distance + 0.3 + 1.5 * deep))
-    foot[:, 2] = np.minimum(relief.height(foot), top[:, 2]) - 0.03
+    foot[:, 2] = np.minimum(terrain.height(foot), top[:, 2]) - 0.03
     if not np.any(deep > 0.1) and lift < 0:
         return []
     bridge = _over_road(top, foot, deep, index)
     parts = []
-    for start, end in runs(~bridge):
+    for start, end in true_spans(~bridge, least=2):
         parts.append(grid(np.stack((top[start:end], foot[start:end]), axis=1), BANK, (0, 0, 1)))
-    for start, end in runs(bridge, more=1):
+    for first, after in true_spans(bridge):
+        # A bridge reaches a vertex farther on either side.
+        start, end = max(first - 1, 0), min(after + 1, len(line))
         deck = np.stack((top[start:end], top[start:end] - (0.0, 0.0, _DECK)), axis=1)
         parts.append(grid(deck, CONCRETE, np.append(foot[start, :2] - top[start, :2], 0.0)))
     return parts
@@ -198,13 +200,6 @@ def _over_road(top: Points, foot: Points, deep: NDArray[np.float64], index: Lane
         places[:, 2] = foot[:, 2]
         below |= index.clearance(places, same_level=_LEVEL) < _SPAN
     return np.asarray(below & (deep > 3.0))
-
-
-def runs(chosen: NDArray[np.bool_], *, more: int = 0) -> list[tuple[int, int]]:
-    """Stretches of two vertices or more (start, end) that are chosen, each with some more on either side."""
-    changes = np.flatnonzero(np.diff(np.concatenate(([0], chosen.astype(int), [0]))))
-    widened = [(max(a - more, 0), min(b + more, len(chosen))) for a, b in changes.reshape(-1, 2).tolist()]
-    return [(a, b) for a, b in widened if b - a > 1]
 
 
 def guard_rail(line: NDArray[np.float64], side: int, distance: float) -> Mesh:

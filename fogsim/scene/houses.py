@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from fogsim.scene.edges import Edge
 from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.polyline import Points
-from fogsim.scene.relief import Relief
 from fogsim.scene.road import TOWN
 from fogsim.scene.roadside import placed, stations
 from fogsim.scene.solids import GLASS, Material, merge, polygon, quad
+from fogsim.scene.terrain import Terrain
 from fogsim.values.scene import FAR, TINY, Batch, Mesh
 
 HOUSE_RADIUS = 9.0
@@ -91,7 +91,7 @@ def _pane(x: float, low: float, width: float, height: float, y: float, material:
     return quad([(a, y + 0.02 * side, b) for a, b in _box(x, low, width, height)], material, (0.0, side, 0.0))
 
 
-def houses(edges: Sequence[Edge], index: LaneIndex, relief: Relief, rng: np.random.Generator) -> list[Batch]:
+def houses(edges: Sequence[Edge], index: LaneIndex, terrain: Terrain, rng: np.random.Generator) -> list[Batch]:
     """Houses that face the streets, where there is room.
 
     Parameters
@@ -100,7 +100,7 @@ def houses(edges: Sequence[Edge], index: LaneIndex, relief: Relief, rng: np.rand
         Free sides of roads; only those of streets have houses.
     index : LaneIndex
         All lanes.
-    relief : Relief
+    terrain : Terrain
         The land.
     rng : numpy Generator
         What chooses them.
@@ -117,7 +117,7 @@ def houses(edges: Sequence[Edge], index: LaneIndex, relief: Relief, rng: np.rand
             if built and free and taken.takes(place):
                 facing = turn if edge.side > 0 else turn + np.pi
                 found.setdefault(f"house_{kind}", []).append((place, facing, size))
-    return [_built(name, members, relief) for name, members in found.items()]
+    return [_built(name, members, terrain) for name, members in found.items()]
 
 
 class _Taken:
@@ -138,9 +138,9 @@ class _Taken:
         return True
 
 
-def _built(name: str, members: Sequence[tuple[Points, float, float]], relief: Relief) -> Batch:
+def _built(name: str, members: Sequence[tuple[Points, float, float]], terrain: Terrain) -> Batch:
     places = np.array([place for place, _, _ in members])
-    places[:, 2] = relief.height(places)
+    places[:, 2] = terrain.height(places)
     sizes = np.array([[size] * 3 for _, _, size in members])
     return placed(name, places, np.array([turn for _, turn, _ in members]), sizes)
 

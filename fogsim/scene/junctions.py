@@ -5,10 +5,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.jit import kernel
 from fogsim.scene.edges import Edge, border_edge
 from fogsim.scene.lane_index import LaneIndex
-from fogsim.scene.polyline import Points, cleaned, refined
-from fogsim.scene.polyline_kernels import crossed_oddly
+from fogsim.scene.polyline import Points, cleaned, refined, true_spans
 from fogsim.scene.road import ASPHALT, FLAGSTONES, KERB, ROAD
 from fogsim.scene.solids import concave_faces, mesh
 from fogsim.values.road import Lane, LaneKind, PavedArea
@@ -154,21 +154,20 @@ def _free_parts(corners: Points, index: LaneIndex, everything: LaneIndex) -> Ite
     beside = 0.5 * (outline + following)
     beside[:, :2] += 0.4 * outward
     free = (index.clearance(beside, same_level=2.5) > 0.1) & (everything.clearance(beside, same_level=2.5) > -0.1)
-    for run in _runs_around(free):
-        line = np.concatenate((outline[run], following[run[-1:]]))
+    for span in _spans_around(free):
+        line = np.concatenate((outline[span], following[span[-1:]]))
         if np.sum(np.hypot(*np.diff(line[:, :2], axis=0).T)) > 0.1:
             yield line
 
 
-def _runs_around(chosen: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
-    """Stretches of neighbours that are chosen on a ring; a ring that is chosen whole is one stretch."""
+def _spans_around(chosen: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
+    """Spans of neighbours that are chosen on a ring; a ring that is chosen whole is one span."""
     count = len(chosen)
     if chosen.all():
         return [np.arange(count)]
     first = int(np.argmin(chosen))
     order = (np.arange(count) + first) % count
-    changes = np.flatnonzero(np.diff(np.concatenate(([0], chosen[order].astype(int), [0]))))
-    return [order[a:b] for a, b in changes.reshape(-1, 2).tolist()]
+    return [order[start:end] for start, end in true_spans(chosen[order])]
 
 
 class Areas:
@@ -199,4 +198,19 @@ def _inside(points: NDArray[np.float64], outline: NDArray[np.float64]) -> bool:
 
 def _within(points: NDArray[np.float64], outline: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Tell which points (n, 2) lie within an outline (m, 2)."""
-    return crossed_oddly(np.ascontiguousarray(points), np.ascontiguousarray(outline))
+    return _lie_within(np.ascontiguousarray(points), np.ascontiguousarray(outline))
+
+
+@kernel
+def _lie_within(points: NDArray[np.float64], outline: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Tell from which points (n, 2) a ray to the east crosses an outline (m, 2) an odd number of times."""
+    result = np.zeros(len(points), np.bool_)
+    for i in range(len(points)):
+        x, y = points[i, 0], points[i, 1]
+        for j in range(len(outline)):
+            k = j + 1 if j + 1 < len(outline) else 0
+            if (outline[j, 1] > y) != (outline[k, 1] > y):
+                share = (y - outline[j, 1]) / (outline[k, 1] - outline[j, 1])
+                if x < outline[j, 0] + share * (outline[k, 0] - outline[j, 0]):
+                    result[i] = not result[i]
+    return result

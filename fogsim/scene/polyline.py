@@ -1,57 +1,114 @@
-"""Polylines on the ground: lengths, directions, parallels, projection."""
+"""Polylines on the ground: _arc_length, directions, parallels, projection.
+
+The work is compiled: networks have a hundred thousand of them, each too short for numpy to be fast.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.scene.polyline_kernels import kept_vertices, lengths, normals_to_the_left, parallel_line, refined_line
+from fogsim.jit import kernel
 
 Points = NDArray[np.float64]
 
+_TIGHT = 1e-9  # pieces whose length times that of the line's piece is less than this have no direction [m²]
+
 
 def cleaned(points: Points, shortest: float = 0.05) -> Points:
-    """Polyline (n, 3) without segments shorter than `shortest` [m]."""
+    """Polyline without its shortest segments.
+
+    Parameters
+    ----------
+    points : (n, 2 or 3) float64
+        The polyline [m].
+    shortest : float
+        Length below which a segment is joined to the next [m].
+    """
     array = np.ascontiguousarray(points, np.float64)
-    kept = kept_vertices(array, shortest)
+    kept = _kept_vertices(array, shortest)
     return array if len(kept) == len(array) else array[kept]
 
 
 def arc_length(points: Points) -> NDArray[np.float64]:
-    """Distance of each vertex from the first along the polyline in the plane [m]."""
-    return lengths(np.ascontiguousarray(points, np.float64))
+    """Distance of each vertex from the first along the polyline in the plane [m].
+
+    Parameters
+    ----------
+    points : (n, 2 or 3) float64
+        The polyline [m].
+    """
+    return _arc_length(np.ascontiguousarray(points, np.float64))
 
 
 def at_distance(points: Points, distance: NDArray[np.float64]) -> Points:
-    """Points (k, 3) at distances along a polyline [m]."""
+    """Points (k, 3) along a polyline.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+        The polyline [m].
+    distance : (k,) float64
+        Distances from its first vertex [m].
+    """
     length = arc_length(points)
     return np.stack([np.interp(distance, length, points[:, axis]) for axis in range(3)], axis=1)
 
 
 def refined(points: Points, longest: float) -> Points:
-    """Polyline with all its vertices and so many more that no segment is longer than `longest` [m]."""
-    return refined_line(np.ascontiguousarray(points, np.float64), longest)
+    """Polyline with all its vertices and more between them.
+
+    Parameters
+    ----------
+    points : (n, 2 or 3) float64
+        The polyline [m].
+    longest : float
+        Length above which a segment is divided evenly [m].
+    """
+    return _refined(np.ascontiguousarray(points, np.float64), longest)
 
 
 def left_normals(points: Points) -> NDArray[np.float64]:
     """Vectors (n, 2) to the left at the vertices, mitred so that parallels keep their distance.
 
     A mitre is at most twice as long as the distance; sharper corners are cut.
+
+    Parameters
+    ----------
+    points : (n, 2 or 3) float64
+        The polyline [m].
     """
-    return normals_to_the_left(np.ascontiguousarray(points, np.float64))
+    return _left_normals(np.ascontiguousarray(points, np.float64))
 
 
 def parallel(points: Points, left: float | NDArray[np.float64], lift: float = 0.0) -> Points:
-    """Polyline at a distance `left` to the left [m], raised by `lift` [m].
+    """Polyline beside another.
 
     On the inside of a bend that is tighter than the distance it is cut short, so that it never runs backwards; it has a
     vertex for each of the line's all the same.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+        The polyline [m].
+    left : float or (n,) float64
+        How far to the left of it the other lies [m].
+    lift : float
+        How far above it [m].
     """
     distance = np.empty(len(points))
     distance[:] = left
-    return parallel_line(np.ascontiguousarray(points, np.float64), distance, lift)
+    return _parallel(np.ascontiguousarray(points, np.float64), distance, lift)
 
 
 def project(points: NDArray[np.float64], line: Points) -> NDArray[np.float64]:
-    """Distance along a polyline [m] of the place on it that is nearest to each point (k, 2 or 3)."""
+    """Distance along a polyline [m] of the place on it that is nearest to each point.
+
+    Parameters
+    ----------
+    points : (k, 2 or 3) float64
+        The points [m].
+    line : (n, 2 or 3) float64
+        The polyline [m].
+    """
     start, step = line[:-1, :2], np.diff(line[:, :2], axis=0)
     length = np.hypot(*step.T)
     offset = points[:, None, :2] - start
@@ -60,3 +117,134 @@ def project(points: NDArray[np.float64], line: Points) -> NDArray[np.float64]:
     nearest = np.argmin(gap, axis=1)
     along = share[np.arange(len(points)), nearest] * length[nearest]
     return np.asarray(arc_length(line)[nearest] + along, np.float64)
+
+
+def true_spans(chosen: NDArray[np.bool_], *, least: int = 1) -> list[tuple[int, int]]:
+    """First indices of spans of neighbours that are all true, and those after their last.
+
+    Parameters
+    ----------
+    chosen : (n,) bool
+        Which are.
+    least : int
+        Shorter spans are left out.
+    """
+    changes = np.flatnonzero(np.diff(np.concatenate(([0], chosen.astype(int), [0]))))
+    return [(first, end) for first, end in changes.reshape(-1, 2).tolist() if end - first >= least]
+
+
+@kernel
+def _kept_vertices(points: Points, shortest: float) -> NDArray[np.int64]:
+    """Numbers of the vertices between which no segment is shorter than `shortest` [m]."""
+    kept = np.empty(len(points), np.int64)
+    kept[0], count = 0, 1
+    for i in range(1, len(points)):
+        last = kept[count - 1]
+        if np.hypot(points[i, 0] - points[last, 0], points[i, 1] - points[last, 1]) >= shortest:
+            kept[count] = i
+            count += 1
+    return kept[:count]
+
+
+@kernel
+def _arc_length(points: Points) -> NDArray[np.float64]:
+    """Distance of each vertex from the first along the polyline [m]."""
+    result = np.zeros(len(points))
+    for i in range(1, len(points)):
+        step = np.hypot(points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1])
+        result[i] = result[i - 1] + step
+    return result
+
+
+@kernel
+def _refined(points: Points, longest: float) -> Points:
+    """Polyline with as many vertices more that no segment is longer than `longest` [m]."""
+    count = 1
+    pieces = np.empty(max(len(points) - 1, 0), np.int64)
+    for i in range(len(points) - 1):
+        step = np.hypot(points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1])
+        pieces[i] = max(int(np.ceil(step / longest)), 1)
+        count += pieces[i]
+    result = np.empty((count, points.shape[1]))
+    k = 0
+    for i in range(len(points) - 1):
+        for j in range(pieces[i]):
+            share = j / pieces[i]
+            for axis in range(points.shape[1]):
+                result[k, axis] = points[i, axis] + share * (points[i + 1, axis] - points[i, axis])
+            k += 1
+    result[k] = points[-1]
+    return result
+
+
+@kernel
+def _left_normals(points: Points) -> NDArray[np.float64]:
+    """Vectors (n, 2) to the left at the vertices, mitred (see `left_normals`)."""
+    last = len(points) - 1
+    normal = np.empty((last, 2))
+    for i in range(last):
+        dx, dy = points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1]
+        length = np.hypot(dx, dy)
+        normal[i, 0], normal[i, 1] = -dy / length, dx / length
+    result = np.empty((last + 1, 2))
+    for i in range(last + 1):
+        before, after = max(i - 1, 0), min(i, last - 1)
+        x, y = normal[before, 0] + normal[after, 0], normal[before, 1] + normal[after, 1]
+        scale = 2 / max(x * x + y * y, 1.0)
+        result[i, 0], result[i, 1] = scale * x, scale * y
+    return result
+
+
+@kernel
+def _parallel(points: Points, left: NDArray[np.float64], lift: float) -> Points:
+    """Polyline at distances `left` to the left [m], raised by `lift` [m], that never runs backwards."""
+    normal, result = _left_normals(points), np.empty((len(points), 3))
+    for i in range(len(points)):
+        result[i, 0] = points[i, 0] + left[i] * normal[i, 0]
+        result[i, 1] = points[i, 1] + left[i] * normal[i, 1]
+        result[i, 2] = points[i, 2] + lift
+    forward = np.empty(len(points) - 1)
+    # Each round draws at least one more piece together.
+    for _ in range(len(forward)):
+        worst = 0.0
+        for i in range(len(forward)):
+            dx, dy = points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1]
+            forward[i] = dx * (result[i + 1, 0] - result[i, 0]) + dy * (result[i + 1, 1] - result[i, 1])
+            worst = min(worst, forward[i])
+        if worst >= -_TIGHT:
+            break
+        _draw_together(result, forward)
+    return result
+
+
+@kernel
+def _draw_together(line: Points, forward: NDArray[np.float64]) -> None:
+    """Put all vertices of each span of pieces that do not lead forward, of which one leads backward, in one place."""
+    first = 0
+    while first < len(forward):
+        end, backward = first, False
+        while end < len(forward) and forward[end] <= _TIGHT:
+            backward |= forward[end] < -_TIGHT
+            end += 1
+        if backward:
+            x, y = _meeting(line, first, end)
+            line[first : end + 1, 0], line[first : end + 1, 1] = x, y
+        first = end + 1
+
+
+@kernel
+def _meeting(line: Points, first: int, last: int) -> tuple[float, float]:
+    """Where what leads to one vertex meets what leads on from another; their middle where that is far off."""
+    x, y = 0.5 * (line[first, 0] + line[last, 0]), 0.5 * (line[first, 1] + line[last, 1])
+    if first == 0 or last == len(line) - 1:
+        return x, y
+    ax, ay = line[first, 0] - line[first - 1, 0], line[first, 1] - line[first - 1, 1]
+    bx, by = line[last + 1, 0] - line[last, 0], line[last + 1, 1] - line[last, 1]
+    cross = ax * by - ay * bx
+    if abs(cross) < 1e-3 * np.hypot(ax, ay) * np.hypot(bx, by):
+        return x, y
+    gx, gy = line[last, 0] - line[first, 0], line[last, 1] - line[first, 1]
+    share = (gx * by - gy * bx) / cross
+    u, v = line[first, 0] + share * ax, line[first, 1] + share * ay
+    near = np.hypot(u - x, v - y) <= np.hypot(gx, gy) + 1e-9
+    return (u, v) if near else (x, y)

@@ -1,5 +1,6 @@
-"""Pavement: lanes with the attributes of their painted lines, footways, and which of their sides are free."""
+"""Pavement: lanes with the attributes of their painted lines, transverse markings, footways, sides that are free."""
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -7,9 +8,9 @@ from numpy.typing import NDArray
 
 from fogsim.scene.chainage import Chainage
 from fogsim.scene.lane_index import LaneIndex
-from fogsim.scene.polyline import Points, cleaned, parallel, refined
-from fogsim.scene.solids import Material, grid, merge, mesh
-from fogsim.values.road import Lane, LaneKind, LaneMarking
+from fogsim.scene.polyline import Points, arc_length, at_distance, cleaned, left_normals, parallel, refined, true_spans
+from fogsim.scene.solids import Material, grid, merge
+from fogsim.values.road import Lane, LaneEnd, LaneKind, LaneMarking
 from fogsim.values.scene import Mesh, Surface
 
 ROAD = 2
@@ -34,9 +35,15 @@ LINE_CODE = {LaneMarking.NONE: 0, LaneMarking.SOLID: 1, LaneMarking.DASHED: 2, L
 LONGEST = 40.0
 """Longest piece of a strip [m]: short enough to be culled in pieces."""
 
+LINE_WIDTH = 0.2
+"""Width of the line that road attributes stand for [m]."""
+
 _LOOK = 2.0  # whether a side is free is looked at every so many metres
 _CLOSER = 8  # and so many times as closely where that changes
 _OVERLAP = 0.03  # neighbouring lanes overlap by this much on each side [m], so that no gap shows between them
+_LIFT = 0.002  # above the lane [m]
+_STOP_WIDTH, _YIELD_WIDTH = 0.5, 0.35  # along the road [m]
+_SETBACK = 0.4  # from the lane's end [m]
 _INSET = 0.16  # the middle of each of two lines between directions lies this far inside its lane [m]
 
 
@@ -115,12 +122,12 @@ def footway_mesh(line: Points, left: tuple[float, float | NDArray[np.float64]]) 
 
 
 def free_edges(lane: Lane, index: LaneIndex) -> Iterator[tuple[int, NDArray[np.float64]]]:
-    """Stretches of a lane's sides with nothing paved beside them.
+    """Spans of a lane's sides with nothing paved beside them.
 
     Yields
     ------
     tuple of int and (n, 3) float64
-        1 for the left or −1 for the right side, and the lane's centreline along the free stretch [m], with a vertex at
+        1 for the left or −1 for the right side, and the lane's centreline along the free span [m], with a vertex at
         least every 2 m.
     """
     centre = refined(cleaned(lane.centreline), _LOOK)
@@ -128,10 +135,8 @@ def free_edges(lane: Lane, index: LaneIndex) -> Iterator[tuple[int, NDArray[np.f
         if side < 0 and not lane.outermost and lane.kind is not LaneKind.FOOTWAY:
             continue
         fine, free = _looked_at(centre, side * (lane.width / 2 + 0.6), index)
-        changes = np.flatnonzero(np.diff(np.concatenate(([0], free.astype(int), [0]))))
-        for start, end in changes.reshape(-1, 2).tolist():
-            if end - start >= 2:
-                yield side, fine[start:end]
+        for start, end in true_spans(free, least=2):
+            yield side, fine[start:end]
 
 
 def _looked_at(line: Points, left: float, index: LaneIndex) -> tuple[Points, NDArray[np.bool_]]:
@@ -146,20 +151,56 @@ def _looked_at(line: Points, left: float, index: LaneIndex) -> tuple[Points, NDA
     return closer, index.clearance(parallel(closer, left), same_level=2.5) > 0.2
 
 
-def terrain(lanes: Sequence[Lane], ground: float) -> Mesh:
-    """Level grassland around all lanes, as two triangles that reach beyond the horizon.
+def transverse_markings(lanes: Sequence[Lane]) -> list[Mesh]:
+    """Stop lines, lines to give way at, and zebra crossings of all lanes."""
+    parts = []
+    for lane in lanes:
+        line = cleaned(lane.centreline)
+        if lane.kind is LaneKind.CROSSING:
+            parts.append(_zebra(line, lane.width))
+        elif lane.end is LaneEnd.STOP:
+            parts.append(_bars(line, lane.width, _STOP_WIDTH, [(-0.5, 0.5)]))
+        elif lane.end is LaneEnd.YIELD:
+            count = max(round(lane.width / 0.75), 2)
+            edges = [(i / count - 0.5 + 0.17 / count, i / count - 0.5 + 0.83 / count) for i in range(count)]
+            parts.append(_bars(line, lane.width, _YIELD_WIDTH, edges))
+    return parts
 
-    Parameters
-    ----------
-    lanes : sequence of Lane
-        The lanes.
-    ground : float
-        Its height [m].
+
+def _bars(line: Points, width: float, thick: float, pieces: Sequence[tuple[float, float]]) -> Mesh:
+    """Bars across the end of a lane; pieces reach from its right (−1/2) to its left (1/2)."""
+    length = float(arc_length(line)[-1])
+    near, far = (at_distance(line, np.array([max(length - _SETBACK - d, 0.0)]))[0] for d in (thick, 0.0))
+    left = np.append(left_normals(line)[-1], 0.0)
+    parts = []
+    for low, high in pieces:
+        ends = [0.98 * width * low * left, 0.98 * width * high * left]
+        parts.append(_painted(np.array([[near + end, far + end] for end in ends])))
+    return merge(parts)
+
+
+def _zebra(line: Points, width: float) -> Mesh:
+    """Stripes along the carriageway, across the way of the pedestrians."""
+    length = float(arc_length(line)[-1])
+    left = np.append(left_normals(line)[0], 0.0)
+    parts = []
+    for start in np.arange(0.25, max(length - 0.5, 0.3), 1.0).tolist():
+        a, b = at_distance(line, np.array([start, start + 0.5]))
+        parts.append(_painted(np.array([[a + end, b + end] for end in (-width / 2 * left, width / 2 * left)])))
+    return merge(parts)
+
+
+def _painted(corners: Points) -> Mesh:
+    """Patch of paint: corners (2, 2, 3), whose second index runs across the line that the road attributes stand for.
+
+    Only part of the attributes' line is as wide as its patch, so that its edges are smoothed like those of any line.
     """
-    everything = np.concatenate([lane.centreline[:, :2] for lane in lanes])
-    low, high = everything.min(axis=0) - 40e3, everything.max(axis=0) + 40e3
-    corners = [(low[0], low[1]), (high[0], low[1]), (low[0], high[1]), (high[0], high[1])]
-    points = np.array([(x, y, ground) for x, y in corners])
-    normals = np.broadcast_to((0.0, 0.0, 1.0), (4, 3))
-    grass = Material((0.064, 0.088, 0.036), Surface.TERRAIN)
-    return mesh(points, [[0, 1, 2], [1, 3, 2]], normals, grass, instance=1)
+    along = math.dist(corners[0, 0], corners[1, 0])
+    middle = corners.mean(axis=1, keepdims=True)
+    widened = middle + 1.5 * (corners - middle)
+    road = np.zeros((2, 2, 4))
+    road[..., 0] = np.array([[0.0], [along]])
+    road[..., 1] = 1.0 + 0.75 * LINE_WIDTH * np.array([-1.0, 1.0])
+    road[..., 2], road[..., 3] = 1.0, 3.0
+    lifted = widened + np.array([0.0, 0.0, _LIFT])
+    return grid(lifted, ASPHALT, (0, 0, 1), road=road.reshape(-1, 4), instance=ROAD)

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from fogsim.linear_algebra import matrix_product
 from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.polyline import arc_length, at_distance, left_normals
-from fogsim.scene.relief import Relief
 from fogsim.scene.solids import ROADSIDE, Material, box, merge
+from fogsim.scene.terrain import Terrain
 from fogsim.values.scene import Batch, Mesh, Surface
 
 TREE_CLEARANCE = 9.0
@@ -95,7 +95,7 @@ def trees(
     index: LaneIndex,
     taken: Points,
     shapes: Mapping[str, Mesh],
-    relief: Relief,
+    terrain: Terrain,
     rng: np.random.Generator,
 ) -> list[Batch]:
     """Trees near the road and woods behind them, clear of every lane.
@@ -110,7 +110,7 @@ def trees(
         Where something else stands [m].
     shapes : mapping from str to Mesh
         Among others the shapes of the trees.
-    relief : Relief
+    terrain : Terrain
         The land.
     rng : numpy Generator
         What scatters them.
@@ -121,11 +121,11 @@ def trees(
     batches = []
     for name, members in (("conifer", conifers), ("broad_leaved", ~conifers)):
         kinds = sorted(shape for shape in shapes if shape.startswith(name) and ":" not in shape)
-        batches += _planted(near[members], kinds, relief, rng, height=(6.0, 15.0), slender=1.0)
+        batches += _planted(near[members], kinds, terrain, rng, height=(6.0, 15.0), slender=1.0)
     far = _scatter(stretches, rng, spacing=60.0, nearest=75.0, reach=170.0, clumps=400.0)
     far = far[(index.clearance(far) > 25.0) & _apart(far, taken, 35.0)]
     kinds = sorted(shape for shape in shapes if shape.startswith("woodland") and ":" not in shape)
-    return batches + _planted(far, kinds, relief, rng, height=(9.0, 16.0), slender=5.0, clear_of=index)
+    return batches + _planted(far, kinds, terrain, rng, height=(9.0, 16.0), slender=5.0, clear_of=index)
 
 
 def _apart(places: Points, taken: Points, distance: float) -> NDArray[np.bool_]:
@@ -172,14 +172,14 @@ def _clumps(places: NDArray[np.float64], wavelength: float, rng: np.random.Gener
 def _planted(
     places: Points,
     kinds: Sequence[str],
-    relief: Relief,
+    terrain: Terrain,
     rng: np.random.Generator,
     *,
     height: tuple[float, float],
     slender: float,
     clear_of: LaneIndex | None = None,
 ) -> list[Batch]:
-    standing = np.column_stack((places[:, :2], relief.height(places) - 0.05))
+    standing = np.column_stack((places[:, :2], terrain.height(places) - 0.05))
     kind = rng.integers(len(kinds), size=len(places))
     tall = rng.uniform(*height, len(places))
     wide = tall * slender * rng.uniform(0.85, 1.2, len(places))

@@ -8,8 +8,8 @@ from itertools import product
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fogsim.jit import kernel
 from fogsim.linear_algebra import matrix_product
-from fogsim.scene.polyline_kernels import surface_normals
 from fogsim.values.scene import Mesh, Surface
 
 ROADSIDE = 3
@@ -102,7 +102,33 @@ def grid_normals(points: NDArray[np.float64], toward: ArrayLike) -> NDArray[np.f
 
     Where points coincide, the normal is `toward` itself.
     """
-    return surface_normals(np.ascontiguousarray(points, np.float64), np.array(toward, np.float64))
+    return _grid_normals(np.ascontiguousarray(points, np.float64), np.array(toward, np.float64))
+
+
+@kernel
+def _grid_normals(points: NDArray[np.float64], toward: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Normals (n, m, 3) (see `grid_normals`)."""
+    rows, columns = points.shape[0], points.shape[1]
+    result, facing = np.empty(points.shape), 0.0
+    for i in range(rows):
+        up, down = max(i - 1, 0), min(i + 1, rows - 1)
+        for j in range(columns):
+            west, east = max(j - 1, 0), min(j + 1, columns - 1)
+            ax, ay, az = points[down, j] - points[up, j]
+            bx, by, bz = points[i, east] - points[i, west]
+            x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+            share = 1.0 / ((down - up) * (east - west))
+            result[i, j, 0], result[i, j, 1], result[i, j, 2] = share * x, share * y, share * z
+            facing += share * (x * toward[0] + y * toward[1] + z * toward[2])
+    sign = 1.0 if facing >= 0 else -1.0
+    for i in range(rows):
+        for j in range(columns):
+            normal = result[i, j]
+            if max(abs(normal[0]), abs(normal[1]), abs(normal[2])) < 1e-9:
+                result[i, j] = toward
+            else:
+                result[i, j] = sign * normal
+    return result
 
 
 def grid(

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from fogsim.scene import build_scene, street_lamp_heads
-from fogsim.scene.crosslines import cross_lines
 from fogsim.scene.junctions import Areas, area_mesh
 from fogsim.scene.lane_index import LaneIndex
-from fogsim.scene.relief import Relief
-from fogsim.scene.road import KERB
+from fogsim.scene.road import KERB, transverse_markings
+from fogsim.scene.terrain import Terrain
 from fogsim.values import (
     Lane,
     LaneEnd,
@@ -136,7 +135,7 @@ def test_lanes_within_a_junction_are_not_drawn_twice(town: RoadNetwork) -> None:
 def test_stop_lines_span_their_lanes_at_the_junction(town: RoadNetwork) -> None:
     lane = next(lane for lane in town.lanes if lane.lane_id == "in0")
     assert lane.end is LaneEnd.STOP
-    (bar,) = cross_lines([lane])
+    (bar,) = transverse_markings([lane])
     end = lane.centreline[-1]
     assert np.abs(bar.positions[:, 0] - end[0]).max() < 1.5
     assert np.ptp(bar.positions[:, 1]) == pytest.approx(0.98 * lane.width, rel=0.01)
@@ -150,14 +149,14 @@ def test_a_line_to_give_way_at_is_broken_and_a_crossing_is_striped() -> None:
     line = np.array([[0.0, 0, 0], [50, 0, 0]])
     none = LaneMarking.NONE
     way = Lane("a", "a", line, 3.6, 14.0, none, none, outermost=True, end=LaneEnd.YIELD)
-    (teeth,) = cross_lines([way])
+    (teeth,) = transverse_markings([way])
     assert len(teeth.faces) == 2 * 5
     covered = sum(np.ptp(teeth.positions[4 * i : 4 * i + 4, 1]) for i in range(5))
     assert covered / 3.6 == pytest.approx(0.65, abs=0.03)
     zebra = dataclasses.replace(way, centreline=line / 5, end=LaneEnd.OPEN, kind=LaneKind.CROSSING)
-    (stripes,) = cross_lines([zebra])
+    (stripes,) = transverse_markings([zebra])
     assert len(stripes.faces) == 2 * 10
-    assert cross_lines([dataclasses.replace(way, end=LaneEnd.OPEN)]) == []
+    assert transverse_markings([dataclasses.replace(way, end=LaneEnd.OPEN)]) == []
 
 
 def test_a_double_line_lies_inside_its_lane() -> None:
@@ -201,20 +200,20 @@ def test_the_land_lies_below_every_road_and_falls_to_the_plain() -> None:
         high, lane_id="b_0", edge_id="b", centreline=high.centreline + np.array([0.0, 60.0, 8.0])
     )
     climbing = hill()
-    relief = Relief([climbing, high])
+    terrain = Terrain([climbing, high])
     for lane in (climbing, high):
-        assert (relief.height(lane.centreline) < lane.centreline[:, 2] - 0.3).all()
-    assert relief.height(np.array([[200.0, 900.0], [-900.0, 0.0]])) == pytest.approx(relief.plain)
-    mesh = relief.mesh()
+        assert (terrain.height(lane.centreline) < lane.centreline[:, 2] - 0.3).all()
+    assert terrain.height(np.array([[200.0, 900.0], [-900.0, 0.0]])) == pytest.approx(terrain.plain)
+    mesh = terrain.mesh()
     assert mesh is not None
     chosen = mesh.positions[::7].astype(float)
-    assert relief.height(chosen) - 0.02 == pytest.approx(chosen[:, 2], abs=1e-4)
+    assert terrain.height(chosen) - 0.02 == pytest.approx(chosen[:, 2], abs=1e-4)
 
 
 def test_a_plain_has_no_land_of_its_own(motorway: RoadNetwork) -> None:
-    relief = Relief(motorway.lanes)
-    assert relief.mesh() is None
-    assert relief.height(np.zeros((3, 2))) == pytest.approx(relief.plain) == pytest.approx(-0.1)
+    terrain = Terrain(motorway.lanes)
+    assert terrain.mesh() is None
+    assert terrain.height(np.zeros((3, 2))) == pytest.approx(terrain.plain) == pytest.approx(-0.1)
 
 
 def test_a_road_that_passes_over_another_leaves_it_free() -> None:

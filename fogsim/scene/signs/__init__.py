@@ -5,13 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.scene.relief import Relief
 from fogsim.scene.roadside import placed, tube
 from fogsim.scene.signs.faces import back
 from fogsim.scene.signs.gantry import Gantry, gantries, gantry_mesh
 from fogsim.scene.signs.kinds import SIGN_KINDS, SignKind, face_of, shape_name
 from fogsim.scene.signs.symbols import SIGN
 from fogsim.scene.solids import Material, merge
+from fogsim.scene.terrain import Terrain
 from fogsim.values.road import Sign
 from fogsim.values.scene import FAR, TINY, Batch, Mesh
 
@@ -32,12 +32,12 @@ def sign_shapes(signs: Sequence[Sign]) -> dict[str, Mesh]:
     return shapes
 
 
-def sign_batches(signs: Sequence[Sign], hanging: Sequence[Sign], relief: Relief) -> list[Batch]:
+def sign_batches(signs: Sequence[Sign], hanging: Sequence[Sign], terrain: Terrain) -> list[Batch]:
     """Every sign where the map says, and posts under those that do not hang from a gantry."""
     batches = [_face(sign) for sign in signs]
     held = {sign.sign_id for sign in hanging}
     standing = [sign for sign in signs if sign.sign_id not in held]
-    return [*batches, _posts(standing, relief)] if standing else batches
+    return [*batches, _posts(standing, terrain)] if standing else batches
 
 
 def _face(sign: Sign) -> Batch:
@@ -55,12 +55,12 @@ def _face(sign: Sign) -> Batch:
     )
 
 
-def _posts(signs: Sequence[Sign], relief: Relief) -> Batch:
+def _posts(signs: Sequence[Sign], terrain: Terrain) -> Batch:
     heading = np.array([sign.heading for sign in signs])
     behind = np.array([0.05 * sign.diameter + 0.045 for sign in signs])
     places = np.array([sign.position for sign in signs])
     places[:, :2] += behind[:, None] * np.column_stack((np.cos(heading), np.sin(heading)))
     top = places[:, 2] + 0.35 * np.array([sign.diameter for sign in signs])
-    places[:, 2] = np.minimum(relief.height(places[:, :2]), places[:, 2]) - 0.3
+    places[:, 2] = np.minimum(terrain.height(places[:, :2]), places[:, 2]) - 0.3
     size: NDArray[np.float64] = np.column_stack((np.ones((len(signs), 2)), top - places[:, 2]))
     return placed(_POST, places, heading, size, instance=SIGN)

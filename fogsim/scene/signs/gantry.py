@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from fogsim.linear_algebra import matrix_product
 from fogsim.scene.polyline import cleaned
-from fogsim.scene.relief import Relief
 from fogsim.scene.solids import Material, box, merge, moved
+from fogsim.scene.terrain import Terrain
 from fogsim.values.road import Lane, LaneKind, Sign
 from fogsim.values.scene import Mesh
 
@@ -109,14 +109,14 @@ class _Pieces:
         return left[near], self._half[through][near]
 
 
-def gantry_mesh(gantry: Gantry, relief: Relief) -> Mesh:
+def gantry_mesh(gantry: Gantry, terrain: Terrain) -> Mesh:
     """Two legs and a beam of two tubes with struts, behind the signs."""
     first = gantry.signs[0]
     right, left = gantry.reach
     ahead = np.array([np.cos(first.heading), np.sin(first.heading), 0.0])
     side = np.array([-ahead[1], ahead[0], 0.0])
     feet = np.array([first.position + side * reach for reach in gantry.reach])
-    down = relief.height(feet[:, :2]) - first.position[2] - 0.3
+    down = terrain.height(feet[:, :2]) - first.position[2] - 0.3
     parts = [
         box((0.35, reach - 0.18, float(foot)), (0.75, reach + 0.18, 0.55), _STEEL)
         for reach, foot in zip(gantry.reach, down, strict=True)

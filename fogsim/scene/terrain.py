@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from fogsim.scene.polyline import Points, cleaned, refined
 from fogsim.scene.solids import Material, grid_faces, grid_normals, mesh
 from fogsim.values.road import Lane
-from fogsim.values.scene import Mesh
+from fogsim.values.scene import Mesh, Surface
 
 _LEVEL = 2.0  # roads whose heights differ by no more than this lie in a plain [m]
 _CELL = 14.0  # side of a cell of the land [m]
@@ -19,7 +19,7 @@ _FALL, _RISE = 0.22, 0.5  # steepest slopes away from a road, down and up [-]
 _GRASS = np.array([0.064, 0.088, 0.036])
 
 
-class Relief:
+class Terrain:
     """Height of the land.
 
     Near a road the land lies a little below it; farther away it falls to the plain that all of it stands in. Where a
@@ -122,3 +122,22 @@ def _spread(
     away = np.maximum(np.hypot(i - column, j - row) * cell - _SHELF - cell, 0.0)
     fallen[window] = np.maximum(fallen[window], z - _BELOW - _FALL * away)
     risen[window] = np.minimum(risen[window], z - _BELOW + _RISE * away)
+
+
+def plain_mesh(lanes: Sequence[Lane], height: float) -> Mesh:
+    """Level grassland around all lanes, as two triangles that reach beyond the horizon.
+
+    Parameters
+    ----------
+    lanes : sequence of Lane
+        The lanes.
+    height : float
+        Its height [m].
+    """
+    everything = np.concatenate([lane.centreline[:, :2] for lane in lanes])
+    low, high = everything.min(axis=0) - 40e3, everything.max(axis=0) + 40e3
+    corners = [(low[0], low[1]), (high[0], low[1]), (low[0], high[1]), (high[0], high[1])]
+    points = np.array([(x, y, height) for x, y in corners])
+    normals = np.broadcast_to((0.0, 0.0, 1.0), (4, 3))
+    grass = Material((0.064, 0.088, 0.036), Surface.TERRAIN)
+    return mesh(points, [[0, 1, 2], [1, 3, 2]], normals, grass, instance=1)

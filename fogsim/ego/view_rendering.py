@@ -11,7 +11,7 @@ from fogsim.lighting import LampMount, own_head_lamps
 from fogsim.render import Renderer, RenderError, make_renderer
 from fogsim.scenario import Scenario, build
 from fogsim.scene import (
-    Nearness,
+    Corridor,
     build_scene,
     light_sources,
     street_lamp_heads,
@@ -97,7 +97,7 @@ class Outlook:
         rng = np.random.default_rng(scenario.scenery_seed)
         scene = build_scene(around.network, around.signs, rng, street_lamps=scenario.street_lamps)
         self._origin, self._shifted, self._streets = around.origin, bool(np.any(around.origin)), None
-        self._known = None if around.whole else Nearness(line, _LEEWAY)
+        self._known = None if around.whole else Corridor(line, _LEEWAY)
         self._street_lamps = street_lamp_heads(scene) + around.origin
         sky = scenario.light.illuminance_lx
         if len(self._street_lamps) and self._by_lamplight:
@@ -139,7 +139,7 @@ class Outlook:
         """The renderer of a scene that has what is around a place."""
         if self._renderer is None:
             raise RenderError("this outlook is closed; make a new one")
-        if self._known is None or self._known.tell(place[None, :])[0]:
+        if self._known is None or self._known.contains(place[None, :])[0]:
             return self._renderer
         return self._look_at(place[None, :])
 

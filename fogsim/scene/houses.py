@@ -1,17 +1,14 @@
 """Houses along streets."""
 
-import math
 from collections.abc import Mapping, Sequence
-from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fogsim.scene.edges import Edge
 from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.polyline import Points
 from fogsim.scene.road import TOWN
-from fogsim.scene.roadside import placed, stations
+from fogsim.scene.roadside import Spacing, placed, stations
 from fogsim.scene.solids import GLASS, Material, merge, polygon, quad
 from fogsim.scene.terrain import Terrain
 from fogsim.values.scene import FAR, TINY, Batch, Mesh
@@ -106,7 +103,7 @@ def houses(edges: Sequence[Edge], index: LaneIndex, terrain: Terrain, rng: np.ra
         What chooses them.
     """
     found: dict[str, list[tuple[Points, float, float]]] = {}
-    taken = _Taken(1.8 * HOUSE_RADIUS)
+    taken = Spacing(1.8 * HOUSE_RADIUS)
     for edge in edges:
         if edge.speed_limit > TOWN:
             continue
@@ -118,24 +115,6 @@ def houses(edges: Sequence[Edge], index: LaneIndex, terrain: Terrain, rng: np.ra
                 facing = turn if edge.side > 0 else turn + np.pi
                 found.setdefault(f"house_{kind}", []).append((place, facing, size))
     return [_built(name, members, terrain) for name, members in found.items()]
-
-
-class _Taken:
-    """Places that keep a distance from one another, looked up by square cells of that side [m]."""
-
-    def __init__(self, distance: float) -> None:
-        self._distance = distance
-        self._cells: dict[tuple[int, int], list[tuple[float, float]]] = {}
-
-    def takes(self, place: NDArray[np.float64]) -> bool:
-        """Take a place (at least 2,) [m] unless one is taken that is too near."""
-        x, y = float(place[0]), float(place[1])
-        column, row = math.floor(x / self._distance), math.floor(y / self._distance)
-        for cell in product((column - 1, column, column + 1), (row - 1, row, row + 1)):
-            if any(math.dist(other, (x, y)) <= self._distance for other in self._cells.get(cell, ())):
-                return False
-        self._cells.setdefault((column, row), []).append((x, y))
-        return True
 
 
 def _built(name: str, members: Sequence[tuple[Points, float, float]], terrain: Terrain) -> Batch:

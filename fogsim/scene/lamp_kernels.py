@@ -16,7 +16,7 @@ its luminous area as the eye sees it [m²].
 """
 
 
-class LampNumbers(NamedTuple):
+class LampTable(NamedTuple):
     """Lamps of all bodies in their unit boxes.
 
     Attributes
@@ -33,6 +33,8 @@ class LampNumbers(NamedTuple):
         1 for a lamp that shines ahead, −1 for one that shines back.
     of_body : (bodies, most) int64
         Lamps of each body, then −1.
+    signals : int
+        Bits of lamps whose intensity is that of the table; that of others is left at 0.
     """
 
     place: NDArray[np.float64]
@@ -41,19 +43,37 @@ class LampNumbers(NamedTuple):
     intensity: NDArray[np.float64]
     forwards: NDArray[np.float64]
     of_body: NDArray[np.int64]
+    signals: int
+
+
+class LampCarriers(NamedTuple):
+    """Vehicles with lamps.
+
+    Attributes
+    ----------
+    position : (v, 3) float64
+        Middles of the front bumpers [m].
+    turned : (4, v) float64
+        Cosine and sine of their headings, and of their grades.
+    size : (3, v) float64
+        Length, width and height [m].
+    lit, body : (v,) int64
+        Bits of lit lamps, and number of the body.
+    """
+
+    position: NDArray[np.float64]
+    turned: NDArray[np.float64]
+    size: NDArray[np.float64]
+    lit: NDArray[np.int64]
+    body: NDArray[np.int64]
 
 
 @kernel
 def find_lamps(
-    position: NDArray[np.float64],
-    turned: NDArray[np.float64],
-    size: NDArray[np.float64],
-    lit: NDArray[np.int64],
-    body: NDArray[np.int64],
+    vehicles: LampCarriers,
+    lamps: LampTable,
     eye: NDArray[np.float64],
     farthest: float,
-    signals: int,
-    lamps: LampNumbers,
     found: NDArray[np.float64],
     which: NDArray[np.int64],
 ) -> int:
@@ -61,29 +81,20 @@ def find_lamps(
 
     Parameters
     ----------
-    position : (v, 3) float64
-        Middles of the front bumpers of vehicles [m].
-    turned : (4, v) float64
-        Cosine and sine of their headings, and of their grades.
-    size : (3, v) float64
-        Length, width and height [m].
-    lit, body : (v,) int64
-        Lit lamps, and number of the body.
+    vehicles, lamps
+        The vehicles, and the lamps of bodies.
     eye : (3,) float64
         Where the eye is [m].
     farthest : float
         Distance beyond which vehicles are left out [m].
-    signals : int
-        Bits of lamps whose intensity is that of the table; that of others is left at 0.
-    lamps : LampNumbers
-        Lamps of bodies.
     found : (n, FOUND) float64
         Is filled.
     which : (2, n) int64
         Is filled: number of each lamp, and the bits that light it.
     """
+    position, turned, size = vehicles.position, vehicles.turned, vehicles.size
     count = 0
-    for row in range(len(body)):
+    for row in range(len(vehicles.body)):
         dx, dy, dz = eye[0] - position[row, 0], eye[1] - position[row, 1], eye[2] - position[row, 2]
         if abs(dx) + abs(dy) > farthest:
             continue
@@ -92,8 +103,8 @@ def find_lamps(
         onward, aside = dx * cosine + dy * sine, dy * cosine - dx * sine
         ahead, above = onward * level + dz * rise, dz * level - onward * rise
         for column in range(lamps.of_body.shape[1]):
-            lamp = lamps.of_body[body[row], column]
-            bits = lit[row] & lamps.mask[lamp]
+            lamp = lamps.of_body[vehicles.body[row], column]
+            bits = vehicles.lit[row] & lamps.mask[lamp]
             # The eye sees lamps at the front from before it, those at the rear from behind it.
             before = ahead > 0.0 if lamps.forwards[lamp] > 0.0 else ahead + length < 0.0
             if lamp < 0 or bits == 0 or not before:
@@ -108,7 +119,7 @@ def find_lamps(
             one[1] = position[row, 1] + over * sine + y * cosine
             one[2] = position[row, 2] + x * rise + z * level
             one[FORWARD], one[LEFT], one[UP] = forward, left, up
-            one[INTENSITY] = lamps.intensity[lamp] * square * square if bits & signals else 0.0
+            one[INTENSITY] = lamps.intensity[lamp] * square * square if bits & lamps.signals else 0.0
             one[AREA] = lamps.area[lamp] * width * height * facing
             which[0, count], which[1, count] = lamp, bits
             count += 1

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.scene.bodies import LIT_AREAS, BodyLamp, bodies
-from fogsim.scene.lamp_kernels import AREA, FORWARD, FOUND, INTENSITY, LEFT, UP, LampNumbers, find_lamps
+from fogsim.scene.lamp_kernels import AREA, FORWARD, FOUND, INTENSITY, LEFT, UP, LampCarriers, LampTable, find_lamps
 from fogsim.scene.street_lamps import HEIGHT, SIZE
 from fogsim.scene.vehicles import body_names
 from fogsim.units import luminance_of
@@ -61,7 +61,7 @@ class _Lamps:
 
     number: Mapping[str, int]
     colour: NDArray[np.float64]
-    lamps: LampNumbers
+    lamps: LampTable
 
 
 def light_sources(
@@ -108,8 +108,8 @@ def _of_vehicles(
     state: TrafficState, skip: int | None, eye: NDArray[np.float64], beams: Mapping[Lamp, Beam]
 ) -> LightSources:
     table = _lamps()
-    bodies = _numbers(body_names(state))
-    most = len(bodies) * table.lamps.of_body.shape[1]
+    numbers = _numbers(body_names(state))
+    most = len(numbers) * table.lamps.of_body.shape[1]
     found, lit = np.empty((most, FOUND)), np.empty((2, most), np.int64)
     turned = np.stack((np.cos(state.heading), np.sin(state.heading), np.cos(state.grade), np.sin(state.grade)))
     size = np.stack((state.length, state.width, state.height))
@@ -117,7 +117,8 @@ def _of_vehicles(
     if skip is not None:
         lamps[skip] = 0
     position = np.ascontiguousarray(state.position, np.float64)
-    count = find_lamps(position, turned, size, lamps, bodies, eye, FARTHEST_VEHICLE, _SIGNALS, table.lamps, found, lit)
+    vehicles = LampCarriers(position, turned, size, lamps, numbers)
+    count = find_lamps(vehicles, table.lamps, eye, FARTHEST_VEHICLE, found, lit)
     found, lit = found[:count], lit[:, :count]
     _add_beams(found[:, INTENSITY], lit[1], (found[:, FORWARD], found[:, LEFT], found[:, UP]), beams)
     seen = np.flatnonzero(found[:, INTENSITY] > 1e-3)
@@ -198,13 +199,14 @@ def _lamps() -> _Lamps:
     return _Lamps(
         number={name: number for number, name in enumerate(bodies())},
         colour=np.array(colour),
-        lamps=LampNumbers(
+        lamps=LampTable(
             place=np.array(place),
             area=np.array(area),
             mask=np.array(mask),
             intensity=np.array(intensity),
             forwards=np.array(forwards),
             of_body=np.array([member + [-1] * (most - len(member)) for member in members]),
+            signals=_SIGNALS,
         ),
     )
 

@@ -1,7 +1,9 @@
 """What stands beside the road and is drawn many times: trees, posts of guard rails, delineators."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,8 +92,39 @@ def placed(
     )
 
 
+class Spacing:
+    """Places that keep a distance from one another.
+
+    Parameters
+    ----------
+    distance : float
+        What places that are taken are farther apart than [m].
+    """
+
+    def __init__(self, distance: float) -> None:
+        self._distance = distance
+        # By square cells of that side.
+        self._cells: dict[tuple[int, int], list[tuple[float, float]]] = {}
+
+    def takes(self, place: NDArray[np.float64]) -> bool:
+        """Take a place unless one is taken that is too near.
+
+        Parameters
+        ----------
+        place : (2 or 3,) float64
+            The place [m].
+        """
+        x, y = float(place[0]), float(place[1])
+        column, row = math.floor(x / self._distance), math.floor(y / self._distance)
+        for cell in product((column - 1, column, column + 1), (row - 1, row, row + 1)):
+            if any(math.dist(other, (x, y)) <= self._distance for other in self._cells.get(cell, ())):
+                return False
+        self._cells.setdefault((column, row), []).append((x, y))
+        return True
+
+
 def trees(
-    stretches: Sequence[tuple[int, Points]],
+    free: Sequence[tuple[int, Points]],
     index: LaneIndex,
     taken: Points,
     shapes: Mapping[str, Mesh],
@@ -102,7 +135,7 @@ def trees(
 
     Parameters
     ----------
-    stretches : sequence of tuple of int and (n, 3) float64
+    free : sequence of tuple of int and (n, 3) float64
         Side (1 left, −1 right) and centreline of the lanes' free sides.
     index : LaneIndex
         The lanes.
@@ -115,14 +148,14 @@ def trees(
     rng : numpy Generator
         What scatters them.
     """
-    near = _scatter(stretches, rng, spacing=10.0, nearest=13.0, reach=38.0, clumps=90.0)
+    near = _scatter(free, rng, spacing=10.0, nearest=13.0, reach=38.0, clumps=90.0)
     near = near[(index.clearance(near) > TREE_CLEARANCE) & _apart(near, taken, 11.0)]
     conifers = _clumps(near[:, :2], 160.0, rng) + 0.35 * rng.normal(size=len(near)) > 0.1
     batches = []
     for name, members in (("conifer", conifers), ("broad_leaved", ~conifers)):
         kinds = sorted(shape for shape in shapes if shape.startswith(name) and ":" not in shape)
         batches += _planted(near[members], kinds, terrain, rng, height=(6.0, 15.0), slender=1.0)
-    far = _scatter(stretches, rng, spacing=60.0, nearest=75.0, reach=170.0, clumps=400.0)
+    far = _scatter(free, rng, spacing=60.0, nearest=75.0, reach=170.0, clumps=400.0)
     far = far[(index.clearance(far) > 25.0) & _apart(far, taken, 35.0)]
     kinds = sorted(shape for shape in shapes if shape.startswith("woodland") and ":" not in shape)
     return batches + _planted(far, kinds, terrain, rng, height=(9.0, 16.0), slender=5.0, clear_of=index)
@@ -141,7 +174,7 @@ def _apart(places: Points, taken: Points, distance: float) -> NDArray[np.bool_]:
 
 
 def _scatter(
-    stretches: Sequence[tuple[int, Points]],
+    free: Sequence[tuple[int, Points]],
     rng: np.random.Generator,
     *,
     spacing: float,
@@ -149,9 +182,9 @@ def _scatter(
     reach: float,
     clumps: float,
 ) -> Points:
-    """Random places beside the stretches, where a slowly changing density lets them stand."""
+    """Random places beside free sides, where a slowly changing density lets them stand."""
     groups = [np.zeros((0, 3))]
-    for side, line in stretches:
+    for side, line in free:
         count = rng.poisson(arc_length(line)[-1] / spacing)
         here = at_distance(line, rng.uniform(0.0, arc_length(line)[-1], count))
         direction = np.arctan2(*(line[-1, 1::-1] - line[0, 1::-1])) + side * np.pi / 2

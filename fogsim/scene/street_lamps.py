@@ -1,16 +1,14 @@
 """Lamps on poles beside streets."""
 
 from collections.abc import Sequence
-from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fogsim.linear_algebra import matrix_product
 from fogsim.scene.edges import Edge
 from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.polyline import Points, arc_length
-from fogsim.scene.roadside import placed, stations, tube
+from fogsim.scene.roadside import Spacing, placed, stations, tube
 from fogsim.scene.solids import Material, box, merge
 from fogsim.values.scene import FAR, TINY, Batch, Mesh, Scene, Surface
 
@@ -45,7 +43,7 @@ def street_lamp_shapes() -> dict[str, Mesh]:
 def lamp_posts(edges: Sequence[Edge], index: LaneIndex) -> list[Batch]:
     """Lamps about every 35 m along the outer sides of roads, on one side of roads of two directions, off all lanes."""
     side = outer_side(edges)
-    places, turns, taken = [], [], dict[tuple[int, int], list[NDArray[np.float64]]]()
+    places, turns, spacing = [], [], Spacing(_APART)
     for edge in edges:
         if edge.side != side:
             continue
@@ -54,13 +52,9 @@ def lamp_posts(edges: Sequence[Edge], index: LaneIndex) -> list[Batch]:
         # Their arms reach to the left of where they look.
         facing = heading if side < 0 else heading + np.pi
         for place, turn in zip(along[free], facing[free].tolist(), strict=True):
-            column, row = np.floor(place[:2] / _APART).astype(int).tolist()
-            around = product((column - 1, column, column + 1), (row - 1, row, row + 1))
-            near = [other for cell in around for other in taken.get(cell, ())]
-            if all(np.hypot(*(place[:2] - other[:2])) > _APART for other in near):
+            if spacing.takes(place):
                 places.append(place)
                 turns.append(turn)
-                taken.setdefault((column, row), []).append(place)
     return [placed(STREET_LAMP, np.array(places), np.array(turns))] if places else []
 
 

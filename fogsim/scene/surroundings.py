@@ -55,10 +55,10 @@ def surroundings(network: RoadNetwork, signs: SignMap, line: Points) -> Surround
     """
     plane = line[:, :2]
     origin = np.append(np.round(0.5 * (plane.min(axis=0) + plane.max(axis=0)) / _ORIGINS) * _ORIGINS, 0.0)
-    near = Nearness(line, REACH)
-    lanes = _chosen(network.lanes, near.any([lane.centreline for lane in network.lanes]))
-    areas = _chosen(network.areas, near.any([area.outline for area in network.areas]))
-    posts = _chosen(signs.signs, near.any([np.array([sign.position]) for sign in signs.signs]))
+    near = Corridor(line, REACH)
+    lanes = _chosen(network.lanes, near.reaches([lane.centreline for lane in network.lanes]))
+    areas = _chosen(network.areas, near.reaches([area.outline for area in network.areas]))
+    posts = _chosen(signs.signs, near.reaches([np.array([sign.position]) for sign in signs.signs]))
     return Surroundings(
         RoadNetwork(
             tuple(replace(lane, centreline=lane.centreline - origin) for lane in lanes),
@@ -80,8 +80,8 @@ def _moved(position: tuple[float, float, float], origin: NDArray[np.float64]) ->
     return x, y, z
 
 
-class Nearness:
-    """Which places are near a line.
+class Corridor:
+    """Places near a line.
 
     Parameters
     ----------
@@ -106,23 +106,39 @@ class Nearness:
     def _squares(self, places: NDArray[np.float64]) -> NDArray[np.int64]:
         return np.asarray(np.floor((places[:, :2] - self._corner) / _SQUARE), np.int64)
 
-    def tell(self, places: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Tell which places (n, 2 or 3) [m] are near."""
+    def contains(self, places: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Which places are near.
+
+        Parameters
+        ----------
+        places : (n, 2 or 3) float64
+            The places [m].
+        """
         squares = self._squares(places)
         inside = np.all((squares >= 0) & (squares < self._near.shape), axis=1)
         result = np.zeros(len(places), np.bool_)
         result[inside] = self._near[squares[inside, 0], squares[inside, 1]]
         return result
 
-    def any(self, lines: Sequence[NDArray[np.float64]]) -> list[bool]:
-        """Tell of which lines (n, 2 or 3) any part is near."""
+    def reaches(self, lines: Sequence[NDArray[np.float64]]) -> list[bool]:
+        """Which lines have any part near.
+
+        Parameters
+        ----------
+        lines : sequence of (n, 2 or 3) float64
+            The lines [m].
+        """
         if not lines:
             return []
         dense = [_dense(line) for line in lines]
-        near = self.tell(np.concatenate([points[:, :2] for points in dense]))
+        near = self.contains(np.concatenate([points[:, :2] for points in dense]))
         first = np.cumsum([0, *map(len, dense[:-1])])
         found: list[bool] = np.logical_or.reduceat(near, first).tolist()
         return found
+
+
+Nearness = Corridor
+"""The old name."""
 
 
 def _dense(line: NDArray[np.float64]) -> NDArray[np.float64]:

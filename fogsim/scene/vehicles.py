@@ -2,6 +2,7 @@
 
 import math
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,46 +34,48 @@ def vehicle_batches(state: TrafficState, skip: int | None) -> tuple[Batch, ...]:
     shapes, rows, instance = _grouped(state.ids, state.types, state.length.tobytes(), state.height.tobytes(), skip)
     # Sorted all at once, and taken apart by slices, which cost little.
     transforms, paint = np.zeros((len(rows), 4, 4), np.float32), np.empty((len(rows), 3), np.float32)
-    lamps, size = np.empty(len(rows), np.int32), (state.length, state.width, state.height)
-    turned = (state.heading, state.grade)
-    set_up(rows, state.position, turned, size, state.paint, state.lamps, transforms, paint, lamps)
-    return tuple(Batch(name, transforms[own], paint[own], lamps[own], instance[own]) for name, own in shapes)
+    copies = _Copies(transforms, paint, np.empty(len(rows), np.int32))
+    size = (state.length, state.width, state.height)
+    _place_copies(rows, _Vehicles(state.position, state.heading, state.grade, *size, state.paint, state.lamps), copies)
+    return tuple(Batch(name, transforms[own], paint[own], copies.lamps[own], instance[own]) for name, own in shapes)
+
+
+class _Vehicles(NamedTuple):
+    """Columns of a `TrafficState`."""
+
+    position: NDArray[np.float64]
+    heading: NDArray[np.float64]
+    grade: NDArray[np.float64]
+    length: NDArray[np.float64]
+    width: NDArray[np.float64]
+    height: NDArray[np.float64]
+    paint: NDArray[np.float64]
+    lamps: NDArray[np.int32]
+
+
+class _Copies(NamedTuple):
+    """Columns of a `Batch`."""
+
+    transforms: NDArray[np.float32]
+    paint: NDArray[np.float32]
+    lamps: NDArray[np.int32]
 
 
 @kernel
-def set_up(
-    rows: NDArray[np.int64],
-    position: NDArray[np.float64],
-    turned: tuple[NDArray[np.float64], NDArray[np.float64]],
-    size: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
-    paint: NDArray[np.float64],
-    lamps: NDArray[np.int32],
-    transforms: NDArray[np.float32],
-    paint_out: NDArray[np.float32],
-    lamps_out: NDArray[np.int32],
-) -> None:
-    """Transforms from a unit box turned by heading and grade, paint and lamps of some rows of a `TrafficState`."""
-    length, width, height = size
-    heading, grade = turned
+def _place_copies(rows: NDArray[np.int64], vehicles: _Vehicles, copies: _Copies) -> None:
+    """Transforms from a unit box turned by heading and grade, paint and lamps of some rows."""
     for i in range(len(rows)):
-        row = rows[i]
-        cosine, sine = math.cos(heading[row]), math.sin(heading[row])
-        level, rise = math.cos(grade[row]), math.sin(grade[row])
-        ahead, upward = level * length[row], rise * height[row]
-        transforms[i, 0, 0], transforms[i, 0, 1], transforms[i, 0, 2] = (
-            cosine * ahead,
-            -sine * width[row],
-            -cosine * upward,
-        )
-        transforms[i, 1, 0], transforms[i, 1, 1], transforms[i, 1, 2] = (
-            sine * ahead,
-            cosine * width[row],
-            -sine * upward,
-        )
-        transforms[i, 2, 0], transforms[i, 2, 2], transforms[i, 3, 3] = rise * length[row], level * height[row], 1.0
+        row, transform = rows[i], copies.transforms[i]
+        cosine, sine = math.cos(vehicles.heading[row]), math.sin(vehicles.heading[row])
+        level, rise = math.cos(vehicles.grade[row]), math.sin(vehicles.grade[row])
+        length, width, height = vehicles.length[row], vehicles.width[row], vehicles.height[row]
+        ahead, upward = level * length, rise * height
+        transform[0, 0], transform[0, 1], transform[0, 2] = cosine * ahead, -sine * width, -cosine * upward
+        transform[1, 0], transform[1, 1], transform[1, 2] = sine * ahead, cosine * width, -sine * upward
+        transform[2, 0], transform[2, 2], transform[3, 3] = rise * length, level * height, 1.0
         for axis in range(3):
-            transforms[i, axis, 3], paint_out[i, axis] = position[row, axis], paint[row, axis]
-        lamps_out[i] = lamps[row]
+            transform[axis, 3], copies.paint[i, axis] = vehicles.position[row, axis], vehicles.paint[row, axis]
+        copies.lamps[i] = vehicles.lamps[row]
 
 
 # Traffic changes slowly: from one picture to the next nearly all vehicles are the same, in the same order.
@@ -95,7 +98,13 @@ def _grouped(
 
 
 def body_names(state: TrafficState) -> tuple[str, ...]:
-    """Name of the shape of every vehicle."""
+    """Name of the shape of every vehicle.
+
+    Parameters
+    ----------
+    state : TrafficState
+        The vehicles.
+    """
     return _names(state.ids, state.types, state.length.tobytes(), state.height.tobytes())
 
 

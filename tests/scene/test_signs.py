@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from fogsim.scene import build_scene
-from fogsim.scene.lettering import lettering
 from fogsim.scene.signs import SIGN_KINDS, gantries, sign_shapes
 from fogsim.scene.signs.kinds import face_of, shape_name
-from fogsim.scene.signs.symbols import BLACK
+from fogsim.scene.signs.symbols import BLACK, lettering
 from fogsim.values import Batch, RoadNetwork, Scene, Sign, SignMap, Surface
 
 LIMIT = Sign("s", "speed_limit", 80 / 3.6, (200.0, -6.0, 2.2), 0.0, 0.9)
@@ -88,7 +87,7 @@ def test_from_afar_a_face_keeps_its_mean_colour() -> None:
 def test_an_unknown_code_is_a_plate_with_the_code_on_it() -> None:
     one, other = (dataclasses.replace(LIMIT, kind=kind) for kind in ("xodr.450-52", "tempo"))
     written = [face_of(sign).symbol for sign in (one, other)]
-    expected = [lettering(code, BLACK, 4) for code in ("450-52", "TEMPO")]
+    expected = [lettering(code, BLACK) for code in ("450-52", "TEMPO")]
     for mesh, letters in zip(written, expected, strict=True):
         assert len(mesh.faces) == len(letters.faces) > 0
         assert np.ptp(mesh.positions[:, 0]) < 0.92
@@ -107,12 +106,12 @@ def test_codes_of_the_catalogue_have_the_faces_of_their_kinds() -> None:
 def test_every_character_differs_and_stays_in_its_field() -> None:
     seen = set()
     for character in "0123456789ABCDEFGHIJKLMNPQRSTUVWXYZ-_.:/?":
-        positions = lettering(character, BLACK, 4).positions
+        positions = lettering(character, BLACK).positions
         assert np.abs(positions[:, 0]).max() < 0.4
         assert np.abs(positions[:, 1]).max() < 0.6
         seen.add(positions.tobytes())
     assert len(seen) == 41
-    assert len(lettering(" ", BLACK, 4).faces) == 0
+    assert len(lettering(" ", BLACK).faces) == 0
 
 
 def test_posts_reach_from_the_ground_to_the_face(motorway: RoadNetwork) -> None:

@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from fogsim.scene import Nearness, build_scene, surroundings
+from fogsim.scene import Corridor, build_scene, surroundings
 from fogsim.scene.surroundings import REACH
 from fogsim.values import Lane, RoadNetwork, Sign, SignMap
 
@@ -46,10 +46,8 @@ def test_what_is_far_from_the_route_is_left_out(motorway: RoadNetwork) -> None:
 
 
 def test_near_is_what_is_as_near_as_told_also_beside_long_pieces() -> None:
-    near = Nearness(np.array([[0.0, 0, 0], [9000, 0, 0]]), 600.0)
-    assert near.tell(np.array([[4500.0, 590.0], [4500, -590], [-590, 0], [9590, 0]])).all()
-    assert not near.tell(np.array([[4500.0, 1400.0], [-1400, 0], [1e7, 0]])).any()
-    assert near.any([np.array([[4500.0, -9000, 0], [4500, 9000, 0]]), np.array([[0.0, 5000, 0], [9000, 5000, 0]])]) == [
-        True,
-        False,
-    ]
+    near = Corridor(np.array([[0.0, 0, 0], [9000, 0, 0]]), 600.0)
+    assert near.contains(np.array([[4500.0, 590.0], [4500, -590], [-590, 0], [9590, 0]])).all()
+    assert not near.contains(np.array([[4500.0, 1400.0], [-1400, 0], [1e7, 0]])).any()
+    lines = [np.array([[4500.0, -9000, 0], [4500, 9000, 0]]), np.array([[0.0, 5000, 0], [9000, 5000, 0]])]
+    assert near.reaches(lines) == [True, False]

@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help check demo test portability lint types contracts ci figures clean
+.PHONY: help check demo test quick hooks portability lint types contracts ci figures clean
 
 help: ## Show what can be made
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -34,6 +34,12 @@ demo: $(VENV)/.installed ## Run the demo scenario; results go to runs/demo/
 
 test: $(VENV)/.installed-test $(VENV)/.compiled ## Run the whole test suite but for portability
 	@$(BIN)/python -m pytest -n auto --dist worksteal --ignore tests/portability
+
+quick: $(VENV)/.installed-test ## Run the tests that take half a minute together
+	@$(BIN)/python -m pytest -q tests/advice tests/files tests/fusion tests/lighting tests/metrics tests/sensors tests/values
+
+hooks: $(VENV)/.installed-test ## Check style, types, contracts and quick tests before each commit
+	@$(BIN)/pre-commit install
 
 portability: $(VENV)/.installed-test ## Check that other processors' kernels change nothing (compiles all anew)
 	@$(BIN)/python -m pytest tests/portability

@@ -1,6 +1,6 @@
 """Time of a camera frame: from where the vehicles are to an 8-bit image, in fog and with noise.
 
-What is timed is what the closed loop does for a frame: `Outlook.see` (vehicles to batches and lit lamps to lights,
+What is timed is what the closed loop does for a frame: `ViewRenderer.render` (vehicles to batches, lit lamps to lights,
 drawing to radiance, distance and ids, fog and lamplight) and `CameraSensor.take` (exposure with photon and read noise,
 response curve and quantisation). Traffic and estimators are not in it. Of the stages, "render" is the drawing, "air"
 fog and lamplight, "camera" the taking, and "scene" what is left.
@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 import fogsim
 from fogsim.camera import mounted_pose
-from fogsim.ego.view_rendering import Outlook
+from fogsim.ego.view_rendering import ViewRenderer
 from fogsim.render import RENDERERS
 from fogsim.scenario import Scenario, build
 from fogsim.scene import build_scene, vehicle_batches
@@ -114,7 +114,7 @@ def traffic_at(route: NDArray[np.float64], travelled: float) -> TrafficState:
 
 
 class Timed:
-    """Stands before a part of the outlook and adds up the time [s] that one of its methods takes."""
+    """Stands before a part of the view renderer and adds up the time [s] that one of its methods takes."""
 
     def __init__(self, part: Any, method: str) -> None:
         self._part, self._method, self.spent = part, method, 0.0
@@ -148,19 +148,19 @@ class Case:
     def __init__(self, key: Key, network: RoadNetwork) -> None:
         described = scenario(*key)
         camera, setback = build.camera(described), described.camera.setback_m
-        self._outlook = Outlook(described, network, signs_beside(network.route))
+        self._view_renderer = ViewRenderer(described, network, signs_beside(network.route))
         self._camera_sensor, self._rng = build.camera_sensor(described), np.random.default_rng(1)
         self.traffic = [traffic_at(network.route, STEP * number) for number in range(ROUND)]
         self.poses = [mounted_pose(camera, one.position[0], float(one.heading[0]), setback) for one in self.traffic]
-        self._render = self._outlook._renderer = Timed(self._outlook._renderer, "render")
-        self._air = self._outlook._air = Timed(self._outlook._air, "radiance")
+        self._render = self._view_renderer._renderer = Timed(self._view_renderer._renderer, "render")
+        self._air = self._view_renderer._air = Timed(self._view_renderer._air, "radiance")
 
     def frame(self, number: int) -> list[float]:
         """Take a frame; seconds that each stage took."""
         number %= ROUND
         self._render.spent = self._air.spent = 0.0
         started = time.perf_counter()
-        _, radiance = self._outlook.see(self.traffic[number], 0, self.poses[number], 0.1 * number)
+        _, radiance = self._view_renderer.render(self.traffic[number], 0, self.poses[number], 0.1 * number)
         seen = time.perf_counter()
         self._camera_sensor.take(radiance, self._rng)
         render, air = self._render.spent, self._air.spent
@@ -168,7 +168,7 @@ class Case:
 
     def close(self) -> None:
         """Free the renderer."""
-        self._outlook.close()
+        self._view_renderer.close()
 
 
 def triangles(network: RoadNetwork, state: TrafficState) -> int:

@@ -1,7 +1,7 @@
 """Pictures for the docs, staged without SUMO: place, vehicles, signs, light and fog, seen as the closed loop sees them.
 
-What is called is what `fogsim run` calls for a frame: `Outlook.see` draws the scene and puts the air before it, the
-scenario's camera sensor exposes it.
+What is called is what `fogsim run` calls for a frame: `ViewRenderer.render` draws the scene and puts the air before it,
+the scenario's camera sensor exposes it.
 """
 
 import math
@@ -15,7 +15,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 import fogsim
 from fogsim.camera import mounted_pose
-from fogsim.ego.view_rendering import Outlook
+from fogsim.ego.view_rendering import ViewRenderer
 from fogsim.scenario import Scenario, build
 from fogsim.traffic.road.network import read_net, road_network
 from fogsim.values import CameraPose, Lamp, Lane, LaneMarking, RoadNetwork, Sign, SignMap, TrafficState
@@ -152,11 +152,11 @@ def photograph(shot: Shot, renderer: str = "cpu", size: tuple[int, int] = (480, 
     described, roads = scenario(shot.settings, renderer, size), network(shot.place)
     state = traffic(roads.route, shot)
     pose = mounted_pose(build.camera(described), state.position[0], float(state.heading[0]), described.camera.setback_m)
-    outlook = Outlook(described, roads, signs(roads.route, shot))
+    view_renderer = ViewRenderer(described, roads, signs(roads.route, shot))
     try:
-        _, radiance = outlook.see(state, 0, pose, shot.time)
+        _, radiance = view_renderer.render(state, 0, pose, shot.time)
     finally:
-        outlook.close()
+        view_renderer.close()
     image = build.camera_sensor(described).take(radiance, np.random.default_rng(1)).astype(np.uint8)
     return Taken(image, radiance, described, pose)
 

@@ -5,14 +5,14 @@ import math
 import warnings
 from collections.abc import Generator
 from types import TracebackType
-from typing import Self
+from typing import Protocol, Self
 
 from fogsim.atmosphere import FogNow
-from fogsim.ego.equipment import OnBoard
+from fogsim.ego.equipment import EgoEquipment
 from fogsim.errors import SimulationError, UnplayedWarning
 from fogsim.randomness import spawn_streams
 from fogsim.scenario import Scenario, build
-from fogsim.traffic import Traffic, libsumo_traffic
+from fogsim.traffic import FogAccess, Traffic, libsumo_traffic
 from fogsim.values import Command, Ending, FogField, Step, TrafficSnapshot
 from fogsim.values.result_checks import checked_advice, checked_command, checked_lamps
 
@@ -89,22 +89,82 @@ class AdvisedDriving:
         self._adviser = build.adviser(scenario)
         self._lighting = build.lighting_policy(scenario)
         self._frames = build.periods(scenario).decision_frames
-        self._to_all = scenario.drivers.advised == "all"
 
     def decide(self, step: Step) -> Command:
-        """Command for the next camera period; the one in force between decisions."""
+        """Command for the next camera period; the one in force between decisions.
+
+        Parameters
+        ----------
+        step : Step
+            What was finished last.
+        """
         if step.index % self._frames:
             return step.command
         previous = step.command
         advised = self._adviser.advise(step.belief, step.speed_limit, step.time, previous.advice)
         advice = checked_advice(self._scenario.advice.method, advised)
-        lamps = self._lighting.lamps(step.belief, previous.lamps)
-        others = step.traffic.ids if self._to_all and math.isfinite(advice.speed) else ()
-        return Command(
-            advice=advice,
-            lamps=checked_lamps(self._scenario.lighting.method, lamps),
-            advised_speeds=dict.fromkeys(others, advice.speed),
-        )
+        lamps = checked_lamps(self._scenario.lighting.method, self._lighting.lamps(step.belief, previous.lamps))
+        return spread_advice(Command(advice=advice, lamps=lamps), step, self._scenario)
+
+
+def spread_advice(command: Command, step: Step, scenario: Scenario) -> Command:
+    """Give the ego's advice to every vehicle near it too, if the scenario says so.
+
+    Parameters
+    ----------
+    command : Command
+        With the ego's advice.
+    step : Step
+        With the vehicles near it.
+    scenario : Scenario
+        Its ``drivers.advised`` says whom the advice goes to.
+    """
+    if scenario.drivers.advised != "all" or not math.isfinite(command.advice.speed):
+        return command
+    return dataclasses.replace(command, advised_speeds=dict.fromkeys(step.traffic.ids, command.advice.speed))
+
+
+class EntersFog(Protocol):
+    """A traffic simulation, as far as fog concerns it."""
+
+    def enter_fog(self, fog: FogAccess) -> None:
+        """Let drivers see only what this fog lets them see; see `Traffic.enter_fog`."""
+
+
+class DriversFog:
+    """The fog about the drivers of a traffic simulation, which moves on with time."""
+
+    def __init__(self) -> None:
+        self._fog: FogNow | None = None
+
+    @property
+    def is_entered(self) -> bool:
+        """Whether the traffic has been told of the fog."""
+        return self._fog is not None
+
+    def enter(self, fog: FogField, traffic: EntersFog) -> None:
+        """Tell a traffic of the fog, whose place is known only when the ego's route is.
+
+        Parameters
+        ----------
+        fog : FogField
+            The fog over time.
+        traffic : Traffic
+            Or something else with `Traffic.enter_fog`.
+        """
+        self._fog = FogNow(fog)
+        traffic.enter_fog(self._fog)
+
+    def set_time(self, time: float) -> None:
+        """Let it be a time from here on.
+
+        Parameters
+        ----------
+        time : float
+            Time since the run began [s].
+        """
+        if self._fog is not None:
+            self._fog.set_time(time)
 
 
 class ClosedLoop:
@@ -123,8 +183,8 @@ class ClosedLoop:
         self._periods = build.periods(scenario)
         self._traffic = traffic or libsumo_traffic(build.traffic_setup(scenario))
         self._replays = traffic is None
-        self._onboard = OnBoard(scenario)
-        self._drivers_fog: FogNow | None = None
+        self._equipment = EgoEquipment(scenario)
+        self._drivers_fog = DriversFog()
         self._step: Step | None = None
 
     def start(self, seed: int) -> Step:
@@ -144,26 +204,19 @@ class ClosedLoop:
         """
         streams = spawn_streams(seed)
         self._step = None
-        if self._drivers_fog is not None:
-            self._drivers_fog.set_time(0.0)
+        self._drivers_fog.set_time(0.0)
         self._traffic.start(streams.traffic_seed)
-        fog = self._onboard.begin(streams, self._traffic.network).fog
-        if self._drivers_fog is None and (fog.extinction > 0 or fog.banks):
-            self._drivers_fog = self._enter_fog(fog, streams.traffic_seed)
+        fog = self._equipment.start_run(streams, self._traffic.network)
+        if not self._drivers_fog.is_entered and (fog.extinction > 0 or fog.banks):
+            self._drivers_fog.enter(fog, self._traffic)
+            if self._replays:
+                # Drivers must have had the fog about them while the road filled: begin once more, with it.
+                self._traffic.start(streams.traffic_seed)
         snapshot = self._traffic.observe()
         if snapshot is None:
             raise SimulationError("the ego left the road as soon as it had appeared")
-        self._step = self._closing(self._finish(0, snapshot, Command()))
+        self._step = self._with_unplayed(self._complete_step(0, snapshot, Command()))
         return self._step
-
-    def _enter_fog(self, fog: FogField, seed: int) -> FogNow:
-        """Tell the traffic of the fog, whose place is known only when the ego's route is."""
-        drivers_fog = FogNow(fog)
-        self._traffic.enter_fog(drivers_fog)
-        if self._replays:
-            # Drivers must have had the fog about them while the road filled: begin once more, with it.
-            self._traffic.start(seed)
-        return drivers_fog
 
     def advance(self, command: Command) -> Step:
         """Move by one camera period with a command in force.
@@ -189,26 +242,25 @@ class ClosedLoop:
             raise SimulationError("the run has not been started or is over: call start() before advance()")
         checked_command(command)
         for number in range(self._periods.traffic_steps):
-            if self._drivers_fog is not None:
-                part = number / self._periods.traffic_steps
-                self._drivers_fog.set_time((self._step.index + part) * self._periods.camera_period)
+            part = number / self._periods.traffic_steps
+            self._drivers_fog.set_time((self._step.index + part) * self._periods.camera_period)
             self._traffic.advance(command)
         snapshot, index = self._traffic.observe(), self._step.index + 1
         if snapshot is None:
             time = self._periods.time(index)
             step = dataclasses.replace(self._step, index=index, time=time, ending=Ending.LEFT_NETWORK)
         else:
-            step = self._finish(index, snapshot, command)
-        self._step = self._closing(step)
+            step = self._complete_step(index, snapshot, command)
+        self._step = self._with_unplayed(step)
         return self._step
 
-    def _closing(self, step: Step) -> Step:
-        """The step that ends a run tells what was not played."""
+    def _with_unplayed(self, step: Step) -> Step:
+        """A step; one that ends a run with what was not played."""
         return step if step.ending is None else dataclasses.replace(step, unplayed=self._traffic.unplayed())
 
-    def _finish(self, index: int, snapshot: TrafficSnapshot, command: Command) -> Step:
+    def _complete_step(self, index: int, snapshot: TrafficSnapshot, command: Command) -> Step:
         time = self._periods.time(index)
-        return self._onboard.finish(index, time, snapshot, command, self._ending(index, snapshot))
+        return self._equipment.complete_step(index, time, snapshot, command, self._ending(index, snapshot))
 
     def _ending(self, index: int, snapshot: TrafficSnapshot) -> Ending | None:
         ego = snapshot.state.ids[snapshot.ego]
@@ -221,7 +273,7 @@ class ClosedLoop:
     def close(self) -> None:
         """End the simulation and free the renderer; closing twice is allowed."""
         self._traffic.close()
-        self._onboard.close()
+        self._equipment.close()
         self._step = None
 
     def __enter__(self) -> Self:

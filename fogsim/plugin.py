@@ -8,10 +8,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from fogsim.atmosphere import FogNow
-from fogsim.ego.equipment import OnBoard
+from fogsim.ego.equipment import EgoEquipment
 from fogsim.errors import InputError, SimulationError, UnplayedWarning
-from fogsim.loop import AdvisedDriving
+from fogsim.loop import AdvisedDriving, DriversFog
 from fogsim.randomness import spawn_streams
 from fogsim.scenario import Scenario, attached_scenario, build, override
 from fogsim.traffic import AttachedTraffic, TraciLink, Traffic, step_length, traci_traffic
@@ -159,12 +158,12 @@ class AttachedSession:
         self._traffic = traffic
         self._drivers = drivers
         self._seed = seed
-        self._onboard = OnBoard(scenario)
+        self._equipment = EgoEquipment(scenario)
         self._policy = AdvisedDriving(scenario)
         self._command = Command()
         self._times: tuple[float, float] | None = None
         self._index = 0
-        self._drivers_fog: FogNow | None = None
+        self._drivers_fog = DriversFog()
         self._started = False
         self._looked = False
         self._closed = False
@@ -193,19 +192,17 @@ class AttachedSession:
         elif self._traffic.ego_is_there():
             self._traffic.start(self._seed)
             self._started = True
-            fog = self._onboard.begin(spawn_streams(self._seed), self._traffic.network).fog
+            fog = self._equipment.start_run(spawn_streams(self._seed), self._traffic.network)
             if self._drivers:
-                self._drivers_fog = FogNow(fog)
-                self._traffic.enter_fog(self._drivers_fog)
+                self._drivers_fog.enter(fog, self._traffic)
         else:
             return None
         snapshot = self._traffic.observe()
         if snapshot is None:
             return None
         time = self._elapsed(snapshot.state.time)
-        if self._drivers_fog is not None:
-            self._drivers_fog.set_time(time)
-        step = self._onboard.finish(self._index, time, snapshot, self._command, None)
+        self._drivers_fog.set_time(time)
+        step = self._equipment.complete_step(self._index, time, snapshot, self._command, None)
         self._index += 1
         return step
 
@@ -266,7 +263,7 @@ class AttachedSession:
             with contextlib.suppress(SimulationError):
                 self._traffic.release()
         self._closed = True
-        self._onboard.close()
+        self._equipment.close()
 
     def __enter__(self) -> Self:
         return self

@@ -10,8 +10,8 @@ import pytest
 
 import fogsim
 from fogsim.camera import mounted_pose
-from fogsim.ego.equipment import OnBoard, fog_truth
-from fogsim.ego.view_rendering import Outlook
+from fogsim.ego.equipment import EgoEquipment, fog_truth
+from fogsim.ego.view_rendering import ViewRenderer
 from fogsim.randomness import spawn_streams
 from fogsim.scenario import build, catalogue
 from fogsim.values import (
@@ -79,12 +79,12 @@ def traffic(grade: float, station: float, lamps: Lamp = Lamp.POSITION) -> Traffi
 def look(grade: float, *settings: str, lamps: Lamp = Lamp.POSITION) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Instance ids, distances and radiance."""
     scenario = fogsim.load_scenario("motorway_fog_bank", [*SETTINGS, "fog={visibility_m: 150}", *settings])
-    outlook, state = Outlook(scenario, road(grade), SignMap()), traffic(grade, 400.0, lamps)
+    view_renderer, state = ViewRenderer(scenario, road(grade), SignMap()), traffic(grade, 400.0, lamps)
     pose = mounted_pose(
         build.camera(scenario), state.position[0], 0.0, scenario.camera.setback_m, float(state.grade[0])
     )
-    view, radiance = outlook.see(state, 0, pose, 0.0)
-    outlook.close()
+    view, radiance = view_renderer.render(state, 0, pose, 0.0)
+    view_renderer.close()
     return view.instance.copy(), view.distance.copy(), radiance.copy()
 
 
@@ -164,14 +164,14 @@ def drive(grade: float, visibility: float) -> list[Step]:
     scenario = fogsim.load_scenario(
         "motorway_fog_bank", ["renderer=cpu", f"fog={{visibility_m: {visibility}}}", f"estimators=[{methods}]"]
     )
-    board = OnBoard(scenario)
-    board.begin(spawn_streams(1), lambda: (road(grade), SignMap()))
+    equipment = EgoEquipment(scenario)
+    equipment.start_run(spawn_streams(1), lambda: (road(grade), SignMap()))
     steps = []
     for index in range(3):
         state = dataclasses.replace(traffic(grade, 200.0 + 37.0 * index), time=2.0 * index)
         snapshot = TrafficSnapshot(state, 0, 200.0, 1500.0, 36.0, Leader("other", GAP, 20.0), ())
-        steps.append(board.finish(index, 2.0 * index, snapshot, Command(), None))
-    board.close()
+        steps.append(equipment.complete_step(index, 2.0 * index, snapshot, Command(), None))
+    equipment.close()
     return steps
 
 

@@ -1,7 +1,5 @@
 """What environments have in common in which the agent advises the ego's speed and chooses its lamps."""
 
-import dataclasses
-import math
 from collections.abc import Callable, Sequence
 from typing import Any, cast
 
@@ -11,10 +9,11 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
+from fogsim.loop import spread_advice
 from fogsim.metrics import step_metrics
 from fogsim.recorders import FramePanel
 from fogsim.scenario import Scenario, build
-from fogsim.values import Command, Ending, Step
+from fogsim.values import Ending, Step
 from fogsim_envs.hosting import Simulation
 from fogsim_envs.rewards import RewardWeights, reward_terms
 from fogsim_envs.spaces import action_space, command_of, observation_space, observe
@@ -96,7 +95,7 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         """Let an action be in force for one decision period."""
         if self._simulation is None or self._step is None:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
-        before, command = self._step, self._told_to_all(command_of(action, self._continuous), self._step)
+        before, command = self._step, spread_advice(command_of(action, self._continuous), self._step, self._active)
         for _ in range(self._frames):
             self._step = self._simulation.advance(command)
             if self._step.ending is not None:
@@ -107,12 +106,6 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         terminated = after.ending is not None and not truncated
         info = {**_info(after), "reward_terms": terms}
         return observe(after), float(sum(terms.values())), terminated, truncated, info
-
-    def _told_to_all(self, command: Command, step: Step) -> Command:
-        """The command, with the ego's advice for everybody near it too if the scenario says so."""
-        if self._active.drivers.advised != "all" or not math.isfinite(command.advice.speed):
-            return command
-        return dataclasses.replace(command, advised_speeds=dict.fromkeys(step.traffic.ids, command.advice.speed))
 
     def render(self) -> NDArray[np.uint8] | None:
         """Draw the latest camera frame and its panel."""

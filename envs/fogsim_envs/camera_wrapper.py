@@ -9,22 +9,21 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
 
-from fogsim.atmosphere import FieldAccess
-from fogsim.ego.equipment import OnBoard
+from fogsim.ego.equipment import EgoEquipment
 from fogsim.errors import InputError
+from fogsim.loop import DriversFog
 from fogsim.randomness import spawn_streams
 from fogsim.scenario import Scenario, build
 from fogsim.traffic.highway import (
     Fleet,
     is_highway_environment,
-    let_drivers_meet,
     read_snapshot,
     road_network,
     same_roads,
     take_over,
 )
 from fogsim.traffic.setup import UNTOUCHED
-from fogsim.values import Command, RoadNetwork, SignMap, Step
+from fogsim.values import Command, FogField, RoadNetwork, SignMap, Step
 from fogsim_envs.highway import clock_settings, highway_config, highway_scenario
 from fogsim_envs.spaces import LAMP_MODES, observation_space, observe
 
@@ -90,8 +89,9 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
         size = (f"camera.width={image_size[0]}", f"camera.height={image_size[1]}")
         self._scenario = _scenario(highway_config(env.unwrapped), visibility, [*size, *overrides])
         self._drivers = drivers
-        self._onboard = OnBoard(self._scenario)
+        self._equipment = EgoEquipment(self._scenario)
         self._network: RoadNetwork | None = None
+        self._drivers_fog = DriversFog()
         self._fleet: Fleet | None = None
         self._step: Step | None = None
         # The noise of the sensors draws on numbers of its own: the environment runs as it would without the camera.
@@ -104,7 +104,15 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Reset the environment and put the camera into its controlled vehicle."""
+        """Reset the environment and put the camera into its controlled vehicle.
+
+        Parameters
+        ----------
+        seed : int or None
+            Seed of the environment and of the sensors' noise; None goes on with the numbers of before.
+        options : dict or None
+            Of the environment.
+        """
         observation, info = self.env.reset(seed=seed, options=options)
         if seed is not None:
             self._noise = np.random.default_rng(seed)
@@ -113,31 +121,38 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
         self._fleet.ego_lamps = _COMMAND.lamps
         network = road_network(environment.road, environment.vehicle)
         if self._network is not None and not same_roads(self._network, network):
-            self._onboard.close()
-            self._onboard = OnBoard(self._scenario)
+            self._equipment.close()
+            self._equipment = EgoEquipment(self._scenario)
         self._network = network
         streams = spawn_streams(int(self._noise.integers(2**31)))
-        fog = self._onboard.begin(streams, lambda: (network, SignMap())).fog
-        self._meet(FieldAccess(fog), self._fleet, streams.traffic_seed)
+        fog = self._equipment.start_run(streams, lambda: (network, SignMap()))
+        self._drivers_fog = self._take_over_drivers(fog, self._fleet, streams.traffic_seed)
         self._step = None
-        return self._looked(observation), self._told(info)
+        return self._with_frame(observation), self._with_truth(info)
 
-    def _meet(self, fog: FieldAccess, fleet: Fleet, seed: int) -> None:
-        """Let the environment's drivers meet the fog, if they shall, and play the script."""
-        setup = build.traffic_setup(self._scenario)
+    def _take_over_drivers(self, fog: FogField, fleet: Fleet, seed: int) -> DriversFog:
+        """Play the script, and put the fog about the environment's drivers if it concerns them."""
+        setup, drivers_fog = build.traffic_setup(self._scenario), DriversFog()
         manners = setup.drivers if self._drivers else UNTOUCHED
-        conduct = take_over(fleet, manners, setup.events, seed, setup.advice_deceleration)
+        conduct = take_over(fleet, manners, setup.events, seed, setup.advice_deceleration, setup.sight)
         if self._drivers:
-            conduct.enter_fog(fog)
-            if setup.sight is not None:
-                let_drivers_meet(fog, fleet, setup.sight)
+            drivers_fog.enter(fog, conduct)
+        return drivers_fog
 
     def step(self, action: Any) -> tuple[dict[str, Any], Any, bool, bool, dict[str, Any]]:
-        """Let the environment make its step, then look."""
-        observation, reward, terminated, truncated, info = self.env.step(action)
-        return self._looked(observation), reward, terminated, truncated, self._told(info)
+        """Let the environment make its step, then draw the frame at its end.
 
-    def _looked(self, observation: Any) -> dict[str, Any]:
+        Parameters
+        ----------
+        action : object
+            Of the environment's own action space.
+        """
+        if self._fleet is not None:
+            self._drivers_fog.set_time(self._fleet.time)
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        return self._with_frame(observation), reward, terminated, truncated, self._with_truth(info)
+
+    def _with_frame(self, observation: Any) -> dict[str, Any]:
         """Observation with the frame of now; with the last one if the vehicle is no longer there."""
         if self._fleet is None or self._network is None:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
@@ -145,13 +160,13 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
         snapshot = read_snapshot(self._fleet, self._network.route, (), reach)
         if snapshot is not None:
             index = 0 if self._step is None else self._step.index + 1
-            self._step = self._onboard.finish(index, self._fleet.time, snapshot, _COMMAND, None)
+            self._step = self._equipment.complete_step(index, self._fleet.time, snapshot, _COMMAND, None)
         if self._step is None:
             raise gymnasium.error.ResetNeeded("the controlled vehicle is not on the road: call reset()")
         own = observe(self._step)
         return {"camera": own["camera"], "state": own["state"], "highway": observation}
 
-    def _told(self, info: dict[str, Any]) -> dict[str, Any]:
+    def _with_truth(self, info: dict[str, Any]) -> dict[str, Any]:
         truth = None if self._step is None else self._step.truth
         if truth is None:
             return info
@@ -159,6 +174,6 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
 
     def close(self) -> None:
         """Close the environment and free the renderer; closing twice is allowed."""
-        self._onboard.close()
+        self._equipment.close()
         self._fleet, self._network, self._step = None, None, None
         super().close()

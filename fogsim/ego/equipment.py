@@ -7,7 +7,7 @@ import numpy as np
 
 from fogsim.atmosphere import extinction, field_at, optical_depth_along
 from fogsim.camera import mounted_pose
-from fogsim.ego.view_rendering import Outlook
+from fogsim.ego.view_rendering import ViewRenderer
 from fogsim.errors import SimulationError
 from fogsim.randomness import Streams
 from fogsim.scenario import Scenario, build
@@ -34,7 +34,7 @@ _SIGHT_LINE = np.geomspace(1.0, 20_000.0, 400)
 """Distances ahead at which the optical depth is looked up to find how far one sees [m]."""
 
 
-class OnBoard:
+class EgoEquipment:
     """The ego's camera, sensors, estimators and belief, in the fog of a scenario.
 
     Parameters
@@ -52,11 +52,11 @@ class OnBoard:
         self._told_camera = build.told_camera(scenario)
         self._estimators = build.estimators(scenario, self._told_camera)
         self._fusion = build.fusion(scenario)
-        self._outlook: Outlook | None = None
+        self._view_renderer: ViewRenderer | None = None
         self._streams: Streams | None = None
 
-    def begin(self, streams: Streams, network: Callable[[], tuple[RoadNetwork, SignMap]]) -> Outlook:
-        """Forget earlier runs.
+    def start_run(self, streams: Streams, network: Callable[[], tuple[RoadNetwork, SignMap]]) -> FogField:
+        """Forget earlier runs, and lay the scenario's fog along the route.
 
         Parameters
         ----------
@@ -65,22 +65,27 @@ class OnBoard:
         network : callable
             Gives roads and signs; asked the first time only.
 
+        Returns
+        -------
+        FogField
+            The fog at the start of the run, and how it changes.
+
         Raises
         ------
         MissingDependencyError
             If no renderer works here.
         """
-        if self._outlook is None:
-            self._outlook = Outlook(self._scenario, *network())
+        if self._view_renderer is None:
+            self._view_renderer = ViewRenderer(self._scenario, *network())
         for estimator in self._estimators:
             estimator.reset()
         self._fusion.reset()
         self._camera_sensor.reset()
         self._body.reset()
         self._streams = streams
-        return self._outlook
+        return self._view_renderer.fog
 
-    def finish(
+    def complete_step(
         self, index: int, time: float, snapshot: TrafficSnapshot, command: Command, ending: Ending | None
     ) -> Step:
         """See, measure, estimate and believe: everything between the traffic and the next decision.
@@ -101,16 +106,16 @@ class OnBoard:
         Raises
         ------
         SimulationError
-            If `begin` has not been called, or it is closed.
+            If `start_run` has not been called, or it is closed.
         """
-        if self._outlook is None or self._streams is None:
+        if self._view_renderer is None or self._streams is None:
             raise SimulationError("the run has not been started, or is closed")
-        outlook, state, ego = self._outlook, snapshot.state, snapshot.ego
+        renderer, state, ego = self._view_renderer, snapshot.state, snapshot.ego
         pose = self._pose(state, ego)
-        view, radiance = outlook.see(state, ego, pose, time)
+        view, radiance = renderer.render(state, ego, pose, time)
         image = self._camera_sensor.take(radiance, self._streams.camera)
         frame = Frame(time, image, self._told_camera)
-        observation = self._observe(frame, snapshot, outlook.signs, self._streams)
+        observation = self._observe(frame, snapshot, renderer.signs, self._streams)
         estimates = tuple(
             checked_estimate(section.method, estimator.update(observation))
             for section, estimator in zip(self._scenario.estimators, self._estimators, strict=True)
@@ -124,7 +129,7 @@ class OnBoard:
             speed_limit=snapshot.speed_limit,
             leader=snapshot.leader,
             collisions=snapshot.collisions,
-            truth=fog_truth(field_at(outlook.fog, time), pose, self._camera, outlook.signs),
+            truth=fog_truth(field_at(renderer.fog, time), pose, self._camera, renderer.signs),
             view=view,
             observation=observation,
             estimates=estimates,
@@ -151,9 +156,9 @@ class OnBoard:
 
     def close(self) -> None:
         """Free the renderer; closing twice is allowed."""
-        if self._outlook is not None:
-            self._outlook.close()
-        self._outlook, self._streams = None, None
+        if self._view_renderer is not None:
+            self._view_renderer.close()
+        self._view_renderer, self._streams = None, None
 
 
 def fog_truth(fog: FogField, pose: CameraPose, camera: Camera, signs: SignMap) -> Truth:

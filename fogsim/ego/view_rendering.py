@@ -51,7 +51,7 @@ _UNLIT = Lights.none()
 _USUAL = (Lamp.LOW_BEAM, Lamp.LOW_BEAM | Lamp.FRONT_FOG, Lamp.LOW_BEAM | Lamp.HIGH_BEAM)
 
 
-class Outlook:
+class ViewRenderer:
     """The world of a scenario as the camera on its ego sees it.
 
     Parameters
@@ -87,11 +87,11 @@ class Outlook:
         self._mount = LampMount()
         self._air = Air(self.fog, scenario.fog.droplets)
         self._renderer: Renderer | None = None
-        self._look_at(network.route)
+        self._build_scene_along(network.route)
         if self._by_lamplight:
             self._air.prepare(self._drawn_camera, [self._own_lamps(lit) for lit in _USUAL])
 
-    def _look_at(self, line: NDArray[np.float64]) -> Renderer:
+    def _build_scene_along(self, line: NDArray[np.float64]) -> Renderer:
         """Build the scene along a line (n, 3) [m]."""
         scenario, around = self._scenario, surroundings(self._network, self.signs, line)
         rng = np.random.default_rng(scenario.scenery_seed)
@@ -107,7 +107,7 @@ class Outlook:
         self._renderer = make_renderer(scenario.renderer, scene, sky)
         return self._renderer
 
-    def see(self, state: TrafficState, ego: int, pose: CameraPose, time: float) -> tuple[View, NDArray[np.float32]]:
+    def render(self, state: TrafficState, ego: int, pose: CameraPose, time: float) -> tuple[View, NDArray[np.float32]]:
         """Draw what is there, and what of it reaches the camera through the air.
 
         Parameters
@@ -130,18 +130,18 @@ class Outlook:
         """
         renderer = self._renderer_at(state.position[ego])
         camera, lights = self._drawn_camera, self._lights(state, ego, pose)
-        near, seen_from = self._from_origin(state, pose)
-        view = renderer.render(vehicle_batches(near, ego), camera, seen_from, lamplight=bool(lights.own))
+        near, viewpoint = self._from_origin(state, pose)
+        view = renderer.render(vehicle_batches(near, ego), camera, viewpoint, lamplight=bool(lights.own))
         radiance = self._air.radiance(view, camera, pose, lights, time)
         return middle_samples(view, self._samples), averaged(radiance, self._samples)
 
     def _renderer_at(self, place: NDArray[np.float64]) -> Renderer:
         """The renderer of a scene that has what is around a place."""
         if self._renderer is None:
-            raise RenderError("this outlook is closed; make a new one")
+            raise RenderError("this view renderer is closed; make a new one")
         if self._known is None or self._known.contains(place[None, :])[0]:
             return self._renderer
-        return self._look_at(place[None, :])
+        return self._build_scene_along(place[None, :])
 
     def _from_origin(self, state: TrafficState, pose: CameraPose) -> tuple[TrafficState, CameraPose]:
         """Vehicles and camera in the coordinates of the scene."""

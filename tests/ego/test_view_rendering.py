@@ -5,7 +5,7 @@ import pytest
 
 import fogsim
 from fogsim.camera import mounted_pose
-from fogsim.ego.view_rendering import Outlook
+from fogsim.ego.view_rendering import ViewRenderer
 from fogsim.scenario import build
 from fogsim.values import Lane, LaneMarking, RoadNetwork, SignMap, TrafficState
 
@@ -35,9 +35,9 @@ def two_cars(x: float, y: float) -> TrafficState:
     )
 
 
-def seen(outlook: Outlook, scenario: fogsim.Scenario, state: TrafficState) -> tuple[np.ndarray, np.ndarray]:
+def seen(view_renderer: ViewRenderer, scenario: fogsim.Scenario, state: TrafficState) -> tuple[np.ndarray, np.ndarray]:
     pose = mounted_pose(build.camera(scenario), state.position[0], 0.0, scenario.camera.setback_m)
-    view, radiance = outlook.see(state, 0, pose, 0.0)
+    view, radiance = view_renderer.render(state, 0, pose, 0.0)
     return view.instance.copy(), radiance.copy()
 
 
@@ -50,9 +50,9 @@ def test_a_million_metres_from_the_origin_the_picture_is_the_same(scenario: fogs
     pictures = []
     for x, y in ((0.0, 0.0), (1.0e6, 5.5e6)):
         lane = road((x, y), 900.0, "a")
-        outlook = Outlook(scenario, RoadNetwork((lane,), lane.centreline), SignMap())
-        pictures.append(seen(outlook, scenario, two_cars(x + 100.13, y + 0.17)))
-        outlook.close()
+        view_renderer = ViewRenderer(scenario, RoadNetwork((lane,), lane.centreline), SignMap())
+        pictures.append(seen(view_renderer, scenario, two_cars(x + 100.13, y + 0.17)))
+        view_renderer.close()
     assert (pictures[0][0] >= 16).sum() > 10
     assert np.mean(pictures[0][0] == pictures[1][0]) > 0.999
     # The grain of asphalt and grass lies elsewhere, and trees are the same.
@@ -61,16 +61,16 @@ def test_a_million_metres_from_the_origin_the_picture_is_the_same(scenario: fogs
 
 def test_where_the_ego_leaves_its_route_there_is_a_road_too(scenario: fogsim.Scenario) -> None:
     lanes = road((0.0, 0.0), 900.0, "a"), road((0.0, 9000.0), 900.0, "b")
-    outlook = Outlook(scenario, RoadNetwork(lanes, lanes[0].centreline), SignMap())
-    shares = [np.mean(seen(outlook, scenario, two_cars(100.0, y))[0] == 2) for y in (0.0, 9000.0, 0.0)]
+    view_renderer = ViewRenderer(scenario, RoadNetwork(lanes, lanes[0].centreline), SignMap())
+    shares = [np.mean(seen(view_renderer, scenario, two_cars(100.0, y))[0] == 2) for y in (0.0, 9000.0, 0.0)]
     assert shares[0] > 0.2
     assert shares[1:] == pytest.approx([shares[0]] * 2, abs=0.02)
-    outlook.close()
+    view_renderer.close()
 
 
-def test_a_closed_outlook_says_so(scenario: fogsim.Scenario) -> None:
+def test_a_closed_view_renderer_says_so(scenario: fogsim.Scenario) -> None:
     lane = road((0.0, 0.0), 100.0, "a")
-    outlook = Outlook(scenario, RoadNetwork((lane,), lane.centreline), SignMap())
-    outlook.close()
+    view_renderer = ViewRenderer(scenario, RoadNetwork((lane,), lane.centreline), SignMap())
+    view_renderer.close()
     with pytest.raises(fogsim.FogSimError, match="closed"):
-        seen(outlook, scenario, two_cars(10.0, 0.0))
+        seen(view_renderer, scenario, two_cars(10.0, 0.0))

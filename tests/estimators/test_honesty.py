@@ -32,7 +32,7 @@ METHODS = sorted(ESTIMATORS)
 HONEST = ("fogsim.estimators", "fogsim.vision")
 """What estimators are made of."""
 
-TRUTHFUL = ("render", "traffic", "atmosphere", "scene", "camera", "sensors", "scenario", "outlook", "onboard", "loop")
+TRUTHFUL = ("render", "traffic", "atmosphere", "scene", "camera", "sensors", "scenario", "ego", "loop")
 """Modules of fogsim that know the truth."""
 
 UNSEEN = {"Truth", "Step", "View", "FogField", "FogBank", "FogChange", "FogPatches", "CameraPose", "TrafficState"} | {
@@ -87,11 +87,11 @@ def test_deleting_the_truth_changes_nothing(as_it_is: list[Step], monkeypatch: p
 
 def test_a_false_truth_changes_nothing(as_it_is: list[Step], monkeypatch: pytest.MonkeyPatch) -> None:
     """Another fog, visibility, calibration, place, distances, instances and leader than what was drawn and measured."""
-    from fogsim.ego.view_rendering import Outlook
+    from fogsim.ego.view_rendering import ViewRenderer
     from fogsim.sensors import measure_lead
 
     rng = np.random.default_rng(4)
-    see = Outlook.see
+    render = ViewRenderer.render
 
     def false_truth(fog: FogField, pose: CameraPose, camera: Camera, signs: SignMap) -> Truth:
         k = float(rng.uniform(0.0, 0.2))
@@ -99,8 +99,8 @@ def test_a_false_truth_changes_nothing(as_it_is: list[Step], monkeypatch: pytest
         place = dataclasses.replace(pose, position=(0.0, 0.0, 50.0), heading=pose.heading + 1.0)
         return Truth(k, 0.5 * k, wrong, place, dataclasses.replace(fog, extinction=k), dataclasses.replace(signs))
 
-    def see_falsely(self, *arguments):
-        view, radiance = see(self, *arguments)
+    def render_falsely(self, *arguments):
+        view, radiance = render(self, *arguments)
         shuffled = dataclasses.replace(
             view, distance=rng.permuted(view.distance), instance=rng.permuted(view.instance), radiance=1.0 - radiance
         )
@@ -111,7 +111,7 @@ def test_a_false_truth_changes_nothing(as_it_is: list[Step], monkeypatch: pytest
 
     monkeypatch.setattr("fogsim.ego.equipment.fog_truth", false_truth)
     monkeypatch.setattr("fogsim.ego.equipment.measure_lead", measure_another)
-    monkeypatch.setattr(Outlook, "see", see_falsely)
+    monkeypatch.setattr(ViewRenderer, "render", render_falsely)
     misled = drive()
     assert misled[3].truth.visibility != as_it_is[3].truth.visibility
     assert not np.array_equal(misled[3].view.distance, as_it_is[3].view.distance)

@@ -3,7 +3,6 @@
 from fogsim.traffic.highway.behaviour import Conduct, take_over
 from fogsim.traffic.highway.fleet import EGO, LEAD, Fleet
 from fogsim.traffic.highway.network import road_network, same_roads
-from fogsim.traffic.highway.perception import let_drivers_meet
 from fogsim.traffic.highway.snapshot import read_snapshot
 from fogsim.traffic.highway.traffic import HighwayTraffic, is_highway_environment
 
@@ -14,7 +13,6 @@ __all__ = [
     "Fleet",
     "HighwayTraffic",
     "is_highway_environment",
-    "let_drivers_meet",
     "read_snapshot",
     "road_network",
     "same_roads",

@@ -7,11 +7,12 @@ drivers have chosen their speeds, and before the script has its way. IDM and MOB
 from collections.abc import Sequence
 
 from fogsim.traffic.drivers.events import Event
-from fogsim.traffic.drivers.sight import FogAccess
+from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.drivers.speed_choice import DriverSetup
 from fogsim.traffic.highway.drivers import HighwayDrivers
 from fogsim.traffic.highway.fleet import Fleet
 from fogsim.traffic.highway.manoeuvres import Manoeuvres
+from fogsim.traffic.highway.perception import let_drivers_meet
 from fogsim.values import Command, Unplayed
 
 
@@ -30,6 +31,8 @@ class Conduct:
         Seed of the drivers' differences.
     advice_deceleration : float
         How hard vehicles slow down to a speed that they have chosen or are advised [m/s²].
+    sight : DriverSight or None
+        Eyes of the drivers; None if they see through the fog.
 
     Raises
     ------
@@ -38,16 +41,25 @@ class Conduct:
     """
 
     def __init__(
-        self, fleet: Fleet, setup: DriverSetup, events: Sequence[Event], seed: int, advice_deceleration: float
+        self,
+        fleet: Fleet,
+        setup: DriverSetup,
+        events: Sequence[Event],
+        seed: int,
+        advice_deceleration: float,
+        sight: DriverSight | None,
     ) -> None:
         self.command = Command()
         self._fleet = fleet
+        self._sight = sight
         self._drivers = HighwayDrivers(fleet, setup, seed, advice_deceleration)
         self._manoeuvres = Manoeuvres(fleet, events) if events else None
 
     def enter_fog(self, fog: FogAccess) -> None:
-        """Let the drivers choose their speeds in a fog."""
+        """Let the drivers choose their speeds in a fog, and see only what it lets them see."""
         self._drivers.fog = fog
+        if self._sight is not None:
+            let_drivers_meet(fog, self._fleet, self._sight)
 
     def unplayed(self, keep_lane: Sequence[str]) -> Unplayed:
         """Tell what has not been played so far; see `Manoeuvres.unplayed`."""
@@ -64,10 +76,15 @@ class Conduct:
 
 
 def take_over(
-    fleet: Fleet, setup: DriverSetup, events: Sequence[Event], seed: int, advice_deceleration: float
+    fleet: Fleet,
+    setup: DriverSetup,
+    events: Sequence[Event],
+    seed: int,
+    advice_deceleration: float,
+    sight: DriverSight | None,
 ) -> Conduct:
     """Let the drivers of an environment choose speeds and play a script, until its next reset; see `Conduct`."""
-    conduct = Conduct(fleet, setup, events, seed, advice_deceleration)
+    conduct = Conduct(fleet, setup, events, seed, advice_deceleration, sight)
     # On this one road, not in the library: other environments of the process go on as they are.
     fleet.environment.road.act = conduct
     return conduct

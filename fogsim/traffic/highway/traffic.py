@@ -14,7 +14,6 @@ from fogsim.traffic.highway.behaviour import Conduct, take_over
 from fogsim.traffic.highway.collisions import CollisionWatch
 from fogsim.traffic.highway.fleet import LEAD, Fleet
 from fogsim.traffic.highway.network import planned_route, road_network, same_roads, speed_limit
-from fogsim.traffic.highway.perception import let_drivers_meet
 from fogsim.traffic.highway.snapshot import read_snapshot
 from fogsim.traffic.setup import UNTOUCHED, AfterCollision
 from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot, Unplayed
@@ -108,7 +107,9 @@ class HighwayTraffic:
             raise SimulationError(f"{type(self._environment).__name__} has no controlled vehicle to become the ego")
         self._fleet = Fleet(self._environment, _driver_for(self._environment))
         self._watch = CollisionWatch(self._fleet)
-        self._conduct = take_over(self._fleet, self._drivers, self._events, seed, self._advice_deceleration)
+        self._conduct = take_over(
+            self._fleet, self._drivers, self._events, seed, self._advice_deceleration, self._sight
+        )
         self._hold_in_lane(self._fleet)
         network = road_network(self._environment.road, self._fleet.ego)
         if self._network is not None and not same_roads(self._network, network):
@@ -117,19 +118,14 @@ class HighwayTraffic:
                 "set its config so that the roads stay the same"
             )
         self._network = network
-        self._meet_fog()
+        if self._fog is not None:
+            self._conduct.enter_fog(self._fog)
 
     def enter_fog(self, fog: FogAccess) -> None:
         """Let drivers see only what this fog lets them see, from now on and in every later run."""
         self._fog = fog
-        self._meet_fog()
-
-    def _meet_fog(self) -> None:
-        if self._fleet is None or self._conduct is None or self._fog is None:
-            return
-        self._conduct.enter_fog(self._fog)
-        if self._sight is not None:
-            let_drivers_meet(self._fog, self._fleet, self._sight)
+        if self._conduct is not None:
+            self._conduct.enter_fog(fog)
 
     def _hold_in_lane(self, fleet: Fleet) -> None:
         vehicles = fleet.present()

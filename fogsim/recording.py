@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from fogsim.errors import InputError, RecorderError
-from fogsim.files.existing import refuse_existing
+from fogsim.files.atomic import refuse_existing
 from fogsim.interruption import Interruption
 from fogsim.loop import run, warn_of_unplayed
 from fogsim.metrics import RunMetrics, RunSummary, step_metrics

@@ -27,6 +27,7 @@ def fog_command(
     """Put homogeneous fog on an image from disk: Koschmieder's law on light and slant range."""
     from fogsim.offline.camera_file import load_calibration, straight_camera
     from fogsim.offline.fog_image import fog_file
+    from fogsim.offline.image_files import DepthMap
 
     if depth_kind is None:
         raise InputError("--depth-kind is missing: planar or range? Data sets differ, and the wrong one goes unseen")
@@ -34,7 +35,8 @@ def fog_command(
     calibration = load_calibration(camera)
     print_remarks("assumed", calibration.remarks)
     pinhole = straight_camera(calibration, camera)
-    used = fog_file(image, depth, depth_kind, visibility, pinhole, out, light, depth_scale, overwrite=overwrite)
+    depth_map = DepthMap(depth, depth_kind, depth_scale)
+    used = fog_file(image, depth_map, visibility, pinhole, out, light, overwrite=overwrite)
     values = ", ".join(f"{value:.4g}" for value in used)
     stdout.print(f"{escape(out)}: visibility {visibility:g} m, airlight {values}", soft_wrap=True)
 

@@ -1,4 +1,4 @@
-"""Writing files so that none is ever half written under its final name."""
+"""Writing files so that none is ever half written under its final name, and none is replaced unasked."""
 
 import contextlib
 import json
@@ -107,3 +107,45 @@ class Reserve:
     def release(self) -> None:
         """Give the room back; twice does nothing."""
         self._path.unlink(missing_ok=True)
+
+
+def refuse_existing(path: Path, overwrite: bool, option: str = "--out") -> None:
+    """Refuse to write a file that is there already, or whose name is a folder's.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    overwrite : bool
+        True where a file may be replaced.
+    option : str
+        The option that names it.
+
+    Raises
+    ------
+    InputError
+        If it is there and must not be replaced, or is a folder.
+    """
+    if path.is_dir():
+        raise InputError(f"{option} {path} is a folder; give the name of a file")
+    if path.exists() and not overwrite:
+        raise InputError(f"{option} {path} is there already; give another name, or replace it with --overwrite")
+
+
+def refuse_missing_folder(path: Path, option: str = "") -> None:
+    """Refuse to write a file into a folder that is not there.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    option : str
+        The option that names it, if one does.
+
+    Raises
+    ------
+    InputError
+        If there is no such folder.
+    """
+    if not path.parent.is_dir():
+        raise InputError(f"{option} {path}: there is no folder {path.parent}".lstrip())

@@ -1,15 +1,13 @@
 """Visibility from a person's own images and videos: what ``fogsim estimate`` does."""
 
+from fogsim.offline.camera_file import camera_text, refuse_existing, write_camera
 from fogsim.offline.estimation import FrameEstimates, chosen_methods, estimate_images, estimates_of
-from fogsim.offline.find import find_source
 from fogsim.offline.guess import CameraGuess, guess_camera
-from fogsim.offline.guess_file import camera_text, refuse_existing, write_camera
-from fogsim.offline.overlay_file import OverlayFile
-from fogsim.offline.record import record_lines
-from fogsim.offline.source import ImageFiles, Picture, Source
-from fogsim.offline.straighten import Straightener, straightened
-from fogsim.offline.table import table_heading, table_rows
-from fogsim.offline.video_file import VideoFile
+from fogsim.offline.input_paths import find_source
+from fogsim.offline.overlay import OverlayFile
+from fogsim.offline.rectification import Straightener, straightened
+from fogsim.offline.results import record_lines, table_heading, table_rows
+from fogsim.offline.source import ImageFiles, Picture, Source, VideoFile
 
 __all__ = [
     "CameraGuess",

@@ -1,4 +1,4 @@
-"""The calibration of a camera in a file, ``camera.yaml``, for images that come from disk."""
+"""The calibration of a camera in a file, ``camera.yaml``, for images that come from disk: read, or guessed and written."""
 
 import math
 from dataclasses import dataclass
@@ -8,6 +8,8 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationError
 
 from fogsim.errors import InputError
+from fogsim.files import atomic
+from fogsim.offline.guess import CameraGuess
 from fogsim.scenario.document import read_document
 from fogsim.scenario.mistakes import tell_mistakes
 from fogsim.scenario.section import Number, PixelPlace, Pixels, Section, Whole
@@ -187,3 +189,67 @@ def load_calibration(path: Path) -> Calibration:
         return Calibration(camera, keys.distortion or (), math.radians(keys.yaw_deg), remarks)
     except InputError as error:
         raise InputError(f"{document.where(('yaw_deg',))}: {error}") from error
+
+
+def camera_text(guess: CameraGuess) -> str:
+    """Text of a camera file, with comments that say what each value was taken from.
+
+    Parameters
+    ----------
+    guess : CameraGuess
+        The calibration and its reasons.
+    """
+    camera = guess.camera
+    values = {
+        "width": f"{camera.width}",
+        "height": f"{camera.height}",
+        "focal_length_px": f"{camera.focal_length:.1f}",
+        "principal_point_px": f"[{camera.principal_point[0]:g}, {camera.principal_point[1]:g}]",
+        "mount_height_m": f"{camera.mount_height:g}",
+        "pitch_deg": f"{math.degrees(camera.pitch):.3f}",
+        "response": camera.response.value,
+    }
+    lines = ["# Guessed by fogsim estimate --guess-camera; correct what you know better.\n"]
+    lines += [f"# Uncertain: {warning}\n" for warning in guess.warnings]
+    lines += [f"{key}: {value}  # {guess.reasons[key]}\n" for key, value in values.items()]
+    return "".join(lines)
+
+
+def refuse_existing(path: Path, *, overwrite: bool) -> None:
+    """Refuse a camera file that is there already or whose folder is not.
+
+    Parameters
+    ----------
+    path : Path
+        The camera file.
+    overwrite : bool
+        True where a file may be replaced.
+
+    Raises
+    ------
+    InputError
+        If it must not or cannot be written.
+    """
+    atomic.refuse_existing(path, overwrite, "--camera")
+    atomic.refuse_missing_folder(path, "--camera")
+
+
+def write_camera(path: Path, guess: CameraGuess, *, overwrite: bool = False) -> None:
+    """Write a guessed calibration as a camera file, whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+        The camera file.
+    guess : CameraGuess
+        The calibration and its reasons.
+    overwrite : bool
+        True to replace a file that is there.
+
+    Raises
+    ------
+    InputError
+        If it is there already and not to be replaced, or its folder is not there.
+    """
+    refuse_existing(path, overwrite=overwrite)
+    atomic.write_text(path, camera_text(guess))

@@ -9,10 +9,10 @@ import numpy as np
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.estimators import ESTIMATORS, Estimator, make
 from fogsim.offline.camera_file import Calibration
-from fogsim.offline.find import find_source
 from fogsim.offline.image_files import Pixels
+from fogsim.offline.input_paths import find_source
+from fogsim.offline.rectification import straightened
 from fogsim.offline.source import Picture, Source
-from fogsim.offline.straighten import straightened
 from fogsim.values import Camera, Estimate, Frame, Observation
 
 ALL = "all"

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
-from fogsim.files.existing import refuse_existing
-from fogsim.offline.image_files import Pixels, read_distance, read_image, write_image
+from fogsim.files.atomic import refuse_existing
+from fogsim.offline.image_files import DepthMap, Pixels, read_distance, read_image, write_image
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera
 from fogsim.values.camera_response import exposure_of, respond
@@ -54,17 +54,25 @@ def fog_image(
     full = full_scale(image, camera)
     colours = image.reshape(*image.shape[:2], -1)
     channels = min(colours.shape[2], 3)
-    transmission = np.exp(-extinction * distance)[..., None]
+    transmittance = np.exp(-extinction * distance)[..., None]
     light = exposure_of(colours[..., :channels] / full, camera.response)
     air = exposure_of(airlight[:channels] / full, camera.response)
-    fogged = respond(light * transmission + air * (1.0 - transmission), camera.response)
+    fogged = respond(light * transmittance + air * (1.0 - transmittance), camera.response)
     out = colours.copy()
     out[..., :channels] = np.rint(np.clip(fogged, 0.0, 1.0) * full)
     return out.reshape(image.shape)
 
 
 def full_scale(image: Pixels, camera: Camera) -> float:
-    """Largest pixel value that an image can have."""
+    """Largest pixel value that an image can have.
+
+    Parameters
+    ----------
+    image : (rows, cols[, channels]) uint8 or uint16
+        Pixel values.
+    camera : Camera
+        Its bit depth, for images of 16 bits.
+    """
     if image.dtype == np.uint16 and camera.bits > 8:
         return float(2**camera.bits - 1)
     return float(np.iinfo(image.dtype).max)
@@ -97,13 +105,11 @@ def airlight_of(image: Pixels, distance: NDArray[np.float64]) -> NDArray[np.floa
 
 def fog_file(
     image: Path,
-    depth: Path,
-    kind: str,
+    depth: DepthMap,
     visibility: float,
     camera: Camera,
     out: Path,
     airlight: tuple[float, ...] | None = None,
-    scale: float | None = None,
     *,
     overwrite: bool = False,
 ) -> NDArray[np.float64]:
@@ -111,10 +117,10 @@ def fog_file(
 
     Parameters
     ----------
-    image, depth : Path
-        The image and its depth map, of the camera's size.
-    kind : str
-        What the depth map holds; see `read_distance`.
+    image : Path
+        The image, of the camera's size.
+    depth : DepthMap
+        Its depth map, of the same size.
     visibility : float
         Meteorological visibility V_met [m].
     camera : Camera
@@ -123,8 +129,6 @@ def fog_file(
         The fogged image.
     airlight : tuple of float or None
         Pixel value of the airlight: one, or red, green and blue; None to take it from the image (`airlight_of`).
-    scale : float or None
-        Metres in one unit of the depth map.
     overwrite : bool
         True to replace a file that is there.
 
@@ -138,7 +142,7 @@ def fog_file(
     InputError
         If anything does not fit, or there is a file `out` that must not be replaced.
     """
-    if out.exists() and any(given.exists() and out.samefile(given) for given in (image, depth)):
+    if out.exists() and any(given.exists() and out.samefile(given) for given in (image, depth.path)):
         raise InputError(f"--out {out} would replace what is read; give another name")
     refuse_existing(out, overwrite)
     pixels = read_image(image)
@@ -148,7 +152,7 @@ def fog_file(
             f"{image}: the image has {columns} × {rows} pixels, the camera {camera.width} × {camera.height}; "
             "they must be the same"
         )
-    distance = read_distance(depth, kind, scale, camera)
+    distance = read_distance(depth, camera)
     colours = min(3, 1 if pixels.ndim == 2 else pixels.shape[2])
     air = airlight_of(pixels, distance) if airlight is None else _given_airlight(airlight, colours, pixels, camera)
     write_image(out, fog_image(pixels, distance, visibility, camera, air))

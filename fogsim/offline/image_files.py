@@ -5,6 +5,7 @@ import math
 import warnings
 import zipfile
 from pathlib import Path
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
 from fogsim.errors import InputError, UnknownNameError
+from fogsim.files.atomic import refuse_missing_folder, write_bytes
 from fogsim.values import Camera
 
 DEPTH_KINDS = ("planar", "range")
@@ -25,6 +27,11 @@ Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 
 def read_image(path: Path) -> Pixels:
     """Read an image of 8 or 16 bits as it is stored, colours in OpenCV's order.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
 
     Raises
     ------
@@ -76,10 +83,10 @@ def _refuse_damaged(path: Path, data: bytes) -> None:
         raise InputError(f"{path}: the image is damaged or cut off: {error}") from error
 
 
-def read_distance(path: Path, kind: str, scale: float | None, camera: Camera) -> NDArray[np.float64]:
-    """Read a depth map as distances along the rays.
+class DepthMap(NamedTuple):
+    """A depth map on disk.
 
-    Parameters
+    Attributes
     ----------
     path : Path
         A ``.npy`` file of numbers, or an image of 16 bits.
@@ -87,6 +94,20 @@ def read_distance(path: Path, kind: str, scale: float | None, camera: Camera) ->
         ``"planar"`` or ``"range"``.
     scale : float or None
         Metres in one unit of the file; an image must have it, a ``.npy`` file is in metres without it.
+    """
+
+    path: Path
+    kind: str
+    scale: float | None = None
+
+
+def read_distance(depth_map: DepthMap, camera: Camera) -> NDArray[np.float64]:
+    """Read a depth map as distances along the rays.
+
+    Parameters
+    ----------
+    depth_map : DepthMap
+        The file.
     camera : Camera
         The calibration.
 
@@ -100,6 +121,7 @@ def read_distance(path: Path, kind: str, scale: float | None, camera: Camera) ->
     InputError
         If the file, its size or a value does not fit.
     """
+    path, kind, scale = depth_map
     if kind not in DEPTH_KINDS:
         raise UnknownNameError("depth kind", kind, DEPTH_KINDS)
     if scale is not None and not (scale > 0 and math.isfinite(scale)):
@@ -150,6 +172,13 @@ def _refuse_impossible(path: Path, depth: NDArray[np.float64]) -> None:
 def write_image(path: Path, image: Pixels) -> None:
     """Write an image, whole or not at all; the ending of the name says how.
 
+    Parameters
+    ----------
+    path : Path
+        The file.
+    image : (rows, cols[, channels]) uint8 or uint16
+        Pixel values, colours in OpenCV's order.
+
     Raises
     ------
     InputError
@@ -160,14 +189,11 @@ def write_image(path: Path, image: Pixels) -> None:
         raise InputError(f"{path}: no image can be written with the ending {ending!r}; allowed: .png, .tif, .jpg, …")
     if image.dtype == np.uint16 and ending not in {".png", ".tif", ".tiff"}:
         raise InputError(f"{path}: an image of 16 bits is written as .png or .tif, not {ending}")
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: there is no folder {path.parent}")
+    refuse_missing_folder(path)
     written, data = cv2.imencode(ending, image)
     if not written:
         raise InputError(f"{path}: this image cannot be written as {ending}")
-    partial = path.with_name(path.name + ".part")
-    partial.write_bytes(data.tobytes())
-    partial.replace(path)
+    write_bytes(path, data.tobytes())
 
 
 def range_from_planar(depth: NDArray[np.float64], camera: Camera) -> NDArray[np.float64]:

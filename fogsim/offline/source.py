@@ -1,12 +1,18 @@
-"""What images come from, and image files."""
+"""What images come from: image files and videos."""
 
+import re
+import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import IO, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from fogsim.errors import InputError
 from fogsim.offline.image_files import Pixels, read_image
+from fogsim.recorders.video import ffmpeg_program
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,3 +118,132 @@ def _red_first(stored: Pixels) -> Pixels:
     if stored.shape[2] == 1:
         return stored[:, :, 0].copy()
     return stored[:, :, 2::-1].copy(order="C")
+
+
+_DURATION = re.compile(r"Duration: (\d+):(\d+):(\d+(?:\.\d+)?)")
+_RATE = re.compile(r"Video:.*?(\d+(?:\.\d+)?k?) (?:fps|tbr)")
+MOST_MISSING = 0.5
+"""Time by which a whole video's pictures may end before its header says, as where its sound lasts longer [s]."""
+
+_HEADER_LINES = 3  # P6, size, largest value: https://netpbm.sourceforge.net/doc/ppm.html as ffmpeg writes it
+
+
+@dataclass(frozen=True, slots=True)
+class VideoFile:
+    """A video; its frames have 8 bits a channel and are turned upright.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    temporal : bool
+        Whether its frames are looked at in their order; False takes each on its own.
+    size : tuple of int
+        Columns and rows [px].
+    period : float
+        Time between two frames [s].
+    duration : float
+        Its length as its header has it [s]; 0 if that says nothing.
+    """
+
+    path: Path
+    temporal: bool
+    size: tuple[int, int]
+    period: float
+    duration: float
+
+    @classmethod
+    def open(cls, path: Path, temporal: bool = True) -> "VideoFile":
+        """Read the header and the first frame of a video.
+
+        Raises
+        ------
+        InputError
+            If it cannot be read as one, or has no frames.
+        """
+        done = subprocess.run(  # noqa: S603 - imageio's own ffmpeg with arguments made here
+            _command(path, "-frames:v", "1"), stdin=subprocess.DEVNULL, capture_output=True, check=False
+        )
+        told = done.stderr.decode(errors="replace")
+        rate = _RATE.search(told)
+        if rate is None:
+            raise InputError(f"{path}: this is no video that can be read")
+        header = done.stdout.split(b"\n", _HEADER_LINES)
+        if len(header) <= _HEADER_LINES:
+            raise InputError(f"{path}: this video has no frames that can be read")
+        cols, rows = (int(part) for part in header[1].split())
+        duration = _DURATION.search(told)
+        seconds = 0.0
+        if duration is not None:
+            hours, minutes, rest = duration.groups()
+            seconds = 3600.0 * int(hours) + 60.0 * int(minutes) + float(rest)
+        return cls(path, temporal, (cols, rows), 1.0 / _number(rate[1]), seconds)
+
+    @property
+    def count(self) -> int:
+        """Number of frames by the header."""
+        return max(round(self.duration / self.period), 1)
+
+    @property
+    def description(self) -> str:
+        """Size and rate."""
+        kind = "" if self.temporal else ", each frame on its own"
+        return f"a video of {self.size[0]} × {self.size[1]} pixels at {1.0 / self.period:.4g} frames a second{kind}"
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """The video alone."""
+        return (self.path,)
+
+    def pictures(self) -> Iterator[Picture]:
+        """Read the frames; where the file is damaged, ffmpeg mends or leaves out what it can.
+
+        Of one that ends before its time the last has no image, and how many frames are missing as its ``error``.
+        """
+        read = 0
+        with subprocess.Popen(  # noqa: S603 - imageio's own ffmpeg with arguments made here
+            _command(self.path), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+        ) as process:
+            assert process.stdout is not None  # noqa: S101 - it was opened as a pipe
+            try:
+                for image in _frames(process.stdout):
+                    yield Picture(read, read * self.period, image)
+                    read += 1
+            finally:
+                process.kill()
+        if self.duration and self.count - read > max(MOST_MISSING / self.period, 2):
+            told = f"{self.path}: the video is cut off or damaged: {read} of {self.count} frames could be read"
+            yield Picture(read, read * self.period, None, told)
+
+
+def _number(text: str) -> float:
+    """Rate as ffmpeg writes it: "90k" is 90,000."""
+    return 1000.0 * float(text[:-1]) if text.endswith("k") else float(text)
+
+
+def _command(path: Path, *limits: str) -> list[str]:
+    """Command line of a decoder that writes frames as PPM images, one behind the other."""
+    source = ["-i", f"file:{path}", "-map", "0:v:0", *limits]
+    return [
+        ffmpeg_program(),
+        "-hide_banner",
+        "-nostdin",
+        *source,
+        "-f",
+        "image2pipe",
+        "-c:v",
+        "ppm",
+        "-pix_fmt",
+        "rgb24",
+        "-",
+    ]
+
+
+def _frames(pipe: IO[bytes]) -> Iterator[NDArray[np.uint8]]:
+    while pipe.readline():
+        cols, rows = (int(part) for part in pipe.readline().split())
+        pipe.readline()
+        data = pipe.read(3 * cols * rows)
+        if len(data) < 3 * cols * rows:
+            return
+        yield np.frombuffer(data, np.uint8).reshape(rows, cols, 3)

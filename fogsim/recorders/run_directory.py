@@ -9,8 +9,7 @@ from typing import Any, Self
 
 from fogsim.errors import InputError
 from fogsim.files.atomic import Reserve, partial_path, write_json
-from fogsim.files.writer_lock import WriterLock
-from fogsim.files.writing_process import WritingProcess
+from fogsim.files.writer_lock import WriterLock, WritingProcess
 
 UNFINISHED = "unfinished"
 """Folder in the directory that holds the results of a run until its end."""

@@ -17,7 +17,7 @@ from PIL import Image
 from fogsim.cli import app
 from fogsim.errors import InputError
 from fogsim.offline import find_source
-from fogsim.offline.image_files import read_distance, read_image
+from fogsim.offline.image_files import DepthMap, read_distance, read_image
 from fogsim.recorders.video import ffmpeg_program
 from fogsim.values import Camera
 
@@ -168,7 +168,7 @@ def test_a_depth_map_that_is_none_is_told_in_one_line(tmp_path: Path, name: str)
     path = tmp_path / f"{name}.npy"
     path.write_bytes(DEPTHS[name])
     with pytest.raises(InputError, match=path.name) as told:
-        read_distance(path, "planar", None, CAMERA)
+        read_distance(DepthMap(path, "planar"), CAMERA)
     assert len(str(told.value).splitlines()) == 1
 
 
@@ -177,7 +177,7 @@ def test_a_depth_map_larger_than_memory_is_told(tmp_path: Path) -> None:
     path = tmp_path / "huge.npy"
     path.write_bytes(b"\x93NUMPY\x01\x00" + struct.pack("<H", 118) + header.ljust(117).encode() + b"\n")
     with pytest.raises(InputError, match=r"huge\.npy: cannot be read"):
-        read_distance(path, "planar", None, CAMERA)
+        read_distance(DepthMap(path, "planar"), CAMERA)
 
 
 def test_fog_with_a_depth_map_that_is_none_writes_nothing(fogsim, folder: Path) -> None:

@@ -13,7 +13,7 @@ from fogsim.atmosphere import Air
 from fogsim.errors import InputError
 from fogsim.offline.camera_file import load_camera
 from fogsim.offline.fog_image import airlight_of, fog_file, fog_image
-from fogsim.offline.image_files import range_from_planar
+from fogsim.offline.image_files import DepthMap, range_from_planar
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, CameraPose, FogField, Response, View
 from fogsim.values.camera_response import respond
@@ -62,7 +62,9 @@ def run(folder: Path, **changed: object) -> NDArray[np.generic]:
         "overwrite": True,
         "airlight": (255.0,),
     }
-    fog_file(**{**given, **changed})  # type: ignore[arg-type]  # some are wrong on purpose
+    options = {**given, **changed}
+    depth = DepthMap(options.pop("depth"), options.pop("kind"), options.pop("scale", None))  # type: ignore[arg-type]
+    fog_file(depth=depth, **options)  # type: ignore[arg-type]  # some are wrong on purpose
     return np.asarray(cv2.imread(str(folder / "out.png"), cv2.IMREAD_UNCHANGED))
 
 

@@ -8,8 +8,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from fogsim.errors import InputError, suggest
-from fogsim.offline.source import ImageFiles, Source
-from fogsim.offline.video_file import VideoFile
+from fogsim.offline.source import ImageFiles, Source, VideoFile
 
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".pgm", ".ppm")
 """Endings of the files that are taken from a folder."""

@@ -6,7 +6,7 @@ import pytest
 
 from fogsim.errors import InputError
 from fogsim.offline import find_source
-from fogsim.offline.find import is_sequence
+from fogsim.offline.input_paths import is_sequence
 
 
 @pytest.fixture

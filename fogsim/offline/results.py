@@ -1,0 +1,119 @@
+"""Estimates as text: JSON, one object a line, and lines of a table that can be printed one by one."""
+
+import json
+import math
+from collections.abc import Iterator, Sequence
+
+from fogsim.offline.estimation import FrameEstimates
+from fogsim.offline.source import Source
+from fogsim.values import Estimate
+
+ENDLESS = 10_000.0
+"""Visibility from which on one speaks of clear air [m]."""
+
+
+def metres(visibility: float) -> str:
+    """Visibility [m] with its unit; "clear" from ten kilometres on."""
+    return "clear" if visibility >= ENDLESS else f"{visibility:.0f} m"
+
+
+def interval_text(estimate: Estimate) -> str:
+    """Give the 90 % interval of a valid estimate's visibility."""
+    low, high = estimate.visibility_interval
+    if high >= ENDLESS:
+        return f"> {low:.0f} m"
+    return f"{low:.0f} – {high:.0f} m"
+
+
+DIGITS = 6
+"""Significant digits; no method has more than three."""
+
+
+def record_lines(result: FrameEstimates) -> Iterator[str]:
+    """JSON objects of an image: one for each method, or one with an ``error``.
+
+    Parameters
+    ----------
+    result : FrameEstimates
+        The image and its estimates.
+
+    Yields
+    ------
+    str
+        A line without its end; ASCII, strict JSON.
+    """
+    if result.picture.error:
+        yield json.dumps({"frame": result.picture.name, "error": result.picture.error})
+    for estimate in result.estimates:
+        yield json.dumps(_record(result.picture.name, estimate), allow_nan=False)
+
+
+def _record(name: str | int, estimate: Estimate) -> dict[str, object]:
+    low, high = estimate.visibility_interval
+    valid = estimate.valid
+    return {
+        "frame": name,
+        "method": estimate.method,
+        "valid": valid,
+        "visibility_m": _number(estimate.visibility) if valid else None,
+        "visibility_low_m": _number(low) if valid else None,
+        "visibility_high_m": _number(high) if valid else None,
+        "extinction_per_m": _number(estimate.extinction) if valid else None,
+        "category": estimate.category.value if valid else None,
+        "horizon_row": _number(estimate.diagnostics.get("horizon_row")) if valid else None,
+    }
+
+
+def _number(value: object) -> float | None:
+    """Value with the digits that are shown; None for what JSON has no number for, such as an endless visibility."""
+    if not isinstance(value, int | float) or not math.isfinite(value):
+        return None
+    return float(f"{value:.{DIGITS}g}")
+
+
+_MOST_NAME = 48
+"""Columns that a file's name may take; a longer one loses its beginning."""
+
+
+def table_heading(source: Source, methods: Sequence[str]) -> str:
+    """Heading over the rows of a source."""
+    return _line(
+        _widths(source, methods),
+        ("frame", "method", "visibility", "90 % interval", "extinction", "category", "horizon"),
+    )
+
+
+def table_rows(source: Source, methods: Sequence[str], result: FrameEstimates) -> Iterator[str]:
+    """One row for each method; none for an image that could not be used."""
+    widths = _widths(source, methods)
+    name = str(result.picture.name)
+    shown = name if len(name) <= _MOST_NAME else "…" + name[1 - _MOST_NAME :]
+    for estimate in result.estimates:
+        yield _line(widths, (shown, estimate.method, *_cells(estimate)))
+
+
+def _widths(source: Source, methods: Sequence[str]) -> tuple[int, int]:
+    longest = max((len(str(path)) for path in source.paths), default=5) if source.count == len(source.paths) else 8
+    return min(max(longest, 5), _MOST_NAME), max(6, *(len(name) for name in methods))
+
+
+def _line(widths: tuple[int, int], cells: Sequence[str]) -> str:
+    frame, method, visibility, *rest = cells
+    start = f"{frame:<{widths[0]}}  {method:<{widths[1]}}  "
+    if not rest:
+        return start + visibility
+    interval, extinction, category, horizon = rest
+    return f"{start}{visibility:>10}  {interval:>17}  {extinction:>11}  {category:<10}  {horizon:>9}".rstrip()
+
+
+def _cells(estimate: Estimate) -> tuple[str, ...]:
+    if not estimate.valid:
+        return (f"cannot tell: {estimate.diagnostics.get('reason', 'no reason given')}",)
+    horizon = estimate.diagnostics.get("horizon_row")
+    return (
+        metres(estimate.visibility),
+        interval_text(estimate),
+        f"{estimate.extinction:.4f} /m",
+        estimate.category.value,
+        f"row {horizon:.1f}" if isinstance(horizon, int | float) else "",
+    )

@@ -17,8 +17,8 @@ from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.metrics import RunMetrics
 from fogsim.parameters import accepted_parameters, mismatch
 from fogsim.recorders.table import table_columns
-from fogsim.scenario.methods import GIVEN_BY_THE_LOOP, Method
 from fogsim.scenario.schema import Scenario
+from fogsim.scenario.section import GIVEN_BY_THE_LOOP, Method
 from fogsim.scene import SIGN_KINDS
 
 HERE = Path(__file__).resolve().parent

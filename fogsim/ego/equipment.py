@@ -49,8 +49,8 @@ class EgoEquipment:
         self._camera_sensor = build.camera_sensor(scenario)
         self._body = build.body_pitch(scenario)
         self._lead_sensor = build.lead_sensor(scenario)
-        self._told_camera = build.told_camera(scenario)
-        self._estimators = build.estimators(scenario, self._told_camera)
+        self._assumed_camera = build.assumed_camera(scenario)
+        self._estimators = build.estimators(scenario, self._assumed_camera)
         self._fusion = build.fusion(scenario)
         self._view_renderer: ViewRenderer | None = None
         self._streams: Streams | None = None
@@ -114,7 +114,7 @@ class EgoEquipment:
         pose = self._pose(state, ego)
         view, radiance = renderer.render(state, ego, pose, time)
         image = self._camera_sensor.take(radiance, self._streams.camera)
-        frame = Frame(time, image, self._told_camera)
+        frame = Frame(time, image, self._assumed_camera)
         observation = self._observe(frame, snapshot, renderer.signs, self._streams)
         estimates = tuple(
             checked_estimate(section.method, estimator.update(observation))

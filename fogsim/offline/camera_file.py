@@ -1,4 +1,4 @@
-"""The calibration of a camera in a file, ``camera.yaml``, for images that come from disk: read, or guessed and written."""
+"""The calibration of a camera in a file, ``camera.yaml``, for images from disk: read, or written as guessed."""
 
 import math
 from dataclasses import dataclass

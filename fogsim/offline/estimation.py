@@ -134,7 +134,7 @@ class _Bench:
     Parameters
     ----------
     camera : Camera
-        The told calibration.
+        The assumed calibration.
     methods : sequence of str
         Names in the registry.
     """

@@ -17,8 +17,7 @@ from fogsim.offline.image_files import Pixels
 from fogsim.offline.results import interval_text, metres
 from fogsim.offline.source import Source
 from fogsim.recorders.camera_picture import scale_image
-from fogsim.recorders.method_colours import method_colours
-from fogsim.recorders.style import GROUND, MUTED, TEXT, Colour, font
+from fogsim.recorders.style import GROUND, MUTED, TEXT, Colour, font, method_colours
 from fogsim.recorders.video import Encoder, encoder_command
 from fogsim.values import Camera, Estimate
 from fogsim.values.camera_response import eight_bit
@@ -41,7 +40,7 @@ class Overlay:
     Parameters
     ----------
     camera : Camera
-        The told calibration.
+        The assumed calibration.
     methods : sequence of str
         Names of the methods, each of which has its line below the image.
     """

@@ -9,7 +9,6 @@ from PIL import Image, ImageDraw
 
 from fogsim.recorders import camera_picture
 from fogsim.recorders.camera_picture import draw_camera_picture
-from fogsim.recorders.method_colours import method_colours
 from fogsim.recorders.protocol import Derived
 from fogsim.recorders.strip_chart import Axis, Curve, StripChart
 from fogsim.recorders.style import (
@@ -27,6 +26,7 @@ from fogsim.recorders.style import (
     WELL,
     Colour,
     font,
+    method_colours,
 )
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Collision, Estimate, Lamp, Step

@@ -1,14 +1,215 @@
-"""The run as a report to read."""
+"""The run as a report to read: one HTML page."""
 
-from collections.abc import Mapping
+import base64
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
 
 from fogsim.files.atomic import write_text
+from fogsim.recorders.camera_picture import scale_image
 from fogsim.recorders.manifest import versions
 from fogsim.recorders.protocol import Derived, RunInformation
-from fogsim.recorders.report_data import Album, Curves
+from fogsim.recorders.report_data import Album, Curves, ReportPicture
 from fogsim.recorders.report_figures import draw_figures
-from fogsim.recorders.report_page import ReportContent, render_report
+from fogsim.units import KMH_PER_MPS
 from fogsim.values import Step
+
+_UNITS: Mapping[str, str] = {
+    "_mps3": "m/s³",
+    "_mps2": "m/s²",
+    "_mps": "m/s",
+    "_s2": "s²",
+    "_s": "s",
+    "_m": "m",
+    "_percent": "%",
+    "_share": "%",
+}
+"""Unit by the end of a key."""
+
+_STYLE = """
+:root { color-scheme: light; }
+body { font: 15px/1.5 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; color: #1c2733; background: #fff;
+  max-width: 62rem; margin: 2.5rem auto; padding: 0 1.25rem; }
+h1 { font-size: 1.9rem; margin: 0 0 .25rem; letter-spacing: -.01em; }
+h2 { font-size: 1.15rem; margin: 2.4rem 0 .6rem; padding-bottom: .3rem; border-bottom: 2px solid #e3e8ed; }
+p.lead { color: #44505c; margin: 0 0 1rem; white-space: pre-line; }
+.partial { background: #cf3a34; color: #fff; font-weight: 600; padding: .7rem 1rem; border-radius: .4rem;
+  margin: 1rem 0; }
+table { border-collapse: collapse; width: 100%; font-size: .9rem; }
+th, td { text-align: left; padding: .3rem .8rem .3rem 0; border-bottom: 1px solid #edf0f3; vertical-align: baseline; }
+th { font-weight: 600; color: #44505c; }
+td.value, th.value { text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }
+td.meaning { color: #5d6975; }
+figure { margin: 1.2rem 0 0; break-inside: avoid; }
+figure img { width: 100%; height: auto; display: block; }
+figcaption, p.note { font-size: .85rem; color: #5d6975; margin-top: .25rem; }
+.pictures { display: grid; grid-template-columns: repeat(auto-fill, minmax(19rem, 1fr)); gap: 1rem; }
+.pictures figure { margin: 0; }
+.pictures img { border-radius: .3rem; background: #11151b; }
+footer { margin-top: 2.5rem; font-size: .8rem; color: #5d6975; border-top: 2px solid #e3e8ed; padding-top: .6rem; }
+@media print { body { margin: 0; max-width: none; font-size: 11px; } .pictures { grid-template-columns: 1fr 1fr 1fr; } }
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class ReportContent:
+    """Everything that a report shows.
+
+    Attributes
+    ----------
+    title, description : str
+        Name and description of the scenario.
+    interrupted_at : float or None
+        Instant at which the run was cut short [s], None if it was complete.
+    not_played : sequence of str
+        What of the script was not played, a line each.
+    metrics : mapping from str to object
+        Summary of the run; a key ends in its unit, and a mapping under ``estimators`` has one entry per method.
+    meanings : mapping from str to str
+        One line on each key.
+    figures : sequence of (str, bytes)
+        Caption and PNG of each figure.
+    pictures : sequence of ReportPicture
+        Camera images.
+    footer : mapping from str to str
+        Seed and versions.
+    """
+
+    title: str
+    description: str
+    interrupted_at: float | None
+    not_played: Sequence[str]
+    metrics: Mapping[str, object]
+    meanings: Mapping[str, str]
+    figures: Sequence[tuple[str, bytes]]
+    pictures: Sequence[ReportPicture]
+    footer: Mapping[str, str]
+
+
+def render_report(content: ReportContent) -> str:
+    """Render a report as HTML; nothing in it is loaded from elsewhere."""
+    title = escape(content.title)
+    return "\n".join(
+        [
+            '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            f"<title>{title} – FogSim</title>\n<style>{_STYLE}</style>\n</head>\n<body>",
+            f'<h1>{title}</h1>\n<p class="lead">{escape(content.description)}</p>',
+            _banner(content.interrupted_at),
+            *(f'<p class="note">Not played: {escape(line)}</p>' for line in content.not_played),
+            _summary_table(content.metrics, content.meanings),
+            _methods_table(content.metrics, content.meanings),
+            _figures(content.figures, recorded=bool(content.pictures)),
+            _pictures(content.pictures),
+            _footer(content.footer),
+            "</body>\n</html>\n",
+        ]
+    )
+
+
+def _banner(interrupted_at: float | None) -> str:
+    if interrupted_at is None:
+        return ""
+    return f'<div class="partial">PARTIAL: interrupted at t = {interrupted_at:.1f} s</div>'
+
+
+def _summary_table(metrics: Mapping[str, object], meanings: Mapping[str, str]) -> str:
+    rows = [
+        f'<tr><td>{escape(_label(key))}</td><td class="value">{escape(_value(key, value))}</td>'
+        f'<td class="meaning">{escape(meanings.get(key, ""))}</td></tr>'
+        for key, value in metrics.items()
+        if not isinstance(value, Mapping)
+    ]
+    if not rows:
+        return ""
+    head = '<tr><th>metric</th><th class="value">value</th><th>meaning</th></tr>'
+    return f"<h2>Summary</h2>\n<table>{head}\n" + "\n".join(rows) + "\n</table>"
+
+
+def _methods_table(metrics: Mapping[str, object], meanings: Mapping[str, str]) -> str:
+    """Show the metrics that have one entry per method, one row each."""
+    return "\n".join(
+        _method_rows(key, value, meanings.get(key, ""))
+        for key, value in metrics.items()
+        if isinstance(value, Mapping) and value
+    )
+
+
+def _method_rows(name: str, methods: Mapping[str, Mapping[str, object]], meaning: str) -> str:
+    keys = list(next(iter(methods.values())))
+    head = "".join(f'<th class="value">{escape(_label(key))}</th>' for key in keys)
+    rows = [
+        f"<tr><td>{escape(method)}</td>"
+        + "".join(f'<td class="value">{escape(_value(key, values.get(key)))}</td>' for key in keys)
+        + "</tr>"
+        for method, values in methods.items()
+    ]
+    table = f"<table><tr><th>method</th>{head}</tr>\n" + "\n".join(rows) + "\n</table>"
+    heading = f"<h2>{escape(_label(name).capitalize())}</h2>"
+    return f'{heading}\n{table}\n<p class="note">{escape(meaning)}</p>'
+
+
+def _figures(figures: Sequence[tuple[str, bytes]], *, recorded: bool) -> str:
+    if not figures:
+        return f"<p>{'Figures are of whole runs; the rows are a table.' if recorded else 'No step was recorded.'}</p>"
+    return "<h2>Over time</h2>\n" + "\n".join(_figure(png, caption, caption) for caption, png in figures)
+
+
+def _pictures(pictures: Sequence[ReportPicture]) -> str:
+    if not pictures:
+        return ""
+    shown = "\n".join(_figure(_png(picture), "camera image", _caption(picture)) for picture in pictures)
+    return f'<h2>What the camera saw</h2>\n<div class="pictures">\n{shown}\n</div>'
+
+
+def _figure(png: bytes, alternative: str, caption: str) -> str:
+    source = "data:image/png;base64," + base64.b64encode(png).decode("ascii")
+    return (
+        f'<figure><img src="{source}" alt="{escape(alternative)}"><figcaption>{escape(caption)}</figcaption></figure>'
+    )
+
+
+def _footer(entries: Mapping[str, str]) -> str:
+    return "<footer>" + " · ".join(f"{escape(name)} {escape(value)}" for name, value in entries.items()) + "</footer>"
+
+
+def _png(picture: ReportPicture) -> bytes:
+    buffer = io.BytesIO()
+    scale_image(picture.image, 480, 480).save(buffer, format="PNG")
+    return buffer.getvalue()
+
+
+def _caption(picture: ReportPicture) -> str:
+    truth = "clear" if picture.truth is None else f"{picture.truth:.0f} m"
+    return (
+        f"t = {picture.time:.1f} s at {picture.route_position / 1000:.2f} km. Visibility ahead: true {truth}, "
+        f"believed {picture.belief:.0f} m ({picture.low:.0f} – {picture.high:.0f} m)"
+    )
+
+
+def _suffix(key: str) -> str:
+    return next((suffix for suffix in _UNITS if key.endswith(suffix)), "")
+
+
+def _label(key: str) -> str:
+    """Words of a key without its unit; a share keeps its name."""
+    suffix = _suffix(key)
+    return key.removesuffix("" if suffix == "_share" else suffix).replace("_", " ")
+
+
+def _value(key: str, value: object) -> str:
+    """Say a value with its unit, speeds also in km/h."""
+    if value is None:
+        return "–"
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return str(value)
+    suffix = _suffix(key)
+    if suffix == "_share":
+        value *= 100
+    number = str(value) if isinstance(value, int) else f"{value:.3g}" if abs(value) < 100 else f"{value:.0f}"
+    in_kmh = f" ({value * KMH_PER_MPS:.0f} km/h)" if suffix == "_mps" else ""
+    return f"{number} {_UNITS.get(suffix, '')}".strip() + in_kmh
 
 
 class ReportRecorder:
@@ -48,11 +249,11 @@ class ReportRecorder:
             # Figures take longer than somebody waits who has pressed Ctrl-C.
             figures=draw_figures(self._curves) if self._curves.time and complete else [],
             pictures=self._album.chosen(),
-            footer=_footer(self._information.seed),
+            footer=_footnotes(self._information.seed),
         )
         write_text(self._information.directory.report, render_report(content))
         self._open = False
 
 
-def _footer(seed: int) -> Mapping[str, str]:
+def _footnotes(seed: int) -> Mapping[str, str]:
     return {"seed": str(seed), **{name: version or "not installed" for name, version in versions().items()}}

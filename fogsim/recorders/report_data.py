@@ -66,7 +66,7 @@ class Curves:
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
+class ReportPicture:
     """One camera image and what was known when it was taken.
 
     Attributes
@@ -90,8 +90,14 @@ class Picture:
     image: NDArray[np.uint8]
 
     @classmethod
-    def of(cls, step: Step) -> "Picture":
-        """Take the picture of a step; the image is copied, since a camera may use its memory again."""
+    def of_step(cls, step: Step) -> "ReportPicture":
+        """Take the picture of a step; the image is copied, since a camera may use its memory again.
+
+        Parameters
+        ----------
+        step : Step
+            The step.
+        """
         low, middle, high = (step.belief.visibility_quantile(share) for share in (0.05, 0.5, 0.95))
         truth = _finite(step.truth.visibility_ahead)
         return cls(step.time, step.route_position, truth, low, middle, high, shown_image(step.observation).copy())
@@ -107,7 +113,7 @@ class Album:
     def __init__(self) -> None:
         self._stride = 1
         self._count = 0
-        self._pictures: list[Picture] = []
+        self._pictures: list[ReportPicture] = []
         self._last: Step | None = None
 
     def add(self, step: Step) -> None:
@@ -116,17 +122,17 @@ class Album:
             if len(self._pictures) == 2 * MOST_PICTURES:
                 self._pictures = self._pictures[::2]
                 self._stride *= 2
-            self._pictures.append(Picture.of(step))
+            self._pictures.append(ReportPicture.of_step(step))
         self._count += 1
         self._last = step
 
-    def chosen(self) -> list[Picture]:
+    def chosen(self) -> list[ReportPicture]:
         """Choose the pictures to show: the first, the last and what lies evenly between them."""
         if self._last is None:
             return []
         pictures = list(self._pictures)
         if pictures[-1].time != self._last.time:
-            pictures.append(Picture.of(self._last))
+            pictures.append(ReportPicture.of_step(self._last))
         count = min(MOST_PICTURES, len(pictures))
         places = np.linspace(0, len(pictures) - 1, count).round().astype(int)
         return [pictures[place] for place in places]

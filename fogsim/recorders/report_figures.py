@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
-from fogsim.recorders.method_colours import ON_LIGHT, method_colours
 from fogsim.recorders.report_data import Curves
+from fogsim.recorders.style import ON_LIGHT, method_colours
 from fogsim.units import KMH_PER_MPS
 
 _TRUTH, _BELIEF, _ADVICE, _ALARM, _SPEED = "#c28a00", "#1f6fd0", "#1f9d61", "#cf3a34", "#1c2733"

@@ -1,5 +1,6 @@
-"""Colours and fonts of the video panel, and the colours that report and panel share."""
+"""Colours and fonts of the video panel, and the colours that report, overlay and panel share."""
 
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
@@ -28,3 +29,71 @@ def font(size: int, *, bold: bool = False) -> ImageFont.FreeTypeFont:
     name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
     path = Path(mpl.get_data_path(), "fonts", "ttf", name)
     return ImageFont.truetype(str(path), size, layout_engine=ImageFont.Layout.BASIC)
+
+
+_NAMED = ("negru2013", "zhu2015", "huang2015", "huang2015_rough", "huang2015_lead", "joint_road", "lead_contrast")
+"""Methods that the first colours belong to, whichever others stand beside them."""
+
+ON_DARK: tuple[Colour, ...] = (
+    (210, 255, 15),
+    (165, 45, 255),
+    (225, 0, 135),
+    (150, 105, 75),
+    (240, 45, 0),
+    (180, 195, 255),
+    (0, 150, 30),
+    (150, 135, 180),
+    (225, 0, 210),
+    (180, 195, 0),
+    (255, 225, 180),
+    (195, 165, 105),
+    (90, 255, 120),
+    (165, 240, 240),
+    (255, 150, 180),
+    (75, 150, 255),
+)
+"""Colours as far apart as sixteen can be on a dark ground, the first ones farthest from the panel's belief and truth.
+
+The least colour difference of any two (CIE 1976, ΔE of L*a*b*) is 19 for normal sight and for any of the three
+dichromacies as Machado et al. 2009 simulate them; found by search over a grid of all colours of L* 48 … 94.
+"""
+
+ON_LIGHT: tuple[Colour, ...] = (
+    (45, 90, 90),
+    (165, 45, 255),
+    (225, 0, 135),
+    (150, 105, 75),
+    (105, 45, 0),
+    (0, 0, 135),
+    (45, 45, 30),
+    (150, 135, 180),
+    (120, 30, 135),
+    (195, 165, 135),
+    (255, 135, 90),
+    (240, 45, 0),
+    (0, 150, 30),
+    (0, 180, 255),
+    (60, 15, 60),
+    (0, 0, 240),
+)
+"""The same on a white ground, ΔE 18 or more.
+
+Named methods keep their colour where it is dark enough and far from the report's belief and truth.
+"""
+
+
+def method_colours(methods: Sequence[str], table: Sequence[Colour] = ON_DARK) -> dict[str, Colour]:
+    """Colour of each method: of those that come with FogSim always the same, whichever others stand beside it.
+
+    Parameters
+    ----------
+    methods : sequence of str
+        Names; others than FogSim's get the colours that are left, in their order, again from the start where there are
+        more.
+    table : sequence of Colour
+        `ON_DARK` or `ON_LIGHT`.
+    """
+    named, left = dict(zip(_NAMED, table, strict=False)), table[len(_NAMED) :]
+    others = dict.fromkeys(name for name in methods if name not in named)
+    free = {name: left[i % len(left)] for i, name in enumerate(others)}
+    return {name: named[name] if name in named else free[name] for name in methods}

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fogsim.reproduce import huang2015_printed as printed
 from fogsim.reproduce.huang2015_chase import Followed
+from fogsim.reproduce.huang2015_published import TABLE_4_3, TABLE_5_2, TABLE_5_3
 from fogsim.values import Camera, Estimate
 
 CAMERA = Camera(800, 600, 5600.0, (399.5, 299.5), mount_height=1.0)
@@ -22,7 +22,7 @@ WAYS = ("away", "back", "noisy")
 STEP, FIRST, LAST = 5.0, 25.0, 90.0
 """Ranges at which the thesis clips [m]."""
 
-TABLE_4_2 = 150.0
+VISIBILITY_4_2 = 150.0
 """V_met of table 4.2 [m]."""
 
 NEAR = 0.1
@@ -43,14 +43,14 @@ class Plan:
         Positions of the reference in table 5.3 [m].
     """
 
-    methods: tuple[float, ...] = tuple(printed.TABLE_4_3)
+    methods: tuple[float, ...] = tuple(TABLE_4_3)
     ratios: tuple[float, ...] = (150.0, 500.0)
     tracks: tuple[float, ...] = (100.0, 200.0, 300.0, 400.0, 500.0)
     references: tuple[float, ...] = (100.0, 200.0, 300.0, 400.0, 500.0)
     intervals: Mapping[float, tuple[float, ...]] = field(
-        default_factory=lambda: {interval: tuple(row) for interval, row in printed.TABLE_5_2.items()}
+        default_factory=lambda: {interval: tuple(row) for interval, row in TABLE_5_2.items()}
     )
-    starts: tuple[float, ...] = tuple(printed.TABLE_5_3)
+    starts: tuple[float, ...] = tuple(TABLE_5_3)
 
 
 @dataclass(frozen=True, slots=True)

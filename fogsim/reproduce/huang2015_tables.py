@@ -5,8 +5,8 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.reproduce import huang2015_printed as printed
-from fogsim.reproduce.huang2015_plan import FIRST, STEP, TABLE_4_2, VARIANTS, WAYS, Case, Plan, Results, Rough
+from fogsim.reproduce.huang2015_plan import FIRST, STEP, VARIANTS, VISIBILITY_4_2, WAYS, Case, Plan, Results, Rough
+from fogsim.reproduce.huang2015_published import TABLE_4_1, TABLE_4_2, TABLE_4_3, TABLE_5_1, TABLE_5_2, TABLE_5_3
 from fogsim.reproduce.result import Cell, Rows, TitledTable
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Estimate
@@ -36,7 +36,7 @@ def tables(results: Results, rough: Rough, plan: Plan) -> tuple[TitledTable, ...
     return (
         TitledTable("Table 4.1: V_met from the road alone [m]", _table_4_1(rough)),
         TitledTable(
-            f"Table 4.2: ratios of variances at V_met = {TABLE_4_2:.0f} m [%]: thesis | ours", _table_4_2(results)
+            f"Table 4.2: ratios of variances at V_met = {VISIBILITY_4_2:.0f} m [%]: thesis | ours", _table_4_2(results)
         ),
         TitledTable(
             "Table 4.3: V_met from a vehicle followed from 25 to 90 m, and back [m]", _table_4_3(results, plan)
@@ -71,7 +71,7 @@ def _table_4_1(rough: Rough) -> Rows:
         published = found["published"]
         first = published.diagnostics.get("first_extinction")
         ours = f"{np.log(20.0) / first:.0f}" if isinstance(first, float) else "—"
-        before, after = printed.TABLE_4_1.get(visibility, (None, None))
+        before, after = TABLE_4_1.get(visibility, (None, None))
         told = (_said(before), ours, _said(after), _metres(published), _metres(found["corrected"]))
         rows.append((f"{visibility:.0f}", *told, str(published.diagnostics.get("reason", ""))))
     return tuple(rows)
@@ -80,7 +80,7 @@ def _table_4_1(rough: Rough) -> Rows:
 def _table_4_2(results: Results) -> Rows:
     columns = (25.0, 30.0, 35.0, 40.0, 45.0)
     rows = [("apart", *(f"{column:.0f} m" for column in columns), "e^(-2kd)")]
-    estimate = _last(results, Case(TABLE_4_2, "published"))
+    estimate = _last(results, Case(VISIBILITY_4_2, "published"))
     variance = dict.fromkeys(columns, np.nan)
     if estimate is not None and "variances" in estimate.diagnostics:
         distances = np.asarray(estimate.diagnostics["distances"])
@@ -92,9 +92,9 @@ def _table_4_2(results: Results) -> Rows:
         cells = []
         for j, column in enumerate(columns):
             ratio = 100.0 * variance[column] / variance[column - apart] if j > i else np.nan
-            thesis = printed.TABLE_4_2[apart].get(column)
+            thesis = TABLE_4_2[apart].get(column)
             cells.append(f"{thesis:.1f} | {ratio:.1f}" if thesis is not None and np.isfinite(ratio) else _said(thesis))
-        model = 100.0 * np.exp(-2.0 * extinction_from_visibility(TABLE_4_2) * apart)
+        model = 100.0 * np.exp(-2.0 * extinction_from_visibility(VISIBILITY_4_2) * apart)
         rows.append((f"{apart:.0f} m", *cells, f"{model:.1f}"))
     return tuple(rows)
 
@@ -107,7 +107,7 @@ def _table_4_3(results: Results, plan: Plan) -> Rows:
             for name in VARIANTS
             for way in WAYS
         ]
-        rows.append((f"{visibility:.0f}", _said(printed.TABLE_4_3.get(visibility)), *ours))
+        rows.append((f"{visibility:.0f}", _said(TABLE_4_3.get(visibility)), *ours))
     return tuple(rows)
 
 
@@ -130,10 +130,10 @@ def _after(results: Results, case: Case, track: float) -> Estimate | None:
 def _table_5_1(results: Results, plan: Plan) -> Rows:
     def cell(share: float) -> Callable[[float], str]:
         return lambda v: _three(
-            printed.TABLE_5_1[share].get(v), [_after(results, Case(v, name), share * v) for name in VARIANTS]
+            TABLE_5_1[share].get(v), [_after(results, Case(v, name), share * v) for name in VARIANTS]
         )
 
-    return _grid("track", plan.tracks, {f"{100 * share:.0f} %": cell(share) for share in printed.TABLE_5_1})
+    return _grid("track", plan.tracks, {f"{100 * share:.0f} %": cell(share) for share in TABLE_5_1})
 
 
 def _table_5_2(results: Results, plan: Plan) -> Rows:
@@ -142,7 +142,7 @@ def _table_5_2(results: Results, plan: Plan) -> Rows:
             if v not in plan.intervals[interval]:
                 return ""
             found = [_last(results, Case(v, name, interval)) for name in VARIANTS]
-            return _three(printed.TABLE_5_2[interval].get(v), found)
+            return _three(TABLE_5_2[interval].get(v), found)
 
         return told
 
@@ -153,7 +153,7 @@ def _table_5_2(results: Results, plan: Plan) -> Rows:
 def _table_5_3(results: Results, plan: Plan) -> Rows:
     def cell(start: float) -> Callable[[float], str]:
         return lambda v: _three(
-            printed.TABLE_5_3[start].get(v), [_last(results, Case(v, name, start=start)) for name in VARIANTS]
+            TABLE_5_3[start].get(v), [_last(results, Case(v, name, start=start)) for name in VARIANTS]
         )
 
     return _grid("first", plan.references, {f"{start:.0f} m": cell(start) for start in plan.starts})
@@ -178,7 +178,7 @@ def _number(value: float | str | None) -> float | None:
 
 def _rough_records(rough: Rough) -> list[Mapping[str, Cell]]:
     return [
-        _record("4.1", v, name, found, thesis_m=_number(printed.TABLE_4_1.get(v, (None, None))[1]))
+        _record("4.1", v, name, found, thesis_m=_number(TABLE_4_1.get(v, (None, None))[1]))
         for v, by_variant in rough.items()
         for name, found in by_variant.items()
     ]
@@ -189,21 +189,21 @@ def _lead_records(results: Results, plan: Plan) -> list[Mapping[str, Cell]]:
     for name in VARIANTS:
         for v in plan.methods:
             for way in WAYS:
-                thesis = _number(printed.TABLE_4_3.get(v)) if way == "away" else None
+                thesis = _number(TABLE_4_3.get(v)) if way == "away" else None
                 found = _last(results, Case(v, name, back=way == "back", noisy=way == "noisy"))
                 records.append(_record("4.3", v, name, found, thesis_m=thesis, way=way))
-        for share, row in printed.TABLE_5_1.items():
+        for share, row in TABLE_5_1.items():
             for v in plan.tracks:
                 found = _after(results, Case(v, name), share * v)
                 records.append(_record("5.1", v, name, found, thesis_m=_number(row.get(v)), track_share=share))
         for interval, visibilities in plan.intervals.items():
             for v in visibilities:
-                thesis = _number(printed.TABLE_5_2[interval].get(v))
+                thesis = _number(TABLE_5_2[interval].get(v))
                 found = _last(results, Case(v, name, interval))
                 records.append(_record("5.2", v, name, found, thesis_m=thesis, interval_m=interval))
         for start in plan.starts:
             for v in plan.references:
-                thesis = _number(printed.TABLE_5_3[start].get(v))
+                thesis = _number(TABLE_5_3[start].get(v))
                 found = _last(results, Case(v, name, start=start))
                 records.append(_record("5.3", v, name, found, thesis_m=thesis, first_m=start))
     return records

@@ -84,7 +84,7 @@ def drive(
     renderer : Renderer
         Of the road.
     camera : Camera
-        The told calibration; the true pitch differs from it.
+        The assumed calibration; the true pitch differs from it.
     frames : int
         How many instants.
     lead : bool
@@ -168,7 +168,7 @@ def observed(moment: Moment, camera: Camera, visibility: float, rng: np.random.G
     moment : Moment
         The instant.
     camera : Camera
-        The told calibration.
+        The assumed calibration.
     visibility : float
         Meteorological visibility [m]; ``inf`` for clear air.
     rng : numpy Generator

@@ -36,7 +36,7 @@ def picture(moment: Moment, camera: Camera) -> NDArray[np.uint8]:
     moment : Moment
         The instant.
     camera : Camera
-        The told calibration.
+        The assumed calibration.
 
     Returns
     -------

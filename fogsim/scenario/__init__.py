@@ -1,7 +1,13 @@
 """Scenario files: schema, loading, catalogue, and building the stages from a scenario."""
 
-from fogsim.scenario.loading import attached_scenario, load_scenario, override, resolved, scenario_from_config
-from fogsim.scenario.locating import catalogue
+from fogsim.scenario.loading import (
+    attached_scenario,
+    catalogue,
+    load_scenario,
+    override,
+    resolved,
+    scenario_from_config,
+)
 from fogsim.scenario.schema import Scenario
 
 __all__ = [

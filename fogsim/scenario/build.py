@@ -13,7 +13,7 @@ from fogsim.estimators import ESTIMATORS, Estimator
 from fogsim.fusion import FUSIONS, Fusion
 from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy
 from fogsim.metrics import SafetyStandard
-from fogsim.scenario.fog_build import fog_along
+from fogsim.scenario.fog import fog_along
 from fogsim.scenario.schema import Scenario
 from fogsim.scenario.traffic_schema import AnyEvent, Brake, BreakDown, ChangeLane, LampsFail
 from fogsim.sensors import LeadSensor
@@ -156,8 +156,8 @@ def camera(scenario: Scenario) -> Camera:
     )
 
 
-def told_camera(scenario: Scenario) -> Camera:
-    """Calibration that the ego's estimators are told, with the scenario's errors in it."""
+def assumed_camera(scenario: Scenario) -> Camera:
+    """Calibration that the ego's estimators assume, with the scenario's errors in it."""
     true, told = camera(scenario), scenario.camera.told
     return dataclasses.replace(
         true,

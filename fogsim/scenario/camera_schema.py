@@ -12,20 +12,20 @@ MOST_SAMPLES = 16_384
 """Columns and rows of samples that every OpenGL of today can draw."""
 
 
-class Told(Section):
-    """How the calibration that the vehicle is told differs from the true one."""
+class CalibrationErrors(Section):
+    """How the calibration that the vehicle assumes differs from the true one."""
 
     pitch_error_deg: Number = Field(default=0.0, ge=-10, le=10)
-    """Told minus true pitch."""
+    """Assumed minus true pitch."""
 
     roll_error_deg: Number = Field(default=0.0, ge=-10, le=10)
-    """Told minus true roll."""
+    """Assumed minus true roll."""
 
     focal_length_error_percent: Number = Field(default=0.0, ge=-50, le=50)
-    """Told over true focal length, minus 1."""
+    """Assumed over true focal length, minus 1."""
 
     mount_height_error_percent: Number = Field(default=0.0, ge=-50, le=50)
-    """Told over true height of the mount, minus 1."""
+    """Assumed over true height of the mount, minus 1."""
 
 
 class Exposure(Section):
@@ -132,8 +132,8 @@ class CameraSection(Section):
     bits: Literal[8, 10, 12] = 8
     """Bit depth; images of 10 and 12 bits are uint16."""
 
-    told: Told = Told()
-    """Errors of the calibration that the estimators are told."""
+    told: CalibrationErrors = CalibrationErrors()
+    """Errors of the calibration that the estimators assume."""
 
     @property
     def automatic(self) -> bool:

@@ -7,8 +7,9 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from fogsim.errors import nearest, shown, suggest
-from fogsim.scenario.document import Document, KeyPath, dotted
-from fogsim.scenario.methods import MISTAKE
+from fogsim.scenario.document import Document
+from fogsim.scenario.plain_yaml import KeyPath, dotted
+from fogsim.scenario.section import MISTAKE
 from fogsim.scenario.traffic_schema import AnyEvent
 
 MOST_TOLD = 50

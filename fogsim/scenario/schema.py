@@ -16,9 +16,8 @@ from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.render import RENDERERS
 from fogsim.scenario.camera_schema import CameraSection
-from fogsim.scenario.fog_schema import Fog
-from fogsim.scenario.methods import Method, method_of
-from fogsim.scenario.section import Distance, Flag, Length, Number, Period, Section, Seed, Text
+from fogsim.scenario.fog import Fog
+from fogsim.scenario.section import Distance, Flag, Length, Method, Number, Period, Section, Seed, Text, method_of
 from fogsim.scenario.traffic_schema import DriversSection, Traffic
 
 

@@ -10,7 +10,7 @@ from PIL import Image
 from fogsim.errors import InputError
 from fogsim.offline import FrameEstimates, OverlayFile, Picture, estimates_of, find_source
 from fogsim.offline.overlay import Overlay
-from fogsim.recorders.method_colours import method_colours
+from fogsim.recorders.style import method_colours
 from fogsim.values import Estimate
 
 

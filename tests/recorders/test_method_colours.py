@@ -9,8 +9,7 @@ from matplotlib.colors import to_rgb
 from fogsim.estimators import ESTIMATORS
 from fogsim.metrics import step_metrics
 from fogsim.recorders import FramePanel, report_figures
-from fogsim.recorders.method_colours import ON_DARK, ON_LIGHT, method_colours
-from fogsim.recorders.style import BELIEF, GROUND, MUTED, TEXT, TRUTH
+from fogsim.recorders.style import BELIEF, GROUND, MUTED, ON_DARK, ON_LIGHT, TEXT, TRUTH, method_colours
 from tests.recorders.synthetic import estimate, make_step
 
 # Machado, Oliveira & Fernandes 2009, table 1, severity 1: linear RGB as protanopes, deuteranopes and tritanopes see it.

@@ -8,7 +8,7 @@ import pytest
 from fogsim.cli import reproduce as reproduce_module
 from fogsim.estimators.huang2015_ratios import image_confidence
 from fogsim.reproduce import REPRODUCTIONS, Reproduction
-from fogsim.reproduce import huang2015_printed as printed
+from fogsim.reproduce import huang2015_published as published
 from fogsim.reproduce.huang2015 import reproduce
 from fogsim.reproduce.huang2015_chase import Chase, road
 from fogsim.reproduce.huang2015_plan import CAMERA, LAST, VARIANTS, VEHICLE, Case, Plan
@@ -50,7 +50,7 @@ def test_all_of_the_thesis_is_run_unless_told_otherwise() -> None:
 def test_printed_first_estimates_are_ten_to_twenty_rows_low_with_the_camera_of_eq_4_11() -> None:
     off = [
         1.5 * CAMERA.row_distance * (1.0 / first - 1.0 / true)
-        for true, (first, _) in printed.TABLE_4_1.items()
+        for true, (first, _) in published.TABLE_4_1.items()
         if isinstance(first, float)
     ]
     assert [round(rows) for rows in off] == [15, 11, 18, 20, 12]

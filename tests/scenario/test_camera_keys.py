@@ -47,7 +47,7 @@ def test_told_errors_are_in_the_told_calibration_alone() -> None:
         "camera.told={pitch_error_deg: 1, roll_error_deg: -2, focal_length_error_percent: 10, "
         "mount_height_error_percent: -20}",
     )
-    true, told = build.camera(wrong), build.told_camera(wrong)
+    true, told = build.camera(wrong), build.assumed_camera(wrong)
     assert math.degrees(told.pitch - true.pitch) == pytest.approx(1.0)
     assert math.degrees(told.roll) == pytest.approx(-1.0)
     assert told.focal_length == pytest.approx(1.1 * true.focal_length)

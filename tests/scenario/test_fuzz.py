@@ -29,7 +29,7 @@ from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.loop import AdvisedDriving, ClosedLoop
 from fogsim.parameters import Range, accepted_parameters
 from fogsim.scenario import Scenario, load_scenario
-from fogsim.scenario.methods import GIVEN_BY_THE_LOOP, Method
+from fogsim.scenario.section import GIVEN_BY_THE_LOOP, Method
 from fogsim.scene import build as scene_build
 
 FUZZ = int(os.environ.get("FOGSIM_FUZZ", "0"))

@@ -6,7 +6,7 @@ import pytest
 
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.scenario import attached_scenario, catalogue, load_scenario, override, resolved
-from fogsim.scenario.overrides import apply_overrides, parse_override
+from fogsim.scenario.document import apply_overrides, parse_override
 
 
 @pytest.fixture

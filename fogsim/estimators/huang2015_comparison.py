@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from fogsim.estimators.huang2015_sighting import MIDDLE, TOP, Sighting
 from fogsim.vision.light.clipped_sky import darker_by
 from fogsim.vision.region.road_image import CannotTellError
-from fogsim.vision.vehicle.patch import Patch, Placement, moved, shrunk
-from fogsim.vision.vehicle.patch_light import SharedLight, shared_light
-from fogsim.vision.vehicle.patch_match import PlacementPrior, Regression, register
+from fogsim.vision.vehicle.contrast_ratio import MeanLuminances, mean_luminances
+from fogsim.vision.vehicle.patch import Patch, Placement, rescale_position, shrink
+from fogsim.vision.vehicle.registration import PlacementPrior, Regression, register
 
 RANGE_DEVIATION = 0.3
 """Standard deviation of the told range [m]."""
@@ -20,7 +20,7 @@ SMALL = 0.6
 """Relative standard deviation of a contrast by how little a small picture shows [px]: over the vehicle's width."""
 
 BROADEST = 64.0
-"""Width of a vehicle beyond which its picture is shrunk before it is compared [px]: it shows no more."""
+"""Width of a vehicle beyond which its picture is shrink before it is compared [px]: it shows no more."""
 
 OUTLINE = 1.28
 """Size of what a vehicle is placed by, over that of what is compared [-]: its outline tells more than its rear."""
@@ -43,7 +43,7 @@ there at heights that no far picture resolves."""
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A sighting, and its window's variance before it was shrunk.
+    """A sighting, and its window's variance before it was shrink.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ def picture_of(sighting: Sighting) -> Picture:
     """Shrink a broad sighting; its variance is measured before."""
     scale = min(BROADEST / sighting.width, 1.0)
     small = replace(
-        sighting, patch=shrunk(sighting.patch, scale), width=sighting.width * scale, noise=sighting.noise * scale,
+        sighting, patch=shrink(sighting.patch, scale), width=sighting.width * scale, noise=sighting.noise * scale,
         pitch_deviation=sighting.pitch_deviation * scale, metre=sighting.metre * scale,
     )  # fmt: skip
     return Picture(small, window_variance(sighting.patch), scale)
@@ -130,7 +130,7 @@ def placed(picture: Picture, sighting: Sighting, at: Placement) -> Picture:
     small = replace(picture.sighting.patch, column=at.column, row=at.row)
     sizes = zip(small.luminance.shape, sighting.patch.luminance.shape, strict=True)
     places = zip((at.row, at.column), sizes, strict=True)
-    row, column = (moved(place, 1.0 / picture.scale, *size) for place, size in places)
+    row, column = (rescale_position(place, 1.0 / picture.scale, *size) for place, size in places)
     variance = window_variance(replace(sighting.patch, column=column, row=row))
     return replace(picture, sighting=replace(picture.sighting, patch=small), variance=variance)
 
@@ -139,7 +139,7 @@ def lowered(picture: Picture, widths: float) -> Picture:
     """The same picture of a vehicle that turned out to stand lower in it, by so many of its widths [-]."""
     sighting = picture.sighting
     patch = replace(sighting.patch, row=sighting.patch.row + widths * sighting.width)
-    # Of a picture that was shrunk the frame's own pixels are gone, and with them its exact variance.
+    # Of a picture that was shrink the frame's own pixels are gone, and with them its exact variance.
     variance = window_variance(patch) if picture.scale == 1.0 else picture.variance
     return replace(picture, sighting=replace(sighting, patch=patch), variance=variance)
 
@@ -196,7 +196,7 @@ def compared(reference: Picture, picture: Picture, prior: PlacementPrior, most: 
     if found is None:
         return None
     body, at = _above_bumper(near, found.placement)
-    light = shared_light(body, far.patch, at, (near.sky, far.sky), far.noise) if seen else None
+    light = mean_luminances(body, far.patch, at, (near.sky, far.sky), far.noise) if seen else None
     light = None if light is None else _unclipped(light, far)
     if light is None and found.pixels == 0:
         return None
@@ -218,7 +218,7 @@ def compared(reference: Picture, picture: Picture, prior: PlacementPrior, most: 
     )
 
 
-def _apart(found: Regression, gain: float, light: SharedLight | None) -> float:
+def _apart(found: Regression, gain: float, light: MeanLuminances | None) -> float:
     """By how much detail that is clearly seen has faded less than the mean contrast, beyond what says nothing [-]."""
     if light is None or light.near >= 1.0 or not math.isfinite(found.noise_deviation):
         return 0.0
@@ -242,7 +242,7 @@ def _unplaced(at: Placement) -> Regression:
     )
 
 
-def _unclipped(light: SharedLight, far: Sighting) -> SharedLight:
+def _unclipped(light: MeanLuminances, far: Sighting) -> MeanLuminances:
     """The same light with what clipping takes of pixels that are hardly darker than the sky."""
     if far.lost is None or far.lost.noise <= 0.0:
         return light

@@ -52,7 +52,7 @@ class Huang2015Lead:
     As published, variances of the windows are compared two by two: a table of ratios by difference of range, those
     beyond ± 50 % of their row's median dropped, means, least squares over k ≤ 0.09 1/m. Camera noise adds to every
     variance (dense fog comes out too thin) and detail is lost with distance (thin fog comes out too dense). Corrected,
-    the nearest picture is shrunk as the camera would, placed to a fraction of a pixel by the vehicle's outline, and
+    the nearest picture is shrink as the camera would, placed to a fraction of a pixel by the vehicle's outline, and
     each farther picture compared with it in two ways. The slope of its regression, noise taken out, falls as e^(−kd);
     so does the mean contrast to the sky up to the roof, in which dark pixels count most, as no shading or loss of
     detail makes them bright. Where the two contradict each other, detail was misplaced. Pixels that changed (lit

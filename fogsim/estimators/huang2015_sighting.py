@@ -11,11 +11,10 @@ from fogsim.vision.light.clipped_sky import Clipping, clipping
 from fogsim.vision.light.luminance import linear_luminance
 from fogsim.vision.lines.horizon import PITCH_DEVIATION, levelled
 from fogsim.vision.region.road_image import MIN_AIRLIGHT, CannotTellError
-from fogsim.vision.vehicle.lead_daylight import RoadFall, check_road, road_before, road_fall
-from fogsim.vision.vehicle.lead_scene import steepness
-from fogsim.vision.vehicle.lead_sky import airlight_beside, hidden_beside
-from fogsim.vision.vehicle.lead_window import WIDTHS, LeadWindow, lead_region
+from fogsim.vision.vehicle.airlight import RoadFall, airlight_beside, check_road, hidden_beside, road_before, road_fall
 from fogsim.vision.vehicle.patch import Patch
+from fogsim.vision.vehicle.rear_localisation import WIDTHS, RearBox, search_window
+from fogsim.vision.vehicle.vehicle_crop import noise_gain
 
 HALF_WIDTH, MIDDLE, HALF_HEIGHT = 0.42, 0.42, 0.32
 """The part of a rear that is compared, in widths of the vehicle: half its width, its middle above the foot, and half
@@ -108,7 +107,7 @@ def vehicle_crop(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera, 
     scale = camera.focal_length / distance
     if WIDTHS[1] * scale < LEAST_WIDTH:
         raise CannotTellError("the vehicle ahead is too small in the image")
-    region = lead_region(camera, distance)
+    region = search_window(camera, distance)
     if region is None:
         raise CannotTellError("the vehicle ahead is outside the image")
     rows, cols = region
@@ -122,7 +121,7 @@ def vehicle_crop(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera, 
     check_road(luminance_of(*road_before(camera, distance)), sky)
     road = road_fall(luminance_of, camera, distance, sky)
     pitch = 1.5 * PITCH_DEVIATION * camera.focal_length
-    noise *= steepness(luminance, sky, camera)
+    noise *= noise_gain(luminance, sky, camera)
     return Crop(luminance, (cols.start, rows.start), sky, noise, pitch, road, scale, lost)
 
 
@@ -152,7 +151,7 @@ def _sky(
     return mean + lost.loss, max(noise, lost.noise), known
 
 
-def sighting_of(crop: Crop, distance: float, window: LeadWindow, blur: float) -> Sighting:
+def sighting_of(crop: Crop, distance: float, window: RearBox, blur: float) -> Sighting:
     """Cut the picture of a vehicle out, with room about it for what is not known of its place.
 
     Parameters
@@ -161,7 +160,7 @@ def sighting_of(crop: Crop, distance: float, window: LeadWindow, blur: float) ->
         Where it can be.
     distance : float
         From the camera to its rear [m].
-    window : LeadWindow
+    window : RearBox
         Where it is or is expected [px].
     blur : float
         Standard deviation of the lens' blur [px].

@@ -23,8 +23,8 @@ from fogsim.estimators.lead_ranges import LeadRanges
 from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
 from fogsim.vision.region.road_image import CannotTellError
-from fogsim.vision.vehicle.lead_daylight import RoadFall
-from fogsim.vision.vehicle.lead_window import LeadWindow, find_lead
+from fogsim.vision.vehicle.airlight import RoadFall
+from fogsim.vision.vehicle.rear_localisation import RearBox, localise_rear
 
 FOLLOWED = 0.4
 """Share of a new place that the expectation for the next frame takes over: pitch of the moment is no trend [-]."""
@@ -90,7 +90,7 @@ class LeadTrack:
         return tuple(sorted(placed, key=lambda c: c.distance))
 
     @property
-    def window(self) -> LeadWindow | None:
+    def window(self) -> RearBox | None:
         """Where the vehicle was seen last; None if it never was."""
         if self._reference is None:
             return None
@@ -127,7 +127,7 @@ class LeadTrack:
             self._follow(crop, distance, number, self._reference)
 
     def _begin(self, crop: Crop, distance: float, number: int) -> None:
-        window = find_lead(crop.luminance, crop.origin, self._camera, distance, crop.noise)
+        window = localise_rear(crop.luminance, crop.origin, self._camera, distance, crop.noise)
         if window is None:
             raise CannotTellError("no vehicle stands out where the range says that there is one")
         picture = picture_of(replace(sighting_of(crop, distance, window, self._blur), number=number))
@@ -172,7 +172,7 @@ class LeadTrack:
     def _renew(self, crop: Crop, nearest: Picture) -> None:
         """Take the nearest picture for the reference of all: it shows the most, and best where the vehicle stands."""
         known = self._expected(nearest.sighting.distance, nearest)
-        found = find_lead(crop.luminance, crop.origin, self._camera, nearest.sighting.distance, crop.noise)
+        found = localise_rear(crop.luminance, crop.origin, self._camera, nearest.sighting.distance, crop.noise)
         if found is not None and _is_same(found, known):
             lower = (found.foot - known.foot) / known.width
             index = next(i for i, kept in enumerate(self._kept) if kept is nearest)
@@ -202,16 +202,16 @@ class LeadTrack:
         self._offset = (before[0] + share * (across - before[0]), before[1] + share * (pitch - before[1]))
         self._last_distance = distance
 
-    def _expected(self, distance: float, reference: Picture) -> LeadWindow:
+    def _expected(self, distance: float, reference: Picture) -> RearBox:
         camera, near = self._camera, reference.sighting
-        return LeadWindow(
+        return RearBox(
             column=camera.principal_point[0] + self._offset[0] * camera.focal_length / distance,
             foot=camera.horizon_row + camera.row_distance / distance + self._offset[1],
             width=near.width / reference.scale * near.distance / distance,
         )
 
 
-def _is_same(found: LeadWindow, known: LeadWindow) -> bool:
+def _is_same(found: RearBox, known: RearBox) -> bool:
     """Whether two windows of one picture are of one vehicle."""
     apart = max(abs(found.column - known.column), abs(found.foot - known.foot), abs(found.width - known.width))
     return apart < SAME * known.width

@@ -17,10 +17,10 @@ from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation
 from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation
 from fogsim.vision.region.road_image import CannotTellError
+from fogsim.vision.vehicle.airlight import RoadFall
+from fogsim.vision.vehicle.contrast_ratio import HALF_BODY, LARGE
 from fogsim.vision.vehicle.decay_fit import DecayFit, fit_decay
-from fogsim.vision.vehicle.lead_daylight import RoadFall
-from fogsim.vision.vehicle.lead_patch import HALF_BODY, LARGE
-from fogsim.vision.vehicle.lead_scene import lead_scene
+from fogsim.vision.vehicle.vehicle_crop import vehicle_crop
 
 MIN_SAMPLES = 4
 """Fewest ranges for a fit."""
@@ -160,7 +160,7 @@ class LeadContrast:
         try:
             number = self._ranges.add(observation.time, lead)
             likely = float(self._ranges.smoothed([number], np.array([lead.distance]))[0])
-            scene = lead_scene(image, self._camera, likely + self._setback, self._pitch_deviation)
+            scene = vehicle_crop(image, self._camera, likely + self._setback, self._pitch_deviation)
             fit = self._fit()
             densest = math.inf if fit is None else max(fit.extinction + 2.0 * fit.deviation, 0.0)
             sight = self._track.look(scene, number, lead.distance, observation.time, surprise=surprise, densest=densest)

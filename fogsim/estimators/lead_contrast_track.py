@@ -5,10 +5,10 @@ from collections import deque
 from dataclasses import dataclass, replace
 
 from fogsim.vision.region.road_image import CannotTellError
-from fogsim.vision.vehicle.lead_patch import Fading, LeadPicture, compared
-from fogsim.vision.vehicle.lead_place import Surroundings, placed
-from fogsim.vision.vehicle.lead_scene import LeadScene
-from fogsim.vision.vehicle.lead_window import LeadWindow
+from fogsim.vision.vehicle.contrast_ratio import ContrastRatio, RearPicture, contrast_ratio
+from fogsim.vision.vehicle.rear_localisation import RearBox
+from fogsim.vision.vehicle.registration import RoadBehind, register_rear
+from fogsim.vision.vehicle.vehicle_crop import VehicleCrop
 
 SPACING = 1.0
 """Change of range that makes a new picture worth keeping [m]; between, a picture only shows where the vehicle is."""
@@ -64,11 +64,11 @@ class Sight:
         Its range as measured, and from the camera to its rear [m].
     time : float
         [s].
-    picture : LeadPicture
+    picture : RearPicture
         The picture.
-    window : LeadWindow
+    window : RearBox
         Its place in the image.
-    fading : Fading
+    fading : ContrastRatio
         Contrast over that of the reference.
     clipped : bool
         Whether the sky may be brighter than it looks.
@@ -80,9 +80,9 @@ class Sight:
     distance: float
     depth: float
     time: float
-    picture: LeadPicture
-    window: LeadWindow
-    fading: Fading
+    picture: RearPicture
+    window: RearBox
+    fading: ContrastRatio
     clipped: bool
     alike: bool
 
@@ -125,13 +125,13 @@ class ContrastTrack:
         self._swayed += 1
 
     def look(
-        self, scene: LeadScene, number: int, distance: float, time: float, *, surprise: float, densest: float
+        self, scene: VehicleCrop, number: int, distance: float, time: float, *, surprise: float, densest: float
     ) -> Sight:
         """Find the vehicle in a frame and keep its picture if the range is new.
 
         Parameters
         ----------
-        scene : LeadScene
+        scene : VehicleCrop
             The frame.
         number, distance : int, float
             Number of the measured range, and that range [m].
@@ -182,31 +182,31 @@ class ContrastTrack:
             self.sights.extend([*rest, sight])
 
     @property
-    def _reference_picture(self) -> LeadPicture | None:
+    def _reference_picture(self) -> RearPicture | None:
         return None if self.reference is None else self.reference.picture
 
-    def _begun(self, scene: LeadScene, distance: float, time: float) -> Sight:
+    def _begun(self, scene: VehicleCrop, distance: float, time: float) -> Sight:
         """Find a vehicle that has not been seen before."""
         picture = scene.found()
-        fading = compared(picture, picture)
+        fading = contrast_ratio(picture, picture)
         if fading is None:
             raise CannotTellError("the vehicle ahead hardly differs from the airlight")
         return Sight(0, distance, scene.depth, time, picture, scene.window(picture), fading, scene.sky.is_clipped, True)
 
-    def _followed(self, scene: LeadScene, distance: float, time: float, reference: Sight, densest: float) -> Sight:
+    def _followed(self, scene: VehicleCrop, distance: float, time: float, reference: Sight, densest: float) -> Sight:
         """Find the vehicle that is tracked."""
-        expected = scene.expected(self._aside, reference.picture.width).moved(0.0, self._lift * scene.depth)
+        expected = scene.expected(self._aside, reference.picture.width).displaced(0.0, self._lift * scene.depth)
         pitch = scene.depth * self._pitch_deviation + 0.02
         known = min(self.sights, key=lambda s: abs(s.distance - distance)).fading.ratio
-        around = Surroundings(scene.camera.mount_height, known)
-        found = placed(reference.picture, expected, STEERING, pitch, around)
-        fading = None if found is None else compared(reference.picture, found[0])
+        around = RoadBehind(scene.camera.mount_height, known)
+        found = register_rear(reference.picture, expected, STEERING, pitch, around)
+        fading = None if found is None else contrast_ratio(reference.picture, found[0])
         if found is None or fading is None:
             raise CannotTellError("the vehicle ahead is too small in the image, or hidden")
         picture, likeness = found
         if fading.ratio < SURE * fading.deviation:
             # The best of many places would be that of the noise: it is where it was expected.
-            picture, fading = expected, compared(reference.picture, expected) or fading
+            picture, fading = expected, contrast_ratio(reference.picture, expected) or fading
             fading = replace(fading, deviation=math.hypot(fading.deviation, UNPLACED * fading.ratio))
         least, most = self._bounds(distance, densest)
         if fading.visible * least > VISIBLE and likeness < max(ALIKE, _likeness_if_fixed(scene, reference)):
@@ -226,7 +226,7 @@ class ContrastTrack:
     def _compare_anew(self, reference: Sight) -> None:
         """Take the nearest picture for the reference of all: it shows the most."""
         self.reference = reference
-        pairs = [(s, compared(reference.picture, s.picture)) for s in self.sights]
+        pairs = [(s, contrast_ratio(reference.picture, s.picture)) for s in self.sights]
         self.sights.clear()
         self.sights.extend(replace(s, fading=fading) for s, fading in pairs if fading is not None)
 
@@ -240,11 +240,11 @@ class ContrastTrack:
             self._compare_anew(min(self.sights, key=lambda s: s.depth))
 
 
-def _likeness_if_fixed(scene: LeadScene, reference: Sight) -> float:
+def _likeness_if_fixed(scene: VehicleCrop, reference: Sight) -> float:
     """Correlation that a vehicle must have: that of what is at the reference's place and of its size in the image."""
     change = abs(math.log(scene.depth / reference.depth))
     if change < SCALED:
         return 0.0
-    around = Surroundings(scene.camera.mount_height, 1.0)
-    found = placed(reference.picture, scene.picture(reference.window, reference.picture.scale), 0.1, 0.1, around)
+    around = RoadBehind(scene.camera.mount_height, 1.0)
+    found = register_rear(reference.picture, scene.picture(reference.window, reference.picture.scale), 0.1, 0.1, around)
     return 0.0 if found is None else found[1] - (BETTER if change < RESCALED else 0.0)

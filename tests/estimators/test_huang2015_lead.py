@@ -17,8 +17,8 @@ from fogsim.estimators.huang2015_sighting import vehicle_crop
 from fogsim.values import Camera, Frame, LeadMeasurement, Observation, Response
 from fogsim.values.camera_response import respond
 from fogsim.values.estimate import NORMAL_90_PERCENT
-from fogsim.vision.vehicle.lead_daylight import RoadFall, road_fall
-from fogsim.vision.vehicle.lead_window import find_lead
+from fogsim.vision.vehicle.airlight import RoadFall, road_fall
+from fogsim.vision.vehicle.rear_localisation import localise_rear
 
 LN20 = np.log(20.0)
 
@@ -306,7 +306,7 @@ def test_the_foot_is_found_as_well_as_the_pitch_is_known_or_better(distance, vis
         pitch = np.random.default_rng(seed).normal(0.0, chase.pitch_scatter)
         image = exposed(chase, picture(chase, distance, rng), rng)
         crop = vehicle_crop(image, chase.camera, distance)
-        found = find_lead(crop.luminance, crop.origin, chase.camera, distance, crop.noise)
+        found = localise_rear(crop.luminance, crop.origin, chase.camera, distance, crop.noise)
         camera = replace(chase.camera, pitch=chase.camera.pitch + pitch)
         errors.append((found.foot - camera.horizon_row - camera.row_distance / distance) * distance)
     # The told pitch alone is 0.15 m off at 90 m.

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.jit import kernel
 from fogsim.linear_algebra import matrix_product
 
 Floats = NDArray[np.float64]
@@ -84,16 +85,31 @@ def box_weights(
     # A near pixel is itself a mean over 1 and blurred: squares of widths add, as variances do, and a box of width w
     # has the variance w²/12.
     half = 0.5 * math.sqrt(max((1.0 + 12.0 * blur**2) * (scale**-2 - 1.0), LEAST_BOX**2))
-    middle = centre + (far - far_centre) / scale
-    near = np.arange(near_size, dtype=np.float64)
-    upper = np.minimum(middle[:, None] + half, near + 0.5)
-    lower = np.maximum(middle[:, None] - half, near - 0.5)
-    return np.asarray(np.maximum(upper - lower, 0.0) / (2.0 * half), np.float64)
+    return _overlaps(near_size, centre + (far - far_centre) / scale, half)
+
+
+@kernel
+def _overlaps(size: int, middle: Floats, half: float) -> Floats:
+    """Shares of boxes about middles that lie on each of so many pixels."""
+    shares = np.zeros((middle.size, size))
+    for i in range(middle.size):
+        low, high = middle[i] - half, middle[i] + half
+        for j in range(max(int(low) - 1, 0), min(int(high) + 3, size)):
+            shares[i, j] = max(min(high, j + 0.5) - max(low, j - 0.5), 0.0) / (2.0 * half)
+    return shares
 
 
 @dataclass(frozen=True, slots=True)
 class PixelGrid:
-    """Far pixels that are compared."""
+    """Far pixels that are compared.
+
+    Attributes
+    ----------
+    rows, cols : (n,) and (m,) float64
+        Which they are in the far patch [px].
+    far : (n, m) float64
+        Their luminance [linear grey levels].
+    """
 
     rows: Floats
     cols: Floats
@@ -101,7 +117,15 @@ class PixelGrid:
 
 
 def pixel_grid(near: Patch, far: Patch, at: Placement) -> PixelGrid | None:
-    """Far pixels that the followed thing covers wholly."""
+    """Far pixels that the followed thing covers wholly; None if they are too few.
+
+    Parameters
+    ----------
+    near, far : Patch
+        The two pictures.
+    at : Placement
+        Where the near one is in the far one.
+    """
     spans = []
     for centre, half, size in (
         (at.row, near.half_height * at.scale, far.luminance.shape[0]),
@@ -117,14 +141,45 @@ def pixel_grid(near: Patch, far: Patch, at: Placement) -> PixelGrid | None:
     return PixelGrid(np.arange(top, bottom + 1.0), np.arange(left, right + 1.0), pixels)
 
 
-def seen_as(near: Patch, grid: PixelGrid, at: Placement) -> Floats:
-    """Near patch as the far camera would see it without fog."""
+def downsample_to(near: Patch, grid: PixelGrid, at: Placement) -> Floats:
+    """Near patch (n, m) as the far camera would show it without fog.
+
+    Parameters
+    ----------
+    near : Patch
+        The near picture.
+    grid : PixelGrid
+        The far pixels.
+    at : Placement
+        Where the near picture is among them.
+    """
+    return matrix_product(shrunk_rows(near, grid, at), column_weights(near, grid, at).T)
+
+
+def shrunk_rows(near: Patch, grid: PixelGrid, at: Placement) -> Floats:
+    """Rows of the near patch as the far camera would show them, in its own columns (n, near columns).
+
+    Parameters
+    ----------
+    near, grid, at : Patch, PixelGrid, Placement
+        See `downsample_to`.
+    """
     rows = box_weights(near.luminance.shape[0], near.row, grid.rows, at.row, at.scale, near.blur)
-    cols = box_weights(near.luminance.shape[1], near.column, grid.cols, at.column, at.scale, near.blur)
-    return matrix_product(matrix_product(rows, near.luminance), cols.T)
+    return matrix_product(rows, near.luminance)
 
 
-def shrunk(patch: Patch, scale: float) -> Patch:
+def column_weights(near: Patch, grid: PixelGrid, at: Placement) -> Floats:
+    """Shares (m, near columns) of the near patch's columns in the far ones.
+
+    Parameters
+    ----------
+    near, grid, at : Patch, PixelGrid, Placement
+        See `downsample_to`.
+    """
+    return box_weights(near.luminance.shape[1], near.column, grid.cols, at.column, at.scale, near.blur)
+
+
+def shrink(patch: Patch, scale: float) -> Patch:
     """Picture of fewer, larger pixels.
 
     Parameters
@@ -148,8 +203,8 @@ def shrunk(patch: Patch, scale: float) -> Patch:
     return replace(
         patch,
         luminance=np.ascontiguousarray(luminance),
-        column=moved(patch.column, scale, cols, luminance.shape[1]),
-        row=moved(patch.row, scale, rows, luminance.shape[0]),
+        column=rescale_position(patch.column, scale, cols, luminance.shape[1]),
+        row=rescale_position(patch.row, scale, rows, luminance.shape[0]),
         half_width=patch.half_width * scale,
         half_height=patch.half_height * scale,
         blur=patch.blur * scale,
@@ -171,6 +226,16 @@ def _box_means(values: Floats, scale: float, half: float) -> Floats:
     return np.asarray((upto(high) - upto(low)) / (high - low)[:, None])
 
 
-def moved(position: float, scale: float, before: int, after: int) -> float:
-    """Row or column of a point once so many pixels have become others of another size about the same middle [px]."""
+def rescale_position(position: float, scale: float, before: int, after: int) -> float:
+    """Row or column of a point once a picture's pixels have become others of another size about the same middle [px].
+
+    Parameters
+    ----------
+    position : float
+        Before [px].
+    scale : float
+        New size of the picture over its old one [-].
+    before, after : int
+        How many pixels there were and are along the axis.
+    """
     return (position - 0.5 * (before - 1)) * scale + 0.5 * (after - 1)

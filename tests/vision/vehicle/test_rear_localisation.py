@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from fogsim.values import Camera
-from fogsim.vision.vehicle.lead_window import find_lead, lead_region
+from fogsim.vision.vehicle.rear_localisation import localise_rear, search_window
 
 CAMERA = Camera(640, 480, 600.0, (319.5, 239.5), 1.4, np.radians(2.0))
 
@@ -30,8 +30,8 @@ def road(depth, rear, visibility, noise, seed, aside=0.0, light=0.1, camera=CAME
 
 
 def found(image, depth, noise=1.0, camera=CAMERA):
-    rows, cols = lead_region(camera, depth)
-    return find_lead(image[rows, cols], (cols.start, rows.start), camera, depth, noise)
+    rows, cols = search_window(camera, depth)
+    return localise_rear(image[rows, cols], (cols.start, rows.start), camera, depth, noise)
 
 
 @pytest.mark.parametrize("rear", [0.65, 0.9, 1.6, 1.9, 2.5], ids=str)
@@ -69,8 +69,8 @@ def test_what_the_fog_hides_is_not_found():
 
 
 def test_regions_lie_in_the_image_or_there_is_none():
-    rows, cols = lead_region(CAMERA, 20.0)
+    rows, cols = search_window(CAMERA, 20.0)
     assert 0 <= rows.start < rows.stop <= CAMERA.height
     assert 0 <= cols.start < cols.stop <= CAMERA.width
-    assert lead_region(CAMERA, 2.0) is None
-    assert lead_region(CAMERA, 2000.0) is None
+    assert search_window(CAMERA, 2.0) is None
+    assert search_window(CAMERA, 2000.0) is None

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fogsim.vision.vehicle.patch import Patch, Placement, moved, shrunk
-from fogsim.vision.vehicle.patch_light import shared_light
+from fogsim.vision.vehicle.contrast_ratio import mean_luminances
+from fogsim.vision.vehicle.patch import Patch, Placement, rescale_position, shrink
 
 SKY = 200.0
 
@@ -29,7 +29,7 @@ def fogged(luminance: np.ndarray, left: float) -> np.ndarray:
 
 def fallen(near: np.ndarray, far: np.ndarray, noise: float = 0.5) -> float:
     there = patch(far)
-    light = shared_light(patch(near), there, Placement(there.column, there.row, 1.0), (SKY, SKY), noise)
+    light = mean_luminances(patch(near), there, Placement(there.column, there.row, 1.0), (SKY, SKY), noise)
     assert light is not None
     assert light.deviation > 0.0
     return (1.0 - light.far) / (1.0 - light.near)
@@ -42,7 +42,7 @@ def test_contrast_to_the_sky_falls_by_one_factor(left):
 
 def test_another_exposure_changes_nothing():
     there = patch(0.5 * fogged(rear(), 0.4))
-    light = shared_light(patch(rear()), there, Placement(there.column, there.row, 1.0), (SKY, 0.5 * SKY), 0.5)
+    light = mean_luminances(patch(rear()), there, Placement(there.column, there.row, 1.0), (SKY, 0.5 * SKY), 0.5)
     assert (1.0 - light.far) / (1.0 - light.near) == pytest.approx(0.4)
 
 
@@ -68,32 +68,32 @@ def test_noise_does_not_bias_what_hardly_shows():
 
 def test_nothing_is_said_of_what_is_as_bright_as_the_sky():
     same = patch(np.full((40, 48), SKY))
-    assert shared_light(same, same, Placement(same.column, same.row, 1.0), (SKY, SKY), 0.5) is None
+    assert mean_luminances(same, same, Placement(same.column, same.row, 1.0), (SKY, SKY), 0.5) is None
 
 
 @pytest.mark.parametrize("scale", [0.9, 0.5, 0.31])
 def test_a_smaller_picture_shows_the_same_at_the_same_place(scale):
     ramp = np.add.outer(2.0 * np.arange(80.0), 3.0 * np.arange(120.0))
-    small = shrunk(patch(ramp), scale)
+    small = shrink(patch(ramp), scale)
     row, col = small.luminance.shape[0] // 2, small.luminance.shape[1] // 2
     rows, cols = small.luminance.shape
-    there = moved(row, 1.0 / scale, rows, 80), moved(col, 1.0 / scale, cols, 120)
+    there = rescale_position(row, 1.0 / scale, rows, 80), rescale_position(col, 1.0 / scale, cols, 120)
     assert small.luminance[row, col] == pytest.approx(2.0 * there[0] + 3.0 * there[1], abs=0.5)
-    assert moved(small.column, 1.0 / scale, small.luminance.shape[1], 120) == pytest.approx(59.5)
+    assert rescale_position(small.column, 1.0 / scale, small.luminance.shape[1], 120) == pytest.approx(59.5)
     assert small.half_width == pytest.approx(58.0 * scale)
 
 
 @pytest.mark.parametrize("scale", [0.9, 0.5, 0.31])
 def test_a_mirrored_picture_is_shrunk_to_the_mirror_image(scale):
     noisy = patch(np.random.default_rng(1).normal(100.0, 8.0, (40, 47)))
-    small, other = shrunk(noisy, scale), shrunk(replace(noisy, luminance=noisy.luminance[:, ::-1], column=5.0), scale)
+    small, other = shrink(noisy, scale), shrink(replace(noisy, luminance=noisy.luminance[:, ::-1], column=5.0), scale)
     np.testing.assert_allclose(other.luminance, small.luminance[:, ::-1], rtol=1e-12)
-    there = shrunk(replace(noisy, column=41.0), scale).column
+    there = shrink(replace(noisy, column=41.0), scale).column
     assert other.column == pytest.approx(small.luminance.shape[1] - 1 - there)
 
 
 def test_shrinking_averages_noise_away():
     noisy = patch(np.random.default_rng(0).normal(100.0, 8.0, (200, 240)))
-    inner = shrunk(noisy, 0.25).luminance[2:-2, 2:-2]
+    inner = shrink(noisy, 0.25).luminance[2:-2, 2:-2]
     assert inner.std() == pytest.approx(8.0 * 0.25, rel=0.1)
-    assert shrunk(noisy, 1.0) is noisy
+    assert shrink(noisy, 1.0) is noisy

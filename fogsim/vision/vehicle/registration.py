@@ -1,4 +1,4 @@
-"""Registration of a near, sharp picture of a thing to a farther one, to a fraction of a pixel, and their regression."""
+"""Registration of a picture of a vehicle in a farther one."""
 
 import math
 from dataclasses import dataclass, replace
@@ -7,8 +7,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.linear_algebra import inverse_of, matrix_product
-from fogsim.vision.vehicle.match_kernels import correlations
-from fogsim.vision.vehicle.patch import Patch, PixelGrid, Placement, pixel_grid, seen_as
+from fogsim.vision.light.medians import median
+from fogsim.vision.vehicle.contrast_ratio import RearPicture, cell_centres, common_cell, resample
+from fogsim.vision.vehicle.patch import (
+    Patch,
+    PixelGrid,
+    Placement,
+    column_weights,
+    downsample_to,
+    pixel_grid,
+    shrunk_rows,
+)
+from fogsim.vision.vehicle.template_matching import INDEPENDENT, match_cost, vertex
 
 Floats = NDArray[np.float64]
 
@@ -37,11 +47,11 @@ OTHER = 0.2
 NOISE_SHARE = 0.3
 """Relative standard deviation of the told noise's power, which is taken out of slopes [-]."""
 
-ALIKE = 8.0
-"""Neighbouring pixels that differ alike where a thing has changed: so many count as one [-]."""
-
 LEAST_PIXELS = 24
 """Fewest pixels that a regression is made of."""
+
+ASIDE, ABOVE, BELOW = 0.25, 0.15, 0.4
+"""What is placed reaches so far beyond that part, or beyond the vehicle's sides [m]: its outline tells the place."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,19 +126,17 @@ def coarse_placement(near: Patch, far: Patch, prior: PlacementPrior) -> Placemen
     grid = pixel_grid(near, far, prior.placement)
     if grid is None:
         return None
-    template = seen_as(near, grid, prior.placement)
+    template = downsample_to(near, grid, prior.placement)
     if far.luminance.shape[0] < template.shape[0] or far.luminance.shape[1] < template.shape[1]:
         return None
     if float(template.std()) < 1e-3:
         return None
-    correlation = np.clip(correlations(np.ascontiguousarray(far.luminance), template), 0.0, 0.9999)
-    down = np.arange(correlation.shape[0]) - grid.rows[0]
-    across = np.arange(correlation.shape[1]) - grid.cols[0]
+    down = np.arange(far.luminance.shape[0] - template.shape[0] + 1) - grid.rows[0]
+    across = np.arange(far.luminance.shape[1] - template.shape[1] + 1) - grid.cols[0]
     expected = 0.5 * (down[:, None] / prior.row_deviation) ** 2 + 0.5 * (across / prior.column_deviation) ** 2
-    cost = 0.5 * template.size / ALIKE * np.log1p(-(correlation**2)) + expected
-    row, col = np.unravel_index(int(np.argmin(cost)), cost.shape)
+    found = match_cost(far.luminance, template, expected)
     at = prior.placement
-    return replace(at, column=at.column + float(across[col]), row=at.row + float(down[row]))
+    return replace(at, column=at.column + float(across[found.col]), row=at.row + float(down[found.row]))
 
 
 def register(
@@ -195,13 +203,15 @@ def _line(shown: Floats, far: Floats) -> tuple[NDArray[np.bool_], float, float, 
     for _ in range(4):
         if int(used.sum()) < max(LEAST_PIXELS, 0.4 * used.size):
             return None
-        near_mean, mean = float(shown[used].mean()), float(far[used].mean())
-        spread = float(((shown[used] - near_mean) ** 2).sum())
+        shown_used, far_used = shown[used], far[used]
+        near_mean, mean = float(shown_used.mean()), float(far_used.mean())
+        apart = shown_used - near_mean
+        spread = float((apart**2).sum())
         if spread <= 1e-9:
             return None
-        slope = float(((shown[used] - near_mean) * far[used]).sum()) / spread
+        slope = float((apart * far_used).sum()) / spread
         residual = far - mean - slope * (shown - near_mean)
-        scale = max(1.4826 * float(np.median(np.abs(residual[valid]))), 0.2)
+        scale = max(1.4826 * median(np.abs(residual[valid])), 0.2)
         own = abs(slope) * (OWN_SHARE * np.abs(shown - near_mean) + EDGE_SHARE * change)
         kept = valid & (np.abs(residual) <= OUTLIER * scale + own)
         if bool((kept == used).all()):
@@ -211,22 +221,19 @@ def _line(shown: Floats, far: Floats) -> tuple[NDArray[np.bool_], float, float, 
 
 
 def _step(near: Patch, grid: PixelGrid, at: Placement, prior: PlacementPrior, noise: float) -> Floats | None:
-    shown = seen_as(near, grid, at)
+    rows, cols = shrunk_rows(near, grid, at), column_weights(near, grid, at)
+    shown = matrix_product(rows, cols.T)
     line = _line(shown, grid.far)
     if line is None:
         return None
     used, slope, near_mean, mean, scale = line
     residual = (grid.far - mean - slope * (shown - near_mean))[used]
-    # From either side, so that a mirrored picture is placed alike.
-    moved = [
-        (
-            replace(at, column=at.column + sign * NUDGE),
-            replace(at, row=at.row + sign * NUDGE),
-            replace(at, scale=at.scale * math.exp(sign * RESIZE)),
-        )
-        for sign in (1.0, -1.0)
-    ]
-    change = [seen_as(near, grid, more) - seen_as(near, grid, less) for more, less in zip(*moved, strict=True)]
+    # From either side, so that a mirrored picture is placed alike; only what is moved is computed anew.
+    sides = (1.0, -1.0)
+    right, left = (matrix_product(rows, column_weights(near, grid, _moved(at, s * NUDGE, 0.0, 0.0)).T) for s in sides)
+    below, above = (matrix_product(shrunk_rows(near, grid, _moved(at, 0.0, s * NUDGE, 0.0)), cols.T) for s in sides)
+    larger, smaller = (downsample_to(near, grid, _moved(at, 0.0, 0.0, s * RESIZE)) for s in sides)
+    change = (right - left, below - above, larger - smaller)
     jacobian = np.stack([slope * one[used] for one in change], axis=1) / (2.0 * np.array([NUDGE, NUDGE, RESIZE]))
     # What slope and mean can take up is no displacement.
     jacobian -= jacobian.mean(axis=0)
@@ -235,15 +242,20 @@ def _step(near: Patch, grid: PixelGrid, at: Placement, prior: PlacementPrior, no
     expected = prior.placement
     deviation = np.array([prior.column_deviation, prior.row_deviation, prior.scale_deviation])
     offset = np.array([at.column - expected.column, at.row - expected.row, math.log(at.scale / expected.scale)])
-    variance = noise**2 + ALIKE * max(scale**2 - noise**2, 0.0)
+    variance = noise**2 + INDEPENDENT * max(scale**2 - noise**2, 0.0)
     information = matrix_product(jacobian.T, jacobian) / variance + np.diag(deviation**-2)
     return np.asarray(
         matrix_product(inverse_of(information), matrix_product(jacobian.T, residual) / variance - offset / deviation**2)
     )
 
 
+def _moved(at: Placement, right: float, down: float, larger: float) -> Placement:
+    """A placement moved [px] and resized by a change of the scale's logarithm."""
+    return Placement(at.column + right, at.row + down, at.scale * math.exp(larger))
+
+
 def _regression(near: Patch, grid: PixelGrid, at: Placement, noise: float) -> Regression | None:
-    shown = seen_as(near, grid, at)
+    shown = downsample_to(near, grid, at)
     line = _line(shown, grid.far)
     if line is None:
         return None
@@ -271,3 +283,84 @@ def _regression(near: Patch, grid: PixelGrid, at: Placement, noise: float) -> Re
         variance=variance,
         pixels=count,
     )
+
+
+@dataclass(frozen=True, slots=True)
+class RoadBehind:
+    """What is known of the road behind a vehicle: the higher it is seen, the farther it is, and the faster it fades.
+
+    Attributes
+    ----------
+    mount_height : float
+        Height of the camera above the road [m].
+    ratio : float
+        Contrast of the vehicle that is expected, over that of the reference [-].
+    """
+
+    mount_height: float
+    ratio: float
+
+    def contrast_ratio(self, height: Floats) -> Floats:
+        """Ratio of a level road's contrasts over that of the vehicle's: t^(h / (H − h)).
+
+        A line of sight at height h over a vehicle's foot at range d ends on the road at d H / (H − h).
+
+        Parameters
+        ----------
+        height : (n,) float64
+            Heights over the vehicle's foot at which the road is seen [m].
+        """
+        eye = self.mount_height
+        farther = np.where(height < 0.9 * eye, height / np.maximum(eye - height, 0.1 * eye), 9.0)
+        return np.asarray(min(max(self.ratio, 1e-3), 1.0) ** farther)
+
+
+def register_rear(
+    reference: RearPicture, picture: RearPicture, aside: float, pitch: float, behind: RoadBehind
+) -> tuple[RearPicture, float] | None:
+    """Find the vehicle of a reference in a picture.
+
+    Parameters
+    ----------
+    reference : RearPicture
+        The vehicle as it was seen.
+    picture : RearPicture
+        Where it is expected.
+    aside, pitch : float
+        Standard deviations of its place sideways and upward [m].
+    behind : RoadBehind
+        The road beside the vehicle, which is placed by its outline, too.
+
+    Returns
+    -------
+    (RearPicture, float) or None
+        The picture with the place of greatest posterior, and the correlation there [-]; None if it is too small.
+    """
+    cell = common_cell(reference, picture)
+    side = 0.5 * reference.width + ASIDE
+    low, high = reference.heights
+    lateral, height = cell_centres(-side, side, cell, 5), cell_centres(low - BELOW, high + ABOVE, cell, 4)
+    across, up = (max(math.ceil(2.5 * deviation / cell), 1) for deviation in (aside, pitch))
+    template, _ = resample(reference, lateral, height, cell)
+    beside = (np.abs(lateral) > 0.5 * reference.width) | (height[:, None] < 0.0)
+    template = np.where(beside, template * behind.contrast_ratio(height)[:, None], template)
+    template = _less_road_beside(template, lateral, reference)
+    wide = cell * np.arange(-across, across + 1), cell * np.arange(-up, up + 1)
+    lateral = np.concatenate([lateral[0] + wide[0][:across], lateral, lateral[-1] + wide[0][across + 1 :]])
+    height = np.concatenate([height[0] + wide[1][:up], height, height[-1] + wide[1][up + 1 :]])
+    seen, _ = resample(picture, lateral, height, cell)
+    seen = _less_road_beside(seen, lateral, reference)
+    if float(template.std()) < 1e-4:
+        return None
+    known = 0.5 * (wide[1][:, None] / pitch) ** 2 + 0.5 * (wide[0] / aside) ** 2
+    found = match_cost(seen, template, known)
+    right = (float(found.col) - across + vertex(found.cost[found.row], found.col)) * cell
+    high = (float(found.row) - up + vertex(found.cost[:, found.col], found.row)) * cell
+    return picture.displaced(right, high), float(found.correlation[found.row, found.col])
+
+
+def _less_road_beside(contrast: Floats, lateral: Floats, reference: RearPicture) -> Floats:
+    """Contrast less that of the road beside the vehicle at the same height: near road fades into far road upwards."""
+    beside = np.abs(lateral) > 0.5 * reference.width + 0.3 * ASIDE
+    outer = contrast[:, beside] if beside.any() else contrast[:, [0, -1]]
+    return np.asarray(contrast - np.median(outer, axis=1)[:, None], np.float64)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
+from fogsim.vision.vehicle.template_matching import vertex
 
 Floats = NDArray[np.float64]
 
@@ -52,7 +53,7 @@ where none stands out so, the calibration says more [-]."""
 
 
 @dataclass(frozen=True, slots=True)
-class LeadWindow:
+class RearBox:
     """Rear of a vehicle in an image.
 
     Attributes
@@ -70,7 +71,7 @@ class LeadWindow:
     width: float
 
 
-def lead_region(camera: Camera, distance: float) -> tuple[slice, slice] | None:
+def search_window(camera: Camera, distance: float) -> tuple[slice, slice] | None:
     """Rows and columns of a level image in which a vehicle at a distance can be.
 
     Parameters
@@ -95,9 +96,9 @@ def lead_region(camera: Camera, distance: float) -> tuple[slice, slice] | None:
     return slice(*rows), slice(*cols)
 
 
-def find_lead(
+def localise_rear(
     luminance: NDArray[np.float32], origin: tuple[int, int], camera: Camera, distance: float, noise: float
-) -> LeadWindow | None:
+) -> RearBox | None:
     """Find the rear of a vehicle at a known distance.
 
     Left and right edge are the pair of columns with the strongest steps over the height of a vehicle's body, one up
@@ -119,7 +120,7 @@ def find_lead(
 
     Returns
     -------
-    LeadWindow or None
+    RearBox or None
         In pixels of the whole image; None if no such pair stands out of the noise.
     """
     scale = camera.focal_length / distance
@@ -133,7 +134,7 @@ def find_lead(
         return None
     left, right = pair
     foot = _refined_foot(luminance[:, math.ceil(left) + 1 : math.floor(right)], foot, camera, noise)
-    return LeadWindow(0.5 * (left + right) + origin[0], foot + origin[1], right - left)
+    return RearBox(0.5 * (left + right) + origin[0], foot + origin[1], right - left)
 
 
 def _span(first: float, last: float, size: int) -> slice | None:
@@ -155,7 +156,9 @@ def _best_pair(body: NDArray[np.float32], scale: float, axis: float, noise: floa
         narrow = _alone(narrow, step, scale, floor)
     if narrow is not None and (wide is None or narrow[0] > NARROWER * wide[0]):
         wide = narrow
-    return None if wide is None else (_peak(np.abs(step), wide[1]), _peak(np.abs(step), wide[2]))
+    return (
+        None if wide is None else (wide[1] + vertex(-np.abs(step), wide[1]), wide[2] + vertex(-np.abs(step), wide[2]))
+    )
 
 
 def _pair(
@@ -199,15 +202,6 @@ def _symmetry(pixels: NDArray[np.float32]) -> float:
     return float((centred * centred[:, ::-1]).sum()) / power if power > 0 else 0.0
 
 
-def _peak(values: Floats, at: int) -> float:
-    """Place of a maximum to a fraction of a pixel, by a parabola."""
-    if not 0 < at < values.size - 1:
-        return float(at)
-    left, here, right = values[at - 1 : at + 2]
-    bend = float(left - 2.0 * here + right)
-    return at + float(np.clip(0.5 * (left - right) / bend, -0.5, 0.5)) if bend < 0 else float(at)
-
-
 def _refined_foot(strip: NDArray[np.float32], foot: float, camera: Camera, noise: float) -> float:
     """Row near where the foot should be at which the road begins, brighter than tyres and shadow above it."""
     reach = max(camera.focal_length * REACH, 1.5)
@@ -223,4 +217,4 @@ def _refined_foot(strip: NDArray[np.float32], foot: float, camera: Camera, noise
     best = int(np.argmax(evidence[1:-1])) + 1
     if step[best] < STANDS_OUT * other:
         return foot
-    return _peak(np.maximum(step, 0.0), best) + first - 1
+    return best + vertex(-np.maximum(step, 0.0), best) + first - 1

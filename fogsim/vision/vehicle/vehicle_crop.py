@@ -15,10 +15,9 @@ from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels
 from fogsim.vision.lines.horizon import levelled
 from fogsim.vision.region.road_image import CannotTellError
 from fogsim.vision.strips.sky import Sky, sky_above
-from fogsim.vision.vehicle.lead_daylight import RoadFall, check_road, road_before, road_fall
-from fogsim.vision.vehicle.lead_patch import LeadPicture
-from fogsim.vision.vehicle.lead_sky import airlight_beside, hidden_beside
-from fogsim.vision.vehicle.lead_window import LeadWindow, find_lead, lead_region
+from fogsim.vision.vehicle.airlight import RoadFall, airlight_beside, check_road, hidden_beside, road_before, road_fall
+from fogsim.vision.vehicle.contrast_ratio import RearPicture
+from fogsim.vision.vehicle.rear_localisation import RearBox, localise_rear, search_window
 
 MIN_AIRLIGHT = 6.0
 """Sky darker than this is no day [linear grey levels]."""
@@ -38,7 +37,7 @@ LEAST_WIDTH = 3.0
 
 
 @dataclass(frozen=True, slots=True)
-class LeadScene:
+class VehicleCrop:
     """Where in an image the vehicle ahead is looked for.
 
     Attributes
@@ -75,7 +74,7 @@ class LeadScene:
         """Pixels in a metre at the vehicle [px/m]."""
         return self.camera.focal_length / self.depth
 
-    def found(self) -> LeadPicture:
+    def found(self) -> RearPicture:
         """Find a vehicle that has not been seen before.
 
         Raises
@@ -83,20 +82,20 @@ class LeadScene:
         CannotTellError
             If none stands out.
         """
-        window = find_lead(self.luminance, self.origin, self.camera, self.depth, self.noise)
+        window = localise_rear(self.luminance, self.origin, self.camera, self.depth, self.noise)
         if window is None or window.width < LEAST_WIDTH:
             raise CannotTellError("no vehicle stands out where the range says that there is one")
-        return self.picture(LeadWindow(window.column, self._road_row, window.width), self.scale)
+        return self.picture(RearBox(window.column, self._road_row, window.width), self.scale)
 
-    def expected(self, aside: float, width: float) -> LeadPicture:
+    def expected(self, aside: float, width: float) -> RearPicture:
         """Picture of a vehicle of known width [m] expected so far to the right of the axis [m]."""
         column = self.camera.principal_point[0] + aside * self.scale
-        return self.picture(LeadWindow(column, self._road_row, width * self.scale), self.scale)
+        return self.picture(RearBox(column, self._road_row, width * self.scale), self.scale)
 
-    def picture(self, window: LeadWindow, scale: float) -> LeadPicture:
+    def picture(self, window: RearBox, scale: float) -> RearPicture:
         """Picture of what stands at a place in the image, at a number of pixels in a metre."""
         contrast = 1.0 - self.luminance.astype(np.float64) / self.sky.luminance
-        return LeadPicture(
+        return RearPicture(
             contrast=contrast,
             noise=self.noise / self.sky.luminance,
             column=window.column - self.origin[0],
@@ -106,16 +105,16 @@ class LeadScene:
             clipped=(255.0 / self.sky.luminance - 1.0, self.clipping / self.sky.luminance),
         )
 
-    def window(self, picture: LeadPicture) -> LeadWindow:
+    def window(self, picture: RearPicture) -> RearBox:
         """Place in the image of a picture of this scene."""
         column, foot = picture.column + self.origin[0], picture.foot + self.origin[1]
-        return LeadWindow(column, foot, picture.width * picture.scale)
+        return RearBox(column, foot, picture.width * picture.scale)
 
-    def aside(self, picture: LeadPicture) -> float:
+    def aside(self, picture: RearPicture) -> float:
         """How far the vehicle is to the right of the axis [m]."""
         return (picture.column + self.origin[0] - self.camera.principal_point[0]) / self.scale
 
-    def lift(self, picture: LeadPicture) -> float:
+    def lift(self, picture: RearPicture) -> float:
         """How far above where the told pitch has it the vehicle is [rad]."""
         return (self._road_row - picture.foot - self.origin[1]) / self.camera.focal_length
 
@@ -124,7 +123,7 @@ class LeadScene:
         return self.camera.horizon_row + self.camera.row_distance / self.depth
 
 
-def lead_scene(image: Pixels, camera: Camera, depth: float, pitch_deviation: float) -> LeadScene:
+def vehicle_crop(image: Pixels, camera: Camera, depth: float, pitch_deviation: float) -> VehicleCrop:
     """Cut out of a frame where a vehicle can be.
 
     Parameters
@@ -149,18 +148,18 @@ def lead_scene(image: Pixels, camera: Camera, depth: float, pitch_deviation: flo
         raise CannotTellError(f"a range of {depth:.1f} m is none of a vehicle ahead")
     pixels = linear_pixels(levelled(image, camera), camera)
     sky, lost = _daylight(pixels, camera, 3.0 * pitch_deviation * camera.focal_length + 2.0, depth)
-    region = lead_region(camera, depth)
+    region = search_window(camera, depth)
     if region is None:
         raise CannotTellError("the vehicle ahead is too small in the image, or outside it")
     luminance = _luminance(pixels, *region)
     check_road(_luminance(pixels, *road_before(camera, depth)), sky.luminance)
-    return LeadScene(
+    return VehicleCrop(
         camera=camera,
         depth=depth,
         luminance=luminance,
         origin=(region[1].start, region[0].start),
         sky=sky,
-        noise=max(sky.noise * steepness(luminance, sky.luminance, camera), 0.3 * 255.0 / 2**camera.bits),
+        noise=max(sky.noise * noise_gain(luminance, sky.luminance, camera), 0.3 * 255.0 / 2**camera.bits),
         road=road_fall(partial(_luminance, pixels), camera, depth, sky.luminance),
         clipping=lost.spread,
     )
@@ -199,7 +198,7 @@ def _daylight(pixels: LinearPixels, camera: Camera, margin: float, depth: float)
     return replace(sky, luminance=luminance + lost.loss, noise=max(sky.noise, lost.noise), clipped=clipped), lost
 
 
-def steepness(luminance: NDArray[np.float32], sky: float, camera: Camera) -> float:
+def noise_gain(luminance: NDArray[np.float32], sky: float, camera: Camera) -> float:
     """How much larger noise is on a vehicle than on the sky once the response is undone, as noise is of the signal.
 
     Parameters

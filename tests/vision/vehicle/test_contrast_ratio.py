@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from fogsim.vision.vehicle.lead_patch import LeadPicture, compared
-from fogsim.vision.vehicle.lead_place import Surroundings, placed
+from fogsim.vision.vehicle.contrast_ratio import RearPicture, contrast_ratio
+from fogsim.vision.vehicle.registration import RoadBehind, register_rear
 
 CELLS = np.random.default_rng(3).uniform(0.4, 0.9, (12, 12))
 
@@ -21,24 +21,24 @@ def picture(scale, faded=1.0, column=40.2, row=60.7, noise=0.002, seed=0, lamp=F
         contrast = np.where((np.abs(np.abs(x) - 0.6) < 0.12) & (np.abs(z - 0.8) < 0.1), -2.0, contrast)
     contrast = contrast.reshape(size[0], 8, size[1], 8).mean(axis=(1, 3))
     contrast += np.random.default_rng(seed).normal(0.0, noise, contrast.shape)
-    return LeadPicture(contrast, noise, column, row, scale, 1.8)
+    return RearPicture(contrast, noise, column, row, scale, 1.8)
 
 
 @pytest.mark.parametrize("scale", [25.0, 14.0, 8.0])
 @pytest.mark.parametrize("faded", [1.0, 0.4, 0.1])
 def test_the_ratio_of_contrasts_is_found_at_any_size(scale, faded):
-    fading = compared(picture(28.0), picture(scale, faded, seed=1))
+    fading = contrast_ratio(picture(28.0), picture(scale, faded, seed=1))
     assert fading.ratio == pytest.approx(faded, rel=0.02, abs=3 * fading.deviation)
     assert fading.kept > 0.9
 
 
 def test_a_reference_that_is_smaller_serves_as_well():
-    fading = compared(picture(10.0, 0.5), picture(28.0, 1.0, seed=1))
+    fading = contrast_ratio(picture(10.0, 0.5), picture(28.0, 1.0, seed=1))
     assert fading.ratio == pytest.approx(2.0, rel=0.03)
 
 
 def test_lamps_that_were_lit_are_left_out():
-    fading = compared(picture(28.0), picture(16.0, 0.5, seed=1, lamp=True))
+    fading = contrast_ratio(picture(28.0), picture(16.0, 0.5, seed=1, lamp=True))
     assert fading.ratio == pytest.approx(0.5, rel=0.04)
     assert fading.kept < 1.0
 
@@ -46,7 +46,7 @@ def test_lamps_that_were_lit_are_left_out():
 @pytest.mark.parametrize(("right", "up"), [(0.0, 0.0), (0.21, -0.06), (-0.37, 0.1)])
 def test_the_place_is_found_to_a_fraction_of_a_pixel(right, up):
     reference, far = picture(28.0), picture(12.0, 0.3, seed=2)
-    found, likeness = placed(reference, far.moved(right, up), 0.25, 0.08, Surroundings(1.3, 0.3))
+    found, likeness = register_rear(reference, far.displaced(right, up), 0.25, 0.08, RoadBehind(1.3, 0.3))
     assert found.column == pytest.approx(far.column, abs=0.25)
     assert found.foot == pytest.approx(far.foot, abs=0.3)
     assert likeness > 0.9
@@ -54,10 +54,10 @@ def test_the_place_is_found_to_a_fraction_of_a_pixel(right, up):
 
 def test_another_thing_does_not_look_alike():
     other = picture(12.0, 0.5)
-    other = LeadPicture(other.contrast[::-1, ::-1].T.copy(), other.noise, other.column, other.foot, 12.0, 1.8)
-    _, likeness = placed(picture(28.0), other, 0.25, 0.08, Surroundings(1.3, 0.5))
+    other = RearPicture(other.contrast[::-1, ::-1].T.copy(), other.noise, other.column, other.foot, 12.0, 1.8)
+    _, likeness = register_rear(picture(28.0), other, 0.25, 0.08, RoadBehind(1.3, 0.5))
     assert likeness < 0.8
 
 
 def test_what_has_no_contrast_cannot_be_compared():
-    assert compared(picture(28.0, faded=0.0), picture(14.0)) is None
+    assert contrast_ratio(picture(28.0, faded=0.0), picture(14.0)) is None

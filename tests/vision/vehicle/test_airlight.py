@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from fogsim.vision.vehicle.lead_sky import airlight_beside
+from fogsim.vision.vehicle.airlight import airlight_beside
 
 NOISE = 2.0
 

@@ -1,0 +1,331 @@
+"""Contrast of the rear of a vehicle to the airlight in one picture over that in another."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.vision.light.box_means import box_means
+from fogsim.vision.light.clipped_sky import darker_by
+from fogsim.vision.light.medians import median
+from fogsim.vision.vehicle.patch import Patch, Placement, downsample_to, pixel_grid
+from fogsim.vision.vehicle.template_matching import INDEPENDENT
+
+Floats = NDArray[np.float64]
+
+HALF_BODY = 0.42
+"""Half the width of the part of the rear that is compared, in widths of the vehicle [-]."""
+
+HEIGHTS = (0.3, 1.2)
+"""Heights of that part above the road [m]: above the road's shadow, below the roof of the flattest car."""
+
+LARGE, HIGH = 2.25, (0.6, 1.6)
+"""Width from which a vehicle is a lorry or a bus [m], and those heights then [m]: one sees below a semitrailer, and
+differently from afar, so the part begins above the bar that keeps cars from running under it."""
+
+TOP = 2.2
+"""Height to which a rear may reach [m]: dark windows of vans tell the most, and sky above a car tells nothing."""
+
+FINEST = 0.02
+"""Smallest cell on which pictures are compared [m]."""
+
+DARKEST = 0.05
+"""Luminance, over the sky's, that the darkest parts of any vehicle have from nearby: glass, tyres, shadow [-]."""
+
+SHADING = 0.08
+"""Standard deviation of a surface's own luminance between two pictures, relative [-]: gloss, shading, what is drawn or
+resolved of it. White paint is uncertain by that much of the sky's light, glass by next to nothing."""
+
+MISPLACED = 0.5
+"""Misplacement of a cell that is reckoned with, in cells: what else is resolved in it [-]."""
+
+BIWEIGHT, ROUNDS = 4.7, 5
+"""Residual at which a cell no longer counts, in robust standard deviations [-] (Tukey's biweight): a lit lamp; and
+rounds of the regression."""
+
+LOST = 0.25
+"""Deviation of what clipping takes from a vehicle, relative to it [-]."""
+
+LEAST_KEPT, LEAST_PIXELS = 0.5, 12
+"""Share of the cells that must not have changed [-], and fewest pixels of a mean."""
+
+
+@dataclass(frozen=True, slots=True)
+class RearPicture:
+    """A part of an image around the rear of a vehicle.
+
+    Attributes
+    ----------
+    contrast : (rows, cols) float64
+        (A − L) / A, A the luminance of the sky [-].
+    noise : float
+        Deviation of single pixels of it [-].
+    column, foot : float
+        Where the middle of the rear meets the road, in columns and rows of the picture [px].
+    scale : float
+        Pixels in a metre at the vehicle [px/m].
+    width : float
+        Of the vehicle [m].
+    clipped : tuple of float
+        By how much the light from which channels are clipped is above the sky's, and their single deviation, over it;
+        the latter is 0 where nothing is clipped [-].
+    """
+
+    contrast: Floats
+    noise: float
+    column: float
+    foot: float
+    scale: float
+    width: float
+    clipped: tuple[float, float] = (1.0, 0.0)
+
+    @property
+    def heights(self) -> tuple[float, float]:
+        """Lowest and highest part of the rear that is compared, above the road [m]."""
+        return HIGH if self.width >= LARGE else HEIGHTS
+
+    def displaced(self, right: float, up: float) -> "RearPicture":
+        """The same picture of a vehicle that stands elsewhere in it.
+
+        Parameters
+        ----------
+        right, up : float
+            How much farther right and up [m].
+        """
+        return replace(self, column=self.column + right * self.scale, foot=self.foot - up * self.scale)
+
+
+@dataclass(frozen=True, slots=True)
+class ContrastRatio:
+    """Contrast of a picture over that of another of the same vehicle.
+
+    Attributes
+    ----------
+    ratio, deviation : float
+        The ratio and its standard deviation by noise and by cells that differ [-].
+    lever : float
+        Change of the ratio with an error of the airlight relative to it [-].
+    visible : float
+        Contrast of the reference in standard deviations of the other picture's cells [-].
+    kept : float
+        Share of the cells that took part [-].
+    """
+
+    ratio: float
+    deviation: float
+    lever: float
+    visible: float
+    kept: float
+
+
+@dataclass(frozen=True, slots=True)
+class MeanLuminances:
+    """Weighted means of the same pixels of two pictures, over the luminance of either's sky.
+
+    Attributes
+    ----------
+    far, near : float
+        Means [-].
+    deviation : float
+        Standard deviation of the far mean by noise, shading and misplacement [-].
+    """
+
+    far: float
+    near: float
+    deviation: float
+
+
+def resample(picture: RearPicture, lateral: Floats, height: Floats, cell: float) -> tuple[Floats, float]:
+    """Contrast on a grid in metres as seen by pixels of one cell, and the variance of its noise.
+
+    A far picture's box is one pixel; a near one's is wider by what a far pixel blurs, and squares of widths add.
+
+    Parameters
+    ----------
+    picture : RearPicture
+        The picture.
+    lateral, height : (n,) and (m,) float64
+        Middles of the cells to the right of the vehicle's middle and above the road [m].
+    cell : float
+        Size of a cell [m].
+    """
+    box = math.sqrt(max(2.0 * (cell * picture.scale) ** 2 - 1.0, 1.0))
+    rows, cols = picture.foot - height * picture.scale, picture.column + lateral * picture.scale
+    means, left = box_means(picture.contrast, rows, cols, box)
+    return means, picture.noise**2 * left
+
+
+def common_cell(one: RearPicture, other: RearPicture) -> float:
+    """Size of a pixel of the coarser of two pictures [m].
+
+    Parameters
+    ----------
+    one, other : RearPicture
+        The two, in either order.
+    """
+    return max(1.0 / one.scale, 1.0 / other.scale, FINEST)
+
+
+def cell_centres(low: float, high: float, cell: float, least: int) -> Floats:
+    """Middles of cells between two places [m].
+
+    Parameters
+    ----------
+    low, high, cell : float
+        The places and the cells' size [m].
+    least : int
+        How many cells there are at least.
+    """
+    count = max(round((high - low) / cell), least)
+    return np.asarray(0.5 * (low + high) + cell * (np.arange(count) - 0.5 * (count - 1)), np.float64)
+
+
+def contrast_ratio(reference: RearPicture, picture: RearPicture) -> ContrastRatio | None:
+    """Ratio of the contrasts of two pictures of one vehicle: a line through the airlight, not a free one.
+
+    Every part of the rear fades alike. Parts count by how well that is known: dark ones the most, as no shading and no
+    loss of detail makes them bright; edges, which are not resolved alike, little; what is as bright as the airlight and
+    what has changed (lit lamps) not at all.
+
+    Parameters
+    ----------
+    reference, picture : RearPicture
+        The vehicle, placed in both.
+
+    Returns
+    -------
+    ContrastRatio or None
+        None if the reference shows no contrast, or too much has changed.
+    """
+    cell = common_cell(reference, picture)
+    side = HALF_BODY * reference.width
+    lateral, height = cell_centres(-side, side, cell, 2), cell_centres(reference.heights[0], TOP, cell, 3)
+    shown, shown_noise = resample(reference, lateral, height, cell)
+    seen, seen_noise = resample(picture, lateral, height, cell)
+    own = _own_deviation(shown, math.sqrt(shown_noise))
+    if own is None:
+        return None
+    sure = shown**2 / (seen_noise + shown_noise + own**2)
+    first = _weighted_median(seen / np.where(np.abs(shown) > 1e-9, shown, 1e-9), sure)
+    weight, ratio = _line_through_airlight(shown, seen, first, seen_noise, shown_noise + own**2)
+    count = int((weight > 0).sum())
+    if count < max(LEAST_KEPT * shown.size, 6):
+        return None
+    power, by_noise = float((weight * shown**2).sum()), float(weight.sum()) * shown_noise
+    if power <= by_noise + 4.0 * math.sqrt(float((weight**2).sum())) * shown_noise:
+        return None
+    # Noise of the reference flattens the line.
+    power -= by_noise
+    ratio *= 1.0 + by_noise / power
+    spread = seen_noise + ratio**2 * (shown_noise + INDEPENDENT * own**2)
+    deviation = math.sqrt(float((weight**2 * shown**2 * spread).sum())) / power
+    lever = abs(float((weight * shown).sum())) / power
+    visible = math.sqrt(power / float(weight.sum()) / max(seen_noise, 1e-12))
+    if lever > 0.0:
+        fall, lost = darker_by(ratio / lever, *picture.clipped)
+        ratio, deviation = fall * lever, math.hypot(deviation, LOST * lost * lever)
+    return ContrastRatio(ratio, deviation, lever, visible, count / shown.size)
+
+
+def mean_luminances(
+    near: Patch, far: Patch, at: Placement, skies: tuple[float, float], noise: float
+) -> MeanLuminances | None:
+    """Mean luminance of a thing in two pictures, over pixels that say most of the fog and least of what has changed.
+
+    In even fog each pixel's difference to the sky shrinks by one factor (Duntley's law). Pixels count by how much they
+    differ and by how well that is known: dark ones most, edges little, and those that do not share the factor (lamps,
+    what moved) not at all. The weights come from the near picture, or with residuals of either sign, so noise does not
+    bias the mean.
+
+    Parameters
+    ----------
+    near, far : Patch
+        The two pictures.
+    at : Placement
+        Where the near one is in the far one.
+    skies : tuple of float
+        Luminance of the near and of the far picture's sky [linear grey levels].
+    noise : float
+        Standard deviation of single pixels [linear grey levels].
+
+    Returns
+    -------
+    MeanLuminances or None
+        None if nothing differs from the sky, or too few pixels can be compared.
+    """
+    grid = pixel_grid(near, far, at)
+    if grid is None or grid.far.size < LEAST_PIXELS:
+        return None
+    shown = downsample_to(near, grid, at) / skies[0]
+    weight, gain = _pixel_weights(1.0 - shown, 1.0 - grid.far / skies[1], noise / skies[1])
+    total = float((weight * gain).sum())
+    if total <= 0.0:
+        return None
+    share = weight * gain / total
+    return MeanLuminances(
+        far=float((share * grid.far).sum()) / skies[1],
+        near=float((share * shown).sum()),
+        deviation=math.sqrt(float((share * share / np.maximum(weight, 1e-12)).sum())),
+    )
+
+
+def _pixel_weights(near: Floats, far: Floats, noise: float) -> tuple[Floats, Floats]:
+    """Weights of pixels by their contrasts to the sky, and the near contrasts, which the means are weighted by, too."""
+    most = float(np.percentile(near, 95))
+    if most <= 2.0 * noise:
+        return np.zeros_like(near), np.zeros_like(near)
+    shading = _shading_deviation(near, most, 1.0)
+    down, across = np.gradient(near)
+    change = np.abs(down) + np.abs(across)
+    gain = np.maximum(near, 0.0)
+    first = _weighted_median(far / np.maximum(gain, 1e-9), gain**2 / (noise**2 + shading**2))
+    own = shading**2 + (MISPLACED * change) ** 2
+    return _line_through_airlight(gain, far, first, noise**2, own, rescaled=True)[0], gain
+
+
+def _own_deviation(shown: Floats, noise: float) -> Floats | None:
+    """Deviation of each cell's own contrast between two pictures; None if nothing stands out of the noise."""
+    most = float(np.percentile(shown, 95))
+    if most <= 2.0 * noise:
+        most = float(np.percentile(np.abs(shown), 95))
+        if most <= 2.0 * noise:
+            return None
+    down, across = np.gradient(shown)
+    shading = _shading_deviation(shown, most)
+    return np.asarray(np.sqrt(shading**2 + MISPLACED**2 * (down**2 + across**2)), np.float64)
+
+
+def _shading_deviation(contrast: Floats, most: float, brightest: float = math.inf) -> Floats:
+    """Deviation of contrasts by shading: a share of the luminance, at most so bright, that the fog lets through."""
+    through = most / (1.0 - DARKEST)
+    luminance = np.clip(1.0 - contrast / through, DARKEST, brightest)
+    return np.asarray(SHADING * through * luminance, np.float64)
+
+
+def _line_through_airlight(
+    shown: Floats, seen: Floats, ratio: float, noise: float, own: Floats, *, rescaled: bool = False
+) -> tuple[Floats, float]:
+    """Weights and slope of seen = ratio · shown from a first ratio on, by variances of the noise and of what is shown.
+
+    Iterated with Tukey's biweight; `rescaled` weights are by the variance that is found and not by that expected.
+    """
+    weight = np.zeros_like(shown)
+    for _ in range(ROUNDS):
+        t = min(max(ratio, 0.0), 2.0)
+        variance = noise + t**2 * own
+        residual = np.abs(seen - ratio * shown) / np.sqrt(variance)
+        scale = max(1.4826 * median(residual), 1.0)
+        kept = np.maximum(1.0 - (residual / (BIWEIGHT * scale)) ** 2, 0.0) ** 2
+        weight = kept / (variance * scale**2 if rescaled else variance)
+        power = float((weight * shown**2).sum())
+        if power <= 0.0:
+            return np.zeros_like(shown), ratio
+        ratio = float((weight * shown * seen).sum()) / power
+    return weight, ratio
+
+
+def _weighted_median(values: Floats, weights: Floats) -> float:
+    order = np.argsort(values, axis=None)
+    upto = np.cumsum(weights.ravel()[order])
+    return float(values.ravel()[order][int(np.searchsorted(upto, 0.5 * upto[-1]))])

@@ -26,8 +26,8 @@ from fogsim.values.scene import Batch, Mesh, Scene
 
 _RAIL_BEHIND_SHOULDER = 0.5  # [m]
 _LOOK = 1.0  # whether a road lies across a footway is looked at every so many metres
-_ASTRAY = 0.3  # footways may be so much on a road [m]
-_STICKING_OUT = 0.4  # lanes may stick out of their junction by so much [m]
+_ASTRAY = 0.3  # how far footways may reach onto a road [m]
+_STICKING_OUT = 0.4  # how far lanes may stick out of their junction [m]
 _POST_SPACING = 4.0  # of guard rails [m]
 _DELINEATOR_SPACING = 50.0  # [m]
 

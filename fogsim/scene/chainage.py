@@ -38,7 +38,15 @@ class Chainage:
         self._other = {edge: other for edge, other in opposites.items() if edge > other}
 
     def along(self, lane: Lane, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distance along the lane's carriageway of points (n, 3) on it [m]."""
+        """Distance along the lane's carriageway of points on it (n,) [m].
+
+        Parameters
+        ----------
+        lane : Lane
+            The lane.
+        points : (n, 3) float64
+            Points on it [m].
+        """
         other = self._other.get(lane.edge_id)
         if other is not None:
             # Distances of both directions add up to the length of a dash, so that their dashes coincide.
@@ -46,7 +54,13 @@ class Chainage:
         return self._offset[lane.edge_id] + project(points, self._reference[lane.edge_id])
 
     def follows(self, lane: Lane) -> bool:
-        """Tell whether the lane is measured along the other direction of its road."""
+        """Whether the lane is measured along the other direction of its road.
+
+        Parameters
+        ----------
+        lane : Lane
+            The lane.
+        """
         return lane.edge_id in self._other
 
 

@@ -62,8 +62,19 @@ def lane_edge(lane: Lane, side: int, line: Points, index: LaneIndex) -> Edge:
     """Free side of a lane, as from `free_edges`.
 
     Beside a footway there is nothing more, and of the room up to another lane each side gets half.
+
+    Parameters
+    ----------
+    lane : Lane
+        The lane.
+    side : int
+        1 for its left, −1 for its right.
+    line : (n, 3) float64
+        The free part of its centreline [m].
+    index : LaneIndex
+        All lanes.
     """
-    width = 0.0 if lane.kind is LaneKind.FOOTWAY else shoulder_width(lane.speed_limit, side)
+    width = 0.0 if lane.kind is LaneKind.FOOTWAY else _shoulder_width(lane.speed_limit, side)
     inner, marking = lane.width / 2, lane.left if side > 0 else lane.right
     room = room_beside(line, side * inner, width + _VERGE, index, 0.5)
     along, there = _thinned(line, room)
@@ -71,8 +82,20 @@ def lane_edge(lane: Lane, side: int, line: Points, index: LaneIndex) -> Edge:
 
 
 def border_edge(line: Points, speed_limit: float, footways: bool, index: LaneIndex) -> Edge:
-    """Free part of a junction's border, with the land on its right; footways of the network may lead along it."""
-    width = 0.0 if footways else shoulder_width(speed_limit, -1)
+    """Free part of a junction's border, with the land on its right.
+
+    Parameters
+    ----------
+    line : (n, 3) float64
+        The part of the border [m].
+    speed_limit : float
+        That of the roads that lead to the junction [m/s].
+    footways : bool
+        Whether footways of the network lead along it.
+    index : LaneIndex
+        All lanes.
+    """
+    width = 0.0 if footways else _shoulder_width(speed_limit, -1)
     along, there = _thinned(line, room_beside(line, -0.0, width + _VERGE, index, 1.0))
     return Edge(along, -1, 0.0, speed_limit, width, there)
 
@@ -114,7 +137,7 @@ def _thinned(line: Points, room: NDArray[np.float64]) -> tuple[Points, NDArray[n
     return corners, np.interp(arc_length(corners), arc_length(line), room)
 
 
-def shoulder_width(speed_limit: float, side: int) -> float:
+def _shoulder_width(speed_limit: float, side: int) -> float:
     """Width of the paved shoulder, or of a street's footway [m], on the left (side 1) or right (side −1) of a road."""
     if speed_limit <= TOWN:
         return _FOOTWAY

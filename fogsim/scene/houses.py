@@ -125,11 +125,25 @@ def _built(name: str, members: Sequence[tuple[Points, float, float]], terrain: T
 
 
 def house_places(batches: Sequence[Batch]) -> Points:
-    """Middles of houses (n, 3) [m]."""
+    """Middles of houses (n, 3) [m].
+
+    Parameters
+    ----------
+    batches : sequence of Batch
+        The houses.
+    """
     return np.concatenate([np.zeros((0, 3)), *(batch.transforms[:, :3, 3].astype(np.float64) for batch in batches)])
 
 
 def shapes_in_use(shapes: Mapping[str, Mesh], batches: Sequence[Batch]) -> dict[str, Mesh]:
-    """Those shapes, with their levels of detail, that batches refer to."""
+    """Those shapes, with their levels of detail, that batches refer to.
+
+    Parameters
+    ----------
+    shapes : mapping from str to Mesh
+        Shapes by name.
+    batches : sequence of Batch
+        The copies.
+    """
     used = {batch.shape for batch in batches}
     return {name: shape for name, shape in shapes.items() if name.split(":", maxsplit=1)[0] in used}

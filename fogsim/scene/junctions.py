@@ -22,7 +22,13 @@ _TOUCHING = 6.0  # lanes that end no farther than this from a corner lead to the
 
 
 def area_mesh(area: PavedArea) -> Mesh | None:
-    """Pavement of an area without a hole; None where the area is too narrow to see."""
+    """Pavement of an area without a hole; None where the area is too narrow to see.
+
+    Parameters
+    ----------
+    area : PavedArea
+        The area.
+    """
     outline = _counterclockwise(area)
     if len(outline) < 3 or abs(_area(outline)) < 0.05:
         return None
@@ -185,7 +191,13 @@ class Areas:
         self._high = np.array([outline.max(axis=0) for outline in self._outlines]).reshape(-1, 2)
 
     def cover(self, points: Points) -> bool:
-        """Tell whether one area has all of some points (n, 3) inside or on its border."""
+        """Whether one area has all of some points inside or on its border.
+
+        Parameters
+        ----------
+        points : (n, 3) float64
+            The points [m].
+        """
         low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
         candidates = np.flatnonzero(np.all((self._low < low + 0.1) & (high - 0.1 < self._high), axis=1))
         return any(_inside(points[:, :2], self._outlines[candidate]) for candidate in candidates)
@@ -197,13 +209,13 @@ def _inside(points: NDArray[np.float64], outline: NDArray[np.float64]) -> bool:
 
 
 def _within(points: NDArray[np.float64], outline: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Tell which points (n, 2) lie within an outline (m, 2)."""
+    """Which points (n, 2) lie within an outline (m, 2)."""
     return _lie_within(np.ascontiguousarray(points), np.ascontiguousarray(outline))
 
 
 @kernel
 def _lie_within(points: NDArray[np.float64], outline: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Tell from which points (n, 2) a ray to the east crosses an outline (m, 2) an odd number of times."""
+    """From which points (n, 2) a ray to the east crosses an outline (m, 2) an odd number of times."""
     result = np.zeros(len(points), np.bool_)
     for i in range(len(points)):
         x, y = points[i, 0], points[i, 1]

@@ -41,7 +41,7 @@ SIGNAL_LAMPS: Mapping[tuple[Surface, bool], tuple[Lamp, float, tuple[float, floa
 
 Within what UNECE allows: rear position 4–12 cd (R7), stop 60–185 cd (R7), rear fog 150–300 cd (R38), direction
 indicators 50–500 cd rear and 175–1000 cd front (R6), daytime 400–1200 cd (R87). Lamps whose surface is smaller than
-that of `LIT_AREAS`, as that of the third stop lamp, have so much less.
+that of `LIT_AREAS`, as the third stop lamp, have less in proportion.
 """
 
 _FOG_HEIGHT, _FOG_INSET = 0.55, 1.0  # front fog lamps lie below the head lamps: share of their height, and of their y

@@ -48,13 +48,21 @@ _INSET = 0.16  # the middle of each of two lines between directions lies this fa
 
 
 def lane_mesh(lane: Lane, chainage: Chainage) -> Mesh:
-    """One lane as a strip with its road attributes."""
+    """One lane as a strip with its road attributes.
+
+    Parameters
+    ----------
+    lane : Lane
+        The lane.
+    chainage : Chainage
+        Distances along carriageways.
+    """
     centre = refined(cleaned(lane.centreline), LONGEST)
     half = lane.width / 2
     lines = 3 * LINE_CODE[lane.left] + LINE_CODE[lane.right]
-    # Lanes without lines are what runs across junctions; where they overlap others, the painted ones shall show.
+    # Lanes without lines are what runs across junctions; where they overlap others, the painted ones must show.
     lift = 0.0 if lines else -0.001
-    # Where both directions of a road overlap, one of them shall show, lest their dashes end in combs in bends.
+    # Where both directions of a road overlap, one of them must show: otherwise their dashes end in combs in bends.
     lift -= 0.0005 * chainage.follows(lane)
     left, right = (_INSET * (marking is LaneMarking.DOUBLE) for marking in (lane.left, lane.right))
     return strip(
@@ -104,7 +112,15 @@ def strip(
 
 
 def footway_mesh(line: Points, left: tuple[float, float | NDArray[np.float64]]) -> Mesh:
-    """Footway with kerbs along a line, between distances to its left [m]; it lies `KERB` above the line."""
+    """Footway with kerbs along a line, `KERB` above it.
+
+    Parameters
+    ----------
+    line : (n, 3) float64
+        The line, at the height of the street [m].
+    left : tuple of float or (n,) float64
+        Distances to its left between which the footway lies [m].
+    """
     low, high = np.minimum(left[0], left[1]), np.maximum(left[0], left[1])
     stone = np.minimum(0.13, (high - low) / 2)
     # A kerbstone on each side, and how far above the line each fold of the profile lies.
@@ -123,6 +139,13 @@ def footway_mesh(line: Points, left: tuple[float, float | NDArray[np.float64]]) 
 
 def free_edges(lane: Lane, index: LaneIndex) -> Iterator[tuple[int, NDArray[np.float64]]]:
     """Spans of a lane's sides with nothing paved beside them.
+
+    Parameters
+    ----------
+    lane : Lane
+        The lane.
+    index : LaneIndex
+        All lanes.
 
     Yields
     ------
@@ -152,7 +175,13 @@ def _looked_at(line: Points, left: float, index: LaneIndex) -> tuple[Points, NDA
 
 
 def transverse_markings(lanes: Sequence[Lane]) -> list[Mesh]:
-    """Stop lines, lines to give way at, and zebra crossings of all lanes."""
+    """Stop lines, lines to give way at, and zebra crossings of all lanes.
+
+    Parameters
+    ----------
+    lanes : sequence of Lane
+        The lanes.
+    """
     parts = []
     for lane in lanes:
         line = cleaned(lane.centreline)

@@ -40,7 +40,17 @@ def post_shapes() -> dict[str, Mesh]:
 
 
 def tube(bottom: float, top: float, half_depth: float, half_width: float, material: Material) -> Mesh:
-    """Four upright sides; the ends do not show."""
+    """Four upright sides of a box; the ends do not show.
+
+    Parameters
+    ----------
+    bottom, top : float
+        Heights of its ends [m].
+    half_depth, half_width : float
+        Half its extents along x and y [m].
+    material : Material
+        Its material.
+    """
     upright = box((-half_depth, -half_width, bottom), (half_depth, half_width, top), material)
     level = np.abs(upright.normals[upright.faces[:, 0], 2]) > 0.5
     return replace(upright, faces=upright.faces[~level])
@@ -74,7 +84,21 @@ def placed(
     *,
     instance: int = ROADSIDE,
 ) -> Batch:
-    """Batch of copies standing at places, turned by headings [rad], scaled by sizes ((n, 3) or one number)."""
+    """Batch of upright copies of a shape.
+
+    Parameters
+    ----------
+    shape : str
+        Name of the shape.
+    places : (n, 3) float64
+        Where the copies stand [m].
+    heading : (n,) float64
+        Their headings [rad].
+    size : (n, 3) float64 or float
+        Their scales.
+    instance : int
+        Their instance id.
+    """
     count = len(places)
     scale = np.broadcast_to(np.asarray(size, np.float64), (count, 3))
     transforms = np.zeros((count, 4, 4), np.float32)
@@ -162,7 +186,7 @@ def trees(
 
 
 def _apart(places: Points, taken: Points, distance: float) -> NDArray[np.bool_]:
-    """Tell which places lie farther from every place that is taken than a distance [m]."""
+    """Which places lie farther than a distance [m] from every place that is taken."""
     apart = np.ones(len(places), np.bool_)
     order = np.argsort(places[:, 0], kind="stable")
     east = places[order, 0]
@@ -226,7 +250,7 @@ def _planted(
 def _fitting(
     places: Points, turn: NDArray[np.float64], wide: NDArray[np.float64], index: LaneIndex
 ) -> NDArray[np.bool_]:
-    """Tell which woods, as wide as given [m], stand clear of every lane from end to end."""
+    """Which woods, as wide as given [m], stand clear of every lane from end to end."""
     along = np.column_stack((np.cos(turn), np.sin(turn), np.zeros(len(turn)))) * wide[:, None]
     fits = np.ones(len(places), np.bool_)
     for share in np.linspace(-0.5, 0.5, 9).tolist():

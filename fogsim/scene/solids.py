@@ -1,4 +1,4 @@
-"""Small meshes to build with: patches, polygons, boxes, cylinders, blobs, and how to put them together."""
+"""Small meshes to build with: patches, polygons, boxes, discs, and how to put them together."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -87,7 +87,13 @@ def _snapped(positions: NDArray[np.float64]) -> NDArray[np.float32]:
 
 @lru_cache(maxsize=256)
 def grid_faces(rows: int, columns: int) -> NDArray[np.int64]:
-    """Two triangles for each cell of a grid of vertices numbered row by row."""
+    """Two triangles for each cell of a grid of vertices numbered row by row.
+
+    Parameters
+    ----------
+    rows, columns : int
+        Vertices of the grid.
+    """
     corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
     lower = np.stack((corner, corner + 1, corner + columns), axis=1)
     upper = np.stack((corner + 1, corner + columns + 1, corner + columns), axis=1)
@@ -98,9 +104,16 @@ def grid_faces(rows: int, columns: int) -> NDArray[np.int64]:
 
 
 def grid_normals(points: NDArray[np.float64], toward: ArrayLike) -> NDArray[np.float64]:
-    """Normals of a grid of points (n, m, 3) from differences of neighbours, all turned to the side of `toward`.
+    """Normals of a grid of points from differences of neighbours.
 
     Where points coincide, the normal is `toward` itself.
+
+    Parameters
+    ----------
+    points : (n, m, 3) float64
+        The grid [m].
+    toward : (3,)
+        Direction to whose side the normals are turned.
     """
     return _grid_normals(np.ascontiguousarray(points, np.float64), np.array(toward, np.float64))
 
@@ -167,14 +180,36 @@ def grid(
     )
 
 
-def quad(corners: ArrayLike, material: Material, toward: ArrayLike, instance: int = ROADSIDE) -> Mesh:
-    """Rectangle (or any flat convex quadrilateral) through four corners in order around it."""
+def quad(corners: ArrayLike, material: Material, toward: ArrayLike) -> Mesh:
+    """Rectangle or any flat convex quadrilateral.
+
+    Parameters
+    ----------
+    corners : (4, 3)
+        Its corners, in order around it [m].
+    material : Material
+        Its material.
+    toward : (3,)
+        Direction to whose side it faces.
+    """
     a, b, c, d = np.asarray(corners, np.float64)
-    return grid([[a, b], [d, c]], material, toward, instance=instance)
+    return grid([[a, b], [d, c]], material, toward)
 
 
 def polygon(corners: ArrayLike, material: Material, toward: ArrayLike, instance: int = ROADSIDE) -> Mesh:
-    """Flat convex polygon through corners (n, 3) in order around it."""
+    """Flat convex polygon.
+
+    Parameters
+    ----------
+    corners : (n, 3)
+        Its corners, in order around it [m].
+    material : Material
+        Its material.
+    toward : (3,)
+        Its normal.
+    instance : int
+        Instance id.
+    """
     points = np.asarray(corners, np.float64)
     index = np.arange(1, len(points) - 1)
     faces = np.stack((np.zeros_like(index), index, index + 1), axis=1)
@@ -285,7 +320,13 @@ def disc(
 
 
 def merge(parts: Sequence[Mesh]) -> Mesh:
-    """One mesh of many."""
+    """One mesh of many.
+
+    Parameters
+    ----------
+    parts : sequence of Mesh
+        The meshes.
+    """
     offsets = np.cumsum([0, *(len(part.positions) for part in parts)])
     names = ("positions", "normals", "reflectance", "surface", "road", "instance")
     if not parts:
@@ -296,7 +337,15 @@ def merge(parts: Sequence[Mesh]) -> Mesh:
 
 
 def moved(part: Mesh, matrix: NDArray[np.float64]) -> Mesh:
-    """Place a part by a rigid transform (4, 4)."""
+    """Place a part by a rigid transform (4, 4).
+
+    Parameters
+    ----------
+    part : Mesh
+        The part.
+    matrix : (4, 4) float64
+        Rigid transform.
+    """
     rotation = matrix[:3, :3]
     positions = matrix_product(part.positions, rotation.T) + matrix[:3, 3]
     return replace(

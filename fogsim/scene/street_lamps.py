@@ -41,8 +41,16 @@ def street_lamp_shapes() -> dict[str, Mesh]:
 
 
 def lamp_posts(edges: Sequence[Edge], index: LaneIndex) -> list[Batch]:
-    """Lamps about every 35 m along the outer sides of roads, on one side of roads of two directions, off all lanes."""
-    side = outer_side(edges)
+    """Lamps about every 35 m along the outer sides of roads, on one side of roads of two directions, off all lanes.
+
+    Parameters
+    ----------
+    edges : sequence of Edge
+        Free sides of lanes.
+    index : LaneIndex
+        All lanes.
+    """
+    side = _outer_side(edges)
     places, turns, spacing = [], [], Spacing(_APART)
     for edge in edges:
         if edge.side != side:
@@ -58,14 +66,20 @@ def lamp_posts(edges: Sequence[Edge], index: LaneIndex) -> list[Batch]:
     return [placed(STREET_LAMP, np.array(places), np.array(turns))] if places else []
 
 
-def outer_side(edges: Sequence[Edge]) -> int:
+def _outer_side(edges: Sequence[Edge]) -> int:
     """Side of roads, 1 left or −1 right, that most of the free sides are on: that to which vehicles keep."""
     lengths = {side: sum(float(arc_length(edge.line)[-1]) for edge in edges if edge.side == side) for side in (1, -1)}
     return 1 if lengths[1] > 1.001 * lengths[-1] else -1
 
 
 def street_lamp_heads(scene: Scene) -> Points:
-    """Middles of the luminous surfaces of all street lamps of a scene (n, 3) [m]."""
+    """Middles of the luminous surfaces of all street lamps of a scene (n, 3) [m].
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    """
     batches = [batch.transforms for batch in scene.scenery if batch.shape == STREET_LAMP]
     if not batches:
         return np.zeros((0, 3))

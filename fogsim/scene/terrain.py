@@ -1,4 +1,4 @@
-"""The lie of the land: level where the roads are, and following them where they climb."""
+"""Terrain: level where the roads are, following them where they climb, and the plain beyond."""
 
 from collections.abc import Sequence
 
@@ -56,7 +56,13 @@ class Terrain:
         self._heights = np.maximum(np.minimum(fallen, risen), self.plain)
 
     def height(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Height of the land [m] at places (n, 2 or 3) [m]."""
+        """Height of the land at places (n,) [m].
+
+        Parameters
+        ----------
+        places : (n, 2 or 3) float64
+            The places [m].
+        """
         if self._heights is None:
             return np.full(len(places), self.plain)
         at = (places[:, :2] - self._corner) / self._cell

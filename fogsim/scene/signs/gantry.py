@@ -110,7 +110,15 @@ class _Pieces:
 
 
 def gantry_mesh(gantry: Gantry, terrain: Terrain) -> Mesh:
-    """Two legs and a beam of two tubes with struts, behind the signs."""
+    """Two legs and a beam of two tubes with struts, behind the signs.
+
+    Parameters
+    ----------
+    gantry : Gantry
+        The gantry.
+    terrain : Terrain
+        The land that its legs stand on.
+    """
     first = gantry.signs[0]
     right, left = gantry.reach
     ahead = np.array([np.cos(first.heading), np.sin(first.heading), 0.0])

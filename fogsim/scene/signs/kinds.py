@@ -50,18 +50,18 @@ class SignKind:
     face: Callable[[float], Face]
 
 
-def number(speed: float) -> str:
+def _number(speed: float) -> str:
     """What a limit [m/s] says: km/h."""
     return str(round(speed * KMH_PER_MPS))
 
 
 def _limit(speed: float) -> Face:
-    digits = number(speed)
+    digits = _number(speed)
     return disc_face(text(digits, 0.46 if len(digits) < 3 else 0.40, BLACK, widest=0.64))
 
 
 def _end_of_limit(speed: float) -> Face:
-    digits = number(speed)
+    digits = _number(speed)
     grey = text(digits, 0.46 if len(digits) < 3 else 0.40, GREY, widest=0.64)
     return disc_face(merge((grey, _stripes())), frame=BLACK, ring=0.93)
 
@@ -72,7 +72,7 @@ def _stripes() -> Mesh:
 
 
 def _variable_limit(speed: float) -> Face:
-    lit = text(number(speed), 0.42 if len(number(speed)) < 3 else 0.36, DIODES, widest=0.58)
+    lit = text(_number(speed), 0.42 if len(_number(speed)) < 3 else 0.36, DIODES, widest=0.58)
     ring = disc((0, 0, 0), 0.45, (1, 0, 0), (0, 1, 0), RED_DIODES, sides=32, hole=0.36, instance=SIGN)
     housing = Material((0.012, 0.012, 0.013))
     return plate_face(merge((lit, ring)), field=housing, border=housing)
@@ -97,7 +97,7 @@ def _priority() -> Face:
     return Face(regular(4, 0.0), BLACK, FIELD, YELLOW, (0.97, 0.72), nothing)
 
 
-def plate(code: str) -> Face:
+def _plate(code: str) -> Face:
     """Blank plate with a sign's code written on it, for codes that have no face."""
     return plate_face(text(code, 0.24, BLACK, widest=0.84))
 
@@ -128,13 +128,25 @@ _BY_CODE = {kind.code: kind for kind in SIGN_KINDS.values()}
 
 
 def face_of(sign: Sign) -> Face:
-    """Face of a sign; that of an unknown kind is a plate with its code."""
+    """Face of a sign; that of an unknown kind is a plate with its code.
+
+    Parameters
+    ----------
+    sign : Sign
+        The sign.
+    """
     code = sign.kind.removeprefix("xodr.")
     kind = SIGN_KINDS.get(code) or _BY_CODE.get(code)
     speechless = kind in _LIMITS and sign.value <= 0
-    return plate(code) if kind is None or speechless else kind.face(sign.value)
+    return _plate(code) if kind is None or speechless else kind.face(sign.value)
 
 
 def shape_name(sign: Sign) -> str:
-    """Name of the shape of a sign's face; signs that look alike share it."""
-    return f"sign {sign.kind} {number(sign.value)}"
+    """Name of the shape of a sign's face; signs that look alike share it.
+
+    Parameters
+    ----------
+    sign : Sign
+        The sign.
+    """
+    return f"sign {sign.kind} {_number(sign.value)}"

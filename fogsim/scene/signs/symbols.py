@@ -31,13 +31,16 @@ _X, _Y, _Z = np.eye(3)
 
 
 def flat(corners: Corners, material: Material) -> Mesh:
-    """Convex polygon."""
+    """Convex polygon.
+
+    Parameters
+    ----------
+    corners : sequence of (x, y)
+        Its corners, in order around it.
+    material : Material
+        Its material.
+    """
     return polygon([(x, y, 0.0) for x, y in corners], material, _Z, SIGN)
-
-
-def round_spot(x: float, y: float, radius: float, material: Material) -> Mesh:
-    """Disc."""
-    return disc((x, y, 0.0), radius, _X, _Y, material, sides=12, instance=SIGN)
 
 
 def line(points: Corners, width: float, material: Material) -> Mesh:
@@ -166,21 +169,18 @@ def lettering(words: str, material: Material) -> Mesh:
     return merge(parts)
 
 
-def shifted(part: Mesh, x: float, y: float, size: float = 1.0) -> Mesh:
+def _shifted(part: Mesh, x: float, y: float, size: float = 1.0) -> Mesh:
     """Part scaled and moved in its plane."""
     return replace(part, positions=part.positions * np.float32(size) + np.array([x, y, 0.0], np.float32))
 
 
-def exclamation(material: Material = BLACK) -> Mesh:
+def exclamation() -> Mesh:
     """Mark of a general warning."""
-    return merge((flat([(-0.045, 0.22), (-0.025, -0.06), (0.025, -0.06), (0.045, 0.22)], material), _dot(material)))
+    dot = disc((0.0, -0.14, 0.0), 0.045, _X, _Y, BLACK, sides=12, instance=SIGN)
+    return merge((flat([(-0.045, 0.22), (-0.025, -0.06), (0.025, -0.06), (0.045, 0.22)], BLACK), dot))
 
 
-def _dot(material: Material) -> Mesh:
-    return round_spot(0.0, -0.14, 0.045, material)
-
-
-def car_from_behind(material: Material) -> Mesh:
+def _car_from_behind(material: Material) -> Mesh:
     """Car, 1 wide, standing on y = 0."""
     return merge(
         (
@@ -196,11 +196,17 @@ def skidding_car() -> Mesh:
     """Car above two wavy tracks."""
     wave = np.linspace(-0.19, 0.05, 9)
     tracks = [line([(x + 0.03 * np.sin(26 * y), y) for y in wave.tolist()], 0.025, BLACK) for x in (-0.06, 0.06)]
-    return merge((shifted(car_from_behind(BLACK), 0.0, 0.07, 0.19), *tracks))
+    return merge((_shifted(_car_from_behind(BLACK), 0.0, 0.07, 0.19), *tracks))
 
 
 def bend(side: int) -> Mesh:
-    """Arrow that bends to the left (1) or the right (−1)."""
+    """Arrow of a bend.
+
+    Parameters
+    ----------
+    side : int
+        1 to the left, −1 to the right.
+    """
     shaft = line([(side * 0.07, -0.19), (side * 0.07, -0.02), (-side * 0.03, 0.08), (-side * 0.03, 0.12)], 0.05, BLACK)
     tip = flat([(-side * 0.03 - 0.06, 0.11), (-side * 0.03 + 0.06, 0.11), (-side * 0.03, 0.22)], BLACK)
     return merge((shaft, tip))
@@ -209,13 +215,13 @@ def bend(side: int) -> Mesh:
 def queue_of_cars() -> Mesh:
     """Three cars, one behind the other."""
     places = ((0.0, -0.19, 0.24), (0.0, 0.02, 0.18), (0.0, 0.17, 0.12))
-    return merge([shifted(car_from_behind(BLACK), x, y, size) for x, y, size in places])
+    return merge([_shifted(_car_from_behind(BLACK), x, y, size) for x, y, size in places])
 
 
 def fog() -> Mesh:
     """Car in horizontal swathes of fog."""
     wave = np.linspace(-1.0, 1.0, 13)
-    parts = [shifted(car_from_behind(BLACK), 0.0, -0.03, 0.17)]
+    parts = [_shifted(_car_from_behind(BLACK), 0.0, -0.03, 0.17)]
     for height, reach in ((-0.17, 0.24), (-0.105, 0.2), (0.15, 0.07)):
         parts.append(line([(reach * s, height + 0.014 * np.sin(9 * s)) for s in wave.tolist()], 0.026, BLACK))
     return merge(parts)
@@ -223,7 +229,7 @@ def fog() -> Mesh:
 
 def two_cars() -> Mesh:
     """Red car that overtakes a black one."""
-    return merge([shifted(car_from_behind(m), x, -0.11, 0.25) for m, x in ((RED, -0.16), (BLACK, 0.16))])
+    return merge([_shifted(_car_from_behind(m), x, -0.11, 0.25) for m, x in ((RED, -0.16), (BLACK, 0.16))])
 
 
 def motorway() -> Mesh:

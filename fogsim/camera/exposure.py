@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.camera.exposure_kernels import develop, luminance_samples
+from fogsim.camera.exposure_kernels import Exposure, develop, luminance_samples
 from fogsim.jit import Bands
 from fogsim.values import Response
 from fogsim.values.camera_response import respond
@@ -78,13 +78,17 @@ def expose(radiance: NDArray[np.float32], sensor: Sensor, response: Response, rn
     key = int(rng.integers(1 << 62))
     rows, columns, _ = radiance.shape
     light, values = np.ascontiguousarray(radiance, dtype=np.float32).reshape(-1), out.reshape(-1)
-    gain, per_electron = np.float32(1.0 / sensor.saturation_luminance), np.float32(1.0 / sensor.full_well)
-    read_variance = np.float32((sensor.read_noise / sensor.full_well) ** 2)
-    keys = np.uint32(key & 0xFFFFFFFF), np.uint32(key >> 32)
+    exposure = Exposure(
+        gain=np.float32(1.0 / sensor.saturation_luminance),
+        shot_variance=np.float32(1.0 / sensor.full_well),
+        read_variance=np.float32((sensor.read_noise / sensor.full_well) ** 2),
+        first_key=np.uint32(key & 0xFFFFFFFF),
+        second_key=np.uint32(key >> 32),
+    )
 
     def expose_rows(_: int, top: int, bottom: int) -> None:
         begin, end = 3 * columns * top, 3 * columns * bottom
-        develop(light, gain, per_electron, read_variance, *keys, table, begin, end, values)
+        develop(light, exposure, table, begin, end, values)
 
     Bands().work(expose_rows, rows, columns)
     return out
@@ -169,7 +173,15 @@ def metered_luminance(radiance: NDArray[np.float32], metering: Metering) -> floa
 
 
 def wanted_saturation(luminance: float, auto: AutoExposure) -> float:
-    """Saturation luminance that puts a metered luminance at the target, as far as the camera's limits allow [cd/m²]."""
+    """Saturation luminance that puts a metered luminance at the target, as far as the camera's limits allow [cd/m²].
+
+    Parameters
+    ----------
+    luminance : float
+        Metered luminance [cd/m²].
+    auto : AutoExposure
+        Target and limits.
+    """
     return min(max(luminance / auto.target, auto.darkest), auto.brightest)
 
 

@@ -1,6 +1,7 @@
-"""The per-pixel loops of the camera: exposure with noise, response and quantisation; averaging; metering."""
+"""From luminance to pixel values, sample by sample: averaging, metering, exposure with noise, and response."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,54 +22,83 @@ MOST_EXPOSURE = np.float32(4.0)
 _RED, _GREEN, _BLUE = (np.float32(share) for share in LUMINANCE_WEIGHTS)
 
 
+class Exposure(NamedTuple):
+    """How light becomes a signal, and the noise in it.
+
+    Attributes
+    ----------
+    gain : float32
+        Exposure relative to saturation per luminance [m²/cd].
+    shot_variance, read_variance : float32
+        Variance of the shot noise per exposure, and of the read noise, relative to saturation².
+    first_key, second_key : uint32
+        What tells the noise of one frame from that of another.
+    """
+
+    gain: np.float32
+    shot_variance: np.float32
+    read_variance: np.float32
+    first_key: np.uint32
+    second_key: np.uint32
+
+
 @kernel
 def develop(
-    radiance: NDArray[np.float32],
-    gain: np.float32,
-    shot_variance: np.float32,
-    read_variance: np.float32,
-    first_key: np.uint32,
-    second_key: np.uint32,
+    luminance: NDArray[np.float32],
+    exposure: Exposure,
     response: NDArray[np.uint8] | NDArray[np.uint16],
     begin: int,
     end: int,
     out: NDArray[np.uint8] | NDArray[np.uint16],
 ) -> None:
-    """Pixel values from radiance, of the samples from `begin` to before `end`; both arrays are flat.
+    """Pixel values of the samples from `begin` to before `end`.
 
-    `gain` takes radiance to exposure relative to saturation. Shot noise has variance `shot_variance` · exposure and
-    read noise `read_variance`, both relative to saturation². `response` takes exposure in even steps to pixel values.
+    Parameters
+    ----------
+    luminance : (samples,) float32
+        Of each channel of each pixel [cd/m²].
+    exposure : Exposure
+        Gain and noise.
+    response : (levels,) uint8 or uint16
+        Pixel value for exposure in even steps from 0 to saturation.
+    begin, end : int
+        Samples.
+    out : (samples,) uint8 or uint16
+        Pixel values; written to.
 
+    Notes
+    -----
     Hash and arithmetic are loops that the compiler turns into vector instructions; only the response is read from a
     table, one by one. Slices, since an offset index would be checked for its sign.
     """
+    gain, shot_variance, read_variance = exposure.gain, exposure.shot_variance, exposure.read_variance
     top, half = np.float32(response.shape[0] - 1), np.float32(0.5)
     zero, one = np.float32(0.0), np.float32(1.0)
     index = np.empty(BLOCK, np.uint32)
     mean, first, third, fifth = np.float32(_MEAN), np.float32(_FIRST), np.float32(_THIRD), np.float32(_FIFTH)
     for start in range(begin, end, BLOCK):
         count = min(BLOCK, end - start)
-        light, pixels = radiance[start : start + count], out[start : start + count]
-        _hashed(np.uint32(start), count, first_key, second_key, index)
+        light, pixels = luminance[start : start + count], out[start : start + count]
+        _hash_counters(np.uint32(start), count, exposure.first_key, exposure.second_key, index)
         for i in range(count):
-            exposure = light[i] * gain
+            signal = light[i] * gain
             # Written so that what is not a number counts as black, and never as an index into nowhere.
-            exposure = exposure if exposure > zero else zero
-            exposure = exposure if exposure < MOST_EXPOSURE else MOST_EXPOSURE
+            signal = signal if signal > zero else zero
+            signal = signal if signal < MOST_EXPOSURE else MOST_EXPOSURE
             pairs = (index[i] & np.uint32(0x00FF00FF)) + ((index[i] >> np.uint32(8)) & np.uint32(0x00FF00FF))
             off = np.float32(np.int32((pairs & np.uint32(0xFFFF)) + (pairs >> np.uint32(16)))) - mean
             square = off * off
             noise = off * (first + square * (third + square * fifth))
-            exposure += noise * np.float32(math.sqrt(shot_variance * exposure + read_variance))
-            exposure = exposure if exposure > zero else zero
-            exposure = exposure if exposure < one else one
-            index[i] = np.uint32(np.int32(exposure * top + half))
+            signal += noise * np.float32(math.sqrt(shot_variance * signal + read_variance))
+            signal = signal if signal > zero else zero
+            signal = signal if signal < one else one
+            index[i] = np.uint32(np.int32(signal * top + half))
         for i in range(count):
             pixels[i] = response[index[i]]
 
 
 @kernel
-def _hashed(
+def _hash_counters(
     start: np.uint32, count: int, first_key: np.uint32, second_key: np.uint32, index: NDArray[np.uint32]
 ) -> None:
     """Evenly distributed numbers of 32 bits for the samples from `start` on.
@@ -89,7 +119,17 @@ def _hashed(
 
 @kernel
 def block_means(fine: NDArray[np.float32], side: int, out: NDArray[np.float32]) -> None:
-    """Mean of each block of side × side pixels: flat rows (side · rows, side · cols · 3) to (rows, cols, 3)."""
+    """Mean of each block of side × side samples.
+
+    Parameters
+    ----------
+    fine : (side · rows, side · cols · 3) float32
+        Samples.
+    side : int
+        Samples a pixel side.
+    out : (rows, cols, 3) float32
+        Means; written to.
+    """
     rows, cols, _ = out.shape
     share = np.float32(1.0 / (side * side))
     total = np.empty(fine.shape[1], np.float32)
@@ -110,11 +150,21 @@ def block_means(fine: NDArray[np.float32], side: int, out: NDArray[np.float32]) 
 
 
 @kernel
-def luminance_samples(radiance: NDArray[np.float32], stride: int, out: NDArray[np.float32]) -> None:
-    """Luminance of every stride-th pixel of every stride-th row, from the middle of the first block."""
+def luminance_samples(image: NDArray[np.float32], stride: int, out: NDArray[np.float32]) -> None:
+    """Luminance of every stride-th pixel of every stride-th row, from the middle of the first block.
+
+    Parameters
+    ----------
+    image : (rows, cols, 3) float32
+        Luminance per channel [cd/m²].
+    stride : int
+        Pixels between two samples.
+    out : (rows // stride, cols // stride) float32
+        Luminance [cd/m²]; written to.
+    """
     rows, cols = out.shape
     for row in range(rows):
-        line = radiance[row * stride + stride // 2]
+        line = image[row * stride + stride // 2]
         for col in range(cols):
             pixel = line[col * stride + stride // 2]
             out[row, col] = _RED * pixel[0] + _GREEN * pixel[1] + _BLUE * pixel[2]

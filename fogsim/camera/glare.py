@@ -7,7 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.camera.glare_kernels import add_rows, blur, coarsen, count_bright, gather, spread_core, widen
+from fogsim.camera.glare_kernels import (
+    Places,
+    add_interpolated_rows,
+    blur_grid,
+    coarsen_grid,
+    count_bright,
+    interpolate_columns,
+    share_among_cells,
+    spread_core,
+)
 from fogsim.jit import Bands
 from fogsim.values import Camera
 
@@ -31,22 +40,14 @@ _BORDER = 1
 
 
 @dataclass(frozen=True, slots=True)
-class _Places:
-    """Where points of a finer grid lie between the cells of a coarser one: the cell before, and how far beyond it."""
-
-    at: NDArray[np.int32]
-    share: NDArray[np.float32]
-
-
-@dataclass(frozen=True, slots=True)
 class _Level:
     """A grid that holds one of the wide Gaussians, and where the next finer grid's (first: the pixels') points lie."""
 
     shape: tuple[int, int]
     taps: NDArray[np.float32]
     gain: np.float32
-    rows: _Places
-    columns: _Places
+    rows: Places
+    columns: Places
 
 
 class LensGlare:
@@ -111,9 +112,9 @@ class LensGlare:
         below = np.zeros_like(grids[-1])
         for number in range(len(grids) - 1, -1, -1):
             level = self._levels[number]
-            blur(grids[number], level.taps, level.gain, below)
+            blur_grid(grids[number], level.taps, level.gain, below)
             wide = np.empty((below.shape[0], 3 * level.columns.at.size), np.float32)
-            widen(below, level.columns.at, level.columns.share, wide)
+            interpolate_columns(below, level.columns, wide)
             if number > 0:
                 below = self._added(np.zeros_like(grids[number - 1]), wide, level)
         return self._added(lines, wide, self._levels[0])
@@ -124,16 +125,16 @@ class LensGlare:
         """Scattered light in each level's grid, from fine to coarse."""
         grids = [np.zeros(level.shape, np.float32) for level in self._levels]
         rows, columns = self._levels[0].rows, self._levels[0].columns
-        gather(lines, counts, limit, self._share, rows.at, rows.share, columns.at, columns.share, grids[0])
+        share_among_cells(lines, counts, limit, self._share, rows, columns, grids[0])
         for level, (fine, coarse) in zip(self._levels[1:], itertools.pairwise(grids), strict=True):
-            coarsen(fine, level.rows.at, level.rows.share, level.columns.at, level.columns.share, coarse)
+            coarsen_grid(fine, level.rows, level.columns, coarse)
         return grids
 
     def _added(self, lines: NDArray[np.float32], wide: NDArray[np.float32], level: _Level) -> NDArray[np.float32]:
         out = np.empty_like(lines)
 
         def add(_: int, begin: int, end: int) -> None:
-            add_rows(lines, wide, level.rows.at, level.rows.share, begin, end, out)
+            add_interpolated_rows(lines, wide, level.rows, begin, end, out)
 
         self._bands.work(add, lines.shape[0], lines.shape[1] // 3)
         return out
@@ -154,12 +155,12 @@ def _levels(size: tuple[int, int], spreads: list[float], each: float) -> tuple[_
     return tuple(levels)
 
 
-def _places(count: int, finer: int, border: int, side: int, cells: int) -> _Places:
+def _places(count: int, finer: int, border: int, side: int, cells: int) -> Places:
     """Places of `count` points that are `finer` pixels apart among cells of `side` pixels."""
     middle = (np.arange(count) - border + 0.5) * finer
     place = middle / side - 0.5 + _BORDER
     at = np.clip(np.floor(place), 0, cells - 2)
-    return _Places(at.astype(np.int32), (place - at).astype(np.float32))
+    return Places(at.astype(np.int32), (place - at).astype(np.float32))
 
 
 def _taps(spread: float) -> NDArray[np.float32]:

@@ -1,5 +1,7 @@
 """The loops of the lens's glare; grids of light are (rows, 3 · columns), so that colours go side by side."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -8,9 +10,34 @@ from fogsim.jit import kernel
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)
 
 
+class Places(NamedTuple):
+    """Where points of a finer grid lie between the cells of a coarser one, along rows or columns.
+
+    Attributes
+    ----------
+    at : (n,) int32
+        The cell before each point.
+    share : (n,) float32
+        How far beyond it the point is, in cells.
+    """
+
+    at: NDArray[np.int32]
+    share: NDArray[np.float32]
+
+
 @kernel
 def count_bright(lines: NDArray[np.float32], limit: np.float32, counts: NDArray[np.int32]) -> int:
-    """Values above a limit in each row, and in all: a sum of integers, of which compilers make vector instructions."""
+    """Values above a limit in each row, and in all: a sum of integers, of which compilers make vector instructions.
+
+    Parameters
+    ----------
+    lines : (rows, 3 · cols) float32
+        Light.
+    limit : float32
+        The limit, in the light's unit.
+    counts : (rows,) int32
+        Values above it; written to.
+    """
     total = 0
     for row in range(lines.shape[0]):
         line, found = lines[row], np.int32(0)
@@ -29,27 +56,37 @@ def _scattered(line: NDArray[np.float32], at: int, limit: np.float32, share: np.
 
 
 @kernel
-def gather(
+def share_among_cells(
     lines: NDArray[np.float32],
     counts: NDArray[np.int32],
     limit: np.float32,
     share: np.float32,
-    row_at: NDArray[np.int32],
-    row_share: NDArray[np.float32],
-    column_at: NDArray[np.int32],
-    column_share: NDArray[np.float32],
+    rows: Places,
+    columns: Places,
     grid: NDArray[np.float32],
 ) -> None:
-    """Add the light that bright pixels scatter to the four cells around each, so that its middle stays in place."""
+    """Add the light that bright pixels scatter to the four cells around each, so that its middle stays in place.
+
+    Parameters
+    ----------
+    lines, counts, limit
+        Light, as for `count_bright`, and what that found.
+    share : float32
+        Share of what is above the limit that is scattered.
+    rows, columns : Places
+        Of the pixels between the cells.
+    grid : (grid rows, 3 · grid cols) float32
+        Light in the cells; added to.
+    """
     for row in range(lines.shape[0]):
         if counts[row] == 0:
             continue
-        line, upper, lower = lines[row], grid[row_at[row]], grid[row_at[row] + 1]
-        down = row_share[row]
-        for column in range(column_at.shape[0]):
+        line, upper, lower = lines[row], grid[rows.at[row]], grid[rows.at[row] + 1]
+        down = rows.share[row]
+        for column in range(columns.at.shape[0]):
             lost = _scattered(line, 3 * column, limit, share)
             if lost > _ZERO:
-                right, cell = column_share[column], 3 * column_at[column]
+                right, cell = columns.share[column], 3 * columns.at[column]
                 for i in range(3):
                     light = lost * line[3 * column + i]
                     upper[cell + i] += (_ONE - down) * (_ONE - right) * light
@@ -59,36 +96,54 @@ def gather(
 
 
 @kernel
-def coarsen(
+def coarsen_grid(
     fine: NDArray[np.float32],
-    row_at: NDArray[np.int32],
-    row_share: NDArray[np.float32],
-    column_at: NDArray[np.int32],
-    column_share: NDArray[np.float32],
+    rows: Places,
+    columns: Places,
     coarse: NDArray[np.float32],
 ) -> None:
-    """Add each cell's light to the four cells around it in a coarser grid."""
+    """Add each cell's light to the four cells around it in a coarser grid.
+
+    Parameters
+    ----------
+    fine : (rows, 3 · cols) float32
+        Light.
+    rows, columns : Places
+        Of its cells between those of the coarser grid.
+    coarse : (coarse rows, 3 · coarse cols) float32
+        Light; added to.
+    """
     strip = np.zeros(coarse.shape[1], np.float32)
     for row in range(fine.shape[0]):
         line = fine[row]
         if not line.any():
             continue
         strip[:] = _ZERO
-        for column in range(column_at.shape[0]):
-            right, cell = column_share[column], 3 * column_at[column]
+        for column in range(columns.at.shape[0]):
+            right, cell = columns.share[column], 3 * columns.at[column]
             for i in range(3):
                 light = line[3 * column + i]
                 strip[cell + i] += (_ONE - right) * light
                 strip[cell + 3 + i] += right * light
-        down, upper, lower = row_share[row], coarse[row_at[row]], coarse[row_at[row] + 1]
+        down, upper, lower = rows.share[row], coarse[rows.at[row]], coarse[rows.at[row] + 1]
         for i in range(strip.shape[0]):
             upper[i] += (_ONE - down) * strip[i]
             lower[i] += down * strip[i]
 
 
 @kernel
-def blur(grid: NDArray[np.float32], taps: NDArray[np.float32], gain: np.float32, out: NDArray[np.float32]) -> None:
-    """Add a grid, spread by the taps along rows and columns, to another; what leaves the grid is lost."""
+def blur_grid(grid: NDArray[np.float32], taps: NDArray[np.float32], gain: np.float32, out: NDArray[np.float32]) -> None:
+    """Add a grid, spread by the taps along rows and columns, to another; what leaves the grid is lost.
+
+    Parameters
+    ----------
+    grid, out : (rows, 3 · cols) float32
+        Light; `out` is added to.
+    taps : (2 n + 1,) float32
+        Weights.
+    gain : float32
+        Factor of all weights.
+    """
     reach = taps.shape[0] // 2
     strip = np.empty(grid.shape[1] + 6 * reach, np.float32)
     for row in range(grid.shape[0]):
@@ -131,36 +186,56 @@ def _spread_across(
 
 
 @kernel
-def widen(
+def interpolate_columns(
     grid: NDArray[np.float32],
-    column_at: NDArray[np.int32],
-    column_share: NDArray[np.float32],
+    columns: Places,
     wide: NDArray[np.float32],
 ) -> None:
-    """Interpolate the rows of a grid at the columns of a finer one."""
+    """Interpolate the rows of a grid at the columns of a finer one.
+
+    Parameters
+    ----------
+    grid : (rows, 3 · cols) float32
+        Light.
+    columns : Places
+        Of the finer grid's columns.
+    wide : (rows, 3 · finer cols) float32
+        Light; written to.
+    """
     for row in range(grid.shape[0]):
         line, out = grid[row], wide[row]
-        for column in range(column_at.shape[0]):
-            cell, right = 3 * column_at[column], column_share[column]
+        for column in range(columns.at.shape[0]):
+            cell, right = 3 * columns.at[column], columns.share[column]
             for i in range(3):
                 left = line[cell + i]
                 out[3 * column + i] = left + right * (line[cell + 3 + i] - left)
 
 
 @kernel
-def add_rows(
+def add_interpolated_rows(
     lines: NDArray[np.float32],
     wide: NDArray[np.float32],
-    row_at: NDArray[np.int32],
-    row_share: NDArray[np.float32],
+    rows: Places,
     begin: int,
     end: int,
     out: NDArray[np.float32],
 ) -> None:
-    """The lines from `begin` to before `end`, plus rows that are interpolated between those of a coarser grid."""
+    """The lines from `begin` to before `end`, plus rows that are interpolated between those of a coarser grid.
+
+    Parameters
+    ----------
+    lines, out : (rows, 3 · cols) float32
+        Light before and after; `out` is written to.
+    wide : (coarse rows, 3 · cols) float32
+        Light to be added.
+    rows : Places
+        Of the lines between the coarse rows.
+    begin, end : int
+        Lines.
+    """
     for row in range(begin, end):
-        line, upper, lower, sums = lines[row], wide[row_at[row]], wide[row_at[row] + 1], out[row]
-        down = row_share[row]
+        line, upper, lower, sums = lines[row], wide[rows.at[row]], wide[rows.at[row] + 1], out[row]
+        down = rows.share[row]
         up = _ONE - down
         for i in range(line.shape[0]):
             sums[i] = line[i] + (up * upper[i] + down * lower[i])
@@ -176,7 +251,19 @@ def spread_core(
     gain: np.float32,
     out: NDArray[np.float32],
 ) -> None:
-    """Take the scattered light from the bright pixels and give the part `gain` of it to those next to them."""
+    """Take the scattered light from the bright pixels and give the part `gain` of it to those next to them.
+
+    Parameters
+    ----------
+    lines, counts, limit, share
+        As for `share_among_cells`.
+    taps : (2 n + 1,) float32
+        Weights by which the light is spread.
+    gain : float32
+        Share of the scattered light that is spread here.
+    out : (rows, 3 · cols) float32
+        Light; changed in place.
+    """
     reach, size = taps.shape[0] // 2, lines.shape[1]
     light = np.zeros(size, np.float32)
     strip = np.empty(size + 6 * reach, np.float32)

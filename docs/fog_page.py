@@ -21,7 +21,8 @@ from staging import LIT, PICTURES, Shot, Vehicle, network, photograph, scenario
 from fogsim.atmosphere import Air, Droplets, airlight_from_illuminance, extinction, field_at
 from fogsim.atmosphere.lamps.lamp_tables import lamp_table
 from fogsim.atmosphere.lamps.phase_function import henyey_greenstein, phase_function
-from fogsim.atmosphere.lamps.veil import FOLD_DISTANCE, INTERVALS, VeilRays, lit_air, ray_pieces, veil_along
+from fogsim.atmosphere.lamps.veil import FOLD_DISTANCE, INTERVALS, lit_air, ray_pieces, veil_along
+from fogsim.atmosphere.lamps.veil_kernels import VeilRays
 from fogsim.atmosphere.visibility.disability_glare import veiling_luminance
 from fogsim.atmosphere.visibility.night_visibility import (
     FogKind,

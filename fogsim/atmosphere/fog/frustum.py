@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.fog.frustum_kernels import fog_rows_by_grid, grid_depths
+from fogsim.atmosphere.fog.frustum_kernels import PixelGrid, fog_rows_by_grid, grid_depths
 from fogsim.atmosphere.fog.koschmieder_kernels import ENDLESS
 from fogsim.atmosphere.fog.medium import Medium, medium_of
 from fogsim.atmosphere.fog.optical_depth_kernels import extinctions_on_ray
@@ -197,18 +197,21 @@ def radiance_through_grid(
     width = grid.columns[left + 1] - grid.columns[left]
     middles = (np.arange(_BINS) + 0.5) / _BINS
     interval = np.searchsorted(grid.distances, _FOLD * middles / (1.0 - middles), side="right") - 1
+    pixels = PixelGrid(
+        rows=grid.rows,
+        left=left,
+        right_share=((place - grid.columns[left]) / width).astype(np.float32),
+        distances=grid.distances.astype(np.float32),
+        # Endless rays end in the last interval, at its far end.
+        interval=np.append(np.clip(interval, 0, len(grid.distances) - 2), len(grid.distances) - 2),
+        fold=np.float32(_FOLD),
+        depth=grid.depth.reshape(len(grid.rows), -1),
+        source=np.zeros((len(grid.rows), 0), np.float32) if source is None else source.reshape(len(grid.rows), -1),
+    )
     fog_rows_by_grid(
         radiance.reshape(rows, 3 * columns),
         np.ascontiguousarray(view.distance, dtype=np.float32),
-        grid.rows,
-        left,
-        ((place - grid.columns[left]) / width).astype(np.float32),
-        grid.distances.astype(np.float32),
-        # Endless rays end in the last interval, at its far end.
-        np.append(np.clip(interval, 0, len(grid.distances) - 2), len(grid.distances) - 2),
-        np.float32(_FOLD),
-        grid.depth.reshape(len(grid.rows), -1),
-        np.zeros((len(grid.rows), 0), np.float32) if source is None else source.reshape(len(grid.rows), -1),
+        pixels,
         np.array(airlight, dtype=np.float32),
         out.reshape(rows, 3 * columns),
     )

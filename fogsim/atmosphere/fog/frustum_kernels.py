@@ -1,6 +1,7 @@
 """Optical depth on the rays of a frustum grid, and its way to the pixels between them."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 from fogsim.atmosphere.fog.koschmieder_kernels import (
     ENDLESS,
     add_airlight,
+    fill_channels,
     interpolate_rows,
     repeat_channels,
     transmittances,
@@ -53,9 +55,20 @@ def grid_depths(
     extinction: NDArray[np.float32],
     depth: NDArray[np.float32],
 ) -> None:
-    """Extinction and optical depth at the nodes (n) of each ray (m, 3), by Simpson's rule between nodes.
+    """Extinction and optical depth at the nodes of each ray, by Simpson's rule between nodes.
 
-    The last node stands for the end of the ray, wherever that is.
+    Parameters
+    ----------
+    eye : (3,) float64
+        Where the rays begin [m].
+    directions : (m, 3) float64
+        Unit vectors.
+    distances : (n,) float64
+        Of the nodes, ascending from 0 [m]; the last stands for the end of the ray, wherever that is.
+    medium : Medium
+        The fog.
+    extinction, depth : (m, n) float32
+        Extinction coefficient [1/m] and optical depth [-]; written to.
     """
     last = distances.shape[0] - 1
     at, values, pieces = np.empty(2 * last - 1), np.empty(2 * last - 1), np.zeros(last + 1)
@@ -82,28 +95,64 @@ def grid_depths(
             depth[m, n] = min(total, OPAQUE)
 
 
+class PixelGrid(NamedTuple):
+    """What lies on a grid's rays, and where the pixels of an image are between them.
+
+    Attributes
+    ----------
+    rows : (grid rows,) float32
+        Image rows of the grid [px].
+    left : (cols,) int64
+        Number of the grid's column before each of the image's.
+    right_share : (cols,) float32
+        How far each column of the image is on to the next of the grid's, 0 … 1.
+    distances : (nodes,) float32
+        Distances of the nodes along every ray [m].
+    interval : (bins + 1,) int64
+        The node before a distance d, for d / (d + fold) in even steps over 0 … 1.
+    fold : float32
+        See `interval` [m].
+    depth : (grid rows, grid cols · nodes) float32
+        Optical depth from the eye to the nodes [-].
+    source : (grid rows, grid cols · nodes · 3) float32
+        Luminance scattered in up to the nodes beyond the airlight [cd/m²]; of no columns where there is none.
+    """
+
+    rows: NDArray[np.float32]
+    left: NDArray[np.int64]
+    right_share: NDArray[np.float32]
+    distances: NDArray[np.float32]
+    interval: NDArray[np.int64]
+    fold: np.float32
+    depth: NDArray[np.float32]
+    source: NDArray[np.float32]
+
+
 @kernel
 def fog_rows_by_grid(
-    radiance: NDArray[np.float32],
+    luminance: NDArray[np.float32],
     distance: NDArray[np.float32],
-    rows: NDArray[np.float32],
-    left: NDArray[np.int64],
-    right_share: NDArray[np.float32],
-    distances: NDArray[np.float32],
-    interval: NDArray[np.int64],
-    fold: np.float32,
-    depth: NDArray[np.float32],
-    source: NDArray[np.float32],
+    grid: PixelGrid,
     airlight: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:
-    """Fog every pixel of an image (rows, cols · 3) by what lies on the grid's rays.
+    """Fog every pixel of an image by what lies on the grid's rays.
 
-    L = L0 T + L∞ (1 − T) + S, τ and S interpolated linearly between four rays and two nodes. `rows` are the image rows
-    of the grid; `left` (cols) and `right_share` place each column between two of the grid's. `interval` gives for
-    d / (d + fold), in even steps over 0 … 1, the node before a distance d. `depth` is (grid rows, grid cols · nodes),
-    `source` (grid rows, grid cols · nodes · 3) or of no columns where there is none.
+    L = L0 T + L∞ (1 − T) + S, τ and S interpolated linearly between four rays and two nodes.
+
+    Parameters
+    ----------
+    luminance, out : (rows, cols · 3) float32
+        Luminance per channel without fog and with it [cd/m²]; `out` is written to.
+    distance : (rows, cols) float32
+        Distance along the ray [m].
+    grid : PixelGrid
+        Optical depths and scattered light.
+    airlight : (3,) float32
+        L∞ per channel [cd/m²].
     """
+    rows, left, right_share, distances = grid.rows, grid.left, grid.right_share, grid.distances
+    interval, fold, depth, source = grid.interval, grid.fold, grid.depth, grid.source
     columns, nodes, bins = distance.shape[1], distances.shape[0], interval.shape[0]
     above, scattered = np.empty(depth.shape[1], np.float32), np.empty(source.shape[1], np.float32)
     row_depth, transmittance = np.empty(columns, np.float32), np.empty(columns, np.float32)
@@ -114,8 +163,7 @@ def fog_rows_by_grid(
     per_metre = np.empty(nodes - 1, np.float32)
     for n in range(nodes - 1):
         per_metre[n] = np.float32(1.0) / (distances[n + 1] - distances[n])
-    for j in range(3 * columns):
-        light[j] = airlight[j % 3]
+    fill_channels(airlight, light)
     upper = 0
     for v in range(distance.shape[0]):
         while upper < rows.shape[0] - 2 and rows[upper + 1] <= v:
@@ -136,7 +184,7 @@ def fog_rows_by_grid(
             node[u], share[u] = n, f
         transmittances(row_depth, power, transmittance)
         repeat_channels(transmittance, in_channels)
-        add_airlight(radiance[v], in_channels, light, out[v])
+        add_airlight(luminance[v], in_channels, light, out[v])
         if source.shape[1] > 0:
             interpolate_rows(source[upper], source[upper + 1], down, scattered)
             _add_source(scattered, left, right_share, node, share, nodes, out[v])

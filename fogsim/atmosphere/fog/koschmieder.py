@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from fogsim.atmosphere.fog.airlight import airlight_source
 from fogsim.atmosphere.fog.forward_scatter import add_forward_scatter, pixel_width
 from fogsim.atmosphere.fog.frustum import frustum_grid, radiance_through_grid
-from fogsim.atmosphere.fog.koschmieder_kernels import fog_rows
+from fogsim.atmosphere.fog.koschmieder_kernels import BankedFog, fog_rows
 from fogsim.atmosphere.fog.medium import has_closed_form
 from fogsim.jit import Bands
 from fogsim.values import Camera, CameraPose, FogBank, FogField, View
@@ -99,13 +99,17 @@ def fogged_radiance(
     rows, columns = view.distance.shape
     lines, fogged = radiance.reshape(rows, 3 * columns), out.reshape(rows, 3 * columns)
     distance, rays = np.ascontiguousarray(view.distance, dtype=np.float32), np.ascontiguousarray(ray_map, np.float32)
-    headroom, extinction = np.float32(field.top - eye[2]), np.float32(field.extinction)
-    banks, airlight = _bank_rows(field.banks, eye), np.array(field.airlight, dtype=np.float32)
+    fog = BankedFog(
+        headroom=np.float32(field.top - eye[2]),
+        extinction=np.float32(field.extinction),
+        banks=_bank_rows(field.banks, eye),
+        airlight=np.array(field.airlight, dtype=np.float32),
+    )
 
-    def fog(_: int, top: int, bottom: int) -> None:
-        fog_rows(lines, distance, rays, headroom, extinction, banks, airlight, top, bottom, fogged)
+    def add_fog(_: int, top: int, bottom: int) -> None:
+        fog_rows(lines, distance, rays, fog, top, bottom, fogged)
 
-    Bands().work(fog, rows, columns)
+    Bands().work(add_fog, rows, columns)
     return out
 
 

@@ -5,6 +5,7 @@ plain loop over float32 that compiles to vector instructions, which a call of th
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +27,19 @@ _NEXT = np.uint32(1)
 
 @kernel
 def transmittances(depth: NDArray[np.float32], power: NDArray[np.int32], out: NDArray[np.float32]) -> None:
-    """e^(−τ) for a row of optical depths, to 2·10⁻⁷; exactly 1 for 0. `depth` is used up, `power` is scratch.
+    """e^(−τ) for a row of optical depths, to 2·10⁻⁷; exactly 1 for 0.
 
+    Parameters
+    ----------
+    depth : (n,) float32
+        Optical depths [-]; used up.
+    power : (n,) int32
+        Scratch.
+    out : (n,) float32
+        Written to.
+
+    Notes
+    -----
     2^y is split at the whole number i above y: the power 2^i is written straight into a float's exponent.
     """
     as_float = power.view(np.float32)
@@ -43,7 +55,15 @@ def transmittances(depth: NDArray[np.float32], power: NDArray[np.int32], out: ND
 
 @kernel
 def repeat_channels(values: NDArray[np.float32], out: NDArray[np.float32]) -> None:
-    """Each value of a row for each of three interleaved channels."""
+    """Each value of a row for each of three interleaved channels.
+
+    Parameters
+    ----------
+    values : (n,) float32
+        Any.
+    out : (3 · n,) float32
+        Written to.
+    """
     for u in range(values.shape[0]):
         out[3 * u] = values[u]
         out[3 * u + 1] = values[u]
@@ -52,7 +72,15 @@ def repeat_channels(values: NDArray[np.float32], out: NDArray[np.float32]) -> No
 
 @kernel
 def fill_channels(colour: NDArray[np.float32], out: NDArray[np.float32]) -> None:
-    """A colour (3) in each of a row's pixels of three interleaved channels."""
+    """A colour in each of a row's pixels of three interleaved channels.
+
+    Parameters
+    ----------
+    colour : (3,) float32
+        Any.
+    out : (3 · n,) float32
+        Written to.
+    """
     for j in range(out.shape[0]):
         out[j] = colour[j % 3]
 
@@ -61,14 +89,30 @@ def fill_channels(colour: NDArray[np.float32], out: NDArray[np.float32]) -> None
 def interpolate_rows(
     low: NDArray[np.float32], high: NDArray[np.float32], share: np.float32, out: NDArray[np.float32]
 ) -> None:
-    """A row that lies between two rows of a coarser grid, at a share of the way from the lower to the higher."""
+    """A row that lies between two rows of a coarser grid.
+
+    Parameters
+    ----------
+    low, high, out : (n,) float32
+        The two rows, and the one between them; `out` is written to.
+    share : float32
+        How far it is on the way from `low` to `high`, 0 … 1.
+    """
     for j in range(out.shape[0]):
         out[j] = low[j] + (high[j] - low[j]) * share
 
 
 @kernel
 def bilinear(table: NDArray[np.float32], row: np.float32, column: np.float32) -> np.float32:
-    """Value of a table at a place within it, before its last row and column."""
+    """Value of a table at a place within it.
+
+    Parameters
+    ----------
+    table : (rows, cols) float32
+        Any.
+    row, column : float32
+        The place, before the last row and column.
+    """
     a, b = np.uint32(row), np.uint32(column)
     down, aside = row - np.float32(a), column - np.float32(b)
     low = table[a, b] + (table[a, b + _NEXT] - table[a, b]) * aside
@@ -79,14 +123,20 @@ def bilinear(table: NDArray[np.float32], row: np.float32, column: np.float32) ->
 
 @kernel
 def add_airlight(
-    radiance: NDArray[np.float32],
+    luminance: NDArray[np.float32],
     transmittance: NDArray[np.float32],
     airlight: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:
-    """L = L0 T + L∞ (1 − T) over a row of interleaved channels: L0 exactly where T is 1."""
+    """L = L0 T + L∞ (1 − T) over a row: L0 exactly where T is 1.
+
+    Parameters
+    ----------
+    luminance, transmittance, airlight, out : (3 · n,) float32
+        L0 [cd/m²], T [-], L∞ and L [cd/m²] of interleaved channels; `out` is written to.
+    """
     for j in range(out.shape[0]):
-        out[j] = radiance[j] * transmittance[j] + airlight[j] * (_ONE - transmittance[j])
+        out[j] = luminance[j] * transmittance[j] + airlight[j] * (_ONE - transmittance[j])
 
 
 @kernel
@@ -124,32 +174,59 @@ def _add_bank(
         depth[u] += extra * length[u] * (share if along else middle)
 
 
+class BankedFog(NamedTuple):
+    """Fog whose optical depth has a closed form, as it lies about an eye.
+
+    Attributes
+    ----------
+    headroom : float32
+        Height of the fog's top above the eye [m].
+    extinction : float32
+        Extinction coefficient outside the banks [1/m].
+    banks : (n, 6) float32
+        Axis (x, y), how far the eye is beyond start and end, edge [m], extra extinction [1/m].
+    airlight : (3,) float32
+        L∞ per channel [cd/m²].
+    """
+
+    headroom: np.float32
+    extinction: np.float32
+    banks: NDArray[np.float32]
+    airlight: NDArray[np.float32]
+
+
 @kernel
 def fog_rows(
-    radiance: NDArray[np.float32],
+    luminance: NDArray[np.float32],
     distance: NDArray[np.float32],
     ray_map: NDArray[np.float32],
-    headroom: np.float32,
-    extinction: np.float32,
-    banks: NDArray[np.float32],
-    airlight: NDArray[np.float32],
+    fog: BankedFog,
     top: int,
     bottom: int,
     out: NDArray[np.float32],
 ) -> None:
-    """Fog the rows from `top` to before `bottom` of an image (rows, cols · 3), τ exact through banks and up to a top.
+    """Fog rows of an image, with τ exact through banks and up to a top.
 
-    `ray_map` (3, 3) takes (u, v, 1) to a ray in the world (not normalised); `headroom` is the height of the fog's top
-    above the eye. `banks` (n, 6) holds for each bank the axis (x, y), how far the eye is beyond its start and end, its
-    edge and its extra extinction.
+    Parameters
+    ----------
+    luminance, out : (rows, cols · 3) float32
+        Luminance per channel without fog and with it [cd/m²]; `out` is written to.
+    distance : (rows, cols) float32
+        Distance along the ray [m].
+    ray_map : (3, 3) float32
+        Takes (u, v, 1) to a ray in the world, not normalised.
+    fog : BankedFog
+        The fog.
+    top, bottom : int
+        The first row, and the one after the last.
     """
+    headroom, extinction, banks = fog.headroom, fog.extinction, fog.banks
     columns = distance.shape[1]
     length, towards = np.empty(columns, np.float32), np.empty(columns, np.float32)
     depth, transmittance = np.empty(columns, np.float32), np.empty(columns, np.float32)
     power = np.empty(columns, np.int32)
     in_channels, light = np.empty(3 * columns, np.float32), np.empty(3 * columns, np.float32)
-    for j in range(3 * columns):
-        light[j] = airlight[j % 3]
+    fill_channels(fog.airlight, light)
     right_x, right_y, right_z = ray_map[0, 0], ray_map[1, 0], ray_map[2, 0]
     for v in range(top, bottom):
         first_x = ray_map[0, 1] * np.float32(v) + ray_map[0, 2]
@@ -172,4 +249,4 @@ def fog_rows(
             _add_bank(bank[2:], towards, length, depth)
         transmittances(depth, power, transmittance)
         repeat_channels(transmittance, in_channels)
-        add_airlight(radiance[v], in_channels, light, out[v])
+        add_airlight(luminance[v], in_channels, light, out[v])

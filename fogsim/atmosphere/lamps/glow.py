@@ -101,13 +101,27 @@ def glow(depth: ArrayLike, angle: ArrayLike, droplets: Droplets) -> NDArray[np.f
 
 
 def mean_cosine(phase: PhaseFunction) -> float:
-    """Mean cosine g of the scattering angle."""
+    """Mean cosine g of the scattering angle.
+
+    Parameters
+    ----------
+    phase : PhaseFunction
+        Of the droplets.
+    """
     theta = np.linspace(0.0, math.pi, 20001)
     return float(2.0 * math.pi * np.trapezoid(phase(theta) * np.sin(theta) * np.cos(theta), theta))
 
 
 def forward_share(phase: PhaseFunction, angle: float = FORWARD) -> float:
-    """Share of light that droplets scatter by less than an angle [rad]."""
+    """Share of light that droplets scatter by less than an angle.
+
+    Parameters
+    ----------
+    phase : PhaseFunction
+        Of the droplets.
+    angle : float
+        The angle [rad].
+    """
     theta = np.linspace(0.0, angle, 400)
     return float(2.0 * math.pi * np.trapezoid(phase(theta) * np.sin(theta), theta))
 
@@ -159,7 +173,13 @@ class GlowTable:
 
 @cache
 def glow_table(droplets: Droplets) -> GlowTable:
-    """Table of the glow in fog of given droplets; computing it takes a fraction of a second."""
+    """Table of the glow in fog; computing it takes a fraction of a second.
+
+    Parameters
+    ----------
+    droplets : Droplets
+        What the fog is made of.
+    """
     folded = (np.arange(_CHORDS) / (_CHORDS - 1)) * (1.98 / (1.98 + FOLD_CHORD))
     chord = np.maximum(FOLD_CHORD * folded / (1.0 - folded), 1e-4)
     values = glow(_DEPTHS[:, None], 2.0 * np.arcsin(chord / 2.0), droplets)

@@ -10,7 +10,9 @@ from fogsim.atmosphere.lamps.halo_lamps import (
     AHEAD,
     BEHIND,
     COLOUR,
+    CORE_SIZE,
     DEPTH,
+    HIDDEN_SHARE,
     PIXELS,
     PLACE_U,
     PLACE_V,
@@ -18,8 +20,10 @@ from fogsim.atmosphere.lamps.halo_lamps import (
     SHOWN,
     STRENGTH,
     TOWARDS,
+    WIDE_FOLD,
+    WIDE_SIZE,
+    lamp_profile,
 )
-from fogsim.atmosphere.lamps.halo_profiles import CORE_SIZE, HIDDEN_SHARE, WIDE_FOLD, WIDE_SIZE, lamp_profile
 from fogsim.jit import kernel
 from fogsim.units import LUMINANCE_WEIGHTS
 
@@ -41,9 +45,22 @@ def add_wide_glows(
     faintest: float,
     out: NDArray[np.float32],
 ) -> None:
-    """Sum wide glows on the coarsest image: (4, m), three channels, and their luminance times 1 / R [1/m].
+    """Sum wide glows on the coarsest image.
 
-    `directions` (3, m) are unit vectors. Glows that are nowhere brighter than `faintest` are left out.
+    Parameters
+    ----------
+    directions : (3, m) float32
+        Unit vectors of its pixels in the camera's axes.
+    lamps : (n, COLUMNS) float64
+        Table of lamps.
+    table : (depths, WIDE_SIZE) float32
+        Profiles of unit strength.
+    log_depth : (depths,) float64
+        ln τ of the profiles.
+    faintest : float
+        Glows that are nowhere brighter are left out [cd/m²].
+    out : (4, m) float32
+        Luminance of three channels [cd/m²], and luminance times 1 / R; added to.
     """
     red, green, blue, near = out[0], out[1], out[2], out[3]
     count = red.shape[0]
@@ -71,7 +88,13 @@ def add_wide_glows(
 
 @kernel
 def upsample_grid(coarsest: NDArray[np.float32], out: NDArray[np.float32]) -> None:
-    """The coarsest image (4, rows, cols) stretched to the coarse one, linearly between its corners."""
+    """The coarsest image stretched to the coarse one, linearly between its corners.
+
+    Parameters
+    ----------
+    coarsest, out : (4, rows, cols) float32
+        The two images; `out` is written to.
+    """
     rows, columns = out.shape[1], out.shape[2]
     for v in range(rows):
         place = v * (coarsest.shape[1] - 1) / (rows - 1)
@@ -99,9 +122,18 @@ def add_middle_glows(
     faintest: float,
     out: NDArray[np.float32],
 ) -> None:
-    """Add to the coarse image (4, rows, cols) what the coarsest lacks within `reach` of the lamps [rad].
+    """Add to the coarse image what the coarsest lacks near the lamps.
 
-    `cell` holds the width and height of a cell [px] and `reach` on the axis, in cells.
+    Parameters
+    ----------
+    directions, lamps, table, log_depth, faintest
+        As for `add_wide_glows`, with the directions of the coarse image.
+    cell : (3,) float64
+        Width and height of a cell [px], and `reach` on the axis in cells.
+    reach : float
+        Angle from a lamp within which something is lacking [rad].
+    out : (4, rows, cols) float32
+        The coarse image; added to.
     """
     rows, columns = out.shape[1], out.shape[2]
     profile, scale = np.empty(CORE_SIZE, np.float32), np.float32((CORE_SIZE - 1.0) / reach)
@@ -130,7 +162,13 @@ def add_middle_glows(
 
 @kernel
 def divide_by_luminance(coarse: NDArray[np.float32]) -> None:
-    """Make of luminance over range in the last channel of a coarse image (4, m) the mean 1 / R [1/m]."""
+    """Make of luminance over range in the last channel of a coarse image the mean 1 / R [1/m].
+
+    Parameters
+    ----------
+    coarse : (4, m) float32
+        The image; changed in place.
+    """
     for p in range(coarse.shape[1]):
         coarse[3, p] /= max(_RED * coarse[0, p] + _GREEN * coarse[1, p] + _BLUE * coarse[2, p], _LEAST)
 
@@ -164,10 +202,21 @@ def _add_product(light: NDArray[np.float32], seen: NDArray[np.float32], out: NDA
 def add_upsampled(
     coarse: NDArray[np.float32], coarse_columns: int, distance: NDArray[np.float32], out: NDArray[np.float32]
 ) -> None:
-    """Add the coarse image (4, m) to an image (rows, cols · 3).
+    """Add the coarse image to an image.
 
     Light is scattered into a line of sight about evenly up to its lamp, so of the glow of a lamp at R what is seen
     before a surface at d is the share min(1, d / R).
+
+    Parameters
+    ----------
+    coarse : (4, m) float32
+        Luminance of three channels [cd/m²], and mean 1 / R [1/m].
+    coarse_columns : int
+        Columns of the coarse image.
+    distance : (rows, cols) float32
+        What the pixels see [m].
+    out : (rows, cols · 3) float32
+        Luminance [cd/m²]; added to.
     """
     rows, columns = distance.shape
     coarse_rows, ready = coarse.shape[1] // coarse_columns, -1
@@ -198,7 +247,21 @@ def add_glow_cores(
     distance: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:
-    """Add to an image (rows, cols · 3) the cores of glows within a reach of the lamps [px]."""
+    """Add to an image the cores of glows.
+
+    Parameters
+    ----------
+    lamps : (n, COLUMNS) float64
+        Table of lamps.
+    bright, profiles : (n,) bool and (n, CORE_SIZE) float32
+        From `core_profiles`.
+    reach : float
+        Distance from the lamps up to which there are cores [px].
+    distance : (rows, cols) float32
+        What the pixels see [m].
+    out : (rows, cols · 3) float32
+        Luminance [cd/m²]; added to.
+    """
     rows, columns = distance.shape
     scale, last = np.float32((CORE_SIZE - 1.001) / reach), np.float32(CORE_SIZE - 1.001)
     place = np.empty(columns, np.float32)
@@ -230,12 +293,12 @@ def add_glow_cores(
 
 
 @kernel
-def _drawn_about(radiance: NDArray[np.float32], columns: int, u0: int, v0: int) -> float:
+def _drawn_about(luminance: NDArray[np.float32], columns: int, u0: int, v0: int) -> float:
     """Sum of the luminance of the sixteen pixels about a place."""
     drawn = 0.0
-    for v in range(max(0, v0 - 1), min(radiance.shape[0], v0 + 3)):
+    for v in range(max(0, v0 - 1), min(luminance.shape[0], v0 + 3)):
         for u in range(max(0, u0 - 1), min(columns, u0 + 3)):
-            drawn += _RED * radiance[v, 3 * u] + _GREEN * radiance[v, 3 * u + 1] + _BLUE * radiance[v, 3 * u + 2]
+            drawn += _RED * luminance[v, 3 * u] + _GREEN * luminance[v, 3 * u + 1] + _BLUE * luminance[v, 3 * u + 2]
     return drawn
 
 
@@ -245,14 +308,27 @@ def add_direct_light(
     focal: float,
     largest: float,
     faintest: float,
-    radiance: NDArray[np.float32],
+    luminance: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:
-    """Add what a renderer lost of lamps that cover fewer pixels than `largest`.
+    """Add what a renderer lost of small lamps.
 
-    What of the luminance that a lamp should show without fog `radiance` (rows, cols · 3) holds already about the lamp,
-    shared with its neighbours, is not added again. Of a lamp behind something the part that is hidden is left out. The
-    light goes to the four pixels about the place.
+    What of the luminance that a lamp should show without fog was drawn already about the lamp, shared with its
+    neighbours, is not added again. Of a lamp behind something the part that is hidden is left out. The light goes to
+    the four pixels about the place.
+
+    Parameters
+    ----------
+    lamps : (n, COLUMNS) float64
+        Table of lamps.
+    focal : float
+        Focal length [px].
+    largest : float
+        Lamps that cover as many pixels or more are complete [px²].
+    faintest : float
+        Lamps whose light on all pixels together is less are left out [cd/m²].
+    luminance, out : (rows, cols · 3) float32
+        As drawn, without fog, and the image with it [cd/m²]; `out` is added to.
     """
     rows, columns = out.shape[0], out.shape[1] // 3
     for i in range(lamps.shape[0]):
@@ -266,7 +342,7 @@ def add_direct_light(
         if expected * transmittance < faintest:
             continue
         u0, v0 = math.floor(lamp[PLACE_U]), math.floor(lamp[PLACE_V])
-        drawn, around = _drawn_about(radiance, columns, u0, v0), 0.0
+        drawn, around = _drawn_about(luminance, columns, u0, v0), 0.0
         for j in range(lamps.shape[0]):
             if abs(lamps[j, PLACE_U] - lamp[PLACE_U]) < 2.5 and abs(lamps[j, PLACE_V] - lamp[PLACE_V]) < 2.5:
                 around += lamps[j, STRENGTH] * focal**2 / max(lamps[j, AHEAD], BEHIND) ** 3
@@ -282,7 +358,15 @@ def add_direct_light(
 
 @kernel
 def mean_luminance(image: NDArray[np.float32], step: int) -> float:
-    """Mean of an image's green channel (rows, cols · 3), by each `step`-th row and column."""
+    """Mean of an image's green channel, near enough to that of its luminance [cd/m²].
+
+    Parameters
+    ----------
+    image : (rows, cols · 3) float32
+        Luminance per channel [cd/m²].
+    step : int
+        Rows and columns between two pixels that are read.
+    """
     total, count = 0.0, 0
     for v in range(step // 2, image.shape[0], step):
         for u in range(step // 2, image.shape[1] // 3, step):

@@ -1,6 +1,7 @@
-"""Lamps of others as a camera meets them: where, how bright, behind what, and which of them look like one."""
+"""Lamps of others before a camera: where, how bright, behind what, which look like one; and how each one glows."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +21,56 @@ colour (3) and direction in the camera's axes (3).
 BEHIND = 0.2
 """Cosine of the angle off the camera's axis at which lamps begin to fade as they pass the camera."""
 
+WIDE_SIZE = 200
+"""Entries of a lamp's profile on the coarsest image, over c² / (c² + WIDE_FOLD)."""
+
+WIDE_FOLD = 0.02
+
+CORE_SIZE = 64
+"""Entries of a lamp's profile near it, evenly over the chord or the distance on the image."""
+
+HIDDEN_SHARE = 0.5
+"""Share of the wide glow that is left of a lamp that something hides, which casts a shadow into the fog as well."""
+
 _NEAREST = 0.5  # lamps nearer than this are not drawn [m]
 _BEFORE = 1.0  # a surface so far before a lamp may be the lamp's own vehicle [m]
 _SAME_RANGE = 0.15  # share by which ranges of lamps may differ that are drawn as one
+
+
+class LampLight(NamedTuple):
+    """Light of lamps.
+
+    Attributes
+    ----------
+    intensity : (n,) float64
+        Luminous intensity toward the camera [cd].
+    colour : (n, 3) float64
+        Linear colours of luminance 1.
+    area : (n,) float64
+        Luminous area as the camera sees it [m²].
+    """
+
+    intensity: NDArray[np.float64]
+    colour: NDArray[np.float64]
+    area: NDArray[np.float64]
+
+
+class GlowLines(NamedTuple):
+    """Glow of a lamp of unit strength, over optical depth and chord.
+
+    Attributes
+    ----------
+    values : (depths, chords) float64
+        Glow times chord, over chords that lie evenly over c / (c + fold).
+    log_depth : (depths,) float64
+        ln τ of the rows, evenly spaced.
+    fold : float
+        Chord that is placed half-way.
+    """
+
+    values: NDArray[np.float64]
+    log_depth: NDArray[np.float64]
+    fold: float
 
 
 @kernel
@@ -35,9 +83,24 @@ def project_lamps(
     lamps: NDArray[np.float64],
     chosen: NDArray[np.int64],
 ) -> int:
-    """Set place, range and direction of lamps before a camera, the numbers of which go to `chosen`; their count.
+    """Set place, range and direction of lamps before a camera; their count.
 
-    `lens` holds the focal length and the principal point [px].
+    Parameters
+    ----------
+    position : (n, 3) float64
+        Places [m].
+    intensity : (n,) float64
+        Those without any are left out [cd].
+    eye : (3,) float64
+        Optical centre [m].
+    axes : (3, 3) float64
+        The camera's axes (right, down, forward) in the world.
+    lens : (3,) float64
+        Focal length and principal point [px].
+    lamps : (n, COLUMNS) float64
+        Table of lamps; written to.
+    chosen : (n,) int64
+        Numbers of the lamps in the table; written to.
     """
     count = 0
     for i in range(position.shape[0]):
@@ -83,9 +146,7 @@ def _shown(distance: NDArray[np.float32], u: float, v: float, nearest: float) ->
 
 @kernel
 def select_lamps(
-    intensity: NDArray[np.float64],
-    colour: NDArray[np.float64],
-    area: NDArray[np.float64],
+    light: LampLight,
     chosen: NDArray[np.int64],
     depth: NDArray[np.float64],
     farthest: float,
@@ -93,7 +154,26 @@ def select_lamps(
     distance: NDArray[np.float32],
     lamps: NDArray[np.float64],
 ) -> int:
-    """Set the other columns of placed lamps, and keep those that are not lost in fog; their count."""
+    """Set the other columns of projected lamps, and keep those that are not lost in fog; their count.
+
+    Parameters
+    ----------
+    light : LampLight
+        Of all lamps.
+    chosen : (n,) int64
+        Numbers of the projected ones among them.
+    depth : (n,) float64
+        Optical depths to those [-].
+    farthest : float
+        Optical depth at which a lamp has faded from sight [-].
+    focal : float
+        Focal length [px].
+    distance : (rows, cols) float32
+        What the pixels see [m].
+    lamps : (n, COLUMNS) float64
+        Table of lamps; changed in place.
+    """
+    intensity, colour, area = light.intensity, light.colour, light.area
     count = 0
     for i in range(depth.shape[0]):
         if depth[i] >= farthest:
@@ -115,9 +195,16 @@ def select_lamps(
 
 @kernel
 def merge_lamps(lamps: NDArray[np.float64], apart: float, fused: NDArray[np.float64]) -> int:
-    """Draw together lamps that are less than `apart` from each other on the image [px], at like ranges; their count.
+    """Draw together lamps that are close to each other on the image, at like ranges; their count.
 
     What is left for them is the sum of their strengths, at the middle of their light.
+
+    Parameters
+    ----------
+    lamps, fused : (n, COLUMNS) float64
+        Table of lamps before and after; `fused` is written to.
+    apart : float
+        Distance on the image from which lamps are drawn separately [px].
     """
     count = 0
     for i in range(lamps.shape[0]):
@@ -137,3 +224,142 @@ def merge_lamps(lamps: NDArray[np.float64], apart: float, fused: NDArray[np.floa
             fused[found, column] += (lamps[i, column] - fused[found, column]) * share
         fused[found, STRENGTH] = strength
     return count
+
+
+@kernel
+def _glow(chord: float, line: NDArray[np.float64], fold: float) -> float:
+    """Glow at a chord, from its values times chord."""
+    place = min(chord / (chord + fold) * (line.shape[0] - 1) * ((1.98 + fold) / 1.98), line.shape[0] - 1.001)
+    c = int(place)
+    return float((line[c] + (line[c + 1] - line[c]) * (place - c)) / chord)
+
+
+@kernel
+def profile_tables(
+    glow: GlowLines,
+    soft: float,
+    softer: float,
+    reach: float,
+    wide: NDArray[np.float32],
+    middle: NDArray[np.float32],
+) -> None:
+    """Glow of unit strength at each depth of a table: `wide` with its middle softened, `middle` what is missing there.
+
+    Parameters
+    ----------
+    glow : GlowLines
+        The glow.
+    soft, softer : float
+        Radii within which the glow is flat on the coarse and the coarsest image [rad].
+    reach : float
+        Radius at which `middle` goes to 0 [rad].
+    wide, middle : (depths, WIDE_SIZE) and (depths, CORE_SIZE) float32
+        Written to.
+    """
+    lines, fold = glow.values, glow.fold
+    for i in range(lines.shape[0]):
+        for n in range(WIDE_SIZE):
+            u = min(n / (WIDE_SIZE - 1.0), 0.995)
+            wide[i, n] = _glow(math.sqrt(WIDE_FOLD * u / (1.0 - u) + softer**2), lines[i], fold)
+        for n in range(CORE_SIZE):
+            x = n / (CORE_SIZE - 1.0)
+            square = (reach * x) ** 2
+            sharp, blunt = math.sqrt(square + soft**2), math.sqrt(square + softer**2)
+            middle[i, n] = (_glow(sharp, lines[i], fold) - _glow(blunt, lines[i], fold)) * (1.0 - x**4) ** 2
+
+
+@kernel
+def _row_of(depth: float, log_depth: NDArray[np.float64]) -> tuple[int, float, float]:
+    """Row of a table before an optical depth, the share of the next one, and a factor for depths below the table."""
+    step = log_depth[1] - log_depth[0]
+    place = (math.log(max(depth, 1e-9)) - log_depth[0]) / step
+    # Below the table glow is proportional to optical depth.
+    factor = math.exp(min(place, 0.0) * step)
+    place = min(max(place, 0.0), log_depth.shape[0] - 1.001)
+    return int(place), place - int(place), factor
+
+
+@kernel
+def lamp_profile(
+    table: NDArray[np.float32],
+    lamp: NDArray[np.float64],
+    left: float,
+    log_depth: NDArray[np.float64],
+    out: NDArray[np.float32],
+) -> None:
+    """Profile of a lamp's glow beyond its core [cd/m²].
+
+    Parameters
+    ----------
+    table : (depths, entries) float32
+        Profiles of unit strength.
+    lamp : (COLUMNS,) float64
+        The lamp.
+    left : float
+        Share of the glow that is left of a hidden lamp.
+    log_depth : (depths,) float64
+        ln τ of the table's rows.
+    out : (entries,) float32
+        Written to.
+    """
+    row, share, factor = _row_of(lamp[DEPTH], log_depth)
+    gain = np.float32(lamp[STRENGTH] * factor * (left + (1.0 - left) * lamp[SHOWN]))
+    low, high, part = table[row], table[row + 1], np.float32(share)
+    for n in range(out.shape[0]):
+        out[n] = gain * (low[n] + (high[n] - low[n]) * part)
+
+
+@kernel
+def core_profiles(
+    lamps: NDArray[np.float64],
+    glow: GlowLines,
+    soft: float,
+    reach: float,
+    pixel: float,
+    faintest: float,
+    core: NDArray[np.float32],
+    bright: NDArray[np.bool_],
+) -> None:
+    """Luminance of each glow that coarse images lack, evenly over the distance on the image.
+
+    Parameters
+    ----------
+    lamps : (n, COLUMNS) float64
+        Table of lamps.
+    glow : GlowLines
+        The glow.
+    soft : float
+        Radius within which the glow is flat on the coarse image [rad].
+    reach : float
+        Distance up to which there are cores [px].
+    pixel : float
+        Angle of a pixel on the axis [rad].
+    faintest : float
+        Cores that are nowhere brighter are not `bright` [cd/m²].
+    core : (n, CORE_SIZE) float32
+        Luminance [cd/m²]; written to.
+    bright : (n,) bool
+        Written to.
+    """
+    lines, log_depth, fold = glow.values, glow.log_depth, glow.fold
+    line = np.empty(lines.shape[1])
+    for i in range(lamps.shape[0]):
+        lamp = lamps[i]
+        row, share, factor = _row_of(lamp[DEPTH], log_depth)
+        gain = lamp[STRENGTH] * factor * lamp[SHOWN]
+        # Off the axis a pixel sees a smaller angle.
+        angle = pixel * max(lamp[AHEAD], BEHIND) ** 1.5
+        flat = lamp[PIXELS] * angle**2 / math.pi + (0.5 * angle) ** 2
+        chord = math.sqrt(flat)
+        place = min(chord / (chord + fold) * (line.shape[0] - 1), line.shape[0] - 2.0)
+        peak = gain * max(lines[row, int(place)], lines[row + 1, int(place)]) / chord
+        bright[i] = peak > faintest and lamp[AHEAD] > BEHIND
+        if not bright[i]:
+            continue
+        for c in range(line.shape[0]):
+            line[c] = gain * (lines[row, c] + (lines[row + 1, c] - lines[row, c]) * share)
+        for n in range(CORE_SIZE):
+            x = n / (CORE_SIZE - 1.0)
+            square = (reach * angle * x) ** 2
+            sharp, blunt = _glow(math.sqrt(square + flat), line, fold), _glow(math.sqrt(square + soft**2), line, fold)
+            core[i, n] = (sharp - blunt) * (1.0 - x**4) ** 2

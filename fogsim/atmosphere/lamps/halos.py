@@ -20,8 +20,20 @@ from fogsim.atmosphere.lamps.halo_kernels import (
     mean_luminance,
     upsample_grid,
 )
-from fogsim.atmosphere.lamps.halo_lamps import COLUMNS, DEPTH, RANGE, merge_lamps, project_lamps, select_lamps
-from fogsim.atmosphere.lamps.halo_profiles import CORE_SIZE, WIDE_SIZE, core_profiles, profile_tables
+from fogsim.atmosphere.lamps.halo_lamps import (
+    COLUMNS,
+    CORE_SIZE,
+    DEPTH,
+    RANGE,
+    WIDE_SIZE,
+    GlowLines,
+    LampLight,
+    core_profiles,
+    merge_lamps,
+    profile_tables,
+    project_lamps,
+    select_lamps,
+)
 from fogsim.atmosphere.lamps.phase_function import Droplets
 from fogsim.values import Camera, CameraPose, FogField, LightSources, View
 from fogsim.values.pinhole import camera_axes
@@ -88,7 +100,13 @@ class Halos:
         self._plans: dict[Camera, _Plan] = {}
 
     def prepare(self, camera: Camera) -> None:
-        """Compute beforehand what depends on camera and droplets alone."""
+        """Compute beforehand what depends on camera and droplets alone.
+
+        Parameters
+        ----------
+        camera : Camera
+            The camera.
+        """
         self._plan(camera)
 
     def add(
@@ -135,19 +153,19 @@ class Halos:
         lamps: NDArray[np.float64],
         faintest: float,
     ) -> None:
-        plan, (log_depth, lines) = self._plan(camera), _fine_table(self._droplets)
+        plan, glow = self._plan(camera), _glow_lines(self._droplets)
         lamps, glows = _merged(lamps, _SAME_CORE), _merged(lamps, _SAME_GLOW * float(plan.cell[0]))
         coarsest = np.zeros((4, *plan.half_shape), np.float32)
         coarse = np.empty((4, *plan.shape), np.float32)
-        add_wide_glows(plan.half_directions, glows, plan.wide, log_depth, faintest, coarsest.reshape(4, -1))
+        add_wide_glows(plan.half_directions, glows, plan.wide, glow.log_depth, faintest, coarsest.reshape(4, -1))
         upsample_grid(coarsest, coarse)
-        add_middle_glows(plan.directions, plan.cell, plan.reach, glows, plan.middle, log_depth, faintest, coarse)
+        add_middle_glows(plan.directions, plan.cell, plan.reach, glows, plan.middle, glow.log_depth, faintest, coarse)
         flat = coarse.reshape(4, -1)
         divide_by_luminance(flat)
         add_upsampled(flat, plan.shape[1], distance, image)
         core, bright = np.empty((len(lamps), CORE_SIZE), np.float32), np.empty(len(lamps), np.bool_)
         pixel, reach = 1.0 / camera.focal_length, _REACH_CELLS * float(plan.cell[0])
-        core_profiles(lamps, lines, log_depth, FOLD_CHORD, plan.soft, reach, pixel, faintest, core, bright)
+        core_profiles(lamps, glow, plan.soft, reach, pixel, faintest, core, bright)
         add_glow_cores(lamps, bright, reach, core, distance, image)
 
     def _plan(self, camera: Camera) -> _Plan:
@@ -157,12 +175,13 @@ class Halos:
 
 
 @cache
-def _fine_table(droplets: Droplets) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Logarithm of T in steps so fine that glow is linear between them, and glow times chord there."""
+def _glow_lines(droplets: Droplets) -> GlowLines:
+    """Glow at optical depths in steps so fine that it is linear between them."""
     table = glow_table(droplets)
     log_depth = np.linspace(table.log_depth[0], table.log_depth[-1], _DEPTHS)
     columns = [np.interp(log_depth, table.log_depth, column) for column in table.log_glow.T]
-    return log_depth, np.ascontiguousarray(np.exp(np.stack(columns, axis=1) + log_depth[:, None]))
+    values = np.ascontiguousarray(np.exp(np.stack(columns, axis=1) + log_depth[:, None]))
+    return GlowLines(values, log_depth, FOLD_CHORD)
 
 
 def _merged(lamps: NDArray[np.float64], apart: float) -> NDArray[np.float64]:
@@ -184,18 +203,17 @@ def _lamps_in_view(
         depth = fog.extinction * lamps[: len(chosen), RANGE]
     else:
         depth = optical_depth(fog, eye, places)
-    light = (sources.intensity, sources.colour, sources.area)
-    return lamps[: select_lamps(*light, chosen, depth, FARTHEST, camera.focal_length, distance, lamps)]
+    light = LampLight(sources.intensity, sources.colour, sources.area)
+    return lamps[: select_lamps(light, chosen, depth, FARTHEST, camera.focal_length, distance, lamps)]
 
 
 def _plan(camera: Camera, droplets: Droplets) -> _Plan:
     cells = min(max(round(camera.width / COARSE_PIXELS), 40), 80) // 2
     rows = max(1, math.ceil(cells * camera.height / camera.width))
     angle = camera.width / (2 * cells) / camera.focal_length
-    _, lines = _fine_table(droplets)
     wide, middle = np.empty((_DEPTHS, WIDE_SIZE), np.float32), np.empty((_DEPTHS, CORE_SIZE), np.float32)
     soft, reach = _SOFT_CELLS * angle, 2.0 * _REACH_CELLS * angle
-    profile_tables(lines, FOLD_CHORD, soft, 2.0 * soft, reach, wide, middle)
+    profile_tables(_glow_lines(droplets), soft, 2.0 * soft, reach, wide, middle)
     shape, half_shape = (2 * rows + 1, 2 * cells + 1), (rows + 1, cells + 1)
     return _Plan(
         cell=np.array(((camera.width - 1) / (2 * cells), (camera.height - 1) / (2 * rows), 2.0 * _REACH_CELLS)),

@@ -9,19 +9,11 @@ from numpy.typing import NDArray
 from fogsim.atmosphere.fog.frustum_kernels import grid_depths
 from fogsim.atmosphere.fog.medium import is_uniform_below, medium_of
 from fogsim.atmosphere.lamps.lamp_tables import lamp_table
-from fogsim.atmosphere.lamps.lamplight_kernels import add_own_light
+from fogsim.atmosphere.lamps.lamplight_kernels import LampGroup, VeilGrid, add_own_light
 from fogsim.atmosphere.lamps.phase_function import Droplets
 from fogsim.atmosphere.lamps.plane_pieces import piece_length
-from fogsim.atmosphere.lamps.veil import (
-    FOLD_DISTANCE,
-    INTERVALS,
-    LitAir,
-    VeilRays,
-    lit_air,
-    node_distances,
-    veil_along,
-    veil_rays,
-)
+from fogsim.atmosphere.lamps.veil import FOLD_DISTANCE, INTERVALS, lit_air, node_distances, veil_along, veil_rays
+from fogsim.atmosphere.lamps.veil_kernels import LitAir, VeilRays
 from fogsim.linear_algebra import matrix_product
 from fogsim.values import Beam, Camera, CameraPose, FogField, HeadLamp, View
 from fogsim.values.pinhole import camera_axes, ray_from_pixel
@@ -44,9 +36,7 @@ class _Group:
     """Lamps of one colour, ready for drawing."""
 
     lamps: tuple[HeadLamp, ...]
-    places: NDArray[np.float32]
-    tables: NDArray[np.float32]
-    colour: NDArray[np.float32]
+    light: LampGroup
     air: LitAir
 
 
@@ -74,7 +64,15 @@ class OwnLamplight:
         self._memory = _Memory()
 
     def prepare(self, camera: Camera, lamps: tuple[HeadLamp, ...]) -> None:
-        """Compute beforehand what depends on camera, lamps and droplets alone."""
+        """Compute beforehand what depends on camera, lamps and droplets alone.
+
+        Parameters
+        ----------
+        camera : Camera
+            The camera.
+        lamps : tuple of HeadLamp
+            Lamps that may be lit together.
+        """
         self._groups(camera, lamps)
 
     def add(
@@ -111,19 +109,20 @@ class OwnLamplight:
         rays, ray_map = self._rays(camera)
         mean, local = _extinction_on(rays, camera, pose, fog)
         for group in self._groups(camera, lamps):
+            grid = VeilGrid(
+                columns=rays.shape[1],
+                nodes=np.uint32(INTERVALS + 1),
+                fold=np.float32(FOLD_DISTANCE),
+                veil=self._veil(group, mean, local).reshape(-1, rays.shape[1] * (INTERVALS + 1)),
+                attenuation=mean if mean.size == 1 else mean.reshape(rays.shape[0], -1),
+            )
             add_own_light(
                 np.ascontiguousarray(view.distance, dtype=np.float32),
                 np.ascontiguousarray(response, dtype=np.float32).reshape(len(response), 3 * columns),
                 ray_map,
                 piece_length(camera.focal_length),
-                group.places,
-                group.tables,
-                group.colour,
-                rays.shape[1],
-                np.uint32(INTERVALS + 1),
-                np.float32(FOLD_DISTANCE),
-                self._veil(group, mean, local).reshape(-1, rays.shape[1] * (INTERVALS + 1)),
-                mean if mean.size == 1 else mean.reshape(rays.shape[0], -1),
+                group.light,
+                grid,
                 radiance.reshape(rows, 3 * columns),
             )
 
@@ -159,9 +158,11 @@ class OwnLamplight:
         ]
         group = _Group(
             lamps=lamps,
-            places=matrix_product(np.array(places, dtype=np.float32), _MIRROR.astype(np.float32)),
-            tables=np.stack([table[0] for table in tables]),
-            colour=np.array(lamps[0].colour, dtype=np.float32),
+            light=LampGroup(
+                places=matrix_product(np.array(places, dtype=np.float32), _MIRROR.astype(np.float32)),
+                tables=np.stack([table[0] for table in tables]),
+                colour=np.array(lamps[0].colour, dtype=np.float32),
+            ),
             air=lit_air(self._rays(camera)[0], list(zip(places, tables, strict=True)), self._droplets),
         )
         _keep(self._memory.groups, key, group)

@@ -1,5 +1,7 @@
 """Own lamps' light on surfaces and in the fog before them, for every pixel, row by row."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,7 +14,7 @@ from fogsim.atmosphere.fog.koschmieder_kernels import (
     transmittances,
 )
 from fogsim.atmosphere.lamps.lamp_tables import FOLD, SIZE
-from fogsim.atmosphere.lamps.plane_pieces import choose_pixels, row_points, spread
+from fogsim.atmosphere.lamps.plane_pieces import choose_pixels, row_points, spread_over_row
 from fogsim.jit import kernel
 
 _ONE, _HALF, _THIRD = np.float32(1.0), np.float32(0.5), np.float32(1.0 / 3.0)
@@ -28,8 +30,50 @@ _ChoiceRows = tuple[_Floats, _Floats, NDArray[np.uint32], _Floats, NDArray[np.ui
 _LightRows = tuple[_Floats, _Floats, _Floats, _Floats, _Floats, _Floats]
 
 
+class LampGroup(NamedTuple):
+    """Lamps of one colour.
+
+    Attributes
+    ----------
+    places : (n, 3) float32
+        Where they are from the eye in the vehicle's axes (forward, right, up) [m].
+    tables : (n, SIZE, SIZE) float32
+        Their beams, sharp [cd].
+    colour : (3,) float32
+        Linear colour of luminance 1.
+    """
+
+    places: NDArray[np.float32]
+    tables: NDArray[np.float32]
+    colour: NDArray[np.float32]
+
+
+class VeilGrid(NamedTuple):
+    """The veil on a grid of rays, and what fog there is on them.
+
+    Attributes
+    ----------
+    columns : int
+        Columns of the grid.
+    nodes : uint32
+        Nodes of a ray, which lie evenly over r / (r + fold).
+    fold : float32
+        See `nodes` [m].
+    veil : (rows, columns · nodes) float32
+        Veil from the eye to each node [cd/m²]; without rows in clear air.
+    attenuation : (rows, columns · nodes) or (1, 1) float32
+        Mean extinction coefficient to each node; one entry where fog is even [1/m].
+    """
+
+    columns: int
+    nodes: np.uint32
+    fold: np.float32
+    veil: NDArray[np.float32]
+    attenuation: NDArray[np.float32]
+
+
 @kernel
-def _read_row(
+def _read_profiles(
     count: np.uint64,
     values: NDArray[np.float32],
     nodes: np.uint32,
@@ -50,7 +94,7 @@ def _read_row(
 
 
 @kernel
-def _add_row(
+def _add_lamplight(
     colour: NDArray[np.float32],
     scattered: NDArray[np.float32],
     shone: NDArray[np.float32],
@@ -62,7 +106,7 @@ def _add_row(
 
 
 @kernel
-def _places(
+def _table_places(
     count: np.uint64,
     along: NDArray[np.float32],
     across: NDArray[np.float32],
@@ -77,7 +121,7 @@ def _places(
 
 
 @kernel
-def _weights(
+def _distance_weights(
     count: np.uint64,
     forward: NDArray[np.float32],
     right: NDArray[np.float32],
@@ -130,13 +174,12 @@ def _column_places(
 
 
 @kernel
-def _light_row(
+def _light_surfaces(
     count: np.uint64,
     points: NDArray[np.float32],
     length: NDArray[np.float32],
     mean: NDArray[np.float32],
-    lamps: NDArray[np.float32],
-    tables: NDArray[np.float32],
+    lamps: LampGroup,
     scratch: NDArray[np.float32],
     power: NDArray[np.int32],
     light: NDArray[np.float32],
@@ -146,11 +189,12 @@ def _light_row(
     column, row, weight, kept = scratch[0], scratch[1], scratch[2], scratch[3]
     for u in range(count):
         light[u] = _ZERO
-    for i in range(lamps.shape[0]):
-        _places(count, forward, right, lamps[i, 0], lamps[i, 1], column)
-        _places(count, forward, up, lamps[i, 0], lamps[i, 2], row)
-        _weights(count, forward, right, up, lamps[i], length, mean, weight)
-        _add_intensity(count, tables[i], row, column, weight, light)
+    places = lamps.places
+    for i in range(places.shape[0]):
+        _table_places(count, forward, right, places[i, 0], places[i, 1], column)
+        _table_places(count, forward, up, places[i, 0], places[i, 2], row)
+        _distance_weights(count, forward, right, up, places[i], length, mean, weight)
+        _add_intensity(count, lamps.tables[i], row, column, weight, light)
     for u in range(count):
         weight[u] = np.float32(2.0) * mean[u] * length[u]
     transmittances(weight[:count], power, kept)
@@ -184,7 +228,7 @@ def _node_places(
 
 
 @kernel
-def _rows_of_choice(columns: int, cells: int, nodes: int) -> _ChoiceRows:
+def _choice_rows(columns: int, cells: int, nodes: int) -> _ChoiceRows:
     """Rows for the pixels that are chosen: columns, distances, profiles left of them and how far on, and pieces.
 
     They begin as if every pixel were chosen.
@@ -196,7 +240,7 @@ def _rows_of_choice(columns: int, cells: int, nodes: int) -> _ChoiceRows:
 
 
 @kernel
-def _rows_of_light(columns: int) -> _LightRows:
+def _light_rows(columns: int) -> _LightRows:
     """Rows for what is scattered and what shines on surfaces: of the chosen pixels, of every pixel, of each channel."""
     few_scattered, few_light = np.empty(columns, np.float32), np.empty(columns, np.float32)
     scattered, light = np.zeros(columns, np.float32), np.zeros(columns, np.float32)
@@ -210,36 +254,42 @@ def add_own_light(
     response: NDArray[np.float32],
     ray_map: NDArray[np.float32],
     step: int,
-    lamps: NDArray[np.float32],
-    tables: NDArray[np.float32],
-    colour: NDArray[np.float32],
-    grid_columns: int,
-    nodes: np.uint32,
-    fold: np.float32,
-    veil: NDArray[np.float32],
-    attenuation: NDArray[np.float32],
+    lamps: LampGroup,
+    grid: VeilGrid,
     out: NDArray[np.float32],
 ) -> None:
-    """Add to an image (rows, cols · 3) what own lamps of one colour make of it.
+    """Add to an image what own lamps of one colour make of it.
 
-    `response` (rows, cols · 3) may have no rows. `ray_map` takes (u, v, 1) to a ray in the vehicle's axes (forward,
-    right, up); on plane surfaces light is computed at each `step`-th pixel. `lamps` (n, 3) are places in those axes and
-    `tables` (n, SIZE, SIZE) their beams. `veil` and `attenuation` (rows, columns · nodes) hold the veil at each node of
-    the grid's rays and the mean extinction coefficient to there; where fog is even `attenuation` has one entry, and in
-    clear air `veil` has no rows. Nodes lie evenly over r / (r + fold).
+    Parameters
+    ----------
+    distance : (rows, cols) float32
+        What the pixels see [m].
+    response : (rows, cols · 3) float32
+        Its response to lamplight [cd/m² per lx]; may have no rows.
+    ray_map : (3, 3) float32
+        Takes (u, v, 1) to a ray in the vehicle's axes (forward, right, up).
+    step : int
+        On plane surfaces light is computed at each so many pixels.
+    lamps : LampGroup
+        The lamps.
+    grid : VeilGrid
+        Their veil.
+    out : (rows, cols · 3) float32
+        Luminance [cd/m²]; added to.
     """
+    nodes, fold, veil, attenuation = grid.nodes, grid.fold, grid.veil, grid.attenuation
     columns = distance.shape[1]
     uniform, clear, surfaces = attenuation.size == 1, veil.shape[0] == 0, response.shape[0] > 0
-    grid_rows, cells, last = max(veil.shape[0], attenuation.shape[0]), grid_columns - 1, np.float32(nodes - 1)
-    profiles, node = np.zeros(grid_columns * int(nodes), np.float32), np.empty(columns, np.float32)
+    grid_rows, cells, last = max(veil.shape[0], attenuation.shape[0]), grid.columns - 1, np.float32(nodes - 1)
+    profiles, node = np.zeros(grid.columns * int(nodes), np.float32), np.empty(columns, np.float32)
     points, scratch = np.empty((3, columns), np.float32), np.empty((4, columns), np.float32)
     length, inverse = np.empty(columns, np.float32), np.empty(columns, np.float32)
     bent, power = np.empty(columns, np.uint8), np.empty(columns, np.int32)
     mean, channels = np.full(columns, attenuation[0, 0]), np.empty(3 * columns, np.float32)
     no_response, n = np.zeros(3 * columns, np.float32), np.uint64(columns)
-    pixel, chosen, left, aside, first, even = _rows_of_choice(columns, cells, int(nodes))
-    few_scattered, few_light, scattered, light, veiled, shone = _rows_of_light(columns)
-    fill_channels(colour, channels)
+    pixel, chosen, left, aside, first, even = _choice_rows(columns, cells, int(nodes))
+    few_scattered, few_light, scattered, light, veiled, shone = _light_rows(columns)
+    fill_channels(lamps.colour, channels)
     if step == 1:
         # Every pixel is chosen, so that what is found for the chosen ones is every pixel's.
         chosen, scattered, light = length, few_scattered, few_light
@@ -256,17 +306,17 @@ def add_own_light(
         upper = min(int(place), grid_rows - 2)
         if not clear:
             interpolate_rows(veil[upper], veil[upper + 1], place - np.float32(upper), profiles)
-            _read_row(n, profiles, nodes, left, aside, node, few_scattered)
+            _read_profiles(n, profiles, nodes, left, aside, node, few_scattered)
             if step > 1:
-                spread(few_scattered, step, first, even, scattered)
+                spread_over_row(few_scattered, step, first, even, scattered)
             repeat_channels(scattered, veiled)
         if lit:
             if not uniform:
                 interpolate_rows(attenuation[upper], attenuation[upper + 1], place - np.float32(upper), profiles)
-                _read_row(n, profiles, nodes, left, aside, node, mean)
+                _read_profiles(n, profiles, nodes, left, aside, node, mean)
             row_points(n, ray_map, v, pixel, chosen, points)
-            _light_row(n, points, chosen, mean, lamps, tables, scratch, power, few_light)
+            _light_surfaces(n, points, chosen, mean, lamps, scratch, power, few_light)
             if step > 1:
-                spread(few_light, step, first, even, light)
+                spread_over_row(few_light, step, first, even, light)
             repeat_channels(light, shone)
-        _add_row(channels, veiled, shone, response[v] if lit else no_response, out[v])
+        _add_lamplight(channels, veiled, shone, response[v] if lit else no_response, out[v])

@@ -13,7 +13,13 @@ _STEEPEST = np.float32(0.2)  # relative change of 1 / distance over a piece abov
 
 
 def piece_length(focal_length: float) -> int:
-    """Pixels of a piece of a camera with a focal length [px]: 0.6°, over which beams and light change by little."""
+    """Pixels of a piece: 0.6°, over which beams and light change by little.
+
+    Parameters
+    ----------
+    focal_length : float
+        Focal length of the camera [px].
+    """
     return min(max(int(math.radians(0.6) * focal_length), 1), 8)
 
 
@@ -30,8 +36,25 @@ def choose_pixels(
 ) -> np.uint64:
     """Choose a row's pixels to compute: each `step`-th and the last, and all between where the surface is not plane.
 
-    Over a plane 1 / distance is linear. `pixel` and `chosen` take columns and distances of the pixels, `first` for each
-    piece of the row the number of its first pixel among them, `even` whether the piece is plane.
+    Over a plane 1 / distance is linear.
+
+    Parameters
+    ----------
+    length : (cols,) float32
+        What the row sees [m].
+    step : int
+        Pixels of a piece.
+    inverse, bent : (cols,) float32 and uint8
+        Scratch.
+    pixel, chosen : (cols,) float32
+        Columns and distances of the chosen pixels; written to.
+    first, even : (cols,) uint64 and bool
+        For each piece the number of its first pixel among the chosen, and whether it is plane; written to.
+
+    Returns
+    -------
+    uint64
+        How many were chosen.
     """
     # Unsigned, because indices that may be negative cost a comparison each.
     columns, size = np.uint64(length.shape[0]), np.uint64(step)
@@ -74,7 +97,21 @@ def row_points(
     length: NDArray[np.float32],
     points: NDArray[np.float32],
 ) -> None:
-    """Where the things are (3, n) that chosen pixels of row `v` see, in the axes of `ray_map`'s rays [m]."""
+    """Where the things are that chosen pixels of a row see.
+
+    Parameters
+    ----------
+    count : uint64
+        Chosen pixels.
+    ray_map : (3, 3) float32
+        Takes (u, v, 1) to a ray.
+    v : int
+        The row.
+    pixel, length : (cols,) float32
+        Columns of the pixels, and what they see [m].
+    points : (3, cols) float32
+        Places in the axes of the rays [m]; written to.
+    """
     first_x = ray_map[0, 1] * np.float32(v) + ray_map[0, 2]
     first_y = ray_map[1, 1] * np.float32(v) + ray_map[1, 2]
     first_z = ray_map[2, 1] * np.float32(v) + ray_map[2, 2]
@@ -88,14 +125,24 @@ def row_points(
 
 
 @kernel
-def spread(
+def spread_over_row(
     values: NDArray[np.float32],
     step: int,
     first: NDArray[np.uint64],
     even: NDArray[np.bool_],
     out: NDArray[np.float32],
 ) -> None:
-    """Values of the chosen pixels, for every pixel of a row."""
+    """Values of the chosen pixels, for every pixel of a row.
+
+    Parameters
+    ----------
+    values : (cols,) float32
+        Of the chosen pixels.
+    step, first, even
+        As for `choose_pixels`.
+    out : (cols,) float32
+        Written to.
+    """
     if step == 1:
         for u in range(values.shape[0]):
             out[u] = values[u]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fogsim.atmosphere.fog.medium import is_uniform_below
 from fogsim.atmosphere.fog.optical_depth import extinction
 from fogsim.atmosphere.lamps.plane_pieces import piece_length
-from fogsim.atmosphere.lamps.streetlight_kernels import add_lamp_illuminance, add_street_light
+from fogsim.atmosphere.lamps.streetlight_kernels import EyeOnMap, GroundLight, add_lamp_illuminance, add_street_light
 from fogsim.atmosphere.lamps.veil import LOSS_OF_SPREAD_LIGHT
 from fogsim.values import Camera, CameraPose, FogField, StreetLighting, View
 from fogsim.values.pinhole import ray_from_pixel
@@ -40,15 +40,14 @@ class _Map:
         Where its middle is [m].
     extinction : (n,) float64
         That at each lamp [1/m].
-    illuminance, tops : (cells, cells) float32
-        Horizontal illuminance [lx] and height of the nearest lamp [m], rows to the north, columns to the east.
+    light : GroundLight
+        The map itself.
     """
 
     lamps: StreetLighting
     middle: NDArray[np.float64]
     extinction: NDArray[np.float64]
-    illuminance: NDArray[np.float32]
-    tops: NDArray[np.float32]
+    light: GroundLight
 
 
 class StreetLight:
@@ -89,16 +88,14 @@ class StreetLight:
             self._lit = np.empty(view.radiance.shape, np.float32)
         rows, columns = view.distance.shape
         eye = np.array(pose.position[:2])
-        start = (*((eye - ground.middle) / CELL + 0.5 * (_CELLS - 1)), 1.0 / CELL)
+        column, row = ((eye - ground.middle) / CELL + 0.5 * (_CELLS - 1)).astype(np.float32)
         add_street_light(
             np.ascontiguousarray(view.radiance, dtype=np.float32).reshape(rows, 3 * columns),
             np.ascontiguousarray(view.distance, dtype=np.float32),
             ray_from_pixel(camera, pose).astype(np.float32),
             piece_length(camera.focal_length),
-            np.array(start, dtype=np.float32),
-            np.float32(pose.position[2]),
-            ground.illuminance,
-            ground.tops,
+            EyeOnMap(column, row, np.float32(1.0 / CELL), np.float32(pose.position[2])),
+            ground.light,
             np.array(lamps.colour, dtype=np.float32) / np.float32(lamps.sky_illuminance),
             np.float32(_WHITEST * lamps.sky_illuminance / math.pi),
             self._lit.reshape(rows, 3 * columns),
@@ -130,6 +127,6 @@ def _map_of(
 ) -> _Map:
     illuminance, tops = np.zeros((_CELLS, _CELLS), np.float32), np.zeros((_CELLS, _CELLS), np.float32)
     intensity = np.interp(np.arccos(_COSINES), lamps.angle, lamps.intensity)
-    origin, lost = middle - 0.5 * (_CELLS - 1) * CELL, LOSS_OF_SPREAD_LIGHT * dense
-    add_lamp_illuminance(near, lost, lamps.height, intensity, REACH, origin, CELL, illuminance, tops)
-    return _Map(lamps, middle, dense, illuminance, tops)
+    light = GroundLight(middle - 0.5 * (_CELLS - 1) * CELL, CELL, illuminance, tops)
+    add_lamp_illuminance(near, LOSS_OF_SPREAD_LIGHT * dense, lamps.height, intensity, REACH, light)
+    return _Map(lamps, middle, dense, light)

@@ -1,16 +1,55 @@
 """Light of street lamps on the ground, as a map, and from the map on what pixels see."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere.fog.koschmieder_kernels import bilinear, fill_channels, repeat_channels
-from fogsim.atmosphere.lamps.plane_pieces import choose_pixels, row_points, spread
+from fogsim.atmosphere.lamps.plane_pieces import choose_pixels, row_points, spread_over_row
 from fogsim.jit import kernel
 
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)
 _FARTHEST = np.float32(500.0)  # half the diagonal of a map, and more
+
+
+class GroundLight(NamedTuple):
+    """A map of the light on the ground.
+
+    Attributes
+    ----------
+    origin : (2,) float64
+        Where the middle of the map's first corner is (x, y) [m].
+    cell : float
+        Side of its cells [m].
+    illuminance, tops : (rows, cols) float32
+        Horizontal illuminance [lx] and height of the nearest lamp [m], rows to the north, columns to the east.
+    """
+
+    origin: NDArray[np.float64]
+    cell: float
+    illuminance: NDArray[np.float32]
+    tops: NDArray[np.float32]
+
+
+class EyeOnMap(NamedTuple):
+    """Where the eye is on a map.
+
+    Attributes
+    ----------
+    column, row : float32
+        Place on the map [cells].
+    cells_per_metre : float32
+        [1/m]
+    height : float32
+        Of the eye [m].
+    """
+
+    column: np.float32
+    row: np.float32
+    cells_per_metre: np.float32
+    height: np.float32
 
 
 @kernel
@@ -20,16 +59,26 @@ def add_lamp_illuminance(
     height: float,
     intensity: NDArray[np.float64],
     farthest: float,
-    origin: NDArray[np.float64],
-    cell: float,
-    illuminance: NDArray[np.float32],
-    tops: NDArray[np.float32],
+    ground: GroundLight,
 ) -> None:
-    """Add lamps (n, 3) to a map of horizontal illuminance [lx], and set how high the nearest lamp hangs [m].
+    """Add lamps to a map of illuminance, and set how high the nearest lamp hangs.
 
-    `extinction` holds what each lamp's light loses a metre [1/m], `intensity` values over the cosine of the angle from
-    straight down in even steps from 0 to 1 [cd]. `origin` is where the middle of the map's first corner is.
+    Parameters
+    ----------
+    lamps : (n, 3) float64
+        Places [m].
+    extinction : (n,) float64
+        What the light of each loses on its way [1/m].
+    height : float
+        Height of the lamps above the road [m].
+    intensity : (m,) float64
+        Over the cosine of the angle from straight down, in even steps from 0 to 1 [cd].
+    farthest : float
+        Distance along the ground beyond which a lamp lights nothing [m].
+    ground : GroundLight
+        The map; added to.
     """
+    origin, cell, illuminance, tops = ground.origin, ground.cell, ground.illuminance, ground.tops
     rows, columns = illuminance.shape
     last = intensity.shape[0] - 1.001
     nearest = np.full((rows, columns), np.float32(np.inf))
@@ -66,21 +115,17 @@ def _any_near(distance: NDArray[np.float32]) -> bool:
 def _read_map(
     count: np.uint64,
     points: NDArray[np.float32],
-    start: NDArray[np.float32],
-    eye_height: np.float32,
-    illuminance: NDArray[np.float32],
-    tops: NDArray[np.float32],
+    eye: EyeOnMap,
+    ground: GroundLight,
     light: NDArray[np.float32],
 ) -> bool:
-    """Illuminance of what chosen pixels see, none above the lamps; whether there is any.
-
-    `points` (3, n) are from the eye, `start` and `eye_height` as for `add_street_light`.
-    """
+    """Illuminance of what chosen pixels see, at `points` (3, n) from the eye, none above the lamps; if there is any."""
+    illuminance, tops, eye_height = ground.illuminance, ground.tops, eye.height
     last_row, last_column = np.float32(illuminance.shape[0] - 1.001), np.float32(illuminance.shape[1] - 1.001)
-    east, north, up, per_cell = points[0], points[1], points[2], start[2]
+    east, north, up, per_metre = points[0], points[1], points[2], eye.cells_per_metre
     any_light = False
     for n in range(count):
-        x, y = start[0] + east[n] * per_cell, start[1] + north[n] * per_cell
+        x, y = eye.column + east[n] * per_metre, eye.row + north[n] * per_metre
         light[n] = _ZERO
         if not (_ZERO <= x < last_column and _ZERO <= y < last_row):
             continue
@@ -94,36 +139,48 @@ def _read_map(
 
 @kernel
 def _light_row(
-    radiance: NDArray[np.float32],
+    luminance: NDArray[np.float32],
     light: NDArray[np.float32],
     factor: NDArray[np.float32],
     most: np.float32,
     out: NDArray[np.float32],
 ) -> None:
     for j in range(out.shape[0]):
-        out[j] = radiance[j] + min(radiance[j], most) * light[j] * factor[j]
+        out[j] = luminance[j] + min(luminance[j], most) * light[j] * factor[j]
 
 
 @kernel
 def add_street_light(
-    radiance: NDArray[np.float32],
+    luminance: NDArray[np.float32],
     distance: NDArray[np.float32],
     ray_map: NDArray[np.float32],
     step: int,
-    start: NDArray[np.float32],
-    eye_height: np.float32,
-    illuminance: NDArray[np.float32],
-    tops: NDArray[np.float32],
+    eye: EyeOnMap,
+    ground: GroundLight,
     factor: NDArray[np.float32],
     most: np.float32,
     out: NDArray[np.float32],
 ) -> None:
-    """Radiance of an image (rows, cols · 3) by the sky's light and that of street lamps.
+    """Luminance of an image by the sky's light and that of street lamps.
 
-    Surfaces return the lamps' light as they do the sky's: `factor` (3) is the lamps' colour per illuminance of the sky
-    [1/lx]. What is brighter than `most` shines by itself and returns no more than that [cd/m²]. `ray_map` takes
-    (u, v, 1) to a ray in the world; on plane surfaces light is read at each `step`-th pixel. `start` is the eye's place
-    on the map and the cells per metre.
+    Parameters
+    ----------
+    luminance, out : (rows, cols · 3) float32
+        By the sky's light, and by both [cd/m²]; `out` is written to.
+    distance : (rows, cols) float32
+        What the pixels see [m].
+    ray_map : (3, 3) float32
+        Takes (u, v, 1) to a ray in the world.
+    step : int
+        On plane surfaces light is read at each so many pixels.
+    eye : EyeOnMap
+        Where the camera is on the map.
+    ground : GroundLight
+        The map.
+    factor : (3,) float32
+        The lamps' colour per illuminance of the sky [1/lx]: surfaces return the lamps' light as they do the sky's.
+    most : float32
+        What is brighter shines by itself, and returns no more than that [cd/m²].
     """
     columns = distance.shape[1]
     points, light, few = (
@@ -143,11 +200,11 @@ def add_street_light(
                 length[u] = min(distance[v, u], _FARTHEST)
             n = choose_pixels(length, step, inverse, bent, pixel, chosen, first, even)
             row_points(n, ray_map, v, pixel, chosen, points)
-            any_light = _read_map(n, points, start, eye_height, illuminance, tops, few)
+            any_light = _read_map(n, points, eye, ground, few)
         if any_light:
-            spread(few, step, first, even, light)
+            spread_over_row(few, step, first, even, light)
             repeat_channels(light, lit)
-            _light_row(radiance[v], lit, channels, most, out[v])
+            _light_row(luminance[v], lit, channels, most, out[v])
         else:
             for j in range(3 * columns):
-                out[v, j] = radiance[v, j]
+                out[v, j] = luminance[v, j]

@@ -11,14 +11,13 @@ four numbers below were fitted to photons (`benchmarks/monte_carlo.py veil`); th
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere.lamps.lamp_tables import phase_table
 from fogsim.atmosphere.lamps.phase_function import Droplets, blurred, phase_function
-from fogsim.atmosphere.lamps.veil_kernels import add_scattered_light, integrate_veil
+from fogsim.atmosphere.lamps.veil_kernels import LitAir, ScatteringPhase, VeilRays, add_scattered_light, integrate_veil
 from fogsim.linear_algebra import matrix_product
 from fogsim.values import Camera, CameraPose
 from fogsim.values.pinhole import camera_axes
@@ -31,12 +30,6 @@ SPREAD = 0.22
 
 PHASE_SPREAD = 0.17
 """Width by which the phase function of spread light is blurred [rad]."""
-
-LAMP_SIZE = 0.08
-"""Radius of a lamp's face [m]: seen from near, its beam is blurred by as much."""
-
-HIDDEN = 0.4
-"""Distance from a lamp within which its light in the air is damped [m]: there a car's bonnet hides it from the eye."""
 
 FOLD_DISTANCE = 10.0
 """Nodes lie evenly over r / (r + FOLD_DISTANCE) [m]."""
@@ -53,26 +46,6 @@ def node_distances() -> NDArray[np.float64]:
     """Distances of a ray's nodes [m]; the last stands for an endless ray."""
     folded = np.arange(INTERVALS + 1) / INTERVALS
     return np.minimum(FOLD_DISTANCE * folded / np.maximum(1.0 - folded, 1e-9), _FARTHEST)
-
-
-@dataclass(frozen=True, slots=True)
-class VeilRays:
-    """Rays of a camera's view, in the vehicle's axes (forward, left, up).
-
-    Attributes
-    ----------
-    shape : tuple of int
-        Rows and columns of the grid, whose corners are the middles of the image's corner pixels.
-    directions : (n, 3) float32
-        Unit vectors, row by row.
-    at, length : (pieces,) float64
-        Middles and lengths of the pieces of each ray [m].
-    """
-
-    shape: tuple[int, int]
-    directions: NDArray[np.float32]
-    at: NDArray[np.float64]
-    length: NDArray[np.float64]
 
 
 def veil_rays(camera: Camera) -> VeilRays:
@@ -102,23 +75,6 @@ def ray_pieces() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return FOLD_DISTANCE * folded / (1.0 - folded), FOLD_DISTANCE / count / (1.0 - folded) ** 2
 
 
-@dataclass(frozen=True, slots=True)
-class LitAir:
-    """What lamps would send to the eye from each piece of the rays, were the air clear on the way.
-
-    Attributes
-    ----------
-    straight, turned : (rays, pieces) float32
-        From the beam as it is and as scattering spreads it [cd/m² per extinction].
-    path : (rays, pieces) float32
-        Way from lamp to piece to eye [m].
-    """
-
-    straight: NDArray[np.float32]
-    turned: NDArray[np.float32]
-    path: NDArray[np.float32]
-
-
 def lit_air(
     rays: VeilRays, lamps: list[tuple[tuple[float, float, float], NDArray[np.float32]]], droplets: Droplets
 ) -> LitAir:
@@ -136,25 +92,13 @@ def lit_air(
     shape = (len(rays.directions), len(rays.at))
     straight, turned, path = (np.zeros(shape, np.float32) for _ in range(3))
     phase = phase_function(droplets)
-    tables = phase_table(phase), phase_table(blurred(phase, PHASE_SPREAD))
+    phases = ScatteringPhase(phase_table(phase), phase_table(blurred(phase, PHASE_SPREAD)), SPREAD)
+    air = LitAir(straight, turned, path)
     for offset, table in lamps:
-        add_scattered_light(
-            rays.directions,
-            rays.at,
-            rays.length,
-            np.array(offset, dtype=np.float64),
-            table,
-            *tables,
-            LAMP_SIZE,
-            HIDDEN,
-            SPREAD,
-            straight,
-            turned,
-            path,
-        )
+        add_scattered_light(rays, np.array(offset, dtype=np.float64), table, phases, air)
     path /= np.maximum(straight + turned, np.float32(1e-30))
     path += rays.at.astype(np.float32)
-    return LitAir(straight, turned, path)
+    return air
 
 
 def veil_along(air: LitAir, extinction: NDArray[np.float32], mean: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -168,5 +112,5 @@ def veil_along(air: LitAir, extinction: NDArray[np.float32], mean: NDArray[np.fl
         Extinction coefficient in each interval between nodes, and its mean from the eye to there [1/m].
     """
     veil = np.empty((len(air.path), INTERVALS + 1), np.float32)
-    integrate_veil(air.straight, air.turned, air.path, extinction, mean, np.float32(LOSS_OF_SPREAD_LIGHT), veil)
+    integrate_veil(air, extinction, mean, np.float32(LOSS_OF_SPREAD_LIGHT), veil)
     return veil

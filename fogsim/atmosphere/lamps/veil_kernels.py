@@ -1,6 +1,7 @@
 """Fog lit by own lamps, along rays: how much light meets each place, and how much of it comes back to the eye."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,9 +10,66 @@ from fogsim.atmosphere.fog.koschmieder_kernels import transmittances
 from fogsim.atmosphere.lamps.lamp_tables import BLURS, FIRST_BLUR, FOLD, PHASE_SIZE, SIZE
 from fogsim.jit import kernel
 
+LAMP_SIZE = 0.08
+"""Radius of a lamp's face [m]: seen from near, its beam is blurred by as much."""
+
+HIDDEN = 0.4
+"""Distance from a lamp within which its light in the air is damped [m]: there a car's bonnet hides it from the eye."""
+
 _LAST_CELL = SIZE - 1.001
 _LAST_BLUR = BLURS - 1.001
 _HALF = 0.5 * (SIZE - 1)
+
+
+class VeilRays(NamedTuple):
+    """Rays of a camera's view, in the vehicle's axes (forward, left, up).
+
+    Attributes
+    ----------
+    shape : tuple of int
+        Rows and columns of the grid, whose corners are the middles of the image's corner pixels.
+    directions : (n, 3) float32
+        Unit vectors, row by row.
+    at, length : (pieces,) float64
+        Middles and lengths of the pieces of each ray [m].
+    """
+
+    shape: tuple[int, int]
+    directions: NDArray[np.float32]
+    at: NDArray[np.float64]
+    length: NDArray[np.float64]
+
+
+class ScatteringPhase(NamedTuple):
+    """Where light is scattered to, as it is and after it has been spread.
+
+    Attributes
+    ----------
+    straight, spread : (PHASE_SIZE,) float32
+        Tables of the phase functions of straight and of spread light [1/sr].
+    width : float
+        Standard deviation of the directions of spread light [rad].
+    """
+
+    straight: NDArray[np.float32]
+    spread: NDArray[np.float32]
+    width: float
+
+
+class LitAir(NamedTuple):
+    """What lamps would send to the eye from each piece of the rays, were the air clear on the way.
+
+    Attributes
+    ----------
+    straight, turned : (rays, pieces) float32
+        From the beam as it is and as scattering spreads it [cd/m² per extinction].
+    path : (rays, pieces) float32
+        Way from lamp to piece to eye [m]; while lamps are added, that from lamp to piece weighted by its light.
+    """
+
+    straight: NDArray[np.float32]
+    turned: NDArray[np.float32]
+    path: NDArray[np.float32]
 
 
 @kernel
@@ -34,26 +92,30 @@ def _intensity(table: NDArray[np.float32], forward: float, right: float, up: flo
 
 @kernel
 def add_scattered_light(
-    directions: NDArray[np.float32],
-    at: NDArray[np.float64],
-    length: NDArray[np.float64],
+    rays: VeilRays,
     offset: NDArray[np.float64],
     table: NDArray[np.float32],
-    phase: NDArray[np.float32],
-    spread_phase: NDArray[np.float32],
-    lamp_size: float,
-    hidden: float,
-    spread: float,
-    straight: NDArray[np.float32],
-    turned: NDArray[np.float32],
-    path: NDArray[np.float32],
+    phases: ScatteringPhase,
+    air: LitAir,
 ) -> None:
     """Add a lamp's light on pieces of rays that is scattered to the eye: Σ p(Θ) I / s² Δr [cd/m² per extinction].
 
-    `directions` (m, 3) and `offset` are in the vehicle's axes (forward, left, up); pieces are at `at` (n) and `length`
-    (n) long. `straight` and `turned` (m, n) take the light of the beam as it is and as it is spread by scattering at
-    small angles; `path` takes its way from the lamp to the piece, weighted by it.
+    Parameters
+    ----------
+    rays : VeilRays
+        The rays.
+    offset : (3,) float64
+        Place of the lamp from the eye in the vehicle's axes (forward, left, up) [m].
+    table : (BLURS, SIZE, SIZE) float32
+        Its beam; see `lamp_table`.
+    phases : ScatteringPhase
+        Where light is scattered to.
+    air : LitAir
+        Light on the pieces; added to.
     """
+    directions, at, length = rays.directions, rays.at, rays.length
+    phase, spread_phase, spread = phases.straight, phases.spread, phases.width
+    straight, turned, path = air.straight, air.turned, air.path
     for m in range(directions.shape[0]):
         ux, uy, uz = directions[m, 0], directions[m, 1], directions[m, 2]
         for n in range(at.shape[0]):
@@ -68,8 +130,8 @@ def add_scattered_light(
             i = int(place)
             share = place - i
             # Seen from near, a lamp is a disc: its beam is blurred by the disc's angle.
-            near = lamp_size / s
-            falling = length[n] / (square + hidden * hidden)
+            near = LAMP_SIZE / s
+            falling = length[n] / (square + HIDDEN * HIDDEN)
             once = (phase[i] + (phase[i + 1] - phase[i]) * share) * _intensity(table, forward, -left, up, near)
             wide = math.sqrt(near * near + spread * spread)
             again = (spread_phase[i] + (spread_phase[i + 1] - spread_phase[i]) * share) * _intensity(
@@ -82,20 +144,26 @@ def add_scattered_light(
 
 @kernel
 def integrate_veil(
-    straight: NDArray[np.float32],
-    turned: NDArray[np.float32],
-    path: NDArray[np.float32],
+    air: LitAir,
     extinction: NDArray[np.float32],
     mean: NDArray[np.float32],
     loss: np.float32,
     veil: NDArray[np.float32],
 ) -> None:
-    """Light that comes back to the eye from the ray up to each node, cumulated (m, nodes) [cd/m²].
+    """Light that comes back to the eye from the ray up to each node.
 
-    `path` (m, n) is the way of light from lamp to eye; `extinction` and `mean` (m or 1, intervals or 1) are the
-    extinction coefficient in each interval between nodes, and its mean from the eye to there [1/m]. `loss` is the part
-    of the extinction that spread light suffers; straight light suffers twice that.
+    Parameters
+    ----------
+    air : LitAir
+        Light on m rays.
+    extinction, mean : (m or 1, intervals or 1) float32
+        Extinction coefficient in each interval between nodes, and its mean from the eye to there [1/m].
+    loss : float32
+        Part of the extinction that spread light suffers; straight light suffers twice that.
+    veil : (m, nodes) float32
+        Luminance, cumulated [cd/m²]; written to.
     """
+    straight, turned, path = air.straight, air.turned, air.path
     pieces, intervals = path.shape[1], veil.shape[1] - 1
     each = pieces // intervals
     depth, kept = np.empty(pieces, np.float32), np.empty(pieces, np.float32)

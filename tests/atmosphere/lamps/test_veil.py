@@ -7,17 +7,8 @@ import pytest
 
 from fogsim.atmosphere.lamps.lamp_tables import lamp_table
 from fogsim.atmosphere.lamps.phase_function import Droplets
-from fogsim.atmosphere.lamps.veil import (
-    FOLD_DISTANCE,
-    INTERVALS,
-    LitAir,
-    VeilRays,
-    lit_air,
-    node_distances,
-    ray_pieces,
-    veil_along,
-)
-from fogsim.atmosphere.lamps.veil_kernels import integrate_veil
+from fogsim.atmosphere.lamps.veil import FOLD_DISTANCE, INTERVALS, lit_air, node_distances, ray_pieces, veil_along
+from fogsim.atmosphere.lamps.veil_kernels import LitAir, VeilRays, integrate_veil
 from fogsim.atmosphere.visibility.night_visibility import FogKind, high_beam_veil
 from fogsim.lighting.beams import high_beam, low_beam
 from fogsim.units import extinction_from_visibility
@@ -53,7 +44,7 @@ def everywhere(visibility):
 
 def scattered_once(air, visibility, reach):
     k, veil = everywhere(visibility), np.empty((1, INTERVALS + 1), np.float32)
-    integrate_veil(air.straight, np.zeros_like(air.turned), air.path, k, k, np.float32(0.5), veil)
+    integrate_veil(air._replace(turned=np.zeros_like(air.turned)), k, k, np.float32(0.5), veil)
     return up_to(veil[0], reach)
 
 

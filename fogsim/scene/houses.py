@@ -1,6 +1,7 @@
 """Houses along streets."""
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 
 import numpy as np
 
@@ -29,8 +30,9 @@ _DOOR = Material((0.10, 0.055, 0.03))
 _Z = np.array([0.0, 0.0, 1.0])
 
 
-def house_shapes() -> dict[str, Mesh]:
-    """Shapes of houses, fronts to −y, with their levels of detail."""
+@cache
+def house_shapes() -> Mapping[str, Mesh]:
+    """Shapes of houses, fronts to −y, with their levels of detail: the same in every scene."""
     shapes: dict[str, Mesh] = {}
     for number, (width, depth, eaves, rise, wall, roof) in enumerate(_KINDS):
         size = (width, depth, eaves, rise)

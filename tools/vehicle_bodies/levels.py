@@ -1,6 +1,6 @@
-"""Stand-ins of few triangles for vehicles that are small in the picture, made from the shapes that they stand for.
+"""Levels of detail of vehicles that are small in the picture: of few triangles, made from the shapes in full.
 
-A stand-in is a stack of few zones of height. In each zone, from each side, it has as much paint as the shape shows
+A level is a stack of few zones of height. In each zone, from each side, it has as much paint as the shape shows
 from there, under the same light, and what is not paint in one panel of its mean colour; its outline encloses the same
 area. So it has the mean radiance of the shape in any paint, from the rear, the front and the sides. Lamps and plates
 are those of the shape.
@@ -34,7 +34,7 @@ _STEP = 0.9  # a zone whose footprint is smaller than this share of the one belo
 
 @dataclass(frozen=True, slots=True)
 class Detail:
-    """How much of a body its stand-in shows.
+    """How much of a body a level shows.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class _Gain:
 
 
 def levels_of_detail(shape: Mesh, size: Size, details: Sequence[Detail], shadow: float) -> list[Mesh]:
-    """Stand-ins of a body, with its lamps and plates.
+    """Levels of detail of a body, with its lamps and plates.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def _matched(
     rest: Mesh,
     size: Size,
 ) -> Mesh:
-    """Stand-in that covers as much as the body from each side, with as much light: built, looked at and corrected."""
+    """Level that covers as much as the body from each side, with as much light: built, looked at and corrected."""
     left = looks["left"].seen
     runs: dict[str, list[Span]] = {}
     for side, look in looks.items():

@@ -18,7 +18,7 @@ BEHIND = 0.003  # how far panels stay behind lamps and plates [units of the box]
 
 @dataclass(frozen=True, slots=True)
 class SideView:
-    """A body from one side: all of it but its shadow, and of that what its stand-ins keep."""
+    """A body from one side: all of it but its shadow, and of that what its levels of detail keep."""
 
     side: str
     seen: Projection

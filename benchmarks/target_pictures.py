@@ -27,7 +27,7 @@ from fogsim.values import Camera, LeadMeasurement, Observation, Response
 from fogsim.values.estimate import NORMAL_90_PERCENT
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.lines.horizon import Horizon, calibrated_horizon, levelled
-from fogsim.vision.lines.road_lines import meeting_lines
+from fogsim.vision.lines.road_lines import road_vanishing_point
 
 CAMERAS = (
     Camera(688, 515, 700.0, (343.5, 257.0), 1.3, math.radians(2.0)),
@@ -121,7 +121,7 @@ def fit_row(
 def horizon_row(image: Image, told: Camera, true: Camera, cell: str, within: dict[str, str]) -> Row:
     """Where the road's lines meet; an error is that of the horizon's row, in pixels."""
     pixels = linear_pixels(levelled(image, told), told)
-    return met_row(meeting_lines(pixels, told, calibrated_horizon(told)), true.horizon_row, cell, within)
+    return met_row(road_vanishing_point(pixels, told, calibrated_horizon(told)), true.horizon_row, cell, within)
 
 
 def met_row(point: Any, truth: float, cell: str, within: dict[str, str]) -> Row:
@@ -177,5 +177,5 @@ def of_stripes(number: int, seed: int) -> Row:
     guess, deviation = stripes.ROW + rng.normal(0.0, 1.5), 1.5
     told = Camera(640, 300, 600.0, (325.0, guess), 1.4)
     pixels = np.clip(np.rint(stripes.road_lines(seed=int(rng.integers(2**31)))), 0, 255).astype(np.uint8)
-    point = meeting_lines(linear_pixels(pixels, told), told, Horizon(guess, deviation))
+    point = road_vanishing_point(linear_pixels(pixels, told), told, Horizon(guess, deviation))
     return met_row(point, stripes.ROW, "painted stripes, no fog", {})

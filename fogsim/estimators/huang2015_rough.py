@@ -14,7 +14,7 @@ from fogsim.values.estimate import Estimate
 from fogsim.values.observation import Observation
 from fogsim.vision.lines.edges import edge_map, smoothed
 from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation, calibrated_horizon
-from fogsim.vision.lines.lane_lines import hough_lines, plain_vanishing_point
+from fogsim.vision.lines.lane_lines import hough_lines, published_vanishing_point
 from fogsim.vision.region.inflection import koschmieder
 from fogsim.vision.region.profile import path_lengths
 from fogsim.vision.region.road_image import CannotTellError, RoadImage, road_image
@@ -152,7 +152,7 @@ def _grown_medians(road: RoadImage, camera: Camera) -> tuple[_Medians, float]:
         raise CannotTellError("the region grows over fewer rows than the method compares")
     medians = _Medians((np.flatnonzero(seen) + road.first_row).astype(np.float64), rows.luminance[seen])
     below = math.ceil(camera.horizon_row) - road.first_row + 1
-    point = plain_vanishing_point(hough_lines(edges.pixels, below, math.radians(1.0)))
+    point = published_vanishing_point(hough_lines(edges.pixels, below, math.radians(1.0)))
     agrees = (
         point is not None and abs(point.row + road.first_row - camera.horizon_row) <= DISAGREEMENT * camera.focal_length
     )

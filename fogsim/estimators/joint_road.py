@@ -15,8 +15,15 @@ from fogsim.values.observation import LeadMeasurement, Observation
 from fogsim.vision.light.daylight import lit_by_lamps
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.pixel_kernels import LinearPixels
-from fogsim.vision.lines.horizon import PITCH_DEVIATION, Horizon, PitchDeviation, calibrated_horizon, levelled, weighed
-from fogsim.vision.lines.road_lines import meeting_lines
+from fogsim.vision.lines.horizon import (
+    PITCH_DEVIATION,
+    Horizon,
+    PitchDeviation,
+    calibrated_horizon,
+    levelled,
+    weighted_mean,
+)
+from fogsim.vision.lines.road_lines import road_vanishing_point
 from fogsim.vision.strips.agreeing_strips import fit_own, with_neighbours
 from fogsim.vision.strips.joint_checks import no_road
 from fogsim.vision.strips.joint_fit import JointFit, JointPrior
@@ -199,8 +206,8 @@ class JointRoad:
 
     def _seen_horizon(self, pixels: LinearPixels) -> Horizon:
         """Weigh the told horizon with the point in which the road's lines meet."""
-        point = meeting_lines(pixels, self._camera, self._horizon)
-        return self._horizon if point is None else weighed(self._horizon, point.horizon)
+        point = road_vanishing_point(pixels, self._camera, self._horizon)
+        return self._horizon if point is None else weighted_mean(self._horizon, point.horizon)
 
     def _doubt(self, fit: JointFit, sky: Sky, curves: StripCurves, free: float) -> str:
         """Say why a fit is not to be believed; empty if it is."""

@@ -18,11 +18,12 @@ from fogsim.values.observation import Observation
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.medians import median
 from fogsim.vision.light.pixel_kernels import LinearPixels
-from fogsim.vision.lines.canny_deriche import CannyDeriche
+from fogsim.vision.lines.deriche import CannyDeriche
 from fogsim.vision.lines.edges import Edges
-from fogsim.vision.lines.horizon import PITCH_DEVIATION, Horizon, PitchDeviation, calibrated_horizon, weighed
-from fogsim.vision.lines.road_lines import meeting_lines
-from fogsim.vision.lines.vanishing import VanishingPoint, vanishing_point
+from fogsim.vision.lines.gradient_lines import consensus_vanishing_point
+from fogsim.vision.lines.horizon import PITCH_DEVIATION, Horizon, PitchDeviation, calibrated_horizon, weighted_mean
+from fogsim.vision.lines.road_lines import road_vanishing_point
+from fogsim.vision.lines.vanishing_point import VanishingPoint
 from fogsim.vision.region.inflection import FogModel, best_inflection, printed_inflection
 from fogsim.vision.region.profile import RoadCurve, band_profile
 from fogsim.vision.region.road_image import MIN_CONTRAST, MIN_ROWS, SATURATED, CannotTellError, RoadImage, road_image
@@ -246,15 +247,15 @@ class Negru2013:
         if not self._looks_for_lines:
             return self._told
         if not self._as_published:
-            meeting = meeting_lines(pixels, self._camera, self._told)
-            return self._told if meeting is None else weighed(self._told, meeting.horizon)
+            seen = road_vanishing_point(pixels, self._camera, self._told)
+            return self._told if seen is None else weighted_mean(self._told, seen.horizon)
         guess = (self._camera.principal_point[0], self._told.row - road.first_row)
         reach = max(REACH * self._camera.focal_length, 8.0)
-        point = vanishing_point(edges.gradient, edges.pixels, guess, reach)
+        point = consensus_vanishing_point(edges.gradient, edges.pixels, guess, reach)
         if point is not None:
             self._points.append(replace(point, row=point.row + road.first_row))
-        best = max(self._points, key=lambda p: p.score, default=None)
-        found = self._told if best is None else Horizon(best.row, best.deviation)
+        best = max(self._points, key=lambda p: p.support, default=None)
+        found = self._told if best is None else best.horizon
         return found if 1.0 <= found.row <= self._camera.height - 1 - MIN_ROWS else self._told
 
     def _check_clear_view(self, seen: SeenBand) -> None:

@@ -16,12 +16,12 @@ from fogsim.vision.lines.horizon import Horizon, calibrated_horizon, levelled
 from fogsim.vision.lines.lane_lines import (
     CLEAR_OF_VANISHING_POINT,
     LaneLine,
-    VanishingPoint,
     hough_lines,
-    plain_vanishing_point,
+    lane_vanishing_point,
+    published_vanishing_point,
     refined_lines,
-    vanishing_point,
 )
+from fogsim.vision.lines.vanishing_point import VanishingPoint
 from fogsim.vision.region.inflection import steepest_slope
 from fogsim.vision.region.region_kernels import region_tops
 from fogsim.vision.region.road_image import CannotTellError, RoadImage, road_image
@@ -116,13 +116,13 @@ def seen_road(
     first = math.ceil(told.row - road.first_row) + 1
     if growth is not None:
         lines = hough_lines(edges.pixels, first, LOWEST_ANGLE)
-        point = plain_vanishing_point(lines)
+        point = published_vanishing_point(lines)
         limits = constant_limits(blurred.shape[0], growth[0], growth[0] * growth[1], growth[0])
         region = grow_region(blurred, edges.pixels, limits)
     else:
         lines = _sure_lines(edges, blurred, road, camera, told)
         expected = (camera.principal_point[0], told.row - road.first_row)
-        point = vanishing_point(lines, expected, max(5.0 * told.standard_deviation, 2.0))
+        point = lane_vanishing_point(lines, expected, max(5.0 * told.standard_deviation, 2.0))
         steps = (slope + edges.threshold).astype(np.float32)
         limits = cumulative_limits(steps, SIMILARITY * road.contrast + edges.threshold)
         region = grow_region(blurred, edges.pixels, limits)

@@ -10,9 +10,10 @@ from PIL import Image, UnidentifiedImageError
 
 from fogsim.errors import InputError
 from fogsim.offline.image_files import Pixels
-from fogsim.offline.meeting_lines import MeetingPoint, meeting_point
 from fogsim.offline.source import Picture, Source
 from fogsim.values import Camera, Response
+from fogsim.vision.lines.segments import segment_vanishing_point
+from fogsim.vision.lines.vanishing_point import VanishingPoint
 
 ASSUMED_FIELD_OF_VIEW = math.radians(60.0)
 """Horizontal field of view of a camera of which nothing is known [rad]."""
@@ -190,7 +191,8 @@ def _horizon(
     """Row of the horizon [px], what it was taken from, and warnings."""
     if stated is not None:
         return stated, f"the horizon on row {stated:g} as stated", []
-    points = [point for image in pictures if (point := meeting_point(image, response, _bits(image))) is not None]
+    seen = (segment_vanishing_point(image, response, _bits(image)) for image in pictures)
+    points = [point for point in seen if point is not None]
     if not points:
         raise InputError(
             f"no lane lines that meet were found in {len(pictures)} images: give the row of the horizon, counted from "
@@ -205,7 +207,7 @@ def _bits(image: Pixels) -> int:
     return 8 if image.dtype == np.uint8 else 16
 
 
-def _middle(points: list[MeetingPoint]) -> tuple[float, float]:
+def _middle(points: list[VanishingPoint]) -> tuple[float, float]:
     """Median row of points and its standard deviation [px]."""
     rows = np.array([point.row for point in points])
     row = float(np.median(rows))
@@ -215,7 +217,7 @@ def _middle(points: list[MeetingPoint]) -> tuple[float, float]:
     return row, math.hypot(1.25 * max(scatter, single) / math.sqrt(len(points)), SYSTEMATIC)
 
 
-def _doubts(points: list[MeetingPoint], row: float, deviation: float, focal: float, cols: int) -> list[str]:
+def _doubts(points: list[VanishingPoint], row: float, deviation: float, focal: float, cols: int) -> list[str]:
     doubts = []
     if len(points) < SURE_COUNT:
         doubts.append(f"the pitch comes from {len(points)} image{'s' if len(points) > 1 else ''} alone: give more")

@@ -1,4 +1,4 @@
-"""Deriche's smoothing and derivative (Deriche 1987), the gradient of the Canny–Deriche edge detector."""
+"""The Canny–Deriche edge detector (Canny 1986, Deriche 1987): Deriche's smoothing and derivative."""
 
 import math
 from functools import lru_cache
@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
+from fogsim.vision.lines.edges import EdgeDetector
 
 Image = NDArray[np.float32]
 
@@ -67,6 +68,13 @@ def _taps(alpha: float) -> NDArray[np.float64]:
 
 TAPS = math.ceil(REACH / ALPHA)
 """Taps on either side of the middle one: known to the compiler, which then does without the loops over them."""
+
+
+class CannyDeriche(EdgeDetector):
+    """Edge detector by Deriche's derivatives."""
+
+    def __init__(self) -> None:
+        super().__init__(derivatives)
 
 
 def derivatives(image: Image, across: Image, down: Image) -> None:

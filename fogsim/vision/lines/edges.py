@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.vision.light.medians import columns_apart, median, row_medians
-from fogsim.vision.lines import canny_kernels
+from fogsim.vision.lines import edge_kernels
 
 Image = NDArray[np.float32]
 
@@ -53,15 +53,21 @@ class Edges:
 
 
 def smoothed(luminance: Image) -> Image:
-    """Smooth (rows, cols) float32 with a Gaussian of 1 px, over 5 px; what lies outside is as its border."""
+    """Smooth with a Gaussian of 1 px, over 5 px; what lies outside is as the border.
+
+    Parameters
+    ----------
+    luminance : (rows, cols) float32
+        The image.
+    """
     blurred = np.empty_like(luminance)
-    canny_kernels.smooth(luminance, _gaussian(), blurred)
+    edge_kernels.smooth(luminance, _gaussian(), blurred)
     return blurred
 
 
 def _gaussian() -> Image:
     """Weights from the middle one on: the rest is its mirror image."""
-    weights = np.exp(-0.5 * np.arange(canny_kernels.SMOOTH_TAPS + 1) ** 2)
+    weights = np.exp(-0.5 * np.arange(edge_kernels.SMOOTH_TAPS + 1) ** 2)
     return np.asarray(weights / (2.0 * weights.sum() - weights[0]), np.float32)
 
 
@@ -118,9 +124,9 @@ class EdgeDetector:
             # Fog over a dark road brightens upward, so dI/dv is negative.
             medians = row_medians(columns_apart(down, self._of_row))
             slope = np.clip(medians, -fog_slope, 0.0).astype(np.float32)
-        canny_kernels.squared_lengths(across, down, slope, self._squares)
+        edge_kernels.squared_lengths(across, down, slope, self._squares)
         high = max(EDGE_FACTOR * _median_size(self._squares, self._of_road), MIN_GRADIENT)
-        canny_kernels.trace_edges(across, down, self._squares, 0.5 * high, high, self._pixels)
+        edge_kernels.trace_edges(across, down, self._squares, 0.5 * high, high, self._pixels)
         return Edges(self._pixels, high, self._gradient)
 
     def _make_room(self, shape: tuple[int, ...]) -> None:

@@ -15,7 +15,7 @@ PITCH_DEVIATION = math.radians(0.1)
 """Standard deviation of a vehicle's pitch about its calibration [rad]: load, suspension, uneven road."""
 
 PitchDeviation = Annotated[float, Range(1e-6, 0.2, "rad")]
-"""Standard deviation of the pitch as methods are told it [rad]."""
+"""Standard deviation of the pitch that methods assume [rad]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +40,9 @@ def calibrated_horizon(camera: Camera, pitch_deviation: float = PITCH_DEVIATION)
     Parameters
     ----------
     camera : Camera
-        The told calibration.
+        The assumed calibration.
     pitch_deviation : float
-        Standard deviation of the true pitch about the told one [rad].
+        Standard deviation of the true pitch about the assumed one [rad].
 
     Returns
     -------
@@ -53,8 +53,8 @@ def calibrated_horizon(camera: Camera, pitch_deviation: float = PITCH_DEVIATION)
     return Horizon(row=camera.horizon_row, standard_deviation=deviation)
 
 
-def weighed(first: Horizon, second: Horizon) -> Horizon:
-    """Weigh two independent measurements of the horizon by their variances.
+def weighted_mean(first: Horizon, second: Horizon) -> Horizon:
+    """Mean of two independent measurements of the horizon, weighted by one over their variances.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def levelled(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera) -> N
     image : (rows, cols) or (rows, cols, 3) uint8 or uint16
         An image of the camera.
     camera : Camera
-        The told calibration; its roll is what is undone.
+        The assumed calibration; its roll is what is undone.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Lane lines by a Hough transform of limited angle, to a fraction of a pixel, and the point where they meet."""
+"""Lane lines by a Hough transform of limited angle, to a fraction of a pixel, and their vanishing point."""
 
 import math
 from dataclasses import dataclass
@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.linear_algebra import inverse_of, matrix_product
+from fogsim.linear_algebra import matrix_product
+from fogsim.vision.lines.vanishing_point import VanishingPoint, crossings, nearest_point, residual_scale, sloped_lines
 
 Floats = NDArray[np.float64]
 
@@ -51,28 +52,19 @@ class LaneLine:
     spread: float
 
     def column(self, row: float) -> float:
-        """Column at a row [px]."""
+        """Column of the line.
+
+        Parameters
+        ----------
+        row : float
+            Row [px].
+
+        Returns
+        -------
+        float
+            [px].
+        """
         return self.offset + self.slope * row
-
-
-@dataclass(frozen=True, slots=True)
-class VanishingPoint:
-    """Where lane lines meet.
-
-    Attributes
-    ----------
-    column, row : float
-        [px].
-    row_deviation : float
-        Standard deviation of the row [px].
-    lines : int
-        How many lines meet there.
-    """
-
-    column: float
-    row: float
-    row_deviation: float
-    lines: int
 
 
 def hough_lines(
@@ -201,7 +193,7 @@ def _least_squares(rows: Floats, cols: Floats) -> LaneLine | None:
     return LaneLine(slope, middle - slope * centre, rows.size, centre, math.sqrt(spread))
 
 
-def plain_vanishing_point(lines: list[LaneLine]) -> VanishingPoint | None:
+def published_vanishing_point(lines: list[LaneLine]) -> VanishingPoint | None:
     """Intersection of the longest line of either half, as published.
 
     Parameters
@@ -214,15 +206,18 @@ def plain_vanishing_point(lines: list[LaneLine]) -> VanishingPoint | None:
     VanishingPoint or None
         None if a half has no line; its deviation is that of 1° and 1 px at either line.
     """
-    halves = [next((line for line in lines if side * line.slope < 0), None) for side in HALVES]
-    first, second = halves
+    pair = [next((line for line in lines if side * line.slope < 0), None) for side in HALVES]
+    first, second = pair
     if first is None or second is None:
         return None
-    row = (second.offset - first.offset) / (first.slope - second.slope)
-    return VanishingPoint(first.column(row), row, 15.0, 2)
+    both = sloped_lines([first.offset, second.offset], [first.slope, second.slope])
+    row = float(crossings(both, np.zeros(1, np.int64), np.ones(1, np.int64), 0.0)[0, 1])
+    return VanishingPoint(first.column(row), row, 15.0, 2, first.votes + second.votes)
 
 
-def vanishing_point(lines: list[LaneLine], expected: tuple[float, float], tolerance: float) -> VanishingPoint | None:
+def lane_vanishing_point(
+    lines: list[LaneLine], expected: tuple[float, float], tolerance: float
+) -> VanishingPoint | None:
     """Least-squares intersection of the lines that pass near where the calibration expects it.
 
     Parameters
@@ -252,21 +247,19 @@ def vanishing_point(lines: list[LaneLine], expected: tuple[float, float], tolera
         return None
     if abs(point[1] - expected[1]) > tolerance:
         return None
-    scale = max(1.0, math.sqrt(float(matrix_product(residual, residual)) / max(len(kept) - 2, 1)))
-    return VanishingPoint(float(point[0]), float(point[1]), scale * math.sqrt(covariance[1, 1]), len(kept))
+    deviation = residual_scale(residual) * math.sqrt(covariance[1, 1])
+    return VanishingPoint(float(point[0]), float(point[1]), deviation, len(kept), sum(line.votes for line in kept))
 
 
-def _intersection(lines: list[LaneLine]) -> tuple[Floats, Floats, Floats]:
+def _intersection(kept: list[LaneLine]) -> tuple[Floats, Floats, Floats]:
     """Point, its covariance, and each line's standardised residual."""
-    slope, offset = np.array([line.slope for line in lines]), np.array([line.offset for line in lines])
-    point = np.zeros(2)
-    row = float(np.median([line.centre - line.spread for line in lines]))
+    slope = np.array([line.slope for line in kept])
+    lines = sloped_lines([line.offset for line in kept], slope)
+    row = float(np.median([line.centre - line.spread for line in kept]))
     for _ in range(2):
         # Variance of a fitted line's column at the row of the intersection, and 0.2 px that lines are not straight by.
-        variance = np.array([EDGE_DEVIATION**2 * (1 / n.votes + ((row - n.centre) / n.spread) ** 2) for n in lines])
+        variance = np.array([EDGE_DEVIATION**2 * (1 / n.votes + ((row - n.centre) / n.spread) ** 2) for n in kept])
         weight = 1.0 / (variance * (1.0 + slope**2) + 0.04)
-        jacobian = np.column_stack((np.ones_like(slope), -slope))
-        covariance = inverse_of(matrix_product(jacobian.T, weight[:, None] * jacobian))
-        point = matrix_product(covariance, matrix_product(jacobian.T, weight * offset))
+        point, covariance = nearest_point(lines, weight)
         row = float(point[1])
-    return point, covariance, (offset - matrix_product(jacobian, point)) * np.sqrt(weight)
+    return point, covariance, lines.misses(point) * np.sqrt(weight)

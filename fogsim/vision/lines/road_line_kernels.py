@@ -1,38 +1,16 @@
-"""Compiled search for the lines along a road: edges of single rows, and the point in which straight lines meet."""
+"""Lines along a road from edges of single rows: Hough's transform, each line's fit, and the fit of all at once."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
 from fogsim.linear_algebra import inverse_of, times
-from fogsim.vision.light.medians import median_of_few
-from fogsim.vision.light.pixel_kernels import row_luminance
+from fogsim.vision.lines.row_edges import KINDS
 
-RISING, FALLING, RIDGE = 0, 1, 2
-"""Kinds of points: edges to the brighter and to the darker side, and the middle of a narrow bright stripe."""
-
-NARROW = 5.5
-"""Width up to which a bright stripe is one point [px]: blurred together, its edges seem further apart than they are."""
-
-EDGE_IN_NOISE = 6.0
-"""Least gradient of an edge, in deviations of the row's own gradients [-]."""
-
-SAMPLED = 64
-"""Gradients of a row that show how much they scatter, as many from either side."""
-
-LEAST_GRADIENT = 0.7
-"""Least gradient of an edge [linear grey levels per px]."""
-
-REACH, SMOOTHING = 4, 1.3
-"""Half-width of the derivative's kernel, and deviation of the Gaussian that it is the derivative of [px]."""
-
-MOST_A_ROW, MOST_POINTS = 48, 4000
-"""Points that are kept of a row, and of an image."""
-
-KINDS = 3
-"""How many kinds of points there are."""
+Floats = NDArray[np.float64]
 
 LEAST_POINTS, LEAST_TURN = 10.0, 0.4
 """Fewest points of a line, and least difference of two lines' slopes for their crossing to say anything [-]."""
@@ -41,135 +19,106 @@ LEAST_SCATTER, ALIKE, CROOKED = 0.12, 3.0, 0.12
 """Least deviation of a point from its line [px], how many neighbouring points err together, and by how much a line
 that was painted straight is none [px]."""
 
-
-@kernel
-def row_points(
-    pixels: NDArray[np.uint8] | NDArray[np.uint16], tables: NDArray[np.float32], rows: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Points of rows where the luminance changes sharply along the row, to a fraction of a pixel.
-
-    Each row is looked at alone: what fog does from row to row moves no edge within it.
-
-    Parameters
-    ----------
-    pixels : (rows, cols, channels) uint8 or uint16
-        The image.
-    tables : (channels, levels) float32
-        Linear grey levels that each channel adds.
-    rows : (n,) int64
-        Which rows.
-
-    Returns
-    -------
-    tuple of (m, 2) float64 and (m,) int64
-        Column and row of each point [px], and its kind.
-    """
-    cols = pixels.shape[1]
-    place, kind = np.empty((MOST_POINTS, 2)), np.empty(MOST_POINTS, np.int64)
-    line, slope = np.zeros(cols, np.float32), np.zeros(cols, np.float32)
-    tap = np.arange(REACH + 1).astype(np.float64)
-    weight = tap * np.exp(-0.5 * (tap / SMOOTHING) ** 2)
-    weight = weight / (2.0 * (weight * tap).sum())
-    w1, w2, w3, w4 = np.float32(weight[1]), np.float32(weight[2]), np.float32(weight[3]), np.float32(weight[4])
-    # Views that start at each tap: indices that cannot be negative let the loop be vectorised.
-    l4, l3, l2, l1 = line, line[1:], line[2:], line[3:]
-    r1, r2, r3, r4 = line[5:], line[6:], line[7:], line[8:]
-    inner = slope[REACH:]
-    edge, sign = np.empty(MOST_A_ROW), np.empty(MOST_A_ROW, np.int64)
-    count = 0
-    for row in rows:
-        row_luminance(pixels, tables, row, line)
-        for col in range(cols - 2 * REACH):
-            inner[col] = (
-                w1 * (r1[col] - l1[col])
-                + w2 * (r2[col] - l2[col])
-                + w3 * (r3[col] - l3[col])
-                + w4 * (r4[col] - l4[col])
-            )
-        found = _row_edges(slope, edge, sign)
-        i = 0
-        while i < found and count < MOST_POINTS:
-            stripe = i + 1 < found and sign[i] > 0 and sign[i + 1] < 0 and edge[i + 1] - edge[i] < NARROW
-            place[count, 1] = row
-            if stripe:
-                place[count, 0], kind[count] = 0.5 * (edge[i] + edge[i + 1]), RIDGE
-                i += 2
-            else:
-                place[count, 0], kind[count] = edge[i], RISING if sign[i] > 0 else FALLING
-                i += 1
-            count += 1
-    return place[:count].copy(), kind[:count].copy()
+COLUMN, ROW, BEND, SLOPE = range(4)
+"""Unknowns of the fit: the vanishing point [px], the bend [px²], and from the fourth on each line's slope [-]."""
 
 
-@kernel
-def _row_edges(slope: NDArray[np.float32], edge: NDArray[np.float64], sign: NDArray[np.int64]) -> int:
-    """Peaks of a row's gradient that stand out of it; returns how many."""
-    cols = slope.size
-    # Half of a row's gradients, at least, are noise and texture.
-    sample, ordered = np.empty(SAMPLED, np.float32), np.empty(SAMPLED, np.float32)
-    step = max((cols - 2 * REACH) // SAMPLED, 1)
-    for i in range(SAMPLED // 2):
-        sample[2 * i] = abs(slope[min(REACH + i * step, cols - 1)])
-        sample[2 * i + 1] = abs(slope[max(cols - 1 - REACH - i * step, 0)])
-    middle = median_of_few(sample, ordered)
-    least = np.float32(max(EDGE_IN_NOISE * middle / 0.6745, LEAST_GRADIENT))
-    found = 0
-    for col in range(REACH + 1, cols - REACH - 1):
-        here = abs(slope[col])
-        if here < least or found == edge.size:
-            continue
-        before, behind = slope[col - 1], slope[col + 1]
-        rising = slope[col] > 0
-        if not rising:
-            before, behind = -before, -behind
-        if here < before or here <= behind:
-            continue
-        bend = before - 2.0 * here + behind
-        edge[found] = col + (0.5 * (before - behind) / bend if bend < 0.0 else 0.0)
-        sign[found] = 1 if rising else -1
-        found += 1
-    return found
+class Points(NamedTuple):
+    """Points of edges, by row.
 
-
-@kernel
-def vote(
-    across: NDArray[np.float64],
-    below: NDArray[np.float64],
-    kind: NDArray[np.int64],
-    offsets: NDArray[np.float64],
-    slopes: NDArray[np.float64],
-    most: int,
-    least: int,
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Straight lines that many points of one kind lie on (Hough's transform), the ones with most points first.
-
-    Parameters
+    Attributes
     ----------
     across, below : (m,) float64
-        Columns and rows of the points from the expected vanishing point [px].
+        Columns and rows from the expected vanishing point [px].
     kind : (m,) int64
-        Their kinds.
+        Their kinds: `RISING`, `FALLING` or `RIDGE`.
+    """
+
+    across: Floats
+    below: Floats
+    kind: NDArray[np.int64]
+
+
+class RoadLines(NamedTuple):
+    """Straight lines across = offset + slope · below, the ones with most points first.
+
+    Attributes
+    ----------
+    offset, slope : (n,) float64
+        Column at the expected horizon [px], and columns per row [-].
+    kind : (n,) int64
+        Kind of their points.
+    points : (n,) float64
+        How many points they are of.
+    """
+
+    offset: Floats
+    slope: Floats
+    kind: NDArray[np.int64]
+    points: Floats
+
+    def chosen(self, mask: NDArray[np.bool_]) -> "RoadLines":
+        """Some of the lines.
+
+        Parameters
+        ----------
+        mask : (n,) bool
+            Which.
+        """
+        return RoadLines(self.offset[mask], self.slope[mask], self.kind[mask], self.points[mask])
+
+
+class RoadFit(NamedTuple):
+    """Least squares of all lines at once.
+
+    Attributes
+    ----------
+    column, row : float
+        Where they meet, from the expected vanishing point [px].
+    variance : float
+        Variance of the row [px²].
+    lines : int
+        How many lines have points enough.
+    span : float
+        Range of their slopes [-].
+    points : float
+        How many points they are of.
+    """
+
+    column: float
+    row: float
+    variance: float
+    lines: int
+    span: float
+    points: float
+
+
+@kernel
+def hough_lines(points: Points, offsets: Floats, slopes: Floats, most: int, least: int) -> RoadLines:
+    """Straight lines that many points of one kind lie on (Hough's transform).
+
+    Parameters
+    ----------
+    points : Points
+        All points.
     offsets : (b,) float64
-        Columns from there at which lines may cross the expected horizon [px], evenly.
+        Columns at which lines may cross the expected horizon [px], evenly.
     slopes : (s,) float64
         Middles of the cells for slopes, columns per row [-], evenly.
     most, least : int
         Most lines, and fewest points of one.
-
-    Returns
-    -------
-    tuple of (n, 2) float64 and (n,) int64
-        Offset [px] and slope of each line, and its kind.
     """
+    across, below, kind = points
     cells = np.zeros((KINDS, offsets.size, slopes.size), np.int16)
     step, width = slopes[1] - slopes[0], offsets[1] - offsets[0]
     for i in range(across.size):
-        _cast(cells[kind[i]], across[i], below[i], offsets, slopes, 1)
-    lines, kinds, free = np.empty((most, 2)), np.empty(most, np.int64), np.ones(across.size, np.bool_)
+        _cast_votes(cells[kind[i]], across[i], below[i], offsets, slopes, 1)
+    lines = RoadLines(np.empty(most), np.empty(most), np.empty(most, np.int64), np.empty(most))
+    count, free = 0, np.ones(across.size, np.bool_)
     # Votes only ever get fewer, so that a row's last maximum bounds it: only rows that may hold the best are looked at.
     table = cells.reshape(KINDS * offsets.size, slopes.size)
     bound, place = np.full(table.shape[0], np.iinfo(np.int16).max, np.int16), np.zeros(table.shape[0], np.int64)
-    for line in range(most):
+    while count < most:
         best = _middle_argmax(bound, offsets.size)
         while True:
             place[best] = _middle_argmax(table[best], slopes.size)
@@ -178,17 +127,26 @@ def vote(
             bound[best] = table[best, place[best]]
             best = _middle_argmax(bound, offsets.size)
         if bound[best] < least:
-            return lines[:line].copy(), kinds[:line].copy()
+            break
         which = best // offsets.size
         offset, slope = offsets[best % offsets.size], slopes[place[best]]
-        lines[line, 0], lines[line, 1], kinds[line] = offset, slope, which
+        lines.offset[count], lines.slope[count], lines.kind[count] = offset, slope, which
+        lines.points[count] = bound[best]
+        count += 1
         # What lies on this line votes for no other.
         for i in range(across.size):
             near = abs(across[i] - offset - slope * below[i]) <= width + step * below[i]
             if free[i] and kind[i] == which and near:
                 free[i] = False
-                _cast(cells[which], across[i], below[i], offsets, slopes, -1)
-    return lines, kinds
+                _cast_votes(cells[which], across[i], below[i], offsets, slopes, -1)
+    return _first_lines(lines, count)
+
+
+@kernel
+def _first_lines(lines: RoadLines, count: int) -> RoadLines:
+    return RoadLines(
+        lines.offset[:count].copy(), lines.slope[:count].copy(), lines.kind[:count].copy(), lines.points[:count].copy()
+    )
 
 
 @kernel
@@ -207,7 +165,7 @@ def _middle_argmax(values: NDArray[np.int16], size: int) -> int:
 
 
 @kernel
-def _cast(
+def _cast_votes(
     cells: NDArray[np.int16],
     across: float,
     below: float,
@@ -223,30 +181,28 @@ def _cast(
 
 
 @kernel
-def straighten(
-    across: NDArray[np.float64],
-    below: NDArray[np.float64],
-    kind: NDArray[np.int64],
-    lines: NDArray[np.float64],
-    kinds: NDArray[np.int64],
-    reach: float,
-) -> NDArray[np.float64]:
-    """Fit each line to the points of its kind near it.
+def refitted_lines(points: Points, lines: RoadLines, reach: float) -> RoadLines:
+    """Fit each line to the points of its kind near it; lines of too few points, or of none far apart, are left out.
 
-    Returns
-    -------
-    (n, 3) float64
-        Offset [px], slope, and how many points that is of; 0 of lines that have too few, or too near to one another.
+    Parameters
+    ----------
+    points : Points
+        All points.
+    lines : RoadLines
+        From `hough_lines`.
+    reach : float
+        Distance along a row within which points count at first [px].
     """
-    out = np.zeros((lines.shape[0], 3))
-    for line in range(lines.shape[0]):
-        offset, slope, count, near = lines[line, 0], lines[line, 1], 0.0, reach
+    across, below, kind = points
+    out, kept = _first_lines(lines, lines.slope.size), 0
+    for line in range(lines.slope.size):
+        offset, slope, count, near = lines.offset[line], lines.slope[line], 0.0, reach
         for _ in range(3):
             n, sy, sx, syy, sxy = 0.0, 0.0, 0.0, 0.0, 0.0
             low, high = np.inf, 0.0
             for i in range(across.size):
                 y, x = below[i], across[i]
-                if kind[i] != kinds[line] or abs(x - offset - slope * y) > near:
+                if kind[i] != lines.kind[line] or abs(x - offset - slope * y) > near:
                     continue
                 n, sy, sx, syy, sxy = n + 1.0, sy + y, sx + x, syy + y * y, sxy + x * y
                 # Points come by row: one or two that are not of the line make it no longer.
@@ -260,134 +216,130 @@ def straighten(
             slope = (sxy - sy * sx / n) / spread
             offset = (sx - slope * sy) / n
             near = max(0.5 * near, 2.0)
-        out[line, 0], out[line, 1], out[line, 2] = offset, slope, count
-    return out
+        if count > 0.0:
+            out.offset[kept], out.slope[kept], out.kind[kept], out.points[kept] = offset, slope, lines.kind[line], count
+            kept += 1
+    return _first_lines(out, kept)
+
+
+class _Fit(NamedTuple):
+    """State of the fit: the unknowns, and of each line kind, deviation of its points [px] and how many they are."""
+
+    unknown: Floats
+    kind: NDArray[np.int64]
+    scatter: Floats
+    number: Floats
 
 
 @kernel
-def agreeing(lines: NDArray[np.float64], tolerance: float, most: float) -> tuple[float, float, float]:
-    """Point near the expected one through which lines with most points pass: offset, row and those points."""
-    best_offset, best_row, best = 0.0, 0.0, 0.0
-    for i in range(lines.shape[0]):
-        for j in range(i):
-            turn = lines[i, 1] - lines[j, 1]
-            if lines[i, 2] == 0.0 or lines[j, 2] == 0.0 or abs(turn) < LEAST_TURN:
-                continue
-            row = -(lines[i, 0] - lines[j, 0]) / turn
-            if abs(row) > most:
-                continue
-            offset = lines[i, 0] + lines[i, 1] * row
-            total = 0.0
-            for m in range(lines.shape[0]):
-                if abs(lines[m, 0] + lines[m, 1] * row - offset) <= tolerance:
-                    total += lines[m, 2]
-            # Of points that are about as good, the one nearer to the expected row.
-            total *= 1.0 - 0.3 * abs(row) / most
-            if total > best:
-                best_offset, best_row, best = offset, row, total
-    return best_offset, best_row, best
-
-
-@kernel
-def meet(  # noqa: C901, PLR0912, PLR0915 - one iteration of a solver, which shares all its arrays
-    across: NDArray[np.float64],
-    below: NDArray[np.float64],
-    kind: NDArray[np.int64],
-    slopes: NDArray[np.float64],
-    kinds: NDArray[np.int64],
-    offset: float,
-    row: float,
-    bend_deviation: float,
-) -> tuple[float, float, float, int, float]:
-    """Least squares of all lines at once: they meet in one point and bend alike.
+def fit_road_lines(points: Points, lines: RoadLines, column: float, row: float, bend_deviation: float) -> RoadFit:
+    """Least squares of all lines at once (Gauss–Newton): they meet in one point and bend alike.
 
     A line along a road of constant curvature is u = u_h + s (v − v_h) + c / (v − v_h), with the same c for all lines.
 
     Parameters
     ----------
-    across, below, kind : (m,)
-        The points.
-    slopes, kinds : (n,)
-        The lines.
-    offset, row : float
-        Where they meet, from the expected vanishing point [px].
+    points : Points
+        All points.
+    lines : RoadLines
+        Those that pass the first guess of the point.
+    column, row : float
+        This guess, from the expected vanishing point [px].
     bend_deviation : float
         Deviation of c [px²].
-
-    Returns
-    -------
-    tuple
-        Offset and row of the point [px], variance of the row [px²], number of lines, and range of their slopes [-].
     """
-    lines = slopes.size
-    size = 3 + lines
-    slope, bend, reach = slopes.copy(), 0.0, 3.0
-    scatter, number = np.full(lines, 0.5), np.zeros(lines)
-    inverse: NDArray[np.float64] = np.eye(size)
-    which = np.empty(across.size, np.int64)
+    count = lines.slope.size
+    size = SLOPE + count
+    fit = _Fit(np.zeros(size), lines.kind, np.full(count, 0.5), np.zeros(count))
+    unknown, reach = fit.unknown, 3.0
+    unknown[COLUMN], unknown[ROW], unknown[SLOPE:] = column, row, lines.slope
+    inverse: Floats = np.eye(size)
+    line_of = np.empty(points.across.size, np.int64)
     for _ in range(5):
-        squares, number = np.zeros(lines), np.zeros(lines)
-        for i in range(across.size):
-            which[i] = -1
-            y = below[i] - row
-            if y < 4.0:
-                continue
-            nearest = np.inf
-            for m in range(lines):
-                if kinds[m] == kind[i]:
-                    apart = abs(across[i] - offset - slope[m] * y - bend / y)
-                    if apart < min(nearest, max(4.0 * scatter[m], 0.6), reach):
-                        nearest, which[i] = apart, m
-            if which[i] >= 0:
-                number[which[i]] += 1.0
-                squares[which[i]] += nearest * nearest
+        _assign_points(points, fit, reach, line_of)
         normal, right = np.zeros((size, size)), np.zeros(size)
-        normal[2, 2] = 1.0 / bend_deviation**2
-        right[2] = -bend / bend_deviation**2
-        for m in range(lines):
-            normal[3 + m, 3 + m] = 1e-3
-            if number[m] >= LEAST_POINTS:
-                scatter[m] = math.sqrt(squares[m] / number[m])
-            weight = 1.0 / (ALIKE * max(scatter[m], LEAST_SCATTER) ** 2 + number[m] * CROOKED**2)
-            if number[m] < LEAST_POINTS:
-                weight = 0.0
-            n00, n01, n02, n0s, n11, n12, n1s, n22, n2s, nss = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-            r0, r1, r2, rs = 0.0, 0.0, 0.0, 0.0
-            for i in range(across.size):
-                if which[i] != m:
-                    continue
-                y = below[i] - row
-                residual = across[i] - offset - slope[m] * y - bend / y
-                by_row, by_bend = -slope[m] + bend / (y * y), 1.0 / y
-                n00, n01, n02, n0s = n00 + 1.0, n01 + by_row, n02 + by_bend, n0s + y
-                n11, n12, n1s = n11 + by_row * by_row, n12 + by_row * by_bend, n1s + by_row * y
-                n22, n2s, nss = n22 + by_bend * by_bend, n2s + by_bend * y, nss + y * y
-                r0, r1, r2, rs = r0 + residual, r1 + by_row * residual, r2 + by_bend * residual, rs + y * residual
-            s = 3 + m
-            normal[0, 0] += weight * n00
-            normal[0, 1] += weight * n01
-            normal[0, 2] += weight * n02
-            normal[1, 1] += weight * n11
-            normal[1, 2] += weight * n12
-            normal[2, 2] += weight * n22
-            normal[0, s], normal[1, s], normal[2, s] = weight * n0s, weight * n1s, weight * n2s
-            normal[s, s] += weight * nss
-            right[0] += weight * r0
-            right[1] += weight * r1
-            right[2] += weight * r2
-            right[s] = weight * rs
-        normal[0, 0] += 1e-6
-        normal[1, 1] += 1e-3
+        normal[BEND, BEND] = 1.0 / bend_deviation**2
+        right[BEND] = -unknown[BEND] / bend_deviation**2
+        for line in range(count):
+            _add_equations(points, fit, line_of, line, normal, right)
+        normal[COLUMN, COLUMN] += 1e-6
+        normal[ROW, ROW] += 1e-3
         for a in range(size):
             for b in range(a):
                 normal[a, b] = normal[b, a]
         inverse = inverse_of(normal)
         step = times(inverse, right)
-        offset, row, bend = offset + step[0], row + min(max(step[1], -5.0), 5.0), bend + step[2]
-        slope += step[3:]
+        step[ROW] = min(max(step[ROW], -5.0), 5.0)
+        unknown += step
         reach = max(0.6 * reach, 1.0)
-    low, high, used = np.inf, -np.inf, 0
-    for m in range(lines):
+    low, high, used, total = np.inf, -np.inf, 0, 0.0
+    for line in range(count):
+        if fit.number[line] >= LEAST_POINTS:
+            low, high = min(low, unknown[SLOPE + line]), max(high, unknown[SLOPE + line])
+            used, total = used + 1, total + fit.number[line]
+    return RoadFit(unknown[COLUMN], unknown[ROW], float(inverse[ROW, ROW]), used, high - low, total)
+
+
+@kernel
+def _assign_points(points: Points, fit: _Fit, reach: float, line_of: NDArray[np.int64]) -> None:
+    """Give each point to the nearest line of its kind within reach, −1 for none; count and scatter follow."""
+    across, below, kind = points
+    unknown, kinds, scatter, number = fit
+    column, row, bend = unknown[COLUMN], unknown[ROW], unknown[BEND]
+    squares = np.zeros(number.size)
+    number[:] = 0.0
+    for i in range(across.size):
+        line_of[i] = -1
+        y = below[i] - row
+        if y < 4.0:
+            continue
+        nearest = np.inf
+        for m in range(number.size):
+            if kinds[m] == kind[i]:
+                apart = abs(across[i] - column - unknown[SLOPE + m] * y - bend / y)
+                if apart < min(nearest, max(4.0 * scatter[m], 0.6), reach):
+                    nearest, line_of[i] = apart, m
+        if line_of[i] >= 0:
+            number[line_of[i]] += 1.0
+            squares[line_of[i]] += nearest * nearest
+    for m in range(number.size):
         if number[m] >= LEAST_POINTS:
-            low, high, used = min(low, slope[m]), max(high, slope[m]), used + 1
-    return offset, row, float(inverse[1, 1]), used, high - low
+            scatter[m] = math.sqrt(squares[m] / number[m])
+
+
+@kernel
+def _add_equations(
+    points: Points, fit: _Fit, line_of: NDArray[np.int64], line: int, normal: Floats, right: Floats
+) -> None:
+    """Add the normal equations of one line's points, above the diagonal."""
+    across, below, _ = points
+    column, row, bend, slope = fit.unknown[COLUMN], fit.unknown[ROW], fit.unknown[BEND], fit.unknown[SLOPE + line]
+    number, s = fit.number[line], SLOPE + line
+    normal[s, s] = 1e-3
+    if number < LEAST_POINTS:
+        return
+    n00, n01, n02, n0s, n11, n12, n1s, n22, n2s, nss = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    r0, r1, r2, rs = 0.0, 0.0, 0.0, 0.0
+    for i in range(across.size):
+        if line_of[i] != line:
+            continue
+        y = below[i] - row
+        residual = across[i] - column - slope * y - bend / y
+        by_row, by_bend = -slope + bend / (y * y), 1.0 / y
+        n00, n01, n02, n0s = n00 + 1.0, n01 + by_row, n02 + by_bend, n0s + y
+        n11, n12, n1s = n11 + by_row * by_row, n12 + by_row * by_bend, n1s + by_row * y
+        n22, n2s, nss = n22 + by_bend * by_bend, n2s + by_bend * y, nss + y * y
+        r0, r1, r2, rs = r0 + residual, r1 + by_row * residual, r2 + by_bend * residual, rs + y * residual
+    weight = 1.0 / (ALIKE * max(fit.scatter[line], LEAST_SCATTER) ** 2 + number * CROOKED**2)
+    normal[COLUMN, COLUMN] += weight * n00
+    normal[COLUMN, ROW] += weight * n01
+    normal[COLUMN, BEND] += weight * n02
+    normal[ROW, ROW] += weight * n11
+    normal[ROW, BEND] += weight * n12
+    normal[BEND, BEND] += weight * n22
+    normal[COLUMN, s], normal[ROW, s], normal[BEND, s] = weight * n0s, weight * n1s, weight * n2s
+    normal[s, s] += weight * nss
+    right[COLUMN] += weight * r0
+    right[ROW] += weight * r1
+    right[BEND] += weight * r2
+    right[s] = weight * rs

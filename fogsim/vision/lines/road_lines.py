@@ -2,16 +2,24 @@
 
 import functools
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
 from fogsim.vision.light.pixel_kernels import LinearPixels
-from fogsim.vision.lines import road_line_kernels
 from fogsim.vision.lines.horizon import Horizon
-from fogsim.vision.lines.uprights import lying
+from fogsim.vision.lines.road_line_kernels import (
+    LEAST_POINTS,
+    LEAST_TURN,
+    Points,
+    RoadLines,
+    fit_road_lines,
+    hough_lines,
+    refitted_lines,
+)
+from fogsim.vision.lines.row_edges import may_lie_on_road, row_points
+from fogsim.vision.lines.vanishing_point import VanishingPoint, all_pairs, crossings, sloped_lines, supports
 
 Floats = NDArray[np.float64]
 
@@ -41,88 +49,75 @@ FLAT, DRAWN = math.radians(0.012), 0.05
 scaled and compressed [px]."""
 
 AGREES = 4.0
-"""Standard deviations within which a vanishing point belongs to the told horizon [-]."""
+"""Standard deviations within which a vanishing point belongs to the assumed horizon [-]."""
 
 
-@dataclass(frozen=True, slots=True)
-class MeetingLines:
-    """Where the lines along the road meet.
-
-    Attributes
-    ----------
-    column, row : float
-        In the image [px].
-    row_deviation : float
-        Standard deviation of the row [px].
-    lines : int
-        How many they are.
-    """
-
-    column: float
-    row: float
-    row_deviation: float
-    lines: int
-
-    @property
-    def horizon(self) -> Horizon:
-        """The horizon that they show."""
-        return Horizon(self.row, self.row_deviation)
-
-
-def meeting_lines(image: LinearPixels, camera: Camera, horizon: Horizon) -> MeetingLines | None:
-    """Find the vanishing point of the road's lines near the one that the calibration tells.
+def road_vanishing_point(image: LinearPixels, camera: Camera, horizon: Horizon) -> VanishingPoint | None:
+    """Find the vanishing point of the road's lines near the one by the calibration.
 
     Edges along single rows, placed within the pixel; Hough's transform of those that can lie on lines toward the
-    neighbourhood of the told vanishing point; the point through which most of the lines pass; least squares of all of
-    them at once, which lets the road bend.
+    neighbourhood of the expected vanishing point; the point through which most of the lines pass; least squares of all
+    of them at once, which lets the road bend.
 
     Parameters
     ----------
     image : LinearPixels
         A level image.
     camera : Camera
-        Its told calibration.
+        Its assumed calibration.
     horizon : Horizon
         What is known of the horizon.
 
     Returns
     -------
-    MeetingLines or None
-        None if no two lines meet near the told horizon.
+    VanishingPoint or None
+        None if no two lines meet near the assumed horizon.
     """
     rows = _rows(camera, horizon)
-    if rows.size < road_line_kernels.LEAST_POINTS:
+    if rows.size < LEAST_POINTS:
         return None
-    place, kind = _points(image, rows, horizon)
-    across, below = place[:, 0] - camera.principal_point[0], place[:, 1] - horizon.row
+    points = _points(image, rows, camera, horizon)
     offsets, slopes = _cells(YAW * camera.focal_length)
-    least = max(int(road_line_kernels.LEAST_POINTS), rows.size // 8)
-    found, kinds = road_line_kernels.vote(across, below, kind, offsets, slopes, MOST_LINES, least)
-    lines = road_line_kernels.straighten(across, below, kind, found, kinds, 0.5 * (offsets[1] - offsets[0]) + 2.0)
-    farthest = AGREES * horizon.standard_deviation + 2.0
-    offset, row, votes = road_line_kernels.agreeing(lines, TOLERANCE, farthest)
-    passing = (lines[:, 2] > 0) & (np.abs(lines[:, 0] + lines[:, 1] * row - offset) <= TOLERANCE)
-    if votes == 0.0 or passing.sum() < 2:
+    found = hough_lines(points, offsets, slopes, MOST_LINES, max(int(LEAST_POINTS), rows.size // 8))
+    found = refitted_lines(points, found, 0.5 * (offsets[1] - offsets[0]) + 2.0)
+    first = _first_point(found, AGREES * horizon.standard_deviation + 2.0)
+    if first is None:
         return None
-    offset, row, variance, count, span = road_line_kernels.meet(
-        across, below, kind, lines[passing, 1], kinds[passing], offset, row, BEND * camera.focal_length**2
-    )
-    deviation = math.hypot(math.sqrt(variance), FLAT * camera.focal_length, DRAWN)
+    lines = found.chosen(np.abs(found.offset + found.slope * first[1] - first[0]) <= TOLERANCE)
+    if lines.slope.size < 2:
+        return None
+    fit = fit_road_lines(points, lines, *first, BEND * camera.focal_length**2)
+    deviation = math.hypot(math.sqrt(fit.variance), FLAT * camera.focal_length, DRAWN)
     apart = AGREES * math.hypot(horizon.standard_deviation, deviation)
-    if count < 2 or span < road_line_kernels.LEAST_TURN or not abs(row) <= apart:
+    if fit.lines < 2 or fit.span < LEAST_TURN or not abs(fit.row) <= apart:
         return None
-    return MeetingLines(camera.principal_point[0] + offset, horizon.row + row, deviation, count)
+    place = camera.principal_point[0] + fit.column, horizon.row + fit.row
+    return VanishingPoint(*place, deviation, fit.lines, fit.points)
 
 
-def _points(
-    image: LinearPixels, rows: NDArray[np.int64], horizon: Horizon
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _points(image: LinearPixels, rows: NDArray[np.int64], camera: Camera, horizon: Horizon) -> Points:
     """Edges on rows, without those that stand upright: these are followed up to the horizon."""
     step = int(rows[1] - rows[0])
     above = np.arange(int(rows[0]) - step, max(math.floor(horizon.row), -1), -step, dtype=np.int64)[::-1]
-    place, kind = road_line_kernels.row_points(image.pixels, image.tables, np.concatenate((above, rows)))
-    lies = lying(place, step) & (place[:, 1] >= rows[0])
-    return place[lies], kind[lies]
+    place, kind = row_points(image.pixels, image.tables, np.concatenate((above, rows)))
+    lies = may_lie_on_road(place, step) & (place[:, 1] >= rows[0])
+    return Points(place[lies, 0] - camera.principal_point[0], place[lies, 1] - horizon.row, kind[lies])
+
+
+def _first_point(found: RoadLines, farthest: float) -> tuple[float, float] | None:
+    """Crossing of two lines, near the expected point, through which lines with most points pass: column and row."""
+    first, second = all_pairs(found.slope.size)
+    lines = sloped_lines(found.offset, found.slope)
+    crossed = crossings(lines, first, second, LEAST_TURN)
+    aside = np.abs(crossed[:, 1])
+    # Of points that are about as good, the one nearer to the expected row.
+    support = supports(lines, found.points, crossed, TOLERANCE) * (1.0 - 0.3 * aside / farthest)
+    support[~(aside <= farthest)] = 0.0
+    if not support.any():
+        return None
+    best = int(np.argmax(support))
+    row = float(crossed[best, 1])
+    return float(found.offset[first[best]] + found.slope[first[best]] * row), row
 
 
 @functools.lru_cache(maxsize=8)

@@ -2,8 +2,7 @@ import cv2
 import numpy as np
 import pytest
 
-from fogsim.vision.lines.canny_deriche import CannyDeriche
-from fogsim.vision.lines.deriche import derivative_kernel, derivatives, smoothing_kernel
+from fogsim.vision.lines.deriche import CannyDeriche, derivative_kernel, derivatives, smoothing_kernel
 from fogsim.vision.lines.edges import smoothed
 
 

@@ -1,4 +1,4 @@
-"""Where a road's lines meet in an image of a camera that nothing is known of."""
+"""The vanishing point of the line segments in an image of a camera of which nothing is known."""
 
 import math
 from dataclasses import dataclass
@@ -7,10 +7,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.linear_algebra import inverse_of, matrix_product
-from fogsim.offline.image_files import Pixels
-from fogsim.values import Response
+from fogsim.values.camera import Response
 from fogsim.vision.light.luminance import linear_luminance
+from fogsim.vision.light.pixel_kernels import Pixels
+from fogsim.vision.lines.vanishing_point import Lines, VanishingPoint, crossings, nearest_point, residual_scale
 
 Floats = NDArray[np.float64]
 
@@ -37,45 +37,27 @@ STRAIGHTNESS = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class MeetingPoint:
-    """Where the lines of a road meet.
-
-    Attributes
-    ----------
-    column, row : float
-        [px].
-    row_deviation : float
-        Standard deviation of the row [px].
-    segments : int
-        How many segments point there.
-    """
-
-    column: float
-    row: float
-    row_deviation: float
-    segments: int
-
-
-@dataclass(frozen=True, slots=True)
 class _Segments:
-    """Straight pieces of edges: middle (n, 2), normal (n, 2), its product with the middle, length, top, lean."""
+    """Straight pieces of edges: lines of unit normals, and each one's middle (n, 2), length, top, and lean (n,)."""
 
+    lines: Lines
     middle: Floats
-    normal: Floats
-    offset: Floats
     length: Floats
     top: Floats
     lean: Floats
 
-    def miss(self, point: Floats) -> Floats:
-        """By how much each one's line passes a point [px]."""
-        return matrix_product(self.normal, point) - self.offset
+    def pointing(self, points: Floats, reach: Floats) -> NDArray[np.bool_]:
+        """Which segments point at each point within reach, and lie below it, as all do that lie on the ground."""
+        below = self.top > points[..., 1:] - 2.0
+        return np.asarray((np.abs(self.lines.misses(points)) < reach) & below)
 
-    def leans_both_ways(self, chosen: NDArray[np.bool_]) -> bool:
-        return bool((self.lean[chosen] < 0).any() and (self.lean[chosen] > 0).any())
+    def distance(self, points: Floats) -> Floats:
+        """Distance of each segment's middle from each point [px]."""
+        apart = points[..., None, :] - self.middle
+        return np.asarray(np.hypot(apart[..., 0], apart[..., 1]))
 
 
-def meeting_point(image: Pixels, response: Response, bits: int) -> MeetingPoint | None:
+def segment_vanishing_point(image: Pixels, response: Response, bits: int) -> VanishingPoint | None:
     """Vanishing point of the road in an image.
 
     Line segments (von Gioi et al. 2010, in OpenCV) that could lie along a road; the intersection of two that lean to
@@ -93,7 +75,7 @@ def meeting_point(image: Pixels, response: Response, bits: int) -> MeetingPoint 
 
     Returns
     -------
-    MeetingPoint or None
+    VanishingPoint or None
         None if no two segments that lean to either side meet between the image's top and its lower fifth.
     """
     segments = _segments(linear_luminance(image, response, bits))
@@ -117,47 +99,39 @@ def _segments(luminance: NDArray[np.float32]) -> _Segments:
     normal = np.stack((-along[kept, 1], along[kept, 0]), axis=1) / length[kept, None]
     middle = 0.5 * (ends[kept, :2] + ends[kept, 2:])
     lean = np.sign(along[kept, 0] * along[kept, 1])
-    return _Segments(middle, normal, (normal * middle).sum(axis=1), length[kept], top[kept], lean)
+    return _Segments(Lines(normal, (normal * middle).sum(axis=1)), middle, length[kept], top[kept], lean)
 
 
 def _first_point(segments: _Segments, rows: int, cols: int) -> Floats | None:
     """Intersection of two segments at which the greatest length of segments points."""
     longest = np.argsort(-segments.length, kind="stable")[:LONGEST]
-    best, most = None, 0.0
-    for i in longest[segments.lean[longest] < 0]:
-        for j in longest[segments.lean[longest] > 0]:
-            (a, b), (c, d) = segments.normal[[i, j]].tolist()
-            e, f = segments.offset[[i, j]].tolist()
-            # Of two that lean to either side by 8° or more, none is parallel to the other.
-            point = np.array([d * e - b * f, a * f - c * e]) / (a * d - b * c)
-            if not (0.0 <= point[1] <= 0.8 * rows and 0.1 * cols <= point[0] <= 0.9 * cols):
-                continue
-            reach = np.maximum(FIRST_REACH * np.hypot(*(point - segments.middle).T), 1.0)
-            pointing = (np.abs(segments.miss(point)) < reach) & _below(segments, point)
-            length = float(segments.length[pointing].sum())
-            if segments.leans_both_ways(pointing) and length > most:
-                best, most = point, length
-    return best
+    lefts, rights = longest[segments.lean[longest] < 0], longest[segments.lean[longest] > 0]
+    # Of two that lean to either side by 8° or more, none is parallel to the other.
+    points = crossings(segments.lines, np.repeat(lefts, rights.size), np.tile(rights, lefts.size), 0.0)
+    column, row = points.T
+    points = points[(row >= 0.0) & (row <= 0.8 * rows) & (column >= 0.1 * cols) & (column <= 0.9 * cols)]
+    pointing = segments.pointing(points, np.maximum(FIRST_REACH * segments.distance(points), 1.0))
+    length = np.where(_both_ways(segments, pointing), (pointing * segments.length).sum(axis=1), 0.0)
+    return points[int(np.argmax(length))] if length.any() else None
 
 
-def _below(segments: _Segments, point: Floats) -> NDArray[np.bool_]:
-    """Which segments lie below a point, as all do that lie on the ground."""
-    return np.asarray(segments.top > point[1] - 2.0)
+def _both_ways(segments: _Segments, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Whether segments that are chosen lean to both sides."""
+    left, right = (chosen & (segments.lean < 0)), (chosen & (segments.lean > 0))
+    return np.asarray(left.any(axis=-1) & right.any(axis=-1))
 
 
-def _fitted(segments: _Segments, point: Floats) -> MeetingPoint | None:
+def _fitted(segments: _Segments, point: Floats) -> VanishingPoint | None:
     for _ in range(6):
-        far = np.hypot(*(point - segments.middle).T)
+        far = segments.distance(point)
         # A straight line through n pixels: 1/n for its place, 12 d²/n³ for its direction.
         by_pixels = PLACE_DEVIATION**2 * (1.0 / segments.length + 12.0 * far**2 / segments.length**3)
         deviation = np.sqrt(by_pixels) + STRAIGHTNESS
-        pointing = (np.abs(segments.miss(point)) < 3.0 * deviation) & _below(segments, point)
-        if not segments.leans_both_ways(pointing):
+        pointing = segments.pointing(point, 3.0 * deviation)
+        if not _both_ways(segments, pointing):
             return None
-        weight = pointing / deviation**2
-        inverse = inverse_of(matrix_product((segments.normal * weight[:, None]).T, segments.normal))
-        point = matrix_product(inverse, matrix_product((segments.normal * weight[:, None]).T, segments.offset))
-    count = int(pointing.sum())
-    scale = float(matrix_product(weight, segments.miss(point) ** 2)) / max(count - 2, 1)
-    spread = math.sqrt(max(scale, 1.0) * float(inverse[1, 1]))
-    return MeetingPoint(float(point[0]), float(point[1]), spread, count)
+        point, covariance = nearest_point(segments.lines, pointing / deviation**2)
+    residual = (segments.lines.misses(point) / deviation)[pointing]
+    spread = residual_scale(residual) * math.sqrt(float(covariance[1, 1]))
+    support = float(segments.length[pointing].sum())
+    return VanishingPoint(float(point[0]), float(point[1]), spread, residual.size, support)

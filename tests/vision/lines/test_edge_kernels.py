@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fogsim.vision.lines.canny_kernels import squared_lengths, trace_edges
+from fogsim.vision.lines.edge_kernels import squared_lengths, trace_edges
 
 LOW, HIGH = 600.0, 1200.0
 

@@ -21,9 +21,16 @@ _WEAK, _EDGE = 1, 2
 def squared_lengths(
     across: NDArray[np.float32], down: NDArray[np.float32], slope: NDArray[np.float32], squares: NDArray[np.float32]
 ) -> None:
-    """Take each row's (rows,) slope from the downward gradient, in place, and square the gradient's length.
+    """Take each row's slope from the downward gradient, in place, and square the gradient's length.
 
-    Of the (rows + 2, cols + 2) squares the border is left as it is.
+    Parameters
+    ----------
+    across, down : (rows, cols) float32
+        The gradient; `down` is changed.
+    slope : (rows,) float32
+        What is taken off.
+    squares : (rows + 2, cols + 2) float32
+        Is written, all but its border.
     """
     rows, cols = across.shape
     for row in range(rows):
@@ -42,9 +49,18 @@ def trace_edges(
     high: float,
     pixels: NDArray[np.uint8],
 ) -> None:
-    """Write 255 into (rows, cols) on edges and 0 elsewhere: ridges above `low` that touch one above `high`, or another.
+    """Find the ridges of the gradient above `low` that touch one above `high`, or another such ridge.
 
-    The squares (rows + 2, cols + 2) of the gradient's length are 0 on the border.
+    Parameters
+    ----------
+    across, down : (rows, cols) float32
+        The gradient.
+    squares : (rows + 2, cols + 2) float32
+        Squares of its length, 0 on the border.
+    low, high : float
+        Thresholds of its length.
+    pixels : (rows, cols) uint8
+        Is written: 255 on edges and 0 elsewhere.
     """
     marks, waiting = np.zeros(squares.shape, np.uint8), np.empty(pixels.size, np.int64)
     bounds = np.float32(low * low), np.float32(high * high)
@@ -82,7 +98,7 @@ def _mark_ridges(
                 slant = width + 1 if (across[row, col] > 0.0) == (down[row, col] > 0.0) else width - 1
                 step = 1 if flat else width if upright else slant
                 before, after = squares[first + col - step], squares[first + col + step]
-                # Without branches, which nobody could predict. Of equals side by side both are ridges.
+                # Without branches, which no processor could predict. Of equals side by side both are ridges.
                 ridge = (here > before) & ((here > after) | ((here == after) & (flat | upright)))
                 ridge |= flat & (here == before) & (here > after)
                 if ridge:
@@ -114,7 +130,15 @@ SMOOTH_TAPS = 2
 
 @kernel
 def smooth(image: NDArray[np.float32], weights: NDArray[np.float32], out: NDArray[np.float32]) -> None:
-    """Smooth (rows, cols) down the columns and along each row, with (`SMOOTH_TAPS` + 1,) weights from the middle on."""
+    """Smooth down the columns and along each row; what lies outside is as the border.
+
+    Parameters
+    ----------
+    image, out : (rows, cols) float32
+        The image, and what is written.
+    weights : (`SMOOTH_TAPS` + 1,) float32
+        Weights from the middle one on.
+    """
     rows, cols = image.shape
     line = np.empty(cols + 2 * SMOOTH_TAPS, np.float32)
     for row in range(rows):
@@ -129,3 +153,21 @@ def smooth(image: NDArray[np.float32], weights: NDArray[np.float32], out: NDArra
             for tap in range(1, SMOOTH_TAPS + 1):
                 value += weights[tap] * (line[SMOOTH_TAPS + col + tap] + line[SMOOTH_TAPS + col - tap])
             out[row, col] = value
+
+
+@kernel
+def peak_offset(before: float, here: float, behind: float) -> float:
+    """Place of the peak of a parabola through three neighbouring pixels.
+
+    Parameters
+    ----------
+    before, here, behind : float
+        Their values.
+
+    Returns
+    -------
+    float
+        Distance from the middle one [px]; 0 where the parabola has no peak.
+    """
+    bend = before - 2.0 * here + behind
+    return 0.5 * (before - behind) / bend if bend < 0.0 else 0.0

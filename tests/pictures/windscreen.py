@@ -65,10 +65,14 @@ def hash_noise(x, y, seed):
 
 def albedo(scene, ahead, right, seed):
     across = right - scene.curvature * ahead**2 / 2 + scene.aside
-    wear = sum(hash_noise(ahead / size, across / (0.5 * size), seed + i) for i, size in enumerate((0.4, 1.7, 6.0)))
+    paved = np.abs(across) < scene.half_road
+    at, beside = ahead[paved], across[paved]
+    wear = sum(hash_noise(at / size, beside / (0.5 * size), seed + i) for i, size in enumerate((0.4, 1.7, 6.0)))
     road = scene.asphalt * (1 + scene.texture * wear / np.sqrt(3.0))
-    grass = scene.shoulder * (1 + 3 * scene.texture * hash_noise(ahead / 1.1, across / 1.1, seed + 5))
-    out = np.where(np.abs(across) < scene.half_road, road, grass)
+    at, beside = ahead[~paved], across[~paved]
+    grass = scene.shoulder * (1 + 3 * scene.texture * hash_noise(at / 1.1, beside / 1.1, seed + 5))
+    out = np.empty(ahead.shape)
+    out[paved], out[~paved] = road, grass
     half = scene.mark_width / 2
     dashed = (np.abs(np.abs(across) - scene.lane / 2) < half) & ((ahead + seed) % scene.dash[1] < scene.dash[0])
     solid = (np.abs(np.abs(across) - scene.half_road + 0.3) < half) & scene.edge_lines
@@ -97,7 +101,8 @@ def draw(scene, seed, over=2):
     depth = np.where(ground, np.minimum(reach, 1e4), 0.0)
     turned_x = right * np.cos(scene.yaw) - forward * np.sin(scene.yaw)
     turned_z = forward * np.cos(scene.yaw) + right * np.sin(scene.yaw)
-    own = albedo(scene, depth * turned_z, depth * turned_x, seed)
+    own = np.zeros(reach.shape)
+    own[ground] = albedo(scene, (depth * turned_z)[ground], (depth * turned_x)[ground], seed)
     for box in _boxes(scene):
         own, reach = _stand(box, own, reach, (forward, down, right), camera, scene, seed)
     length = np.where(np.isfinite(reach), np.minimum(reach, 1e6) * size, 0.0)
@@ -130,12 +135,17 @@ def _stand(box, own, reach, directions, camera, scene, seed):
     forward, down, right = directions
     depth = distance / forward
     height, side = camera.mount_height - depth * down, depth * right
+    # No outline is twice as high, so hashes are only needed there.
+    inside = (side > left) & (side < right_side) & (height > 0) & (height < 2 * top) & (depth < reach)
+    height, side = height[inside], side[inside]
     ragged = top * (1 + 0.3 * hash_noise(side / 4.0, np.zeros_like(side), seed + 9)) if top > 5 else top
-    inside = (side > left) & (side < right_side) & (height > 0) & (height < ragged) & (depth < reach)
     tone = np.where(height < 0.25, 0.04, np.where((height > 0.6 * top) & (height < 0.9 * top), 0.06, paint))
     if top > 5:
         tone = paint * (1 + 0.3 * hash_noise(side / 1.5, height / 1.5, seed + 11))
-    return np.where(inside, tone, own), np.where(inside, depth, reach)
+    within = height < ragged
+    inside[inside] = within
+    own[inside], reach[inside] = tone[within], np.broadcast_to(depth, reach.shape)[inside]
+    return own, reach
 
 
 def _taken(light, scene, seed):

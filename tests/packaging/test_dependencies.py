@@ -1,0 +1,31 @@
+"""What the packages import is what an installation of them brings along."""
+
+import ast
+import re
+import sys
+import tomllib
+from importlib.metadata import packages_distributions
+from pathlib import Path
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+OWN = {"fogsim", "fogsim_envs"}
+BROUGHT_ALONG = {"OpenGL": "pyrender", "pydantic_core": "pydantic"}
+"""Imports that a dependency pins to what it works with, and that one."""
+
+
+def imported(path: Path) -> set[str]:
+    nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+    whole = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    parts = {node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.module and not node.level}
+    return {name.split(".")[0] for name in whole | parts}
+
+
+def test_every_import_is_a_declared_dependency_and_every_dependency_is_imported() -> None:
+    project = tomllib.loads((CHECKOUT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    declared = {re.split(r"[<>=!~\[; ]", one)[0].lower() for one in project["dependencies"]}
+    sources = [*(CHECKOUT / "fogsim").rglob("*.py"), *(CHECKOUT / "envs").rglob("*.py")]
+    names = set().union(*map(imported, sources)) - OWN - set(sys.stdlib_module_names)
+    assert names
+    distributions = packages_distributions()
+    needed = {BROUGHT_ALONG.get(name, distributions[name][0].lower().replace("_", "-")) for name in names}
+    assert needed == declared

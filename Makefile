@@ -19,10 +19,12 @@ $(VENV)/.installed: pyproject.toml | check
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --use-pep517 --editable .
 	@touch $@
 
-$(VENV)/.installed-test: $(VENV)/.installed
-	@echo "Installing the test tools into $(VENV) …"
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --use-pep517 --editable '.[test]'
-	@touch $@
+# One installation, not two after one another; bytecode is made as modules are used.
+$(VENV)/.installed-test: pyproject.toml | check
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@echo "Installing FogSim and the test tools into $(VENV) (once, a minute or two) …"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --use-pep517 --editable '.[test]'
+	@touch $(VENV)/.installed $@
 
 $(VENV)/.compiled: $(VENV)/.installed-test
 	@echo "Compiling kernels (once, a minute or two) …"

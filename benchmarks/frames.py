@@ -30,7 +30,6 @@ from numpy.typing import NDArray
 import fogsim
 from fogsim.camera import mounted_pose
 from fogsim.ego.view_rendering import ViewRenderer
-from fogsim.render import RENDERERS
 from fogsim.scenario import Scenario, build
 from fogsim.scene import build_scene, vehicle_batches
 from fogsim.traffic.road.network import read_net, road_network
@@ -51,6 +50,7 @@ LIGHTS = {"day": 10_000.0, "night": 0.5}  # [lx]
 Key = tuple[str, str, str, int]
 """Renderer, light, size and samples a pixel side of a case."""
 
+RENDERERS = ("opengl", "cpu")
 STAGES = ("scene", "render", "air", "camera")
 
 
@@ -211,7 +211,7 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--renderer", action="append", choices=list(RENDERERS), help="default: all")
+    parser.add_argument("--renderer", action="append", choices=RENDERERS, help="default: all")
     parser.add_argument("--light", action="append", choices=LIGHTS, help="default: all")
     parser.add_argument("--size", action="append", help="camera WIDTHxHEIGHT (default 160x120 and 640x480)")
     parser.add_argument("--samples", action="append", type=int, help="samples a pixel side (default 1)")
@@ -220,7 +220,7 @@ def main() -> None:
     arguments = parser.parse_args()
     keys = list(
         itertools.product(
-            arguments.renderer or list(RENDERERS),
+            arguments.renderer or RENDERERS,
             arguments.light or LIGHTS,
             arguments.size or ["160x120", "640x480"],
             arguments.samples or [1],

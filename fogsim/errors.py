@@ -28,6 +28,10 @@ class SimulationRunningError(SimulationError):
     """A simulation runs in this process already, and only one can."""
 
 
+class RenamedWarning(FutureWarning):
+    """A value is called otherwise now and works by its old name; the message tells the new one."""
+
+
 class UnplayedWarning(UserWarning):
     """Events of a scenario were not played, or vehicles that it names were never there."""
 

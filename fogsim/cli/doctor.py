@@ -60,7 +60,7 @@ def examine() -> list[Finding]:
     """Check Python, packages, SUMO, the renderers and the video encoder."""
     findings = [Finding("Python", True, f"{platform.python_version()} on {platform.platform()}")]
     findings += [_package(name) for name in PACKAGES]
-    findings += [_try("SUMO", _sumo), _try("renderer pyrender", _gl), _try("renderer cpu", _cpu)]
+    findings += [_try("SUMO", _sumo), _try("renderer opengl", _gl), _try("renderer cpu", _cpu)]
     findings += [_try("renderer auto", _auto), _try("video encoder", _ffmpeg)]
     return findings
 

@@ -6,12 +6,22 @@ from fogsim.errors import InputError
 from fogsim.registry import Registry
 from fogsim.render.best import best_renderer
 from fogsim.render.protocol import Renderer, RenderError
+from fogsim.render.pyrender_scene import to_pyrender
 from fogsim.values.scene import Scene
 
-__all__ = ["RENDERERS", "RenderError", "Renderer", "best_renderer", "gl_report", "make_renderer"]
+__all__ = [
+    "RENDERERS",
+    "ROLES",
+    "RenderError",
+    "Renderer",
+    "best_renderer",
+    "gl_report",
+    "make_renderer",
+    "to_pyrender",
+]
 
 
-def _pyrender(scene: Scene, illuminance: float) -> Renderer:
+def _opengl(scene: Scene, illuminance: float) -> Renderer:
     # OpenGL is loaded by the process that draws, when it first draws: not by every one that imports FogSim.
     from fogsim.render.opengl.rasteriser import GLRasteriser  # noqa: PLC0415
     from fogsim.render.renderer import SceneRenderer  # noqa: PLC0415
@@ -27,8 +37,21 @@ def _cpu(scene: Scene, illuminance: float) -> Renderer:
     return SceneRenderer(scene, illuminance, CPURasteriser)
 
 
-RENDERERS: Registry[Callable[[Scene, float], Renderer]] = Registry("renderer", {"pyrender": _pyrender, "cpu": _cpu})
+def _pyrender(scene: Scene, illuminance: float) -> Renderer:
+    # So is pyrender.
+    from fogsim.render.pyrender_reference import PyrenderReference  # noqa: PLC0415
+
+    return PyrenderReference(scene, illuminance)
+
+
+RENDERERS: Registry[Callable[[Scene, float], Renderer]] = Registry(
+    "renderer", {"opengl": _opengl, "cpu": _cpu, "pyrender": _pyrender}
+)
 """Factories of renderers by name, each called with the scene and the horizontal illuminance [lx]."""
+
+
+ROLES = ("auto", "reference")
+"""Names that stand for a renderer: for the best one here, and for the independent reference, which is pyrender."""
 
 
 def make_renderer(name: str, scene: Scene, illuminance: float) -> Renderer:
@@ -37,7 +60,7 @@ def make_renderer(name: str, scene: Scene, illuminance: float) -> Renderer:
     Parameters
     ----------
     name : str
-        Name in `RENDERERS`, or "auto" for the one that `best_renderer` names.
+        Name in `RENDERERS`, or "auto" for the one that `best_renderer` names, or "reference" for "pyrender".
     scene : Scene
         What stands still.
     illuminance : float
@@ -54,7 +77,9 @@ def make_renderer(name: str, scene: Scene, illuminance: float) -> Renderer:
     """
     if not 0.0 <= illuminance < float("inf"):
         raise InputError(f"illuminance must be a finite number of lux ≥ 0, got {illuminance!r}")
-    return RENDERERS[best_renderer()[0] if name == "auto" else name](scene, illuminance)
+    if name in ROLES:
+        name = best_renderer()[0] if name == "auto" else "pyrender"
+    return RENDERERS[name](scene, illuminance)
 
 
 def gl_report() -> str:

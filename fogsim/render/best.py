@@ -30,7 +30,7 @@ def best_renderer() -> tuple[str, str]:
             "cpu",
             f"OpenGL is not drawn by a graphics card here ({found.description}), and then the cpu renderer is faster",
         )
-    return "pyrender", f"there is a graphics card for OpenGL ({found.description})"
+    return "opengl", f"there is a graphics card for OpenGL ({found.description})"
 
 
 def _may_have_card() -> bool:

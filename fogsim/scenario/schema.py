@@ -3,6 +3,7 @@
 Everything inside FogSim is SI and radians; `fogsim.scenario.build` converts, once.
 """
 
+import warnings
 from pathlib import Path
 from typing import Annotated, Self
 
@@ -10,11 +11,11 @@ from pydantic import Field, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from fogsim.advice import ADVISERS
-from fogsim.errors import UnknownNameError
+from fogsim.errors import RenamedWarning, UnknownNameError
 from fogsim.estimators import ESTIMATORS
 from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
-from fogsim.render import RENDERERS
+from fogsim.render import RENDERERS, ROLES
 from fogsim.scenario.camera_schema import CameraSection
 from fogsim.scenario.fog import Fog
 from fogsim.scenario.section import Distance, Flag, Length, Method, Number, Period, Section, Seed, Text, method_of
@@ -110,7 +111,7 @@ class Scenario(Section):
     """The camera."""
 
     renderer: Annotated[str, Field(default="auto")]
-    """`auto` or a renderer's name."""
+    """`auto`, `opengl`, `cpu`, or `reference` (pyrender's own drawing: slow, by day only)."""
 
     street_lamps: Flag = False
     """Whether lamps stand along the roads, about every 35 m."""
@@ -146,8 +147,18 @@ class Scenario(Section):
     @field_validator("renderer")
     @classmethod
     def _known_renderer(cls, value: str) -> str:
-        if value != "auto" and value not in RENDERERS:
-            raise ValueError(str(UnknownNameError("renderer", value, ["auto", *RENDERERS])))
+        if value == "pyrender":
+            # What drew under this name is what old files mean by it.
+            warnings.warn(
+                "renderer: pyrender is called opengl now, and opengl draws; write renderer: opengl (pyrender's own "
+                "drawing is renderer: reference)",
+                RenamedWarning,
+                stacklevel=2,
+            )
+            return "opengl"
+        known = [*ROLES, *(name for name in RENDERERS if name != "pyrender")]
+        if value not in known:
+            raise ValueError(str(UnknownNameError("renderer", value, known)))
         return value
 
     @model_validator(mode="after")

@@ -59,10 +59,10 @@ def difference(one: np.ndarray, other: np.ndarray) -> float:
     return float(np.abs(means[0] - means[1]).reshape(8, rows // 8, 8, columns // 8, 3).mean(axis=(1, 3, 4)).max())
 
 
-@pytest.mark.parametrize("renderer", ["cpu", "pyrender"])
+@pytest.mark.parametrize("renderer", ["cpu", "opengl"])
 @pytest.mark.parametrize("title", TITLES)
 def test_kept_pictures_are_those_drawn_today(sheets: ModuleType, renderer: str, title: str) -> None:
-    if renderer == "pyrender":
+    if renderer == "opengl":
         try:
             gl_report()
         except MissingDependencyError as error:
@@ -72,7 +72,7 @@ def test_kept_pictures_are_those_drawn_today(sheets: ModuleType, renderer: str, 
     assert difference(drawn, known.pop(title)) < TOLERANCE
 
 
-@pytest.mark.parametrize("renderer", ["cpu", "pyrender"])
+@pytest.mark.parametrize("renderer", ["cpu", "opengl"])
 def test_no_two_pictures_of_a_sheet_pass_for_each_other(sheets: ModuleType, renderer: str) -> None:
     known = list(kept(sheets, renderer).items())
     for number, (title, picture) in enumerate(known):

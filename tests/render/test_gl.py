@@ -40,7 +40,7 @@ def make() -> Iterator[Maker]:
     made: list[Renderer] = []
 
     def renderer(scene: Scene) -> Renderer:
-        made.append(make_renderer("pyrender", scene, ILLUMINANCE))
+        made.append(make_renderer("opengl", scene, ILLUMINANCE))
         return made[-1]
 
     yield renderer
@@ -307,7 +307,7 @@ def test_unknown_renderers_and_light_are_refused(scene: Scene) -> None:
     with pytest.raises(UnknownNameError, match="pyrender"):
         make_renderer("pyrendr", scene, ILLUMINANCE)
     with pytest.raises(InputError, match="illuminance"):
-        make_renderer("pyrender", scene, -1.0)
+        make_renderer("opengl", scene, -1.0)
 
 
 def test_the_report_names_the_version(renderer: Renderer) -> None:

@@ -28,7 +28,7 @@ def pair(scene: Scene) -> Iterator[Pair]:
         gl_report()
     except MissingDependencyError as error:
         pytest.skip(str(error))
-    made = (make_renderer("pyrender", scene, ILLUMINANCE), make_renderer("cpu", scene, ILLUMINANCE))
+    made = (make_renderer("opengl", scene, ILLUMINANCE), make_renderer("cpu", scene, ILLUMINANCE))
     yield made
     for one in made:
         one.close()
@@ -149,7 +149,7 @@ def walls(*distances: float) -> Scene:
     return Scene(ground=ground, shapes={}, scenery=())
 
 
-@pytest.mark.parametrize("renderer", ["pyrender", "cpu"])
+@pytest.mark.parametrize("renderer", ["opengl", "cpu"])
 @pytest.mark.parametrize(
     ("distance", "tolerance"),
     [(10.0, 0.002), (30.0, 0.002), (100.0, 0.002), (300.0, 0.002), (1000.0, 0.01)],

@@ -36,7 +36,7 @@ def run(*arguments: str, **environment: str) -> str:
 
 
 @pytest.mark.usefixtures("_opengl")
-@pytest.mark.parametrize("renderer", ["pyrender", "cpu"])
+@pytest.mark.parametrize("renderer", ["opengl", "cpu"])
 @pytest.mark.parametrize("method", ["fork", "spawn", "forkserver"])
 def test_workers_of_vector_environments_draw(method: str, renderer: str) -> None:
     assert "frames 2 2 alike" in run(str(WORKERS), method, renderer)
@@ -44,7 +44,7 @@ def test_workers_of_vector_environments_draw(method: str, renderer: str) -> None
 
 @pytest.mark.usefixtures("_opengl")
 def test_workers_that_are_forked_after_the_parent_drew_with_opengl_say_so() -> None:
-    said = run(str(WORKERS), "fork", "pyrender", "--draw-first")
+    said = run(str(WORKERS), "fork", "opengl", "--draw-first")
     assert "RenderError" in said
     assert "start workers before the parent draws, or with the start method 'spawn'" in said
     assert "parent draws on" in said
@@ -52,7 +52,7 @@ def test_workers_that_are_forked_after_the_parent_drew_with_opengl_say_so() -> N
 
 @pytest.mark.usefixtures("_opengl")
 def test_workers_that_are_spawned_after_the_parent_drew_draw() -> None:
-    assert "frames 2 2 alike" in run(str(WORKERS), "spawn", "pyrender", "--draw-first")
+    assert "frames 2 2 alike" in run(str(WORKERS), "spawn", "opengl", "--draw-first")
 
 
 def test_workers_that_are_forked_after_the_parent_drew_without_opengl_draw() -> None:
@@ -88,7 +88,7 @@ def test_without_opengl_the_cpu_draws(missing: str) -> None:
 
 
 @pytest.mark.usefixtures("_opengl")
-@pytest.mark.parametrize("renderer", ["pyrender", "cpu"])
+@pytest.mark.parametrize("renderer", ["opengl", "cpu"])
 def test_renderers_made_and_closed_leave_no_memory_behind(renderer: str) -> None:
     code = (
         "import sys\n"

@@ -73,6 +73,17 @@ class Context:
             )
         self.platform.make_current()
 
+    def restore(self) -> None:
+        """Set what pyrender changes of the state back to what `GLRasteriser` takes for granted."""
+        from OpenGL import GL  # noqa: PLC0415 - must come after the context has chosen its platform
+
+        for switch in (GL.GL_CULL_FACE, GL.GL_BLEND):
+            GL.glDisable(switch)
+        GL.glEnable(GL.GL_MULTISAMPLE)
+        GL.glDepthMask(GL.GL_TRUE)
+        GL.glDepthFunc(GL.GL_LESS)
+        GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, 0)
+
 
 def context() -> Context:
     """Make the process's context at the first call, and make it current at every call.
@@ -92,7 +103,7 @@ def context() -> Context:
 @functools.cache
 def _only_context() -> Context:
     # Deleting any EGL context of pyrender's terminates the display that all share, so there is one and it stays.
-    way = os.environ["PYOPENGL_PLATFORM"] = _way()  # PyOpenGL reads it when it is first imported
+    way = choose_platform()
     try:
         platform = _egl_platform() if way == "egl" else _osmesa_platform()
         from OpenGL import GL  # noqa: PLC0415
@@ -107,6 +118,12 @@ def _only_context() -> Context:
         raise MissingDependencyError(f"OpenGL {wanted} or newer is needed, {renderer} offers {text}; {_ADVICE}")
     software = any(name in renderer.lower() for name in _SOFTWARE)
     return Context(platform, os.getpid(), version, software, f"OpenGL ({_NAMES[way]}) {text}, {renderer}")
+
+
+def choose_platform() -> str:
+    """Choose the way to a context; PyOpenGL reads it from the environment when it is first imported."""
+    way = os.environ["PYOPENGL_PLATFORM"] = _way()
+    return way
 
 
 def _way() -> str:

@@ -9,7 +9,8 @@ from fogsim.jit import kernel
 LINE_WIDTH = 0.2
 """Width of a line [m]."""
 
-_DASH, _PERIOD = 6.0, 18.0
+DASH, PERIOD = 6.0, 18.0
+"""Length of a dash, and of a dash with the gap after it [m]."""
 
 
 @kernel
@@ -45,5 +46,5 @@ def dashed_share(along: float, length: float) -> float:
 @kernel
 def _painted_below(x: float) -> float:
     """Length of what lies below x of dashes that start at multiples of their period [m]."""
-    periods = math.floor(x / _PERIOD)
-    return periods * _DASH + min(x - _PERIOD * periods, _DASH)
+    periods = math.floor(x / PERIOD)
+    return periods * DASH + min(x - PERIOD * periods, DASH)

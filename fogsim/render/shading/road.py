@@ -14,7 +14,9 @@ from fogsim.render.shading.texture import ASPHALT, Row, weave
 DEPTH, ALONG, ACROSS, WHITE = layout.DEPTH, layout.ALONG, layout.ACROSS, layout.WHITE
 HALF_WIDTH, LINES, COLOUR, ROAD = layout.HALF_WIDTH, layout.LINES, layout.COLOUR, layout.ROAD
 
-_LINE_REFLECTANCE = 0.6
+LINE_REFLECTANCE = 0.6
+"""Reflectance of painted lines."""
+
 _TRACK, _TRACK_WIDTH, _TRACK_DEPTH = 0.85, 0.28, 0.035  # wheel tracks beside a lane's middle [m], and how dark they are
 
 ROAD_RESPONSE = 0.0125
@@ -110,7 +112,7 @@ def _paint(members: int, runs: Runs, work: Row, picture: Picture) -> None:
         s_base = sx * begin + sy * row + known[k, ALONG + 2]
         t_base = tx * begin + ty * row + known[k, ACROSS + 2]
         base = zx * begin + zy * row + known[k, DEPTH + 2]
-        paint = np.float32(known[k, WHITE] * _LINE_REFLECTANCE)
+        paint = np.float32(known[k, WHITE] * LINE_REFLECTANCE)
         for edge in range(2):
             code, line = (codes // 3, half_lane) if edge == 0 else (codes % 3, -half_lane)
             if code == 0:

@@ -9,11 +9,11 @@ from fogsim.render.drawing import NEAR
 from fogsim.render.lens import Lens
 from fogsim.render.shading import layout
 from fogsim.render.shading.layout import Array, Copies, Light, Meshes, Runs, Wide
+from fogsim.render.shading.lines import PERIOD
 from fogsim.render.vectors import Triple, Vector, columns_times, cross, dot, plus, row, rows_times, scaled, unit
 from fogsim.values.scene import Surface
 
 _ROAD, _PAINT, _SHEETING = int(Surface.ROAD), int(Surface.PAINT), int(Surface.SHEETING)
-_PERIOD = 18.0  # of dashed lines [m]
 _PER_PI = 1.0 / math.pi
 _WHITE_SHEETING = 0.66  # its reflectance
 
@@ -158,7 +158,7 @@ def _know_road(
 ) -> None:
     """Set where a triangle lies on its lane, the lane's lines and its mean reflectance."""
     i, j, k = corners
-    start = _PERIOD * math.floor(road[i, 0] / _PERIOD)
+    start = PERIOD * math.floor(road[i, 0] / PERIOD)
     _blend(known, number, ALONG, (road[i, 0] - start, road[j, 0] - start, road[k, 0] - start), planes)
     _blend(known, number, ACROSS, (road[i, 1], road[j, 1], road[k, 1]), planes)
     for channel in range(3):

@@ -1,0 +1,166 @@
+"""The independent reference: pyrender's own off-screen renderer draws, all shapes in full detail and none left out."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.errors import InputError
+from fogsim.render.opengl.context import Context, context
+from fogsim.render.photometry import SKY_TINT, zenith_luminance
+from fogsim.render.protocol import RenderError
+from fogsim.render.pyrender_scene import (
+    GAMMA,
+    Part,
+    camera_matrix,
+    copied_parts,
+    empty_scene,
+    load_pyrender,
+    pinhole,
+    still_parts,
+)
+from fogsim.values.camera import Camera, CameraPose
+from fogsim.values.image import View
+from fogsim.values.pinhole import ray_from_pixel
+from fogsim.values.scene import Batch, Scene
+
+
+class PyrenderReference:
+    """Draws a scene by daylight with `pyrender.OffscreenRenderer` (see `Renderer`).
+
+    Distance is pyrender's depth; instance ids are its segmentation; radiance is its colours, 8 bits of them, taken back
+    to linear. FogSim's own is the radiance of the sky and of lit lamps, which are brighter than pyrender's white.
+
+    Parameters
+    ----------
+    scene : Scene
+        What stands still.
+    illuminance : float
+        Horizontal illuminance E [lx].
+
+    Raises
+    ------
+    MissingDependencyError
+        If OpenGL or pyrender is missing or does not work.
+    RenderError
+        If this process was forked from one that had drawn.
+    """
+
+    def __init__(self, scene: Scene, illuminance: float) -> None:
+        self._context = context()
+        self._pyrender = load_pyrender()
+        self._scene: Scene | None = scene
+        self._white = max(illuminance / np.pi, 1e-6)
+        self._zenith = zenith_luminance(illuminance) * np.array(SKY_TINT)
+        self._nodes = empty_scene(self._pyrender, illuminance, self._white)
+        self._still = list(still_parts(self._pyrender, scene, self._white))
+        for part in self._still:
+            self._nodes.add_node(part.node)
+        self._drawer: Any = None
+
+    def render(self, vehicles: Sequence[Batch], camera: Camera, pose: CameraPose, lamplight: bool = False) -> View:
+        """Draw the scene and the vehicles (see `Renderer.render`).
+
+        Raises
+        ------
+        InputError
+            If lamplight is wanted.
+        """
+        if self._scene is None:
+            raise RenderError("this renderer is closed; make a new one")
+        if lamplight:
+            raise InputError(
+                "the renderer pyrender draws by daylight only (1000 lx or more); at night use opengl or cpu"
+            )
+        self._context.activate()
+        moving = list(copied_parts(self._pyrender, self._scene, vehicles, self._white, "vehicle"))
+        for part in moving:
+            self._nodes.add_node(part.node)
+        eye = self._nodes.add(pinhole(self._pyrender, camera), pose=camera_matrix(camera, pose))
+        self._nodes.main_camera_node = eye
+        try:
+            return self._view([*self._still, *moving], camera, pose)
+        finally:
+            for node in (eye, *(part.node for part in moving)):
+                self._nodes.remove_node(node)
+
+    def _view(self, parts: list[Part], camera: Camera, pose: CameraPose) -> View:
+        """What pyrender draws of these parts."""
+        flags, drawer = self._pyrender.RenderFlags, self._drawer_of(camera)
+        numbers = np.arange(1, len(parts) + 1)
+        codes = (numbers[:, None] >> np.array((16, 8, 0))) & 255
+        nodes = [part.node for part in parts]
+        try:
+            colour, _ = drawer.render(self._nodes, flags.NONE)
+            code, depth = drawer.render(self._nodes, flags.SEG, dict(zip(nodes, codes, strict=True)))
+        finally:
+            self._context.restore()
+        seen = code.astype(np.int64) @ np.array((1 << 16, 1 << 8, 1))
+        rays = _rays(camera, pose)
+        length = np.linalg.norm(rays, axis=-1)
+        sky = seen == 0
+        radiance = self._white * (colour / 255.0) ** GAMMA
+        sine = np.maximum(rays[sky, 2] / length[sky], 0.0)
+        radiance[sky] = self._zenith * ((1.0 + 2.0 * sine) / 3.0)[:, None]
+        for number, part in enumerate(parts, 1):
+            if part.radiance is not None:
+                radiance[seen == number] = part.radiance
+        instance = np.array([0, *(part.instance for part in parts)], np.int32)
+        distance = np.where(sky, np.inf, depth * length)
+        return View(radiance.astype(np.float32), distance.astype(np.float32), instance[seen])
+
+    def _drawer_of(self, camera: Camera) -> Any:
+        """Pyrender's renderer, made anew if the camera's size is another than the last one's."""
+        if self._drawer is None:
+            self._drawer = _offscreen_renderer(self._pyrender, self._context, camera.width, camera.height)
+        self._drawer.viewport_width, self._drawer.viewport_height = camera.width, camera.height
+        return self._drawer
+
+    def close(self) -> None:
+        """Free what pyrender holds; the context stays, since others share it."""
+        drawer, self._drawer, self._scene = self._drawer, None, None
+        if drawer is not None and self._context.is_of_this_process:
+            drawer.delete()
+
+
+def _offscreen_renderer(library: Any, shared: Context, width: int, height: int) -> Any:
+    """Pyrender's renderer in the context that this process has: one of its own would end all others' at its end."""
+
+    class Renderer(library.OffscreenRenderer):  # type: ignore[misc]  # pyrender has no types
+        def _create(self) -> None:
+            self._platform = _SharedPlatform(shared, width, height)
+            self._platform.make_current()
+            self._renderer = library.renderer.Renderer(width, height)
+
+        def delete(self) -> None:
+            if self._renderer is not None:
+                self._platform.make_current()
+                self._renderer.delete()
+                self._renderer = None
+
+    return Renderer(width, height)
+
+
+class _SharedPlatform:
+    """What pyrender asks of a platform."""
+
+    def __init__(self, shared: Context, width: int, height: int) -> None:
+        self._context = shared
+        self.viewport_width, self.viewport_height = width, height
+
+    def make_current(self) -> None:
+        self._context.activate()
+
+    def make_uncurrent(self) -> None:
+        pass
+
+    def supports_framebuffers(self) -> bool:
+        return True
+
+
+def _rays(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
+    """Viewing rays (rows, cols, 3) in the world, 1 long along the optical axis."""
+    v, u = np.mgrid[: camera.height, : camera.width]
+    pixels = np.stack((u, v, np.ones_like(u)), axis=-1).astype(np.float64)
+    return np.asarray(pixels @ ray_from_pixel(camera, pose).T)

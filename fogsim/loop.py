@@ -9,6 +9,7 @@ from typing import Protocol, Self
 
 from fogsim.atmosphere import FogNow
 from fogsim.ego.equipment import EgoEquipment
+from fogsim.ego.view_rendering import Surrounding
 from fogsim.errors import SimulationError, UnplayedWarning
 from fogsim.randomness import spawn_streams
 from fogsim.scenario import Scenario, build
@@ -253,6 +254,19 @@ class ClosedLoop:
             step = self._complete_step(index, snapshot, command)
         self._step = self._with_unplayed(step)
         return self._step
+
+    def surrounding(self) -> Surrounding:
+        """Tell what is around the ego's camera now: scene, vehicles, camera and lamps.
+
+        Raises
+        ------
+        SimulationError
+            If the run has not been started.
+        """
+        step = self._step
+        if step is None or step.truth.pose is None:
+            raise SimulationError("the run has not been started: call start()")
+        return self._equipment.surrounding(step.traffic, step.ego, step.truth.pose)
 
     def _with_unplayed(self, step: Step) -> Step:
         """A step; one that ends a run with what was not played."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from fogsim.atmosphere import extinction, field_at, optical_depth_along
 from fogsim.camera import mounted_pose
-from fogsim.ego.view_rendering import ViewRenderer
+from fogsim.ego.view_rendering import Surrounding, ViewRenderer
 from fogsim.errors import SimulationError
 from fogsim.randomness import Streams
 from fogsim.scenario import Scenario, build
@@ -137,6 +137,27 @@ class EgoEquipment:
             command=command,
             ending=ending,
         )
+
+    def surrounding(self, state: TrafficState, ego: int, pose: CameraPose) -> Surrounding:
+        """Tell what is around the camera.
+
+        Parameters
+        ----------
+        state : TrafficState
+            Every vehicle.
+        ego : int
+            Row of the one that carries the camera.
+        pose : CameraPose
+            Where the camera is.
+
+        Raises
+        ------
+        SimulationError
+            If no run has begun.
+        """
+        if self._view_renderer is None:
+            raise SimulationError("the run has not been started: call begin()")
+        return self._view_renderer.surrounding(state, ego, pose)
 
     def _pose(self, state: TrafficState, ego: int) -> CameraPose:
         body_pitch = self._body.update(float(state.acceleration[ego]))

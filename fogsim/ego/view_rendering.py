@@ -1,6 +1,8 @@
 """What the ego's camera looks at: the scene of a scenario, the renderer that draws it, and the air and lamps in it."""
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +22,15 @@ from fogsim.scene import (
     vehicle_batches,
 )
 from fogsim.values import (
+    Batch,
+    Camera,
     CameraPose,
     FogField,
     HeadLamp,
     Lamp,
     Lights,
     RoadNetwork,
+    Scene,
     SignMap,
     TrafficState,
     View,
@@ -49,6 +54,33 @@ _LEEWAY = 600.0
 _UNLIT = Lights.none()
 
 _USUAL = (Lamp.LOW_BEAM, Lamp.LOW_BEAM | Lamp.FRONT_FOG, Lamp.LOW_BEAM | Lamp.HIGH_BEAM)
+
+
+class Surrounding(NamedTuple):
+    """What is around a camera, in the coordinates of its scene.
+
+    Attributes
+    ----------
+    scene : Scene
+        What stands still.
+    vehicles : sequence of Batch
+        Every vehicle but the camera's own.
+    camera : Camera
+        The pinhole.
+    pose : CameraPose
+        Where it is.
+    lights : Lights
+        Lit lamps, by night only.
+    illuminance : float
+        Horizontal illuminance of the daylight [lx].
+    """
+
+    scene: Scene
+    vehicles: Sequence[Batch]
+    camera: Camera
+    pose: CameraPose
+    lights: Lights
+    illuminance: float
 
 
 class ViewRenderer:
@@ -98,13 +130,13 @@ class ViewRenderer:
         scene = build_scene(around.network, around.signs, rng, street_lamps=scenario.street_lamps)
         self._origin, self._shifted, self._streets = around.origin, bool(np.any(around.origin)), None
         self._known = None if around.whole else Corridor(line, _LEEWAY)
+        self._scene, self._sky = scene, scenario.light.illuminance_lx
         self._street_lamps = street_lamp_heads(scene) + around.origin
-        sky = scenario.light.illuminance_lx
         if len(self._street_lamps) and self._by_lamplight:
-            sky = max(sky, DARKEST)
-            self._streets = street_lighting(self._street_lamps, sky)
+            self._sky = max(self._sky, DARKEST)
+            self._streets = street_lighting(self._street_lamps, self._sky)
         self.close()
-        self._renderer = make_renderer(scenario.renderer, scene, sky)
+        self._renderer = make_renderer(scenario.renderer, scene, self._sky)
         return self._renderer
 
     def render(self, state: TrafficState, ego: int, pose: CameraPose, time: float) -> tuple[View, NDArray[np.float32]]:
@@ -134,6 +166,22 @@ class ViewRenderer:
         view = renderer.render(vehicle_batches(near, ego), camera, viewpoint, lamplight=bool(lights.own))
         radiance = self._air.radiance(view, camera, pose, lights, time)
         return middle_samples(view, self._samples), averaged(radiance, self._samples)
+
+    def surrounding(self, state: TrafficState, ego: int, pose: CameraPose) -> Surrounding:
+        """Tell what `render` draws.
+
+        Parameters
+        ----------
+        state, ego, pose
+            See `render`.
+        """
+        self._renderer_at(state.position[ego])
+        near, seen_from = self._from_origin(state, pose)
+        lights = self._lights(state, ego, pose)
+        places = lights.others.position - self._origin
+        streets = lights.streets and replace(lights.streets, position=lights.streets.position - self._origin)
+        lights = replace(lights, others=replace(lights.others, position=places), streets=streets)
+        return Surrounding(self._scene, vehicle_batches(near, ego), self._camera, seen_from, lights, self._sky)
 
     def _renderer_at(self, place: NDArray[np.float64]) -> Renderer:
         """The renderer of a scene that has what is around a place."""

@@ -113,7 +113,7 @@ class PyrenderReference:
     def _drawer_of(self, camera: Camera) -> Any:
         """Pyrender's renderer, made anew if the camera's size is another than the last one's."""
         if self._drawer is None:
-            self._drawer = _offscreen_renderer(self._pyrender, self._context, camera.width, camera.height)
+            self._drawer = offscreen_renderer(self._pyrender, self._context, camera.width, camera.height)
         self._drawer.viewport_width, self._drawer.viewport_height = camera.width, camera.height
         return self._drawer
 
@@ -124,8 +124,18 @@ class PyrenderReference:
             drawer.delete()
 
 
-def _offscreen_renderer(library: Any, shared: Context, width: int, height: int) -> Any:
-    """Pyrender's renderer in the context that this process has: one of its own would end all others' at its end."""
+def offscreen_renderer(library: Any, shared: Context, width: int, height: int) -> Any:
+    """Make pyrender's renderer in this process's context: the end of one of its own would end all others.
+
+    Parameters
+    ----------
+    library : module
+        pyrender.
+    shared : Context
+        The context.
+    width, height : int
+        Size of pictures [px].
+    """
 
     class Renderer(library.OffscreenRenderer):  # type: ignore[misc]  # pyrender has no types
         def _create(self) -> None:

@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fogsim.errors import InputError
+from fogsim.errors import InputError, RenamedWarning
 from fogsim.render import Renderer, RenderError, make_renderer, to_pyrender
 from fogsim.render.photometry import lamp_radiance
 from fogsim.render.renderer import STAND_INS
+from fogsim.scenario import load_scenario
 from fogsim.scene import vehicle_batches
 from fogsim.values import (
     Beam,
@@ -200,6 +201,13 @@ def test_a_scene_of_pyrenders_has_meshes_materials_camera_and_lamps_as_nodes(pla
         assert all(primitive.material is not None for primitive in node.mesh.primitives)
     assert np.isfinite(made.bounds).all()
     assert made.scale < 20e3
+
+
+def test_what_old_scenarios_call_pyrender_is_drawn_by_opengl_and_told() -> None:
+    with pytest.warns(RenamedWarning, match="renderer: pyrender is called opengl now"):
+        old = load_scenario("motorway_fog_bank", ["renderer=pyrender"])
+    assert old.renderer == "opengl"
+    assert load_scenario("motorway_fog_bank", ["renderer=reference"]).renderer == "reference"
 
 
 def test_without_lamps_and_vehicles_the_scene_is_that_of_the_day() -> None:

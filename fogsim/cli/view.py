@@ -1,0 +1,75 @@
+"""``fogsim view``: the world around the ego at an instant, in pyrender's viewer or as a picture."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from fogsim.cli.printing import escape, stderr, stdout
+from fogsim.cli.progress import SimulationProgress
+from fogsim.cli.scenario_options import (
+    EgoId,
+    HomogeneousVisibility,
+    ScenarioName,
+    Settings,
+    SumoConfiguration,
+    chosen_scenario,
+)
+from fogsim.errors import InputError
+
+if TYPE_CHECKING:
+    from fogsim.ego.view_rendering import Surrounding
+    from fogsim.scenario import Scenario
+
+
+def view_command(
+    scenario: ScenarioName = None,
+    sumocfg: SumoConfiguration = None,
+    ego: EgoId = None,
+    visibility: HomogeneousVisibility = None,
+    at: Annotated[float, typer.Option(min=0.0, help="Instant of the run [s].")] = 0.0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the run.")] = 0,
+    out: Annotated[Path | None, typer.Option(help="Write what the window would show to this image instead.")] = None,
+    settings: Settings = None,
+) -> None:
+    """Open the world around the ego, in clear air, in pyrender's viewer, or write a picture of it."""
+    from fogsim.offline.image_files import write_image
+    from fogsim.render import to_pyrender
+    from fogsim.render.viewer import first_picture, open_viewer, require_display
+
+    if out is None:
+        require_display()  # before the run, not after it
+    loaded = chosen_scenario(scenario, sumocfg, ego, visibility, settings)
+    around = _surrounding(loaded, at, seed)
+    nodes = to_pyrender(
+        around.scene,
+        around.pose,
+        around.lights,
+        vehicles=around.vehicles,
+        camera=around.camera,
+        illuminance=around.illuminance,
+    )
+    size = (around.camera.width, around.camera.height)
+    if out is None:
+        stdout.print("Drag turns about what lies ahead, the wheel moves, z goes back to the ego's camera, q closes.")
+        open_viewer(nodes, size, f"{loaded.name}, {at:g} s")
+        return
+    write_image(out, first_picture(nodes, size)[:, :, ::-1])  # blue first
+    stdout.print(escape(out), soft_wrap=True)
+
+
+def _surrounding(scenario: "Scenario", at: float, seed: int) -> "Surrounding":
+    """Run a scenario with its own policy to an instant [s]."""
+    from fogsim.loop import AdvisedDriving, ClosedLoop
+
+    # The viewer needs an OpenGL context of its own kind, so frames are drawn without.
+    drawn = scenario.model_copy(update={"renderer": "cpu"})
+    policy = AdvisedDriving(drawn)
+    with SimulationProgress(stderr, at) as progress, ClosedLoop(drawn) as loop:
+        step = loop.start(seed)
+        while step.time < at - 1e-9:
+            if step.ending is not None:
+                raise InputError(f"--at {at:g}: the run ends after {step.time:g} s ({step.ending.value})")
+            step = loop.advance(policy.decide(step))
+            progress.show(step)
+        return loop.surrounding()

@@ -1,0 +1,55 @@
+"""``fogsim view``: the picture that the viewer would show first, and what is said where there is no display."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from fogsim.cli.view import view_command
+from fogsim.errors import InputError
+from fogsim.loop import ClosedLoop
+from fogsim.scenario import load_scenario
+
+
+def test_the_picture_is_that_of_the_ego_in_clear_air(tmp_path: Path) -> None:
+    out = tmp_path / "view.png"
+    settings = ["camera.width=160", "camera.height=120", "fog.visibility_m=30"]
+    view_command("motorway_fog_bank", at=0.2, out=out, settings=settings)
+    picture = np.asarray(Image.open(out)).astype(float)
+    assert picture.shape == (120, 160, 3)
+    # Sky above, asphalt below, grass (more green than red than blue) between them, which fog of 30 m would hide.
+    assert np.median(picture[:20]) > 150
+    assert np.ptp(picture[-10:, 60:100], axis=2).max() < 10
+    assert (picture[50:70, :, 1] > picture[50:70, :, 2] + 15).any()
+
+
+def test_without_a_display_one_line_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+    with pytest.raises(InputError, match=r"no display here .*--out FILE\.png") as caught:
+        view_command("motorway_fog_bank")
+    assert "\n" not in str(caught.value)
+
+
+def test_an_instant_after_the_end_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"--at 60: the run ends after 0\.2 s \(time\)"):
+        view_command(
+            "motorway_fog_bank",
+            at=60.0,
+            out=tmp_path / "view.png",
+            settings=["camera.width=32", "camera.height=24", "duration_s=0.2"],
+        )
+
+
+def test_what_is_around_the_ego_is_what_its_camera_sees() -> None:
+    scenario = load_scenario("motorway_fog_bank", ["renderer=cpu", "camera.width=64", "camera.height=48"])
+    with ClosedLoop(scenario) as loop:
+        step = loop.start(0)
+        around = loop.surrounding()
+    assert step.truth.pose is not None
+    assert around.camera == step.truth.camera
+    assert around.pose.heading == step.truth.pose.heading
+    assert sum(len(batch.instance) for batch in around.vehicles) == len(step.traffic.ids) - 1
+    assert 16 + step.ego not in np.concatenate([batch.instance for batch in around.vehicles])
+    assert around.illuminance == scenario.light.illuminance_lx
+    assert not around.lights.own

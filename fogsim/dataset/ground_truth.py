@@ -10,9 +10,7 @@ from fogsim.errors import InputError
 from fogsim.linear_algebra import matrix_product
 from fogsim.values import Step, Truth, View
 from fogsim.values.pinhole import ray_from_pixel
-
-FIRST_VEHICLE = 16
-"""Ids in `View.instance` from which on they are vehicles: this plus the row in the traffic state."""
+from fogsim.values.scene import Instance
 
 
 class SemanticClass(IntEnum):
@@ -102,9 +100,9 @@ def semantic_mask(step: Step) -> NDArray[np.uint8]:
     (rows, cols) uint8
         Values of `SemanticClass`.
     """
-    table = np.full(FIRST_VEHICLE + len(step.traffic.types), SemanticClass.ROADSIDE, np.uint8)
+    table = np.full(Instance.FIRST_VEHICLE + len(step.traffic.types), SemanticClass.ROADSIDE, np.uint8)
     table[: SemanticClass.CAR] = range(SemanticClass.CAR)
-    table[FIRST_VEHICLE:] = [vehicle_class(body) for body in step.traffic.types]
+    table[Instance.FIRST_VEHICLE :] = [vehicle_class(body) for body in step.traffic.types]
     return np.asarray(table[step.view.instance])
 
 
@@ -129,7 +127,7 @@ def instance_mask(step: Step) -> NDArray[np.uint16]:
     """
     ids = step.view.instance
     vehicles = len(step.traffic.ids)
-    mask = np.where(ids >= FIRST_VEHICLE, ids - (FIRST_VEHICLE - 1), 0).astype(np.uint16)
+    mask = np.where(ids >= Instance.FIRST_VEHICLE, ids - (Instance.FIRST_VEHICLE - 1), 0).astype(np.uint16)
     rows, cols = np.nonzero(ids == SemanticClass.SIGN)
     if rows.size:
         sign = _sign_of(_places(step.view, step.truth, rows, cols), step.truth)

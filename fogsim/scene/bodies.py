@@ -12,8 +12,7 @@ from importlib.resources import files
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.scene.solids import ROADSIDE
-from fogsim.values.scene import Mesh, Surface
+from fogsim.values.scene import Instance, Mesh, Surface
 
 LIT_AREAS = {
     Surface.LAMP_POSITION_REAR: 62e-4,
@@ -89,7 +88,7 @@ def _shapes() -> Mapping[str, Mesh]:
         "reflectance": packed["reflectance"],
         "surface": packed["surface"].astype(np.int32),
         "road": np.zeros((count, 4), np.float32),
-        "instance": np.full(count, ROADSIDE, np.int32),
+        "instance": np.full(count, Instance.ROADSIDE, np.int32),
         "faces": packed["faces"].astype(np.uint32),
     }
     for array in columns.values():

@@ -13,10 +13,10 @@ from fogsim.scene.terrain import Terrain
 from fogsim.values.road import Lane, LaneKind, LaneMarking
 from fogsim.values.scene import Mesh, Surface
 
-SHOULDER = Material((0.097, 0.096, 0.094), Surface.ROAD)
-GRAVEL = Material((0.115, 0.105, 0.085))
-BANK = Material((0.062, 0.085, 0.034))
-CONCRETE = Material((0.24, 0.238, 0.23))
+_SHOULDER = Material((0.097, 0.096, 0.094), Surface.ROAD)
+_GRAVEL = Material((0.115, 0.105, 0.085))
+_BANK = Material((0.062, 0.085, 0.034))
+_CONCRETE = Material((0.24, 0.238, 0.23))
 
 # Shoulders lie this much lower [m], so that a lane that crosses one covers it; more would hide the line beside them.
 _SHOULDER_DROP = 0.002
@@ -76,7 +76,7 @@ def lane_edge(lane: Lane, side: int, line: Points, index: LaneIndex) -> Edge:
     """
     width = 0.0 if lane.kind is LaneKind.FOOTWAY else _shoulder_width(lane.speed_limit, side)
     inner, marking = lane.width / 2, lane.left if side > 0 else lane.right
-    room = room_beside(line, side * inner, width + _VERGE, index, 0.5)
+    room = _room_beside(line, side * inner, width + _VERGE, index, 0.5)
     along, there = _thinned(line, room)
     return Edge(along, side, inner, lane.speed_limit, width, there, marking)
 
@@ -96,30 +96,15 @@ def border_edge(line: Points, speed_limit: float, footways: bool, index: LaneInd
         All lanes.
     """
     width = 0.0 if footways else _shoulder_width(speed_limit, -1)
-    along, there = _thinned(line, room_beside(line, -0.0, width + _VERGE, index, 1.0))
+    along, there = _thinned(line, _room_beside(line, -0.0, width + _VERGE, index, 1.0))
     return Edge(along, -1, 0.0, speed_limit, width, there)
 
 
-def room_beside(line: Points, inner: float, most: float, index: LaneIndex, share: float) -> NDArray[np.float64]:
-    """Room beside the points of a line.
+def _room_beside(line: Points, inner: float, most: float, index: LaneIndex, share: float) -> NDArray[np.float64]:
+    """Room beside the points of a line [m], at least 0.1 m, at most `most`.
 
-    Parameters
-    ----------
-    line : (n, 3) float64
-        The line [m].
-    inner : float
-        How far to the left of the line the room begins [m]; to the right if it is negative, −0.0 included.
-    most : float
-        More than this is not asked for [m].
-    index : LaneIndex
-        The lanes that it ends at.
-    share : float
-        Share of the gap up to such a lane that counts.
-
-    Returns
-    -------
-    (n,) float64
-        Room [m], at least 0.1 m.
+    It begins at `inner` to the left of the line (to the right if that is negative, −0.0 included); of the gap up to
+    another lane a share counts.
     """
     side = np.copysign(1.0, inner)
     gap = index.room(parallel(line, inner), side * left_normals(line), most / share, _LEVEL)
@@ -170,7 +155,7 @@ def edge_meshes(edge: Edge, terrain: Terrain, index: LaneIndex, along: NDArray[n
         parallel(edge.line, edge.side * (paved - 0.02), -_SHOULDER_DROP - 0.001),
         parallel(edge.line, edge.side * outer, -0.06),
     ]
-    verge = grid(np.stack(rows, axis=1), GRAVEL, (0, 0, 1))
+    verge = grid(np.stack(rows, axis=1), _GRAVEL, (0, 0, 1))
     return [_shoulder(edge, paved, distance), verge, *_down(edge, outer, -0.06, terrain, index)]
 
 
@@ -184,7 +169,7 @@ def _shoulder(edge: Edge, paved: NDArray[np.float64], along: NDArray[np.float64]
         # It shows its half of the line beside it: on its right if it lies to the left of the road.
         marking if edge.side > 0 else 3 * marking,
         along,
-        SHOULDER,
+        _SHOULDER,
         middle=edge.side * (edge.inner + edge.shoulder / 2),
     )
 
@@ -204,12 +189,12 @@ def _down(edge: Edge, distance: NDArray[np.float64], lift: float, terrain: Terra
     bridge = _over_road(top, foot, deep, index)
     parts = []
     for start, end in true_spans(~bridge, least=2):
-        parts.append(grid(np.stack((top[start:end], foot[start:end]), axis=1), BANK, (0, 0, 1)))
+        parts.append(grid(np.stack((top[start:end], foot[start:end]), axis=1), _BANK, (0, 0, 1)))
     for first, after in true_spans(bridge):
         # A bridge reaches a vertex farther on either side.
         start, end = max(first - 1, 0), min(after + 1, len(line))
         deck = np.stack((top[start:end], top[start:end] - (0.0, 0.0, _DECK)), axis=1)
-        parts.append(grid(deck, CONCRETE, np.append(foot[start, :2] - top[start, :2], 0.0)))
+        parts.append(grid(deck, _CONCRETE, np.append(foot[start, :2] - top[start, :2], 0.0)))
     return parts
 
 

@@ -9,10 +9,10 @@ from fogsim.jit import kernel
 from fogsim.scene.edges import Edge, border_edge
 from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.polyline import Points, cleaned, refined, true_spans
-from fogsim.scene.road import ASPHALT, FLAGSTONES, KERB, ROAD
+from fogsim.scene.road import ASPHALT, FLAGSTONES, KERB
 from fogsim.scene.solids import concave_faces, mesh
 from fogsim.values.road import Lane, LaneKind, PavedArea
-from fogsim.values.scene import Mesh
+from fogsim.values.scene import Instance, Mesh
 
 _BELOW = 0.003  # junctions lie this far below the lanes that lead to them [m], so that lines end at full width
 _PIECE = 1.0  # longest piece of a border that is free or not as a whole [m]
@@ -42,7 +42,7 @@ def area_mesh(area: PavedArea) -> Mesh | None:
     # Far from the middle of any lane, so that no wheel has worn a track.
     road[:, 1] += 100.0
     road[:, 2] = 1.75
-    return mesh(points, faces, up, ASPHALT, road=road, instance=ROAD)
+    return mesh(points, faces, up, ASPHALT, road=road, instance=Instance.ROAD)
 
 
 def walkable(areas: Sequence[PavedArea], lanes: Sequence[Lane]) -> list[PavedArea]:

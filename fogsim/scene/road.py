@@ -11,10 +11,7 @@ from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.polyline import Points, arc_length, at_distance, cleaned, left_normals, parallel, refined, true_spans
 from fogsim.scene.solids import Material, grid, merge
 from fogsim.values.road import Lane, LaneEnd, LaneKind, LaneMarking
-from fogsim.values.scene import Mesh, Surface
-
-ROAD = 2
-"""Instance id of the road (see `View.instance`)."""
+from fogsim.values.scene import Instance, Mesh, Surface
 
 FAST = 22.0
 """Speed limit from which a road has wide shoulders, guard rails and delineators [m/s]."""
@@ -108,7 +105,7 @@ def strip(
     road[..., 0] = along[:, None]
     road[:, 0, 1], road[:, 1, 1] = left[0] - middle, left[1] - middle
     road[..., 2:] = half, lines
-    return grid(points, material, (0, 0, 1), road=road.reshape(-1, 4), instance=ROAD)
+    return grid(points, material, (0, 0, 1), road=road.reshape(-1, 4), instance=Instance.ROAD)
 
 
 def footway_mesh(line: Points, left: tuple[float, float | NDArray[np.float64]]) -> Mesh:
@@ -232,4 +229,4 @@ def _painted(corners: Points) -> Mesh:
     road[..., 1] = 1.0 + 0.75 * LINE_WIDTH * np.array([-1.0, 1.0])
     road[..., 2], road[..., 3] = 1.0, 3.0
     lifted = widened + np.array([0.0, 0.0, _LIFT])
-    return grid(lifted, ASPHALT, (0, 0, 1), road=road.reshape(-1, 4), instance=ROAD)
+    return grid(lifted, ASPHALT, (0, 0, 1), road=road.reshape(-1, 4), instance=Instance.ROAD)

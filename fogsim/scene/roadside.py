@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from fogsim.linear_algebra import matrix_product
 from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.polyline import arc_length, at_distance, left_normals
-from fogsim.scene.solids import ROADSIDE, Material, box, merge
+from fogsim.scene.solids import Material, box, merge
 from fogsim.scene.terrain import Terrain
-from fogsim.values.scene import Batch, Mesh, Surface
+from fogsim.values.scene import Batch, Instance, Mesh, Surface
 
 TREE_CLEARANCE = 9.0
 """Least distance of a tree's trunk from the edge of any lane [m]."""
@@ -82,7 +82,7 @@ def placed(
     heading: NDArray[np.float64],
     size: NDArray[np.float64] | float = 1.0,
     *,
-    instance: int = ROADSIDE,
+    instance: int = Instance.ROADSIDE,
 ) -> Batch:
     """Batch of upright copies of a shape.
 

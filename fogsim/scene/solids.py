@@ -10,10 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fogsim.jit import kernel
 from fogsim.linear_algebra import matrix_product
-from fogsim.values.scene import Mesh, Surface
-
-ROADSIDE = 3
-"""Instance id of what stands beside the road (see `View.instance`)."""
+from fogsim.values.scene import Instance, Mesh, Surface
 
 Vector = tuple[float, float, float]
 
@@ -45,7 +42,7 @@ def mesh(
     *,
     reflectance: ArrayLike | None = None,
     road: ArrayLike | None = None,
-    instance: int = ROADSIDE,
+    instance: int = Instance.ROADSIDE,
 ) -> Mesh:
     """Mesh of one material.
 
@@ -151,7 +148,7 @@ def grid(
     *,
     reflectance: ArrayLike | None = None,
     road: ArrayLike | None = None,
-    instance: int = ROADSIDE,
+    instance: int = Instance.ROADSIDE,
 ) -> Mesh:
     """Smooth patch through a grid of points.
 
@@ -196,7 +193,7 @@ def quad(corners: ArrayLike, material: Material, toward: ArrayLike) -> Mesh:
     return grid([[a, b], [d, c]], material, toward)
 
 
-def polygon(corners: ArrayLike, material: Material, toward: ArrayLike, instance: int = ROADSIDE) -> Mesh:
+def polygon(corners: ArrayLike, material: Material, toward: ArrayLike, instance: int = Instance.ROADSIDE) -> Mesh:
     """Flat convex polygon.
 
     Parameters
@@ -296,7 +293,7 @@ def disc(
     *,
     sides: int = 24,
     hole: float = 0.0,
-    instance: int = ROADSIDE,
+    instance: int = Instance.ROADSIDE,
 ) -> Mesh:
     """Disc or ring.
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from fogsim.scene.polyline import Points, cleaned, refined
 from fogsim.scene.solids import Material, grid_faces, grid_normals, mesh
 from fogsim.values.road import Lane
-from fogsim.values.scene import Mesh, Surface
+from fogsim.values.scene import Instance, Mesh, Surface
 
 _LEVEL = 2.0  # roads whose heights differ by no more than this lie in a plain [m]
 _CELL = 14.0  # side of a cell of the land [m]
@@ -93,7 +93,7 @@ class Terrain:
             grid_normals(points, (0, 0, 1)).reshape(-1, 3)[used],
             Material((0.064, 0.088, 0.036)),
             reflectance=tone[:, None] * _GRASS,
-            instance=1,
+            instance=Instance.TERRAIN,
         )
 
 
@@ -146,4 +146,4 @@ def plain_mesh(lanes: Sequence[Lane], height: float) -> Mesh:
     points = np.array([(x, y, height) for x, y in corners])
     normals = np.broadcast_to((0.0, 0.0, 1.0), (4, 3))
     grass = Material((0.064, 0.088, 0.036), Surface.TERRAIN)
-    return mesh(points, [[0, 1, 2], [1, 3, 2]], normals, grass, instance=1)
+    return mesh(points, [[0, 1, 2], [1, 3, 2]], normals, grass, instance=Instance.TERRAIN)

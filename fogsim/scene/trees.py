@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from fogsim.scene.solids import Material, grid, grid_faces, merge, mesh
 from fogsim.values.scene import LEVELS_OF_DETAIL, Mesh
 
-BARK = Material((0.055, 0.042, 0.032))
+_BARK = Material((0.055, 0.042, 0.032))
 
 _OCTAHEDRON = (
     np.array([(1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)], np.float64),
@@ -33,16 +33,8 @@ _ICOSAHEDRON = (
 """Corners, on the unit sphere, and triangles."""
 
 
-def conifer(rng: np.random.Generator, level: int = 0) -> Mesh:
-    """Spruce of 1 m height: ragged whorls of branches around a trunk.
-
-    Parameters
-    ----------
-    rng : numpy Generator
-        What makes it this tree.
-    level : int
-        0 in full, 1 … 4 the simpler ones in the order of `LEVELS_OF_DETAIL`.
-    """
+def _conifer(rng: np.random.Generator, level: int) -> Mesh:
+    """Spruce of 1 m height: ragged whorls of branches around a trunk."""
     whorls, branches, long = ((11, 11, 0.24), (8, 8, 0.28), (5, 5, 0.36), (2, 3, 0.7), (1, 2, 1.0))[level]
     colour = np.array([0.030, 0.052, 0.028]) * rng.uniform(0.8, 1.2) + np.array([0.006, 0.004, 0.0]) * rng.random()
     # Levels of detail have less of the bright tips.
@@ -62,7 +54,7 @@ def _trunk(height: float, radius: float, sides: int = 4) -> Mesh:
     angle = np.linspace(0, 2 * np.pi, sides + 1)
     ring = np.column_stack((np.cos(angle), np.sin(angle), np.zeros(sides + 1)))
     points = np.stack((ring * radius, ring * radius * 0.8 + (0, 0, height)))
-    return mesh(points, grid_faces(2, sides + 1), np.vstack((ring, ring)), BARK)
+    return mesh(points, grid_faces(2, sides + 1), np.vstack((ring, ring)), _BARK)
 
 
 def _whorl(
@@ -84,16 +76,8 @@ def _whorl(
     return mesh(points, faces, normals, Material((0, 0, 0)), reflectance=light[:, None] * colour)
 
 
-def broad_leaved(rng: np.random.Generator, level: int = 0) -> Mesh:
-    """Broad-leaved tree of 1 m height: a trunk and a crown of blobs ragged with clusters of leaves.
-
-    Parameters
-    ----------
-    rng : numpy Generator
-        What makes it this tree.
-    level : int
-        0 in full, 1 … 4 the simpler ones in the order of `LEVELS_OF_DETAIL`.
-    """
+def _broad_leaved(rng: np.random.Generator, level: int) -> Mesh:
+    """Broad-leaved tree of 1 m height: a trunk and a crown of blobs ragged with clusters of leaves."""
     colour = np.array([0.044, 0.066, 0.026]) * rng.uniform(0.75, 1.25) + np.array([0.014, 0.006, 0.0]) * rng.random()
     # Levels of detail have less of the bright leaves and of the ragged outline.
     colour *= (1.0, 1.035, 1.065, 1.09, 1.03)[level]
@@ -155,16 +139,8 @@ def _leaf_clusters(
     )
 
 
-def woodland(rng: np.random.Generator, level: int = 0) -> Mesh:
-    """Edge of a wood, 1 m wide along x and 1 m high: two ragged curtains of crowns, dark below.
-
-    Parameters
-    ----------
-    rng : numpy Generator
-        What makes it this wood.
-    level : int
-        0 in full, 1 … 4 the simpler ones in the order of `LEVELS_OF_DETAIL`.
-    """
+def _woodland(rng: np.random.Generator, level: int) -> Mesh:
+    """Edge of a wood, 1 m wide along x and 1 m high: two ragged curtains of crowns, dark below."""
     columns = (30, 24, 16, 7, 4)[level]
     green = np.array([0.040, 0.057, 0.027]) * rng.uniform(0.8, 1.2)
     parts = []
@@ -194,7 +170,7 @@ def tree_shapes(rng: np.random.Generator, kinds: int = 5) -> dict[str, Mesh]:
         Number of conifers, of broad-leaved trees and of woods.
     """
     shapes: dict[str, Mesh] = {}
-    for name, grow in (("conifer", conifer), ("broad_leaved", broad_leaved), ("woodland", woodland)):
+    for name, grow in (("conifer", _conifer), ("broad_leaved", _broad_leaved), ("woodland", _woodland)):
         for i in range(kinds):
             # All levels get the same random numbers first, so colour and spread agree.
             seed = int(rng.integers(2**31))

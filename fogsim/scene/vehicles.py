@@ -9,11 +9,8 @@ from numpy.typing import NDArray
 
 from fogsim.jit import kernel
 from fogsim.scene.bodies import body_of
-from fogsim.values.scene import Batch
+from fogsim.values.scene import Batch, Instance
 from fogsim.values.traffic import TrafficState
-
-FIRST_VEHICLE = 16
-"""Instance id of the vehicle in row 0 (see `View.instance`)."""
 
 
 def vehicle_batches(state: TrafficState, skip: int | None) -> tuple[Batch, ...]:
@@ -92,7 +89,7 @@ def _grouped(
     ends = np.cumsum([0, *map(len, groups.values())]).tolist()
     shapes = tuple((name, slice(*ends[n : n + 2])) for n, name in enumerate(groups) if groups[name])
     rows = np.array([row for group in groups.values() for row in group], np.int64)
-    instance = (FIRST_VEHICLE + rows).astype(np.int32)
+    instance = (Instance.FIRST_VEHICLE + rows).astype(np.int32)
     rows.flags.writeable = instance.flags.writeable = False
     return shapes, rows, instance
 

@@ -11,6 +11,17 @@ MIDDLE, FAR, TINY, SPECK = LEVELS_OF_DETAIL = (":middle", ":far", ":tiny", ":spe
 """Endings of the names of a shape's levels of detail for when it is small in the picture, the finest first."""
 
 
+class Instance(IntEnum):
+    """Instance ids that renderers draw (see `View.instance`): the vehicle in row i has FIRST_VEHICLE + i."""
+
+    SKY = 0
+    TERRAIN = 1
+    ROAD = 2
+    ROADSIDE = 3
+    SIGN = 4
+    FIRST_VEHICLE = 16
+
+
 class Surface(IntEnum):
     """How a vertex's surface gets its radiance.
 

@@ -9,14 +9,14 @@ from fogsim.scene.roadside import placed, tube
 from fogsim.scene.signs.faces import back
 from fogsim.scene.signs.gantry import Gantry, gantries, gantry_mesh
 from fogsim.scene.signs.kinds import SIGN_KINDS, SignKind, face_of, shape_name
-from fogsim.scene.signs.symbols import SIGN
 from fogsim.scene.solids import Material, merge
 from fogsim.scene.terrain import Terrain
 from fogsim.values.road import Sign
-from fogsim.values.scene import FAR, TINY, Batch, Mesh
+from fogsim.values.scene import FAR, TINY, Batch, Instance, Mesh
 
 __all__ = ["SIGN", "SIGN_KINDS", "Gantry", "SignKind", "gantries", "gantry_mesh", "sign_batches", "sign_shapes"]
 
+SIGN = Instance.SIGN
 _BACK = Material((0.28, 0.285, 0.29))
 _POST = "sign_post"
 
@@ -67,7 +67,7 @@ def _face(sign: Sign) -> Batch:
         transforms=transform[None],
         paint=np.zeros((1, 3), np.float32),
         lamps=np.zeros(1, np.int32),
-        instance=np.full(1, SIGN, np.int32),
+        instance=np.full(1, Instance.SIGN, np.int32),
     )
 
 
@@ -79,4 +79,4 @@ def _posts(signs: Sequence[Sign], terrain: Terrain) -> Batch:
     top = places[:, 2] + 0.35 * np.array([sign.diameter for sign in signs])
     places[:, 2] = np.minimum(terrain.height(places[:, :2]), places[:, 2]) - 0.3
     size: NDArray[np.float64] = np.column_stack((np.ones((len(signs), 2)), top - places[:, 2]))
-    return placed(_POST, places, heading, size, instance=SIGN)
+    return placed(_POST, places, heading, size, instance=Instance.SIGN)

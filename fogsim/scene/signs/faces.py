@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fogsim.linear_algebra import matrix_product
-from fogsim.scene.signs.symbols import BLACK, FIELD, RED, SIGN, Corners, flat
+from fogsim.scene.signs.symbols import BLACK, FIELD, RED, Corners, flat
 from fogsim.scene.solids import Material, merge
-from fogsim.values.scene import Mesh
+from fogsim.values.scene import Instance, Mesh
 
 _ROUND = 36  # corners of what is round
 _CORE = 0.66  # size of the inner of two areas of a face that is very small in the picture
@@ -189,5 +189,5 @@ def back(outline: Corners, material: Material) -> Mesh:
         positions=mirror.positions + np.array([0, 0, -0.05], np.float32),
         normals=-mirror.normals,
         faces=mirror.faces[:, ::-1].copy(),
-        instance=np.full(len(mirror.positions), SIGN, np.int32),
+        instance=np.full(len(mirror.positions), Instance.SIGN, np.int32),
     )

@@ -12,7 +12,6 @@ from fogsim.scene.signs.symbols import (
     GREY,
     RED,
     RED_DIODES,
-    SIGN,
     YELLOW,
     bend,
     exclamation,
@@ -28,7 +27,7 @@ from fogsim.scene.signs.symbols import (
 from fogsim.scene.solids import Material, disc, merge
 from fogsim.units import KMH_PER_MPS
 from fogsim.values.road import Sign
-from fogsim.values.scene import Mesh
+from fogsim.values.scene import Instance, Mesh
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +72,7 @@ def _stripes() -> Mesh:
 
 def _variable_limit(speed: float) -> Face:
     lit = text(_number(speed), 0.42 if len(_number(speed)) < 3 else 0.36, DIODES, widest=0.58)
-    ring = disc((0, 0, 0), 0.45, (1, 0, 0), (0, 1, 0), RED_DIODES, sides=32, hole=0.36, instance=SIGN)
+    ring = disc((0, 0, 0), 0.45, (1, 0, 0), (0, 1, 0), RED_DIODES, sides=32, hole=0.36, instance=Instance.SIGN)
     housing = Material((0.012, 0.012, 0.013))
     return plate_face(merge((lit, ring)), field=housing, border=housing)
 

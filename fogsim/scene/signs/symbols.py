@@ -7,10 +7,7 @@ import numpy as np
 
 from fogsim.scene.polyline import cleaned, parallel
 from fogsim.scene.solids import Material, disc, grid, merge, polygon
-from fogsim.values.scene import Mesh, Surface
-
-SIGN = 4
-"""Instance id of signs (see `View.instance`)."""
+from fogsim.values.scene import Instance, Mesh, Surface
 
 
 def _sheeting(red: float, green: float, blue: float) -> Material:
@@ -40,7 +37,7 @@ def flat(corners: Corners, material: Material) -> Mesh:
     material : Material
         Its material.
     """
-    return polygon([(x, y, 0.0) for x, y in corners], material, _Z, SIGN)
+    return polygon([(x, y, 0.0) for x, y in corners], material, _Z, Instance.SIGN)
 
 
 def line(points: Corners, width: float, material: Material) -> Mesh:
@@ -57,7 +54,7 @@ def line(points: Corners, width: float, material: Material) -> Mesh:
     """
     middle = cleaned(np.column_stack((np.array(points), np.zeros(len(points)))), 1e-4)
     edges = np.stack((parallel(middle, width / 2), parallel(middle, -width / 2)), axis=1)
-    return grid(edges, material, _Z, instance=SIGN)
+    return grid(edges, material, _Z, instance=Instance.SIGN)
 
 
 def text(words: str, height: float, material: Material, *, widest: float = 10.0) -> Mesh:
@@ -176,7 +173,7 @@ def _shifted(part: Mesh, x: float, y: float, size: float = 1.0) -> Mesh:
 
 def exclamation() -> Mesh:
     """Mark of a general warning."""
-    dot = disc((0.0, -0.14, 0.0), 0.045, _X, _Y, BLACK, sides=12, instance=SIGN)
+    dot = disc((0.0, -0.14, 0.0), 0.045, _X, _Y, BLACK, sides=12, instance=Instance.SIGN)
     return merge((flat([(-0.045, 0.22), (-0.025, -0.06), (0.025, -0.06), (0.045, 0.22)], BLACK), dot))
 
 

@@ -34,7 +34,15 @@ def leave_on_signals() -> None:
 
 
 def leave(signum: int, _: FrameType | None = None) -> None:
-    """End the process at once, with one line and the exit code of a signal: 130 for SIGINT, 143 SIGTERM, 129 SIGHUP."""
+    """End the process at once, with one line and the exit code of a signal: 130 for SIGINT, 143 SIGTERM, 129 SIGHUP.
+
+    Parameters
+    ----------
+    signum : int
+        The signal.
+    _ : frame or None
+        Where it came, as handlers are given it.
+    """
     # The terminal may be gone after SIGHUP.
     with contextlib.suppress(OSError):
         os.write(2, b"interrupted\n")

@@ -129,7 +129,13 @@ class EntersFog(Protocol):
     """A traffic simulation, as far as fog concerns it."""
 
     def enter_fog(self, fog: FogAccess) -> None:
-        """Let drivers see only what this fog lets them see; see `Traffic.enter_fog`."""
+        """Let drivers see only what this fog lets them see; see `Traffic.enter_fog`.
+
+        Parameters
+        ----------
+        fog : FogAccess
+            The fog.
+        """
 
 
 class DriversFog:

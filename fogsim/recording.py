@@ -199,6 +199,11 @@ class Recording:
     def record(self, step: Step) -> None:
         """Hand a step to metrics and recorders.
 
+        Parameters
+        ----------
+        step : Step
+            The finished step.
+
         Raises
         ------
         RecorderError

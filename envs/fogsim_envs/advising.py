@@ -74,7 +74,15 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begin an episode; ``options={"overrides": ["fog.visibility_m=80"]}`` changes the scenario for it."""
+        """Begin an episode; ``options={"overrides": ["fog.visibility_m=80"]}`` changes the scenario for it.
+
+        Parameters
+        ----------
+        seed : int or None
+            Seed of this and the following episodes; None goes on with the numbers of before.
+        options : dict or None
+            ``overrides``: a list of ``key.path=value``.
+        """
         super().reset(seed=seed)
         more = tuple((options or {}).get("overrides", ()))
         scenario = self._load([*self._overrides, *more]) if more else self._scenario
@@ -92,7 +100,13 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         return observe(self._step), _info(self._step)
 
     def step(self, action: NDArray[Any]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Let an action be in force for one decision period."""
+        """Let an action be in force for one decision period.
+
+        Parameters
+        ----------
+        action : array_like of two numbers
+            A member of the action space.
+        """
         if self._simulation is None or self._step is None:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
         before, command = self._step, spread_advice(command_of(action, self._continuous), self._step, self._active)

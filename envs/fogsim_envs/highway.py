@@ -90,7 +90,13 @@ class FogHighwayEnv(AdvisingEnv):
 
 
 def highway_config(environment: Any) -> Mapping[str, Any]:
-    """Configuration of a highway-env environment without wrappers."""
+    """Configuration of a highway-env environment without wrappers.
+
+    Parameters
+    ----------
+    environment : object
+        The environment.
+    """
     config: Mapping[str, Any] = environment.config
     return config
 
@@ -139,7 +145,17 @@ def _clocks(config: Mapping[str, Any]) -> list[str]:
 
 
 def clock_settings(step: float, camera: float, decision: float) -> list[str]:
-    """Overrides that set the clocks [s]."""
+    """Overrides that set the clocks [s].
+
+    Parameters
+    ----------
+    step : float
+        Time between two simulation steps [s].
+    camera : float
+        Time between two frames [s].
+    decision : float
+        Time between two decisions [s].
+    """
     keys = ("traffic_step", "camera_period", "decision_period")
     return [f"clocks.{key}_s={time!r}" for key, time in zip(keys, (step, camera, decision), strict=True)]
 

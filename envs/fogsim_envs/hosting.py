@@ -27,10 +27,22 @@ class Simulation(Protocol):
     """What an environment needs of a closed loop, wherever it runs."""
 
     def start(self, seed: int) -> Step:
-        """Begin a run; see `fogsim.loop.ClosedLoop.start`."""
+        """Begin a run; see `fogsim.loop.ClosedLoop.start`.
+
+        Parameters
+        ----------
+        seed : int
+            Seed of every random number of the run.
+        """
 
     def advance(self, command: Command) -> Step:
-        """Move by one camera period; see `fogsim.loop.ClosedLoop.advance`."""
+        """Move by one camera period; see `fogsim.loop.ClosedLoop.advance`.
+
+        Parameters
+        ----------
+        command : Command
+            Advice and lamps in force.
+        """
 
     def close(self) -> None:
         """End the simulation; closing twice is allowed."""
@@ -125,13 +137,25 @@ class HostedLoop:
         self._child.wait()
 
     def start(self, seed: int) -> Step:
-        """Begin a run; see `fogsim.loop.ClosedLoop.start`."""
+        """Begin a run; see `fogsim.loop.ClosedLoop.start`.
+
+        Parameters
+        ----------
+        seed : int
+            Seed of every random number of the run.
+        """
         if self._connection.closed:
             self._open()
         return cast("Step", self._ask("start", seed))
 
     def advance(self, command: Command) -> Step:
-        """Move by one camera period; see `fogsim.loop.ClosedLoop.advance`."""
+        """Move by one camera period; see `fogsim.loop.ClosedLoop.advance`.
+
+        Parameters
+        ----------
+        command : Command
+            Advice and lamps in force.
+        """
         return cast("Step", self._ask("advance", command))
 
     def close(self) -> None:

@@ -46,7 +46,13 @@ LAMP_MODES = (
 
 
 def observation_space(camera: Camera) -> spaces.Dict:
-    """Space of observations with images of a camera's size and bit depth."""
+    """Space of observations with images of a camera's size and bit depth.
+
+    Parameters
+    ----------
+    camera : Camera
+        The calibration of the ego's camera.
+    """
     pixels = np.uint8 if camera.bits == 8 else np.uint16
     return spaces.Dict(
         {
@@ -59,14 +65,26 @@ def observation_space(camera: Camera) -> spaces.Dict:
 
 
 def action_space(continuous: bool) -> spaces.Space[Any]:
-    """Space of actions: a speed level and a lamp mode, or both as numbers in −1 … 1."""
+    """Space of actions: a speed level and a lamp mode, or both as numbers in −1 … 1.
+
+    Parameters
+    ----------
+    continuous : bool
+        Whether actions are numbers in −1 … 1.
+    """
     if continuous:
         return spaces.Box(-1.0, 1.0, (2,), np.float32)
     return spaces.MultiDiscrete([len(ADVISED_SPEEDS) + 1, len(LAMP_MODES)])
 
 
 def observe(step: Step) -> dict[str, NDArray[Any]]:
-    """Observation of a step: only what the vehicle itself has. Every array is the caller's own."""
+    """Observation of a step: only what the vehicle itself has. Every array is the caller's own.
+
+    Parameters
+    ----------
+    step : Step
+        The finished step.
+    """
     signs, mask = _signs(step)
     return {"camera": step.observation.image.copy(), "signs": signs, "signs_mask": mask, "state": _state(step)}
 

@@ -38,7 +38,17 @@ def make_vector(num_envs: int = 1, timeout: float = TIMEOUT, **kwargs: Any) -> A
 
 
 def make_highway_vector(num_envs: int = 1, timeout: float = TIMEOUT, **kwargs: Any) -> AsyncVectorEnv:
-    """Make a vector environment of ``fogsim/FogHighway-v0``, as `make_vector` does of the other."""
+    """Make a vector environment of ``fogsim/FogHighway-v0``, as `make_vector` does of the other.
+
+    Parameters
+    ----------
+    num_envs : int
+        How many.
+    timeout : float
+        As of `make_vector` [s].
+    **kwargs : object
+        Arguments of each environment.
+    """
     return _workers("fogsim_envs:fogsim/FogHighway-v0", num_envs, timeout, kwargs)
 
 

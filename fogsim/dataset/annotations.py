@@ -19,7 +19,13 @@ CATEGORIES = [
 
 
 def frame_record(step: Step) -> dict[str, Any]:
-    """Entry of one frame: what was true, and what the vehicle was told. Endless visibility is null."""
+    """Entry of one frame: what was true, and what the vehicle was told. Endless visibility is null.
+
+    Parameters
+    ----------
+    step : Step
+        The finished step.
+    """
     truth, observation = step.truth, step.observation
     return {
         "step": step.index,

@@ -97,12 +97,24 @@ class DatasetDirectory:
             )
 
     def has(self, number: int) -> bool:
-        """Tell whether a frame is there with all its files."""
+        """Tell whether a frame is there with all its files.
+
+        Parameters
+        ----------
+        number : int
+            Its place in the data set, from 0.
+        """
         files = [*(self._layer(layer, number) for layer in LAYERS), self._record(number)]
         return all(file.is_file() for file in files)
 
     def beyond(self, frames: int) -> int:
-        """How many frames there are in all, where they are more than these; else 0."""
+        """How many frames there are in all, where they are more than these; else 0.
+
+        Parameters
+        ----------
+        frames : int
+            How many are wanted.
+        """
         numbers = [int(p.stem) for p in (self.path / _RECORDS).glob("*.json")]
         return len(numbers) if any(number >= frames for number in numbers) else 0
 
@@ -138,6 +150,11 @@ class DatasetDirectory:
     def record(self, number: int) -> dict[str, Any]:
         """Record of a frame that is there.
 
+        Parameters
+        ----------
+        number : int
+            Its place in the data set, from 0.
+
         Raises
         ------
         InputError
@@ -151,7 +168,13 @@ class DatasetDirectory:
         return found
 
     def write_annotations(self, annotations: Mapping[str, Any]) -> None:
-        """Write the COCO file, in place of one that is there."""
+        """Write the COCO file, in place of one that is there.
+
+        Parameters
+        ----------
+        annotations : mapping
+            Its content; JSON values only.
+        """
         write_json(self.path / ANNOTATIONS, annotations)
 
     def _layer(self, layer: str, number: int) -> Path:

@@ -39,6 +39,11 @@ def encoded_depth(distance: NDArray[np.float32]) -> NDArray[np.uint16]:
 def decoded_depth(values: NDArray[np.uint16]) -> NDArray[np.float64]:
     """Distance along the ray from the values of a depth image.
 
+    Parameters
+    ----------
+    values : (rows, cols) uint16
+        Values as of `encoded_depth`.
+
     Returns
     -------
     (rows, cols) float64
@@ -48,12 +53,24 @@ def decoded_depth(values: NDArray[np.uint16]) -> NDArray[np.float64]:
 
 
 def encoded_transmission(transmission: NDArray[np.float32]) -> NDArray[np.uint16]:
-    """Transmission 0 … 1 as 16-bit values 0 … 65 535."""
+    """Transmission 0 … 1 as 16-bit values 0 … 65 535.
+
+    Parameters
+    ----------
+    transmission : (rows, cols) float32
+        Transmittance, 0 … 1.
+    """
     return np.rint(np.clip(transmission, 0.0, 1.0) * np.float64(_MOST)).astype(np.uint16)
 
 
 def decoded_transmission(values: NDArray[np.uint16]) -> NDArray[np.float64]:
-    """Transmission 0 … 1 from the values of a transmission image."""
+    """Transmission 0 … 1 from the values of a transmission image.
+
+    Parameters
+    ----------
+    values : (rows, cols) uint16
+        Values as of `encoded_transmission`.
+    """
     return np.asarray(values * TRANSMISSION_UNIT)
 
 

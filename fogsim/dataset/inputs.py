@@ -13,6 +13,15 @@ from fogsim.traffic.road.configuration import input_files
 def identity(scenario: Scenario, seed: int, every: int) -> dict[str, Any]:
     """All that decides a data set's frames; JSON values only.
 
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    seed : int
+        Seed of the first run.
+    every : int
+        One frame is taken of so many camera periods.
+
     Raises
     ------
     InputError
@@ -32,6 +41,11 @@ def identity(scenario: Scenario, seed: int, every: int) -> dict[str, Any]:
 
 def input_digests(scenario: Scenario) -> dict[str, str]:
     """SHA-256 of each file of a scenario's simulation, by its name: net, routes, additional, SUMO configuration.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
 
     Raises
     ------

@@ -15,18 +15,35 @@ _LEAST_RESERVE = 2**18
 
 
 def partial_path(path: Path) -> Path:
-    """Where a file is written until it is whole: its name with ``.part`` behind it."""
+    """Where a file is written until it is whole: its name with ``.part`` behind it.
+
+    Parameters
+    ----------
+    path : Path
+        The final name.
+    """
     return path.with_name(path.name + PARTIAL_SUFFIX)
 
 
 def publish(path: Path) -> None:
-    """Give a file that is whole its final name, in place of one that is there, in one move."""
+    """Give a file that is whole its final name, in place of one that is there, in one move.
+
+    Parameters
+    ----------
+    path : Path
+        The final name.
+    """
     partial_path(path).replace(path)
 
 
 @contextlib.contextmanager
 def naming(path: Path) -> Iterator[None]:
     """Let an error of the operating system (a full disk) name the file.
+
+    Parameters
+    ----------
+    path : Path
+        The file that is worked on.
 
     Raises
     ------
@@ -44,6 +61,13 @@ def naming(path: Path) -> Iterator[None]:
 def write_bytes(path: Path, data: bytes) -> None:
     """Write a file, whole or not at all.
 
+    Parameters
+    ----------
+    path : Path
+        The file.
+    data : bytes
+        Its content.
+
     Raises
     ------
     OSError
@@ -60,12 +84,27 @@ def write_bytes(path: Path, data: bytes) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file, whole or not at all; what is no Unicode of file names is escaped, in JSON as JSON has it."""
+    """Write a text file, whole or not at all; what is no Unicode of file names is escaped, in JSON as JSON has it.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    text : str
+        Its content.
+    """
     write_bytes(path, text.encode("utf-8", "backslashreplace"))
 
 
 def write_json(path: Path, values: Mapping[str, object]) -> None:
     """Write a JSON file, whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    values : mapping
+        Its content; JSON values only.
 
     Raises
     ------
@@ -100,7 +139,13 @@ class Reserve:
         self.grow(_LEAST_RESERVE)
 
     def grow(self, size: int) -> None:
-        """Keep more room [bytes]; written, since a file with holes takes none."""
+        """Keep more room [bytes]; written, since a file with holes takes none.
+
+        Parameters
+        ----------
+        size : int
+            How much more [bytes].
+        """
         with naming(self._path), self._path.open("ab") as file:
             file.write(bytes(size))
 

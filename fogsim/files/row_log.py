@@ -40,6 +40,11 @@ class RowLog:
     def append(self, batch: Any) -> None:
         """Write rows (a pyarrow.RecordBatch); they are safe from the end of the process when it returns.
 
+        Parameters
+        ----------
+        batch : pyarrow.RecordBatch
+            The rows.
+
         Raises
         ------
         OSError
@@ -77,6 +82,11 @@ def read_rows(path: Path) -> Any:
     """Rows of a log, also of one that was cut off in the middle of a row.
 
     Of a row that was written more than once (by its column ``index``) the last one counts.
+
+    Parameters
+    ----------
+    path : Path
+        The log.
 
     Returns
     -------

@@ -42,7 +42,13 @@ class WritingProcess:
 
     @classmethod
     def from_json(cls, values: object) -> Self | None:
-        """Process that a file tells of; None if it tells of none."""
+        """Process that a file tells of; None if it tells of none.
+
+        Parameters
+        ----------
+        values : object
+            What the file holds.
+        """
         if not isinstance(values, Mapping) or not isinstance(values.get("id"), int):
             return None
         told: dict[str, Any] = {field.name: values.get(field.name) for field in dataclasses.fields(cls)}

@@ -41,6 +41,11 @@ class FrameEstimates:
 def chosen_methods(names: Sequence[str]) -> tuple[str, ...]:
     """Methods that are meant by names, each once, "all" being all.
 
+    Parameters
+    ----------
+    names : sequence of str
+        Names in the registry, or "all".
+
     Raises
     ------
     UnknownNameError
@@ -99,6 +104,15 @@ def estimates_of(source: Source, camera: Camera, methods: Sequence[str]) -> Iter
 
     An image that does not fit the camera is passed over like one that cannot be read, unless none has fitted before:
     then it is the calibration that is of another camera.
+
+    Parameters
+    ----------
+    source : Source
+        The images.
+    camera : Camera
+        Their calibration.
+    methods : sequence of str
+        Names in the registry.
     """
     bench = _Bench(camera, methods)
     fitted = False

@@ -197,7 +197,13 @@ class OverlayFile:
         self._written = False
 
     def add(self, result: FrameEstimates) -> None:
-        """Add an image with its estimates."""
+        """Add an image with its estimates.
+
+        Parameters
+        ----------
+        result : FrameEstimates
+            The image and its estimates.
+        """
         if result.picture.image is None:
             return
         drawn = self._overlay.draw(result)

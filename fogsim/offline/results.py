@@ -13,12 +13,24 @@ ENDLESS = 10_000.0
 
 
 def metres(visibility: float) -> str:
-    """Visibility [m] with its unit; "clear" from ten kilometres on."""
+    """Visibility [m] with its unit; "clear" from ten kilometres on.
+
+    Parameters
+    ----------
+    visibility : float
+        Visibility [m].
+    """
     return "clear" if visibility >= ENDLESS else f"{visibility:.0f} m"
 
 
 def interval_text(estimate: Estimate) -> str:
-    """Give the 90 % interval of a valid estimate's visibility."""
+    """Give the 90 % interval of a valid estimate's visibility.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        A valid one.
+    """
     low, high = estimate.visibility_interval
     if high >= ENDLESS:
         return f"> {low:.0f} m"
@@ -76,7 +88,15 @@ _MOST_NAME = 48
 
 
 def table_heading(source: Source, methods: Sequence[str]) -> str:
-    """Heading over the rows of a source."""
+    """Heading over the rows of a source.
+
+    Parameters
+    ----------
+    source : Source
+        The images.
+    methods : sequence of str
+        Names of the methods.
+    """
     return _line(
         _widths(source, methods),
         ("frame", "method", "visibility", "90 % interval", "extinction", "category", "horizon"),
@@ -84,7 +104,17 @@ def table_heading(source: Source, methods: Sequence[str]) -> str:
 
 
 def table_rows(source: Source, methods: Sequence[str], result: FrameEstimates) -> Iterator[str]:
-    """One row for each method; none for an image that could not be used."""
+    """One row for each method; none for an image that could not be used.
+
+    Parameters
+    ----------
+    source : Source
+        The images.
+    methods : sequence of str
+        Names of the methods.
+    result : FrameEstimates
+        One image and its estimates.
+    """
     widths = _widths(source, methods)
     name = str(result.picture.name)
     shown = name if len(name) <= _MOST_NAME else "…" + name[1 - _MOST_NAME :]

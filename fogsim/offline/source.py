@@ -156,6 +156,13 @@ class VideoFile:
     def open(cls, path: Path, temporal: bool = True) -> "VideoFile":
         """Read the header and the first frame of a video.
 
+        Parameters
+        ----------
+        path : Path
+            The file.
+        temporal : bool
+            Whether its frames are taken as a sequence.
+
         Raises
         ------
         InputError

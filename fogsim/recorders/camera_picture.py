@@ -20,7 +20,13 @@ _ROWS: dict[str, tuple[str, Colour]] = {
 
 
 def draw_camera_picture(step: Step) -> Image.Image:
-    """Draw the camera's image into 640 × 480 pixels, its aspect kept, with marks at the rows that were found."""
+    """Draw the camera's image into 640 × 480 pixels, its aspect kept, with marks at the rows that were found.
+
+    Parameters
+    ----------
+    step : Step
+        The finished step.
+    """
     pixels = shown_image(step.observation)
     picture = Image.new("RGB", (WIDTH, HEIGHT), GROUND)
     scaled = scale_image(pixels, WIDTH, HEIGHT)
@@ -37,7 +43,13 @@ def draw_camera_picture(step: Step) -> Image.Image:
 
 
 def shown_image(observation: Observation) -> NDArray[np.uint8]:
-    """(rows, cols[, 3]) uint8: the image in 8 bits, whatever the camera has."""
+    """(rows, cols[, 3]) uint8: the image in 8 bits, whatever the camera has.
+
+    Parameters
+    ----------
+    observation : Observation
+        With the image.
+    """
     frame = observation.frame
     return eight_bit(frame.image, frame.camera.bits) if isinstance(frame, Frame) else eight_bit(frame, 8)
 

@@ -88,7 +88,13 @@ class ReportContent:
 
 
 def render_report(content: ReportContent) -> str:
-    """Render a report as HTML; nothing in it is loaded from elsewhere."""
+    """Render a report as HTML; nothing in it is loaded from elsewhere.
+
+    Parameters
+    ----------
+    content : ReportContent
+        What it holds.
+    """
     title = escape(content.title)
     return "\n".join(
         [
@@ -229,13 +235,27 @@ class ReportRecorder:
         self._open = True
 
     def record(self, step: Step, derived: Derived) -> None:
-        """Remember a step."""
+        """Remember a step.
+
+        Parameters
+        ----------
+        step : Step
+            The finished step.
+        derived : mapping from str to float or None
+            `DERIVED_QUANTITIES` of the step.
+        """
         self._curves.add(step, derived)
         self._album.add(step)
         self._not_played = step.unplayed.lines
 
     def close(self, complete: bool) -> None:
-        """Write the report; it says so if the run was cut short."""
+        """Write the report; it says so if the run was cut short.
+
+        Parameters
+        ----------
+        complete : bool
+            False if the run was cut short.
+        """
         if not self._open:
             return
         last = self._curves.time[-1] if self._curves.time else 0.0

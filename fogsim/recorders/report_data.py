@@ -44,7 +44,15 @@ class Curves:
     collisions: list[float] = field(default_factory=list)
 
     def add(self, step: Step, derived: Derived) -> None:
-        """Take in one step."""
+        """Take in one step.
+
+        Parameters
+        ----------
+        step : Step
+            The finished step.
+        derived : mapping from str to float or None
+            `DERIVED_QUANTITIES` of the step.
+        """
         self.time.append(step.time)
         self.speed.append(float(step.traffic.speed[step.ego]))
         self.limit.append(step.speed_limit)
@@ -117,7 +125,13 @@ class Album:
         self._last: Step | None = None
 
     def add(self, step: Step) -> None:
-        """Take in one step."""
+        """Take in one step.
+
+        Parameters
+        ----------
+        step : Step
+            The finished step.
+        """
         if self._count % self._stride == 0:
             if len(self._pictures) == 2 * MOST_PICTURES:
                 self._pictures = self._pictures[::2]

@@ -133,7 +133,13 @@ class RunDirectory:
         new.rename(self.unfinished)
 
     def write_metrics(self, metrics: Mapping[str, object]) -> None:
-        """Write ``metrics.json``; the room kept for it and the manifest is given back first."""
+        """Write ``metrics.json``; the room kept for it and the manifest is given back first.
+
+        Parameters
+        ----------
+        metrics : mapping
+            JSON values only.
+        """
         (self.unfinished / _RESERVE).unlink(missing_ok=True)
         write_json(self.unfinished / _NAMES["metrics"], metrics)
 
@@ -193,12 +199,24 @@ class RunDirectory:
 
 
 def whole_files(folder: Path) -> list[str]:
-    """Names of the whole result files in a folder, sorted."""
+    """Names of the whole result files in a folder, sorted.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder.
+    """
     return sorted(name for name in _NAMES.values() if (folder / name).is_file())
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Manifest in a folder; empty if there is none that can be read."""
+    """Manifest in a folder; empty if there is none that can be read.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder.
+    """
     try:
         content = json.loads((folder / _NAMES["manifest"]).read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -207,7 +225,15 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 
 def finish_folder(path: Path, manifest: Mapping[str, object]) -> None:
-    """Finish a run directory: see `RunDirectory.finish`. When it is cut off, the next call completes it."""
+    """Finish a run directory: see `RunDirectory.finish`. When it is cut off, the next call completes it.
+
+    Parameters
+    ----------
+    path : Path
+        The run directory.
+    manifest : mapping
+        What it says; the names of the files are added.
+    """
     folder = path / UNFINISHED
     (folder / _RESERVE).unlink(missing_ok=True)
     # What a call before this one has moved already is named by the manifest that it wrote.
@@ -235,7 +261,13 @@ def _moved(folder: Path) -> list[str]:
 
 
 def refuse_living(folder: Path) -> None:
-    """Refuse a folder of a process that lives: a second way to know it, should its lock have been removed."""
+    """Refuse a folder of a process that lives: a second way to know it, should its lock have been removed.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of unfinished results.
+    """
     manifest = read_manifest(folder)
     process = WritingProcess.from_json(manifest.get("process"))
     if process is None or manifest.get("status") != "running" or process == WritingProcess.this():

@@ -42,7 +42,13 @@ class Axis:
     logarithmic: bool = False
 
     def height(self, value: float) -> float:
-        """Place of a value between the ends, 0 … 1."""
+        """Place of a value between the ends, 0 … 1.
+
+        Parameters
+        ----------
+        value : float
+            In the unit of the ends.
+        """
         value = min(max(value, self.low), self.high)
         if self.logarithmic:
             return math.log(value / self.low) / math.log(self.high / self.low)
@@ -107,7 +113,15 @@ class StripChart:
         return image
 
     def add(self, time: float, values: tuple[float | None, ...]) -> None:
-        """Add a row of values at an instant [s]; None leaves a gap."""
+        """Add a row of values at an instant [s]; None leaves a gap.
+
+        Parameters
+        ----------
+        time : float
+            The instant [s].
+        values : tuple of float or None
+            One for each column; None leaves a gap.
+        """
         self._latest = (time, values)
         if not self._rows or time - self._rows[-1][0] >= _SPACING - 1e-9:
             self._rows.append(self._latest)

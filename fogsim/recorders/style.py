@@ -25,7 +25,15 @@ AMBER: Colour = (240, 160, 60)
 
 @cache
 def font(size: int, *, bold: bool = False) -> ImageFont.FreeTypeFont:
-    """DejaVu Sans, which comes with matplotlib, in a size [px]; loaded once per size."""
+    """DejaVu Sans, which comes with matplotlib, in a size [px]; loaded once per size.
+
+    Parameters
+    ----------
+    size : int
+        Height of the letters [px].
+    bold : bool
+        Whether they are bold.
+    """
     name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
     path = Path(mpl.get_data_path(), "fonts", "ttf", name)
     return ImageFont.truetype(str(path), size, layout_engine=ImageFont.Layout.BASIC)

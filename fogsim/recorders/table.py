@@ -81,7 +81,15 @@ class TableRecorder:
         self._open = True
 
     def record(self, step: Step, derived: Derived) -> None:
-        """Add a row; a step that comes once more, with its ending, takes the place of the one before."""
+        """Add a row; a step that comes once more, with its ending, takes the place of the one before.
+
+        Parameters
+        ----------
+        step : Step
+            The finished step.
+        derived : mapping from str to float or None
+            `DERIVED_QUANTITIES` of the step.
+        """
         self._rows.append([column.value(step, derived) for column in self._columns])
         now = self._clock()
         if now - self._logged >= LOG_PERIOD:
@@ -100,7 +108,13 @@ class TableRecorder:
         return self._log
 
     def close(self, complete: bool) -> None:
-        """Make the table of the rows and say in it whether the run was complete."""
+        """Make the table of the rows and say in it whether the run was complete.
+
+        Parameters
+        ----------
+        complete : bool
+            False if the run was cut short.
+        """
         if not self._open:
             return
         if self._log is not None:
@@ -139,7 +153,13 @@ def write_table(path: Path, rows: Any, complete: bool) -> None:
 
 
 def table_columns(methods: Sequence[str]) -> list[Column]:
-    """List the columns of the table for given estimators, in their order."""
+    """List the columns of the table for given estimators, in their order.
+
+    Parameters
+    ----------
+    methods : sequence of str
+        Names of the estimators.
+    """
     columns = [*_EGO_COLUMNS, *_TRAFFIC_COLUMNS, *map(_derived_column, DERIVED_QUANTITIES), *_FOG_COLUMNS]
     for method in methods:
         columns += _estimator_columns(method)

@@ -42,14 +42,28 @@ class VideoRecorder:
         self._encoder: Encoder | None = None
 
     def record(self, step: Step, derived: Derived) -> None:
-        """Add a frame."""
+        """Add a frame.
+
+        Parameters
+        ----------
+        step : Step
+            The finished step.
+        derived : mapping from str to float or None
+            `DERIVED_QUANTITIES` of the step.
+        """
         frame = self._panel.draw(step, derived).tobytes()
         if self._encoder is None:
             self._encoder = Encoder(self._command)
         self._encoder.write(frame)
 
     def close(self, complete: bool) -> None:
-        """Finish the video; after an interruption it holds what was recorded until then."""
+        """Finish the video; after an interruption it holds what was recorded until then.
+
+        Parameters
+        ----------
+        complete : bool
+            False if the run was cut short.
+        """
         if self._encoder is None:
             return
         try:
@@ -86,6 +100,11 @@ class Encoder:
 
     def write(self, frame: bytes) -> None:
         """Hand over one frame.
+
+        Parameters
+        ----------
+        frame : bytes
+            Pixel values of the size and kind in its command line.
 
         Raises
         ------

@@ -31,7 +31,17 @@ NOTES = (
 
 
 def tables(results: Results, rough: Rough, plan: Plan) -> tuple[TitledTable, ...]:
-    """All tables of the thesis that have figures."""
+    """All tables of the thesis that have figures.
+
+    Parameters
+    ----------
+    results : mapping
+        Estimates of each case by range [m].
+    rough : mapping
+        Estimates from the road alone, by visibility [m] and variant.
+    plan : Plan
+        What was run.
+    """
     found = "V_met [m]: thesis | published | corrected"
     return (
         TitledTable("Table 4.1: V_met from the road alone [m]", _table_4_1(rough)),
@@ -210,7 +220,13 @@ def _lead_records(results: Results, plan: Plan) -> list[Mapping[str, Cell]]:
 
 
 def verdicts(records: Sequence[Mapping[str, Cell]]) -> list[str]:
-    """How far the thesis and ours are from the truth, over the cells that both have."""
+    """How far the thesis and ours are from the truth, over the cells that both have.
+
+    Parameters
+    ----------
+    records : sequence of mapping
+        Flat records as of `records`.
+    """
     told = []
     for table in ("4.1", "4.3", "5.1", "5.2", "5.3"):
         parts: list[str] = []
@@ -230,5 +246,15 @@ def _misses(rows: Sequence[Mapping[str, Cell]], key: str) -> NDArray[np.float64]
 
 
 def records(results: Results, rough: Rough, plan: Plan) -> list[Mapping[str, Cell]]:
-    """A flat record for each case of each variant."""
+    """A flat record for each case of each variant.
+
+    Parameters
+    ----------
+    results : mapping
+        Estimates of each case by range [m].
+    rough : mapping
+        Estimates from the road alone, by visibility [m] and variant.
+    plan : Plan
+        What was run.
+    """
     return [*_rough_records(rough), *_lead_records(results, plan)]

@@ -13,7 +13,15 @@ Watch = Callable[[int, int], None]
 
 
 def unwatched(done: int, total: int) -> None:
-    """Watch that shows nothing."""
+    """Watch that shows nothing.
+
+    Parameters
+    ----------
+    done : int
+        Steps that are done.
+    total : int
+        How many there are.
+    """
 
 
 class Steps:

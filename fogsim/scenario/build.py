@@ -60,12 +60,24 @@ class Periods:
     frames: int
 
     def time(self, index: int) -> float:
-        """Time of a camera period since the run began [s]."""
+        """Time of a camera period since the run began [s].
+
+        Parameters
+        ----------
+        index : int
+            Number of the camera period, from 0.
+        """
         return clock_time(index * self.camera_period)
 
 
 def periods(scenario: Scenario) -> Periods:
-    """Clocks of a scenario."""
+    """Clocks of a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
     clocks = scenario.clocks
     return Periods(
         camera_period=clocks.camera_period_s,
@@ -79,7 +91,13 @@ _CONDITIONS = ("at_position_m", "at_time_s", "at_gap_to_ego_m")
 
 
 def traffic_setup(scenario: Scenario) -> TrafficSetup:
-    """What the traffic stage needs to know."""
+    """What the traffic stage needs to know.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
     traffic, folder = scenario.traffic, scenario.directory
     return TrafficSetup(
         net=None if traffic.net is None else folder / traffic.net,
@@ -91,15 +109,15 @@ def traffic_setup(scenario: Scenario) -> TrafficSetup:
         warm_up_limit=traffic.warm_up_limit_s,
         advice_deceleration=traffic.advice_deceleration_mps2,
         reading_radius=traffic.reading_radius_m,
-        events=tuple(event for place, written in enumerate(traffic.events) for event in events(written, place)),
-        sight=driver_sight(scenario),
-        drivers=driver_setup(scenario),
+        events=tuple(event for place, written in enumerate(traffic.events) for event in _events(written, place)),
+        sight=_driver_sight(scenario),
+        drivers=_driver_setup(scenario),
         after_collision=traffic.after_collision,
         config=None if traffic.config is None else folder / traffic.config,
     )
 
 
-def events(written: AnyEvent, place: int) -> tuple[Event, ...]:
+def _events(written: AnyEvent, place: int) -> tuple[Event, ...]:
     """What an event of a scenario file, at a place in its list, stands for."""
     vehicle = written.vehicle
     conditions = {key: value for key in _CONDITIONS if (value := getattr(written, key)) is not None}
@@ -119,7 +137,7 @@ def events(written: AnyEvent, place: int) -> tuple[Event, ...]:
             return (LampFailureEvent(vehicle, trigger),)
 
 
-def driver_sight(scenario: Scenario) -> DriverSight | None:
+def _driver_sight(scenario: Scenario) -> DriverSight | None:
     """Eyes of the drivers; None if they see through the fog."""
     drivers = scenario.drivers
     if drivers.see_through_fog:
@@ -127,7 +145,7 @@ def driver_sight(scenario: Scenario) -> DriverSight | None:
     return DriverSight(scenario.light.illuminance_lx, drivers.headlamp_reach_m, drivers.reaction_time_s)
 
 
-def driver_setup(scenario: Scenario) -> DriverSetup:
+def _driver_setup(scenario: Scenario) -> DriverSetup:
     """How drivers choose their speed and follow advice."""
     drivers = scenario.drivers
     compliance = Compliance(
@@ -140,7 +158,13 @@ def driver_setup(scenario: Scenario) -> DriverSetup:
 
 
 def camera(scenario: Scenario) -> Camera:
-    """Calibration of the ego's camera."""
+    """Calibration of the ego's camera.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
     section = scenario.camera
     by_view = 0.5 * section.width / math.tan(0.5 * math.radians(section.field_of_view_deg))
     return Camera(
@@ -157,7 +181,13 @@ def camera(scenario: Scenario) -> Camera:
 
 
 def assumed_camera(scenario: Scenario) -> Camera:
-    """Calibration that the ego's estimators assume, with the scenario's errors in it."""
+    """Calibration that the ego's estimators assume, with the scenario's errors in it.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
     true, told = camera(scenario), scenario.camera.told
     return dataclasses.replace(
         true,
@@ -169,7 +199,13 @@ def assumed_camera(scenario: Scenario) -> Camera:
 
 
 def camera_sensor(scenario: Scenario) -> CameraSensor:
-    """What takes the pictures of the ego's camera."""
+    """What takes the pictures of the ego's camera.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
     section = scenario.camera
     auto = auto_exposure(scenario) if section.automatic else None
     period = scenario.clocks.camera_period_s
@@ -177,7 +213,13 @@ def camera_sensor(scenario: Scenario) -> CameraSensor:
 
 
 def sensor(scenario: Scenario) -> Sensor:
-    """Image sensor of the ego's camera, at the exposure that it has if it is fixed."""
+    """Image sensor of the ego's camera, at the exposure that it has if it is fixed.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
     section = scenario.camera
     airlight = max(airlight_from_illuminance(scenario.light.illuminance_lx))
     return Sensor(
@@ -189,7 +231,13 @@ def sensor(scenario: Scenario) -> Sensor:
 
 
 def auto_exposure(scenario: Scenario) -> AutoExposure:
-    """How the ego's camera sets its own exposure."""
+    """How the ego's camera sets its own exposure.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
     section = scenario.camera.exposure
     percent = METERED_PERCENT[section.metering] if section.target_percent is None else section.target_percent
     return AutoExposure(
@@ -203,14 +251,26 @@ def auto_exposure(scenario: Scenario) -> AutoExposure:
 
 
 def body_pitch(scenario: Scenario) -> BodyPitch:
-    """How the ego's body pitches when it brakes."""
+    """How the ego's body pitches when it brakes.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
     body = scenario.camera.body
     suspension = Suspension(math.radians(body.pitch_deg_per_mps2), body.time_constant_s)
     return BodyPitch(suspension, scenario.clocks.camera_period_s)
 
 
 def lead_sensor(scenario: Scenario) -> LeadSensor:
-    """Radar of the ego."""
+    """Radar of the ego.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
     lead = scenario.sensors.lead
     return LeadSensor(lead.reach_m, lead.distance_deviation_m, lead.speed_deviation_mps)
 
@@ -228,23 +288,49 @@ def fog_field(scenario: Scenario, route: NDArray[np.float64]) -> FogField:
     return fog_along(scenario.fog, airlight_from_illuminance(scenario.light.illuminance_lx), route)
 
 
-def estimators(scenario: Scenario, told: Camera) -> tuple[Estimator, ...]:
-    """Estimators of a scenario, with the calibration that the vehicle is told."""
-    return tuple(ESTIMATORS[e.method](told, **e.parameters) for e in scenario.estimators)
+def estimators(scenario: Scenario, assumed: Camera) -> tuple[Estimator, ...]:
+    """Estimators of a scenario, with the calibration that the vehicle assumes.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    assumed : Camera
+        The assumed calibration.
+    """
+    return tuple(ESTIMATORS[e.method](assumed, **e.parameters) for e in scenario.estimators)
 
 
 def fusion(scenario: Scenario) -> Fusion:
-    """Fusion of a scenario."""
+    """Fusion of a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
     return FUSIONS[scenario.fusion.method](**scenario.fusion.parameters)
 
 
 def adviser(scenario: Scenario) -> Adviser:
-    """Speed adviser of a scenario."""
+    """Speed adviser of a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
     return ADVISERS[scenario.advice.method](**scenario.advice.parameters)
 
 
 def safety_standard(scenario: Scenario) -> SafetyStandard:
-    """What a run is judged by: the reaction time and deceleration that its advice counts with, where it has them."""
+    """What a run is judged by: the reaction time and deceleration that its advice counts with, where it has them.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
     advising, usual = adviser(scenario), SafetyStandard()
     return dataclasses.replace(
         usual,
@@ -254,5 +340,11 @@ def safety_standard(scenario: Scenario) -> SafetyStandard:
 
 
 def lighting_policy(scenario: Scenario) -> LightingPolicy:
-    """Lighting policy of a scenario."""
+    """Lighting policy of a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
     return LIGHTING_POLICIES[scenario.lighting.method](**scenario.lighting.parameters)

@@ -24,12 +24,12 @@ LONGEST_TOLD = 200
 """Most characters of an override that a message repeats."""
 
 
-def told_override(text: str) -> str:
+def _told_override(text: str) -> str:
     """An override as messages name it."""
     return f"--set {text if text.isprintable() and len(text) <= LONGEST_TOLD else shown(text)}"
 
 
-def override_path(text: str) -> KeyPath:
+def _override_path(text: str) -> KeyPath:
     """Key path of a well-formed override; a number in it is a place in a list."""
     return tuple(int(key) if _is_place(key) else key for key in text.partition("=")[0].strip().split("."))
 
@@ -41,6 +41,11 @@ def _is_place(key: str) -> bool:
 def parse_override(text: str) -> tuple[tuple[str, ...], Any]:
     """Split ``key.path=value``; the value is read as YAML.
 
+    Parameters
+    ----------
+    text : str
+        The override.
+
     Raises
     ------
     InputError
@@ -49,13 +54,13 @@ def parse_override(text: str) -> tuple[tuple[str, ...], Any]:
     key, equals, value = text.partition("=")
     path = tuple(key.strip().split("."))
     if not equals or not all(path):
-        raise InputError(f"{told_override(text)}: expected key.path=value, for example --set fog.visibility_m=80")
+        raise InputError(f"{_told_override(text)}: expected key.path=value, for example --set fog.visibility_m=80")
     if len(path) > DEEPEST:
-        raise InputError(f"{told_override(text)}: a key path has at most {DEEPEST} keys, got {len(path)}")
+        raise InputError(f"{_told_override(text)}: a key path has at most {DEEPEST} keys, got {len(path)}")
     try:
         return path, parse_yaml(value)[0]
     except PlainYamlError as error:
-        raise InputError(f"{told_override(text)}: the value is not valid YAML: {error.problem}") from error
+        raise InputError(f"{_told_override(text)}: the value is not valid YAML: {error.problem}") from error
 
 
 def apply_overrides(data: dict[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
@@ -101,12 +106,12 @@ def _set(data: dict[str, Any], path: tuple[str, ...], value: object, text: str) 
 def _place(block: object, key: str, path: tuple[str, ...], text: str) -> int:
     above = ".".join(path[:-1])
     if not isinstance(block, list):
-        raise InputError(f"{told_override(text)}: {above} is a single value and has no keys below it")
+        raise InputError(f"{_told_override(text)}: {above} is a single value and has no keys below it")
     if not block:
-        raise InputError(f"{told_override(text)}: {above} is an empty list; set it as a whole, {above}=[…]")
+        raise InputError(f"{_told_override(text)}: {above} is an empty list; set it as a whole, {above}=[…]")
     if not _is_place(key) or int(key) >= len(block):
         raise InputError(
-            f"{told_override(text)}: {above} is a list of {len(block)}; its places are 0 … {len(block) - 1}"
+            f"{_told_override(text)}: {above} is a list of {len(block)}; its places are 0 … {len(block) - 1}"
         )
     return int(key)
 
@@ -130,7 +135,13 @@ class Document:
     origins: Mapping[KeyPath, str]
 
     def where(self, key_path: KeyPath) -> str:
-        """Where a key stands, or the nearest block around it that has a place."""
+        """Where a key stands, or the nearest block around it that has a place.
+
+        Parameters
+        ----------
+        key_path : KeyPath
+            The key, from the outermost block on.
+        """
         for length in range(len(key_path), 0, -1):
             origin = self.origins.get(key_path[:length])
             if origin is not None:
@@ -149,7 +160,7 @@ class Document:
         """
         origins = dict(self.origins)
         for text in overrides:
-            at, told = override_path(text), told_override(text)
+            at, told = _override_path(text), _told_override(text)
             origins = {key: origin for key, origin in origins.items() if key[: len(at)] != at}
             for block in (at[:length] for length in range(1, len(at))):
                 origins[block] = f"{origins[block]} with {told}" if block in origins else told
@@ -159,6 +170,11 @@ class Document:
 
 def read_document(path: Path) -> Document:
     """Read a YAML file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
 
     Raises
     ------

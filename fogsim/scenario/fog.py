@@ -164,7 +164,13 @@ class Fog(Section):
         return self
 
     def heights(self, change: Change) -> tuple[float | None, float]:
-        """Base and top at the time of a change [m]."""
+        """Base and top at the time of a change [m].
+
+        Parameters
+        ----------
+        change : Change
+            One of `changes`.
+        """
         return (
             self.base_m if change.base_m is None else change.base_m,
             self.top_m if change.top_m is None else change.top_m,

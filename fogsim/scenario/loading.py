@@ -45,9 +45,9 @@ def scenario_file(name_or_path: str | Path) -> Path:
     """
     path = Path(name_or_path)
     # Without a name, the path is that of the working directory.
-    if is_folder(path) and str(name_or_path):
+    if _is_folder(path) and str(name_or_path):
         path = path / SCENARIO_FILE
-    if exists(path) and not path.is_dir():
+    if _exists(path) and not path.is_dir():
         return path
     known = catalogue()
     if str(name_or_path) in known:
@@ -57,7 +57,7 @@ def scenario_file(name_or_path: str | Path) -> Path:
     raise UnknownNameError("scenario", str(name_or_path), known)
 
 
-def exists(path: Path) -> bool:
+def _exists(path: Path) -> bool:
     """Whether there is something of a name; a name that none can have is not there."""
     try:
         return path.exists()
@@ -65,14 +65,14 @@ def exists(path: Path) -> bool:
         return False
 
 
-def is_folder(path: Path) -> bool:
+def _is_folder(path: Path) -> bool:
     """Whether there is a folder of a name; a name that none can have is none."""
-    return exists(path) and path.is_dir()
+    return _exists(path) and path.is_dir()
 
 
-def is_file(path: Path) -> bool:
+def _is_file(path: Path) -> bool:
     """Whether there is a regular file of a name; a name that none can have is none."""
-    return exists(path) and path.is_file()
+    return _exists(path) and path.is_file()
 
 
 LONG_RUN = 600.0
@@ -181,7 +181,13 @@ def override(scenario: Scenario, overrides: Iterable[str], *, others_add_vehicle
 
 
 def resolved(scenario: Scenario) -> dict[str, Any]:
-    """A scenario as plain data with every default filled in, fit for JSON; endless visibility is written "inf"."""
+    """A scenario as plain data with every default filled in, fit for JSON; endless visibility is written "inf".
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
     data: dict[str, Any] = _without_infinities(scenario.model_dump(mode="json", exclude_none=True))
     return data
 
@@ -246,7 +252,7 @@ def _check_files(document: Document, scenario: Scenario) -> None:
     ]
     named += [(("traffic", "routes", i), p) for i, p in enumerate(traffic.routes)]
     named += [(("traffic", "additional", i), p) for i, p in enumerate(traffic.additional)]
-    missing = [(key_path, path) for key_path, path in named if not is_file(scenario.directory / path)]
+    missing = [(key_path, path) for key_path, path in named if not _is_file(scenario.directory / path)]
     if missing:
         raise InputError("\n".join(_no_file(document, scenario.directory, *one) for one in missing))
     if traffic.config is not None:
@@ -256,7 +262,7 @@ def _check_files(document: Document, scenario: Scenario) -> None:
 def _no_file(document: Document, directory: Path, key_path: KeyPath, path: Path) -> str:
     folder = (directory / path).parent
     pattern = "*.sumocfg" if key_path[-1] == "config" else "*.xml"
-    there = sorted(p.name for p in folder.glob(pattern)) if is_folder(folder) else []
+    there = sorted(p.name for p in folder.glob(pattern)) if _is_folder(folder) else []
     return (
         f"{document.where(key_path)}: {dotted(key_path)}: there is no file {shown(str(path))} in "
         f"{directory}; {suggest(path.name, there)}"

@@ -90,6 +90,11 @@ def parse_yaml(text: str) -> tuple[Any, dict[KeyPath, int]]:
 
     All keys are text. Nothing but null, truth values, numbers, text, lists and mappings comes out.
 
+    Parameters
+    ----------
+    text : str
+        YAML.
+
     Raises
     ------
     PlainYamlError
@@ -155,7 +160,13 @@ def _line(node: yaml.Node) -> int:
 
 
 def dotted(key_path: KeyPath) -> str:
-    """Key path as it is written after ``--set``; what cannot be printed is escaped, and what is long is cut."""
+    """Key path as it is written after ``--set``; what cannot be printed is escaped, and what is long is cut.
+
+    Parameters
+    ----------
+    key_path : KeyPath
+        The key, from the outermost block on.
+    """
     return ".".join(_readable(str(key)) for key in key_path)
 
 

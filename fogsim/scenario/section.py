@@ -124,6 +124,11 @@ def method_of(registry: Registry[Callable[..., Any]]) -> BeforeValidator:
 
     A method may be written as its bare name; names that the registry does not know are refused, and so are parameters
     that the method does not have, and values that its annotations do not allow.
+
+    Parameters
+    ----------
+    registry : Registry
+        The methods of one kind.
     """
 
     def check(value: object) -> object:

@@ -27,6 +27,11 @@ def uncountable_step(clocks: Clocks) -> str | None:
     """Say why SUMO cannot make a traffic step, and the nearest that it can; None if it can.
 
     SUMO would make a step of whole milliseconds in its place, and times and speeds would disagree from then on.
+
+    Parameters
+    ----------
+    clocks : Clocks
+        The clocks of a scenario.
     """
     step, camera = clocks.traffic_step_s / CLOCK_TICK, clocks.camera_period_s / CLOCK_TICK
     if step > 0.5 and _is_whole(step):

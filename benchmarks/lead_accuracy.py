@@ -26,7 +26,8 @@ import numpy as np
 
 from fogsim.estimators import make
 from fogsim.render import Renderer
-from fogsim.reproduce.huang2015_chase import FASTER, OWN_SPEED, Followed, drawn, fogged, road
+from fogsim.reproduce.huang2015_chase import FASTER, OWN_SPEED, drawn, fogged
+from fogsim.reproduce.scenes import StagedVehicle, road_renderer
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, Estimate, Frame, LeadMeasurement, Observation, Response
 from fogsim.values.estimate import NORMAL_90_PERCENT
@@ -38,17 +39,17 @@ CAMERAS = {
     "1024 px, 54°": Camera(1024, 640, 1000.0, (500.0, 330.0), 1.5, math.radians(1.5), response=Response.GAMMA),
 }
 VEHICLES = {
-    "red hatchback": Followed("car", 4.05, 1.78, 1.47, (0.45, 0.05, 0.04)),
-    "black saloon": Followed("car", 4.75, 1.80, 1.44, (0.05, 0.05, 0.06)),
-    "white SUV": Followed("car", 4.60, 1.90, 1.70, (0.70, 0.70, 0.70)),
-    "white van": Followed("van", 5.90, 2.00, 2.40, (0.75, 0.75, 0.75)),
-    "blue lorry": Followed("truck", 16.5, 2.55, 4.00, (0.10, 0.20, 0.50)),
+    "red hatchback": StagedVehicle("car", 4.05, 1.78, 1.47, (0.45, 0.05, 0.04)),
+    "black saloon": StagedVehicle("car", 4.75, 1.80, 1.44, (0.05, 0.05, 0.06)),
+    "white SUV": StagedVehicle("car", 4.60, 1.90, 1.70, (0.70, 0.70, 0.70)),
+    "white van": StagedVehicle("van", 5.90, 2.00, 2.40, (0.75, 0.75, 0.75)),
+    "blue lorry": StagedVehicle("truck", 16.5, 2.55, 4.00, (0.10, 0.20, 0.50)),
 }
 OTHERS = {
-    "grey estate": Followed("car", 4.80, 1.83, 1.50, (0.30, 0.30, 0.31), name="followed 3"),
-    "small yellow car": Followed("car", 3.60, 1.64, 1.50, (0.60, 0.45, 0.05)),
-    "dark van": Followed("van", 5.30, 1.95, 2.00, (0.06, 0.06, 0.08)),
-    "red lorry": Followed("truck", 12.0, 2.50, 3.60, (0.40, 0.05, 0.05)),
+    "grey estate": StagedVehicle("car", 4.80, 1.83, 1.50, (0.30, 0.30, 0.31), name="followed 3"),
+    "small yellow car": StagedVehicle("car", 3.60, 1.64, 1.50, (0.60, 0.45, 0.05)),
+    "dark van": StagedVehicle("van", 5.30, 1.95, 2.00, (0.06, 0.06, 0.08)),
+    "red lorry": StagedVehicle("truck", 12.0, 2.50, 3.60, (0.40, 0.05, 0.05)),
 }
 """Others than those of the tables, of other shapes and paints; the id of the first makes an estate of it."""
 VISIBILITIES = (30.0, 50.0, 100.0, 200.0, 300.0, 500.0, 800.0)
@@ -94,7 +95,12 @@ def fogs(arguments: argparse.Namespace, camera: Camera, first: int) -> list[Fog]
 
 
 def follow(
-    arguments: argparse.Namespace, renderer: Renderer, camera: Camera, vehicle: Followed, seen: list[Fog], seed: int
+    arguments: argparse.Namespace,
+    renderer: Renderer,
+    camera: Camera,
+    vehicle: StagedVehicle,
+    seen: list[Fog],
+    seed: int,
 ) -> int:
     """Let a vehicle drive away in every fog; the number of frames."""
     rng = np.random.default_rng(seed)
@@ -125,7 +131,7 @@ def look(fog: Fog, seen: Observation) -> None:
 
 def sequences(arguments: argparse.Namespace) -> Iterator[dict[str, Any]]:
     """What every method found at the end of every sequence."""
-    with road() as renderer:
+    with road_renderer() as renderer:
         for i, (camera_name, camera) in enumerate(list(CAMERAS.items())[: arguments.cameras]):
             vehicles = OTHERS if arguments.others else VEHICLES
             for j, (vehicle_name, vehicle) in enumerate(list(vehicles.items())[: arguments.vehicles]):

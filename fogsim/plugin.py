@@ -13,6 +13,7 @@ from fogsim.errors import InputError, SimulationError, UnplayedWarning
 from fogsim.loop import AdvisedDriving, DriversFog
 from fogsim.randomness import spawn_streams
 from fogsim.scenario import Scenario, attached_scenario, build, override
+from fogsim.scenario.loading import clock_settings
 from fogsim.traffic import AttachedTraffic, TraciLink, Traffic, step_length, traci_traffic
 from fogsim.units import clock_time
 from fogsim.values import Command, Step
@@ -130,10 +131,7 @@ def attach(
 
 def _clocks(step: float, decision_period: float = DECISION_PERIOD) -> list[str]:
     decision = step * max(1, round(decision_period / step))
-    return [f"clocks.{key}_s={t!r}" for key, t in zip(_CLOCKS, (step, step, decision), strict=True)]
-
-
-_CLOCKS = ("traffic_step", "camera_period", "decision_period")
+    return clock_settings(step, step, decision)
 
 
 class AttachedSession:

@@ -93,3 +93,14 @@ def visibility_from_extinction(extinction: float) -> float:
     if not extinction >= 0:
         raise ValueError(f"an extinction coefficient must not be negative, got {extinction!r}")
     return math.inf if extinction == 0 else OPTICAL_DEPTH_AT_VISIBILITY / extinction
+
+
+def finite_or_none(value: float) -> float | None:
+    """A value as files hold it: None for what is not a finite number.
+
+    Parameters
+    ----------
+    value : float
+        Any number.
+    """
+    return value if math.isfinite(value) else None

@@ -29,8 +29,8 @@ from fogsim.estimators import ESTIMATORS, make
 from fogsim.metrics import RunMetrics
 from fogsim.recorders import write_json
 from fogsim.render import make_renderer
-from fogsim.reproduce.huang2015_chase import Chase, Followed
-from fogsim.reproduce.scenes import ILLUMINANCE, straight_road
+from fogsim.reproduce.huang2015_chase import Chase
+from fogsim.reproduce.scenes import ILLUMINANCE, StagedVehicle, straight_road
 from fogsim.scenario import build
 from fogsim.scene import SIGN_KINDS, build_scene
 from fogsim.traffic.road.network import read_net, road_network
@@ -105,7 +105,7 @@ def chase() -> dict[str, Any]:
     told: dict[str, Any] = {"frames": [], "valid": {name: [] for name in ESTIMATORS}, "numbers": {}}
     estimators = [make(name, CHASED) for name in ESTIMATORS]
     scene = build_scene(straight_road(), SignMap(()), np.random.default_rng(0))
-    chased = Chase(CHASED, Followed()).seen(
+    chased = Chase(CHASED, StagedVehicle()).seen(
         make_renderer("cpu", scene, illuminance=ILLUMINANCE),
         dict.fromkeys(RANGES, (VISIBILITY,)),
         np.random.default_rng(1),

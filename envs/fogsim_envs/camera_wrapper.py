@@ -14,6 +14,7 @@ from fogsim.errors import InputError
 from fogsim.loop import DriversFog
 from fogsim.randomness import spawn_streams
 from fogsim.scenario import Scenario, build
+from fogsim.scenario.loading import clock_settings
 from fogsim.traffic.highway import (
     Fleet,
     is_highway_environment,
@@ -24,7 +25,7 @@ from fogsim.traffic.highway import (
 )
 from fogsim.traffic.setup import UNTOUCHED
 from fogsim.values import Command, FogField, RoadNetwork, SignMap, Step
-from fogsim_envs.highway import clock_settings, highway_config, highway_scenario
+from fogsim_envs.highway import highway_config, highway_scenario
 from fogsim_envs.spaces import LAMP_MODES, observation_space, observe
 
 _COMMAND = Command(lamps=LAMP_MODES[0])

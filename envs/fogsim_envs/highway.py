@@ -10,6 +10,7 @@ import gymnasium
 from fogsim.errors import InputError
 from fogsim.loop import ClosedLoop
 from fogsim.scenario import Scenario, attached_scenario, build
+from fogsim.scenario.loading import clock_settings
 from fogsim.traffic.highway import EGO, HighwayTraffic, is_highway_environment
 from fogsim.values import Step
 from fogsim_envs.advising import AdvisingEnv
@@ -142,22 +143,6 @@ def _clocks(config: Mapping[str, Any]) -> list[str]:
     step = 1.0 / config["simulation_frequency"]
     camera = step * max(1, round(CAMERA_PERIOD / step))
     return clock_settings(step, camera, camera * max(1, round(DECISION_PERIOD / camera)))
-
-
-def clock_settings(step: float, camera: float, decision: float) -> list[str]:
-    """Overrides that set the clocks [s].
-
-    Parameters
-    ----------
-    step : float
-        Time between two simulation steps [s].
-    camera : float
-        Time between two frames [s].
-    decision : float
-        Time between two decisions [s].
-    """
-    keys = ("traffic_step", "camera_period", "decision_period")
-    return [f"clocks.{key}_s={time!r}" for key, time in zip(keys, (step, camera, decision), strict=True)]
 
 
 def _traffic(environment: Any, scenario: Scenario) -> HighwayTraffic:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.dataset.ground_truth import SemanticClass, vehicle_class
+from fogsim.units import finite_or_none
 from fogsim.values import Camera, CameraPose, Observation, Step
 
 CATEGORIES = [
@@ -30,8 +31,8 @@ def frame_record(step: Step) -> dict[str, Any]:
     return {
         "step": step.index,
         "time_s": step.time,
-        "visibility_m": _finite(truth.visibility),
-        "visibility_ahead_m": _finite(truth.visibility_ahead),
+        "visibility_m": finite_or_none(truth.visibility),
+        "visibility_ahead_m": finite_or_none(truth.visibility_ahead),
         "extinction_per_m": truth.extinction,
         "speed_mps": observation.speed,
         "speed_limit_mps": step.speed_limit,
@@ -142,10 +143,6 @@ def coco(information: Mapping[str, Any], records: Iterable[Mapping[str, Any]]) -
         "images": images,
         "annotations": annotations,
     }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def _told(observation: Observation) -> Camera | None:

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from fogsim.metrics.metric import JsonValue, Sample, share
-from fogsim.metrics.step_metrics import finite_or_none
+from fogsim.units import finite_or_none
 
 FOG_LIMIT = 1000.0
 """Visibility below which the air is called fog [m] (WMO); errors are counted only there."""

@@ -5,13 +5,12 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from fogsim.metrics.metric import JsonValue, Sample, share
-from fogsim.metrics.step_metrics import finite_or_none
 from fogsim.metrics.surrogate import (
     time_exposed_time_to_collision,
     time_headway,
     time_integrated_time_to_collision,
 )
-from fogsim.units import clock_time
+from fogsim.units import clock_time, finite_or_none
 from fogsim.values import Collision
 
 

@@ -1,6 +1,5 @@
 """What can be derived from one step alone."""
 
-import math
 from collections.abc import Callable
 
 import numpy as np
@@ -12,6 +11,7 @@ from fogsim.metrics.surrogate import (
     deceleration_rate_to_avoid_crash,
     time_to_collision,
 )
+from fogsim.units import finite_or_none
 from fogsim.values import Step
 
 DEFAULT_STANDARD = SafetyStandard()
@@ -44,11 +44,6 @@ def step_metrics(step: Step, standard: SafetyStandard = DEFAULT_STANDARD) -> dic
         "stopping_sight_distance_m": stopping,
         "visibility_margin_m": finite_or_none(step.truth.visibility_ahead - stopping),
     }
-
-
-def finite_or_none(value: float) -> float | None:
-    """Say None for what is not a finite number."""
-    return value if math.isfinite(value) else None
 
 
 def _leader_measure(

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from fogsim.recorders.camera_picture import shown_image
 from fogsim.recorders.protocol import Derived
+from fogsim.units import finite_or_none
 from fogsim.values import Step
 
 MOST_PICTURES = 8
@@ -56,11 +57,11 @@ class Curves:
         self.time.append(step.time)
         self.speed.append(float(step.traffic.speed[step.ego]))
         self.limit.append(step.speed_limit)
-        self.advice.append(_finite(step.command.advice.speed))
+        self.advice.append(finite_or_none(step.command.advice.speed))
         self.gap.append(None if step.leader is None else step.leader.gap)
         self.time_to_collision.append(derived["time_to_collision_s"])
         self.margin.append(derived["visibility_margin_m"])
-        self.truth.append(_finite(step.truth.visibility_ahead))
+        self.truth.append(finite_or_none(step.truth.visibility_ahead))
         for quantiles, share in ((self.low, 0.05), (self.belief, 0.5), (self.high, 0.95)):
             quantiles.append(step.belief.visibility_quantile(share))
         self.collisions.extend(hit.time for hit in step.collisions)
@@ -107,7 +108,7 @@ class ReportPicture:
             The step.
         """
         low, middle, high = (step.belief.visibility_quantile(share) for share in (0.05, 0.5, 0.95))
-        truth = _finite(step.truth.visibility_ahead)
+        truth = finite_or_none(step.truth.visibility_ahead)
         return cls(step.time, step.route_position, truth, low, middle, high, shown_image(step.observation).copy())
 
 
@@ -150,7 +151,3 @@ class Album:
         count = min(MOST_PICTURES, len(pictures))
         places = np.linspace(0, len(pictures) - 1, count).round().astype(int)
         return [pictures[place] for place in places]
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -16,6 +16,7 @@ from fogsim.files.atomic import write_bytes
 from fogsim.files.row_log import RowLog, read_rows
 from fogsim.recorders.protocol import DERIVED_QUANTITIES, Derived
 from fogsim.recorders.run_directory import ROW_LOG
+from fogsim.units import finite_or_none
 from fogsim.values import Estimate, Leader, LeadMeasurement, Step
 
 ROWS_PER_GROUP = 1024
@@ -166,10 +167,6 @@ def table_columns(methods: Sequence[str]) -> list[Column]:
     return columns
 
 
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
-
-
 def _ego(name: str) -> Callable[[Step, Derived], object]:
     return lambda step, _: float(getattr(step.traffic, name)[step.ego])
 
@@ -199,7 +196,7 @@ def _estimator_columns(method: str) -> list[Column]:
         return lambda step, _: next((value(e) for e in step.estimates if e.method == method), None)
 
     def if_valid(value: Callable[[Estimate], float]) -> Callable[[Step, Derived], object]:
-        return of_estimate(lambda estimate: _finite(value(estimate)) if estimate.valid else None)
+        return of_estimate(lambda estimate: finite_or_none(value(estimate)) if estimate.valid else None)
 
     number = pa.float64()
     return [
@@ -239,7 +236,7 @@ _EGO_COLUMNS = (
         "advised_speed_mps",
         pa.float64(),
         "advice in force; null for none",
-        lambda step, _: _finite(step.command.advice.speed),
+        lambda step, _: finite_or_none(step.command.advice.speed),
     ),
     Column(
         "lamps",
@@ -267,13 +264,13 @@ _FOG_COLUMNS = (
         "true_visibility_m",
         pa.float64(),
         "at the camera; null for clear air",
-        lambda step, _: _finite(step.truth.visibility),
+        lambda step, _: finite_or_none(step.truth.visibility),
     ),
     Column(
         "true_visibility_ahead_m",
         pa.float64(),
         "of the fog ahead; null for clear air",
-        lambda step, _: _finite(step.truth.visibility_ahead),
+        lambda step, _: finite_or_none(step.truth.visibility_ahead),
     ),
     Column("believed_visibility_m", pa.float64(), "median of the belief", _believed(0.5)),
     Column("believed_visibility_low_m", pa.float64(), "5 % quantile of the belief", _believed(0.05)),

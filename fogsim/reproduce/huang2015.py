@@ -6,11 +6,12 @@ import numpy as np
 
 from fogsim.estimators import make
 from fogsim.render import Renderer
-from fogsim.reproduce.huang2015_chase import Chase, Scene, drawn, fogged, road
+from fogsim.reproduce.huang2015_chase import Chase, Scene, drawn, fogged
 from fogsim.reproduce.huang2015_picture import Tracked, picture
 from fogsim.reproduce.huang2015_plan import CAMERA, LAST, VARIANTS, VEHICLE, Case, Plan
 from fogsim.reproduce.huang2015_tables import NOTES, records, tables, verdicts
 from fogsim.reproduce.result import Reproduction, Steps, Watch, unwatched
+from fogsim.reproduce.scenes import road_renderer
 from fogsim.values import Estimate, Observation
 
 
@@ -34,7 +35,7 @@ def reproduce(plan: Plan | None = None, *, watch: Watch = unwatched) -> Reproduc
     cases = _cases(plan)
     # Each of the rough method's images is a step, and so is the picture.
     steps = Steps(sum(len(case.frames) for case in cases) + len(plan.methods) + 1, watch)
-    with road() as renderer:
+    with road_renderer() as renderer:
         results: dict[Case, dict[float, Estimate]] = {}
         for way in ((False, False), (True, False), (False, True)):
             results |= _followed(renderer, [case for case in cases if (case.back, case.noisy) == way], rng, steps)

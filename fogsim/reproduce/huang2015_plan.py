@@ -5,14 +5,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fogsim.reproduce.huang2015_chase import Followed
 from fogsim.reproduce.huang2015_published import TABLE_4_3, TABLE_5_2, TABLE_5_3
+from fogsim.reproduce.scenes import StagedVehicle
 from fogsim.values import Camera, Estimate
 
 CAMERA = Camera(800, 600, 5600.0, (399.5, 299.5), mount_height=1.0)
 """λ = 5600 px·m and H = 1 m are eq. 4.11's; the thesis tells no size of image."""
 
-VEHICLE = Followed(length=4.7, width=1.8, height=1.45, paint=(0.03, 0.05, 0.12))
+VEHICLE = StagedVehicle(length=4.7, width=1.8, height=1.45, paint=(0.03, 0.05, 0.12))
 """The vehicle that is followed: the thesis shows dark ones, whose size it does not tell."""
 
 VARIANTS = ("published", "corrected")

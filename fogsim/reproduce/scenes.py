@@ -2,14 +2,14 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere import fogged_radiance
 from fogsim.camera import Sensor, expose
-from fogsim.render import make_renderer
+from fogsim.render import Renderer, make_renderer
 from fogsim.scene import build_scene, vehicle_batches
 from fogsim.values import (
     Camera,
@@ -31,7 +31,6 @@ NOISELESS = Sensor(saturation_luminance=AIRLIGHT, full_well=1e9, read_noise=0.0)
 """A sensor that the airlight fills: pixel value 255."""
 
 _LENGTH, _WIDTH = 1500.0, 3.5  # of the lanes [m]
-_CAR = (4.5, 1.8, 1.5)  # length, width and height [m]
 
 
 def straight_road() -> RoadNetwork:
@@ -43,6 +42,50 @@ def straight_road() -> RoadNetwork:
 
     forward = lane("out", 0.0, 1)
     return RoadNetwork((forward, lane("back", _WIDTH, -1)), forward.centreline)
+
+
+@dataclass(frozen=True, slots=True)
+class StagedVehicle:
+    """A vehicle on the road.
+
+    Attributes
+    ----------
+    kind : str
+        "car", "van", "truck".
+    length, width, height : float
+        Its size [m].
+    paint : tuple of float
+        Reflectance of its paint, red first [-].
+    left : float
+        How far its middle is left of the camera [m].
+    name : str
+        Its id, which chooses among the shapes that its size leaves open.
+    """
+
+    kind: str = "car"
+    length: float = 4.5
+    width: float = 1.8
+    height: float = 1.5
+    paint: tuple[float, float, float] = (0.2, 0.2, 0.2)
+    left: float = 0.1
+    name: str = "followed"
+
+
+@contextmanager
+def road_renderer(*, trees: bool = True) -> Iterator[Renderer]:
+    """Renderer of the straight road.
+
+    Parameters
+    ----------
+    trees : bool
+        Whether what stands beside the road is drawn.
+    """
+    scene = build_scene(straight_road(), SignMap(()), np.random.default_rng(0))
+    renderer = make_renderer("auto", scene if trees else replace(scene, scenery=()), illuminance=ILLUMINANCE)
+    try:
+        yield renderer
+    finally:
+        renderer.close()
 
 
 @contextmanager
@@ -58,13 +101,9 @@ def views(camera: Camera, cars: Sequence[tuple[float, float]], *, trees: bool) -
     trees : bool
         Whether what stands beside the road is drawn.
     """
-    scene = build_scene(straight_road(), SignMap(()), np.random.default_rng(0))
-    renderer = make_renderer("auto", scene if trees else replace(scene, scenery=()), illuminance=ILLUMINANCE)
     pose = CameraPose((0.0, 0.0, camera.mount_height), heading=0.0)
-    try:
+    with road_renderer(trees=trees) as renderer:
         yield renderer.render(vehicle_batches(standing_cars(cars), None), camera, pose), pose
-    finally:
-        renderer.close()
 
 
 def standing_cars(cars: Sequence[tuple[float, float]]) -> TrafficState:
@@ -75,26 +114,39 @@ def standing_cars(cars: Sequence[tuple[float, float]]) -> TrafficState:
     cars : sequence of (float, float)
         How far along the road the near end of each is, and how far left its middle is [m].
     """
-    n = len(cars)
+    return staged_traffic([(rear, StagedVehicle(left=left, name=f"car {i}")) for i, (rear, left) in enumerate(cars)])
+
+
+def staged_traffic(vehicles: Sequence[tuple[float, StagedVehicle]], speed: float = 0.0) -> TrafficState:
+    """Vehicles along the road.
+
+    Parameters
+    ----------
+    vehicles : sequence of (float, StagedVehicle)
+        How far along the road the near end of each is [m], and what it is.
+    speed : float
+        Of each [m/s].
+    """
+    n, kinds = len(vehicles), [vehicle for _, vehicle in vehicles]
     return TrafficState(
         time=0.0,
-        ids=tuple(f"car {i}" for i in range(n)),
-        types=("car",) * n,
-        position=np.array([(ahead + _CAR[0], left, 0.0) for ahead, left in cars]).reshape(n, 3),
+        ids=tuple(vehicle.name for vehicle in kinds),
+        types=tuple(vehicle.kind for vehicle in kinds),
+        position=np.array([(rear + vehicle.length, vehicle.left, 0.0) for rear, vehicle in vehicles]).reshape(n, 3),
         heading=np.zeros(n),
-        speed=np.zeros(n),
+        speed=np.full(n, speed),
         acceleration=np.zeros(n),
-        length=np.full(n, _CAR[0]),
-        width=np.full(n, _CAR[1]),
-        height=np.full(n, _CAR[2]),
+        length=np.array([vehicle.length for vehicle in kinds]),
+        width=np.array([vehicle.width for vehicle in kinds]),
+        height=np.array([vehicle.height for vehicle in kinds]),
         lane=("",) * n,
         lamps=np.full(n, int(Lamp.NONE), np.int32),
-        paint=np.full((n, 3), 0.2),
+        paint=np.array([vehicle.paint for vehicle in kinds]).reshape(n, 3),
     )
 
 
-def foggy_image(view: View, pose: CameraPose, camera: Camera, extinction: float) -> NDArray[np.uint8]:
-    """Image of a view in homogeneous fog, the airlight at pixel value 255, without noise.
+def foggy_radiance(view: View, pose: CameraPose, camera: Camera, extinction: float) -> NDArray[np.float32]:
+    """What a camera gets of a view in homogeneous fog.
 
     Parameters
     ----------
@@ -106,7 +158,23 @@ def foggy_image(view: View, pose: CameraPose, camera: Camera, extinction: float)
         The true calibration.
     extinction : float
         Extinction coefficient k [1/m].
+
+    Returns
+    -------
+    (rows, cols, 3) float32
+        Linear radiance [cd/m²].
     """
     fog = FogField(extinction, (AIRLIGHT,) * 3)
-    radiance = fogged_radiance(view, fog, pose.position, ray_from_pixel(camera, pose))
+    return fogged_radiance(view, fog, pose.position, ray_from_pixel(camera, pose))
+
+
+def foggy_image(view: View, pose: CameraPose, camera: Camera, extinction: float) -> NDArray[np.uint8]:
+    """Image of a view in homogeneous fog, the airlight at pixel value 255, without noise.
+
+    Parameters
+    ----------
+    view, pose, camera, extinction
+        As of `foggy_radiance`.
+    """
+    radiance = foggy_radiance(view, pose, camera, extinction)
     return expose(radiance, NOISELESS, camera.response, np.random.default_rng(0)).astype(np.uint8)

@@ -10,7 +10,8 @@ from fogsim.errors import InputError
 from fogsim.estimators import make
 from fogsim.estimators.zhu2015 import FRAMES
 from fogsim.reproduce.result import Cell, Reproduction, Steps, Watch, unwatched
-from fogsim.reproduce.zhu2015_drive import Moment, drive, observed, road_renderer
+from fogsim.reproduce.scenes import road_renderer
+from fogsim.reproduce.zhu2015_drive import Moment, drive, observed
 from fogsim.reproduce.zhu2015_picture import picture
 from fogsim.values import Camera, Estimate, FogCategory, Observation, Response
 

@@ -2,20 +2,17 @@
 
 import math
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere import fogged_radiance
 from fogsim.camera import Sensor, expose
-from fogsim.render import Renderer, make_renderer
-from fogsim.reproduce.scenes import AIRLIGHT, ILLUMINANCE, standing_cars, straight_road
-from fogsim.scene import build_scene, vehicle_batches
+from fogsim.render import Renderer
+from fogsim.reproduce.scenes import AIRLIGHT, foggy_radiance, standing_cars
+from fogsim.scene import vehicle_batches
 from fogsim.units import extinction_from_visibility
-from fogsim.values import Camera, CameraPose, FogField, LeadMeasurement, Observation, SignMap, View
-from fogsim.values.pinhole import ray_from_pixel
+from fogsim.values import Camera, CameraPose, LeadMeasurement, Observation, View
 
 Floats = NDArray[np.float64]
 
@@ -29,7 +26,7 @@ SENSOR = Sensor(saturation_luminance=AIRLIGHT * 255.0 / 200.0)
 """A sensor with noise, exposed such that the airlight has 200 of 255 linear levels."""
 
 PITCH_ERROR, PITCH_SWAY = math.radians(0.1), math.radians(0.05)
-"""Standard deviations of the pitch about the told one: of a whole drive, and from frame to frame [rad]."""
+"""Standard deviations of the pitch about the assumed one: of a whole drive, and from frame to frame [rad]."""
 
 WEAR, WEAR_LENGTH = 0.03, 40.0
 """Change of the road's albedo along the way, uniform within ± this [-], and the way between two such values [m]."""
@@ -61,17 +58,6 @@ class Moment:
     view: View
     pose: CameraPose
     lead: LeadMeasurement | None
-
-
-@contextmanager
-def road_renderer() -> Iterator[Renderer]:
-    """Renderer of a straight country road with what stands beside it."""
-    scene = build_scene(straight_road(), SignMap(()), np.random.default_rng(0))
-    renderer = make_renderer("auto", scene, illuminance=ILLUMINANCE)
-    try:
-        yield renderer
-    finally:
-        renderer.close()
 
 
 def drive(
@@ -174,7 +160,6 @@ def observed(moment: Moment, camera: Camera, visibility: float, rng: np.random.G
     rng : numpy Generator
         The sensor's noise.
     """
-    fog = FogField(extinction_from_visibility(visibility), (AIRLIGHT,) * 3)
-    radiance = fogged_radiance(moment.view, fog, moment.pose.position, ray_from_pixel(camera, moment.pose))
+    radiance = foggy_radiance(moment.view, moment.pose, camera, extinction_from_visibility(visibility))
     image = expose(radiance, SENSOR, camera.response, rng)
     return Observation(image, speed=SPEED, lead=moment.lead)

@@ -180,6 +180,22 @@ def override(scenario: Scenario, overrides: Iterable[str], *, others_add_vehicle
     return _checked(document, overrides, scenario.directory, closed_demand=not others_add_vehicles)
 
 
+def clock_settings(step: float, camera: float, decision: float) -> list[str]:
+    """Overrides that set the clocks.
+
+    Parameters
+    ----------
+    step : float
+        Time between two traffic steps [s].
+    camera : float
+        Time between two frames [s].
+    decision : float
+        Time between two decisions [s].
+    """
+    times = {"traffic_step": step, "camera_period": camera, "decision_period": decision}
+    return [f"clocks.{key}_s={time!r}" for key, time in times.items()]
+
+
 def resolved(scenario: Scenario) -> dict[str, Any]:
     """A scenario as plain data with every default filled in, fit for JSON; endless visibility is written "inf".
 

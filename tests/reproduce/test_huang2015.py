@@ -10,8 +10,9 @@ from fogsim.estimators.huang2015_ratios import image_confidence
 from fogsim.reproduce import REPRODUCTIONS, Reproduction
 from fogsim.reproduce import huang2015_published as published
 from fogsim.reproduce.huang2015 import reproduce
-from fogsim.reproduce.huang2015_chase import Chase, road
+from fogsim.reproduce.huang2015_chase import Chase
 from fogsim.reproduce.huang2015_plan import CAMERA, LAST, VARIANTS, VEHICLE, Case, Plan
+from fogsim.reproduce.scenes import road_renderer
 
 PART = Plan(
     methods=(100.0, 500.0),
@@ -101,7 +102,7 @@ def test_confidence_is_of_the_estimate() -> None:
 
 def test_the_chase_shows_each_range_once_in_every_fog_wanted() -> None:
     chase = Chase(CAMERA, VEHICLE, range_deviation=0.0)
-    with road() as renderer:
+    with road_renderer() as renderer:
         seen = list(chase.seen(renderer, {25.0: (100.0, 500.0), 30.0: (100.0,)}, np.random.default_rng(0)))
     assert [(ahead, list(views)) for ahead, views in seen] == [(25.0, [100.0, 500.0]), (30.0, [100.0])]
     dense, thin = seen[0][1].values()

@@ -11,8 +11,9 @@ from fogsim.cli import app
 from fogsim.errors import InputError
 from fogsim.estimators.zhu2015 import zhu_category
 from fogsim.reproduce import REPRODUCTIONS, Reproduction
+from fogsim.reproduce.scenes import road_renderer
 from fogsim.reproduce.zhu2015 import CAMERA, EDGE, TITLES, WEATHERS, reproduce, right_share
-from fogsim.reproduce.zhu2015_drive import ROAD, SETBACK, drive, observed, road_renderer, worn
+from fogsim.reproduce.zhu2015_drive import ROAD, SETBACK, drive, observed, worn
 from fogsim.values import CameraPose, View
 
 DRIVES, VISIBILITIES, FRAMES = 2, 2, 4

@@ -132,7 +132,9 @@ def record_run(
     with Interruption() as interruption, RunDirectory(out, overwrite) as directory:
         manifest = Manifest(Status.RUNNING, seed, resolved(scenario), datetime.now(UTC), command_line=command_line)
         metrics = RunMetrics(build.safety_standard(scenario))
-        recording = Recording(directory, manifest, _open(recorders, scenario, seed, directory, metrics), metrics)
+        recording = Recording(
+            directory, manifest, _open_recorders(recorders, scenario, seed, directory, metrics), metrics
+        )
         status, last, message = Status.FAILED, None, ""
         try:
             with contextlib.closing(run(scenario, seed)) as steps, interruption.allowed():
@@ -250,7 +252,7 @@ class Recording:
         for name, recorder in reversed(list(self._recorders.items())):
             status = self._close(name, recorder, status, interruption)
         complete = status is Status.COMPLETE
-        with self._told("metrics"):
+        with self._noting_failure("metrics"):
             self._directory.write_metrics({"complete": complete, **self._metrics.summary().to_json()})
         if self.failures and complete:
             status = Status.FAILED
@@ -263,7 +265,7 @@ class Recording:
         return status
 
     def _close(self, name: str, recorder: Recorder, status: Status, interruption: Interruption) -> Status:
-        with self._told(name):
+        with self._noting_failure(name):
             if status is Status.COMPLETE:
                 try:
                     with interruption.allowed():
@@ -275,15 +277,15 @@ class Recording:
         return status
 
     @contextlib.contextmanager
-    def _told(self, name: str) -> Iterator[None]:
-        """Remember why a recorder failed, where the reason is not known already."""
+    def _noting_failure(self, name: str) -> Iterator[None]:
+        """Note why a recorder failed, where the reason is not known already."""
         try:
             yield
         except Exception as error:  # noqa: BLE001 - a recorder may be anybody's, and must not cost the others their files
             self.failures.setdefault(name, f"{type(error).__name__}: {error}")
 
 
-def _open(
+def _open_recorders(
     recorders: Iterable[str], scenario: Scenario, seed: int, directory: RunDirectory, metrics: RunMetrics
 ) -> dict[str, Recorder]:
     information = RunInformation(

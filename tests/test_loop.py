@@ -1,18 +1,22 @@
 """The closed loop on real parts."""
 
 import itertools
+import math
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import fogsim
 from fogsim.errors import SimulationError
+from fogsim.loop import DriversFog, spread_advice
 from fogsim.scenario import Scenario
-from fogsim.values import Command, Ending, Step
+from fogsim.values import Command, Ending, FogChange, FogField, SpeedAdvice, Step
+from tests.recorders.synthetic import make_step
 
 SMALL = ("camera.width=160", "camera.height=120", "duration_s=4")
 
@@ -139,3 +143,29 @@ def test_public_names_are_there() -> None:
     with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
         _ = fogsim.nonsense
     assert Path(fogsim.__file__).with_name("py.typed").is_file()
+
+
+def test_advice_goes_to_everybody_near_the_ego_only_if_the_scenario_says_so() -> None:
+    step, told = make_step(3), Command(advice=SpeedAdvice(20.0))
+    everybody = fogsim.load_scenario("motorway_fog_bank", ["drivers.advised=all"])
+    assert spread_advice(told, step, fogsim.load_scenario("motorway_fog_bank", ["drivers.advised=ego"])) is told
+    assert spread_advice(told, step, everybody).advised_speeds == dict.fromkeys(step.traffic.ids, 20.0)
+    assert not spread_advice(Command(), step, everybody).advised_speeds
+
+
+def test_the_fog_of_the_drivers_moves_on_with_time() -> None:
+    entered = []
+    traffic = SimpleNamespace(enter_fog=entered.append)
+    changes = (FogChange(0.0, 1.0, -math.inf, 100.0), FogChange(10.0, 3.0, -math.inf, 100.0))
+    thickening = FogField(0.01, (1.0,) * 3, changes=changes)
+    fog = DriversFog()
+    fog.set_time(5.0)
+    assert not fog.is_entered
+    fog.enter(thickening, traffic)
+    assert fog.is_entered
+    seen = []
+    for time in (0.0, 5.0, 10.0):
+        fog.set_time(time)
+        seen.append(float(entered[0].extinction(np.array([0.0, 0.0, 1.0]))))
+    assert len(entered) == 1
+    assert seen == pytest.approx([0.01, 0.02, 0.03])

@@ -40,7 +40,7 @@ def frame_record(step: Step) -> dict[str, Any]:
         "lead_distance_m": None if observation.lead is None else observation.lead.distance,
         "camera": {
             "true": _calibration(truth.camera),
-            "told": _calibration(_told(observation)),
+            "told": _calibration(_assumed_camera(observation)),
             "pose": _pose(truth.pose),
         },
         "signs": [
@@ -145,7 +145,7 @@ def coco(information: Mapping[str, Any], records: Iterable[Mapping[str, Any]]) -
     }
 
 
-def _told(observation: Observation) -> Camera | None:
+def _assumed_camera(observation: Observation) -> Camera | None:
     return getattr(observation.frame, "camera", None)
 
 

@@ -139,7 +139,8 @@ def _locked(folder: Path, path: Path) -> int:
             holder = os.pread(descriptor, 4096, 0)
             os.close(descriptor)
             raise InputError(
-                f"{folder}: {_told(holder)} is writing there; wait for its end, or choose another directory with --out"
+                f"{folder}: {_holder_name(holder)} is writing there; wait for its end, or choose another "
+                "directory with --out"
             ) from None
         except BaseException:
             os.close(descriptor)
@@ -154,7 +155,7 @@ def _is(path: Path, descriptor: int) -> bool:
         return False
 
 
-def _told(content: bytes) -> str:
+def _holder_name(content: bytes) -> str:
     """Name the process that a lock file tells of."""
     try:
         process = WritingProcess.from_json(json.loads(content))

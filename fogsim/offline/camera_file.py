@@ -11,7 +11,7 @@ from fogsim.errors import InputError
 from fogsim.files import atomic
 from fogsim.offline.guess import CameraGuess
 from fogsim.scenario.document import read_document
-from fogsim.scenario.mistakes import tell_mistakes
+from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.section import Number, PixelPlace, Pixels, Section, Whole
 from fogsim.values import Camera, Response
 
@@ -170,7 +170,7 @@ def load_calibration(path: Path) -> Calibration:
     try:
         keys = CameraFile.model_validate(document.data)
     except ValidationError as error:
-        raise InputError(tell_mistakes(document, CameraFile, error)) from error
+        raise InputError(mistake_lines(document, CameraFile, error)) from error
     assumed = Response.SRGB if keys.bits == MADE_TO_BE_LOOKED_AT else Response.LINEAR
     remark = f"{path}: response is not given: {assumed.value} is assumed, as images of {keys.bits} bits mostly have"
     camera = Camera(

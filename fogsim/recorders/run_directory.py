@@ -87,7 +87,7 @@ class RunDirectory:
             return
         if self.unfinished.exists():
             raise InputError(
-                f"{self.path} holds rows of a run that did not come to its end: {_told(self.unfinished)}. "
+                f"{self.path} holds rows of a run that did not come to its end: {_fate_of_run(self.unfinished)}. "
                 f"fogsim recover {self.path} makes them readable, --overwrite replaces them, --out goes elsewhere"
             )
         if self.earlier:
@@ -279,7 +279,7 @@ def refuse_living(folder: Path) -> None:
         )
 
 
-def _told(folder: Path) -> str:
+def _fate_of_run(folder: Path) -> str:
     """Say what has become of the run of an unfinished folder."""
     manifest = read_manifest(folder)
     process = WritingProcess.from_json(manifest.get("process"))

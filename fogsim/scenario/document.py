@@ -20,13 +20,13 @@ TAKES_THE_PLACE_OF = {
 """Setting the key on the left leaves out those beside it that exclude it: ``--set fog.visibility_m=80`` makes the fog
 homogeneous whatever kind the file has."""
 
-LONGEST_TOLD = 200
+_LONGEST_SHOWN = 200
 """Most characters of an override that a message repeats."""
 
 
-def _told_override(text: str) -> str:
+def _shown_override(text: str) -> str:
     """An override as messages name it."""
-    return f"--set {text if text.isprintable() and len(text) <= LONGEST_TOLD else shown(text)}"
+    return f"--set {text if text.isprintable() and len(text) <= _LONGEST_SHOWN else shown(text)}"
 
 
 def _override_path(text: str) -> KeyPath:
@@ -54,13 +54,13 @@ def parse_override(text: str) -> tuple[tuple[str, ...], Any]:
     key, equals, value = text.partition("=")
     path = tuple(key.strip().split("."))
     if not equals or not all(path):
-        raise InputError(f"{_told_override(text)}: expected key.path=value, for example --set fog.visibility_m=80")
+        raise InputError(f"{_shown_override(text)}: expected key.path=value, for example --set fog.visibility_m=80")
     if len(path) > DEEPEST:
-        raise InputError(f"{_told_override(text)}: a key path has at most {DEEPEST} keys, got {len(path)}")
+        raise InputError(f"{_shown_override(text)}: a key path has at most {DEEPEST} keys, got {len(path)}")
     try:
         return path, parse_yaml(value)[0]
     except PlainYamlError as error:
-        raise InputError(f"{_told_override(text)}: the value is not valid YAML: {error.problem}") from error
+        raise InputError(f"{_shown_override(text)}: the value is not valid YAML: {error.problem}") from error
 
 
 def apply_overrides(data: dict[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
@@ -106,12 +106,12 @@ def _set(data: dict[str, Any], path: tuple[str, ...], value: object, text: str) 
 def _place(block: object, key: str, path: tuple[str, ...], text: str) -> int:
     above = ".".join(path[:-1])
     if not isinstance(block, list):
-        raise InputError(f"{_told_override(text)}: {above} is a single value and has no keys below it")
+        raise InputError(f"{_shown_override(text)}: {above} is a single value and has no keys below it")
     if not block:
-        raise InputError(f"{_told_override(text)}: {above} is an empty list; set it as a whole, {above}=[…]")
+        raise InputError(f"{_shown_override(text)}: {above} is an empty list; set it as a whole, {above}=[…]")
     if not _is_place(key) or int(key) >= len(block):
         raise InputError(
-            f"{_told_override(text)}: {above} is a list of {len(block)}; its places are 0 … {len(block) - 1}"
+            f"{_shown_override(text)}: {above} is a list of {len(block)}; its places are 0 … {len(block) - 1}"
         )
     return int(key)
 
@@ -160,7 +160,7 @@ class Document:
         """
         origins = dict(self.origins)
         for text in overrides:
-            at, told = _override_path(text), _told_override(text)
+            at, told = _override_path(text), _shown_override(text)
             origins = {key: origin for key, origin in origins.items() if key[: len(at)] != at}
             for block in (at[:length] for length in range(1, len(at))):
                 origins[block] = f"{origins[block]} with {told}" if block in origins else told

@@ -10,10 +10,10 @@ from pydantic import ValidationError
 
 from fogsim.errors import InputError, UnknownNameError, nearest, shown, suggest
 from fogsim.scenario.document import Document, apply_overrides, read_document
-from fogsim.scenario.mistakes import tell_mistakes
+from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.schema import Scenario
-from fogsim.scenario.sumo_check import demand_mistakes, uncountable_step
+from fogsim.scenario.sumo_check import demand_mistakes, step_mistake
 from fogsim.scenario.traffic_schema import Traffic
 from fogsim.traffic.road.configuration import configured_files
 
@@ -232,9 +232,9 @@ def _checked(
     try:
         scenario = Scenario.model_validate(data).model_copy(update={"directory": folder})
     except ValidationError as error:
-        raise InputError(tell_mistakes(document, Scenario, error, mistakes)) from error
+        raise InputError(mistake_lines(document, Scenario, error, mistakes)) from error
     # A simulation that runs already, or is none of SUMO's, keeps its own time.
-    uncountable = uncountable_step(scenario.clocks) if named_files else None
+    uncountable = step_mistake(scenario.clocks) if named_files else None
     if uncountable:
         key_path = ("clocks", "traffic_step_s")
         mistakes.append(f"{document.where(key_path)}: {dotted(key_path)}: {uncountable}")

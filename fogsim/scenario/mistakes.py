@@ -25,7 +25,7 @@ WORDED = {
 """Messages of pydantic in the words of a file's reader."""
 
 
-def tell_mistakes(
+def mistake_lines(
     document: Document, model: type[BaseModel], error: ValidationError, further: Sequence[str] = ()
 ) -> str:
     """Every mistake in a line of its own, without those that are there for another's sake.
@@ -48,13 +48,15 @@ def tell_mistakes(
     own = [detail for detail in details if detail["loc"] not in blocks]
     unknown = [detail["loc"] for detail in own[:MOST_TOLD] if detail["type"] == "extra_forbidden"]
     meant = {(*place[:-1], nearest(str(place[-1]), _known_keys(model, place[:-1]))) for place in unknown}
-    told = [_told(document, model, d) for d in own[:MOST_TOLD] if d["type"] != "missing" or d["loc"] not in meant]
+    told = [
+        _mistake_line(document, model, d) for d in own[:MOST_TOLD] if d["type"] != "missing" or d["loc"] not in meant
+    ]
     if len(own) > MOST_TOLD:
         told.append(f"{document.path}: and {len(own) - MOST_TOLD} more mistakes")
     return "\n".join([*told, *further])
 
 
-def _told(document: Document, model: type[BaseModel], detail: ErrorDetails) -> str:
+def _mistake_line(document: Document, model: type[BaseModel], detail: ErrorDetails) -> str:
     """One mistake in one line."""
     location: KeyPath = tuple(detail["loc"])
     key_path = _without_kinds(location)

@@ -23,7 +23,7 @@ from fogsim.traffic.sumo.loaded_files import CLOCK_TICK
 _ROUNDING = 1e-6  # of a tick: what writing a number in decimals may cost
 
 
-def uncountable_step(clocks: Clocks) -> str | None:
+def step_mistake(clocks: Clocks) -> str | None:
     """Say why SUMO cannot make a traffic step, and the nearest that it can; None if it can.
 
     SUMO would make a step of whole milliseconds in its place, and times and speeds would disagree from then on.

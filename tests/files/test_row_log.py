@@ -1,0 +1,39 @@
+"""Rows that survive the process that writes them."""
+
+from pathlib import Path
+
+import pyarrow as pa
+import pytest
+
+from fogsim.errors import InputError
+from fogsim.files.row_log import RowLog, read_rows
+
+SCHEMA = pa.schema([("index", pa.int64()), ("speed", pa.float64())])
+
+
+def batch(*rows: tuple[int, float]) -> pa.RecordBatch:
+    return pa.RecordBatch.from_arrays([pa.array(column) for column in zip(*rows, strict=True)], schema=SCHEMA)
+
+
+def test_rows_are_read_back_and_of_equal_ones_the_last_counts(tmp_path: Path) -> None:
+    log = RowLog(tmp_path / "rows", SCHEMA)
+    log.append(batch((0, 1.0), (1, 2.0)))
+    log.append(batch((1, 2.5), (2, 3.0)))
+    assert read_rows(log.path).to_pydict() == {"index": [0, 1, 2], "speed": [1.0, 2.5, 3.0]}
+    log.remove()
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("missing", [1, 40])
+def test_a_log_that_was_cut_off_in_a_row_keeps_those_before(tmp_path: Path, missing: int) -> None:
+    log = RowLog(tmp_path / "rows", SCHEMA)
+    log.append(batch((0, 1.0)))
+    log.append(batch((1, 2.0)))
+    log.path.write_bytes(log.path.read_bytes()[:-missing])
+    assert read_rows(log.path)["index"].to_pylist() == [0]
+
+
+def test_what_is_no_log_is_told(tmp_path: Path) -> None:
+    (tmp_path / "none").write_bytes(b"no rows")
+    with pytest.raises(InputError, match="holds no rows"):
+        read_rows(tmp_path / "none")

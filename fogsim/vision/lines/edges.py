@@ -1,5 +1,10 @@
-"""Canny's edges of an image (Canny 1986), but for those that fog draws."""
+"""Canny's edges of an image (Canny 1986), but for those that fog draws: ridges of the gradient's length.
 
+OpenCV's search takes of two neighbours of one length the left one, so that a mirrored image had other edges, and it
+wants the gradient in 16 bits.
+"""
+
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -7,8 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.jit import kernel
 from fogsim.vision.light.medians import columns_apart, median, row_medians
-from fogsim.vision.lines import edge_kernels
 
 Image = NDArray[np.float32]
 
@@ -17,6 +22,14 @@ EDGE_FACTOR = 10.0
 
 MIN_GRADIENT = 1.5
 """Smallest gradient that can be an edge [linear grey levels per px]: that of the quantisation of 8 bits."""
+
+SMOOTH_TAPS = 2
+"""Taps of the smoothing on either side of the middle one: known to the compiler, which then does without that loop."""
+
+_FLAT, _UPRIGHT = math.tan(math.radians(22.5)), math.tan(math.radians(67.5))
+"""Down over across: below the one a gradient points to the side, above the other up or down [-]."""
+
+_WEAK, _EDGE = 1, 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,13 +74,13 @@ def smoothed(luminance: Image) -> Image:
         The image.
     """
     blurred = np.empty_like(luminance)
-    edge_kernels.smooth(luminance, _gaussian(), blurred)
+    smooth(luminance, _gaussian(), blurred)
     return blurred
 
 
 def _gaussian() -> Image:
     """Weights from the middle one on: the rest is its mirror image."""
-    weights = np.exp(-0.5 * np.arange(edge_kernels.SMOOTH_TAPS + 1) ** 2)
+    weights = np.exp(-0.5 * np.arange(SMOOTH_TAPS + 1) ** 2)
     return np.asarray(weights / (2.0 * weights.sum() - weights[0]), np.float32)
 
 
@@ -124,9 +137,9 @@ class EdgeDetector:
             # Fog over a dark road brightens upward, so dI/dv is negative.
             medians = row_medians(columns_apart(down, self._of_row))
             slope = np.clip(medians, -fog_slope, 0.0).astype(np.float32)
-        edge_kernels.squared_lengths(across, down, slope, self._squares)
+        squared_lengths(across, down, slope, self._squares)
         high = max(EDGE_FACTOR * _median_size(self._squares, self._of_road), MIN_GRADIENT)
-        edge_kernels.trace_edges(across, down, self._squares, 0.5 * high, high, self._pixels)
+        trace_edges(across, down, self._squares, 0.5 * high, high, self._pixels)
         return Edges(self._pixels, high, self._gradient)
 
     def _make_room(self, shape: tuple[int, ...]) -> None:
@@ -164,3 +177,155 @@ def _median_size(squares: Image, step: int) -> float:
     """Median size of the gradient in the lower half, of whose squares there is a border of one pixel."""
     inside = squares[1:-1, 1:-1]
     return median(np.sqrt(columns_apart(inside[len(inside) // 2 :: step], step)))
+
+
+@kernel
+def squared_lengths(
+    across: NDArray[np.float32], down: NDArray[np.float32], slope: NDArray[np.float32], squares: NDArray[np.float32]
+) -> None:
+    """Take each row's slope from the downward gradient, in place, and square the gradient's length.
+
+    Parameters
+    ----------
+    across, down : (rows, cols) float32
+        The gradient; `down` is changed.
+    slope : (rows,) float32
+        What is taken off.
+    squares : (rows + 2, cols + 2) float32
+        Is written, all but its border.
+    """
+    rows, cols = across.shape
+    for row in range(rows):
+        ramp, side, height, target = slope[row], across[row], down[row], squares[row + 1]
+        for col in range(cols):
+            height[col] -= ramp
+            target[col + 1] = side[col] * side[col] + height[col] * height[col]
+
+
+@kernel
+def trace_edges(
+    across: NDArray[np.float32],
+    down: NDArray[np.float32],
+    squares: NDArray[np.float32],
+    low: float,
+    high: float,
+    pixels: NDArray[np.uint8],
+) -> None:
+    """Find the ridges of the gradient above `low` that touch one above `high`, or another such ridge.
+
+    Parameters
+    ----------
+    across, down : (rows, cols) float32
+        The gradient.
+    squares : (rows + 2, cols + 2) float32
+        Squares of its length, 0 on the border.
+    low, high : float
+        Thresholds of its length.
+    pixels : (rows, cols) uint8
+        Is written: 255 on edges and 0 elsewhere.
+    """
+    marks, waiting = np.zeros(squares.shape, np.uint8), np.empty(pixels.size, np.int64)
+    bounds = np.float32(low * low), np.float32(high * high)
+    steep = _mark_ridges(across, down, squares.ravel(), bounds, marks.ravel(), waiting)
+    _follow(marks.ravel(), squares.shape[1], waiting, steep)
+    for row in range(len(pixels)):
+        line, target = marks[row + 1], pixels[row]
+        for col in range(len(target)):
+            target[col] = 255 * (line[col + 1] == _EDGE)
+
+
+@kernel
+def _mark_ridges(
+    across: NDArray[np.float32],
+    down: NDArray[np.float32],
+    squares: NDArray[np.float32],
+    bounds: tuple[np.float32, np.float32],
+    marks: NDArray[np.uint8],
+    steep: NDArray[np.int64],
+) -> int:
+    """Mark where the gradient's length falls off on both of the sides that it points to.
+
+    That is weak between both bounds and an edge above: writes the places of the latter and returns their number.
+    """
+    low, high = bounds
+    rows, cols = across.shape
+    width, count = cols + 2, 0
+    for row in range(rows):
+        first = (row + 1) * width + 1
+        for col in range(cols):
+            here = squares[first + col]
+            if here > low:
+                side, height = abs(across[row, col]), abs(down[row, col])
+                flat, upright = height < _FLAT * side, height > _UPRIGHT * side
+                slant = width + 1 if (across[row, col] > 0.0) == (down[row, col] > 0.0) else width - 1
+                step = 1 if flat else width if upright else slant
+                before, after = squares[first + col - step], squares[first + col + step]
+                # Without branches, which no processor could predict. Of equals side by side both are ridges.
+                ridge = (here > before) & ((here > after) | ((here == after) & (flat | upright)))
+                ridge |= flat & (here == before) & (here > after)
+                if ridge:
+                    marks[first + col] = _WEAK
+                    if here > high:
+                        marks[first + col] = _EDGE
+                        steep[count] = first + col
+                        count += 1
+    return count
+
+
+@kernel
+def _follow(marks: NDArray[np.uint8], width: int, waiting: NDArray[np.int64], count: int) -> None:
+    """Make edges of all weak ridges that touch one of those waiting, or one that has become one."""
+    around = (-width - 1, -width, -width + 1, -1, 1, width - 1, width, width + 1)
+    while count > 0:
+        count -= 1
+        place = waiting[count]
+        for step in around:
+            if marks[place + step] == _WEAK:
+                marks[place + step] = _EDGE
+                waiting[count] = place + step
+                count += 1
+
+
+@kernel
+def smooth(image: NDArray[np.float32], weights: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+    """Smooth down the columns and along each row; what lies outside is as the border.
+
+    Parameters
+    ----------
+    image, out : (rows, cols) float32
+        The image, and what is written.
+    weights : (`SMOOTH_TAPS` + 1,) float32
+        Weights from the middle one on.
+    """
+    rows, cols = image.shape
+    line = np.empty(cols + 2 * SMOOTH_TAPS, np.float32)
+    for row in range(rows):
+        for col in range(cols):
+            value = weights[0] * image[row, col]
+            for tap in range(1, SMOOTH_TAPS + 1):
+                value += weights[tap] * (image[min(row + tap, rows - 1), col] + image[max(row - tap, 0), col])
+            line[SMOOTH_TAPS + col] = value
+        line[:SMOOTH_TAPS], line[SMOOTH_TAPS + cols :] = line[SMOOTH_TAPS], line[SMOOTH_TAPS + cols - 1]
+        for col in range(cols):
+            value = weights[0] * line[SMOOTH_TAPS + col]
+            for tap in range(1, SMOOTH_TAPS + 1):
+                value += weights[tap] * (line[SMOOTH_TAPS + col + tap] + line[SMOOTH_TAPS + col - tap])
+            out[row, col] = value
+
+
+@kernel
+def peak_offset(before: float, here: float, behind: float) -> float:
+    """Place of the peak of a parabola through three neighbouring pixels.
+
+    Parameters
+    ----------
+    before, here, behind : float
+        Their values.
+
+    Returns
+    -------
+    float
+        Distance from the middle one [px]; 0 where the parabola has no peak.
+    """
+    bend = before - 2.0 * here + behind
+    return 0.5 * (before - behind) / bend if bend < 0.0 else 0.0

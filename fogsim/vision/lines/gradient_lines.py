@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
-from fogsim.vision.lines.edge_kernels import peak_offset
-from fogsim.vision.lines.edges import Gradient
+from fogsim.vision.lines.edges import Gradient, peak_offset
 from fogsim.vision.lines.vanishing_point import Lines, VanishingPoint, all_pairs, crossings, supports
 
 Floats = NDArray[np.float64]
@@ -57,7 +56,7 @@ def consensus_vanishing_point(
         None if no two lines agree.
     """
     points = edge_points(gradient.across, gradient.down, edges, guess[0], guess[1])
-    found, votes = hough_lines(points, reach, PEAKS, VOTES)
+    found, votes = hough_peaks(points, reach, PEAKS, VOTES)
     normal = np.array([(math.cos(angle), math.sin(angle)) for angle in found[:, 0]]).reshape(-1, 2)
     lines = Lines(normal, found[:, 1].copy())
     passing = _passing_lines(lines, votes)
@@ -133,7 +132,7 @@ def edge_points(
 
 
 @kernel
-def hough_lines(points: Floats, reach: float, most: int, least: int) -> tuple[Floats, Floats]:
+def hough_peaks(points: Floats, reach: float, most: int, least: int) -> tuple[Floats, Floats]:
     """Highest peaks of Hough's transform of edge points, each voting near the direction of its gradient.
 
     Parameters

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.linear_algebra import matrix_product
+from fogsim.linear_algebra import matrix_product, straight_line
 from fogsim.vision.lines.vanishing_point import VanishingPoint, crossings, nearest_point, residual_scale, sloped_lines
 
 Floats = NDArray[np.float64]
@@ -184,13 +184,12 @@ def _fitted(line: LaneLine, points: _EdgePoints) -> LaneLine | None:
 def _least_squares(rows: Floats, cols: Floats) -> LaneLine | None:
     if rows.size < LEAST_PIXELS:
         return None
-    centre, middle = float(rows.mean()), float(cols.mean())
-    apart = rows - centre
-    spread = float(matrix_product(apart, apart))
+    centre = float(rows.mean())
+    spread = float(matrix_product(rows - centre, rows - centre))
     if spread < LEAST_PIXELS**3 / 12.0:
         return None
-    slope = float(matrix_product(apart, cols - middle)) / spread
-    return LaneLine(slope, middle - slope * centre, rows.size, centre, math.sqrt(spread))
+    slope, offset = straight_line(rows, cols)
+    return LaneLine(slope, offset, rows.size, centre, math.sqrt(spread))
 
 
 def published_vanishing_point(lines: list[LaneLine]) -> VanishingPoint | None:

@@ -94,7 +94,7 @@ class RoadFit(NamedTuple):
 
 
 @kernel
-def hough_lines(points: Points, offsets: Floats, slopes: Floats, most: int, least: int) -> RoadLines:
+def hough_road_lines(points: Points, offsets: Floats, slopes: Floats, most: int, least: int) -> RoadLines:
     """Straight lines that many points of one kind lie on (Hough's transform).
 
     Parameters
@@ -189,7 +189,7 @@ def refitted_lines(points: Points, lines: RoadLines, reach: float) -> RoadLines:
     points : Points
         All points.
     lines : RoadLines
-        From `hough_lines`.
+        From `hough_road_lines`.
     reach : float
         Distance along a row within which points count at first [px].
     """

@@ -15,7 +15,7 @@ from fogsim.vision.lines.road_line_kernels import (
     Points,
     RoadLines,
     fit_road_lines,
-    hough_lines,
+    hough_road_lines,
     refitted_lines,
 )
 from fogsim.vision.lines.row_edges import may_lie_on_road, row_points
@@ -78,7 +78,7 @@ def road_vanishing_point(image: LinearPixels, camera: Camera, horizon: Horizon) 
         return None
     points = _points(image, rows, camera, horizon)
     offsets, slopes = _cells(YAW * camera.focal_length)
-    found = hough_lines(points, offsets, slopes, MOST_LINES, max(int(LEAST_POINTS), rows.size // 8))
+    found = hough_road_lines(points, offsets, slopes, MOST_LINES, max(int(LEAST_POINTS), rows.size // 8))
     found = refitted_lines(points, found, 0.5 * (offsets[1] - offsets[0]) + 2.0)
     first = _first_point(found, AGREES * horizon.standard_deviation + 2.0)
     if first is None:

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from fogsim.jit import kernel
 from fogsim.vision.light.medians import median_of_few
 from fogsim.vision.light.pixel_kernels import row_luminance
-from fogsim.vision.lines.edge_kernels import peak_offset
+from fogsim.vision.lines.edges import peak_offset
 
 RISING, FALLING, RIDGE = 0, 1, 2
 """Kinds of points: edges to the brighter and to the darker side, and the middle of a narrow bright stripe."""

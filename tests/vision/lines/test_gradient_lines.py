@@ -9,7 +9,7 @@ from stripes import CENTRE, ROW, road_lines
 from fogsim.values import Camera
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.lines.deriche import CannyDeriche
-from fogsim.vision.lines.gradient_lines import consensus_vanishing_point, edge_points, hough_lines
+from fogsim.vision.lines.gradient_lines import consensus_vanishing_point, edge_points, hough_peaks
 from fogsim.vision.lines.horizon import Horizon
 from fogsim.vision.lines.road_lines import road_vanishing_point
 
@@ -55,7 +55,7 @@ def test_parallel_lines_have_none():
     guess = (310.0, 20.0)
     edges = CannyDeriche()(image, None)
     points = edge_points(edges.gradient.across, edges.gradient.down, edges.pixels, *guess)
-    assert hough_lines(points, 150.0, 6, 30)[0][:, 0] % math.pi == pytest.approx([0.0] * 6, abs=1e-9)
+    assert hough_peaks(points, 150.0, 6, 30)[0][:, 0] % math.pi == pytest.approx([0.0] * 6, abs=1e-9)
     assert consensus_vanishing_point(edges.gradient, edges.pixels, guess, 150.0) is None
 
 
@@ -68,7 +68,7 @@ def test_an_edge_is_a_line_with_the_direction_of_its_gradient(slope):
     points = edge_points(edges.gradient.across, edges.gradient.down, edges.pixels, 100.0, 0.0)
     assert np.median(points[:, 0] - slope * (points[:, 1] - 100.0)) == pytest.approx(0.8, abs=0.1)
     assert np.median(points[:, 2]) == pytest.approx(math.atan(-slope), abs=0.02)
-    lines, votes = hough_lines(points, 120.0, 1, 30)
+    lines, votes = hough_peaks(points, 120.0, 1, 30)
     angle, offset = lines[0]
     assert math.remainder(angle - math.atan(-slope), 2.0 * math.pi) == pytest.approx(0.0, abs=math.radians(1.5))
     assert offset == pytest.approx(math.cos(angle) * (0.8 - 100.0 * slope), abs=3.0)

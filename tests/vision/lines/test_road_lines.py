@@ -8,7 +8,7 @@ from stripes import CENTRE, ROW, road_lines
 from fogsim.values import Camera, Response
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.lines.horizon import Horizon, calibrated_horizon
-from fogsim.vision.lines.road_line_kernels import Points, RoadLines, fit_road_lines, hough_lines, refitted_lines
+from fogsim.vision.lines.road_line_kernels import Points, RoadLines, fit_road_lines, hough_road_lines, refitted_lines
 from fogsim.vision.lines.road_lines import road_vanishing_point
 
 
@@ -110,7 +110,7 @@ def points_on(column=0.0, row=0.0, bend=0.0):
 def test_lines_of_exact_points_are_found_exactly():
     points = points_on(column=2.0, row=3.0)
     offsets, slopes = np.linspace(-40.0, 40.0, 25), np.linspace(-6.5, 6.5, 373)
-    found = hough_lines(points, offsets, slopes, 12, 12)
+    found = hough_road_lines(points, offsets, slopes, 12, 12)
     lines = refitted_lines(points, found, 4.0)
     order = np.argsort(lines.slope)
     assert lines.slope[order] == pytest.approx(SLOPES, abs=1e-9)
@@ -136,4 +136,4 @@ def test_parallel_lines_have_no_span_and_no_points_no_lines():
     fit = fit_road_lines(points, one, 7.0, 0.0, 1e3)
     assert (fit.lines, fit.span) == (1, 0.0)
     nothing = Points(np.empty(0), np.empty(0), np.empty(0, np.int64))
-    assert hough_lines(nothing, np.linspace(-4.0, 4.0, 5), np.linspace(-1.0, 1.0, 5), 12, 10).slope.size == 0
+    assert hough_road_lines(nothing, np.linspace(-4.0, 4.0, 5), np.linspace(-1.0, 1.0, 5), 12, 10).slope.size == 0

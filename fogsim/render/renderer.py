@@ -14,10 +14,7 @@ from fogsim.render.protocol import RenderError
 from fogsim.render.shading import Shading
 from fogsim.values.camera import Camera, CameraPose
 from fogsim.values.image import View
-from fogsim.values.scene import Batch, Scene, Surface
-
-STAND_INS = (":middle", ":far", ":tiny", ":speck")
-"""Endings of the names of shapes that stand in for the one without, where it is small."""
+from fogsim.values.scene import LEVELS_OF_DETAIL, Batch, Scene, Surface
 
 _CELL = 120.0  # side of the squares in which copies are culled together [m]
 
@@ -43,13 +40,13 @@ class SceneRenderer:
     def __init__(self, scene: Scene, illuminance: float, make_rasteriser: Callable[[MeshTable], Rasteriser]) -> None:
         ground = split_ground(scene.ground)
         meshes = {**scene.shapes, **ground.pieces}
-        # Stand-ins are drawn where they are small, and so from outside.
-        self._table = MeshTable.of(meshes, lambda name: name.endswith(STAND_INS))
+        # Levels of detail are drawn where they are small, and so from outside.
+        self._table = MeshTable.of(meshes, lambda name: name.endswith(LEVELS_OF_DETAIL))
         self._rasteriser: Rasteriser | None = make_rasteriser(self._table)
         self._shading = Shading(self._table, illuminance, ground.height, ground.reflectance)
         plain = np.array([bool(np.all(mesh.surface == int(Surface.MATT))) for mesh in meshes.values()])
         faces = np.diff(self._table.first_face)
-        self._shapes = shapes_of(self._table.numbers, *self._table.extremes(), faces, plain, STAND_INS)
+        self._shapes = shapes_of(self._table.numbers, *self._table.extremes(), faces, plain, LEVELS_OF_DETAIL)
         shape, record, place = self._standing(scene.scenery, ground)
         self._copies, self._cells = cells_of(copies_of(shape, record, place, self._shapes), _CELL)
         self._still = len(shape)

@@ -13,7 +13,6 @@ import pytest
 from fogsim.errors import InputError, RenamedWarning
 from fogsim.render import Renderer, RenderError, make_renderer, to_pyrender
 from fogsim.render.photometry import lamp_radiance
-from fogsim.render.renderer import STAND_INS
 from fogsim.scenario import load_scenario
 from fogsim.scene import vehicle_batches
 from fogsim.values import (
@@ -28,6 +27,7 @@ from fogsim.values import (
     Surface,
     View,
 )
+from fogsim.values.scene import LEVELS_OF_DETAIL
 from tests.render.conftest import Place, camera
 
 ILLUMINANCE = 1e4
@@ -39,7 +39,7 @@ LEVEL = dataclasses.replace(LARGE, pitch=0.0)
 def in_full_detail(scene: Scene) -> Scene:
     """The scene without simpler shapes for what is far, since pyrender draws everything in full."""
     return dataclasses.replace(
-        scene, shapes={name: mesh for name, mesh in scene.shapes.items() if not name.endswith(STAND_INS)}
+        scene, shapes={name: mesh for name, mesh in scene.shapes.items() if not name.endswith(LEVELS_OF_DETAIL)}
     )
 
 

@@ -111,7 +111,7 @@ def glows() -> Rows:
     """Root mean square of ln(model / photons) below 70° by optical depth, for three models."""
     rows = photons("monte_carlo_halo.csv")
     rows = rows[rows["angle"] < 70]
-    table: Rows = [("fog", "T", "FogSim", "single scattering", "Narasimhan & Nayar, q = 0.9")]
+    table: Rows = [("fog", "τ", "FogSim", "single scattering", "Narasimhan & Nayar, q = 0.9")]
     for droplets in Droplets:
         for depth in dict.fromkeys(rows["optical_depth"]):
             some = rows[(rows["fog"] == droplets) & (rows["optical_depth"] == depth)]

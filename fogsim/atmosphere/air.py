@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.fog.koschmieder import daytime_radiance, transmittance
+from fogsim.atmosphere.fog.koschmieder import daytime_luminance, transmittance
 from fogsim.atmosphere.fog.medium import field_at
 from fogsim.atmosphere.lamps.halos import Halos
 from fogsim.atmosphere.lamps.lamplight import OwnLamplight
@@ -19,7 +19,7 @@ _UNLIT = Lights.none()
 class Air:
     """The fog of a scenario, as a camera looks through it.
 
-    The radiance at the camera is L = (L₀ (1 + E_street / E_sky) + R E_own) T + S: the drawn radiance L₀, to which
+    The luminance at the camera is L = (L₀ (1 + E_street / E_sky) + R E_own) T + S: the drawn luminance L₀, to which
     surfaces add of street lamps' light what they return of the sky's, and what they return of the own lamps' light
     (their response R times the illuminance E_own that reaches them), attenuated by T = e^(−τ), and the light S that the
     fog scatters into the line of sight (airlight by day, the lamps' veil and halos at night).
@@ -58,12 +58,12 @@ class Air:
     def radiance(
         self, view: View, camera: Camera, pose: CameraPose, lights: Lights = _UNLIT, time: float = 0.0
     ) -> NDArray[np.float32]:
-        """Radiance that reaches a camera.
+        """Luminance that reaches a camera.
 
         Parameters
         ----------
         view : View
-            The scene without air: linear radiance [cd/m²] and distance along the ray [m].
+            The scene without air: linear luminance per channel [cd/m²] and distance along the ray [m].
         camera : Camera
             Its true calibration.
         pose : CameraPose
@@ -76,7 +76,7 @@ class Air:
         Returns
         -------
         (rows, cols, 3) float32
-            Linear radiance at the camera [cd/m²].
+            Linear luminance per channel at the camera [cd/m²].
 
         Raises
         ------
@@ -85,7 +85,7 @@ class Air:
         """
         field = field_at(self._field, time)
         lit = view if lights.streets is None else self._streets.on(view, camera, pose, field, lights.streets)
-        radiance = daytime_radiance(lit, field, camera, pose)
+        radiance = daytime_luminance(lit, field, camera, pose)
         if lights.own:
             self._own.add(radiance, view, camera, pose, field, lights.own)
         if len(lights.others.intensity):

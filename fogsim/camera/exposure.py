@@ -60,7 +60,7 @@ def expose(radiance: NDArray[np.float32], sensor: Sensor, response: Response, rn
     Parameters
     ----------
     radiance : (rows, cols, 3) float32
-        Linear radiance at the camera [cd/m²].
+        Linear luminance per channel at the camera [cd/m²].
     sensor : Sensor
         The sensor.
     response : Response
@@ -158,7 +158,7 @@ def metered_luminance(radiance: NDArray[np.float32], metering: Metering) -> floa
     Parameters
     ----------
     radiance : (rows, cols, 3) float32
-        Linear radiance at the camera [cd/m²].
+        Linear luminance per channel at the camera [cd/m²].
     metering : Metering
         What of the picture counts.
     """

@@ -82,19 +82,19 @@ class LensGlare:
         self._bands = Bands()
 
     def scatter(self, radiance: NDArray[np.float32], saturation: float) -> NDArray[np.float32]:
-        """Radiance with what the lens scatters.
+        """Luminance with what the lens scatters.
 
         Parameters
         ----------
         radiance : (rows, cols, 3) float32
-            Linear radiance at the camera [cd/m²].
+            Linear luminance per channel at the camera [cd/m²].
         saturation : float
             Luminance that fills a pixel [cd/m²].
 
         Returns
         -------
         (rows, cols, 3) float32
-            The radiance itself where nothing is brighter than `BRIGHT` times saturation.
+            The image itself where nothing is brighter than `BRIGHT` times saturation.
         """
         lines = np.ascontiguousarray(radiance, dtype=np.float32).reshape(radiance.shape[0], -1)
         counts, limit = np.empty(lines.shape[0], np.int32), np.float32(BRIGHT * saturation)

@@ -1,6 +1,6 @@
 """Antialiasing: a scene drawn and fogged with several samples a pixel side, averaged as light before it is exposed.
 
-The average is taken of the radiance that has come through the fog, each sample at its own distance. So a silhouette
+The average is taken of the light that has come through the fog, each sample at its own distance. So a silhouette
 gets no fringe, as it does where colour is averaged and fogged at one distance for all.
 """
 
@@ -38,19 +38,19 @@ def supersampled(camera: Camera, side: int) -> Camera:
 
 
 def averaged(radiance: NDArray[np.float32], side: int) -> NDArray[np.float32]:
-    """Mean radiance of each pixel's samples.
+    """Mean luminance of each pixel's samples.
 
     Parameters
     ----------
     radiance : (side · rows, side · cols, 3) float32
-        Linear radiance of the samples [cd/m²].
+        Linear luminance per channel of the samples [cd/m²].
     side : int
         Samples a pixel side, at least 1.
 
     Returns
     -------
     (rows, cols, 3) float32
-        Linear radiance of the pixels [cd/m²]; the samples themselves where there is one a pixel.
+        Linear luminance per channel of the pixels [cd/m²]; the samples themselves where there is one a pixel.
     """
     if side == 1:
         return radiance

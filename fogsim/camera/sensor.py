@@ -63,7 +63,7 @@ class CameraSensor:
         Parameters
         ----------
         radiance : (rows, cols, 3) float32
-            Linear radiance at the camera [cd/m²].
+            Linear luminance per channel at the camera [cd/m²].
         rng : numpy.random.Generator
             Source of the noise; one draw is taken for a picture.
 

@@ -21,6 +21,7 @@ from fogsim.scene import (
     surroundings,
     vehicle_batches,
 )
+from fogsim.units import DAY_ILLUMINANCE
 from fogsim.values import (
     Batch,
     Camera,
@@ -36,13 +37,7 @@ from fogsim.values import (
     View,
 )
 
-LAMPLIGHT_BELOW = 1000.0
-"""Horizontal illuminance below which lamplight is drawn [lx].
-
-UNECE R48 lights the dipped beam by itself below it; above, the veil of the own lamps is less than 1 % of the airlight.
-"""
-
-DARKEST = 1e-4
+DARKEST_SKY = 1e-4
 """Illuminance below which no sky under street lamps is taken to be [lx]: that of an overcast night without a moon.
 
 Surfaces return street lamps' light as they return the sky's, of which there must be some.
@@ -115,7 +110,7 @@ class ViewRenderer:
         self._drawn_camera = supersampled(self._camera, self._samples)
         self._setback = scenario.camera.setback_m
         self._scenario, self._network = scenario, network
-        self._by_lamplight = scenario.light.illuminance_lx < LAMPLIGHT_BELOW
+        self._by_lamplight = scenario.light.illuminance_lx < DAY_ILLUMINANCE
         self._mount = LampMount()
         self._air = Air(self.fog, scenario.fog.droplets)
         self._renderer: Renderer | None = None
@@ -133,7 +128,7 @@ class ViewRenderer:
         self._scene, self._sky = scene, scenario.light.illuminance_lx
         self._street_lamps = street_lamp_heads(scene) + around.origin
         if len(self._street_lamps) and self._by_lamplight:
-            self._sky = max(self._sky, DARKEST)
+            self._sky = max(self._sky, DARKEST_SKY)
             self._streets = street_lighting(self._street_lamps, self._sky)
         self.close()
         self._renderer = make_renderer(scenario.renderer, scene, self._sky)

@@ -11,7 +11,14 @@ class Fusion(Protocol):
     """Turns many estimates over time into one belief."""
 
     def update(self, estimates: Sequence[Estimate], time: float) -> Belief:
-        """Take in the estimates of one instant [s] and say what is believed now.
+        """Take in the estimates of one instant and say what is believed now.
+
+        Parameters
+        ----------
+        estimates : sequence of Estimate
+            From any estimators.
+        time : float
+            The instant [s].
 
         Raises
         ------

@@ -35,7 +35,13 @@ class FogLampRules:
     hysteresis: Annotated[float, Range(0.0, 10.0)] = 0.2
 
     def lamps(self, belief: Belief, previous: Lamp) -> Lamp:
-        """Choose the lamps to light; see `LightingPolicy.lamps`."""
+        """Choose the lamps to light; see `LightingPolicy.lamps`.
+
+        Parameters
+        ----------
+        belief, previous
+            What is believed about the fog, and lamps lit now.
+        """
         lit = BY_DAY
         for lamp, threshold in ((Lamp.REAR_FOG, self.rear_fog_below), (Lamp.FRONT_FOG, self.front_fog_below)):
             margin = 1.0 + self.hysteresis if lamp in previous else 1.0
@@ -53,5 +59,11 @@ class LowBeamOnly:
         belief: Belief,  # noqa: ARG002 - the protocol's parameters
         previous: Lamp,  # noqa: ARG002 - the protocol's parameters
     ) -> Lamp:
-        """Choose the lamps to light; see `LightingPolicy.lamps`."""
+        """Choose the lamps to light; see `LightingPolicy.lamps`.
+
+        Parameters
+        ----------
+        belief, previous
+            What is believed about the fog, and lamps lit now.
+        """
         return BY_DAY

@@ -64,7 +64,17 @@ class Estimate:
 
     @classmethod
     def invalid(cls, method: str, reason: str, **diagnostics: object) -> "Estimate":
-        """Build the statement that a method cannot tell, with the reason in the diagnostics."""
+        """Build the statement that a method cannot tell, with the reason in the diagnostics.
+
+        Parameters
+        ----------
+        method : str
+            Name of the estimator in the registry.
+        reason : str
+            Why it cannot tell.
+        **diagnostics : object
+            What else it found.
+        """
         return cls(method, 0.0, math.inf, valid=False, diagnostics={"reason": reason, **diagnostics})
 
     @property

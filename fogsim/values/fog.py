@@ -125,7 +125,7 @@ class FogField:
     banks : tuple of FogBank
         Denser (or thinner) stretches, not overlapping.
     airlight : tuple of float
-        Radiance of an infinite path through the fog near the ground by day, per colour channel [cd/m²].
+        Luminance of an infinite path through the fog near the ground by day, per colour channel [cd/m²].
     top : float
         Height above which there is no fog [m]; ``inf`` where the layer has no end.
     top_edge : float

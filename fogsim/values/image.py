@@ -15,13 +15,13 @@ class View:
     Attributes
     ----------
     radiance : (rows, cols, 3) float32
-        Linear radiance, weighted as luminance per channel [cd/m²].
+        Luminance of each linear channel [cd/m²]: their sum by `LUMINANCE_WEIGHTS` is the luminance.
     distance : (rows, cols) float32
         Distance along the ray from the optical centre [m]; ``inf`` for the sky.
     instance : (rows, cols) int32
         What is seen: 0 sky, 1 terrain, 2 road, 3 roadside, 4 sign, 16 + i the vehicle in row i of the traffic state.
     lamp_response : (rows, cols, 3) float32 or None
-        Radiance toward the camera per illuminance that the camera's own vehicle casts, measured across the ray
+        Luminance toward the camera per illuminance that the camera's own vehicle casts, measured across the ray
         [cd/m² per lx]: of diffuse surfaces ρ/π cos θ, of road, markings and sheeting their coefficient of
         retroreflected luminance; zero for the sky. None where it was not asked for.
     """

@@ -17,6 +17,11 @@ from fogsim.values.camera import Camera, CameraPose
 def camera_axes(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
     """Axes of a camera in the world.
 
+    Parameters
+    ----------
+    camera, pose
+        The camera, and where it is.
+
     Returns
     -------
     (3, 3) float64
@@ -39,6 +44,11 @@ def camera_axes(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
 @functools.lru_cache(maxsize=8)
 def ray_from_pixel(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
     """Matrix from a pixel (u, v, 1) [px] to its viewing ray in the world.
+
+    Parameters
+    ----------
+    camera, pose
+        The camera, and where it is.
 
     Returns
     -------

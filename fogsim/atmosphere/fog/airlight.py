@@ -32,7 +32,7 @@ def airlight_from_illuminance(illuminance: float, share: float = 0.95) -> tuple[
     Returns
     -------
     tuple of float
-        Radiance per channel [cd/m²].
+        Luminance per channel [cd/m²].
 
     Raises
     ------
@@ -64,7 +64,7 @@ def airlight_source(field: FogField, grid: FrustumGrid) -> NDArray[np.float32] |
     Returns
     -------
     (r, c, n, 3) float32 or None
-        Radiance scattered in between the eye and each node, beyond L∞ (1 − T) [cd/m²]; None if there is no shading.
+        Luminance scattered in between the eye and each node, beyond L∞ (1 − T) [cd/m²]; None if there is no shading.
     """
     shading = field.airlight_shading
     if shading == 0 or (field.extinction == 0 and not field.banks):

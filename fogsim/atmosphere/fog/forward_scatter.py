@@ -14,13 +14,13 @@ _REACH = 4.0
 """Widths within which all of a Gaussian lies."""
 
 _DARK = 1e-12
-"""Radiance that is none [cd/m²]; numbers near the smallest that exist are very slow."""
+"""Luminance that is none [cd/m²]; numbers near the smallest that exist are very slow."""
 
 _NONE, _HALF = np.float32(0.0), np.float32(0.5)
 
 
 def add_forward_scatter(
-    radiance: NDArray[np.float32],
+    luminance: NDArray[np.float32],
     airlight: tuple[float, float, float],
     transmittance: NDArray[np.float32],
     weight: float,
@@ -35,8 +35,8 @@ def add_forward_scatter(
 
     Parameters
     ----------
-    radiance : (rows, cols, 3) float32
-        Radiance at the camera [cd/m²]; added to in place.
+    luminance : (rows, cols, 3) float32
+        Luminance at the camera [cd/m²]; added to in place.
     airlight : tuple of float
         L∞ per channel [cd/m²].
     transmittance : (rows, cols) float32
@@ -47,14 +47,14 @@ def add_forward_scatter(
         Standard deviation of the blur [px].
     """
     block = max(1, int(width / _COARSEST))
-    difference = radiance - np.array(airlight, np.float32)
+    difference = luminance - np.array(airlight, np.float32)
     small = _block_means(difference, block)
     reach = math.ceil(_REACH * width / block)
     weights = np.exp(-0.5 * np.square(np.arange(-reach, reach + 1) * block / width)).astype(np.float32)
     across_first, blurred = np.empty_like(small), np.empty_like(small)
     blur_rows(small, weights, across_first)
     blur_rows(across_first.transpose(1, 0, 2), weights, blurred.transpose(1, 0, 2))
-    exchange(radiance, difference, transmittance, blurred, block, np.float32(weight))
+    exchange(luminance, difference, transmittance, blurred, block, np.float32(weight))
 
 
 def _block_means(image: NDArray[np.float32], block: int) -> NDArray[np.float32]:
@@ -83,7 +83,15 @@ def pixel_width(angle: float, focal_length: float) -> float:
 
 @kernel
 def blur_rows(image: NDArray[np.float32], weights: NDArray[np.float32], out: NDArray[np.float32]) -> None:
-    """Convolve each row of an image (rows, cols, 3); what the weights miss at the edges is shared among the rest."""
+    """Convolve each row of an image; what the weights miss at the edges is shared among the rest.
+
+    Parameters
+    ----------
+    image, out : (rows, cols, 3) float32
+        Before and after; `out` is written to.
+    weights : (2 n + 1,) float32
+        Of the pixels to either side.
+    """
     columns, reach = image.shape[1], weights.shape[0] // 2
     for u in range(columns):
         first, last = max(0, u - reach), min(columns, u + reach + 1)
@@ -100,14 +108,28 @@ def blur_rows(image: NDArray[np.float32], weights: NDArray[np.float32], out: NDA
 
 @kernel
 def exchange(
-    radiance: NDArray[np.float32],
+    luminance: NDArray[np.float32],
     difference: NDArray[np.float32],
     transmittance: NDArray[np.float32],
     blurred: NDArray[np.float32],
     block: int,
     weight: np.float32,
 ) -> None:
-    """Exchange a share w (1 − T) of a difference for its blur, of which each block (rows, cols, 3) has a value."""
+    """Exchange a share w (1 − T) of a difference for its blur.
+
+    Parameters
+    ----------
+    luminance, difference : (rows, cols, 3) float32
+        Luminance, changed in place, and the difference [cd/m²].
+    transmittance : (rows, cols) float32
+        T.
+    blurred : (block rows, block cols, 3) float32
+        Blurred difference of each block [cd/m²].
+    block : int
+        Side of a block [px].
+    weight : float32
+        w.
+    """
     rows, columns = blurred.shape[0], blurred.shape[1]
     part = np.float32(1.0) / np.float32(block)
     for v in range(transmittance.shape[0]):
@@ -124,4 +146,4 @@ def exchange(
             for c in range(3):
                 above = blurred[upper, left, c] + (blurred[upper, right, c] - blurred[upper, left, c]) * a
                 below = blurred[lower, left, c] + (blurred[lower, right, c] - blurred[lower, left, c]) * a
-                radiance[v, u, c] += share * (above + (below - above) * b - difference[v, u, c])
+                luminance[v, u, c] += share * (above + (below - above) * b - difference[v, u, c])

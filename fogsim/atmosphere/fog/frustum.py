@@ -171,7 +171,7 @@ def radiance_through_grid(
     airlight: tuple[float, float, float],
     source: NDArray[np.float32] | None = None,
 ) -> NDArray[np.float32]:
-    """Radiance at the camera, L = L0 T + L∞ (1 − T) + S, with τ and S taken from a grid to every pixel.
+    """Luminance at the camera, L = L0 T + L∞ (1 − T) + S, with τ and S taken from a grid to every pixel.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def radiance_through_grid(
     Returns
     -------
     (rows, cols, 3) float32
-        Linear radiance at the camera [cd/m²].
+        Linear luminance per channel at the camera [cd/m²].
     """
     radiance = np.ascontiguousarray(view.radiance, dtype=np.float32)
     out = np.empty_like(radiance)

@@ -15,8 +15,8 @@ from fogsim.values import Camera, CameraPose, FogBank, FogField, View
 from fogsim.values.pinhole import ray_from_pixel
 
 
-def daytime_radiance(view: View, field: FogField, camera: Camera, pose: CameraPose) -> NDArray[np.float32]:
-    """Radiance at a camera, L = L0 T + L∞ (1 − T), with the field's forward scattering.
+def daytime_luminance(view: View, field: FogField, camera: Camera, pose: CameraPose) -> NDArray[np.float32]:
+    """Luminance at a camera, L = L0 T + L∞ (1 − T), with the field's forward scattering.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def daytime_radiance(view: View, field: FogField, camera: Camera, pose: CameraPo
     Returns
     -------
     (rows, cols, 3) float32
-        Linear radiance [cd/m²].
+        Linear luminance per channel [cd/m²].
     """
     radiance = _through_fog(view, field, camera, pose)
     if field.forward_scatter > 0:
@@ -74,12 +74,12 @@ def _through_fog(view: View, field: FogField, camera: Camera, pose: CameraPose) 
 def fogged_radiance(
     view: View, field: FogField, eye: tuple[float, float, float], ray_map: NDArray[np.float64]
 ) -> NDArray[np.float32]:
-    """Radiance that reaches the camera through daytime fog: L = L0 e^(−τ) + L∞ (1 − e^(−τ)) (Koschmieder 1924).
+    """Luminance that reaches the camera through daytime fog: L = L0 e^(−τ) + L∞ (1 − e^(−τ)) (Koschmieder 1924).
 
     Parameters
     ----------
     view : View
-        The scene without air: linear radiance [cd/m²] and distance along the ray [m].
+        The scene without air: linear luminance per channel [cd/m²] and distance along the ray [m].
     field : FogField
         The fog.
     eye : tuple of float
@@ -90,7 +90,7 @@ def fogged_radiance(
     Returns
     -------
     (rows, cols, 3) float32
-        Linear radiance at the camera [cd/m²].
+        Linear luminance per channel at the camera [cd/m²].
     """
     radiance = np.ascontiguousarray(view.radiance, dtype=np.float32)
     if field.extinction == 0 and not field.banks:

@@ -161,7 +161,13 @@ def medium_of(field: FogField) -> Medium:
 
 
 def has_closed_form(field: FogField) -> bool:
-    """Tell whether nothing but banks and a sharp top makes a field uneven."""
+    """Tell whether nothing but banks and a sharp top makes a field uneven, so that τ has a closed form.
+
+    Parameters
+    ----------
+    field : FogField
+        The fog.
+    """
     return (
         (field.patches is None or field.patches.strength == 0)
         and math.isinf(field.scale_height)
@@ -172,5 +178,13 @@ def has_closed_form(field: FogField) -> bool:
 
 
 def is_uniform_below(field: FogField, height: float) -> bool:
-    """Tell whether fog is the same everywhere below a height [m]."""
+    """Tell whether fog is the same everywhere below a height.
+
+    Parameters
+    ----------
+    field : FogField
+        The fog.
+    height : float
+        The height [m].
+    """
     return has_closed_form(field) and not field.banks and height <= field.top

@@ -160,11 +160,27 @@ class FieldAccess:
         return medium_of(field_at(self.field, 0.0)).factors
 
     def extinction(self, points: ArrayLike, time: float | None = None) -> NDArray[np.float64]:
-        """Extinction coefficient at points (..., 3) [1/m]; see `fogsim.atmosphere.extinction`."""
+        """Extinction coefficient at points [1/m]; see `fogsim.atmosphere.extinction`.
+
+        Parameters
+        ----------
+        points : (..., 3) array_like
+            Places [m].
+        time : float or None
+            Time since the run began [s]; None for `time` of the access.
+        """
         return extinction(self.field, points, self.time if time is None else time)
 
     def optical_depth(self, start: ArrayLike, end: ArrayLike, time: float | None = None) -> NDArray[np.float64]:
-        """Optical depth between points (..., 3) [-]; see `fogsim.atmosphere.fog.optical_depth`."""
+        """Optical depth between points [-]; see `fogsim.atmosphere.optical_depth`.
+
+        Parameters
+        ----------
+        start, end : (..., 3) array_like
+            Ends of the lines of sight [m].
+        time : float or None
+            Time since the run began [s]; None for `time` of the access.
+        """
         return optical_depth(self.field, start, end, self.time if time is None else time)
 
 
@@ -202,9 +218,21 @@ class FogNow:
         return self._always.minimum_extinction
 
     def extinction(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Extinction coefficient at points (..., 3) now [1/m]."""
+        """Extinction coefficient at points now [1/m].
+
+        Parameters
+        ----------
+        points : (..., 3) array_like
+            Places [m].
+        """
         return extinction(self._now, points)
 
     def optical_depth(self, start: ArrayLike, end: ArrayLike) -> NDArray[np.float64]:
-        """Optical depth between points (..., 3) now [-]."""
+        """Optical depth between points now [-].
+
+        Parameters
+        ----------
+        start, end : (..., 3) array_like
+            Ends of the lines of sight [m].
+        """
         return optical_depth(self._now, start, end)

@@ -26,7 +26,7 @@ _WEIGHTS = np.array((0.17392742256872692, 0.32607257743127307, 0.326072577431273
 
 
 @kernel
-def smoothstep(value: float, middle: float, edge: float) -> float:
+def _smoothstep(value: float, middle: float, edge: float) -> float:
     """Smoothstep from 0 to 1 over an edge; a plain step where the edge has no length."""
     if edge <= 0.0:
         return 1.0 if value > middle else 0.0
@@ -56,7 +56,7 @@ def _patch_factor(across: float, along: float, up: float, factors: NDArray[np.fl
 @kernel
 def _height_profile(z: float, base: float, base_edge: float, top: float, top_edge: float) -> float:
     """Share of the extinction that is left at a height between base and top, 0 … 1."""
-    return smoothstep(z, base, base_edge) - smoothstep(z, top, top_edge)
+    return _smoothstep(z, base, base_edge) - _smoothstep(z, top, top_edge)
 
 
 @kernel
@@ -67,8 +67,23 @@ def extinctions_on_ray(
     medium: Medium,
     values: NDArray[np.float64],
 ) -> None:
-    """Extinction coefficient at distances along a ray [1/m].
+    """Extinction coefficient at distances along a ray.
 
+    Parameters
+    ----------
+    start : (3,) float64
+        Where the line begins [m].
+    towards : (3,) float64
+        Unit vector along it.
+    at : (n,) float64
+        Distances [m].
+    medium : Medium
+        The fog.
+    values : (n,) float64
+        Extinction coefficients [1/m]; written to.
+
+    Notes
+    -----
     One pass over the places for each part of the field: handing arrays to a function for every single place would take
     longer than what is computed there.
     """
@@ -84,7 +99,7 @@ def extinctions_on_ray(
         first, last, edge, extra = banks[b, 4], banks[b, 5], banks[b, 6], banks[b, 7]
         for i in range(at.shape[0]):
             station = here + rate * at[i]
-            values[i] += extra * (smoothstep(station, first, edge) - smoothstep(station, last, edge))
+            values[i] += extra * (_smoothstep(station, first, edge) - _smoothstep(station, last, edge))
     for i in range(at.shape[0]):
         values[i] *= _height_profile(z + dz * at[i], base, base_edge, top, top_edge)
     if decay > 0.0:
@@ -182,7 +197,23 @@ def depths_along(
     depths: NDArray[np.float64],
     scratch: NDArray[np.float64],
 ) -> None:
-    """Optical depth from a point to places along one direction, at ascending distances [m]."""
+    """Optical depth from a point to places along one direction.
+
+    Parameters
+    ----------
+    start : (3,) float64
+        Where the line begins [m].
+    towards : (3,) float64
+        Unit vector along it.
+    distances : (n,) float64
+        Ascending [m].
+    medium : Medium
+        The fog.
+    depths : (n,) float64
+        Optical depths [-]; written to.
+    scratch : (2, 4 MOST_PIECES) float64
+        Scratch.
+    """
     cuts = np.empty(8 + 4 * medium.banks.shape[0])
     total, here, next_cut = 0.0, 0.0, 0
     count = _edges_crossed(start, towards, distances[-1], medium, cuts)
@@ -205,7 +236,15 @@ def depths_between(
     depths: NDArray[np.float64],
     scratch: NDArray[np.float64],
 ) -> None:
-    """Optical depth of each of many straight lines, (n, 3) to (n, 3)."""
+    """Optical depth of each of many straight lines.
+
+    Parameters
+    ----------
+    starts, ends : (n, 3) float64
+        Their ends [m].
+    medium, depths, scratch
+        As for `depths_along`.
+    """
     distance, towards = np.empty(1), np.empty(3)
     for i in range(starts.shape[0]):
         towards[:] = ends[i] - starts[i]
@@ -218,7 +257,17 @@ def depths_between(
 
 @kernel
 def extinctions(points: NDArray[np.float64], medium: Medium, values: NDArray[np.float64]) -> None:
-    """Extinction coefficient at each of many places (n, 3)."""
+    """Extinction coefficient at each of many places.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+        The places [m].
+    medium : Medium
+        The fog.
+    values : (n,) float64
+        Extinction coefficients [1/m]; written to.
+    """
     nowhere, here = np.zeros(3), np.zeros(1)
     for i in range(points.shape[0]):
         extinctions_on_ray(points[i], nowhere, here, medium, values[i : i + 1])

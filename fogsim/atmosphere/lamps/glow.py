@@ -1,17 +1,17 @@
 """Glow about a lamp in fog: light that droplets scatter out of its way and into the eye.
 
 Light that an isotropic point source of intensity I at a distance R sends past the eye is scattered once into a line of
-sight at an angle γ from the source with the radiance
+sight at an angle γ from the source with the luminance
 
-    L(γ) = ∫ k p(Θ) I e^(−k (s + r)) / s² dr = I / R² · P₁(γ, T),        T = k R.
+    L(γ) = ∫ k p(Θ) I e^(−k (s + r)) / s² dr = I / R² · P₁(γ, τ),        τ = k R.
 
-In fog more than T ≈ 1 away most light is scattered several times, at small angles each. As in the veil of own lamps,
+In fog more than τ ≈ 1 away most light is scattered several times, at small angles each. As in the veil of own lamps,
 light that was scattered a little is not lost but goes on, spread: the glow is the sum of three such integrals,
 
     P = P₁[p, η₁] + (P₁[p₂, η₂] − P₁[p₂, η₁]) + (P₁[p₃, η₃] − P₁[p₃, η₂]),
 
 each with its part η of the extinction and with phase functions p₂, p₃ that are blurred ever wider. 1 − η₁ is what the
-droplets scatter by less than a degree. For T → 0 that is single scattering. The other four numbers were fitted to
+droplets scatter by less than a degree. For τ → 0 that is single scattering. The other four numbers were fitted to
 photons (`benchmarks/monte_carlo.py halo`); the docs have the deviations, and those of Narasimhan & Nayar's series.
 """
 
@@ -47,14 +47,14 @@ _STEPS = 240
 def scattered_once(
     depth: ArrayLike, angle: ArrayLike, phase: PhaseFunction, loss: float = 1.0, steps: int = _STEPS
 ) -> NDArray[np.float64]:
-    """P₁: radiance scattered once about a point source, times R² over its intensity [-].
+    """P₁: luminance scattered once about a point source, times R² over its intensity [-].
 
     The line of sight is walked by the angle at which it is seen from the source, which makes the integrand flat.
 
     Parameters
     ----------
     depth : array_like
-        Optical depth T = k R to the source [-], positive; broadcasts with `angle`.
+        Optical depth τ = k R to the source [-], positive; broadcasts with `angle`.
     angle : array_like
         Angle γ of the line of sight from the direction of the source [rad], in 0 … π without its ends.
     phase : PhaseFunction
@@ -77,12 +77,12 @@ def scattered_once(
 
 
 def glow(depth: ArrayLike, angle: ArrayLike, droplets: Droplets) -> NDArray[np.float64]:
-    """P: radiance scattered about a lamp, times R² over its intensity [-]; see the module.
+    """P: luminance scattered about a lamp, times R² over its intensity [-]; see the module.
 
     Parameters
     ----------
     depth : array_like
-        Optical depth T = k R to the lamp [-], positive; broadcasts with `angle`.
+        Optical depth τ = k R to the lamp [-], positive; broadcasts with `angle`.
     angle : array_like
         Angle of the line of sight from the lamp's direction [rad], in 0 … π without its ends.
     droplets : Droplets
@@ -129,12 +129,12 @@ def forward_share(phase: PhaseFunction, angle: float = FORWARD) -> float:
 def narasimhan_nayar(depth: float, angle: ArrayLike, asymmetry: float = 0.9, terms: int = 200) -> NDArray[np.float64]:
     """Glow by the series of Narasimhan & Nayar (2003), "Shedding light on the weather", times T² (eqs. 5.25–5.28).
 
-    For comparison: FogSim does not draw with it. It knows no single scattering and diverges for T ≤ 1.
+    For comparison: FogSim does not draw with it. It knows no single scattering and diverges for τ ≤ 1.
 
     Parameters
     ----------
     depth : float
-        Optical depth T to the source [-], more than 1.
+        Optical depth τ to the source [-], more than 1.
     angle : array_like
         Angle of the line of sight from the source's direction [rad].
     asymmetry : float
@@ -162,9 +162,9 @@ class GlowTable:
     Attributes
     ----------
     log_depth : (t,) float64
-        ln T of the rows, evenly spaced.
+        ln τ of the rows, evenly spaced.
     log_glow : (t, c) float64
-        ln(P c / T), over chords c = 2 sin(γ/2) that lie evenly over c / (c + FOLD_CHORD).
+        ln(P c / τ), over chords c = 2 sin(γ/2) that lie evenly over c / (c + FOLD_CHORD).
     """
 
     log_depth: NDArray[np.float64]

@@ -111,7 +111,7 @@ class Halos:
 
     def add(
         self,
-        radiance: NDArray[np.float32],
+        luminance: NDArray[np.float32],
         view: View,
         camera: Camera,
         pose: CameraPose,
@@ -122,8 +122,8 @@ class Halos:
 
         Parameters
         ----------
-        radiance : (rows, cols, 3) float32
-            Radiance at the camera [cd/m²]; added to in place, C-contiguous.
+        luminance : (rows, cols, 3) float32
+            Luminance at the camera [cd/m²]; added to in place, C-contiguous.
         view : View
             What is seen; lamps that it shows are complete already.
         camera, pose : Camera, CameraPose
@@ -138,7 +138,7 @@ class Halos:
         if not len(lamps):
             return
         rows, columns = distance.shape
-        image = radiance.reshape(rows, 3 * columns)
+        image = luminance.reshape(rows, 3 * columns)
         faintest = FAINTEST * mean_luminance(image, 16)
         if np.any(lamps[:, DEPTH] > 0):
             self._add_glow(image, distance, camera, lamps, faintest)

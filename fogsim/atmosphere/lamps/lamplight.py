@@ -77,7 +77,7 @@ class OwnLamplight:
 
     def add(
         self,
-        radiance: NDArray[np.float32],
+        luminance: NDArray[np.float32],
         view: View,
         camera: Camera,
         pose: CameraPose,
@@ -88,8 +88,8 @@ class OwnLamplight:
 
         Parameters
         ----------
-        radiance : (rows, cols, 3) float32
-            Radiance at the camera [cd/m²]; added to in place, C-contiguous.
+        luminance : (rows, cols, 3) float32
+            Luminance at the camera [cd/m²]; added to in place, C-contiguous.
         view : View
             What is seen, with its response to the lamps' light.
         camera, pose : Camera, CameraPose
@@ -123,7 +123,7 @@ class OwnLamplight:
                 piece_length(camera.focal_length),
                 group.light,
                 grid,
-                radiance.reshape(rows, 3 * columns),
+                luminance.reshape(rows, 3 * columns),
             )
 
     def _rays(self, camera: Camera) -> tuple[VeilRays, NDArray[np.float32]]:

@@ -10,7 +10,13 @@ from numpy.typing import NDArray
 from fogsim.atmosphere.fog.medium import is_uniform_below
 from fogsim.atmosphere.fog.optical_depth import extinction
 from fogsim.atmosphere.lamps.plane_pieces import piece_length
-from fogsim.atmosphere.lamps.streetlight_kernels import EyeOnMap, GroundLight, add_lamp_illuminance, add_street_light
+from fogsim.atmosphere.lamps.streetlight_kernels import (
+    EyeOnMap,
+    GroundLight,
+    Reflection,
+    add_lamp_illuminance,
+    add_street_light,
+)
 from fogsim.atmosphere.lamps.veil import LOSS_OF_SPREAD_LIGHT
 from fogsim.values import Camera, CameraPose, FogField, StreetLighting, View
 from fogsim.values.pinhole import ray_from_pixel
@@ -79,7 +85,7 @@ class StreetLight:
         Returns
         -------
         View
-            Its radiance is valid until the next call.
+            Its image is valid until the next call.
         """
         if not len(lamps.position) or lamps.sky_illuminance <= 0:
             return view
@@ -96,8 +102,10 @@ class StreetLight:
             piece_length(camera.focal_length),
             EyeOnMap(column, row, np.float32(1.0 / CELL), np.float32(pose.position[2])),
             ground.light,
-            np.array(lamps.colour, dtype=np.float32) / np.float32(lamps.sky_illuminance),
-            np.float32(_WHITEST * lamps.sky_illuminance / math.pi),
+            Reflection(
+                np.array(lamps.colour, dtype=np.float32) / np.float32(lamps.sky_illuminance),
+                np.float32(_WHITEST * lamps.sky_illuminance / math.pi),
+            ),
             self._lit.reshape(rows, 3 * columns),
         )
         return dataclasses.replace(view, radiance=self._lit)

@@ -52,6 +52,21 @@ class EyeOnMap(NamedTuple):
     height: np.float32
 
 
+class Reflection(NamedTuple):
+    """How surfaces return the lamps' light: as they do the sky's.
+
+    Attributes
+    ----------
+    factor : (3,) float32
+        The lamps' colour per illuminance of the sky [1/lx].
+    most : float32
+        What is brighter shines by itself, and returns no more than that [cd/m²].
+    """
+
+    factor: NDArray[np.float32]
+    most: np.float32
+
+
 @kernel
 def add_lamp_illuminance(
     lamps: NDArray[np.float64],
@@ -157,8 +172,7 @@ def add_street_light(
     step: int,
     eye: EyeOnMap,
     ground: GroundLight,
-    factor: NDArray[np.float32],
-    most: np.float32,
+    reflection: Reflection,
     out: NDArray[np.float32],
 ) -> None:
     """Luminance of an image by the sky's light and that of street lamps.
@@ -177,10 +191,8 @@ def add_street_light(
         Where the camera is on the map.
     ground : GroundLight
         The map.
-    factor : (3,) float32
-        The lamps' colour per illuminance of the sky [1/lx]: surfaces return the lamps' light as they do the sky's.
-    most : float32
-        What is brighter shines by itself, and returns no more than that [cd/m²].
+    reflection : Reflection
+        How surfaces return the lamps' light.
     """
     columns = distance.shape[1]
     points, light, few = (
@@ -192,7 +204,7 @@ def add_street_light(
     pixel, chosen = np.empty(columns, np.float32), np.empty(columns, np.float32)
     bent, first, even = np.empty(columns, np.uint8), np.empty(columns, np.uint64), np.empty(columns, np.bool_)
     lit, channels = np.empty(3 * columns, np.float32), np.empty(3 * columns, np.float32)
-    fill_channels(factor, channels)
+    fill_channels(reflection.factor, channels)
     for v in range(distance.shape[0]):
         any_light = False
         if _any_near(distance[v]):
@@ -204,7 +216,7 @@ def add_street_light(
         if any_light:
             spread_over_row(few, step, first, even, light)
             repeat_channels(light, lit)
-            _light_row(luminance[v], lit, channels, most, out[v])
+            _light_row(luminance[v], lit, channels, reflection.most, out[v])
         else:
             for j in range(3 * columns):
                 out[v, j] = luminance[v, j]

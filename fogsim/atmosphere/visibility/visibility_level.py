@@ -116,7 +116,13 @@ def visibility_level(
 
 
 def flux_root(luminance: ArrayLike) -> NDArray[np.float64]:
-    """√φ of Adrian's formula, that of Ricco's law for small targets (luminance in cd/m²)."""
+    """√φ of Adrian's formula, that of Ricco's law for small targets.
+
+    Parameters
+    ----------
+    luminance : array_like
+        Adaptation luminance [cd/m²].
+    """
     value = np.asarray(luminance, dtype=np.float64)
     log = np.log10(np.maximum(value, LEAST_LUMINANCE))
     bright = np.log10(4.1925 * 10.0 ** (0.1556 * log)) + 0.1684 * 10.0 ** (0.5867 * log)
@@ -126,7 +132,13 @@ def flux_root(luminance: ArrayLike) -> NDArray[np.float64]:
 
 
 def luminance_root(luminance: ArrayLike) -> NDArray[np.float64]:
-    """√L of Adrian's formula, that of Weber's law for large targets (luminance in cd/m²)."""
+    """√L of Adrian's formula, that of Weber's law for large targets.
+
+    Parameters
+    ----------
+    luminance : array_like
+        Adaptation luminance [cd/m²].
+    """
     value = np.asarray(luminance, dtype=np.float64)
     log = np.log10(np.maximum(value, LEAST_LUMINANCE))
     bright = 0.05946 * 10.0 ** (0.466 * log)

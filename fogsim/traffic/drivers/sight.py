@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fogsim.units import CONTRAST_THRESHOLD, luminance_of
+from fogsim.units import CONTRAST_THRESHOLD, DAY_ILLUMINANCE, NIGHT_ILLUMINANCE, luminance_of
 from fogsim.values import Lamp
 
 REAR_LAMPS = ((int(Lamp.REAR_FOG), 200.0), (int(Lamp.STOP), 100.0), (int(Lamp.POSITION), 8.0))
@@ -25,17 +25,14 @@ BRIGHTEST = REAR_LAMPS[0][1]
 EYE_HEIGHT = 1.2
 """Height of a driver's eyes and of the middle of a rear above the road [m]."""
 
-NIGHT, DAY = 1.0, 1000.0
-"""Horizontal illuminance up to which the eye is adapted to night, and from which to day [lx]."""
-
 NIGHT_EYE_THRESHOLD, DAY_EYE_THRESHOLD = 1e-5, 1e-3
 """Illuminance at the eye at which a lamp is noticed on a road, by night and by day [lx]."""
 
 LEAST_CONTRAST = 0.5
 """No vehicle's rear has less contrast to the airlight than this, not even a white one [-]."""
 
-DAYLIGHT = 10.0
-"""Horizontal illuminance from which a body is seen against the fog [lx]."""
+SILHOUETTE_ILLUMINANCE = 10.0
+"""Horizontal illuminance in twilight from which a body is seen against the fog, below it by headlamps [lx]."""
 
 AIRLIGHT_REFLECTANCE = 0.95
 """Reflectance of a white horizontal surface that would be as bright as the airlight [-]."""
@@ -97,7 +94,7 @@ class DriverSight:
         maximum_extinction : float
             Extinction coefficient [1/m].
         """
-        if self.illuminance < DAYLIGHT:
+        if self.illuminance < SILHOUETTE_ILLUMINANCE:
             return 0.0
         depth = math.log(LEAST_CONTRAST / self.contrast_threshold)
         return math.inf if maximum_extinction == 0 else depth / maximum_extinction
@@ -113,7 +110,7 @@ class DriverSight:
         if minimum_extinction == 0:
             return math.inf
         by_day = -math.log(self.contrast_threshold) / minimum_extinction
-        body = by_day if self.illuminance >= DAYLIGHT else self.headlamp_reach
+        body = by_day if self.illuminance >= SILHOUETTE_ILLUMINANCE else self.headlamp_reach
         return max(body, self._lamp_distance(minimum_extinction))
 
     def _lamp_distance(self, extinction: float) -> float:
@@ -144,7 +141,7 @@ class DriverSight:
             through the fog twice.
         """
         transmission = np.exp(-np.asarray(depth))
-        if self.illuminance >= DAYLIGHT:
+        if self.illuminance >= SILHOUETTE_ILLUMINANCE:
             return np.asarray(inherent_contrast * transmission >= self.contrast_threshold)
         reach = self.headlamp_reach
         # Retro-reflectors and plates return light as I e^(−2τ) / d²; in clear air they are seen up to the reach.
@@ -165,7 +162,7 @@ class DriverSight:
         float
             By day at any distance; negative for a body that is not even seen without fog.
         """
-        if self.illuminance >= DAYLIGHT:
+        if self.illuminance >= SILHOUETTE_ILLUMINANCE:
             return math.log(max(inherent_contrast, 1e-9) / self.contrast_threshold)
         return math.log(self.headlamp_reach / distance)
 
@@ -197,7 +194,8 @@ class DriverSight:
 
 @functools.lru_cache
 def _eye_threshold(illuminance: float, at_night: float, by_day: float) -> float:
-    share = math.log(max(illuminance, NIGHT) / NIGHT) / math.log(DAY / NIGHT)
+    night, day = NIGHT_ILLUMINANCE, DAY_ILLUMINANCE
+    share = math.log(max(illuminance, night) / night) / math.log(day / night)
     return float(at_night * (by_day / at_night) ** min(share, 1.0))
 
 

@@ -7,8 +7,8 @@ import numpy as np
 from fogsim.traffic.appearance import OTHERS_LAMPS, lamps_from_signals, paint
 from fogsim.traffic.drivers.sight import (
     BRIGHTEST,
-    DAYLIGHT,
     EYE_HEIGHT,
+    SILHOUETTE_ILLUMINANCE,
     DriverSight,
     FogAccess,
     inherent_contrast,
@@ -94,7 +94,7 @@ class PairSight:
         spare = self._sight.body_limit(distance, contrast) - depth
         if spare >= 0.0:
             # In the own headlamps, the limit falls with the distance, and is asked for anew in each step.
-            if self._sight.illuminance < DAYLIGHT:
+            if self._sight.illuminance < SILHOUETTE_ILLUMINANCE:
                 return True, 0.0
             return True, min(spare / self._rates(follower, leader, horizon)[1], horizon)
         lit, brightest = self._intensities(leader, own_lamps)

@@ -127,6 +127,11 @@ def checked_lamps(method: str, value: object) -> Lamp:
 def checked_command(value: object) -> Command:
     """A command that the user's own policy has made.
 
+    Parameters
+    ----------
+    value : object
+        What it has made.
+
     Raises
     ------
     InputError

@@ -60,7 +60,13 @@ class TrafficState:
             object.__setattr__(self, "grade", np.zeros(len(self.ids)))
 
     def row(self, vehicle_id: str) -> int | None:
-        """Row of a vehicle, or None if it is not on the road now."""
+        """Row of a vehicle, or None if it is not on the road now.
+
+        Parameters
+        ----------
+        vehicle_id : str
+            The vehicle.
+        """
         try:
             return self.ids.index(vehicle_id)
         except ValueError:

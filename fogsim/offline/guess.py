@@ -93,7 +93,7 @@ def guess_camera(
         If neither height nor field of view is given, a value is impossible, images differ in size or none can be
         read, or no vanishing point is found and no horizon is given.
     """
-    _check(mount_height, field_of_view)
+    _check_values(mount_height, field_of_view)
     pictures = list(_spread(source))
     first = pictures[0]
     rows, cols = first.shape[:2]
@@ -122,15 +122,15 @@ def guess_camera(
     return CameraGuess(camera, reasons, tuple(warnings))
 
 
-def _check(mount_height: float | None, field_of_view: float | None) -> None:
+def _check_values(mount_height: float | None, field_of_view: float | None) -> None:
     if mount_height is None and field_of_view is None:
         raise InputError("--guess-camera needs --mount-height (metres above the road) or --field-of-view, better both")
     if mount_height is not None and not 0.1 <= mount_height <= 20.0:
         raise InputError(f"--mount-height must lie within 0.1 … 20 m above the road, got {mount_height!r}")
     if field_of_view is not None and not math.radians(1.0) <= field_of_view <= math.radians(170.0):
-        told = math.degrees(field_of_view)
+        degrees = math.degrees(field_of_view)
         raise InputError(
-            f"--field-of-view must lie within 1 … 170 degrees, from the left to the right edge, got {told:g}"
+            f"--field-of-view must lie within 1 … 170 degrees, from the left to the right edge, got {degrees:g}"
         )
 
 
@@ -160,8 +160,8 @@ def _refuse_other_size(picture: Picture, image: Pixels, size: tuple[int, ...], n
 def _focal_length(source: Source, cols: int, rows: int, field_of_view: float | None) -> tuple[float, str, list[str]]:
     """Focal length [px], what it was taken from, and warnings."""
     if field_of_view is not None:
-        told = f"a field of view of {math.degrees(field_of_view):g}° as stated"
-        return 0.5 * cols / math.tan(0.5 * field_of_view), told, []
+        reason = f"a field of view of {math.degrees(field_of_view):g}° as stated"
+        return 0.5 * cols / math.tan(0.5 * field_of_view), reason, []
     stated = _stated_focal_length(source.paths[0])
     if stated is not None:
         focal = stated * math.hypot(cols, rows) / _FULL_FRAME_DIAGONAL_MM
@@ -198,16 +198,16 @@ def _horizon(
             f"no lane lines that meet were found in {len(pictures)} images: give the row of the horizon, counted from "
             "the top, as --horizon-row, or take images of a straight road with marks"
         )
-    row, deviation = _middle(points)
-    told = f"lines of the road meet on row {row:.1f} ± {deviation:.1f} in {len(points)} of {len(pictures)} images"
-    return row, told, _doubts(points, row, deviation, focal, pictures[0].shape[1])
+    row, deviation = _median_row(points)
+    reason = f"lines of the road meet on row {row:.1f} ± {deviation:.1f} in {len(points)} of {len(pictures)} images"
+    return row, reason, _warnings_of(points, row, deviation, focal, pictures[0].shape[1])
 
 
 def _bits(image: Pixels) -> int:
     return 8 if image.dtype == np.uint8 else 16
 
 
-def _middle(points: list[VanishingPoint]) -> tuple[float, float]:
+def _median_row(points: list[VanishingPoint]) -> tuple[float, float]:
     """Median row of points and its standard deviation [px]."""
     rows = np.array([point.row for point in points])
     row = float(np.median(rows))
@@ -217,21 +217,22 @@ def _middle(points: list[VanishingPoint]) -> tuple[float, float]:
     return row, math.hypot(1.25 * max(scatter, single) / math.sqrt(len(points)), SYSTEMATIC)
 
 
-def _doubts(points: list[VanishingPoint], row: float, deviation: float, focal: float, cols: int) -> list[str]:
-    doubts = []
+def _warnings_of(points: list[VanishingPoint], row: float, deviation: float, focal: float, cols: int) -> list[str]:
+    """What is uncertain about a horizon from vanishing points."""
+    found = []
     if len(points) < SURE_COUNT:
-        doubts.append(f"the pitch comes from {len(points)} image{'s' if len(points) > 1 else ''} alone: give more")
+        found.append(f"the pitch comes from {len(points)} image{'s' if len(points) > 1 else ''} alone: give more")
     sure = focal * SURE_PITCH
     if deviation > sure:
-        doubts.append(
+        found.append(
             f"the vanishing point is uncertain: row {row:.1f} ± {deviation:.1f}, where ± {sure:.1f} would be 0.1°; "
             "give images of a straight road with marks, or the row of the horizon as --horizon-row"
         )
     aside = math.atan((float(np.median([point.column for point in points])) - 0.5 * (cols - 1)) / focal)
     if abs(aside) > ASIDE:
         side = "left" if aside > 0 else "right"
-        doubts.append(
+        found.append(
             f"the road leads {abs(math.degrees(aside)):.0f}° past the image's middle: either the road bends, or the "
             f"camera is turned to the {side}: then add `yaw_deg: {math.degrees(aside):.1f}` to the camera file"
         )
-    return doubts
+    return found

@@ -68,11 +68,11 @@ def build_scene(network: RoadNetwork, signs: SignMap, rng: np.random.Generator, 
     covered = {lane.lane_id for lane in across}
     lanes = [lane for lane in lanes if lane.lane_id not in covered]
     borders = _borders(network, lanes, index)
-    pavement, furniture, posts = _pavement(network, [*lanes, *bulging], driven), _Furniture(index), list[Batch]()
+    pavement, posts = _pavement(network, [*lanes, *bulging], driven), list[Batch]()
     for lane, edge in borders:
         pavement += edge_meshes(edge, terrain, index)
         if lane is not None and lane.speed_limit >= FAST:
-            rails, standing = furniture.along(edge)
+            rails, standing = _furniture(edge, index)
             pavement += rails
             posts += standing
     bridges = gantries(signs.signs, driven)
@@ -147,24 +147,18 @@ def _place(point: NDArray[np.float64]) -> tuple[int, int]:
     return column, row
 
 
-class _Furniture:
-    """Guard rails, their posts and delineators along free sides, where they stand clear of other lanes."""
-
-    def __init__(self, index: LaneIndex) -> None:
-        self._index = index
-
-    def along(self, edge: Edge) -> tuple[list[Mesh], list[Batch]]:
-        """What stands along one free side."""
-        side, distance = edge.side, edge.inner + edge.shoulder + _RAIL_BEHIND_SHOULDER
-        free = self._index.clearance(parallel(edge.line, side * (distance + 0.2)), same_level=2.5) >= 0.4
-        rails, batches = list[Mesh](), list[Batch]()
-        for start, end in true_spans(free, least=2):
-            line = edge.line[start:end]
-            posts, heading = stations(line, _POST_SPACING, side * (distance + 0.15))
-            delineators, direction = stations(line, _DELINEATOR_SPACING, side * (distance + 0.35))
-            rails.append(guard_rail(line, side, distance))
-            batches += [placed("rail_post", posts, heading), placed("delineator", delineators, direction)]
-        return rails, batches
+def _furniture(edge: Edge, index: LaneIndex) -> tuple[list[Mesh], list[Batch]]:
+    """Guard rails, their posts and delineators along a free side, where they stand clear of other lanes."""
+    side, distance = edge.side, edge.inner + edge.shoulder + _RAIL_BEHIND_SHOULDER
+    free = index.clearance(parallel(edge.line, side * (distance + 0.2)), same_level=2.5) >= 0.4
+    rails, batches = list[Mesh](), list[Batch]()
+    for start, end in true_spans(free, least=2):
+        line = edge.line[start:end]
+        posts, heading = stations(line, _POST_SPACING, side * (distance + 0.15))
+        delineators, direction = stations(line, _DELINEATOR_SPACING, side * (distance + 0.35))
+        rails.append(guard_rail(line, side, distance))
+        batches += [placed("rail_post", posts, heading), placed("delineator", delineators, direction)]
+    return rails, batches
 
 
 def _joined(batches: list[Batch]) -> tuple[Batch, ...]:

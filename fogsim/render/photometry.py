@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.units import luminance_of
-from fogsim.values.lamps import Lamp
+from fogsim.values.light import Lamp
 from fogsim.values.scene import Surface
 
 SKY_TINT = (0.988, 1.0, 1.035)

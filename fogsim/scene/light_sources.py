@@ -12,8 +12,7 @@ from fogsim.scene.lamp_kernels import AREA, FORWARD, FOUND, INTENSITY, LEFT, UP,
 from fogsim.scene.street_lamps import HEIGHT, SIZE
 from fogsim.scene.vehicles import body_names
 from fogsim.units import luminance_of
-from fogsim.values.lamps import Lamp
-from fogsim.values.light import Beam, LightSources, StreetLighting
+from fogsim.values.light import Beam, Lamp, LightSources, StreetLighting
 from fogsim.values.luminous_intensity import luminous_intensity
 from fogsim.values.scene import Surface
 from fogsim.values.traffic import TrafficState

@@ -6,8 +6,7 @@ from fogsim.values.command import Command, SpeedAdvice
 from fogsim.values.estimate import Estimate, FogCategory, fog_category
 from fogsim.values.fog import FogBank, FogChange, FogField, FogPatches
 from fogsim.values.image import Frame, View
-from fogsim.values.lamps import Lamp
-from fogsim.values.light import Beam, HeadLamp, Lights, LightSources, StreetLighting
+from fogsim.values.light import Beam, HeadLamp, Lamp, Lights, LightSources, StreetLighting
 from fogsim.values.observation import LeadMeasurement, Observation, SignSighting
 from fogsim.values.road import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea, RoadNetwork, Sign, SignMap
 from fogsim.values.scene import Batch, Mesh, Scene, Surface

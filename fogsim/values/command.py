@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from fogsim.values.lamps import Lamp
+from fogsim.values.light import Lamp
 
 
 @dataclass(frozen=True, slots=True)

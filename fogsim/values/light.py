@@ -1,9 +1,25 @@
-"""Light that is not daylight: beams of head lamps, and lamps that are seen from afar."""
+"""Light that is not daylight: lamps of a vehicle, beams of head lamps, and lamps that are seen from afar."""
 
 from dataclasses import dataclass
+from enum import IntFlag
 
 import numpy as np
 from numpy.typing import NDArray
+
+
+class Lamp(IntFlag):
+    """Lamps of a vehicle that can be lit, one bit each, so that an integer array holds those of many vehicles."""
+
+    NONE = 0
+    POSITION = 1
+    LOW_BEAM = 2
+    HIGH_BEAM = 4
+    FRONT_FOG = 8
+    REAR_FOG = 16
+    STOP = 32
+    INDICATOR_LEFT = 64
+    INDICATOR_RIGHT = 128
+    DAYTIME = 256
 
 
 @dataclass(frozen=True, slots=True)

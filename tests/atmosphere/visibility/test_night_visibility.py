@@ -119,13 +119,6 @@ def test_nothing_is_seen_without_light():
     assert visibility_distance(scaled_beam(low_beam(), 0.0), CLEAR) == 0.0
 
 
-@pytest.mark.parametrize(
-    ("angle", "age", "veil"), [(3, 25, 1.1292), (3, 70, 20 / 9), (10, 1e-9, 0.1), (0.2, 1e-9, 10.0)]
-)
-def test_disability_glare(angle, age, veil):
-    assert veiling_luminance(1.0, math.radians(angle), age) == pytest.approx(veil, rel=1e-4)
-
-
 def test_oncoming_lamps_shorten_sight():
     # A pair of low beams of 500 cd each, 60 m ahead, 3.5 m aside: E = 2 · 500 / 60² at the eye, 3.3° off the road.
     glare = float(veiling_luminance(2 * 500 / 60**2, math.atan2(3.5, 60)))

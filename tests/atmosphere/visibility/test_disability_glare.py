@@ -1,0 +1,21 @@
+"""Veil inside the eye: values of Vos (2003), its limits, and that sources add."""
+
+import math
+
+import numpy as np
+import pytest
+
+from fogsim.atmosphere import veiling_luminance
+
+
+@pytest.mark.parametrize(
+    ("angle", "age", "veil"), [(3, 25, 1.1292), (3, 70, 20 / 9), (10, 1e-9, 0.1), (0.2, 1e-9, 10.0)]
+)
+def test_values_of_the_formula(angle: float, age: float, veil: float) -> None:
+    assert veiling_luminance(1.0, math.radians(angle), age) == pytest.approx(veil, rel=1e-4)
+
+
+def test_the_veil_is_proportional_to_the_light_and_falls_with_the_square_of_the_angle() -> None:
+    veils = veiling_luminance(np.array([[1.0], [3.0]]), np.radians([2.0, 4.0, 8.0]))
+    assert veils[1] == pytest.approx(3.0 * veils[0])
+    assert veils[0, :2] / veils[0, 1:] == pytest.approx(4.0)

@@ -1,0 +1,29 @@
+"""Response curves: published values, their inverses, and eight bits of more."""
+
+import numpy as np
+import pytest
+
+from fogsim.values import Response
+from fogsim.values.camera_response import eight_bit, exposure_of, respond
+
+
+def test_srgb_check_values() -> None:
+    """IEC 61966-2-1: 0.18 → 0.461356, 0.5 → 0.735357."""
+    assert respond(np.array([0.18, 0.5]), Response.SRGB) == pytest.approx([0.461356, 0.735357], abs=1e-6)
+
+
+@pytest.mark.parametrize("response", list(Response))
+def test_the_exposure_behind_a_signal(response: Response) -> None:
+    exposure = np.linspace(0.0, 1.0, 101)
+    assert exposure_of(respond(exposure, response), response) == pytest.approx(exposure, abs=1e-6)
+
+
+@pytest.mark.parametrize("response", list(Response))
+def test_black_and_saturation_are_those_of_the_signal(response: Response) -> None:
+    assert respond(np.array([0.0, 1.0]), response) == pytest.approx([0.0, 1.0], abs=1e-12)
+
+
+def test_eight_bits_are_the_highest_ones() -> None:
+    assert eight_bit(np.array([0, 15, 16, 4095], np.uint16), 12).tolist() == [0, 0, 1, 255]
+    shown = np.array([0, 255], np.uint8)
+    assert eight_bit(shown, 8) is shown

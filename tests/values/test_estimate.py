@@ -1,0 +1,35 @@
+"""What an estimate says: its visibility, the interval of it, and negru2013's categories."""
+
+import math
+
+import pytest
+
+from fogsim.units import extinction_from_visibility
+from fogsim.values import Estimate
+from fogsim.values.estimate import FogCategory, fog_category
+
+
+@pytest.mark.parametrize(
+    ("visibility", "category"),
+    [(49.9, "very dense"), (50.0, "dense"), (100.0, "moderate"), (300.0, "low"), (1000.0, "none"), (math.inf, "none")],
+)
+def test_categories_of_negru2013(visibility: float, category: str) -> None:
+    assert fog_category(visibility) is FogCategory(category)
+
+
+def test_visibility_of_an_estimate_and_its_interval() -> None:
+    k = extinction_from_visibility(100.0)
+    estimate = Estimate("negru2013", k, 0.1 * k)
+    low, high = estimate.visibility_interval
+    assert estimate.visibility == pytest.approx(100.0)
+    assert (low, high) == pytest.approx((100.0 / 1.16448536, 100.0 / 0.83551464))
+
+
+def test_an_interval_that_reaches_clear_air_has_no_end() -> None:
+    assert Estimate("negru2013", 0.01, 0.01).visibility_interval[1] == math.inf
+
+
+def test_no_estimate_says_nothing() -> None:
+    nothing = Estimate.invalid("negru2013", "no road", row=7)
+    assert (nothing.valid, nothing.visibility_interval) == (False, (0.0, math.inf))
+    assert nothing.diagnostics == {"reason": "no road", "row": 7}

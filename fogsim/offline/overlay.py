@@ -16,7 +16,7 @@ from fogsim.offline.estimation import FrameEstimates
 from fogsim.offline.image_files import Pixels
 from fogsim.offline.results import interval_text, metres
 from fogsim.offline.source import Source
-from fogsim.recorders.camera_picture import scale_image
+from fogsim.recorders.camera_picture import found_row, scale_image
 from fogsim.recorders.style import GROUND, MUTED, TEXT, Colour, font, method_colours
 from fogsim.recorders.video import Encoder, encoder_command
 from fogsim.values import Camera, Estimate
@@ -89,7 +89,7 @@ class Overlay:
 
     def _draw_rows(self, draw: ImageDraw.ImageDraw, estimates: Sequence[Estimate], name: str, *, dashed: bool) -> None:
         """Draw one kind of row of all methods; where some lie upon one another, their colours take turns along it."""
-        found = {e.method: row for e in estimates if (row := _row(e, f"{name}_row")) is not None}
+        found = {e.method: row for e in estimates if (row := found_row(e, f"{name}_row")) is not None}
         for place, (method, row) in enumerate(found.items()):
             together = [other for other, its in found.items() if abs(its - row) * self._scale < _APART]
             turn = (together.index(method), len(together))
@@ -142,11 +142,6 @@ def _draw_estimate(draw: ImageDraw.ImageDraw, y: int, estimate: Estimate, colour
     draw.text((288, y), f"90 %: {interval_text(estimate)}", fill=MUTED, font=font(13), anchor="lm")
     category = estimate.category.value
     draw.text((470, y), "no fog" if category == "none" else f"{category} fog", fill=TEXT, font=font(15), anchor="lm")
-
-
-def _row(estimate: Estimate, key: str) -> float | None:
-    row = estimate.diagnostics.get(key)
-    return float(row) if isinstance(row, int | float) and math.isfinite(row) else None
 
 
 def _shown(image: Pixels, bits: int) -> NDArray[np.uint8]:

@@ -76,10 +76,24 @@ def scale_image(pixels: NDArray[np.uint8], width: int, height: int) -> Image.Ima
 
 def _first_row(estimates: Sequence[Estimate], key: str) -> float | None:
     for estimate in estimates:
-        row = estimate.diagnostics.get(key)
-        if estimate.valid and isinstance(row, int | float) and math.isfinite(row):
-            return float(row)
+        row = found_row(estimate, key)
+        if estimate.valid and row is not None:
+            return row
     return None
+
+
+def found_row(estimate: Estimate, key: str) -> float | None:
+    """Row in the diagnostics of an estimate; None if there is none.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        The estimate.
+    key : str
+        Name of the row: "horizon_row".
+    """
+    row = estimate.diagnostics.get(key)
+    return float(row) if isinstance(row, int | float) and math.isfinite(row) else None
 
 
 def _mark(draw: ImageDraw.ImageDraw, sides: tuple[int, int], y: float, label: str, colour: Colour) -> None:

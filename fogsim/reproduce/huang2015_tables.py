@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fogsim.reproduce.huang2015_plan import FIRST, STEP, VARIANTS, VISIBILITY_4_2, WAYS, Case, Plan, Results, Rough
 from fogsim.reproduce.huang2015_published import TABLE_4_1, TABLE_4_2, TABLE_4_3, TABLE_5_1, TABLE_5_2, TABLE_5_3
-from fogsim.reproduce.result import Cell, Rows, TitledTable
+from fogsim.reproduce.result import Cell, Rows, TitledTable, found_visibility
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Estimate
 
@@ -170,15 +170,15 @@ def _table_5_3(results: Results, plan: Plan) -> Rows:
 
 
 def _record(table: str, visibility: float, variant: str, estimate: Estimate | None, **more: Cell) -> dict[str, Cell]:
-    told = estimate is not None and estimate.valid and estimate.extinction > 0.0
+    found = found_visibility(estimate)
     return {
         "paper": "huang2015",
         "table": table,
         "visibility_m": visibility,
         "variant": variant,
         **more,
-        "found_m": estimate.visibility if told and estimate is not None else None,
-        "deviation_rel": estimate.standard_deviation / estimate.extinction if told and estimate is not None else None,
+        "found_m": found,
+        "deviation_rel": estimate.standard_deviation / estimate.extinction if estimate and found is not None else None,
     }
 
 

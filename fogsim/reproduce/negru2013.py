@@ -9,7 +9,7 @@ from PIL import Image, ImageDraw
 
 from fogsim.estimators import make
 from fogsim.recorders.style import font
-from fogsim.reproduce.result import Cell, Reproduction, Steps, Watch, unwatched
+from fogsim.reproduce.result import Cell, Reproduction, Steps, Watch, found_visibility, unwatched
 from fogsim.reproduce.scenes import foggy_image, views
 from fogsim.units import visibility_from_extinction
 from fogsim.values import Camera, Estimate, Observation, fog_category
@@ -105,8 +105,7 @@ def _record(scene: str, extinction: float, estimates: Mapping[str, Estimate]) ->
         "category": fog_category(true).value,
     }
     for name, estimate in estimates.items():
-        seen = estimate.valid and estimate.extinction > 0
-        record[f"{name}_visibility_m"] = estimate.visibility if seen else None
+        record[f"{name}_visibility_m"] = found_visibility(estimate)
         record[f"{name}_category"] = estimate.category.value if estimate.valid else None
     return record
 

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.values import Estimate
+
 Cell = str | float | bool | None
 
 Watch = Callable[[int, int], None]
@@ -22,6 +24,17 @@ def unwatched(done: int, total: int) -> None:
     total : int
         How many there are.
     """
+
+
+def found_visibility(estimate: Estimate | None) -> float | None:
+    """Visibility of fog that a method has found [m]; None where it could not tell or saw no fog.
+
+    Parameters
+    ----------
+    estimate : Estimate or None
+        What the method said, if it was asked.
+    """
+    return estimate.visibility if estimate is not None and estimate.valid and estimate.extinction > 0.0 else None
 
 
 class Steps:

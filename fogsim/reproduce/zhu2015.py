@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fogsim.errors import InputError
 from fogsim.estimators import make
 from fogsim.estimators.zhu2015 import FRAMES
-from fogsim.reproduce.result import Cell, Reproduction, Steps, Watch, unwatched
+from fogsim.reproduce.result import Cell, Reproduction, Steps, Watch, found_visibility, unwatched
 from fogsim.reproduce.scenes import road_renderer
 from fogsim.reproduce.zhu2015_drive import Moment, drive, observed
 from fogsim.reproduce.zhu2015_picture import picture
@@ -166,7 +166,7 @@ def _records(
             "visibility_m": visibility if np.isfinite(visibility) else None,
         }
         for name, estimates in found.items():
-            record |= _told(name, estimates[frame])
+            record |= _state_record(name, estimates[frame])
         records.append(record)
     return records
 
@@ -176,11 +176,10 @@ def _estimates(observations: Sequence[Observation], options: Mapping[str, bool |
     return [estimator.update(observation) for observation in observations]
 
 
-def _told(name: str, estimate: Estimate) -> dict[str, Cell]:
+def _state_record(name: str, estimate: Estimate) -> dict[str, Cell]:
     state = estimate.diagnostics["state"]
-    seen = estimate.valid and estimate.extinction > 0
     return {
-        f"{name}_visibility_m": estimate.visibility if seen else None,
+        f"{name}_visibility_m": found_visibility(estimate),
         f"{name}_state": None if state is None else str(state),
     }
 

@@ -1,14 +1,37 @@
-"""Two pictures of the vehicle ahead compared: its place, its detail and its light."""
+"""Pictures of the vehicle ahead as huang2015 compares them: their place, their detail and their light."""
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 
-from fogsim.estimators.huang2015_sighting import MIDDLE, TOP, Sighting
-from fogsim.vision.light.clipped_sky import darker_by
-from fogsim.vision.region.road_image import CannotTellError
-from fogsim.vision.vehicle.contrast_ratio import MeanLuminances, mean_luminances
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.values.camera import Camera
+from fogsim.vision.light.clipped_sky import clipping, darker_by
+from fogsim.vision.light.luminance import linear_luminance
+from fogsim.vision.light.pixel_kernels import Pixels
+from fogsim.vision.lines.horizon import PITCH_DEVIATION, levelled
+from fogsim.vision.region.road_image import MIN_AIRLIGHT, CannotTellError
+from fogsim.vision.vehicle.airlight import airlight_beside, hidden_beside
+from fogsim.vision.vehicle.contrast_ratio import LOST, TOP, MeanLuminances, mean_luminances
 from fogsim.vision.vehicle.patch import Patch, Placement, rescale_position, shrink
+from fogsim.vision.vehicle.rear_localisation import WIDTHS, RearBox
 from fogsim.vision.vehicle.registration import PlacementPrior, Regression, register
+from fogsim.vision.vehicle.vehicle_crop import MOST_NOISE, SkyReading, VehicleCrop, vehicle_crop
+
+HALF_WIDTH, MIDDLE, HALF_HEIGHT = 0.42, 0.42, 0.32
+"""The part of a rear that is compared, in widths of the vehicle: half its width, its middle above the foot, and half
+its height [-]. It ends below the roof of the flattest car and above the shadow under it."""
+
+MARGIN, MARGIN_PIXELS = 0.12, 8
+"""What a stored picture holds around that part: widths of the vehicle [-] and pixels."""
+
+FULL = 254.7
+"""Mean luminance of a sky that is saturated; a little less, and its noise still shows where it is [linear levels]."""
+
+LEAST_WIDTH = 8.0
+"""Narrowest vehicle whose picture is compared [px]."""
 
 RANGE_DEVIATION = 0.3
 """Standard deviation of the told range [m]."""
@@ -33,31 +56,49 @@ that the mean may err by [-]."""
 MISPLACED = 3.0
 """Standard deviation of the fading of detail that is faster than the light's, over their difference [-]."""
 
-LOST = 0.25
-"""Deviation of what clipping takes from a vehicle, relative to it [-]."""
-
 BUMPER = 0.15
 """Height of the lowest part of a rear that tells no light, in widths of the vehicle [-]: black plinths and shadows end
 there at heights that no far picture resolves."""
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
-    """A sighting, and its window's variance before it was shrink.
+class RearPatch:
+    """One picture of the vehicle ahead.
 
     Attributes
     ----------
-    sighting : Sighting
-        The vehicle, no broader than `BROADEST`.
+    number : int
+        Number of the measured range.
+    distance : float
+        From the camera to its rear [m].
+    patch : Patch
+        The picture, about the middle of its body.
     variance : float
-        Of the window's pixels [linear grey levels²].
+        Of the window's pixels, before it was shrunk [linear grey levels²].
+    sky : SkyReading
+        The airlight [linear grey levels].
+    noise : float
+        Deviation of single pixels of the vehicle [linear grey levels].
+    width : float
+        Of the vehicle [px].
+    pitch_deviation : float
+        Rows by which pitch moves the picture between frames [px].
+    metre : float
+        Pixels in a metre at the vehicle [px/m].
     scale : float
         Size over that in the frame [-].
     """
 
-    sighting: Sighting
+    number: int
+    distance: float
+    patch: Patch
     variance: float
-    scale: float
+    sky: SkyReading
+    noise: float
+    width: float
+    pitch_deviation: float
+    metre: float
+    scale: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,10 +107,10 @@ class Comparison:
 
     Attributes
     ----------
+    picture : RearPatch
+        The picture.
     distance : float
         From the camera to the vehicle's rear [m].
-    variance : float
-        Of the picture's window [linear grey levels²].
     contrast, deviation : float
         Detail over that of the reference, changes of exposure taken out, and its standard deviation [-].
     mean, near_mean : float
@@ -78,19 +119,26 @@ class Comparison:
         Standard deviation of the mean; ``inf`` if it is not known, as where the sky is saturated [-].
     regression : Regression
         Of the picture on the reference.
-    number : int
-        Number of the measured range.
     """
 
+    picture: RearPatch
     distance: float
-    variance: float
     contrast: float
     deviation: float
     mean: float
     near_mean: float
     mean_deviation: float
     regression: Regression
-    number: int = 0
+
+    @property
+    def number(self) -> int:
+        """Number of the measured range."""
+        return self.picture.number
+
+    @property
+    def variance(self) -> float:
+        """Of the picture's window [linear grey levels²]."""
+        return self.picture.variance
 
     @property
     def fallen(self) -> tuple[float, float]:
@@ -105,46 +153,153 @@ class Comparison:
         return 1.0 - self.near_mean > 3.0 * self.mean_deviation
 
 
-def picture_of(sighting: Sighting) -> Picture:
-    """Shrink a broad sighting; its variance is measured before."""
-    scale = min(BROADEST / sighting.width, 1.0)
-    small = replace(
-        sighting, patch=shrink(sighting.patch, scale), width=sighting.width * scale, noise=sighting.noise * scale,
-        pitch_deviation=sighting.pitch_deviation * scale, metre=sighting.metre * scale,
-    )  # fmt: skip
-    return Picture(small, window_variance(sighting.patch), scale)
-
-
-def placed(picture: Picture, sighting: Sighting, at: Placement) -> Picture:
-    """Picture of a sighting whose vehicle has been found at a place.
+def crop_vehicle(image: Pixels, camera: Camera, distance: float) -> VehicleCrop:
+    """Cut out of a frame where a vehicle can be, before the sky in a band above the horizon.
 
     Parameters
     ----------
-    picture : Picture
-        The sighting's.
-    sighting : Sighting
+    image : (rows, cols) or (rows, cols, 3) uint8 or uint16
+        An image of the camera.
+    camera : Camera
+        The assumed calibration.
+    distance : float
+        From the camera to the vehicle's rear [m].
+
+    Raises
+    ------
+    CannotTellError
+        If no vehicle can be seen there, or no sky by day, or lamps light the road.
+    """
+    if not 0.5 < distance < math.inf:
+        raise CannotTellError(f"a range of {distance:.1f} m is none of a vehicle ahead")
+    if WIDTHS[1] * camera.focal_length / distance < LEAST_WIDTH:
+        raise CannotTellError("the vehicle ahead is too small in the image")
+    level = levelled(image, camera)
+
+    def luminance_of(rows: slice, cols: slice) -> NDArray[np.float32]:
+        return linear_luminance(level[rows, cols], camera.response, camera.bits)
+
+    return vehicle_crop(camera, distance, luminance_of, partial(_sky_above, level, camera, distance))
+
+
+def _sky_above(image: Pixels, camera: Camera, distance: float) -> SkyReading:
+    """The sky in a band above the horizon."""
+    bottom = min(math.floor(camera.horizon_row - 3), camera.height)
+    if bottom < 2:
+        raise CannotTellError("no sky is in the image")
+    top, side = max(bottom - max(camera.height // 16, 4), 0), camera.width // 6
+    pixels = image[top:bottom, side : camera.width - side]
+    luminance = linear_luminance(pixels, camera.response, camera.bits)
+    bright = float(np.percentile(luminance, 80, method="lower"))
+    if bright < MIN_AIRLIGHT:
+        raise CannotTellError("too dark above the horizon: this is a daytime method")
+    even = np.abs(luminance - bright) <= max(0.03 * bright, 4.0)
+    across = np.abs(np.diff(luminance, axis=1))
+    # Half of the neighbours are of one surface even where trees stand before the sky.
+    noise = 1.4826 * float(np.median(across)) / math.sqrt(2.0)
+    if noise > MOST_NOISE * bright:
+        raise CannotTellError("what is above the horizon is no sky")
+    hidden = hidden_beside(camera.focal_length, distance)
+    mean = airlight_beside(luminance, bright, noise, camera.principal_point[0] - side, hidden)
+    lost = clipping(pixels[even], camera)
+    known = lost if lost.noise > 0.0 or mean < FULL else None
+    return SkyReading(mean + lost.loss, max(noise, lost.noise), known, known is None)
+
+
+def cut_patch(crop: VehicleCrop, window: RearBox, number: int, blur: float) -> RearPatch:
+    """Cut the picture of a vehicle out, with room about it for what is not known of its place.
+
+    Parameters
+    ----------
+    crop : VehicleCrop
+        Where it can be.
+    window : RearBox
+        Where it is or is expected [px].
+    number : int
+        Number of the measured range.
+    blur : float
+        Standard deviation of the lens' blur [px].
+
+    Raises
+    ------
+    CannotTellError
+        If it is too small or outside the image.
+    """
+    if window.width < LEAST_WIDTH:
+        raise CannotTellError("the vehicle ahead is too small in the image")
+    row, col = window.foot - MIDDLE * window.width - crop.origin[1], window.column - crop.origin[0]
+    half_width, half_height = HALF_WIDTH * window.width, HALF_HEIGHT * window.width
+    margin = MARGIN * window.width + MARGIN_PIXELS
+    above = max(half_height, TOP * crop.scale - MIDDLE * window.width)
+    rows = max(math.floor(row - above - margin), 0), math.ceil(row + half_height + margin) + 1
+    cols = max(math.floor(col - half_width - margin), 0), math.ceil(col + half_width + margin) + 1
+    pixels = crop.luminance[rows[0] : max(rows[1], 0), cols[0] : max(cols[1], 0)].astype(np.float64)
+    patch = Patch(pixels, col - cols[0], row - rows[0], half_width, half_height, blur)
+    inside = 0 <= patch.column < pixels.shape[1] and 0 <= patch.row < pixels.shape[0]
+    if not inside or min(pixels.shape) < LEAST_WIDTH / 2:
+        raise CannotTellError("the vehicle ahead is outside the image")
+    return RearPatch(
+        number=number,
+        distance=crop.depth,
+        patch=patch,
+        variance=_window_variance(patch),
+        sky=crop.sky,
+        noise=max(crop.noise, 0.1),
+        width=window.width,
+        pitch_deviation=1.5 * PITCH_DEVIATION * crop.camera.focal_length,
+        metre=crop.scale,
+    )
+
+
+def shrink_broad(picture: RearPatch) -> RearPatch:
+    """The same picture no broader than `BROADEST`.
+
+    Parameters
+    ----------
+    picture : RearPatch
         As it was cut from the frame.
+    """
+    scale = min(BROADEST / picture.width, 1.0)
+    return replace(
+        picture, patch=shrink(picture.patch, scale), width=picture.width * scale, noise=picture.noise * scale,
+        pitch_deviation=picture.pitch_deviation * scale, metre=picture.metre * scale, scale=scale,
+    )  # fmt: skip
+
+
+def placed_at(picture: RearPatch, full: RearPatch, at: Placement) -> RearPatch:
+    """Picture of a vehicle that has been found at a place.
+
+    Parameters
+    ----------
+    picture, full : RearPatch
+        The picture, and as it was cut from the frame.
     at : Placement
         Where the vehicle is in the picture.
     """
-    small = replace(picture.sighting.patch, column=at.column, row=at.row)
-    sizes = zip(small.luminance.shape, sighting.patch.luminance.shape, strict=True)
+    small = replace(picture.patch, column=at.column, row=at.row)
+    sizes = zip(small.luminance.shape, full.patch.luminance.shape, strict=True)
     places = zip((at.row, at.column), sizes, strict=True)
     row, column = (rescale_position(place, 1.0 / picture.scale, *size) for place, size in places)
-    variance = window_variance(replace(sighting.patch, column=column, row=row))
-    return replace(picture, sighting=replace(picture.sighting, patch=small), variance=variance)
+    return replace(picture, patch=small, variance=_window_variance(replace(full.patch, column=column, row=row)))
 
 
-def lowered(picture: Picture, widths: float) -> Picture:
-    """The same picture of a vehicle that turned out to stand lower in it, by so many of its widths [-]."""
-    sighting = picture.sighting
-    patch = replace(sighting.patch, row=sighting.patch.row + widths * sighting.width)
-    # Of a picture that was shrink the frame's own pixels are gone, and with them its exact variance.
-    variance = window_variance(patch) if picture.scale == 1.0 else picture.variance
-    return replace(picture, sighting=replace(sighting, patch=patch), variance=variance)
+def lower(picture: RearPatch, widths: float) -> RearPatch:
+    """The same picture of a vehicle that turned out to stand lower in it.
+
+    Parameters
+    ----------
+    picture : RearPatch
+        The picture.
+    widths : float
+        By how many of its widths it does [-].
+    """
+    patch = replace(picture.patch, row=picture.patch.row + widths * picture.width)
+    # Of a picture that was shrunk the frame's own pixels are gone, and with them its exact variance.
+    variance = _window_variance(patch) if picture.scale == 1.0 else picture.variance
+    return replace(picture, patch=patch, variance=variance)
 
 
-def window_variance(patch: Patch) -> float:
+def _window_variance(patch: Patch) -> float:
     """Variance of the pixels of the followed thing (eq. 4.12 with the square that it lacks); 0 if none are there."""
     spans = (
         slice(max(round(middle - half), 0), max(round(middle + half) + 1, 0))
@@ -154,27 +309,39 @@ def window_variance(patch: Patch) -> float:
     return float(pixels.var()) if pixels.size else 0.0
 
 
-def expected_placement(reference: Sighting, sighting: Sighting) -> PlacementPrior:
-    """Where the reference is expected in the next frame: as before, but for pitch, steering and the range's noise."""
-    nearness = 1.0 / sighting.distance + 1.0 / reference.distance
-    placement = Placement(sighting.patch.column, sighting.patch.row, sighting.width / reference.width)
+def expected_placement(reference: RearPatch, picture: RearPatch) -> PlacementPrior:
+    """Where the reference is expected in the next frame: as before, but for pitch, steering and the range's noise.
+
+    Parameters
+    ----------
+    reference, picture : RearPatch
+        The two.
+    """
+    nearness = 1.0 / picture.distance + 1.0 / reference.distance
+    placement = Placement(picture.patch.column, picture.patch.row, picture.width / reference.width)
     return PlacementPrior(
-        placement, 1.0 + STEERING * sighting.width, 0.5 + sighting.pitch_deviation, RANGE_DEVIATION * nearness
+        placement, 1.0 + STEERING * picture.width, 0.5 + picture.pitch_deviation, RANGE_DEVIATION * nearness
     )
 
 
-def known_placement(reference: Sighting, sighting: Sighting) -> PlacementPrior:
-    """Where the reference is expected in a picture that has been registered before."""
-    return replace(expected_placement(reference, sighting), column_deviation=0.5, row_deviation=0.5)
+def known_placement(reference: RearPatch, picture: RearPatch) -> PlacementPrior:
+    """Where the reference is expected in a picture that has been registered before.
+
+    Parameters
+    ----------
+    reference, picture : RearPatch
+        The two.
+    """
+    return replace(expected_placement(reference, picture), column_deviation=0.5, row_deviation=0.5)
 
 
-def compared(reference: Picture, picture: Picture, prior: PlacementPrior, most: float = math.inf) -> Comparison | None:
+def compare(near: RearPatch, far: RearPatch, prior: PlacementPrior, most: float = math.inf) -> Comparison | None:
     """Compare a picture with the reference.
 
     Parameters
     ----------
-    reference, picture : Picture
-        The two; the reference shows more.
+    near, far : RearPatch
+        The reference, which shows more, and the picture.
     prior : PlacementPrior
         Where the reference is expected in the picture.
     most : float
@@ -185,19 +352,19 @@ def compared(reference: Picture, picture: Picture, prior: PlacementPrior, most: 
     Comparison or None
         None if too few pixels can be compared.
     """
-    near, far = reference.sighting, picture.sighting
     # A saturated sky does not tell the exposure.
-    seen = near.lost is not None and far.lost is not None
-    gain = far.sky / near.sky if seen else 1.0
+    seen = near.sky.clipping is not None and far.sky.clipping is not None
+    gain = far.sky.luminance / near.sky.luminance if seen else 1.0
     found = register(near.patch, far.patch, prior, far.noise, most * gain, OUTLINE)
     if found is None:
         # Too many pixels are near saturation, or none differ: only its light may say something.
         found = _unplaced(prior.placement) if seen else None
     if found is None:
         return None
+    skies = near.sky.luminance, far.sky.luminance
     body, at = _above_bumper(near, found.placement)
-    light = mean_luminances(body, far.patch, at, (near.sky, far.sky), far.noise) if seen else None
-    light = None if light is None else _unclipped(light, far)
+    light = mean_luminances(body, far.patch, at, skies, far.noise) if seen else None
+    light = None if light is None else _unclipped(light, far.sky)
     if light is None and found.pixels == 0:
         return None
     # What a small picture does not resolve alike: its detail and its place.
@@ -206,15 +373,14 @@ def compared(reference: Picture, picture: Picture, prior: PlacementPrior, most: 
     apart = _apart(found, gain, light)
     contradicted = 0.0 if light is None else CONTRADICTED * max(apart, 0.0) * (1.0 - light.near)
     return Comparison(
+        picture=far,
         distance=far.distance,
-        variance=picture.variance,
         contrast=found.slope / gain,
         deviation=math.hypot(found.slope_deviation / gain, by_size / gain, MISPLACED * abs(apart)),
-        mean=found.mean / far.sky if light is None else light.far,
-        near_mean=found.near_mean / near.sky if light is None else light.near,
+        mean=found.mean / skies[1] if light is None else light.far,
+        near_mean=found.near_mean / skies[0] if light is None else light.near,
         mean_deviation=math.inf if light is None else math.hypot(light.deviation, contradicted),
         regression=found,
-        number=far.number,
     )
 
 
@@ -242,15 +408,15 @@ def _unplaced(at: Placement) -> Regression:
     )
 
 
-def _unclipped(light: MeanLuminances, far: Sighting) -> MeanLuminances:
+def _unclipped(light: MeanLuminances, sky: SkyReading) -> MeanLuminances:
     """The same light with what clipping takes of pixels that are hardly darker than the sky."""
-    if far.lost is None or far.lost.noise <= 0.0:
+    if sky.clipping is None or sky.clipping.noise <= 0.0:
         return light
-    fall, lost = darker_by(1.0 - light.far, 255.0 / far.sky - 1.0, far.lost.spread / far.sky)
+    fall, lost = darker_by(1.0 - light.far, 255.0 / sky.luminance - 1.0, sky.clipping.spread / sky.luminance)
     return replace(light, far=1.0 - fall, deviation=math.hypot(light.deviation, LOST * lost))
 
 
-def _above_bumper(near: Sighting, at: Placement) -> tuple[Patch, Placement]:
+def _above_bumper(near: RearPatch, at: Placement) -> tuple[Patch, Placement]:
     """The rear from above its lowest part up to where roofs of all vehicles may be, and where that is."""
     bottom = near.patch.row + near.patch.half_height - BUMPER * near.width
     top = max(
@@ -261,17 +427,22 @@ def _above_bumper(near: Sighting, at: Placement) -> tuple[Patch, Placement]:
     return body, replace(at, row=at.row + (middle - near.patch.row) * at.scale)
 
 
-def compared_with_itself(reference: Picture) -> Comparison:
+def compare_with_itself(reference: RearPatch) -> Comparison:
     """The reference as the first of its comparisons.
 
     Its contrast is 1 by definition, which says nothing of how much of its detail others show; its light does count.
+
+    Parameters
+    ----------
+    reference : RearPatch
+        The picture.
 
     Raises
     ------
     CannotTellError
         If it shows nothing that could be followed.
     """
-    own = compared(reference, reference, known_placement(reference.sighting, reference.sighting))
+    own = compare(reference, reference, known_placement(reference, reference))
     if own is None or not (math.isfinite(own.regression.noise_deviation) or own.shows_light):
         raise CannotTellError("the vehicle ahead shows nothing that could be followed")
     exact = 0.0 if math.isfinite(own.mean_deviation) else math.inf

@@ -31,9 +31,6 @@ SPACING, PUBLISHED_SPACING = 2.5, 5.0
 LEAST_CHANGE = 10.0
 """Change of range below which nothing is said [m]: the shortest track of the thesis' table 5.1."""
 
-LOST = 5
-"""Frames in a row without the vehicle after which it is another one."""
-
 WORST = 1.0
 """Relative standard deviation of k beyond which it is as good as unknown [-]."""
 
@@ -101,7 +98,6 @@ class Huang2015Lead:
         """Forget the vehicle ahead."""
         self._check.reset()
         self._track = self._new_track()
-        self._missed = 0
         self._tracks = 0
 
     @property
@@ -148,12 +144,10 @@ class Huang2015Lead:
         except CannotTellError as reason:
             self._miss()
             return Estimate.invalid(self.method, str(reason))
-        self._missed = 0
         return self._estimate()
 
     def _miss(self) -> None:
-        self._missed += 1
-        if self._missed >= LOST:
+        if self._track.miss():
             self._track = self._new_track()
 
     def _estimate(self) -> Estimate:

@@ -3,28 +3,28 @@
 import math
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from fogsim.estimators.huang2015_comparison import (
     RANGE_DEVIATION,
     Comparison,
-    Picture,
-    compared,
-    compared_with_itself,
+    RearPatch,
+    compare,
+    compare_with_itself,
+    crop_vehicle,
+    cut_patch,
     expected_placement,
     known_placement,
-    lowered,
-    picture_of,
-    placed,
+    lower,
+    placed_at,
+    shrink_broad,
 )
-from fogsim.estimators.huang2015_sighting import Crop, sighting_of, vehicle_crop
-from fogsim.estimators.lead_ranges import LeadRanges
+from fogsim.estimators.tracked_vehicle import SmoothedRanges, TrackedVehicle
 from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
+from fogsim.vision.light.pixel_kernels import Pixels
 from fogsim.vision.region.road_image import CannotTellError
 from fogsim.vision.vehicle.airlight import RoadFall
 from fogsim.vision.vehicle.rear_localisation import RearBox, localise_rear
+from fogsim.vision.vehicle.vehicle_crop import VehicleCrop
 
 FOLLOWED = 0.4
 """Share of a new place that the expectation for the next frame takes over: pitch of the moment is no trend [-]."""
@@ -38,15 +38,15 @@ SAME = 0.2
 MOST_JUMP = 12.0
 """Change of range between frames by more than which the vehicle is another one [m]."""
 
-SIGHTINGS = 64
+PICTURES = 64
 """Pictures of a vehicle that are kept."""
 
 NEARER = 0.9
 """A vehicle that has come this much nearer than its reference picture, relative to that, becomes the reference [-]."""
 
 
-class LeadTrack:
-    """Pictures of one vehicle ahead, and where it was last.
+class LeadTrack(TrackedVehicle[Comparison]):
+    """Pictures of one vehicle ahead, and where it was last; the reference is kept, and renewed as it comes nearer.
 
     Parameters
     ----------
@@ -68,14 +68,11 @@ class LeadTrack:
     """
 
     def __init__(self, camera: Camera, setback: float, spacing: float, blur: float, range_deviation: float) -> None:
+        super().__init__(SmoothedRanges(range_deviation), PICTURES, offset=setback, keeps_reference=True)
         self._camera = camera
         self._setback = setback
         self._spacing = spacing
         self._blur = blur
-        self._ranges = LeadRanges(range_deviation)
-        self._reference: Picture | None = None
-        self._kept: list[Picture] = []
-        self._comparisons: list[Comparison] = []
         self._offset = (0.0, 0.0)
         self._last_distance = math.nan
         self.road: RoadFall | None = None
@@ -83,24 +80,25 @@ class LeadTrack:
     @property
     def comparisons(self) -> tuple[Comparison, ...]:
         """Every kept picture against the reference at its likely range, nearest first."""
-        found = self._comparisons
-        measured = np.array([c.distance for c in found]) - self._setback
-        likely = self._ranges.smoothed([c.number for c in found], measured) + self._setback
-        placed = (replace(c, distance=float(d)) for c, d in zip(found, likely, strict=True))
-        return tuple(sorted(placed, key=lambda c: c.distance))
+        likely = zip(self.detections, self.likely_distances(), strict=True)
+        return tuple(sorted((replace(c, distance=float(d)) for c, d in likely), key=lambda c: c.distance))
 
     @property
     def window(self) -> RearBox | None:
         """Where the vehicle was seen last; None if it never was."""
-        if self._reference is None:
-            return None
-        return self._expected(self._last_distance, self._reference)
+        return None if self.reference is None else self._expected(self._last_distance, self.reference.picture)
 
     def follows(self, distance: float) -> bool:
-        """Whether a range can be that of the same vehicle as before."""
-        return self._reference is not None and abs(distance + self._setback - self._last_distance) <= MOST_JUMP
+        """Whether a range can be that of the same vehicle as before.
 
-    def see(self, image: NDArray[np.uint8] | NDArray[np.uint16], told: LeadMeasurement, time: float) -> None:
+        Parameters
+        ----------
+        distance : float
+            From the own front bumper [m].
+        """
+        return self.reference is not None and abs(distance + self._setback - self._last_distance) <= MOST_JUMP
+
+    def see(self, image: Pixels, told: LeadMeasurement, time: float) -> None:
         """Look for the vehicle in the next frame.
 
         Parameters
@@ -119,31 +117,32 @@ class LeadTrack:
         """
         distance = told.distance + self._setback
         number = self._ranges.add(time, told)
-        crop = vehicle_crop(image, self._camera, distance)
+        crop = crop_vehicle(image, self._camera, distance)
         self.road = crop.road
-        if self._reference is None:
-            self._begin(crop, distance, number)
+        if self.reference is None:
+            self._begin(crop, number)
         else:
-            self._follow(crop, distance, number, self._reference)
+            self._follow(crop, number, self.reference.picture)
+        self._missed = 0
 
-    def _begin(self, crop: Crop, distance: float, number: int) -> None:
-        window = localise_rear(crop.luminance, crop.origin, self._camera, distance, crop.noise)
+    def _begin(self, crop: VehicleCrop, number: int) -> None:
+        window = localise_rear(crop.luminance, crop.origin, self._camera, crop.depth, crop.noise)
         if window is None:
             raise CannotTellError("no vehicle stands out where the range says that there is one")
-        picture = picture_of(replace(sighting_of(crop, distance, window, self._blur), number=number))
-        comparison = compared_with_itself(picture)
+        comparison = compare_with_itself(shrink_broad(cut_patch(crop, window, number, self._blur)))
         if comparison.mean >= 1.0:
             # Fog only ever brings a vehicle nearer to the sky's light; lamps alone are brighter.
             raise CannotTellError("what stands where the range says is brighter than the sky: no vehicle by day")
-        self._reference, self._kept, self._comparisons = picture, [picture], [comparison]
-        self._remember(window.column, window.foot, distance)
+        self.reference, self.detections = comparison, [comparison]
+        self._remember(window.column, window.foot, crop.depth)
 
-    def _follow(self, crop: Crop, distance: float, number: int, reference: Picture) -> None:
+    def _follow(self, crop: VehicleCrop, number: int, reference: RearPatch) -> None:
+        distance = crop.depth
         expected = self._expected(distance, reference)
-        sighting = replace(sighting_of(crop, distance, expected, self._blur), number=number)
-        picture, most = picture_of(sighting), self._most_contrast(distance)
-        prior = expected_placement(reference.sighting, picture.sighting)
-        comparison = compared(reference, picture, prior, most)
+        full = cut_patch(crop, expected, number, self._blur)
+        picture, most = shrink_broad(full), self._most_contrast(distance)
+        prior = expected_placement(reference, picture)
+        comparison = compare(reference, picture, prior, most)
         if comparison is None or _exceeds(comparison, most):
             raise CannotTellError("the vehicle ahead was lost")
         at, by = comparison.regression.placement, prior.placement
@@ -151,47 +150,30 @@ class LeadTrack:
         self._remember(expected.column + moved[0], expected.foot + moved[1], distance)
         # Noise of the ranges makes some steps look shorter than they are.
         least = self._spacing - min(0.25 * self._spacing, 4.0 * RANGE_DEVIATION)
-        if all(abs(distance - kept.sighting.distance) >= least for kept in self._kept):
-            found = placed(picture, sighting, at)
-            self._keep(found, replace(comparison, variance=found.variance), reference)
-            if distance < NEARER * reference.sighting.distance:
-                self._renew(crop, self._kept[-1])
+        if all(abs(distance - kept.distance) >= least for kept in self.detections):
+            self._keep(replace(comparison, picture=placed_at(picture, full, at)))
+            if distance < NEARER * reference.distance:
+                self._renew(crop, self.detections[-1].picture)
 
     def _most_contrast(self, distance: float) -> float:
         """Contrast that fog leaves at most: not more than nearer by, but for errors."""
-        nearer = [c.fallen[0] + UNSURE * c.fallen[1] for c in self._comparisons if c.distance <= distance]
+        nearer = [c.fallen[0] + UNSURE * c.fallen[1] for c in self.detections if c.distance <= distance]
         return GROWTH * min(nearer, default=math.inf)
 
-    def _keep(self, picture: Picture, comparison: Comparison, reference: Picture) -> None:
-        self._kept.append(picture)
-        self._comparisons.append(comparison)
-        if len(self._kept) > SIGHTINGS:
-            oldest = next(i for i, kept in enumerate(self._kept) if kept is not reference)
-            del self._kept[oldest], self._comparisons[oldest]
-
-    def _renew(self, crop: Crop, nearest: Picture) -> None:
+    def _renew(self, crop: VehicleCrop, nearest: RearPatch) -> None:
         """Take the nearest picture for the reference of all: it shows the most, and best where the vehicle stands."""
-        known = self._expected(nearest.sighting.distance, nearest)
-        found = localise_rear(crop.luminance, crop.origin, self._camera, nearest.sighting.distance, crop.noise)
+        known = self._expected(nearest.distance, nearest)
+        found = localise_rear(crop.luminance, crop.origin, self._camera, nearest.distance, crop.noise)
         if found is not None and _is_same(found, known):
-            lower = (found.foot - known.foot) / known.width
-            index = next(i for i, kept in enumerate(self._kept) if kept is nearest)
-            self._kept = [lowered(kept, lower) for kept in self._kept]
-            nearest = self._kept[index]
+            widths = (found.foot - known.foot) / known.width
+            self.detections = [replace(c, picture=lower(c.picture, widths)) for c in self.detections]
             self._offset = (self._offset[0], self._offset[1] + found.foot - known.foot)
-        self._compare_anew(nearest)
+        self._compare_all(self.detections[-1])
 
-    def _compare_anew(self, reference: Picture) -> None:
-        """Compare all pictures with a new reference."""
-        own = compared_with_itself(reference)
-        others = [kept for kept in self._kept if kept is not reference]
-        found = [
-            (kept, compared(reference, kept, known_placement(reference.sighting, kept.sighting))) for kept in others
-        ]
-        pairs = [(kept, comparison) for kept, comparison in found if comparison is not None]
-        self._reference = reference
-        self._kept = [reference, *(kept for kept, _ in pairs)]
-        self._comparisons = [own, *(comparison for _, comparison in pairs)]
+    def _compare(self, reference: Comparison, detection: Comparison) -> Comparison | None:
+        if detection.picture is reference.picture:
+            return compare_with_itself(reference.picture)
+        return compare(reference.picture, detection.picture, known_placement(reference.picture, detection.picture))
 
     def _remember(self, column: float, foot: float, distance: float) -> None:
         """Keep lateral offset [m] and what pitch the foot shows [px]: they change least from frame to frame."""
@@ -202,12 +184,12 @@ class LeadTrack:
         self._offset = (before[0] + share * (across - before[0]), before[1] + share * (pitch - before[1]))
         self._last_distance = distance
 
-    def _expected(self, distance: float, reference: Picture) -> RearBox:
-        camera, near = self._camera, reference.sighting
+    def _expected(self, distance: float, reference: RearPatch) -> RearBox:
+        camera = self._camera
         return RearBox(
             column=camera.principal_point[0] + self._offset[0] * camera.focal_length / distance,
             foot=camera.horizon_row + camera.row_distance / distance + self._offset[1],
-            width=near.width / reference.scale * near.distance / distance,
+            width=reference.width / reference.scale * reference.distance / distance,
         )
 
 

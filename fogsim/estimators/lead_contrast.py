@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.estimators.image_check import ObservationCheck
-from fogsim.estimators.lead_contrast_track import SPACING, ContrastTrack, Sight
-from fogsim.estimators.lead_ranges import LeadRanges
+from fogsim.estimators.lead_contrast_track import SPACING, ContrastTrack, RearDetection
+from fogsim.estimators.tracked_vehicle import SmoothedRanges
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
@@ -20,7 +20,7 @@ from fogsim.vision.region.road_image import CannotTellError
 from fogsim.vision.vehicle.airlight import RoadFall
 from fogsim.vision.vehicle.contrast_ratio import HALF_BODY, LARGE
 from fogsim.vision.vehicle.decay_fit import DecayFit, fit_decay
-from fogsim.vision.vehicle.vehicle_crop import vehicle_crop
+from fogsim.vision.vehicle.vehicle_crop import daytime_crop
 
 MIN_SAMPLES = 4
 """Fewest ranges for a fit."""
@@ -36,7 +36,7 @@ SHAPE, BRIGHT_SHAPE = 0.005, 0.03
 latter is that of the luminance, which matters as much more as a vehicle is brighter than its contrast to the sky."""
 
 SMOOTHED = 0.008
-"""Relative deviation of k by what neighbouring sights share: errors of smoothed ranges, places in noise [-]."""
+"""Relative deviation of k by what neighbouring detections share: errors of smoothed ranges, places in noise [-]."""
 
 LARGE_SHAPE = 0.018
 """That deviation of a lorry or a bus: one sees below it, and differently far as it moves away [-]."""
@@ -49,9 +49,6 @@ CLIPPED_AIRLIGHT_DEVIATION = 0.03
 
 JUMP, SURPRISE = 15.0, 5.0
 """Changes of range, as such and against what the relative speed says, that together mean another vehicle [m]."""
-
-LOST, GAP = 5, 3.0
-"""Frames in a row, and time [s], without the vehicle after which it is another one."""
 
 MAX_MISFIT = 6.0
 """Mean square of the standardised residuals beyond which the contrast does not fall as Duntley's law has it [-]."""
@@ -88,11 +85,11 @@ class LeadContrast:
     range_deviation : float
         Standard deviation of the measured range [m].
     pitch_deviation : float
-        Standard deviation of the true pitch about the told one [rad].
+        Standard deviation of the true pitch about the assumed one [rad].
     window : float
-        How long a sight counts [s].
+        How long a detection counts [s].
     frames : int
-        How many sights count at most.
+        How many detections count at most.
 
     Raises
     ------
@@ -115,7 +112,7 @@ class LeadContrast:
         self._camera, self._setback = camera, setback
         self._check = ObservationCheck(camera)
         self._range_deviation, self._pitch_deviation = range_deviation, pitch_deviation
-        self._track = ContrastTrack(pitch_deviation, window, int(frames))
+        self._window, self._frames = window, int(frames)
         self.reset()
 
     def reset(self) -> None:
@@ -124,9 +121,8 @@ class LeadContrast:
         self._forget()
 
     def _forget(self) -> None:
-        self._track.forget()
-        self._ranges = LeadRanges(self._range_deviation)
-        self._missed = 0
+        self._ranges = SmoothedRanges(self._range_deviation)
+        self._track = ContrastTrack(self._ranges, self._pitch_deviation, self._window, self._frames)
         self._last: tuple[float, LeadMeasurement] | None = None
 
     def update(self, observation: Observation) -> Estimate:
@@ -160,22 +156,20 @@ class LeadContrast:
         try:
             number = self._ranges.add(observation.time, lead)
             likely = float(self._ranges.smoothed([number], np.array([lead.distance]))[0])
-            scene = vehicle_crop(image, self._camera, likely + self._setback, self._pitch_deviation)
+            crop = daytime_crop(image, self._camera, likely + self._setback, self._pitch_deviation)
             fit = self._fit()
             densest = math.inf if fit is None else max(fit.extinction + 2.0 * fit.deviation, 0.0)
-            sight = self._track.look(scene, number, lead.distance, observation.time, surprise=surprise, densest=densest)
-            found["lead_box"], road = _box(sight), scene.road
-            self._missed = 0
+            detection = self._track.look(
+                crop, number, lead.distance, observation.time, surprise=surprise, densest=densest
+            )
+            found["lead_box"], road = _box(detection), crop.road
         except CannotTellError as error:
             reason = str(error)
             self._miss(observation.time)
         return self._estimate(reason, road, found)
 
     def _miss(self, time: float) -> None:
-        """Count a frame without the vehicle."""
-        self._missed += 1
-        seen = self._track.sights[-1].time if self._track.sights else time
-        if self._missed >= LOST and abs(time - seen) >= (GAP if time else 0.0):
+        if self._track.is_lost(time):
             self._forget()
 
     def _surprise(self, lead: LeadMeasurement, time: float) -> float:
@@ -192,8 +186,8 @@ class LeadContrast:
 
     def _estimate(self, reason: str, road: RoadFall | None, found: dict[str, object]) -> Estimate:
         found |= {
-            "distance": self._distances(),
-            "contrast": np.array([s.fading.ratio for s in self._track.sights]),
+            "distance": self._track.likely_distances(),
+            "contrast": np.array([s.contrast.ratio for s in self._track.detections]),
         }
         fit = self._fit()
         if reason or fit is None:
@@ -204,19 +198,15 @@ class LeadContrast:
             return Estimate.invalid(self.method, reason, **found)
         return Estimate(self.method, max(fit.extinction, 0.0), fit.deviation, diagnostics=found)
 
-    def _distances(self) -> NDArray[np.float64]:
-        """Likely ranges of the sights [m]."""
-        sights = self._track.sights
-        return self._ranges.smoothed([s.number for s in sights], np.array([s.distance for s in sights]))
-
     def _fit(self) -> DecayFit | None:
-        if len(self._track.sights) < MIN_SAMPLES or sum(sample.alike for sample in self._track.sights) < MIN_ALIKE:
+        if len(self._track.detections) < MIN_SAMPLES or sum(one.alike for one in self._track.detections) < MIN_ALIKE:
             return None
-        distance = self._distances()
+        distance = self._track.likely_distances()
         contrast, noise, lever = (
-            np.array([getattr(s.fading, name) for s in self._track.sights]) for name in ("ratio", "deviation", "lever")
+            np.array([getattr(s.contrast, name) for s in self._track.detections])
+            for name in ("ratio", "deviation", "lever")
         )
-        clipped = any(s.clipped for s in self._track.sights)
+        clipped = any(s.clipped for s in self._track.detections)
         airlight = CLIPPED_AIRLIGHT_DEVIATION if clipped else AIRLIGHT_DEVIATION
         offset = max(airlight * float(np.median(lever)), 1e-6)
         fit = fit_decay(distance, contrast, noise, REGISTRATION, offset)
@@ -234,10 +224,10 @@ class LeadContrast:
 
     def _shape(self, extinction: float, lever: float) -> float:
         """By how much size and aspect may change the farthest contrast, relative [-]."""
-        depth = min(sight.depth for sight in self._track.sights)
+        depth = min(one.depth for one in self._track.detections)
         # What the lever would be without fog is over 1 by luminance over contrast.
         bright = max(lever * math.exp(-max(extinction, 0.0) * depth) - 1.0, 0.0)
-        large = self._track.sights[0].picture.width >= LARGE
+        large = self._track.detections[0].picture.width >= LARGE
         return math.hypot(LARGE_SHAPE if large else SHAPE, BRIGHT_SHAPE * bright)
 
 
@@ -257,9 +247,9 @@ def _doubt(fit: DecayFit, road: RoadFall | None) -> str:
     return ""
 
 
-def _box(sight: Sight) -> tuple[int, int, int, int]:
+def _box(detection: RearDetection) -> tuple[int, int, int, int]:
     """Left, right, top and bottom of the part of a rear that is compared [px]."""
-    window, scale = sight.window, sight.picture.scale
-    low, high = sight.picture.heights
+    window, scale = detection.box, detection.picture.scale
+    low, high = detection.picture.heights
     left, right = window.column - HALF_BODY * window.width, window.column + HALF_BODY * window.width
     return round(left), round(right), round(window.foot - high * scale), round(window.foot - low * scale)

@@ -1,9 +1,9 @@
 """The vehicle ahead as `lead_contrast` follows it: found once, then known by its likeness to the nearest picture."""
 
 import math
-from collections import deque
 from dataclasses import dataclass, replace
 
+from fogsim.estimators.tracked_vehicle import SmoothedRanges, TrackedVehicle
 from fogsim.vision.region.road_image import CannotTellError
 from fogsim.vision.vehicle.contrast_ratio import ContrastRatio, RearPicture, contrast_ratio
 from fogsim.vision.vehicle.rear_localisation import RearBox
@@ -15,7 +15,7 @@ SPACING = 1.0
 
 CHANGED, REFRESHED = 0.1, 10.0
 """Relative change of the contrast at a range from which the fog is another one and the track begins anew [-], and age
-from which a sight gives way to another from its range [s]."""
+from which a detection gives way to another from its range [s]."""
 
 NEARER = 0.85
 """A vehicle that has come this much nearer than its reference picture, relative to that, becomes the reference [-]."""
@@ -48,13 +48,16 @@ SURE = 12.0
 UNPLACED = 0.15
 """Relative deviation of its contrast where it is not: what is off its place shows less [-]."""
 
+GAP = 3.0
+"""Time without the vehicle after which it is another one, where frames have a time [s]."""
+
 DENSEST = 0.1
 """Densest fog that is thought of before a track says more [1/m]."""
 
 
 @dataclass(frozen=True, slots=True)
-class Sight:
-    """One look at the vehicle ahead.
+class RearDetection:
+    """One picture of the vehicle ahead.
 
     Attributes
     ----------
@@ -66,9 +69,9 @@ class Sight:
         [s].
     picture : RearPicture
         The picture.
-    window : RearBox
+    box : RearBox
         Its place in the image.
-    fading : ContrastRatio
+    contrast : ContrastRatio
         Contrast over that of the reference.
     clipped : bool
         Whether the sky may be brighter than it looks.
@@ -81,58 +84,58 @@ class Sight:
     depth: float
     time: float
     picture: RearPicture
-    window: RearBox
-    fading: ContrastRatio
+    box: RearBox
+    contrast: ContrastRatio
     clipped: bool
     alike: bool
 
 
-class ContrastTrack:
-    """Pictures of one vehicle ahead at different ranges.
+class ContrastTrack(TrackedVehicle[RearDetection]):
+    """Pictures of one vehicle ahead at different ranges; the reference is the nearest.
 
     Parameters
     ----------
+    ranges : SmoothedRanges
+        Its measured ranges.
     pitch_deviation : float
-        Standard deviation of the true pitch about the told one [rad].
+        Standard deviation of the true pitch about the assumed one [rad].
     window : float
-        How long a sight counts [s].
+        How long a detection counts [s].
     frames : int
         How many count at most.
-
-    Attributes
-    ----------
-    sights : deque of Sight
-        What is kept, oldest first.
-    reference : Sight or None
-        The nearest of them.
     """
 
-    def __init__(self, pitch_deviation: float, window: float, frames: int) -> None:
+    def __init__(self, ranges: SmoothedRanges, pitch_deviation: float, window: float, frames: int) -> None:
+        super().__init__(ranges, frames)
         self._pitch_deviation, self._window = pitch_deviation, window
-        self.sights: deque[Sight] = deque(maxlen=frames)
-        self.forget()
+        self._forget()
 
-    def forget(self) -> None:
-        """Forget the vehicle."""
-        self.sights.clear()
-        self.reference: Sight | None = None
+    def _forget(self) -> None:
+        """Forget the vehicle, but not the ranges."""
+        self.detections, self.reference = [], None
         self._aside = self._lift = 0.0
         self._swayed = 0
 
-    def _follow_pitch(self, lift: float) -> None:
-        """What of the pitch's error is common to all frames: their mean, later frames no less than a share of it."""
-        self._lift += max(1.0 / (self._swayed + 1.0), FOLLOWED) * (lift - self._lift)
-        self._swayed += 1
+    def is_lost(self, time: float) -> bool:
+        """Count a frame without the vehicle; whether it may be another one from now on.
+
+        Parameters
+        ----------
+        time : float
+            [s]; 0 where frames have none.
+        """
+        seen = self.detections[-1].time if self.detections else time
+        return self.miss() and abs(time - seen) >= (GAP if time else 0.0)
 
     def look(
-        self, scene: VehicleCrop, number: int, distance: float, time: float, *, surprise: float, densest: float
-    ) -> Sight:
+        self, crop: VehicleCrop, number: int, distance: float, time: float, *, surprise: float, densest: float
+    ) -> RearDetection:
         """Find the vehicle in a frame and keep its picture if the range is new.
 
         Parameters
         ----------
-        scene : VehicleCrop
-            The frame.
+        crop : VehicleCrop
+            Where in the frame it is looked for.
         number, distance : int, float
             Number of the measured range, and that range [m].
         time : float
@@ -148,103 +151,98 @@ class ContrastTrack:
             If it is not there to be seen.
         """
         self._forget_old(time)
-        sight = None
+        found = None
         if self.reference is not None:
             try:
-                sight = replace(self._followed(scene, distance, time, self.reference, densest), number=number)
+                found = self._follow(crop, distance, self.reference, densest)
             except CannotTellError:
                 if surprise < SUSPICION:
                     raise
-                self.forget()
-        if sight is None:
-            sight = replace(self._begun(scene, distance, time), number=number)
-        self._aside = scene.aside(sight.picture)
-        self._follow_pitch(scene.lift(sight.picture))
-        self._keep(sight)
-        if self.reference is None or sight.depth < NEARER * self.reference.depth:
-            self._compare_anew(sight)
-        return sight
+                self._forget()
+        picture, ratio, alike = self._begin(crop) if found is None else found
+        detection = RearDetection(
+            number, distance, crop.depth, time, picture, crop.box_of(picture), ratio, crop.sky.is_clipped, alike
+        )
+        self._missed = 0
+        self._aside = crop.lateral_offset(picture)
+        # What of the pitch's error is common to all frames: their mean, later frames no less than a share of it.
+        self._lift += max(1.0 / (self._swayed + 1.0), FOLLOWED) * (crop.pitch_error(picture) - self._lift)
+        self._swayed += 1
+        self._keep_new(detection)
+        if self.reference is None or detection.depth < NEARER * self.reference.depth:
+            self._compare_all(detection)
+        return detection
 
-    def _keep(self, sight: Sight) -> None:
-        """Keep a sight from a new range; one from a known range tells whether fog has changed, or replaces it."""
-        known = min(self.sights, key=lambda s: abs(s.distance - sight.distance), default=None)
-        if known is None or abs(known.distance - sight.distance) >= SPACING:
-            self.sights.append(sight)
+    def _keep_new(self, detection: RearDetection) -> None:
+        """Keep a detection from a new range; one from a known range tells whether fog has changed, or replaces it."""
+        known = self._nearest(detection.distance) if self.detections else None
+        if known is None or abs(known.distance - detection.distance) >= SPACING:
+            self._keep(detection)
             return
-        noise = math.hypot(known.fading.deviation, sight.fading.deviation)
-        if abs(sight.fading.ratio - known.fading.ratio) > CHANGED * known.fading.ratio + 5.0 * noise:
-            self.sights.clear()
-            self.sights.append(sight)
-            self._compare_anew(sight)
-        elif sight.time - known.time > REFRESHED and known.picture is not self._reference_picture:
-            rest = [s for s in self.sights if s is not known]
-            self.sights.clear()
-            self.sights.extend([*rest, sight])
+        noise = math.hypot(known.contrast.deviation, detection.contrast.deviation)
+        if abs(detection.contrast.ratio - known.contrast.ratio) > CHANGED * known.contrast.ratio + 5.0 * noise:
+            self.detections = [detection]
+            self._compare_all(detection)
+        elif detection.time - known.time > REFRESHED and not self._is_reference(known):
+            self.detections = [*(one for one in self.detections if one is not known), detection]
 
-    @property
-    def _reference_picture(self) -> RearPicture | None:
-        return None if self.reference is None else self.reference.picture
-
-    def _begun(self, scene: VehicleCrop, distance: float, time: float) -> Sight:
-        """Find a vehicle that has not been seen before."""
-        picture = scene.found()
-        fading = contrast_ratio(picture, picture)
-        if fading is None:
+    def _begin(self, crop: VehicleCrop) -> tuple[RearPicture, ContrastRatio, bool]:
+        """Find a vehicle that has not been seen before: its picture, and its contrast to itself."""
+        picture = crop.localise()
+        ratio = contrast_ratio(picture, picture)
+        if ratio is None:
             raise CannotTellError("the vehicle ahead hardly differs from the airlight")
-        return Sight(0, distance, scene.depth, time, picture, scene.window(picture), fading, scene.sky.is_clipped, True)
+        return picture, ratio, True
 
-    def _followed(self, scene: VehicleCrop, distance: float, time: float, reference: Sight, densest: float) -> Sight:
-        """Find the vehicle that is tracked."""
-        expected = scene.expected(self._aside, reference.picture.width).displaced(0.0, self._lift * scene.depth)
-        pitch = scene.depth * self._pitch_deviation + 0.02
-        known = min(self.sights, key=lambda s: abs(s.distance - distance)).fading.ratio
-        around = RoadBehind(scene.camera.mount_height, known)
-        found = register_rear(reference.picture, expected, STEERING, pitch, around)
-        fading = None if found is None else contrast_ratio(reference.picture, found[0])
-        if found is None or fading is None:
+    def _follow(
+        self, crop: VehicleCrop, distance: float, reference: RearDetection, densest: float
+    ) -> tuple[RearPicture, ContrastRatio, bool]:
+        """Find the vehicle that is tracked: its picture, its contrast to the reference, and whether it looks alike."""
+        expected = crop.expected(self._aside, reference.picture.width).displaced(0.0, self._lift * crop.depth)
+        pitch = crop.depth * self._pitch_deviation + 0.02
+        behind = RoadBehind(crop.camera.mount_height, self._nearest(distance).contrast.ratio)
+        found = register_rear(reference.picture, expected, STEERING, pitch, behind)
+        ratio = None if found is None else contrast_ratio(reference.picture, found[0])
+        if found is None or ratio is None:
             raise CannotTellError("the vehicle ahead is too small in the image, or hidden")
         picture, likeness = found
-        if fading.ratio < SURE * fading.deviation:
+        if ratio.ratio < SURE * ratio.deviation:
             # The best of many places would be that of the noise: it is where it was expected.
-            picture, fading = expected, contrast_ratio(reference.picture, expected) or fading
-            fading = replace(fading, deviation=math.hypot(fading.deviation, UNPLACED * fading.ratio))
+            picture, ratio = expected, contrast_ratio(reference.picture, expected) or ratio
+            ratio = replace(ratio, deviation=math.hypot(ratio.deviation, UNPLACED * ratio.ratio))
         least, most = self._bounds(distance, densest)
-        if fading.visible * least > VISIBLE and likeness < max(ALIKE, _likeness_if_fixed(scene, reference)):
+        if ratio.visible * least > VISIBLE and likeness < max(ALIKE, _likeness_if_fixed(crop, reference)):
             raise CannotTellError("what is seen there does not look like the vehicle that was tracked")
-        if fading.ratio > most + 4.0 * fading.deviation:
+        if ratio.ratio > most + 4.0 * ratio.deviation:
             raise CannotTellError("what is seen there has more contrast than fog leaves")
-        window, alike = scene.window(picture), likeness >= ALIKE
-        return Sight(0, distance, scene.depth, time, picture, window, fading, scene.sky.is_clipped, alike)
+        return picture, ratio, likeness >= ALIKE
 
     def _bounds(self, distance: float, densest: float) -> tuple[float, float]:
         """Least and greatest contrast that the vehicle can have at a range, over that of the reference."""
-        nearer = [s.fading.ratio + 4.0 * s.fading.deviation for s in self.sights if s.distance <= distance + SPACING]
-        nearest = min(self.sights, key=lambda s: abs(s.distance - distance))
-        least = nearest.fading.ratio * math.exp(-min(densest, DENSEST) * abs(distance - nearest.distance))
-        return least, GROWTH * min(nearer, default=math.inf)
+        upto = [one.contrast for one in self.detections if one.distance <= distance + SPACING]
+        nearest = self._nearest(distance)
+        least = nearest.contrast.ratio * math.exp(-min(densest, DENSEST) * abs(distance - nearest.distance))
+        return least, GROWTH * min((one.ratio + 4.0 * one.deviation for one in upto), default=math.inf)
 
-    def _compare_anew(self, reference: Sight) -> None:
-        """Take the nearest picture for the reference of all: it shows the most."""
-        self.reference = reference
-        pairs = [(s, contrast_ratio(reference.picture, s.picture)) for s in self.sights]
-        self.sights.clear()
-        self.sights.extend(replace(s, fading=fading) for s, fading in pairs if fading is not None)
+    def _compare(self, reference: RearDetection, detection: RearDetection) -> RearDetection | None:
+        ratio = contrast_ratio(reference.picture, detection.picture)
+        return None if ratio is None else replace(detection, contrast=ratio)
 
     def _forget_old(self, time: float) -> None:
-        while self.sights and time - self.sights[0].time > self._window:
-            self.sights.popleft()
-        if self.reference is not None and all(s.picture is not self.reference.picture for s in self.sights):
-            if not self.sights:
-                self.forget()
-                return
-            self._compare_anew(min(self.sights, key=lambda s: s.depth))
+        while self.detections and time - self.detections[0].time > self._window:
+            del self.detections[0]
+        if self.reference is not None and not any(self._is_reference(one) for one in self.detections):
+            if self.detections:
+                self._compare_all(min(self.detections, key=lambda one: one.depth))
+            else:
+                self._forget()
 
 
-def _likeness_if_fixed(scene: VehicleCrop, reference: Sight) -> float:
+def _likeness_if_fixed(crop: VehicleCrop, reference: RearDetection) -> float:
     """Correlation that a vehicle must have: that of what is at the reference's place and of its size in the image."""
-    change = abs(math.log(scene.depth / reference.depth))
+    change = abs(math.log(crop.depth / reference.depth))
     if change < SCALED:
         return 0.0
-    around = RoadBehind(scene.camera.mount_height, 1.0)
-    found = register_rear(reference.picture, scene.picture(reference.window, reference.picture.scale), 0.1, 0.1, around)
+    behind = RoadBehind(crop.camera.mount_height, 1.0)
+    found = register_rear(reference.picture, crop.picture(reference.box, reference.picture.scale), 0.1, 0.1, behind)
     return 0.0 if found is None else found[1] - (BETTER if change < RESCALED else 0.0)

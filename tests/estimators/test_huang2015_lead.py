@@ -5,6 +5,7 @@ import pytest
 
 from fogsim.errors import InputError
 from fogsim.estimators import make
+from fogsim.estimators.huang2015_comparison import crop_vehicle
 from fogsim.estimators.huang2015_ratios import (
     Regressions,
     fitted_extinction,
@@ -13,7 +14,6 @@ from fogsim.estimators.huang2015_ratios import (
     ratio_table,
     variance_ratio_extinction,
 )
-from fogsim.estimators.huang2015_sighting import vehicle_crop
 from fogsim.values import Camera, Frame, LeadMeasurement, Observation, Response
 from fogsim.values.camera_response import respond
 from fogsim.values.estimate import NORMAL_90_PERCENT
@@ -305,7 +305,7 @@ def test_the_foot_is_found_as_well_as_the_pitch_is_known_or_better(distance, vis
         chase, rng = Chase(visibility=visibility), np.random.default_rng(seed)
         pitch = np.random.default_rng(seed).normal(0.0, chase.pitch_scatter)
         image = exposed(chase, picture(chase, distance, rng), rng)
-        crop = vehicle_crop(image, chase.camera, distance)
+        crop = crop_vehicle(image, chase.camera, distance)
         found = localise_rear(crop.luminance, crop.origin, chase.camera, distance, crop.noise)
         camera = replace(chase.camera, pitch=chase.camera.pitch + pitch)
         errors.append((found.foot - camera.horizon_row - camera.row_distance / distance) * distance)

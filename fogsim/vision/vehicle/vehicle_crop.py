@@ -1,9 +1,10 @@
 """The part of a daytime image in which the vehicle ahead must be, as contrast to the sky."""
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from fogsim.vision.light.luminance import linear_pixels, linear_table
 from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels
 from fogsim.vision.lines.horizon import levelled
 from fogsim.vision.region.road_image import CannotTellError
-from fogsim.vision.strips.sky import Sky, sky_above
+from fogsim.vision.strips.sky import sky_above
 from fogsim.vision.vehicle.airlight import RoadFall, airlight_beside, check_road, hidden_beside, road_before, road_fall
 from fogsim.vision.vehicle.contrast_ratio import RearPicture
 from fogsim.vision.vehicle.rear_localisation import RearBox, localise_rear, search_window
@@ -36,6 +37,28 @@ LEAST_WIDTH = 3.0
 """Narrowest vehicle that is looked at [px]."""
 
 
+Luminance = NDArray[np.float32]
+
+
+class SkyReading(NamedTuple):
+    """The airlight as a method reads it above the horizon.
+
+    Attributes
+    ----------
+    luminance, noise : float
+        Its luminance, and the deviation of its single pixels [linear grey levels].
+    clipping : Clipping or None
+        What clipping takes of it; None if it is saturated, and its luminance unknown.
+    is_clipped : bool
+        Whether it may be brighter than it looks.
+    """
+
+    luminance: float
+    noise: float
+    clipping: Clipping | None
+    is_clipped: bool
+
+
 @dataclass(frozen=True, slots=True)
 class VehicleCrop:
     """Where in an image the vehicle ahead is looked for.
@@ -43,38 +66,35 @@ class VehicleCrop:
     Attributes
     ----------
     camera : Camera
-        The told calibration.
+        The assumed calibration.
     depth : float
         From the camera to the vehicle's rear [m].
     luminance : (rows, cols) float32
         The part of the image [linear grey levels].
     origin : tuple of int
         Column and row of the whole image that its first pixel is.
-    sky : Sky
+    sky : SkyReading
         The airlight.
     noise : float
         Deviation of its single pixels [linear grey levels].
     road : RoadFall
         How the contrast of the nearest road falls.
-    clipping : float
-        Deviation of single channels of the sky's pixels where some are clipped, otherwise 0 [linear grey levels].
     """
 
     camera: Camera
     depth: float
     luminance: NDArray[np.float32]
     origin: tuple[int, int]
-    sky: Sky
+    sky: SkyReading
     noise: float
     road: RoadFall
-    clipping: float
 
     @property
     def scale(self) -> float:
         """Pixels in a metre at the vehicle [px/m]."""
         return self.camera.focal_length / self.depth
 
-    def found(self) -> RearPicture:
+    def localise(self) -> RearPicture:
         """Find a vehicle that has not been seen before.
 
         Raises
@@ -88,12 +108,27 @@ class VehicleCrop:
         return self.picture(RearBox(window.column, self._road_row, window.width), self.scale)
 
     def expected(self, aside: float, width: float) -> RearPicture:
-        """Picture of a vehicle of known width [m] expected so far to the right of the axis [m]."""
+        """Picture of a vehicle where it is expected.
+
+        Parameters
+        ----------
+        aside, width : float
+            How far to the right of the axis it is, and its width [m].
+        """
         column = self.camera.principal_point[0] + aside * self.scale
         return self.picture(RearBox(column, self._road_row, width * self.scale), self.scale)
 
     def picture(self, window: RearBox, scale: float) -> RearPicture:
-        """Picture of what stands at a place in the image, at a number of pixels in a metre."""
+        """Picture of what stands at a place in the image.
+
+        Parameters
+        ----------
+        window : RearBox
+            The place.
+        scale : float
+            Pixels in a metre at the vehicle [px/m].
+        """
+        spread = 0.0 if self.sky.clipping is None else self.sky.clipping.spread
         contrast = 1.0 - self.luminance.astype(np.float64) / self.sky.luminance
         return RearPicture(
             contrast=contrast,
@@ -102,20 +137,38 @@ class VehicleCrop:
             foot=window.foot - self.origin[1],
             scale=scale,
             width=window.width / scale,
-            clipped=(255.0 / self.sky.luminance - 1.0, self.clipping / self.sky.luminance),
+            clipped=(255.0 / self.sky.luminance - 1.0, spread / self.sky.luminance),
         )
 
-    def window(self, picture: RearPicture) -> RearBox:
-        """Place in the image of a picture of this scene."""
+    def box_of(self, picture: RearPicture) -> RearBox:
+        """Place in the image.
+
+        Parameters
+        ----------
+        picture : RearPicture
+            A picture of this crop.
+        """
         column, foot = picture.column + self.origin[0], picture.foot + self.origin[1]
         return RearBox(column, foot, picture.width * picture.scale)
 
-    def aside(self, picture: RearPicture) -> float:
-        """How far the vehicle is to the right of the axis [m]."""
+    def lateral_offset(self, picture: RearPicture) -> float:
+        """How far the vehicle is to the right of the axis [m].
+
+        Parameters
+        ----------
+        picture : RearPicture
+            A picture of this crop.
+        """
         return (picture.column + self.origin[0] - self.camera.principal_point[0]) / self.scale
 
-    def lift(self, picture: RearPicture) -> float:
-        """How far above where the told pitch has it the vehicle is [rad]."""
+    def pitch_error(self, picture: RearPicture) -> float:
+        """How far above where the assumed pitch has it the vehicle is [rad].
+
+        Parameters
+        ----------
+        picture : RearPicture
+            A picture of this crop.
+        """
         return (self._road_row - picture.foot - self.origin[1]) / self.camera.focal_length
 
     @property
@@ -123,19 +176,63 @@ class VehicleCrop:
         return self.camera.horizon_row + self.camera.row_distance / self.depth
 
 
-def vehicle_crop(image: Pixels, camera: Camera, depth: float, pitch_deviation: float) -> VehicleCrop:
+def vehicle_crop(
+    camera: Camera,
+    depth: float,
+    luminance_of: Callable[[slice, slice], Luminance],
+    read_sky: Callable[[], SkyReading],
+    least_noise: float = 0.0,
+) -> VehicleCrop:
     """Cut out of a frame where a vehicle can be.
+
+    Parameters
+    ----------
+    camera : Camera
+        The assumed calibration.
+    depth : float
+        From the camera to the vehicle's rear [m].
+    luminance_of : callable
+        Linear luminance of rows and columns of the level image [linear grey levels].
+    read_sky : callable
+        The method's own reading of the airlight; called where a vehicle could be seen.
+    least_noise : float
+        Noise of single pixels that there is at least [linear grey levels].
+
+    Raises
+    ------
+    CannotTellError
+        If no vehicle can be seen there, or this is no road by day.
+    """
+    region = search_window(camera, depth)
+    if region is None:
+        raise CannotTellError("the vehicle ahead is too small in the image, or outside it")
+    sky = read_sky()
+    luminance = luminance_of(*region)
+    check_road(luminance_of(*road_before(camera, depth)), sky.luminance)
+    return VehicleCrop(
+        camera=camera,
+        depth=depth,
+        luminance=luminance,
+        origin=(region[1].start, region[0].start),
+        sky=sky,
+        noise=max(sky.noise * noise_gain(luminance, sky.luminance, camera), least_noise),
+        road=road_fall(luminance_of, camera, depth, sky.luminance),
+    )
+
+
+def daytime_crop(image: Pixels, camera: Camera, depth: float, pitch_deviation: float) -> VehicleCrop:
+    """Cut out of a frame where a vehicle can be, before a sky that is told from all else by its evenness.
 
     Parameters
     ----------
     image : (rows, cols) or (rows, cols, 3) uint8 or uint16
         An image of the camera.
     camera : Camera
-        The told calibration.
+        The assumed calibration.
     depth : float
         From the camera to the vehicle's rear [m].
     pitch_deviation : float
-        Standard deviation of the true pitch about the told one [rad].
+        Standard deviation of the true pitch about the assumed one [rad].
 
     Raises
     ------
@@ -147,21 +244,13 @@ def vehicle_crop(image: Pixels, camera: Camera, depth: float, pitch_deviation: f
     if not 1.0 < depth < math.inf:
         raise CannotTellError(f"a range of {depth:.1f} m is none of a vehicle ahead")
     pixels = linear_pixels(levelled(image, camera), camera)
-    sky, lost = _daylight(pixels, camera, 3.0 * pitch_deviation * camera.focal_length + 2.0, depth)
-    region = search_window(camera, depth)
-    if region is None:
-        raise CannotTellError("the vehicle ahead is too small in the image, or outside it")
-    luminance = _luminance(pixels, *region)
-    check_road(_luminance(pixels, *road_before(camera, depth)), sky.luminance)
-    return VehicleCrop(
-        camera=camera,
-        depth=depth,
-        luminance=luminance,
-        origin=(region[1].start, region[0].start),
-        sky=sky,
-        noise=max(sky.noise * noise_gain(luminance, sky.luminance, camera), 0.3 * 255.0 / 2**camera.bits),
-        road=road_fall(partial(_luminance, pixels), camera, depth, sky.luminance),
-        clipping=lost.spread,
+    margin = 3.0 * pitch_deviation * camera.focal_length + 2.0
+    return vehicle_crop(
+        camera,
+        depth,
+        partial(_luminance, pixels),
+        partial(_daylight, pixels, camera, margin, depth),
+        least_noise=0.3 * 255.0 / 2**camera.bits,
     )
 
 
@@ -175,8 +264,8 @@ def _luminance(pixels: LinearPixels, rows: slice, cols: slice) -> NDArray[np.flo
     return light
 
 
-def _daylight(pixels: LinearPixels, camera: Camera, margin: float, depth: float) -> tuple[Sky, Clipping]:
-    """Sky by day with what clipping takes of it, or the reason why this is none."""
+def _daylight(pixels: LinearPixels, camera: Camera, margin: float, depth: float) -> SkyReading:
+    """Sky by day, or the reason why this is none."""
     sky = sky_above(pixels, camera, margin)
     if sky is None or sky.luminance < MIN_AIRLIGHT:
         raise CannotTellError("too dark above the horizon, or no sky: this is a daytime method")
@@ -194,8 +283,8 @@ def _daylight(pixels: LinearPixels, camera: Camera, margin: float, depth: float)
     clear = np.abs(light - luminance) <= 4.0 * max(sky.noise, 1.0)
     lost = clipping(pixels.pixels[rows, camera.width // 6 : camera.width - camera.width // 6][clear], camera)
     # What clipping takes from the sky, its noise shows; then it is no longer clipped.
-    clipped = 0.0 if lost.noise > 0.0 else sky.clipped
-    return replace(sky, luminance=luminance + lost.loss, noise=max(sky.noise, lost.noise), clipped=clipped), lost
+    is_clipped = not lost.noise > 0.0 and sky.is_clipped
+    return SkyReading(luminance + lost.loss, max(sky.noise, lost.noise), lost, is_clipped)
 
 
 def noise_gain(luminance: NDArray[np.float32], sky: float, camera: Camera) -> float:
@@ -208,7 +297,7 @@ def noise_gain(luminance: NDArray[np.float32], sky: float, camera: Camera) -> fl
     sky : float
         Luminance of the sky [linear grey levels].
     camera : Camera
-        The told calibration.
+        The assumed calibration.
     """
     table = linear_table(camera.response, camera.bits)
     slope = np.gradient(table.astype(np.float64))

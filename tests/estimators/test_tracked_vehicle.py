@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from fogsim.estimators.lead_ranges import LeadRanges
+from fogsim.estimators.tracked_vehicle import SmoothedRanges
 from fogsim.values.observation import LeadMeasurement
 
 TIME = np.arange(0.0, 13.0, 0.5)
@@ -10,7 +10,7 @@ SPEED = 5.0 + 0.3 * TIME
 
 
 def smoothed(distance, speed, time=TIME, deviation=0.25):
-    ranges = LeadRanges(deviation)
+    ranges = SmoothedRanges(deviation)
     numbers = [
         ranges.add(t, LeadMeasurement(float(d), float(v))) for t, d, v in zip(time, distance, speed, strict=True)
     ]
@@ -62,7 +62,7 @@ def test_pictures_without_a_time_keep_their_ranges():
 
 
 def test_what_is_too_old_keeps_its_range():
-    ranges = LeadRanges(0.25)
+    ranges = SmoothedRanges(0.25)
     for i in range(600):
         ranges.add(0.1 * i, LeadMeasurement(30.0 + 0.2 * (-1) ** i, 0.0))
     found = ranges.smoothed([0, 599], np.array([30.2, 29.8]))

@@ -1,7 +1,9 @@
-"""Ranges of the vehicle ahead, made smoother by the relative speed that the same sensor measures."""
+"""A vehicle ahead as methods follow it: its pictures at smoothed ranges, each compared with the one that shows most."""
 
 import math
+from abc import ABC, abstractmethod
 from collections import deque
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +30,103 @@ LATEST, CONTRADICTED = 8, 1.8
 """Of how many of the last measurements, and of all, the root mean square change by smoothing may be, in deviations of a
 range [-]: more, and the speeds are not those of these ranges."""
 
+LOST = 5
+"""Frames in a row without the vehicle after which it is another one."""
 
-class LeadRanges:
+
+class Detection(Protocol):
+    """One picture of a vehicle, compared with the reference.
+
+    Attributes
+    ----------
+    number : int
+        Number of the measured range.
+    distance : float
+        That range [m].
+    picture : object
+        The picture; the same object as long as it is of the same pixels at the same place.
+    """
+
+    @property
+    def number(self) -> int: ...  # noqa: D102 - see above
+
+    @property
+    def distance(self) -> float: ...  # noqa: D102
+
+    @property
+    def picture(self) -> Any: ...  # noqa: D102
+
+
+D = TypeVar("D", bound=Detection)
+
+
+class TrackedVehicle(ABC, Generic[D]):
+    """Pictures of one vehicle at different ranges.
+
+    A method says how a picture is compared with the reference, and which of them becomes the reference.
+
+    Parameters
+    ----------
+    ranges : SmoothedRanges
+        The vehicle's measured ranges.
+    most : int
+        How many detections are kept.
+    offset : float
+        By how much the detections' distances exceed measured ranges [m].
+    keeps_reference : bool
+        Whether the reference stays even if it is the oldest.
+
+    Attributes
+    ----------
+    detections : list
+        What is kept, oldest first.
+    reference : Detection or None
+        That which all are compared with; None before the first.
+    """
+
+    def __init__(
+        self, ranges: "SmoothedRanges", most: int, *, offset: float = 0.0, keeps_reference: bool = False
+    ) -> None:
+        self.detections: list[D] = []
+        self.reference: D | None = None
+        self._ranges, self._most = ranges, most
+        self._offset_of_ranges, self._keeps_reference = offset, keeps_reference
+        self._missed = 0
+
+    @abstractmethod
+    def _compare(self, reference: D, detection: D) -> D | None:
+        """The detection compared with another reference; None if it cannot be."""
+
+    def likely_distances(self) -> Floats:
+        """Distances of the detections by all measurements so far [m]."""
+        measured = np.array([one.distance for one in self.detections]) - self._offset_of_ranges
+        return self._ranges.smoothed([one.number for one in self.detections], measured) + self._offset_of_ranges
+
+    def miss(self) -> bool:
+        """Count a frame without the vehicle; whether it may be another one from now on."""
+        self._missed += 1
+        return self._missed >= LOST
+
+    def _nearest(self, distance: float) -> D:
+        return min(self.detections, key=lambda one: abs(one.distance - distance))
+
+    def _is_reference(self, detection: D) -> bool:
+        return self.reference is not None and detection.picture is self.reference.picture
+
+    def _keep(self, detection: D) -> None:
+        self.detections.append(detection)
+        if len(self.detections) > self._most:
+            oldest = int(self._keeps_reference and self._is_reference(self.detections[0]))
+            del self.detections[oldest]
+
+    def _compare_all(self, reference: D) -> None:
+        """Take another reference."""
+        compared = [self._compare(reference, one) for one in self.detections]
+        self.reference = reference
+        self.detections = [one for one in compared if one is not None]
+
+
+class SmoothedRanges:
     """Ranges as measured, and as they are likely with those before and after and the speeds between.
 
     Parameters

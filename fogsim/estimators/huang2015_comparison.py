@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.estimators.huang2015_ratios import RANGE_DEVIATION
 from fogsim.values.camera import Camera
 from fogsim.vision.light.clipped_sky import clipping, darker_by
 from fogsim.vision.light.luminance import linear_luminance
@@ -32,9 +33,6 @@ FULL = 254.7
 
 LEAST_WIDTH = 8.0
 """Narrowest vehicle whose picture is compared [px]."""
-
-RANGE_DEVIATION = 0.3
-"""Standard deviation of the told range [m]."""
 
 STEERING = 0.1
 """Change of the lateral offset between frames in widths of the vehicle [-]."""

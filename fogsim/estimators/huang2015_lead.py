@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
-from fogsim.estimators.huang2015_comparison import RANGE_DEVIATION, Comparison
+from fogsim.estimators.huang2015_comparison import Comparison
 from fogsim.estimators.huang2015_ratios import (
+    RANGE_DEVIATION,
     Regressions,
     fitted_extinction,
     image_confidence,
@@ -63,14 +64,14 @@ class Huang2015Lead:
     Parameters
     ----------
     camera : Camera
-        The calibration as the vehicle was told it.
+        The assumed calibration.
     as_published : bool
         Ratios of variances instead of regressions.
     setback : float
         From the own front bumper, where ranges begin, back to the camera [m]; it hardly matters.
     blur : float
         Standard deviation of the lens' blur beside the pixels' own size [px]. Detail that it takes from far pictures
-        would be taken for fog: with 0.7 px that are not told, 120 m come out as some 105 m.
+        would be taken for fog: with 0.7 px that are not given, 120 m come out as some 105 m.
     spacing : float, optional
         Change of range between pictures that are kept [m]: 2.5 m, as published 5 m.
     """
@@ -189,7 +190,7 @@ class Huang2015Lead:
         if fit is None:
             return None
         if fit.extinction <= fit.deviation:
-            # No fog that could be told from none; what it may be is in the deviation.
+            # No fog that differs surely from none; what it may be is in the deviation.
             return max(fit.extinction, 0.0), fit.deviation
         return (fit.extinction, fit.deviation) if fit.deviation <= WORST * fit.extinction else None
 

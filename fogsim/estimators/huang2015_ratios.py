@@ -32,7 +32,7 @@ SKY_SHARE = 0.01
 """Standard deviation of the airlight ahead relative to the sky's luminance above it [-]."""
 
 DETAIL_SHARE = 0.3
-"""Standard deviation of the share of its detail that only the reference shows: fine detail, noise told wrong [-]."""
+"""Standard deviation of the share of its detail that only the reference shows: fine detail, another noise [-]."""
 
 DRIFT = 0.009
 """Standard deviation of the relative change of a mean contrast as a picture becomes smaller by a factor e [-]."""
@@ -135,6 +135,11 @@ def ratio_table(distances: Floats, variances: Floats, spacing: float) -> RatioTa
 
 def published_extinction(table: RatioTable) -> tuple[float, float]:
     """Extinction of least squared error between mean and theoretical ratios, of k from 0 to 0.09 (section 4.3.3).
+
+    Parameters
+    ----------
+    table : RatioTable
+        At least one ratio.
 
     Returns
     -------

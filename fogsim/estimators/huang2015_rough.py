@@ -61,7 +61,7 @@ class Huang2015Rough:
     Parameters
     ----------
     camera : Camera
-        The calibration as the vehicle was told it.
+        The assumed calibration.
     as_published : bool
         The thesis' own constraints, 20-row medians and search.
     pitch_deviation : float

@@ -4,7 +4,6 @@ import math
 from dataclasses import replace
 
 from fogsim.estimators.huang2015_comparison import (
-    RANGE_DEVIATION,
     Comparison,
     RearPatch,
     compare,
@@ -17,6 +16,7 @@ from fogsim.estimators.huang2015_comparison import (
     placed_at,
     shrink_broad,
 )
+from fogsim.estimators.huang2015_ratios import RANGE_DEVIATION
 from fogsim.estimators.tracked_vehicle import SmoothedRanges, TrackedVehicle
 from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
@@ -51,7 +51,7 @@ class LeadTrack(TrackedVehicle[Comparison]):
     Parameters
     ----------
     camera : Camera
-        The calibration as the vehicle was told it.
+        The assumed calibration.
     setback : float
         From the own front bumper back to the camera [m].
     spacing : float
@@ -98,14 +98,14 @@ class LeadTrack(TrackedVehicle[Comparison]):
         """
         return self.reference is not None and abs(distance + self._setback - self._last_distance) <= MOST_JUMP
 
-    def see(self, image: Pixels, told: LeadMeasurement, time: float) -> None:
+    def see(self, image: Pixels, measured: LeadMeasurement, time: float) -> None:
         """Look for the vehicle in the next frame.
 
         Parameters
         ----------
         image : (rows, cols) or (rows, cols, 3) uint8 or uint16
             An image of the camera.
-        told : LeadMeasurement
+        measured : LeadMeasurement
             Range and relative speed by the radar.
         time : float
             [s].
@@ -115,8 +115,8 @@ class LeadTrack(TrackedVehicle[Comparison]):
         CannotTellError
             If it is not there to be seen.
         """
-        distance = told.distance + self._setback
-        number = self._ranges.add(time, told)
+        distance = measured.distance + self._setback
+        number = self._ranges.add(time, measured)
         crop = crop_vehicle(image, self._camera, distance)
         self.road = crop.road
         if self.reference is None:

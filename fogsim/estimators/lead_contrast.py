@@ -79,7 +79,7 @@ class LeadContrast:
     Parameters
     ----------
     camera : Camera
-        The calibration as the vehicle was told it.
+        The assumed calibration.
     setback : float
         Distance of the camera behind the front bumper, from which the range counts [m].
     range_deviation : float

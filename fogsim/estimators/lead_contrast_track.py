@@ -30,8 +30,8 @@ ALIKE = 0.6
 """Least correlation with the reference where the vehicle must be visible [-]."""
 
 SCALED, RESCALED, BETTER = 0.06, 0.2, 0.03
-"""Changes of the range's logarithm from which a vehicle is told from a thing that keeps its size in the image, by its
-correlation: if that of such a thing is better by so much, and if it is better at all [-]."""
+"""Changes of the range's logarithm from which a vehicle is distinguished by its correlation from a thing that keeps its
+size in the image: if that of such a thing is better by so much, and if it is better at all [-]."""
 
 VISIBLE = 3.0
 """Contrast of the reference, faded, in deviations of a cell from which the vehicle must look alike [-]."""

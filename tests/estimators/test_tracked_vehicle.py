@@ -1,7 +1,9 @@
+from dataclasses import dataclass, replace
+
 import numpy as np
 import pytest
 
-from fogsim.estimators.tracked_vehicle import SmoothedRanges
+from fogsim.estimators.tracked_vehicle import LOST, SmoothedRanges, TrackedVehicle
 from fogsim.values.observation import LeadMeasurement
 
 TIME = np.arange(0.0, 13.0, 0.5)
@@ -73,3 +75,53 @@ def test_what_is_too_old_keeps_its_range():
 def test_without_noise_nothing_is_smoothed():
     distance, speed = noisy(5)
     assert smoothed(distance, speed, deviation=0.0) is distance
+
+
+@dataclass(frozen=True)
+class Look:
+    number: int
+    distance: float
+    picture: object
+    ratio: float = 1.0
+
+
+class Track(TrackedVehicle[Look]):
+    def _compare(self, reference, detection):
+        ratio = detection.distance / reference.distance
+        return None if ratio > 2.0 else replace(detection, ratio=ratio)
+
+    def see(self, *distances, reference=0):
+        for number, distance in enumerate(distances):
+            self._keep(Look(number, distance, object()))
+            if number == reference:
+                self._compare_all(self.detections[-1])
+
+
+def test_all_are_compared_with_the_reference_and_what_cannot_be_is_dropped():
+    track = Track(SmoothedRanges(0.0), 9)
+    track.see(10.0, 30.0, 20.0, reference=2)
+    assert [one.ratio for one in track.detections] == [0.5, 1.5, 1.0]
+    track._compare_all(track.detections[0])
+    assert [(one.distance, one.ratio) for one in track.detections] == [(10.0, 1.0), (20.0, 2.0)]
+
+
+@pytest.mark.parametrize(("keeps_reference", "kept"), [(False, [2.0, 3.0]), (True, [1.0, 3.0])])
+def test_the_oldest_gives_way(keeps_reference, kept):
+    track = Track(SmoothedRanges(0.0), 2, keeps_reference=keeps_reference)
+    track.see(1.0, 2.0, 3.0)
+    assert [one.distance for one in track.detections] == kept
+
+
+def test_likely_distances_are_from_where_detections_are_measured():
+    distance, speed = noisy(6)
+    ranges = SmoothedRanges(0.25)
+    track = Track(ranges, 99, offset=1.7)
+    for t, d, v in zip(TIME, distance, speed, strict=True):
+        number = ranges.add(t, LeadMeasurement(float(d), float(v)))
+        track._keep(Look(number, float(d) + 1.7, object()))
+    assert track.likely_distances() - 1.7 == pytest.approx(smoothed(distance, speed))
+
+
+def test_a_vehicle_is_lost_after_so_many_frames_without_it():
+    track = Track(SmoothedRanges(0.0), 9)
+    assert [track.miss() for _ in range(LOST)] == [False] * (LOST - 1) + [True]

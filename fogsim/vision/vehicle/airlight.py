@@ -42,7 +42,7 @@ def road_before(camera: Camera, depth: float) -> tuple[slice, slice]:
     Parameters
     ----------
     camera : Camera
-        The told calibration.
+        The assumed calibration.
     depth : float
         From the camera to the vehicle's rear [m].
     """
@@ -113,7 +113,7 @@ def road_fall(luminance_of: Callable[[slice, slice], Floats], camera: Camera, de
     luminance_of : callable
         Linear luminance of rows and columns of the level image.
     camera : Camera
-        The told calibration.
+        The assumed calibration.
     depth : float
         From the camera to the vehicle's rear, ``inf`` where there is none [m].
     sky : float
@@ -211,5 +211,13 @@ def _mean(part: NDArray[np.float32], about: float, noise: float) -> float | None
 
 
 def hidden_beside(focal_length: float, depth: float) -> float:
-    """How far from the axis a vehicle at a depth [m] may hide the sky [px]."""
+    """How far from the axis a vehicle ahead may hide the sky [px].
+
+    Parameters
+    ----------
+    focal_length : float
+        [px].
+    depth : float
+        From the camera to its rear, ``inf`` where there is none [m].
+    """
     return HALF_TRUCK * focal_length / depth if math.isfinite(depth) else 0.0

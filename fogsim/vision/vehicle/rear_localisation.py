@@ -77,7 +77,7 @@ def search_window(camera: Camera, distance: float) -> tuple[slice, slice] | None
     Parameters
     ----------
     camera : Camera
-        The told calibration.
+        The assumed calibration.
     distance : float
         From the camera to the vehicle's rear [m].
 
@@ -112,7 +112,7 @@ def localise_rear(
     origin : tuple of int
         Column and row of the whole image that its first pixel is.
     camera : Camera
-        The told calibration.
+        The assumed calibration.
     distance : float
         From the camera to the rear [m].
     noise : float
@@ -210,7 +210,7 @@ def _refined_foot(strip: NDArray[np.float32], foot: float, camera: Camera, noise
         return foot
     rows = strip[first - 1 : last + 2].mean(axis=1, dtype=np.float64)
     step = np.gradient(rows)
-    # What the told pitch says counts as much as a step does that stands out of the noise and of the other steps.
+    # What the assumed pitch says counts as much as a step does that stands out of the noise and of the other steps.
     other = max(noise / math.sqrt(2.0 * strip.shape[1]), float(np.median(np.abs(step))), LEAST_STEP)
     at = (np.arange(step.size) + first - 1 - foot) / (0.5 * reach)
     evidence = np.log1p((np.maximum(step, 0.0) / other) ** 2) - 0.5 * at**2

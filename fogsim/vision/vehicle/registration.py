@@ -45,7 +45,7 @@ OTHER = 0.2
 """Share of a far picture's variance that the near one does not explain beyond which its detail is another's [-]."""
 
 NOISE_SHARE = 0.3
-"""Relative standard deviation of the told noise's power, which is taken out of slopes [-]."""
+"""Relative standard deviation of the assumed noise's power, which is taken out of slopes [-]."""
 
 LEAST_PIXELS = 24
 """Fewest pixels that a regression is made of."""

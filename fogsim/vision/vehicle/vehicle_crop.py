@@ -221,7 +221,7 @@ def vehicle_crop(
 
 
 def daytime_crop(image: Pixels, camera: Camera, depth: float, pitch_deviation: float) -> VehicleCrop:
-    """Cut out of a frame where a vehicle can be, before a sky that is told from all else by its evenness.
+    """Cut out of a frame where a vehicle can be, before an even sky.
 
     Parameters
     ----------

@@ -1,12 +1,21 @@
 """Pictures made smaller, and the light that two pictures of one thing share."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from fogsim.vision.vehicle.contrast_ratio import mean_luminances
-from fogsim.vision.vehicle.patch import Patch, Placement, rescale_position, shrink
+from fogsim.vision.vehicle.patch import (
+    Patch,
+    Placement,
+    box_weights,
+    downsample_to,
+    pixel_grid,
+    rescale_position,
+    shrink,
+)
 
 SKY = 200.0
 
@@ -97,3 +106,26 @@ def test_shrinking_averages_noise_away():
     inner = shrink(noisy, 0.25).luminance[2:-2, 2:-2]
     assert inner.std() == pytest.approx(8.0 * 0.25, rel=0.1)
     assert shrink(noisy, 1.0) is noisy
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.7, 0.3])
+def test_boxes_share_the_near_pixels_out(scale):
+    far = np.arange(3.0, 9.0)
+    weights = box_weights(60, 29.4, far, 5.5, scale)
+    assert weights.sum(axis=1) == pytest.approx(1.0)
+    # The middle of what a far pixel covers is where the placement says.
+    assert weights @ np.arange(60.0) == pytest.approx(29.4 + (far - 5.5) / scale, abs=0.5)
+    half, middle, near = 0.5 * math.sqrt(max(scale**-2 - 1.0, 0.25)), 29.4 + (far[:, None] - 5.5) / scale, np.arange(60)
+    overlap = np.minimum(middle + half, near + 0.5) - np.maximum(middle - half, near - 0.5)
+    assert weights == pytest.approx(np.maximum(overlap, 0.0) / (2.0 * half), abs=1e-15)
+
+
+def test_pixels_beyond_the_border_have_no_share():
+    weights = box_weights(10, 5.0, np.array([-20.0, 5.0, 40.0]), 5.0, 0.5)
+    assert weights.sum(axis=1) == pytest.approx([0.0, 1.0, 0.0])
+
+
+def test_an_even_patch_is_even_however_it_is_seen():
+    even = patch(np.full((40, 48), 70.0))
+    grid = pixel_grid(even, even, Placement(23.5, 19.5, 0.6))
+    assert downsample_to(even, grid, Placement(23.5, 19.5, 0.6)) == pytest.approx(70.0)

@@ -1,0 +1,65 @@
+import numpy as np
+import pytest
+
+from fogsim.values import Camera, Response
+from fogsim.vision.light.clipped_sky import Clipping
+from fogsim.vision.region.road_image import CannotTellError
+from fogsim.vision.vehicle.vehicle_crop import SkyReading, noise_gain, vehicle_crop
+
+CAMERA = Camera(640, 480, 600.0, (319.5, 239.5), 1.4, np.radians(2.0), response=Response.LINEAR)
+SKY = SkyReading(200.0, 1.5, Clipping(0.0, 0.0, 0.0), is_clipped=False)
+
+
+def crop(depth: float, light: float = 120.0, road: float = 120.0, least_noise: float = 0.0):
+    image = np.full((CAMERA.height, CAMERA.width), light, np.float32)
+    image[int(CAMERA.horizon_row) + 2 :] = road
+    return vehicle_crop(CAMERA, depth, lambda rows, cols: image[rows, cols], lambda: SKY, least_noise)
+
+
+@pytest.mark.parametrize("depth", [8.0, 25.0, 90.0])
+@pytest.mark.parametrize("aside", [-0.8, 0.0, 0.5])
+def test_places_in_metres_and_in_pixels_are_the_same(depth, aside):
+    found = crop(depth)
+    picture = found.expected(aside, 1.8)
+    assert found.lateral_offset(picture) == pytest.approx(aside)
+    assert found.pitch_error(picture) == pytest.approx(0.0, abs=1e-12)
+    assert found.pitch_error(picture.displaced(0.0, 0.01 * depth)) == pytest.approx(0.01)
+    box = found.box_of(picture)
+    assert box.foot == pytest.approx(CAMERA.horizon_row + CAMERA.row_distance / depth)
+    assert box.width == pytest.approx(1.8 * CAMERA.focal_length / depth)
+    again = found.picture(box, picture.scale)
+    assert (again.column, again.foot, again.width) == pytest.approx((picture.column, picture.foot, picture.width))
+
+
+def test_contrast_is_to_the_sky():
+    assert crop(30.0, light=50.0, road=50.0).expected(0.0, 1.8).contrast == pytest.approx(0.75)
+
+
+def test_noise_has_a_least_value():
+    assert crop(30.0).noise == pytest.approx(SKY.noise)
+    assert crop(30.0, least_noise=4.0).noise == 4.0
+
+
+@pytest.mark.parametrize("depth", [0.8, 800.0])
+def test_what_is_too_near_or_too_far_cannot_be_looked_for(depth):
+    with pytest.raises(CannotTellError, match="too small in the image, or outside it"):
+        crop(depth)
+
+
+def test_a_road_brighter_than_the_sky_is_refused():
+    with pytest.raises(CannotTellError, match="brighter than the sky"):
+        crop(30.0, road=230.0)
+
+
+def test_an_even_picture_shows_no_vehicle():
+    with pytest.raises(CannotTellError, match="no vehicle stands out"):
+        crop(30.0).localise()
+
+
+@pytest.mark.parametrize(("light", "expected"), [(180.0, 1.0), (45.0, 0.25 ** (1.2 / 2.2))])
+def test_noise_grows_with_the_slope_of_the_response(light, expected):
+    luminance = np.full((4, 4), light, np.float32)
+    assert noise_gain(luminance, 180.0, CAMERA) == pytest.approx(1.0, rel=1e-3)
+    gamma = Camera(640, 480, 600.0, (319.5, 239.5), 1.4, 0.03, response=Response.GAMMA)
+    # Light goes as the 2.2th power of the value, and its slope as the 1.2th.
+    assert noise_gain(luminance, 180.0, gamma) == pytest.approx(expected, rel=0.02)

@@ -100,7 +100,7 @@ def _patch(axes: Axes, piece: NDArray[np.uint8], window: tuple[float, float, flo
     axes.set_ylabel(name)
     if window is not None:
         column, foot, width = window
-        # What is compared: see huang2015_sighting.
+        # What is compared: see huang2015_comparison.
         sides, ends = (
             column + 0.42 * width * np.array([-1, 1, 1, -1, -1]),
             foot - width * np.array([0.1, 0.1, 0.74, 0.74, 0.1]),

@@ -1,9 +1,12 @@
 import numpy as np
 import pytest
 
-from fogsim.vision.vehicle.airlight import airlight_beside
+from fogsim.values import Camera, Response
+from fogsim.vision.region.road_image import CannotTellError
+from fogsim.vision.vehicle.airlight import RoadFall, airlight_beside, check_road, hidden_beside, road_before, road_fall
 
 NOISE = 2.0
+CAMERA = Camera(688, 515, 700.0, (343.5, 257.0), 1.3, np.radians(1.0), response=Response.LINEAR)
 
 
 def sky(light=180.0, seed=0):
@@ -38,3 +41,55 @@ def test_a_high_vehicle_before_the_axis_is_no_sky():
 
 def test_nothing_of_that_light_leaves_what_it_was_thought_to_be():
     assert airlight_beside(sky(90.0), 180.0, NOISE, 300.0, 30.0) == 180.0
+
+
+@pytest.mark.parametrize("extinction", [0.003, 0.03, 0.1])
+@pytest.mark.parametrize("reflectance", [0.05, 0.5])
+def test_the_roads_contrast_falls_as_fog_has_it(extinction, reflectance):
+    camera = CAMERA
+
+    def row(beam):
+        def luminance_of(rows, cols):
+            d = camera.row_distance / (np.arange(camera.height)[rows] - camera.horizon_row)
+            light = reflectance * (1.0 + beam * (6.0 / d) ** 2)
+            seen = 200.0 * (1.0 - (1.0 - light) * np.exp(-extinction * d))
+            return np.repeat(seen[:, None], 9, axis=1).astype(np.float32)
+
+        return road_fall(luminance_of, camera, 40.0, 200.0)
+
+    day, lit = row(0.0), row(0.8)
+    assert day.fall == pytest.approx(extinction * day.apart, rel=0.03)
+    assert not day.is_lit(extinction, 0.0)
+    assert not day.is_lit(1.1 * extinction, 0.0)
+    assert lit.fall < day.fall
+    assert lit.is_lit(extinction, 0.0) == (reflectance == 0.5)
+    assert row(4.0).fall < lit.fall
+
+
+def test_where_little_road_is_seen_nothing_is_lit():
+    camera = CAMERA
+    for depth, light in ((10.0, 50.0), (60.0, 200.0), (60.0, 250.0)):
+        even = np.full((camera.height, camera.width), light, np.float32)
+        found = road_fall(lambda *where, even=even: even[where], camera, depth, 200.0)
+        assert found == RoadFall(0.0, 0.0)
+        assert not found.is_lit(1.0, 0.0)
+
+
+@pytest.mark.parametrize("depth", [8.0, 30.0, 200.0])
+def test_the_road_before_a_vehicle_ends_below_its_foot(depth):
+    rows, cols = road_before(CAMERA, depth)
+    assert rows.start >= CAMERA.horizon_row + CAMERA.row_distance / depth
+    assert rows.stop == CAMERA.height
+    assert cols.start + cols.stop - 1 == pytest.approx(2 * CAMERA.principal_point[0], abs=1.0)
+
+
+def test_a_road_brighter_than_the_sky_is_refused_and_none_is_not():
+    check_road(np.full((4, 5), 215.0, np.float32), 200.0)
+    check_road(np.zeros((0, 5), np.float32), 200.0)
+    with pytest.raises(CannotTellError, match="brighter than the sky"):
+        check_road(np.full((4, 5), 225.0, np.float32), 200.0)
+
+
+def test_what_a_vehicle_may_hide_is_as_wide_as_it_is_near():
+    assert hidden_beside(700.0, 20.0) == pytest.approx(2.0 * hidden_beside(700.0, 40.0))
+    assert hidden_beside(700.0, np.inf) == 0.0

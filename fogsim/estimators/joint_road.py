@@ -8,7 +8,6 @@ import numpy as np
 
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.parameters import Range, checked_parameters
-from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation
@@ -24,9 +23,9 @@ from fogsim.vision.lines.horizon import (
     weighted_mean,
 )
 from fogsim.vision.lines.road_lines import road_vanishing_point
-from fogsim.vision.strips.agreeing_strips import fit_own, with_neighbours
-from fogsim.vision.strips.joint_checks import no_road
-from fogsim.vision.strips.joint_fit import JointFit, JointPrior
+from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, no_road
+from fogsim.vision.strips.joint_fit import MODEL_DEVIATION, JointFit, fit_own, with_neighbours
+from fogsim.vision.strips.joint_kernels import JointPrior
 from fogsim.vision.strips.joint_prior import joint_prior
 from fogsim.vision.strips.sky import Sky, sky_above
 from fogsim.vision.strips.strip_curves import (
@@ -45,28 +44,18 @@ MIN_COLS, MIN_ROWS = 32, 16
 MIN_AIRLIGHT = 6.0
 """Sky darker than this is no day [linear grey levels]."""
 
-MIN_CONTRAST = 0.08
-"""Least contrast of the road to the airlight for fog to show [-]."""
-
-MAX_MISFIT = 4.0
-"""Mean square of the standardised residuals beyond which the curve is none of Koschmieder's [-]."""
-
 MIN_USED = 0.4
 """Least share of the own lane's bins, as far as it is free, that must fit [-]."""
 
 SURE_OF_FOG = 2.0
 """Least k in its standard deviations for an estimate of dense fog [-]."""
 
-CLEAR = OPTICAL_DEPTH_AT_VISIBILITY / 300.0
-"""Extinction that an unsure estimate must surely be below to say "little fog" [1/m]."""
-
 OVERCONFIDENCE = 1.6
 """By how much the fit's deviation is too small where roads and cameras are not what its model knows: verges, tracks and
 repairs in the strips, compression, soiled windscreens; measured on pictures that FogSim did not draw [-]."""
 
-MODEL_DEVIATION, LEAST_DEVIATION = 0.01, 1e-4
-"""Relative deviation of k by what the model leaves out: marks, rounding, a road that is not quite flat [-]; and the
-deviation that this leaves in clear air [1/m]."""
+LEAST_DEVIATION = 1e-4
+"""Deviation of k that what the model leaves out makes in clear air [1/m]."""
 
 MOST_OBSTACLES = 2
 """How often what stands in the own lane is looked for anew, each time nearer."""
@@ -211,7 +200,7 @@ class JointRoad:
 
     def _doubt(self, fit: JointFit, sky: Sky, curves: StripCurves, free: float) -> str:
         """Say why a fit is not to be believed; empty if it is."""
-        if fit.road >= (1.0 - MIN_CONTRAST) * fit.airlight or fit.road >= 0.98 * sky.luminance:
+        if fit.road >= (1.0 - LEAST_CONTRAST) * fit.airlight or fit.road >= 0.98 * sky.luminance:
             return "the road is nearly as bright as the airlight, or brighter"
         if fit.misfit > MAX_MISFIT:
             return "the road fades, but not as Koschmieder's law has it"

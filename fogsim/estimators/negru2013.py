@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.negru2013_band import SeenBand, fog_slope, road_band, road_curve
 from fogsim.parameters import Range, checked_parameters
-from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import Observation
@@ -27,7 +26,7 @@ from fogsim.vision.lines.vanishing_point import VanishingPoint
 from fogsim.vision.region.inflection import FogModel, best_inflection, printed_inflection
 from fogsim.vision.region.profile import RoadCurve, band_profile
 from fogsim.vision.region.road_image import MIN_CONTRAST, MIN_ROWS, SATURATED, CannotTellError, RoadImage, road_image
-from fogsim.vision.strips.joint_checks import no_road
+from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, no_road
 from fogsim.vision.strips.joint_fit import JointFit, fit_jointly
 from fogsim.vision.strips.joint_prior import joint_prior
 from fogsim.vision.strips.sky import sky_above
@@ -47,11 +46,8 @@ NEAR_HORIZON = 4.0  # [px] a region that ends this close below the horizon has s
 REACH = math.radians(4.0)  # [rad] about the told vanishing point, within which lines of the road may pass
 ALBEDO_DEVIATION = 0.015  # [-] of k by slow changes of the road's reflectance, which one row's inflection does not show
 MAX_RESIDUAL = 0.12  # [-] of the fitted contrast: more is no curve of Koschmieder's
-MAX_MISFIT = 4.0  # [-] mean square of standardised residuals: more is no curve of Koschmieder's either
 MIN_USED = 0.6  # [-] least share of the band's rows that must fit
-LEAST_CONTRAST = 0.08  # [-] of the road to the airlight, for fog to show
 SURE_OF_FOG = 4.5  # [-] least k in its standard deviations
-CLEAR = OPTICAL_DEPTH_AT_VISIBILITY / 300.0  # [1/m] what k must surely be below to be called no fog
 USUAL_HEIGHT = 1.3  # [m] of a camera, for which the lengths of the fit are meant
 MODEL_DEVIATION = 0.02  # [-] of k by what the model leaves out: dark corners, marks, a road that is not quite flat
 

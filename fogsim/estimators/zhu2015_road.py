@@ -1,12 +1,11 @@
 """What zhu2015 sees of the road in one frame: lane lines, horizon, region, and the fog in its rows."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.estimators.zhu2015_fit import fitted_strips
 from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
 from fogsim.vision.light.luminance import linear_pixels
@@ -26,6 +25,13 @@ from fogsim.vision.region.inflection import steepest_slope
 from fogsim.vision.region.region_kernels import region_tops
 from fogsim.vision.region.road_image import CannotTellError, RoadImage, road_image
 from fogsim.vision.region.road_region import constant_limits, cumulative_limits, grow_region
+from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, no_road
+from fogsim.vision.strips.joint_fit import MODEL_DEVIATION, JointFit, fit_agreeing
+from fogsim.vision.strips.joint_kernels import JointPrior
+from fogsim.vision.strips.joint_prior import SKY_DEVIATION
+from fogsim.vision.strips.sky import UNKNOWN_VIGNETTING, Sky, sky_above
+from fogsim.vision.strips.strip_curves import StripCurves, strip_curves, without_clipped
+from fogsim.vision.strips.strip_geometry import StripGeometry, strip_geometry
 
 LOWEST_ANGLE = math.radians(10.0)
 """Angle to the rows below which a line is no lane line (zhu2015 section 3.2) [rad]."""
@@ -45,6 +51,16 @@ BENT_ROAD = 0.2
 
 HALF_VEHICLE, VEHICLE_MARGIN = 1.5, 2.0
 """What a tracked vehicle hides either side of the axis, and how much nearer than told its foot may be [m]."""
+
+COVERED = 0.6
+"""Share of a bin that the region must hold for it to be road [-]."""
+
+FIRST_BINS, FIRST_COVERED = 12, 0.5
+"""Nearest bins of a strip, and the share of them that must be road: a region that gets beside the road farther away,
+where the fog hides its edge, has found the verge [-]."""
+
+CLIPPED_LEVEL, CLIPPED_DEVIATION = 1.03, 0.1
+"""How much brighter than it looks a clipped sky is taken to be, and its deviation upward, relative to it [-]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,6 +188,11 @@ def _hide(region: NDArray[np.uint8], road: RoadImage, camera: Camera, free: floa
 def inflection_rows(road: SeenRoad) -> NDArray[np.float64]:
     """Rows at which the columns of the region end, below the horizon [px]: the published inflection.
 
+    Parameters
+    ----------
+    road : SeenRoad
+        The road.
+
     Raises
     ------
     CannotTellError
@@ -186,10 +207,68 @@ def inflection_rows(road: SeenRoad) -> NDArray[np.float64]:
 def fitted_fog(road: SeenRoad, camera: Camera) -> tuple[float, float]:
     """Extinction and its standard deviation by a fit over the region's strips and the sky [1/m].
 
+    Parameters
+    ----------
+    road : SeenRoad
+        The road.
+    camera : Camera
+        The assumed calibration.
+
     Raises
     ------
     CannotTellError
-        If the road is hidden or follows no Koschmieder's law.
+        If the road is hidden, too bright, or follows no Koschmieder's law, or the fog does not show.
     """
-    fit, deviation = fitted_strips(road.pixels, road.region, road.image.first_row, camera, road.horizon, road.free)
-    return max(fit.extinction, 0.0), deviation
+    horizon = road.horizon
+    tilt = math.atan((camera.principal_point[1] - horizon.row) / camera.focal_length)
+    level = replace(camera, pitch=tilt, roll=0.0)
+    sky = sky_above(road.pixels, level, 3.0 * horizon.standard_deviation + 2.0)
+    if sky is None:
+        raise CannotTellError("no sky is seen above the horizon")
+    geometry = strip_geometry(level, max(1.0, horizon.standard_deviation))
+    curves = strip_curves(road.pixels, geometry, sky.noise, level, road.free)
+    curves = without_clipped(curves) if sky.is_clipped else curves
+    curves = _on_road(curves, geometry, road.region, road.image.first_row)
+    fit = fit_agreeing(curves, geometry, _prior(sky, horizon))
+    if fit is None:
+        raise CannotTellError("no road is seen")
+    _check(fit, sky)
+    if why := no_road(fit, curves, geometry, level):
+        raise CannotTellError(why)
+    return max(fit.extinction, 0.0), math.hypot(fit.extinction_deviation, MODEL_DEVIATION * fit.extinction)
+
+
+def _on_road(curves: StripCurves, geometry: StripGeometry, region: NDArray[np.uint8], first_row: int) -> StripCurves:
+    """Leave out bins that are not on the region, and strips that begin beside it."""
+    rows = (geometry.first + geometry.last) // 2 - first_row
+    inside = np.cumsum(np.pad(region[rows] != 0, ((0, 0), (1, 0))), axis=1, dtype=np.int32)
+    cols = region.shape[1]
+    left = np.clip(np.ceil(geometry.left).astype(np.int64), 0, cols)
+    right = np.clip(np.floor(geometry.right).astype(np.int64) + 1, left, cols)
+    at = np.arange(rows.size)
+    share = (inside[at, right] - inside[at, left]) / np.maximum(right - left, 1)
+    road = (share >= COVERED) & (curves.variance > 0)
+    for strip in range(1, len(road)):
+        nearest = np.flatnonzero(curves.variance[strip] > 0)[:FIRST_BINS]
+        if nearest.size == 0 or road[strip, nearest].mean() < FIRST_COVERED:
+            road[strip] = False
+    return replace(curves, variance=np.where(road, curves.variance, 0.0))
+
+
+def _prior(sky: Sky, horizon: Horizon) -> JointPrior:
+    airlight = sky.luminance
+    below, above = (math.hypot(SKY_DEVIATION * airlight, apart) for apart in (sky.deviation, sky.upward))
+    if sky.is_clipped:
+        airlight *= CLIPPED_LEVEL
+        below, above = below + airlight - sky.luminance, CLIPPED_DEVIATION * airlight
+    return JointPrior(airlight, below, above, 0.0, horizon.standard_deviation, 0.0, UNKNOWN_VIGNETTING)
+
+
+def _check(fit: JointFit, sky: Sky) -> None:
+    if fit.road >= (1.0 - LEAST_CONTRAST) * fit.airlight or fit.road >= 0.98 * sky.luminance:
+        raise CannotTellError("the road is nearly as bright as the airlight, or brighter")
+    if fit.misfit > MAX_MISFIT:
+        raise CannotTellError("the road fades into the airlight, but not as Koschmieder's law has it")
+    deviation = fit.extinction_deviation
+    if fit.extinction < 2.0 * deviation and fit.extinction + 2.0 * deviation > CLEAR:
+        raise CannotTellError("the extinction is not observable: too little road is seen")

@@ -8,6 +8,7 @@ exact likelihood of that model.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,59 @@ OUTLIERS_OF_OBSTACLE = 3
 """Fewest outliers that make an obstacle."""
 
 
+class Albedo(NamedTuple):
+    """How the albedo of a road wanders, relative to it.
+
+    Attributes
+    ----------
+    patch_deviation, patch_length : float
+        Standard deviation [-] and correlation length [m] of patches.
+    drift_deviation, drift_length : float
+        The same of the drift.
+    """
+
+    patch_deviation: float
+    patch_length: float
+    drift_deviation: float
+    drift_length: float
+
+
+class Residuals(NamedTuple):
+    """What the filter takes, bins from near to far.
+
+    Attributes
+    ----------
+    columns : (strips, n, m) float64
+        Residuals in column 0, and derivatives.
+    scale : (strips, n) float64
+        R t: what a relative change of albedo changes.
+    noise : (strips, n) float64
+        Variance of each bin apart from the albedo's; 0 marks a bin without data.
+    """
+
+    columns: NDArray[np.float64]
+    scale: NDArray[np.float64]
+    noise: NDArray[np.float64]
+
+
+class Whitened(NamedTuple):
+    """What the filter makes of them.
+
+    Attributes
+    ----------
+    innovations : (strips, n, m) float64
+        Over their standard deviations; 0 where a bin is not used.
+    constants : (strips, m) float64
+        What each column says of the strips' constants.
+    used : (strips, n) uint8
+        `USED`, `HIDDEN` or 0.
+    """
+
+    innovations: NDArray[np.float64]
+    constants: NDArray[np.float64]
+    used: NDArray[np.uint8]
+
+
 @kernel
 def _averaged(ratio: float) -> float:
     """Deviation of an Ornstein–Uhlenbeck process's mean over an extent of `ratio` lengths, relative to its own."""
@@ -38,8 +92,8 @@ def _averaged(ratio: float) -> float:
 
 
 @kernel
-def wandering(
-    distance: NDArray[np.float64], extent: NDArray[np.float64], albedo: NDArray[np.float64]
+def albedo_transitions(
+    distance: NDArray[np.float64], extent: NDArray[np.float64], albedo: Albedo
 ) -> NDArray[np.float64]:
     """How the albedo's states change from bin to bin, and what a bin shows of them.
 
@@ -49,8 +103,8 @@ def wandering(
     ----------
     distance, extent : (n,) float64
         Distance of each bin and how much road it covers [m].
-    albedo : (4,) float64
-        Deviation and length [m] of patches, of drift.
+    albedo : Albedo
+        How it wanders.
 
     Returns
     -------
@@ -59,25 +113,23 @@ def wandering(
         and the shares of drift and of patches that a bin's mean shows.
     """
     out = np.zeros((distance.size, 7))
-    rate = math.sqrt(3.0) / albedo[3]
+    rate = math.sqrt(3.0) / albedo.drift_length
     for i in range(distance.size):
         step = abs(distance[i] - distance[i - 1]) if i else 0.0
         fade = math.exp(-rate * step)
         out[i, 0], out[i, 1] = fade * (1.0 + rate * step), fade * step
         out[i, 2], out[i, 3] = -fade * rate * rate * step, fade * (1.0 - rate * step)
-        out[i, 4] = math.exp(-step / albedo[1])
-        out[i, 5], out[i, 6] = _averaged(extent[i] / albedo[3]), _averaged(extent[i] / albedo[1])
+        out[i, 4] = math.exp(-step / albedo.patch_length)
+        out[i, 5] = _averaged(extent[i] / albedo.drift_length)
+        out[i, 6] = _averaged(extent[i] / albedo.patch_length)
     return out
 
 
 @kernel
-def _age(
-    covariance: NDArray[np.float64],
-    state: NDArray[np.float64],
-    change: NDArray[np.float64],
-    albedo: NDArray[np.float64],
+def _predict(
+    covariance: NDArray[np.float64], state: NDArray[np.float64], change: NDArray[np.float64], albedo: Albedo
 ) -> None:
-    """Let drift (states 0 and 1, value and slope) and patches (states 3, 5, …) forget over a step along the road."""
+    """Predict drift (states 0 and 1, value and slope) and patches (states 3, 5, …) a step farther along the road."""
     size, width = state.shape
     f00, f01, f10, f11, keep = change[0], change[1], change[2], change[3], change[4]
     for j in range(width):
@@ -96,30 +148,31 @@ def _age(
         covariance[j, 0], covariance[j, 1] = f00 * first + f01 * second, f10 * first + f11 * second
         for a in range(3, size, 2):
             covariance[j, a] *= keep
-    value, slope = albedo[2] ** 2, (math.sqrt(3.0) / albedo[3] * albedo[2]) ** 2
+    value = albedo.drift_deviation**2
+    slope = (math.sqrt(3.0) / albedo.drift_length * albedo.drift_deviation) ** 2
     covariance[0, 0] += value - f00 * f00 * value - f01 * f01 * slope
     covariance[1, 1] += slope - f10 * f10 * value - f11 * f11 * slope
     cross = f00 * f10 * value + f01 * f11 * slope
     covariance[0, 1] -= cross
     covariance[1, 0] -= cross
     for a in range(3, size, 2):
-        covariance[a, a] += (1.0 - keep * keep) * albedo[0] ** 2
+        covariance[a, a] += (1.0 - keep * keep) * albedo.patch_deviation**2
 
 
 @kernel
-def _started(strips: int, albedo: NDArray[np.float64]) -> NDArray[np.float64]:
+def _initial_covariance(strips: int, albedo: Albedo) -> NDArray[np.float64]:
     """Covariance of drift, its slope, and each strip's constant and patches before anything is seen."""
     covariance = np.zeros((2 + 2 * strips, 2 + 2 * strips))
-    covariance[0, 0] = albedo[2] ** 2
-    covariance[1, 1] = 3.0 * (albedo[2] / albedo[3]) ** 2
+    covariance[0, 0] = albedo.drift_deviation**2
+    covariance[1, 1] = 3.0 * (albedo.drift_deviation / albedo.drift_length) ** 2
     for strip in range(strips):
         covariance[2 + 2 * strip, 2 + 2 * strip] = CONSTANT_DEVIATION**2
-        covariance[3 + 2 * strip, 3 + 2 * strip] = albedo[0] ** 2
+        covariance[3 + 2 * strip, 3 + 2 * strip] = albedo.patch_deviation**2
     return covariance
 
 
 @kernel
-def _seen_covariance(
+def _covariance_with_bin(
     covariance: NDArray[np.float64], h0: float, h1: float, h2: float, strip: int, out: NDArray[np.float64]
 ) -> None:
     """Covariance of all states with what a bin shows of the drift, and of its strip's constant and patches."""
@@ -137,7 +190,7 @@ def _is_road(
     p: NDArray[np.float64],
     state: NDArray[np.float64],
 ) -> bool:
-    """Whether a bin, of which a residual and its variance are seen, is no outlier; see `_seen_covariance`."""
+    """Whether a bin, of which a residual and its variance are seen, is no outlier; see `_covariance_with_bin`."""
     c, d = strip, strip + 1
     total = h0 * h0 * p[0, 0] + h1 * h1 * p[c, c] + h2 * h2 * p[d, d]
     total += 2.0 * (h0 * h1 * p[0, c] + h0 * h2 * p[0, d] + h1 * h2 * p[c, d])
@@ -146,7 +199,7 @@ def _is_road(
 
 
 @kernel
-def _unexplained(used: int, noise: float, airlight: float) -> float:
+def _cost_without(used: int, noise: float, airlight: float) -> float:
     """What a bin adds to the cost that is not in use."""
     if used == HIDDEN:
         return HIDDEN_COST + math.log(noise)
@@ -154,7 +207,7 @@ def _unexplained(used: int, noise: float, airlight: float) -> float:
 
 
 @kernel
-def _learn(
+def _update(
     covariance: NDArray[np.float64],
     state: NDArray[np.float64],
     gain: NDArray[np.float64],
@@ -172,85 +225,90 @@ def _learn(
 
 
 @kernel
-def whiten(  # noqa: C901 - one pass of a filter, which shares all its arrays
-    columns: NDArray[np.float64],
-    scale: NDArray[np.float64],
-    noise: NDArray[np.float64],
-    changes: NDArray[np.float64],
-    albedo: NDArray[np.float64],
-    airlight: float,
-    reject: bool,
+def _mark_outliers(
+    residuals: Residuals,
+    i: int,
+    change: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+    state: NDArray[np.float64],
     used: NDArray[np.uint8],
-    out: NDArray[np.float64],
-    constant: NDArray[np.float64],
+) -> None:
+    """Note which strips show road on one bin: all by what lies nearer, so that none comes before another."""
+    for strip in range(used.shape[0]):
+        h1 = residuals.scale[strip, i]
+        h0, h2 = h1 * change[5], h1 * change[6]
+        seen = (residuals.columns[strip, i, 0], residuals.noise[strip, i])
+        used[strip, i] = USED if _is_road(seen, h0, h1, h2, 2 + 2 * strip, covariance, state) else 0
+
+
+@kernel
+def whiten(
+    residuals: Residuals, changes: NDArray[np.float64], albedo: Albedo, airlight: float, reject: bool, out: Whitened
 ) -> float:
-    """Innovations of residual and derivatives of all strips, near to far; returns the logarithm of the determinant.
+    """Innovations of residuals and derivatives of all strips, near to far; returns the logarithm of the determinant.
 
     Parameters
     ----------
-    columns : (strips, n, m) float64
-        Residuals in column 0 and derivatives.
-    scale : (strips, n) float64
-        R t: what a relative change of albedo changes.
-    noise : (strips, n) float64
-        Variance of each bin apart from the albedo's; 0 marks a bin without data.
+    residuals : Residuals
+        Residuals and derivatives.
     changes : (n, 7) float64
-        See `wandering`.
-    albedo : (4,) float64
-        Deviation and length [m] of patches, of drift.
+        See `albedo_transitions`.
+    albedo : Albedo
+        How the albedo wanders.
     airlight : float
         Luminance that no bin much exceeds [linear grey levels].
     reject : bool
-        Look for outliers and note in `used` (strips, n) what is left; else go by `used`.
-    out : (strips, n, m) float64
-        The innovations over their deviations; 0 where a bin is not used.
-    constant : (strips, m) float64
-        What each column says of the strips' constants.
+        Look for outliers and note in `out.used` what is left; else go by that.
+    out : Whitened
+        The innovations; is written.
     """
+    columns, scale, noise, used = residuals.columns, residuals.scale, residuals.noise, out.used
     strips, count, width = columns.shape
-    covariance = _started(strips, albedo)
+    covariance = _initial_covariance(strips, albedo)
     size = covariance.shape[0]
     state, gain, innovation = np.zeros((size, width)), np.empty(size), np.empty(width)
     log_determinant, product = 0.0, 1.0
     for i in range(count):
         if i:
-            _age(covariance, state, changes[i], albedo)
+            _predict(covariance, state, changes[i], albedo)
         if reject:
-            # All strips by what lies nearer, so that none comes before another.
-            for strip in range(strips):
-                h1 = scale[strip, i]
-                h0, h2 = h1 * changes[i, 5], h1 * changes[i, 6]
-                seen = (columns[strip, i, 0], noise[strip, i])
-                used[strip, i] = USED if _is_road(seen, h0, h1, h2, 2 + 2 * strip, covariance, state) else 0
+            _mark_outliers(residuals, i, changes[i], covariance, state, used)
         for strip in range(strips):
-            out[strip, i, :] = 0.0
+            out.innovations[strip, i, :] = 0.0
             if noise[strip, i] <= 0.0:
                 used[strip, i] = 0
                 continue
             c, h1 = 2 + 2 * strip, scale[strip, i]
             h0, h2 = h1 * changes[i, 5], h1 * changes[i, 6]
-            _seen_covariance(covariance, h0, h1, h2, c, gain)
+            _covariance_with_bin(covariance, h0, h1, h2, c, gain)
             total = h0 * gain[0] + h1 * gain[c] + h2 * gain[c + 1] + noise[strip, i]
             for j in range(width):
                 innovation[j] = columns[strip, i, j] - h0 * state[0, j] - h1 * state[c, j] - h2 * state[c + 1, j]
             if used[strip, i] != USED:
-                log_determinant += _unexplained(used[strip, i], noise[strip, i], airlight)
+                log_determinant += _cost_without(used[strip, i], noise[strip, i], airlight)
                 continue
             # One logarithm for several factors.
             product *= total
             if not 1e-100 < product < 1e100:
                 log_determinant, product = log_determinant + math.log(product), 1.0
-            _learn(covariance, state, gain, innovation, total)
+            _update(covariance, state, gain, innovation, total)
             weight = 1.0 / math.sqrt(total)
             for j in range(width):
-                out[strip, i, j] = innovation[j] * weight
-    constant[:] = state[2::2]
+                out.innovations[strip, i, j] = innovation[j] * weight
+    out.constants[:] = state[2::2]
     return log_determinant + math.log(product)
 
 
 @kernel
 def hide_behind_obstacles(noise: NDArray[np.float64], used: NDArray[np.uint8]) -> bool:
     """Drop what lies behind each strip's nearest outlier from which on most is outliers: it stands there and hides it.
+
+    Parameters
+    ----------
+    noise : (strips, n) float64
+        Variance of each bin; 0 marks a bin without data.
+    used : (strips, n) uint8
+        See `Whitened`; is written.
 
     Returns
     -------

@@ -3,12 +3,22 @@
 import numpy as np
 
 from fogsim.linear_algebra import matrix_product
+from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.vision.light.luminance import linear_table
 from fogsim.vision.light.medians import median
 from fogsim.vision.strips.joint_fit import JointFit
 from fogsim.vision.strips.strip_curves import StripCurves
 from fogsim.vision.strips.strip_geometry import StripGeometry
+
+LEAST_CONTRAST = 0.08
+"""Least contrast of the road to the airlight for fog to show [-]."""
+
+MAX_MISFIT = 4.0
+"""Mean square of the standardised residuals beyond which the curve is none of Koschmieder's [-]."""
+
+CLEAR = OPTICAL_DEPTH_AT_VISIBILITY / 300.0
+"""Extinction that an estimate which may as well be none must surely be below to say "little fog" [1/m]."""
 
 MAX_SCATTER = 0.22
 """Scatter across the own lane relative to its contrast to the airlight, beyond which it is no road [-]: marks, shadows

@@ -1,4 +1,7 @@
-"""Joint fit of extinction, airlight and horizon over strips of road whose albedo may wander."""
+"""Joint fit of extinction, airlight and horizon over strips of road whose albedo may wander.
+
+`fit_jointly` fits given strips, `fit_agreeing` the own lane with those neighbours that agree with it.
+"""
 
 import math
 from dataclasses import dataclass
@@ -6,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.vision.strips import albedo_filter, joint_kernels, joint_search
-from fogsim.vision.strips.sky import UNTOLD_DARKENING
+from fogsim.vision.strips import albedo_filter, joint_kernels
+from fogsim.vision.strips.albedo_filter import Albedo
+from fogsim.vision.strips.joint_kernels import Bins, JointPrior, Solution
 from fogsim.vision.strips.strip_curves import StripCurves
 from fogsim.vision.strips.strip_geometry import StripGeometry
 
@@ -41,15 +45,27 @@ STEPS, MORE_STEPS = 10, 5
 LEAST_BINS = 8
 """Fewest bins of the own lane for a fit."""
 
-
-UNSURE = 0.008
+UNSURE_AIRLIGHT = 0.008
 """Relative deviation of the airlight from which on its place is sought [-]."""
 
-MOST_DARKENED = 0.6
+MOST_VIGNETTING = 0.6
 """Most that a lens takes of a bin's light [-]."""
 
 FAR_BINS = 8
 """Farthest bins of the own lane, which show the airlight where the fog is dense."""
+
+DISAGREEMENT = 2.0
+"""Standard deviations by which a neighbouring strip may change the extinction [-]."""
+
+MODEL_DEVIATION = 0.01
+"""Relative deviation of k by what the model leaves out: marks, rounding, a road that is not quite flat [-]."""
+
+SURE = 0.03
+"""Relative deviation of k up to which the own lane's answer judges its neighbours [-]: one that is less sure, as where
+something stands in that lane, is itself more easily wrong than they."""
+
+OVERCONFIDENCE = 1.0
+"""How much farther than its deviation says such an answer may be off [-]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +79,7 @@ class JointFit:
     airlight : float
         A [linear grey levels].
     shift : float
-        Rows by which the horizon is lower than told [px].
+        Rows by which the horizon is lower than the calibration has it [px].
     road : float
         Luminance of the own lane without fog [linear grey levels].
     misfit : float
@@ -82,32 +98,6 @@ class JointFit:
     misfit: float
     used: NDArray[np.bool_]
     hidden: NDArray[np.bool_]
-
-
-@dataclass(frozen=True, slots=True)
-class JointPrior:
-    """What is known before the road is looked at.
-
-    Attributes
-    ----------
-    airlight : float
-        Luminance of the sky [linear grey levels].
-    below, above : float
-        Deviation of the airlight from it, downward and upward; upward it is large where the sky is saturated.
-    shift, shift_deviation : float
-        Rows by which the horizon is lower than told, and their standard deviation [px].
-    darkening, darkening_deviation : float
-        How much of what a simple lens takes from pixels off its axis (1 − cos⁴) this one takes, and the standard
-        deviation of that [-].
-    """
-
-    airlight: float
-    below: float
-    above: float
-    shift: float
-    shift_deviation: float
-    darkening: float = 0.0
-    darkening_deviation: float = UNTOLD_DARKENING
 
 
 def fit_jointly(
@@ -136,120 +126,97 @@ def fit_jointly(
     """
     if int((curves.variance[0] > 0).sum()) < LEAST_BINS:
         return None
-    data = _Data(_brightened(curves, geometry, prior.darkening), geometry)
-    best = data.from_search(prior) if near is None else data.from_near(near, prior)
+    bins = _bins(curves, geometry, prior.vignetting)
+    best = _from_search(bins, prior) if near is None else _from_near(bins, near, prior)
     tried = ALBEDOS if best.misfit > EXPLAINED else ALBEDOS[:SMOOTH]
-    return _average([best] + [data.refined(albedo, prior, best.theta, MORE_STEPS) for albedo in tried[1:]])
+    return _average([best] + [_refined(bins, albedo, prior, best.theta, MORE_STEPS) for albedo in tried[1:]])
 
 
-@dataclass(frozen=True, slots=True)
-class _Refined:
-    """Answer for one strength of patches and drift: k, airlight, shift and darkening with their covariance."""
-
-    theta: Floats
-    covariance: Floats
-    cost: float
-    misfit: float
-    road: float
-    used: NDArray[np.uint8]
-
-
-@dataclass(frozen=True, slots=True)
-class _Data:
-    """Strips of one image, as the kernels take them."""
-
-    curves: StripCurves
-    geometry: StripGeometry
-
-    @property
-    def _bins(self) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats, Floats]:
-        g = self.geometry
-        return (self.curves.luminance, self.curves.variance, g.below, g.half, g.path, g.distance, g.extent)
-
-    def from_near(self, near: JointFit, prior: JointPrior) -> _Refined:
-        """Best answer from one for some of the strips, and from that of the simple model if it is another."""
-        found = [self._refined_from(prior, (near.extinction, near.airlight), near.shift)]
-        simple = self._simple(prior)
-        if abs(math.log(simple[0] / max(near.extinction, self._span()[0]))) > ALIKE:
-            found.append(self._refined_from(prior, simple, prior.shift))
-        return min(found, key=lambda f: f.cost)
-
-    def from_search(self, prior: JointPrior) -> _Refined:
-        """Best answer from that of the simple model, whose likelihood is not so narrow that a grid may miss it.
-
-        Where it does not fit nearly all bins, others are tried: the best of a coarse grid with an airlight as in the
-        prior or, where that is unsure, as what the farthest road may have faded into.
-        """
-        starts = [self._simple(prior)]
-        found = [self._refined_from(prior, starts[0], prior.shift)]
-        if self._is_clear(found[0]):
-            return found[0]
-        airlights = [prior.airlight]
-        if prior.below > UNSURE * prior.airlight:
-            airlights.append(self._farthest())
-        grid = self._grid(EXTINCTIONS)
-        for airlight in airlights:
-            cost = joint_search.search(*self._bins, _albedo(ALBEDOS[1]), grid, airlight, prior.shift)
-            best = int(np.argmin(cost))
-            new = all(abs(math.log(grid[best] / k)) > ALIKE for k, _ in starts)
-            if math.isfinite(cost[best]) and new:
-                starts.append((float(grid[best]), airlight))
-                found.append(self._refined_from(prior, starts[-1], prior.shift))
-        return min(found, key=lambda f: f.cost)
-
-    def _simple(self, prior: JointPrior) -> tuple[float, float]:
-        return joint_search.simple_search(*self._bins[:5], self._grid(SIMPLE_EXTINCTIONS), _known(prior))
-
-    def _grid(self, count: int) -> Floats:
-        least, most = self._span()
-        return np.exp(np.linspace(math.log(least), math.log(most), count))
-
-    def _span(self) -> tuple[float, float]:
-        """Least and greatest extinction that show [1/m]."""
-        unit = 1.0 / float(self.geometry.path[0, 0])
-        return 0.2 * unit, 2.0 * unit * float(self.geometry.below[0])
-
-    def _refined_from(self, prior: JointPrior, start: tuple[float, float], shift: float) -> _Refined:
-        return self.refined(ALBEDOS[0], prior, np.array([*start, shift, 0.0]), STEPS)
-
-    def _is_clear(self, found: _Refined) -> bool:
-        """Whether an answer leaves nothing to explain, even on a road that hardly wanders."""
-        used = int((found.used == albedo_filter.USED).sum())
-        return found.misfit < CLEAR_MISFIT and used >= CLEAR_USED * int((self.curves.variance > 0).sum())
-
-    def _farthest(self) -> float:
-        seen = self.curves.luminance[0][self.curves.variance[0] > 0]
-        return float(np.median(seen[-FAR_BINS:]))
-
-    def refined(self, albedo: tuple[float, float], prior: JointPrior, start: Floats, steps: int) -> _Refined:
-        """Gauss–Newton from a start."""
-        used = np.zeros(self.curves.luminance.shape, np.uint8)
-        bins = (*self._bins, self.geometry.off_axis)
-        theta, covariance, road, cost, squares, number = joint_kernels.refine(
-            *bins, _albedo(albedo), _known(prior), start, used, steps
-        )
-        return _Refined(theta, covariance, cost, squares / max(number, 1), road, used)
+def _bins(curves: StripCurves, geometry: StripGeometry, vignetting: float) -> Bins:
+    """Strips as the kernels take them, the lens's vignetting undone."""
+    luminance, variance = curves.luminance, curves.variance
+    if vignetting != 0.0:
+        gain = 1.0 / (1.0 - np.minimum(vignetting * geometry.off_axis, MOST_VIGNETTING))
+        luminance, variance = gain * luminance, gain**2 * variance
+    return Bins(
+        luminance=np.ascontiguousarray(luminance),
+        noise=np.ascontiguousarray(variance),
+        path=geometry.path,
+        off_axis=geometry.off_axis,
+        below=geometry.below,
+        half=geometry.half,
+        distance=geometry.distance,
+        extent=geometry.extent,
+    )
 
 
-def _known(prior: JointPrior) -> Floats:
-    shift = (prior.shift, prior.shift_deviation)
-    return np.array([prior.airlight, prior.below, prior.above, *shift, prior.darkening_deviation])
+def _from_near(bins: Bins, near: JointFit, prior: JointPrior) -> Solution:
+    """Best answer from one for some of the strips, and from that with a constant albedo if it is another."""
+    found = [_refined_from(bins, prior, (near.extinction, near.airlight), near.shift)]
+    simple = _constant_albedo(bins, prior)
+    if abs(math.log(simple[0] / max(near.extinction, _span(bins)[0]))) > ALIKE:
+        found.append(_refined_from(bins, prior, simple, prior.shift))
+    return min(found, key=lambda f: f.cost)
 
 
-def _brightened(curves: StripCurves, geometry: StripGeometry, darkening: float) -> StripCurves:
-    """Undo the lens's darkening."""
-    if darkening == 0.0:
-        return curves
-    gain = 1.0 / (1.0 - np.minimum(darkening * geometry.off_axis, MOST_DARKENED))
-    return StripCurves(gain * curves.luminance, gain**2 * curves.variance, curves.scatter)
+def _from_search(bins: Bins, prior: JointPrior) -> Solution:
+    """Best answer from that with a constant albedo, whose likelihood is not so narrow that a grid may miss it.
+
+    Where it does not fit nearly all bins, others are tried: the best of a coarse grid with an airlight as in the
+    prior or, where that is unsure, as what the farthest road may have faded into.
+    """
+    starts = [_constant_albedo(bins, prior)]
+    found = [_refined_from(bins, prior, starts[0], prior.shift)]
+    if _is_clear(bins, found[0]):
+        return found[0]
+    airlights = [prior.airlight]
+    if prior.below > UNSURE_AIRLIGHT * prior.airlight:
+        airlights.append(float(np.median(bins.luminance[0][bins.noise[0] > 0][-FAR_BINS:])))
+    grid = _grid(bins, EXTINCTIONS)
+    for airlight in airlights:
+        cost = joint_kernels.extinction_costs(bins, _albedo(ALBEDOS[1]), grid, airlight, prior.shift)
+        best = int(np.argmin(cost))
+        new = all(abs(math.log(grid[best] / k)) > ALIKE for k, _ in starts)
+        if math.isfinite(cost[best]) and new:
+            starts.append((float(grid[best]), airlight))
+            found.append(_refined_from(bins, prior, starts[-1], prior.shift))
+    return min(found, key=lambda f: f.cost)
 
 
-def _albedo(deviations: tuple[float, float]) -> Floats:
-    """Deviation and length of patches, deviation and length of drift, as the kernels take them."""
-    return np.array([deviations[0], PATCH_LENGTH, deviations[1], DRIFT_LENGTH])
+def _constant_albedo(bins: Bins, prior: JointPrior) -> tuple[float, float]:
+    return joint_kernels.fit_constant_albedo(bins, _grid(bins, SIMPLE_EXTINCTIONS), prior)
 
 
-def _average(found: list[_Refined]) -> JointFit:
+def _grid(bins: Bins, count: int) -> Floats:
+    least, most = _span(bins)
+    return np.exp(np.linspace(math.log(least), math.log(most), count))
+
+
+def _span(bins: Bins) -> tuple[float, float]:
+    """Least and greatest extinction that show [1/m]."""
+    unit = 1.0 / float(bins.path[0, 0])
+    return 0.2 * unit, 2.0 * unit * float(bins.below[0])
+
+
+def _refined_from(bins: Bins, prior: JointPrior, start: tuple[float, float], shift: float) -> Solution:
+    return _refined(bins, ALBEDOS[0], prior, np.array([*start, shift, 0.0]), STEPS)
+
+
+def _refined(bins: Bins, albedo: tuple[float, float], prior: JointPrior, start: Floats, steps: int) -> Solution:
+    return joint_kernels.gauss_newton(bins, _albedo(albedo), prior, start, steps)
+
+
+def _albedo(deviations: tuple[float, float]) -> Albedo:
+    return Albedo(deviations[0], PATCH_LENGTH, deviations[1], DRIFT_LENGTH)
+
+
+def _is_clear(bins: Bins, found: Solution) -> bool:
+    """Whether an answer leaves nothing to explain, even on a road that hardly wanders."""
+    used = int((found.used == albedo_filter.USED).sum())
+    return found.misfit < CLEAR_MISFIT and used >= CLEAR_USED * int((bins.noise > 0).sum())
+
+
+def _average(found: list[Solution]) -> JointFit:
     costs = np.array([f.cost for f in found]) - 2.0 * np.log(ALBEDO_CHANCES[: len(found)])
     weight = np.exp(-0.5 * (costs - costs.min()))
     weight /= weight.sum()
@@ -267,3 +234,100 @@ def _average(found: list[_Refined]) -> JointFit:
         used=best.used == albedo_filter.USED,
         hidden=best.used[0] == albedo_filter.HIDDEN,
     )
+
+
+def fit_agreeing(curves: StripCurves, geometry: StripGeometry, prior: JointPrior) -> JointFit | None:
+    """Fit the own lane, which is the first strip, with the neighbours that agree with it.
+
+    A strip that holds a lane at one distance and a verge at another looks like fog of another density. Where the own
+    lane alone says little, all strips count.
+
+    Parameters
+    ----------
+    curves : StripCurves
+        Luminance by bin.
+    geometry : StripGeometry
+        Where the bins are.
+    prior : JointPrior
+        Sky and horizon.
+
+    Returns
+    -------
+    JointFit or None
+        None if the own lane has too few bins.
+    """
+    own = fit_own(curves, geometry, prior)
+    return None if own is None else with_neighbours(own, curves, geometry, prior)
+
+
+def fit_own(curves: StripCurves, geometry: StripGeometry, prior: JointPrior) -> JointFit | None:
+    """Fit the own lane alone.
+
+    Parameters
+    ----------
+    curves, geometry, prior
+        See `fit_agreeing`.
+
+    Returns
+    -------
+    JointFit or None
+        None if it has too few bins.
+    """
+    return _fitted(curves, geometry, prior, [0])
+
+
+def with_neighbours(own: JointFit, curves: StripCurves, geometry: StripGeometry, prior: JointPrior) -> JointFit:
+    """Fit the own lane again, with the neighbours that agree with it.
+
+    Parameters
+    ----------
+    own : JointFit
+        Fit of the own lane alone.
+    curves, geometry, prior
+        See `fit_agreeing`.
+    """
+    seen = [strip for strip in range(1, len(curves.variance)) if (curves.variance[strip] > 0).any()]
+    best = _fitted(curves, geometry, prior, [0, *seen], own) if seen else None
+    if best is None:
+        return own
+    if agree(own, best):
+        return best
+    if len(seen) == 1:
+        return own
+    found = [_fitted(curves, geometry, prior, [0, strip], own) for strip in seen]
+    pairs = [pair for pair in found if pair is not None]
+    # With an obstacle where there is none, or without the one that there is, a lane alone fits well and is far off.
+    if own.hidden.any() and len(pairs) == len(seen) and all(_alike(pair, best) for pair in pairs):
+        return best
+    kept = [pair for pair in pairs if agree(own, pair)]
+    return kept[0] if len(kept) == 1 else own
+
+
+def agree(own: JointFit, more: JointFit) -> bool:
+    """Whether more strips change the extinction by no more than they sharpen it (Hausman 1978, eq. 2.2).
+
+    Parameters
+    ----------
+    own, more : JointFit
+        Fit of the own lane, and of it with others.
+    """
+    sharpened = max(own.extinction_deviation**2 - more.extinction_deviation**2, 0.0)
+    if own.extinction_deviation > SURE * own.extinction:
+        sharpened = (OVERCONFIDENCE * own.extinction_deviation) ** 2
+    return abs(more.extinction - own.extinction) <= DISAGREEMENT * math.hypot(
+        math.sqrt(sharpened), MODEL_DEVIATION * own.extinction
+    )
+
+
+def _alike(first: JointFit, second: JointFit) -> bool:
+    """Whether two answers differ by no more than their deviations."""
+    apart = math.hypot(first.extinction_deviation, second.extinction_deviation)
+    return abs(first.extinction - second.extinction) <= DISAGREEMENT * apart
+
+
+def _fitted(
+    curves: StripCurves, geometry: StripGeometry, prior: JointPrior, strips: list[int], near: JointFit | None = None
+) -> JointFit | None:
+    lanes = geometry.only(strips)
+    read = StripCurves(curves.luminance[strips], curves.variance[strips], curves.scatter[strips])
+    return fit_jointly(read, lanes, prior, near)

@@ -1,21 +1,32 @@
-"""Compiled Gauss–Newton for Koschmieder's law over strips of road whose albedo wanders.
+"""Compiled fit of Koschmieder's law to strips of road whose albedo wanders: searches for a start, and Gauss–Newton.
 
 The filter of `albedo_filter` turns residuals and derivatives alike into independent ones, and so gives the exact step
 and the exact likelihood.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
 from fogsim.linear_algebra import times
-from fogsim.vision.strips.albedo_filter import USED, hide_behind_obstacles, wandering, whiten
-from fogsim.vision.strips.road_curve import near_road, transmission
+from fogsim.vision.strips.albedo_filter import (
+    USED,
+    Albedo,
+    Residuals,
+    Whitened,
+    albedo_transitions,
+    hide_behind_obstacles,
+    whiten,
+)
 
 PARAMETERS = 4
-"""Extinction, airlight, rows by which the horizon is lower, darkening of the lens that is left."""
+"""Extinction, airlight, rows by which the horizon is lower, vignetting that is left."""
+
+SHORT = 0.15
+"""Height of a bin over its rows below the horizon up to which a series takes the place of Simpson's rule [-]."""
 
 NEAR_BINS = 12
 """Nearest bins that the first guess of the road's luminance is made of."""
@@ -23,37 +34,158 @@ NEAR_BINS = 12
 CONVERGED = 1e-3
 """Step of k, relative to it and to the least that shows, below which no other is made [-]."""
 
+GRAINY = 0.01
+"""Deviation of bins by the road's texture in the search with a constant albedo, relative to the airlight [-]."""
+
+
+class Bins(NamedTuple):
+    """Bins of rows of strips of road, nearest first, as the kernels take them.
+
+    Attributes
+    ----------
+    luminance, noise : (strips, n) float64
+        Luminance and its variance apart from the albedo's; see `fogsim.vision.strips.strip_curves.StripCurves`.
+    path, off_axis : (strips, n) float64
+        See `fogsim.vision.strips.strip_geometry.StripGeometry`.
+    below, half, distance, extent : (n,) float64
+        See there.
+    """
+
+    luminance: NDArray[np.float64]
+    noise: NDArray[np.float64]
+    path: NDArray[np.float64]
+    off_axis: NDArray[np.float64]
+    below: NDArray[np.float64]
+    half: NDArray[np.float64]
+    distance: NDArray[np.float64]
+    extent: NDArray[np.float64]
+
+
+class JointPrior(NamedTuple):
+    """What is known before the road is looked at.
+
+    Attributes
+    ----------
+    airlight : float
+        Luminance of the sky [linear grey levels].
+    below, above : float
+        Deviation of the airlight from it, downward and upward; upward it is large where the sky is saturated.
+    shift, shift_deviation : float
+        Rows by which the horizon is lower than the calibration has it, and their standard deviation [px].
+    vignetting, vignetting_deviation : float
+        How much of what a simple lens takes from pixels off its axis (1 − cos⁴) this one takes, and the standard
+        deviation of that [-].
+    """
+
+    airlight: float
+    below: float
+    above: float
+    shift: float
+    shift_deviation: float
+    vignetting: float
+    vignetting_deviation: float
+
+
+class Solution(NamedTuple):
+    """Answer for one strength of patches and drift.
+
+    Attributes
+    ----------
+    theta : (4,) float64
+        k, airlight, shift and vignetting that is left.
+    covariance : (4, 4) float64
+        Theirs.
+    cost : float
+        Minus twice the log likelihood, with the parameters' priors and integrated over them.
+    misfit : float
+        Mean square of the innovations.
+    road : float
+        Luminance of the first strip without fog [linear grey levels].
+    used : (strips, n) uint8
+        Which bins took part, see `fogsim.vision.strips.albedo_filter.Whitened`.
+    """
+
+    theta: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    cost: float
+    misfit: float
+    road: float
+    used: NDArray[np.uint8]
+
 
 @kernel
-def _linearise(
-    luminance: NDArray[np.float64],
-    below: NDArray[np.float64],
-    half: NDArray[np.float64],
-    path: NDArray[np.float64],
-    off_axis: NDArray[np.float64],
-    theta: NDArray[np.float64],
-    road: float,
-    columns: NDArray[np.float64],
-    scale: NDArray[np.float64],
-) -> None:
+def mean_transmittance(below: float, half: float, path: float, k: float) -> tuple[float, float, float]:
+    """Mean transmittance over a bin's height, with its derivatives by extinction and by the horizon's row.
+
+    Near the horizon a row spans hundreds of metres: Simpson's rule there, farther down e^(−x) with x = k path / below
+    and the second term of its Taylor series, which is what Simpson's rule makes of short bins.
+
+    Parameters
+    ----------
+    below, half : float
+        Middle of the bin below the horizon, and half its height [px].
+    path : float
+        λ times the slant: over the rows below the horizon, the length of the ray [px·m].
+    k : float
+        Extinction [1/m].
+    """
+    value, by_k, by_shift = 0.0, 0.0, 0.0
+    if half < SHORT * below:
+        distance = path / below
+        x, share, middle = k * distance, (half / below) ** 2 / 6.0, math.exp(-k * distance)
+        curve, bend = x * x - 2.0 * x, 2.0 * x - 2.0
+        value = middle * (1.0 + share * curve)
+        by_k = distance * (middle * share * bend - value)
+        by_shift = middle / below * (share * (2.0 * curve + x * bend) - x * (1.0 + share * curve))
+        return value, by_k, by_shift
+    for j in range(3):
+        rows = below + (j - 1) * half
+        if rows <= 0.0:
+            continue
+        distance = path / rows
+        part = (4.0 if j == 1 else 1.0) / 6.0 * math.exp(-k * distance)
+        value += part
+        by_k -= distance * part
+        by_shift -= k * distance / rows * part
+    return value, by_k, by_shift
+
+
+@kernel
+def _near_road(bins: Bins, strip: int, k: float, airlight: float, shift: float) -> float:
+    """Luminance of a strip without fog: median of what its nearest bins say, given the fog."""
+    found = np.empty(NEAR_BINS)
+    count = 0
+    for i in range(bins.below.size):
+        if bins.noise[strip, i] > 0.0 and count < NEAR_BINS:
+            value, _, _ = mean_transmittance(bins.below[i] - shift, bins.half[i], bins.path[strip, i], k)
+            found[count] = airlight + (bins.luminance[strip, i] - airlight) / max(value, 1e-6)
+            count += 1
+    return float(np.median(found[:count])) if count else 0.0
+
+
+@kernel
+def _linearise(bins: Bins, strip: int, theta: NDArray[np.float64], road: float, out: Residuals) -> None:
     """Residual and derivatives by the parameters of one strip, and the scale of its albedo."""
     drop = road - theta[1]
-    for i in range(below.size):
-        value, by_k, by_shift = transmission(below[i] - theta[2], half[i], path[i], theta[0])
-        bright, open_part = theta[1] + drop * value, 1.0 - theta[3] * off_axis[i]
-        columns[i, 0] = luminance[i] - bright * open_part
+    columns, scale = out.columns[strip], out.scale[strip]
+    for i in range(bins.below.size):
+        value, by_k, by_shift = mean_transmittance(
+            bins.below[i] - theta[2], bins.half[i], bins.path[strip, i], theta[0]
+        )
+        off_axis = bins.off_axis[strip, i]
+        bright, open_part = theta[1] + drop * value, 1.0 - theta[3] * off_axis
+        columns[i, 0] = bins.luminance[strip, i] - bright * open_part
         columns[i, 1] = drop * by_k * open_part
         columns[i, 2] = (1.0 - value) * open_part
         columns[i, 3] = drop * by_shift * open_part
-        columns[i, 4] = -bright * off_axis[i]
+        columns[i, 4] = -bright * off_axis
         scale[i] = road * value
 
 
 @kernel
-def _add_bins(
-    out: NDArray[np.float64], used: NDArray[np.uint8], normal: NDArray[np.float64], gradient: NDArray[np.float64]
-) -> tuple[float, int]:
+def _add_bins(whitened: Whitened, normal: NDArray[np.float64], gradient: NDArray[np.float64]) -> tuple[float, int]:
     """Add what the bins in use say to the normal equations; returns their squares and their number."""
+    out, used = whitened.innovations, whitened.used
     squares, number = 0.0, 0
     for strip in range(used.shape[0]):
         for i in range(used.shape[1]):
@@ -75,21 +207,21 @@ def _add_bins(
 
 @kernel
 def _add_prior(
-    theta: NDArray[np.float64], prior: NDArray[np.float64], normal: NDArray[np.float64], gradient: NDArray[np.float64]
+    theta: NDArray[np.float64], prior: JointPrior, normal: NDArray[np.float64], gradient: NDArray[np.float64]
 ) -> float:
     """Add what is known beforehand to the normal equations; returns what it adds to the cost."""
-    off, lower = theta[1] - prior[0], theta[2] - prior[3]
-    airlight = 1.0 / (prior[1] if off < 0.0 else prior[2]) ** 2
-    shift, darkening = 1.0 / prior[4] ** 2, 1.0 / prior[5] ** 2
+    off, lower = theta[1] - prior.airlight, theta[2] - prior.shift
+    airlight = 1.0 / (prior.below if off < 0.0 else prior.above) ** 2
+    shift, vignetting = 1.0 / prior.shift_deviation**2, 1.0 / prior.vignetting_deviation**2
     # A weak hold on k keeps the matrix regular where there is nothing to see.
     normal[0, 0] += 1.0
     normal[1, 1] += airlight
     normal[2, 2] += shift
-    normal[3, 3] += darkening
+    normal[3, 3] += vignetting
     gradient[1] -= airlight * off
     gradient[2] -= shift * lower
-    gradient[3] -= darkening * theta[3]
-    return float(airlight * off * off + shift * lower * lower + darkening * theta[3] * theta[3])
+    gradient[3] -= vignetting * theta[3]
+    return float(airlight * off * off + shift * lower * lower + vignetting * theta[3] * theta[3])
 
 
 @kernel
@@ -142,75 +274,157 @@ def _move(
 
 
 @kernel
-def refine(
-    luminance: NDArray[np.float64],
-    noise: NDArray[np.float64],
-    below: NDArray[np.float64],
-    half: NDArray[np.float64],
-    path: NDArray[np.float64],
-    distance: NDArray[np.float64],
-    extent: NDArray[np.float64],
-    off_axis: NDArray[np.float64],
-    albedo: NDArray[np.float64],
-    prior: NDArray[np.float64],
-    start: NDArray[np.float64],
-    used: NDArray[np.uint8],
-    iterations: int,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], float, float, float, int]:
+def _allocated(strips: int, count: int, width: int, noise: NDArray[np.float64]) -> tuple[Residuals, Whitened]:
+    """Room for residuals and innovations."""
+    columns, scale = np.empty((strips, count, width)), np.empty((strips, count))
+    out, constants, used = (
+        np.empty((strips, count, width)),
+        np.empty((strips, width)),
+        np.zeros((strips, count), np.uint8),
+    )
+    return Residuals(columns, scale, noise), Whitened(out, constants, used)
+
+
+@kernel
+def gauss_newton(
+    bins: Bins, albedo: Albedo, prior: JointPrior, start: NDArray[np.float64], iterations: int
+) -> Solution:
     """Gauss–Newton from a start.
 
     Parameters
     ----------
-    luminance, noise, path, off_axis : (strips, n) float64
-        See `fogsim.vision.strips.strip_curves.StripCurves` and `fogsim.vision.strips.strip_geometry.StripGeometry`.
-    below, half, distance, extent : (n,) float64
-        See there.
-    albedo : (4,) float64
-        See `fogsim.vision.strips.albedo_filter.wandering`.
-    prior : (6,) float64
-        Airlight by the sky, its deviation downward and upward, the horizon's row and its deviation, the deviation of
-        the lens's darkening.
+    bins : Bins
+        What is seen where.
+    albedo : Albedo
+        How the albedo wanders.
+    prior : JointPrior
+        Sky, horizon and lens.
     start : (4,) float64
-        k, airlight, shift, darkening that is left.
-    used : (strips, n) uint8
-        Which bins took part; is written.
+        k, airlight, shift, vignetting that is left.
     iterations : int
         Most steps.
-
-    Returns
-    -------
-    tuple
-        Parameters (4,), their covariance (4, 4), luminance of the first strip without fog, minus twice the log
-        likelihood (with the parameters' priors and integrated over them), sum of the squared innovations, and how many
-        there are.
     """
-    strips, count = luminance.shape
+    strips, count = bins.luminance.shape
     theta, road = start.copy(), np.empty(strips)
     for s in range(strips):
-        guess = near_road(luminance[s], noise[s], below, half, path[s], theta[0], theta[1], theta[2], NEAR_BINS)
+        guess = _near_road(bins, s, theta[0], theta[1], theta[2])
         road[s] = min(max(guess, 0.01 * theta[1]), theta[1])
-    columns, scale = np.empty((strips, count, PARAMETERS + 1)), np.empty((strips, count))
-    out, constant = np.empty((strips, count, PARAMETERS + 1)), np.empty((strips, PARAMETERS + 1))
-    changes, unit = wandering(distance, extent, albedo), 1.0 / path[0, 0]
+    residuals, whitened = _allocated(strips, count, PARAMETERS + 1, bins.noise)
+    changes, unit = albedo_transitions(bins.distance, bins.extent, albedo), 1.0 / bins.path[0, 0]
     covariance: NDArray[np.float64] = np.eye(PARAMETERS)
     cost, squares, number = 0.0, 0.0, 0
     for iteration in range(iterations + 1):
         for s in range(strips):
-            _linearise(luminance[s], below, half, path[s], off_axis[s], theta, road[s], columns[s], scale[s])
+            _linearise(bins, s, theta, road[s], residuals)
         # What is an outlier is settled before the last steps, so that they converge.
         reject = iteration < max(iterations - 2, 1)
-        cost = whiten(columns, scale, noise, changes, albedo, prior[0], reject, used, out, constant)
-        if reject and hide_behind_obstacles(noise, used):
+        cost = whiten(residuals, changes, albedo, prior.airlight, reject, whitened)
+        if reject and hide_behind_obstacles(bins.noise, whitened.used):
             # Else what was seen of the bins that are now hidden would still count through the others.
-            cost = whiten(columns, scale, noise, changes, albedo, prior[0], False, used, out, constant)
+            cost = whiten(residuals, changes, albedo, prior.airlight, False, whitened)
         normal, gradient = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
-        squares, number = _add_bins(out, used, normal, gradient)
+        squares, number = _add_bins(whitened, normal, gradient)
         cost += squares + _add_prior(theta, prior, normal, gradient)
         cost += _invert(normal, covariance)
         if iteration >= iterations:
             break
         step = times(covariance, gradient)
-        _move(theta, step, road, constant, unit, prior[4])
+        _move(theta, step, road, whitened.constants, unit, prior.shift_deviation)
         if iteration >= 2 and abs(step[0]) < CONVERGED * (abs(theta[0]) + unit):
             iterations = min(iterations, iteration + 1)
-    return theta, covariance, road[0], cost, squares, number
+    return Solution(theta, covariance, cost, squares / max(number, 1), road[0], whitened.used)
+
+
+@kernel
+def extinction_costs(
+    bins: Bins, albedo: Albedo, extinctions: NDArray[np.float64], airlight: float, shift: float
+) -> NDArray[np.float64]:
+    """Minus twice the log likelihood of each of several extinctions, the rest at their first guesses; inf for none.
+
+    Parameters
+    ----------
+    bins : Bins
+        What is seen where.
+    albedo : Albedo
+        How the albedo wanders.
+    extinctions : (m,) float64
+        The extinctions [1/m].
+    airlight : float
+        Airlight [linear grey levels].
+    shift : float
+        Rows by which the horizon is lower [px].
+    """
+    strips, count = bins.luminance.shape
+    cost, changes = np.empty(extinctions.size), albedo_transitions(bins.distance, bins.extent, albedo)
+    residuals, whitened = _allocated(strips, count, 1, bins.noise)
+    for j in range(extinctions.size):
+        k, possible = extinctions[j], True
+        for strip in range(strips):
+            road = _near_road(bins, strip, k, airlight, shift)
+            possible = possible and 0.0 < road < 1.5 * airlight
+            for i in range(count):
+                value, _, _ = mean_transmittance(bins.below[i] - shift, bins.half[i], bins.path[strip, i], k)
+                rest = bins.luminance[strip, i] - airlight - (road - airlight) * value
+                residuals.columns[strip, i, 0] = rest
+                residuals.scale[strip, i] = road * value
+        cost[j] = np.inf
+        if possible:
+            cost[j] = whiten(residuals, changes, albedo, airlight, True, whitened)
+            cost[j] += (whitened.innovations**2).sum()
+    return cost
+
+
+@kernel
+def fit_constant_albedo(bins: Bins, extinctions: NDArray[np.float64], prior: JointPrior) -> tuple[float, float]:
+    """Extinction and airlight that best fit all strips as one road of constant albedo, in Cauchy's norm.
+
+    A smooth broad search, where `extinction_costs` has narrow minima: what does not fit weighs little, and nothing is
+    explained by an albedo that wanders.
+
+    Parameters
+    ----------
+    bins : Bins
+        What is seen where.
+    extinctions : (m,) float64
+        The extinctions that are tried [1/m].
+    prior : JointPrior
+        Sky and horizon.
+    """
+    luminance, noise = bins.luminance, bins.noise
+    strips, count = luminance.shape
+    best, best_k, best_airlight = np.inf, extinctions[0], prior.airlight
+    scale = (GRAINY * prior.airlight) ** 2
+    stride = max(count // 36, 1)
+    value = np.empty((count + stride - 1) // stride)
+    for k in extinctions:
+        for j in range(value.size):
+            i = j * stride
+            value[j], _, _ = mean_transmittance(bins.below[i] - prior.shift, bins.half[i], bins.path[0, i], k)
+        airlight, drop, total = prior.airlight, 0.0, 0.0
+        for iteration in range(4):
+            s0, s1, s2, r0, r1 = 0.0, 0.0, 0.0, 0.0, 0.0
+            total = 0.0
+            for strip in range(strips):
+                for j in range(value.size):
+                    i = j * stride
+                    if noise[strip, i] <= 0.0:
+                        continue
+                    t, spread = value[j], noise[strip, i] + scale * (value[j] ** 2 + 0.02)
+                    rest = luminance[strip, i] - airlight - drop * t
+                    weight = 1.0 / (spread + rest * rest) if iteration else 1.0 / spread
+                    if iteration == 3:
+                        total += math.log1p(rest * rest / spread)
+                    y = luminance[strip, i] - prior.airlight
+                    s0, s1, s2 = s0 + weight, s1 + weight * t, s2 + weight * t * t
+                    r0, r1 = r0 + weight * y, r1 + weight * t * y
+            off = airlight - prior.airlight
+            known = 1.0 / (prior.below if off < 0.0 else prior.above) ** 2
+            total += known * off * off
+            s0 += known
+            determinant = max(s0 * s2 - s1 * s1, 1e-12)
+            airlight = prior.airlight + (s2 * r0 - s1 * r1) / determinant
+            drop = min((s0 * r1 - s1 * r0) / determinant, 0.0)
+            drop = max(drop, -airlight)
+        if total < best:
+            best, best_k, best_airlight = total, k, airlight
+    return best_k, best_airlight

@@ -6,7 +6,7 @@ from statistics import NormalDist
 from fogsim.values.camera import Camera
 from fogsim.vision.light.luminance import linear_table
 from fogsim.vision.lines.horizon import Horizon
-from fogsim.vision.strips.joint_fit import JointPrior
+from fogsim.vision.strips.joint_kernels import JointPrior
 from fogsim.vision.strips.sky import SATURATED_SHARE, Sky
 
 SKY_DEVIATION = 0.005
@@ -20,7 +20,7 @@ HALF, MOSTLY = 0.5, 0.98
 
 
 def joint_prior(sky: Sky, camera: Camera, horizon: Horizon) -> JointPrior:
-    """Prior of airlight and horizon for `fogsim.vision.strips.joint_fit.fit_jointly`.
+    """Prior of airlight, horizon and lens for `fogsim.vision.strips.joint_fit.fit_jointly`.
 
     Parameters
     ----------
@@ -38,8 +38,8 @@ def joint_prior(sky: Sky, camera: Camera, horizon: Horizon) -> JointPrior:
         above=above,
         shift=horizon.row - camera.horizon_row,
         shift_deviation=horizon.standard_deviation,
-        darkening=sky.darkening,
-        darkening_deviation=sky.darkening_deviation,
+        vignetting=sky.vignetting,
+        vignetting_deviation=sky.vignetting_deviation,
     )
 
 

@@ -18,11 +18,11 @@ SATURATED_SHARE = 0.02
 """Share of the sky's pixels at the largest value from which on its brightness is not what its mean says [-]."""
 
 
-UNTOLD_DARKENING = 0.3
-"""Standard deviation of a lens's darkening where the sky does not show it [-]: most pictures are corrected."""
+UNKNOWN_VIGNETTING = 0.3
+"""Standard deviation of a lens's vignetting where the sky does not show it [-]: most pictures are corrected."""
 
-UNEVEN, LEAST_SEEN, MOST_DARKENING = 0.02, 0.7, 1.5
-"""Deviation of a lens's darkening by skies that are brighter in the middle, least share of a sky's pixels that must
+UNEVEN, LEAST_SEEN, MOST_VIGNETTING = 0.02, 0.7, 1.5
+"""Deviation of a lens's vignetting by skies that are brighter in the middle, least share of a sky's pixels that must
 show it, and most that it can be [-]."""
 
 
@@ -40,7 +40,7 @@ class Sky:
         Deviation of single pixels [linear grey levels].
     saturated, clipped : float
         Shares of its pixels of which all channels, and of which some, have the largest value [-].
-    darkening, darkening_deviation : float
+    vignetting, vignetting_deviation : float
         How much of what a simple lens takes from pixels off its axis (1 − cos⁴) this one takes, and the standard
         deviation of that [-].
     """
@@ -51,8 +51,8 @@ class Sky:
     noise: float
     saturated: float
     clipped: float
-    darkening: float = 0.0
-    darkening_deviation: float = UNTOLD_DARKENING
+    vignetting: float = 0.0
+    vignetting_deviation: float = UNKNOWN_VIGNETTING
 
     @property
     def is_clipped(self) -> bool:
@@ -116,24 +116,24 @@ def sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
     free = np.flatnonzero(height >= lowest)[::-2] if clipped <= SATURATED_SHARE else np.zeros(0, np.int64)
     shading = _shading(image, camera, rows[free], bright[free], noise)
     if shading is None:
-        shading = _Shading(level, scatter, 0.0, UNTOLD_DARKENING)
+        shading = _Shading(level, scatter, 0.0, UNKNOWN_VIGNETTING)
     level, scatter = shading.level, shading.deviation
     unseen = UNSEEN * max(float(lowest) - margin / camera.focal_length - CLOSE, 0.0) * level
     deviation = math.hypot(scatter, unseen)
     # What looks everywhere different is a wood rather than a sky, which is no darker than that.
     covered = median(share) < PATCHY and scatter > SCATTERED * level
     upward = BRIGHTER * level if covered else deviation
-    return Sky(level, deviation, upward, noise, saturated, clipped, shading.darkening, shading.darkening_deviation)
+    return Sky(level, deviation, upward, noise, saturated, clipped, shading.vignetting, shading.vignetting_deviation)
 
 
 @dataclass(frozen=True, slots=True)
 class _Shading:
-    """Brightness at the horizon straight ahead and darkening of the lens, with their standard deviations."""
+    """Brightness at the horizon straight ahead and vignetting of the lens, with their standard deviations."""
 
     level: float
     deviation: float
-    darkening: float
-    darkening_deviation: float
+    vignetting: float
+    vignetting_deviation: float
 
 
 def _shading(
@@ -147,9 +147,9 @@ def _shading(
     level = float(found[0])
     if seen < LEAST_SEEN or level <= 0.0:
         return None
-    darkening = min(max(float(found[3]) / level, 0.0), MOST_DARKENING)
-    deviation = min(math.hypot(UNEVEN, math.sqrt(covariance[3, 3]) / level), UNTOLD_DARKENING)
-    return _Shading(level, math.sqrt(covariance[0, 0]), darkening, deviation)
+    vignetting = min(max(float(found[3]) / level, 0.0), MOST_VIGNETTING)
+    deviation = min(math.hypot(UNEVEN, math.sqrt(covariance[3, 3]) / level), UNKNOWN_VIGNETTING)
+    return _Shading(level, math.sqrt(covariance[0, 0]), vignetting, deviation)
 
 
 @functools.lru_cache(maxsize=64)

@@ -37,7 +37,7 @@ def make(name: str, camera: Camera, **options: object) -> Estimator:
     name : str
         Name in `ESTIMATORS`.
     camera : Camera
-        The calibration as the vehicle was told it.
+        The assumed calibration.
     **options : object
         Parameters of the estimator.
 

@@ -95,7 +95,7 @@ class Huang2015:
     Parameters
     ----------
     camera : Camera
-        The calibration as the vehicle was told it.
+        The assumed calibration.
     as_published : bool
         Both methods and their combination as in the thesis.
     time_scale, way_scale : float
@@ -105,7 +105,7 @@ class Huang2015:
     blur : float
         Standard deviation of the lens' blur beside the pixels' own size [px].
     pitch_deviation : float
-        Standard deviation of the true pitch about the told one [rad].
+        Standard deviation of the true pitch about the assumed one [rad].
     """
 
     method = "huang2015"

@@ -65,7 +65,7 @@ class Huang2015Rough:
     as_published : bool
         The thesis' own constraints, 20-row medians and search.
     pitch_deviation : float
-        Standard deviation of the true pitch about the told one [rad].
+        Standard deviation of the true pitch about the assumed one [rad].
     """
 
     method = "huang2015_rough"
@@ -111,8 +111,8 @@ class Huang2015Rough:
         return self._estimate(extinction, deviation, road.horizon.row)
 
     def _published(self, image: NDArray[np.uint8] | NDArray[np.uint16]) -> Estimate:
-        told = calibrated_horizon(self._camera, self._pitch_deviation)
-        road = road_image(image, self._camera, told)
+        assumed = calibrated_horizon(self._camera, self._pitch_deviation)
+        road = road_image(image, self._camera, assumed)
         medians, horizon = _grown_medians(road, self._camera)
         if medians.rows[0] > horizon:
             raise CannotTellError("the region holds no sky: no fog, or fog that the method does not see")

@@ -13,12 +13,12 @@ from fogsim.values.observation import Observation
 
 
 class ObservationCheck:
-    """What every method demands of its observations: the told camera's images, in the order of time.
+    """What every method demands of its observations: the assumed camera's images, in the order of time.
 
     Parameters
     ----------
     camera : Camera
-        The calibration as the vehicle was told it.
+        The assumed calibration.
     """
 
     def __init__(self, camera: Camera) -> None:
@@ -30,13 +30,18 @@ class ObservationCheck:
         self._time = -math.inf
 
     def image_of(self, observation: Observation) -> NDArray[np.uint8] | NDArray[np.uint16]:
-        """Image of an observation that can follow the earlier ones; a bare image has neither time nor camera.
+        """Image of an observation that can follow the earlier ones.
+
+        Parameters
+        ----------
+        observation : Observation
+            Its frame; a bare image has neither time nor camera.
 
         Raises
         ------
         InputError
-            If the frame's camera is not the told one, its time is not finite or before that of an earlier frame, or its
-            image is none of the camera (see `checked_image`). What is refused leaves no trace.
+            If the frame's camera is not the assumed one, its time is not finite or before that of an earlier frame, or
+            its image is none of the camera (see `checked_image`). What is refused leaves no trace.
         """
         frame = observation.frame
         if not isinstance(frame, Frame):
@@ -67,7 +72,7 @@ def checked_image(image: object, camera: Camera) -> NDArray[np.uint8] | NDArray[
     image : (rows, cols) or (rows, cols, 3) uint8, or uint16 of a camera of 10 or 12 bits
         The pixels.
     camera : Camera
-        The told calibration.
+        The assumed calibration.
 
     Raises
     ------

@@ -30,7 +30,7 @@ from fogsim.vision.strips.joint_prior import joint_prior
 from fogsim.vision.strips.sky import Sky, sky_above
 from fogsim.vision.strips.strip_curves import (
     StripCurves,
-    above_bonnet,
+    lowest_road_row,
     mean_curves,
     strip_curves,
     without_clipped,
@@ -81,9 +81,9 @@ class JointRoad:
     Parameters
     ----------
     camera : Camera
-        The calibration as the vehicle was told it.
+        The assumed calibration.
     pitch_deviation : float
-        Standard deviation of the true pitch about the told one [rad].
+        Standard deviation of the true pitch about the assumed one [rad].
     frames : int
         How many of the last frames' curves are averaged; 1 lets every frame stand alone. More average patches out,
         and lag behind a change of fog by half as many frames.
@@ -161,7 +161,7 @@ class JointRoad:
 
         What stands in the own lane hides, further on, the neighbours' lanes too: they are read again without it.
         """
-        lowest = above_bonnet(pixels, self._camera, sky.luminance)
+        lowest = lowest_road_row(pixels, self._camera, sky.luminance)
         curves = self._usable(strip_curves(pixels, self._geometry, sky.noise, self._camera, free), sky, lowest)
         own = fit = fit_own(self._averaged(curves, sky), self._geometry, prior)
         for _ in range(MOST_OBSTACLES):
@@ -194,7 +194,7 @@ class JointRoad:
         return mean_curves((*self._earlier, (curves, sky)))
 
     def _seen_horizon(self, pixels: LinearPixels) -> Horizon:
-        """Weigh the told horizon with the point in which the road's lines meet."""
+        """Weigh the assumed horizon with the point in which the road's lines meet."""
         point = road_vanishing_point(pixels, self._camera, self._horizon)
         return self._horizon if point is None else weighted_mean(self._horizon, point.horizon)
 

@@ -30,7 +30,7 @@ from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT,
 from fogsim.vision.strips.joint_fit import JointFit, fit_jointly
 from fogsim.vision.strips.joint_prior import joint_prior
 from fogsim.vision.strips.sky import sky_above
-from fogsim.vision.strips.strip_curves import above_bonnet, strip_curves, without_clipped
+from fogsim.vision.strips.strip_curves import lowest_road_row, strip_curves, without_clipped
 from fogsim.vision.strips.strip_geometry import band_geometry
 
 MAX_ASIDE = 0.1
@@ -40,10 +40,10 @@ MIDDLE, LEAST_MIDDLE = 0.3, 200.0
 """How far to either side of the vanishing column a band is sought, a share of the image's width and at least [px]."""
 
 MAX_ABOVE = 0.05
-"""Share of the image's height that a clear road's region may reach above the told horizon [-]."""
+"""Share of the image's height that a clear road's region may reach above the assumed horizon [-]."""
 
 NEAR_HORIZON = 4.0  # [px] a region that ends this close below the horizon has seen the whole road
-REACH = math.radians(4.0)  # [rad] about the told vanishing point, within which lines of the road may pass
+REACH = math.radians(4.0)  # [rad] about the assumed vanishing point, within which lines of the road may pass
 ALBEDO_DEVIATION = 0.015  # [-] of k by slow changes of the road's reflectance, which one row's inflection does not show
 MAX_RESIDUAL = 0.12  # [-] of the fitted contrast: more is no curve of Koschmieder's
 MIN_USED = 0.6  # [-] least share of the band's rows that must fit
@@ -78,7 +78,7 @@ class Negru2013:
     Parameters
     ----------
     camera : Camera
-        The calibration as the vehicle was told it.
+        The assumed calibration.
     as_published : bool
         Follow the paper where it is less accurate than what is known today.
     printed_signs : bool
@@ -88,7 +88,7 @@ class Negru2013:
     horizon_frames, inflection_frames : int
         With `as_published`: frames of the temporal schemes.
     pitch_deviation : float
-        Standard deviation of the true pitch about the told one [rad].
+        Standard deviation of the true pitch about the assumed one [rad].
 
     Raises
     ------
@@ -112,7 +112,7 @@ class Negru2013:
         self._check = ObservationCheck(camera)
         # The fit takes the distances of a camera of the usual height: flat roads scale with it.
         self._camera, self._usual = camera, replace(camera, mount_height=USUAL_HEIGHT)
-        self._told = calibrated_horizon(camera, pitch_deviation)
+        self._assumed = calibrated_horizon(camera, pitch_deviation)
         self._as_published, self._looks_for_lines = as_published, vanishing_point
         self._model = printed_inflection if printed_signs else best_inflection
         self._detector = CannyDeriche()
@@ -148,7 +148,7 @@ class Negru2013:
         diagnostics: dict[str, object] = {"horizon_row": self._camera.horizon_row}
         try:
             road, pixels = self._road(image)
-            slope = fog_slope(road, self._told)
+            slope = fog_slope(road, self._assumed)
             edges = self._edges(road, slope)
             horizon = self._horizon(edges, road, pixels)
             diagnostics["horizon_row"] = horizon.row
@@ -164,14 +164,14 @@ class Negru2013:
     def _road(self, image: NDArray[np.uint8] | NDArray[np.uint16]) -> tuple[RoadImage, LinearPixels]:
         """Road from a little above the horizon down to the image's bottom or (corrected) the own bonnet."""
         if self._as_published:
-            road = road_image(image, self._camera, self._told)
+            road = road_image(image, self._camera, self._assumed)
             return road, linear_pixels(road.level, self._camera)
         # A band may lie in the middle only: the verges would but cost time.
         centre, reach = self._camera.principal_point[0], max(MIDDLE * self._camera.width, LEAST_MIDDLE)
         columns = max(math.ceil(centre - reach), 0), min(math.floor(centre + reach) + 1, self._camera.width)
-        road = road_image(image, self._camera, self._told, columns)
+        road = road_image(image, self._camera, self._assumed, columns)
         pixels = linear_pixels(road.level, self._camera)
-        lowest = above_bonnet(pixels, self._camera, road.airlight)
+        lowest = lowest_road_row(pixels, self._camera, road.airlight)
         luminance = road.luminance[: lowest + 1 - road.first_row]
         return replace(road, luminance=luminance, road=median(luminance[-1])), pixels
 
@@ -211,7 +211,7 @@ class Negru2013:
     def _fit(self, seen: SeenBand) -> JointFit:
         """Fit of the band, in distances of a camera of the usual height."""
         camera, pixels, band, horizon = self._usual, seen.pixels, seen.band, seen.horizon
-        sky = sky_above(pixels, camera, 3.0 * self._told.standard_deviation + 2.0)
+        sky = sky_above(pixels, camera, 3.0 * self._assumed.standard_deviation + 2.0)
         if sky is None:
             raise CannotTellError("no sky is seen above the horizon")
         rows = (band.top + seen.road.first_row, band.bottom + seen.road.first_row)
@@ -239,20 +239,20 @@ class Negru2013:
         return edges
 
     def _horizon(self, edges: Edges, road: RoadImage, pixels: LinearPixels) -> Horizon:
-        """Told horizon and vanishing point, weighed (corrected), or the best vanishing point of late (published)."""
+        """Assumed horizon and vanishing point, weighed (corrected), or the best vanishing point of late (published)."""
         if not self._looks_for_lines:
-            return self._told
+            return self._assumed
         if not self._as_published:
-            seen = road_vanishing_point(pixels, self._camera, self._told)
-            return self._told if seen is None else weighted_mean(self._told, seen.horizon)
-        guess = (self._camera.principal_point[0], self._told.row - road.first_row)
+            seen = road_vanishing_point(pixels, self._camera, self._assumed)
+            return self._assumed if seen is None else weighted_mean(self._assumed, seen.horizon)
+        guess = (self._camera.principal_point[0], self._assumed.row - road.first_row)
         reach = max(REACH * self._camera.focal_length, 8.0)
         point = consensus_vanishing_point(edges.gradient, edges.pixels, guess, reach)
         if point is not None:
             self._points.append(replace(point, row=point.row + road.first_row))
         best = max(self._points, key=lambda p: p.support, default=None)
-        found = self._told if best is None else best.horizon
-        return found if 1.0 <= found.row <= self._camera.height - 1 - MIN_ROWS else self._told
+        found = self._assumed if best is None else best.horizon
+        return found if 1.0 <= found.row <= self._camera.height - 1 - MIN_ROWS else self._assumed
 
     def _check_clear_view(self, seen: SeenBand) -> None:
         """Refuse to say "no fog" of anything but the road itself, seen up to the horizon where it vanishes.

@@ -49,7 +49,15 @@ class SeenBand:
 
 
 def fog_slope(road: RoadImage, horizon: Horizon) -> NDArray[np.float32]:
-    """Steepest brightening upward that fog can make of each row [linear grey levels per px]."""
+    """Steepest brightening upward that fog can make of each row [linear grey levels per px].
+
+    Parameters
+    ----------
+    road : RoadImage
+        The picture.
+    horizon : Horizon
+        The horizon above it.
+    """
     below_horizon = np.arange(road.luminance.shape[0], dtype=np.float64) + (road.first_row - horizon.row)
     return np.minimum(steepest_slope(below_horizon, road.airlight), SIMILARITY * road.contrast).astype(np.float32)
 
@@ -66,7 +74,7 @@ def road_band(road: RoadImage, edges: Edges, slope: NDArray[np.float32], camera:
     slope : (rows,) float32
         What fog can change from row to row, see `fog_slope`.
     camera : Camera
-        The told calibration.
+        The assumed calibration.
 
     Raises
     ------
@@ -86,7 +94,15 @@ def road_band(road: RoadImage, edges: Edges, slope: NDArray[np.float32], camera:
 
 
 def road_curve(seen: SeenBand, camera: Camera) -> RoadCurve:
-    """Luminance of a band of road over the rows below its horizon."""
+    """Luminance of a band of road over the rows below its horizon.
+
+    Parameters
+    ----------
+    seen : SeenBand
+        The band.
+    camera : Camera
+        The assumed calibration.
+    """
     below, band = seen.below_horizon, seen.band
     u0, v0 = camera.principal_point
     across = (0.5 * (band.left + band.right) - u0) / camera.focal_length

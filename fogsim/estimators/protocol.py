@@ -9,7 +9,7 @@ from fogsim.values.observation import Observation
 class Estimator(Protocol):
     """Turns what a vehicle has at one instant into an estimate of the extinction coefficient.
 
-    An estimator is built from the camera as the vehicle was told it and from keyword parameters of its own.
+    An estimator is built from the camera that the vehicle assumes and from keyword parameters of its own.
     """
 
     @property
@@ -19,6 +19,11 @@ class Estimator(Protocol):
 
     def update(self, observation: Observation) -> Estimate:
         """Estimate the fog from one observation.
+
+        Parameters
+        ----------
+        observation : Observation
+            What the vehicle has at this instant.
 
         Raises
         ------

@@ -88,7 +88,7 @@ class Zhu2015:
     Parameters
     ----------
     camera : Camera
-        The calibration as the vehicle was told it.
+        The assumed calibration.
     as_published : bool
         Take the row where the grown region ends for the inflection, and whole Hough cells for lines.
     growth : float
@@ -96,7 +96,7 @@ class Zhu2015:
     growth_share : float
         ρ < 1 of eq. 10, as published [-].
     pitch_deviation : float
-        Standard deviation of the true pitch about the told one [rad].
+        Standard deviation of the true pitch about the assumed one [rad].
     """
 
     method = "zhu2015"

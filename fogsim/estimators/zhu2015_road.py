@@ -50,7 +50,7 @@ BENT_ROAD = 0.2
 """Deviation of the row where lane lines meet from the horizon, for roads bend and undulate [px]."""
 
 HALF_VEHICLE, VEHICLE_MARGIN = 1.5, 2.0
-"""What a tracked vehicle hides either side of the axis, and how much nearer than told its foot may be [m]."""
+"""What a tracked vehicle hides either side of the axis, and how much nearer than measured its foot may be [m]."""
 
 COVERED = 0.6
 """Share of a bin that the region must hold for it to be road [-]."""
@@ -108,7 +108,7 @@ def seen_road(
     image : (rows, cols) or (rows, cols, 3) uint8 or uint16
         An image of the camera.
     camera : Camera
-        The told calibration.
+        The assumed calibration.
     pitch_deviation : float
         Standard deviation of the pitch [rad].
     growth : tuple of float or None
@@ -121,49 +121,49 @@ def seen_road(
     CannotTellError
         If the image shows no road by day.
     """
-    told, free = calibrated_horizon(camera, pitch_deviation), _free(lead)
-    road = road_image(image, camera, told)
+    assumed, free = calibrated_horizon(camera, pitch_deviation), _free(lead)
+    road = road_image(image, camera, assumed)
     blurred = smoothed(road.luminance)
-    below = np.arange(blurred.shape[0], dtype=np.float64) + (road.first_row - told.row)
+    below = np.arange(blurred.shape[0], dtype=np.float64) + (road.first_row - assumed.row)
     slope = np.minimum(steepest_slope(below, road.airlight), SIMILARITY * road.contrast).astype(np.float32)
     edges = edge_map(blurred, slope if growth is None else np.zeros_like(slope))
     if edges.threshold > road.contrast:
         raise CannotTellError("noise or texture drowns the contrast of road and airlight")
-    first = math.ceil(told.row - road.first_row) + 1
+    first = math.ceil(assumed.row - road.first_row) + 1
     if growth is not None:
         lines = hough_lines(edges.pixels, first, LOWEST_ANGLE)
         point = published_vanishing_point(lines)
         limits = constant_limits(blurred.shape[0], growth[0], growth[0] * growth[1], growth[0])
         region = grow_region(blurred, edges.pixels, limits)
     else:
-        lines = _sure_lines(edges, blurred, road, camera, told)
-        expected = (camera.principal_point[0], told.row - road.first_row)
-        point = lane_vanishing_point(lines, expected, max(5.0 * told.standard_deviation, 2.0))
+        lines = _sure_lines(edges, blurred, road, camera, assumed)
+        expected = (camera.principal_point[0], assumed.row - road.first_row)
+        point = lane_vanishing_point(lines, expected, max(5.0 * assumed.standard_deviation, 2.0))
         steps = (slope + edges.threshold).astype(np.float32)
         limits = cumulative_limits(steps, SIMILARITY * road.contrast + edges.threshold)
         region = grow_region(blurred, edges.pixels, limits)
         _hide(region, road, camera, free)
-    horizon = told if point is None else _combined(told, point, road.first_row, plain=growth is not None)
+    horizon = assumed if point is None else _combined(assumed, point, road.first_row, plain=growth is not None)
     where = None if point is None else (point.column, point.row + road.first_row)
     pixels = linear_pixels(levelled(image, camera), camera)
     return SeenRoad(road, horizon, region, where, tuple(lines), pixels, free)
 
 
 def _sure_lines(
-    edges: Edges, blurred: NDArray[np.float32], road: RoadImage, camera: Camera, told: Horizon
+    edges: Edges, blurred: NDArray[np.float32], road: RoadImage, camera: Camera, assumed: Horizon
 ) -> list[LaneLine]:
     clear = min(CLEAR_OF_VANISHING_POINT, 0.08 * camera.height)
-    first = math.ceil(told.row - road.first_row + clear)
+    first = math.ceil(assumed.row - road.first_row + clear)
     lines = hough_lines(edges.pixels, first, SURE_LOWEST, LINES, SURE_STEEPEST)
     return refined_lines(lines, edges.pixels, blurred, first)
 
 
-def _combined(told: Horizon, point: VanishingPoint, first_row: int, *, plain: bool) -> Horizon:
+def _combined(assumed: Horizon, point: VanishingPoint, first_row: int, *, plain: bool) -> Horizon:
     if plain:
         return Horizon(point.row + first_row, point.row_deviation)
     near = math.hypot(point.row_deviation, BENT_ROAD)
-    share = told.standard_deviation**2 / (told.standard_deviation**2 + near**2)
-    row = told.row + share * (point.row + first_row - told.row)
+    share = assumed.standard_deviation**2 / (assumed.standard_deviation**2 + near**2)
+    row = assumed.row + share * (point.row + first_row - assumed.row)
     return Horizon(row, math.sqrt(share) * near)
 
 

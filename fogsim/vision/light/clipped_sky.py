@@ -13,7 +13,7 @@ from fogsim.vision.light.luminance import linear_table
 from fogsim.vision.light.pixel_kernels import Pixels
 
 LEAST, MOST = 0.002, 0.98
-"""Shares of clipped pixels below which nothing is missing, and above which what is missing cannot be told [-]."""
+"""Shares of clipped pixels below which nothing is missing, and above which what is missing cannot be known [-]."""
 
 LOWER = 0.3
 """Which of the pixels that are not clipped lie below the lower of the two lights that are looked at [-]."""
@@ -54,7 +54,7 @@ def clipping(pixels: Pixels, camera: Camera) -> Clipping:
     pixels : (n,) or (n, 1 or 3) uint8 or uint16
         Pixels of an even surface.
     camera : Camera
-        The told calibration.
+        The assumed calibration.
     """
     channels = pixels.reshape(pixels.shape[0], -1)
     weights = LUMINANCE_WEIGHTS if channels.shape[1] == 3 else (1.0,)

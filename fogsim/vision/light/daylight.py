@@ -68,7 +68,7 @@ def lit_by_lamps(level: Pixels, camera: Camera) -> str:
     level : (rows, cols) or (rows, cols, 3) uint8 or uint16
         A level image, its horizon inside.
     camera : Camera
-        The told calibration.
+        The assumed calibration.
     """
     view = _view_of(camera)
     luminance = linear_luminance(level[view.rows], camera.response, camera.bits)

@@ -82,7 +82,7 @@ def road_image(
     image : (rows, cols) or (rows, cols, 3) uint8 or uint16
         An image of the camera.
     camera : Camera
-        The told calibration.
+        The assumed calibration.
     horizon : Horizon
         Where the calibration has the horizon.
     columns : (int, int) or None

@@ -26,7 +26,7 @@ and texture make at most 0.15, boards, stripes and writing at least 0.3."""
 
 STRAIGHT, LEAST_RISE = 0.018, 10.0
 """Deviation from a straight line, relative to that line's rise, below which a curve is a ramp [-], and least rise for
-that to be told [pixel values of 8 bits]. Fog of whatever density leaves at least 0.028: its curve is hollow near the
+that to be seen [pixel values of 8 bits]. Fog of whatever density leaves at least 0.028: its curve is hollow near the
 camera and level at the horizon."""
 
 
@@ -42,7 +42,7 @@ def no_road(fit: JointFit, curves: StripCurves, geometry: StripGeometry, camera:
     geometry : StripGeometry
         Where the bins are.
     camera : Camera
-        The told calibration.
+        The assumed calibration.
     """
     if is_scattered(fit, curves, geometry):
         return "what is ahead is too patchy for a road"
@@ -77,7 +77,7 @@ def is_ramp(curves: StripCurves, geometry: StripGeometry, camera: Camera) -> boo
     geometry : StripGeometry
         Where the bins are.
     camera : Camera
-        The told calibration.
+        The assumed calibration.
     """
     seen = curves.variance[0] > 0
     if int(seen.sum()) < 3:

@@ -27,7 +27,7 @@ def joint_prior(sky: Sky, camera: Camera, horizon: Horizon) -> JointPrior:
     sky : Sky
         The sky above the horizon; where it is saturated it is brighter than it looks.
     camera : Camera
-        The told calibration, from whose horizon the prior's shift counts.
+        The assumed calibration, from whose horizon the prior's shift counts.
     horizon : Horizon
         What is known of the horizon.
     """

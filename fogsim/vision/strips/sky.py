@@ -89,7 +89,7 @@ def sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
     image : LinearPixels
         The image.
     camera : Camera
-        The told calibration.
+        The assumed calibration.
     margin : float
         Rows above the horizon that are left out [px].
 
@@ -154,5 +154,13 @@ def _shading(
 
 @functools.lru_cache(maxsize=64)
 def even_rows(first: int, last: int, count: int) -> NDArray[np.int64]:
-    """Up to so many rows from the first to the last, evenly and downward; they belong to all who ask."""
+    """Rows evenly from the first to the last, downward; the array is shared, so never to be written.
+
+    Parameters
+    ----------
+    first, last : int
+        First and last row.
+    count : int
+        Most rows.
+    """
     return np.unique(np.linspace(first, last, count).astype(np.int64))

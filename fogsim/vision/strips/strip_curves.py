@@ -61,7 +61,7 @@ def strip_curves(
     noise : float
         Deviation of single pixels [linear grey levels].
     camera : Camera
-        The told calibration.
+        The assumed calibration.
     free : float
         Depth up to which the own lane is free; a vehicle ahead hides what is behind [m].
     known : StripCurves or None
@@ -91,15 +91,15 @@ BONNET_STEP, BONNET_OUTLIER = 0.03, 6.0
 """Least step of luminance at the bonnet's edge, relative to the airlight, and in median changes over as many rows."""
 
 
-def above_bonnet(image: LinearPixels, camera: Camera, airlight: float) -> int:
-    """Lowest row that shows road, not the own vehicle's bonnet or dashboard.
+def lowest_road_row(image: LinearPixels, camera: Camera, airlight: float) -> int:
+    """Lowest row that shows road, above the own vehicle's bonnet or dashboard.
 
     Parameters
     ----------
     image : LinearPixels
         A level image.
     camera : Camera
-        The told calibration.
+        The assumed calibration.
     airlight : float
         Luminance of the sky [linear grey levels].
     """
@@ -142,10 +142,26 @@ CLIPPED = 0.95 * 255.0
 
 
 def without_clipped(curves: StripCurves) -> StripCurves:
-    """Leave out bins so bright that their noise, or one of their colours, is clipped."""
+    """Leave out bins so bright that their noise, or one of their colours, is clipped.
+
+    Parameters
+    ----------
+    curves : StripCurves
+        Luminance by bin.
+    """
     return replace(curves, variance=np.where(curves.luminance > CLIPPED, 0.0, curves.variance))
 
 
 def without_rows_below(curves: StripCurves, geometry: StripGeometry, lowest: int) -> StripCurves:
-    """Leave out bins that reach below a row."""
+    """Leave out bins that reach below a row.
+
+    Parameters
+    ----------
+    curves : StripCurves
+        Luminance by bin.
+    geometry : StripGeometry
+        Where the bins are.
+    lowest : int
+        Last row that is kept.
+    """
     return replace(curves, variance=np.where(geometry.last > lowest, 0.0, curves.variance))

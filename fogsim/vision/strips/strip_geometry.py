@@ -30,7 +30,7 @@ class StripGeometry:
     first, last : (n,) int64
         Rows of each bin.
     below, half : (n,) float64
-        Middle of each bin below the told horizon, and half its height [px].
+        Middle of each bin below the assumed horizon, and half its height [px].
     distance, extent : (n,) float64
         Depth of each bin along the road, and how much road it covers [m].
     left, right : (strips, n) float64
@@ -75,7 +75,7 @@ def strip_geometry(camera: Camera, nearest: float, lanes: tuple[tuple[float, flo
     Parameters
     ----------
     camera : Camera
-        The told calibration; its roll is taken as undone.
+        The assumed calibration; its roll is taken as undone.
     nearest : float
         Rows below the horizon from which the road is looked at [px].
     lanes : tuple of (float, float)
@@ -98,7 +98,7 @@ def band_geometry(camera: Camera, nearest: float, columns: tuple[int, int], rows
     Parameters
     ----------
     camera : Camera
-        The told calibration; its roll is taken as undone.
+        The assumed calibration; its roll is taken as undone.
     nearest : float
         Rows below the horizon from which the road is looked at [px].
     columns, rows : (int, int)

@@ -1,0 +1,98 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fogsim.values import Camera
+from fogsim.vision.light.luminance import linear_pixels
+from fogsim.vision.strips.sky import UNKNOWN_VIGNETTING, even_rows, sky_above
+from fogsim.vision.strips.sky_kernels import level_at_horizon, pixel_noise, saturation, sky_shading
+
+CAMERA = Camera(320, 240, 288.0, (159.5, 119.5), 1.38, np.radians(1.0))
+ROWS, COLS = np.indices((240, 320))
+AWAY = 1.0 - (1.0 + ((COLS - 159.5) ** 2 + (ROWS - 119.5) ** 2) / 288.0**2) ** -2
+
+
+def photographed(sky, noise=1.0, seed=0):
+    """A sky as luminances, and a dark road below the horizon."""
+    light = np.where(CAMERA.horizon_row > ROWS, sky, 60.0)
+    grey = np.rint(light + np.random.default_rng(seed).normal(0.0, noise, light.shape))
+    return linear_pixels(np.clip(grey, 0, 255).astype(np.uint8), CAMERA)
+
+
+def test_an_even_sky_is_as_bright_as_it_is_and_its_noise_that_of_the_pixels():
+    sky = sky_above(photographed(np.full(ROWS.shape, 180.0), noise=2.0), CAMERA, 3.0)
+    assert sky.luminance == pytest.approx(180.0, abs=3.0 * sky.deviation + 0.3)
+    assert sky.deviation < 2.0
+    assert sky.noise == pytest.approx(np.hypot(2.0, 1.0 / np.sqrt(12.0)), rel=0.1)
+    assert (sky.saturated, sky.clipped, sky.is_clipped) == (0.0, 0.0, False)
+    assert sky.vignetting == pytest.approx(0.0, abs=0.1)
+
+
+@pytest.mark.parametrize("slope", [-0.3, 0.4])
+def test_a_sky_that_brightens_upward_counts_as_it_is_at_the_horizon(slope):
+    height = (CAMERA.horizon_row - ROWS) / CAMERA.focal_length
+    sky = sky_above(photographed(150.0 * (1.0 + slope * height)), CAMERA, 3.0)
+    assert sky.luminance == pytest.approx(150.0, abs=max(3.0 * sky.deviation, 1.5))
+
+
+@pytest.mark.parametrize("vignetting", [0.0, 0.5, 1.0])
+def test_the_lens_shows_in_the_corners_of_an_even_sky(vignetting):
+    sky = sky_above(photographed(190.0 * (1.0 - vignetting * AWAY)), CAMERA, 3.0)
+    assert sky.vignetting == pytest.approx(vignetting, abs=3.0 * sky.vignetting_deviation)
+    assert sky.vignetting_deviation < UNKNOWN_VIGNETTING
+    assert sky.luminance == pytest.approx(190.0, abs=3.0)
+
+
+def test_a_wood_along_the_horizon_leaves_the_sky_above_it_and_a_wall_none():
+    tall = np.where(CAMERA.horizon_row - 0.06 * 288.0 < ROWS, 40.0, 180.0)
+    sky = sky_above(photographed(tall), CAMERA, 3.0)
+    assert sky.luminance == pytest.approx(180.0, abs=4.0)
+    assert sky.deviation > sky_above(photographed(np.full(ROWS.shape, 180.0)), CAMERA, 3.0).deviation
+    assert sky_above(photographed(np.where(CAMERA.horizon_row - 0.18 * 288.0 < ROWS, 40.0, 180.0)), CAMERA, 3.0) is None
+    assert sky_above(photographed(np.full(ROWS.shape, 180.0)), replace(CAMERA, pitch=0.45), 3.0) is None
+
+
+def test_trees_before_most_of_the_sky_leave_its_bright_part():
+    trees = np.where(np.isin(COLS // 8 % 4, (0, 1, 2)), 30.0, 180.0)
+    assert sky_above(photographed(trees), CAMERA, 3.0).luminance == pytest.approx(180.0, abs=3.0)
+
+
+def test_saturated_and_clipped_pixels_are_counted():
+    image = np.full((240, 320, 3), 200, np.uint8)
+    image[:60, :, 0] = 255
+    image[:30] = 255
+    paired = linear_pixels(image, CAMERA)
+    assert saturation(paired, np.arange(120), 40) == (0.25, 0.5)
+    assert pixel_noise(paired, np.arange(120)) == 0.0
+
+
+def test_a_sky_of_even_slopes_behind_a_lens_is_found_with_its_covariance():
+    rows = even_rows(100, 10, 16)
+    axis = np.array([159.5, 119.5, CAMERA.horizon_row, 288.0])
+    across, height = (COLS - 159.5) / 288.0, (CAMERA.horizon_row - ROWS) / 288.0
+    truth, found = np.array([170.0, 12.0, 30.0, 60.0]), []
+    sky = truth[0] + truth[1] * across + truth[2] * height - truth[3] * AWAY
+    for seed in range(20):
+        image = photographed(sky, noise=1.5, seed=seed)
+        fit, covariance, seen = sky_shading(image, rows, axis, sky[rows].mean(axis=1), 1.5)
+        assert seen > 0.95
+        found.append(fit)
+    spread = np.sqrt(np.diag(covariance))
+    assert np.mean(found, axis=0) == pytest.approx(truth, abs=float(spread.max()))
+    # Neighbouring pixels of a true sky err together, here they do not: twice as sure.
+    assert (np.std(found, axis=0) < spread).all()
+    assert (np.std(found, axis=0) > 0.2 * spread).all()
+
+
+def test_the_level_at_the_horizon_is_that_of_a_straight_line_above_what_stands_there():
+    height = np.linspace(0.2, 0.02, 24)
+    level, slope, scatter, lowest = level_at_horizon(180.0 + 50.0 * height, height, 0.012)
+    assert (level, slope) == pytest.approx((180.0, 50.0))
+    assert scatter == pytest.approx(0.0, abs=1e-9)
+    assert lowest == height[-1]
+    bright = 180.0 + 50.0 * height
+    bright[18:] = 90.0
+    level, _, _, lowest = level_at_horizon(bright, height, 0.012)
+    assert level == pytest.approx(180.0)
+    assert lowest == height[17]

@@ -38,7 +38,7 @@ import gymnasium
 import fogsim
 import fogsim_envs  # noqa: F401 - registers the environments
 from fogsim.scenario import build
-from fogsim.traffic.sumo.library import LibsumoLink
+from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo_traffic import SumoTraffic, command_line
 
 ENV_ID, SCENARIO = "fogsim/FogAdvisory-v0", "motorway_fog_bank"

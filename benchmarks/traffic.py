@@ -26,7 +26,7 @@ from pathlib import Path
 
 from fogsim.atmosphere import FieldAccess
 from fogsim.traffic import DriverSetup, DriverSight, TrafficSetup
-from fogsim.traffic.sumo.library import LibsumoLink
+from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo_traffic import SumoTraffic
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Command, FogField

@@ -1,4 +1,4 @@
-"""Stopping: the formulas that advice and metrics share."""
+"""Stopping and slowing down: the formulas that advice, metrics and traffic share."""
 
 import math
 
@@ -37,3 +37,20 @@ def safe_speed(distance: float, reaction_time: float, deceleration: float, grade
     """
     braking = deceleration + GRAVITY * grade
     return braking * (math.sqrt(reaction_time**2 + 2 * distance / braking) - reaction_time)
+
+
+def decelerated_speed(speed: float, target: float, deceleration: float, step_length: float) -> float:
+    """Speed after one step of slowing down to a target [m/s]; ``inf`` for a target of ``inf``, which is no limit.
+
+    A target above the speed is given back: speeding up is left to the vehicle's own acceleration.
+
+    Parameters
+    ----------
+    speed, target : float
+        Speed now and to come to [m/s].
+    deceleration : float
+        Largest deceleration to use [m/s²], positive.
+    step_length : float
+        Time to the next step [s].
+    """
+    return target if math.isinf(target) else max(target, speed - deceleration * step_length)

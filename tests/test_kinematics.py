@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from fogsim.kinematics import safe_speed, stopping_sight_distance
+from fogsim.kinematics import decelerated_speed, safe_speed, stopping_sight_distance
 
 
 @pytest.mark.parametrize(("kmh", "metres"), [(50, 63.1), (90, 154.4), (100, 182.9), (110, 213.7), (130, 282.0)])
@@ -24,3 +24,10 @@ def test_round_trip_and_limits() -> None:
 
 def test_uphill_stops_sooner() -> None:
     assert stopping_sight_distance(30.0, 2.5, 3.4, 0.05) < stopping_sight_distance(30.0, 2.5, 3.4)
+
+
+def test_decelerated_speed_brakes_no_harder_than_asked() -> None:
+    assert decelerated_speed(30.0, 10.0, 2.0, 0.1) == pytest.approx(29.8)
+    assert decelerated_speed(10.1, 10.0, 2.0, 0.1) == 10.0
+    assert decelerated_speed(5.0, 10.0, 2.0, 0.1) == 10.0
+    assert decelerated_speed(30.0, math.inf, 2.0, 0.1) == math.inf

@@ -13,7 +13,7 @@ import fogsim
 from fogsim.errors import InputError, SimulationError, UnplayedWarning
 from fogsim.randomness import spawn_streams
 from fogsim.scenario import build
-from fogsim.traffic.sumo.library import load_libsumo
+from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.traffic.sumo_traffic import command_line
 from fogsim.values import Command, SpeedAdvice, Step
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import fogsim
-from fogsim.traffic.sumo.library import load_libsumo
+from fogsim.traffic.sumo.libsumo_link import load_libsumo
 
 GRID = Path(__file__).resolve().parent / "data" / "grid"
 

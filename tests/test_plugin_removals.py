@@ -9,7 +9,7 @@ import traci
 
 import fogsim
 from fogsim.plugin import AttachedSession
-from fogsim.traffic.sumo.library import load_libsumo
+from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.values import Step
 
 GRID = Path(__file__).resolve().parent / "data" / "grid"

@@ -17,11 +17,11 @@ from fogsim.scenario import Scenario, build
 from fogsim.scenario.loading import clock_settings
 from fogsim.traffic.highway import (
     Fleet,
+    control_drivers,
     is_highway_environment,
     read_snapshot,
     road_network,
     same_roads,
-    take_over,
 )
 from fogsim.traffic.setup import UNTOUCHED
 from fogsim.values import Command, FogField, RoadNetwork, SignMap, Step
@@ -135,9 +135,9 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
         """Play the script, and put the fog about the environment's drivers if it concerns them."""
         setup, drivers_fog = build.traffic_setup(self._scenario), DriversFog()
         manners = setup.drivers if self._drivers else UNTOUCHED
-        conduct = take_over(fleet, manners, setup.events, seed, setup.advice_deceleration, setup.sight)
+        control = control_drivers(fleet, manners, setup.events, seed, setup.advice_deceleration, setup.sight)
         if self._drivers:
-            drivers_fog.enter(fog, conduct)
+            drivers_fog.enter(fog, control)
         return drivers_fog
 
     def step(self, action: Any) -> tuple[dict[str, Any], Any, bool, bool, dict[str, Any]]:

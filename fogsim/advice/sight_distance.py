@@ -54,7 +54,13 @@ class StoppingSightDistance:
     widest_belief: Annotated[float, Range(0.01, 10.0)] = 0.7
 
     def advise(self, belief: Belief, speed_limit: float, time: float, previous: SpeedAdvice) -> SpeedAdvice:
-        """Advise a speed; see `Adviser.advise`. No advice (``inf``) where the limit itself is safe."""
+        """Advise a speed; see `Adviser.advise`. No advice (``inf``) where the limit itself is safe.
+
+        Parameters
+        ----------
+        belief, speed_limit, time, previous
+            As of `Adviser.advise`.
+        """
         if belief.log_standard_deviation > self.widest_belief:
             return SpeedAdvice(previous.speed)
         sight = self.sight_share * belief.visibility_quantile(self.quantile)
@@ -83,7 +89,13 @@ class NoAdvice:
         time: float,  # noqa: ARG002 - the protocol's parameters
         previous: SpeedAdvice,  # noqa: ARG002 - the protocol's parameters
     ) -> SpeedAdvice:
-        """Advise nothing; see `Adviser.advise`."""
+        """Advise nothing; see `Adviser.advise`.
+
+        Parameters
+        ----------
+        belief, speed_limit, time, previous
+            As of `Adviser.advise`; they do not matter.
+        """
         return SpeedAdvice()
 
 
@@ -112,5 +124,11 @@ class FixedSpeed:
         time: float,  # noqa: ARG002 - the protocol's parameters
         previous: SpeedAdvice,  # noqa: ARG002 - the protocol's parameters
     ) -> SpeedAdvice:
-        """Advise the fixed speed; see `Adviser.advise`."""
+        """Advise the fixed speed; see `Adviser.advise`.
+
+        Parameters
+        ----------
+        belief, speed_limit, time, previous
+            As of `Adviser.advise`; they do not matter.
+        """
         return SpeedAdvice(self.speed)

@@ -80,7 +80,7 @@ def _try(subject: str, check: Callable[[], str]) -> Finding:
 
 
 def _sumo() -> str:
-    from fogsim.traffic.sumo.library import load_libsumo
+    from fogsim.traffic.sumo.libsumo_link import load_libsumo
 
     return f"{load_libsumo().getVersion()[1]} in process"
 

@@ -1,8 +1,8 @@
 """Surrogate safety, comfort and estimator error."""
 
 from fogsim.kinematics import stopping_sight_distance
-from fogsim.metrics.accumulate import METRICS, MetricFactory, RunMetrics, RunSummary
 from fogsim.metrics.metric import JsonValue, Metric, Sample
+from fogsim.metrics.run_metrics import METRICS, MetricFactory, RunMetrics, RunSummary
 from fogsim.metrics.step_metrics import DEFAULT_STANDARD, step_metrics
 from fogsim.metrics.surrogate import (
     SafetyStandard,

@@ -15,7 +15,13 @@ FOG_LIMIT = 1000.0
 
 
 def relative_error(visibility: float, truth: float) -> float:
-    """|V − V_true| / V_true in percent; ``inf`` for a visibility without limit."""
+    """|V − V_true| / V_true in percent; ``inf`` for a visibility without limit.
+
+    Parameters
+    ----------
+    visibility, truth : float
+        Visibilities [m].
+    """
     return abs(visibility - truth) / truth * 100.0
 
 
@@ -54,7 +60,13 @@ class EstimatorErrors:
     _methods: dict[str, Errors] = field(default_factory=dict)
 
     def update(self, sample: Sample) -> None:
-        """Take in one step."""
+        """Take in one step.
+
+        Parameters
+        ----------
+        sample : Sample
+            The step, and what is derived from it.
+        """
         truth = sample.step.truth.visibility_ahead
         for estimate in sample.step.estimates:
             errors = self._methods.setdefault(estimate.method, Errors())
@@ -83,7 +95,13 @@ class BeliefError:
     _covered: int = 0
 
     def update(self, sample: Sample) -> None:
-        """Take in one step."""
+        """Take in one step.
+
+        Parameters
+        ----------
+        sample : Sample
+            The step, and what is derived from it.
+        """
         truth, belief = sample.step.truth.visibility_ahead, sample.step.belief
         if truth >= FOG_LIMIT:
             return

@@ -36,12 +36,24 @@ class Metric(Protocol):
     """One line on each key of the result; a key ends in its unit."""
 
     def update(self, sample: Sample) -> None:
-        """Take in one step."""
+        """Take in one step.
+
+        Parameters
+        ----------
+        sample : Sample
+            The step, and what is derived from it.
+        """
 
     def result(self) -> Mapping[str, JsonValue]:
         """Say what the steps so far amount to; the keys are those of `meanings`."""
 
 
 def share(part: float, whole: float) -> float | None:
-    """Part of a whole [-], None where there is no whole."""
+    """Part of a whole [-], None where there is no whole.
+
+    Parameters
+    ----------
+    part, whole : float
+        Of the same unit.
+    """
     return part / whole if whole > 0 else None

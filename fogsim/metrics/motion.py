@@ -27,7 +27,13 @@ class Motion:
     _max_speed: float = 0.0
 
     def update(self, sample: Sample) -> None:
-        """Take in one step."""
+        """Take in one step.
+
+        Parameters
+        ----------
+        sample : Sample
+            The step, and what is derived from it.
+        """
         step = sample.step
         if self._steps == 0:
             self._start = step.route_position
@@ -62,7 +68,13 @@ class Comfort:
     _time: float = 0.0
 
     def update(self, sample: Sample) -> None:
-        """Take in one step."""
+        """Take in one step.
+
+        Parameters
+        ----------
+        sample : Sample
+            The step, and what is derived from it.
+        """
         acceleration = float(sample.step.traffic.acceleration[sample.step.ego])
         self._max_deceleration = max(self._max_deceleration or 0.0, -acceleration)
         if self._previous is not None and sample.elapsed > 0:
@@ -101,7 +113,13 @@ class Compliance:
     _above_time: float = 0.0
 
     def update(self, sample: Sample) -> None:
-        """Take in one step."""
+        """Take in one step.
+
+        Parameters
+        ----------
+        sample : Sample
+            The step, and what is derived from it.
+        """
         advised = sample.step.command.advice.speed
         self._time += sample.elapsed
         if not math.isfinite(advised):

@@ -41,7 +41,13 @@ class Conflict:
     _least_headway: float | None = None
 
     def update(self, sample: Sample) -> None:
-        """Take in one step."""
+        """Take in one step.
+
+        Parameters
+        ----------
+        sample : Sample
+            The step, and what is derived from it.
+        """
         leader = sample.step.leader
         if leader is None:
             return
@@ -99,7 +105,13 @@ class Sight:
     _judged: bool = False
 
     def update(self, sample: Sample) -> None:
-        """Take in one step."""
+        """Take in one step.
+
+        Parameters
+        ----------
+        sample : Sample
+            The step, and what is derived from it.
+        """
         margin = sample.derived["visibility_margin_m"]
         self._judged = True
         self._least_visibility = _least(self._least_visibility, finite_or_none(sample.step.truth.visibility_ahead))
@@ -133,7 +145,13 @@ class Collisions:
     _ego: list[Collision] = field(default_factory=list)
 
     def update(self, sample: Sample) -> None:
-        """Take in one step."""
+        """Take in one step.
+
+        Parameters
+        ----------
+        sample : Sample
+            The step, and what is derived from it.
+        """
         ego = sample.step.traffic.ids[sample.step.ego]
         self._all.extend(sample.step.collisions)
         self._ego.extend(hit for hit in sample.step.collisions if ego in {hit.collider, hit.victim})

@@ -6,11 +6,11 @@ from fogsim.traffic.drivers.events import BrakeEvent, Event, LampFailureEvent, L
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.drivers.speed_choice import SPEED_CHOICES, Compliance, DriverSetup
 from fogsim.traffic.protocol import Traffic
-from fogsim.traffic.road.configuration import configured_files, left_out
+from fogsim.traffic.road.configuration import configured_files, ignored_options
 from fogsim.traffic.road.demand import Demand, VehicleRoute, read_configured_demand, read_demand
 from fogsim.traffic.road.net_edges import NetEdges, read_net_edges
 from fogsim.traffic.setup import AfterCollision, TrafficSetup
-from fogsim.traffic.sumo.library import LibsumoLink
+from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.traci_link import TraciLink
 from fogsim.traffic.sumo_traffic import SumoTraffic
 from fogsim.traffic.user_simulation import AttachedTraffic, step_length
@@ -29,7 +29,7 @@ def libsumo_traffic(setup: TrafficSetup) -> Traffic:
     UserWarning
         If its configuration has options that cannot hold here and are left out.
     """
-    for option in left_out(setup.config) if setup.config else ():
+    for option in ignored_options(setup.config) if setup.config else ():
         warnings.warn(f"{setup.config}: {option}", stacklevel=2)
     return SumoTraffic(setup, LibsumoLink())
 

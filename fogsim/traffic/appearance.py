@@ -96,8 +96,16 @@ def body_kind(vehicle_class: str, shape: str = "", length: float = 0.0) -> str:
     return known or ("truck" if length > LONGEST_CAR else "car")
 
 
-def section(kind: str, width: float, height: float) -> tuple[float, float]:
-    """Width and height [m] of a vehicle, those of a truck where its type says no more than that it is long."""
+def cross_section(kind: str, width: float, height: float) -> tuple[float, float]:
+    """Width and height [m] of a vehicle, those of a truck where its type says no more than that it is long.
+
+    Parameters
+    ----------
+    kind : str
+        Body kind.
+    width, height : float
+        The vehicle's own [m].
+    """
     large = kind in {"truck", "bus"} and math.isclose(width, CAR_SECTION[0]) and math.isclose(height, CAR_SECTION[1])
     return LARGE_SECTION if large else (width, height)
 
@@ -120,7 +128,13 @@ def paint(vehicle_id: str, colour: tuple[int, ...]) -> tuple[float, float, float
 
 @functools.lru_cache(maxsize=1024)
 def lamps_from_signals(signals: int) -> int:
-    """Lamps, as bits of `Lamp`, that SUMO's vehicle signals stand for."""
+    """Lamps, as bits of `Lamp`, that SUMO's vehicle signals stand for.
+
+    Parameters
+    ----------
+    signals : int
+        Bits of SUMO's vehicle signals.
+    """
     lamps = 0
     for bit, lamp in _SIGNALS:
         if signals & bit:
@@ -132,6 +146,12 @@ _LAMPS_OF_SIGNALS = np.array([lamps_from_signals(signals) for signals in range(_
 
 
 def lamps_from_many_signals(signals: Sequence[int]) -> NDArray[np.int32]:
-    """Lamps as bits of `Lamp` (n,), as `lamps_from_signals` gives them for each."""
+    """Lamps as bits of `Lamp` (n,), as `lamps_from_signals` gives them for each.
+
+    Parameters
+    ----------
+    signals : (n,) sequence of int
+        Bits of SUMO's vehicle signals.
+    """
     known = len(_LAMPS_OF_SIGNALS) - 1
     return np.asarray(_LAMPS_OF_SIGNALS[np.asarray(signals, dtype=np.intp) & known])

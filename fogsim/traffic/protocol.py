@@ -24,13 +24,25 @@ class Traffic(Protocol):
         """
 
     def enter_fog(self, fog: FogAccess) -> None:
-        """Let drivers see only what this fog lets them see, from now on and in every later run."""
+        """Let drivers see only what this fog lets them see, from now on and in every later run.
+
+        Parameters
+        ----------
+        fog : FogAccess
+            The fog.
+        """
 
     def network(self) -> tuple[RoadNetwork, SignMap]:
         """Roads and signs; after `start`."""
 
     def advance(self, command: Command) -> None:
-        """Move by one traffic step with a command in force."""
+        """Move by one traffic step with a command in force.
+
+        Parameters
+        ----------
+        command : Command
+            Advised speeds and lamps.
+        """
 
     def observe(self) -> TrafficSnapshot | None:
         """Tell where everybody is and what has happened since the last call; None once the ego has left."""

@@ -8,29 +8,27 @@ from typing import Concatenate, ParamSpec, TypeVar
 import numpy as np
 
 from fogsim.errors import SimulationError
+from fogsim.traffic.collision_log import CollisionLog
 from fogsim.traffic.drivers.events import Order, Script, Situation
 from fogsim.traffic.drivers.sight import FogAccess
-from fogsim.traffic.road.configuration import FIT_ARGUMENTS
+from fogsim.traffic.road.configuration import OVERRIDES
 from fogsim.traffic.road.network import read_net, road_network
 from fogsim.traffic.road.opendrive import is_opendrive
 from fogsim.traffic.road.signs import sign_map
 from fogsim.traffic.setup import AfterCollision, TrafficSetup
 from fogsim.traffic.sumo.claims import new_session
-from fogsim.traffic.sumo.collisions import CollisionWatch
-from fogsim.traffic.sumo.control import LaneKeeping, SpeedControl
-from fogsim.traffic.sumo.gaps import GapToEgo
 from fogsim.traffic.sumo.lane_changes import LaneChangeSmoothing
+from fogsim.traffic.sumo.lane_keeping import LaneKeeping
 from fogsim.traffic.sumo.link import Api, SumoLink
-from fogsim.traffic.sumo.loaded_files import check_step_length, loaded_additional, loaded_net, those_seen
+from fogsim.traffic.sumo.loaded_files import check_step_length, describe_seen, loaded_additional, loaded_net
 from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo.route import RouteProgress
-from fogsim.traffic.sumo.subscribed_reader import SubscribedReader
-from fogsim.traffic.sumo.vehicle_reader import Reader, VehicleReader
+from fogsim.traffic.sumo.route_position import GapToEgo, RoutePosition
+from fogsim.traffic.sumo.vehicle_reader import SubscribedReader, VehicleReader, read_collisions
 from fogsim.traffic.sumo_drivers.perception import Perception
-from fogsim.traffic.sumo_drivers.speed_setting import Drivers
+from fogsim.traffic.sumo_drivers.speed_control import SpeedControl, SumoDesiredSpeeds
 from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot, TrafficState, Unplayed
 
-_NOBODY: Mapping[str, float] = {}
+_NO_ADVICE: Mapping[str, float] = {}
 _FOR_EVER = "1e6"
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -42,32 +40,32 @@ class _Run:
 
     api: Api
     roster: Roster
-    reader: Reader
+    reader: VehicleReader
     lane_changes: LaneChangeSmoothing
-    control: SpeedControl
+    speeds: SpeedControl
     lanes: LaneKeeping
-    collisions: CollisionWatch
+    collisions: CollisionLog
     script: Script
     session: str
     perception: Perception | None = None
-    drivers: Drivers | None = None
+    drivers: SumoDesiredSpeeds | None = None
 
 
-def _watched(
+def _translates_errors(
     method: Callable[Concatenate["SumoTraffic", _P], _R],
 ) -> Callable[Concatenate["SumoTraffic", _P], _R]:
-    """Let a lost simulation end a method with an error of ours."""
+    """Turn the errors of a simulation that is lost or refuses a call into `SimulationError`."""
 
     @functools.wraps(method)
-    def watched(self: "SumoTraffic", /, *arguments: _P.args, **named: _P.kwargs) -> _R:
-        # A block that watches costs more than most of what is watched, so it is entered only to tell an error.
+    def translating(self: "SumoTraffic", /, *arguments: _P.args, **named: _P.kwargs) -> _R:
+        # Entering the block costs more than most methods, so it is entered only once there is an error.
         try:
             return method(self, *arguments, **named)
         except Exception:
-            with self._link.watched():
+            with self._link.translated_errors():
                 raise
 
-    return watched
+    return translating
 
 
 class SumoTraffic:
@@ -89,7 +87,7 @@ class SumoTraffic:
         self._seed = 0
         self._ego_lamps = Command().lamps
         self._ego_since = 0.0
-        self._route: RouteProgress | None = None
+        self._route: RoutePosition | None = None
         self._mark = 0
         self._teleported = False
 
@@ -99,21 +97,27 @@ class SumoTraffic:
             raise SimulationError("the traffic simulation has not been started, or is closed")
         return self._run
 
-    @_watched
+    @_translates_errors
     def start(self, seed: int) -> None:
-        """Begin, or begin anew, and run until the ego is on the road; see `Traffic.start`."""
+        """Begin, or begin anew, and run until the ego is on the road; see `Traffic.start`.
+
+        Parameters
+        ----------
+        seed : int
+            SUMO's seed.
+        """
         setup = self._setup
         api = self._link.begin(command_line(setup, seed))
-        roster, session = Roster(api, self._link.distant), new_session(api)
-        reader = SubscribedReader if self._link.distant else VehicleReader
+        roster, session = Roster(api, self._link.remote), new_session(api)
+        reader = SubscribedReader if self._link.remote else VehicleReader
         self._run = _Run(
             api=api,
             roster=roster,
             reader=reader(api, setup.ego, setup.reading_radius, roster),
             lane_changes=LaneChangeSmoothing(),
-            control=SpeedControl(api, setup.step_length),
+            speeds=SpeedControl(api, setup.step_length),
             lanes=LaneKeeping(api, setup.keep_lane, roster, session),
-            collisions=CollisionWatch(api),
+            collisions=CollisionLog(),
             script=Script(setup.events),
             session=session,
         )
@@ -137,15 +141,21 @@ class SumoTraffic:
             if waited > self._setup.warm_up_limit or simulation.getMinExpectedNumber() == 0:
                 raise SimulationError(
                     f"the ego {ego!r} did not appear within {waited:g} s of simulated time (traffic.warm_up_limit_s "
-                    f"is {self._setup.warm_up_limit:g}); {those_seen(ego, seen)}"
+                    f"is {self._setup.warm_up_limit:g}); {describe_seen(ego, seen)}"
                 )
             self._step(run)
             seen.update(simulation.getDepartedIDList())
         self._ego_since = simulation.getTime()
-        run.collisions.tell()
+        run.collisions.take()
 
     def enter_fog(self, fog: FogAccess) -> None:
-        """Let drivers see only what this fog lets them see; see `Traffic.enter_fog`."""
+        """Let drivers see only what this fog lets them see; see `Traffic.enter_fog`.
+
+        Parameters
+        ----------
+        fog : FogAccess
+            The fog.
+        """
         self._fog = fog
         if self._run is not None:
             setup, api, roster, session = self._setup, self._run.api, self._run.roster, self._run.session
@@ -153,13 +163,13 @@ class SumoTraffic:
                 self._run,
                 perception=None
                 if setup.sight is None
-                else Perception(api, fog, setup.sight, roster, self._link.distant, session),
-                drivers=Drivers(
+                else Perception(api, fog, setup.sight, roster, self._link.remote, session),
+                drivers=SumoDesiredSpeeds(
                     api, setup.drivers, fog, setup.ego, self._seed, setup.advice_deceleration, roster, session
                 ),
             )
 
-    @_watched
+    @_translates_errors
     def network(self) -> tuple[RoadNetwork, SignMap]:
         """Roads and signs; see `Traffic.network`."""
         api = self._running.api
@@ -167,37 +177,49 @@ class SumoTraffic:
         route = api.vehicle.getRoute(self._setup.ego)
         return road_network(net, route), sign_map(net, self._setup.additional or loaded_additional(api))
 
-    @_watched
+    @_translates_errors
     def advance(self, command: Command) -> None:
-        """Move by one traffic step; see `Traffic.advance`."""
+        """Move by one traffic step; see `Traffic.advance`.
+
+        Parameters
+        ----------
+        command : Command
+            Advised speeds and lamps.
+        """
         self.obey(command)
         self._link.step()
         self.look()
 
-    @_watched
+    @_translates_errors
     def obey(self, command: Command) -> None:
-        """Put a command in force for the next step of a simulation that somebody else steps."""
+        """Put a command in force for the next step of a simulation that somebody else steps.
+
+        Parameters
+        ----------
+        command : Command
+            Advised speeds and lamps.
+        """
         run = self._running
         self._ego_lamps = command.lamps
-        run.control.carry_out(self._orders(run, command))
-        self._prepare(run, command.advised_speeds)
+        run.speeds.apply(self._play_script(run, command))
+        self._update_drivers(run, command.advised_speeds)
 
-    @_watched
+    @_translates_errors
     def look(self) -> None:
-        """Take in what the last step has brought, in a simulation that somebody else steps."""
-        self._take_in(self._running)
+        """Read the last step of a simulation that somebody else steps."""
+        self._read_step(self._running)
 
-    def _orders(self, run: _Run, command: Command) -> dict[str, Order]:
-        run.roster.look()
+    def _play_script(self, run: _Run, command: Command) -> dict[str, Order]:
+        run.roster.update()
         present, ego = run.roster.present, self._setup.ego
         orders = {ego: (command.advice.speed, self._setup.advice_deceleration)} if ego in present else {}
         if run.script.is_idle:
             return orders
-        doings = run.script.play(self._situation(run, present))
-        for event in doings.lane_changes:
+        actions = run.script.play(self._situation(run, present))
+        for event in actions.lane_changes:
             run.api.vehicle.changeLaneRelative(event.vehicle, event.lanes, event.stay)
         # What is scripted comes last, so that it overrides advice.
-        return {**orders, **doings.orders}
+        return {**orders, **actions.orders}
 
     def _situation(self, run: _Run, present: set[str]) -> Situation:
         vehicle, ego = run.api.vehicle, self._setup.ego
@@ -214,42 +236,42 @@ class SumoTraffic:
         return Situation(time, present, vehicle.getDistance, gap_to_ego, has_lane)
 
     def _step(self, run: _Run) -> None:
-        self._prepare(run, _NOBODY)
+        self._update_drivers(run, _NO_ADVICE)
         self._link.step()
-        self._take_in(run)
+        self._read_step(run)
 
-    def _prepare(self, run: _Run, advised: Mapping[str, float]) -> None:
+    def _update_drivers(self, run: _Run, advised: Mapping[str, float]) -> None:
         if run.perception is not None:
             run.perception.update(self._setup.ego, self._ego_lamps, run.script.dark)
         if run.drivers is not None:
             run.drivers.update(advised)
 
-    def _take_in(self, run: _Run) -> None:
-        run.collisions.look()
-        run.roster.look()
+    def _read_step(self, run: _Run) -> None:
+        run.collisions.add(read_collisions(run.api))
+        run.roster.update()
         if self._link.shared:
             # SUMO has let the other clients do what they do in this step before it answers.
-            run.roster.recount()
-        self._teleported |= self._setup.ego in run.roster.beamed_away
-        run.lanes.keep()
+            run.roster.check_count()
+        self._teleported |= self._setup.ego in run.roster.teleported
+        run.lanes.update()
 
-    @_watched
+    @_translates_errors
     def observe(self) -> TrafficSnapshot | None:
         """Tell where everybody near the ego is; see `Traffic.observe`."""
         run, ego = self._running, self._setup.ego
         teleported, self._teleported = self._teleported, False
-        run.roster.look()
+        run.roster.update()
         if teleported or ego not in run.roster.present:
             # Where it comes back, if it does, has nothing to do with where it was.
             self._route = None
             return None
-        new, self._mark = run.roster.newcomers(self._mark)
+        new, self._mark = run.roster.entered_since(self._mark)
         # Another vehicle may have come under the ego's name.
-        self._route = RouteProgress(run.api, ego) if self._route is None or ego in new else self._route
+        self._route = RoutePosition(run.api, ego) if self._route is None or ego in new else self._route
         state = run.reader.state(self._ego_lamps)
         row = state.ids.index(ego)
-        route_position, route_length = self._route.now(state.position[row])
-        state = _with_dark(run.lane_changes.smoothed(state), run.script.dark)
+        route_position, route_length = self._route.update(state.position[row])
+        state = _with_failed_lamps(run.lane_changes.smoothed(state), run.script.dark)
         return TrafficSnapshot(
             state=state,
             ego=row,
@@ -257,7 +279,7 @@ class SumoTraffic:
             route_length=route_length,
             speed_limit=run.api.lane.getMaxSpeed(state.lane[row]),
             leader=run.reader.leader(),
-            collisions=run.collisions.tell(),
+            collisions=run.collisions.take(),
         )
 
     def unplayed(self) -> Unplayed:
@@ -266,14 +288,14 @@ class SumoTraffic:
 
     def _unplayed(self, seen_before: Iterable[str]) -> Unplayed:
         run = self._running
-        seen, _ = run.roster.newcomers(0)
+        seen, _ = run.roster.entered_since(0)
         return run.script.unplayed({*seen, *seen_before}, run.roster.present, self._setup.keep_lane)
 
     def _release(self) -> None:
         """Give every vehicle on the road back what was changed about it: it drives and sees by itself again."""
         run = self._running
-        run.roster.check()
-        run.control.release(run.roster.present)
+        run.roster.reload()
+        run.speeds.release(run.roster.present)
         run.lanes.release(run.roster.present)
         if run.perception is not None:
             run.perception.release()
@@ -286,7 +308,7 @@ class SumoTraffic:
         self._run = None
 
 
-def _with_dark(state: TrafficState, dark: frozenset[str]) -> TrafficState:
+def _with_failed_lamps(state: TrafficState, dark: frozenset[str]) -> TrafficState:
     """A state in which some vehicles' lamps have failed."""
     if not dark:
         return state
@@ -306,7 +328,7 @@ def command_line(setup: TrafficSetup, seed: int) -> list[str]:
     if setup.config is None:
         source = ["--net-file", str(setup.net)]
     else:
-        source = ["--configuration-file", str(setup.config), *FIT_ARGUMENTS]
+        source = ["--configuration-file", str(setup.config), *OVERRIDES]
     arguments = [*source, "--step-length", repr(setup.step_length), "--seed", str(seed)]
     # OpenDRIVE files among them are the sign map's; SUMO cannot read them here.
     additional = tuple(path for path in setup.additional if not is_opendrive(path))
@@ -314,8 +336,8 @@ def command_line(setup: TrafficSetup, seed: int) -> list[str]:
         if paths:
             arguments += [option, ",".join(map(str, paths))]
     quiet = ["--no-step-log", "true", "--duration-log.disable", "true", "--no-warnings", "true"]
-    # Nobody is beamed away: collisions stay where they happen and are counted. How jams dissolve in a simulation of the
-    # user's own is left to its configuration.
+    # Vehicles are not teleported: collisions stay where they happen and are counted. How jams dissolve in a simulation
+    # of the user's own is left to its configuration.
     patient = ["--time-to-teleport", "-1"] if setup.config is None else []
     physical = [*patient, "--collision.action"]
     if setup.after_collision is AfterCollision.STOP:

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 from fogsim.errors import InputError, SimulationError
 from fogsim.traffic.setup import TrafficSetup
-from fogsim.traffic.sumo.library import load_libsumo
-from fogsim.traffic.sumo.link import Api, told_errors
-from fogsim.traffic.sumo.loaded_files import those_seen
+from fogsim.traffic.sumo.libsumo_link import load_libsumo
+from fogsim.traffic.sumo.link import Api, translated_errors
+from fogsim.traffic.sumo.loaded_files import describe_seen
 from fogsim.traffic.sumo.traci_link import load_traci
 from fogsim.traffic.sumo_traffic import SumoTraffic
 from fogsim.values import Command, Unplayed
@@ -38,13 +38,19 @@ class AttachedLink:
         self._api = api
         # A connection of traci does not say what it is; both modules do.
         inside = bool(getattr(api, "isLibsumo", bool)())
-        self.distant = not inside
+        self.remote = not inside
         self._library = load_libsumo() if inside else load_traci()
         if inside and not api.isLoaded():
             raise SimulationError("no simulation runs in libsumo: call libsumo.start first")
 
     def begin(self, arguments: Sequence[str]) -> Api:  # noqa: ARG002 - the simulation has its own
-        """Take the simulation as it is; see `SumoLink.begin`."""
+        """Take the simulation as it is; see `SumoLink.begin`.
+
+        Parameters
+        ----------
+        arguments : sequence of str
+            SUMO's command line without the program's name.
+        """
         return self._api
 
     def step(self) -> None:
@@ -53,9 +59,9 @@ class AttachedLink:
     def end(self) -> None:
         """Do nothing: the simulation is its owner's."""
 
-    def watched(self) -> contextlib.AbstractContextManager[None]:
-        """Turn the loss of the simulation into an error of ours; see `SumoLink.watched`."""
-        return told_errors(self._library, "to which FogSim is attached")
+    def translated_errors(self) -> contextlib.AbstractContextManager[None]:
+        """Turn the loss of the simulation into an error of ours; see `SumoLink.translated_errors`."""
+        return translated_errors(self._library, "to which FogSim is attached")
 
 
 class AttachedTraffic(SumoTraffic):
@@ -88,16 +94,22 @@ class AttachedTraffic(SumoTraffic):
 
     def ego_is_there(self) -> bool:
         """True while the ego is on the road."""
-        with self._attached.watched():
+        with self._attached.translated_errors():
             present = self._api.vehicle.getIDList()
         self._seen.update(present)
         return self.ego in present
 
     def obey(self, command: Command) -> None:
-        """Put a command in force for the next step; see `SumoTraffic.obey`."""
+        """Put a command in force for the next step; see `SumoTraffic.obey`.
+
+        Parameters
+        ----------
+        command : Command
+            Advised speeds and lamps.
+        """
         # The owner may have taken a vehicle away since the look.
-        with self._attached.watched():
-            self._running.roster.recount()
+        with self._attached.translated_errors():
+            self._running.roster.check_count()
         super().obey(command)
 
     def unplayed(self) -> Unplayed:
@@ -106,11 +118,11 @@ class AttachedTraffic(SumoTraffic):
 
     def absence(self) -> str:
         """Say that the ego has not been on the road so far, and who has."""
-        return f"the ego {self.ego!r} did not appear while FogSim was attached; {those_seen(self.ego, self._seen)}"
+        return f"the ego {self.ego!r} did not appear while FogSim was attached; {describe_seen(self.ego, self._seen)}"
 
     def release(self) -> None:
         """Give every vehicle back what was changed about it."""
-        with self._attached.watched():
+        with self._attached.translated_errors():
             # In a simulation that was loaded since, others bear the same names.
             if self._api.simulation.getTime() >= self._running.roster.time:
                 self._release()
@@ -119,10 +131,15 @@ class AttachedTraffic(SumoTraffic):
 def step_length(api: Api) -> float:
     """Step of a simulation that runs [s].
 
+    Parameters
+    ----------
+    api : module or traci.Connection
+        libsumo, traci, or one connection of traci.
+
     Raises
     ------
     SimulationError
         If none does.
     """
-    with AttachedLink(api).watched():
+    with AttachedLink(api).translated_errors():
         return float(api.simulation.getDeltaT())

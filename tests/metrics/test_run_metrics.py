@@ -1,30 +1,16 @@
 import dataclasses
 import json
 import math
-from collections.abc import Iterable
 
 import pytest
 
 import fogsim
 from fogsim.errors import SimulationError, UnknownNameError
-from fogsim.metrics import METRICS, JsonValue, RunMetrics, RunSummary, SafetyStandard
+from fogsim.metrics import METRICS, JsonValue, RunMetrics, RunSummary
 from fogsim.scenario import build
-from fogsim.units import extinction_from_visibility
-from fogsim.values import Collision, Ending, Estimate, Leader, Step
-from tests.recorders.synthetic import belief, drive, estimate, make_step
-
-
-def summarise(steps: Iterable[Step], **standard: float) -> dict[str, JsonValue]:
-    metrics = RunMetrics(SafetyStandard(**standard))
-    for step in steps:
-        metrics.update(step)
-    return metrics.summary().to_json()
-
-
-def method_errors(summary: dict[str, JsonValue], method: str) -> dict[str, JsonValue]:
-    estimators = summary["estimators"]
-    assert isinstance(estimators, dict)
-    return dict(estimators[method])
+from fogsim.values import Collision, Ending
+from tests.metrics.summaries import summarise
+from tests.recorders.synthetic import drive, make_step
 
 
 def test_every_key_has_a_meaning_and_every_value_is_json() -> None:
@@ -96,123 +82,12 @@ def test_a_run_is_judged_by_what_its_advice_counts_with(advice: str, reaction_ti
     assert (standard.reaction_time, standard.deceleration) == (reaction_time, deceleration)
 
 
-def test_distance_and_speed_with_uneven_steps() -> None:
-    steps = [
-        make_step(0, time=1.0, speed=10.0, route_position=100.0),
-        make_step(1, time=1.5, speed=20.0, route_position=110.0),
-        make_step(2, time=3.0, speed=12.0, route_position=130.0, ending=Ending.ARRIVED),
-    ]
-    summary = summarise(steps)
-    assert summary["duration_s"] == pytest.approx(2.0)
-    assert summary["distance_m"] == pytest.approx(30.0)
-    assert summary["mean_speed_mps"] == pytest.approx(15.0)
-    assert summary["max_speed_mps"] == 20.0
-    assert summary["ending"] == "arrived"
-    assert summary["steps"] == 3
-
-
-def test_times_add_up_without_noise() -> None:
-    steps = [make_step(i, time=i / 10, speed=25.0, leader=Leader("other", 5.0, 20.0)) for i in range(39)]
-    summary = summarise(steps, time_to_collision=4.0)
-    assert summary["duration_s"] == 3.8
-    assert summary["time_exposed_time_to_collision_s"] == 3.8
-
-
-def test_conflicts_are_weighted_with_the_time_between_steps() -> None:
-    approach = [(20.0, 4.0), (10.0, 2.0), (5.0, 1.0)]
-    steps = [
-        make_step(i, time=0.5 * i, speed=25.0, leader=Leader("other", gap, 20.0)) for i, (gap, _) in enumerate(approach)
-    ]
-    summary = summarise([*steps, make_step(3, time=1.5)])
-    assert summary["minimum_time_to_collision_s"] == pytest.approx(1.0)
-    assert summary["time_exposed_time_to_collision_s"] == pytest.approx(1.0)
-    assert summary["time_integrated_time_to_collision_s2"] == pytest.approx(0.5 * (1.0 + 2.0))
-    assert summary["max_drac_mps2"] == pytest.approx(0.5 * 25.0 / 5.0)
-    assert summary["minimum_gap_m"] == 5.0
-    assert summary["minimum_time_headway_s"] == pytest.approx(0.2)
-    assert summarise(steps, time_to_collision=1.5)["time_exposed_time_to_collision_s"] == pytest.approx(0.5)
-
-
-def test_share_of_time_in_which_the_ego_could_not_stop_in_sight() -> None:
-    steps = [
-        make_step(i, time=float(i), speed=20.0, visibility=v) for i, v in enumerate((300.0, 300.0, 50.0, math.inf))
-    ]
-    summary = summarise(steps)
-    assert summary["negative_margin_time_share"] == pytest.approx(1 / 3)
-    assert summary["minimum_visibility_m"] == pytest.approx(50.0)
-    assert summary["minimum_visibility_margin_m"] == pytest.approx(50.0 - (50.0 + 400 / 6.8))
-
-
-def test_collisions_of_the_ego_and_of_others() -> None:
-    hits = (Collision(0.0, "a", "b", 12.0), Collision(0.0, "ego", "other", 5.0))
-    summary = summarise([make_step(0, collisions=hits[:1]), make_step(1, time=1.0, collisions=hits[1:])])
-    assert (summary["collisions"], summary["ego_collisions"]) == (2, 1)
-    assert (summary["max_impact_speed_mps"], summary["ego_max_impact_speed_mps"]) == (12.0, 5.0)
-
-
 def test_a_step_that_comes_once_more_adds_only_its_ending() -> None:
     step = make_step(0, time=1.0, collisions=(Collision(1.0, "a", "b", 3.0),))
     summary = summarise([step, dataclasses.replace(step, ending=Ending.LEFT_NETWORK)])
     assert summary["collisions"] == 1
     assert summary["steps"] == 1
     assert summary["ending"] == "left the network"
-
-
-def test_braking_and_jerk() -> None:
-    accelerations = (0.0, -2.0, -2.0, 0.5)
-    summary = summarise(make_step(i, time=0.5 * i, acceleration=a) for i, a in enumerate(accelerations))
-    assert summary["max_deceleration_mps2"] == 2.0
-    assert summary["rms_jerk_mps3"] == pytest.approx(math.sqrt((4.0**2 + 0.0 + 5.0**2) / 3))
-
-
-def test_speed_above_the_advice_counts_only_while_there_is_one() -> None:
-    advised = (math.inf, math.inf, 20.0, 25.0, 24.9)
-    summary = summarise(make_step(i, time=float(i), speed=25.0, advised=a) for i, a in enumerate(advised))
-    assert summary["advised_time_share"] == pytest.approx(3 / 4)
-    assert summary["mean_advised_speed_mps"] == pytest.approx((20.0 + 25.0 + 24.9) / 3)
-    assert summary["above_advice_time_share"] == pytest.approx(1 / 4)
-    strict = summarise((make_step(i, time=float(i), advised=a) for i, a in enumerate(advised)), advice_tolerance=0.0)
-    assert strict["above_advice_time_share"] == pytest.approx(2 / 4)
-
-
-def test_estimator_error_is_against_the_visibility_ahead_and_only_in_fog() -> None:
-    steps = [
-        make_step(0, time=0.0, visibility=500.0, visibility_ahead=100.0, estimates=(estimate("m", 110.0),)),
-        make_step(1, time=1.0, visibility_ahead=200.0, estimates=(estimate("m", 150.0),)),
-        make_step(2, time=2.0, visibility_ahead=200.0, estimates=(Estimate.invalid("m", "no road"),)),
-        make_step(3, time=3.0, visibility=2000.0, estimates=(estimate("m", 100.0),)),
-    ]
-    errors = method_errors(summarise(steps), "m")
-    assert errors["count"] == 3
-    assert errors["valid_share"] == pytest.approx(2 / 3)
-    assert errors["median_error_percent"] == pytest.approx(10.0)
-    assert errors["p95_error_percent"] == pytest.approx(25.0)
-
-
-def test_an_estimate_of_clear_air_in_fog_is_an_error_without_limit_and_shows() -> None:
-    clear = Estimate("m", 0.0, 0.001)
-    estimates = (estimate("m", 110.0), estimate("m", 90.0), clear)
-    errors = method_errors(summarise(make_step(i, time=float(i), estimates=(e,)) for i, e in enumerate(estimates)), "m")
-    assert errors["median_error_percent"] == pytest.approx(10.0)
-    assert errors["p95_error_percent"] is None
-    assert errors["clear_air_share"] == pytest.approx(1 / 3)
-
-
-def test_belief_error_and_coverage() -> None:
-    beliefs = [belief(100.0, 0.1), belief(105.0, 0.1), belief(150.0, 0.1), belief(150.0, 0.5)]
-    summary = summarise(make_step(i, time=float(i), believed=b) for i, b in enumerate(beliefs))
-    assert summary["belief_count"] == 4
-    assert summary["belief_median_error_percent"] == pytest.approx(5.0, abs=0.5)
-    assert summary["belief_p95_error_percent"] == pytest.approx(50.0, abs=0.5)
-    assert summary["belief_coverage_share"] == pytest.approx(3 / 4)
-
-
-def test_clear_air_is_no_fog_to_be_right_about() -> None:
-    summary = summarise([make_step(visibility=math.inf, believed=belief(100.0), estimates=(estimate("m", 100.0),))])
-    assert extinction_from_visibility(math.inf) == 0.0
-    assert summary["belief_count"] == 0
-    assert summary["belief_coverage_share"] is None
-    assert method_errors(summary, "m")["median_error_percent"] is None
 
 
 def test_steps_out_of_order_are_refused() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from fogsim.metrics import deceleration_rate_to_avoid_crash, time_to_collision
 from fogsim.traffic import TrafficSetup
-from fogsim.traffic.sumo.library import LibsumoLink
+from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo_traffic import SumoTraffic
 from fogsim.values import Command

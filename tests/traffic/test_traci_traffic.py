@@ -15,10 +15,9 @@ from fogsim.atmosphere import FieldAccess
 from fogsim.errors import SimulationError
 from fogsim.scenario import build, scenario_from_config
 from fogsim.traffic import DriverSetup, DriverSight, TraciLink, Traffic, TrafficSetup, libsumo_traffic, traci_traffic
-from fogsim.traffic.sumo.library import LibsumoLink
+from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.link import Api, SumoLink
-from fogsim.traffic.sumo.subscribed_reader import SubscribedReader
-from fogsim.traffic.sumo.vehicle_reader import Reader, VehicleReader
+from fogsim.traffic.sumo.vehicle_reader import SubscribedReader, VehicleReader
 from fogsim.traffic.sumo_traffic import command_line
 from fogsim.values import Command, FogField, Lamp, SpeedAdvice, TrafficSnapshot, TrafficState
 
@@ -74,8 +73,8 @@ def link(sumo_process: Callable) -> Iterator[TraciLink]:
 
 
 def test_the_traffic_is_the_same_as_in_process(link: TraciLink, in_process: list[TrafficSnapshot]) -> None:
-    distant = drive(traci_traffic(SETUP, link), 1)
-    for here, there in zip(in_process, distant, strict=True):
+    remote = drive(traci_traffic(SETUP, link), 1)
+    for here, there in zip(in_process, remote, strict=True):
         assert equal(here.state, there.state)
         assert (here.leader, here.route_position, here.speed_limit) == (
             there.leader,
@@ -129,7 +128,7 @@ def test_beginning_anew_loads_the_scenario_with_the_seed(link: TraciLink, in_pro
 def readers_agree(link: SumoLink, api: Api) -> None:
     while "ego" not in api.vehicle.getIDList():
         link.step()
-    readers: list[Reader] = [kind(api, "ego", 300.0) for kind in (VehicleReader, SubscribedReader)]
+    readers: list[VehicleReader] = [kind(api, "ego", 300.0) for kind in (VehicleReader, SubscribedReader)]
     for _ in range(30):
         plain, subscribed = (reader.state(Lamp.REAR_FOG) for reader in readers)
         assert equal(plain, subscribed)
@@ -158,7 +157,7 @@ def test_one_of_two_clients_in_their_order(sumo_process: Callable, in_process: l
         def keep_stepping() -> None:
             other.begin(())
             # The last step may wait for a client that has left.
-            with contextlib.suppress(SimulationError), other.watched():
+            with contextlib.suppress(SimulationError), other.translated_errors():
                 while not done.is_set():
                     other.step()
             other.end()
@@ -189,7 +188,7 @@ def test_another_client_may_take_the_ego_away(sumo_process: Callable, order: int
 
         def take_away() -> None:
             api = other.begin(())
-            with contextlib.suppress(SimulationError), other.watched():
+            with contextlib.suppress(SimulationError), other.translated_errors():
                 while not done.is_set():
                     if "veh0" in api.vehicle.getIDList() and api.vehicle.getDistance("veh0") > 40.0:
                         api.vehicle.remove("veh0")

@@ -5,50 +5,15 @@ from typing import Any
 
 import gymnasium
 import highway_env  # noqa: F401 - registers its environments
-import pytest
 
 from fogsim.scenario import build, scenario_from_config
-from fogsim.traffic import BrakeEvent, Event, LampFailureEvent, LaneChangeEvent, Traffic, Trigger, libsumo_traffic
-from fogsim.traffic.drivers.events import Script, Situation
+from fogsim.traffic import BrakeEvent, Event, LaneChangeEvent, Traffic, Trigger, libsumo_traffic
 from fogsim.traffic.highway import HighwayTraffic
 from fogsim.values import Command, Reason, Unplayed, UnplayedEvent
 
 GRID = Path(__file__).resolve().parents[1] / "data" / "grid" / "grid.sumocfg"
 EGO = "veh18"
 NOW = Trigger(at_time=0.0, name="now")
-
-
-def after(script: Script, present: set[str], seen: set[str], *, lanes: bool = True) -> Unplayed:
-    script.play(Situation(0.0, present, lambda _: 0.0, lambda _: None, lambda *_: lanes))
-    return script.unplayed(seen, present)
-
-
-@pytest.mark.parametrize(
-    ("event", "reason"),
-    [
-        (BrakeEvent("a", Trigger(at_position=5000.0, name="x")), Reason.NOT_REACHED),
-        (BrakeEvent("gone", Trigger(at_time=0.0, name="x")), Reason.LEFT),
-        (BrakeEvent("nobody", Trigger(at_time=0.0, name="x")), Reason.NEVER_SEEN),
-        (LaneChangeEvent("a", Trigger(at_time=0.0, name="x"), -1), Reason.NO_LANE),
-    ],
-)
-def test_each_event_that_was_not_played_says_why(event: Event, reason: Reason) -> None:
-    told = after(Script([event]), {"a"}, {"a", "gone"}, lanes=False)
-    assert told.events == (UnplayedEvent("x", reason),)
-    assert told.vehicles == (("nobody",) if reason is Reason.NEVER_SEEN else ())
-    assert told.is_final == (reason in (Reason.LEFT, Reason.NO_LANE))
-
-
-def test_nothing_is_told_of_what_was_played() -> None:
-    told = after(Script([BrakeEvent("a", NOW), LampFailureEvent("a", NOW), LaneChangeEvent("a", NOW, 1)]), {"a"}, {"a"})
-    assert not told
-    assert told == Unplayed()
-
-
-def test_an_event_that_stands_for_two_is_told_once() -> None:
-    late = Trigger(at_time=9.0, name="traffic.events.0 (break_down of a at_time_s=9)")
-    told = after(Script([BrakeEvent("a", late), LampFailureEvent("a", late)]), {"a"}, {"a"})
-    assert str(told) == f"{late.name}: its time, position or gap was not reached"
 
 
 def town(*settings: str) -> Traffic:

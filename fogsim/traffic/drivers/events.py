@@ -176,8 +176,8 @@ class Situation:
 
 
 @dataclass(frozen=True, slots=True)
-class Doings:
-    """What the script wants of this step.
+class ScriptedActions:
+    """What the script asks for in this step.
 
     Attributes
     ----------
@@ -215,13 +215,19 @@ class Script:
 
     @property
     def is_idle(self) -> bool:
-        """True if nothing waits and nobody brakes, so that `play` would do nothing."""
+        """True if no event waits and no vehicle brakes, so that `play` would do nothing."""
         return not (self._waiting or self._braking)
 
-    def play(self, situation: Situation) -> Doings:
-        """Begin what is due and go on with what has begun."""
+    def play(self, situation: Situation) -> ScriptedActions:
+        """Begin what is due and go on with what has begun.
+
+        Parameters
+        ----------
+        situation : Situation
+            What triggers depend on.
+        """
         begun = self._begin(situation) if self._waiting else []
-        return Doings(
+        return ScriptedActions(
             orders=self._orders(situation) if self._braking else {},
             lane_changes=self._lane_changes(begun, situation),
         )

@@ -42,7 +42,7 @@ VERTICAL_ILLUMINANCE = 0.5
 
 
 class FogAccess(Protocol):
-    """The fog as the traffic stage needs it; handed in by whoever knows the atmosphere."""
+    """The fog as the traffic stage needs it; given by the stage that knows the atmosphere."""
 
     @property
     def maximum_extinction(self) -> float:
@@ -53,10 +53,22 @@ class FogAccess(Protocol):
         """An extinction coefficient that the fog reaches everywhere near the road [1/m]; 0 if there is none."""
 
     def extinction(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Extinction coefficient at points (..., 3) [1/m]."""
+        """Extinction coefficient at points (..., 3) [1/m].
+
+        Parameters
+        ----------
+        points : (..., 3) array_like
+            Points [m].
+        """
 
     def optical_depth(self, start: ArrayLike, end: ArrayLike) -> NDArray[np.float64]:
-        """Optical depth between points (..., 3) [-]."""
+        """Optical depth between points (..., 3) [-].
+
+        Parameters
+        ----------
+        start, end : (..., 3) array_like
+            Points [m].
+        """
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,12 +152,12 @@ class DriverSight:
             By day where C₀ e^(−τ) reaches the threshold; at night within the reach of the headlamps, whose light goes
             through the fog twice.
         """
-        transmission = np.exp(-np.asarray(depth))
+        transmittance = np.exp(-np.asarray(depth))
         if self.illuminance >= SILHOUETTE_ILLUMINANCE:
-            return np.asarray(inherent_contrast * transmission >= self.contrast_threshold)
+            return np.asarray(inherent_contrast * transmittance >= self.contrast_threshold)
         reach = self.headlamp_reach
         # Retro-reflectors and plates return light as I e^(−2τ) / d²; in clear air they are seen up to the reach.
-        return np.asarray(transmission**2 * reach**2 >= np.square(distance))
+        return np.asarray(transmittance**2 * reach**2 >= np.square(distance))
 
     def body_limit(self, distance: float, inherent_contrast: float) -> float:
         """Optical depth up to which a body is seen [-]: `sees_body`, solved for the depth.

@@ -6,8 +6,11 @@ few: on a fog-warned motorway drivers advised 30 mph drove 61 mph.
 """
 
 import math
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
+
+import numpy as np
 
 from fogsim.kinematics import DECELERATION, REACTION_TIME, safe_speed
 from fogsim.registry import Registry
@@ -23,17 +26,35 @@ Choice = Callable[[float], float]
 
 
 def unaffected(visibility: float) -> float:  # noqa: ARG001 - every choice is asked with the visibility
-    """Drive as in clear air, whatever the fog: the worst case."""
+    """Drive as in clear air, whatever the fog: the worst case.
+
+    Parameters
+    ----------
+    visibility : float
+        Meteorological visibility [m].
+    """
     return math.inf
 
 
 def within_sight(visibility: float) -> float:
-    """Drive so that one can stop within the visibility: the careful case."""
+    """Drive so that one can stop within the visibility: the careful case.
+
+    Parameters
+    ----------
+    visibility : float
+        Meteorological visibility [m].
+    """
     return safe_speed(visibility, REACTION_TIME, DECELERATION)
 
 
 def too_fast(visibility: float) -> float:
-    """Slow down below 200 m, but to 1.4 times what would be safe (between the 1.3 and 1.5 that studies suggest)."""
+    """Slow down below 200 m, but to 1.4 times what would be safe (between the 1.3 and 1.5 that studies suggest).
+
+    Parameters
+    ----------
+    visibility : float
+        Meteorological visibility [m].
+    """
     return math.inf if visibility >= UNAFFECTED_ABOVE else 1.4 * within_sight(visibility)
 
 
@@ -116,3 +137,69 @@ class DriverSetup:
     spread: float = 0.1
     compliance: Compliance = Compliance()
     misjudgement: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class DriverTraits:
+    """What sets one driver apart.
+
+    Attributes
+    ----------
+    speed_factor : float
+        Factor on the speed that the setup's choice gives [-].
+    follows_advice : bool
+        Whether advice reaches and moves them.
+    """
+
+    speed_factor: float
+    follows_advice: bool
+
+
+def driver_traits(setup: DriverSetup, vehicle: str, seed: int) -> DriverTraits:
+    """Traits of the driver of a vehicle; they depend on nothing but the seed and the vehicle's id.
+
+    Parameters
+    ----------
+    setup : DriverSetup
+        What drivers are like.
+    vehicle : str
+        Its id.
+    seed : int
+        Seed of the run, not negative.
+    """
+    rng = np.random.default_rng([seed, zlib.crc32(vehicle.encode())])
+    return DriverTraits(
+        speed_factor=math.exp(setup.spread * rng.standard_normal()),
+        follows_advice=bool(rng.random() < setup.compliance.reached_share)
+        and bool(rng.random() < setup.compliance.rate),
+    )
+
+
+def desired_speed(
+    setup: DriverSetup,
+    driver: DriverTraits,
+    own: float,
+    visibility: float,
+    advised: float = math.inf,
+    advised_for: float = 0.0,
+) -> float:
+    """Speed that a driver wants to drive [m/s], never more than the own one.
+
+    Parameters
+    ----------
+    setup : DriverSetup
+        What drivers are like.
+    driver : DriverTraits
+        What this one is like.
+    own : float
+        Speed that they would drive in clear air without advice [m/s].
+    visibility : float
+        Meteorological visibility where they are [m]; ``inf`` in clear air.
+    advised : float
+        Advised speed [m/s]; ``inf`` for none.
+    advised_for : float
+        Time since there is advice for them [s].
+    """
+    chosen = min(driver.speed_factor * SPEED_CHOICES[setup.speed_choice](visibility), own)
+    heard = driver.follows_advice and advised_for >= setup.compliance.delay
+    return complied_speed(chosen, advised, setup.compliance.strength) if heard and math.isfinite(advised) else chosen

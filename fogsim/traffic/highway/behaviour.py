@@ -9,14 +9,14 @@ from collections.abc import Sequence
 from fogsim.traffic.drivers.events import Event
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.drivers.speed_choice import DriverSetup
-from fogsim.traffic.highway.drivers import HighwayDrivers
+from fogsim.traffic.highway.desired_speeds import HighwayDesiredSpeeds
 from fogsim.traffic.highway.fleet import Fleet
 from fogsim.traffic.highway.manoeuvres import Manoeuvres
-from fogsim.traffic.highway.perception import let_drivers_meet
+from fogsim.traffic.highway.perception import limit_sight
 from fogsim.values import Command, Unplayed
 
 
-class Conduct:
+class DriverControl:
     """Stands in for the method ``act`` of one road.
 
     Parameters
@@ -47,44 +47,61 @@ class Conduct:
         events: Sequence[Event],
         seed: int,
         advice_deceleration: float,
-        sight: DriverSight | None,
+        sight: DriverSight | None = None,
     ) -> None:
         self.command = Command()
         self._fleet = fleet
         self._sight = sight
-        self._drivers = HighwayDrivers(fleet, setup, seed, advice_deceleration)
-        self._manoeuvres = Manoeuvres(fleet, events) if events else None
+        self._desired_speeds = HighwayDesiredSpeeds(fleet, setup, seed, advice_deceleration)
+        self._manoeuvres = Manoeuvres(fleet, events)
 
     def enter_fog(self, fog: FogAccess) -> None:
-        """Let the drivers choose their speeds in a fog, and see only what it lets them see."""
-        self._drivers.fog = fog
+        """Let the drivers choose their speeds in a fog, and see only what it lets them see.
+
+        Parameters
+        ----------
+        fog : FogAccess
+            The fog.
+        """
+        self._desired_speeds.fog = fog
         if self._sight is not None:
-            let_drivers_meet(fog, self._fleet, self._sight)
+            limit_sight(fog, self._fleet, self._sight)
 
     def unplayed(self, keep_lane: Sequence[str]) -> Unplayed:
-        """Tell what has not been played so far; see `Manoeuvres.unplayed`."""
-        return (self._manoeuvres or Manoeuvres(self._fleet, ())).unplayed(keep_lane)
+        """Tell what has not been played so far; see `Manoeuvres.unplayed`.
+
+        Parameters
+        ----------
+        keep_lane : sequence of str
+            Vehicles that are expected beside those of the script.
+        """
+        return self._manoeuvres.unplayed(keep_lane)
 
     def __call__(self) -> None:
         """Decide for everybody on the road."""
         road = self._fleet.environment.road
-        self._drivers.update(self.command)
-        orders = {} if self._manoeuvres is None else self._manoeuvres.begin()
+        self._desired_speeds.update(self.command)
+        orders = self._manoeuvres.plan()
         type(road).act(road)
-        if self._manoeuvres is not None:
-            self._manoeuvres.hold(orders)
+        self._manoeuvres.apply(orders)
 
 
-def take_over(
+def control_drivers(
     fleet: Fleet,
     setup: DriverSetup,
     events: Sequence[Event],
     seed: int,
     advice_deceleration: float,
-    sight: DriverSight | None,
-) -> Conduct:
-    """Let the drivers of an environment choose speeds and play a script, until its next reset; see `Conduct`."""
-    conduct = Conduct(fleet, setup, events, seed, advice_deceleration, sight)
+    sight: DriverSight | None = None,
+) -> DriverControl:
+    """Let the drivers of an environment choose speeds and play a script, until its next reset; see `DriverControl`.
+
+    Parameters
+    ----------
+    fleet, setup, events, seed, advice_deceleration, sight
+        As of `DriverControl`.
+    """
+    control = DriverControl(fleet, setup, events, seed, advice_deceleration, sight)
     # On this one road, not in the library: other environments of the process go on as they are.
-    fleet.environment.road.act = conduct
-    return conduct
+    fleet.environment.road.act = control
+    return control

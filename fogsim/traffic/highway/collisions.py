@@ -1,4 +1,4 @@
-"""Collisions in highway-env, each pair once; the library marks who has crashed, but not with whom or how fast."""
+"""Collisions in highway-env; the library marks who has crashed, but not with whom or how fast."""
 
 import itertools
 import math
@@ -12,42 +12,21 @@ from fogsim.traffic.highway.fleet import Fleet
 from fogsim.values import Collision
 
 
-class CollisionWatch:
-    """Looks after every simulation step, by the library's own rule, who has hit whom.
+def find_collisions(fleet: Fleet, period: float) -> Iterator[Collision]:
+    """Collisions of the last simulation step by the library's own rule; they are found in later steps again.
 
     Parameters
     ----------
     fleet : Fleet
         The vehicles.
+    period : float
+        Length of a step [s]: the library counts as hit who would be in the next one, and so does this.
     """
-
-    def __init__(self, fleet: Fleet) -> None:
-        self._fleet = fleet
-        self._known: set[frozenset[str]] = set()
-        self._untold: list[Collision] = []
-
-    def look(self, period: float) -> None:
-        """Take in the last simulation step.
-
-        Parameters
-        ----------
-        period : float
-            Length of a step [s]: the library counts as hit who would be in the next one, and so does this.
-        """
-        name = self._fleet.name
-        for one, other in _hits(self._fleet.environment.road, period):
-            pair = frozenset((name(one), name(other)))
-            if pair not in self._known:
-                self._known.add(pair)
-                collider, victim = (one, other) if _approach(one, other) >= _approach(other, one) else (other, one)
-                impact = math.dist(one.velocity, other.velocity)
-                self._untold.append(Collision(self._fleet.time, name(collider), name(victim), impact))
-
-    def tell(self) -> tuple[Collision, ...]:
-        """Collisions that have not been told yet."""
-        told = tuple(self._untold)
-        self._untold.clear()
-        return told
+    for one, other in _hits(fleet.environment.road, period):
+        collider, victim = fleet.name(one), fleet.name(other)
+        if _approach(one, other) < _approach(other, one):
+            collider, victim = victim, collider
+        yield Collision(fleet.time, collider, victim, math.dist(one.velocity, other.velocity))
 
 
 def _hits(road: Any, period: float) -> Iterator[tuple[Any, Any]]:
@@ -65,5 +44,5 @@ def _hits(road: Any, period: float) -> Iterator[tuple[Any, Any]]:
 
 
 def _approach(one: Any, other: Any) -> float:
-    """How fast one moves towards the other, times their distance."""
+    """Component of one's velocity towards the other, times their distance."""
     return float(matrix_product(one.velocity, other.position - one.position))

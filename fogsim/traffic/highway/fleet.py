@@ -53,6 +53,11 @@ class Fleet:
         """Id of a vehicle or an obstacle, for as long as the run lasts: its kind and its place in the order of naming.
 
         Those on the road at the beginning are named first, in the environment's own order.
+
+        Parameters
+        ----------
+        vehicle : highway_env.vehicle.kinematics.Vehicle
+            The vehicle.
         """
         return self._names.setdefault(vehicle, f"{type(vehicle).__name__} {len(self._names)}")
 
@@ -65,11 +70,23 @@ class Fleet:
         return {self.name(vehicle): vehicle for vehicle in self.environment.road.vehicles}
 
     def paint(self, vehicle: Any) -> tuple[float, float, float]:
-        """Linear reflectance of a vehicle's paint, 0 … 1; highway-env's colours tell roles, not paints."""
+        """Linear reflectance of a vehicle's paint, 0 … 1; highway-env's colours tell roles, not paints.
+
+        Parameters
+        ----------
+        vehicle : highway_env.vehicle.kinematics.Vehicle
+            The vehicle.
+        """
         return paint(self.name(vehicle), SUMO_DEFAULT_COLOUR)
 
     def lamps(self, vehicle: Any) -> Lamp:
-        """Lit lamps; an obstacle has none, and neither has a vehicle whose lamps have failed."""
+        """Lit lamps; an obstacle has none, and neither has a vehicle whose lamps have failed.
+
+        Parameters
+        ----------
+        vehicle : highway_env.vehicle.kinematics.Vehicle
+            The vehicle.
+        """
         if not hasattr(vehicle, "action") or self.name(vehicle) in self.dark:
             return Lamp.NONE
         steady = self.ego_lamps if vehicle is self.ego else OTHERS_LAMPS
@@ -77,11 +94,25 @@ class Fleet:
 
 
 def acceleration(vehicle: Any) -> float:
-    """Acceleration along the heading [m/s²]."""
+    """Acceleration along the heading [m/s²].
+
+    Parameters
+    ----------
+    vehicle : highway_env.vehicle.kinematics.Vehicle
+        The vehicle.
+    """
     return float(vehicle.action["acceleration"])
 
 
 def ahead(road: Any, vehicle: Any) -> Any:
-    """What is ahead of a vehicle in its lane, seen or not; None if there is nothing."""
+    """What is ahead of a vehicle in its lane, seen or not; None if there is nothing.
+
+    Parameters
+    ----------
+    road : highway_env.road.road.Road
+        Its road.
+    vehicle : highway_env.vehicle.kinematics.Vehicle
+        The vehicle.
+    """
     # The class's own way, as the instance's may be that of drivers in fog.
     return type(road).neighbour_vehicles(road, vehicle, vehicle.lane_index)[0]

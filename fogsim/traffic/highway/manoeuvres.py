@@ -1,4 +1,4 @@
-"""The script of a scenario, acted out by highway-env's vehicles."""
+"""The script of a scenario, played by highway-env's vehicles."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -7,8 +7,8 @@ from typing import Any
 from highway_env.vehicle.controller import ControlledVehicle
 
 from fogsim.errors import InputError, suggest
+from fogsim.kinematics import decelerated_speed
 from fogsim.linear_algebra import matrix_product
-from fogsim.traffic.drivers.deceleration import governed_speed
 from fogsim.traffic.drivers.events import Event, LaneChangeEvent, Order, Script, Situation, signed_gap
 from fogsim.traffic.highway.fleet import LEAD, Fleet, acceleration
 from fogsim.values import Unplayed
@@ -27,7 +27,7 @@ class Manoeuvres:
     Raises
     ------
     InputError
-        If it names a vehicle that is not there. That there is nobody ahead of the ego is no mistake, only chance.
+        If it names a vehicle that is not there. That no vehicle is ahead of the ego is no mistake, only chance.
     """
 
     def __init__(self, fleet: Fleet, events: Sequence[Event]) -> None:
@@ -43,39 +43,47 @@ class Manoeuvres:
         self._driven: dict[str, float] = {}
         self._keeping_lane: dict[str, tuple[float, bool]] = {}
 
-    def begin(self) -> Mapping[str, Order]:
+    def plan(self) -> Mapping[str, Order]:
         """Begin what is due, before the drivers decide.
 
         Returns
         -------
         mapping from vehicle id to Order
-            Speeds for this step, for `hold` once the drivers have decided.
+            Speeds for this step, for `apply` once the drivers have decided.
         """
         vehicles = self._fleet.present()
-        self._let_change_lanes_again(vehicles)
-        doings = self._script.play(self._situation(vehicles))
-        for event in doings.lane_changes:
+        self._end_lane_changes(vehicles)
+        actions = self._script.play(self._situation(vehicles))
+        for event in actions.lane_changes:
             self._change_lane(vehicles[event.vehicle], event)
         self._fleet.dark = self._script.dark
         for name, vehicle in vehicles.items():
             self._driven[name] = self._driven.get(name, 0.0) + max(vehicle.speed, 0.0) * self._fleet.step_length
-        return doings.orders
+        return actions.orders
 
-    def hold(self, orders: Mapping[str, Order]) -> None:
+    def apply(self, orders: Mapping[str, Order]) -> None:
         """Slow vehicles down to the speeds of their orders, whatever their drivers have decided.
 
         Parameters
         ----------
         orders : mapping from vehicle id to Order
-            From `begin`.
+            From `plan`.
         """
         vehicles = self._fleet.present() if orders else {}
         for name, (target, deceleration) in orders.items():
             vehicle = vehicles[name]
-            vehicle.action["acceleration"] = _held(vehicle, target, deceleration, self._fleet.step_length)
+            vehicle.action["acceleration"] = _limited_acceleration(
+                vehicle, target, deceleration, self._fleet.step_length
+            )
 
     def unplayed(self, keep_lane: Sequence[str]) -> Unplayed:
-        """Tell what has not been played so far, and which vehicles of `keep_lane` are not there either."""
+        """Tell what has not been played so far, and which vehicles of `keep_lane` are not there either.
+
+        Parameters
+        ----------
+        keep_lane : sequence of str
+            Vehicles that are expected beside those of the script.
+        """
         present = self._fleet.present()
         return self._script.unplayed(self._fleet.known(), present, keep_lane)
 
@@ -104,7 +112,7 @@ class Manoeuvres:
             self._keeping_lane[event.vehicle] = (self._fleet.time + event.stay, own)
             vehicle.enable_lane_change = False
 
-    def _let_change_lanes_again(self, vehicles: Mapping[str, Any]) -> None:
+    def _end_lane_changes(self, vehicles: Mapping[str, Any]) -> None:
         for name, (until, own) in list(self._keeping_lane.items()):
             if self._fleet.time >= until:
                 del self._keeping_lane[name]
@@ -129,10 +137,10 @@ def _gap(vehicle: Any, ego: Any) -> float | None:
     return signed_gap(ahead, behind, vehicle.LENGTH, ego.LENGTH)
 
 
-def _held(vehicle: Any, target: float, deceleration: float, step_length: float) -> float:
+def _limited_acceleration(vehicle: Any, target: float, deceleration: float, step_length: float) -> float:
     """Acceleration of a vehicle that is brought to a speed and kept there [m/s²]; it does not roll backwards."""
     # What no driver steers is left to roll.
     own = acceleration(vehicle) if isinstance(vehicle, ControlledVehicle) else 0.0
     hardest = min(deceleration, getattr(vehicle, "ACC_MAX", math.inf))
-    asked = (governed_speed(vehicle.speed, target, hardest, step_length) - vehicle.speed) / step_length
+    asked = (decelerated_speed(vehicle.speed, target, hardest, step_length) - vehicle.speed) / step_length
     return float(max(min(own, asked), -max(vehicle.speed, 0.0) / step_length))

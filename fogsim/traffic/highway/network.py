@@ -24,7 +24,13 @@ _MARKINGS = {
 
 
 def upright(points: ArrayLike) -> NDArray[np.float64]:
-    """Points (..., 2) of highway-env as (..., 3) with y up, on the level road [m]."""
+    """Points (..., 2) of highway-env as (..., 3) with y up, on the level road [m].
+
+    Parameters
+    ----------
+    points : (..., 2) array_like
+        highway-env's positions [m].
+    """
     flat = np.asarray(points, dtype=np.float64)
     return np.stack((flat[..., 0], 0.0 - flat[..., 1], np.zeros(flat.shape[:-1])), axis=-1)
 
@@ -76,17 +82,35 @@ def _carriageway(edge_id: str, parallel: Sequence[Any]) -> Iterator[Lane]:
 
 
 def speed_limit(lane: Any) -> float:
-    """Speed limit of a lane [m/s]; where it has none, the highest speed of highway-env's vehicles."""
+    """Speed limit of a lane [m/s]; where it has none, the highest speed of highway-env's vehicles.
+
+    Parameters
+    ----------
+    lane : highway_env.road.lane.AbstractLane
+        The lane.
+    """
     return float(Vehicle.MAX_SPEED if lane.speed_limit is None else lane.speed_limit)
 
 
 def planned_route(vehicle: Any) -> Any:
-    """Lanes that a vehicle plans to drive; None if it has no plan, or is of a kind that makes none."""
+    """Lanes that a vehicle plans to drive; None if it has no plan, or is of a kind that makes none.
+
+    Parameters
+    ----------
+    vehicle : highway_env.vehicle.kinematics.Vehicle
+        The vehicle.
+    """
     return getattr(vehicle, "route", None)
 
 
 def lane_id(index: tuple[str, str, int]) -> str:
-    """Id of a lane, as in the road network."""
+    """Id of a lane, as in the road network.
+
+    Parameters
+    ----------
+    index : tuple
+        Start node, end node and number.
+    """
     start, end, number = index
     return f"{start}>{end}_{number}"
 
@@ -105,7 +129,7 @@ def _route(network: Any, ego: Any) -> NDArray[np.float64]:
 
 
 def _lanes_ahead(network: Any, ego: Any) -> Iterator[tuple[str, str, int]]:
-    """Lanes one after the other, from the ego's own; a way round in circles is ended."""
+    """Lanes one after the other, from the ego's own; a route in circles is ended."""
     # The library takes what has been driven off the list that it is given.
     here, plan, passed = ego.lane_index, list(planned_route(ego) or ()), set()
     while here not in passed:
@@ -118,7 +142,13 @@ def _lanes_ahead(network: Any, ego: Any) -> Iterator[tuple[str, str, int]]:
 
 
 def same_roads(one: RoadNetwork, other: RoadNetwork) -> bool:
-    """Tell whether two networks have the same lanes, whatever the routes."""
+    """Tell whether two networks have the same lanes, whatever the routes.
+
+    Parameters
+    ----------
+    one, other : RoadNetwork
+        The networks.
+    """
     return len(one.lanes) == len(other.lanes) and all(
         np.array_equal(a.centreline, b.centreline)
         and (a.lane_id, a.width, a.speed_limit, a.left, a.right) == (b.lane_id, b.width, b.speed_limit, b.left, b.right)

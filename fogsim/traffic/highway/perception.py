@@ -1,7 +1,7 @@
 """highway-env's drivers react to a leader only once they can see it.
 
-Its drivers ask their road who is ahead of them; in fog, a road answers with nobody where the driver sees nobody. IDM
-and MOBIL stay as they are.
+Its drivers ask their road for the vehicle ahead; in fog, a road answers with none where the driver sees none. IDM and
+MOBIL stay as they are.
 """
 
 import math
@@ -14,7 +14,7 @@ from fogsim.traffic.highway.fleet import Fleet
 from fogsim.traffic.highway.snapshot import front_bumper, rear_bumper
 
 
-def let_drivers_meet(fog: FogAccess, fleet: Fleet, sight: DriverSight) -> None:
+def limit_sight(fog: FogAccess, fleet: Fleet, sight: DriverSight) -> None:
     """Let the drivers of an environment see only what a fog lets them see, until its next reset.
 
     Parameters
@@ -36,14 +36,14 @@ class VisibleNeighbours:
     Parameters
     ----------
     fog, fleet, sight
-        As in `let_drivers_meet`.
+        As in `limit_sight`.
     """
 
     def __init__(self, fog: FogAccess, fleet: Fleet, sight: DriverSight) -> None:
         self._fog = fog
         self._fleet = fleet
         self._sight = sight
-        self._surely_seen = sight.sure_distance(fog.maximum_extinction)
+        self._certainly_seen = sight.sure_distance(fog.maximum_extinction)
         self._last_hidden: dict[tuple[Any, Any], float] = {}
 
     def __call__(self, vehicle: Any, lane_index: Any = None) -> tuple[Any, Any]:
@@ -66,7 +66,7 @@ class VisibleNeighbours:
         lift = np.array([0.0, 0.0, EYE_HEIGHT])
         eye, rear = front_bumper(vehicle) + lift, rear_bumper(front) + lift
         distance = max(math.dist(eye, rear), 0.1)
-        if distance <= self._surely_seen:
+        if distance <= self._certainly_seen:
             return True
         depth, fleet = self._fog.optical_depth(eye, rear), self._fleet
         by_body = self._sight.sees_body(distance, depth, inherent_contrast(fleet.paint(front)))

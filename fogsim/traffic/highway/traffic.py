@@ -7,11 +7,12 @@ from highway_env.envs.common.abstract import AbstractEnv
 from highway_env.vehicle.behavior import IDMVehicle
 
 from fogsim.errors import InputError, SimulationError, suggest
+from fogsim.traffic.collision_log import CollisionLog
 from fogsim.traffic.drivers.events import Event
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.drivers.speed_choice import DriverSetup
-from fogsim.traffic.highway.behaviour import Conduct, take_over
-from fogsim.traffic.highway.collisions import CollisionWatch
+from fogsim.traffic.highway.behaviour import DriverControl, control_drivers
+from fogsim.traffic.highway.collisions import find_collisions
 from fogsim.traffic.highway.fleet import LEAD, Fleet
 from fogsim.traffic.highway.network import planned_route, road_network, same_roads, speed_limit
 from fogsim.traffic.highway.snapshot import read_snapshot
@@ -20,7 +21,13 @@ from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot, Unplay
 
 
 def is_highway_environment(environment: object) -> bool:
-    """Tell whether something is one of highway-env's environments."""
+    """Tell whether something is one of highway-env's environments.
+
+    Parameters
+    ----------
+    environment : object
+        Anything.
+    """
     return isinstance(environment, AbstractEnv)
 
 
@@ -78,8 +85,8 @@ class HighwayTraffic:
         self._after_collision = after_collision
         self._fog: FogAccess | None = None
         self._fleet: Fleet | None = None
-        self._watch: CollisionWatch | None = None
-        self._conduct: Conduct | None = None
+        self._collisions = CollisionLog()
+        self._control: DriverControl | None = None
         self._network: RoadNetwork | None = None
 
     @property
@@ -106,8 +113,8 @@ class HighwayTraffic:
         if self._environment.vehicle is None:
             raise SimulationError(f"{type(self._environment).__name__} has no controlled vehicle to become the ego")
         self._fleet = Fleet(self._environment, _driver_for(self._environment))
-        self._watch = CollisionWatch(self._fleet)
-        self._conduct = take_over(
+        self._collisions = CollisionLog()
+        self._control = control_drivers(
             self._fleet, self._drivers, self._events, seed, self._advice_deceleration, self._sight
         )
         self._hold_in_lane(self._fleet)
@@ -119,13 +126,19 @@ class HighwayTraffic:
             )
         self._network = network
         if self._fog is not None:
-            self._conduct.enter_fog(self._fog)
+            self._control.enter_fog(self._fog)
 
     def enter_fog(self, fog: FogAccess) -> None:
-        """Let drivers see only what this fog lets them see, from now on and in every later run."""
+        """Let drivers see only what this fog lets them see, from now on and in every later run.
+
+        Parameters
+        ----------
+        fog : FogAccess
+            The fog.
+        """
         self._fog = fog
-        if self._conduct is not None:
-            self._conduct.enter_fog(fog)
+        if self._control is not None:
+            self._control.enter_fog(fog)
 
     def _hold_in_lane(self, fleet: Fleet) -> None:
         vehicles = fleet.present()
@@ -142,15 +155,21 @@ class HighwayTraffic:
         return self._network, SignMap()
 
     def advance(self, command: Command) -> None:
-        """Move by one simulation step with a command in force."""
-        fleet, watch, conduct = self._running()
+        """Move by one simulation step with a command in force.
+
+        Parameters
+        ----------
+        command : Command
+            Advised speeds and lamps.
+        """
+        fleet, control = self._running()
         fleet.ego_lamps = command.lamps
-        conduct.command = command
+        control.command = command
         fleet.environment.road.act()
         fleet.environment.road.step(self.step_length)
         fleet.environment.steps += 1
         fleet.environment.time += self.step_length
-        watch.look(self.step_length)
+        self._collisions.add(find_collisions(fleet, self.step_length))
         if self._after_collision is AfterCollision.REMOVE:
             road = fleet.environment.road
             road.vehicles = [v for v in road.vehicles if v is fleet.ego or not v.crashed]
@@ -160,23 +179,23 @@ class HighwayTraffic:
 
         The impact speed of a collision is the length of the difference of both velocities.
         """
-        fleet, watch, _ = self._running()
-        return read_snapshot(fleet, self.network()[0].route, watch.tell(), self._reading_radius)
+        fleet, _ = self._running()
+        return read_snapshot(fleet, self.network()[0].route, self._collisions.take(), self._reading_radius)
 
     def unplayed(self) -> Unplayed:
         """What of the script has not been played; see `Traffic.unplayed`."""
-        _, _, conduct = self._running()
-        return conduct.unplayed(self._keep_lane)
+        _, control = self._running()
+        return control.unplayed(self._keep_lane)
 
-    def _running(self) -> tuple[Fleet, CollisionWatch, Conduct]:
-        if self._fleet is None or self._watch is None or self._conduct is None:
+    def _running(self) -> tuple[Fleet, DriverControl]:
+        if self._fleet is None or self._control is None:
             raise SimulationError("the traffic has not been started, or is closed")
-        return self._fleet, self._watch, self._conduct
+        return self._fleet, self._control
 
     def close(self) -> None:
         """End the simulation; closing twice is allowed."""
         self._environment.close()
-        self._fleet, self._watch, self._conduct, self._network = None, None, None, None
+        self._fleet, self._control, self._network = None, None, None
 
 
 def _driver_for(environment: Any) -> Any:

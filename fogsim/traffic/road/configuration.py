@@ -1,4 +1,4 @@
-"""What a SUMO configuration file names, without starting SUMO, and what of it cannot hold here."""
+"""What a SUMO configuration file names, without starting SUMO, and which of its options FogSim overrides."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,24 +16,26 @@ _REROUTING = "device.rerouting"
 
 
 @dataclass(frozen=True, slots=True)
-class _Unfit:
-    """An option that does not go with FogSim: its names, its value that does, others that mean the same, and why."""
+class _UnsupportedOption:
+    """An option that must have one value with FogSim: its names, that value, equivalent ones, and the reason."""
 
     names: tuple[str, ...]
-    fit: str
-    as_good: tuple[str, ...]
-    why: str
+    value: str
+    equivalents: tuple[str, ...]
+    reason: str
 
 
-_UNFIT = (
-    _Unfit(
+_UNSUPPORTED = (
+    _UnsupportedOption(
         ("remote-port",), "0", ("",), "SUMO would listen on that port of all interfaces, and wait for a client for ever"
     ),
-    _Unfit(("random", "abs-rand"), "false", ("", "0", "f", "no", "off", "-"), "a run must depend on its seed alone"),
+    _UnsupportedOption(
+        ("random", "abs-rand"), "false", ("", "0", "f", "no", "off", "-"), "a run must depend on its seed alone"
+    ),
 )
 
-FIT_ARGUMENTS = tuple(argument for unfit in _UNFIT for argument in (f"--{unfit.names[0]}", unfit.fit))
-"""Arguments of SUMO's command line, stronger than a configuration, in place of options that do not go with FogSim."""
+OVERRIDES = tuple(argument for option in _UNSUPPORTED for argument in (f"--{option.names[0]}", option.value))
+"""Arguments of SUMO's command line that override options of a configuration that FogSim does not support."""
 
 
 def configured_files(config: Path) -> tuple[Path, tuple[Path, ...]]:
@@ -96,8 +98,8 @@ def configured_demand(config: Path) -> ConfiguredDemand:
     )
 
 
-def left_out(config: Path) -> tuple[str, ...]:
-    """Options of a SUMO configuration that `FIT_ARGUMENTS` put out of force, each with the reason.
+def ignored_options(config: Path) -> tuple[str, ...]:
+    """Options of a SUMO configuration that `OVERRIDES` override, each with the reason.
 
     Parameters
     ----------
@@ -111,10 +113,10 @@ def left_out(config: Path) -> tuple[str, ...]:
     """
     root = _root(config)
     return tuple(
-        f"{unfit.names[0]}={value} is left out: {unfit.why}"
-        for unfit in _UNFIT
-        for value in _values(root, unfit.names)
-        if value.lower() not in (unfit.fit, *unfit.as_good)
+        f"{option.names[0]}={value} is left out: {option.reason}"
+        for option in _UNSUPPORTED
+        for value in _values(root, option.names)
+        if value.lower() not in (option.value, *option.equivalents)
     )
 
 

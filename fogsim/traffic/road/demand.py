@@ -61,7 +61,13 @@ class Demand:
     is_open: bool
 
     def lacks(self, vehicle: str) -> bool:
-        """True if a wanted vehicle can never come."""
+        """True if a wanted vehicle can never come.
+
+        Parameters
+        ----------
+        vehicle : str
+            Its id.
+        """
         return not self.is_open and vehicle not in self.found
 
 
@@ -163,7 +169,7 @@ class _DemandReader:
         flow, written = attributes.get("id", ""), attributes.get("number", "")
         number = int(written) if _is_number(written) else None
         names = (f"{flow}.0",) if number in {None, 1} else (f"{flow}.0", f"{flow}.{(number or 1) - 1}")
-        self._take(attributes, () if number == 0 else names, _flown(flow, number, self._wanted))
+        self._take(attributes, () if number == 0 else names, _flow_vehicles(flow, number, self._wanted))
 
     def _take(
         self, attributes: Mapping[str, str], names: tuple[str, ...], vehicles: Collection[str] | None = None
@@ -191,7 +197,7 @@ class _DemandReader:
             self._routes.update({v: VehicleRoute(edges, lane, self.file) for v in vehicles})
 
 
-def _flown(flow: str, number: int | None, wanted: Collection[str]) -> tuple[str, ...]:
+def _flow_vehicles(flow: str, number: int | None, wanted: Collection[str]) -> tuple[str, ...]:
     """Those of some vehicles that a flow makes, each of which it calls by its own id and a number from 0 on."""
     made = []
     for vehicle in wanted:

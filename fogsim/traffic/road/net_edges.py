@@ -32,6 +32,11 @@ class NetEdges:
     def route_length(self, route: Sequence[str]) -> float:
         """Length of the axis that fog is laid along [m]: middle lanes of a route's edges, end to end.
 
+        Parameters
+        ----------
+        route : sequence of str
+            Ids of its edges.
+
         Raises
         ------
         KeyError

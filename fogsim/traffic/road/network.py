@@ -2,7 +2,6 @@
 
 import contextlib
 import gc
-import gzip
 import math
 import re
 from collections.abc import Iterator, Sequence
@@ -14,6 +13,7 @@ import sumolib
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
+from fogsim.traffic.road.xml_stream import open_unpacked
 from fogsim.values import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea, RoadNetwork
 
 _WALKING_AREA = "walkingarea"
@@ -28,13 +28,18 @@ _ADJOINING = 0.6  # two carriageways whose borders lie nearer than this share a 
 def read_net(path: Path) -> Any:
     """Read a SUMO network file.
 
+    Parameters
+    ----------
+    path : Path
+        The file, packed by gzip or not.
+
     Raises
     ------
     InputError
         If the file is no SUMO network.
     """
     try:
-        with _no_garbage():
+        with _no_garbage_collection():
             net = sumolib.net.readNet(str(path), withInternal=True, withFoes=False)
         net.lefthand = _is_lefthand(path)
     except Exception as error:
@@ -45,22 +50,20 @@ def read_net(path: Path) -> Any:
 
 
 @contextlib.contextmanager
-def _no_garbage() -> Iterator[None]:
-    """Do without the search for garbage, which takes two thirds of the time where only what stays is made."""
-    was_searching = gc.isenabled()
+def _no_garbage_collection() -> Iterator[None]:
+    """Pause garbage collection, which takes two thirds of the time where nothing made becomes garbage."""
+    was_enabled = gc.isenabled()
     gc.disable()
     try:
         yield
     finally:
-        if was_searching:
+        if was_enabled:
             gc.enable()
 
 
 def _is_lefthand(path: Path) -> bool:
     """Whether a network file says that its vehicles keep to the left, which sumolib does not tell."""
-    with path.open("rb") as plain:
-        packed = plain.read(2) == b"\x1f\x8b"
-    with gzip.open(path) if packed else path.open("rb") as source:
+    with open_unpacked(path) as source:
         root = _ROOT.search(source.read(_HEAD))
     return root is not None and b'lefthand="' in root[0] and b'lefthand="false"' not in root[0]
 

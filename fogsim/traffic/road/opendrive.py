@@ -42,7 +42,13 @@ class _Road:
 
 
 def is_opendrive(path: Path) -> bool:
-    """Tell whether a file is OpenDRIVE, by its name."""
+    """Tell whether a file is OpenDRIVE, by its name.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    """
     return path.suffix.lower() == ".xodr"
 
 

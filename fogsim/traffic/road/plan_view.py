@@ -40,7 +40,13 @@ class Piece:
     curvature_rate: float
 
     def at(self, distance: float) -> Place:
-        """Point at a distance from its start [m]."""
+        """Point at a distance from its start [m].
+
+        Parameters
+        ----------
+        distance : float
+            From its start along the line [m].
+        """
         turned = self._turned(distance)
         if self.curvature_rate:
             along = 0.5 * distance * (SPIRAL_NODES + 1.0)
@@ -73,6 +79,11 @@ class PlanView:
     def at(self, s: float) -> Place:
         """Point at a distance along the road.
 
+        Parameters
+        ----------
+        s : float
+            Distance along the road [m].
+
         Raises
         ------
         ValueError
@@ -95,7 +106,13 @@ class UnknownPiece:
     shape: str
 
     def at(self, distance: float) -> Place:
-        """Raise what a user can make something of."""
+        """Raise what a user can make something of.
+
+        Parameters
+        ----------
+        distance : float
+            From its start along the line [m].
+        """
         where = self.s + distance
         raise ValueError(f"s = {where:g} m is on a {self.shape}; places on line, arc and spiral are known")
 

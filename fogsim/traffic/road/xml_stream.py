@@ -3,12 +3,25 @@
 import gzip
 import zlib
 from pathlib import Path
-from typing import Protocol
+from typing import IO, Protocol, cast
 from xml.parsers import expat
 
 _CHUNK = 1 << 16
 UNREADABLE = (expat.ExpatError, OSError, EOFError, zlib.error, ValueError, LookupError)
-"""What a file that is damaged, missing, or in an encoding that nobody knows raises."""
+"""What a file that is damaged, missing, or in an unknown encoding raises."""
+
+
+def open_unpacked(path: Path) -> IO[bytes]:
+    """Open a file to be read, packed by gzip or not.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    """
+    with path.open("rb") as plain:
+        packed = plain.read(2) == b"\x1f\x8b"
+    return cast("IO[bytes]", gzip.open(path)) if packed else path.open("rb")
 
 
 class ElementReader(Protocol):
@@ -20,11 +33,25 @@ class ElementReader(Protocol):
         ...
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
-        """Look at the beginning of an element."""
+        """Look at the beginning of an element.
+
+        Parameters
+        ----------
+        tag : str
+            Its name.
+        attributes : dict
+            Its attributes.
+        """
         ...
 
     def end(self, tag: str) -> None:
-        """Look at the end of an element."""
+        """Look at the end of an element.
+
+        Parameters
+        ----------
+        tag : str
+            Its name.
+        """
         ...
 
 
@@ -54,10 +81,8 @@ def read_elements(path: Path, reader: ElementReader, most_bytes: int) -> int:
         raise FileNotFoundError(path)
     parser = expat.ParserCreate()
     parser.StartElementHandler, parser.EndElementHandler = reader.start, reader.end
-    with path.open("rb") as plain:
-        packed = plain.read(2) == b"\x1f\x8b"
     done = 0
-    with gzip.open(path) if packed else path.open("rb") as source:
+    with open_unpacked(path) as source:
         while not reader.is_done and done < most_bytes:
             chunk = source.read(min(_CHUNK, most_bytes - done))
             parser.Parse(chunk, not chunk)

@@ -1,4 +1,4 @@
-"""Setting what others may set too: attributes of SUMO's vehicles, which several sessions of FogSim claim at once.
+"""Setting attributes of SUMO's vehicles that others set too: several sessions of FogSim may claim one at once.
 
 What each session wants of a vehicle, and what the vehicle had by itself, is kept with the vehicle in SUMO, in
 parameters whose keys begin with ``fogsim.``: there all sessions of a simulation find it, those of other processes too,
@@ -63,14 +63,20 @@ SPEED_GAIN = Attribute(
 
 
 def new_session(api: Api) -> str:
-    """Name of a new session of a simulation, which no other session of it has."""
+    """Name of a new session of a simulation, which no other session of it has.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    """
     number = int(api.simulation.getParameter("", _SESSIONS) or 0) + 1
     api.simulation.setParameter("", _SESSIONS, str(number))
     return str(number)
 
 
-class Notes(Generic[_Value]):
-    """What sessions have noted about vehicles under one key, by session.
+class SessionValues(Generic[_Value]):
+    """Values that the sessions keep with vehicles under one key.
 
     Parameters
     ----------
@@ -85,14 +91,28 @@ class Notes(Generic[_Value]):
         self._key = f"fogsim.{name}"
 
     def read(self, vehicle: str) -> dict[str, _Value]:
-        """Notes about a vehicle, by session."""
-        text = self._vehicles.getParameter(vehicle, self._key)
-        notes: dict[str, _Value] = json.loads(text) if text else {}
-        return notes
+        """Values of a vehicle, by session.
 
-    def write(self, vehicle: str, notes: dict[str, _Value]) -> None:
-        """Replace the notes about a vehicle."""
-        self._vehicles.setParameter(vehicle, self._key, json.dumps(notes) if notes else "")
+        Parameters
+        ----------
+        vehicle : str
+            Its id.
+        """
+        text = self._vehicles.getParameter(vehicle, self._key)
+        values: dict[str, _Value] = json.loads(text) if text else {}
+        return values
+
+    def write(self, vehicle: str, values: dict[str, _Value]) -> None:
+        """Replace the values of a vehicle.
+
+        Parameters
+        ----------
+        vehicle : str
+            Its id.
+        values : dict
+            Value by session; an empty one removes the key.
+        """
+        self._vehicles.setParameter(vehicle, self._key, json.dumps(values) if values else "")
 
 
 class Claims:
@@ -115,35 +135,55 @@ class Claims:
         self._vehicles = api.vehicle
         self._attribute = attribute
         self._session = session
-        self._notes = Notes[float](api, attribute.name)
+        self._values = SessionValues[float](api, attribute.name)
 
-    def own(self, vehicle: str) -> float:
-        """The value that a vehicle has without any claim."""
-        return self._known(vehicle)[1][_OWN]
+    def own_value(self, vehicle: str) -> float:
+        """The value that a vehicle has without any claim.
 
-    def _known(self, vehicle: str) -> tuple[float, dict[str, float]]:
+        Parameters
+        ----------
+        vehicle : str
+            Its id.
+        """
+        return self._current(vehicle)[1][_OWN]
+
+    def _current(self, vehicle: str) -> tuple[float, dict[str, float]]:
         """The value in force, and all claims with the vehicle's own value."""
-        now, notes = self._attribute.read(self._vehicles, vehicle), self._notes.read(vehicle)
-        if not notes or now != min(notes.values()):
-            notes[_OWN] = now
-        return now, notes
+        now, values = self._attribute.read(self._vehicles, vehicle), self._values.read(vehicle)
+        if not values or now != min(values.values()):
+            values[_OWN] = now
+        return now, values
 
-    def make(self, vehicle: str, value: float) -> None:
-        """Claim that the attribute be no higher than a value."""
-        now, notes = self._known(vehicle)
-        notes[self._session] = value
-        self._put_in_force(vehicle, now, notes)
+    def claim(self, vehicle: str, value: float) -> None:
+        """Claim that the attribute be no higher than a value.
+
+        Parameters
+        ----------
+        vehicle : str
+            Its id.
+        value : float
+            In the attribute's unit.
+        """
+        now, values = self._current(vehicle)
+        values[self._session] = value
+        self._put_in_force(vehicle, now, values)
 
     def withdraw(self, vehicle: str) -> None:
-        """Withdraw the claim to a vehicle, if there is one: what others claim, or its own value, comes into force."""
-        # Before anything else is asked: mostly there is none.
-        if self._session in self._notes.read(vehicle):
-            now, notes = self._known(vehicle)
-            del notes[self._session]
-            self._put_in_force(vehicle, now, notes)
+        """Withdraw the claim to a vehicle, if there is one: what others claim, or its own value, comes into force.
 
-    def _put_in_force(self, vehicle: str, now: float, notes: dict[str, float]) -> None:
-        value = min(notes.values())
+        Parameters
+        ----------
+        vehicle : str
+            Its id.
+        """
+        # Before anything else is asked: mostly there is none.
+        if self._session in self._values.read(vehicle):
+            now, values = self._current(vehicle)
+            del values[self._session]
+            self._put_in_force(vehicle, now, values)
+
+    def _put_in_force(self, vehicle: str, now: float, values: dict[str, float]) -> None:
+        value = min(values.values())
         if value != now:
             self._attribute.write(self._vehicles, vehicle, value)
-        self._notes.write(vehicle, notes if len(notes) > 1 else {})
+        self._values.write(vehicle, values if len(values) > 1 else {})

@@ -70,7 +70,13 @@ class LaneChangeSmoothing:
         self._glides: dict[str, _Glide] = {}
 
     def smoothed(self, state: TrafficState) -> TrafficState:
-        """The state as it is to be seen; the states of one run are to be given in their order."""
+        """The state as it is to be seen; the states of one run are to be given in their order.
+
+        Parameters
+        ----------
+        state : TrafficState
+            The state as SUMO has it.
+        """
         last, self._last = self._last, state
         if last is not None:
             changed = _lane_changed(last, state)

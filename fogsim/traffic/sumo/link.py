@@ -1,7 +1,8 @@
 """How a SUMO simulation is reached: in this process, or over a connection. Both offer the same calls."""
 
 import contextlib
-from collections.abc import Iterator, Sequence
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import ModuleType
 from typing import Any, Protocol
 
@@ -19,14 +20,14 @@ class SumoLink(Protocol):
 
     Attributes
     ----------
-    distant : bool
+    remote : bool
         True where every call is a message to another process, so that few calls must do.
     shared : bool
         True where others may command the simulation too, and take vehicles away between two calls.
     """
 
     @property
-    def distant(self) -> bool:
+    def remote(self) -> bool:
         """See the class."""
 
     @property
@@ -35,6 +36,11 @@ class SumoLink(Protocol):
 
     def begin(self, arguments: Sequence[str]) -> Api:
         """Start SUMO with arguments of its command line, or load it anew if this link has begun it before.
+
+        Parameters
+        ----------
+        arguments : sequence of str
+            SUMO's command line without the program's name.
 
         Raises
         ------
@@ -48,12 +54,12 @@ class SumoLink(Protocol):
     def end(self) -> None:
         """End the simulation, or leave it; ending twice is allowed."""
 
-    def watched(self) -> contextlib.AbstractContextManager[None]:
+    def translated_errors(self) -> contextlib.AbstractContextManager[None]:
         """Block in which a simulation that is lost or refuses a call becomes a `SimulationError`."""
 
 
 @contextlib.contextmanager
-def told_errors(library: ModuleType, where: str) -> Iterator[None]:
+def translated_errors(library: ModuleType, where: str) -> Iterator[None]:
     """Block in which the errors of libsumo or traci become a `SimulationError`.
 
     Parameters
@@ -71,3 +77,67 @@ def told_errors(library: ModuleType, where: str) -> Iterator[None]:
         ) from error
     except library.TraCIException as error:
         raise SimulationError(f"SUMO {where} refused: {error}") from error
+
+
+Getter = Callable[..., Any]
+"""From a vehicle's id, and what else SUMO asks for, to the answer."""
+
+
+def getter(api: Api, domain: str, name: str) -> Getter:
+    """One getter, as directly as it can be called.
+
+    libsumo's Python functions only pass their arguments on to compiled ones, which costs as much as the answer; where
+    the compiled function is at hand it is taken itself. It names no leader as ``("", -1)`` instead of None.
+
+    Parameters
+    ----------
+    api : Api
+        libsumo or a connection of traci.
+    domain : str
+        ``vehicle``, ``simulation``, ``lane``, …
+    name : str
+        Name of the getter.
+    """
+    compiled = sys.modules.get(f"{getattr(api, '__name__', '')}._libsumo")
+    found: Getter = getattr(compiled, f"{domain}_{name}", None) or getattr(getattr(api, domain), name)
+    return found
+
+
+def vehicle_getter(api: Api, name: str) -> Getter:
+    """Getter of the domain ``vehicle``; see `getter`.
+
+    Parameters
+    ----------
+    api : Api
+        libsumo or a connection of traci.
+    name : str
+        Name of the getter.
+    """
+    return getter(api, "vehicle", name)
+
+
+def subscribed(api: Api, names: Mapping[str, int]) -> tuple[Getter, ...]:
+    """Getters of the domain ``simulation`` whose answers SUMO sends with each step, so that asking sends no message.
+
+    Parameters
+    ----------
+    api : Api
+        A connection of traci.
+    names : mapping from str to int
+        Names of getters, and the numbers of their variables in SUMO's TraCI protocol.
+    """
+    simulation = api.simulation
+    simulation.subscribe(tuple(names.values()))
+
+    def reader(name: str, variable: int) -> Getter:
+        def read() -> Any:
+            try:
+                return simulation.getSubscriptionResults()[variable]
+            except (AttributeError, KeyError):
+                # A simulation that is loaded anew has forgotten what was subscribed, and
+                # traci stumbles over a connection that was closed; its getters tell it.
+                return getattr(simulation, name)()
+
+        return read
+
+    return tuple(reader(name, variable) for name, variable in names.items())

@@ -14,8 +14,16 @@ SHOWN = 8
 """Vehicles that a message names."""
 
 
-def those_seen(ego: str, seen: Collection[str]) -> str:
-    """Say which vehicles there were instead of an ego that was not, those with a similar id first."""
+def describe_seen(ego: str, seen: Collection[str]) -> str:
+    """Say which vehicles there were instead of an ego that was not, those with a similar id first.
+
+    Parameters
+    ----------
+    ego : str
+        Id of the ego.
+    seen : collection of str
+        Vehicles that have been on the road.
+    """
     if not seen:
         return "no vehicle at all did: are there vehicles in its route or additional files?"
     near = difflib.get_close_matches(ego, sorted(seen), n=3, cutoff=0.5)
@@ -26,6 +34,13 @@ def those_seen(ego: str, seen: Collection[str]) -> str:
 
 def check_step_length(api: Api, step_length: float) -> None:
     """Hold a simulation to the step that FogSim counts with.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    step_length : float
+        The step [s].
 
     Raises
     ------
@@ -43,6 +58,11 @@ def check_step_length(api: Api, step_length: float) -> None:
 def loaded_net(api: Api) -> Path:
     """Network file that a running simulation has loaded.
 
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+
     Raises
     ------
     SimulationError
@@ -58,6 +78,12 @@ def loaded_net(api: Api) -> Path:
 
 
 def loaded_additional(api: Api) -> tuple[Path, ...]:
-    """Additional files of a running simulation, as far as they are here to be read."""
+    """Additional files of a running simulation, as far as they are here to be read.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    """
     names = api.simulation.getOption("additional-files").split(",")
     return tuple(path for name in names if (path := Path(name.strip())).is_file())

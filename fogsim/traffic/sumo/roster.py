@@ -1,11 +1,10 @@
-"""Who is on the road, without asking for all names in every step."""
+"""Which vehicles are on the road, without asking for all ids in every step."""
 
 from collections.abc import Collection, Sequence
 
-from fogsim.traffic.sumo.getters import getter, subscribed
-from fogsim.traffic.sumo.link import Api
+from fogsim.traffic.sumo.link import Api, getter, subscribed
 
-_ASKED = {
+_GETTERS = {
     "getTime": 0x66,
     "getDepartedIDList": 0x74,
     "getEndingTeleportIDList": 0x78,
@@ -15,19 +14,19 @@ _ASKED = {
 """Getters, and their variables in SUMO's TraCI protocol."""
 
 CHECK_PERIOD = 1.0
-"""Time after which the vehicles are counted [s], should somebody have taken one away by hand."""
+"""Time after which the vehicles are counted [s], should somebody have removed one by hand."""
 
 
 class Roster:
-    """Keeps the set of vehicles on the road by who has come and who has gone in the last step.
+    """Keeps the set of vehicles on the road by which have entered and left in the last step.
 
-    All names are asked for at the first look, when steps were missed, and when once a second their number is another.
+    All ids are asked for at first, when steps were missed, and when once a second their number is another.
 
     Parameters
     ----------
     api : Api
         The simulation.
-    distant : bool
+    remote : bool
         True where every call is a message to another process.
 
     Attributes
@@ -35,74 +34,80 @@ class Roster:
     present : set of str
         Vehicles on the road at `time`; not to be changed by others.
     time : float
-        Simulated time of the last look [s].
-    beamed_away : sequence of str
+        Simulated time of the last update [s].
+    teleported : sequence of str
         Vehicles that SUMO has begun to teleport in the last step.
-    departures : int
-        How often somebody has gone: as long as it stays, nobody has.
+    removals : int
+        Number of steps in which vehicles have left: as long as it stays, none has.
     """
 
-    def __init__(self, api: Api, distant: bool = False) -> None:
-        getters = subscribed(api, _ASKED) if distant else [getter(api, "simulation", name) for name in _ASKED]
-        self._now, self._departed, self._back, self._off, self._arrived = getters
-        self._everybody = getter(api, "vehicle", "getIDList")
+    def __init__(self, api: Api, remote: bool = False) -> None:
+        getters = subscribed(api, _GETTERS) if remote else [getter(api, "simulation", name) for name in _GETTERS]
+        self._now, self._departed, self._returned, self._teleporting, self._arrived = getters
+        self._all_ids = getter(api, "vehicle", "getIDList")
         self._count = getter(api, "vehicle", "getIDCount")
         self._step = float(api.simulation.getDeltaT())
         self._checked = 0.0
-        self._came: list[str] = []
+        self._entered: list[str] = []
         self.present: set[str] = set()
-        self.beamed_away: Sequence[str] = ()
-        self.departures = 0
+        self.teleported: Sequence[str] = ()
+        self.removals = 0
         self.time = float("nan")
-        self.check()
+        self.reload()
 
-    def look(self) -> None:
-        """Take in the last step; a second look in the same step costs next to nothing."""
+    def update(self) -> None:
+        """Read the last step; a second call in the same step costs next to nothing."""
         now = self._now()
         if now == self.time:
             return
-        self.beamed_away = self._off()
+        self.teleported = self._teleporting()
         # Lists of changes are of one step only: after a jump of time they do not tell all.
         if not 0.0 < now - self.time < 1.5 * self._step:
-            self.check()
+            self.reload()
             return
         self.time = now
         departed = self._departed()
-        # Who departs under the name of one on the road has come in place of one that was taken away by hand.
-        self._go(self.present.intersection(departed))
-        self._come(departed)
-        # Who is beamed away and back in one step has ended up on the road.
-        self._go(self.beamed_away)
-        self._come(self._back())
-        self._go(self._arrived())
+        # A vehicle that departs under the id of one on the road replaces one that was removed by hand.
+        self._leave(self.present.intersection(departed))
+        self._enter(departed)
+        # One that is teleported away and back in one step has ended up on the road.
+        self._leave(self.teleported)
+        self._enter(self._returned())
+        self._leave(self._arrived())
         if now - self._checked >= CHECK_PERIOD:
             self._checked = now
-            self.recount()
+            self.check_count()
 
-    def recount(self) -> None:
-        """Notice at once whom somebody has taken away by hand, of which SUMO says nothing; asks for all if any."""
+    def check_count(self) -> None:
+        """Notice vehicles removed by hand, of which SUMO says nothing; asks for all ids if there are any."""
         if self._count() != len(self.present):
-            self.check()
+            self.reload()
 
-    def check(self) -> None:
-        """Ask for all names."""
+    def reload(self) -> None:
+        """Ask for all ids."""
         self.time = self._checked = self._now()
-        everybody = self._everybody()
-        self._go(self.present.difference(everybody))
-        self._come(everybody)
+        ids = self._all_ids()
+        self._leave(self.present.difference(ids))
+        self._enter(ids)
 
-    def _come(self, vehicles: Sequence[str]) -> None:
+    def _enter(self, vehicles: Sequence[str]) -> None:
         if vehicles:
             new = [v for v in vehicles if v not in self.present]
-            self._came += new
+            self._entered += new
             self.present.update(new)
 
-    def _go(self, vehicles: Collection[str]) -> None:
+    def _leave(self, vehicles: Collection[str]) -> None:
         if vehicles:
-            self.departures += 1
+            self.removals += 1
             self.present.difference_update(vehicles)
 
-    def newcomers(self, since: int) -> tuple[list[str], int]:
-        """Who has come since an earlier call, and the mark to give to the next call; the first mark is 0."""
-        came = self._came
-        return (came[since:], len(came)) if since < len(came) else ([], since)
+    def entered_since(self, since: int) -> tuple[list[str], int]:
+        """Vehicles that have entered since an earlier call, and the mark to give to the next call.
+
+        Parameters
+        ----------
+        since : int
+            Mark of the earlier call; 0 for all since the beginning.
+        """
+        entered = self._entered
+        return (entered[since:], len(entered)) if since < len(entered) else ([], since)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from types import ModuleType
 
 from fogsim.errors import InputError, MissingDependencyError, SimulationError
-from fogsim.traffic.sumo.link import Api, told_errors
+from fogsim.traffic.sumo.link import Api, translated_errors
 
 WAIT = 0.25
 """Time between two attempts to connect [s]."""
@@ -59,7 +59,7 @@ class TraciLink:
         If the timeout is no such time.
     """
 
-    distant = True
+    remote = True
     shared = True
 
     def __init__(
@@ -86,6 +86,11 @@ class TraciLink:
     def begin(self, arguments: Sequence[str]) -> Api:
         """Connect, or load the simulation anew; see `SumoLink.begin`.
 
+        Parameters
+        ----------
+        arguments : sequence of str
+            SUMO's command line without the program's name.
+
         Raises
         ------
         SimulationError
@@ -95,7 +100,7 @@ class TraciLink:
         if self._connection is None:
             self._connection = self._connect()
         else:
-            with self.watched():
+            with self.translated_errors():
                 self._load(arguments)
         return self._connection
 
@@ -110,16 +115,16 @@ class TraciLink:
                 break
             except (traci.FatalTraCIError, OSError) as error:
                 if attempt == self._retries or time.monotonic() - begun > longest:
-                    raise SimulationError(self._silence(attempt + 1, time.monotonic() - begun, error)) from error
+                    raise SimulationError(self._no_answer(attempt + 1, time.monotonic() - begun, error)) from error
                 time.sleep(WAIT)
         connection._socket = _LimitedSocket(connection._socket, self._timeout, self._where)
         if self._order is not None:
-            with self.watched():
+            with self.translated_errors():
                 connection.setOrder(self._order)
         return connection
 
-    def _silence(self, asked: int, waited: float, error: Exception) -> str:
-        """Say that nobody has answered, for how long, and what to do."""
+    def _no_answer(self, asked: int, waited: float, error: Exception) -> str:
+        """Message that SUMO has not answered, for how long, and what to do."""
         # traci's own words only count the tries of one attempt, which is always one.
         why = f" ({error})" if isinstance(error, OSError) else ""
         return (
@@ -146,11 +151,11 @@ class TraciLink:
         """Leave the simulation; SUMO ends when its last client has left. See `SumoLink.end`."""
         connection, self._connection = self._connection, None
         if connection is not None:
-            _hang_up(connection)
+            _close(connection)
 
-    def watched(self) -> contextlib.AbstractContextManager[None]:
-        """Turn the loss of the connection into an error of ours; see `SumoLink.watched`."""
-        return told_errors(load_traci(), self._where)
+    def translated_errors(self) -> contextlib.AbstractContextManager[None]:
+        """Turn the loss of the connection into an error of ours; see `SumoLink.translated_errors`."""
+        return translated_errors(load_traci(), self._where)
 
 
 class _LimitedSocket:
@@ -177,16 +182,16 @@ class _LimitedSocket:
         try:
             return self._socket.recv(size)
         except TimeoutError as error:
-            raise self._given_up() from error
+            raise self._timed_out() from error
 
     def send(self, message: bytes) -> None:
         """Send a whole message; with a time limit, a plain ``send`` may stop half-way."""
         try:
             self._socket.sendall(message)
         except TimeoutError as error:
-            raise self._given_up() from error
+            raise self._timed_out() from error
 
-    def _given_up(self) -> SimulationError:
+    def _timed_out(self) -> SimulationError:
         # An answer that comes yet would be taken for that to the next message, the farewell too.
         self._socket.close()
         return SimulationError(
@@ -199,7 +204,7 @@ class _LimitedSocket:
         self._socket.close()
 
 
-def _hang_up(connection: Api) -> None:
+def _close(connection: Api) -> None:
     # On an error of sending, traci leaves the socket open and keeps nothing that would close it.
     connected = connection._socket
     with contextlib.suppress(load_traci().FatalTraCIError, OSError, SimulationError):

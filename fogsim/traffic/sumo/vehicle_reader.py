@@ -2,20 +2,17 @@
 
 import itertools
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.traffic.appearance import OTHERS_LAMPS, lamps_from_many_signals
-from fogsim.traffic.sumo.bodies import Bodies
-from fogsim.traffic.sumo.getters import vehicle_getter
-from fogsim.traffic.sumo.link import Api
-from fogsim.traffic.sumo.nearness import Nearness
+from fogsim.traffic.appearance import OTHERS_LAMPS, body_kind, cross_section, lamps_from_many_signals, paint
+from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
+from fogsim.traffic.sumo.nearby_vehicles import NearbyVehicles
 from fogsim.traffic.sumo.roster import Roster
-from fogsim.values import Lamp, Leader, TrafficState
+from fogsim.values import Collision, Lamp, Leader, TrafficState
 
 LEADER_RANGE = 500.0
 """How far ahead a leader is looked for [m]."""
@@ -23,8 +20,22 @@ LEADER_RANGE = 500.0
 _CHANGING = ("getAngle", "getSpeed", "getAcceleration", "getSignals", "getLaneID")
 """Getters of what changes."""
 
+# Numbers of SUMO's TraCI protocol, which libsumo and traci share (traci.constants).
+_VEHICLES = 0xA4
+_SPEED = 0x40
+_POSITION_3D = 0x39
+_ANGLE = 0x43
+_ACCELERATION = 0x72
+_LANE = 0x51
+_SIGNALS = 0x5B
+_SLOPE = 0x36
+_MOVING = (_POSITION_3D, _ANGLE, _SPEED, _ACCELERATION, _LANE, _SIGNALS, _SLOPE)
 
-class Moving(NamedTuple):
+_MARGIN = 50.0
+"""SUMO gathers vehicles by the lanes near the ego; this much more radius leaves none out [m]."""
+
+
+class DynamicState(NamedTuple):
     """What changes about vehicles, in SUMO's units; entry i of each belongs to ``ids[i]``.
 
     A named tuple is made in a third of the time of a frozen dataclass, which is noticeable in each step.
@@ -57,8 +68,7 @@ class Moving(NamedTuple):
     slope: NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class _Known:
+class _Constants(NamedTuple):
     """What never changes about those near, and which row is the ego's."""
 
     ids: Sequence[str]
@@ -70,14 +80,59 @@ class _Known:
     paint: NDArray[np.float64]
 
 
-class Reader(Protocol):
-    """Reads the vehicles near an ego that is on the road."""
+class VehicleBodies:
+    """Kinds, sizes and paints of vehicles as a table that grows with every vehicle.
 
-    def state(self, ego_lamps: Lamp) -> TrafficState:
-        """Vehicles near the ego; its lamps are those of the command, and the stop lamps that it lights itself."""
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    """
 
-    def leader(self) -> Leader | None:
-        """The vehicle ahead of the ego in its lane."""
+    def __init__(self, api: Api) -> None:
+        self._api = api
+        self._row: dict[str, int] = {}
+        self._kinds: list[str] = []
+        self._numbers = np.empty((64, 6))
+
+    def look_up(self, ids: Sequence[str]) -> tuple[tuple[str, ...], NDArray[np.float64]]:
+        """Body kinds, and (n, 6) length, width, height [m] and linear reflectances red, green, blue of the paint.
+
+        Parameters
+        ----------
+        ids : (n,) sequence of str
+            Vehicles on the road.
+        """
+        known = self._row
+        try:
+            rows = [known[v] for v in ids]
+        except KeyError:
+            rows = [known[v] if v in known else self._add(v) for v in ids]
+        kinds = self._kinds
+        return tuple([kinds[row] for row in rows]), self._numbers[rows]
+
+    def forget(self, vehicles: Sequence[str]) -> None:
+        """Forget vehicles whose ids others may bear now.
+
+        Parameters
+        ----------
+        vehicles : sequence of str
+            Their ids.
+        """
+        for vehicle in vehicles:
+            self._row.pop(vehicle, None)
+
+    def _add(self, vehicle: str) -> int:
+        get, row = self._api.vehicle, len(self._kinds)
+        if row == len(self._numbers):
+            self._numbers = np.concatenate((self._numbers, np.empty_like(self._numbers)))
+        length = get.getLength(vehicle)
+        kind = body_kind(get.getVehicleClass(vehicle), get.getShapeClass(vehicle), length)
+        self._numbers[row, :3] = length, *cross_section(kind, get.getWidth(vehicle), get.getHeight(vehicle))
+        self._numbers[row, 3:] = paint(vehicle, get.getColor(vehicle))
+        self._kinds.append(kind)
+        self._row[vehicle] = row
+        return row
 
 
 class VehicleReader:
@@ -99,9 +154,9 @@ class VehicleReader:
         self._api = api
         self._ego = ego
         self._radius = radius
-        self._bodies = Bodies(api)
+        self._bodies = VehicleBodies(api)
         self._roster = Roster(api) if roster is None else roster
-        self._nearness = Nearness(api, ego, radius, self._roster)
+        self._nearby_vehicles = NearbyVehicles(api, ego, radius, self._roster)
         self._getters = tuple(vehicle_getter(api, name) for name in _CHANGING)
         self._slope = vehicle_getter(api, "getSlope")
         self._level = math.nan
@@ -109,65 +164,71 @@ class VehicleReader:
         self._speed = vehicle_getter(api, "getSpeed")
         self._minimum_gap = vehicle_getter(api, "getMinGap")
         self._mark = 0
-        self._known: _Known | None = None
+        self._constants: _Constants | None = None
         self._signals: tuple[Sequence[int], NDArray[np.int32]] = ([], np.zeros(0, dtype=np.int32))
 
     def state(self, ego_lamps: Lamp) -> TrafficState:
-        """Vehicles near the ego; see `Reader.state`."""
-        self._roster.look()
-        new, self._mark = self._roster.newcomers(self._mark)
+        """Vehicles near the ego.
+
+        Parameters
+        ----------
+        ego_lamps : Lamp
+            Lamps of the command; the ego lights its stop lamps itself.
+        """
+        self._roster.update()
+        new, self._mark = self._roster.entered_since(self._mark)
         self._bodies.forget(new)
-        now = self._moving()
-        known = self._knowledge(now.ids)
-        ego = known.ego
+        now = self._dynamic_state()
+        constants = self._constants_of(now.ids)
+        ego = constants.ego
         lamps = self._lamps(now.signals)
         lamps[ego] = int(ego_lamps) | (int(lamps[ego]) & int(Lamp.STOP))
         return TrafficState(
             time=self._roster.time,
             ids=now.ids,
-            types=known.kinds,
+            types=constants.kinds,
             position=now.position,
             heading=np.radians(90.0 - now.angle),
             speed=now.speed,
             acceleration=now.acceleration,
-            length=known.length,
-            width=known.width,
-            height=known.height,
+            length=constants.length,
+            width=constants.width,
+            height=constants.height,
             lane=now.lane,
             lamps=lamps,
-            paint=known.paint,
+            paint=constants.paint,
             grade=np.radians(now.slope),
         )
 
     def _lamps(self, signals: Sequence[int]) -> NDArray[np.int32]:
-        """Lamps of all as if nobody were told any; computed anew when a signal has changed."""
+        """Lamps of all by their own signals; computed anew when a signal has changed."""
         if signals != self._signals[0]:
             self._signals = signals, lamps_from_many_signals(signals) | np.int32(OTHERS_LAMPS)
         return self._signals[1].copy()
 
-    def _knowledge(self, ids: Sequence[str]) -> _Known:
-        """What never changes; looked up anew when others are near than before."""
-        if self._known is None or self._known.ids is not ids:
-            kinds, numbers = self._bodies.of(ids)
+    def _constants_of(self, ids: Sequence[str]) -> _Constants:
+        """What never changes; looked up anew when other vehicles are near."""
+        if self._constants is None or self._constants.ids is not ids:
+            kinds, numbers = self._bodies.look_up(ids)
             length, width, height = numbers[:, :3].T
-            self._known = _Known(ids, ids.index(self._ego), kinds, length, width, height, numbers[:, 3:])
-        return self._known
+            self._constants = _Constants(ids, ids.index(self._ego), kinds, length, width, height, numbers[:, 3:])
+        return self._constants
 
-    def _moving(self) -> Moving:
-        ids, position = self._nearness.find()
+    def _dynamic_state(self) -> DynamicState:
+        ids, position = self._nearby_vehicles.find()
         angle, speed, acceleration, signals, lane = self._getters
         # One array for all: for few vehicles making arrays costs more than asking.
         flat = itertools.chain(map(angle, ids), map(speed, ids), map(acceleration, ids))
         angles, speeds, accelerations = np.fromiter(flat, np.float64, 3 * len(ids)).reshape(3, -1)
         lanes, lit, slopes = tuple(map(lane, ids)), list(map(signals, ids)), self._slopes(ids, position[:, 2])
-        return Moving(ids, position, angles, speeds, accelerations, lanes, lit, slopes)
+        return DynamicState(ids, position, angles, speeds, accelerations, lanes, lit, slopes)
 
     def _slopes(self, ids: Sequence[str], heights: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Slopes (n,) [°], which nobody is asked for while all stay on the level."""
+        """Slopes (n,) [°], which are not asked for while all stay on the level."""
         if (heights == self._level).all():
             return np.zeros(len(ids))
         slopes = np.fromiter(map(self._slope, ids), np.float64, len(ids))
-        # Whoever leaves the level, or comes to it, is at another height first.
+        # A vehicle that leaves the level, or comes to it, is at another height first.
         self._level = math.nan if slopes.any() or np.ptp(heights) else float(heights[0])
         return slopes
 
@@ -176,9 +237,55 @@ class VehicleReader:
         return np.asarray(np.hypot(offset[:, 0], offset[:, 1]) <= self._radius)
 
     def leader(self) -> Leader | None:
-        """The vehicle ahead of the ego; see `Reader.leader`."""
+        """The vehicle ahead of the ego in its lane."""
         found = self._leader(self._ego, LEADER_RANGE)
         if found is None or not found[0]:
             return None
         # SUMO's gap leaves out the follower's minimum gap.
         return Leader(found[0], found[1] + self._minimum_gap(self._ego), self._speed(found[0]))
+
+
+class SubscribedReader(VehicleReader):
+    """Reads vehicles by subscribing to the surroundings of the ego, which SUMO sends at once.
+
+    The subscription is for this instant alone: SUMO ends itself if one outlives its vehicle, and other
+    clients may take the ego away before the next step. The interface and the result are those of
+    `VehicleReader`, whose getters cost a message each over a connection.
+    """
+
+    def _dynamic_state(self) -> DynamicState:
+        rows = self._surroundings()
+        # Rows of a subscription of the user's own may be among them, with other variables.
+        listed = sorted(vehicle for vehicle, row in rows.items() if all(v in row for v in _MOVING))
+        position = np.array([rows[v][_POSITION_3D] for v in listed])
+        near = self._is_near(listed, position)
+        ids = tuple(v for v, is_near in zip(listed, near, strict=True) if is_near)
+        return DynamicState(
+            ids=ids,
+            position=position[near],
+            angle=np.array([rows[v][_ANGLE] for v in ids]),
+            speed=np.array([rows[v][_SPEED] for v in ids]),
+            acceleration=np.array([rows[v][_ACCELERATION] for v in ids]),
+            lane=tuple(rows[v][_LANE] for v in ids),
+            signals=[rows[v][_SIGNALS] for v in ids],
+            slope=np.array([rows[v][_SLOPE] for v in ids]),
+        )
+
+    def _surroundings(self) -> Mapping[str, Mapping[int, Any]]:
+        vehicle = self._api.vehicle
+        vehicle.subscribeContext(self._ego, _VEHICLES, self._radius + _MARGIN, _MOVING, end=self._roster.time)
+        rows: Mapping[str, Mapping[int, Any]] = vehicle.getContextSubscriptionResults(self._ego)
+        return rows
+
+
+def read_collisions(api: Api) -> Iterator[Collision]:
+    """Collisions of the last step; SUMO tells one in every step while the vehicles overlap.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    """
+    for c in getter(api, "simulation", "getCollisions")():
+        impact = abs(c.colliderSpeed - c.victimSpeed)
+        yield Collision(api.simulation.getTime(), c.collider, c.victim, impact)

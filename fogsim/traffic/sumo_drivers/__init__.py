@@ -1,1 +1,1 @@
-"""SUMO's drivers: whom they see, and how fast they go."""
+"""SUMO's drivers: which leaders they see, and how fast they drive."""

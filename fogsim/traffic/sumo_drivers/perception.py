@@ -1,35 +1,31 @@
 """Drivers react to a leader only once they can see it.
 
-SUMO's own car-following models are told which leader to ignore (``carFollowModel.ignoreIDs``), and only when that
-changes; so Krauss, IDM, EIDM and the rest stay as they are, and an unseen vehicle stays on the road. Lane changing is
-told in the same moment; see `Ignoring`.
+SUMO's own car-following models get the leader to ignore (``carFollowModel.ignoreIDs``), and only when that changes; so
+Krauss, IDM, EIDM and the rest stay as they are, and an unseen vehicle stays on the road. Lane changing is changed with
+it; see `IgnoredLeaders`.
 
-Drivers are looked at only in steps in which what they see could have changed. Between two looks a gap changes at most
-by the fastest approach there is, and near the edge of sight by what speeds and accelerations allow; so for a leader
-that stays the same the decision is in every step the one that looking in every step would give. A leader that is new
-(one of the two has changed lane, or somebody came within `REACH`) is taken up in the next look, at most
-`LONGEST_PAUSE` later; until then SUMO's driver sees it.
+Sight is computed only in steps in which what a driver sees could have changed. Between two computations a gap changes
+at most by the fastest approach there is, and near the edge of sight by what speeds and accelerations allow; so for a
+leader that stays the same the decision is in every step the one that computing in every step would give. A leader that
+is new (one of the two has changed lane, or somebody came within `REACH`) is noticed in the next computation, at most
+`MAX_PAUSE` later; until then SUMO's driver sees it.
 """
 
+import contextlib
 import itertools
 from collections.abc import Iterable, Sequence
 
-from fogsim.traffic.drivers.sight import EYE_HEIGHT, DriverSight, FogAccess
-from fogsim.traffic.sumo.claims import SOLE_SESSION
-from fogsim.traffic.sumo.getters import Getter, vehicle_getter
-from fogsim.traffic.sumo.link import Api
-from fogsim.traffic.sumo.motion_bounds import MotionBounds
+from fogsim.traffic.drivers.sight import DriverSight, FogAccess
+from fogsim.traffic.sumo.claims import SOLE_SESSION, SPEED_GAIN, Claims, SessionValues
+from fogsim.traffic.sumo.link import Api, Getter, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo.schedule import Schedule
-from fogsim.traffic.sumo_drivers.ignored_leaders import Ignoring
-from fogsim.traffic.sumo_drivers.pair_sight import OwnLamps, Pair, PairSight
-from fogsim.traffic.sumo_drivers.subscribed_pairs import SubscribedPairs
+from fogsim.traffic.sumo.traci_link import load_traci
+from fogsim.traffic.sumo.update_schedule import UpdateSchedule, closing_speed_bound
+from fogsim.traffic.sumo_drivers.leader_sight import LeaderSight, OwnLamps, Pair, SubscribedLeaders
 from fogsim.values import Lamp
 
-__all__ = ["EYE_HEIGHT", "LONGEST_PAUSE", "REACH", "Perception"]
-
 REACH = 250.0
-"""Leaders farther ahead than this matter to nobody [m]: from 150 km/h one stops in less."""
+"""Leaders farther ahead than this do not matter [m]: from 150 km/h one stops in less."""
 
 LARGEST_MINIMUM_GAP = 5.0
 """No driver's minimum gap is larger than this [m]."""
@@ -37,10 +33,67 @@ LARGEST_MINIMUM_GAP = 5.0
 FASTEST_APPROACH = 70.0
 """Faster than this no gap changes [m/s]: 250 km/h towards a standing vehicle."""
 
-LONGEST_PAUSE = 0.5
-"""Every driver looks at least this often [s], for leaders change."""
+MAX_PAUSE = 0.5
+"""Every driver's sight is computed at least this often [s], for leaders change."""
 
-_NOBODY = ("", 0.0)
+_NO_LEADER = ("", 0.0)
+_IGNORED = "carFollowModel.ignoreIDs"
+_NO_SPEED_GAIN = 0.0
+
+
+class IgnoredLeaders:
+    """Makes drivers ignore the vehicle ahead, and not leave the lane because of it.
+
+    SUMO's lane changing takes no notice of `_IGNORED`: it would avoid a slow leader that its driver cannot see. To a
+    driver who sees no vehicle ahead the lane is free, and there is no speed to gain in another.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    session : str
+        Name of the session; a driver ignores what any session has it ignore.
+    """
+
+    def __init__(self, api: Api, session: str) -> None:
+        self._vehicles = api.vehicle
+        # A connection of traci has no errors of its own; both modules do.
+        self._refusal: type[Exception] = getattr(api, "TraCIException", None) or load_traci().TraCIException
+        self._session = session
+        self._ignored = SessionValues[str](api, "ignored")
+        self._speed_gain = Claims(api, SPEED_GAIN, session)
+
+    def ignore(self, follower: str, leader: str) -> None:
+        """Let a follower ignore one vehicle.
+
+        Parameters
+        ----------
+        follower, leader : str
+            The vehicles.
+        """
+        leaders = self._ignored.read(follower)
+        leaders[self._session] = leader
+        self._set(follower, leaders)
+        # A lane-change model without such a parameter (DK2008) keeps seeing through the fog.
+        with contextlib.suppress(self._refusal):
+            self._speed_gain.claim(follower, _NO_SPEED_GAIN)
+
+    def stop_ignoring(self, follower: str) -> None:
+        """Let a follower react again to the vehicle that this session had it ignore, and change lanes as before.
+
+        Parameters
+        ----------
+        follower : str
+            The vehicle.
+        """
+        leaders = self._ignored.read(follower)
+        if leaders.pop(self._session, None) is not None:
+            self._set(follower, leaders)
+            self._speed_gain.withdraw(follower)
+
+    def _set(self, follower: str, leaders: dict[str, str]) -> None:
+        self._vehicles.setParameter(follower, _IGNORED, " ".join(sorted(set(leaders.values()))))
+        self._ignored.write(follower, leaders)
 
 
 class Perception:
@@ -56,7 +109,7 @@ class Perception:
         The drivers' eyes.
     roster : Roster or None
         Who is on the road; None for one of its own.
-    distant : bool
+    remote : bool
         True where every call is a message to another process: leaders and speeds are subscribed to.
     session : str
         Name of the session.
@@ -68,26 +121,26 @@ class Perception:
         fog: FogAccess,
         sight: DriverSight,
         roster: Roster | None = None,
-        distant: bool = False,
+        remote: bool = False,
         session: str = SOLE_SESSION,
     ) -> None:
-        self._ignoring = Ignoring(api, session)
-        sent = SubscribedPairs(api, REACH) if distant else None
-        self._leader: Getter = vehicle_getter(api, "getLeader") if sent is None else sent.leader
-        self._motion = MotionBounds(vehicle_getter(api, "getSpeed") if sent is None else sent.speed)
+        self._ignored_leaders = IgnoredLeaders(api, session)
+        subscribed = SubscribedLeaders(api, REACH) if remote else None
+        self._leader: Getter = vehicle_getter(api, "getLeader") if subscribed is None else subscribed.leader
+        self._speed: Getter = vehicle_getter(api, "getSpeed") if subscribed is None else subscribed.speed
         self._roster = Roster(api) if roster is None else roster
         self._reaction_time = sight.reaction_time
-        self._pairs = PairSight(api, fog, sight, self._motion)
-        self._schedule = Schedule(float(api.simulation.getDeltaT()), self._roster.time)
+        self._leader_sight = LeaderSight(api, fog, sight, self._speed)
+        self._schedule = UpdateSchedule(float(api.simulation.getDeltaT()), self._roster.time)
         self._mark = 0
         self._ignored: dict[str, str] = {}
         self._emerging: dict[str, tuple[str, float]] = {}
-        # Nobody nearer than this is hidden, wherever the fog is densest: for them nothing need be computed.
-        self._surely_seen = sight.sure_distance(fog.maximum_extinction) - LARGEST_MINIMUM_GAP
-        # And nobody farther than this is seen, wherever the fog is thinnest.
-        self._surely_hidden = sight.hidden_distance(fog.minimum_extinction)
-        margin = FASTEST_APPROACH * LONGEST_PAUSE
-        self._seen_for_long, self._hidden_for_long = self._surely_seen - margin, self._surely_hidden + margin
+        # No leader nearer than this is hidden, wherever the fog is densest: for them nothing need be computed.
+        self._certainly_seen = sight.sure_distance(fog.maximum_extinction) - LARGEST_MINIMUM_GAP
+        # And none farther than this is seen, wherever the fog is thinnest.
+        self._certainly_hidden = sight.hidden_distance(fog.minimum_extinction)
+        margin = FASTEST_APPROACH * MAX_PAUSE
+        self._seen_for_long, self._hidden_for_long = self._certainly_seen - margin, self._certainly_hidden + margin
 
     @property
     def ignored(self) -> dict[str, str]:
@@ -95,7 +148,7 @@ class Perception:
         return dict(self._ignored)
 
     def update(self, ego: str, ego_lamps: Lamp, dark: frozenset[str]) -> None:
-        """Look once: tell SUMO's drivers which leader they do not see.
+        """Tell SUMO's drivers which leader they do not see.
 
         Parameters
         ----------
@@ -114,80 +167,80 @@ class Perception:
 
     def _due(self) -> list[str]:
         roster, schedule = self._roster, self._schedule
-        roster.look()
-        due = schedule.due(roster.time)
+        roster.update()
+        due = schedule.pop_due(roster.time)
         if not roster.present.issuperset(due):
             self._forget(v for v in due if v not in roster.present)
             due = [v for v in due if v in roster.present]
-        new, self._mark = roster.newcomers(self._mark)
+        new, self._mark = roster.entered_since(self._mark)
         self._forget(new)
-        self._pairs.forget(new)
-        # Who comes back from a teleport still ignores somebody.
+        self._leader_sight.forget(new)
+        # A vehicle that comes back from a teleport still ignores its leader.
         for follower in roster.present.intersection(new) if new else ():
-            self._ignoring.heed(follower)
-        return due + [v for v in schedule.not_waiting(new) if v in roster.present and v not in due] if new else due
+            self._ignored_leaders.stop_ignoring(follower)
+        return due + [v for v in schedule.unscheduled(new) if v in roster.present and v not in due] if new else due
 
-    def _forget(self, gone: Iterable[str]) -> None:
-        for follower in gone:
+    def _forget(self, vehicles: Iterable[str]) -> None:
+        for follower in vehicles:
             self._ignored.pop(follower, None)
             self._emerging.pop(follower, None)
 
     def _decide_by_gap(self, due: Sequence[str]) -> list[Pair]:
-        """Decide where the gap alone tells, and give back the rest."""
+        """Decide where the gap alone is enough, and give back the rest."""
         ignored, emerging = self._ignored, self._emerging
-        # Far from any doubt: that most vehicles are, and they rest for as long as anybody.
-        rested: list[str] = []
+        # Most vehicles are far from any doubt, and pause for the longest time.
+        certain: list[str] = []
         doubtful: list[Pair] = []
         for follower, found in zip(due, map(self._leader, due, itertools.repeat(REACH)), strict=False):
-            leader, gap = found or _NOBODY
+            leader, gap = found or _NO_LEADER
             if not leader:
                 if follower in ignored:
-                    self._see(follower)
-            elif gap > self._surely_hidden:
+                    self._reveal(follower)
+            elif gap > self._certainly_hidden:
                 if ignored.get(follower) != leader or follower in emerging:
-                    self._lose(follower, leader)
+                    self._hide(follower, leader)
                 if gap <= self._hidden_for_long:
-                    self._rest_near_edge(follower, leader, gap - self._surely_hidden)
+                    self._pause_near_edge(follower, leader, gap - self._certainly_hidden)
                     continue
-            elif gap > self._surely_seen or follower in ignored:
+            elif gap > self._certainly_seen or follower in ignored:
                 doubtful.append((follower, leader, gap))
                 continue
             elif gap > self._seen_for_long:
-                self._rest_near_edge(follower, leader, self._surely_seen - gap)
+                self._pause_near_edge(follower, leader, self._certainly_seen - gap)
                 continue
-            rested.append(follower)
-        self._rest(rested, LONGEST_PAUSE)
+            certain.append(follower)
+        self._pause(certain, MAX_PAUSE)
         return doubtful
 
-    def _rest_near_edge(self, follower: str, leader: str, distance: float) -> None:
-        """Let a follower rest until the gap could have changed by a distance [m]."""
-        closing = self._motion.closing(follower, leader, LONGEST_PAUSE)
-        self._rest((follower,), min(distance / closing, LONGEST_PAUSE))
+    def _pause_near_edge(self, follower: str, leader: str, distance: float) -> None:
+        """Leave a follower alone until the gap could have changed by a distance [m]."""
+        closing = closing_speed_bound(float(self._speed(follower)), float(self._speed(leader)), MAX_PAUSE)
+        self._pause((follower,), min(distance / closing, MAX_PAUSE))
 
     def _decide_by_sight(self, pairs: Sequence[Pair], own_lamps: OwnLamps) -> None:
-        looks = self._pairs.look(pairs, own_lamps, LONGEST_PAUSE)
-        for (follower, leader, _), (is_seen, pause) in zip(pairs, looks, strict=True):
+        assessed = self._leader_sight.assess(pairs, own_lamps, MAX_PAUSE)
+        for (follower, leader, _), (is_seen, pause) in zip(pairs, assessed, strict=True):
             if not is_seen:
-                self._lose(follower, leader)
+                self._hide(follower, leader)
             elif follower in self._ignored and self._reacts(follower, leader):
-                self._see(follower)
-            self._rest((follower,), 0.0 if follower in self._emerging else pause)
+                self._reveal(follower)
+            self._pause((follower,), 0.0 if follower in self._emerging else pause)
 
-    def _rest(self, followers: Sequence[str], pause: float) -> None:
-        self._schedule.put(followers, self._roster.time + pause)
+    def _pause(self, followers: Sequence[str], pause: float) -> None:
+        self._schedule.add(followers, self._roster.time + pause)
 
-    def _lose(self, follower: str, leader: str) -> None:
-        """From now on a follower reacts to a leader no more."""
+    def _hide(self, follower: str, leader: str) -> None:
+        """From now on a follower does not react to a leader."""
         self._emerging.pop(follower, None)
         if self._ignored.get(follower) != leader:
-            self._ignoring.ignore(follower, leader)
+            self._ignored_leaders.ignore(follower, leader)
             self._ignored[follower] = leader
 
-    def _see(self, follower: str) -> None:
+    def _reveal(self, follower: str) -> None:
         """From now on a follower reacts to everybody."""
         self._emerging.pop(follower, None)
         if self._ignored.pop(follower, None) is not None:
-            self._ignoring.heed(follower)
+            self._ignored_leaders.stop_ignoring(follower)
 
     def _reacts(self, follower: str, leader: str) -> bool:
         """Whether a follower who sees a leader reacts: not at once if that leader has just come into view."""
@@ -202,5 +255,5 @@ class Perception:
     def release(self) -> None:
         """Let everybody on the road react to everybody again."""
         for follower in self._roster.present.intersection(self._ignored):
-            self._see(follower)
+            self._reveal(follower)
         self._ignored.clear()

@@ -12,7 +12,7 @@ import pytest
 from fogsim.atmosphere import FieldAccess, airlight_from_illuminance
 from fogsim.kinematics import safe_speed
 from fogsim.traffic import Compliance, DriverSetup
-from fogsim.traffic.drivers.individual import nature, wanted_speed
+from fogsim.traffic.drivers.speed_choice import desired_speed, driver_traits
 from fogsim.traffic.highway import HighwayTraffic
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Command, FogField
@@ -105,7 +105,7 @@ def test_every_driver_has_a_factor_of_their_own() -> None:
     setup = DriverSetup("too_fast", spread=0.2)
     targets = Road(setup, 60.0).drive(25.0).targets()
     assert len(set(targets)) > 6
-    drawn = [nature(setup, f"vehicle {i}", 1).factor for i in range(2000)]
+    drawn = [driver_traits(setup, f"vehicle {i}", 1).speed_factor for i in range(2000)]
     assert np.mean(np.log(drawn)) == pytest.approx(0.0, abs=0.02)
     assert np.std(np.log(drawn)) == pytest.approx(0.2, rel=0.05)
 
@@ -130,18 +130,18 @@ def test_advice_that_all_follow_sets_every_target_speed() -> None:
 def test_those_whom_it_reaches_and_who_follow_are_the_share_that_is_asked_for() -> None:
     setup = exact(reached_share=0.5, rate=0.8)
     road = Road(setup)
-    followers = [nature(setup, name, 3).follows for name in road.ids]
+    followers = [driver_traits(setup, name, 3).follows_advice for name in road.ids]
     assert 0 < sum(followers) < len(followers)
     targets = road.drive(20.0, advised(road)).targets()
     assert targets == pytest.approx([15.0 if follows else FAST for follows in followers])
-    shares = [nature(setup, f"vehicle {i}", 1).follows for i in range(4000)]
+    shares = [driver_traits(setup, f"vehicle {i}", 1).follows_advice for i in range(4000)]
     assert np.mean(shares) == pytest.approx(0.4, abs=0.02)
 
 
 def test_the_field_result_that_advice_of_30_mph_gave_61() -> None:
     setup = exact(strength=4.0 / 35.0)
-    driver = nature(setup, "any", 1)
-    assert wanted_speed(setup, driver, 65.0 * MPH, math.inf, 30.0 * MPH, 60.0) == pytest.approx(61.0 * MPH)
+    driver = driver_traits(setup, "any", 1)
+    assert desired_speed(setup, driver, 65.0 * MPH, math.inf, 30.0 * MPH, 60.0) == pytest.approx(61.0 * MPH)
     road = Road(setup)
     for vehicle in road.others:
         vehicle.target_speed = 65.0 * MPH
@@ -180,4 +180,4 @@ def test_the_same_seed_gives_the_same_run_and_another_other_drivers() -> None:
 
     assert np.array_equal(run(5), run(5))
     assert not np.array_equal(run(5), run(6))
-    assert nature(setup, "lead", 5) != nature(setup, "lead", 6)
+    assert driver_traits(setup, "lead", 5) != driver_traits(setup, "lead", 6)

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from fogsim.errors import InputError
-from fogsim.traffic.road.configuration import FIT_ARGUMENTS, configured_files, left_out
+from fogsim.traffic.road.configuration import OVERRIDES, configured_files, ignored_options
 
 
 def config(folder: Path, content: str) -> Path:
@@ -41,12 +41,12 @@ def test_options_that_cannot_hold_here_are_told_with_the_reason(tmp_path: Path) 
         tmp_path,
         '<configuration><traci_server><remote-port value="8813"/></traci_server><random v="true"/></configuration>',
     )
-    port, random = left_out(path)
+    port, random = ignored_options(path)
     assert port.startswith("remote-port=8813 is left out: SUMO would listen")
     assert random == "random=true is left out: a run must depend on its seed alone"
-    assert FIT_ARGUMENTS == ("--remote-port", "0", "--random", "false")
+    assert OVERRIDES == ("--remote-port", "0", "--random", "false")
 
 
 @pytest.mark.parametrize("text", ['<remote-port value="0"/>', '<random value="False"/>', "<random/>"])
 def test_options_that_hold_as_they_are_need_no_word(tmp_path: Path, text: str) -> None:
-    assert left_out(config(tmp_path, f"<configuration>{text}</configuration>")) == ()
+    assert ignored_options(config(tmp_path, f"<configuration>{text}</configuration>")) == ()

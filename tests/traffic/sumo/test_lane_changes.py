@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fogsim.traffic import AttachedTraffic, TraciLink, TrafficSetup
 from fogsim.traffic.sumo.lane_changes import DURATION, LaneChangeSmoothing
-from fogsim.traffic.sumo.library import LibsumoLink
+from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.vehicle_reader import VehicleReader
 from fogsim.traffic.sumo_traffic import command_line
 from fogsim.values import Command, Lamp, SpeedAdvice, TrafficState

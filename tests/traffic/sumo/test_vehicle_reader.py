@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 
 from fogsim.traffic.appearance import body_kind, lamps_from_many_signals, lamps_from_signals, paint
-from fogsim.traffic.sumo.bodies import Bodies
-from fogsim.traffic.sumo.library import LibsumoLink
-from fogsim.traffic.sumo.nearness import Nearness
-from fogsim.traffic.sumo.subscribed_reader import SubscribedReader
-from fogsim.traffic.sumo.vehicle_reader import OTHERS_LAMPS, VehicleReader
+from fogsim.traffic.sumo.libsumo_link import LibsumoLink
+from fogsim.traffic.sumo.nearby_vehicles import NearbyVehicles
+from fogsim.traffic.sumo.vehicle_reader import OTHERS_LAMPS, SubscribedReader, VehicleBodies, VehicleReader
 from fogsim.values import Lamp, TrafficState
 
 FOLDER = Path(__file__).resolve().parents[3] / "scenarios" / "motorway_fog_bank"
@@ -123,7 +121,7 @@ def test_slopes_are_read_wherever_the_road_is_not_level(link: LibsumoLink, tmp_p
 
 def test_a_vehicle_far_away_is_not_asked_again_at_once(link: LibsumoLink) -> None:
     api = begun(link)
-    nearness = Nearness(api, "ego", 100.0)
+    nearness = NearbyVehicles(api, "ego", 100.0)
     nearness.find()
     asked: list[str] = []
     original = nearness._position
@@ -166,11 +164,11 @@ def test_a_vehicle_that_is_moved_by_hand_is_found_within_a_second(link: LibsumoL
 
 def test_the_table_of_bodies_grows(link: LibsumoLink) -> None:
     api = begun(link)
-    bodies = Bodies(api)
+    bodies = VehicleBodies(api)
     for _ in range(600):
         link.step()
         ids = api.vehicle.getIDList()
-        kinds, numbers = bodies.of(ids)
+        kinds, numbers = bodies.look_up(ids)
         assert numbers.shape == (len(ids), 6)
     assert len(bodies._numbers) > 64
     assert numbers[:, 0].tolist() == [api.vehicle.getLength(v) for v in ids]

@@ -12,16 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from fogsim.atmosphere import FieldAccess
 from fogsim.traffic import Compliance, DriverSetup, DriverSight, Traffic, TrafficSetup, libsumo_traffic
 from fogsim.traffic.drivers.speed_choice import (
-    SPEED_CHOICES,
-    complied_speed,
-    perceived_distance_factor,
-    too_fast,
-    unaffected,
     within_sight,
 )
-from fogsim.traffic.sumo.library import LibsumoLink, load_libsumo
-from fogsim.traffic.sumo.motion_bounds import MotionBounds
-from fogsim.traffic.sumo_drivers.pair_sight import PairSight
+from fogsim.traffic.sumo.libsumo_link import LibsumoLink, load_libsumo
+from fogsim.traffic.sumo_drivers.leader_sight import LeaderSight
 from fogsim.values import Collision, Command, FogBank, FogField
 
 NET = Path(__file__).resolve().parents[3] / "scenarios" / "motorway_fog_bank" / "motorway.net.xml"
@@ -175,8 +169,8 @@ def test_on_a_grade_sight_is_the_closed_form_over_the_way_along_the_road(bank: b
         assert gap + 2.5 == pytest.approx(way, abs=1e-3)
         assert abs(front[2] - ahead[2]) > 2.5
         sight = DriverSight(illuminance=10_000.0)
-        pairs = PairSight(api, fog, sight, MotionBounds(api.vehicle.getSpeed))
-        assert pairs._depths([("ego", leader, gap)], [gap + 2.5]) == pytest.approx([0.03 * way], rel=1e-4)
+        pairs = LeaderSight(api, fog, sight, api.vehicle.getSpeed)
+        assert pairs._optical_depths([("ego", leader, gap)], [gap + 2.5]) == pytest.approx([0.03 * way], rel=1e-4)
     finally:
         link.end()
 
@@ -251,21 +245,6 @@ def test_drivers_choose_a_speed_in_fog_and_only_those_who_comply_follow_advice(c
     assert 0.25 < slow < 0.95  # half comply, and some of the others are held up behind them
 
 
-def test_speed_choices() -> None:
-    assert unaffected(30.0) == np.inf
-    assert within_sight(50.0) * 3.6 == pytest.approx(42.5, abs=0.05)
-    assert too_fast(200.0) == np.inf
-    assert too_fast(100.0) == pytest.approx(1.4 * within_sight(100.0))
-    assert {"unaffected", "too_fast", "within_sight"} <= set(SPEED_CHOICES)
-
-
-def test_distances_seem_longer_in_dense_fog() -> None:
-    """Cavallo, Colomb & Doré 2001: up to 60 % at night in the densest fog."""
-    assert perceived_distance_factor(20.0, 0.6) == pytest.approx(1.6)
-    assert perceived_distance_factor(90.0, 0.6) == pytest.approx(1.3)
-    assert perceived_distance_factor(500.0, 0.6) == 1.0
-
-
 def mean_headway(setup: TrafficSetup, misjudgement: float) -> float:
     """Mean time headway that drivers want in fog of 30 m [s]."""
     drivers = DriverSetup("unaffected", spread=0.0, misjudgement=misjudgement)
@@ -284,13 +263,3 @@ def mean_headway(setup: TrafficSetup, misjudgement: float) -> float:
 
 def test_who_misjudges_distances_follows_closer(setup: TrafficSetup) -> None:
     assert mean_headway(setup, 0.6) == pytest.approx(mean_headway(setup, 0.0) / 1.6, rel=0.02)
-
-
-def test_drivers_advised_30_mph_who_drive_61_can_be_represented() -> None:
-    """The field result: advice of 30 mph, mean speed 61 mph; with 65 mph unadvised that is a strength of 4 in 35."""
-    mph = 0.44704
-    strength = (65 - 61) / (65 - 30)
-    assert complied_speed(65 * mph, 30 * mph, strength) == pytest.approx(61 * mph)
-    assert complied_speed(65 * mph, 30 * mph, 1.0) == pytest.approx(30 * mph)
-    assert complied_speed(65 * mph, 30 * mph, 0.0) == pytest.approx(65 * mph)
-    assert complied_speed(20 * mph, 30 * mph, 1.0) == pytest.approx(20 * mph)  # nobody is advised to go faster

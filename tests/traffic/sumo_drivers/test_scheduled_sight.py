@@ -10,10 +10,8 @@ from fogsim.atmosphere import FieldAccess
 from fogsim.traffic import DriverSight
 from fogsim.traffic.appearance import OTHERS_LAMPS, lamps_from_signals, paint
 from fogsim.traffic.drivers.sight import EYE_HEIGHT, inherent_contrast, rear_intensity
-from fogsim.traffic.sumo.library import LibsumoLink
-from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo.schedule import Schedule
-from fogsim.traffic.sumo_drivers.perception import LONGEST_PAUSE, REACH, Perception
+from fogsim.traffic.sumo.libsumo_link import LibsumoLink
+from fogsim.traffic.sumo_drivers.perception import MAX_PAUSE, REACH, Perception
 from fogsim.values import FogBank, FogField, Lamp
 
 FOLDER = Path(__file__).resolve().parents[3] / "scenarios" / "motorway_fog_bank"
@@ -73,7 +71,7 @@ def test_scheduled_looks_decide_as_looks_in_every_step(link: LibsumoLink, field:
             leader, gap = api.vehicle.getLeader(follower, REACH) or ("", 0.0)
             known, since = steady.get(follower, ("", step))
             steady[follower] = (leader, since if known == leader else step)
-            if leader and (step - steady[follower][1]) * STEP > LONGEST_PAUSE:
+            if leader and (step - steady[follower][1]) * STEP > MAX_PAUSE:
                 compared += 1
                 seen = is_seen(api, fog, sight, (follower, leader, gap), lamps)
                 assert seen == (ignored.get(follower) != leader), (step, follower, leader, gap)
@@ -101,41 +99,3 @@ def test_a_look_costs_only_those_who_are_due(link: LibsumoLink) -> None:
         present += api.vehicle.getIDCount()
     assert set(api.vehicle.getIDList()) <= set(asked)
     assert len(asked) < 0.5 * present
-
-
-def test_the_roster_is_who_is_on_the_road(link: LibsumoLink) -> None:
-    api = link.begin(ARGUMENTS)
-    roster = Roster(api)
-    mark, came = 0, set()
-    for step in range(900):
-        link.step()
-        # A step in a hundred is missed, and once somebody is taken away.
-        if step % 100:
-            roster.look()
-            new, mark = roster.newcomers(mark)
-            came.update(new)
-            assert roster.present == set(api.vehicle.getIDList())
-        if step == 450:
-            api.vehicle.remove(min(roster.present))
-    assert roster.present < came
-    assert roster.departures > 0
-
-
-def test_who_is_scheduled_is_due_in_time_and_once() -> None:
-    schedule = Schedule(0.1, 3.0)
-    schedule.put(["now"], 3.0)
-    schedule.put(["soon"], 3.27)
-    schedule.put(["later"], 3.74)
-    seen = {}
-    for step in range(1, 12):
-        time = 3.0 + 0.1 * step
-        for vehicle in schedule.due(time):
-            seen[vehicle] = time
-    assert seen["now"] == pytest.approx(3.1)
-    assert seen["soon"] == pytest.approx(3.2)
-    assert 3.1 < seen["later"] <= 3.74
-    schedule.put(["a", "b"], 4.5)
-    assert schedule.not_waiting(["c", "a", "c"]) == ["c"]
-    assert schedule.due(9.0) == ["a", "b"]
-    assert schedule.not_waiting(["a", "c"]) == ["a", "c"]
-    assert schedule.due(10.0) == []

@@ -12,7 +12,7 @@ import pytest
 from fogsim.atmosphere import FieldAccess
 from fogsim.traffic import Compliance, DriverSetup, TraciLink, Traffic, TrafficSetup, libsumo_traffic, traci_traffic
 from fogsim.traffic.drivers.speed_choice import within_sight
-from fogsim.traffic.sumo.library import load_libsumo
+from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.traffic.sumo_traffic import command_line
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Command, FogField

@@ -1,17 +1,5 @@
-import math
-
-import pytest
-
-from fogsim.traffic.appearance import LARGE_SECTION, PAINTS, body_kind, lamps_from_signals, paint, section
-from fogsim.traffic.drivers.deceleration import governed_speed
+from fogsim.traffic.appearance import LARGE_SECTION, PAINTS, body_kind, cross_section, lamps_from_signals, paint
 from fogsim.values import Lamp
-
-
-def test_governed_speed_brakes_no_harder_than_told() -> None:
-    assert governed_speed(30.0, 10.0, 2.0, 0.1) == pytest.approx(29.8)
-    assert governed_speed(10.1, 10.0, 2.0, 0.1) == 10.0
-    assert governed_speed(5.0, 10.0, 2.0, 0.1) == 10.0
-    assert governed_speed(30.0, math.inf, 2.0, 0.1) == math.inf
 
 
 def test_body_kinds() -> None:
@@ -24,9 +12,9 @@ def test_a_shape_or_a_length_tells_what_a_class_left_at_cars_does_not() -> None:
     assert [body_kind("passenger", shape) for shape in shapes] == ["truck", "bus", "car", "van", "car"]
     assert body_kind("bus", "truck") == "bus"
     assert [body_kind("passenger", "passenger", length) for length in (5.0, 12.0)] == ["car", "truck"]
-    assert section("truck", 1.8, 1.5) == LARGE_SECTION
-    assert section("truck", 2.3, 1.5) == (2.3, 1.5)
-    assert section("car", 1.8, 1.5) == (1.8, 1.5)
+    assert cross_section("truck", 1.8, 1.5) == LARGE_SECTION
+    assert cross_section("truck", 2.3, 1.5) == (2.3, 1.5)
+    assert cross_section("car", 1.8, 1.5) == (1.8, 1.5)
 
 
 def test_paint_is_sumos_colour_or_one_of_the_common_ones() -> None:

@@ -1,4 +1,4 @@
-"""How fast highway-env's drivers want to drive: by themselves in fog, and when they are advised."""
+"""How fast highway-env's drivers desire to drive: by their own choice in fog, and when they are advised."""
 
 import math
 from collections.abc import Mapping
@@ -7,9 +7,15 @@ from typing import Any
 import numpy as np
 from highway_env.vehicle.behavior import IDMVehicle
 
-from fogsim.traffic.drivers.individual import Nature, nature, wanted_speed
 from fogsim.traffic.drivers.sight import FogAccess
-from fogsim.traffic.drivers.speed_choice import CHOICE_PERIOD, DriverSetup, perceived_distance_factor
+from fogsim.traffic.drivers.speed_choice import (
+    CHOICE_PERIOD,
+    DriverSetup,
+    DriverTraits,
+    desired_speed,
+    driver_traits,
+    perceived_distance_factor,
+)
 from fogsim.traffic.highway.fleet import Fleet
 from fogsim.traffic.highway.network import speed_limit
 from fogsim.traffic.highway.snapshot import front_bumper
@@ -17,7 +23,7 @@ from fogsim.units import visibility_from_extinction
 from fogsim.values import Command
 
 
-class HighwayDrivers:
+class HighwayDesiredSpeeds:
     """Sets the target speeds of an environment's IDM drivers, and in dense fog their time headways.
 
     Parameters
@@ -27,7 +33,7 @@ class HighwayDrivers:
     setup : DriverSetup
         What drivers are like; the ego's follows its advice as it is.
     seed : int
-        With a vehicle's id it gives its driver's nature.
+        With a vehicle's id it gives its driver's traits.
     advice_deceleration : float
         How hard vehicles slow down to a lower target speed [m/s²].
     """
@@ -38,53 +44,53 @@ class HighwayDrivers:
         self._setup = setup
         self._seed = seed
         self._deceleration = advice_deceleration
-        self._natures: dict[str, Nature] = {}
+        self._traits: dict[str, DriverTraits] = {}
         self._advised_since: dict[str, float] = {}
-        self._wanted: dict[Any, float] = {}
+        self._desired: dict[Any, float] = {}
         self._own_speed: dict[Any, float] = {}
         self._own_headway: dict[Any, float] = {}
         self._next = 0.0
 
     def update(self, command: Command) -> None:
-        """Set the target speeds of this step, and give back their own to those whom nothing slows down any more.
+        """Set the target speeds of this step, and restore those of drivers whom nothing slows down any more.
 
         Parameters
         ----------
         command : Command
             The advice to the ego and to others.
         """
-        drivers = [v for v in self._fleet.environment.road.vehicles if _decides(v)]
+        drivers = [v for v in self._fleet.environment.road.vehicles if _drives_itself(v)]
         if self._fleet.time >= self._next:
             self._next = self._fleet.time + CHOICE_PERIOD
             self._choose([v for v in drivers if v is not self._fleet.ego], command.advised_speeds)
         for vehicle in drivers:
             ego = vehicle is self._fleet.ego
-            wanted = command.advice.speed if ego else self._wanted.get(vehicle, math.inf)
-            if math.isfinite(wanted):
+            desired = command.advice.speed if ego else self._desired.get(vehicle, math.inf)
+            if math.isfinite(desired):
                 self._own_speed.setdefault(vehicle, vehicle.target_speed)
-                vehicle.target_speed = self._eased(vehicle, wanted)
+                vehicle.target_speed = self._target_speed(vehicle, desired)
             elif vehicle in self._own_speed:
                 vehicle.target_speed = self._own_speed.pop(vehicle)
 
     def _choose(self, vehicles: list[Any], advised: Mapping[str, float]) -> None:
-        """Let every driver think again."""
+        """Let every driver choose a speed."""
         time, name = self._fleet.time, self._fleet.name
         self._advised_since = {v: self._advised_since.get(v, time) for v in advised}
-        self._wanted = {}
+        self._desired = {}
         for vehicle, visibility in zip(vehicles, self._visibilities(vehicles), strict=True):
-            self._judge_distances(vehicle, visibility)
+            self._shorten_headway(vehicle, visibility)
             vehicle_id = name(vehicle)
             own = min(self._own_speed.get(vehicle, vehicle.target_speed), speed_limit(vehicle.lane))
-            wanted = wanted_speed(
+            desired = desired_speed(
                 self._setup,
-                self._nature(vehicle_id),
+                self._traits_of(vehicle_id),
                 own,
                 visibility,
                 advised.get(vehicle_id, math.inf),
                 time - self._advised_since.get(vehicle_id, time),
             )
-            if wanted < own:
-                self._wanted[vehicle] = wanted
+            if desired < own:
+                self._desired[vehicle] = desired
 
     def _visibilities(self, vehicles: list[Any]) -> list[float]:
         if self.fog is None or not vehicles:
@@ -92,19 +98,19 @@ class HighwayDrivers:
         extinction = self.fog.extinction(np.array([front_bumper(v) for v in vehicles]))
         return [visibility_from_extinction(float(k)) for k in extinction]
 
-    def _judge_distances(self, vehicle: Any, visibility: float) -> None:
-        """Who takes a gap for longer than it is keeps a shorter one: the wanted time headway shrinks by that factor."""
+    def _shorten_headway(self, vehicle: Any, visibility: float) -> None:
+        """Divide the headway by the perceived over the true distance: who overestimates gaps keeps shorter ones."""
         if self._setup.misjudgement > 0:
             own = self._own_headway.setdefault(vehicle, vehicle.TIME_WANTED)
             vehicle.TIME_WANTED = own / perceived_distance_factor(visibility, self._setup.misjudgement)
 
-    def _nature(self, vehicle: str) -> Nature:
-        if vehicle not in self._natures:
-            self._natures[vehicle] = nature(self._setup, vehicle, self._seed)
-        return self._natures[vehicle]
+    def _traits_of(self, vehicle: str) -> DriverTraits:
+        if vehicle not in self._traits:
+            self._traits[vehicle] = driver_traits(self._setup, vehicle, self._seed)
+        return self._traits[vehicle]
 
-    def _eased(self, vehicle: Any, speed: float) -> float:
-        """Target speed on the way to a wanted one at which IDM slows down no harder than the advice asks.
+    def _target_speed(self, vehicle: Any, speed: float) -> float:
+        """Target speed on the way to a desired one at which IDM slows down no harder than the advice asks.
 
         On a free road IDM's acceleration is a (1 − (v / v₀)^δ), so −b follows from v₀ = v / (1 + b / a)^(1/δ).
         """
@@ -112,6 +118,6 @@ class HighwayDrivers:
         return float(max(speed, vehicle.speed / ratio ** (1.0 / vehicle.DELTA)))
 
 
-def _decides(vehicle: Any) -> bool:
+def _drives_itself(vehicle: Any) -> bool:
     """Tell whether a vehicle's target speed is its driver's: that of one who gives way at a junction is the road's."""
     return isinstance(vehicle, IDMVehicle) and not getattr(vehicle, "is_yielding", False)

@@ -1,4 +1,4 @@
-"""The libsumo library: imported on first use, and asked whether a simulation runs in this process already."""
+"""SUMO inside this process: the libsumo library, imported on first use."""
 
 import contextlib
 import io
@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from types import ModuleType
 
 from fogsim.errors import MissingDependencyError, SimulationError, SimulationRunningError
-from fogsim.traffic.sumo.link import Api, told_errors
+from fogsim.traffic.sumo.link import Api, translated_errors
 
 
 def load_libsumo() -> ModuleType:
@@ -36,7 +36,7 @@ def load_libsumo() -> ModuleType:
 class LibsumoLink:
     """SUMO inside this process, through libsumo; one at a time."""
 
-    distant = False
+    remote = False
     shared = False
 
     def __init__(self) -> None:
@@ -44,6 +44,11 @@ class LibsumoLink:
 
     def begin(self, arguments: Sequence[str]) -> Api:
         """Start SUMO here, or load it anew; see `SumoLink.begin`.
+
+        Parameters
+        ----------
+        arguments : sequence of str
+            SUMO's command line without the program's name.
 
         Raises
         ------
@@ -86,9 +91,9 @@ class LibsumoLink:
             self._sumo.close()
         self._sumo = None
 
-    def watched(self) -> contextlib.AbstractContextManager[None]:
-        """Turn what libsumo refuses into an error of ours; see `SumoLink.watched`."""
-        return told_errors(self._sumo or load_libsumo(), "in this process")
+    def translated_errors(self) -> contextlib.AbstractContextManager[None]:
+        """Turn what libsumo refuses into an error of ours; see `SumoLink.translated_errors`."""
+        return translated_errors(self._sumo or load_libsumo(), "in this process")
 
 
 @contextlib.contextmanager

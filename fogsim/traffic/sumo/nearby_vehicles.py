@@ -7,23 +7,21 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.traffic.sumo.getters import vehicle_getter
-from fogsim.traffic.sumo.link import Api
-from fogsim.traffic.sumo.motion_bounds import HARDEST_CHANGE
+from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo.schedule import Schedule
+from fogsim.traffic.sumo.update_schedule import MAX_RELATIVE_ACCELERATION, UpdateSchedule
 
 TOP_SPEED = 100.0
 """Speed that no road vehicle exceeds [m/s]."""
 
-LONGEST_WAIT = 1.0
-"""Time after which a vehicle's distance is looked at again in any case [s], should somebody have moved it by hand."""
+MAX_WAIT = 1.0
+"""Time after which a vehicle's distance is computed again in any case [s], should somebody have moved it by hand."""
 
 
-class Nearness:
+class NearbyVehicles:
     """Finds the vehicles near the ego; one far away is asked again only when it could have come near.
 
-    Nor are distances of those near looked at before one of them could have gone.
+    Nor are distances of those near computed before one of them could be far.
 
     Parameters
     ----------
@@ -43,11 +41,11 @@ class Nearness:
         self._position = vehicle_getter(api, "getPosition3D")
         self._speed = vehicle_getter(api, "getSpeed")
         self._roster = Roster(api) if roster is None else roster
-        self._far = Schedule(float(api.simulation.getDeltaT()), self._roster.time)
+        self._far = UpdateSchedule(float(api.simulation.getDeltaT()), self._roster.time)
         self._near: tuple[str, ...] = ()
-        self._mark = self._departures = 0
-        self._seen_at = (-math.inf, math.inf, math.inf)
-        self._none_leaves_before = -math.inf
+        self._mark = self._removals = 0
+        self._last_place = (-math.inf, math.inf, math.inf)
+        self._all_near_until = -math.inf
 
     def find(self) -> tuple[tuple[str, ...], NDArray[np.float64]]:
         """Ids of those near in SUMO's order, the ego among them, and their positions (n, 3) [m].
@@ -55,78 +53,78 @@ class Nearness:
         As long as they are the same vehicles, the ids are the same object.
         """
         roster = self._roster
-        roster.look()
+        roster.update()
         here = self._position(self._ego)
-        # Nobody far can be relied on to have stayed far after a jump of the ego or of time, and nobody near to be near.
+        # After a jump of the ego or of time no vehicle can be relied on to be still far, or still near.
         has_jumped = self._has_jumped(here)
         far = self._all_others() if has_jumped else self._due()
-        if self._departures != roster.departures:
-            self._departures = roster.departures
-            self._settle([v for v in self._near if v in roster.present])
-        come_near = self._sorted_out(far, self._distances(self._positions(far), here)) if far else ()
+        if self._removals != roster.removals:
+            self._removals = roster.removals
+            self._set_near([v for v in self._near if v in roster.present])
+        come_near = self._schedule_far(far, self._distances(self._positions(far), here)) if far else ()
         if come_near:
-            self._settle([*self._near, *come_near])
+            self._set_near([*self._near, *come_near])
         position = self._positions(self._near)
-        if has_jumped or come_near or roster.time >= self._none_leaves_before:
-            position = self._without_those_far(position, here)
+        if has_jumped or come_near or roster.time >= self._all_near_until:
+            position = self._drop_far(position, here)
         return self._near, position
 
-    def _without_those_far(self, position: NDArray[np.float64], here: Sequence[float]) -> NDArray[np.float64]:
-        """Let those go who have become far, and give the others' positions back."""
+    def _drop_far(self, position: NDArray[np.float64], here: Sequence[float]) -> NDArray[np.float64]:
+        """Schedule those that have become far, and give the others' positions back."""
         distance = self._distances(position, here)
         if float(distance.max()) > self._radius:
             is_near = distance <= self._radius
-            self._settle(self._sorted_out(self._near, distance))
+            self._set_near(self._schedule_far(self._near, distance))
             position, distance = position[is_near], distance[is_near]
-        wait = float(np.min((self._radius - distance) / self._drifting(self._near)))
-        self._none_leaves_before = self._roster.time + min(wait, LONGEST_WAIT)
+        wait = float(np.min((self._radius - distance) / self._max_rates(self._near)))
+        self._all_near_until = self._roster.time + min(wait, MAX_WAIT)
         return position
 
-    def _settle(self, near: Sequence[str]) -> None:
+    def _set_near(self, near: Sequence[str]) -> None:
         self._near = tuple(sorted(near))
 
-    def _sorted_out(self, vehicles: Sequence[str], distance: NDArray[np.float64]) -> list[str]:
+    def _schedule_far(self, vehicles: Sequence[str], distance: NDArray[np.float64]) -> list[str]:
         """Those near; the others wait until they could have come near."""
         now = self._roster.time
-        waits = np.minimum((distance - self._radius) / self._drifting(vehicles), LONGEST_WAIT).tolist()
+        waits = np.minimum((distance - self._radius) / self._max_rates(vehicles), MAX_WAIT).tolist()
         near: list[str] = []
         far: list[str] = []
         for vehicle, wait in zip(vehicles, waits, strict=True):
-            if wait == LONGEST_WAIT:
+            if wait == MAX_WAIT:
                 far.append(vehicle)
             elif wait > 0.0:
-                self._far.put((vehicle,), now + wait)
+                self._far.add((vehicle,), now + wait)
             else:
                 near.append(vehicle)
-        self._far.put(far, now + LONGEST_WAIT)
+        self._far.add(far, now + MAX_WAIT)
         return near
 
-    def _drifting(self, vehicles: Sequence[str]) -> NDArray[np.float64]:
+    def _max_rates(self, vehicles: Sequence[str]) -> NDArray[np.float64]:
         """How fast their distances from the ego change at most, within the longest wait (n,) [m/s]."""
         speeds = np.fromiter(map(self._speed, vehicles), np.float64, len(vehicles))
-        return np.asarray(speeds + (float(self._speed(self._ego)) + HARDEST_CHANGE * LONGEST_WAIT))
+        return np.asarray(speeds + (float(self._speed(self._ego)) + MAX_RELATIVE_ACCELERATION * MAX_WAIT))
 
     def _has_jumped(self, here: Sequence[float]) -> bool:
         """True after a jump of the ego or of time, and at the first look."""
-        time, x, y = self._seen_at
+        time, x, y = self._last_place
         now = self._roster.time
-        self._seen_at = (now, here[0], here[1])
+        self._last_place = (now, here[0], here[1])
         return now < time or not math.hypot(here[0] - x, here[1] - y) <= TOP_SPEED * (now - time) + 1.0
 
     def _all_others(self) -> list[str]:
         self._far.clear()
-        self._far.due(self._roster.time)
-        _, self._mark = self._roster.newcomers(self._mark)
+        self._far.pop_due(self._roster.time)
+        _, self._mark = self._roster.entered_since(self._mark)
         return sorted(self._roster.present.difference(self._near))
 
     def _due(self) -> list[str]:
         """Vehicles that may have come near, and those new on the road."""
         present = self._roster.present
-        due = [v for v in self._far.due(self._roster.time) if v in present]
-        new, self._mark = self._roster.newcomers(self._mark)
+        due = [v for v in self._far.pop_due(self._roster.time) if v in present]
+        new, self._mark = self._roster.entered_since(self._mark)
         if not new:
             return due
-        return [*due, *(v for v in self._far.not_waiting(new) if v in present and v not in {*self._near, *due})]
+        return [*due, *(v for v in self._far.unscheduled(new) if v in present and v not in {*self._near, *due})]
 
     @staticmethod
     def _distances(position: NDArray[np.float64], here: Sequence[float]) -> NDArray[np.float64]:

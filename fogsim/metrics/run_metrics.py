@@ -52,7 +52,7 @@ class RunSummary:
     def to_json(self) -> dict[str, JsonValue]:
         """Give the values as a dict that JSON can hold without NaN or infinity, numbers in the digits that they have.
 
-        Processors differ in the last bits of exponentials and logarithms, and nobody measures to the tenth digit.
+        Processors differ in the last bits of exponentials and logarithms, and no measurement has ten digits.
         """
         return {key: _written(value) for key, value in self.values.items()}
 
@@ -94,6 +94,11 @@ class RunMetrics:
         """Take in one finished step; the time since the one before is read from their times.
 
         When the ego leaves the network, the last step comes once more with its ending; only that is taken from it.
+
+        Parameters
+        ----------
+        step : Step
+            The step.
 
         Raises
         ------

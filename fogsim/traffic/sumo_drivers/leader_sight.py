@@ -1,6 +1,7 @@
-"""What each of some drivers sees of the vehicle ahead, and how long that is sure to stay so."""
+"""What drivers see of the vehicle ahead, and for how long that is sure to stay so."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -14,9 +15,8 @@ from fogsim.traffic.drivers.sight import (
     inherent_contrast,
     rear_intensity,
 )
-from fogsim.traffic.sumo.getters import vehicle_getter
-from fogsim.traffic.sumo.link import Api
-from fogsim.traffic.sumo.motion_bounds import MotionBounds
+from fogsim.traffic.sumo.link import Api, Getter, vehicle_getter
+from fogsim.traffic.sumo.update_schedule import MAX_RELATIVE_ACCELERATION, closing_speed_bound
 from fogsim.values import Lamp
 
 LEAST_EXTINCTION = 1e-6
@@ -31,8 +31,12 @@ OwnLamps = dict[str, int | None]
 Pair = tuple[str, str, float]
 """Follower, leader, and SUMO's gap between them [m], which leaves out the follower's minimum gap."""
 
+# Numbers of variables in SUMO's TraCI protocol.
+_LEADER = 0x68
+_SPEED = 0x40
 
-class PairSight:
+
+class LeaderSight:
     """Computes sight along the fog between drivers and the vehicles ahead of them.
 
     Parameters
@@ -43,14 +47,14 @@ class PairSight:
         The fog.
     sight : DriverSight
         The drivers' eyes.
-    motion : MotionBounds
-        How fast vehicles can move.
+    speed : Getter
+        Speed of a vehicle [m/s].
     """
 
-    def __init__(self, api: Api, fog: FogAccess, sight: DriverSight, motion: MotionBounds) -> None:
-        self._motion = motion
+    def __init__(self, api: Api, fog: FogAccess, sight: DriverSight, speed: Getter) -> None:
+        self._speed = speed
         self._fog = fog
-        self._thinnest, self._densest = fog.minimum_extinction, fog.maximum_extinction
+        self._min_extinction, self._max_extinction = fog.minimum_extinction, fog.maximum_extinction
         self._sight = sight
         self._position = vehicle_getter(api, "getPosition3D")
         self._signals = vehicle_getter(api, "getSignals")
@@ -60,18 +64,24 @@ class PairSight:
         self._minimum_gaps: dict[str, float] = {}
 
     def forget(self, vehicles: Iterable[str]) -> None:
-        """Forget vehicles whose ids others may bear now."""
+        """Forget vehicles whose ids others may bear now.
+
+        Parameters
+        ----------
+        vehicles : iterable of str
+            Their ids.
+        """
         for vehicle in vehicles:
             self._contrasts.pop(vehicle, None)
             self._minimum_gaps.pop(vehicle, None)
 
-    def look(self, pairs: Sequence[Pair], own_lamps: OwnLamps, horizon: float) -> list[tuple[bool, float]]:
+    def assess(self, pairs: Sequence[Pair], own_lamps: OwnLamps, horizon: float) -> list[tuple[bool, float]]:
         """Whether each leader is seen, and for how long that is sure to stay so [s].
 
         Parameters
         ----------
         pairs : sequence of Pair
-            Who looks at whom.
+            Followers and their leaders.
         own_lamps : dict
             Lamps of vehicles whose lamps are not SUMO's.
         horizon : float
@@ -79,13 +89,13 @@ class PairSight:
         """
         # SUMO's gap leaves out the follower's minimum gap.
         distances = [max(gap + self._minimum_gap(follower), 0.1) for follower, _, gap in pairs]
-        depths = self._depths(pairs, distances)
+        depths = self._optical_depths(pairs, distances)
         return [
-            self._glance(pair, distance, depth, own_lamps, horizon)
+            self._assess_pair(pair, distance, depth, own_lamps, horizon)
             for pair, distance, depth in zip(pairs, distances, depths, strict=True)
         ]
 
-    def _glance(
+    def _assess_pair(
         self, pair: Pair, distance: float, depth: float, own_lamps: OwnLamps, horizon: float
     ) -> tuple[bool, float]:
         # Plain numbers: mostly there is a pair or two, and making arrays of them would cost more than all the rest.
@@ -106,10 +116,10 @@ class PairSight:
         limit = max(self._sight.body_limit(nearest, contrast), self._sight.lamp_limit(nearest, brightest))
         return False, min(max(depth - limit, 0.0) / deepening, horizon)
 
-    def _depths(self, pairs: Sequence[Pair], distances: Sequence[float]) -> list[float]:
+    def _optical_depths(self, pairs: Sequence[Pair], distances: Sequence[float]) -> list[float]:
         """Optical depths between eyes and rears [-]."""
-        if self._thinnest == self._densest:
-            return [self._densest * distance for distance in distances]
+        if self._min_extinction == self._max_extinction:
+            return [self._max_extinction * distance for distance in distances]
         lift = np.array([0.0, 0.0, EYE_HEIGHT])
         eyes = np.array([self._position(follower) for follower, _, _ in pairs]) + lift
         towards = np.array([self._position(leader) for _, leader, _ in pairs]) + lift - eyes
@@ -119,17 +129,19 @@ class PairSight:
 
     def _rates(self, follower: str, leader: str, horizon: float) -> tuple[float, float]:
         """Bounds on how fast a gap closes [m/s] and on how fast its optical depth changes [1/s] up to a horizon."""
-        closing = self._motion.closing(follower, leader, horizon)
-        if self._thinnest == self._densest:
-            return closing, max(self._densest, LEAST_EXTINCTION) * closing
+        speed, leader_speed = float(self._speed(follower)), float(self._speed(leader))
+        closing = closing_speed_bound(speed, leader_speed, horizon)
+        if self._min_extinction == self._max_extinction:
+            return closing, max(self._max_extinction, LEAST_EXTINCTION) * closing
         # In a bank that one end has reached and the other has not, each end counts by itself; and the fog drifts.
-        return closing, self._densest * (self._motion.travel(follower, leader, horizon) + FASTEST_DRIFT)
+        together = speed + leader_speed + MAX_RELATIVE_ACCELERATION * horizon
+        return closing, self._max_extinction * (together + FASTEST_DRIFT)
 
     def _intensities(self, vehicle: str, own_lamps: OwnLamps) -> tuple[float, float]:
-        """Of the brightest rear lamp that is lit, and that could be lit before the next look [cd]."""
+        """Of the brightest rear lamp that is lit, and that could be lit before the next assessment [cd]."""
         if vehicle in own_lamps:
             own = own_lamps[vehicle]
-            # Who is told which lamps to light may be told otherwise in any step.
+            # Lamps that are commanded may be commanded otherwise in any step.
             return (0.0 if own is None else rear_intensity(own | self._signalled(vehicle)), BRIGHTEST)
         lit = rear_intensity(int(OTHERS_LAMPS) | self._signalled(vehicle))
         return lit, max(lit, rear_intensity(int(Lamp.STOP)))
@@ -148,3 +160,49 @@ class PairSight:
         if known is None:
             known = self._minimum_gaps[vehicle] = float(self._get_minimum_gap(vehicle))
         return known
+
+
+class SubscribedLeaders:
+    """``getLeader`` and ``getSpeed`` by subscription, for simulations in another process: asking sends no message.
+
+    Parameters
+    ----------
+    api : Api
+        A connection of traci.
+    reach : float
+        How far ahead leaders are looked for [m].
+    """
+
+    def __init__(self, api: Api, reach: float) -> None:
+        self._vehicles = api.vehicle
+        self._results = api.vehicle.getSubscriptionResults
+        self._reach = reach
+
+    def leader(self, vehicle: str, _: float) -> tuple[str, float]:
+        """Leader of a vehicle, empty if there is none, and the gap to it [m].
+
+        Parameters
+        ----------
+        vehicle : str
+            Its id.
+        """
+        leader: tuple[str, float] = self._of(vehicle)[_LEADER]
+        return leader
+
+    def speed(self, vehicle: str) -> float:
+        """Speed of a vehicle [m/s].
+
+        Parameters
+        ----------
+        vehicle : str
+            Its id.
+        """
+        return float(self._of(vehicle)[_SPEED])
+
+    def _of(self, vehicle: str) -> Mapping[int, Any]:
+        results: Mapping[int, Any] = self._results(vehicle)
+        if _LEADER not in results or _SPEED not in results:
+            # SUMO adds them to what the user may have subscribed to.
+            self._vehicles.subscribe(vehicle, (_SPEED, _LEADER), parameters={_LEADER: ("d", self._reach)})
+            results = self._results(vehicle)
+        return results

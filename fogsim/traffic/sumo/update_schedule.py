@@ -1,0 +1,98 @@
+"""Which vehicles are to be looked at again in which step: those whose gaps can have changed enough."""
+
+import itertools
+import math
+from collections.abc import Sequence
+
+MAX_RELATIVE_ACCELERATION = 20.0
+"""One vehicle's acceleration minus another's is never larger than this [m/s²]: emergency braking and driving off."""
+
+BATCH_PERIOD = 0.5
+"""Vehicles that may wait this long are gathered with others in the steps of this period [s]: a batch costs less than
+many single vehicles."""
+
+_ROUNDING = 1e-6
+"""Share of a step by which clocks may differ from a whole number of steps [-]."""
+
+
+def closing_speed_bound(speed: float, leader_speed: float, horizon: float) -> float:
+    """How fast the gap between two vehicles changes at most [m/s].
+
+    Parameters
+    ----------
+    speed, leader_speed : float
+        Their speeds now [m/s].
+    horizon : float
+        Time from now up to which the bound holds [s].
+    """
+    return abs(leader_speed - speed) + 0.5 * MAX_RELATIVE_ACCELERATION * horizon
+
+
+class UpdateSchedule:
+    """Vehicles by the step in which each is due; only those due are ever touched.
+
+    Parameters
+    ----------
+    step : float
+        Time between two steps [s].
+    now : float
+        Simulated time [s].
+    """
+
+    def __init__(self, step: float, now: float) -> None:
+        self._step = step
+        self._batch = max(1, round(BATCH_PERIOD / step))
+        self._current = self._number(now)
+        self._due: dict[int, list[str]] = {}
+
+    def _number(self, time: float) -> int:
+        return math.floor(time / self._step + _ROUNDING)
+
+    def unscheduled(self, vehicles: Sequence[str]) -> list[str]:
+        """Those of some vehicles that wait for no step, each once.
+
+        Parameters
+        ----------
+        vehicles : sequence of str
+            Their ids.
+        """
+        # Seldom asked for any, so that keeping a set of all scheduled vehicles would cost more.
+        if not vehicles:
+            return []
+        scheduled = set(itertools.chain.from_iterable(self._due.values()))
+        return [v for v in dict.fromkeys(vehicles) if v not in scheduled]
+
+    def add(self, vehicles: Sequence[str], time: float) -> None:
+        """Schedule vehicles that are not scheduled yet, at the earliest for the next step.
+
+        Parameters
+        ----------
+        vehicles : sequence of str
+            Their ids.
+        time : float
+            When they are due at the latest [s].
+        """
+        if vehicles:
+            number = max(self._number(time), self._current + 1)
+            if number - self._current >= self._batch:
+                number -= number % self._batch
+            self._due.setdefault(number, []).extend(vehicles)
+
+    def pop_due(self, now: float) -> list[str]:
+        """Take out the vehicles that are due.
+
+        Parameters
+        ----------
+        now : float
+            Simulated time [s].
+        """
+        number, last = self._number(now), self._current
+        self._current = number
+        if number - last == 1:
+            return self._due.pop(number, [])
+        passed = sorted(n for n in self._due if n <= number)
+        return [vehicle for n in passed for vehicle in self._due.pop(n)]
+
+    def clear(self) -> None:
+        """Forget all vehicles."""
+        self._due.clear()

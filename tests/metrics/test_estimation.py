@@ -1,0 +1,57 @@
+"""Errors of estimators and belief: figures by hand."""
+
+import math
+
+import pytest
+
+from fogsim.metrics import JsonValue
+from fogsim.units import extinction_from_visibility
+from fogsim.values import Estimate
+from tests.metrics.summaries import summarise
+from tests.recorders.synthetic import belief, estimate, make_step
+
+
+def method_errors(summary: dict[str, JsonValue], method: str) -> dict[str, JsonValue]:
+    estimators = summary["estimators"]
+    assert isinstance(estimators, dict)
+    return dict(estimators[method])
+
+
+def test_estimator_error_is_against_the_visibility_ahead_and_only_in_fog() -> None:
+    steps = [
+        make_step(0, time=0.0, visibility=500.0, visibility_ahead=100.0, estimates=(estimate("m", 110.0),)),
+        make_step(1, time=1.0, visibility_ahead=200.0, estimates=(estimate("m", 150.0),)),
+        make_step(2, time=2.0, visibility_ahead=200.0, estimates=(Estimate.invalid("m", "no road"),)),
+        make_step(3, time=3.0, visibility=2000.0, estimates=(estimate("m", 100.0),)),
+    ]
+    errors = method_errors(summarise(steps), "m")
+    assert errors["count"] == 3
+    assert errors["valid_share"] == pytest.approx(2 / 3)
+    assert errors["median_error_percent"] == pytest.approx(10.0)
+    assert errors["p95_error_percent"] == pytest.approx(25.0)
+
+
+def test_an_estimate_of_clear_air_in_fog_is_an_error_without_limit_and_shows() -> None:
+    clear = Estimate("m", 0.0, 0.001)
+    estimates = (estimate("m", 110.0), estimate("m", 90.0), clear)
+    errors = method_errors(summarise(make_step(i, time=float(i), estimates=(e,)) for i, e in enumerate(estimates)), "m")
+    assert errors["median_error_percent"] == pytest.approx(10.0)
+    assert errors["p95_error_percent"] is None
+    assert errors["clear_air_share"] == pytest.approx(1 / 3)
+
+
+def test_belief_error_and_coverage() -> None:
+    beliefs = [belief(100.0, 0.1), belief(105.0, 0.1), belief(150.0, 0.1), belief(150.0, 0.5)]
+    summary = summarise(make_step(i, time=float(i), believed=b) for i, b in enumerate(beliefs))
+    assert summary["belief_count"] == 4
+    assert summary["belief_median_error_percent"] == pytest.approx(5.0, abs=0.5)
+    assert summary["belief_p95_error_percent"] == pytest.approx(50.0, abs=0.5)
+    assert summary["belief_coverage_share"] == pytest.approx(3 / 4)
+
+
+def test_clear_air_is_no_fog_to_be_right_about() -> None:
+    summary = summarise([make_step(visibility=math.inf, believed=belief(100.0), estimates=(estimate("m", 100.0),))])
+    assert extinction_from_visibility(math.inf) == 0.0
+    assert summary["belief_count"] == 0
+    assert summary["belief_coverage_share"] is None
+    assert method_errors(summary, "m")["median_error_percent"] is None

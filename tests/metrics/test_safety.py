@@ -1,0 +1,41 @@
+"""Conflicts, sight and collisions: figures by hand."""
+
+import math
+
+import pytest
+
+from fogsim.values import Collision, Leader
+from tests.metrics.summaries import summarise
+from tests.recorders.synthetic import make_step
+
+
+def test_conflicts_are_weighted_with_the_time_between_steps() -> None:
+    approach = [(20.0, 4.0), (10.0, 2.0), (5.0, 1.0)]
+    steps = [
+        make_step(i, time=0.5 * i, speed=25.0, leader=Leader("other", gap, 20.0)) for i, (gap, _) in enumerate(approach)
+    ]
+    summary = summarise([*steps, make_step(3, time=1.5)])
+    assert summary["minimum_time_to_collision_s"] == pytest.approx(1.0)
+    assert summary["time_exposed_time_to_collision_s"] == pytest.approx(1.0)
+    assert summary["time_integrated_time_to_collision_s2"] == pytest.approx(0.5 * (1.0 + 2.0))
+    assert summary["max_drac_mps2"] == pytest.approx(0.5 * 25.0 / 5.0)
+    assert summary["minimum_gap_m"] == 5.0
+    assert summary["minimum_time_headway_s"] == pytest.approx(0.2)
+    assert summarise(steps, time_to_collision=1.5)["time_exposed_time_to_collision_s"] == pytest.approx(0.5)
+
+
+def test_share_of_time_in_which_the_ego_could_not_stop_in_sight() -> None:
+    steps = [
+        make_step(i, time=float(i), speed=20.0, visibility=v) for i, v in enumerate((300.0, 300.0, 50.0, math.inf))
+    ]
+    summary = summarise(steps)
+    assert summary["negative_margin_time_share"] == pytest.approx(1 / 3)
+    assert summary["minimum_visibility_m"] == pytest.approx(50.0)
+    assert summary["minimum_visibility_margin_m"] == pytest.approx(50.0 - (50.0 + 400 / 6.8))
+
+
+def test_collisions_of_the_ego_and_of_others() -> None:
+    hits = (Collision(0.0, "a", "b", 12.0), Collision(0.0, "ego", "other", 5.0))
+    summary = summarise([make_step(0, collisions=hits[:1]), make_step(1, time=1.0, collisions=hits[1:])])
+    assert (summary["collisions"], summary["ego_collisions"]) == (2, 1)
+    assert (summary["max_impact_speed_mps"], summary["ego_max_impact_speed_mps"]) == (12.0, 5.0)

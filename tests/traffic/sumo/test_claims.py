@@ -1,0 +1,72 @@
+"""Several sessions claim an attribute of a vehicle at once; no simulation runs."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from fogsim.traffic.sumo.claims import TOP_SPEED, Claims, SessionValues, new_session
+
+OWN = 30.0
+
+
+class Vehicles:
+    """What claims use of SUMO's domain of vehicles."""
+
+    def __init__(self) -> None:
+        self.top_speed = OWN
+        self.parameters: dict[str, str] = {}
+
+    def getMaxSpeed(self, _: str) -> float:  # noqa: N802 - as SUMO calls it
+        return self.top_speed
+
+    def setMaxSpeed(self, _: str, speed: float) -> None:  # noqa: N802 - as SUMO calls it
+        self.top_speed = speed
+
+    def getParameter(self, _: str, key: str) -> str:  # noqa: N802 - as SUMO calls it
+        return self.parameters.get(key, "")
+
+    def setParameter(self, _: str, key: str, value: str) -> None:  # noqa: N802 - as SUMO calls it
+        self.parameters[key] = value
+
+
+@pytest.fixture
+def api() -> Any:
+    return SimpleNamespace(vehicle=Vehicles(), simulation=Vehicles())
+
+
+def test_the_lowest_claim_holds_and_the_own_value_comes_back(api: Any) -> None:
+    one, other = (Claims(api, TOP_SPEED, session) for session in "12")
+    one.claim("v", 20.0)
+    other.claim("v", 15.0)
+    assert api.vehicle.top_speed == 15.0
+    assert one.own_value("v") == other.own_value("v") == OWN
+    other.withdraw("v")
+    assert api.vehicle.top_speed == 20.0
+    one.withdraw("v")
+    assert api.vehicle.top_speed == OWN
+    assert not any(api.vehicle.parameters.values())
+
+
+def test_a_claim_above_the_own_value_changes_nothing(api: Any) -> None:
+    claims = Claims(api, TOP_SPEED, "1")
+    claims.claim("v", 50.0)
+    assert api.vehicle.top_speed == OWN
+
+
+def test_a_value_that_somebody_else_sets_is_the_own_one_from_then_on(api: Any) -> None:
+    claims = Claims(api, TOP_SPEED, "1")
+    claims.claim("v", 20.0)
+    api.vehicle.top_speed = 25.0
+    claims.claim("v", 18.0)
+    claims.withdraw("v")
+    assert api.vehicle.top_speed == 25.0
+
+
+def test_sessions_have_numbers_of_their_own_and_their_values_make_a_round_trip(api: Any) -> None:
+    assert [new_session(api) for _ in range(3)] == ["1", "2", "3"]
+    values = SessionValues[str](api, "ignored")
+    values.write("v", {"1": "lead", "2": "ä"})
+    assert values.read("v") == {"1": "lead", "2": "ä"}
+    values.write("v", {})
+    assert values.read("v") == {}

@@ -1,0 +1,40 @@
+"""What a running simulation says of itself; a stand-in for it here."""
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from fogsim.errors import SimulationError
+from fogsim.traffic.sumo.loaded_files import check_step_length, describe_seen, loaded_additional, loaded_net
+
+
+def simulation(step: float = 0.1, **options: str) -> Any:
+    return SimpleNamespace(
+        simulation=SimpleNamespace(getDeltaT=lambda: step, getOption=lambda name: options[name.replace("-", "_")])
+    )
+
+
+def test_the_most_similar_ids_are_named_first() -> None:
+    seen = [f"veh{i}" for i in range(20)] + ["egon"]
+    text = describe_seen("ego", seen)
+    assert text.startswith("those that did: egon, ")
+    assert text.endswith(" and 13 more")
+    assert "no vehicle at all" in describe_seen("ego", [])
+
+
+def test_another_step_is_refused_but_not_the_rounding_of_sumos_clock() -> None:
+    check_step_length(simulation(0.1), 0.1 + 1e-9)
+    with pytest.raises(SimulationError, match=r"steps of 0\.1 s, but clocks\.traffic_step_s is 0\.05"):
+        check_step_length(simulation(0.1), 0.05)
+
+
+def test_files_that_are_here_are_found(tmp_path: Path) -> None:
+    net = tmp_path / "a.net.xml"
+    net.touch()
+    api = simulation(net_file=str(net), additional_files=f"{net}, {tmp_path / 'none.xml'}")
+    assert loaded_net(api) == net
+    assert loaded_additional(api) == (net,)
+    with pytest.raises(SimulationError, match="there is no such file"):
+        loaded_net(simulation(net_file="nowhere.net.xml"))

@@ -24,6 +24,9 @@ from fogsim.traffic.sumo_drivers.driver_table import Column, DriverTable
 from fogsim.traffic.sumo_drivers.top_speeds import TopSpeedControl
 from fogsim.units import visibility_from_extinction
 
+UNNOTICED_FACTOR = 0.02
+"""Change of a headway's factor [-] that is not noticed; setting it costs a call."""
+
 _SUMO_DRIVES = -1.0
 
 
@@ -78,12 +81,8 @@ class SpeedControl:
         self._held.add(vehicle)
 
 
-UNNOTICED_FACTOR = 0.02
-"""Change of a headway's factor [-] that is not noticed; setting it costs a call."""
-
-
 class SumoDesiredSpeeds:
-    """Sets the top speed of every vehicle but the ego by what its driver chooses and is told.
+    """Sets the top speed of every vehicle but the ego by what its driver chooses and is advised.
 
     Parameters
     ----------
@@ -178,7 +177,7 @@ class SumoDesiredSpeeds:
     def _desired(
         self, ids: Sequence[str], advised: Mapping[str, float]
     ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        """Rows of vehicles and the top speeds that their drivers want (n,) [m/s]."""
+        """Rows of vehicles and the top speeds that their drivers desire (n,) [m/s]."""
         table = self._table
         rows = table.rows(ids)
         self._choose_in_fog(ids, rows)

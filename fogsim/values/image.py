@@ -34,7 +34,7 @@ class View:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """An image and the calibration that its vehicle believes in.
+    """An image and the calibration that its vehicle assumes.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class Frame:
     image : (rows, cols, 3) or (rows, cols) uint8, or uint16 of a camera of 10 or 12 bits
         Pixel values 0 … 2^bits − 1, red first.
     camera : Camera
-        The calibration as the vehicle was told it, which may differ from the true one.
+        The calibration that the vehicle assumes, which may differ from the true one.
     """
 
     time: float

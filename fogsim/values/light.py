@@ -125,7 +125,7 @@ class Lights:
     others : LightSources
         Everyone else's.
     streets : StreetLighting or None
-        Street lamps as what lights the road; how they are seen themselves is told by `others`.
+        Street lamps as what lights the road; how they are seen themselves is in `others`.
     """
 
     own: tuple[HeadLamp, ...]

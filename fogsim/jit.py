@@ -76,12 +76,30 @@ def kernel(function: F) -> F:
     name = plain.__qualname__
     plain.__qualname__ = f"{name}-{_fingerprint(plain)}"
     try:
-        return cast("F", numba.njit(cache=True, **options)(function))
+        compiled = numba.njit(cache=True, **options)(function)
+        _forgive_outdated_index(compiled)
+        return cast("F", compiled)
     except RuntimeError:
         # numba found no place for its cache
         return cast("F", numba.njit(cache=False, **options)(function))
     finally:
         plain.__qualname__ = name
+
+
+def _forgive_outdated_index(compiled: Any) -> None:
+    """Let numba compile again, instead of failing, where an older version's file names types that are gone."""
+    file: Any = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
+    load = getattr(file, "_load_index", None)
+    if load is None:
+        return
+
+    def load_index() -> Any:
+        try:
+            return load()
+        except (AttributeError, ImportError):
+            return {}
+
+    file._load_index = load_index
 
 
 def _fingerprint(function: FunctionType) -> str:

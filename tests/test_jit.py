@@ -69,3 +69,16 @@ def test_unchanged_sources_are_not_compiled_again(tmp_path: Path) -> None:
     write(tmp_path, 2.0, 1.0)
     assert ask(tmp_path) == ["21.0", "answer", "0"]
     assert ask(tmp_path) == ["21.0", "answer", "1"]
+
+
+def test_an_index_that_names_types_of_an_older_version_is_compiled_anew(tmp_path: Path) -> None:
+    module = tmp_path / "renamed.py"
+    text = (
+        "from typing import NamedTuple\n\nfrom fogsim.jit import kernel\n\n\n"
+        "class Old(NamedTuple):\n    x: float\n\n\n"
+        "@kernel\ndef doubled(value):\n    return 2.0 * value.x\n\n\nprint(doubled(Old(21.0)))\n"
+    )
+    for name in ("Old", "New"):
+        module.write_text(text.replace("Old", name), encoding="utf-8")
+        done = subprocess.run([sys.executable, module], capture_output=True, text=True, check=False)
+        assert done.stdout.strip() == "42.0", done.stderr

@@ -1,4 +1,4 @@
-"""The choice of what a picture may show: copies in view and large enough, small ones by simpler stand-ins."""
+"""Culling and levels of detail: copies in view and large enough, small ones by simpler shapes."""
 
 from collections.abc import Mapping
 from itertools import pairwise
@@ -15,8 +15,8 @@ FARTHEST = 1600.0
 
 _LARGEST = 8.0  # about the radius of what is largest, but for the ground and woods [m]
 _SMALLEST, _SMALLEST_PLAIN = 1.0, 3.0  # radius in the picture below which a copy is left out [px]
-# Half a square's breadth over the root of its triangles, below which a stand-in does [px]: in general, and for what has
-# neither paint nor lamps nor signs' sheeting, such as trees, of which more is seen than of all else.
+# Half a square's breadth over the root of its triangles, below which a simpler shape does [px]: in general, and for
+# what has neither paint nor lamps nor signs' sheeting, such as trees, of which more is seen than of all else.
 _DENSEST, _DENSEST_PLAIN = 1.15, 1.7
 _BINS = 64  # of distance, to draw near copies first: four while it doubles
 _NUMBERS = 17  # 32-bit numbers of a record
@@ -33,8 +33,8 @@ class Shapes(NamedTuple):
     ----------
     centre, half_extent : (n, 3) float64
         Middle and half the extents of each shape's bounding box.
-    stand_in : (n,) int64
-        The simpler shape that stands in for each where it is small, −1 if there is none.
+    coarser : (n,) int64
+        The simpler shape that is drawn for each where it is small, −1 if there is none.
     detail : (n,) float64
         Half the breadth in the picture below which it does [px].
     faces : (n,) int64
@@ -45,7 +45,7 @@ class Shapes(NamedTuple):
 
     centre: Wide
     half_extent: Wide
-    stand_in: Index
+    coarser: Index
     detail: Wide
     faces: Index
     smallest: Wide
@@ -96,7 +96,7 @@ class Cells(NamedTuple):
     radius: Wide
 
 
-class Chosen(NamedTuple):
+class Selection(NamedTuple):
     """Memory for what is chosen: the arrays of a `Drawing`, and copies as found, their distance and their order."""
 
     mesh: Index
@@ -123,20 +123,20 @@ def shapes_of(
     plain : (n,) bool
         Whether they have neither paint nor lamps nor sheeting, and so may be simpler than others.
     endings : tuple of str
-        Endings of the names of stand-ins, the most detailed first.
+        Endings of the names of levels of detail, the most detailed first.
     """
-    stand_in = np.full(len(numbers), -1, np.int64)
+    coarser = np.full(len(numbers), -1, np.int64)
     for name in numbers:
         if not name.endswith(endings):
             levels = [numbers[level] for level in (name, *(name + ending for ending in endings)) if level in numbers]
-            stand_in[levels[:-1]] = levels[1:]
-    # Where a shape has too many triangles and its stand-in would have too few, the mean of both decides.
-    mean = np.sqrt(faces * np.where(stand_in < 0, faces, faces[stand_in]))
+            coarser[levels[:-1]] = levels[1:]
+    # Where a shape has too many triangles and the simpler one would have too few, the mean of both decides.
+    mean = np.sqrt(faces * np.where(coarser < 0, faces, faces[coarser]))
     densest = np.where(plain, _DENSEST_PLAIN, _DENSEST)
     return Shapes(
         0.5 * (low + high),
         0.5 * (high - low),
-        stand_in,
+        coarser,
         densest * np.sqrt(mean),
         faces,
         np.where(plain, _SMALLEST_PLAIN, _SMALLEST),
@@ -199,7 +199,7 @@ def measure(shapes: Shapes, copies: Copies, begin: int, end: int) -> None:
 
 
 @kernel
-def choose(
+def select_copies(
     shapes: Shapes,
     copies: Copies,
     cells: Cells,
@@ -207,7 +207,7 @@ def choose(
     planes: Wide,
     eye: Wide,
     focal: float,
-    chosen: Chosen,
+    selection: Selection,
 ) -> int:
     """Choose the copies that a picture may show, near ones first.
 
@@ -225,13 +225,13 @@ def choose(
         Where the camera is [m].
     focal : float
         Its focal length [px].
-    chosen : Chosen
+    selection : Selection
         Is filled; has room for all copies.
 
     Returns
     -------
     int
-        Number of copies chosen.
+        Number of copies selection.
     """
     middle, radius, first, smallest = copies.middle, copies.radius, cells.first, shapes.smallest
     begin = first[len(first) - 1]
@@ -254,11 +254,11 @@ def choose(
                 continue
             depth = _depth((x, y, z), radius[copy], p, q, r, s, ahead)
             if depth < farthest:
-                chosen.copy[count] = copy
-                chosen.bin[count] = _bin(depth)
+                selection.copy[count] = copy
+                selection.bin[count] = _bin(depth)
                 count += 1
-    _sort(chosen, count)
-    _write(shapes, copies, ahead, eye, focal, chosen, count)
+    _sort(selection, count)
+    _write_records(shapes, copies, ahead, eye, focal, selection, count)
     return count
 
 
@@ -279,9 +279,9 @@ def _bin(depth: float) -> int:
 
 
 @kernel
-def _sort(chosen: Chosen, count: int) -> None:
+def _sort(selection: Selection, count: int) -> None:
     """Set the order in which copies are drawn: by bin of distance."""
-    bins, copies, order = chosen.bin, chosen.copy, chosen.order
+    bins, copies, order = selection.bin, selection.copy, selection.order
     place = np.zeros(_BINS + 1, np.int64)
     for i in range(count):
         place[bins[i] + 1] += 1
@@ -293,16 +293,18 @@ def _sort(chosen: Chosen, count: int) -> None:
 
 
 @kernel
-def _write(shapes: Shapes, copies: Copies, ahead: Vector, eye: Wide, focal: float, chosen: Chosen, count: int) -> None:
+def _write_records(
+    shapes: Shapes, copies: Copies, ahead: Vector, eye: Wide, focal: float, selection: Selection, count: int
+) -> None:
     """Write what is drawn of the chosen copies."""
-    mesh, record, first, order = chosen.mesh, chosen.record, chosen.first, chosen.order
+    mesh, record, first, order = selection.mesh, selection.record, selection.first, selection.order
     first[0] = 0
     for i in range(count):
         copy = order[i]
         x, y, z = copies.middle[copy, 0] - eye[0], copies.middle[copy, 1] - eye[1], copies.middle[copy, 2] - eye[2]
         depth, shape = dot(ahead, (x, y, z)), copies.shape[copy]
-        while shapes.stand_in[shape] >= 0 and focal * copies.breadth[copy] < shapes.detail[shape] * depth:
-            shape = shapes.stand_in[shape]
+        while shapes.coarser[shape] >= 0 and focal * copies.breadth[copy] < shapes.detail[shape] * depth:
+            shape = shapes.coarser[shape]
         mesh[i] = shape
         first[i + 1] = first[i] + shapes.faces[shape]
         for number in range(_NUMBERS):

@@ -21,7 +21,7 @@ NEAR = 0.4
 """Depth before which nothing is seen [m]."""
 
 NOTHING = -1
-"""Slot of a pixel that sees no triangle."""
+"""Id of a pixel that sees no triangle."""
 
 RECORD = np.dtype([("transform", "<f4", (3, 4)), ("paint", "<f4", (3,)), ("lamps", "<i4"), ("instance", "<i4")])
 """One copy of a mesh: the upper rows of its transform, paint, lit lamps and instance id (0: that of the vertices)."""
@@ -118,8 +118,8 @@ class Drawing:
     record : (c,) `RECORD`
         Each copy; its transform leads from coordinates of the mesh to offsets from the camera in world axes [m].
     first : (c + 1,) int64
-        Slot of the first triangle of each copy, and the number of all slots at the end: triangle i of the mesh of
-        copy j has slot ``first[j] + i``.
+        Id of the first triangle of each copy, and the number of all ids at the end: triangle i of the mesh of
+        copy j has id ``first[j] + i``.
     """
 
     mesh: NDArray[np.int64]
@@ -130,7 +130,7 @@ class Drawing:
 class Rasteriser(Protocol):
     """Finds which triangle each pixel sees; made for one `MeshTable`."""
 
-    def slots(self, drawing: Drawing, camera: Camera, pose: CameraPose) -> NDArray[np.int32]:
+    def triangle_ids(self, drawing: Drawing, camera: Camera, pose: CameraPose) -> NDArray[np.int32]:
         """Find the nearest triangle for the ray through the centre of each pixel.
 
         Both sides of a triangle are seen; nothing nearer than a depth of `NEAR` is.
@@ -147,7 +147,7 @@ class Rasteriser(Protocol):
         Returns
         -------
         (rows, cols) int32
-            Slot of the triangle, `NOTHING` where there is none; valid until the next call.
+            Id of the triangle, `NOTHING` where there is none; valid until the next call.
 
         Raises
         ------

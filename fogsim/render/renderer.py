@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
-from fogsim.render.culling import Chosen, cells_of, choose, copies_of, shapes_of, with_room
+from fogsim.render.culling import Selection, cells_of, copies_of, select_copies, shapes_of, with_room
 from fogsim.render.drawing import RECORD, Drawing, MeshTable, Rasteriser
 from fogsim.render.ground import Ground, split_ground
 from fogsim.render.lens import lens_of
@@ -57,8 +57,8 @@ class SceneRenderer:
         if self._rasteriser is None:
             raise RenderError("this renderer is closed; make a new one")
         drawing = self._drawing(vehicles, camera, pose)
-        slots = self._rasteriser.slots(drawing, camera, pose)
-        return self._shading.view(slots, drawing, camera, pose, lamplight)
+        triangle_ids = self._rasteriser.triangle_ids(drawing, camera, pose)
+        return self._shading.view(triangle_ids, drawing, camera, pose, lamplight)
 
     def close(self) -> None:
         """Give back what the rasteriser holds."""
@@ -70,7 +70,7 @@ class SceneRenderer:
         """What a picture may show."""
         end = self._place(vehicles)
         lens = lens_of(camera, pose)
-        count = choose(
+        count = select_copies(
             self._shapes, self._copies, self._cells, end, lens.planes, lens.eye, camera.focal_length, self._chosen
         )
         return Drawing(
@@ -131,8 +131,8 @@ def _records(batch: Batch) -> NDArray[np.float32]:
     return record.view(np.float32).reshape(-1, 17)
 
 
-def _room(count: int) -> Chosen:
-    return Chosen(
+def _room(count: int) -> Selection:
+    return Selection(
         mesh=np.zeros(count, np.int64),
         record=np.zeros((count, 17), np.float32),
         first=np.zeros(count + 1, np.int64),

@@ -155,10 +155,10 @@ def test_pixels_see_the_triangles_that_their_rays_hit(seed: int) -> None:
     middle = rng.normal(size=(120, 1, 3)) * (12.0, 9.0, 6.0)  # many reach behind the camera
     triangles = (middle + rng.normal(size=(120, 3, 3)) * rng.choice([0.3, 2.0, 9.0], (120, 1, 1))).astype(np.float32)
     table, drawing = one_copy(mesh(triangles))
-    slots = CPURasteriser(table).slots(drawing, camera, CameraPose((0.0, 0.0, 0.0), 0.0))
+    triangle_ids = CPURasteriser(table).triangle_ids(drawing, camera, CameraPose((0.0, 0.0, 0.0), 0.0))
     exact, _ = nearest(triangles.astype(float), camera)
     assert (exact >= 0).mean() > 0.5
-    assert (slots != exact).mean() < 1e-3  # edges and depths that rounding decides
+    assert (triangle_ids != exact).mean() < 1e-3  # edges and depths that rounding decides
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -172,12 +172,12 @@ def test_triangles_that_share_edges_leave_no_gap(seed: int) -> None:
     a, b, c, d = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
     triangles = np.concatenate((np.stack((a, b, c), axis=2), np.stack((a, c, d), axis=2))).reshape(-1, 3, 3)
     table, drawing = one_copy(mesh(triangles))
-    assert (CPURasteriser(table).slots(drawing, camera, CameraPose((0.0, 0.0, 0.0), 0.0)) >= 0).all()
+    assert (CPURasteriser(table).triangle_ids(drawing, camera, CameraPose((0.0, 0.0, 0.0), 0.0)) >= 0).all()
 
 
 def test_nothing_before_the_near_plane_is_seen() -> None:
     table, drawing = one_copy(mesh(rectangle((0.3, -9, -9), (0.3, 9, -9), (0.3, 9, 9), (0.3, -9, 9))))
-    assert (CPURasteriser(table).slots(drawing, CAMERA, CameraPose((0.0, 0.0, 0.0), 0.0)) == -1).all()
+    assert (CPURasteriser(table).triangle_ids(drawing, CAMERA, CameraPose((0.0, 0.0, 0.0), 0.0)) == -1).all()
 
 
 def test_what_is_seen_has_its_instance_id(place: Any) -> None:
@@ -348,7 +348,7 @@ def test_stand_ins_replace_shapes_level_by_level() -> None:
     box = np.ones((6, 3))
     plain = np.array([False, False, False, False, True, True])
     shapes = shapes_of(names, -box, box, np.array([400, 100, 4, 9, 50, 8]), plain, (":far", ":tiny"))
-    assert shapes.stand_in.tolist() == [1, 2, -1, -1, 5, -1]
+    assert shapes.coarser.tolist() == [1, 2, -1, -1, 5, -1]
     # The geometric mean of the triangles of both decides: of 200 and of 20.
     assert shapes.detail[0] == pytest.approx(math.sqrt(10.0) * shapes.detail[1])
     # What is plain gives way sooner, and is sooner left out.

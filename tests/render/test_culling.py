@@ -83,18 +83,18 @@ def drawing_of(table: MeshTable, mesh: np.ndarray, transforms: np.ndarray) -> Dr
 
 def alone(table: MeshTable, drawing: Drawing) -> tuple[np.ndarray, np.ndarray]:
     """Slots and 1/z of what is nearest, found by drawing each copy on its own."""
-    slots = np.full((CAMERA.height, CAMERA.width), -1)
-    nearest = np.zeros(slots.shape)
+    triangle_ids = np.full((CAMERA.height, CAMERA.width), -1)
+    nearest = np.zeros(triangle_ids.shape)
     u, v = np.meshgrid(np.arange(CAMERA.width), np.arange(CAMERA.height))
     rasteriser = CPURasteriser(table)
     for copy in range(len(drawing.mesh)):
         one = drawing_of(table, drawing.mesh[[copy]], drawing.record["transform"][[copy]])
-        seen = rasteriser.slots(one, CAMERA, POSE).copy()
+        seen = rasteriser.triangle_ids(one, CAMERA, POSE).copy()
         inverse = np.where(seen >= 0, inverse_depths(table, one, seen, u, v), 0.0)
         closer = inverse > nearest
-        slots = np.where(closer, seen + drawing.first[copy], slots)
+        triangle_ids = np.where(closer, seen + drawing.first[copy], triangle_ids)
         nearest = np.where(closer, inverse, nearest)
-    return slots, nearest
+    return triangle_ids, nearest
 
 
 def inverse_depths(table: MeshTable, one: Drawing, seen: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -118,12 +118,12 @@ def test_copies_are_left_out_only_where_nothing_of_them_is_seen(seed: int, order
     table = MeshTable.of(shapes)
     mesh, transforms = scattered(np.random.default_rng(seed), 150, len(shapes))
     drawing = drawing_of(table, mesh[::order], transforms[::order])
-    slots = CPURasteriser(table).slots(drawing, CAMERA, POSE)
+    triangle_ids = CPURasteriser(table).triangle_ids(drawing, CAMERA, POSE)
     expected, inverse = alone(table, drawing)
     assert (expected >= 0).mean() > 0.3
     assert inverse.max() < 1 / NEAR
-    assert (slots != expected).mean() < 2e-4  # equal depths that rounding decides
-    copies = np.unique(np.searchsorted(drawing.first, slots[slots >= 0], side="right"))
+    assert (triangle_ids != expected).mean() < 2e-4  # equal depths that rounding decides
+    copies = np.unique(np.searchsorted(drawing.first, triangle_ids[triangle_ids >= 0], side="right"))
     assert 15 < len(copies) < 140  # some copies are hidden, or the test would say nothing
 
 
@@ -134,7 +134,7 @@ def test_inner_sides_of_solids_make_no_difference_from_outside() -> None:
     assert not table.in_solid.any()
     mesh, transforms = scattered(np.random.default_rng(5), 60, 1)
     drawing = drawing_of(table, mesh, transforms)
-    seen, all_seen = (CPURasteriser(one).slots(drawing, CAMERA, POSE).copy() for one in (culled, table))
+    seen, all_seen = (CPURasteriser(one).triangle_ids(drawing, CAMERA, POSE).copy() for one in (culled, table))
     assert (seen >= 0).mean() > 0.3
     np.testing.assert_array_equal(seen, all_seen)
 
@@ -142,9 +142,9 @@ def test_inner_sides_of_solids_make_no_difference_from_outside() -> None:
 def test_the_outer_side_is_what_is_kept() -> None:
     opened = MeshTable.of({"open": replace(BALL, faces=BALL.faces[BALL.positions[BALL.faces, 0].mean(axis=1) > -0.5])})
     drawing = drawing_of(opened, np.zeros(1, np.int64), np.column_stack((np.eye(3), (4.0, 0.0, 0.0)))[None])
-    both = CPURasteriser(opened).slots(drawing, CAMERA, POSE).copy()
+    both = CPURasteriser(opened).triangle_ids(drawing, CAMERA, POSE).copy()
     outer = CPURasteriser(replace(opened, in_solid=np.ones(len(opened.faces), np.bool_)))
-    kept = outer.slots(drawing, CAMERA, POSE)
+    kept = outer.triangle_ids(drawing, CAMERA, POSE)
     # Its open side is toward the camera: of the inside nothing is left, of the rim's outside something.
     assert kept[45, 60] < 0 <= both[45, 60]
     assert 0 < (kept >= 0).sum() < 0.8 * (both >= 0).sum()

@@ -71,7 +71,9 @@ def test_both_rasterisers_see_the_same_triangle_of_the_same_copy() -> None:
     table = soup(rng, (1, 7, 60, 300))
     mesh = list(rng.integers(0, 4, 200))
     drawing = drawing_of(table, mesh, scattered(rng, 200, camera_axes(CAMERA, POSE)))
-    by_opengl, by_numba = (maker(table).slots(drawing, CAMERA, POSE).copy() for maker in (GLRasteriser, CPURasteriser))
+    by_opengl, by_numba = (
+        maker(table).triangle_ids(drawing, CAMERA, POSE).copy() for maker in (GLRasteriser, CPURasteriser)
+    )
     assert len(np.unique(by_opengl)) > 1000
     # Triangles pierce one another all over the picture, and along those lines either may win.
     assert np.mean(by_opengl == by_numba) > 0.99
@@ -84,7 +86,7 @@ def test_both_rasterisers_cover_the_same_pixels_where_triangles_reach_behind_the
     transforms = scattered(rng, 5, camera_axes(CAMERA, POSE))
     transforms[..., 3] *= 0.05
     drawing = drawing_of(table, [0] * 5, transforms)
-    seen = [maker(table).slots(drawing, CAMERA, POSE) != NOTHING for maker in (GLRasteriser, CPURasteriser)]
+    seen = [maker(table).triangle_ids(drawing, CAMERA, POSE) != NOTHING for maker in (GLRasteriser, CPURasteriser)]
     assert 0.1 < seen[0].mean() < 0.98
     assert np.mean(seen[0] == seen[1]) > 0.999
 
@@ -103,12 +105,12 @@ def test_the_nearer_is_seen_from_both_sides_and_nothing_before_the_near_plane(
     table = MeshTable.of({"far": mesh_of(quad(30.0, 3.0)), "near": mesh_of(turned), "eye": mesh_of(quad(0.39, 1.0))})
     axes = camera_axes(CAMERA, POSE)
     level = np.concatenate((axes.T, np.zeros((3, 1))), axis=1)
-    slots = maker(table).slots(drawing_of(table, [2, 1, 0], np.array([level] * 3)), CAMERA, POSE)
-    middle, beside = slots[58:62, 78:82], slots[60, 80 + 10]
+    triangle_ids = maker(table).triangle_ids(drawing_of(table, [2, 1, 0], np.array([level] * 3)), CAMERA, POSE)
+    middle, beside = triangle_ids[58:62, 78:82], triangle_ids[60, 80 + 10]
     assert NEAR > 0.39
     assert set(np.unique(middle)) <= {2, 3}
     assert beside in {4, 5}
-    assert slots[0, 0] == NOTHING
+    assert triangle_ids[0, 0] == NOTHING
 
 
 @pytest.mark.parametrize("maker", [GLRasteriser, CPURasteriser])
@@ -120,7 +122,7 @@ def test_a_pixel_is_seen_if_its_centre_is(maker: type[GLRasteriser] | type[CPURa
     shifted[..., 1] += 1.0 + (70 + beside - 60) * 10.0 / CAMERA.focal_length
     table = MeshTable.of({"quad": mesh_of(shifted)})
     level = np.concatenate((camera_axes(CAMERA, POSE).T, np.zeros((3, 1))), axis=1)
-    rows, columns = np.nonzero(maker(table).slots(drawing_of(table, [0], level[None]), CAMERA, POSE) != NOTHING)
+    rows, columns = np.nonzero(maker(table).triangle_ids(drawing_of(table, [0], level[None]), CAMERA, POSE) != NOTHING)
     assert (rows.min(), columns.min()) == ((70, 100) if beside < 0 else (71, 101))
 
 
@@ -129,9 +131,9 @@ def test_an_empty_drawing_shows_nothing_and_forgets_the_last_one() -> None:
     table = soup(rng, (50,))
     rasteriser = GLRasteriser(table)
     full = drawing_of(table, [0] * 20, scattered(rng, 20, camera_axes(CAMERA, POSE)))
-    assert (rasteriser.slots(full, CAMERA, POSE) != NOTHING).any()
+    assert (rasteriser.triangle_ids(full, CAMERA, POSE) != NOTHING).any()
     empty = drawing_of(table, [], np.empty((0, 3, 4)))
-    assert (rasteriser.slots(empty, CAMERA, POSE) == NOTHING).all()
+    assert (rasteriser.triangle_ids(empty, CAMERA, POSE) == NOTHING).all()
 
 
 def test_packing_keeps_copies_of_a_mesh_together_and_their_slots() -> None:
@@ -159,14 +161,14 @@ def test_a_size_can_change_and_a_closed_one_is_refused() -> None:
     table = soup(rng, (50,))
     rasteriser = GLRasteriser(table)
     drawing = drawing_of(table, [0] * 20, scattered(rng, 20, camera_axes(CAMERA, POSE)))
-    first = rasteriser.slots(drawing, CAMERA, POSE).copy()
+    first = rasteriser.triangle_ids(drawing, CAMERA, POSE).copy()
     wide = Camera(200, 50, 144.25, (100.0, 25.0), 1.38)
-    assert rasteriser.slots(drawing, wide, POSE).shape == (50, 200)
-    assert np.array_equal(rasteriser.slots(drawing, CAMERA, POSE), first)
+    assert rasteriser.triangle_ids(drawing, wide, POSE).shape == (50, 200)
+    assert np.array_equal(rasteriser.triangle_ids(drawing, CAMERA, POSE), first)
     rasteriser.close()
     rasteriser.close()
     with pytest.raises(RenderError, match="closed"):
-        rasteriser.slots(drawing, CAMERA, POSE)
+        rasteriser.triangle_ids(drawing, CAMERA, POSE)
 
 
 DRAW = """
@@ -177,9 +179,9 @@ import test_gl_rasteriser as t
 rng = np.random.default_rng(9)
 table = t.soup(rng, (3, 40, 90))
 drawing = t.drawing_of(table, [0, 1, 2, 1, 1, 2] * 4, t.scattered(rng, 24, t.camera_axes(t.CAMERA, t.POSE)))
-slots = t.GLRasteriser(table).slots(drawing, t.CAMERA, t.POSE)
+triangle_ids = t.GLRasteriser(table).triangle_ids(drawing, t.CAMERA, t.POSE)
 print(t.context().version, t.context().description)
-print(len(np.unique(slots)), hashlib.sha256(slots.tobytes()).hexdigest())
+print(len(np.unique(triangle_ids)), hashlib.sha256(triangle_ids.tobytes()).hexdigest())
 """
 
 

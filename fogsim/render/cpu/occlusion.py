@@ -5,21 +5,18 @@ from typing import Any
 import numpy as np
 
 from fogsim.jit import kernel
-from fogsim.render.cpu.triangles import Array, Index, Triangles, Wide, Work
+from fogsim.render.cpu.triangles import Array, Drawn, Index, Pinhole, Triangles, Wide, Work
 
 _MANY = 40  # triangles from which looking at a copy's box costs less than looking at all of them
 _SLACK = 1e-3  # by which boxes are widened, over their extents and in metres, for the sake of rounding
 
 
 @kernel
-def gather(
+def gather_copies(
     triangles: Triangles,
-    mesh: Index,
-    record: Array,
+    drawn: Drawn,
     begin: int,
-    axes: Wide,
-    lens: Wide,
-    near: float,
+    pinhole: Pinhole,
     picture: Index,
     size: tuple[int, int, int],
     work: Work,
@@ -28,7 +25,7 @@ def gather(
 
     Parameters
     ----------
-    triangles, mesh, record, axes, lens, near, picture, work
+    triangles, drawn, pinhole, picture, work
         See `rasterise`.
     begin : int
         The first copy to look at.
@@ -40,6 +37,7 @@ def gather(
     tuple of int
         Number of copies gathered, and the first copy that has not been looked at.
     """
+    mesh, record, axes, lens, near = drawn.mesh, drawn.record, pinhole.axes, pinhole.lens, pinhole.near
     first_vertex, first_face, copies = triangles.first_vertex, triangles.first_face, work.copy
     centre, half = triangles.centre, triangles.half_extent
     count, vertices, faces = 0, 0, 0
@@ -54,7 +52,7 @@ def gather(
                 per_nearest, per_farthest = lens[0] / (z - deep), lens[0] / (z + deep)
                 left, right = _pixels(x - wide, x + wide, per_nearest, per_farthest, lens[1], 0, size[2])
                 top, bottom = _pixels(y - high, y + high, per_nearest, per_farthest, lens[2], size[0], size[1])
-                limit, hidden = key(np.float32(1.0001 / (z - deep)), 0), True
+                limit, hidden = depth_key(np.float32(1.0001 / (z - deep)), 0), True
                 for v in range(np.uint64(top), np.uint64(bottom)):
                     for u in range(np.uint64(left), np.uint64(right)):
                         hidden &= picture[v, u] > limit
@@ -72,9 +70,9 @@ def gather(
 
 
 @kernel
-def key(inverse_depth: float | np.float32, slot: int) -> Any:
+def depth_key(inverse_depth: float | np.float32, triangle_id: int) -> Any:
     """What a pixel sees as one number: the greater, the nearer."""
-    return np.int64(np.float32(inverse_depth).view(np.int32)) << 32 | np.int64(slot)
+    return np.int64(np.float32(inverse_depth).view(np.int32)) << 32 | np.int64(triangle_id)
 
 
 @kernel

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fogsim.jit import Bands
 from fogsim.render.cpu.rasteriser_kernels import rasterise
-from fogsim.render.cpu.triangles import Triangles, Work
+from fogsim.render.cpu.triangles import Drawn, Pinhole, Triangles, Work
 from fogsim.render.drawing import NEAR, Drawing, MeshTable
 from fogsim.render.lens import lens_of
 from fogsim.values.camera import Camera, CameraPose
@@ -47,26 +47,23 @@ class CPURasteriser:
         self._bands = Bands()
         self._picture = np.empty((0, 0), np.int64)
 
-    def slots(self, drawing: Drawing, camera: Camera, pose: CameraPose) -> NDArray[np.int32]:
-        """Find the nearest triangle of each pixel (see `Rasteriser.slots`)."""
+    def triangle_ids(self, drawing: Drawing, camera: Camera, pose: CameraPose) -> NDArray[np.int32]:
+        """Find the nearest triangle of each pixel (see `Rasteriser.triangle_ids`)."""
         # Behind each row lies what vectors reach over its end, and so much that rows lie apart in the cache.
         size = (camera.height, camera.width // 16 * 16 + 24)
         if self._picture.shape != size:
             self._picture = np.empty(size, np.int64)
         lens = lens_of(camera, pose)
-        record = drawing.record.view(np.float32).reshape(-1, 17)
+        drawn = Drawn(drawing.mesh, drawing.record.view(np.float32).reshape(-1, 17), drawing.first)
+        pinhole = Pinhole(lens.axes, lens.lens, NEAR)
 
         def draw(band: int, top: int, bottom: int) -> None:
             if band == len(self._work):
                 self._work.append(_room(*self._most))
             rasterise(
                 self._triangles,
-                drawing.mesh,
-                record,
-                drawing.first,
-                lens.axes,
-                lens.lens,
-                NEAR,
+                drawn,
+                pinhole,
                 self._picture,
                 camera.width,
                 top,
@@ -90,6 +87,6 @@ def _room(vertices: int, faces: int) -> Work:
         box=np.empty((faces, 4), np.int32),
         # One more, since the last one is written down before it is left out.
         vertex=np.empty((faces + 1, 3), np.uint32),
-        slot=np.empty(faces + 1, np.int32),
+        triangle_id=np.empty(faces + 1, np.int32),
         copy=np.empty(faces, np.int64),
     )

@@ -11,8 +11,18 @@ from typing import Any
 import numpy as np
 
 from fogsim.jit import kernel
-from fogsim.render.cpu.occlusion import gather, key
-from fogsim.render.cpu.triangles import Array, Index, Triangles, Wide, Work, project, set_up, sift
+from fogsim.render.cpu.occlusion import depth_key, gather_copies
+from fogsim.render.cpu.triangles import (
+    Drawn,
+    Index,
+    Pinhole,
+    Triangles,
+    Wide,
+    Work,
+    cull_triangles,
+    project,
+    set_up_boxes,
+)
 
 _SMALL = 64  # boxes of no more pixels are looked at before their triangle is drawn
 _LANES = 8
@@ -26,12 +36,8 @@ Edges = tuple[float, float, float, float, float, float, float, float, float, flo
 @kernel
 def rasterise(
     triangles: Triangles,
-    mesh: Index,
-    record: Array,
-    first: Index,
-    axes: Wide,
-    lens: Wide,
-    near: float,
+    drawn: Drawn,
+    pinhole: Pinhole,
     picture: Index,
     columns: int,
     top: int,
@@ -44,18 +50,12 @@ def rasterise(
     ----------
     triangles : Triangles
         All meshes.
-    mesh, first
-        As in `Drawing`.
-    record : (c, 17) float32
-        The records of a `Drawing`; the first twelve numbers are the transform.
-    axes : (3, 3) float64
-        Axes of the camera in the world as rows.
-    lens : (3,) float64
-        Focal length and principal point [px].
-    near : float
-        Depth before which nothing is seen [m].
+    drawn : Drawn
+        The copies.
+    pinhole : Pinhole
+        The camera.
     picture : (rows, columns + at least 7) int64
-        Is set to what is seen: in the lower half its slot, −1 for nothing, in the upper half the bits of its 1/z as a
+        Is set to what is seen: in the lower half its id, −1 for nothing, in the upper half the bits of its 1/z as a
         32-bit float, which sort like the float. Of two surfaces the greater number is the nearer one.
     columns : int
         Width of the picture [px]; what lies behind it is not set.
@@ -67,13 +67,13 @@ def rasterise(
     picture[top:bottom] = _EMPTY
     # Handing an array to a function costs as much as drawing a triangle, so the functions below take many copies each.
     size, begin = (top, bottom, columns), 0
-    while begin < len(mesh):
-        count, begin = gather(triangles, mesh, record, begin, axes, lens, near, picture, size, work)
+    while begin < len(drawn.mesh):
+        count, begin = gather_copies(triangles, drawn, begin, pinhole, picture, size, work)
         copies = work.copy[:count]
-        project(triangles, mesh, record, copies, axes, lens, near, work.corners)
-        count = sift(triangles, mesh, first, copies, size, work)
-        count = set_up(count, lens, near, size, work)
-        _fill(work, count, lens, near, picture)
+        project(triangles, drawn, copies, pinhole, work.corners)
+        count = cull_triangles(triangles, drawn, copies, size, work)
+        count = set_up_boxes(count, pinhole, size, work)
+        _fill(work, count, pinhole.lens, pinhole.near, picture)
 
 
 @kernel
@@ -108,14 +108,14 @@ def _edges(p: Point, q: Point, r: Point, focal: float, u0: float, v0: float) -> 
 @kernel
 def _fill(work: Work, count: int, lens: Wide, near: float, picture: Index) -> None:
     """Draw the pixels of triangles, row by row between their edges."""
-    points, box, slots, focal, u0, v0 = work.points, work.box, work.slot, lens[0], lens[1], lens[2]
+    points, box, triangle_ids, focal, u0, v0 = work.points, work.box, work.triangle_id, lens[0], lens[1], lens[2]
     for t in range(count):
         top, bottom, left, right = int(box[t, 0]), int(box[t, 1]), int(box[t, 2]), int(box[t, 3])
         least = min(points[t, 2], points[t, 5], points[t, 8])
         crossing = least <= near
         if not crossing and right - left < _LANES:
             # Most small triangles are hidden by what has been drawn already, and to see that is cheap.
-            limit, hidden = key(np.float32(1.0001) / least, 0), True
+            limit, hidden = depth_key(np.float32(1.0001) / least, 0), True
             beside, over = np.uint64(left), np.int64(right - left)
             for v in range(np.uint64(top), np.uint64(bottom + 1)):
                 shown = 0
@@ -139,7 +139,7 @@ def _fill(work: Work, count: int, lens: Wide, near: float, picture: Index) -> No
             top, bottom = _rows(top, bottom, ax, ay, az)
             top, bottom = _rows(top, bottom, bx, by, bz)
             top, bottom = _rows(top, bottom, cx, cy, cz)
-        first, last, number, step = float(left), float(right), slots[t], np.float32(zx)
+        first, last, number, step = float(left), float(right), triangle_ids[t], np.float32(zx)
         for v in range(np.uint64(top), np.uint64(bottom + 1)):
             row = float(v)
             low = max(a1 * row + a0, b1 * row + b0, c1 * row + c0, d1 * row + d0)
@@ -154,7 +154,7 @@ def _fill(work: Work, count: int, lens: Wide, near: float, picture: Index) -> No
             start = np.float32(zx * low + zy * row + zz)
             # Unsigned numbers tell the compiler that no index counts from the end.
             for i in range(np.uint64(lanes)):
-                found = key(start + step * np.float32(np.int32(i)), number)
+                found = depth_key(start + step * np.float32(np.int32(i)), number)
                 found = found if np.int64(i) <= end else 0
                 before = picture[v, begin + i]
                 picture[v, begin + i] = found if found > before else before

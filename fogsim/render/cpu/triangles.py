@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
+from fogsim.render.vectors import Vector
 
 _SLACK = 1e-3  # by which boxes are widened, since corners are projected with 32 bits [px]
 
@@ -53,8 +54,8 @@ class Work(NamedTuple):
         Its first and last row and column.
     vertex : (m, 3) uint32
         Where its vertices are among the corners.
-    slot : (m,) int32
-        Its slot.
+    triangle_id : (m,) int32
+        Its id.
     copy : (c,) int64
         The copies that are worked on.
     """
@@ -63,22 +64,60 @@ class Work(NamedTuple):
     points: Array
     box: NDArray[np.int32]
     vertex: NDArray[np.uint32]
-    slot: NDArray[np.int32]
+    triangle_id: NDArray[np.int32]
     copy: Index
 
 
+class Drawn(NamedTuple):
+    """A `Drawing` as plain numbers.
+
+    Attributes
+    ----------
+    mesh, first
+        As in `Drawing`.
+    record : (c, 17) float32
+        The records; the first twelve numbers of each are the transform.
+    """
+
+    mesh: Index
+    record: Array
+    first: Index
+
+
+class Pinhole(NamedTuple):
+    """Where a camera looks.
+
+    Attributes
+    ----------
+    axes : (3, 3) float64
+        Axes of the camera in the world as rows.
+    lens : (3,) float64
+        Focal length and principal point [px].
+    near : float
+        Depth before which nothing is seen [m].
+    """
+
+    axes: Wide
+    lens: Wide
+    near: float
+
+
 @kernel
-def project(
-    triangles: Triangles,
-    mesh: Index,
-    record: Array,
-    copies: Index,
-    axes: Wide,
-    lens: Wide,
-    near: float,
-    corners: Array,
-) -> None:
-    """Vertices of copies one after another; one loop for each number, since each alone runs in vector registers."""
+def project(triangles: Triangles, drawn: Drawn, copies: Index, pinhole: Pinhole, corners: Array) -> None:
+    """Set the vertices of copies one after another.
+
+    One loop for each number, since each alone runs in vector registers.
+
+    Parameters
+    ----------
+    triangles, drawn, pinhole
+        See `rasterise`.
+    copies : (n,) int64
+        The copies.
+    corners : (5, n) float32
+        See `Work`; is filled.
+    """
+    mesh, record, axes, lens, near = drawn.mesh, drawn.record, pinhole.axes, pinhole.lens, pinhole.near
     positions, first_vertex = triangles.positions, triangles.first_vertex
     focal, nearest, nothing = np.float32(lens[0]), np.float32(near), np.float32(np.nan)
     base = 0
@@ -104,15 +143,32 @@ def project(
 
 
 @kernel
-def sift(triangles: Triangles, mesh: Index, first: Index, copies: Index, size: tuple[int, int, int], work: Work) -> int:
-    """Triangles of copies whose boxes may hold the centre of any pixel, with vertices and slots; their count.
+def cull_triangles(triangles: Triangles, drawn: Drawn, copies: Index, size: tuple[int, int, int], work: Work) -> int:
+    """Keep the triangles of copies whose boxes may hold the centre of any pixel, with vertices and ids.
 
     Every triangle is written down, and by the next one again unless it is kept: which are is hard to foresee, and so
     costs a processor that guesses more than to write.
+
+    Parameters
+    ----------
+    triangles, drawn
+        See `rasterise`.
+    copies : (n,) int64
+        The copies.
+    size : tuple of int
+        First row, the one after the last, and columns.
+    work : Work
+        Has the corners and gets the triangles.
+
+    Returns
+    -------
+    int
+        Number of triangles kept.
     """
+    mesh, first = drawn.mesh, drawn.first
     faces, first_vertex, first_face = triangles.faces, triangles.first_vertex, triangles.first_face
     in_solid = triangles.in_solid
-    corners, vertex, slot = work.corners, work.vertex, work.slot
+    corners, vertex, triangle_id = work.corners, work.vertex, work.triangle_id
     first_row, last_row, last_column = np.float32(size[0]), np.float32(size[1] - 1), np.float32(size[2] - 1)
     zero, slack = np.float32(0.0), np.float32(_SLACK)
     count, base = np.uint64(0), np.uint32(0)
@@ -130,7 +186,7 @@ def sift(triangles: Triangles, mesh: Index, first: Index, copies: Index, size: t
             empty = behind | (left > right) | (top > bottom) | (right < zero) | (left > last_column)
             empty |= (bottom < first_row) | (top > last_row)
             vertex[count, 0], vertex[count, 1], vertex[count, 2] = i, j, k
-            slot[count] = np.int32(first[copy]) + np.int32(own)
+            triangle_id[count] = np.int32(first[copy]) + np.int32(own)
             # Where a corner lies before the near plane nothing is known yet.
             count += np.uint64(not (empty & (not np.isnan(whole))))
         base += np.uint32(first_vertex[mesh[copy] + 1] - first_vertex[mesh[copy]])
@@ -150,21 +206,36 @@ def _greatest(a: np.float32, b: np.float32, c: np.float32) -> np.float32:
 
 
 @kernel
-def set_up(sifted: int, lens: Wide, near: float, size: tuple[int, int, int], work: Work) -> int:
-    """Boxes and corners of sifted triangles, less those before the near plane; their count."""
-    corners, points, box, vertex, slot = work.corners, work.points, work.box, work.vertex, work.slot
+def set_up_boxes(kept: int, pinhole: Pinhole, size: tuple[int, int, int], work: Work) -> int:
+    """Set boxes and corners of kept triangles, and leave out those before the near plane.
+
+    Parameters
+    ----------
+    kept : int
+        Number of triangles that `cull_triangles` kept.
+    pinhole, size, work
+        See `rasterise` and `cull_triangles`.
+
+    Returns
+    -------
+    int
+        Number of triangles left.
+    """
+    lens, near = pinhole.lens, pinhole.near
+    corners, points, box, vertex, triangle_id = work.corners, work.points, work.box, work.vertex, work.triangle_id
     first_row, last_row, last_column = float(size[0]), size[1] - 1.0, size[2] - 1.0
     focal, u0, v0 = lens[0], lens[1], lens[2]
     count, slack = np.uint64(0), np.float32(_SLACK)
-    for t in range(np.uint64(sifted)):
+    for t in range(np.uint64(kept)):
         i, j, k = vertex[t, 0], vertex[t, 1], vertex[t, 2]
         a, b, c = corners[3, i], corners[3, j], corners[3, k]
         if np.isnan(a + b + c):
             z0, z1, z2 = np.float64(corners[2, i]), np.float64(corners[2, j]), np.float64(corners[2, k])
             if max(z0, z1, z2) <= near:
                 continue
-            left, right = _extent(corners[0, i], corners[0, j], corners[0, k], z0, z1, z2, focal, u0, near)
-            top, bottom = _extent(corners[1, i], corners[1, j], corners[1, k], z0, z1, z2, focal, v0, near)
+            depths = z0, z1, z2
+            left, right = _extent((corners[0, i], corners[0, j], corners[0, k]), depths, focal, u0, near)
+            top, bottom = _extent((corners[1, i], corners[1, j], corners[1, k]), depths, focal, v0, near)
             if top > bottom or right < 0 or bottom < first_row or left > last_column or top > last_row:
                 continue
         else:
@@ -177,16 +248,16 @@ def set_up(sifted: int, lens: Wide, near: float, size: tuple[int, int, int], wor
             points[count, row] = corners[row, i]
             points[count, 3 + row] = corners[row, j]
             points[count, 6 + row] = corners[row, k]
-        slot[count] = slot[t]
+        triangle_id[count] = triangle_id[t]
         count += np.uint64(1)
     return int(count)
 
 
 @kernel
-def _extent(
-    x0: float, x1: float, x2: float, z0: float, z1: float, z2: float, focal: float, middle: float, near: float
-) -> tuple[float, float]:
+def _extent(across: Vector, depths: Vector, focal: float, middle: float, near: float) -> tuple[float, float]:
     """First and last column or row of that part of a triangle which lies beyond the near plane."""
+    x0, x1, x2 = across
+    z0, z1, z2 = depths
     low, high = np.inf, -np.inf
     for here, there, z, other in ((x0, x1, z0, z1), (x1, x2, z1, z2), (x2, x0, z2, z0)):
         if z > near:

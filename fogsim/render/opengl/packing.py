@@ -10,7 +10,7 @@ CORNER = np.dtype([("position", "<f4", (3,)), ("triangle", "<i4")])
 """A corner of a triangle, and the triangle's number in its mesh."""
 
 COPY = np.dtype([("clip", "<f4", (3, 4)), ("first", "<i4")])
-"""A copy of a mesh: its transform to the clip coordinates x, y and w, and the slot of its first triangle."""
+"""A copy of a mesh: its transform to the clip coordinates x, y and w, and the id of its first triangle."""
 
 COMMAND = np.dtype([(name, "<u4") for name in ("count", "copies", "first", "copy")])
 """Copies of one mesh, in the layout of glMultiDrawArraysIndirect: how many and the first of corners and copies."""
@@ -87,11 +87,11 @@ def _pack(
             commands[used, 3] = begin
             begin += counts[number]
             used += 1
-    slots = words.view(np.int32)
+    triangle_ids = words.view(np.int32)
     for copy in range(len(mesh)):
         row = place[mesh[copy]]
         place[mesh[copy]] += 1
-        slots[row, 12] = first[copy]
+        triangle_ids[row, 12] = first[copy]
         own = transform[copy]
         for i in range(3):
             x, y, z = clip[i, 0], clip[i, 1], clip[i, 2]

@@ -13,7 +13,7 @@ _FOLDER = Path(__file__).parent / "shaders"
 
 @functools.cache
 def visibility_program() -> int:
-    """Name of the program that writes slots; compiled at the first call, and kept as long as the context."""
+    """Name of the program that writes triangle_ids; compiled at the first call, and kept as long as the context."""
     # Linking validates, and in a core profile that needs some vertex array to be bound.
     vertex_array = GL.glGenVertexArrays(1)
     GL.glBindVertexArray(vertex_array)

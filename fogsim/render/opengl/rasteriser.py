@@ -48,8 +48,8 @@ class GLRasteriser:
         self._target: Target | None = None
         self._closed = False
 
-    def slots(self, drawing: Drawing, camera: Camera, pose: CameraPose) -> NDArray[np.int32]:
-        """Find the triangle that each pixel sees (see `Rasteriser.slots`)."""
+    def triangle_ids(self, drawing: Drawing, camera: Camera, pose: CameraPose) -> NDArray[np.int32]:
+        """Find the triangle that each pixel sees (see `Rasteriser.triangle_ids`)."""
         if self._closed:
             raise RenderError("this renderer is closed; make a new one")
         self._context.activate()

@@ -14,7 +14,7 @@ _BACKGROUND = np.array([NOTHING, 0, 0, 0], np.int32)
 
 
 class Target:
-    """Framebuffer of slots for one size of picture, one sample a pixel.
+    """Framebuffer of triangle ids for one size of picture, one sample a pixel.
 
     Parameters
     ----------
@@ -33,8 +33,8 @@ class Target:
         self._framebuffer = int(GL.glGenFramebuffers(1))
         self._renderbuffers = [int(name) for name in GL.glGenRenderbuffers(2)]
         GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self._framebuffer)
-        slots, depth = self._renderbuffers
-        _attach(slots, GL.GL_R32I, GL.GL_COLOR_ATTACHMENT0, self.size)
+        triangle_ids, depth = self._renderbuffers
+        _attach(triangle_ids, GL.GL_R32I, GL.GL_COLOR_ATTACHMENT0, self.size)
         _attach(depth, GL.GL_DEPTH_COMPONENT32F, GL.GL_DEPTH_ATTACHMENT, self.size)
         status = GL.glCheckFramebufferStatus(GL.GL_FRAMEBUFFER)
         if status != GL.GL_FRAMEBUFFER_COMPLETE:

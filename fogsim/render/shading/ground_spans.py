@@ -1,66 +1,66 @@
-"""Runs of ground in a row that lie in one plane, and so are textured together."""
+"""Spans of ground in a row that lie in one plane, and so are textured together."""
 
 import numpy as np
 
 from fogsim.jit import kernel
 from fogsim.render.shading import layout
-from fogsim.render.shading.layout import Picture, Runs, Wide
+from fogsim.render.shading.layout import Picture, Spans, Wide
 from fogsim.render.shading.texture import Row
 
 INSTANCE, LEAST, MOST, DEPTH = layout.INSTANCE, layout.LEAST, layout.MOST, layout.DEPTH
-_GAP = 16  # pixels between runs of a stretch that may show something else
+_GAP = 16  # pixels between spans of a row that may show something else
 _SAME = 0.005  # difference of depths up to which two planes are taken as one, over the depth
 
 
 @kernel
-def next_stretch(
-    kind: int, runs: Runs, begin: int, count: int, lens: Wide, work: Row, picture: Picture
+def next_coplanar_spans(
+    kind: int, spans: Spans, begin: int, count: int, lens: Wide, work: Row, picture: Picture
 ) -> tuple[int, int]:
-    """Find the next runs of a kind that lie in a row and a plane, and set their depths, distances and instance ids.
+    """Find the next spans of a kind that lie in a row and a plane, and set their depths, distances and instance ids.
 
     Parameters
     ----------
     kind : int
         `ROAD` or `TERRAIN`.
-    runs : Runs
-        The runs and what is known of their surfaces.
+    spans : Spans
+        The spans and their surfaces.
     begin, count : int
-        The first run to look at, and the number of all.
+        The first span to look at, and the number of all.
     lens : (3,) float64
         See `Lens`.
     work : Row
-        Gets the runs as its members, and their depths.
+        Gets the spans as its members, and their depths.
     picture : Picture
-        Is filled where these runs are.
+        Is filled where these spans are.
 
     Returns
     -------
     tuple of int
-        Number of members, 0 if there are none any more, and the first run that has not been looked at.
+        Number of members, 0 if there are none any more, and the first span that has not been looked at.
     """
-    run, kinds, known, member, depth = runs.run, runs.kind, runs.surface, work.member, work.depth
+    span, kinds, surface, member, depth = spans.span, spans.kind, spans.surface, work.member, work.depth
     distance, instance = picture.distance, picture.instance
     one, per_focal = np.float32(1.0), np.float32(1.0 / lens[0])
     members, number, first, end = 0, begin, 0, 0
     while number < count:
-        k = run[number, 3]
+        k = span[number, 3]
         if kinds[k] != kind:
             number += 1
             continue
-        v, start, row = np.uint64(run[number, 0]), run[number, 1], float(run[number, 0])
-        rest = known[k, DEPTH] * start + known[k, DEPTH + 1] * row + known[k, DEPTH + 2]
+        v, start, row = np.uint64(span[number, 0]), span[number, 1], float(span[number, 0])
+        rest = surface[k, DEPTH] * start + surface[k, DEPTH + 1] * row + surface[k, DEPTH + 2]
         if members == 0:
             first = number
         else:
-            f = run[first, 3]
-            before = known[f, DEPTH] * start + known[f, DEPTH + 1] * row + known[f, DEPTH + 2]
-            if run[number, 0] != run[first, 0] or start > end + _GAP or abs(before - rest) > _SAME * rest:
+            f = span[first, 3]
+            before = surface[f, DEPTH] * start + surface[f, DEPTH + 1] * row + surface[f, DEPTH + 2]
+            if span[number, 0] != span[first, 0] or start > end + _GAP or abs(before - rest) > _SAME * rest:
                 break
         member[members] = number
-        members, end = members + 1, run[number, 2]
-        name = np.int32(known[k, INSTANCE])
-        least, most = np.float32(known[k, LEAST]), np.float32(known[k, MOST])
-        slope, level = np.float32(known[k, DEPTH]), np.float32(rest)
+        members, end = members + 1, span[number, 2]
+        name = np.int32(surface[k, INSTANCE])
+        least, most = np.float32(surface[k, LEAST]), np.float32(surface[k, MOST])
+        slope, level = np.float32(surface[k, DEPTH]), np.float32(rest)
         x, y = np.float32((start - lens[1]) / lens[0]), np.float32((row - lens[2]) / lens[0])
         square = one + y * y
         for i in range(np.uint64(end - start)):

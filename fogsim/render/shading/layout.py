@@ -1,4 +1,4 @@
-"""What the kernels of shading share: the picture's geometry, and what is known of each surface that is seen."""
+"""What the kernels of shading share: the picture's geometry, and the surfaces that are seen."""
 
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ Index = NDArray[np.int64]
 OBJECT, ROAD, TERRAIN, SKY = range(4)
 """Kinds of surfaces: colour that varies over a triangle, textured ground, and what is no triangle."""
 
-# Columns of what is known of a surface. A plane is three numbers: times column, row and 1.
+# Columns of a surface. A plane is three numbers: times column, row and 1.
 INSTANCE, LEAST, MOST = range(3)  # least and greatest 1/z [1/m]
 DEPTH = 4  # plane of 1/z [1/m]
 LIGHT = 7  # radiance per channel: planes of it over z, or numbers
@@ -71,26 +71,26 @@ class Copies(NamedTuple):
     first: Index
 
 
-class Runs(NamedTuple):
+class Spans(NamedTuple):
     """Neighbouring pixels of a row that see the same.
 
     Attributes
     ----------
-    run : (n, 4) int32
+    span : (n, 4) int32
         Row, first column, last column and surface.
-    surface_of_slot : (slots,) int32
-        Number of the surface of each slot, or −2 − its copy as long as it has none.
-    slot, copy : (n,) int32
+    surface_of_triangle : (triangle_ids,) int32
+        Number of the surface of each triangle id, or −2 − its copy as long as it has none.
+    triangle_id, copy : (n,) int32
         Of each surface, from number 2 on; number 0 is the sky and 1 the terrain.
     kind : (n,) int32
         Kind of each.
     surface : (n, COLUMNS) float64
-        What else is known of each.
+        What else there is to say of each.
     """
 
-    run: Numbers
-    surface_of_slot: Numbers
-    slot: Numbers
+    span: Numbers
+    surface_of_triangle: Numbers
+    triangle_id: Numbers
     copy: Numbers
     kind: Numbers
     surface: Wide

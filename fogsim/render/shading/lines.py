@@ -1,4 +1,4 @@
-"""Painted lines beside a lane: which pixels of a run come near one, and how much of a dashed one is paint."""
+"""Painted lines beside a lane: which pixels of a span come near one, and how much of a dashed one is paint."""
 
 import math
 
@@ -15,7 +15,7 @@ DASH, PERIOD = 6.0, 18.0
 
 @kernel
 def columns_near(away: float, change: float, reach: float, size: int) -> tuple[int, int]:
-    """First of the pixels of a run that lie within reach of a line, and the one after the last.
+    """First of the pixels of a span that lie within reach of a line, and the one after the last.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def columns_near(away: float, change: float, reach: float, size: int) -> tuple[i
     size : int
         Number of pixels.
     """
-    if abs(change) * size <= 1e-9 * reach:  # the row runs along the line
+    if abs(change) * size <= 1e-9 * reach:  # the row spans along the line
         return 0, size if abs(away) < reach else 0
     per_change = 1.0 / change
     middle, half = -away * per_change, reach * abs(per_change)

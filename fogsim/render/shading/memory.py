@@ -1,4 +1,4 @@
-"""Memory of pictures that nobody holds any more, used again: to get new memory costs as much as to shade it."""
+"""Memory of pictures that are no longer referred to, used again: to allocate a picture takes as long as to shade it."""
 
 import sys
 from typing import Any
@@ -11,16 +11,24 @@ _MOST = 8  # arrays of a size that are kept
 
 
 class Memory:
-    """Gives arrays out, and again when nothing refers to them, neither themselves nor as a view.
+    """A pool of arrays: one is used again when no other reference to it or to a view of it exists.
 
-    That is what Python's count of references says; an implementation without one gives new arrays only.
+    CPython's reference counts tell that; on an implementation without them every array is new.
     """
 
     def __init__(self) -> None:
         self._arrays: dict[tuple[int, ...], list[NDArray[np.int32]]] = {}
 
     def empty(self, shape: tuple[int, ...], kind: type[np.float32] | type[np.int32]) -> NDArray[Any]:
-        """Array of a shape with any contents; `kind` has 32 bits."""
+        """Give an array with any contents.
+
+        Parameters
+        ----------
+        shape : tuple of int
+            Its shape.
+        kind : type
+            `numpy.float32` or `numpy.int32`.
+        """
         arrays = self._arrays.get(shape)
         if arrays is None:
             # What is kept is for pictures of one size.

@@ -4,7 +4,7 @@ import numpy as np
 
 from fogsim.jit import kernel
 from fogsim.render.shading import layout
-from fogsim.render.shading.layout import Light, Picture, Runs, Wide
+from fogsim.render.shading.layout import Light, Picture, Spans, Wide
 
 INSTANCE, LEAST, MOST, DEPTH = layout.INSTANCE, layout.LEAST, layout.MOST, layout.DEPTH
 LIGHT, RESPONSE, LOW, HIGH = layout.LIGHT, layout.RESPONSE, layout.LOW, layout.HIGH
@@ -13,59 +13,59 @@ OBJECT = layout.OBJECT
 
 
 @kernel
-def shade_objects(runs: Runs, count: int, lens: Wide, picture: Picture) -> None:
-    """Shade the runs of triangles without texture, and set their distances and instance ids.
+def shade_objects(spans: Spans, count: int, lens: Wide, picture: Picture) -> None:
+    """Shade the spans of triangles without texture, and set their distances and instance ids.
 
     Parameters
     ----------
-    runs : Runs
-        The runs and what is known of their surfaces.
+    spans : Spans
+        The spans and their surfaces.
     count : int
-        Number of runs.
+        Number of spans.
     lens : (3,) float64
         See `Lens`.
     picture : Picture
-        Is filled where these runs are.
+        Is filled where these spans are.
     """
-    run, kinds, known = runs.run, runs.kind, runs.surface
+    span, kinds, surface = spans.span, spans.kind, spans.surface
     radiance, distance, instance, response = picture.radiance, picture.distance, picture.instance, picture.response
     lamplight, depths = len(response) > 0, np.empty(distance.shape[1], np.float32)
     per_focal, one = np.float32(1.0 / lens[0]), np.float32(1.0)
     for number in range(count):
-        k = run[number, 3]
+        k = span[number, 3]
         if kinds[k] != OBJECT:
             continue
-        v, begin, end = np.uint64(run[number, 0]), run[number, 1], run[number, 2]
-        row, name = float(run[number, 0]), np.int32(known[k, INSTANCE])
-        least, most = np.float32(known[k, LEAST]), np.float32(known[k, MOST])
-        slope = np.float32(known[k, DEPTH])
-        rest = np.float32(known[k, DEPTH] * begin + known[k, DEPTH + 1] * row + known[k, DEPTH + 2])
+        v, begin, end = np.uint64(span[number, 0]), span[number, 1], span[number, 2]
+        row, name = float(span[number, 0]), np.int32(surface[k, INSTANCE])
+        least, most = np.float32(surface[k, LEAST]), np.float32(surface[k, MOST])
+        slope = np.float32(surface[k, DEPTH])
+        rest = np.float32(surface[k, DEPTH] * begin + surface[k, DEPTH + 1] * row + surface[k, DEPTH + 2])
         x, y = np.float32((begin - lens[1]) / lens[0]), np.float32((row - lens[2]) / lens[0])
         square = one + y * y
         length = np.uint64(end - begin)
-        # Few loops, since most runs are of few pixels, and to guess where each ends costs more than the rest.
+        # Few loops, since most spans are of few pixels, and to guess where each ends costs more than the rest.
         for i in range(length):
             step, u = np.float32(np.int32(i)), np.uint64(begin) + i
             across, z = x + per_focal * step, one / min(max(rest + slope * step, least), most)
             depths[i] = z
             distance[v, u] = np.sqrt(square + across * across) * z
             instance[v, u] = name
-        red, red_step = _along(known, k, LIGHT, begin, row)
-        green, green_step = _along(known, k, LIGHT + 3, begin, row)
-        blue, blue_step = _along(known, k, LIGHT + 6, begin, row)
-        red_low, green_low, blue_low = _numbers(known, k, LOW)
-        red_high, green_high, blue_high = _numbers(known, k, HIGH)
+        red, red_step = _along(surface, k, LIGHT, begin, row)
+        green, green_step = _along(surface, k, LIGHT + 3, begin, row)
+        blue, blue_step = _along(surface, k, LIGHT + 6, begin, row)
+        red_low, green_low, blue_low = _numbers(surface, k, LOW)
+        red_high, green_high, blue_high = _numbers(surface, k, HIGH)
         for i in range(length):
             step, z, u = np.float32(np.int32(i)), depths[i], np.uint64(begin) + i
             radiance[v, u, 0] = min(max((red + red_step * step) * z, red_low), red_high)
             radiance[v, u, 1] = min(max((green + green_step * step) * z, green_low), green_high)
             radiance[v, u, 2] = min(max((blue + blue_step * step) * z, blue_low), blue_high)
         if lamplight:
-            red, red_step = _along(known, k, RESPONSE, begin, row)
-            green, green_step = _along(known, k, RESPONSE + 3, begin, row)
-            blue, blue_step = _along(known, k, RESPONSE + 6, begin, row)
-            red_low, green_low, blue_low = _numbers(known, k, RESPONSE_LOW)
-            red_high, green_high, blue_high = _numbers(known, k, RESPONSE_HIGH)
+            red, red_step = _along(surface, k, RESPONSE, begin, row)
+            green, green_step = _along(surface, k, RESPONSE + 3, begin, row)
+            blue, blue_step = _along(surface, k, RESPONSE + 6, begin, row)
+            red_low, green_low, blue_low = _numbers(surface, k, RESPONSE_LOW)
+            red_high, green_high, blue_high = _numbers(surface, k, RESPONSE_HIGH)
             for i in range(length):
                 step, z, u = np.float32(np.int32(i)), depths[i], np.uint64(begin) + i
                 far = distance[v, u]
@@ -75,22 +75,26 @@ def shade_objects(runs: Runs, count: int, lens: Wide, picture: Picture) -> None:
 
 
 @kernel
-def _along(known: Wide, number: int, plane: int, begin: int, row: float) -> tuple[np.float32, np.float32]:
-    """A plane at the first pixel of a run, and its change from one pixel to the next."""
-    slope = known[number, plane]
-    return np.float32(slope * begin + known[number, plane + 1] * row + known[number, plane + 2]), np.float32(slope)
+def _along(surface: Wide, number: int, plane: int, begin: int, row: float) -> tuple[np.float32, np.float32]:
+    """A plane at the first pixel of a span, and its change from one pixel to the next."""
+    slope = surface[number, plane]
+    return np.float32(slope * begin + surface[number, plane + 1] * row + surface[number, plane + 2]), np.float32(slope)
 
 
 @kernel
-def _numbers(known: Wide, number: int, first: int) -> tuple[np.float32, np.float32, np.float32]:
-    """Three numbers that are known of a surface."""
-    return np.float32(known[number, first]), np.float32(known[number, first + 1]), np.float32(known[number, first + 2])
+def _numbers(surface: Wide, number: int, first: int) -> tuple[np.float32, np.float32, np.float32]:
+    """Three numbers of a surface."""
+    return (
+        np.float32(surface[number, first]),
+        np.float32(surface[number, first + 1]),
+        np.float32(surface[number, first + 2]),
+    )
 
 
 @kernel
-def shade_sky(runs: Runs, count: int, rays: Wide, light: Light, picture: Picture) -> None:
-    """Shade the runs of sky: the CIE standard overcast sky, L(θ) = L_z (1 + 2 sin θ) / 3."""
-    run = runs.run
+def shade_sky(spans: Spans, count: int, rays: Wide, light: Light, picture: Picture) -> None:
+    """Shade the spans of sky: the CIE standard overcast sky, L(θ) = L_z (1 + 2 sin θ) / 3."""
+    span = spans.span
     radiance, distance, instance, response = picture.radiance, picture.distance, picture.instance, picture.response
     shares = np.empty(distance.shape[1], np.float32)
     lamplight, nothing, far = len(response) > 0, np.float32(0.0), np.float32(np.inf)
@@ -98,14 +102,14 @@ def shade_sky(runs: Runs, count: int, rays: Wide, light: Light, picture: Picture
     third, two_thirds = np.float32(1.0 / 3.0), np.float32(2.0 / 3.0)
     dx, dy, dz = np.float32(rays[0, 0]), np.float32(rays[1, 0]), np.float32(rays[2, 0])
     for number in range(count):
-        if run[number, 3] != 0:
+        if span[number, 3] != 0:
             continue
-        v, begin, end = np.uint64(run[number, 0]), run[number, 1], run[number, 2]
-        row = float(run[number, 0])
+        v, begin, end = np.uint64(span[number, 0]), span[number, 1], span[number, 2]
+        row = float(span[number, 0])
         x = np.float32(rays[0, 0] * begin + rays[0, 1] * row + rays[0, 2])
         y = np.float32(rays[1, 0] * begin + rays[1, 1] * row + rays[1, 2])
         z = np.float32(rays[2, 0] * begin + rays[2, 1] * row + rays[2, 2])
-        # Loops apart, since each alone runs in vector registers.
+        # Loops apart, since each alone spans in vector registers.
         for i in range(np.uint64(end - begin)):
             step = np.float32(np.int32(i))
             a, b, c = x + dx * step, y + dy * step, z + dz * step

@@ -1,5 +1,7 @@
 """The shading of a whole picture."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -8,13 +10,13 @@ from fogsim.render.drawing import Drawing, MeshTable
 from fogsim.render.lens import Lens, lens_of
 from fogsim.render.photometry import SKY_TINT, lamp_radiance, lighting_bits, zenith_luminance
 from fogsim.render.shading import layout
-from fogsim.render.shading.layout import Copies, Light, Meshes, Numbers, Picture, Runs
+from fogsim.render.shading.layout import Copies, Light, Meshes, Numbers, Picture, Spans
 from fogsim.render.shading.memory import Memory
 from fogsim.render.shading.noise import Noise, tiles
 from fogsim.render.shading.objects import shade_objects, shade_sky
-from fogsim.render.shading.pixel_spans import find_runs
+from fogsim.render.shading.pixel_spans import find_spans
 from fogsim.render.shading.road import shade_road
-from fogsim.render.shading.surfaces import know, know_background
+from fogsim.render.shading.surfaces import set_background_surfaces, set_surfaces
 from fogsim.render.shading.terrain import shade_terrain
 from fogsim.render.shading.texture import Row, memory_for_row
 from fogsim.values.camera import Camera, CameraPose
@@ -38,7 +40,7 @@ class Shading:
     """
 
     def __init__(self, table: MeshTable, illuminance: float, height: float, reflectance: NDArray[np.float64]) -> None:
-        self._meshes = Meshes(
+        meshes = Meshes(
             table.positions,
             table.normals,
             table.reflectance,
@@ -48,32 +50,33 @@ class Shading:
             table.faces,
             table.first_face,
         )
-        self._light = Light(
+        light = Light(
             white=illuminance / np.pi,
             zenith=zenith_luminance(illuminance) * np.array(SKY_TINT),
             terrain=np.array((height, *reflectance)),
             lamp_masks=np.array([lighting_bits(surface) for surface in Surface], np.int32),
             lamp_radiance=np.array([lamp_radiance(surface) for surface in Surface]),
         )
-        self._noise, self._bands, self._memory = tiles(), Bands(), Memory()
+        self._scene = ShadedScene(meshes, light, tiles())
+        self._bands, self._memory = Bands(), Memory()
         # For each band.
-        self._rows, self._runs = [memory_for_row(0), memory_for_row(0)], [_room(0, 0), _room(0, 0)]
+        self._rows, self._spans = [memory_for_row(0), memory_for_row(0)], [_room(0, 0), _room(0, 0)]
 
     def view(
-        self, slots: NDArray[np.int32], drawing: Drawing, camera: Camera, pose: CameraPose, lamplight: bool
+        self, triangle_ids: NDArray[np.int32], drawing: Drawing, camera: Camera, pose: CameraPose, lamplight: bool
     ) -> View:
         """Shade what each pixel sees.
 
         Parameters
         ----------
-        slots : (rows, cols) int32
+        triangle_ids : (rows, cols) int32
             What a `Rasteriser` found.
         drawing, camera, pose
             What it was given.
         lamplight : bool
             Whether the answer to lamplight is wanted.
         """
-        rows, columns = slots.shape
+        rows, columns = triangle_ids.shape
         copies = Copies(
             drawing.mesh,
             drawing.record.view(np.float32).reshape(-1, 17),
@@ -89,70 +92,93 @@ class Shading:
         lens = lens_of(camera, pose)
 
         def shade(band: int, top: int, bottom: int) -> None:
-            runs = self._room(band, (bottom - top) * columns, int(drawing.first[-1]))
+            spans = self._room(band, (bottom - top) * columns, int(drawing.first[-1]))
             if len(self._rows[band].depth) != columns:
                 self._rows[band] = memory_for_row(columns)
-            shade_rows(
-                slots,
-                top,
-                bottom,
-                self._meshes,
-                copies,
-                lens,
-                self._light,
-                self._noise,
-                runs,
-                self._rows[band],
-                picture,
-            )
+            shade_rows(triangle_ids, (top, bottom), self._scene, copies, lens, spans, self._rows[band], picture)
 
         self._bands.work(shade, rows, columns)
         response = picture.response if lamplight else None
         return View(picture.radiance, picture.distance, picture.instance, response)
 
-    def _room(self, band: int, pixels: int, slots: int) -> Runs:
-        """Memory for the runs of a band."""
-        runs = self._runs[band]
-        if 2 * pixels > len(runs.run) or slots > len(runs.surface_of_slot):
+    def _room(self, band: int, pixels: int, triangle_ids: int) -> Spans:
+        """Memory for the spans of a band."""
+        spans = self._spans[band]
+        if 2 * pixels > len(spans.span) or triangle_ids > len(spans.surface_of_triangle):
             # Bands change, and so does what is seen.
-            runs = self._runs[band] = _room(pixels + pixels // 4, slots + slots // 2)
-        return runs
+            spans = self._spans[band] = _room(pixels + pixels // 4, triangle_ids + triangle_ids // 2)
+        return spans
+
+
+class ShadedScene(NamedTuple):
+    """What stays the same from picture to picture.
+
+    Attributes
+    ----------
+    meshes : Meshes
+        All meshes.
+    light : Light
+        Daylight and lamps.
+    noise : Noise
+        Texture.
+    """
+
+    meshes: Meshes
+    light: Light
+    noise: Noise
 
 
 @kernel
 def shade_rows(
-    slots: Numbers,
-    top: int,
-    bottom: int,
-    meshes: Meshes,
+    triangle_ids: Numbers,
+    rows: tuple[int, int],
+    scene: ShadedScene,
     copies: Copies,
     lens: Lens,
-    light: Light,
-    noise: Noise,
-    runs: Runs,
+    spans: Spans,
     work: Row,
     picture: Picture,
 ) -> None:
-    """Shade the rows of a picture from `top` to the one before `bottom`."""
+    """Shade some rows of a picture.
+
+    Parameters
+    ----------
+    triangle_ids : (rows, cols) int32
+        What each pixel sees.
+    rows : tuple of int
+        The first row, and the one after the last.
+    scene : ShadedScene
+        Meshes, light and texture.
+    copies : Copies
+        What is drawn.
+    lens : Lens
+        Where the camera is.
+    spans, work : Spans, Row
+        Memory.
+    picture : Picture
+        Is filled in these rows.
+    """
+    meshes, light, noise = scene.meshes, scene.light, scene.noise
+    top, bottom = rows
     height = light.terrain[0]
     terrain = lens.eye[2] > height > -np.inf
-    count, surfaces = find_runs(slots, top, bottom, copies, lens.rays, terrain, runs)
-    know_background(lens, light, runs)
-    know(meshes, copies, lens, light, len(picture.response) > 0, runs, surfaces)
-    shade_objects(runs, count, lens.lens, picture)
-    shade_road(runs, count, lens, noise, work, picture)
-    shade_terrain(runs, count, lens, noise, work, picture)
-    shade_sky(runs, count, lens.rays, light, picture)
+    count, surfaces = find_spans(triangle_ids, top, bottom, copies, lens.rays, terrain, spans)
+    set_background_surfaces(lens, light, spans)
+    set_surfaces(meshes, copies, lens, light, len(picture.response) > 0, spans, surfaces)
+    shade_objects(spans, count, lens.lens, picture)
+    shade_road(spans, count, lens, noise, work, picture)
+    shade_terrain(spans, count, lens, noise, work, picture)
+    shade_sky(spans, count, lens.rays, light, picture)
 
 
-def _room(pixels: int, slots: int) -> Runs:
-    """Memory for a picture: at most every pixel is a run, and every slot or pixel a surface."""
-    surfaces = min(pixels, slots) + 2
-    return Runs(
-        # A run of background may be split at the horizon.
-        run=np.empty((2 * pixels, 4), np.int32),
-        surface_of_slot=np.empty(slots, np.int32),
-        slot=np.empty(surfaces, np.int32),
+def _room(pixels: int, triangle_ids: int) -> Spans:
+    """Memory for a picture: at most every pixel is a span, and every triangle or pixel a surface."""
+    surfaces = min(pixels, triangle_ids) + 2
+    return Spans(
+        # A span of background may be split at the horizon.
+        span=np.empty((2 * pixels, 4), np.int32),
+        surface_of_triangle=np.empty(triangle_ids, np.int32),
+        triangle_id=np.empty(surfaces, np.int32),
         copy=np.empty(surfaces, np.int32),
         kind=np.empty(surfaces, np.int32),
         surface=np.empty((surfaces, layout.COLUMNS)),

@@ -1,22 +1,22 @@
-"""From the slots of pixels to runs of pixels, and a list of the surfaces that are seen."""
+"""From the triangle ids of pixels to spans of pixels, and a list of the surfaces that are seen."""
 
 from typing import Any
 
 import numpy as np
 
 from fogsim.jit import kernel
-from fogsim.render.shading.layout import Copies, Numbers, Runs, Wide
+from fogsim.render.shading.layout import Copies, Numbers, Spans, Wide
 
 
 @kernel
-def find_runs(
-    slots: Numbers, top: int, bottom: int, copies: Copies, rays: Wide, terrain: bool, runs: Runs
+def find_spans(
+    triangle_ids: Numbers, top: int, bottom: int, copies: Copies, rays: Wide, terrain: bool, spans: Spans
 ) -> tuple[int, int]:
-    """Find the runs of some rows.
+    """Find the spans of some rows.
 
     Parameters
     ----------
-    slots : (rows, cols) int32
+    triangle_ids : (rows, cols) int32
         What each pixel sees.
     top, bottom : int
         First row, and the one after the last.
@@ -26,40 +26,45 @@ def find_runs(
         See `Lens`.
     terrain : bool
         Whether there is terrain below the horizon; else there is sky.
-    runs : Runs
-        Is filled, but for what is known of the surfaces.
+    spans : Spans
+        Is filled, but for the numbers of the surfaces.
 
     Returns
     -------
     tuple of int
-        Numbers of runs and of surfaces.
+        Numbers of spans and of surfaces.
     """
-    run, surface_of_slot, slot_of, copy_of = runs.run, runs.surface_of_slot, runs.slot, runs.copy
+    span, surface_of_triangle, triangle_of, copy_of = (
+        spans.span,
+        spans.surface_of_triangle,
+        spans.triangle_id,
+        spans.copy,
+    )
     first = copies.first
     for copy in range(len(copies.mesh)):
         for own in range(first[copy], first[copy + 1]):
-            surface_of_slot[own] = -2 - copy
+            surface_of_triangle[own] = -2 - copy
     count, surfaces = 0, 2
-    columns = np.uint64(slots.shape[1])
+    columns = np.uint64(triangle_ids.shape[1])
     ends = np.empty(columns, np.int32)
     for v in range(top, bottom):
         begin = np.int32(0)
-        for piece in range(_ends(slots[v], ends)):
-            end, slot = ends[piece], slots[v, begin]
+        for piece in range(_ends(triangle_ids[v], ends)):
+            end, triangle_id = ends[piece], triangle_ids[v, begin]
             surface: Any = 0
-            if slot >= 0:
-                surface = surface_of_slot[slot]
+            if triangle_id >= 0:
+                surface = surface_of_triangle[triangle_id]
                 if surface < 0:
-                    copy_of[surfaces], slot_of[surfaces] = -2 - surface, slot
-                    surface_of_slot[slot] = surface = surfaces
+                    copy_of[surfaces], triangle_of[surfaces] = -2 - surface, triangle_id
+                    surface_of_triangle[triangle_id] = surface = surfaces
                     surfaces += 1
                 split: Any = end
             else:
                 surface, split = _background(v, int(begin), int(end), rays, terrain)
-            run[count, 0], run[count, 1], run[count, 2], run[count, 3] = v, begin, split, surface
+            span[count, 0], span[count, 1], span[count, 2], span[count, 3] = v, begin, split, surface
             count += 1
             if split < end:
-                run[count, 0], run[count, 1], run[count, 2], run[count, 3] = v, split, end, 1 - surface
+                span[count, 0], span[count, 1], span[count, 2], span[count, 3] = v, split, end, 1 - surface
                 count += 1
             begin = end
     return count, surfaces
@@ -67,9 +72,9 @@ def find_runs(
 
 @kernel
 def _ends(row: Numbers, ends: Numbers) -> np.uint64:
-    """Columns after the last pixel of each stretch of equal slots in a row; their count.
+    """Columns after the last pixel of each span of equal triangle ids in a row; their count.
 
-    Every column is written down, and by the next one again unless a stretch ends there: a processor that guesses where
+    Every column is written down, and by the next one again unless a span ends there: a processor that guesses where
     that is loses more than it takes to write.
     """
     last, count = np.uint64(row.shape[0] - 1), np.uint64(0)
@@ -83,7 +88,7 @@ def _ends(row: Numbers, ends: Numbers) -> np.uint64:
 
 @kernel
 def _background(v: int, begin: int, end: int, rays: Wide, terrain: bool) -> tuple[int, int]:
-    """Whether a run of background begins with sky (0) or terrain (1), and where it changes to the other."""
+    """Whether a span of background begins with sky (0) or terrain (1), and where it changes to the other."""
     slope, rest = rays[2, 0], rays[2, 1] * v + rays[2, 2]
     surface = 1 if terrain and slope * begin + rest < 0.0 else 0
     last = 1 if terrain and slope * (end - 1) + rest < 0.0 else 0

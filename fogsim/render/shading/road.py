@@ -5,11 +5,11 @@ import numpy as np
 from fogsim.jit import kernel
 from fogsim.render.lens import Lens
 from fogsim.render.shading import layout
-from fogsim.render.shading.ground_spans import next_stretch
-from fogsim.render.shading.layout import Picture, Runs
+from fogsim.render.shading.ground_spans import next_coplanar_spans
+from fogsim.render.shading.layout import Picture, Spans
 from fogsim.render.shading.lines import LINE_WIDTH, columns_near, dashed_share
 from fogsim.render.shading.noise import Noise
-from fogsim.render.shading.texture import ASPHALT, Row, weave
+from fogsim.render.shading.texture import ASPHALT, Row, set_texture
 
 DEPTH, ALONG, ACROSS, WHITE = layout.DEPTH, layout.ALONG, layout.ACROSS, layout.WHITE
 HALF_WIDTH, LINES, COLOUR, ROAD = layout.HALF_WIDTH, layout.LINES, layout.COLOUR, layout.ROAD
@@ -27,15 +27,15 @@ LINE_RESPONSE = 0.15
 
 
 @kernel
-def shade_road(runs: Runs, count: int, lens: Lens, noise: Noise, work: Row, picture: Picture) -> None:
-    """Shade the runs of road, and set their distances and instance ids.
+def shade_road(spans: Spans, count: int, lens: Lens, noise: Noise, work: Row, picture: Picture) -> None:
+    """Shade the spans of road, and set their distances and instance ids.
 
     Parameters
     ----------
-    runs : Runs
-        The runs and what is known of their surfaces.
+    spans : Spans
+        The spans and their surfaces.
     count : int
-        Number of runs.
+        Number of spans.
     lens : Lens
         Where the camera is.
     noise : Noise
@@ -43,76 +43,77 @@ def shade_road(runs: Runs, count: int, lens: Lens, noise: Noise, work: Row, pict
     work : Row
         Memory.
     picture : Picture
-        Is filled where these runs are.
+        Is filled where these spans are.
     """
-    run, known, member = runs.run, runs.surface, work.member
-    members, number = next_stretch(ROAD, runs, 0, count, lens.lens, work, picture)
+    span, surface, member = spans.span, spans.surface, work.member
+    members, number = next_coplanar_spans(ROAD, spans, 0, count, lens.lens, work, picture)
     while members > 0:
-        k, row = run[member[0], 3], float(run[member[0], 0])
-        begin, end = run[member[0], 1], run[member[members - 1], 2]
-        weave(ASPHALT, known[k, DEPTH], known[k, DEPTH + 1], known[k, DEPTH + 2], row, begin, end, lens, noise, work)
-        _pave(members, runs, work, picture)
-        _paint(members, runs, work, picture)
-        members, number = next_stretch(ROAD, runs, number, count, lens.lens, work, picture)
+        k, row = span[member[0], 3], float(span[member[0], 0])
+        begin, end = span[member[0], 1], span[member[members - 1], 2]
+        plane = surface[k, DEPTH], surface[k, DEPTH + 1], surface[k, DEPTH + 2]
+        set_texture(ASPHALT, plane, row, begin, end, lens, noise, work)
+        _pave(members, spans, work, picture)
+        _paint(members, spans, work, picture)
+        members, number = next_coplanar_spans(ROAD, spans, number, count, lens.lens, work, picture)
 
 
 @kernel
-def _pave(members: int, runs: Runs, work: Row, picture: Picture) -> None:
-    """Asphalt of the members of a stretch, darker where wheels roll."""
-    run, known, depth, texture, member = runs.run, runs.surface, work.depth, work.texture, work.member
+def _pave(members: int, spans: Spans, work: Row, picture: Picture) -> None:
+    """Asphalt of the members of a row of spans, darker where wheels roll."""
+    span, surface, depth, texture, member = spans.span, spans.surface, work.depth, work.texture, work.member
     radiance, response = picture.radiance, picture.response
     one, track = np.float32(1.0), np.float32(_TRACK)
     for place in range(members):
         number = member[place]
-        k, v, row = run[number, 3], np.uint64(run[number, 0]), float(run[number, 0])
-        begin, size = np.uint64(run[number, 1]), np.uint64(run[number, 2] - run[number, 1])
-        zx, zy = known[k, DEPTH], known[k, DEPTH + 1]
-        tx, ty = known[k, ACROSS], known[k, ACROSS + 1]
-        base = tx * run[number, 1] + ty * row + known[k, ACROSS + 2]
+        k, v, row = span[number, 3], np.uint64(span[number, 0]), float(span[number, 0])
+        begin, size = np.uint64(span[number, 1]), np.uint64(span[number, 2] - span[number, 1])
+        zx, zy = surface[k, DEPTH], surface[k, DEPTH + 1]
+        tx, ty = surface[k, ACROSS], surface[k, ACROSS + 1]
+        base = tx * span[number, 1] + ty * row + surface[k, ACROSS + 2]
         middle = size // np.uint64(2)
         z = np.float64(depth[begin + middle])
         across = (base + tx * float(middle)) * z
         spread = abs(z * (tx - across * zx)) + abs(z * (ty - across * zy))
         width = np.float32(1.0 / (_TRACK_WIDTH + 0.5 * spread))
         darker = np.float32(_TRACK_DEPTH * _TRACK_WIDTH) * width
-        rest, slope, white = np.float32(base), np.float32(tx), known[k, WHITE]
-        red, green, blue = known[k, COLOUR], known[k, COLOUR + 1], known[k, COLOUR + 2]
+        rest, slope, white = np.float32(base), np.float32(tx), surface[k, WHITE]
+        red, green, blue = surface[k, COLOUR], surface[k, COLOUR + 1], surface[k, COLOUR + 2]
         r, g, b = np.float32(red * white), np.float32(green * white), np.float32(blue * white)
         for i in range(size):
             column = begin + i
             off = (abs((rest + slope * np.float32(np.int32(i))) * depth[column]) - track) * width
             off = one + off * off
             texture[column] -= darker / (off * off)
-        # A loop of its own, since each alone runs in vector registers.
-        for u in range(begin, np.uint64(run[number, 2])):
+        # A loop of its own, since each alone spans in vector registers.
+        for u in range(begin, np.uint64(span[number, 2])):
             radiance[v, u, 0], radiance[v, u, 1], radiance[v, u, 2] = r * texture[u], g * texture[u], b * texture[u]
         if len(response) > 0:
             per_mean = 3.0 * ROAD_RESPONSE / max(red + green + blue, 3e-6)
             r, g, b = np.float32(red * per_mean), np.float32(green * per_mean), np.float32(blue * per_mean)
-            for u in range(begin, np.uint64(run[number, 2])):
+            for u in range(begin, np.uint64(span[number, 2])):
                 response[v, u, 0], response[v, u, 1], response[v, u, 2] = r * texture[u], g * texture[u], b * texture[u]
 
 
 @kernel
-def _paint(members: int, runs: Runs, work: Row, picture: Picture) -> None:
-    """Lines on the members of a stretch, where they come near one."""
-    run, known, depth, texture, member = runs.run, runs.surface, work.depth, work.texture, work.member
+def _paint(members: int, spans: Spans, work: Row, picture: Picture) -> None:
+    """Lines on the members of a row of spans, where they come near one."""
+    span, surface, depth, texture, member = spans.span, spans.surface, work.depth, work.texture, work.member
     radiance, response, one = picture.radiance, picture.response, np.float32(1.0)
     lamplight, paint_response = len(response) > 0, np.float32(LINE_RESPONSE)
     for place in range(members):
         number = member[place]
-        k, v, row = run[number, 3], np.uint64(run[number, 0]), float(run[number, 0])
-        codes, half_lane = int(known[k, LINES]), known[k, HALF_WIDTH]
+        k, v, row = span[number, 3], np.uint64(span[number, 0]), float(span[number, 0])
+        codes, half_lane = int(surface[k, LINES]), surface[k, HALF_WIDTH]
         if codes == 0:
             continue
-        begin, size = run[number, 1], run[number, 2] - run[number, 1]
-        zx, zy = known[k, DEPTH], known[k, DEPTH + 1]
-        sx, sy = known[k, ALONG], known[k, ALONG + 1]
-        tx, ty = known[k, ACROSS], known[k, ACROSS + 1]
-        s_base = sx * begin + sy * row + known[k, ALONG + 2]
-        t_base = tx * begin + ty * row + known[k, ACROSS + 2]
-        base = zx * begin + zy * row + known[k, DEPTH + 2]
-        paint = np.float32(known[k, WHITE] * LINE_REFLECTANCE)
+        begin, size = span[number, 1], span[number, 2] - span[number, 1]
+        zx, zy = surface[k, DEPTH], surface[k, DEPTH + 1]
+        sx, sy = surface[k, ALONG], surface[k, ALONG + 1]
+        tx, ty = surface[k, ACROSS], surface[k, ACROSS + 1]
+        s_base = sx * begin + sy * row + surface[k, ALONG + 2]
+        t_base = tx * begin + ty * row + surface[k, ACROSS + 2]
+        base = zx * begin + zy * row + surface[k, DEPTH + 2]
+        paint = np.float32(surface[k, WHITE] * LINE_REFLECTANCE)
         for edge in range(2):
             code, line = (codes // 3, half_lane) if edge == 0 else (codes % 3, -half_lane)
             if code == 0:

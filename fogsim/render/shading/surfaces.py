@@ -1,4 +1,4 @@
-"""What is known of each triangle that is seen: its plane, its light and its answer to lamplight."""
+"""Each triangle that is seen: its plane, its light and its answer to lamplight."""
 
 import math
 
@@ -8,7 +8,7 @@ from fogsim.jit import kernel
 from fogsim.render.drawing import NEAR
 from fogsim.render.lens import Lens
 from fogsim.render.shading import layout
-from fogsim.render.shading.layout import Array, Copies, Light, Meshes, Runs, Wide
+from fogsim.render.shading.layout import Array, Copies, Light, Meshes, Spans, Wide
 from fogsim.render.shading.lines import PERIOD
 from fogsim.render.vectors import Triple, Vector, columns_times, cross, dot, plus, row, rows_times, scaled, unit
 from fogsim.values.scene import Surface
@@ -50,9 +50,9 @@ def retroreflection(distance: float) -> float:
 
 
 @kernel
-def know_background(lens: Lens, light: Light, runs: Runs) -> None:
-    """Set what is known of sky and terrain."""
-    kind, surface, height = runs.kind, runs.surface, lens.eye[2] - light.terrain[0]
+def set_background_surfaces(lens: Lens, light: Light, spans: Spans) -> None:
+    """Set the numbers of sky and terrain."""
+    kind, surface, height = spans.kind, spans.surface, lens.eye[2] - light.terrain[0]
     kind[0], surface[0, INSTANCE] = layout.SKY, 0
     kind[1], surface[1, INSTANCE], surface[1, WHITE] = TERRAIN, 1, light.white
     surface[1, LEAST], surface[1, MOST] = 0.0, np.inf
@@ -62,21 +62,23 @@ def know_background(lens: Lens, light: Light, runs: Runs) -> None:
 
 
 @kernel
-def know(meshes: Meshes, copies: Copies, lens: Lens, light: Light, lamplight: bool, runs: Runs, count: int) -> None:
-    """Set what is known of the surfaces from number 2 to `count`."""
+def set_surfaces(
+    meshes: Meshes, copies: Copies, lens: Lens, light: Light, lamplight: bool, spans: Spans, count: int
+) -> None:
+    """Set the numbers of the surfaces from number 2 to `count`."""
     surface_of, faces, first_face, vertex_instance = meshes.surface, meshes.faces, meshes.first_face, meshes.instance
     positions, normals, colours = meshes.positions, meshes.normals, meshes.reflectance
     integers, record, mesh, first = copies.integers, copies.record, copies.mesh, copies.first
-    slot_of, copy_of, kinds, known = runs.slot, runs.copy, runs.kind, runs.surface
+    triangle_of, copy_of, kinds, surface = spans.triangle_id, spans.copy, spans.kind, spans.surface
     masks, lamps = light.lamp_masks, light.lamp_radiance
     axes = row(lens.axes, 0), row(lens.axes, 1), row(lens.axes, 2)
     pinhole = lens.lens[0], lens.lens[1], lens.lens[2]
     for number in range(2, count):
         copy = copy_of[number]
-        face = first_face[mesh[copy]] + slot_of[number] - first[copy]
+        face = first_face[mesh[copy]] + triangle_of[number] - first[copy]
         i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
         kind, own = surface_of[i], integers[copy, 16]
-        known[number, INSTANCE] = own if own != 0 else vertex_instance[i]
+        surface[number, INSTANCE] = own if own != 0 else vertex_instance[i]
         turn = _column(record, copy, 0), _column(record, copy, 1), _column(record, copy, 2)
         place = _column(record, copy, 3)
         p, q, r = (
@@ -84,7 +86,7 @@ def know(meshes: Meshes, copies: Copies, lens: Lens, light: Light, lamplight: bo
             plus(columns_times(turn, row(positions, j)), place),
             plus(columns_times(turn, row(positions, k)), place),
         )
-        planes = _know_place(known, number, (rows_times(axes, p), rows_times(axes, q), rows_times(axes, r)), pinhole)
+        planes = _set_depth(surface, number, (rows_times(axes, p), rows_times(axes, q), rows_times(axes, r)), pinhole)
         # Normals turn with the transform, and against the lengths of its columns.
         straight = (
             scaled(turn[0], 1.0 / dot(turn[0], turn[0])),
@@ -94,8 +96,8 @@ def know(meshes: Meshes, copies: Copies, lens: Lens, light: Light, lamplight: bo
         a = unit(columns_times(straight, row(normals, i)))
         if kind == _ROAD:
             kinds[number] = ROAD
-            known[number, WHITE] = light.white * light_share(a[0], a[1], a[2])
-            _know_road(known, number, meshes.road, colours, (i, j, k), planes)
+            surface[number, WHITE] = light.white * light_share(a[0], a[1], a[2])
+            _set_lane(surface, number, meshes.road, colours, (i, j, k), planes)
             continue
         kinds[number] = OBJECT
         b = unit(columns_times(straight, row(normals, j)))
@@ -113,15 +115,15 @@ def know(meshes: Meshes, copies: Copies, lens: Lens, light: Light, lamplight: bo
             light.white * light_share(b[0], b[1], b[2]),
             light.white * light_share(c[0], c[1], c[2]),
         )
-        _know_colours(known, number, LIGHT, LOW, HIGH, tints, white, glow, planes)
+        _set_colours(surface, number, (LIGHT, LOW, HIGH), tints, white, glow, planes)
         if lamplight:
             # Times the distance, by which each pixel divides; over a flat triangle the product is the same everywhere.
             facing = -dot(a, p), -dot(b, q), -dot(c, r)
-            _know_answer(known, number, kind == _SHEETING, p, tints, facing, planes)
+            _set_lamp_response(surface, number, kind == _SHEETING, p, tints, facing, planes)
 
 
 @kernel
-def _know_place(known: Wide, number: int, corners: Triple, pinhole: Vector) -> Triple:
+def _set_depth(surface: Wide, number: int, corners: Triple, pinhole: Vector) -> Triple:
     """Set the depth of a triangle from its corners in camera axes [m].
 
     Returns what interpolates over it: for each corner a plane over column, row and 1 of its share over z [1/m].
@@ -140,8 +142,8 @@ def _know_place(known: Wide, number: int, corners: Triple, pinhole: Vector) -> T
         _over_pixels(b, scale, focal, u0, v0, edge_on),
         _over_pixels(c, scale, focal, u0, v0, edge_on),
     )
-    known[number, LEAST], known[number, MOST] = 1.0 / max(high, NEAR), 1.0 / max(low, NEAR)
-    _blend(known, number, DEPTH, (1.0, 1.0, 1.0), planes)
+    surface[number, LEAST], surface[number, MOST] = 1.0 / max(high, NEAR), 1.0 / max(low, NEAR)
+    _blend(surface, number, DEPTH, (1.0, 1.0, 1.0), planes)
     return planes
 
 
@@ -153,22 +155,22 @@ def _over_pixels(plane: Vector, scale: float, focal: float, u0: float, v0: float
 
 
 @kernel
-def _know_road(
-    known: Wide, number: int, road: Array, colours: Array, corners: tuple[int, int, int], planes: Triple
+def _set_lane(
+    surface: Wide, number: int, road: Array, colours: Array, corners: tuple[int, int, int], planes: Triple
 ) -> None:
     """Set where a triangle lies on its lane, the lane's lines and its mean reflectance."""
     i, j, k = corners
     start = PERIOD * math.floor(road[i, 0] / PERIOD)
-    _blend(known, number, ALONG, (road[i, 0] - start, road[j, 0] - start, road[k, 0] - start), planes)
-    _blend(known, number, ACROSS, (road[i, 1], road[j, 1], road[k, 1]), planes)
+    _blend(surface, number, ALONG, (road[i, 0] - start, road[j, 0] - start, road[k, 0] - start), planes)
+    _blend(surface, number, ACROSS, (road[i, 1], road[j, 1], road[k, 1]), planes)
     for channel in range(3):
-        known[number, COLOUR + channel] = (colours[i, channel] + colours[j, channel] + colours[k, channel]) / 3.0
-    known[number, HALF_WIDTH], known[number, LINES] = road[i, 2], road[i, 3]
+        surface[number, COLOUR + channel] = (colours[i, channel] + colours[j, channel] + colours[k, channel]) / 3.0
+    surface[number, HALF_WIDTH], surface[number, LINES] = road[i, 2], road[i, 3]
 
 
 @kernel
-def _know_answer(
-    known: Wide, number: int, sheeting: bool, middle: Vector, tints: Triple, facing: Vector, planes: Triple
+def _set_lamp_response(
+    surface: Wide, number: int, sheeting: bool, middle: Vector, tints: Triple, facing: Vector, planes: Triple
 ) -> None:
     """Set what a triangle returns of lamplight, times distance; `facing` is that times the cosines to its normals."""
     most = max(facing[0], facing[1], facing[2])
@@ -182,7 +184,7 @@ def _know_answer(
         # Of what is seen from behind, as of leaves, the other side is lit.
         side = _PER_PI if most > 0.0 else -_PER_PI
         share = max(side * facing[0], 0.0), max(side * facing[1], 0.0), max(side * facing[2], 0.0)
-    _know_colours(known, number, RESPONSE, RESPONSE_LOW, RESPONSE_HIGH, tints, share, (0.0, 0.0, 0.0), planes)
+    _set_colours(surface, number, (RESPONSE, RESPONSE_LOW, RESPONSE_HIGH), tints, share, (0.0, 0.0, 0.0), planes)
 
 
 @kernel
@@ -192,32 +194,31 @@ def _capped(tint: Vector) -> Vector:
 
 
 @kernel
-def _know_colours(
-    known: Wide,
+def _set_colours(
+    surface: Wide,
     number: int,
-    first: int,
-    low: int,
-    high: int,
+    columns: tuple[int, int, int],
     tints: Triple,
     white: Vector,
     glow: Vector,
     planes: Triple,
 ) -> None:
     """Set planes and extremes of each channel, from the corners' reflectances, what white ones return, and a glow."""
+    first, low, high = columns
     for channel in range(3):
         a = tints[0][channel] * white[0] + glow[channel]
         b = tints[1][channel] * white[1] + glow[channel]
         c = tints[2][channel] * white[2] + glow[channel]
-        known[number, low + channel], known[number, high + channel] = min(a, b, c), max(a, b, c)
-        _blend(known, number, first + 3 * channel, (a, b, c), planes)
+        surface[number, low + channel], surface[number, high + channel] = min(a, b, c), max(a, b, c)
+        _blend(surface, number, first + 3 * channel, (a, b, c), planes)
 
 
 @kernel
-def _blend(known: Wide, number: int, first: int, values: Vector, planes: Triple) -> None:
+def _blend(surface: Wide, number: int, first: int, values: Vector, planes: Triple) -> None:
     """Set a plane that has given values times z⁻¹ at the corners."""
     a, b, c = values
     for axis in range(3):
-        known[number, first + axis] = a * planes[0][axis] + b * planes[1][axis] + c * planes[2][axis]
+        surface[number, first + axis] = a * planes[0][axis] + b * planes[1][axis] + c * planes[2][axis]
 
 
 @kernel

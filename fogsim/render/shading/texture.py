@@ -10,6 +10,7 @@ from fogsim.jit import kernel
 from fogsim.render.lens import Lens
 from fogsim.render.shading.layout import Array, Numbers
 from fogsim.render.shading.noise import GRAIN, PER_CELL, SMOOTH, Noise
+from fogsim.render.vectors import Vector
 
 ASPHALT = ((0.01, 0.25, 3.0, 12.0), (0.12, 0.025, 0.012, 0.02))
 """Sides of the squares of noise [m] and deviations of reflectance: grain, mottling, patches and large patches."""
@@ -34,7 +35,7 @@ class Row(NamedTuple):
     place : (columns,) uint32
         Places in a tile of noise.
     member : (columns,) int32
-        Runs that are textured together.
+        Spans that are textured together.
     """
 
     depth: Array
@@ -51,11 +52,9 @@ def memory_for_row(columns: int) -> Row:
 
 
 @kernel
-def weave(
-    fabric: tuple[Four, Four],
-    slope: float,
-    drop: float,
-    rest: float,
+def set_texture(
+    material: tuple[Four, Four],
+    plane: Vector,
     row: float,
     begin: int,
     end: int,
@@ -67,14 +66,14 @@ def weave(
 
     Parameters
     ----------
-    fabric : tuple
+    material : tuple
         `ASPHALT` or `GRASS`.
-    slope, drop, rest : float
+    plane : tuple of float
         1/z of the ground as a plane over column, row and 1 [1/m].
     row : float
         The row.
     begin, end : int
-        Columns between which the depths are known.
+        Columns between which the depths are surface.
     lens : Lens
         Where the camera is.
     noise : Noise
@@ -82,10 +81,11 @@ def weave(
     work : Row
         Has the depths and gets the texture.
     """
+    slope, drop, rest = plane
     rays, eye = lens.rays, lens.eye
-    depth, texture, place = work.depth, work.texture, work.place
+    texture, place = work.texture, work.place
     grain, smooth = noise.grain, noise.smooth
-    sides, deviations = fabric
+    sides, deviations = material
     last_wide, last_long = -1.0, -1.0
     strength_1, strength_2, strength_3, strength_4 = 0.0, 0.0, 0.0, 0.0
     scale_1, x_1, y_1, scale_2, x_2, y_2 = 1.0, 0.0, 0.0, 1.0, 0.0, 0.0
@@ -115,15 +115,15 @@ def weave(
             if strength_2 > _FAINTEST:
                 scale_2, x_2, y_2 = _scale(sides[1] / PER_CELL, SMOOTH, narrow / PER_CELL, eye[0], eye[1])
         place_0 = (eye[0] + rx * z - middle * ux, eye[1] + ry * z - middle * uy)
-        _lay_patches((sides[2], strength_3), (sides[3], strength_4), place_0, (ux, uy), begin, after, smooth, work)
+        _add_patches((sides[2], strength_3), (sides[3], strength_4), place_0, (ux, uy), begin, after, smooth, work)
         # Grain and mottling.
         if strength_1 > _FAINTEST:
-            _places(depth, rays, row, begin, after, scale_1, x_1, y_1, GRAIN, place)
+            _set_tile_places(work, rays, row, begin, after, (scale_1, x_1, y_1, GRAIN))
             amount = np.float32(strength_1)
             for i in range(np.uint64(begin), np.uint64(after)):
                 texture[i] += amount * grain[place[i]]
         if strength_2 > _FAINTEST:
-            _places(depth, rays, row, begin, after, scale_2, x_2, y_2, SMOOTH, place)
+            _set_tile_places(work, rays, row, begin, after, (scale_2, x_2, y_2, SMOOTH))
             amount = np.float32(strength_2)
             for i in range(np.uint64(begin), np.uint64(after)):
                 texture[i] += amount * smooth[place[i]]
@@ -131,7 +131,7 @@ def weave(
 
 
 @kernel
-def _lay_patches(
+def _add_patches(
     patches: tuple[float, float],
     large: tuple[float, float],
     place: tuple[float, float],
@@ -168,19 +168,12 @@ def _lay_patches(
 
 
 @kernel
-def _places(
-    depth: Array,
-    rays: NDArray[np.float64],
-    row: float,
-    begin: int,
-    after: int,
-    scale: float,
-    x: float,
-    y: float,
-    side: int,
-    place: NDArray[np.uint32],
+def _set_tile_places(
+    work: Row, rays: NDArray[np.float64], row: float, begin: int, after: int, tile: tuple[float, float, float, int]
 ) -> None:
-    """Places of pixels in a tile with so many numbers of a scale [m] on each side, where the camera is at x and y."""
+    """Set places of pixels in a tile: size of its numbers [m], where on it the camera is, and how many a side has."""
+    depth, place = work.depth, work.place
+    scale, x, y, side = tile
     gx, gy = np.float32(rays[0, 0] * begin + rays[0, 1] * row + rays[0, 2]), np.float32(rays[0, 0])
     hx, hy = np.float32(rays[1, 0] * begin + rays[1, 1] * row + rays[1, 2]), np.float32(rays[1, 0])
     ox, oy, per_scale, first = np.float32(x + _FAR), np.float32(y + _FAR), np.float32(1.0 / scale), np.int32(begin)

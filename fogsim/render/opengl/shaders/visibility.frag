@@ -1,9 +1,9 @@
 // Which triangle is seen.
 
-flat in int slot;
+flat in int triangle_id;
 
 layout(location = 0) out int seen;
 
 void main() {
-    seen = slot;
+    seen = triangle_id;
 }

@@ -7,11 +7,11 @@ layout(location = 3) in vec4 clip_y;
 layout(location = 4) in vec4 clip_w;
 layout(location = 5) in int first;
 
-flat out int slot;
+flat out int triangle_id;
 
 void main() {
     vec4 local = vec4(position, 1.0);
     float w = dot(clip_w, local);
     gl_Position = vec4(dot(clip_x, local), dot(clip_y, local), w - 2.0 * NEAR, w);
-    slot = first + triangle;
+    triangle_id = first + triangle;
 }

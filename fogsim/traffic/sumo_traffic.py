@@ -23,7 +23,7 @@ from fogsim.traffic.sumo.link import Api, SumoLink
 from fogsim.traffic.sumo.loaded_files import check_step_length, describe_seen, loaded_additional, loaded_net
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.route_position import GapToEgo, RoutePosition
-from fogsim.traffic.sumo.vehicle_reader import SubscribedReader, VehicleReader, read_collisions
+from fogsim.traffic.sumo.vehicle_reader import SubscribedReader, VehicleReader
 from fogsim.traffic.sumo_drivers.perception import Perception
 from fogsim.traffic.sumo_drivers.speed_control import SpeedControl, SumoDesiredSpeeds
 from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot, TrafficState, Unplayed
@@ -247,7 +247,7 @@ class SumoTraffic:
             run.drivers.update(advised)
 
     def _read_step(self, run: _Run) -> None:
-        run.collisions.add(read_collisions(run.api))
+        run.collisions.add(run.reader.collisions())
         run.roster.update()
         if self._link.shared:
             # SUMO has let the other clients do what they do in this step before it answers.

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -163,6 +163,7 @@ class VehicleReader:
         self._leader = vehicle_getter(api, "getLeader")
         self._speed = vehicle_getter(api, "getSpeed")
         self._minimum_gap = vehicle_getter(api, "getMinGap")
+        self._hits = getter(api, "simulation", "getCollisions")
         self._mark = 0
         self._constants: _Constants | None = None
         self._signals: tuple[Sequence[int], NDArray[np.int32]] = ([], np.zeros(0, dtype=np.int32))
@@ -244,6 +245,11 @@ class VehicleReader:
         # SUMO's gap leaves out the follower's minimum gap.
         return Leader(found[0], found[1] + self._minimum_gap(self._ego), self._speed(found[0]))
 
+    def collisions(self) -> list[Collision]:
+        """Collisions of the last step; SUMO tells one in every step while the vehicles overlap."""
+        hits, time = self._hits(), self._api.simulation.getTime
+        return [Collision(time(), c.collider, c.victim, abs(c.colliderSpeed - c.victimSpeed)) for c in hits]
+
 
 class SubscribedReader(VehicleReader):
     """Reads vehicles by subscribing to the surroundings of the ego, which SUMO sends at once.
@@ -276,16 +282,3 @@ class SubscribedReader(VehicleReader):
         vehicle.subscribeContext(self._ego, _VEHICLES, self._radius + _MARGIN, _MOVING, end=self._roster.time)
         rows: Mapping[str, Mapping[int, Any]] = vehicle.getContextSubscriptionResults(self._ego)
         return rows
-
-
-def read_collisions(api: Api) -> Iterator[Collision]:
-    """Collisions of the last step; SUMO tells one in every step while the vehicles overlap.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    """
-    for c in getter(api, "simulation", "getCollisions")():
-        impact = abs(c.colliderSpeed - c.victimSpeed)
-        yield Collision(api.simulation.getTime(), c.collider, c.victim, impact)

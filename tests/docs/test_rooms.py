@@ -1,0 +1,50 @@
+"""The drawing of the rooms is of today, every module has its layer, and the walks lead through files that exist."""
+
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+PAGE = (CHECKOUT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+CONTRACTS = tomllib.loads((CHECKOUT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"][
+    "contracts"
+]
+
+
+def test_the_drawing_is_of_today() -> None:
+    done = subprocess.run(
+        [sys.executable, CHECKOUT / "tools" / "rooms.py", "--check"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_every_module_has_its_layer() -> None:
+    layered = [contract for contract in CONTRACTS if contract["type"] == "layers"]
+    assert all(contract["exhaustive"] for contract in layered)
+    # What contracts say of the packages at the top they say of all modules: none is loose.
+    held = {container for contract in layered for container in contract["containers"]}
+    assert {"fogsim", "fogsim_envs", "fogsim.vision", "fogsim.atmosphere", "fogsim.traffic"} <= held
+
+
+def test_no_package_has_more_than_twenty_modules() -> None:
+    for package in (CHECKOUT / "fogsim").rglob("__init__.py"):
+        assert len([*package.parent.glob("*.py")]) <= 21, package.parent
+
+
+def test_every_kernel_module_is_one_that_knows_no_values() -> None:
+    (kernels,) = (contract for contract in CONTRACTS if contract["name"] == "Kernels know no values")
+    named = {
+        ".".join(path.relative_to(CHECKOUT).with_suffix("").parts)
+        for path in (CHECKOUT / "fogsim").rglob("*_kernels.py")
+    }
+    assert named <= set(kernels["source_modules"])
+
+
+def test_the_walks_lead_through_files_that_are_there() -> None:
+    walks = PAGE.partition("### Three walks")[2].partition("\n## ")[0]
+    files = re.findall(r"\b(?<!tools/)([a-z_]+/[\w/]+\.py|loop\.py)", walks.replace("tools/walks.py", ""))
+    assert len(files) > 30
+    for file in files:
+        assert any((CHECKOUT / "fogsim" / folder / file).exists() for folder in ("", "atmosphere")), file

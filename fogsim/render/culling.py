@@ -144,7 +144,15 @@ def shapes_of(
 
 
 def copies_of(shape: Index, record: Array, place: Wide, shapes: Shapes) -> Copies:
-    """Measure copies (see `Copies` for the arrays)."""
+    """Measure copies.
+
+    Parameters
+    ----------
+    shape, record, place
+        See `Copies`.
+    shapes : Shapes
+        All shapes.
+    """
     count = len(shape)
     copies = Copies(shape, place, record, np.empty((count, 3)), np.empty(count), np.empty(count))
     measure(shapes, copies, 0, count)
@@ -152,7 +160,15 @@ def copies_of(shape: Index, record: Array, place: Wide, shapes: Shapes) -> Copie
 
 
 def with_room(copies: Copies, count: int) -> Copies:
-    """Add room for so many more copies."""
+    """Add room for so many more copies.
+
+    Parameters
+    ----------
+    copies : Copies
+        The copies.
+    count : int
+        How many more.
+    """
 
     def longer(column: NDArray[Any]) -> NDArray[Any]:
         return np.concatenate((column, np.zeros((count, *column.shape[1:]), column.dtype)))
@@ -161,7 +177,15 @@ def with_room(copies: Copies, count: int) -> Copies:
 
 
 def cells_of(copies: Copies, side: float) -> tuple[Copies, Cells]:
-    """Sort copies by squares of the ground with a side [m]."""
+    """Sort copies by squares of the ground with a side [m].
+
+    Parameters
+    ----------
+    copies : Copies
+        The copies.
+    side : float
+        Side of the squares [m].
+    """
     square = np.floor(copies.middle[:, :2] / side).astype(np.int64)
     _, number = np.unique(square, axis=0, return_inverse=True)
     order = np.argsort(number.ravel(), kind="stable")
@@ -178,7 +202,17 @@ def cells_of(copies: Copies, side: float) -> tuple[Copies, Cells]:
 
 @kernel
 def measure(shapes: Shapes, copies: Copies, begin: int, end: int) -> None:
-    """Set middle, radius and breadth of copies from `begin` to `end`."""
+    """Set middle, radius and breadth of copies from `begin` to `end`.
+
+    Parameters
+    ----------
+    shapes : Shapes
+        All shapes.
+    copies : Copies
+        Is filled.
+    begin, end : int
+        First copy, and the one after the last.
+    """
     shape, record, place = copies.shape, copies.record, copies.place
     centre, half_extent = shapes.centre, shapes.half_extent
     for copy in range(begin, end):

@@ -34,7 +34,13 @@ class Ground:
 
 
 def split_ground(ground: Mesh) -> Ground:
-    """Take a ground apart."""
+    """Take a ground apart.
+
+    Parameters
+    ----------
+    ground : Mesh
+        Of a `Scene`.
+    """
     flat = ground.surface[ground.faces[:, 0]] == int(Surface.TERRAIN)
     height, reflectance = -np.inf, np.zeros(3)
     if flat.any():

@@ -40,7 +40,15 @@ class Lens(NamedTuple):
 # The parts of a renderer ask for the same one in turn.
 @functools.lru_cache(maxsize=8)
 def lens_of(camera: Camera, pose: CameraPose) -> Lens:
-    """Geometry of a picture; the arrays belong to all who asked and are not to be written to."""
+    """Geometry of a picture; the arrays belong to all who asked and are not to be written to.
+
+    Parameters
+    ----------
+    camera : Camera
+        The pinhole.
+    pose : CameraPose
+        Where it is.
+    """
     axes = camera_axes(camera, pose)
     lens, planes = _of_camera(camera)
     return Lens(
@@ -55,7 +63,13 @@ def _of_camera(camera: Camera) -> tuple[Wide, Wide]:
 
 
 def frustum(camera: Camera) -> Wide:
-    """Inward unit normals (5, 3) of the planes that bound the picture, in camera axes, the forward one last."""
+    """Inward unit normals (5, 3) of the planes that bound the picture, in camera axes, the forward one last.
+
+    Parameters
+    ----------
+    camera : Camera
+        The pinhole.
+    """
     (u0, v0), focal = camera.principal_point, camera.focal_length
     planes = np.array(
         [

@@ -62,6 +62,11 @@ class PyrenderReference:
     def render(self, vehicles: Sequence[Batch], camera: Camera, pose: CameraPose, lamplight: bool = False) -> View:
         """Draw the scene and the vehicles (see `Renderer.render`).
 
+        Parameters
+        ----------
+        vehicles, camera, pose, lamplight
+            See `Renderer.render`.
+
         Raises
         ------
         InputError

@@ -53,7 +53,13 @@ class SceneRenderer:
         self._chosen = _room(0)
 
     def render(self, vehicles: Sequence[Batch], camera: Camera, pose: CameraPose, lamplight: bool = False) -> View:
-        """Draw the scene and the vehicles (see `Renderer.render`)."""
+        """Draw the scene and the vehicles (see `Renderer.render`).
+
+        Parameters
+        ----------
+        vehicles, camera, pose, lamplight
+            See `Renderer.render`.
+        """
         if self._rasteriser is None:
             raise RenderError("this renderer is closed; make a new one")
         drawing = self._drawing(vehicles, camera, pose)

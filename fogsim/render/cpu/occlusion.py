@@ -71,7 +71,15 @@ def gather_copies(
 
 @kernel
 def depth_key(inverse_depth: float | np.float32, triangle_id: int) -> Any:
-    """What a pixel sees as one number: the greater, the nearer."""
+    """What a pixel sees as one number: the greater, the nearer.
+
+    Parameters
+    ----------
+    inverse_depth : float
+        1/z [1/m].
+    triangle_id : int
+        What is seen.
+    """
     return np.int64(np.float32(inverse_depth).view(np.int32)) << 32 | np.int64(triangle_id)
 
 

@@ -22,6 +22,11 @@ def corners(table: MeshTable) -> NDArray[np.void]:
     A graphics system could share them and count triangles itself (gl_PrimitiveID), but software ones then copy each
     triangle's vertices all the same and take longer: 2.6 ms instead of 1.7 ms for 20,000 triangles in llvmpipe.
 
+    Parameters
+    ----------
+    table : MeshTable
+        All meshes.
+
     Returns
     -------
     (3 m,) `CORNER`

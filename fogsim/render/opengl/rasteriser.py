@@ -49,7 +49,13 @@ class GLRasteriser:
         self._closed = False
 
     def triangle_ids(self, drawing: Drawing, camera: Camera, pose: CameraPose) -> NDArray[np.int32]:
-        """Find the triangle that each pixel sees (see `Rasteriser.triangle_ids`)."""
+        """Find the triangle that each pixel sees (see `Rasteriser.triangle_ids`).
+
+        Parameters
+        ----------
+        drawing, camera, pose
+            See `Rasteriser.triangle_ids`.
+        """
         if self._closed:
             raise RenderError("this renderer is closed; make a new one")
         self._context.activate()

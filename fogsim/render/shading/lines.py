@@ -37,7 +37,15 @@ def columns_near(away: float, change: float, reach: float, size: int) -> tuple[i
 
 @kernel
 def dashed_share(along: float, length: float) -> float:
-    """Share of a footprint that dashes cover, from the place of its middle along the line and its length [m]."""
+    """Share of a footprint that dashes cover, from the place of its middle along the line and its length [m].
+
+    Parameters
+    ----------
+    along : float
+        Where its middle is [m].
+    length : float
+        Its length [m].
+    """
     length = max(length, 1e-4)
     start = along - 0.5 * length
     return (_painted_below(start + length) - _painted_below(start)) / length

@@ -93,7 +93,17 @@ def _numbers(surface: Wide, number: int, first: int) -> tuple[np.float32, np.flo
 
 @kernel
 def shade_sky(spans: Spans, count: int, rays: Wide, light: Light, picture: Picture) -> None:
-    """Shade the spans of sky: the CIE standard overcast sky, L(θ) = L_z (1 + 2 sin θ) / 3."""
+    """Shade the spans of sky: the CIE standard overcast sky, L(θ) = L_z (1 + 2 sin θ) / 3.
+
+    Parameters
+    ----------
+    spans, count, picture
+        See `shade_objects`.
+    rays : (3, 3) float64
+        See `Lens`.
+    light : Light
+        Has the radiance of the zenith.
+    """
     span = spans.span
     radiance, distance, instance, response = picture.radiance, picture.distance, picture.instance, picture.response
     shares = np.empty(distance.shape[1], np.float32)

@@ -46,7 +46,13 @@ class Row(NamedTuple):
 
 
 def memory_for_row(columns: int) -> Row:
-    """Make memory for a row of so many pixels."""
+    """Make memory for a row of so many pixels.
+
+    Parameters
+    ----------
+    columns : int
+        Number of pixels.
+    """
     depth, texture, tint = np.zeros((3, columns), np.float32)
     return Row(depth, texture, tint, np.zeros(columns, np.uint32), np.zeros(columns, np.int32))
 

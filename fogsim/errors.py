@@ -40,8 +40,8 @@ class RecorderError(FogSimError, RuntimeError):
     """Recorders of a run failed; the message names them, and where the others' results are."""
 
     def __init__(self, failures: Mapping[str, str], directory: Path) -> None:
-        told = "; ".join(f"the recorder {name} failed: {reason}" for name, reason in failures.items())
-        super().__init__(f"{told}; what else was recorded is kept in {directory}")
+        reasons = "; ".join(f"the recorder {name} failed: {reason}" for name, reason in failures.items())
+        super().__init__(f"{reasons}; what else was recorded is kept in {directory}")
 
 
 class UnknownNameError(InputError):
@@ -74,12 +74,26 @@ def suggest(name: str, known: Iterable[str]) -> str:
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
-    """Which of the known names was probably meant; None if none is near."""
+    """Which of the known names was probably meant; None if none is near.
+
+    Parameters
+    ----------
+    name : str
+        What was given.
+    known : iterable of str
+        What is allowed.
+    """
     return next(iter(difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)), None)
 
 
 def shown(value: object) -> str:
-    """A user's value as messages repeat it: `repr`, cut short in the middle if it is long."""
+    """A user's value as messages repeat it: `repr`, cut short in the middle if it is long.
+
+    Parameters
+    ----------
+    value : object
+        Anything.
+    """
     text = repr(value)
     half = LONGEST_SHOWN // 2
     return text if len(text) <= LONGEST_SHOWN else f"{text[:half]} … {text[-half:]}"

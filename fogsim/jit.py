@@ -68,6 +68,11 @@ def kernel(function: F) -> F:
 
     The compiled code is kept beside the module or, for a read-only installation, in the user's cache directory; where
     neither can be written it is compiled again by each process.
+
+    Parameters
+    ----------
+    function : callable
+        Of arrays, numbers and named tuples of them.
     """
     options = {"nogil": True, "fastmath": False, "error_model": "numpy"}
     plain = cast("FunctionType", function)

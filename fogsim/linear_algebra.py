@@ -51,6 +51,11 @@ def inverse_of(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
 
     What it says nothing of, or nothing beside the others, has zeros in its row and column (a generalised inverse).
     Beaton's sweep operator (Goodnight 1979, The American Statistician 33, 149–158), the largest pivots first.
+
+    Parameters
+    ----------
+    matrix : (n, n) float64
+        Not changed.
     """
     count = len(matrix)
     swept, left = matrix.copy(), np.ones(count, np.bool_)
@@ -87,7 +92,13 @@ def _sweep(matrix: NDArray[np.float64], pivot: int) -> None:
 
 @kernel
 def times(matrix: NDArray[np.float64], vector: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Product of a matrix (n, m) and a vector (m,), for kernels."""
+    """Product (n,) of a matrix and a vector, for kernels.
+
+    Parameters
+    ----------
+    matrix : (n, m) float64
+    vector : (m,) float64
+    """
     out = np.zeros(len(matrix))
     for i in range(len(matrix)):
         for j in range(len(vector)):
@@ -97,7 +108,13 @@ def times(matrix: NDArray[np.float64], vector: NDArray[np.float64]) -> NDArray[n
 
 @kernel
 def convolution(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Full convolution (n + m - 1,) of two series (n,) and (m,)."""
+    """Full convolution (n + m - 1,) of two series.
+
+    Parameters
+    ----------
+    one : (n,) float64
+    other : (m,) float64
+    """
     out = np.zeros(len(one) + len(other) - 1)
     for i in range(len(one)):
         for j in range(len(other)):
@@ -106,7 +123,13 @@ def convolution(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray
 
 
 def straight_line(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
-    """Slope and height at zero of the straight line of least squares through points of which two x differ."""
+    """Slope and height at zero of the straight line of least squares.
+
+    Parameters
+    ----------
+    x, y : (n,) float64
+        Points, of which at least two x differ.
+    """
     middle, level = float(x.mean()), float(y.mean())
     apart = x - middle
     slope = float(matrix_product(apart, y - level)) / float(matrix_product(apart, apart))

@@ -63,7 +63,15 @@ def checked_parameters(cls: type[T]) -> type[T]:
 
 
 def accepted_parameters(factory: Callable[..., object], given_elsewhere: Collection[str] = ()) -> dict[str, Any]:
-    """`inspect.Parameter` by name of all that a factory takes by keyword, but what it is given elsewhere."""
+    """`inspect.Parameter` by name of all that a factory takes by keyword.
+
+    Parameters
+    ----------
+    factory : callable
+        A class or function.
+    given_elsewhere : collection of str
+        Those that are left out.
+    """
     return {
         name: parameter
         for name, parameter in inspect.signature(factory, eval_str=True).parameters.items()
@@ -98,6 +106,13 @@ def parameter_mistakes(
 
 def mismatch(annotation: object, value: object) -> str | None:
     """What a value had to be by an annotation; None if it is, or if the annotation is none of those that are checked.
+
+    Parameters
+    ----------
+    annotation : object
+        Of a parameter: a type, a union, a Literal, or Annotated with a `Range`.
+    value : object
+        What was given.
 
     Examples
     --------

@@ -28,6 +28,13 @@ class Registry(Mapping[str, T]):
     def register(self, name: str, factory: T) -> None:
         """Add a factory under a new name.
 
+        Parameters
+        ----------
+        name : str
+            A name that is free.
+        factory : callable
+            What makes one of the kind.
+
         Raises
         ------
         ValueError
@@ -54,7 +61,13 @@ class Registry(Mapping[str, T]):
 
 
 def parameters(factory: Callable[..., object]) -> dict[str, object]:
-    """Names and defaults of the parameters that a factory may be given by keyword and need not be given."""
+    """Names and defaults of the parameters that a factory may be given by keyword and need not be given.
+
+    Parameters
+    ----------
+    factory : callable
+        A class or function.
+    """
     return {
         parameter.name: parameter.default
         for parameter in inspect.signature(factory).parameters.values()

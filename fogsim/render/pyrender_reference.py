@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
+from fogsim.linear_algebra import matrix_product
 from fogsim.render.opengl.context import Context, context
 from fogsim.render.photometry import SKY_TINT, zenith_luminance
 from fogsim.render.protocol import RenderError
@@ -101,7 +102,7 @@ class PyrenderReference:
             code, depth = drawer.render(self._nodes, flags.SEG, dict(zip(nodes, codes, strict=True)))
         finally:
             self._context.restore()
-        seen = code.astype(np.int64) @ np.array((1 << 16, 1 << 8, 1))
+        seen = matrix_product(code.astype(np.int64), np.array((1 << 16, 1 << 8, 1)))
         rays = _rays(camera, pose)
         length = np.linalg.norm(rays, axis=-1)
         sky = seen == 0
@@ -178,4 +179,4 @@ def _rays(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
     """Viewing rays (rows, cols, 3) in the world, 1 long along the optical axis."""
     v, u = np.mgrid[: camera.height, : camera.width]
     pixels = np.stack((u, v, np.ones_like(u)), axis=-1).astype(np.float64)
-    return np.asarray(pixels @ ray_from_pixel(camera, pose).T)
+    return matrix_product(pixels, ray_from_pixel(camera, pose).T)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import MissingDependencyError
+from fogsim.linear_algebra import matrix_product
 from fogsim.render.drawing import NEAR
 from fogsim.render.photometry import lamp_radiance, lighting_bits, zenith_luminance
 from fogsim.render.road_paint import painted_road
@@ -295,7 +296,7 @@ def _mesh(
     """Pyrender's mesh of copies of one, lit as the first of them stands."""
     used, faces = np.unique(mesh.faces, return_inverse=True)
     upper = transforms[0, :3, :3]
-    normals = mesh.normals[used] @ (upper / (upper * upper).sum(axis=0)).T
+    normals = matrix_product(mesh.normals[used], (upper / (upper * upper).sum(axis=0)).T)
     normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-9)[:, None]
     colours = np.ones((len(used), 4))
     emission = (0.0, 0.0, 0.0)
@@ -364,7 +365,7 @@ def _vehicle_axes(pose: CameraPose) -> tuple[NDArray[np.float64], NDArray[np.flo
     """Forward and left of a vehicle."""
     east, north, rise = math.cos(pose.heading), math.sin(pose.heading), math.tan(pose.grade)
     forward = np.array((east, north, rise))
-    return forward / np.linalg.norm(forward), np.array((-north, east, 0.0))
+    return forward / math.hypot(*forward), np.array((-north, east, 0.0))
 
 
 def _beam_axis(lamp: HeadLamp, forward: NDArray[np.float64], left: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -401,9 +402,9 @@ def _clipped(colour: Any) -> NDArray[np.float64]:
 
 def _pointing(axis: NDArray[np.float64], place: Any) -> NDArray[np.float64]:
     """Matrix of a light at a place that shines along an axis."""
-    back = -axis / np.linalg.norm(axis)
+    back = -axis / math.hypot(*axis)
     side = np.cross((0.0, 1.0, 0.0) if abs(back[2]) > 0.9 else (0.0, 0.0, 1.0), back)
-    side /= np.linalg.norm(side)
+    side /= math.hypot(*side)
     return _matrix((side, np.cross(back, side), back), place)
 
 

@@ -49,7 +49,7 @@ def earlier_results(out: Path) -> None:
 
 
 def has_only_earlier(out: Path) -> bool:
-    return all((out / name).read_text("utf-8") == "earlier" for name in (*NAMES, "report.html", "video.mp4"))
+    return all((out / name).read_bytes() == b"earlier" for name in (*NAMES, "report.html", "video.mp4"))
 
 
 @pytest.mark.parametrize("overwrite", [False, True])

@@ -2,12 +2,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from koschmieder_strips import CAMERA, GEOMETRY, PRIOR, curves
 
 from fogsim.values import Response
 from fogsim.vision.light.luminance import linear_table
 from fogsim.vision.strips.joint_checks import MAX_SCATTER, is_ramp, is_scattered, no_road
 from fogsim.vision.strips.joint_fit import fit_own
+from tests.vision.strips.koschmieder_strips import CAMERA, GEOMETRY, PRIOR, curves
 
 
 @pytest.mark.parametrize("k", [0.005, 0.03, 0.2])

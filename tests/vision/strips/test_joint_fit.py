@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from koschmieder_strips import AIRLIGHT, GEOMETRY, PRIOR, curves
 
 from fogsim.vision.strips.albedo_filter import Albedo
 from fogsim.vision.strips.joint_fit import ALBEDOS, agree, fit_agreeing, fit_jointly, fit_own
 from fogsim.vision.strips.joint_kernels import Bins, extinction_costs, fit_constant_albedo, mean_transmittance
+from tests.vision.strips.koschmieder_strips import AIRLIGHT, GEOMETRY, PRIOR, curves
 
 
 def bins(seen):

@@ -2,7 +2,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from koschmieder_strips import CAMERA, GEOMETRY
 
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.strips.sky import Sky
@@ -13,6 +12,7 @@ from fogsim.vision.strips.strip_curves import (
     without_clipped,
     without_rows_below,
 )
+from tests.vision.strips.koschmieder_strips import CAMERA, GEOMETRY
 
 ROWS, COLS = np.indices((480, 640))
 SKY = Sky(200.0, 1.0, 1.0, 1.0, 0.0, 0.0)

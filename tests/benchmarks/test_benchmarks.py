@@ -70,9 +70,9 @@ def test_records(name: str, arguments: tuple[str, ...], keys: set[str]) -> None:
 
 def test_fog_costs_lives_and_an_oracle_saves_some() -> None:
     """The scenario that the closing figures come from, with few seeds; the full study is the benchmark itself."""
-    dense = records("collisions.py", "--seeds", "3", "--visibility", "60")
+    dense = records("collisions.py", "--seeds", "2", "--visibility", "60")
     none, oracle = (next(r for r in dense if r["policy"] == p) for p in ("none", "oracle"))
     assert none["collisions_mean"] > 0
     assert oracle["collisions_mean"] < none["collisions_mean"]
-    thin = records("collisions.py", "--seeds", "2", "--visibility", "1000")
+    thin = records("collisions.py", "--seeds", "1", "--visibility", "1000")
     assert all(r["collisions_mean"] == 0 for r in thin)

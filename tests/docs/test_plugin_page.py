@@ -31,7 +31,7 @@ def test_mistakes_are_told_in_one_line(python: Run, listening: int, right: str, 
 def test_a_port_that_nobody_listens_on_is_told_in_one_line(python: Run, free_port: Callable[[], int]) -> None:
     port = free_port()
     began = time.monotonic()
-    done = python(CONNECT.replace("8813", str(port)))
+    done = python(CONNECT.replace("8813", str(port)).replace("port=", "retries=4, port="))
     with pytest.raises(ConnectionRefusedError):
         socket.create_connection(("127.0.0.1", port))
     assert done.returncode == 1

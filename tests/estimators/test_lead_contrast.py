@@ -57,18 +57,21 @@ def paint(camera, rears, visibility, seed, airlight=200.0, pitch=0.0, side=2, be
     turn = np.exp(-1j * camera.roll) * (x + 1j * y) / camera.focal_length
     x, y = turn.real, turn.imag
     slope = np.tan(camera.pitch + pitch + np.arctan(y))
-    ground = np.where(slope > 1e-6, camera.mount_height / np.maximum(slope, 1e-6), np.inf)
+    below = slope > 1e-6
+    light, depth = np.ones(slope.shape), np.full(slope.shape, np.inf)
+    depth[below] = ground = camera.mount_height / slope[below]
     cells = 1.0 + 0.04 * np.random.default_rng(99).normal(size=(128, 128))
     far = np.minimum(ground, 1e4)
-    row, col = ((far + 1.7 * seed) / 0.7).astype(int) % 128, (x * far / 0.7).astype(int) % 128
-    light = np.where(np.abs(x * far) < 5.5, 0.3, 0.2) * cells[row, col]
-    light = np.where(np.abs(np.abs(x * far) - 1.75) < 0.08, 0.7, light)
-    light, depth = light * (1.0 + beam * (6.0 / np.maximum(ground, 2.0)) ** 2), ground
+    right = np.abs(x[below] * far)
+    row, col = ((far + 1.7 * seed) / 0.7).astype(int) % 128, (x[below] * far / 0.7).astype(int) % 128
+    road = np.where(right < 5.5, 0.3, 0.2) * cells[row, col]
+    road = np.where(np.abs(right - 1.75) < 0.08, 0.7, road)
+    light[below] = road * (1.0 + beam * (6.0 / np.maximum(ground, 2.0)) ** 2)
     for rear in sorted(rears, key=lambda r: -r.depth):
         height = camera.mount_height - rear.depth * slope
         across = x * rear.depth - rear.aside
         hit = (np.abs(across) < 0.5 * rear.width) & (height > 0) & (height < rear.height)
-        light, depth = np.where(hit, rear.shade(across, height), light), np.where(hit, rear.depth, depth)
+        light[hit], depth[hit] = rear.shade(across[hit], height[hit]), rear.depth
     left = np.exp(-LN20 / visibility * np.minimum(depth, 1e5))
     fine = airlight * (light * left + 1.0 - left)
     linear = fine.reshape(camera.height, side, camera.width, side).mean(axis=(1, 3))

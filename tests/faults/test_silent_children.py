@@ -27,12 +27,12 @@ SMALL = {"image_size": (32, 24), "overrides": ("clocks.camera_period_s=0.5",)}
 
 @pytest.fixture(scope="module")
 def hosted() -> Iterator[HostedLoop]:
-    """A child that may be silent for 5 s: that is five of its signs of life."""
+    """A child that may be silent for 3 s: that is three of its signs of life."""
     settings = ["fog.visibility_m=inf", "camera.width=32", "camera.height=24", "renderer=cpu"]
     scenario = scenario_from_config(TOWN.resolve(), "veh0", settings)
     loop = HostedLoop(scenario)
     loop.start(1)
-    loop._timeout = 5.0
+    loop._timeout = 3.0
     yield loop
     loop.close()
 
@@ -40,7 +40,7 @@ def hosted() -> Iterator[HostedLoop]:
 def test_a_child_that_is_stopped_is_told_and_ended_and_the_next_run_has_another(hosted: HostedLoop) -> None:
     child = hosted._child
     os.kill(child.pid, signal.SIGSTOP)
-    with pytest.raises(SimulationError, match="no sign of life for 5 s, and was ended: it was stopped"):
+    with pytest.raises(SimulationError, match="no sign of life for 3 s, and was ended: it was stopped"):
         hosted.advance(Command())
     assert child.returncode == -signal.SIGKILL
     with pytest.raises(SimulationError, match="has ended"):

@@ -16,11 +16,15 @@ from types import FunctionType, ModuleType
 from typing import Any, TypeVar, cast
 
 import numpy as np
-from numba.core import event
+from numba.core import event, serialize
 
 # Where Intel's vector functions are installed, numba would take them, and they round otherwise than the C library does.
 os.environ["NUMBA_DISABLE_INTEL_SVML"] = "1"
 import numba
+
+# For the class of each array or named tuple that a kernel returns, numba calls this, and goes on whatever comes of it:
+# an exception of a signal's handler in it is lost, or the process is. Nothing is interrupted within a cache in C.
+serialize._numba_unpickle = functools.cache(serialize._numba_unpickle)
 
 F = TypeVar("F", bound=Callable[..., Any])
 

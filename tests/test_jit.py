@@ -82,3 +82,37 @@ def test_an_index_that_names_types_of_an_older_version_is_compiled_anew(tmp_path
         module.write_text(text.replace("Old", name), encoding="utf-8")
         done = subprocess.run([sys.executable, module], capture_output=True, text=True, check=False)
         assert done.stdout.strip() == "42.0", done.stderr
+
+
+INTERRUPTED = """
+import signal
+from collections import Counter
+
+import numpy as np
+
+from fogsim.vision.light.medians import span_medians
+
+def interrupt(*_):
+    raise KeyboardInterrupt
+
+signal.signal(signal.SIGALRM, interrupt)
+image, ends = np.ones((4, 4), np.float32), np.zeros(4, np.int64)
+work = (image, np.ones((4, 4), np.uint8), ends, ends + 3, 4, 1)
+span_medians(*work)
+raised = Counter()
+for number in range(5000):
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 1e-4 + 1e-8 * number)
+        while True:
+            span_medians(*work)
+    except BaseException as error:
+        raised[type(error).__name__] += 1
+print(dict(raised))
+"""
+"""A kernel that returns a named tuple, interrupted at any moment of its calls."""
+
+
+def test_a_signal_in_a_kernels_call_is_a_keyboard_interrupt_and_no_crash() -> None:
+    done = subprocess.run([sys.executable, "-c", INTERRUPTED], capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == "{'KeyboardInterrupt': 5000}"

@@ -21,7 +21,7 @@ from fogsim.cli.scenarios import list_command, validate_command
 from fogsim.cli.signs import signs_command
 from fogsim.cli.view import view_command
 from fogsim.errors import FogSimError
-from fogsim.interruption import ProgramSignals, leave
+from fogsim.interruption import ProgramSignals, leave, leave_on_signals
 
 app = typer.Typer(
     name="fogsim",
@@ -70,6 +70,8 @@ def main() -> None:
     code: object = 0
     try:
         code = _run_app()
+        # All is saved; an exception in Python's own end would be told as a traceback.
+        leave_on_signals()
     except BaseException:
         # Whatever an import or a library made of the exception that the signal raised.
         if signals.last is None:

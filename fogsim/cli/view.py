@@ -31,15 +31,21 @@ def view_command(
     seed: Annotated[int, typer.Option(min=0, help="Seed of the run.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Write what the window would show to this image instead.")] = None,
     settings: Settings = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it is there already.")] = False,
 ) -> None:
     """Open the world around the ego, in clear air, in pyrender's viewer, or write a picture of it."""
+    from fogsim.files.atomic import refuse_existing, refuse_missing_folder
     from fogsim.offline.image_files import write_image
     from fogsim.render import to_pyrender
     from fogsim.render.viewer import first_picture, open_viewer, require_display
 
-    if out is None:
-        require_display()  # before the run, not after it
     loaded = chosen_scenario(scenario, sumocfg, ego, visibility, settings)
+    # Before the run, not after it.
+    if out is None:
+        require_display()
+    else:
+        refuse_existing(out, overwrite)
+        refuse_missing_folder(out, "--out")
     around = _surrounding(loaded, at, seed)
     nodes = to_pyrender(
         around.scene,

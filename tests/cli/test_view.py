@@ -31,6 +31,18 @@ def test_without_a_display_one_line_says_what_to_do(monkeypatch: pytest.MonkeyPa
     assert "\n" not in str(caught.value)
 
 
+def test_mistakes_are_told_before_the_display_and_the_run(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="did you mean 'motorway_fog_bank'"):
+        view_command("motorway_fog_bnk")
+    out = tmp_path / "view.png"
+    out.write_bytes(b"mine")
+    with pytest.raises(InputError, match="--overwrite"):
+        view_command("motorway_fog_bank", out=out)
+    assert out.read_bytes() == b"mine"
+    with pytest.raises(InputError, match="nowhere"):
+        view_command("motorway_fog_bank", out=tmp_path / "nowhere" / "view.png")
+
+
 def test_an_instant_after_the_end_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"--at 60: the run ends after 0\.2 s \(time\)"):
         view_command(

@@ -343,7 +343,7 @@ def test_a_closed_renderer_says_so() -> None:
         renderer.render((), CAMERA, AHEAD)
 
 
-def test_stand_ins_replace_shapes_level_by_level() -> None:
+def test_coarser_levels_of_detail_replace_shapes_one_by_one() -> None:
     names = {"car": 0, "car:far": 1, "car:tiny": 2, "post": 3, "hut": 4, "hut:tiny": 5}
     box = np.ones((6, 3))
     plain = np.array([False, False, False, False, True, True])
@@ -352,7 +352,7 @@ def test_stand_ins_replace_shapes_level_by_level() -> None:
     # The geometric mean of the triangles of both decides: of 200 and of 20.
     assert shapes.detail[0] == pytest.approx(math.sqrt(10.0) * shapes.detail[1])
     # What is plain gives way sooner, and is sooner left out.
-    assert shapes.detail[4] > shapes.detail[1]  # both for a stand-in of 20 triangles
+    assert shapes.detail[4] > shapes.detail[1]  # both for a level of 20 triangles
     assert shapes.smallest[4] > shapes.smallest[0]
 
 

@@ -68,12 +68,12 @@ def _show(done: "Reproduction", *, as_json: bool) -> None:
         return
     # Files and pipes have no width that rows must be broken for.
     wide = stdout if stdout.is_terminal else Console(highlight=False, width=_UNBROKEN)
-    for told in done.told:
-        heading, *rows = told.rows
+    for shown in done.all_tables:
+        heading, *rows = shown.rows
         table = Table(*map(escape, heading), box=None, pad_edge=False)
         for row in rows:
             table.add_row(*map(escape, row))
-        stdout.print(f"[italic]{escape(told.title)}[/]", soft_wrap=True)
+        stdout.print(f"[italic]{escape(shown.title)}[/]", soft_wrap=True)
         wide.print(table)
         if done.tables:
             stdout.print()

@@ -144,12 +144,8 @@ def time_integrated_time_to_collision(
 
     Parameters
     ----------
-    times_to_collision : (n,) array_like
-        Time to collision in each interval [s]; ``inf`` where there is none.
-    durations : (n,) or scalar array_like
-        Length τ of each interval [s].
-    threshold : float
-        TTC* [s].
+    times_to_collision, durations, threshold
+        As of `time_exposed_time_to_collision`.
 
     Returns
     -------

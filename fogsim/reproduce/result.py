@@ -59,7 +59,7 @@ class Steps:
 
 
 Rows = tuple[tuple[str, ...], ...]
-"""A table as it is told: the headings, then the rows."""
+"""A table as it is shown: the headings, then the rows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +89,7 @@ class Reproduction:
     records : tuple of mappings
         One flat record for each case: what was set, what each variant of the method found; None where it cannot tell.
     table : tuple of tuples of str
-        What is told: the headings, then the rows; the paper's figure stands beside ours. The first of `tables`, if
+        What is shown: the headings, then the rows; the paper's figure stands beside ours. The first of `tables`, if
         there are several.
     notes : tuple of str
         What the paper leaves open, and where and why we do not reach it.
@@ -107,6 +107,6 @@ class Reproduction:
     tables: tuple[TitledTable, ...] = ()
 
     @property
-    def told(self) -> tuple[TitledTable, ...]:
+    def all_tables(self) -> tuple[TitledTable, ...]:
         """All tables, one or several."""
         return self.tables or (TitledTable(self.paper, self.table),)

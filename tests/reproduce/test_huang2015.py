@@ -58,12 +58,12 @@ def test_printed_first_estimates_are_ten_to_twenty_rows_low_with_the_camera_of_e
 
 
 def test_the_six_tables_stand_beside_the_thesis(done) -> None:
-    assert [table.title.split()[1].strip(":,") for table in done.told] == ["4.1", "4.2", "4.3", "5.1", "5.2", "5.3"]
-    for table in done.told:
+    assert [table.title.split()[1].strip(":,") for table in done.all_tables] == ["4.1", "4.2", "4.3", "5.1", "5.2", "5.3"]
+    for table in done.all_tables:
         assert {len(row) for row in table.rows} == {len(table.rows[0])}
-    assert done.told[2].rows[1][:2] == ("100", "95")
-    assert done.told[1].rows[1][2].startswith("84.9 | ")
-    assert done.table == done.told[0].rows
+    assert done.all_tables[2].rows[1][:2] == ("100", "95")
+    assert done.all_tables[1].rows[1][2].startswith("84.9 | ")
+    assert done.table == done.all_tables[0].rows
 
 
 def test_corrected_reaches_the_truth_where_published_does_not(done) -> None:
@@ -85,7 +85,7 @@ def test_a_longer_track_is_surer(done) -> None:
     (short,) = found(done, "5.1", "corrected", track_share=0.2)
     (long,) = found(done, "5.1", "corrected", track_share=0.6)
     assert short["deviation_rel"] > long["deviation_rel"] > 0.0
-    assert [row[1].split(" | ")[0] for row in done.told[3].rows[1:3]] == ["106", "99"]
+    assert [row[1].split(" | ")[0] for row in done.all_tables[3].rows[1:3]] == ["106", "99"]
 
 
 def test_the_picture_shows_patches_and_curves(done) -> None:
@@ -117,6 +117,6 @@ def test_the_command_prints_all_tables(done, capsys, monkeypatch) -> None:
     monkeypatch.setattr(reproduce_module.stdout, "_width", 200)
     reproduce_module._show(done, as_json=False)
     told = capsys.readouterr().out
-    for table in done.told:
+    for table in done.all_tables:
         assert table.title in told
     assert set(VARIANTS) == {r["variant"] for r in done.records}

@@ -24,7 +24,7 @@ from fogsim.traffic.sumo.loaded_files import check_step_length, describe_seen, l
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.route_position import GapToEgo, RoutePosition
 from fogsim.traffic.sumo.vehicle_reader import SubscribedReader, VehicleReader
-from fogsim.traffic.sumo_drivers.perception import Perception
+from fogsim.traffic.sumo_drivers.drivers_perception import DriversPerception, drivers_perception
 from fogsim.traffic.sumo_drivers.speed_control import SpeedControl, SumoDesiredSpeeds
 from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot, TrafficState, Unplayed
 
@@ -47,7 +47,7 @@ class _Run:
     collisions: CollisionLog
     script: Script
     session: str
-    perception: Perception | None = None
+    perception: DriversPerception | None = None
     drivers: SumoDesiredSpeeds | None = None
 
 
@@ -163,7 +163,7 @@ class SumoTraffic:
                 self._run,
                 perception=None
                 if setup.sight is None
-                else Perception(api, fog, setup.sight, roster, self._link.remote, session),
+                else drivers_perception(api, fog, setup.sight, roster, self._link.remote, session),
                 drivers=SumoDesiredSpeeds(
                     api, setup.drivers, fog, setup.ego, self._seed, setup.advice_deceleration, roster, session
                 ),

@@ -22,7 +22,6 @@ from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.traci_link import load_traci
 from fogsim.traffic.sumo.update_schedule import UpdateSchedule, closing_speed_bound
 from fogsim.traffic.sumo_drivers.leader_sight import LeaderSight, OwnLamps, Pair, SubscribedLeaders
-from fogsim.values import Lamp
 
 REACH = 250.0
 """Leaders farther ahead than this do not matter [m]: from 150 km/h one stops in less."""
@@ -147,22 +146,17 @@ class Perception:
         """Leaders that are not reacted to, by follower."""
         return dict(self._ignored)
 
-    def update(self, ego: str, ego_lamps: Lamp, dark: frozenset[str]) -> None:
+    def update(self, own_lamps: OwnLamps) -> None:
         """Tell SUMO's drivers which leader they do not see.
 
         Parameters
         ----------
-        ego : str
-            Id of the ego, whose lamps are not SUMO's.
-        ego_lamps : Lamp
-            Its lit lamps.
-        dark : frozenset of str
-            Vehicles whose lamps have failed.
+        own_lamps : dict
+            Lamps of vehicles whose lamps are not SUMO's.
         """
         due = self._due()
         doubtful = self._decide_by_gap(due) if due else ()
         if doubtful:
-            own_lamps = {**dict.fromkeys(dark, None), ego: None if ego in dark else int(ego_lamps)}
             self._decide_by_sight(doubtful, own_lamps)
 
     def _due(self) -> list[str]:

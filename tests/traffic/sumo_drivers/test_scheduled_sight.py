@@ -63,7 +63,7 @@ def test_scheduled_looks_decide_as_looks_in_every_step(link: LibsumoLink, field:
     for step in range(400):
         link.step()
         lamps = Lamp.REAR_FOG if step % 100 > 50 else Lamp.NONE
-        perception.update("ego", lamps, frozenset())
+        perception.update({"ego": int(lamps)})
         ignored = perception.ignored
         changes += len(ignored.items() ^ before.items())
         before = ignored
@@ -95,7 +95,7 @@ def test_a_look_costs_only_those_who_are_due(link: LibsumoLink) -> None:
     present = 0
     for _ in range(100):
         link.step()
-        perception.update("ego", Lamp.NONE, frozenset())
+        perception.update({"ego": 0})
         present += api.vehicle.getIDCount()
     assert set(api.vehicle.getIDList()) <= set(asked)
     assert len(asked) < 0.5 * present

@@ -1,0 +1,84 @@
+"""All that SUMO's drivers perceive through the fog only as far as it can be seen, part by part."""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from fogsim.traffic.drivers.sight import DriverSight, FogAccess
+from fogsim.traffic.sumo.link import Api
+from fogsim.traffic.sumo.roster import Roster
+from fogsim.traffic.sumo_drivers.leader_sight import OwnLamps
+from fogsim.traffic.sumo_drivers.perception import Perception
+from fogsim.values import Lamp
+
+
+class PerceivedPart(Protocol):
+    """What drivers perceive of one kind of thing; it does nothing where everything is certainly seen."""
+
+    def update(self, own_lamps: OwnLamps) -> None:
+        """Tell SUMO's drivers, before a step, what they do not see.
+
+        Parameters
+        ----------
+        own_lamps : dict
+            Lamps of vehicles whose lamps are not SUMO's.
+        """
+
+    def release(self) -> None:
+        """Let everybody on the road see everything again, as SUMO's own drivers do."""
+
+
+class DriversPerception:
+    """Updates and releases the parts in turn.
+
+    Parameters
+    ----------
+    parts : sequence of PerceivedPart
+        What drivers perceive.
+    """
+
+    def __init__(self, parts: Sequence[PerceivedPart]) -> None:
+        self._parts = tuple(parts)
+
+    def update(self, ego: str, ego_lamps: Lamp, dark: frozenset[str]) -> None:
+        """Tell SUMO's drivers, before a step, what they do not see.
+
+        Parameters
+        ----------
+        ego : str
+            Id of the ego, whose lamps are not SUMO's.
+        ego_lamps : Lamp
+            Its lit lamps.
+        dark : frozenset of str
+            Vehicles whose lamps have failed.
+        """
+        own_lamps: OwnLamps = {**dict.fromkeys(dark, None), ego: None if ego in dark else int(ego_lamps)}
+        for part in self._parts:
+            part.update(own_lamps)
+
+    def release(self) -> None:
+        """Let everybody on the road see everything again."""
+        for part in self._parts:
+            part.release()
+
+
+def drivers_perception(
+    api: Api, fog: FogAccess, sight: DriverSight, roster: Roster, remote: bool, session: str
+) -> DriversPerception:
+    """All parts.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    fog : FogAccess
+        The fog.
+    sight : DriverSight
+        The drivers' eyes.
+    roster : Roster
+        Who is on the road.
+    remote : bool
+        True where every call is a message to another process.
+    session : str
+        Name of the session.
+    """
+    return DriversPerception((Perception(api, fog, sight, roster, remote, session),))

@@ -58,7 +58,8 @@ def test_printed_first_estimates_are_ten_to_twenty_rows_low_with_the_camera_of_e
 
 
 def test_the_six_tables_stand_beside_the_thesis(done) -> None:
-    assert [table.title.split()[1].strip(":,") for table in done.all_tables] == ["4.1", "4.2", "4.3", "5.1", "5.2", "5.3"]
+    numbers = [table.title.split()[1].strip(":,") for table in done.all_tables]
+    assert numbers == ["4.1", "4.2", "4.3", "5.1", "5.2", "5.3"]
     for table in done.all_tables:
         assert {len(row) for row in table.rows} == {len(table.rows[0])}
     assert done.all_tables[2].rows[1][:2] == ("100", "95")

@@ -147,7 +147,7 @@ class Case:
 
     def __init__(self, key: Key, network: RoadNetwork) -> None:
         described = scenario(*key)
-        camera, setback = build.camera(described), described.camera.setback_m
+        camera, setback = build.camera(described), build.camera_mount(described).setback
         self._view_renderer = ViewRenderer(described, network, signs_beside(network.route))
         self._camera_sensor, self._rng = build.camera_sensor(described), np.random.default_rng(1)
         self.traffic = [traffic_at(network.route, STEP * number) for number in range(ROUND)]

@@ -86,7 +86,7 @@ def tile(shot: Shot, renderer: str) -> NDArray[np.uint8]:
         return taken.image
     stop = shot.boards[1]
     camera = build.camera(taken.scenario)
-    depth = stop.ahead + taken.scenario.camera.setback_m
+    depth = stop.ahead + build.camera_mount(taken.scenario).setback
     u = round(camera.principal_point[0] - camera.focal_length * shot.boards[0].left / depth)
     v = round(camera.principal_point[1] - camera.focal_length * (math.tan(camera.pitch) + (2.4 - 1.38) / depth))
     across = max(12, 2 * round(0.5 * camera.focal_length * 5.0 / depth))

@@ -151,7 +151,8 @@ def photograph(shot: Shot, renderer: str = "cpu", size: tuple[int, int] = (480, 
     """Take a picture."""
     described, roads = scenario(shot.settings, renderer, size), network(shot.place)
     state = traffic(roads.route, shot)
-    pose = mounted_pose(build.camera(described), state.position[0], float(state.heading[0]), described.camera.setback_m)
+    camera, setback = build.camera(described), build.camera_mount(described).setback
+    pose = mounted_pose(camera, state.position[0], float(state.heading[0]), setback)
     view_renderer = ViewRenderer(described, roads, signs(roads.route, shot))
     try:
         _, radiance = view_renderer.render(state, 0, pose, shot.time)

@@ -213,17 +213,23 @@ class ClosedLoop:
         self._step = None
         self._drivers_fog.set_time(0.0)
         self._traffic.start(streams.traffic_seed)
-        fog = self._equipment.start_run(streams, self._traffic.network)
+        snapshot = self._observe_ego()
+        body = snapshot.state.types[snapshot.ego]
+        fog = self._equipment.start_run(streams, self._traffic.network, body)
         if not self._drivers_fog.is_entered and (fog.extinction > 0 or fog.banks):
             self._drivers_fog.enter(fog, self._traffic)
             if self._replays:
                 # Drivers must have had the fog about them while the road filled: begin once more, with it.
                 self._traffic.start(streams.traffic_seed)
+                snapshot = self._observe_ego()
+        self._step = self._with_unplayed(self._complete_step(0, snapshot, Command()))
+        return self._step
+
+    def _observe_ego(self) -> TrafficSnapshot:
         snapshot = self._traffic.observe()
         if snapshot is None:
             raise SimulationError("the ego left the road as soon as it had appeared")
-        self._step = self._with_unplayed(self._complete_step(0, snapshot, Command()))
-        return self._step
+        return snapshot
 
     def advance(self, command: Command) -> Step:
         """Move by one camera period with a command in force.

@@ -163,6 +163,7 @@ class AttachedSession:
         self._index = 0
         self._drivers_fog = DriversFog()
         self._started = False
+        self._equipped = False
         self._looked = False
         self._closed = False
 
@@ -190,14 +191,17 @@ class AttachedSession:
         elif self._traffic.ego_is_there():
             self._traffic.start(self._seed)
             self._started = True
-            fog = self._equipment.start_run(spawn_streams(self._seed), self._traffic.network)
-            if self._drivers:
-                self._drivers_fog.enter(fog, self._traffic)
         else:
             return None
         snapshot = self._traffic.observe()
         if snapshot is None:
             return None
+        if not self._equipped:
+            body = snapshot.state.types[snapshot.ego]
+            fog = self._equipment.start_run(spawn_streams(self._seed), self._traffic.network, body)
+            self._equipped = True
+            if self._drivers:
+                self._drivers_fog.enter(fog, self._traffic)
         time = self._elapsed(snapshot.state.time)
         self._drivers_fog.set_time(time)
         step = self._equipment.complete_step(self._index, time, snapshot, self._command, None)

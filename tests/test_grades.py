@@ -81,7 +81,7 @@ def look(grade: float, *settings: str, lamps: Lamp = Lamp.POSITION) -> tuple[np.
     scenario = fogsim.load_scenario("motorway_fog_bank", [*SETTINGS, "fog={visibility_m: 150}", *settings])
     view_renderer, state = ViewRenderer(scenario, road(grade), SignMap()), traffic(grade, 400.0, lamps)
     pose = mounted_pose(
-        build.camera(scenario), state.position[0], 0.0, scenario.camera.setback_m, float(state.grade[0])
+        build.camera(scenario), state.position[0], 0.0, build.camera_mount(scenario).setback, float(state.grade[0])
     )
     view, radiance = view_renderer.render(state, 0, pose, 0.0)
     view_renderer.close()

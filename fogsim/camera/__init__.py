@@ -2,7 +2,7 @@
 
 from fogsim.camera.exposure import AutoExposure, Metering, Pixels, Sensor, expose
 from fogsim.camera.glare import LensGlare
-from fogsim.camera.mount import BodyPitch, Suspension, mounted_pose
+from fogsim.camera.mount import USUAL_MOUNTS, BodyPitch, CameraMount, Suspension, mounted_pose
 from fogsim.camera.sampling import averaged, middle_samples, supersampled
 from fogsim.camera.sensor import CameraSensor
 
@@ -10,8 +10,10 @@ Photographer = CameraSensor
 """The name that `CameraSensor` had up to version 0.1."""
 
 __all__ = [
+    "USUAL_MOUNTS",
     "AutoExposure",
     "BodyPitch",
+    "CameraMount",
     "CameraSensor",
     "LensGlare",
     "Metering",

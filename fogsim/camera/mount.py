@@ -2,11 +2,37 @@
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.values import Camera, CameraPose
+
+
+class CameraMount(NamedTuple):
+    """Where on a vehicle a camera is.
+
+    Attributes
+    ----------
+    height : float
+        Height above the road [m].
+    setback : float
+        Distance behind the front bumper [m].
+    """
+
+    height: float
+    setback: float
+
+
+USUAL_MOUNTS = {
+    "car": CameraMount(1.38, 1.7),
+    "van": CameraMount(1.8, 1.2),
+    "truck": CameraMount(2.63, 0.25),
+    "bus": CameraMount(2.1, 0.2),
+    "motorcycle": CameraMount(1.35, 0.8),
+}
+"""Mounts by body kind: behind the windscreen 0.3 m above the driver's eyes, on a motorcycle's helmet at the eyes."""
 
 
 def mounted_pose(

@@ -45,17 +45,26 @@ class EgoEquipment:
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
-        self._camera = build.camera(scenario)
         self._camera_sensor = build.camera_sensor(scenario)
-        self._body = build.body_pitch(scenario)
+        self._body_pitch = build.body_pitch(scenario)
         self._lead_sensor = build.lead_sensor(scenario)
-        self._assumed_camera = build.assumed_camera(scenario)
-        self._estimators = build.estimators(scenario, self._assumed_camera)
         self._fusion = build.fusion(scenario)
         self._view_renderer: ViewRenderer | None = None
         self._streams: Streams | None = None
+        self._mount_camera(build.CAR)
 
-    def start_run(self, streams: Streams, network: Callable[[], tuple[RoadNetwork, SignMap]]) -> FogField:
+    def _mount_camera(self, body: str) -> None:
+        """Put the camera where it belongs on a kind of body, and tell the estimators."""
+        scenario = self._scenario
+        self._body = body
+        self._camera = build.camera(scenario, body)
+        self._setback = build.camera_mount(scenario, body).setback
+        self._assumed_camera = build.assumed_camera(scenario, body)
+        self._estimators = build.estimators(scenario, self._assumed_camera)
+
+    def start_run(
+        self, streams: Streams, network: Callable[[], tuple[RoadNetwork, SignMap]], body: str = build.CAR
+    ) -> FogField:
         """Forget earlier runs, and lay the scenario's fog along the route.
 
         Parameters
@@ -63,7 +72,9 @@ class EgoEquipment:
         streams : Streams
             Random numbers of this run.
         network : callable
-            Gives roads and signs; asked the first time only.
+            Gives roads and signs; asked the first time only, and again for an ego of another kind.
+        body : str
+            Body kind of the ego; see `TrafficState.types`.
 
         Returns
         -------
@@ -75,13 +86,16 @@ class EgoEquipment:
         MissingDependencyError
             If no renderer works here.
         """
+        if body != self._body:
+            self.close()
+            self._mount_camera(body)
         if self._view_renderer is None:
-            self._view_renderer = ViewRenderer(self._scenario, *network())
+            self._view_renderer = ViewRenderer(self._scenario, *network(), body)
         for estimator in self._estimators:
             estimator.reset()
         self._fusion.reset()
         self._camera_sensor.reset()
-        self._body.reset()
+        self._body_pitch.reset()
         self._streams = streams
         return self._view_renderer.fog
 
@@ -160,10 +174,9 @@ class EgoEquipment:
         return self._view_renderer.surrounding(state, ego, pose)
 
     def _pose(self, state: TrafficState, ego: int) -> CameraPose:
-        body_pitch = self._body.update(float(state.acceleration[ego]))
-        heading, setback = float(state.heading[ego]), self._scenario.camera.setback_m
-        grade = float(state.grade[ego])
-        return mounted_pose(self._camera, state.position[ego], heading, setback, grade, body_pitch)
+        body_pitch = self._body_pitch.update(float(state.acceleration[ego]))
+        heading, grade = float(state.heading[ego]), float(state.grade[ego])
+        return mounted_pose(self._camera, state.position[ego], heading, self._setback, grade, body_pitch)
 
     def _observe(self, frame: Frame, snapshot: TrafficSnapshot, signs: SignMap, streams: Streams) -> Observation:
         state, ego = snapshot.state, snapshot.ego

@@ -89,6 +89,8 @@ class ViewRenderer:
         The roads.
     signs : SignMap
         The signs.
+    body : str
+        Body kind of the ego.
 
     Attributes
     ----------
@@ -103,12 +105,12 @@ class ViewRenderer:
         If the renderer does not work here.
     """
 
-    def __init__(self, scenario: Scenario, network: RoadNetwork, signs: SignMap) -> None:
+    def __init__(self, scenario: Scenario, network: RoadNetwork, signs: SignMap, body: str = build.CAR) -> None:
         self.signs = signs
         self.fog: FogField = build.fog_field(scenario, network.route)
-        self._camera, self._samples = build.camera(scenario), scenario.camera.samples
+        self._camera, self._samples = build.camera(scenario, body), scenario.camera.samples
         self._drawn_camera = supersampled(self._camera, self._samples)
-        self._setback = scenario.camera.setback_m
+        self._setback = build.camera_mount(scenario, body).setback
         self._scenario, self._network = scenario, network
         self._by_lamplight = scenario.light.illuminance_lx < DAY_ILLUMINANCE
         self._mount = LampMount()

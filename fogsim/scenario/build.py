@@ -8,7 +8,16 @@ from numpy.typing import NDArray
 
 from fogsim.advice import ADVISERS, Adviser
 from fogsim.atmosphere import airlight_from_illuminance
-from fogsim.camera import AutoExposure, BodyPitch, CameraSensor, Metering, Sensor, Suspension
+from fogsim.camera import (
+    USUAL_MOUNTS,
+    AutoExposure,
+    BodyPitch,
+    CameraMount,
+    CameraSensor,
+    Metering,
+    Sensor,
+    Suspension,
+)
 from fogsim.estimators import ESTIMATORS, Estimator
 from fogsim.fusion import FUSIONS, Fusion
 from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy
@@ -33,6 +42,9 @@ from fogsim.values import Camera, FogField
 
 AIRLIGHT_EXPOSURE = 0.6
 """Share of saturation at which the fixed exposure puts the airlight: bright fog, yet room for lamps above it."""
+
+CAR = "car"
+"""Body kind of an ego of which no more is known."""
 
 METERED_PERCENT = {Metering.HIGHLIGHTS: 65.0, Metering.LOG_AVERAGE: 18.0}
 """Share of saturation at which automatic exposure holds what it meters, where a scenario does not say [%]."""
@@ -157,13 +169,32 @@ def _driver_setup(scenario: Scenario) -> DriverSetup:
     return DriverSetup(drivers.speed_choice, drivers.speed_spread, compliance, drivers.distance_misjudgement)
 
 
-def camera(scenario: Scenario) -> Camera:
+def camera_mount(scenario: Scenario, body: str = CAR) -> CameraMount:
+    """Where on the ego its camera is.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    body : str
+        Body kind of the ego, which settles what the scenario leaves open; see `TrafficState.types`.
+    """
+    section, usual = scenario.camera, USUAL_MOUNTS[body]
+    return CameraMount(
+        height=usual.height if section.mount_height_m is None else section.mount_height_m,
+        setback=usual.setback if section.setback_m is None else section.setback_m,
+    )
+
+
+def camera(scenario: Scenario, body: str = CAR) -> Camera:
     """Calibration of the ego's camera.
 
     Parameters
     ----------
     scenario : Scenario
         The scenario.
+    body : str
+        Body kind of the ego; see `camera_mount`.
     """
     section = scenario.camera
     by_view = 0.5 * section.width / math.tan(0.5 * math.radians(section.field_of_view_deg))
@@ -172,7 +203,7 @@ def camera(scenario: Scenario) -> Camera:
         height=section.height,
         focal_length=section.focal_length_px or by_view,
         principal_point=section.principal_point_px or (section.width / 2, section.height / 2),
-        mount_height=section.mount_height_m,
+        mount_height=camera_mount(scenario, body).height,
         pitch=math.radians(section.pitch_deg),
         roll=math.radians(section.roll_deg),
         response=section.response,
@@ -180,15 +211,17 @@ def camera(scenario: Scenario) -> Camera:
     )
 
 
-def assumed_camera(scenario: Scenario) -> Camera:
+def assumed_camera(scenario: Scenario, body: str = CAR) -> Camera:
     """Calibration that the ego's estimators assume, with the scenario's errors in it.
 
     Parameters
     ----------
     scenario : Scenario
         The scenario.
+    body : str
+        Body kind of the ego; see `camera_mount`.
     """
-    true, told = camera(scenario), scenario.camera.told
+    true, told = camera(scenario, body), scenario.camera.told
     return dataclasses.replace(
         true,
         mount_height=true.mount_height * (1.0 + told.mount_height_error_percent / 100.0),

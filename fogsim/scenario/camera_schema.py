@@ -93,11 +93,11 @@ class CameraSection(Section):
     principal_point_px: tuple[PixelPlace, PixelPlace] | None = None
     """Principal point [u0, v0]; if not given [width / 2, height / 2], half a pixel right of and below the middle."""
 
-    mount_height_m: Annotated[Number, Field(ge=0.05, le=100)] = 1.38
-    """Height of the camera above the road."""
+    mount_height_m: Annotated[Number, Field(ge=0.05, le=100)] | None = None
+    """Height of the camera above the road; if not given, by the ego's body: 1.38 in a car."""
 
-    setback_m: Annotated[Distance, Field(le=100)] = 1.7
-    """Distance of the camera behind the front bumper."""
+    setback_m: Annotated[Distance, Field(le=100)] | None = None
+    """Distance of the camera behind the front bumper; if not given, by the ego's body: 1.7 in a car."""
 
     pitch_deg: Number = Field(default=2.0, ge=-45, le=45)
     """Pitch; positive looks down."""

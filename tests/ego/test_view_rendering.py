@@ -36,7 +36,7 @@ def two_cars(x: float, y: float) -> TrafficState:
 
 
 def seen(view_renderer: ViewRenderer, scenario: fogsim.Scenario, state: TrafficState) -> tuple[np.ndarray, np.ndarray]:
-    pose = mounted_pose(build.camera(scenario), state.position[0], 0.0, scenario.camera.setback_m)
+    pose = mounted_pose(build.camera(scenario), state.position[0], 0.0, build.camera_mount(scenario).setback)
     view, radiance = view_renderer.render(state, 0, pose, 0.0)
     return view.instance.copy(), radiance.copy()
 

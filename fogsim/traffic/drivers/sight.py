@@ -13,14 +13,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST
 from fogsim.units import CONTRAST_THRESHOLD, DAY_ILLUMINANCE, NIGHT_ILLUMINANCE, luminance_of
-from fogsim.values import Lamp
-
-REAR_LAMPS = ((int(Lamp.REAR_FOG), 200.0), (int(Lamp.STOP), 100.0), (int(Lamp.POSITION), 8.0))
-"""Luminous intensity of one rear lamp, brightest first [cd]: within UNECE's 150–300, 60–185 and 4–12."""
-
-BRIGHTEST = REAR_LAMPS[0][1]
-"""Luminous intensity of the brightest rear lamp [cd]."""
 
 EYE_HEIGHT = 1.2
 """Height of a driver's eyes and of the middle of a rear above the road [m]."""
@@ -190,6 +184,27 @@ class DriverSight:
         """
         return math.log(intensity / (self.eye_threshold * distance**2)) if intensity > 0 else -math.inf
 
+    def depth_limit(
+        self, distance: float, inherent_contrast: float, intensity: float = 0.0, head_lamps: float = 1.0
+    ) -> float:
+        """Optical depth up to which a vehicle is seen, by its body or by its lamps [-].
+
+        Parameters
+        ----------
+        distance : float
+            Distance [m], positive.
+        inherent_contrast : float
+            Contrast to the airlight without fog between, 0 … 1.
+        intensity : float
+            Luminous intensity of its brightest lamp toward the eye [cd].
+        head_lamps : float
+            Light of the own head lamps toward it over that straight ahead [-]; 0 while they are dark.
+        """
+        by_lamps = self.lamp_limit(distance, intensity)
+        if self.illuminance >= SILHOUETTE_ILLUMINANCE:
+            return max(self.body_limit(distance, inherent_contrast), by_lamps)
+        return max(self.body_limit(distance / math.sqrt(max(head_lamps, 1e-12)), inherent_contrast), by_lamps)
+
     def sees_lamp(self, distance: ArrayLike, depth: ArrayLike, intensity: ArrayLike) -> NDArray[np.bool_]:
         """Tell whether lamps are seen, E = I e^(−τ) / d² ≥ E_threshold (Allard).
 
@@ -209,18 +224,6 @@ def _eye_threshold(illuminance: float, at_night: float, by_day: float) -> float:
     night, day = NIGHT_ILLUMINANCE, DAY_ILLUMINANCE
     share = math.log(max(illuminance, night) / night) / math.log(day / night)
     return float(at_night * (by_day / at_night) ** min(share, 1.0))
-
-
-@functools.lru_cache(maxsize=1024)
-def rear_intensity(lamps: int) -> float:
-    """Luminous intensity of the brightest rear lamp that is lit [cd].
-
-    Parameters
-    ----------
-    lamps : int
-        Bits of `Lamp`.
-    """
-    return next((intensity for lamp, intensity in REAR_LAMPS if lamps & lamp), 0.0)
 
 
 def inherent_contrast(paint: tuple[float, float, float]) -> float:

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from fogsim.traffic.drivers.sight import EYE_HEIGHT, DriverSight, FogAccess, inherent_contrast, rear_intensity
+from fogsim.traffic.drivers.lamp_intensity import rear_intensity
+from fogsim.traffic.drivers.sight import EYE_HEIGHT, DriverSight, FogAccess, inherent_contrast
 from fogsim.traffic.highway.fleet import Fleet
 from fogsim.traffic.highway.snapshot import front_bumper, rear_bumper
 

@@ -6,8 +6,8 @@ from typing import Protocol
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo_drivers.leader_sight import OwnLamps
 from fogsim.traffic.sumo_drivers.perception import Perception
+from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
 from fogsim.values import Lamp
 
 

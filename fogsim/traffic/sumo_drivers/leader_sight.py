@@ -1,22 +1,15 @@
 """What drivers see of the vehicle ahead, and for how long that is sure to stay so."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from fogsim.traffic.appearance import OTHERS_LAMPS, lamps_from_signals, paint
-from fogsim.traffic.drivers.sight import (
-    BRIGHTEST,
-    EYE_HEIGHT,
-    SILHOUETTE_ILLUMINANCE,
-    DriverSight,
-    FogAccess,
-    inherent_contrast,
-    rear_intensity,
-)
+from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST, rear_intensity
+from fogsim.traffic.drivers.sight import EYE_HEIGHT, SILHOUETTE_ILLUMINANCE, DriverSight, FogAccess
 from fogsim.traffic.sumo.link import Api, Getter, vehicle_getter
 from fogsim.traffic.sumo.update_schedule import MAX_RELATIVE_ACCELERATION, closing_speed_bound
+from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps, SeenVehicles
 from fogsim.values import Lamp
 
 LEAST_EXTINCTION = 1e-6
@@ -24,9 +17,6 @@ LEAST_EXTINCTION = 1e-6
 
 FASTEST_DRIFT = 30.0
 """Fog drifts and changes no faster than if a wind of this speed carried it [m/s]."""
-
-OwnLamps = dict[str, int | None]
-"""Lamps, as bits of `Lamp`, of vehicles whose lamps are not SUMO's; None where all have failed."""
 
 Pair = tuple[str, str, float]
 """Follower, leader, and SUMO's gap between them [m], which leaves out the follower's minimum gap."""
@@ -57,13 +47,11 @@ class LeaderSight:
         self._min_extinction, self._max_extinction = fog.minimum_extinction, fog.maximum_extinction
         self._sight = sight
         self._position = vehicle_getter(api, "getPosition3D")
-        self._signals = vehicle_getter(api, "getSignals")
-        self._get_colour = vehicle_getter(api, "getColor")
+        self._vehicles = SeenVehicles(api)
         self._get_minimum_gap = vehicle_getter(api, "getMinGap")
-        self._contrasts: dict[str, float] = {}
         self._minimum_gaps: dict[str, float] = {}
 
-    def forget(self, vehicles: Iterable[str]) -> None:
+    def forget(self, vehicles: Collection[str]) -> None:
         """Forget vehicles whose ids others may bear now.
 
         Parameters
@@ -72,8 +60,8 @@ class LeaderSight:
             Their ids.
         """
         for vehicle in vehicles:
-            self._contrasts.pop(vehicle, None)
             self._minimum_gaps.pop(vehicle, None)
+        self._vehicles.forget(vehicles)
 
     def assess(self, pairs: Sequence[Pair], own_lamps: OwnLamps, horizon: float) -> list[tuple[bool, float]]:
         """Whether each leader is seen, and for how long that is sure to stay so [s].
@@ -100,7 +88,7 @@ class LeaderSight:
     ) -> tuple[bool, float]:
         # Plain numbers: mostly there is a pair or two, and making arrays of them would cost more than all the rest.
         follower, leader, _ = pair
-        contrast = self._contrast(leader)
+        contrast = self._vehicles.body(leader).contrast
         spare = self._sight.body_limit(distance, contrast) - depth
         if spare >= 0.0:
             # In the own headlamps, the limit falls with the distance, and is asked for anew in each step.
@@ -139,21 +127,9 @@ class LeaderSight:
 
     def _intensities(self, vehicle: str, own_lamps: OwnLamps) -> tuple[float, float]:
         """Of the brightest rear lamp that is lit, and that could be lit before the next assessment [cd]."""
-        if vehicle in own_lamps:
-            own = own_lamps[vehicle]
-            # Lamps that are commanded may be commanded otherwise in any step.
-            return (0.0 if own is None else rear_intensity(own | self._signalled(vehicle)), BRIGHTEST)
-        lit = rear_intensity(int(OTHERS_LAMPS) | self._signalled(vehicle))
-        return lit, max(lit, rear_intensity(int(Lamp.STOP)))
-
-    def _signalled(self, vehicle: str) -> int:
-        return lamps_from_signals(self._signals(vehicle))
-
-    def _contrast(self, vehicle: str) -> float:
-        known = self._contrasts.get(vehicle)
-        if known is None:
-            known = self._contrasts[vehicle] = inherent_contrast(paint(vehicle, self._get_colour(vehicle)))
-        return known
+        lit = rear_intensity(self._vehicles.lamps(vehicle, own_lamps))
+        # Lamps that are commanded may be commanded otherwise in any step.
+        return lit, BRIGHTEST if vehicle in own_lamps else max(lit, rear_intensity(int(Lamp.STOP)))
 
     def _minimum_gap(self, vehicle: str) -> float:
         known = self._minimum_gaps.get(vehicle)

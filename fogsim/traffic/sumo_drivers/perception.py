@@ -21,7 +21,8 @@ from fogsim.traffic.sumo.link import Api, Getter, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.traci_link import load_traci
 from fogsim.traffic.sumo.update_schedule import UpdateSchedule, closing_speed_bound
-from fogsim.traffic.sumo_drivers.leader_sight import LeaderSight, OwnLamps, Pair, SubscribedLeaders
+from fogsim.traffic.sumo_drivers.leader_sight import LeaderSight, Pair, SubscribedLeaders
+from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
 
 REACH = 250.0
 """Leaders farther ahead than this do not matter [m]: from 150 km/h one stops in less."""

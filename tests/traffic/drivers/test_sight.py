@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.traffic.drivers.sight import DAY_EYE_THRESHOLD, DriverSight, inherent_contrast, rear_intensity
+from fogsim.traffic.drivers.lamp_intensity import rear_intensity
+from fogsim.traffic.drivers.sight import DAY_EYE_THRESHOLD, DriverSight, inherent_contrast
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Lamp
 

@@ -9,7 +9,8 @@ import pytest
 from fogsim.atmosphere import FieldAccess
 from fogsim.traffic import DriverSight
 from fogsim.traffic.appearance import OTHERS_LAMPS, lamps_from_signals, paint
-from fogsim.traffic.drivers.sight import EYE_HEIGHT, inherent_contrast, rear_intensity
+from fogsim.traffic.drivers.lamp_intensity import rear_intensity
+from fogsim.traffic.drivers.sight import EYE_HEIGHT, inherent_contrast
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo_drivers.perception import MAX_PAUSE, REACH, Perception
 from fogsim.values import FogBank, FogField, Lamp

@@ -1,0 +1,107 @@
+"""How bright the lamps of a vehicle shine toward an eye: from behind, from ahead, from the side.
+
+Signal lamps within what UNECE allows (R148), dimmer off their axis by the fourth power of its cosine as the pictures
+draw them. Of dipped beams an eye at the height of eyes gets the light above their cut-off, and of both beams what
+leaves to the side: fits to the median US lamps of UMTRI-2004-23, table 4, and UMTRI-2001-19, table 6.
+"""
+
+import functools
+import math
+
+from fogsim.values import Lamp
+
+REAR_LAMPS = ((int(Lamp.REAR_FOG), 200.0), (int(Lamp.STOP), 100.0), (int(Lamp.POSITION), 8.0))
+"""Luminous intensity of one rear lamp, brightest first [cd]: within UNECE's 150–300, 60–185 and 4–12."""
+
+BRIGHTEST = REAR_LAMPS[0][1]
+"""Luminous intensity of the brightest rear lamp [cd]."""
+
+FRONT_SIGNAL_LAMPS = ((int(Lamp.DAYTIME), 600.0), (int(Lamp.POSITION), 10.0))
+"""Luminous intensity of one front lamp that shines all around [cd]: within UNECE's 400–1200 and 4–140."""
+
+LEAST_INTENSITY = 0.05
+"""What lit position lamps send wherever they are to be seen at all [cd] (UNECE R148)."""
+
+SIDE_MARKER = 4.0
+"""Luminous intensity of a side marker lamp [cd]: UNECE R148 asks for 4–25."""
+
+SHORTEST_WITH_MARKERS = 6.0
+"""Vehicles longer than this must have side marker lamps [m] (UNECE R48)."""
+
+HEAD_LAMPS = int(Lamp.LOW_BEAM | Lamp.HIGH_BEAM)
+
+BEAM_WIDTH = math.radians(7.0)
+"""Angle to the side at which a dipped beam below its cut-off has 1/e of its light ahead [rad]: UMTRI-2004-23 at 1.5°
+down has 0.52, 0.22, 0.05 at 5°, 10°, 20°, the mean of both sides."""
+
+
+@functools.lru_cache(maxsize=1024)
+def rear_intensity(lamps: int) -> float:
+    """Luminous intensity of the brightest rear lamp that is lit [cd].
+
+    Parameters
+    ----------
+    lamps : int
+        Bits of `Lamp`.
+    """
+    return next((intensity for lamp, intensity in REAR_LAMPS if lamps & lamp), 0.0)
+
+
+def intensity_toward(lamps: int, length: float, ahead: float, aside: float) -> float:
+    """Luminous intensity of the brightest lamp of a vehicle toward an eye [cd].
+
+    Parameters
+    ----------
+    lamps : int
+        Its lit lamps, bits of `Lamp`.
+    length : float
+        Its length [m].
+    ahead, aside : float
+        Where the eye is, from the middle of the front bumper: ahead of it and to either side [m].
+    """
+    if not lamps:
+        return 0.0
+    least = LEAST_INTENSITY if lamps & int(Lamp.POSITION) else 0.0
+    aside = abs(aside)
+    if ahead > 0.0:
+        return max(_front_intensity(lamps, math.atan2(aside, ahead)), least)
+    if ahead < -length:
+        return max(rear_intensity(lamps) * _dimming(math.atan2(aside, -length - ahead)), least)
+    return SIDE_MARKER if least and length > SHORTEST_WITH_MARKERS else least
+
+
+def head_lamp_share(bearing: float) -> float:
+    """Light of the own head lamps in a direction over that straight ahead [-].
+
+    Parameters
+    ----------
+    bearing : float
+        Angle from straight ahead, to either side [rad].
+    """
+    return math.exp(-abs(bearing) / BEAM_WIDTH)
+
+
+def _dimming(angle: float) -> float:
+    return math.cos(angle) ** 4
+
+
+def _front_intensity(lamps: int, angle: float) -> float:
+    signal = next((intensity for lamp, intensity in FRONT_SIGNAL_LAMPS if lamps & lamp), 0.0) * _dimming(angle)
+    return max(signal, beam_intensity(lamps, math.degrees(angle)))
+
+
+def beam_intensity(lamps: int, degrees: float) -> float:
+    """Luminous intensity of one head lamp toward an eye as high as it or a little higher [cd].
+
+    Parameters
+    ----------
+    lamps : int
+        Lit lamps, bits of `Lamp`; 0 without head lamps.
+    degrees : float
+        Angle of the eye from the lamp's axis [°], not negative.
+    """
+    if lamps & int(Lamp.HIGH_BEAM):
+        return 32585.0 * math.exp(-((degrees / 5.669) ** 1.202)) + 1674.0 * math.exp(-((degrees / 23.30) ** 1.5))
+    if lamps & int(Lamp.LOW_BEAM):
+        return 601.0 * math.exp(-((degrees / 14.0) ** 1.2))
+    return 0.0

@@ -1,0 +1,83 @@
+"""What of SUMO's vehicles there is to see: their bodies and their lit lamps."""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from fogsim.traffic.appearance import OTHERS_LAMPS, lamps_from_signals, paint
+from fogsim.traffic.drivers.sight import inherent_contrast
+from fogsim.traffic.sumo.link import Api, vehicle_getter
+
+OwnLamps = dict[str, int | None]
+"""Lamps, as bits of `Lamp`, of vehicles whose lamps are not SUMO's; None where all have failed."""
+
+
+class SeenBody(NamedTuple):
+    """A vehicle's body.
+
+    Attributes
+    ----------
+    length, width : float
+        [m]
+    contrast : float
+        To the airlight without fog between, 0 … 1.
+    """
+
+    length: float
+    width: float
+    contrast: float
+
+
+class SeenVehicles:
+    """Bodies, each read once, and lit lamps of vehicles.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    """
+
+    def __init__(self, api: Api) -> None:
+        self._signals = vehicle_getter(api, "getSignals")
+        self._get_colour = vehicle_getter(api, "getColor")
+        self._get_length = vehicle_getter(api, "getLength")
+        self._get_width = vehicle_getter(api, "getWidth")
+        self._bodies: dict[str, SeenBody] = {}
+
+    def forget(self, vehicles: Iterable[str]) -> None:
+        """Forget vehicles whose ids others may bear now.
+
+        Parameters
+        ----------
+        vehicles : iterable of str
+            Their ids.
+        """
+        for vehicle in vehicles:
+            self._bodies.pop(vehicle, None)
+
+    def body(self, vehicle: str) -> SeenBody:
+        """Body of a vehicle.
+
+        Parameters
+        ----------
+        vehicle : str
+            Its id.
+        """
+        known = self._bodies.get(vehicle)
+        if known is None:
+            contrast = inherent_contrast(paint(vehicle, self._get_colour(vehicle)))
+            known = SeenBody(float(self._get_length(vehicle)), float(self._get_width(vehicle)), contrast)
+            self._bodies[vehicle] = known
+        return known
+
+    def lamps(self, vehicle: str, own_lamps: OwnLamps) -> int:
+        """Lit lamps of a vehicle, bits of `Lamp`.
+
+        Parameters
+        ----------
+        vehicle : str
+            Its id.
+        own_lamps : dict
+            Lamps of vehicles whose lamps are not SUMO's.
+        """
+        own = own_lamps.get(vehicle, int(OTHERS_LAMPS))
+        return 0 if own is None else own | lamps_from_signals(self._signals(vehicle))

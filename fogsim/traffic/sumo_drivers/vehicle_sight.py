@@ -1,0 +1,137 @@
+"""Whether one vehicle's driver sees another vehicle, wherever it is and whichever side it shows."""
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+from fogsim.traffic.drivers.lamp_intensity import HEAD_LAMPS, head_lamp_share, intensity_toward
+from fogsim.traffic.drivers.sight import EYE_HEIGHT, DriverSight, FogAccess
+from fogsim.traffic.sumo.link import Api, vehicle_getter
+from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps, SeenVehicles
+
+NEAREST = 0.1
+"""Distances are at least this [m]."""
+
+FARTHEST = 2000.0
+"""Nobody is seen farther away than this [m]; a vehicle that is teleported is nowhere."""
+
+_Point = tuple[float, float, float]
+
+
+class LineOfSight(NamedTuple):
+    """The straight line from a driver's eyes to the nearest part of another vehicle.
+
+    Attributes
+    ----------
+    eyes, end : tuple of float
+        Where it begins and ends [m].
+    distance : float
+        Its length [m].
+    bearing : float
+        Its horizontal angle from straight ahead [rad].
+    ahead, aside : float
+        Where the eyes are, from the middle of the other's front bumper: ahead of it and to its left [m].
+    """
+
+    eyes: _Point
+    end: _Point
+    distance: float
+    bearing: float
+    ahead: float
+    aside: float
+
+
+class VehicleSight:
+    """Tells which vehicles drivers see, along straight lines through the fog; buildings and other vehicles hide none.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    fog : FogAccess
+        The fog.
+    sight : DriverSight
+        The drivers' eyes.
+    """
+
+    def __init__(self, api: Api, fog: FogAccess, sight: DriverSight) -> None:
+        self._fog = fog
+        self._sight = sight
+        self._vehicles = SeenVehicles(api)
+        self._position = vehicle_getter(api, "getPosition3D")
+        self._angle = vehicle_getter(api, "getAngle")
+        self._extinction = fog.maximum_extinction if fog.minimum_extinction == fog.maximum_extinction else None
+        self._certainly_seen = sight.sure_distance(fog.maximum_extinction)
+
+    @property
+    def certainly_seen(self) -> float:
+        """Distance up to which every vehicle is seen, wherever it is and whatever its lamps [m]."""
+        return self._certainly_seen
+
+    def forget(self, vehicles: Iterable[str]) -> None:
+        """Forget vehicles whose ids others may bear now.
+
+        Parameters
+        ----------
+        vehicles : iterable of str
+            Their ids.
+        """
+        self._vehicles.forget(vehicles)
+
+    def sees(self, pairs: Sequence[tuple[str, str]], own_lamps: OwnLamps) -> list[bool]:
+        """Whether each observer sees its target.
+
+        Parameters
+        ----------
+        pairs : sequence of tuple of str
+            Observer and target.
+        own_lamps : dict
+            Lamps of vehicles whose lamps are not SUMO's.
+        """
+        lines = [self.line_of_sight(observer, target) for observer, target in pairs]
+        seen = [line.distance <= self._certainly_seen for line in lines]
+        doubtful = [n for n, line in enumerate(lines) if not seen[n] and line.distance <= FARTHEST]
+        for n, depth in zip(doubtful, self._optical_depths([lines[n] for n in doubtful]), strict=True):
+            seen[n] = depth <= self._depth_limit(pairs[n], lines[n], own_lamps)
+        return seen
+
+    def line_of_sight(self, observer: str, target: str) -> LineOfSight:
+        """The straight line from an observer's eyes, above the front bumper, to the nearest part of a target.
+
+        Parameters
+        ----------
+        observer, target : str
+            The vehicles.
+        """
+        # Plain numbers: mostly there is a pair or two, and making arrays of them would cost more than all the rest.
+        x, y, z = self._position(observer)
+        front_x, front_y, front_z = self._position(target)
+        heading = math.radians(90.0 - self._angle(target))
+        east, north = math.cos(heading), math.sin(heading)
+        body = self._vehicles.body(target)
+        ahead = (x - front_x) * east + (y - front_y) * north
+        aside = (y - front_y) * east - (x - front_x) * north
+        along = min(max(ahead, -body.length), 0.0)
+        across = min(max(aside, -0.5 * body.width), 0.5 * body.width)
+        end_x, end_y = front_x + along * east - across * north, front_y + along * north + across * east
+        forward = math.radians(90.0 - self._angle(observer))
+        bearing = math.remainder(math.atan2(end_y - y, end_x - x) - forward, math.tau)
+        eyes, end = (x, y, z + EYE_HEIGHT), (end_x, end_y, front_z + EYE_HEIGHT)
+        return LineOfSight(eyes, end, max(math.dist(eyes, end), NEAREST), bearing, ahead, aside)
+
+    def _depth_limit(self, pair: tuple[str, str], line: LineOfSight, own_lamps: OwnLamps) -> float:
+        observer, target = pair
+        body = self._vehicles.body(target)
+        intensity = intensity_toward(self._vehicles.lamps(target, own_lamps), body.length, line.ahead, line.aside)
+        is_lit = self._vehicles.lamps(observer, own_lamps) & HEAD_LAMPS
+        head_lamps = head_lamp_share(line.bearing) if is_lit else 0.0
+        return self._sight.depth_limit(line.distance, body.contrast, intensity, head_lamps)
+
+    def _optical_depths(self, lines: Sequence[LineOfSight]) -> Sequence[float]:
+        if self._extinction is not None:
+            return [self._extinction * line.distance for line in lines]
+        if not lines:
+            return []
+        eyes, ends = [line.eyes for line in lines], [line.end for line in lines]
+        depths: list[float] = self._fog.optical_depth(eyes, ends).tolist()
+        return depths

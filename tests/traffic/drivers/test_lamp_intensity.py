@@ -1,0 +1,58 @@
+"""Lamps toward an eye: UNECE's limits, the measured beams, and which side shows which."""
+
+import numpy as np
+import pytest
+
+from fogsim.lighting.beams import high_beam, low_beam
+from fogsim.traffic.drivers.lamp_intensity import (
+    LEAST_INTENSITY,
+    SIDE_MARKER,
+    beam_intensity,
+    head_lamp_share,
+    intensity_toward,
+    rear_intensity,
+)
+from fogsim.values import Lamp
+from fogsim.values.luminous_intensity import luminous_intensity
+
+LIT = int(Lamp.POSITION | Lamp.LOW_BEAM)
+
+
+@pytest.mark.parametrize("degrees", [1.0, 2.0, 5.0, 10.0, 20.0])
+def test_light_above_the_cut_off_is_that_of_measured_low_beams(degrees: float) -> None:
+    """Half a degree to one degree up, the mean of left and right of UMTRI-2004-23, within a factor of 2."""
+    aside = np.radians([-degrees, degrees])
+    measured = [luminous_intensity(low_beam(), aside, np.radians(up)).mean() for up in (0.5, 1.0)]
+    assert 0.5 * min(measured) < beam_intensity(LIT, degrees) < 2.0 * max(measured)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 2.0, 5.0, 10.0, 20.0])
+def test_light_of_a_high_beam_is_that_of_measured_ones(degrees: float) -> None:
+    measured = luminous_intensity(high_beam(), np.radians([-degrees, degrees]), 0.0).mean()
+    assert beam_intensity(int(Lamp.HIGH_BEAM), degrees) == pytest.approx(measured, rel=0.35)
+
+
+@pytest.mark.parametrize("degrees", [5.0, 10.0, 20.0])
+def test_own_light_to_the_side_is_that_of_measured_low_beams(degrees: float) -> None:
+    aside = np.radians([-degrees, degrees])
+    measured = luminous_intensity(low_beam(), aside, np.radians(-1.5)).mean()
+    ahead = float(luminous_intensity(low_beam(), 0.0, np.radians(-1.5)))
+    assert head_lamp_share(np.radians(degrees)) == pytest.approx(measured / ahead, rel=0.2)
+
+
+def test_each_side_shows_its_own_lamps() -> None:
+    everything = LIT | int(Lamp.STOP | Lamp.REAR_FOG)
+    assert intensity_toward(everything, 5.0, 30.0, 0.0) == beam_intensity(LIT, 0.0)
+    assert intensity_toward(everything, 5.0, -35.0, 0.0) == rear_intensity(everything) == 200.0
+    assert intensity_toward(everything, 5.0, -2.5, 30.0) == LEAST_INTENSITY
+    assert intensity_toward(everything, 12.0, -2.5, -30.0) == SIDE_MARKER
+    assert intensity_toward(int(Lamp.STOP), 5.0, 30.0, 0.0) == 0.0
+    assert intensity_toward(0, 12.0, -2.5, 30.0) == 0.0
+    assert intensity_toward(int(Lamp.POSITION), 5.0, 30.0, 30.0) == pytest.approx(10.0 / 4.0)
+
+
+def test_lamps_are_as_bright_from_the_left_as_from_the_right_and_dimmer_off_their_axis() -> None:
+    for ahead in (30.0, -35.0):
+        off_axis = [intensity_toward(LIT, 5.0, ahead, aside) for aside in (0.0, 5.0, 20.0, 60.0)]
+        assert off_axis == sorted(off_axis, reverse=True)
+        assert off_axis[2] == intensity_toward(LIT, 5.0, ahead, -20.0)

@@ -1,3 +1,4 @@
+import functools
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -60,25 +61,28 @@ def light(chase: Chase, v: np.ndarray, u: np.ndarray, distance: float, pitch: fl
     camera = chase.camera
     x, y = (u - camera.principal_point[0]) / camera.focal_length, (v - camera.principal_point[1]) / camera.focal_length
     forward, down = np.cos(pitch) - y * np.sin(pitch), np.sin(pitch) + y * np.cos(pitch)
-    depth = np.where(down > 1e-6, camera.mount_height / np.maximum(down, 1e-6), np.inf)
-    shape = np.broadcast_shapes(x.shape, y.shape)
-    ahead = np.broadcast_to(np.minimum(depth * forward, 1e5), shape)
+    on_ground = down > 1e-6
+    depth = np.where(on_ground, camera.mount_height / np.maximum(down, 1e-6), np.inf)
+    per_depth = np.sqrt(1.0 + x**2 + y**2)
+    ahead = np.minimum(depth * forward, 1e5)
     left = -np.minimum(depth, 1e5) * x
-    ground = chase.asphalt * (1.0 + 0.03 * table[(ahead / 0.9).astype(int) % 64, np.floor(left / 0.9).astype(int) % 64])
-    ground = np.where((np.abs(np.abs(left) - 1.8) < 0.08) & (ahead % 12.0 < 4.0), 2.4 * chase.asphalt, ground)
-    ground = ground * (1.0 + chase.beam * (6.0 / np.maximum(ahead, 2.0)) ** 2)
-    path = np.broadcast_to(depth, shape) * np.sqrt(1.0 + x**2 + y**2)
-    plane = distance / forward
-    side = np.broadcast_to(plane * x - chase.across, shape)
-    up = np.broadcast_to(camera.mount_height - plane * down, shape)
+    grain = table[(ahead / 0.9).astype(int) % 64, np.floor(left / 0.9).astype(np.int32) & 63]
+    ground = chase.asphalt * (1.0 + 0.03 * grain)
+    ground[(np.abs(np.abs(left) - 1.8) < 0.08) & (ahead % 12.0 < 4.0)] = 2.4 * chase.asphalt
+    ground *= 1.0 + chase.beam * (6.0 / np.maximum(ahead, 2.0)) ** 2
     shadow = (ahead > distance) & (ahead < distance + 4.0) & (np.abs(left + chase.across) < 0.5 * chase.width)
-    ground = np.where(shadow, 0.25 * chase.asphalt, ground)
-    box = (np.abs(side) < 0.5 * chase.width) & (up > 0.18) & (up < chase.height)
-    ground = np.where(box, rear(chase, side, up, braking=distance > chase.brakes_beyond), ground)
-    path = np.where(box, plane * np.sqrt(1.0 + x**2 + y**2), path)
-    transmission = np.exp(-LN20 / chase.visibility * np.minimum(path, 1e6))
+    ground[shadow] = 0.25 * chase.asphalt
+    transmission = np.exp(-LN20 / chase.visibility * np.minimum(depth * per_depth, 1e6))
     seen = ground * transmission + chase.airlight * (1.0 - transmission)
-    return np.where(np.isfinite(path), seen, chase.airlight * (1.0 + chase.sky_excess))
+    seen[~on_ground[:, 0]] = chase.airlight * (1.0 + chase.sky_excess)
+    plane = distance / forward
+    side, up = plane * x - chase.across, camera.mount_height - plane * down
+    box = (np.abs(side) < 0.5 * chase.width) & (up > 0.18) & (up < chase.height)
+    side, up, path = (np.broadcast_to(one, box.shape)[box] for one in (side, up, plane * per_depth))
+    transmission = np.exp(-LN20 / chase.visibility * path)
+    own = rear(chase, side, up, braking=distance > chase.brakes_beyond)
+    seen[box] = own * transmission + chase.airlight * (1.0 - transmission)
+    return seen
 
 
 def points(first: int, last: int, samples: int) -> np.ndarray:
@@ -115,20 +119,21 @@ def exposed(chase: Chase, light: np.ndarray, rng: np.random.Generator) -> np.nda
     return np.clip(noisy, 0, most).astype(np.uint8 if camera.bits == 8 else np.uint16)
 
 
-def chased(chase: Chase, seed: int, ranges: np.ndarray) -> list[Observation]:
+@functools.lru_cache(maxsize=8)
+def chased(chase: Chase, seed: int, ranges: tuple[float, ...]) -> list[Observation]:
     rng = np.random.default_rng(seed)
     seen = []
     for i, distance in enumerate(ranges):
-        image = exposed(chase, picture(chase, float(distance), rng), rng)
-        told = LeadMeasurement(float(distance) + rng.normal(0.0, chase.range_noise), 5.0)
+        image = exposed(chase, picture(chase, distance, rng), rng)
+        told = LeadMeasurement(distance + rng.normal(0.0, chase.range_noise), 5.0)
         seen.append(Observation(Frame(float(i), image, chase.camera), lead=told))
     return seen
 
 
-AWAY = np.arange(25.0, 91.0, 5.0)
+AWAY = tuple(float(distance) for distance in range(25, 91, 5))
 
 
-def followed(chase: Chase, seed: int = 0, ranges: np.ndarray = AWAY, **options):
+def followed(chase: Chase, seed: int = 0, ranges: tuple[float, ...] = AWAY, **options):
     estimator = make("huang2015_lead", chase.camera, **options)
     for observation in chased(chase, seed, ranges):
         estimate = estimator.update(observation)
@@ -237,7 +242,7 @@ def test_confidence_curve_is_given_with_the_estimate():
 
 def test_the_window_is_where_the_vehicle_is():
     chase = Chase(visibility=120.0, across=0.5, pitch_scatter=0.0)
-    found = followed(chase, ranges=np.array([30.0]))
+    found = followed(chase, ranges=(30.0,))
     column, foot, width = found.diagnostics["window"]
     scale = chase.camera.focal_length / 30.0
     assert column == pytest.approx(chase.camera.principal_point[0] + 0.5 * scale, abs=3.0)
@@ -252,8 +257,8 @@ def test_another_vehicle_begins_another_track():
     estimator = make("huang2015_lead", chase.camera)
     for seen in chased(chase, 0, AWAY):
         estimator.update(seen)
-    (seen,) = chased(chase, 1, np.array([25.0]))
-    assert not estimator.update(replace(seen, frame=replace(seen.frame, time=float(AWAY.size)))).valid
+    (seen,) = chased(chase, 1, (25.0,))
+    assert not estimator.update(replace(seen, frame=replace(seen.frame, time=float(len(AWAY))))).valid
     assert estimator.tracks == 2
     assert estimator.update(Observation(seen.image)).diagnostics["reason"] == "no vehicle is tracked ahead"
 
@@ -288,7 +293,7 @@ BAD = {
 def test_an_image_without_a_vehicle_says_nothing(name, as_published):
     estimator = make("huang2015_lead", Chase().camera, as_published=as_published)
     for distance in AWAY[:4]:
-        found = estimator.update(Observation(BAD[name], lead=LeadMeasurement(float(distance), 0.0)))
+        found = estimator.update(Observation(BAD[name], lead=LeadMeasurement(distance, 0.0)))
         assert not found.valid
         assert found.diagnostics["reason"]
 

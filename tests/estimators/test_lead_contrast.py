@@ -1,5 +1,6 @@
 """The contrast of the vehicle ahead, judged on pictures of a painter that shares nothing with FogSim's renderer."""
 
+import functools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +20,7 @@ CAMERAS = {
     "rolled": replace(CAMERA, roll=np.radians(2.0)),
 }
 SETBACK = 1.7
+SIDE = 2
 RANGES = tuple(float(d) for d in range(25, 91, 5))
 
 
@@ -48,34 +50,38 @@ class Rear:
         return light
 
 
-def paint(camera, rears, visibility, seed, airlight=200.0, pitch=0.0, side=2, beam=0.0):
-    """Image of a grainy road with kerbs, lit by a beam, rears on it, and fog; `side`² samples a pixel."""
+@functools.lru_cache(maxsize=256)
+def paint(camera, rears, visibility, seed, airlight=200.0, pitch=0.0, beam=0.0):
+    """Image of a grainy road with kerbs, lit by a beam, rears on it, and fog; `SIDE`² samples a pixel."""
     rng = np.random.default_rng(seed)
-    at = (np.arange(side) + 0.5) / side - 0.5
-    v, u = ((np.arange(n)[:, None] + at).ravel() for n in (camera.height, camera.width))
-    x, y = np.meshgrid((u - camera.principal_point[0]), (v - camera.principal_point[1]))
-    turn = np.exp(-1j * camera.roll) * (x + 1j * y) / camera.focal_length
-    x, y = turn.real, turn.imag
+    at = (np.arange(SIDE) + 0.5) / SIDE - 0.5
+    y, x = ((np.arange(n)[:, None] + at).ravel() for n in (camera.height, camera.width))
+    x = (x[None, :] - camera.principal_point[0]) / camera.focal_length
+    y = (y[:, None] - camera.principal_point[1]) / camera.focal_length
+    if camera.roll:  # otherwise all points of a row are equally far, and one column of them says how far
+        turn = np.exp(-1j * camera.roll) * (x + 1j * y)
+        x, y = turn.real, turn.imag
     slope = np.tan(camera.pitch + pitch + np.arctan(y))
-    below = slope > 1e-6
-    light, depth = np.ones(slope.shape), np.full(slope.shape, np.inf)
-    depth[below] = ground = camera.mount_height / slope[below]
-    cells = 1.0 + 0.04 * np.random.default_rng(99).normal(size=(128, 128))
+    ground = camera.mount_height / np.maximum(slope, 1e-6)
     far = np.minimum(ground, 1e4)
-    right = np.abs(x[below] * far)
-    row, col = ((far + 1.7 * seed) / 0.7).astype(int) % 128, (x[below] * far / 0.7).astype(int) % 128
-    road = np.where(right < 5.5, 0.3, 0.2) * cells[row, col]
-    road = np.where(np.abs(right - 1.75) < 0.08, 0.7, road)
-    light[below] = road * (1.0 + beam * (6.0 / np.maximum(ground, 2.0)) ** 2)
+    left = np.where(slope > 1e-6, np.exp(-LN20 / visibility * far), 0.0)
+    sideways = x * far
+    cells = 0.04 * np.random.default_rng(99).normal(size=(128, 128)) + 1.0
+    road = cells[((far + 1.7 * seed) / 0.7).astype(np.int32) & 127, (sideways / 0.7).astype(np.int32) & 127]
+    right = np.abs(sideways)
+    road *= np.where(right < 5.5, 0.3, 0.2)
+    road[np.abs(right - 1.75) < 0.08] = 0.7
+    road *= 1.0 + beam * (6.0 / np.maximum(ground, 2.0)) ** 2
+    fine = (road - 1.0) * left + 1.0
     for rear in sorted(rears, key=lambda r: -r.depth):
         height = camera.mount_height - rear.depth * slope
         across = x * rear.depth - rear.aside
         hit = (np.abs(across) < 0.5 * rear.width) & (height > 0) & (height < rear.height)
-        light[hit], depth[hit] = rear.shade(across[hit], height[hit]), rear.depth
-    left = np.exp(-LN20 / visibility * np.minimum(depth, 1e5))
-    fine = airlight * (light * left + 1.0 - left)
-    linear = fine.reshape(camera.height, side, camera.width, side).mean(axis=(1, 3))
-    signal = 255.0 * respond(np.clip(linear / 255.0, 0.0, 1.0), camera.response)
+        across, height = (np.broadcast_to(one, hit.shape)[hit] for one in (across, height))
+        fine[hit] = (rear.shade(across, height) - 1.0) * np.exp(-LN20 / visibility * rear.depth) + 1.0
+    parts = [fine[i::SIDE, j::SIDE] for i in range(SIDE) for j in range(SIDE)]
+    linear = airlight / 255.0 * sum(parts) / len(parts)
+    signal = 255.0 * respond(np.clip(linear, 0.0, 1.0), camera.response)
     return np.clip(np.rint(signal + rng.normal(0.0, 1.2, signal.shape)), 0, 255).astype(np.uint8)
 
 

@@ -49,8 +49,13 @@ class Noise:
         self._table = rng.standard_normal((256, 256)).astype(np.float32)
 
     def __call__(self, a, b, size):
-        u, v = np.mod(a / size, 256).astype(np.float32), np.mod(b / size, 256).astype(np.float32)
+        u, v = (wrapped(one / size).astype(np.float32) for one in (a, b))
         return 1.5 * cv2.remap(self._table, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
+
+
+def wrapped(places):
+    """Remainder of 256: np.mod says the same to the bit, ten times slower."""
+    return places - 256.0 * np.floor(places / 256.0)
 
 
 def rays(scene, over):
@@ -69,12 +74,13 @@ def ground(scene, ahead, right, noise):
     """Luminance of road and grass."""
     across = right - scene.bend * ahead**2 / 2 + scene.aside
     tone = 1.0 + scene.grain * sum(noise(ahead, across, size) for size in (0.35, 1.3, 5.0)) / math.sqrt(3.0)
-    for wheel in (-2.5, -1.0, 1.0, 2.5):
+    for wheel in (-2.5, -1.0, 1.0, 2.5) if scene.tracks else ():
         tone = tone - scene.tracks * np.exp(-(((across - wheel) / 0.28) ** 2))
-    repaired = noise(np.floor(ahead / 9.0) + 0.5, np.floor(across / 1.75) + 0.5, 1.0) > 1.3
-    road = scene.asphalt * (tone - scene.repairs * repaired)
+    if scene.repairs:
+        tone = tone - scene.repairs * (noise(np.floor(ahead / 9.0) + 0.5, np.floor(across / 1.75) + 0.5, 1.0) > 1.3)
+    road = scene.asphalt * tone
     dashes = (np.abs(across) < 0.06) & (np.mod(ahead, 9.0) < 3.0)
-    painted = (dashes | (np.abs(np.abs(across) - scene.half_road + 0.25) < 0.06)) & (scene.marks > 0)
+    painted = scene.marks > 0 and (dashes | (np.abs(np.abs(across) - scene.half_road + 0.25) < 0.06))
     road = np.where(painted, scene.marks * (1 + 0.15 * noise(ahead, across, 0.2)), road)
     grass = scene.grass * (1 + 0.35 * noise(ahead, across, 0.6) + 0.2 * noise(ahead, across, 4.0))
     return np.where(np.abs(across) < scene.half_road, road, np.maximum(grass, 0.02))
@@ -88,7 +94,9 @@ def draw(scene, seed, over=2):
     x, y = right / forward, down / forward
     depth = np.where(y > 1e-6, camera.mount_height / np.maximum(y, 1e-6), np.inf)
     seen = np.minimum(depth, 5e3)
-    light = ground(scene, seen, seen * x, noise)
+    sky = int(np.isfinite(depth).any(axis=1).argmax())  # rows of nothing else
+    light = np.zeros(depth.shape)
+    light[sky:] = ground(scene, seen[sky:], (seen * x)[sky:], noise)
     for side in (-1.0, 1.0) if scene.hedge else ():
         wall = (side * (scene.half_road + 1.0) - scene.aside) / np.where(x * side > 1e-6, x, np.nan)
         place = np.nan_to_num(np.minimum(wall, 4e3), nan=4e3)

@@ -23,7 +23,6 @@ from fogsim.atmosphere.lamps.lamp_tables import lamp_table
 from fogsim.atmosphere.lamps.phase_function import henyey_greenstein, phase_function
 from fogsim.atmosphere.lamps.veil import FOLD_DISTANCE, INTERVALS, lit_air, ray_pieces, veil_along
 from fogsim.atmosphere.lamps.veil_kernels import VeilRays
-from fogsim.atmosphere.visibility.disability_glare import veiling_luminance
 from fogsim.atmosphere.visibility.night_visibility import (
     FogKind,
     high_beam_veil,
@@ -36,6 +35,7 @@ from fogsim.render import make_renderer
 from fogsim.scenario import build
 from fogsim.units import extinction_from_visibility
 from fogsim.values import CameraPose, FogField, Lamp, Mesh, Scene, Surface
+from fogsim.values.eye import veiling_luminance
 
 SIZE = (480, 360)
 ILLUMINANCE = 10_000.0

@@ -7,9 +7,9 @@ from fogsim.atmosphere.fog.koschmieder import fogged_radiance
 from fogsim.atmosphere.fog.medium import field_at
 from fogsim.atmosphere.fog.optical_depth import FieldAccess, FogNow, extinction, optical_depth, optical_depth_along
 from fogsim.atmosphere.lamps.phase_function import Droplets
-from fogsim.atmosphere.visibility.disability_glare import veiling_luminance
 from fogsim.atmosphere.visibility.night_visibility import FogKind, Observer, Pavement, visibility_distance
 from fogsim.atmosphere.visibility.visibility_level import visibility_level
+from fogsim.values.eye import veiling_luminance
 
 __all__ = [
     "Air",

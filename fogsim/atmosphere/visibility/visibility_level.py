@@ -15,12 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fogsim.errors import InputError
+from fogsim.values.eye import LEAST_LUMINANCE, flux_root, luminance_root
 
 ALMOST_CERTAIN = 2.6
 """Threshold factor k for detection with 99.9 % probability [-]; 1 stands for 50 %."""
-
-LEAST_LUMINANCE = 1e-6
-"""Luminance below which the formulas are read at this value [cd/m²]."""
 
 LEAST_FOR_POLARITY = 0.004
 """Luminance below which no contrast polarity factor is known [cd/m²]; it is read at this value."""
@@ -113,38 +111,6 @@ def visibility_level(
         probability_factor=probability_factor,
     )
     return np.asarray(difference / least)
-
-
-def flux_root(luminance: ArrayLike) -> NDArray[np.float64]:
-    """√φ of Adrian's formula, that of Ricco's law for small targets.
-
-    Parameters
-    ----------
-    luminance : array_like
-        Adaptation luminance [cd/m²].
-    """
-    value = np.asarray(luminance, dtype=np.float64)
-    log = np.log10(np.maximum(value, LEAST_LUMINANCE))
-    bright = np.log10(4.1925 * 10.0 ** (0.1556 * log)) + 0.1684 * 10.0 ** (0.5867 * log)
-    middle = 10.0 ** (-0.072 + 0.3372 * log + 0.0866 * log**2)
-    dark = 10.0 ** (0.028 + 0.173 * log)
-    return np.select([value >= 0.6, value > 0.00418], [bright, middle], dark)
-
-
-def luminance_root(luminance: ArrayLike) -> NDArray[np.float64]:
-    """√L of Adrian's formula, that of Weber's law for large targets.
-
-    Parameters
-    ----------
-    luminance : array_like
-        Adaptation luminance [cd/m²].
-    """
-    value = np.asarray(luminance, dtype=np.float64)
-    log = np.log10(np.maximum(value, LEAST_LUMINANCE))
-    bright = 0.05946 * 10.0 ** (0.466 * log)
-    middle = 10.0 ** (-1.256 + 0.319 * log)
-    dark = 10.0 ** (-0.891 + 0.5275 * log + 0.0227 * log**2)
-    return np.select([value >= 0.6, value > 0.00418], [bright, middle], dark)
 
 
 def _threshold_root(luminance: NDArray[np.float64], minutes: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fogsim.traffic.drivers.lamp_intensity import rear_intensity
+from fogsim.traffic.drivers.lamp_intensity import HEAD_LAMPS, rear_intensity
 from fogsim.traffic.drivers.sight import EYE_HEIGHT, DriverSight, FogAccess, inherent_contrast
 from fogsim.traffic.highway.fleet import Fleet
 from fogsim.traffic.highway.snapshot import front_bumper, rear_bumper
@@ -69,6 +69,7 @@ class VisibleNeighbours:
         distance = max(math.dist(eye, rear), 0.1)
         if distance <= self._certainly_seen:
             return True
-        depth, fleet = self._fog.optical_depth(eye, rear), self._fleet
-        by_body = self._sight.sees_body(distance, depth, inherent_contrast(fleet.paint(front)))
-        return bool(by_body) or bool(self._sight.sees_lamp(distance, depth, rear_intensity(int(fleet.lamps(front)))))
+        depth, fleet = float(self._fog.optical_depth(eye, rear)), self._fleet
+        lit = rear_intensity(int(fleet.lamps(front)))
+        head_lamps = 1.0 if int(fleet.lamps(vehicle)) & HEAD_LAMPS else 0.0
+        return depth <= self._sight.depth_limit(distance, inherent_contrast(fleet.paint(front)), lit, head_lamps)

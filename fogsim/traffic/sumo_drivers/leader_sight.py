@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST, rear_intensity
-from fogsim.traffic.drivers.sight import EYE_HEIGHT, SILHOUETTE_ILLUMINANCE, DriverSight, FogAccess
+from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST, HEAD_LAMPS, rear_intensity
+from fogsim.traffic.drivers.sight import EYE_HEIGHT, DriverSight, FogAccess
 from fogsim.traffic.sumo.link import Api, Getter, vehicle_getter
 from fogsim.traffic.sumo.update_schedule import MAX_RELATIVE_ACCELERATION, closing_speed_bound
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps, SeenVehicles
@@ -88,20 +88,21 @@ class LeaderSight:
     ) -> tuple[bool, float]:
         # Plain numbers: mostly there is a pair or two, and making arrays of them would cost more than all the rest.
         follower, leader, _ = pair
-        contrast = self._vehicles.body(leader).contrast
-        spare = self._sight.body_limit(distance, contrast) - depth
-        if spare >= 0.0:
-            # In the own headlamps, the limit falls with the distance, and is asked for anew in each step.
-            if self._sight.illuminance < SILHOUETTE_ILLUMINANCE:
+        sight, contrast = self._sight, self._vehicles.body(leader).contrast
+        lamps = self._vehicles.lamps(leader, own_lamps)
+        head_lamps = 1.0 if self._vehicles.lamps(follower, own_lamps) & HEAD_LAMPS else 0.0
+        if depth <= sight.depth_limit(distance, contrast, rear_intensity(lamps), head_lamps):
+            # What lamps show may go dark at once; the body in the light of the sky stays.
+            if depth >= sight.depth_limit(distance, contrast, 0.0, 0.0):
                 return True, 0.0
-            return True, min(spare / self._rates(follower, leader, horizon)[1], horizon)
-        lit, brightest = self._intensities(leader, own_lamps)
-        if depth <= self._sight.lamp_limit(distance, lit):
-            # What lamps alone show may go dark at once.
-            return True, 0.0
+            closing, deepening = self._rates(follower, leader, horizon)
+            spare = sight.depth_limit(distance + closing * horizon, contrast, 0.0, 0.0) - depth
+            return True, min(max(spare, 0.0) / deepening, horizon)
         closing, deepening = self._rates(follower, leader, horizon)
         nearest = max(distance - closing * horizon, 0.1)
-        limit = max(self._sight.body_limit(nearest, contrast), self._sight.lamp_limit(nearest, brightest))
+        # Lamps that are commanded may be commanded otherwise in any step.
+        brightest = BRIGHTEST if leader in own_lamps else rear_intensity(lamps | int(Lamp.STOP))
+        limit = sight.depth_limit(nearest, contrast, brightest)
         return False, min(max(depth - limit, 0.0) / deepening, horizon)
 
     def _optical_depths(self, pairs: Sequence[Pair], distances: Sequence[float]) -> list[float]:
@@ -124,12 +125,6 @@ class LeaderSight:
         # In a bank that one end has reached and the other has not, each end counts by itself; and the fog drifts.
         together = speed + leader_speed + MAX_RELATIVE_ACCELERATION * horizon
         return closing, self._max_extinction * (together + FASTEST_DRIFT)
-
-    def _intensities(self, vehicle: str, own_lamps: OwnLamps) -> tuple[float, float]:
-        """Of the brightest rear lamp that is lit, and that could be lit before the next assessment [cd]."""
-        lit = rear_intensity(self._vehicles.lamps(vehicle, own_lamps))
-        # Lamps that are commanded may be commanded otherwise in any step.
-        return lit, BRIGHTEST if vehicle in own_lamps else max(lit, rear_intensity(int(Lamp.STOP)))
 
     def _minimum_gap(self, vehicle: str) -> float:
         known = self._minimum_gaps.get(vehicle)

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.atmosphere.visibility.disability_glare import veiling_luminance
 from fogsim.atmosphere.visibility.night_visibility import FogKind, Pavement, high_beam_veil, visibility_distance
 from fogsim.errors import InputError
 from fogsim.lighting.beams import high_beam, low_beam, scaled_beam
 from fogsim.values import Beam
+from fogsim.values.eye import veiling_luminance
 
 CLEAR = math.inf
 PAVEMENT = Pavement()

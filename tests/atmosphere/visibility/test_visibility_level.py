@@ -9,13 +9,12 @@ from fogsim.atmosphere.visibility.visibility_level import (
     age_factor,
     angular_size,
     exposure_factor,
-    flux_root,
-    luminance_root,
     polarity_factor,
     threshold,
     visibility_level,
 )
 from fogsim.errors import InputError
+from fogsim.values.eye import flux_root, luminance_root
 from tests.atmosphere.tables import read_table
 
 VECTORS = read_table("adrian1989.csv")

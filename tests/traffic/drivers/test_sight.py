@@ -1,109 +1,156 @@
-"""What a driver can see: check values of Allard's and Koschmieder's laws, and their limits."""
+"""What a driver can see: check values of Allard's and Koschmieder's laws, their limits, and dusk between them."""
 
 import math
 
 import numpy as np
 import pytest
 
-from fogsim.traffic.drivers.lamp_intensity import rear_intensity
-from fogsim.traffic.drivers.sight import DAY_EYE_THRESHOLD, DriverSight, inherent_contrast
+from fogsim.traffic.drivers.adaptation import DAY_EYE_THRESHOLD, adaptation
+from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST, rear_intensity
+from fogsim.traffic.drivers.sight import LEAST_CONTRAST, DriverSight, inherent_contrast
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Lamp
 
-DISTANCES = np.linspace(1.0, 400.0, 39_901)
+DAY, NIGHT, DARK = DriverSight(10_000.0), DriverSight(0.01), DriverSight(0.0)
+DARK_THRESHOLD = adaptation(0.0).eye_threshold
+ILLUMINANCES = np.geomspace(0.01, 1e5, 281)
+UNLIT, LIT = (0.9, 0.0, 1.0), (0.9, 8.0, 1.0)
+"""Contrast, intensity of the lamps and share of the own head lamps."""
 
 
-def reach(sight: DriverSight, visibility: float, intensity: float) -> float:
-    """Farthest distance at which a lamp is seen [m]."""
-    depth = extinction_from_visibility(visibility) * DISTANCES
-    return float(DISTANCES[sight.sees_lamp(DISTANCES, depth, np.full_like(DISTANCES, intensity))].max())
+def reach(sight: DriverSight, visibility: float, what: tuple[float, ...], glare: float = 0.0) -> float:
+    """Farthest distance at which something is seen [m]."""
+    near, far = 0.1, 1e4
+    while far - near > 1e-4:
+        middle = 0.5 * (near + far)
+        seen = sight.depth_limit(middle, *what, glare) >= extinction_from_visibility(visibility) * middle
+        near, far = (middle, far) if seen else (near, middle)
+    return near
 
 
 @pytest.mark.parametrize(("intensity", "metres"), [(4, 166.0), (10, 188.0), (60, 234.0), (150, 258.0), (300, 276.0)])
-def test_lamps_at_v_100_and_a_threshold_of_one_microlux(
-    intensity: float, metres: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Allard, E = I e^(−kd) / d² = 10⁻⁶ lx at V_met = 100 m: published check values."""
-    monkeypatch.setattr("fogsim.traffic.drivers.sight.NIGHT_EYE_THRESHOLD", 1e-6)
-    assert reach(DriverSight(illuminance=0.1), 100.0, intensity) == pytest.approx(metres, abs=0.6)
+def test_lamps_at_v_100_and_a_threshold_of_one_microlux(intensity: float, metres: float) -> None:
+    """Allard, E = I e^(−kd) / d² = 10⁻⁶ lx at V_met = 100 m: published check values, for as many times the light."""
+    as_bright = intensity * DARK_THRESHOLD / 1e-6
+    assert reach(DARK, 100.0, (1.0, as_bright, 0.0)) == pytest.approx(metres, abs=0.6)
 
 
 def test_a_rear_fog_lamp_is_seen_farther_than_a_tail_lamp_and_all_lamps_less_far_by_day() -> None:
-    night, day = DriverSight(illuminance=0.1), DriverSight(illuminance=10_000.0)
-    assert reach(night, 60.0, rear_intensity(Lamp.REAR_FOG)) > 1.3 * reach(night, 60.0, rear_intensity(Lamp.POSITION))
-    assert reach(day, 60.0, 200.0) < reach(night, 60.0, 200.0)
-    assert day.eye_threshold == pytest.approx(DAY_EYE_THRESHOLD)
+    fog, tail = ((0.0, rear_intensity(int(lamp)), 0.0) for lamp in (Lamp.REAR_FOG, Lamp.POSITION))
+    assert reach(NIGHT, 60.0, fog) > 1.3 * reach(NIGHT, 60.0, tail)
+    assert reach(DAY, 60.0, fog) < reach(NIGHT, 60.0, fog)
 
 
 @pytest.mark.parametrize("visibility", [40.0, 100.0, 300.0])
-def test_by_day_a_black_vehicle_is_seen_up_to_the_meteorological_visibility(visibility: float) -> None:
-    depth = extinction_from_visibility(visibility) * DISTANCES
-    seen = DriverSight(illuminance=10_000.0).sees_body(DISTANCES, depth, np.ones_like(DISTANCES))
-    assert DISTANCES[seen].max() == pytest.approx(visibility, abs=0.02)
+@pytest.mark.parametrize("illuminance", [1000.0, 1e4, 1e5])
+def test_by_day_a_black_vehicle_is_seen_up_to_the_meteorological_visibility(
+    visibility: float, illuminance: float
+) -> None:
+    assert reach(DriverSight(illuminance), visibility, (1.0, 0.0, 1.0)) == pytest.approx(visibility, rel=5e-4)
 
 
 def test_a_light_vehicle_is_lost_sooner() -> None:
     black, white = inherent_contrast((0.02, 0.02, 0.02)), inherent_contrast((0.8, 0.8, 0.8))
     assert 0.5 < white < black <= 1.0
-    depth = np.array([2.85])
-    sight = DriverSight(illuminance=10_000.0)
-    assert sight.sees_body([1.0], depth, [black])[0]
-    assert not sight.sees_body([1.0], depth, [white])[0]
+    assert reach(DAY, 100.0, (white, 0.0, 1.0)) < 0.9 * reach(DAY, 100.0, (black, 0.0, 1.0))
 
 
 def test_in_clear_air_by_day_everything_is_seen_and_at_night_what_the_headlamps_reach() -> None:
-    clear = np.zeros_like(DISTANCES)
-    assert DriverSight(10_000.0).sees_body(DISTANCES, clear, np.full_like(DISTANCES, 0.3)).all()
-    seen = DriverSight(0.1, headlamp_reach=55.0).sees_body(DISTANCES, clear, np.ones_like(DISTANCES))
-    assert DISTANCES[seen].max() == pytest.approx(55.0, abs=0.02)
+    assert DAY.depth_limit(1e6, 0.3, 0.0, 0.0) > 0.0
+    assert reach(DARK, math.inf, (1.0, 0.0, 1.0)) == pytest.approx(55.0, abs=1e-3)
+    assert reach(DriverSight(0.0, headlamp_reach=80.0), math.inf, (1.0, 0.0, 1.0)) == pytest.approx(80.0, abs=1e-3)
+    assert reach(DARK, math.inf, (1.0, 0.0, 0.25)) == pytest.approx(27.5, abs=1e-3)
+
+
+@pytest.mark.parametrize("visibility", [30.0, 100.0])
+def test_at_night_the_light_of_the_own_head_lamps_goes_through_the_fog_twice(visibility: float) -> None:
+    farthest = reach(DARK, visibility, (1.0, 0.0, 1.0))
+    assert (55.0 / farthest) ** 2 * math.exp(-2.0 * extinction_from_visibility(visibility) * farthest) == pytest.approx(
+        1.0, rel=1e-4
+    )
+
+
+def test_without_any_light_nothing_is_seen() -> None:
+    assert DARK.depth_limit(1.0, 1.0, 0.0, 0.0) == -math.inf
+
+
+def test_the_limit_is_where_shares_of_the_threshold_add_up_to_one() -> None:
+    """A x + B x² = 1, the shares taken one by one: each alone is a limit of its own."""
+    sight, contrast, tail, distance = DriverSight(0.3), 0.9, 8.0, 60.0
+    body, lamp = sight.depth_limit(distance, contrast, 0.0, 0.0), sight.depth_limit(distance, 0.0, tail, 0.0)
+    own = sight.depth_limit(distance, 0.0, 0.0, 1.0)
+    together = sight.depth_limit(distance, contrast, tail, 1.0)
+    shares = math.exp(body - together) + math.exp(lamp - together) + math.exp(2.0 * (own - together))
+    assert shares == pytest.approx(1.0)
+    assert together > max(body, lamp, own)
 
 
 def test_the_brightest_lit_lamp_counts_and_an_unlit_vehicle_has_none() -> None:
     assert rear_intensity(int(Lamp.POSITION | Lamp.STOP)) == 100.0
     assert rear_intensity(int(Lamp.REAR_FOG | Lamp.STOP)) == 200.0
     assert rear_intensity(int(Lamp.LOW_BEAM)) == 0.0
-    assert not DriverSight(0.1).sees_lamp([1.0], [0.0], [0.0])[0]
 
 
-def test_the_eye_adapts_between_night_and_day() -> None:
-    thresholds = [DriverSight(illuminance=e).eye_threshold for e in (1e-3, 1.0, 30.0, 1000.0, 1e5)]
-    assert thresholds == sorted(thresholds)
-    assert thresholds[0] == thresholds[1]
-    assert math.isclose(thresholds[2], 1e-4, rel_tol=0.05)
+@pytest.mark.parametrize("visibility", [30.0, 60.0, 120.0, 400.0])
+@pytest.mark.parametrize("what", [UNLIT, LIT, (0.5, 200.0, 0.0)], ids=["unlit", "lit", "rear fog lamp alone"])
+def test_dusk_is_continuous(visibility: float, what: tuple[float, ...]) -> None:
+    """Between illuminances 6 % apart the distance of first sight changes by at most 5 %, and nowhere by a jump."""
+    distances = np.array([reach(DriverSight(lux), visibility, what) for lux in ILLUMINANCES])
+    assert np.abs(np.diff(np.log(distances))).max() < 0.05
+    steepest = int(np.abs(np.diff(np.log(distances))).argmax())
+    fine = np.geomspace(*ILLUMINANCES[steepest : steepest + 2], 101)
+    steps = np.abs(np.diff(np.log([reach(DriverSight(lux), visibility, what) for lux in fine])))
+    assert steps.max() < 2.0 * steps.mean()
 
 
-def test_nobody_within_the_sure_distance_is_hidden() -> None:
-    sight = DriverSight(illuminance=10_000.0)
-    white = inherent_contrast((1.0, 1.0, 1.0))
-    for k in (0.01, 0.1):
-        distance = sight.sure_distance(k)
-        assert sight.sees_body([distance], [k * distance], [white])[0]
-    assert sight.sure_distance(0.0) == math.inf
-    assert DriverSight(illuminance=0.1).sure_distance(0.01) == 0.0
+@pytest.mark.parametrize("visibility", [30.0, 120.0, 400.0])
+def test_an_unlit_body_is_seen_the_farther_the_more_light_there_is_and_lamps_the_less_far(visibility: float) -> None:
+    body, lamp = ([reach(DriverSight(e), visibility, w) for e in ILLUMINANCES] for w in (UNLIT, (0.0, 8.0, 0.0)))
+    assert np.all(np.diff(body) > -1e-3)
+    assert body[-1] > 1.5 * body[0]
+    assert np.all(np.diff(lamp) < 1e-3)
+    assert lamp[-1] < 0.9 * lamp[0]
 
 
-@pytest.mark.parametrize("illuminance", [0.1, 10_000.0])
-@pytest.mark.parametrize("k", [0.01, 0.1])
-def test_beyond_the_hidden_distance_nothing_is_seen_and_just_within_it_something_is(
-    illuminance: float, k: float
+@pytest.mark.parametrize("illuminance", [0.01, 1.0, 10.0, 1000.0])
+@pytest.mark.parametrize("what", [UNLIT, LIT])
+def test_the_limit_falls_with_distance_and_so_does_sight_with_extinction(
+    illuminance: float, what: tuple[float, ...]
 ) -> None:
     sight = DriverSight(illuminance)
-    edge = sight.hidden_distance(k)
-    for distance, expected in ((1.01 * edge, False), (0.98 * edge, True)):
-        body = sight.sees_body([distance], [k * distance], [1.0])[0]
-        assert (body or sight.sees_lamp([distance], [k * distance], [200.0])[0]) == expected
-    assert sight.hidden_distance(0.0) == math.inf
+    limits = [sight.depth_limit(d, *what) for d in np.geomspace(0.1, 1e5, 200)]
+    assert np.all(np.diff(limits) <= 0.0)
+    reaches = [reach(sight, v, what) for v in (20.0, 40.0, 80.0, 160.0, 1000.0)]
+    assert reaches == sorted(reaches)
 
 
-@pytest.mark.parametrize("illuminance", [0.1, 10_000.0])
-def test_limits_are_the_depths_at_which_body_and_lamps_are_lost(illuminance: float) -> None:
-    sight = DriverSight(illuminance)
-    for distance in (5.0, 30.0, 50.0):
-        for contrast in (0.5, 1.0):
-            limit = sight.body_limit(distance, contrast)
-            assert sight.sees_body([distance], [limit - 1e-6], [contrast])[0]
-            assert not sight.sees_body([distance], [limit + 1e-6], [contrast])[0]
-        limit = sight.lamp_limit(distance, 100.0)
-        assert sight.sees_lamp([distance], [limit - 1e-6], [100.0])[0]
-        assert not sight.sees_lamp([distance], [limit + 1e-6], [100.0])[0]
-    assert sight.lamp_limit(1.0, 0.0) == -math.inf
+@pytest.mark.parametrize("illuminance", [0.01, 1.0, 9.9, 10_000.0])
+@pytest.mark.parametrize("visibility", [30.0, 300.0])
+def test_bounds_hold_and_are_close(illuminance: float, visibility: float) -> None:
+    sight, k = DriverSight(illuminance), extinction_from_visibility(visibility)
+    sure, hidden = sight.sure_distance(k), sight.hidden_distance(k)
+    assert sure == pytest.approx(reach(sight, visibility, (LEAST_CONTRAST, 0.0, 0.0)), abs=0.11)
+    assert hidden == pytest.approx(reach(sight, visibility, (1.0, BRIGHTEST, 1.0)), abs=0.02)
+    white = inherent_contrast((1.0, 1.0, 1.0))
+    for distance in np.linspace(0.1, sure, 50) if sure else ():
+        assert k * distance <= sight.depth_limit(distance, white, 0.0, 0.0)
+    for distance in np.geomspace(hidden, 10.0 * hidden, 50):
+        assert k * distance > sight.depth_limit(distance, 1.0, BRIGHTEST)
+
+
+def test_bounds_in_clear_air() -> None:
+    assert DAY.sure_distance(0.0) == DAY.hidden_distance(0.0) == math.inf
+    assert NIGHT.sure_distance(0.0) < 1.0
+    assert NIGHT.hidden_distance(0.0) > math.sqrt(BRIGHTEST / 1.1e-5)
+    assert NIGHT.hidden_distance(0.02, brightest=600.0) > NIGHT.hidden_distance(0.02)
+
+
+def test_glare_raises_both_thresholds() -> None:
+    """A veil of glare counts like so much more light that the eye is adapted to, as Adrian's equations have it."""
+    dazzled = adaptation(0.0, glare=1.0)
+    assert dazzled.eye_threshold == pytest.approx(adaptation(1.0 * math.pi / 0.95).eye_threshold)
+    assert dazzled.eye_threshold > 2.0 * DARK_THRESHOLD
+    assert reach(NIGHT, 400.0, UNLIT, glare=1.0) < 0.85 * reach(NIGHT, 400.0, UNLIT)
+    assert reach(NIGHT, 400.0, LIT, glare=1.0) < 0.95 * reach(NIGHT, 400.0, LIT)
+    assert reach(DAY, 400.0, LIT, glare=1.0) == pytest.approx(reach(DAY, 400.0, LIT), rel=1e-3)
+    assert adaptation(1e5, glare=10.0).eye_threshold == DAY_EYE_THRESHOLD

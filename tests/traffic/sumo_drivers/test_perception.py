@@ -74,11 +74,8 @@ class SeesFrom:
     def hidden_distance(self, *_: float) -> float:
         return self.distance + 10.0
 
-    def body_limit(self, distance: float, _: float) -> float:
+    def depth_limit(self, distance: float, *_: float) -> float:
         return math.inf if distance <= self.distance else -math.inf
-
-    def lamp_limit(self, *_: float) -> float:
-        return -math.inf
 
 
 @pytest.fixture

@@ -43,15 +43,15 @@ def is_seen(api: Any, fog: FieldAccess, sight: DriverSight, pair: tuple[str, str
     distance = max(gap + api.vehicle.getMinGap(follower), 0.1)
     length = sum((b - a) ** 2 for a, b in zip(eyes, rear, strict=True)) ** 0.5
     end = [a + (b - a) * distance / length for a, b in zip(eyes, rear, strict=True)]
-    depth = fog.optical_depth([eyes], [end])
+    (depth,) = fog.optical_depth([eyes], [end])
     lit = int(lamps if leader == "ego" else OTHERS_LAMPS) | lamps_from_signals(api.vehicle.getSignals(leader))
     contrast = inherent_contrast(paint(leader, api.vehicle.getColor(leader)))
-    seen = sight.sees_body([distance], depth, [contrast]) | sight.sees_lamp([distance], depth, [rear_intensity(lit)])
-    return bool(seen[0])
+    head_lamps = 0.0 if follower == "ego" else 1.0
+    return bool(depth <= sight.depth_limit(distance, contrast, rear_intensity(lit), head_lamps))
 
 
 @pytest.mark.parametrize("field", [EVEN, BANKS], ids=["even", "banks"])
-@pytest.mark.parametrize("illuminance", [10_000.0, 0.1], ids=["day", "night"])
+@pytest.mark.parametrize("illuminance", [10_000.0, 3.0, 0.1], ids=["day", "dusk", "night"])
 def test_scheduled_looks_decide_as_looks_in_every_step(link: LibsumoLink, field: FogField, illuminance: float) -> None:
     """For every leader that has been the leader for as long as a look may wait."""
     api, fog = link.begin(ARGUMENTS), FieldAccess(field)

@@ -1,4 +1,4 @@
-"""Disability glare: the veil that light scattered inside the eye lays over what is looked at."""
+"""The human eye: how its thresholds follow the luminance it is adapted to, and the veil that glare lays over it."""
 
 import math
 
@@ -7,8 +7,43 @@ from numpy.typing import ArrayLike, NDArray
 
 from fogsim.errors import InputError
 
+LEAST_LUMINANCE = 1e-6
+"""Luminance below which the formulas are read at this value [cd/m²]."""
+
 LEAST_ANGLE = math.radians(1.0)
 """Angle below which the formula is read at this angle [rad]; it is known from 1° to 30°."""
+
+
+def flux_root(luminance: ArrayLike) -> NDArray[np.float64]:
+    """√φ of Adrian's formula (1989), that of Ricco's law for small targets.
+
+    Parameters
+    ----------
+    luminance : array_like
+        Adaptation luminance [cd/m²].
+    """
+    value = np.asarray(luminance, dtype=np.float64)
+    log = np.log10(np.maximum(value, LEAST_LUMINANCE))
+    bright = np.log10(4.1925 * 10.0 ** (0.1556 * log)) + 0.1684 * 10.0 ** (0.5867 * log)
+    middle = 10.0 ** (-0.072 + 0.3372 * log + 0.0866 * log**2)
+    dark = 10.0 ** (0.028 + 0.173 * log)
+    return np.select([value >= 0.6, value > 0.00418], [bright, middle], dark)
+
+
+def luminance_root(luminance: ArrayLike) -> NDArray[np.float64]:
+    """√L of Adrian's formula (1989), that of Weber's law for large targets.
+
+    Parameters
+    ----------
+    luminance : array_like
+        Adaptation luminance [cd/m²].
+    """
+    value = np.asarray(luminance, dtype=np.float64)
+    log = np.log10(np.maximum(value, LEAST_LUMINANCE))
+    bright = 0.05946 * 10.0 ** (0.466 * log)
+    middle = 10.0 ** (-1.256 + 0.319 * log)
+    dark = 10.0 ** (-0.891 + 0.5275 * log + 0.0227 * log**2)
+    return np.select([value >= 0.6, value > 0.00418], [bright, middle], dark)
 
 
 def veiling_luminance(illuminance: ArrayLike, angle: ArrayLike, age: float = 25.0) -> NDArray[np.float64]:

@@ -8,8 +8,8 @@ A vehicle is seen where
 with the optical depth τ of the line of sight, the distance d, the inherent contrast C₀ of the body, the luminances
 L_air of the fog in the sky's light and L of all that the eye is adapted to, and the intensity I of the brightest lamp.
 The first term of A is Koschmieder's law, the second Allard's; B is what the own head lamps light, through fog twice: it
-is 1 at `DriverSight.headlamp_reach` at night in clear air. Shares of the threshold are added: a body that is nearly seen
-and lamps that are nearly seen are seen together. Solved for e^(−τ), that is a square root. The thresholds C_th and E_th
+is 1 at `DriverSight.headlamp_reach` at night in clear air. Shares of the threshold are added: a body that is nearly
+seen and lamps that are nearly seen are seen together. Solved for e^(−τ), that is a square root. C_th and E_th
 follow adaptation; see `fogsim.traffic.drivers.adaptation`.
 """
 

@@ -10,13 +10,21 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from fogsim.atmosphere import FieldAccess
-from fogsim.traffic import Compliance, DriverSetup, DriverSight, Traffic, TrafficSetup, libsumo_traffic
-from fogsim.traffic.drivers.speed_choice import (
-    within_sight,
+from fogsim.traffic import (
+    Compliance,
+    DriverSetup,
+    DriverSight,
+    LampFailureEvent,
+    Traffic,
+    TrafficSetup,
+    Trigger,
+    libsumo_traffic,
 )
+from fogsim.traffic.drivers.lamp_intensity import rear_intensity
+from fogsim.traffic.drivers.speed_choice import within_sight
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink, load_libsumo
 from fogsim.traffic.sumo_drivers.leader_sight import LeaderSight
-from fogsim.values import Collision, Command, FogBank, FogField
+from fogsim.values import Collision, Command, FogBank, FogField, Lamp
 
 NET = Path(__file__).resolve().parents[3] / "scenarios" / "motorway_fog_bank" / "motorway.net.xml"
 EMERGENCY_DECELERATION = 9.0  # SUMO's default of a passenger car
@@ -140,6 +148,36 @@ def test_real_eyes_in_dense_fog_hit_and_in_thin_fog_stop(setup: TrafficSetup) ->
     eyes = replace(setup, sight=DriverSight(illuminance=10_000.0))
     assert len(collisions(eyes, k=3.0 / 30.0)[0]) == 1
     assert collisions(eyes, k=3.0 / 400.0)[0] == []
+
+
+def first_braking(setup: TrafficSetup, illuminance: float) -> float:
+    """Gap to the wreck when the ego first brakes in fog of 60 m [m]."""
+    traffic = libsumo_traffic(replace(setup, sight=DriverSight(illuminance, reaction_time=0.0), step_length=0.02))
+    traffic.enter_fog(Fog(3.0 / 60.0))
+    try:
+        traffic.start(1)
+        speed = 0.0
+        while True:
+            traffic.advance(Command())
+            snapshot = traffic.observe()
+            assert snapshot is not None
+            before, speed = speed, float(snapshot.state.speed[snapshot.ego])
+            if snapshot.leader is not None and speed < before - 0.05:
+                return snapshot.leader.gap
+    finally:
+        traffic.close()
+
+
+@pytest.mark.parametrize("are_lit", [True, False])
+def test_in_dusk_a_driver_first_brakes_where_the_laws_say_without_a_jump(setup: TrafficSetup, are_lit: bool) -> None:
+    failure = LampFailureEvent("wreck", Trigger(at_time=0.0))
+    setup = setup if are_lit else replace(setup, events=(failure,))
+    gaps = [first_braking(setup, lux) for lux in (10.0, 9.9, 0.3)]
+    # From one step to the next the ego drives 0.7 m.
+    assert gaps[0] == pytest.approx(gaps[1], abs=0.75)
+    for gap, lux in zip(gaps, (10.0, 9.9, 0.3), strict=True):
+        limit = DriverSight(lux).depth_limit(gap, 1.0, rear_intensity(int(Lamp.POSITION)) if are_lit else 0.0)
+        assert 3.0 / 60.0 * gap == pytest.approx(limit, abs=0.2)
 
 
 @pytest.mark.parametrize("bank", [False, True])

@@ -23,11 +23,16 @@ ALL = "all"
 
 
 def reproduce_command(
-    paper: Annotated[str, typer.Argument(metavar="PAPER|all", help="A paper whose evaluation is run again.")],
+    paper: Annotated[
+        str,
+        typer.Argument(
+            metavar="PAPER|all", help="A paper whose evaluation is run again; drivers: field studies of traffic in fog."
+        ),
+    ],
     out: Annotated[Path | None, typer.Option(help="Folder for PAPER.png, a picture like the paper's.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Flat records, one a line, in place of the tables.")] = False,
 ) -> None:
-    """Run a paper's evaluation again on FogSim's frames; its figures stand beside ours."""
+    """Run a paper's evaluation again on FogSim's frames or traffic; its figures stand beside ours."""
     from fogsim.reproduce import REPRODUCTIONS
 
     if paper != ALL and paper not in REPRODUCTIONS:

@@ -1,9 +1,9 @@
-"""Papers' evaluations run again on FogSim's frames, one paper a module, in one registry."""
+"""Papers' evaluations run again on FogSim's frames and traffic, in one registry."""
 
 from typing import Protocol
 
 from fogsim.registry import Registry
-from fogsim.reproduce import huang2015, negru2013, zhu2015
+from fogsim.reproduce import drivers, huang2015, negru2013, zhu2015
 from fogsim.reproduce.result import Reproduction, Watch, unwatched
 
 
@@ -15,8 +15,14 @@ class Evaluation(Protocol):
 
 
 REPRODUCTIONS: Registry[Evaluation] = Registry(
-    "paper", {"negru2013": negru2013.reproduce, "zhu2015": zhu2015.reproduce, "huang2015": huang2015.reproduce}
+    "paper",
+    {
+        "negru2013": negru2013.reproduce,
+        "zhu2015": zhu2015.reproduce,
+        "huang2015": huang2015.reproduce,
+        "drivers": drivers.reproduce,
+    },
 )
-"""Every paper by name: called, it reruns the evaluation."""
+"""Every paper by name, and ``drivers`` for the field studies of traffic: called, it reruns the evaluation."""
 
 __all__ = ["REPRODUCTIONS", "Evaluation", "Reproduction", "Watch"]

@@ -1,0 +1,227 @@
+"""What field studies found of traffic in fog, and what of ours stands beside it.
+
+Of the reports only abstracts and summaries have been seen:
+
+- LR958: White & Jeffery 1980, Transport and Road Research Laboratory; the M4, three lanes
+- SR281: Sumner, Baguley & Burton 1977, the same; 1780 vehicles on the M4
+- M4 1976: Commercial Motor, 10 December 1976, on the study that became SR281
+- C-6: Hogema & van der Horst 1994, TNO-TM; loops on a two-lane motorway near Breda, by day, a year
+- A16: Hogema & van der Horst 1997, as the US DOT's database of benefits tells it
+- SHRP2: Transportation Research Record 2018, doi 10.1177/0361198118774748; how near its "near fog" is, is not told
+"""
+
+import itertools
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.reproduce.drivers.plan import CLEAR, SPARSE
+from fogsim.reproduce.drivers.published import Bound, Finding, Look, Sign, Size
+
+Values = NDArray[np.float64]
+Ours = Callable[[Look], Values]
+
+DENSE_FOGS = (100.0, 70.0, 50.0)
+"""Visibilities of the range in which C-6 found drivers most critical, 40 to 100 m [m]."""
+
+_THICKENING = (200.0, 150.0, 100.0, 70.0, 50.0, 30.0)
+
+
+def _mean_over(visibilities: Sequence[float], value: Callable[[float], Values]) -> Values:
+    return np.asarray(np.mean([value(v) for v in visibilities], axis=0))
+
+
+def _free_speed(look: Look, visibility: float) -> Values:
+    return look("free_speed", visibility, SPARSE)
+
+
+def _free_speed_change(visibility: float) -> Ours:
+    """Change of the free speed from clear air [%]."""
+    return lambda look: 100.0 * (_free_speed(look, visibility) / _free_speed(look, CLEAR) - 1.0)
+
+
+def _share(measure: str, visibility: float) -> Ours:
+    """A share [%]."""
+    return lambda look: 100.0 * look(measure, visibility)
+
+
+def _change(measure: str, visibility: float) -> Ours:
+    """Change of a share from clear air [percentage points]."""
+    return lambda look: 100.0 * (look(measure, visibility) - look(measure, CLEAR))
+
+
+def _sign_effect(measure: str, visibility: float) -> Ours:
+    """What signs change."""
+    return lambda look: look.signed(measure, visibility) - look(measure, visibility)
+
+
+def _over_clear(measure: str) -> Ours:
+    """Mean over 50 to 100 m, over that in clear air [-]."""
+    return lambda look: _mean_over(DENSE_FOGS, lambda v: look(measure, v)) / look(measure, CLEAR)
+
+
+def _least_fall(look: Look) -> Values:
+    """Least fall of the free speed from one visibility to the next smaller one, from 200 m down [km/h]."""
+    speeds = [_free_speed(look, v) for v in _THICKENING]
+    return np.asarray(np.min([a - b for a, b in itertools.pairwise(speeds)], axis=0))
+
+
+def _excess_between(look: Look) -> Values:
+    """By how much more drivers overdrive at 50 to 100 m than at 30 m and at 200 m [percentage points]."""
+    inside = _mean_over(DENSE_FOGS, lambda v: look("overdriving_aashto", v))
+    outside = np.maximum(look("overdriving_aashto", 30.0), look("overdriving_aashto", 200.0))
+    return 100.0 * (inside - outside)
+
+
+SIX: tuple[Finding, ...] = (
+    Finding(
+        "speed_at_200m",
+        "free speed unaffected above about 200 m: change at 200 m",
+        "LR958",
+        Bound(-3.0, 3.0, "%"),
+        _free_speed_change(200.0),
+        six=True,
+    ),
+    Finding(
+        "overdriving_at_50m",
+        "more than half exceed the speed from which they stop within sight at ≤ 50 m",
+        "SR281",
+        Bound(50.0, 100.0, "%"),
+        _share("overdriving", 50.0),
+        six=True,
+    ),
+    Finding(
+        "below_2s_at_150m",
+        "one third of all vehicles follow within 2 s at 150 m",
+        "LR958",
+        Size(33.3, 33.3, "%"),
+        _share("headway_below_2", 150.0),
+        six=True,
+    ),
+    Finding(
+        "speed_below_35m",
+        "mean speed below 35 m without signs (ours: 30 m)",
+        "A16",
+        Size(29.0, 29.0, "km/h"),
+        lambda look: look("mean_speed", 30.0),
+        six=True,
+    ),
+    Finding(
+        "signs_at_100m",
+        "what signs change of the mean speed (ours: 100 m, 80 km/h shown)",
+        "A16",
+        Size(-10.0, -8.0, "km/h"),
+        _sign_effect("mean_speed", 100.0),
+        six=True,
+    ),
+    Finding(
+        "speed_in_near_fog",
+        "change of speed in near fog (ours: 100 m)",
+        "SHRP2",
+        Size(-10.0, -10.0, "%"),
+        _free_speed_change(100.0),
+        six=True,
+    ),
+)
+"""The six sizes that are to be met within 30 %."""
+
+OTHER_SIZES: tuple[Finding, ...] = (
+    Finding(
+        "speed_in_distant_fog",
+        "change of speed in distant fog (ours: 150 m)",
+        "SHRP2",
+        Size(-3.0, -3.0, "%"),
+        _free_speed_change(150.0),
+    ),
+    Finding(
+        "speed_above_91m",
+        "mean speed above 91 m, lanes 2 and 3: 101 and 116 km/h (ours: 150 m)",
+        "M4 1976",
+        Size(101.0, 116.0, "km/h"),
+        lambda look: look("mean_speed", 150.0),
+    ),
+    Finding(
+        "stops_at_150m",
+        "most can stop within sight down to 150 m: share that cannot",
+        "LR958",
+        Bound(0.0, 50.0, "%"),
+        _share("overdriving", 150.0),
+    ),
+    Finding(
+        "headway_stays",
+        "no effect of fog on the headways of followers (ours: 50–100 m)",
+        "C-6",
+        Size(1.0, 1.0, "of clear air"),
+        _over_clear("following_headway"),
+    ),
+    Finding(
+        "signs_below_35m",
+        "mean speed below 35 m with signs (ours: 30 m, 60 km/h shown)",
+        "A16",
+        Size(60.0, 60.0, "km/h"),
+        lambda look: look.signed("mean_speed", 30.0),
+    ),
+    Finding(
+        "signs_leave_headway",
+        "signs hardly change the headways of followers (ours: 100 m)",
+        "A16",
+        Size(1.0, 1.0, "of no signs"),
+        lambda look: look.signed("following_headway", 100.0) / look("following_headway", 100.0),
+    ),
+)
+
+SIGNS_OF_CHANGE: tuple[Finding, ...] = (
+    Finding(
+        "speed_falls",
+        "free speed falls with visibility: least fall of five steps from 200 to 30 m",
+        "C-6",
+        Sign(rises=True, unit="km/h"),
+        _least_fall,
+    ),
+    Finding(
+        "worst_between_40_and_100m",
+        "stopping within sight fails most between 40 and 100 m: excess over 30 and 200 m, by 2.5 s and 3.4 m/s²",
+        "C-6",
+        Sign(rises=True, unit="points"),
+        _excess_between,
+    ),
+    Finding(
+        "close_following_rises",
+        "more follow within 2 s at 150 m than in clear air",
+        "LR958",
+        Sign(rises=True, unit="points"),
+        _change("headway_below_2", 150.0),
+    ),
+    Finding(
+        "distance_falls",
+        "following distances fall (ours: 50–100 m)",
+        "C-6",
+        Sign(rises=False, unit="of clear air", origin=1.0),
+        _over_clear("following_distance"),
+    ),
+    Finding(
+        "differences_fall",
+        "differences of speed to the vehicle ahead fall (ours: 50–100 m)",
+        "C-6",
+        Sign(rises=False, unit="of clear air", origin=1.0),
+        _over_clear("speed_difference"),
+    ),
+    Finding(
+        "ttc_rises",
+        "times to collision rise (ours: median, 50–100 m)",
+        "C-6",
+        Sign(rises=True, unit="of clear air", origin=1.0),
+        _over_clear("ttc_50"),
+    ),
+    Finding(
+        "signs_lower_spread",
+        "signs lower the standard deviation of speed slightly (ours: 100 m)",
+        "A16",
+        Sign(rises=False, unit="km/h"),
+        _sign_effect("speed_sd", 100.0),
+    ),
+)
+
+FINDINGS = SIX + OTHER_SIZES + SIGNS_OF_CHANGE
+"""All findings; the six sizes come first."""

@@ -1,0 +1,159 @@
+"""Passages at a cross-section, and what traffic studies measure of them."""
+
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.kinematics import DECELERATION, REACTION_TIME, safe_speed
+from fogsim.units import KMH_PER_MPS
+
+FREE_ABOVE = 5.0
+"""Time headway above which a vehicle is free, and below which it follows [s]."""
+
+THINKING_TIME, BRAKING = 0.67, 6.57
+"""Reaction time [s] and deceleration [m/s²] of the Highway Code's stopping distances (50 mph: 15 + 38 m).
+
+By these the Transport and Road Research Laboratory judged what it saw on the M4 (Commercial Motor, 10 December 1976).
+"""
+
+
+class Passages(NamedTuple):
+    """Vehicles at a cross-section in the order in which they came, but for each lane's first.
+
+    Attributes
+    ----------
+    speed, leader_speed : (n,) float64
+        Own speed, and that of the vehicle before it in its lane [m/s].
+    headway : (n,) float64
+        Time between their fronts [s].
+    gap : (n,) float64
+        Distance to the vehicle before it [m].
+    """
+
+    speed: NDArray[np.float64]
+    leader_speed: NDArray[np.float64]
+    headway: NDArray[np.float64]
+    gap: NDArray[np.float64]
+
+
+def passages(events: Iterable[Mapping[str, str]], since: float) -> Passages:
+    """Put together what loops saw.
+
+    Parameters
+    ----------
+    events : iterable of mappings
+        What SUMO's instantaneous loops write: ``id`` of the loop, ``time``, ``state`` (enter, stay, leave), ``speed``.
+    since : float
+        Time before which nothing counts [s].
+    """
+    rows: list[tuple[float, float, float, float]] = []
+    before: dict[str, tuple[float, float]] = {}
+    left: dict[str, float] = {}
+    for event in events:
+        lane, time, speed = event["id"], float(event["time"]), float(event["speed"])
+        if event["state"] == "leave":
+            left[lane] = time
+        elif event["state"] == "enter":
+            if lane in before and lane in left and time > since:
+                entered, leader_speed = before[lane]
+                rows.append((speed, leader_speed, time - entered, speed * (time - left[lane])))
+            before[lane] = (time, speed)
+            left.pop(lane, None)
+    return Passages(*np.array(rows, np.float64).reshape(-1, 4).T)
+
+
+class Measures(NamedTuple):
+    """What is measured at one cross-section in one run; NaN where nothing was there to be measured.
+
+    Attributes
+    ----------
+    flow : float
+        Vehicles on both lanes [1/h].
+    free_speed, free_speed_sd : float
+        Mean and standard deviation of free vehicles' speeds [km/h].
+    mean_speed, speed_sd : float
+        Those of all vehicles [km/h].
+    overdriving : float
+        Share of vehicles that are too fast to stop within V_met by the Highway Code [-].
+    overdriving_aashto : float
+        The same by FogSim's own 2.5 s and 3.4 m/s² (AASHTO) [-].
+    headway_15 : float
+        15th percentile of time headways [s].
+    headway_below_1, headway_below_2 : float
+        Shares of time headways below 1 s and 2 s [-].
+    following_headway, following_distance : float
+        Mean time headway [s] and gap [m] of those who follow.
+    speed_difference : float
+        Mean absolute difference of speed to the vehicle ahead of those who follow [m/s].
+    ttc_15, ttc_50 : float
+        15th and 50th percentile of the time to collision of those who follow and come closer [s].
+    ttc_below_10 : float
+        Share of those who follow whose time to collision is below 10 s [-].
+    """
+
+    flow: float
+    free_speed: float
+    free_speed_sd: float
+    mean_speed: float
+    speed_sd: float
+    overdriving: float
+    overdriving_aashto: float
+    headway_15: float
+    headway_below_1: float
+    headway_below_2: float
+    following_headway: float
+    following_distance: float
+    speed_difference: float
+    ttc_15: float
+    ttc_50: float
+    ttc_below_10: float
+
+
+def measured(seen: Passages, visibility: float, seconds: float) -> Measures:
+    """Measure what was seen.
+
+    Parameters
+    ----------
+    seen : Passages
+        Who passed.
+    visibility : float
+        V_met [m]; ``inf`` in clear air.
+    seconds : float
+        For how long was watched [s].
+    """
+    follows = seen.headway < FREE_ABOVE
+    free, closing = seen.speed[~follows], (seen.speed - seen.leader_speed)[follows]
+    gap = seen.gap[follows]
+    ttc = gap[closing > 0.0] / closing[closing > 0.0]
+    return Measures(
+        flow=len(seen.speed) / seconds * 3600.0,
+        free_speed=_mean(free) * KMH_PER_MPS,
+        free_speed_sd=_deviation(free) * KMH_PER_MPS,
+        mean_speed=_mean(seen.speed) * KMH_PER_MPS,
+        speed_sd=_deviation(seen.speed) * KMH_PER_MPS,
+        overdriving=_mean(seen.speed > safe_speed(visibility, THINKING_TIME, BRAKING)),
+        overdriving_aashto=_mean(seen.speed > safe_speed(visibility, REACTION_TIME, DECELERATION)),
+        headway_15=_percentile(seen.headway, 15.0),
+        headway_below_1=_mean(seen.headway < 1.0),
+        headway_below_2=_mean(seen.headway < 2.0),
+        following_headway=_mean(seen.headway[follows]),
+        following_distance=_mean(gap),
+        speed_difference=_mean(np.abs(closing)),
+        ttc_15=_percentile(ttc, 15.0),
+        ttc_50=_percentile(ttc, 50.0),
+        ttc_below_10=float(np.sum(ttc < 10.0) / len(gap)) if len(gap) else np.nan,
+    )
+
+
+def _mean(values: NDArray[np.float64] | NDArray[np.bool_]) -> float:
+    return float(np.mean(values)) if values.size else np.nan
+
+
+def _deviation(values: NDArray[np.float64]) -> float:
+    return float(np.std(values, ddof=1)) if values.size > 1 else np.nan
+
+
+def _percentile(values: NDArray[np.float64], share: float) -> float:
+    return float(np.percentile(values, share)) if values.size else np.nan

@@ -1,0 +1,81 @@
+"""What of the evaluation of drivers in fog is run: who drives, how many, in which fog, with which seeds."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+CALIBRATION_SEEDS = tuple(range(101, 111))
+"""Seeds with which constants of the drivers were calibrated. None of them is reported."""
+
+REPORT_SEEDS = tuple(range(1, 11))
+"""Seeds that are reported. Nothing was calibrated with them."""
+
+DEFAULT, SEEING, SIGNED = "default", "see_through_fog", "with signs"
+
+POPULATIONS: Mapping[str, tuple[str, ...]] = {DEFAULT: (), SEEING: ("drivers.see_through_fog=true",)}
+"""Who drives, by what is set in their scenario."""
+
+SPARSE, MEDIUM, DENSE = 600.0, 1200.0, 2400.0
+"""Demands on both lanes [vehicles/h]."""
+
+CLEAR = math.inf
+"""Visibility of clear air [m]."""
+
+SIGNS: Mapping[float, float] = {100.0: 80.0, 50.0: 60.0, 30.0: 60.0}
+"""What the A16's signs advise [km/h] by V_met [m]: 80 from 70 to 140 m, 60 below (Hogema & van der Horst 1997)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One kind of traffic in one fog.
+
+    Attributes
+    ----------
+    population : str
+        Who drives: a name of the plan's populations, or `SIGNED`, the default drivers under the A16's signs.
+    demand : float
+        Vehicles that want to enter, on both lanes [vehicles/h].
+    visibility : float
+        V_met [m]; ``inf`` in clear air.
+    """
+
+    population: str
+    demand: float
+    visibility: float
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Which part of the evaluation is run.
+
+    Attributes
+    ----------
+    seeds : tuple of int
+        Seeds of SUMO and of the drivers' traits.
+    demands : tuple of float
+        Vehicles that want to enter, on both lanes [vehicles/h].
+    visibilities : tuple of float
+        V_met [m]; clear air is among them.
+    populations : mapping of str to tuple of str
+        Who drives, each by the keys of a scenario that are set: ``drivers.…=…``.
+    seconds : float
+        For how long the cross-section is watched [s].
+    """
+
+    seeds: tuple[int, ...] = REPORT_SEEDS
+    demands: tuple[float, ...] = (SPARSE, MEDIUM, DENSE)
+    visibilities: tuple[float, ...] = (CLEAR, 300.0, 200.0, 150.0, 100.0, 70.0, 50.0, 30.0)
+    populations: Mapping[str, tuple[str, ...]] = field(default_factory=lambda: POPULATIONS)
+    seconds: float = 600.0
+
+    @property
+    def cases(self) -> tuple[Case, ...]:
+        """Every case once."""
+        own = tuple(
+            Case(population, demand, visibility)
+            for population in self.populations
+            for demand in self.demands
+            for visibility in self.visibilities
+        )
+        signed = tuple(Case(SIGNED, MEDIUM, v) for v in self.visibilities if v in SIGNS and MEDIUM in self.demands)
+        return own + (signed if DEFAULT in self.populations else ())

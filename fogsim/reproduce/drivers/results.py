@@ -1,0 +1,73 @@
+"""What was measured over seeds, and how sure it is."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.reproduce.drivers.passages import Measures
+from fogsim.reproduce.drivers.plan import Case
+
+RESAMPLES = 4000
+"""Bootstrap samples of an interval."""
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """A mean over seeds with its 95 % interval, by bootstrap over seeds.
+
+    Attributes
+    ----------
+    mean, low, high : float
+        NaN where no run gave a value.
+    """
+
+    mean: float
+    low: float
+    high: float
+
+
+def interval(values: NDArray[np.float64]) -> Interval:
+    """Mean over seeds and its interval; runs without a value do not count.
+
+    Parameters
+    ----------
+    values : (n,) float64
+        One for each seed.
+    """
+    told = values[np.isfinite(values)]
+    if not told.size:
+        return Interval(np.nan, np.nan, np.nan)
+    means = np.random.default_rng(0).choice(told, (RESAMPLES, told.size)).mean(axis=1)
+    low, high = np.percentile(means, (2.5, 97.5))
+    return Interval(float(told.mean()), float(low), float(high))
+
+
+@dataclass(frozen=True, slots=True)
+class Results:
+    """All that was measured.
+
+    Attributes
+    ----------
+    runs : mapping of Case to tuple of Measures
+        One for each seed, in the same order everywhere.
+    """
+
+    runs: Mapping[Case, tuple[Measures, ...]]
+
+    def __contains__(self, case: object) -> bool:
+        """Whether a case was run."""
+        return case in self.runs
+
+    def over_seeds(self, case: Case, measure: str) -> NDArray[np.float64]:
+        """One measure of a case, seed by seed (n,).
+
+        Parameters
+        ----------
+        case : Case
+            The traffic and its fog.
+        measure : str
+            A field of `Measures`.
+        """
+        return np.array([getattr(run, measure) for run in self.runs[case]], np.float64)

@@ -1,0 +1,156 @@
+"""Tables and records of the evaluation of drivers in fog."""
+
+import math
+from collections.abc import Mapping, Sequence
+
+from fogsim.reproduce.drivers.findings import FINDINGS
+from fogsim.reproduce.drivers.passages import Measures
+from fogsim.reproduce.drivers.plan import SIGNED, Case, Plan
+from fogsim.reproduce.drivers.published import Finding, Look, Verdict
+from fogsim.reproduce.drivers.results import Interval, Results, interval
+from fogsim.reproduce.result import Cell, Rows, TitledTable
+from fogsim.units import finite_or_none
+
+_COLUMNS: Mapping[str, tuple[str, float, int]] = {
+    "flow": ("flow, 1/h", 1.0, 0),
+    "free_speed": ("free speed, km/h", 1.0, 1),
+    "free_speed_sd": ("its sd", 1.0, 1),
+    "overdriving": ("overdrives, %", 100.0, 0),
+    "overdriving_aashto": ("by AASHTO, %", 100.0, 0),
+    "headway_15": ("headway 15 %, s", 1.0, 2),
+    "headway_below_1": ("< 1 s, %", 100.0, 1),
+    "headway_below_2": ("< 2 s, %", 100.0, 1),
+    "following_headway": ("followers' headway, s", 1.0, 2),
+    "following_distance": ("and gap, m", 1.0, 1),
+    "ttc_15": ("TTC 15 %, s", 1.0, 0),
+    "ttc_50": ("TTC 50 %, s", 1.0, 0),
+    "ttc_below_10": ("TTC < 10 s, %", 100.0, 1),
+}
+"""Heading, factor and digits of what the tables of traffic show."""
+
+
+def tables(results: Results, plan: Plan) -> tuple[TitledTable, ...]:
+    """Published findings with ours, then the traffic of every population.
+
+    Parameters
+    ----------
+    results : Results
+        What was measured.
+    plan : Plan
+        What was run.
+    """
+    seeds = f"{len(plan.seeds)} seeds, mean [95 % interval]"
+    found = TitledTable(f"What is published, and ours ({seeds})", findings_table(results, tuple(plan.populations)))
+    names = [*plan.populations, *({case.population for case in plan.cases} - {*plan.populations})]
+    traffic = (TitledTable(f"Traffic: {name} ({seeds})", _traffic(results, plan, name)) for name in names)
+    return (found, *traffic)
+
+
+def findings_table(results: Results, populations: Sequence[str]) -> Rows:
+    """Every finding with ours of some populations beside it.
+
+    Parameters
+    ----------
+    results : Results
+        What was measured.
+    populations : sequence of str
+        Whose.
+    """
+    heading = ["published", "source", "size", *(cell for name in populations for cell in (name, "agrees"))]
+    rows = [tuple(heading)]
+    for finding in FINDINGS:
+        row = [f"{'* ' if finding.six else ''}{finding.text}", finding.source, str(finding.published)]
+        for name in populations:
+            ours, verdict = compared(finding, results, name)
+            row += [_cell(ours, 1.0, _digits(ours)), "—" if verdict is Verdict.UNKNOWN else verdict.value]
+        rows.append(tuple(row))
+    return tuple(rows)
+
+
+def compared(finding: Finding, results: Results, population: str) -> tuple[Interval, Verdict]:
+    """Ours of a population, and whether it agrees.
+
+    Parameters
+    ----------
+    finding : Finding
+        What is published.
+    results : Results
+        What was measured.
+    population : str
+        Whose.
+    """
+    ours = interval(finding.values(Look(results, population)))
+    return ours, finding.verdict(ours.mean)
+
+
+def _digits(ours: Interval) -> int:
+    return 2 if abs(ours.mean) < 3.0 else 1
+
+
+def _cell(value: Interval, factor: float, digits: int) -> str:
+    if math.isnan(value.mean):
+        return "—"
+    mean, low, high = (f"{factor * number + 0.0:.{digits}f}" for number in (value.mean, value.low, value.high))
+    return f"{mean} [{low}, {high}]"
+
+
+def _traffic(results: Results, plan: Plan, population: str) -> Rows:
+    rows = [("demand, 1/h", "V_met, m", *(heading for heading, _, _ in _COLUMNS.values()))]
+    for case in plan.cases:
+        if case.population == population:
+            cells = (
+                _cell(interval(results.over_seeds(case, name)), factor, digits)
+                for name, (_, factor, digits) in _COLUMNS.items()
+            )
+            rows.append((f"{case.demand:.0f}", _metres(case.visibility), *cells))
+    return tuple(rows)
+
+
+def _metres(visibility: float) -> str:
+    return f"{visibility:.0f}" if math.isfinite(visibility) else "∞"
+
+
+def records(results: Results, plan: Plan) -> tuple[Mapping[str, Cell], ...]:
+    """Flat records: one for each measure of each case, then one for each finding of each population.
+
+    Parameters
+    ----------
+    results : Results
+        What was measured.
+    plan : Plan
+        What was run.
+    """
+    found: list[Mapping[str, Cell]] = [
+        _case_record(case) | _interval_record(measure, interval(results.over_seeds(case, measure)))
+        for case in plan.cases
+        for measure in Measures._fields
+    ]
+    for population in plan.populations:
+        for finding in FINDINGS:
+            ours, verdict = compared(finding, results, population)
+            told: dict[str, Cell] = {
+                "published": str(finding.published),
+                "source": finding.source,
+                "one_of_six": finding.six,
+                "verdict": verdict.value,
+            }
+            found.append({"population": population} | _interval_record(finding.name, ours) | told)
+    return tuple(found)
+
+
+def _case_record(case: Case) -> dict[str, Cell]:
+    return {
+        "population": case.population,
+        "demand_per_h": case.demand,
+        "visibility_m": finite_or_none(case.visibility),
+        "signs": case.population == SIGNED,
+    }
+
+
+def _interval_record(name: str, value: Interval) -> dict[str, Cell]:
+    return {
+        "measure": name,
+        "mean": finite_or_none(value.mean),
+        "low": finite_or_none(value.low),
+        "high": finite_or_none(value.high),
+    }

@@ -1,0 +1,228 @@
+"""Ten minutes of networks that FogSim did not write: alone, in clear air and in fog.
+
+For each network (`benchmarks/foreign_networks.py`) SUMO runs alone first. Then FogSim's drivers, as they are by
+default, run the same simulation with the same seed in homogeneous fog by day; who drives longest is the ego, around
+which the traffic is read in each step. In clear air (V_met infinite) every vehicle and every person must be where they
+are in SUMO alone: ``same`` compares the files of floating car data (place, speed, acceleration, lane, angle; in each
+second, with 12 digits after the point).
+
+    python benchmarks/networks.py [--json] [--seconds 600] [--visibilities inf 100 30] [--networks grid rail …]
+        [--step 0.2] [--per-hour 1500] [--jobs 1]
+
+``collisions`` are pairs of vehicles, ``teleports`` those that SUMO takes out of jams and blockades, ``cpu_s`` the time
+of the run. Networks of packages that are not installed are left out, and named. The exit code is 1 if a run fails, or
+if one in clear air is not the same. Traffic of the netgenerate networks: ``--per-hour`` vehicles.
+"""
+
+import argparse
+import hashlib
+import itertools
+import json
+import math
+import multiprocessing
+import sys
+import tempfile
+import time
+import traceback
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from foreign_networks import NETWORKS, Network, write_configuration
+
+from fogsim.atmosphere import FieldAccess
+from fogsim.scenario import build
+from fogsim.scenario.loading import clock_settings, scenario_from_config
+from fogsim.traffic import TrafficSetup
+from fogsim.traffic.sumo.libsumo_link import LibsumoLink
+from fogsim.traffic.sumo.link import Api
+from fogsim.traffic.sumo_traffic import SumoTraffic, command_line
+from fogsim.units import extinction_from_visibility
+from fogsim.values import Command, FogField
+
+SEED = 1
+AIRLIGHT = (3000.0, 3000.0, 3000.0)
+FCD = "fcd.xml"
+CLEAR = "inf m"
+BY_NAME = {network.name: network for network in NETWORKS}
+
+Record = dict[str, Any]
+
+
+class Task(NamedTuple):
+    """What is run on each network."""
+
+    seconds: float
+    step: float
+    per_hour: float
+    visibilities: tuple[float, ...]
+
+
+class CountingLink(LibsumoLink):
+    """SUMO in this process, whose steps are watched."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._collided: set[tuple[str, str]] = set()
+        self._since: dict[str, float] = {}
+        self.stay: dict[str, float] = {}
+        self.teleports = self.steps = self.vehicles = 0
+
+    def begin(self, arguments: Sequence[str]) -> Api:
+        """Start SUMO."""
+        self._simulation = (api := super().begin(arguments)).simulation
+        return api
+
+    def step(self) -> None:
+        """Step, and look at what has happened."""
+        super().step()
+        simulation = self._simulation
+        self._collided.update((c.collider, c.victim) for c in simulation.getCollisions())
+        self.teleports += int(simulation.getStartingTeleportNumber())
+        now = float(simulation.getTime())
+        departed = simulation.getDepartedIDList()
+        self.steps += 1
+        self.vehicles += len(departed)
+        self._since.update(dict.fromkeys(departed, now))
+        for vehicle in simulation.getArrivedIDList():
+            self.stay[vehicle] = now - self._since.pop(vehicle)
+
+    @property
+    def collisions(self) -> int:
+        """Pairs that have collided."""
+        return len(self._collided)
+
+    def stays(self) -> dict[str, float]:
+        """Time that everybody has been on the road [s]."""
+        now = float(self._simulation.getTime())
+        return self.stay | {vehicle: now - since for vehicle, since in self._since.items()}
+
+
+def setup(config: Path, ego: str, task: Task) -> TrafficSetup:
+    """The simulation as FogSim runs it by default."""
+    overrides = [*clock_settings(task.step, task.step, task.step), "fog.visibility_m=100"]
+    return build.traffic_setup(scenario_from_config(config, ego, overrides, others_add_vehicles=True))
+
+
+def run_alone(config: Path, task: Task) -> tuple[CountingLink, str]:
+    """Run SUMO alone, with the options that FogSim gives it; gives who drives longest, too."""
+    link = CountingLink()
+    link.begin(command_line(setup(config, "nobody", task), SEED))
+    try:
+        for _ in range(round(task.seconds / task.step)):
+            link.step()
+        stays = link.stays()
+    finally:
+        link.end()
+    return link, max(stays, key=lambda vehicle: (stays[vehicle], vehicle))
+
+
+def run_in_fog(config: Path, task: Task, ego: str, visibility: float) -> CountingLink:
+    """Run the same with FogSim's drivers in fog."""
+    link = CountingLink()
+    traffic = SumoTraffic(setup(config, ego, task), link)
+    traffic.enter_fog(FieldAccess(FogField(extinction_from_visibility(visibility), AIRLIGHT)))
+    traffic.start(SEED)
+    try:
+        while link.steps < round(task.seconds / task.step):
+            traffic.advance(Command())
+            traffic.observe()
+    finally:
+        traffic.close()
+    return link
+
+
+def digest(path: Path) -> str:
+    """Hash of a file of floating car data, without the comment that tells when it was written; the file is removed."""
+    with path.open("rb") as file:
+        rows = itertools.dropwhile(lambda row: b"<fcd-export" not in row, file)
+        total = hashlib.sha256()
+        for row in rows:
+            total.update(row)
+    path.unlink()
+    return total.hexdigest()
+
+
+def measure(network: Network, task: Task) -> list[Record]:
+    """Records of one network."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        try:
+            files = network.make(folder, task.per_hour, task.seconds)
+        except ModuleNotFoundError as missing:
+            return [{"network": network.name, "left_out": str(missing)}]
+        config = write_configuration(folder, files, FCD)
+        began = time.process_time()
+        link, ego = run_alone(config, task)
+        rows = [record(network, "SUMO alone", link, began)]
+        alone = digest(folder / FCD)
+        for visibility in task.visibilities:
+            began = time.process_time()
+            told = f"{visibility:g} m"
+            try:
+                link = run_in_fog(config, task, ego, visibility)
+            except Exception:  # noqa: BLE001 - whatever goes wrong is what is looked for
+                rows.append({"network": network.name, "run": told, "error": traceback.format_exc()})
+                continue
+            rows.append({**record(network, told, link, began), "same": digest(folder / FCD) == alone})
+    return rows
+
+
+def record(network: Network, run: str, link: CountingLink, began: float) -> Record:
+    """What a run has brought."""
+    return {
+        "network": network.name,
+        "run": run,
+        "vehicles": link.vehicles,
+        "collisions": link.collisions,
+        "teleports": link.teleports,
+        "cpu_s": round(time.process_time() - began, 1),
+    }
+
+
+def measured(networks: Sequence[Network], task: Task, jobs: int) -> Iterator[Record]:
+    """Records of networks, each run in a process of its own: what ends one ends no other."""
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(jobs, mp_context=context, max_tasks_per_child=1) as pool:
+        for network, running in [(network, pool.submit(measure_named, network.name, task)) for network in networks]:
+            try:
+                yield from running.result()
+            except Exception as error:  # noqa: BLE001 - also the end of that process
+                yield {"network": network.name, "error": repr(error)}
+
+
+def measure_named(name: str, task: Task) -> list[Record]:
+    """Records of the network of a name."""
+    return measure(BY_NAME[name], task)
+
+
+def failed(record: Record) -> bool:
+    """Whether a run has failed, or was not the same in clear air."""
+    return "error" in record or (record.get("run") == CLEAR and not record["same"])
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", action="store_true", help="print a list of flat records")
+    parser.add_argument("--seconds", type=float, default=600.0, help="simulated time of each run")
+    parser.add_argument("--step", type=float, default=0.2, help="SUMO's step [s]")
+    parser.add_argument("--per-hour", type=float, default=1500.0, help="vehicles an hour where the traffic is ours")
+    parser.add_argument("--visibilities", nargs="+", type=float, default=[math.inf, 100.0, 30.0], help="V_met [m]")
+    parser.add_argument("--networks", nargs="+", choices=[*BY_NAME], default=[*BY_NAME], help="which (default all)")
+    parser.add_argument("--jobs", type=int, default=1, help="networks at once")
+    arguments = parser.parse_args()
+    task = Task(arguments.seconds, arguments.step, arguments.per_hour, tuple(arguments.visibilities))
+    records = []
+    for record in measured([BY_NAME[name] for name in arguments.networks], task, arguments.jobs):
+        records.append(record)
+        if not arguments.json:
+            print(record.get("error", "  ".join(f"{key} {value}" for key, value in record.items())), flush=True)
+    if arguments.json:
+        print(json.dumps(records, indent=2))
+    sys.exit(any(map(failed, records)))
+
+
+if __name__ == "__main__":
+    main()

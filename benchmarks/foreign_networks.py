@@ -148,8 +148,8 @@ NETWORKS = (
     ),
     Network(
         "roundabout",
-        "eclipse-sumo, DRT: a town from OpenStreetMap, all traffic through its roundabout",
-        mixed(GAMES / "DRT" / "osm.net.xml", through="roundabout"),
+        "eclipse-sumo, A10KW: all traffic through the roundabout beside the motorway",
+        mixed(GAMES / "A10KW" / "osm.net.xml", through="roundabout"),
     ),
     Network("rilsa", "eclipse-sumo, RiLSA1: the crossing of the German guidelines", mixed(RILSA / "rilsa1.net.xml")),
     Network(

@@ -11,6 +11,9 @@ from fogsim.atmosphere.fog.medium import field_at, medium_of
 from fogsim.atmosphere.fog.optical_depth_kernels import MOST_PIECES, depths_along, depths_between, extinctions
 from fogsim.values import FogField
 
+HIGHEST_EYES = 4.0
+"""No driver's eyes are higher above the road than this [m]."""
+
 
 def extinction(field: FogField, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
     """Extinction coefficient at points [1/m].
@@ -146,11 +149,14 @@ class FieldAccess:
     def minimum_extinction(self) -> float:
         """Extinction coefficient that is reached always and everywhere below the fog's top [1/m].
 
-        0 for fog that thins with height or has lifted, since a road may lead out of it. Banks do not overlap.
+        0 for fog that thins with height or has lifted, since a road may lead out of it, and for a layer so shallow that
+        drivers look over it. Banks do not overlap.
         """
         field = self.field
         bases = (field.base, *(change.base for change in field.changes))
-        if math.isfinite(field.scale_height) or max(bases) > -math.inf:
+        lowest_top = min((field.top, *(change.top for change in field.changes))) - 0.5 * field.top_edge
+        is_shallow = lowest_top < field.ground + HIGHEST_EYES
+        if math.isfinite(field.scale_height) or max(bases) > -math.inf or is_shallow:
             return 0.0
         thinnest = field.extinction + min((0.0, *(bank.extra_extinction for bank in field.banks)))
         return thinnest * min((c.density for c in field.changes), default=1.0) * float(self._factors.min())

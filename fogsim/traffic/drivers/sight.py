@@ -25,8 +25,8 @@ from fogsim.traffic.drivers.adaptation import AIRLIGHT_REFLECTANCE, NIGHT_EYE_TH
 from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST
 from fogsim.units import CONTRAST_THRESHOLD, luminance_of
 
-EYE_HEIGHT = 1.2
-"""Height of a driver's eyes and of the middle of a rear above the road [m]."""
+BODY_MIDDLE = 1.2
+"""Height above the road at which a vehicle is looked at by those whose eyes are higher [m]."""
 
 LEAST_CONTRAST = 0.5
 """No vehicle's rear has less contrast to the airlight than this, not even a white one [-]."""

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from fogsim.traffic.drivers.eye_heights import EYE_HEIGHTS
 from fogsim.traffic.drivers.lamp_intensity import HEAD_LAMPS, rear_intensity
-from fogsim.traffic.drivers.sight import EYE_HEIGHT, DriverSight, FogAccess, inherent_contrast
+from fogsim.traffic.drivers.sight import DriverSight, FogAccess, inherent_contrast
 from fogsim.traffic.highway.fleet import Fleet
 from fogsim.traffic.highway.snapshot import front_bumper, rear_bumper
 
@@ -64,7 +65,7 @@ class VisibleNeighbours:
         return now - self._last_hidden.get(pair, -np.inf) >= self._sight.reaction_time
 
     def _sees(self, vehicle: Any, front: Any) -> bool:
-        lift = np.array([0.0, 0.0, EYE_HEIGHT])
+        lift = np.array([0.0, 0.0, EYE_HEIGHTS["car"]])
         eye, rear = front_bumper(vehicle) + lift, rear_bumper(front) + lift
         distance = max(math.dist(eye, rear), 0.1)
         if distance <= self._certainly_seen:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST, HEAD_LAMPS, rear_intensity
-from fogsim.traffic.drivers.sight import EYE_HEIGHT, DriverSight, FogAccess
+from fogsim.traffic.drivers.sight import BODY_MIDDLE, DriverSight, FogAccess
 from fogsim.traffic.sumo.link import Api, Getter, vehicle_getter
 from fogsim.traffic.sumo.update_schedule import MAX_RELATIVE_ACCELERATION, closing_speed_bound
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps, SeenVehicles
@@ -109,9 +109,11 @@ class LeaderSight:
         """Optical depths between eyes and rears [-]."""
         if self._min_extinction == self._max_extinction:
             return [self._max_extinction * distance for distance in distances]
-        lift = np.array([0.0, 0.0, EYE_HEIGHT])
-        eyes = np.array([self._position(follower) for follower, _, _ in pairs]) + lift
-        towards = np.array([self._position(leader) for _, leader, _ in pairs]) + lift - eyes
+        heights = np.array([self._vehicles.eye_height(follower) for follower, _, _ in pairs])
+        eyes = np.array([self._position(follower) for follower, _, _ in pairs])
+        towards = np.array([self._position(leader) for _, leader, _ in pairs]) - eyes
+        eyes[:, 2] += heights
+        towards[:, 2] += np.minimum(heights, BODY_MIDDLE) - heights
         share = np.array(distances) / np.sqrt(np.einsum("ij,ij->i", towards, towards))
         depths: list[float] = self._fog.optical_depth(eyes, eyes + towards * share[:, None]).tolist()
         return depths

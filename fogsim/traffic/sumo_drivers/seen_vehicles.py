@@ -1,9 +1,10 @@
-"""What of SUMO's vehicles there is to see: their bodies and their lit lamps."""
+"""What of SUMO's vehicles there is to see, their bodies and their lit lamps, and from how high their drivers look."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
 
 from fogsim.traffic.appearance import OTHERS_LAMPS, lamps_from_signals, paint
+from fogsim.traffic.drivers.eye_heights import eye_height
 from fogsim.traffic.drivers.sight import inherent_contrast
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 
@@ -28,7 +29,7 @@ class SeenBody(NamedTuple):
 
 
 class SeenVehicles:
-    """Bodies, each read once, and lit lamps of vehicles.
+    """Bodies and heights of eyes, each read once, and lit lamps of vehicles.
 
     Parameters
     ----------
@@ -41,7 +42,10 @@ class SeenVehicles:
         self._get_colour = vehicle_getter(api, "getColor")
         self._get_length = vehicle_getter(api, "getLength")
         self._get_width = vehicle_getter(api, "getWidth")
+        self._get_class = vehicle_getter(api, "getVehicleClass")
+        self._get_shape = vehicle_getter(api, "getShapeClass")
         self._bodies: dict[str, SeenBody] = {}
+        self._eye_heights: dict[str, float] = {}
 
     def forget(self, vehicles: Iterable[str]) -> None:
         """Forget vehicles whose ids others may bear now.
@@ -53,6 +57,7 @@ class SeenVehicles:
         """
         for vehicle in vehicles:
             self._bodies.pop(vehicle, None)
+            self._eye_heights.pop(vehicle, None)
 
     def body(self, vehicle: str) -> SeenBody:
         """Body of a vehicle.
@@ -67,6 +72,20 @@ class SeenVehicles:
             contrast = inherent_contrast(paint(vehicle, self._get_colour(vehicle)))
             known = SeenBody(float(self._get_length(vehicle)), float(self._get_width(vehicle)), contrast)
             self._bodies[vehicle] = known
+        return known
+
+    def eye_height(self, vehicle: str) -> float:
+        """Height of the driver's eyes above the road [m].
+
+        Parameters
+        ----------
+        vehicle : str
+            Its id.
+        """
+        known = self._eye_heights.get(vehicle)
+        if known is None:
+            shape, length = self._get_shape(vehicle), float(self._get_length(vehicle))
+            known = self._eye_heights[vehicle] = eye_height(self._get_class(vehicle), shape, length)
         return known
 
     def lamps(self, vehicle: str, own_lamps: OwnLamps) -> int:

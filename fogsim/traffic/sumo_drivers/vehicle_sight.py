@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from fogsim.traffic.drivers.lamp_intensity import HEAD_LAMPS, head_lamp_share, intensity_toward
-from fogsim.traffic.drivers.sight import EYE_HEIGHT, DriverSight, FogAccess
+from fogsim.traffic.drivers.sight import BODY_MIDDLE, DriverSight, FogAccess
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps, SeenVehicles
 
@@ -116,7 +116,8 @@ class VehicleSight:
         end_x, end_y = front_x + along * east - across * north, front_y + along * north + across * east
         forward = math.radians(90.0 - self._angle(observer))
         bearing = math.remainder(math.atan2(end_y - y, end_x - x) - forward, math.tau)
-        eyes, end = (x, y, z + EYE_HEIGHT), (end_x, end_y, front_z + EYE_HEIGHT)
+        height = self._vehicles.eye_height(observer)
+        eyes, end = (x, y, z + height), (end_x, end_y, front_z + min(height, BODY_MIDDLE))
         return LineOfSight(eyes, end, max(math.dist(eyes, end), NEAREST), bearing, ahead, aside)
 
     def _depth_limit(self, pair: tuple[str, str], line: LineOfSight, own_lamps: OwnLamps) -> float:

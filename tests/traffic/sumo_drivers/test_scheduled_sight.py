@@ -9,8 +9,9 @@ import pytest
 from fogsim.atmosphere import FieldAccess
 from fogsim.traffic import DriverSight
 from fogsim.traffic.appearance import OTHERS_LAMPS, lamps_from_signals, paint
+from fogsim.traffic.drivers.eye_heights import eye_height
 from fogsim.traffic.drivers.lamp_intensity import rear_intensity
-from fogsim.traffic.drivers.sight import EYE_HEIGHT, inherent_contrast
+from fogsim.traffic.drivers.sight import BODY_MIDDLE, inherent_contrast
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo_drivers.perception import MAX_PAUSE, REACH, Perception
 from fogsim.values import FogBank, FogField, Lamp
@@ -39,7 +40,9 @@ def link() -> Iterator[LibsumoLink]:
 def is_seen(api: Any, fog: FieldAccess, sight: DriverSight, pair: tuple[str, str, float], lamps: Lamp) -> bool:
     """One driver's sight, straight from the laws."""
     follower, leader, gap = pair
-    eyes, rear = ([x, y, z + EYE_HEIGHT] for x, y, z in map(api.vehicle.getPosition3D, (follower, leader)))
+    height = eye_height(api.vehicle.getVehicleClass(follower), "", api.vehicle.getLength(follower))
+    places = map(api.vehicle.getPosition3D, (follower, leader))
+    eyes, rear = ([x, y, z + up] for (x, y, z), up in zip(places, (height, min(height, BODY_MIDDLE)), strict=True))
     distance = max(gap + api.vehicle.getMinGap(follower), 0.1)
     length = sum((b - a) ** 2 for a, b in zip(eyes, rear, strict=True)) ** 0.5
     end = [a + (b - a) * distance / length for a, b in zip(eyes, rear, strict=True)]

@@ -20,7 +20,7 @@ EAST = 90.0
 PAIR = [("me", "other")]
 
 
-def two_vehicles(ahead: float, left: float, turned: float, height: float = 0.0) -> Any:
+def two_vehicles(ahead: float, left: float, turned: float, height: float = 0.0, observer: str = "passenger") -> Any:
     """What SUMO tells of me at the origin, bound for the east, and of a black vehicle.
 
     Its front bumper is so far ahead and to the left of mine; it is turned to the left by an angle [°].
@@ -34,6 +34,8 @@ def two_vehicles(ahead: float, left: float, turned: float, height: float = 0.0) 
         getColor=lambda _: (0, 0, 0, 255),
         getLength=lambda _: LENGTH,
         getWidth=lambda _: WIDTH,
+        getVehicleClass=lambda vehicle: observer if vehicle == "me" else "passenger",
+        getShapeClass=lambda _: "",
     )
     return SimpleNamespace(vehicle=vehicle)
 
@@ -102,6 +104,22 @@ def test_sight_goes_through_the_fog_that_lies_on_its_line() -> None:
     assert VehicleSight(behind, fog, DAY).sees(PAIR, DARK) == [False]
     assert VehicleSight(aside, fog, DAY).sees(PAIR, DARK) == [True]
     assert VehicleSight(aside, fog, DAY).sees([], DARK) == []
+
+
+def test_who_sits_higher_looks_down_into_a_shallow_layer_of_fog() -> None:
+    """A layer that ends 1.5 m above the road: a car's driver looks through all of it, a truck's through the last of it.
+
+    From 2.33 m down to 1.2 m the line is within the layer for (1.5 − 1.2) / (2.33 − 1.2) of its length.
+    """
+    fog = FieldAccess(FogField(0.1, (3000.0,) * 3, top=1.5, top_edge=0.001))
+
+    def farthest(observer: str) -> float:
+        views = {
+            d: VehicleSight(two_vehicles(float(d), 0.0, 180.0, observer=observer), fog, DAY) for d in range(5, 200)
+        }
+        return max(distance for distance, view in views.items() if view.sees(PAIR, DARK)[0])
+
+    assert farthest("truck") / farthest("passenger") == pytest.approx((2.33 - 1.2) / (1.5 - 1.2), rel=0.04)
 
 
 def test_a_vehicle_that_is_nowhere_is_not_seen() -> None:

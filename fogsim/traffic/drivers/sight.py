@@ -14,7 +14,6 @@ follow adaptation; see `fogsim.traffic.drivers.adaptation`.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -33,6 +32,9 @@ LEAST_CONTRAST = 0.5
 
 FARTHEST = 1e5
 """Distance beyond which sight is not told apart from sight without end [m]."""
+
+DISTANCE_TOLERANCE = 0.01
+"""By how much a distance that is searched for may be too small [m]."""
 
 VERTICAL_ILLUMINANCE = 0.5
 """Illuminance of a vertical surface under an overcast sky over that of a horizontal one [-]."""
@@ -127,6 +129,41 @@ class DriverSight:
         inverse = 0.5 * (once + math.sqrt(once * once + 4.0 * twice))
         return math.log(inverse) if inverse > 0.0 else -math.inf
 
+    def seen_distance(
+        self,
+        extinction: float,
+        inherent_contrast: float,
+        intensity: float = 0.0,
+        head_lamps: float = 1.0,
+        glare: float = 0.0,
+    ) -> float:
+        """Distance up to which a vehicle is seen in even fog, up to 1 cm less [m].
+
+        Parameters
+        ----------
+        extinction : float
+            Extinction coefficient [1/m].
+        inherent_contrast, intensity, head_lamps, glare : float
+            See `depth_limit`.
+
+        Returns
+        -------
+        float
+            ``inf`` beyond `FARTHEST`.
+        """
+
+        def is_seen(distance: float) -> bool:
+            limit = self.depth_limit(distance, inherent_contrast, intensity, head_lamps, glare)
+            return limit >= extinction * distance
+
+        near, far = 0.0, FARTHEST
+        if is_seen(far):
+            return math.inf
+        while far - near > DISTANCE_TOLERANCE:
+            middle = 0.5 * (near + far)
+            near, far = (middle, far) if is_seen(middle) else (near, middle)
+        return near
+
     def sure_distance(self, maximum_extinction: float) -> float:
         """Distance up to which every body is seen, without any lamps, where the fog is nowhere denser than given [m].
 
@@ -135,7 +172,7 @@ class DriverSight:
         maximum_extinction : float
             Extinction coefficient [1/m].
         """
-        return _range(lambda d: self.depth_limit(d, LEAST_CONTRAST, 0.0, 0.0), maximum_extinction)[0]
+        return self.seen_distance(maximum_extinction, LEAST_CONTRAST, head_lamps=0.0)
 
     def hidden_distance(self, minimum_extinction: float, brightest: float = BRIGHTEST) -> float:
         """Distance from which nothing of a vehicle is seen where the fog is nowhere thinner than given [m].
@@ -147,18 +184,7 @@ class DriverSight:
         brightest : float
             Luminous intensity of the brightest lamp that there may be [cd].
         """
-        return _range(lambda d: self.depth_limit(d, 1.0, brightest), minimum_extinction)[1]
-
-
-def _range(depth_limit: Callable[[float], float], extinction: float) -> tuple[float, float]:
-    """Distances within 1 cm up to which all is seen, and from which nothing is, by bisection [m]."""
-    near, far = 0.0, FARTHEST
-    if depth_limit(far) >= extinction * far:
-        return math.inf, math.inf
-    while far - near > 0.01:
-        middle = 0.5 * (near + far)
-        near, far = (middle, far) if depth_limit(middle) >= extinction * middle else (near, middle)
-    return near, far
+        return self.seen_distance(minimum_extinction, 1.0, brightest) + DISTANCE_TOLERANCE
 
 
 def inherent_contrast(paint: tuple[float, float, float]) -> float:

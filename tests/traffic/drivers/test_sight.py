@@ -129,6 +129,7 @@ def test_the_limit_falls_with_distance_and_so_does_sight_with_extinction(
 def test_bounds_hold_and_are_close(illuminance: float, visibility: float) -> None:
     sight, k = DriverSight(illuminance), extinction_from_visibility(visibility)
     sure, hidden = sight.sure_distance(k), sight.hidden_distance(k)
+    assert 0.0 <= reach(sight, visibility, LIT) - sight.seen_distance(k, *LIT) <= 0.011
     assert sure == pytest.approx(reach(sight, visibility, (LEAST_CONTRAST, 0.0, 0.0)), abs=0.11)
     assert hidden == pytest.approx(reach(sight, visibility, (1.0, BRIGHTEST, 1.0)), abs=0.02)
     white = inherent_contrast((1.0, 1.0, 1.0))

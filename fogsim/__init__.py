@@ -23,12 +23,16 @@ if TYPE_CHECKING:
     from fogsim.values import Belief as Belief
     from fogsim.values import Camera as Camera
     from fogsim.values import Command as Command
+    from fogsim.values import Display as Display
     from fogsim.values import Estimate as Estimate
     from fogsim.values import Frame as Frame
     from fogsim.values import LeadMeasurement as LeadMeasurement
     from fogsim.values import Observation as Observation
     from fogsim.values import SignSighting as SignSighting
+    from fogsim.values import SpeedAdvice as SpeedAdvice
     from fogsim.values import Step as Step
+    from fogsim.values import Stretch as Stretch
+    from fogsim.values import StretchAdvice as StretchAdvice
 
     __version__: str
 
@@ -37,12 +41,16 @@ _VALUES = (
     "Belief",
     "Camera",
     "Command",
+    "Display",
     "Estimate",
     "Frame",
     "LeadMeasurement",
     "Observation",
     "SignSighting",
+    "SpeedAdvice",
     "Step",
+    "Stretch",
+    "StretchAdvice",
 )
 _LAZY = {
     **dict.fromkeys(_ERRORS, "fogsim.errors"),
@@ -66,6 +74,7 @@ __all__ = [
     "Camera",
     "ClosedLoop",
     "Command",
+    "Display",
     "Estimate",
     "FogSimError",
     "Frame",
@@ -76,7 +85,10 @@ __all__ = [
     "Scenario",
     "SignSighting",
     "SimulationError",
+    "SpeedAdvice",
     "Step",
+    "Stretch",
+    "StretchAdvice",
     "attach",
     "catalogue",
     "connect",

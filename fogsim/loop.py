@@ -105,24 +105,24 @@ class AdvisedDriving:
         advised = self._adviser.advise(step.belief, step.speed_limit, step.time, previous.advice)
         advice = checked_advice(self._scenario.advice.method, advised)
         lamps = checked_lamps(self._scenario.lighting.method, self._lighting.lamps(step.belief, previous.lamps))
-        return spread_advice(Command(advice=advice, lamps=lamps), step, self._scenario)
+        return spread_advice(Command(advice=advice, lamps=lamps), self._scenario)
 
 
-def spread_advice(command: Command, step: Step, scenario: Scenario) -> Command:
-    """Give the ego's advice to every vehicle near it too, if the scenario says so.
+def spread_advice(command: Command, scenario: Scenario) -> Command:
+    """Let others hear the ego's advice too, if the scenario says so.
 
     Parameters
     ----------
     command : Command
         With the ego's advice.
-    step : Step
-        With the vehicles near it.
     scenario : Scenario
         Its ``drivers.advised`` says whom the advice goes to.
     """
-    if scenario.drivers.advised != "all" or not math.isfinite(command.advice.speed):
+    if scenario.drivers.advised == "ego" or not math.isfinite(command.advice.speed):
         return command
-    return dataclasses.replace(command, advised_speeds=dict.fromkeys(step.traffic.ids, command.advice.speed))
+    if scenario.drivers.advised == "all":
+        return dataclasses.replace(command, advice_reach=scenario.traffic.reading_radius_m)
+    return dataclasses.replace(command, stretches=(build.stretch_advice(scenario, command.advice.speed),))
 
 
 class EntersFog(Protocol):
@@ -192,6 +192,7 @@ class ClosedLoop:
         self._replays = traffic is None
         self._equipment = EgoEquipment(scenario)
         self._drivers_fog = DriversFog()
+        self._fog: FogField | None = None
         self._step: Step | None = None
 
     def start(self, seed: int) -> Step:
@@ -215,7 +216,7 @@ class ClosedLoop:
         self._traffic.start(streams.traffic_seed)
         snapshot = self._observe_ego()
         body = snapshot.state.types[snapshot.ego]
-        fog = self._equipment.start_run(streams, self._traffic.network, body)
+        fog = self._fog = self._equipment.start_run(streams, self._traffic.network, body)
         if not self._drivers_fog.is_entered and (fog.extinction > 0 or fog.banks):
             self._drivers_fog.enter(fog, self._traffic)
             if self._replays:
@@ -254,6 +255,9 @@ class ClosedLoop:
         if self._step is None or self._step.ending is not None:
             raise SimulationError("the run has not been started or is over: call start() before advance()")
         checked_command(command)
+        if not self._drivers_fog.is_entered and self._fog is not None and command.is_for_others:
+            # In clear air nobody else has chosen a speed so far.
+            self._drivers_fog.enter(self._fog, self._traffic)
         for number in range(self._periods.traffic_steps):
             part = number / self._periods.traffic_steps
             self._drivers_fog.set_time((self._step.index + part) * self._periods.camera_period)

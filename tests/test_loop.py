@@ -5,6 +5,7 @@ import math
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,10 +14,9 @@ import pytest
 
 import fogsim
 from fogsim.errors import SimulationError
-from fogsim.loop import DriversFog, spread_advice
+from fogsim.loop import ClosedLoop, DriversFog, spread_advice
 from fogsim.scenario import Scenario
-from fogsim.values import Command, Ending, FogChange, FogField, SpeedAdvice, Step
-from tests.recorders.synthetic import make_step
+from fogsim.values import Command, Display, Ending, FogChange, FogField, SpeedAdvice, Step, Stretch, StretchAdvice
 
 SMALL = ("camera.width=160", "camera.height=120", "duration_s=4")
 
@@ -41,11 +41,20 @@ def test_a_command_is_decided_once_a_decision_period() -> None:
 
 def test_advice_may_go_to_every_vehicle_near_the_ego() -> None:
     steps = list(fogsim.run(small("fog.visibility_m=60", "drivers.advised=all"), seed=1))
-    advised = steps[-1].command.advised_speeds
-    assert len(advised) > 10
-    assert set(advised.values()) == {steps[-1].command.advice.speed}
     alone = list(fogsim.run(small("fog.visibility_m=60"), seed=1))
-    assert not alone[-1].command.advised_speeds
+    assert steps[-1].command.advice_reach == 1000.0
+    assert not alone[-1].command.is_for_others
+    # 2 s at 2 m/s², after the delay of 2 s.
+    assert np.mean(steps[-1].traffic.speed) < np.mean(alone[-1].traffic.speed) - 2.0
+
+
+def test_others_follow_advice_in_clear_air_too() -> None:
+    advice = StretchAdvice(15.0, Stretch(0.0, 4000.0))
+    with ClosedLoop(small("fog.visibility_m=inf")) as loop:
+        before = loop.start(1).traffic.speed.mean()
+        for _ in range(40):
+            step = loop.advance(Command(SpeedAdvice(15.0), stretches=(advice,)))
+    assert step.traffic.speed.mean() < before - 3.0
 
 
 def test_the_camera_period_may_be_longer_than_the_traffic_step() -> None:
@@ -146,11 +155,15 @@ def test_public_names_are_there() -> None:
 
 
 def test_advice_goes_to_everybody_near_the_ego_only_if_the_scenario_says_so() -> None:
-    step, told = make_step(3), Command(advice=SpeedAdvice(20.0))
+    told = Command(advice=SpeedAdvice(20.0))
     everybody = fogsim.load_scenario("motorway_fog_bank", ["drivers.advised=all"])
-    assert spread_advice(told, step, fogsim.load_scenario("motorway_fog_bank", ["drivers.advised=ego"])) is told
-    assert spread_advice(told, step, everybody).advised_speeds == dict.fromkeys(step.traffic.ids, 20.0)
-    assert not spread_advice(Command(), step, everybody).advised_speeds
+    assert spread_advice(told, fogsim.load_scenario("motorway_fog_bank", ["drivers.advised=ego"])) is told
+    assert spread_advice(told, everybody) == replace(told, advice_reach=1000.0)
+    assert not spread_advice(Command(), everybody).is_for_others
+    stretch = "drivers.advised_stretch={start_m: 500, end_m: inf, display: message_sign}"
+    signs = fogsim.load_scenario("motorway_fog_bank", ["drivers.advised=stretch", stretch])
+    shown = StretchAdvice(20.0, Stretch(500.0), Display.MESSAGE_SIGN)
+    assert spread_advice(told, signs) == replace(told, stretches=(shown,))
 
 
 def test_the_fog_of_the_drivers_moves_on_with_time() -> None:

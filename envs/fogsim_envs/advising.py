@@ -109,7 +109,7 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         """
         if self._simulation is None or self._step is None:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
-        before, command = self._step, spread_advice(command_of(action, self._continuous), self._step, self._active)
+        before, command = self._step, spread_advice(command_of(action, self._continuous), self._active)
         for _ in range(self._frames):
             self._step = self._simulation.advance(command)
             if self._step.ending is not None:

@@ -38,7 +38,7 @@ from fogsim.traffic import (
     Trigger,
 )
 from fogsim.units import KMH_PER_MPS, clock_time
-from fogsim.values import Camera, FogField
+from fogsim.values import Camera, FogField, Stretch, StretchAdvice
 
 AIRLIGHT_EXPOSURE = 0.6
 """Share of saturation at which the fixed exposure puts the airlight: bright fog, yet room for lamps above it."""
@@ -167,6 +167,20 @@ def _driver_setup(scenario: Scenario) -> DriverSetup:
         drivers.compliance.delay_s,
     )
     return DriverSetup(drivers.speed_choice, drivers.speed_spread, compliance, drivers.distance_misjudgement)
+
+
+def stretch_advice(scenario: Scenario, speed: float) -> StretchAdvice:
+    """Advice to all on the scenario's advised stretch.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    speed : float
+        Advised speed [m/s].
+    """
+    stretch = scenario.drivers.advised_stretch
+    return StretchAdvice(speed, Stretch(stretch.start_m, stretch.end_m), stretch.display)
 
 
 def camera_mount(scenario: Scenario, body: str = CAR) -> CameraMount:

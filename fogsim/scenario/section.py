@@ -97,6 +97,10 @@ Top = Annotated[float, _endless(-FARTHEST), BeforeValidator(_infinity), AfterVal
 """A height that may be without end [m]."""
 
 
+RoadEnd = Annotated[float, _endless(0.0), BeforeValidator(_infinity), AfterValidator(_far_or_endless)]
+"""A place along a road [m]; inf is where it ends."""
+
+
 class Section(BaseModel):
     """A block of a scenario file: unknown keys are errors, values never change."""
 

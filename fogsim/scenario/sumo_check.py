@@ -82,7 +82,7 @@ def demand_mistakes(document: Document, scenario: Scenario) -> list[str]:
         unfit = {places[v]: _unfit_way(v, demand.routes[v], edges) for v in named.values() if v in demand.routes}
         told |= {at: text for at, text in unfit.items() if text}
         told |= _wide_changes(scenario, demand, edges)
-        told |= _banks_aside(scenario, demand.routes.get(scenario.traffic.ego), edges)
+        told |= _places_aside(scenario, demand.routes.get(scenario.traffic.ego), edges)
     return [f"{document.where(at)}: {dotted(at)}: {text}" for at, text in told.items()]
 
 
@@ -144,11 +144,21 @@ def _wide_changes(scenario: Scenario, demand: Demand, edges: NetEdges) -> dict[K
     return told
 
 
-def _banks_aside(scenario: Scenario, way: VehicleRoute | None, edges: NetEdges) -> Mapping[KeyPath, str]:
-    """Banks wholly before the start or beyond the end of the ego's route, where no wind brings them in."""
-    if way is None or scenario.fog.wind is not None or not all(edges.axes.get(edge) for edge in way.edges):
+def _places_aside(scenario: Scenario, way: VehicleRoute | None, edges: NetEdges) -> Mapping[KeyPath, str]:
+    """Places along the ego's route that lie beyond its end, or before its beginning."""
+    if way is None or not all(edges.axes.get(edge) for edge in way.edges):
         return {}
-    length = edges.route_length(way.edges)
+    length, stretch = edges.route_length(way.edges), scenario.drivers.advised_stretch
+    told = {} if scenario.fog.wind is not None else _banks_aside(scenario, length)
+    if stretch.start_m >= length:
+        told["drivers", "advised_stretch", "start_m"] = (
+            f"the stretch begins beyond the ego's route, which is {length:.0f} m long; got {stretch.start_m:g}"
+        )
+    return told
+
+
+def _banks_aside(scenario: Scenario, length: float) -> dict[KeyPath, str]:
+    """Banks wholly before the start or beyond the end of the ego's route; no wind brings them in."""
     told: dict[KeyPath, str] = {}
     for i, bank in enumerate(scenario.fog.banks):
         if bank.start_m - bank.edge_m > length:

@@ -1,5 +1,6 @@
 """The schema of the blocks ``traffic`` and ``drivers``: who drives where, what is scripted, what drivers are like."""
 
+import math
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -14,6 +15,7 @@ from fogsim.scenario.section import (
     Length,
     Number,
     Period,
+    RoadEnd,
     Section,
     Share,
     SpeedKmh,
@@ -21,6 +23,7 @@ from fogsim.scenario.section import (
     Whole,
 )
 from fogsim.traffic import SPEED_CHOICES, AfterCollision
+from fogsim.values import Display
 
 
 class Event(Section):
@@ -170,6 +173,25 @@ class ComplianceSection(Section):
     """Time before they do."""
 
 
+class AdvisedStretch(Section):
+    """The stretch of road on which all hear the ego's advice."""
+
+    start_m: Distance = 0.0
+    """Position along the ego's route at which it begins."""
+
+    end_m: RoadEnd = math.inf
+    """Position at which it ends; inf for the end of the route."""
+
+    display: Display = Display.IN_CAR
+    """Where they hear it: `in_car` (wherever they are on it) or off a `message_sign` (where it begins)."""
+
+    @model_validator(mode="after")
+    def _has_length(self) -> Self:
+        if not self.start_m < self.end_m:
+            raise ValueError(f"start_m must be less than end_m, got {self.start_m:g} and {self.end_m:g}")
+        return self
+
+
 class DriversSection(Section):
     """The drivers of all vehicles but, for speed, the ego."""
 
@@ -194,8 +216,11 @@ class DriversSection(Section):
     compliance: ComplianceSection = ComplianceSection()
     """How they follow advice."""
 
-    advised: Literal["ego", "all"] = "ego"
-    """Whether the advice goes to the ego alone, or to every vehicle near it as well."""
+    advised: Literal["ego", "all", "stretch"] = "ego"
+    """Who hears the advice: the ego alone, all vehicles near it as well, or all on a stretch of its route."""
+
+    advised_stretch: AdvisedStretch = AdvisedStretch()
+    """That stretch, with `advised: stretch`."""
 
     @field_validator("speed_choice")
     @classmethod
@@ -203,3 +228,10 @@ class DriversSection(Section):
         if value not in SPEED_CHOICES:
             raise ValueError(str(UnknownNameError("speed choice", value, SPEED_CHOICES)))
         return value
+
+    @model_validator(mode="after")
+    def _stretch_is_advised(self) -> Self:
+        # Who says whom the advice goes to may leave the stretch of another choice there.
+        if "advised_stretch" in self.model_fields_set and "advised" not in self.model_fields_set:
+            raise ValueError("advised_stretch goes with advised: stretch, which is missing")
+        return self

@@ -1,7 +1,7 @@
 """Traffic by SUMO, wherever it runs."""
 
 import functools
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Concatenate, ParamSpec, TypeVar
 
@@ -28,7 +28,7 @@ from fogsim.traffic.sumo_drivers.drivers_perception import DriversPerception, dr
 from fogsim.traffic.sumo_drivers.speed_control import SpeedControl, SumoDesiredSpeeds
 from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot, TrafficState, Unplayed
 
-_NO_ADVICE: Mapping[str, float] = {}
+_NO_ADVICE = Command()
 _FOR_EVER = "1e6"
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -202,7 +202,7 @@ class SumoTraffic:
         run = self._running
         self._ego_lamps = command.lamps
         run.speeds.apply(self._play_script(run, command))
-        self._update_drivers(run, command.advised_speeds)
+        self._update_drivers(run, command)
 
     @_translates_errors
     def look(self) -> None:
@@ -240,11 +240,11 @@ class SumoTraffic:
         self._link.step()
         self._read_step(run)
 
-    def _update_drivers(self, run: _Run, advised: Mapping[str, float]) -> None:
+    def _update_drivers(self, run: _Run, command: Command) -> None:
         if run.perception is not None:
             run.perception.update(self._setup.ego, self._ego_lamps, run.script.dark)
         if run.drivers is not None:
-            run.drivers.update(advised)
+            run.drivers.update(command)
 
     def _read_step(self, run: _Run) -> None:
         run.collisions.add(run.reader.collisions())

@@ -2,7 +2,7 @@
 
 from fogsim.values.belief import Belief
 from fogsim.values.camera import Camera, CameraPose, Response
-from fogsim.values.command import Command, SpeedAdvice
+from fogsim.values.command import Command, Display, SpeedAdvice, Stretch, StretchAdvice
 from fogsim.values.estimate import Estimate, FogCategory, fog_category
 from fogsim.values.fog import FogBank, FogChange, FogField, FogPatches
 from fogsim.values.image import Frame, View
@@ -23,6 +23,7 @@ __all__ = [
     "CameraPose",
     "Collision",
     "Command",
+    "Display",
     "Ending",
     "Estimate",
     "FogBank",
@@ -54,6 +55,8 @@ __all__ = [
     "SpeedAdvice",
     "Step",
     "StreetLighting",
+    "Stretch",
+    "StretchAdvice",
     "Surface",
     "TrafficSnapshot",
     "TrafficState",

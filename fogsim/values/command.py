@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 from fogsim.values.light import Lamp
 
@@ -22,9 +23,56 @@ class SpeedAdvice:
     raise_since: float | None = None
 
 
+class Display(StrEnum):
+    """Where a driver hears advice to all on a stretch of road."""
+
+    MESSAGE_SIGN = "message_sign"
+    """Where the stretch begins, off a variable message sign; what was read there is kept to the stretch's end."""
+    IN_CAR = "in_car"
+    """In the car, wherever on the stretch it is, as long as the advice is in force."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """A stretch of road, all lanes of one direction, junctions on the way included.
+
+    Attributes
+    ----------
+    start, end : float
+        Positions along the ego's route, or along `edges`, at which it begins and ends [m].
+    edges : tuple of str
+        Edges of the network in the order in which they are driven; none for the ego's route.
+    """
+
+    start: float = 0.0
+    end: float = float("inf")
+    edges: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class StretchAdvice:
+    """Advice to all on a stretch, from here on: whoever comes there hears it, too, while it is in force.
+
+    Attributes
+    ----------
+    speed : float
+        Advised speed [m/s]; ``inf`` for no advice.
+    stretch : Stretch
+        Where.
+    display : Display
+        How drivers get it.
+    """
+
+    speed: float
+    stretch: Stretch = Stretch()
+    display: Display = Display.IN_CAR
+
+
 @dataclass(frozen=True, slots=True)
 class Command:
     """Advice and lamps in force until the next decision.
+
+    The ego has its own `advice` alone. Another driver whom several of the others concern has the lowest speed.
 
     Attributes
     ----------
@@ -34,8 +82,20 @@ class Command:
         Lamps that the ego vehicle is to light; dipped head lamps until somebody decides.
     advised_speeds : mapping from vehicle id to float
         Advice to other vehicles [m/s].
+    advice_reach : float
+        Distance from the ego within which all others hear the ego's advice too, from vehicle to vehicle, and whoever
+        comes there [m]; 0 for nobody.
+    stretches : tuple of StretchAdvice
+        Advice to all on stretches of road.
     """
 
     advice: SpeedAdvice = field(default_factory=SpeedAdvice)
     lamps: Lamp = Lamp.POSITION | Lamp.LOW_BEAM
     advised_speeds: Mapping[str, float] = field(default_factory=dict)
+    advice_reach: float = 0.0
+    stretches: tuple[StretchAdvice, ...] = ()
+
+    @property
+    def is_for_others(self) -> bool:
+        """True if others than the ego are advised something, or may be when they come where the advice is given."""
+        return bool(self.advised_speeds or self.advice_reach > 0.0 or self.stretches)

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from fogsim.errors import InputError
-from fogsim.values import Belief, Command, Estimate, Lamp, SpeedAdvice
+from fogsim.values import Belief, Command, Display, Estimate, Lamp, SpeedAdvice, Stretch, StretchAdvice
 
 T = TypeVar("T")
 
@@ -135,7 +135,7 @@ def checked_command(value: object) -> Command:
     Raises
     ------
     InputError
-        If it is no `Command`, or a speed in it is nan or negative.
+        If it is no `Command`, a speed in it is nan or negative, or a stretch does not end behind its beginning.
     """
     command = _of_type("the command", value, Command)
     _of_type("the command's advice", command.advice, SpeedAdvice)
@@ -143,7 +143,31 @@ def checked_command(value: object) -> Command:
     _check_speed("the command", "advice.speed", command.advice.speed)
     for vehicle, speed in command.advised_speeds.items():
         _check_speed("the command", f"advised_speeds[{vehicle!r}]", speed)
+    if not (_is_number(command.advice_reach) and command.advice_reach >= 0.0):
+        raise InputError(f"the command: advice_reach must be at least 0 [m], got {command.advice_reach!r}")
+    _check_kind("the command", "stretches", command.stretches, tuple, "a tuple of StretchAdvice")
+    for place, advice in enumerate(command.stretches):
+        _check_stretch_advice(f"the command's stretches[{place}]", advice)
     return command
+
+
+def _check_stretch_advice(who: str, value: object) -> None:
+    advice = _of_type(who, value, StretchAdvice)
+    _check_speed(who, "speed", advice.speed)
+    _check_kind(who, "display", advice.display, Display, "a fogsim.values.Display")
+    stretch = _of_type(f"{who}.stretch", advice.stretch, Stretch)
+    if not (_is_number(stretch.start) and math.isfinite(stretch.start) and stretch.start >= 0.0):
+        raise InputError(f"{who}: stretch.start must be a finite position of at least 0 [m], got {stretch.start!r}")
+    if not (_is_number(stretch.end) and stretch.end > stretch.start):
+        raise InputError(f"{who}: stretch.end must lie behind its start at {stretch.start!r} [m], got {stretch.end!r}")
+    _check_kind(who, "stretch.edges", stretch.edges, tuple, "a tuple of ids of edges, empty for the ego's route")
+    for edge in stretch.edges:
+        _check_kind(who, "stretch.edges", edge, str, "a tuple of ids of edges")
+
+
+def _check_kind(who: str, field: str, value: object, kind: type, expected: str) -> None:
+    if not isinstance(value, kind):
+        raise InputError(f"{who}: {field} must be {expected}; got {value!r}")
 
 
 def checked_values(metric: str, value: object) -> Mapping[str, Any]:

@@ -264,3 +264,20 @@ def test_a_resolved_scenario_loads_again(folder: Path) -> None:
     scenario = load_scenario("motorway_fog_bank", ["fog.visibility_m=inf"])
     assert override(scenario, []) == scenario
     assert resolved(scenario)["fog"]["visibility_m"] == "inf"
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        (["drivers.advised_stretch.display=in_car"], "advised_stretch goes with advised: stretch, which is missing"),
+        (
+            ["drivers.advised=stretch", "drivers.advised_stretch={start_m: 9, end_m: 9}"],
+            "start_m must be less than end",
+        ),
+        (["drivers.advised=stretch", "drivers.advised_stretch.display=sign"], "display: .*message_sign.*; got 'sign'"),
+        (["drivers.advised=somebody"], "advised: .*'ego', 'all' or 'stretch'"),
+    ],
+)
+def test_advised_stretches_that_do_not_fit(settings: list[str], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        load_scenario("motorway_fog_bank", settings)

@@ -111,3 +111,11 @@ def test_a_change_over_more_lanes_than_there_are_is_told() -> None:
         (told,) = mistakes("motorway_fog_bank", change(-3, vehicle))
         assert "traffic.events.0.lanes: the widest road on the way of" in told
         assert told.endswith("has lanes 0 to 2; got -3")
+
+
+def test_an_advised_stretch_lies_on_the_egos_route() -> None:
+    stretch = "drivers.advised_stretch={start_m: 5600}"
+    with pytest.raises(
+        InputError, match=r"advised_stretch\.start_m: the stretch begins beyond .* 5501 m long; got 5600"
+    ):
+        load_scenario("motorway_fog_bank", ["drivers.advised=stretch", stretch])

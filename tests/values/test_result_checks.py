@@ -12,7 +12,7 @@ from fogsim.fusion import make as make_fusion
 from fogsim.loop import AdvisedDriving
 from fogsim.metrics import METRICS, RunMetrics
 from fogsim.scenario import load_scenario
-from fogsim.values import Command, Estimate, Lamp, SpeedAdvice
+from fogsim.values import Command, Display, Estimate, Lamp, SpeedAdvice, Stretch, StretchAdvice
 from fogsim.values.result_checks import (
     checked_advice,
     checked_belief,
@@ -80,6 +80,41 @@ def test_advice(speed: float) -> None:
     with pytest.raises(InputError, match=r"advised_speeds\['a'\] must"):
         checked_command(Command(advised_speeds={"a": speed}))
     assert checked_command(Command()) == Command()
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        (Command(advice_reach=math.nan), r"advice_reach must be at least 0 \[m\], got nan"),
+        (Command(stretches=[StretchAdvice(20.0)]), "stretches must be a tuple of StretchAdvice; got"),
+        (Command(stretches=(20.0,)), r"stretches\[0\] must be of type fogsim\.values\.StretchAdvice, got 20"),
+        (Command(stretches=(StretchAdvice(20.0), StretchAdvice(-1.0))), r"stretches\[1\]: speed must be at least 0"),
+        (
+            Command(stretches=(StretchAdvice(20.0, "road"),)),
+            r"stretch must be of type fogsim\.values\.Stretch, got 'ro",
+        ),
+        (
+            Command(stretches=(StretchAdvice(20.0, display="sign"),)),
+            r"display must be a fogsim\.values\.Display; got 's",
+        ),
+        (Command(stretches=(StretchAdvice(20.0, Stretch(-1.0)),)), r"stretch\.start must be .* at least 0 .*, got -1"),
+        (Command(stretches=(StretchAdvice(20.0, Stretch(5.0, 5.0)),)), r"stretch\.end must lie behind its start at 5"),
+        (Command(stretches=(StretchAdvice(20.0, Stretch(edges="e1")),)), r"stretch\.edges must be a tuple .*got 'e1'"),
+        (
+            Command(stretches=(StretchAdvice(20.0, Stretch(edges=(1,))),)),
+            r"stretch\.edges must be .* ids of edges; got 1",
+        ),
+    ],
+)
+def test_advice_to_others(command: Command, message: str) -> None:
+    with pytest.raises(InputError, match=f"^the command.*{message}"):
+        checked_command(command)
+
+
+def test_good_advice_to_others() -> None:
+    stretch = Stretch(100.0, math.inf, ("a", "b"))
+    good = Command(advice_reach=math.inf, stretches=(StretchAdvice(math.inf, stretch, Display.MESSAGE_SIGN),))
+    assert checked_command(good) is good
 
 
 def test_lamps() -> None:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from highway_env.vehicle.behavior import IDMVehicle
 
+from fogsim.traffic.drivers.advice_hearing import AdviceHearing
 from fogsim.traffic.drivers.sight import FogAccess
 from fogsim.traffic.drivers.speed_choice import (
     CHOICE_PERIOD,
@@ -19,6 +20,7 @@ from fogsim.traffic.drivers.speed_choice import (
 from fogsim.traffic.highway.fleet import Fleet
 from fogsim.traffic.highway.network import speed_limit
 from fogsim.traffic.highway.snapshot import front_bumper
+from fogsim.traffic.highway.vehicle_places import HighwayVehiclePlaces
 from fogsim.units import visibility_from_extinction
 from fogsim.values import Command
 
@@ -45,6 +47,7 @@ class HighwayDesiredSpeeds:
         self._seed = seed
         self._deceleration = advice_deceleration
         self._traits: dict[str, DriverTraits] = {}
+        self._hearing = AdviceHearing(HighwayVehiclePlaces(fleet))
         self._advised_since: dict[str, float] = {}
         self._desired: dict[Any, float] = {}
         self._own_speed: dict[Any, float] = {}
@@ -62,7 +65,8 @@ class HighwayDesiredSpeeds:
         drivers = [v for v in self._fleet.environment.road.vehicles if _drives_itself(v)]
         if self._fleet.time >= self._next:
             self._next = self._fleet.time + CHOICE_PERIOD
-            self._choose([v for v in drivers if v is not self._fleet.ego], command.advised_speeds)
+            heard = self._hearing.listen(command, CHOICE_PERIOD)
+            self._choose([v for v in drivers if v is not self._fleet.ego], heard)
         for vehicle in drivers:
             ego = vehicle is self._fleet.ego
             desired = command.advice.speed if ego else self._desired.get(vehicle, math.inf)

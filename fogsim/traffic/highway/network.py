@@ -54,7 +54,7 @@ def road_network(road: Any, ego: Any) -> RoadNetwork:
         lane
         for start, ends in road.network.graph.items()
         for end, parallel in ends.items()
-        for lane in _carriageway(f"{start}>{end}", parallel)
+        for lane in _carriageway(edge_id(start, end), parallel)
     ]
     return RoadNetwork(tuple(lanes), _route(road.network, ego))
 
@@ -112,7 +112,18 @@ def lane_id(index: tuple[str, str, int]) -> str:
         Start node, end node and number.
     """
     start, end, number = index
-    return f"{start}>{end}_{number}"
+    return f"{edge_id(start, end)}_{number}"
+
+
+def edge_id(start: str, end: str) -> str:
+    """Id of an edge, as in the road network.
+
+    Parameters
+    ----------
+    start, end : str
+        Its nodes.
+    """
+    return f"{start}>{end}"
 
 
 def _centreline(lane: Any) -> NDArray[np.float64]:
@@ -123,13 +134,21 @@ def _centreline(lane: Any) -> NDArray[np.float64]:
 
 
 def _route(network: Any, ego: Any) -> NDArray[np.float64]:
-    points = np.concatenate([_centreline(network.get_lane(index)) for index in _lanes_ahead(network, ego)])
+    points = np.concatenate([_centreline(network.get_lane(index)) for index in lanes_ahead(network, ego)])
     apart = np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-6
     return points[np.concatenate(([True], apart))]
 
 
-def _lanes_ahead(network: Any, ego: Any) -> Iterator[tuple[str, str, int]]:
-    """Lanes one after the other, from the ego's own; a route in circles is ended."""
+def lanes_ahead(network: Any, ego: Any) -> Iterator[tuple[str, str, int]]:
+    """Lanes one after the other, from the ego's own; a route in circles is ended.
+
+    Parameters
+    ----------
+    network : highway_env.road.road.RoadNetwork
+        The network.
+    ego : highway_env.vehicle.kinematics.Vehicle
+        The ego.
+    """
     # The library takes what has been driven off the list that it is given.
     here, plan, passed = ego.lane_index, list(planned_route(ego) or ()), set()
     while here not in passed:

@@ -55,7 +55,7 @@ class RoutePosition:
 
     def _crossing(self, edge: str, following: str) -> float:
         """Length of the way across the junction between two edges [m]; 0 in a net without inner lanes."""
-        for target, inner in _connections(self._api, edge):
+        for target, inner in connections(self._api, edge):
             if target == following:
                 length = 0.0
                 for lane in inner:
@@ -144,7 +144,7 @@ class GapToEgo:
 
     def _passed(self, edge: str, current: str) -> float:
         """Length of the lanes inside a junction that lie between an edge and the current lane [m]."""
-        for _, inner in _connections(self._api, edge):
+        for _, inner in connections(self._api, edge):
             passed = 0.0
             for lane in inner:
                 if lane == current:
@@ -153,8 +153,16 @@ class GapToEgo:
         return 0.0
 
 
-def _connections(api: Api, edge: str) -> Iterator[tuple[str, Iterator[str]]]:
-    """Edges that the lanes of an edge lead to, each with the lanes inside the junction on the way there."""
+def connections(api: Api, edge: str) -> Iterator[tuple[str, Iterator[str]]]:
+    """Edges that the lanes of an edge lead to, each with the lanes inside the junction on the way there.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    edge : str
+        The edge.
+    """
     links = api.lane.getLinks
 
     def inner(lane: str) -> Iterator[str]:

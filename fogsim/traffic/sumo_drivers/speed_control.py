@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.kinematics import decelerated_speed
+from fogsim.traffic.drivers.advice_hearing import AdviceHearing
 from fogsim.traffic.drivers.events import Order
 from fogsim.traffic.drivers.sight import FogAccess
 from fogsim.traffic.drivers.speed_choice import (
@@ -20,9 +21,11 @@ from fogsim.traffic.drivers.speed_choice import (
 from fogsim.traffic.sumo.claims import TIME_HEADWAY, TOP_SPEED, Claims
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
+from fogsim.traffic.sumo.vehicle_places import SumoVehiclePlaces
 from fogsim.traffic.sumo_drivers.driver_table import Column, DriverTable
 from fogsim.traffic.sumo_drivers.top_speeds import TopSpeedControl
 from fogsim.units import visibility_from_extinction
+from fogsim.values import Command
 
 UNNOTICED_FACTOR = 0.02
 """Change of a headway's factor [-] that is not noticed; setting it costs a call."""
@@ -129,26 +132,29 @@ class SumoDesiredSpeeds:
         self._headways = Claims(api, TIME_HEADWAY, session)
         self._table = DriverTable(setup, seed, top_speeds, self._headways)
         self._top_speeds = TopSpeedControl(api, self._table, top_speeds, deceleration, self._roster.time)
+        self._hearing = AdviceHearing(SumoVehiclePlaces(api, ego, roster))
         self._advised_since: dict[str, float] = {}
-        self._next = 0.0
+        self._next, self._chosen = 0.0, self._roster.time
         self._mark = 0
 
-    def update(self, advised: Mapping[str, float]) -> None:
+    def update(self, command: Command) -> None:
         """Let new drivers choose a speed, and all drivers if it is time to choose again.
 
         Parameters
         ----------
-        advised : mapping from vehicle id to float
-            Advised speeds [m/s].
+        command : Command
+            The advice in force.
         """
         roster = self._roster
         roster.update()
         time, present = roster.time, roster.present
         new, self._mark = roster.entered_since(self._mark)
         if new:
-            self._choose_on_entry([v for v in new if v != self._ego and v in present], advised)
+            self._choose_on_entry([v for v in new if v != self._ego and v in present], command)
         if time >= self._next:
+            elapsed, self._chosen = time - self._chosen, time
             self._next = time + CHOICE_PERIOD
+            advised = self._hearing.listen(command, elapsed)
             # In even fog and without advice, choices stay as they are.
             settled = self._extinction is not None and not advised and not self._advised_since
             self._advised_since = {v: self._advised_since.get(v, time) for v in advised}
@@ -156,18 +162,20 @@ class SumoDesiredSpeeds:
                 self._update_choices([v for v in present if v != self._ego], advised)
         self._top_speeds.update(time, present)
 
-    def _choose_on_entry(self, new: Sequence[str], advised: Mapping[str, float]) -> None:
+    def _choose_on_entry(self, new: Sequence[str], command: Command) -> None:
         """Let new drivers choose; those who enter have driven in that fog before, past the signs with the advice."""
         self._table.reset(new)
         # Departures carry the time at which their step began. Other new vehicles were on the road already.
         since = self._roster.time - 1.5 * self._step
         entering = [v for v in new if self._departure(v) >= since]
-        self._advised_since.update((v, -math.inf) for v in entering if v in advised)
         if entering:
+            advised = self._hearing.enter(command, entering)
+            self._advised_since.update(dict.fromkeys(advised, -math.inf))
             rows, desired = self._desired(entering, advised)
             self._top_speeds.set_at_entry(entering, rows, desired)
         if len(entering) < len(new):
-            self._update_choices([v for v in new if v not in set(entering)], advised)
+            # They hear other advice than that to them by name when all listen again.
+            self._update_choices([v for v in new if v not in set(entering)], command.advised_speeds)
 
     def _update_choices(self, ids: Sequence[str], advised: Mapping[str, float]) -> None:
         if ids:

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from fogsim.atmosphere import FieldAccess, airlight_from_illuminance
+from fogsim.errors import InputError
 from fogsim.kinematics import safe_speed
 from fogsim.traffic import Compliance, DriverSetup
 from fogsim.traffic.drivers.speed_choice import desired_speed, driver_traits
 from fogsim.traffic.highway import HighwayTraffic
 from fogsim.units import extinction_from_visibility
-from fogsim.values import Command, FogField
+from fogsim.values import Command, Display, FogField, SpeedAdvice, Stretch, StretchAdvice
 
 DAY = 10_000.0
 FAST = 30.0
@@ -146,6 +147,50 @@ def test_the_field_result_that_advice_of_30_mph_gave_61() -> None:
     for vehicle in road.others:
         vehicle.target_speed = 65.0 * MPH
     assert road.drive(20.0, advised(road, 30.0 * MPH)).targets() == pytest.approx([61.0 * MPH] * len(road.others))
+
+
+def test_advice_to_all_on_a_stretch_is_heard_there() -> None:
+    road = Road(exact(delay=0.0))
+    places = {
+        name: v.lane.local_coordinates(v.position)[0] + v.LENGTH / 2
+        for name, v in zip(road.ids, road.others, strict=True)
+    }
+    start, end = sorted(places.values())[2] - 1.0, sorted(places.values())[7] + 1.0
+    for stretch in (Stretch(start, end), Stretch(start, end, ("0>1",))):
+        road = Road(exact(delay=0.0))
+        heard = road.drive(0.1, Command(stretches=(StretchAdvice(15.0, stretch),))).targets()
+        assert [target < FAST for target in heard] == [start < x < end for x in places.values()]
+
+
+def test_a_sign_is_read_in_passing_and_its_advice_ends_with_the_stretch() -> None:
+    road = Road(exact(delay=0.0))
+    front = max(v.position[0] for v in road.others)
+    sign = StretchAdvice(25.0, Stretch(front + 50.0, front + 400.0), Display.MESSAGE_SIGN)
+    first = max(road.others, key=lambda v: v.position[0])
+    road.drive(1.0, Command(stretches=(sign,)))
+    assert first.target_speed == FAST
+    road.drive(3.0, Command(stretches=(sign,)))
+    assert 24.0 < first.target_speed < FAST
+    road.drive(16.0)
+    assert first.target_speed == FAST
+
+
+def test_the_egos_advice_reaches_those_near_it() -> None:
+    road = Road(exact(delay=0.0))
+    ego = road.environment.vehicle.position
+    apart = [float(np.linalg.norm(v.position - ego)) for v in road.others]
+    reach = sorted(apart)[5] + 1.0
+    heard = road.drive(0.1, Command(SpeedAdvice(15.0), advice_reach=reach)).targets()
+    assert [target < FAST for target in heard] == [distance <= reach for distance in apart]
+
+
+@pytest.mark.parametrize(
+    ("stretch", "message"),
+    [(Stretch(edges=("0>2",)), "no edge '0>2'; .*0>1"), (Stretch(20_000.0), "the ego's route is 10000 m long")],
+)
+def test_a_stretch_that_the_road_does_not_have_is_refused(stretch: Stretch, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Road(exact()).drive(0.1, Command(stretches=(StretchAdvice(15.0, stretch),)))
 
 
 def test_advice_is_followed_after_the_delay() -> None:

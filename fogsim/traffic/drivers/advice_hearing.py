@@ -1,0 +1,175 @@
+"""Which advice each driver has heard: by name, from the ego, in the car, or off a sign that was passed."""
+
+import math
+from collections.abc import Collection, Iterable, Mapping
+from typing import Protocol
+
+from fogsim.errors import InputError, suggest
+from fogsim.values import Command, Display, Stretch
+
+HARDEST_BRAKING = 9.0
+"""No vehicle brakes harder than this for long [m/s²]."""
+
+
+class VehiclePlaces(Protocol):
+    """Where the vehicles of a simulation are."""
+
+    def on_stretch(self, stretch: Stretch, among: Collection[str] | None = None) -> Mapping[str, float]:
+        """Vehicles on a stretch, and how far past its beginning their front bumpers are [m].
+
+        Parameters
+        ----------
+        stretch : Stretch
+            The stretch.
+        among : collection of str or None
+            Vehicles that are asked about; None for all.
+
+        Raises
+        ------
+        InputError
+            If the network has no such stretch.
+        """
+
+    def near_ego(self, distance: float, among: Collection[str] | None = None) -> Collection[str]:
+        """Vehicles near the ego; nobody while the ego is not on the road.
+
+        Parameters
+        ----------
+        distance : float
+            From front bumper to front bumper, at most [m].
+        among : collection of str or None
+            Vehicles that are asked about; None for all.
+        """
+
+    def speed(self, vehicle: str) -> float:
+        """Speed of a vehicle [m/s].
+
+        Parameters
+        ----------
+        vehicle : str
+            Its id.
+        """
+
+
+class AdviceHearing:
+    """Knows what the drivers of one run have heard.
+
+    A message sign is read in passing, and what it said then is kept to the end of its stretch, whatever it says to
+    those who come later. All other advice is heard as long as it is in force and the driver is where it is given.
+
+    Parameters
+    ----------
+    places : VehiclePlaces
+        Where the vehicles are.
+    """
+
+    def __init__(self, places: VehiclePlaces) -> None:
+        self._places = places
+        self._readers: dict[Stretch, dict[str, float]] = {}
+        self._last_on: dict[Stretch, Collection[str]] = {}
+
+    def enter(self, command: Command, entering: Collection[str]) -> dict[str, float]:
+        """Advice in force where vehicles enter the road [m/s]: they have come past the signs of their stretch upstream.
+
+        Parameters
+        ----------
+        command : Command
+            What is in force.
+        entering : collection of str
+            Vehicles that have entered the road in the last step.
+        """
+        by_name = command.advised_speeds
+        heard = {v: by_name[v] for v in entering if by_name.get(v, math.inf) < math.inf}
+        if command.advice_reach > 0.0:
+            _add_lower(heard, self._places.near_ego(command.advice_reach, entering), command.advice.speed)
+        for advice in command.stretches:
+            on = self._places.on_stretch(advice.stretch, entering)
+            _add_lower(heard, on, advice.speed)
+            if on and advice.display == Display.MESSAGE_SIGN:
+                self._readers.setdefault(advice.stretch, {}).update(dict.fromkeys(on, advice.speed))
+        return heard
+
+    def listen(self, command: Command, elapsed: float) -> dict[str, float]:
+        """Advice that each driver now goes by, as far as there is any [m/s].
+
+        Parameters
+        ----------
+        command : Command
+            What is in force.
+        elapsed : float
+            Time since the last call [s]; signs that show something new are read by those who passed them meanwhile.
+        """
+        heard = {v: speed for v, speed in command.advised_speeds.items() if speed < math.inf}
+        if command.advice_reach > 0.0:
+            _add_lower(heard, self._places.near_ego(command.advice_reach), command.advice.speed)
+        shown: dict[Stretch, float] = {}
+        for advice in command.stretches:
+            if advice.display == Display.MESSAGE_SIGN:
+                shown[advice.stretch] = advice.speed
+            else:
+                _add_lower(heard, self._places.on_stretch(advice.stretch), advice.speed)
+        for stretch in {**self._readers, **shown}:
+            for vehicle, speed in self._read_sign(stretch, shown.get(stretch), elapsed).items():
+                _add_lower(heard, (vehicle,), speed)
+        return heard
+
+    def _read_sign(self, stretch: Stretch, shown: float | None, elapsed: float) -> dict[str, float]:
+        """What those on the stretch of a sign have read there [m/s]."""
+        on, last_on = self._places.on_stretch(stretch), self._last_on.get(stretch, ())
+        readers = {v: speed for v, speed in self._readers.get(stretch, {}).items() if v in on}
+        if shown is not None:
+            for vehicle, past in on.items():
+                if vehicle not in readers and vehicle not in last_on:
+                    # Who has come onto the stretch farther on, from a ramp, has not passed the sign.
+                    driven = self._places.speed(vehicle) * elapsed + 0.5 * HARDEST_BRAKING * elapsed**2
+                    readers.update({vehicle: shown} if past <= driven else {})
+        self._readers[stretch], self._last_on[stretch] = readers, on
+        if shown is None and not readers:
+            del self._readers[stretch], self._last_on[stretch]
+        return readers
+
+
+def _add_lower(heard: dict[str, float], vehicles: Iterable[str], speed: float) -> None:
+    """Let vehicles have heard a speed [m/s], where they have heard none that is lower."""
+    for vehicle in vehicles if speed < math.inf else ():
+        heard[vehicle] = min(heard.get(vehicle, speed), speed)
+
+
+def check_edges(stretch: Stretch, known: Collection[str]) -> None:
+    """Check that a network has the edges of a stretch.
+
+    Parameters
+    ----------
+    stretch : Stretch
+        The stretch.
+    known : collection of str
+        Edges of the network.
+
+    Raises
+    ------
+    InputError
+        If it lacks one.
+    """
+    for edge in stretch.edges:
+        if edge not in known:
+            raise InputError(f"an advised stretch: the network has no edge {edge!r}; {suggest(edge, known)}")
+
+
+def check_start(stretch: Stretch, length: float) -> None:
+    """Check that a stretch begins on its road.
+
+    Parameters
+    ----------
+    stretch : Stretch
+        The stretch.
+    length : float
+        Length of its edges, or of the ego's route [m].
+
+    Raises
+    ------
+    InputError
+        If it begins behind their end.
+    """
+    if stretch.start >= length:
+        road = f"edges, {', '.join(stretch.edges)}, are" if stretch.edges else "ego's route is"
+        raise InputError(f"an advised stretch begins at {stretch.start:g} m, but the {road} {length:.0f} m long")

@@ -1,0 +1,133 @@
+"""Where SUMO's vehicles are: on which stretch of road, and how near the ego."""
+
+import itertools
+import math
+from collections.abc import Collection, Iterator, Sequence
+from typing import NamedTuple
+
+from fogsim.errors import InputError
+from fogsim.traffic.drivers.advice_hearing import check_edges, check_start
+from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
+from fogsim.traffic.sumo.roster import Roster
+from fogsim.traffic.sumo.route_position import connections
+from fogsim.values import Stretch
+
+
+class _Piece(NamedTuple):
+    """An edge, also one inside a junction, and the positions along a road at which it begins and ends [m]."""
+
+    edge: str
+    start: float
+    end: float
+
+
+class SumoVehiclePlaces:
+    """Finds vehicles edge by edge; see `VehiclePlaces`.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    ego : str
+        Id of the ego.
+    roster : Roster
+        Which vehicles are on the road.
+    """
+
+    def __init__(self, api: Api, ego: str, roster: Roster) -> None:
+        self._api = api
+        self._ego = ego
+        self._roster = roster
+        self._position = vehicle_getter(api, "getPosition3D")
+        self._station = vehicle_getter(api, "getLanePosition")
+        self._edge = vehicle_getter(api, "getRoadID")
+        self.speed = vehicle_getter(api, "getSpeed")
+        self._on_edge = getter(api, "edge", "getLastStepVehicleIDs")
+        self._route: tuple[str, tuple[str, ...]] = ("", ())
+        self._pieces: dict[tuple[Stretch, tuple[str, ...]], tuple[_Piece, ...]] = {}
+
+    def on_stretch(self, stretch: Stretch, among: Collection[str] | None = None) -> dict[str, float]:
+        """Vehicles on a stretch, and how far past its beginning they are [m]; see `VehiclePlaces.on_stretch`.
+
+        Parameters
+        ----------
+        stretch : Stretch
+            The stretch.
+        among : collection of str or None
+            Vehicles that are asked about; None for all.
+
+        Raises
+        ------
+        InputError
+            If the network has no such edge, edges do not follow one another, or the stretch begins behind their end.
+        """
+        edges = stretch.edges or self._ego_route()
+        key = (stretch, edges)
+        if key not in self._pieces:
+            self._pieces[key] = tuple(self._find_pieces(stretch, edges)) if edges else ()
+        past = {}
+        for vehicle, piece in self._on_pieces(self._pieces[key], among):
+            position = piece.start + float(self._station(vehicle))
+            if stretch.start <= position < stretch.end:
+                past[vehicle] = position - stretch.start
+        return past
+
+    def _on_pieces(self, pieces: Sequence[_Piece], among: Collection[str] | None) -> Iterator[tuple[str, _Piece]]:
+        present = self._roster.present
+        if among is None:
+            return ((v, piece) for piece in pieces for v in self._on_edge(piece.edge) if v in present)
+        edges = [(v, self._edge(v)) for v in among]
+        return ((v, piece) for piece in pieces for v, edge in edges if edge == piece.edge)
+
+    def _ego_route(self) -> tuple[str, ...]:
+        """Edges of the ego's route; of its last one when it is not on the road."""
+        if self._ego in self._roster.present:
+            route = self._api.vehicle.getRouteID(self._ego)
+            if route != self._route[0]:
+                self._route = (route, tuple(self._api.vehicle.getRoute(self._ego)))
+        return self._route[1]
+
+    def _find_pieces(self, stretch: Stretch, edges: Sequence[str]) -> Iterator[_Piece]:
+        """What of a road lies on a stretch of it."""
+        check_edges(stretch, frozenset(self._api.edge.getIDList()))
+        pieces = list(self._pieces_along(edges, must_follow=bool(stretch.edges)))
+        check_start(stretch, pieces[-1].end)
+        return (piece for piece in pieces if piece.start < stretch.end and piece.end > stretch.start)
+
+    def _pieces_along(self, edges: Sequence[str], must_follow: bool) -> Iterator[_Piece]:
+        begin = 0.0
+        for edge, following in itertools.pairwise((*edges, "")):
+            end = begin + float(self._api.lane.getLength(f"{edge}_0"))
+            yield _Piece(edge, begin, end)
+            begin = end
+            ways = [list(inner) for target, inner in connections(self._api, edge) if target == following]
+            if following and not ways and must_follow:
+                raise InputError(f"an advised stretch: no lane leads from edge {edge!r} to edge {following!r}")
+            crossed: dict[str, _Piece] = {}
+            for lanes in ways:
+                at = end
+                for lane in lanes:
+                    inner = _Piece(lane.rpartition("_")[0], at, at + float(self._api.lane.getLength(lane)))
+                    crossed.setdefault(inner.edge, inner)
+                    at = inner.end
+                # As `RoutePosition` counts: the first way is the length of the crossing.
+                begin = at if begin == end else begin
+            yield from crossed.values()
+
+    def near_ego(self, distance: float, among: Collection[str] | None = None) -> Collection[str]:
+        """Vehicles near the ego; see `VehiclePlaces.near_ego`.
+
+        Parameters
+        ----------
+        distance : float
+            From front bumper to front bumper, at most [m].
+        among : collection of str or None
+            Vehicles that are asked about; None for all.
+        """
+        if self._ego not in self._roster.present:
+            return ()
+        asked = self._roster.present if among is None else among
+        if distance == math.inf:
+            return asked
+        here = self._position(self._ego)[:2]
+        return [v for v in asked if math.dist(self._position(v)[:2], here) <= distance]

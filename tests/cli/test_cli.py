@@ -89,7 +89,7 @@ def test_an_interrupted_run_leaves_readable_results_that_say_they_are_partial(tm
     deadline = time.monotonic() + 120
     while not (partial.exists() and partial.stat().st_size > 0) and time.monotonic() < deadline:
         time.sleep(0.1)
-    time.sleep(3.0)
+    time.sleep(1.0)
     os.killpg(process.pid, signal.SIGINT)  # as Ctrl-C does: every process of the terminal's group
     stdout, stderr = process.communicate(timeout=60)
     assert process.returncode == 130, stderr
@@ -205,8 +205,8 @@ def test_signs_are_written_as_geojson(tmp_path: Path, command: Command) -> None:
     assert 110 in [round(f["properties"]["speed_limit_kmh"]) for f in content["features"]]
 
 
-def test_doctor_finds_everything_here() -> None:
-    done = fogsim("doctor")
+def test_doctor_finds_everything_here(command: Command) -> None:
+    done = command("doctor")
     assert done.returncode == 0, done.stdout
     assert "OpenGL (EGL)" in done.stdout
     assert "missing" not in done.stdout

@@ -52,14 +52,31 @@ LANE_CHANGE_MODE = Attribute(
 )
 """Bits of why a vehicle may change lane."""
 
-_SPEED_GAIN = "laneChangeModel.lcSpeedGain"
 
-SPEED_GAIN = Attribute(
-    "lcSpeedGain",
-    lambda get, v: float(get.getParameter(v, _SPEED_GAIN)),
-    lambda set_, v, x: set_.setParameter(v, _SPEED_GAIN, repr(x)),
-)
+def _lane_change_parameter(name: str, sign: int = 1) -> Attribute:
+    """Parameter of lane-change models that have it; with sign -1 its highest claim holds, as claims hold -x of it."""
+    key = f"laneChangeModel.{name}"
+    return Attribute(
+        name,
+        lambda get, v: sign * float(get.getParameter(v, key)),
+        lambda set_, v, x: set_.setParameter(v, key, repr(sign * x)),
+    )
+
+
+SPEED_GAIN = _lane_change_parameter("lcSpeedGain")
 """Eagerness to change lanes for speed (LC2013, SL2015) [-]."""
+
+STRATEGIC = _lane_change_parameter("lcStrategic")
+"""Eagerness to change lanes for the route and around what stands; negative for never (LC2013, SL2015) [-]."""
+
+COOPERATIVE_SPEED = _lane_change_parameter("lcCooperativeSpeed")
+"""Willingness to change speed for others who change lanes (LC2013, SL2015) [-]."""
+
+COOPERATIVE = _lane_change_parameter("lcCooperative")
+"""Willingness to change lanes for others; negative for never (LC2013, SL2015) [-]."""
+
+OVERTAKE_RIGHT = _lane_change_parameter("lcOvertakeRight", sign=-1)
+"""Minus the probability of overtaking on the right where that is forbidden (LC2013) [-]."""
 
 
 def new_session(api: Api) -> str:

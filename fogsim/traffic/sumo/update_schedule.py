@@ -78,6 +78,21 @@ class UpdateSchedule:
                 number -= number % self._batch
             self._due.setdefault(number, []).extend(vehicles)
 
+    def bring_forward(self, vehicle: str) -> None:
+        """Make a vehicle that waits due in the next step; one that waits for nothing stays so.
+
+        Parameters
+        ----------
+        vehicle : str
+            Its id.
+        """
+        # Seldom asked for, so that keeping where each vehicle waits would cost more.
+        for waiting in self._due.values():
+            if vehicle in waiting:
+                waiting.remove(vehicle)
+                self._due.setdefault(self._current + 1, []).append(vehicle)
+                return
+
     def pop_due(self, now: float) -> list[str]:
         """Take out the vehicles that are due.
 

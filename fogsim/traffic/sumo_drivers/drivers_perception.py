@@ -6,8 +6,10 @@ from typing import Protocol
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.roster import Roster
+from fogsim.traffic.sumo_drivers.lane_changing import LaneChanging
 from fogsim.traffic.sumo_drivers.perception import Perception
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
+from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
 from fogsim.values import Lamp
 
 
@@ -81,4 +83,8 @@ def drivers_perception(
     session : str
         Name of the session.
     """
-    return DriversPerception((Perception(api, fog, sight, roster, remote, session),))
+    leaders = Perception(api, fog, sight, roster, remote, session)
+    vehicle_sight = VehicleSight(api, fog, sight)
+    return DriversPerception(
+        (leaders, LaneChanging(api, fog, sight, roster, leaders, vehicle_sight, remote, session))
+    )

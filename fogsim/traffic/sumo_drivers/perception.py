@@ -11,16 +11,15 @@ is new (one of the two has changed lane, or somebody came within `REACH`) is not
 `MAX_PAUSE` later; until then SUMO's driver sees it.
 """
 
-import contextlib
 import itertools
 from collections.abc import Iterable, Sequence
 
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
-from fogsim.traffic.sumo.claims import SOLE_SESSION, SPEED_GAIN, Claims, SessionValues
+from fogsim.traffic.sumo.claims import SOLE_SESSION, SPEED_GAIN, SessionValues
 from fogsim.traffic.sumo.link import Api, Getter, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo.traci_link import load_traci
 from fogsim.traffic.sumo.update_schedule import UpdateSchedule, closing_speed_bound
+from fogsim.traffic.sumo_drivers.lane_change_switches import LaneChangeSwitch
 from fogsim.traffic.sumo_drivers.leader_sight import LeaderSight, Pair, SubscribedLeaders
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
 
@@ -57,11 +56,10 @@ class IgnoredLeaders:
 
     def __init__(self, api: Api, session: str) -> None:
         self._vehicles = api.vehicle
-        # A connection of traci has no errors of its own; both modules do.
-        self._refusal: type[Exception] = getattr(api, "TraCIException", None) or load_traci().TraCIException
         self._session = session
         self._ignored = SessionValues[str](api, "ignored")
-        self._speed_gain = Claims(api, SPEED_GAIN, session)
+        # A lane-change model without such a parameter (DK2008) keeps seeing through the fog.
+        self._speed_gain = LaneChangeSwitch(api, SPEED_GAIN, _NO_SPEED_GAIN, session)
 
     def ignore(self, follower: str, leader: str) -> None:
         """Let a follower ignore one vehicle.
@@ -74,9 +72,7 @@ class IgnoredLeaders:
         leaders = self._ignored.read(follower)
         leaders[self._session] = leader
         self._set(follower, leaders)
-        # A lane-change model without such a parameter (DK2008) keeps seeing through the fog.
-        with contextlib.suppress(self._refusal):
-            self._speed_gain.claim(follower, _NO_SPEED_GAIN)
+        self._speed_gain.turn(follower, True)
 
     def stop_ignoring(self, follower: str) -> None:
         """Let a follower react again to the vehicle that this session had it ignore, and change lanes as before.
@@ -89,7 +85,7 @@ class IgnoredLeaders:
         leaders = self._ignored.read(follower)
         if leaders.pop(self._session, None) is not None:
             self._set(follower, leaders)
-            self._speed_gain.withdraw(follower)
+        self._speed_gain.turn(follower, False)
 
     def _set(self, follower: str, leaders: dict[str, str]) -> None:
         self._vehicles.setParameter(follower, _IGNORED, " ".join(sorted(set(leaders.values()))))
@@ -146,6 +142,27 @@ class Perception:
     def ignored(self) -> dict[str, str]:
         """Leaders that are not reacted to, by follower."""
         return dict(self._ignored)
+
+    def hidden_leader(self, follower: str) -> str | None:
+        """Leader that a driver does not react to; None if there is none.
+
+        Parameters
+        ----------
+        follower : str
+            Id of the driver's vehicle.
+        """
+        return self._ignored.get(follower)
+
+    def expect_unseen(self, follower: str, leader: str) -> None:
+        """Hide a vehicle that is about to come before a driver who does not see it, and look again in the next step.
+
+        Parameters
+        ----------
+        follower, leader : str
+            The vehicles.
+        """
+        self._hide(follower, leader)
+        self._schedule.bring_forward(follower)
 
     def update(self, own_lamps: OwnLamps) -> None:
         """Tell SUMO's drivers which leader they do not see.

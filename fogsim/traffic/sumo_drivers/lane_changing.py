@@ -1,0 +1,292 @@
+"""Drivers change lanes by what they see.
+
+SUMO's lane-change models look through any fog. Here, for the drivers for whom that makes a difference:
+
+- Who wants to change lanes and is held back by nobody in sight changes: SUMO makes the change by its ``changeLane``,
+  for one step without respect for others' gaps, but never into an overlap. What follows, braking or a collision, is
+  SUMO's.
+- A leader that stands out of sight is no obstacle to leave the lane for (``lcStrategic``), as long as the route goes
+  on in this lane.
+- A slow vehicle in the lane to the left that is out of sight is no reason to fall back behind it, as where overtaking
+  on the right is forbidden (``lcOvertakeRight``).
+- Nobody makes room for somebody who is out of sight (``lcCooperative``, ``lcCooperativeSpeed``).
+
+Drivers look each `LOOK_PERIOD`; who has nobody unseen about is not touched.
+"""
+
+from collections.abc import Mapping, Sequence
+
+from fogsim.traffic.drivers.sight import DriverSight, FogAccess
+from fogsim.traffic.sumo.claims import (
+    COOPERATIVE,
+    COOPERATIVE_SPEED,
+    LANE_CHANGE_MODE,
+    OVERTAKE_RIGHT,
+    STRATEGIC,
+    Claims,
+)
+from fogsim.traffic.sumo.link import Api, vehicle_getter
+from fogsim.traffic.sumo.roster import Roster
+from fogsim.traffic.sumo.update_schedule import UpdateSchedule
+from fogsim.traffic.sumo_drivers.lane_change_switches import LaneChangeSwitch
+from fogsim.traffic.sumo_drivers.neighbour_sight import NEAR, BlockedChange, Neighbours, NeighbourSight
+from fogsim.traffic.sumo_drivers.perception import REACH, Perception
+from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
+from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
+
+LOOK_PERIOD = 0.5
+"""Time between two looks of a driver [s]."""
+
+STANDING_REACH = 150.0
+"""SUMO's drivers leave the lane for who stands within 100 m; between two looks they drive less than the rest [m]."""
+
+_NEVER, _ALWAYS = -1.0, 1.0
+_RESPECT = 0x300
+_NO_OVERLAP = 0x100
+
+
+class StandingLeaders:
+    """Keeps drivers in their lanes behind leaders that stand out of sight.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    leaders : Perception
+        Which leaders are out of sight.
+    session : str
+        Name of the session.
+    """
+
+    def __init__(self, api: Api, leaders: Perception, session: str) -> None:
+        self._vehicles = api.vehicle
+        self._leaders = leaders
+        self._leader = vehicle_getter(api, "getLeader")
+        self._strategic = LaneChangeSwitch(api, STRATEGIC, _NEVER, session)
+
+    def update(self, drivers: Sequence[str]) -> None:
+        """Decide anew for some drivers.
+
+        Parameters
+        ----------
+        drivers : sequence of str
+            Their vehicles.
+        """
+        for driver in drivers:
+            hidden = self._leaders.hidden_leader(driver)
+            self._strategic.turn(driver, hidden is not None and self._would_be_left_for(driver, hidden))
+
+    def _would_be_left_for(self, driver: str, hidden: str) -> bool:
+        """Whether a hidden leader stands so near that SUMO's driver would leave a lane that leads on."""
+        leader, gap = self._leader(driver, STANDING_REACH) or ("", 0.0)
+        if leader != hidden or gap > STANDING_REACH or not self._vehicles.isStopped(hidden):
+            return False
+        lane = self._vehicles.getLaneID(driver)
+        # SUMO tells of each lane of the edge how many lanes away the best one for the route is.
+        return any(best[0] == lane and best[3] == 0 for best in self._vehicles.getBestLanes(driver))
+
+    def turn_off(self, drivers: Sequence[str], present: set[str]) -> None:
+        """Give some drivers their own behaviour back; see `LaneChangeSwitch.turn_off`."""
+        self._strategic.turn_off(drivers, present)
+
+    def release(self, present: set[str]) -> None:
+        """Give everybody their own behaviour back; see `LaneChangeSwitch.release`."""
+        self._strategic.release(present)
+
+
+class RequestedChanges:
+    """Changes of lane that are asked of SUMO, each for one step.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    session : str
+        Name of the session.
+    """
+
+    def __init__(self, api: Api, session: str) -> None:
+        self._vehicles = api.vehicle
+        self._edges = api.edge
+        # Apart from the session's other claim, that vehicles keep their lanes.
+        self._modes = Claims(api, LANE_CHANGE_MODE, f"{session} changes")
+        self._asked: list[str] = []
+
+    def ask(self, driver: str, lanes: int) -> bool:
+        """Let a driver change lane in the next step, whoever is there, but not into an overlap.
+
+        Parameters
+        ----------
+        driver : str
+            Id of the vehicle.
+        lanes : int
+            1 to the left, -1 to the right.
+
+        Returns
+        -------
+        bool
+            False if there is no such lane on the same edge.
+        """
+        lane = int(self._vehicles.getLaneIndex(driver)) + lanes
+        if not 0 <= lane < int(self._edges.getLaneNumber(self._vehicles.getRoadID(driver))):
+            return False
+        self._modes.claim(driver, int(self._modes.own_value(driver)) & ~_RESPECT | _NO_OVERLAP)
+        self._vehicles.changeLane(driver, lane, 0.0)
+        self._asked.append(driver)
+        return True
+
+    def end(self, present: set[str]) -> None:
+        """Give back the lane-change modes of those who were asked before the last step.
+
+        Parameters
+        ----------
+        present : set of str
+            Vehicles on the road.
+        """
+        for driver in self._asked:
+            if driver in present:
+                self._modes.withdraw(driver)
+        self._asked.clear()
+
+
+class LaneChanging:
+    """What drivers perceive of the neighbouring lanes, and of leaders that stand; a part of their perception.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    fog : FogAccess
+        The fog.
+    sight : DriverSight
+        The drivers' eyes.
+    roster : Roster
+        Who is on the road.
+    leaders : Perception
+        What they perceive of their leaders, updated before this.
+    vehicle_sight : VehicleSight
+        Whom they see.
+    remote : bool
+        True where every call is a message to another process.
+    session : str
+        Name of the session.
+    """
+
+    def __init__(
+        self,
+        api: Api,
+        fog: FogAccess,
+        sight: DriverSight,
+        roster: Roster,
+        leaders: Perception,
+        vehicle_sight: VehicleSight,
+        remote: bool,
+        session: str,
+    ) -> None:
+        self._roster = roster
+        self._leaders = leaders
+        self._vehicle_sight = vehicle_sight
+        self._certainly_seen = max(sight.sure_distance(fog.maximum_extinction), NEAR)
+        self._certainly_hidden = sight.hidden_distance(fog.minimum_extinction)
+        self._neighbours = Neighbours(api, REACH, remote)
+        self._sight = NeighbourSight(vehicle_sight, sight.reaction_time)
+        self._requests = RequestedChanges(api, session)
+        self._standing = StandingLeaders(api, leaders, session)
+        self._overtake_right = LaneChangeSwitch(api, OVERTAKE_RIGHT, -_ALWAYS, session)
+        self._unhelpful = tuple(
+            LaneChangeSwitch(api, attribute, value, session)
+            for attribute, value in ((COOPERATIVE, _NEVER), (COOPERATIVE_SPEED, 0.0))
+        )
+        self._schedule = UpdateSchedule(float(api.simulation.getDeltaT()), roster.time)
+        self._mark = 0
+
+    def update(self, own_lamps: OwnLamps) -> None:
+        """Let those who are due look at the lanes beside them.
+
+        Parameters
+        ----------
+        own_lamps : dict
+            Lamps of vehicles whose lamps are not SUMO's.
+        """
+        if self._certainly_seen >= REACH:
+            return
+        self._roster.update()
+        self._requests.end(self._roster.present)
+        due = self._due()
+        if due:
+            self._standing.update(due)
+            self._pass_on_the_right(due, own_lamps)
+            self._change_lanes(due, own_lamps)
+
+    def _due(self) -> list[str]:
+        roster, schedule = self._roster, self._schedule
+        waiting = schedule.pop_due(roster.time)
+        new, self._mark = roster.entered_since(self._mark)
+        self._vehicle_sight.forget(new)
+        self._turn_off([*new, *(v for v in waiting if v not in roster.present)])
+        due = [v for v in dict.fromkeys([*waiting, *schedule.unscheduled(new)]) if v in roster.present]
+        schedule.add(due, roster.time + LOOK_PERIOD)
+        return due
+
+    def _turn_off(self, drivers: Sequence[str]) -> None:
+        """Forget drivers that have left, and begin anew with those who have entered."""
+        if drivers:
+            self._standing.turn_off(drivers, self._roster.present)
+            for switch in (self._overtake_right, *self._unhelpful):
+                switch.turn_off(drivers, self._roster.present)
+
+    def _pass_on_the_right(self, drivers: Sequence[str], own_lamps: OwnLamps) -> None:
+        """Let drivers go on beside a vehicle in the lane to the left that they do not see."""
+        unseen: set[str] = set()
+        doubtful: list[tuple[str, str]] = []
+        for driver in drivers:
+            ahead = self._neighbours.left_leader(driver)
+            if ahead is not None and ahead[1] > self._certainly_hidden:
+                unseen.add(driver)
+            elif ahead is not None and ahead[1] > self._certainly_seen:
+                doubtful.append((driver, ahead[0]))
+        perceived = self._sight.perceive(doubtful, own_lamps, self._roster.time)
+        unseen.update(driver for (driver, _), is_perceived in perceived.items() if not is_perceived)
+        for driver in drivers:
+            self._overtake_right.turn(driver, driver in unseen)
+
+    def _change_lanes(self, drivers: Sequence[str], own_lamps: OwnLamps) -> None:
+        """Let those change lanes who are blocked by nobody whom they perceive, and whom nobody helps whom they see."""
+        for switch in self._unhelpful:
+            switch.turn_off(drivers, self._roster.present)
+        changes = [change for change in self._neighbours.blocked_changes(drivers) if not change.near]
+        pairs = [
+            pair
+            for change in changes
+            for other in change.blockers
+            for pair in ((change.driver, other), (other, change.driver))
+        ]
+        perceived = self._sight.perceive(pairs, own_lamps, self._roster.time)
+        for change in changes:
+            if not any(perceived[change.driver, other] for other in change.blockers):
+                self._change(change, perceived)
+            elif change.is_urgent:
+                self._deny_help([other for other in change.blockers if not perceived[other, change.driver]])
+
+    def _change(self, change: BlockedChange, perceived: Mapping[tuple[str, str], bool]) -> None:
+        if not self._requests.ask(change.driver, change.side.offset):
+            return
+        # SUMO's drivers would see their new leaders until they look again.
+        for leader in change.leaders[:1]:
+            self._leaders.expect_unseen(change.driver, leader)
+        for follower in change.followers:
+            if not perceived[follower, change.driver]:
+                self._leaders.expect_unseen(follower, change.driver)
+
+    def _deny_help(self, drivers: Sequence[str]) -> None:
+        for switch in self._unhelpful:
+            for driver in drivers:
+                switch.turn(driver, True)
+
+    def release(self) -> None:
+        """Give everybody on the road their own lane changing back."""
+        present = self._roster.present
+        self._requests.end(present)
+        self._standing.release(present)
+        for switch in (self._overtake_right, *self._unhelpful):
+            switch.release(present)

@@ -1,0 +1,222 @@
+"""Vehicles in the neighbouring lanes: which of them block a change that is wanted, and which the driver perceives."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from fogsim.traffic.sumo.link import Api, Getter, vehicle_getter
+from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
+from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
+
+NEAR = 5.0
+"""A vehicle beside, or with less gap than this along the road, is seen in any fog [m]."""
+
+# Numbers of variables, bits of signals, states and modes in SUMO's TraCI protocol.
+_SIGNALS, _NEIGHBOURS = 0x5B, 0xBF
+_BLINKERS = 1 | 2
+_TRACI, _URGENT, _OVERLAPPING = 128, 256, 8192
+_LEADERS, _BLOCKING = 2, 4
+_LEFT_LEADERS = _LEADERS
+
+
+@dataclass(frozen=True, slots=True)
+class Side:
+    """One side of a vehicle, in SUMO's numbers.
+
+    Attributes
+    ----------
+    offset : int
+        From the vehicle's lane to the neighbouring one.
+    wanted, leader, follower : int
+        Bits of the lane-change state: the driver wants to go there, is blocked there by a vehicle ahead, or behind.
+    neighbours : int
+        What to ask for its followers by.
+    """
+
+    offset: int
+    wanted: int
+    leader: int
+    follower: int
+    neighbours: int
+
+
+LEFT = Side(1, 2, 512, 1024, 0)
+RIGHT = Side(-1, 4, 2048, 4096, 1)
+
+
+@dataclass(frozen=True, slots=True)
+class BlockedChange:
+    """A change of lane that a driver wants and does not make because of others.
+
+    Attributes
+    ----------
+    driver : str
+        Id of the vehicle.
+    side : Side
+        Where to.
+    is_urgent : bool
+        True if the route needs it, for which drivers ask others to make room.
+    leaders, followers : tuple of str
+        Vehicles that are in the way.
+    near : bool
+        True if one of them is beside it, where it is seen in any fog.
+    """
+
+    driver: str
+    side: Side
+    is_urgent: bool
+    leaders: tuple[str, ...]
+    followers: tuple[str, ...]
+    near: bool
+
+    @property
+    def blockers(self) -> tuple[str, ...]:
+        """All vehicles that are in the way."""
+        return self.leaders + self.followers
+
+
+class Neighbours:
+    """Asks SUMO for neighbours and for changes that are blocked.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    reach : float
+        Neighbours farther along the road than this do not matter [m].
+    remote : bool
+        True where every call is a message to another process: what is asked for every driver is subscribed to.
+    """
+
+    def __init__(self, api: Api, reach: float, remote: bool) -> None:
+        subscribed = _Subscribed(api) if remote else None
+        self._signals: Getter = vehicle_getter(api, "getSignals") if subscribed is None else subscribed.signals
+        self._neighbours: Getter = vehicle_getter(api, "getNeighbors")
+        self._left_leaders = self._of_left_lane if subscribed is None else subscribed.left_leaders
+        self._state = vehicle_getter(api, "getLaneChangeState")
+        self._reach = reach
+
+    def _of_left_lane(self, vehicle: str) -> Sequence[tuple[str, float]]:
+        found: Sequence[tuple[str, float]] = self._neighbours(vehicle, _LEFT_LEADERS)
+        return found
+
+    def left_leader(self, vehicle: str) -> tuple[str, float] | None:
+        """Next vehicle ahead in the lane to the left, and the gap to it [m]; None if there is none within reach.
+
+        Parameters
+        ----------
+        vehicle : str
+            Its id.
+        """
+        found = self._left_leaders(vehicle)
+        if not found:
+            return None
+        nearest = found[0] if len(found) == 1 else min(found, key=_gap)
+        return nearest if nearest[1] <= self._reach else None
+
+    def blocked_changes(self, vehicles: Iterable[str]) -> list[BlockedChange]:
+        """Changes that drivers want by their own model, and that others block.
+
+        Parameters
+        ----------
+        vehicles : iterable of str
+            The drivers' vehicles.
+        """
+        # Who wants to change lanes blinks.
+        blinking = [v for v in vehicles if self._signals(v) & _BLINKERS]
+        found = ((v, side, self._state(v, side.offset)[1]) for v in blinking for side in (LEFT, RIGHT))
+        return [self.blocked_change(*change) for change in found if _is_blocked(*change[1:])]
+
+    def blocked_change(self, vehicle: str, side: Side, state: int) -> BlockedChange:
+        """A change with those who are in the way.
+
+        Parameters
+        ----------
+        vehicle : str
+            Its id.
+        side : Side
+            Where to.
+        state : int
+            Its lane-change state.
+        """
+        leaders, followers = (
+            self._neighbours(vehicle, side.neighbours | mode) if state & bit else ()
+            for bit, mode in ((side.leader, _LEADERS | _BLOCKING), (side.follower, _BLOCKING))
+        )
+        return BlockedChange(
+            driver=vehicle,
+            side=side,
+            is_urgent=bool(state & _URGENT),
+            leaders=tuple(v for v, _ in leaders),
+            followers=tuple(v for v, _ in followers),
+            near=any(gap < NEAR for _, gap in (*leaders, *followers)),
+        )
+
+
+def _gap(neighbour: tuple[str, float]) -> float:
+    return neighbour[1]
+
+
+def _is_blocked(side: Side, state: int) -> bool:
+    """Whether a state says that somebody with whom there is no overlap blocks what the driver's own model wants."""
+    return bool(state & side.wanted and state & (side.leader | side.follower)) and not state & (_TRACI | _OVERLAPPING)
+
+
+class _Subscribed:
+    """Signals and leaders in the left lane by subscription; see `SubscribedLeaders`."""
+
+    def __init__(self, api: Api) -> None:
+        self._vehicles = api.vehicle
+        self._results = api.vehicle.getSubscriptionResults
+
+    def signals(self, vehicle: str) -> int:
+        return int(self._of(vehicle)[_SIGNALS])
+
+    def left_leaders(self, vehicle: str) -> Sequence[tuple[str, float]]:
+        found: Sequence[tuple[str, float]] = self._of(vehicle)[_NEIGHBOURS]
+        return found
+
+    def _of(self, vehicle: str) -> Mapping[int, Any]:
+        results: Mapping[int, Any] = self._results(vehicle)
+        if _SIGNALS not in results or _NEIGHBOURS not in results:
+            self._vehicles.subscribe(vehicle, (_SIGNALS, _NEIGHBOURS), parameters={_NEIGHBOURS: ("b", _LEFT_LEADERS)})
+            results = self._results(vehicle)
+        return results
+
+
+class NeighbourSight:
+    """Which neighbours drivers perceive: those in sight, but not within the reaction time after they were not.
+
+    Parameters
+    ----------
+    sight : VehicleSight
+        Whom drivers see.
+    reaction_time : float
+        From the first sight of a vehicle that was hidden to the first reaction [s].
+    """
+
+    def __init__(self, sight: VehicleSight, reaction_time: float) -> None:
+        self._sight = sight
+        self._reaction_time = reaction_time
+        self._hidden_at: dict[tuple[str, str], float] = {}
+
+    def perceive(
+        self, pairs: Iterable[tuple[str, str]], own_lamps: OwnLamps, time: float
+    ) -> dict[tuple[str, str], bool]:
+        """Whether each observer perceives a target.
+
+        Parameters
+        ----------
+        pairs : iterable of (str, str)
+            Observers and targets.
+        own_lamps : dict
+            Lamps of vehicles whose lamps are not SUMO's.
+        time : float
+            Simulated time [s].
+        """
+        asked = tuple(dict.fromkeys(pairs))
+        seen = self._sight.sees(asked, own_lamps) if asked else []
+        self._hidden_at = {pair: at for pair, at in self._hidden_at.items() if time - at < self._reaction_time}
+        perceived = {pair: is_seen and pair not in self._hidden_at for pair, is_seen in zip(asked, seen, strict=True)}
+        self._hidden_at.update((pair, time) for pair, is_seen in zip(asked, seen, strict=True) if not is_seen)
+        return perceived

@@ -85,6 +85,4 @@ def drivers_perception(
     """
     leaders = Perception(api, fog, sight, roster, remote, session)
     vehicle_sight = VehicleSight(api, fog, sight)
-    return DriversPerception(
-        (leaders, LaneChanging(api, fog, sight, roster, leaders, vehicle_sight, remote, session))
-    )
+    return DriversPerception((leaders, LaneChanging(api, fog, sight, roster, leaders, vehicle_sight, remote, session)))

@@ -14,7 +14,7 @@ SUMO's lane-change models look through any fog. Here, for the drivers for whom t
 Drivers look each `LOOK_PERIOD`; who has nobody unseen about is not touched.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo.claims import (
@@ -29,7 +29,8 @@ from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.update_schedule import UpdateSchedule
 from fogsim.traffic.sumo_drivers.lane_change_switches import LaneChangeSwitch
-from fogsim.traffic.sumo_drivers.neighbour_sight import NEAR, BlockedChange, Neighbours, NeighbourSight
+from fogsim.traffic.sumo_drivers.neighbour_sight import NEAR, Neighbours, NeighbourSight, WantedChange
+from fogsim.traffic.sumo_drivers.overtaking_wish import OvertakingWishes
 from fogsim.traffic.sumo_drivers.perception import REACH, Perception
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
 from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
@@ -39,6 +40,9 @@ LOOK_PERIOD = 0.5
 
 STANDING_REACH = 150.0
 """SUMO's drivers leave the lane for who stands within 100 m; between two looks they drive less than the rest [m]."""
+
+SOON_STANDING = 5.0
+"""Who drives slower than this may stand before the next look [m/s]: braking hard, or after a collision."""
 
 _NEVER, _ALWAYS = -1.0, 1.0
 _RESPECT = 0x300
@@ -61,7 +65,7 @@ class StandingLeaders:
     def __init__(self, api: Api, leaders: Perception, session: str) -> None:
         self._vehicles = api.vehicle
         self._leaders = leaders
-        self._leader = vehicle_getter(api, "getLeader")
+        self._leader, self._speed = vehicle_getter(api, "getLeader"), vehicle_getter(api, "getSpeed")
         self._strategic = LaneChangeSwitch(api, STRATEGIC, _NEVER, session)
 
     def update(self, drivers: Sequence[str]) -> None:
@@ -76,10 +80,23 @@ class StandingLeaders:
             hidden = self._leaders.hidden_leader(driver)
             self._strategic.turn(driver, hidden is not None and self._would_be_left_for(driver, hidden))
 
+    def expect_unseen(self, driver: str, leader: str) -> None:
+        """Keep a driver in the lane to which he changes until the next look, if he does not see who stands there.
+
+        Parameters
+        ----------
+        driver, leader : str
+            Their vehicles.
+        """
+        self._strategic.turn(driver, self._may_soon_stand(leader))
+
+    def _may_soon_stand(self, vehicle: str) -> bool:
+        return float(self._speed(vehicle)) < SOON_STANDING
+
     def _would_be_left_for(self, driver: str, hidden: str) -> bool:
         """Whether a hidden leader stands so near that SUMO's driver would leave a lane that leads on."""
         leader, gap = self._leader(driver, STANDING_REACH) or ("", 0.0)
-        if leader != hidden or gap > STANDING_REACH or not self._vehicles.isStopped(hidden):
+        if leader != hidden or gap > STANDING_REACH or not self._may_soon_stand(hidden):
             return False
         lane = self._vehicles.getLaneID(driver)
         # SUMO tells of each lane of the edge how many lanes away the best one for the route is.
@@ -127,8 +144,9 @@ class RequestedChanges:
         bool
             False if there is no such lane on the same edge.
         """
-        lane = int(self._vehicles.getLaneIndex(driver)) + lanes
-        if not 0 <= lane < int(self._edges.getLaneNumber(self._vehicles.getRoadID(driver))):
+        edge, lane = str(self._vehicles.getRoadID(driver)), int(self._vehicles.getLaneIndex(driver)) + lanes
+        # Nobody changes lanes on a junction.
+        if edge.startswith(":") or not 0 <= lane < int(self._edges.getLaneNumber(edge)):
             return False
         self._modes.claim(driver, int(self._modes.own_value(driver)) & ~_RESPECT | _NO_OVERLAP)
         self._vehicles.changeLane(driver, lane, 0.0)
@@ -190,6 +208,7 @@ class LaneChanging:
         self._certainly_hidden = sight.hidden_distance(fog.minimum_extinction)
         self._neighbours = Neighbours(api, REACH, remote)
         self._sight = NeighbourSight(vehicle_sight, sight.reaction_time)
+        self._wishes = OvertakingWishes(api, REACH, LOOK_PERIOD)
         self._requests = RequestedChanges(api, session)
         self._standing = StandingLeaders(api, leaders, session)
         self._overtake_right = LaneChangeSwitch(api, OVERTAKE_RIGHT, -_ALWAYS, session)
@@ -215,8 +234,11 @@ class LaneChanging:
         due = self._due()
         if due:
             self._standing.update(due)
-            self._pass_on_the_right(due, own_lamps)
-            self._change_lanes(due, own_lamps)
+            free_to_their_eyes = self._free_to_the_left(due, own_lamps)
+            for driver in due:
+                self._overtake_right.turn(driver, driver in free_to_their_eyes)
+            wishes = self._wishes.update(v for v in free_to_their_eyes if self._leaders.hidden_leader(v) is None)
+            self._change_lanes(due, wishes, own_lamps)
 
     def _due(self) -> list[str]:
         roster, schedule = self._roster, self._schedule
@@ -235,32 +257,25 @@ class LaneChanging:
             for switch in (self._overtake_right, *self._unhelpful):
                 switch.turn_off(drivers, self._roster.present)
 
-    def _pass_on_the_right(self, drivers: Sequence[str], own_lamps: OwnLamps) -> None:
-        """Let drivers go on beside a vehicle in the lane to the left that they do not see."""
-        unseen: set[str] = set()
+    def _free_to_the_left(self, drivers: Sequence[str], own_lamps: OwnLamps) -> dict[str, None]:
+        """Drivers to whom the lane to the left looks free ahead, though there is somebody."""
+        unseen: dict[str, None] = {}
         doubtful: list[tuple[str, str]] = []
         for driver in drivers:
             ahead = self._neighbours.left_leader(driver)
             if ahead is not None and ahead[1] > self._certainly_hidden:
-                unseen.add(driver)
+                unseen[driver] = None
             elif ahead is not None and ahead[1] > self._certainly_seen:
                 doubtful.append((driver, ahead[0]))
         perceived = self._sight.perceive(doubtful, own_lamps, self._roster.time)
-        unseen.update(driver for (driver, _), is_perceived in perceived.items() if not is_perceived)
-        for driver in drivers:
-            self._overtake_right.turn(driver, driver in unseen)
+        return unseen | {driver: None for (driver, _), is_perceived in perceived.items() if not is_perceived}
 
-    def _change_lanes(self, drivers: Sequence[str], own_lamps: OwnLamps) -> None:
+    def _change_lanes(self, drivers: Sequence[str], wishes: Iterable[str], own_lamps: OwnLamps) -> None:
         """Let those change lanes who are blocked by nobody whom they perceive, and whom nobody helps whom they see."""
         for switch in self._unhelpful:
             switch.turn_off(drivers, self._roster.present)
-        changes = [change for change in self._neighbours.blocked_changes(drivers) if not change.near]
-        pairs = [
-            pair
-            for change in changes
-            for other in change.blockers
-            for pair in ((change.driver, other), (other, change.driver))
-        ]
+        changes = [change for change in self._neighbours.wanted_changes(drivers, wishes) if not change.near]
+        pairs = [pair for change in changes for pair in change.pairs]
         perceived = self._sight.perceive(pairs, own_lamps, self._roster.time)
         for change in changes:
             if not any(perceived[change.driver, other] for other in change.blockers):
@@ -268,12 +283,13 @@ class LaneChanging:
             elif change.is_urgent:
                 self._deny_help([other for other in change.blockers if not perceived[other, change.driver]])
 
-    def _change(self, change: BlockedChange, perceived: Mapping[tuple[str, str], bool]) -> None:
+    def _change(self, change: WantedChange, perceived: Mapping[tuple[str, str], bool]) -> None:
         if not self._requests.ask(change.driver, change.side.offset):
             return
         # SUMO's drivers would see their new leaders until they look again.
-        for leader in change.leaders[:1]:
-            self._leaders.expect_unseen(change.driver, leader)
+        if change.ahead is not None and not perceived[change.driver, change.ahead]:
+            self._leaders.expect_unseen(change.driver, change.ahead)
+            self._standing.expect_unseen(change.driver, change.ahead)
         for follower in change.followers:
             if not perceived[follower, change.driver]:
                 self._leaders.expect_unseen(follower, change.driver)

@@ -1,6 +1,6 @@
 """Vehicles in the neighbouring lanes: which of them block a change that is wanted, and which the driver perceives."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,8 +45,8 @@ RIGHT = Side(-1, 4, 2048, 4096, 1)
 
 
 @dataclass(frozen=True, slots=True)
-class BlockedChange:
-    """A change of lane that a driver wants and does not make because of others.
+class WantedChange:
+    """A change of lane that a driver wants.
 
     Attributes
     ----------
@@ -57,7 +57,9 @@ class BlockedChange:
     is_urgent : bool
         True if the route needs it, for which drivers ask others to make room.
     leaders, followers : tuple of str
-        Vehicles that are in the way.
+        Vehicles that are in the way in the other lane.
+    ahead : str or None
+        The next vehicle ahead there, in the way or not.
     near : bool
         True if one of them is beside it, where it is seen in any fog.
     """
@@ -67,12 +69,20 @@ class BlockedChange:
     is_urgent: bool
     leaders: tuple[str, ...]
     followers: tuple[str, ...]
+    ahead: str | None
     near: bool
 
     @property
     def blockers(self) -> tuple[str, ...]:
         """All vehicles that are in the way."""
         return self.leaders + self.followers
+
+    @property
+    def pairs(self) -> Iterator[tuple[str, str]]:
+        """Who must be seen by whom: the others by the driver, and the driver by them."""
+        for other in (*self.blockers, *(() if self.ahead is None else (self.ahead,))):
+            yield self.driver, other
+            yield other, self.driver
 
 
 class Neighbours:
@@ -111,55 +121,51 @@ class Neighbours:
         found = self._left_leaders(vehicle)
         if not found:
             return None
-        nearest = found[0] if len(found) == 1 else min(found, key=_gap)
+        nearest = _nearest(found)
         return nearest if nearest[1] <= self._reach else None
 
-    def blocked_changes(self, vehicles: Iterable[str]) -> list[BlockedChange]:
-        """Changes that drivers want by their own model, and that others block.
+    def wanted_changes(self, vehicles: Iterable[str], wishing: Iterable[str]) -> list[WantedChange]:
+        """Changes that drivers want by their own model and that others block, and some more to the left.
 
         Parameters
         ----------
         vehicles : iterable of str
             The drivers' vehicles.
+        wishing : iterable of str
+            Those who want to change to the left, whether their own model wants it or not.
         """
         # Who wants to change lanes blinks.
         blinking = [v for v in vehicles if self._signals(v) & _BLINKERS]
-        found = ((v, side, self._state(v, side.offset)[1]) for v in blinking for side in (LEFT, RIGHT))
-        return [self.blocked_change(*change) for change in found if _is_blocked(*change[1:])]
+        states = ((v, side, int(self._state(v, side.offset)[1])) for v in blinking for side in (LEFT, RIGHT))
+        wanted = [self._change(*change) for change in states if _is_blocked(*change[1:])]
+        there = {change.driver for change in wanted}
+        more = ((v, LEFT, int(self._state(v, LEFT.offset)[1])) for v in wishing if v not in there)
+        return wanted + [self._change(*change) for change in more if not change[2] & _TRACI]
 
-    def blocked_change(self, vehicle: str, side: Side, state: int) -> BlockedChange:
-        """A change with those who are in the way.
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        side : Side
-            Where to.
-        state : int
-            Its lane-change state.
-        """
+    def _change(self, vehicle: str, side: Side, state: int) -> WantedChange:
+        ahead = self._neighbours(vehicle, side.neighbours | _LEADERS)
         leaders, followers = (
             self._neighbours(vehicle, side.neighbours | mode) if state & bit else ()
             for bit, mode in ((side.leader, _LEADERS | _BLOCKING), (side.follower, _BLOCKING))
         )
-        return BlockedChange(
+        return WantedChange(
             driver=vehicle,
             side=side,
             is_urgent=bool(state & _URGENT),
             leaders=tuple(v for v, _ in leaders),
             followers=tuple(v for v, _ in followers),
-            near=any(gap < NEAR for _, gap in (*leaders, *followers)),
+            ahead=_nearest(ahead)[0] if ahead else None,
+            near=bool(state & _OVERLAPPING) or any(gap < NEAR for _, gap in (*leaders, *followers)),
         )
 
 
-def _gap(neighbour: tuple[str, float]) -> float:
-    return neighbour[1]
+def _nearest(neighbours: Sequence[tuple[str, float]]) -> tuple[str, float]:
+    return neighbours[0] if len(neighbours) == 1 else min(neighbours, key=lambda neighbour: neighbour[1])
 
 
 def _is_blocked(side: Side, state: int) -> bool:
-    """Whether a state says that somebody with whom there is no overlap blocks what the driver's own model wants."""
-    return bool(state & side.wanted and state & (side.leader | side.follower)) and not state & (_TRACI | _OVERLAPPING)
+    """Whether a state says that somebody blocks what the driver's own model wants."""
+    return bool(state & side.wanted and state & (side.leader | side.follower)) and not state & _TRACI
 
 
 class _Subscribed:

@@ -84,5 +84,5 @@ def drivers_perception(
         Name of the session.
     """
     leaders = Perception(api, fog, sight, roster, remote, session)
-    vehicle_sight = VehicleSight(api, fog, sight)
+    vehicle_sight = VehicleSight(api, fog, sight, remote)
     return DriversPerception((leaders, LaneChanging(api, fog, sight, roster, leaders, vehicle_sight, remote, session)))

@@ -25,7 +25,7 @@ from fogsim.traffic.sumo.claims import (
     STRATEGIC,
     Claims,
 )
-from fogsim.traffic.sumo.link import Api, vehicle_getter
+from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.update_schedule import UpdateSchedule
 from fogsim.traffic.sumo_drivers.lane_change_switches import LaneChangeSwitch
@@ -65,7 +65,6 @@ class StandingLeaders:
     def __init__(self, api: Api, leaders: Perception, session: str) -> None:
         self._vehicles = api.vehicle
         self._leaders = leaders
-        self._leader, self._speed = vehicle_getter(api, "getLeader"), vehicle_getter(api, "getSpeed")
         self._strategic = LaneChangeSwitch(api, STRATEGIC, _NEVER, session)
 
     def update(self, drivers: Sequence[str]) -> None:
@@ -91,11 +90,11 @@ class StandingLeaders:
         self._strategic.turn(driver, self._may_soon_stand(leader))
 
     def _may_soon_stand(self, vehicle: str) -> bool:
-        return float(self._speed(vehicle)) < SOON_STANDING
+        return float(self._leaders.speed(vehicle)) < SOON_STANDING
 
     def _would_be_left_for(self, driver: str, hidden: str) -> bool:
         """Whether a hidden leader stands so near that SUMO's driver would leave a lane that leads on."""
-        leader, gap = self._leader(driver, STANDING_REACH) or ("", 0.0)
+        leader, gap = self._leaders.leader(driver, REACH) or ("", 0.0)
         if leader != hidden or gap > STANDING_REACH or not self._may_soon_stand(hidden):
             return False
         lane = self._vehicles.getLaneID(driver)
@@ -208,7 +207,7 @@ class LaneChanging:
         self._certainly_hidden = sight.hidden_distance(fog.minimum_extinction)
         self._neighbours = Neighbours(api, REACH, remote)
         self._sight = NeighbourSight(vehicle_sight, sight.reaction_time)
-        self._wishes = OvertakingWishes(api, REACH, LOOK_PERIOD)
+        self._wishes = OvertakingWishes(api, leaders, LOOK_PERIOD)
         self._requests = RequestedChanges(api, session)
         self._standing = StandingLeaders(api, leaders, session)
         self._overtake_right = LaneChangeSwitch(api, OVERTAKE_RIGHT, -_ALWAYS, session)

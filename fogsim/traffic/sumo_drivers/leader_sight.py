@@ -1,7 +1,6 @@
 """What drivers see of the vehicle ahead, and for how long that is sure to stay so."""
 
-from collections.abc import Collection, Mapping, Sequence
-from typing import Any
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -21,10 +20,6 @@ FASTEST_DRIFT = 30.0
 Pair = tuple[str, str, float]
 """Follower, leader, and SUMO's gap between them [m], which leaves out the follower's minimum gap."""
 
-# Numbers of variables in SUMO's TraCI protocol.
-_LEADER = 0x68
-_SPEED = 0x40
-
 
 class LeaderSight:
     """Computes sight along the fog between drivers and the vehicles ahead of them.
@@ -39,15 +34,17 @@ class LeaderSight:
         The drivers' eyes.
     speed : Getter
         Speed of a vehicle [m/s].
+    remote : bool
+        True where every call is a message to another process: what is asked often is subscribed to.
     """
 
-    def __init__(self, api: Api, fog: FogAccess, sight: DriverSight, speed: Getter) -> None:
+    def __init__(self, api: Api, fog: FogAccess, sight: DriverSight, speed: Getter, remote: bool = False) -> None:
         self._speed = speed
         self._fog = fog
         self._min_extinction, self._max_extinction = fog.minimum_extinction, fog.maximum_extinction
         self._sight = sight
         self._position = vehicle_getter(api, "getPosition3D")
-        self._vehicles = SeenVehicles(api)
+        self._vehicles = SeenVehicles(api, remote)
         self._get_minimum_gap = vehicle_getter(api, "getMinGap")
         self._minimum_gaps: dict[str, float] = {}
 
@@ -133,49 +130,3 @@ class LeaderSight:
         if known is None:
             known = self._minimum_gaps[vehicle] = float(self._get_minimum_gap(vehicle))
         return known
-
-
-class SubscribedLeaders:
-    """``getLeader`` and ``getSpeed`` by subscription, for simulations in another process: asking sends no message.
-
-    Parameters
-    ----------
-    api : Api
-        A connection of traci.
-    reach : float
-        How far ahead leaders are looked for [m].
-    """
-
-    def __init__(self, api: Api, reach: float) -> None:
-        self._vehicles = api.vehicle
-        self._results = api.vehicle.getSubscriptionResults
-        self._reach = reach
-
-    def leader(self, vehicle: str, _: float) -> tuple[str, float]:
-        """Leader of a vehicle, empty if there is none, and the gap to it [m].
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        """
-        leader: tuple[str, float] = self._of(vehicle)[_LEADER]
-        return leader
-
-    def speed(self, vehicle: str) -> float:
-        """Speed of a vehicle [m/s].
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        """
-        return float(self._of(vehicle)[_SPEED])
-
-    def _of(self, vehicle: str) -> Mapping[int, Any]:
-        results: Mapping[int, Any] = self._results(vehicle)
-        if _LEADER not in results or _SPEED not in results:
-            # SUMO adds them to what the user may have subscribed to.
-            self._vehicles.subscribe(vehicle, (_SPEED, _LEADER), parameters={_LEADER: ("d", self._reach)})
-            results = self._results(vehicle)
-        return results

@@ -1,18 +1,17 @@
 """Vehicles in the neighbouring lanes: which of them block a change that is wanted, and which the driver perceives."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
-from fogsim.traffic.sumo.link import Api, Getter, vehicle_getter
+from fogsim.traffic.sumo.link import Api, vehicle_getter
+from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
 from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
 
 NEAR = 5.0
 """A vehicle beside, or with less gap than this along the road, is seen in any fog [m]."""
 
-# Numbers of variables, bits of signals, states and modes in SUMO's TraCI protocol.
-_SIGNALS, _NEIGHBOURS = 0x5B, 0xBF
+# Bits of signals, states and modes in SUMO's TraCI protocol.
 _BLINKERS = 1 | 2
 _TRACI, _URGENT, _OVERLAPPING = 128, 256, 8192
 _LEADERS, _BLOCKING = 2, 4
@@ -99,16 +98,11 @@ class Neighbours:
     """
 
     def __init__(self, api: Api, reach: float, remote: bool) -> None:
-        subscribed = _Subscribed(api) if remote else None
-        self._signals: Getter = vehicle_getter(api, "getSignals") if subscribed is None else subscribed.signals
-        self._neighbours: Getter = vehicle_getter(api, "getNeighbors")
-        self._left_leaders = self._of_left_lane if subscribed is None else subscribed.left_leaders
+        names = ("getSignals", "getNeighbors")
+        self._signals, self._left_leaders = vehicle_getters(api, remote, names, {"getNeighbors": ("b", _LEFT_LEADERS)})
+        self._neighbours = vehicle_getter(api, "getNeighbors")
         self._state = vehicle_getter(api, "getLaneChangeState")
         self._reach = reach
-
-    def _of_left_lane(self, vehicle: str) -> Sequence[tuple[str, float]]:
-        found: Sequence[tuple[str, float]] = self._neighbours(vehicle, _LEFT_LEADERS)
-        return found
 
     def left_leader(self, vehicle: str) -> tuple[str, float] | None:
         """Next vehicle ahead in the lane to the left, and the gap to it [m]; None if there is none within reach.
@@ -118,7 +112,7 @@ class Neighbours:
         vehicle : str
             Its id.
         """
-        found = self._left_leaders(vehicle)
+        found = self._left_leaders(vehicle, _LEFT_LEADERS)
         if not found:
             return None
         nearest = _nearest(found)
@@ -166,28 +160,6 @@ def _nearest(neighbours: Sequence[tuple[str, float]]) -> tuple[str, float]:
 def _is_blocked(side: Side, state: int) -> bool:
     """Whether a state says that somebody blocks what the driver's own model wants."""
     return bool(state & side.wanted and state & (side.leader | side.follower)) and not state & _TRACI
-
-
-class _Subscribed:
-    """Signals and leaders in the left lane by subscription; see `SubscribedLeaders`."""
-
-    def __init__(self, api: Api) -> None:
-        self._vehicles = api.vehicle
-        self._results = api.vehicle.getSubscriptionResults
-
-    def signals(self, vehicle: str) -> int:
-        return int(self._of(vehicle)[_SIGNALS])
-
-    def left_leaders(self, vehicle: str) -> Sequence[tuple[str, float]]:
-        found: Sequence[tuple[str, float]] = self._of(vehicle)[_NEIGHBOURS]
-        return found
-
-    def _of(self, vehicle: str) -> Mapping[int, Any]:
-        results: Mapping[int, Any] = self._results(vehicle)
-        if _SIGNALS not in results or _NEIGHBOURS not in results:
-            self._vehicles.subscribe(vehicle, (_SIGNALS, _NEIGHBOURS), parameters={_NEIGHBOURS: ("b", _LEFT_LEADERS)})
-            results = self._results(vehicle)
-        return results
 
 
 class NeighbourSight:

@@ -13,8 +13,9 @@ import math
 from collections.abc import Iterable
 
 from fogsim.traffic.sumo.claims import SPEED_GAIN
-from fogsim.traffic.sumo.link import Api, vehicle_getter
+from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo_drivers.lane_change_switches import refusal_of
+from fogsim.traffic.sumo_drivers.perception import REACH, Perception
 
 THRESHOLD = 0.2
 """Sum of relative gains at which the wish begins, over the driver's eagerness [s]."""
@@ -58,18 +59,16 @@ class OvertakingWishes:
     ----------
     api : Api
         The simulation.
-    reach : float
-        Leaders farther ahead than this do not matter [m].
+    leaders : Perception
+        What they perceive of their leaders.
     period : float
         Time between two looks [s].
     """
 
-    def __init__(self, api: Api, reach: float, period: float) -> None:
+    def __init__(self, api: Api, leaders: Perception, period: float) -> None:
         self._vehicles = api.vehicle
-        self._leader = vehicle_getter(api, "getLeader")
-        self._speed = vehicle_getter(api, "getSpeed")
+        self._leader, self._speed = leaders.leader, leaders.speed
         self._refusal = refusal_of(api)
-        self._reach = reach
         self._period = period
         self._gains: dict[str, float] = {}
 
@@ -96,7 +95,7 @@ class OvertakingWishes:
 
     def _relative_gain(self, driver: str) -> float:
         """What a free lane would gain over staying behind the leader [-]."""
-        leader, gap = self._leader(driver, self._reach) or ("", 0.0)
+        leader, gap = self._leader(driver, REACH) or ("", 0.0)
         if not leader:
             return 0.0
         get = self._vehicles

@@ -16,11 +16,12 @@ from collections.abc import Iterable, Sequence
 
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo.claims import SOLE_SESSION, SPEED_GAIN, SessionValues
-from fogsim.traffic.sumo.link import Api, Getter, vehicle_getter
+from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.update_schedule import UpdateSchedule, closing_speed_bound
+from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
 from fogsim.traffic.sumo_drivers.lane_change_switches import LaneChangeSwitch
-from fogsim.traffic.sumo_drivers.leader_sight import LeaderSight, Pair, SubscribedLeaders
+from fogsim.traffic.sumo_drivers.leader_sight import LeaderSight, Pair
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
 
 REACH = 250.0
@@ -109,6 +110,11 @@ class Perception:
         True where every call is a message to another process: leaders and speeds are subscribed to.
     session : str
         Name of the session.
+
+    Attributes
+    ----------
+    leader, speed : Getter
+        SUMO's ``getLeader``, to be asked with `REACH`, and ``getSpeed``.
     """
 
     def __init__(
@@ -121,12 +127,10 @@ class Perception:
         session: str = SOLE_SESSION,
     ) -> None:
         self._ignored_leaders = IgnoredLeaders(api, session)
-        subscribed = SubscribedLeaders(api, REACH) if remote else None
-        self._leader: Getter = vehicle_getter(api, "getLeader") if subscribed is None else subscribed.leader
-        self._speed: Getter = vehicle_getter(api, "getSpeed") if subscribed is None else subscribed.speed
+        self.leader, self.speed = vehicle_getters(api, remote, ("getLeader", "getSpeed"), {"getLeader": ("d", REACH)})
         self._roster = Roster(api) if roster is None else roster
         self._reaction_time = sight.reaction_time
-        self._leader_sight = LeaderSight(api, fog, sight, self._speed)
+        self._leader_sight = LeaderSight(api, fog, sight, self.speed, remote)
         self._schedule = UpdateSchedule(float(api.simulation.getDeltaT()), self._roster.time)
         self._mark = 0
         self._ignored: dict[str, str] = {}
@@ -203,7 +207,7 @@ class Perception:
         # Most vehicles are far from any doubt, and pause for the longest time.
         certain: list[str] = []
         doubtful: list[Pair] = []
-        for follower, found in zip(due, map(self._leader, due, itertools.repeat(REACH)), strict=False):
+        for follower, found in zip(due, map(self.leader, due, itertools.repeat(REACH)), strict=False):
             leader, gap = found or _NO_LEADER
             if not leader:
                 if follower in ignored:
@@ -226,7 +230,7 @@ class Perception:
 
     def _pause_near_edge(self, follower: str, leader: str, distance: float) -> None:
         """Leave a follower alone until the gap could have changed by a distance [m]."""
-        closing = closing_speed_bound(float(self._speed(follower)), float(self._speed(leader)), MAX_PAUSE)
+        closing = closing_speed_bound(float(self.speed(follower)), float(self.speed(leader)), MAX_PAUSE)
         self._pause((follower,), min(distance / closing, MAX_PAUSE))
 
     def _decide_by_sight(self, pairs: Sequence[Pair], own_lamps: OwnLamps) -> None:

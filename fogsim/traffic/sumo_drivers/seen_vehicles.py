@@ -7,6 +7,7 @@ from fogsim.traffic.appearance import OTHERS_LAMPS, lamps_from_signals, paint
 from fogsim.traffic.drivers.eye_heights import eye_height
 from fogsim.traffic.drivers.sight import inherent_contrast
 from fogsim.traffic.sumo.link import Api, vehicle_getter
+from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
 
 OwnLamps = dict[str, int | None]
 """Lamps, as bits of `Lamp`, of vehicles whose lamps are not SUMO's; None where all have failed."""
@@ -35,10 +36,12 @@ class SeenVehicles:
     ----------
     api : Api
         The simulation.
+    remote : bool
+        True where every call is a message to another process: what is asked often is subscribed to.
     """
 
-    def __init__(self, api: Api) -> None:
-        self._signals = vehicle_getter(api, "getSignals")
+    def __init__(self, api: Api, remote: bool = False) -> None:
+        (self._signals,) = vehicle_getters(api, remote, ("getSignals",))
         self._get_colour = vehicle_getter(api, "getColor")
         self._get_length = vehicle_getter(api, "getLength")
         self._get_width = vehicle_getter(api, "getWidth")

@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 from fogsim.traffic.drivers.lamp_intensity import HEAD_LAMPS, head_lamp_share, intensity_toward
 from fogsim.traffic.drivers.sight import BODY_MIDDLE, DriverSight, FogAccess
-from fogsim.traffic.sumo.link import Api, vehicle_getter
+from fogsim.traffic.sumo.link import Api
+from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps, SeenVehicles
 
 NEAREST = 0.1
@@ -52,14 +53,15 @@ class VehicleSight:
         The fog.
     sight : DriverSight
         The drivers' eyes.
+    remote : bool
+        True where every call is a message to another process: what is asked often is subscribed to.
     """
 
-    def __init__(self, api: Api, fog: FogAccess, sight: DriverSight) -> None:
+    def __init__(self, api: Api, fog: FogAccess, sight: DriverSight, remote: bool = False) -> None:
         self._fog = fog
         self._sight = sight
-        self._vehicles = SeenVehicles(api)
-        self._position = vehicle_getter(api, "getPosition3D")
-        self._angle = vehicle_getter(api, "getAngle")
+        self._vehicles = SeenVehicles(api, remote)
+        self._position, self._angle = vehicle_getters(api, remote, ("getPosition3D", "getAngle"))
         self._extinction = fog.maximum_extinction if fog.minimum_extinction == fog.maximum_extinction else None
         self._certainly_seen = sight.sure_distance(fog.maximum_extinction)
 

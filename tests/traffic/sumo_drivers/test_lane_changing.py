@@ -19,13 +19,6 @@ FREE, IN_LANE = 1621, 0
 CLEAR = 1000.0
 
 
-class SeesSoFar(SeesFrom):
-    """Eyes that see every side of every vehicle from a fixed distance on."""
-
-    def depth_limit(self, distance: float, *_: float) -> float:
-        return self.body_limit(distance, 0.0)
-
-
 @dataclass
 class Road:
     """A road with vehicles whose drivers see so far."""
@@ -49,7 +42,7 @@ class Road:
         self.link.step()
         for vehicle in api.vehicle.getIDList():
             api.vehicle.setLaneChangeMode(vehicle, FREE if vehicle in free else IN_LANE)
-        roster, sight, fog = Roster(api), SeesSoFar(reach), Fog(0.05)
+        roster, sight, fog = Roster(api), SeesFrom(reach), Fog(0.05)
         leaders = Perception(api, fog, sight, roster)
 
         eyes = VehicleSight(api, fog, sight)

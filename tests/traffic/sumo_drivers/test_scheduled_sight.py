@@ -89,13 +89,13 @@ def test_a_look_costs_only_those_who_are_due(link: LibsumoLink) -> None:
         link.step()
     perception = Perception(api, FieldAccess(EVEN), DriverSight(10_000.0))
     asked: list[str] = []
-    original = perception._leader
+    original = perception.leader
 
     def watched(vehicle: str, reach: float) -> Any:
         asked.append(vehicle)
         return original(vehicle, reach)
 
-    perception._leader = watched
+    perception.leader = watched
     present = 0
     for _ in range(100):
         link.step()

@@ -10,12 +10,15 @@ from fogsim.reproduce import REPRODUCTIONS, Reproduction
 from fogsim.reproduce.drivers import reproduce
 from fogsim.reproduce.drivers.findings import FINDINGS, SIX
 from fogsim.reproduce.drivers.motorway import drive
+from fogsim.reproduce.drivers.pairs import follow, measured_pairs
 from fogsim.reproduce.drivers.passages import BRAKING, THINKING_TIME, Measures, Passages, measured, passages
-from fogsim.reproduce.drivers.plan import CALIBRATION_SEEDS, CLEAR, DEFAULT, SEEING, SIGNED, SPARSE, Case, Plan
+from fogsim.reproduce.drivers.plan import CALIBRATION_SEEDS, CLEAR, DEFAULT, SEEING, SIGNED, SLOW, SPARSE, Case, Plan
 from fogsim.reproduce.drivers.published import Bound, Look, Sign, Size, Verdict
 from fogsim.reproduce.drivers.results import Results, interval
 
-PART = Plan(seeds=(1, 2), demands=(SPARSE,), visibilities=(CLEAR, 100.0), seconds=120.0)
+PART = Plan(
+    seeds=(1,), demands=(SPARSE,), visibilities=(CLEAR, 100.0), seconds=60.0, leader_speeds=(SLOW,), followers=2
+)
 
 
 @pytest.fixture(scope="module")
@@ -56,13 +59,30 @@ def test_drivers_slow_down_in_fog_and_pass_as_often_as_they_come(done) -> None:
         if "verdict" not in r and r["population"] == DEFAULT
     }
     assert found[100.0, "free_speed"] < found[None, "free_speed"] - 3.0
-    assert found[None, "flow"] == pytest.approx(600.0, rel=0.3)
+    assert found[None, "flow"] == pytest.approx(600.0, rel=0.5)
 
 
 def test_the_same_seed_gives_the_same_traffic() -> None:
     one, other = (drive((), SPARSE, 50.0, 3, 30.0) for _ in range(2))
     assert len(one.speed) > 0
     assert all(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
+
+
+def test_followers_are_measured_behind_their_own_leaders() -> None:
+    def at(vehicle: str, time: float, state: str) -> dict[str, str]:
+        return {"vehID": vehicle, "time": str(time), "state": state, "speed": "20"}
+
+    seen = [at("leader0", 1.0, "enter"), at("leader0", 2.0, "leave"), at("leader1", 4.0, "enter")]
+    seen += [at("leader1", 5.0, "leave"), at("behind0", 6.0, "enter"), at("behind1", 6.5, "enter")]
+    found = measured_pairs(seen, 50.0)
+    assert (found.out_of_sight, found.headway, found.headway_in_sight) == (0.5, 2.75, 1.5)
+    assert math.isnan(measured_pairs(seen[:2], 50.0).out_of_sight)
+
+
+def test_a_follower_in_clear_air_keeps_the_headway_of_clear_air() -> None:
+    found = follow((), SLOW, CLEAR, 1, 2)
+    # The wanted 1.2 s and the gap of 2.5 m that is kept at a standstill.
+    assert found.headway == pytest.approx(1.2 + 2.5 / SLOW, abs=0.1)
 
 
 def event(lane: str, time: float, state: str, speed: float) -> dict[str, str]:

@@ -1,15 +1,16 @@
 """Traffic in fog against field studies: speeds, overdriving, headways and times to collision on a motorway."""
 
 import math
-from collections.abc import Mapping
 
-from fogsim.reproduce.drivers.motorway import advised_speed, drive
+from fogsim.reproduce.drivers.motorway import drive
+from fogsim.reproduce.drivers.pairs import PairMeasures, follow
 from fogsim.reproduce.drivers.passages import Measures, measured
 from fogsim.reproduce.drivers.picture import picture
-from fogsim.reproduce.drivers.plan import DEFAULT, SIGNED, SIGNS, Case, Plan
+from fogsim.reproduce.drivers.plan import DEFAULT, SIGNED, SIGNS, Case, Pair, Plan
 from fogsim.reproduce.drivers.results import Results
 from fogsim.reproduce.drivers.tables import records, tables
 from fogsim.reproduce.result import Reproduction, Steps, Watch, unwatched
+from fogsim.units import KMH_PER_MPS
 
 NOTES = (
     "* one of the six sizes that are to be met within 30 %; of the reports only abstracts and summaries were seen",
@@ -37,13 +38,13 @@ def reproduce(plan: Plan | None = None, *, watch: Watch = unwatched) -> Reproduc
         A record for each measure of each case, and one for each published finding.
     """
     plan = plan or Plan()
-    cases = plan.cases
-    steps = Steps(len(cases) * len(plan.seeds) + 1, watch)
-    runs: dict[Case, tuple[Measures, ...]] = {}
-    for case in cases:
+    steps = Steps((len(plan.cases) + len(plan.pairs)) * len(plan.seeds) + 1, watch)
+    runs: dict[Case | Pair, tuple[Measures | PairMeasures, ...]] = {}
+    wanted: tuple[Case | Pair, ...] = (*plan.cases, *plan.pairs)
+    for case in wanted:
         found = []
         for seed in plan.seeds:
-            found.append(_run(case, seed, plan.seconds, plan.populations))
+            found.append(_run(case, seed, plan))
             steps.advance()
         runs[case] = tuple(found)
     results = Results(runs)
@@ -53,9 +54,11 @@ def reproduce(plan: Plan | None = None, *, watch: Watch = unwatched) -> Reproduc
     return Reproduction("drivers", records(results, plan), shown[0].rows, NOTES, drawing, shown)
 
 
-def _run(case: Case, seed: int, seconds: float, populations: Mapping[str, tuple[str, ...]]) -> Measures:
+def _run(case: Case | Pair, seed: int, plan: Plan) -> Measures | PairMeasures:
+    if isinstance(case, Pair):
+        return follow(plan.populations[case.population], case.leader_speed, case.visibility, seed, plan.followers)
     signed = case.population == SIGNED
-    overrides = populations[DEFAULT if signed else case.population]
-    advised = advised_speed(SIGNS[case.visibility]) if signed else math.inf
-    seen = drive(overrides, case.demand, case.visibility, seed, seconds, advised)
-    return measured(seen, case.visibility, seconds)
+    overrides = plan.populations[DEFAULT if signed else case.population]
+    advised = SIGNS[case.visibility] / KMH_PER_MPS if signed else math.inf
+    seen = drive(overrides, case.demand, case.visibility, seed, plan.seconds, advised)
+    return measured(seen, case.visibility, plan.seconds)

@@ -7,6 +7,7 @@ Of the reports only abstracts and summaries have been seen:
 - M4 1976: Commercial Motor, 10 December 1976, on the study that became SR281
 - C-6: Hogema & van der Horst 1994, TNO-TM; loops on a two-lane motorway near Breda, by day, a year
 - A16: Hogema & van der Horst 1997, as the US DOT's database of benefits tells it
+- Broughton: Broughton, Switzer & Scott 2007, a simulator, behind leaders of 13.4 and 22.4 m/s; its fogs are not told
 - SHRP2: Transportation Research Record 2018, doi 10.1177/0361198118774748; how near its "near fog" is, is not told
 """
 
@@ -16,7 +17,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.reproduce.drivers.plan import CLEAR, SPARSE
+from fogsim.reproduce.drivers.plan import CLEAR, FAST, PAIRS_IN, SLOW, SPARSE
 from fogsim.reproduce.drivers.published import Bound, Finding, Look, Sign, Size
 
 Values = NDArray[np.float64]
@@ -223,5 +224,29 @@ SIGNS_OF_CHANGE: tuple[Finding, ...] = (
     ),
 )
 
-FINDINGS = SIX + OTHER_SIZES + SIGNS_OF_CHANGE
+FOLLOWERS: tuple[Finding, ...] = (
+    Finding(
+        "fog_splits_at_22_4mps",
+        "behind 22.4 m/s fog splits drivers, some lag out of sight (ours: V_met 40 m): share",
+        "Broughton",
+        Bound(5.0, 95.0, "%"),
+        lambda look: 100.0 * look.pair("out_of_sight", FAST, PAIRS_IN),
+    ),
+    Finding(
+        "no_split_at_13_4mps",
+        "behind 13.4 m/s it does not: share out of sight, less than at 22.4 m/s by",
+        "Broughton",
+        Sign(rises=True, unit="points"),
+        lambda look: 100.0 * (look.pair("out_of_sight", FAST, PAIRS_IN) - look.pair("out_of_sight", SLOW, PAIRS_IN)),
+    ),
+    Finding(
+        "short_headways_in_sight",
+        "those who stay in sight at 22.4 m/s keep less than the recommended 2 s",
+        "Broughton",
+        Bound(0.0, 2.0, "s"),
+        lambda look: look.pair("headway_in_sight", FAST, PAIRS_IN),
+    ),
+)
+
+FINDINGS = SIX + OTHER_SIZES + SIGNS_OF_CHANGE + FOLLOWERS
 """All findings; the six sizes come first."""

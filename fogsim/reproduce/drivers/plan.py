@@ -21,6 +21,12 @@ SPARSE, MEDIUM, DENSE = 600.0, 1200.0, 2400.0
 CLEAR = math.inf
 """Visibility of clear air [m]."""
 
+SLOW, FAST = 13.4, 22.4
+"""Speeds of leaders in the simulator of Broughton, Switzer & Scott (2007) [m/s]."""
+
+PAIRS_IN = 40.0
+"""V_met in which drivers follow one leader each [m]; the study's fogs are not told in what we have seen."""
+
 SIGNS: Mapping[float, float] = {100.0: 80.0, 50.0: 60.0, 30.0: 60.0}
 """What the A16's signs advise [km/h] by V_met [m]: 80 from 70 to 140 m, 60 below (Hogema & van der Horst 1997)."""
 
@@ -45,6 +51,25 @@ class Case:
 
 
 @dataclass(frozen=True, slots=True)
+class Pair:
+    """Drivers who follow one leader each.
+
+    Attributes
+    ----------
+    population : str
+        Who follows: a name of the plan's populations.
+    leader_speed : float
+        Speed of the leaders [m/s].
+    visibility : float
+        V_met [m]; ``inf`` in clear air.
+    """
+
+    population: str
+    leader_speed: float
+    visibility: float
+
+
+@dataclass(frozen=True, slots=True)
 class Plan:
     """Which part of the evaluation is run.
 
@@ -60,6 +85,10 @@ class Plan:
         Who drives, each by the keys of a scenario that are set: ``drivers.…=…``.
     seconds : float
         For how long the cross-section is watched [s].
+    leader_speeds : tuple of float
+        Speeds of leaders whom one driver each follows [m/s].
+    followers : int
+        How many such drivers there are in a run.
     """
 
     seeds: tuple[int, ...] = REPORT_SEEDS
@@ -67,6 +96,8 @@ class Plan:
     visibilities: tuple[float, ...] = (CLEAR, 300.0, 200.0, 150.0, 100.0, 70.0, 50.0, 30.0)
     populations: Mapping[str, tuple[str, ...]] = field(default_factory=lambda: POPULATIONS)
     seconds: float = 600.0
+    leader_speeds: tuple[float, ...] = (SLOW, FAST)
+    followers: int = 20
 
     @property
     def cases(self) -> tuple[Case, ...]:
@@ -79,3 +110,13 @@ class Plan:
         )
         signed = tuple(Case(SIGNED, MEDIUM, v) for v in self.visibilities if v in SIGNS and MEDIUM in self.demands)
         return own + (signed if DEFAULT in self.populations else ())
+
+    @property
+    def pairs(self) -> tuple[Pair, ...]:
+        """Every case of drivers behind one leader once."""
+        return tuple(
+            Pair(population, speed, visibility)
+            for population in self.populations
+            for speed in self.leader_speeds
+            for visibility in (CLEAR, PAIRS_IN)
+        )

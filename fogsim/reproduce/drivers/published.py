@@ -8,7 +8,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.reproduce.drivers.plan import DEFAULT, MEDIUM, SIGNED, Case
+from fogsim.reproduce.drivers.plan import DEFAULT, MEDIUM, SIGNED, Case, Pair
 from fogsim.reproduce.drivers.results import Results
 
 NEAR, FACTOR = 0.3, 2.0
@@ -176,6 +176,25 @@ class Look:
         """
         population = SIGNED if self.population == DEFAULT else f"{self.population} {SIGNED}"
         return self.results.over_seeds(Case(population, MEDIUM, visibility), measure)
+
+    def pair(self, measure: str, leader_speed: float, visibility: float) -> NDArray[np.float64]:
+        """Values of a measure of drivers behind one leader, seed by seed (n,).
+
+        Parameters
+        ----------
+        measure : str
+            A field of `PairMeasures`.
+        leader_speed : float
+            Speed of the leaders [m/s].
+        visibility : float
+            V_met [m].
+
+        Raises
+        ------
+        KeyError
+            If that was not run.
+        """
+        return self.results.over_seeds(Pair(self.population, leader_speed, visibility), measure)
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.reproduce.drivers.pairs import PairMeasures
 from fogsim.reproduce.drivers.passages import Measures
-from fogsim.reproduce.drivers.plan import Case
+from fogsim.reproduce.drivers.plan import Case, Pair
 
 RESAMPLES = 4000
 """Bootstrap samples of an interval."""
@@ -50,24 +51,20 @@ class Results:
 
     Attributes
     ----------
-    runs : mapping of Case to tuple of Measures
+    runs : mapping of Case to tuple of Measures, and of Pair to tuple of PairMeasures
         One for each seed, in the same order everywhere.
     """
 
-    runs: Mapping[Case, tuple[Measures, ...]]
+    runs: Mapping[Case | Pair, tuple[Measures | PairMeasures, ...]]
 
-    def __contains__(self, case: object) -> bool:
-        """Whether a case was run."""
-        return case in self.runs
-
-    def over_seeds(self, case: Case, measure: str) -> NDArray[np.float64]:
+    def over_seeds(self, case: Case | Pair, measure: str) -> NDArray[np.float64]:
         """One measure of a case, seed by seed (n,).
 
         Parameters
         ----------
-        case : Case
+        case : Case or Pair
             The traffic and its fog.
         measure : str
-            A field of `Measures`.
+            A field of `Measures`, or of `PairMeasures`.
         """
         return np.array([getattr(run, measure) for run in self.runs[case]], np.float64)

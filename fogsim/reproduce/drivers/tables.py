@@ -4,8 +4,9 @@ import math
 from collections.abc import Mapping, Sequence
 
 from fogsim.reproduce.drivers.findings import FINDINGS
+from fogsim.reproduce.drivers.pairs import PairMeasures
 from fogsim.reproduce.drivers.passages import Measures
-from fogsim.reproduce.drivers.plan import SIGNED, Case, Plan
+from fogsim.reproduce.drivers.plan import SIGNED, Case, Pair, Plan
 from fogsim.reproduce.drivers.published import Finding, Look, Verdict
 from fogsim.reproduce.drivers.results import Interval, Results, interval
 from fogsim.reproduce.result import Cell, Rows, TitledTable
@@ -111,7 +112,7 @@ def _metres(visibility: float) -> str:
 
 
 def records(results: Results, plan: Plan) -> tuple[Mapping[str, Cell], ...]:
-    """Flat records: one for each measure of each case, then one for each finding of each population.
+    """Flat records: one for each measure of each case and pair, then one for each finding of each population.
 
     Parameters
     ----------
@@ -120,21 +121,25 @@ def records(results: Results, plan: Plan) -> tuple[Mapping[str, Cell], ...]:
     plan : Plan
         What was run.
     """
+    described: list[tuple[Case | Pair, dict[str, Cell], tuple[str, ...]]] = [
+        *((case, _case_record(case), Measures._fields) for case in plan.cases),
+        *((pair, _pair_record(pair), PairMeasures._fields) for pair in plan.pairs),
+    ]
     found: list[Mapping[str, Cell]] = [
-        _case_record(case) | _interval_record(measure, interval(results.over_seeds(case, measure)))
-        for case in plan.cases
-        for measure in Measures._fields
+        told | _interval_record(measure, interval(results.over_seeds(case, measure)))
+        for case, told, measures in described
+        for measure in measures
     ]
     for population in plan.populations:
         for finding in FINDINGS:
             ours, verdict = compared(finding, results, population)
-            told: dict[str, Cell] = {
+            agreement: dict[str, Cell] = {
                 "published": str(finding.published),
                 "source": finding.source,
                 "one_of_six": finding.six,
                 "verdict": verdict.value,
             }
-            found.append({"population": population} | _interval_record(finding.name, ours) | told)
+            found.append({"population": population} | _interval_record(finding.name, ours) | agreement)
     return tuple(found)
 
 
@@ -144,6 +149,14 @@ def _case_record(case: Case) -> dict[str, Cell]:
         "demand_per_h": case.demand,
         "visibility_m": finite_or_none(case.visibility),
         "signs": case.population == SIGNED,
+    }
+
+
+def _pair_record(pair: Pair) -> dict[str, Cell]:
+    return {
+        "population": pair.population,
+        "leader_speed_mps": pair.leader_speed,
+        "visibility_m": finite_or_none(pair.visibility),
     }
 
 

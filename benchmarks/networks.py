@@ -7,7 +7,7 @@ are in SUMO alone: ``same`` compares the files of floating car data (place, spee
 second, with 12 digits after the point).
 
     python benchmarks/networks.py [--json] [--seconds 600] [--visibilities inf 100 30] [--networks grid rail …]
-        [--step 0.2] [--per-hour 1500] [--jobs 1]
+        [--step 0.2] [--per-hour 1500] [--jobs 1 | --one-process]
 
 ``collisions`` are pairs of vehicles, ``teleports`` those that SUMO takes out of jams and blockades, ``cpu_s`` the time
 of the run. Networks of packages that are not installed are left out, and named. The exit code is 1 if a run fails, or
@@ -182,7 +182,11 @@ def record(network: Network, run: str, link: CountingLink, began: float) -> Reco
 
 
 def measured(networks: Sequence[Network], task: Task, jobs: int) -> Iterator[Record]:
-    """Records of networks, each run in a process of its own: what ends one ends no other."""
+    """Records of networks, each run in a process of its own, so that what ends one ends no other; 0 jobs: in this."""
+    if not jobs:
+        for network in networks:
+            yield from measure(network, task)
+        return
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(jobs, mp_context=context, max_tasks_per_child=1) as pool:
         for network, running in [(network, pool.submit(measure_named, network.name, task)) for network in networks]:
@@ -211,11 +215,13 @@ def main() -> None:
     parser.add_argument("--per-hour", type=float, default=1500.0, help="vehicles an hour where the traffic is ours")
     parser.add_argument("--visibilities", nargs="+", type=float, default=[math.inf, 100.0, 30.0], help="V_met [m]")
     parser.add_argument("--networks", nargs="+", choices=[*BY_NAME], default=[*BY_NAME], help="which (default all)")
-    parser.add_argument("--jobs", type=int, default=1, help="networks at once")
+    parser.add_argument("--jobs", type=int, default=1, help="networks at once, each in a process of its own")
+    parser.add_argument("--one-process", action="store_true", help="all in this process: quicker, and a crash ends all")
     arguments = parser.parse_args()
     task = Task(arguments.seconds, arguments.step, arguments.per_hour, tuple(arguments.visibilities))
+    jobs = 0 if arguments.one_process else arguments.jobs
     records = []
-    for record in measured([BY_NAME[name] for name in arguments.networks], task, arguments.jobs):
+    for record in measured([BY_NAME[name] for name in arguments.networks], task, jobs):
         records.append(record)
         if not arguments.json:
             print(record.get("error", "  ".join(f"{key} {value}" for key, value in record.items())), flush=True)

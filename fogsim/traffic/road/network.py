@@ -71,6 +71,8 @@ def _is_lefthand(path: Path) -> bool:
 def road_network(net: Any, route: Sequence[str]) -> RoadNetwork:
     """Every lane of a network that is a road or a footway, its junctions, and the axis of a route.
 
+    In a network without any, the tracks or waterways are drawn in their place, as lanes without lines.
+
     Parameters
     ----------
     net : sumolib.net.Net
@@ -85,7 +87,9 @@ def road_network(net: Any, route: Sequence[str]) -> RoadNetwork:
     """
     edges = [edge for edge in net.getEdges() if edge.getFunction() != _WALKING_AREA]
     lefthand = getattr(net, "lefthand", False)
-    lanes = tuple(_lane(lane, lefthand) for edge in edges for lane in edge.getLanes() if _kind(lane))
+    every = [lane for edge in edges for lane in edge.getLanes()]
+    drawn = [lane for lane in every if _kind(lane)] or every
+    lanes = tuple(_lane(lane, lefthand) for lane in drawn)
     return RoadNetwork(lanes=lanes, route=_route_axis(net, route), areas=(*_junctions(net), *_walking_areas(net)))
 
 
@@ -103,7 +107,7 @@ def _kind(lane: Any) -> LaneKind | None:
 
 
 def _lane(lane: Any, lefthand: bool) -> Lane:
-    kind = _kind(lane) or LaneKind.CARRIAGEWAY
+    kind = _kind(lane)
     inner, outer = _markings(lane) if kind is LaneKind.CARRIAGEWAY else (LaneMarking.NONE, LaneMarking.NONE)
     # Lanes are counted from the side that vehicles keep to.
     left, right = (outer, inner) if lefthand else (inner, outer)
@@ -117,7 +121,7 @@ def _lane(lane: Any, lefthand: bool) -> Lane:
         left=left,
         right=right,
         outermost=lane is rightmost,
-        kind=kind,
+        kind=kind or LaneKind.CARRIAGEWAY,
         end=_end(lane) if kind is LaneKind.CARRIAGEWAY else LaneEnd.OPEN,
     )
 

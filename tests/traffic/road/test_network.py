@@ -3,11 +3,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import sumo
 
 from fogsim.errors import InputError
+from fogsim.scene import build_scene
 from fogsim.traffic.road.network import read_net, road_network
 from fogsim.traffic.road.signs import sign_map
-from fogsim.values import LaneEnd, LaneKind, LaneMarking
+from fogsim.values import LaneEnd, LaneKind, LaneMarking, SignMap
 
 FOLDER = Path(__file__).resolve().parents[3] / "scenarios" / "motorway_fog_bank"
 NET = FOLDER / "motorway.net.xml"
@@ -136,3 +138,11 @@ def test_a_sign_stands_on_no_other_road(tmp_path: Path) -> None:
     sign = next(sign for sign in sign_map(read_net(file), ()).signs if sign.sign_id == "limit.b")
     assert sign.position[1] < -1.6
     assert abs(sign.position[1] + 5.5) > 1.6
+
+
+def test_in_a_network_of_tracks_alone_they_are_drawn_as_lanes_without_lines() -> None:
+    net = read_net(Path(sumo.SUMO_HOME, "tools", "game", "rail_demo", "net.net.xml"))
+    network = road_network(net, ["E1", "E7"])
+    assert {lane.kind for lane in network.lanes} == {LaneKind.CARRIAGEWAY}
+    assert {line for lane in network.lanes for line in (lane.left, lane.right)} == {LaneMarking.NONE}
+    assert len(build_scene(network, SignMap(), np.random.default_rng(1)).ground.faces) > 0

@@ -1,0 +1,32 @@
+"""On networks that FogSim did not write drivers in clear air are SUMO's own, bit for bit, and runs in fog end well."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+PROGRAM = Path(__file__).resolve().parents[2] / "benchmarks" / "networks.py"
+NETWORKS = ("grid", "spider", "random", "left_hand", "roundabout", "rail")
+RUNS = ["SUMO alone", "inf m", "30 m"]
+
+
+@pytest.fixture(scope="module")
+def records() -> list[dict[str, Any]]:
+    arguments = ["--json", "--seconds", "60", "--step", "1", "--visibilities", "inf", "30", "--networks", *NETWORKS]
+    command = [sys.executable, str(PROGRAM), *arguments, "--one-process"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=280, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    found: list[dict[str, Any]] = json.loads(done.stdout)
+    return found
+
+
+@pytest.mark.parametrize("name", NETWORKS)
+def test_clear_air_changes_nothing_and_fog_does(name: str, records: list[dict[str, Any]]) -> None:
+    rows = {row["run"]: row for row in records if row["network"] == name}
+    assert list(rows) == RUNS
+    assert rows["SUMO alone"]["vehicles"] >= 3
+    assert rows["inf m"]["same"]
+    assert not rows["30 m"]["same"], "a comparison that finds no difference in dense fog compares nothing"

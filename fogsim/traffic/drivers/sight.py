@@ -164,15 +164,17 @@ class DriverSight:
             near, far = (middle, far) if is_seen(middle) else (near, middle)
         return near
 
-    def sure_distance(self, maximum_extinction: float) -> float:
+    def sure_distance(self, maximum_extinction: float, most_glare: float = 0.0) -> float:
         """Distance up to which every body is seen, without any lamps, where the fog is nowhere denser than given [m].
 
         Parameters
         ----------
         maximum_extinction : float
             Extinction coefficient [1/m].
+        most_glare : float
+            Veil inside the eye that there may be at most [cd/m²].
         """
-        return self.seen_distance(maximum_extinction, LEAST_CONTRAST, head_lamps=0.0)
+        return self.seen_distance(maximum_extinction, LEAST_CONTRAST, head_lamps=0.0, glare=most_glare)
 
     def hidden_distance(self, minimum_extinction: float, brightest: float = BRIGHTEST) -> float:
         """Distance from which nothing of a vehicle is seen where the fog is nowhere thinner than given [m].

@@ -4,10 +4,11 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST, HEAD_LAMPS, rear_intensity
+from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST, rear_intensity
 from fogsim.traffic.drivers.sight import BODY_MIDDLE, DriverSight, FogAccess
 from fogsim.traffic.sumo.link import Api, Getter, vehicle_getter
 from fogsim.traffic.sumo.update_schedule import MAX_RELATIVE_ACCELERATION, closing_speed_bound
+from fogsim.traffic.sumo_drivers.oncoming_glare import OncomingGlare, most_glare
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps, SeenVehicles
 from fogsim.values import Lamp
 
@@ -45,6 +46,8 @@ class LeaderSight:
         self._sight = sight
         self._position = vehicle_getter(api, "getPosition3D")
         self._vehicles = SeenVehicles(api, remote)
+        self._glare = OncomingGlare(api, fog, self._vehicles, remote)
+        self._most_glare = most_glare(sight.illuminance)
         self._get_minimum_gap = vehicle_getter(api, "getMinGap")
         self._minimum_gaps: dict[str, float] = {}
 
@@ -86,15 +89,16 @@ class LeaderSight:
         # Plain numbers: mostly there is a pair or two, and making arrays of them would cost more than all the rest.
         follower, leader, _ = pair
         sight, contrast = self._sight, self._vehicles.body(leader).contrast
-        lamps = self._vehicles.lamps(leader, own_lamps)
-        head_lamps = 1.0 if self._vehicles.lamps(follower, own_lamps) & HEAD_LAMPS else 0.0
-        if depth <= sight.depth_limit(distance, contrast, rear_intensity(lamps), head_lamps):
-            # What lamps show may go dark at once; the body in the light of the sky stays.
-            if depth >= sight.depth_limit(distance, contrast, 0.0, 0.0):
-                return True, 0.0
+        # What lamps show may go dark at once; the body in the light of the sky stays.
+        if depth < sight.depth_limit(distance, contrast, 0.0, 0.0, self._most_glare):
             closing, deepening = self._rates(follower, leader, horizon)
-            spare = sight.depth_limit(distance + closing * horizon, contrast, 0.0, 0.0) - depth
+            spare = sight.depth_limit(distance + closing * horizon, contrast, 0.0, 0.0, self._most_glare) - depth
             return True, min(max(spare, 0.0) / deepening, horizon)
+        lamps = self._vehicles.lamps(leader, own_lamps)
+        head_lamps = 1.0 if self._vehicles.has_head_lamps(follower, own_lamps) else 0.0
+        glare = self._glare.veil(follower, leader, own_lamps) if self._most_glare else 0.0
+        if depth <= sight.depth_limit(distance, contrast, rear_intensity(lamps), head_lamps, glare):
+            return True, 0.0
         closing, deepening = self._rates(follower, leader, horizon)
         nearest = max(distance - closing * horizon, 0.1)
         # Lamps that are commanded may be commanded otherwise in any step.

@@ -22,6 +22,7 @@ from fogsim.traffic.sumo.update_schedule import UpdateSchedule, closing_speed_bo
 from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
 from fogsim.traffic.sumo_drivers.lane_change_switches import LaneChangeSwitch
 from fogsim.traffic.sumo_drivers.leader_sight import LeaderSight, Pair
+from fogsim.traffic.sumo_drivers.oncoming_glare import most_glare
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
 
 REACH = 250.0
@@ -136,7 +137,9 @@ class Perception:
         self._ignored: dict[str, str] = {}
         self._emerging: dict[str, tuple[str, float]] = {}
         # No leader nearer than this is hidden, wherever the fog is densest: for them nothing need be computed.
-        self._certainly_seen = sight.sure_distance(fog.maximum_extinction) - LARGEST_MINIMUM_GAP
+        self._certainly_seen = (
+            sight.sure_distance(fog.maximum_extinction, most_glare(sight.illuminance)) - LARGEST_MINIMUM_GAP
+        )
         # And none farther than this is seen, wherever the fog is thinnest.
         self._certainly_hidden = sight.hidden_distance(fog.minimum_extinction)
         margin = FASTEST_APPROACH * MAX_PAUSE

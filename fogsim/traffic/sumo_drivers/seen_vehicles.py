@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from fogsim.traffic.appearance import OTHERS_LAMPS, lamps_from_signals, paint
 from fogsim.traffic.drivers.eye_heights import eye_height
+from fogsim.traffic.drivers.lamp_intensity import HEAD_LAMPS
 from fogsim.traffic.drivers.sight import inherent_contrast
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
@@ -103,3 +104,16 @@ class SeenVehicles:
         """
         own = own_lamps.get(vehicle, int(OTHERS_LAMPS))
         return 0 if own is None else own | lamps_from_signals(self._signals(vehicle))
+
+    @staticmethod
+    def has_head_lamps(vehicle: str, own_lamps: OwnLamps) -> bool:
+        """Whether a vehicle's head lamps are lit; those of SUMO's vehicles are, as `OTHERS_LAMPS` says.
+
+        Parameters
+        ----------
+        vehicle : str
+            Its id.
+        own_lamps : dict
+            Lamps of vehicles whose lamps are not SUMO's.
+        """
+        return bool((own_lamps.get(vehicle, int(OTHERS_LAMPS)) or 0) & HEAD_LAMPS)

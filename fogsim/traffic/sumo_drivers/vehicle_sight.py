@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from fogsim.traffic.drivers.lamp_intensity import HEAD_LAMPS, head_lamp_share, intensity_toward
+from fogsim.traffic.drivers.lamp_intensity import head_lamp_share, intensity_toward
 from fogsim.traffic.drivers.sight import BODY_MIDDLE, DriverSight, FogAccess
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
@@ -126,7 +126,7 @@ class VehicleSight:
         observer, target = pair
         body = self._vehicles.body(target)
         intensity = intensity_toward(self._vehicles.lamps(target, own_lamps), body.length, line.ahead, line.aside)
-        is_lit = self._vehicles.lamps(observer, own_lamps) & HEAD_LAMPS
+        is_lit = self._vehicles.has_head_lamps(observer, own_lamps)
         head_lamps = head_lamp_share(line.bearing) if is_lit else 0.0
         return self._sight.depth_limit(line.distance, body.contrast, intensity, head_lamps)
 

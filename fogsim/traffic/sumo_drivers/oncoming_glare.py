@@ -1,0 +1,129 @@
+"""Glare of head lamps that come toward a driver on the other side of the road."""
+
+import math
+from collections.abc import Sequence
+
+from fogsim.traffic.drivers.lamp_intensity import HEAD_LAMPS, beam_intensity
+from fogsim.traffic.drivers.sight import FogAccess
+from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
+from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
+from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps, SeenVehicles
+from fogsim.units import DAY_ILLUMINANCE
+from fogsim.values.eye import veiling_luminance
+
+FARTHEST_SOURCE = 200.0
+"""Lamps farther away than this are left out [m]."""
+
+MOST_GLARE = 10.0
+"""A veil of glare counts up to this [cd/m²]: the low beams of one car on the next lane
+lay 0.2 … 0.3 cd/m² over the eye, high beams 10 and more."""
+
+LAMP_HEIGHT = 0.65
+"""Of head lamps above the road [m]."""
+
+LAMPS_OF_A_PAIR = 2.0
+
+
+def most_glare(illuminance: float) -> float:
+    """Veil of glare that there can be at most [cd/m²]; none by day, when it is nothing beside the airlight.
+
+    Parameters
+    ----------
+    illuminance : float
+        Horizontal illuminance of the scene [lx].
+    """
+    return 0.0 if illuminance >= DAY_ILLUMINANCE else MOST_GLARE
+
+
+class OppositeEdges:
+    """Edges that lead from an edge's end back to its beginning: the other side of a two-way road.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    """
+
+    def __init__(self, api: Api) -> None:
+        self._from, self._to = getter(api, "edge", "getFromJunction"), getter(api, "edge", "getToJunction")
+        self._outgoing = getter(api, "junction", "getOutgoingEdges")
+        self._known: dict[str, tuple[str, ...]] = {}
+
+    def of(self, edge: str) -> tuple[str, ...]:
+        """Ids of the edges opposite to one; none for what lies inside a junction.
+
+        Parameters
+        ----------
+        edge : str
+            Its id.
+        """
+        known = self._known.get(edge)
+        if known is None:
+            inside = not edge or edge.startswith(":")
+            back = () if inside else self._outgoing(self._to(edge))
+            known = tuple(e for e in back if not e.startswith(":") and self._to(e) == self._from(edge))
+            self._known[edge] = known
+        return known
+
+
+class OncomingGlare:
+    """Computes the veil that oncoming head lamps lay over drivers' eyes.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    fog : FogAccess
+        The fog.
+    vehicles : SeenVehicles
+        Lamps and heights of eyes.
+    remote : bool
+        True where every call is a message to another process: what is asked often is subscribed to.
+    """
+
+    def __init__(self, api: Api, fog: FogAccess, vehicles: SeenVehicles, remote: bool = False) -> None:
+        self._fog = fog
+        self._vehicles = vehicles
+        self._opposite = OppositeEdges(api)
+        self._road = vehicle_getter(api, "getRoadID")
+        self._on_edge = getter(api, "edge", "getLastStepVehicleIDs")
+        self._position, self._angle = vehicle_getters(api, remote, ("getPosition3D", "getAngle"))
+
+    def veil(self, observer: str, target: str, own_lamps: OwnLamps) -> float:
+        """Veil inside an observer's eyes who looks at a target [cd/m²], at most `MOST_GLARE`.
+
+        Parameters
+        ----------
+        observer, target : str
+            The vehicles.
+        own_lamps : dict
+            Lamps of vehicles whose lamps are not SUMO's.
+        """
+        edges = {e for vehicle in (observer, target) for e in self._opposite.of(self._road(vehicle))}
+        oncoming = [v for edge in sorted(edges) for v in self._on_edge(edge)]
+        return min(self._veil_of(observer, target, oncoming, own_lamps), MOST_GLARE) if oncoming else 0.0
+
+    def _veil_of(self, observer: str, target: str, oncoming: Sequence[str], own_lamps: OwnLamps) -> float:
+        x, y, z = self._position(observer)
+        eyes = (x, y, z + self._vehicles.eye_height(observer))
+        target_x, target_y, _ = self._position(target)
+        looking = math.atan2(target_y - y, target_x - x)
+        ends, light, angles = [], [], []
+        for vehicle in oncoming:
+            lamp_x, lamp_y, lamp_z = self._position(vehicle)
+            end = (lamp_x, lamp_y, lamp_z + LAMP_HEIGHT)
+            distance = math.dist(eyes, end)
+            bearing = math.atan2(lamp_y - y, lamp_x - x)
+            heading = math.radians(90.0 - self._angle(vehicle))
+            aside = abs(math.remainder(bearing + math.pi - heading, math.tau))
+            angle = abs(math.remainder(bearing - looking, math.tau))
+            lit = self._vehicles.lamps(vehicle, own_lamps) & HEAD_LAMPS
+            if lit and 0.0 < distance < FARTHEST_SOURCE and max(aside, angle) < 0.5 * math.pi:
+                ends.append(end)
+                light.append(LAMPS_OF_A_PAIR * beam_intensity(lit, math.degrees(aside)) / distance**2)
+                angles.append(angle)
+        if not ends:
+            return 0.0
+        depths = self._fog.optical_depth([eyes] * len(ends), ends).tolist()
+        dimmed = [e * math.exp(-depth) for e, depth in zip(light, depths, strict=True)]
+        return float(veiling_luminance(dimmed, angles).sum())

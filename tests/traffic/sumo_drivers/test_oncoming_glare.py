@@ -1,0 +1,92 @@
+"""Glare of oncoming head lamps on a two-way road of a real SUMO, and none where nothing comes."""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fogsim.atmosphere import FieldAccess
+from fogsim.traffic import DriverSight
+from fogsim.traffic.drivers.eye_heights import EYE_HEIGHTS
+from fogsim.traffic.drivers.lamp_intensity import beam_intensity
+from fogsim.traffic.sumo.libsumo_link import LibsumoLink
+from fogsim.traffic.sumo_drivers.leader_sight import LeaderSight
+from fogsim.traffic.sumo_drivers.oncoming_glare import (
+    LAMP_HEIGHT,
+    MOST_GLARE,
+    OncomingGlare,
+    OppositeEdges,
+    most_glare,
+)
+from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps, SeenVehicles
+from fogsim.units import extinction_from_visibility
+from fogsim.values import FogField, Lamp
+
+NET = Path(__file__).resolve().parents[2] / "data" / "grid" / "grid.net.xml"
+ROUTES = """<routes><vType id="c" length="5" width="1.8"/><route id="r" edges="B0C0"/><route id="s" edges="C0B0"/>
+  <vehicle id="leader" type="c" route="r" depart="0" departPos="65" departLane="0" color="0,0,0"/>
+  <vehicle id="me" type="c" route="r" depart="0" departPos="10" departLane="0"/>
+  <vehicle id="coming" type="c" route="s" depart="0" departPos="40" departLane="0"/></routes>"""
+HIGH_BEAM: OwnLamps = {"coming": int(Lamp.LOW_BEAM | Lamp.HIGH_BEAM)}
+
+
+@pytest.fixture(scope="module")
+def api(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    routes = tmp_path_factory.mktemp("two_way") / "two_way.rou.xml"
+    routes.write_text(ROUTES, encoding="utf-8")
+    link = LibsumoLink()
+    begun = link.begin(["--net-file", str(NET), "--route-files", str(routes), "--no-step-log", "true"])
+    link.step()
+    yield begun
+    link.end()
+
+
+def even(visibility: float) -> FieldAccess:
+    return FieldAccess(FogField(extinction_from_visibility(visibility), (3000.0,) * 3))
+
+
+def veil(api: Any, observer: str, target: str, visibility: float, own_lamps: OwnLamps) -> float:
+    return OncomingGlare(api, even(visibility), SeenVehicles(api)).veil(observer, target, own_lamps)
+
+
+def test_the_other_side_of_a_road_leads_back(api: Any) -> None:
+    opposite = OppositeEdges(api)
+    assert opposite.of("B0C0") == ("C0B0",)
+    assert opposite.of(":B0_0") == opposite.of("") == ()
+
+
+def test_the_veil_is_that_of_the_lamps_that_come(api: Any) -> None:
+    """Vos (2003), written out: L = 10 E (1 + (25/70)⁴) / θ², E of two low beams through the fog."""
+    eyes, lamps, target = (np.array(api.vehicle.getPosition3D(v)) for v in ("me", "coming", "leader"))
+    apart = lamps - eyes + np.array([0.0, 0.0, LAMP_HEIGHT - EYE_HEIGHTS["car"]])
+    distance = float(np.linalg.norm(apart))
+    theta = math.degrees(math.atan2(apart[1], apart[0]) - math.atan2(*(target - eyes)[1::-1]))
+    light = 2.0 * beam_intensity(int(Lamp.LOW_BEAM), math.degrees(math.atan2(abs(apart[1]), apart[0]))) / distance**2
+    for visibility in (math.inf, 60.0):
+        seen = light * math.exp(-extinction_from_visibility(visibility) * distance)
+        expected = 10.0 * seen * (1.0 + (25.0 / 70.0) ** 4) / theta**2
+        assert veil(api, "me", "leader", visibility, {}) == pytest.approx(expected, rel=1e-6)
+
+
+def test_only_lit_head_lamps_that_face_the_driver_dazzle(api: Any) -> None:
+    assert veil(api, "me", "leader", 300.0, {"coming": None}) == 0.0
+    assert veil(api, "coming", "me", 300.0, {"me": 0, "leader": None}) == 0.0
+    assert veil(api, "me", "leader", 300.0, HIGH_BEAM) > 5.0 * veil(api, "me", "leader", 300.0, {})
+    assert veil(api, "me", "leader", 1e6, HIGH_BEAM) <= MOST_GLARE
+
+
+def test_a_dazzled_driver_sees_an_unlit_leader_later(api: Any) -> None:
+    """The same leader, 50 m ahead in thin fog: by head lamps alone it is seen, against high beams it is not."""
+    pairs = [("me", "leader", 50.0 - api.vehicle.getMinGap("me"))]
+    sight = LeaderSight(api, even(1e5), DriverSight(0.01), api.vehicle.getSpeed)
+    dark: OwnLamps = {"leader": None}
+    assert sight.assess(pairs, {**dark, "coming": None}, 0.5) == [(True, 0.0)]
+    assert sight.assess(pairs, {**dark, **HIGH_BEAM}, 0.5)[0][0] is False
+
+
+def test_by_day_there_is_none(api: Any) -> None:
+    assert most_glare(1000.0) == 0.0
+    assert most_glare(999.0) == MOST_GLARE

@@ -166,7 +166,9 @@ def _driver_setup(scenario: Scenario) -> DriverSetup:
         drivers.compliance.strength,
         drivers.compliance.delay_s,
     )
-    return DriverSetup(drivers.speed_choice, drivers.speed_spread, compliance, drivers.distance_misjudgement)
+    return DriverSetup(
+        drivers.speed_choice, drivers.speed_spread, compliance, drivers.distance_misjudgement, drivers.following
+    )
 
 
 def stretch_advice(scenario: Scenario, speed: float) -> StretchAdvice:

@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, field_validator, model_validator
 
 from fogsim.errors import UnknownNameError
 from fogsim.scenario.section import (
@@ -22,8 +22,10 @@ from fogsim.scenario.section import (
     Time,
     Whole,
 )
-from fogsim.traffic import SPEED_CHOICES, AfterCollision
+from fogsim.traffic import FOLLOWING_MODELS, SPEED_CHOICES, AfterCollision
 from fogsim.values import Display
+
+_ROUNDING = 1e-6
 
 
 class Event(Section):
@@ -192,6 +194,27 @@ class AdvisedStretch(Section):
         return self
 
 
+def _shares_of_kinds(value: object) -> object:
+    """Let one kind of driver be written as its name; names that are not known are refused."""
+    shares = {value: 1.0} if isinstance(value, str) else value
+    if isinstance(shares, dict):
+        for name in shares:
+            if name not in FOLLOWING_MODELS:
+                raise ValueError(str(UnknownNameError("following model", name, FOLLOWING_MODELS)))
+    return shares
+
+
+def _together_one(shares: dict[str, float]) -> dict[str, float]:
+    total = math.fsum(shares.values())
+    if abs(total - 1.0) > _ROUNDING:
+        raise ValueError(f"shares of kinds of drivers must together be 1, and are {total:g}")
+    return shares
+
+
+Following = Annotated[dict[str, Share], BeforeValidator(_shares_of_kinds), AfterValidator(_together_one)]
+"""Shares of kinds of drivers, by name [-]."""
+
+
 class DriversSection(Section):
     """The drivers of all vehicles but, for speed, the ego."""
 
@@ -204,14 +227,19 @@ class DriversSection(Section):
     headlamp_reach_m: Annotated[Length, Field(ge=1, le=1000)] = 55.0
     """Distance at which an unlit vehicle is seen in the headlamps at night in clear air."""
 
-    speed_choice: str = "too_fast"
+    speed_choice: str = "observed"
     """How fast they drive in fog by themselves."""
 
     speed_spread: Annotated[Number, Field(ge=0, le=1)] = 0.1
-    """Standard deviation of the logarithm of a driver's own factor on that speed."""
+    """Standard deviation of the logarithm of a driver's own factor on that speed, where sight limits it."""
+
+    following: Following | None = None
+    """How they follow: a kind of driver, or shares of several that together are 1 (`{in_sight: 0.6, careful: 0.4}`). By
+    default the mixture of docs/drivers.md with observed speeds, and as in clear air with the other choices."""
 
     distance_misjudgement: Annotated[Number, Field(ge=0, le=10)] = 0.0
-    """By which share they take distances for longer in dense fog, and so follow closer; 0.3 to 0.6 at night."""
+    """By which share they take distances for longer where lamps show and the outline does not, and so follow closer;
+    0.3 to 0.6."""
 
     compliance: ComplianceSection = ComplianceSection()
     """How they follow advice."""

@@ -3,6 +3,7 @@
 import warnings
 
 from fogsim.traffic.drivers.events import BrakeEvent, Event, LampFailureEvent, LaneChangeEvent, Trigger
+from fogsim.traffic.drivers.following import FOLLOWING_MODELS
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.drivers.speed_choice import SPEED_CHOICES, Compliance, DriverSetup
 from fogsim.traffic.protocol import Traffic
@@ -48,6 +49,7 @@ def traci_traffic(setup: TrafficSetup, link: TraciLink) -> Traffic:
 
 
 __all__ = [
+    "FOLLOWING_MODELS",
     "SPEED_CHOICES",
     "AfterCollision",
     "AttachedTraffic",

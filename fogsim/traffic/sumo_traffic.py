@@ -164,9 +164,7 @@ class SumoTraffic:
                 perception=None
                 if setup.sight is None
                 else drivers_perception(api, fog, setup.sight, roster, self._link.remote, session),
-                drivers=SumoDesiredSpeeds(
-                    api, setup.drivers, fog, setup.ego, self._seed, setup.advice_deceleration, roster, session
-                ),
+                drivers=SumoDesiredSpeeds(api, setup, fog, self._seed, roster, session),
             )
 
     @_translates_errors

@@ -1,28 +1,68 @@
 """How fast drivers drive in fog by themselves, and how they follow advice.
 
-Field and simulator studies agree that drivers slow down in fog, but not enough to stop within what they see, and not at
-all above some 200 m of visibility (Hogema & van der Horst 1994; Kang, Ni & Andersen 2008); and that advice alone moves
-few: on a fog-warned motorway drivers advised 30 mph drove 61 mph.
+Sources, of which only abstracts and summaries have been seen: White & Jeffery 1980 (TRL LR958) and TRL SR281 on the M4;
+Hogema & van der Horst 1994 (TNO-TM C-6, C-7) and 1997 (A16); McCann & Fontaine 2016 (VTRC 17-R4) and Gonzales &
+Fontaine 2018 (VTRC 19-R6) on I-77; Pretto, Bresciani, Rainer & Bülthoff 2012 (eLife 1:e00031); the SHRP2 naturalistic
+study (Transportation Research Record 2018, doi 10.1177/0361198118774748); MacCarley, Ackles & Watts 2006 (TRB; mean
+speeds averaged 61 mph where signs of Caltrans' CAWS advised 30 mph in dense fog).
 """
 
 import math
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from fogsim.kinematics import DECELERATION, REACTION_TIME, safe_speed
 from fogsim.registry import Registry
+from fogsim.traffic.drivers.following import OBSERVED_MIXTURE
 
 UNAFFECTED_ABOVE = 200.0
-"""Visibility above which drivers do not slow down [m]."""
+"""Visibility above which drivers do not slow down [m] (White & Jeffery 1980)."""
 
 CHOICE_PERIOD = 1.0
 """Time between two choices of speed [s]."""
 
 Choice = Callable[[float], float]
 """From visibility [m] to the speed that a driver will not exceed [m/s]; ``inf`` if fog does not matter."""
+
+
+@runtime_checkable
+class RelativeChoice(Protocol):
+    """A choice that also slows drivers relative to the speed that they would drive in clear air, on any road."""
+
+    def __call__(self, visibility: float) -> float:
+        """Speed that a driver will not exceed [m/s].
+
+        Parameters
+        ----------
+        visibility : float
+            Meteorological visibility [m].
+        """
+
+    def share(self, visibility: float) -> float:
+        """Share of the speed in clear air that a driver still wants [-].
+
+        Parameters
+        ----------
+        visibility : float
+            Meteorological visibility [m].
+        """
+
+
+def speed_share(choice: Choice, visibility: float) -> float:
+    """Share of the speed in clear air that drivers of a choice still want [-]; 1 if it is not relative.
+
+    Parameters
+    ----------
+    choice : Choice
+        How drivers choose.
+    visibility : float
+        Meteorological visibility [m].
+    """
+    return choice.share(visibility) if isinstance(choice, RelativeChoice) else 1.0
 
 
 def unaffected(visibility: float) -> float:  # noqa: ARG001 - every choice is asked with the visibility
@@ -48,7 +88,7 @@ def within_sight(visibility: float) -> float:
 
 
 def too_fast(visibility: float) -> float:
-    """Slow down below 200 m, but to 1.4 times what would be safe (between the 1.3 and 1.5 that studies suggest).
+    """Slow down below 200 m, but to 1.4 times what would be safe: a factor of FogSim's own, from no field study.
 
     Parameters
     ----------
@@ -56,6 +96,73 @@ def too_fast(visibility: float) -> float:
         Meteorological visibility [m].
     """
     return math.inf if visibility >= UNAFFECTED_ABOVE else 1.4 * within_sight(visibility)
+
+
+@dataclass(frozen=True, slots=True)
+class ObservedSpeed:
+    """Slow down as drivers were seen to: a little on any road, and to what sight allows only in the densest fog.
+
+    Two tendencies, of which the slower holds. Fog makes people drive slower than they otherwise would, by a share that
+    grows from nothing at 200 m (White & Jeffery 1980) to 18 % in severe fog (Pretto et al. 2012: 70 km/h where 85 km/h
+    was to be driven; SHRP2: 10 % in near fog, 3 % in distant fog); so it does in a town, too. And they drive no faster
+    than so many times the safe speed: twice (I-77: mean speeds were twice the safe speed), but not more than once where
+    they see next to nothing (A16 without signs below 35 m: 29 km/h on average, which is the safe speed at 30 m).
+    Between, the ratio is linear in visibility: FogSim's own link. So overdriving is worst between 40 and 100 m (Hogema
+    & van der Horst 1994), and at 50 m more than half drive faster than they can stop within what they see (SR281).
+
+    Attributes
+    ----------
+    unaffected_above : float
+        Visibility from which drivers do not slow down [m].
+    slowest_share : float
+        Share of the speed in clear air that is still wanted in severe fog [-].
+    severe : float
+        Visibility up to which fog is severe [m].
+    overdriving : float
+        Speed over the safe one that drivers do not exceed [-].
+    overdriving_from : float
+        Visibility from which they drive so much faster than is safe [m].
+    safe_up_to : float
+        Visibility up to which they drive no faster than is safe [m].
+    """
+
+    unaffected_above: float = UNAFFECTED_ABOVE
+    slowest_share: float = 0.82
+    severe: float = 30.0
+    overdriving: float = 2.0
+    overdriving_from: float = 50.0
+    safe_up_to: float = 30.0
+
+    def __call__(self, visibility: float) -> float:
+        """Speed that a driver will not exceed [m/s]; ``inf`` where fog does not matter.
+
+        Parameters
+        ----------
+        visibility : float
+            Meteorological visibility [m].
+        """
+        if visibility >= self.unaffected_above:
+            return math.inf
+        rise = (visibility - self.safe_up_to) / (self.overdriving_from - self.safe_up_to)
+        return (1.0 + (self.overdriving - 1.0) * _clipped(rise)) * within_sight(visibility)
+
+    def share(self, visibility: float) -> float:
+        """Share of the speed in clear air that a driver still wants [-].
+
+        Parameters
+        ----------
+        visibility : float
+            Meteorological visibility [m].
+        """
+        density = _clipped((self.unaffected_above - visibility) / (self.unaffected_above - self.severe))
+        return 1.0 - (1.0 - self.slowest_share) * density
+
+
+observed = ObservedSpeed()
+
+
+def _clipped(share: float) -> float:
+    return min(max(share, 0.0), 1.0)
 
 
 def complied_speed(own: float, advised: float, strength: float) -> float:
@@ -71,26 +178,9 @@ def complied_speed(own: float, advised: float, strength: float) -> float:
     return own + strength * min(0.0, advised - own)
 
 
-FULLY_MISJUDGED, RIGHTLY_JUDGED = 30.0, 150.0
-"""Visibilities up to which distances are misjudged in full, and from which not at all [m]."""
-
-
-def perceived_distance_factor(visibility: float, misjudgement: float) -> float:
-    """Perceived over true distance in fog [-] (Cavallo, Colomb & Doré 2001; linear in between).
-
-    Parameters
-    ----------
-    visibility : float
-        Meteorological visibility [m].
-    misjudgement : float
-        Overestimate in the densest fog [-].
-    """
-    share = (RIGHTLY_JUDGED - visibility) / (RIGHTLY_JUDGED - FULLY_MISJUDGED)
-    return 1.0 + misjudgement * min(max(share, 0.0), 1.0)
-
-
 SPEED_CHOICES: Registry[Choice] = Registry(
-    "speed choice", {"unaffected": unaffected, "too_fast": too_fast, "within_sight": within_sight}
+    "speed choice",
+    {"observed": observed, "unaffected": unaffected, "too_fast": too_fast, "within_sight": within_sight},
 )
 
 
@@ -129,14 +219,25 @@ class DriverSetup:
     compliance : Compliance
         How they follow advice.
     misjudgement : float
-        By which share they take distances for longer than they are in dense fog [-], and so follow closer: 0.3 … 0.6 at
-        night (Cavallo, Colomb & Doré 2001); in full up to 30 m of visibility, not at all from 150 m.
+        By which share they take distances for longer than they are [-] where they see the lamps of a leader and not its
+        outline, and so follow closer: 0.3 … 0.6 (Cavallo, Colomb & Doré 2001).
+    following : mapping from str to float, or None
+        Shares of the kinds of drivers, by their names in `FOLLOWING_MODELS`, together 1. None stands for
+        `OBSERVED_MIXTURE` if speeds are `observed` ones, and for drivers who follow as in clear air otherwise.
     """
 
-    speed_choice: str = "too_fast"
+    speed_choice: str = "observed"
     spread: float = 0.1
     compliance: Compliance = Compliance()
     misjudgement: float = 0.0
+    following: Mapping[str, float] | None = None
+
+    @property
+    def following_shares(self) -> Mapping[str, float]:
+        """Shares of the kinds of drivers, by name [-]."""
+        if self.following is not None:
+            return self.following
+        return OBSERVED_MIXTURE if self.speed_choice == "observed" else {"unaffected": 1.0}
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,10 +250,13 @@ class DriverTraits:
         Factor on the speed that the setup's choice gives [-].
     follows_advice : bool
         Whether advice reaches and moves them.
+    following : str
+        How they follow, a name in `FOLLOWING_MODELS`.
     """
 
     speed_factor: float
     follows_advice: bool
+    following: str = "unaffected"
 
 
 def driver_traits(setup: DriverSetup, vehicle: str, seed: int) -> DriverTraits:
@@ -168,11 +272,41 @@ def driver_traits(setup: DriverSetup, vehicle: str, seed: int) -> DriverTraits:
         Seed of the run, not negative.
     """
     rng = np.random.default_rng([seed, zlib.crc32(vehicle.encode())])
+    speed_factor = math.exp(setup.spread * rng.standard_normal())
+    reached, moved, kind = rng.random(3)
     return DriverTraits(
-        speed_factor=math.exp(setup.spread * rng.standard_normal()),
-        follows_advice=bool(rng.random() < setup.compliance.reached_share)
-        and bool(rng.random() < setup.compliance.rate),
+        speed_factor=speed_factor,
+        follows_advice=bool(reached < setup.compliance.reached_share and moved < setup.compliance.rate),
+        following=_drawn_kind(setup.following_shares, kind),
     )
+
+
+def _drawn_kind(shares: Mapping[str, float], draw: float) -> str:
+    """The kind of driver in whose part of 0 … 1 a draw falls."""
+    upper = 0.0
+    for name, share in shares.items():
+        upper += share
+        if draw < upper:
+            return name
+    # Shares that add up to a little less than 1 in binary fractions.
+    return next(reversed(list(shares)))
+
+
+def chosen_speed(choice: Choice, factor: float, own: float, visibility: float) -> float:
+    """Speed that a driver chooses in fog [m/s].
+
+    Parameters
+    ----------
+    choice : Choice
+        How drivers choose.
+    factor : float
+        This one's factor on speeds that sight limits [-].
+    own : float
+        Speed that they would drive in clear air [m/s].
+    visibility : float
+        Visibility that they go by [m].
+    """
+    return min(factor * choice(visibility), speed_share(choice, visibility) * own)
 
 
 def desired_speed(
@@ -200,6 +334,6 @@ def desired_speed(
     advised_for : float
         Time since there is advice for them [s].
     """
-    chosen = min(driver.speed_factor * SPEED_CHOICES[setup.speed_choice](visibility), own)
+    chosen = chosen_speed(SPEED_CHOICES[setup.speed_choice], driver.speed_factor, own, visibility)
     heard = driver.follows_advice and advised_for >= setup.compliance.delay
     return complied_speed(chosen, advised, setup.compliance.strength) if heard and math.isfinite(advised) else chosen

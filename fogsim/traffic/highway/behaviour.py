@@ -52,7 +52,7 @@ class DriverControl:
         self.command = Command()
         self._fleet = fleet
         self._sight = sight
-        self._desired_speeds = HighwayDesiredSpeeds(fleet, setup, seed, advice_deceleration)
+        self._desired_speeds = HighwayDesiredSpeeds(fleet, setup, seed, advice_deceleration, sight)
         self._manoeuvres = Manoeuvres(fleet, events)
 
     def enter_fog(self, fog: FogAccess) -> None:

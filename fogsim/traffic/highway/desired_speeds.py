@@ -8,14 +8,15 @@ import numpy as np
 from highway_env.vehicle.behavior import IDMVehicle
 
 from fogsim.traffic.drivers.advice_hearing import AdviceHearing
-from fogsim.traffic.drivers.sight import FogAccess
+from fogsim.traffic.drivers.following import FOLLOWING_MODELS, Surroundings, misjudged_headway
+from fogsim.traffic.drivers.leader_reach import drivers_visibility, leader_reach
+from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.drivers.speed_choice import (
     CHOICE_PERIOD,
     DriverSetup,
     DriverTraits,
     desired_speed,
     driver_traits,
-    perceived_distance_factor,
 )
 from fogsim.traffic.highway.fleet import Fleet
 from fogsim.traffic.highway.network import speed_limit
@@ -38,14 +39,19 @@ class HighwayDesiredSpeeds:
         With a vehicle's id it gives its driver's traits.
     advice_deceleration : float
         How hard vehicles slow down to a lower target speed [m/s²].
+    sight : DriverSight or None
+        Eyes of the drivers; None if they see through the fog.
     """
 
-    def __init__(self, fleet: Fleet, setup: DriverSetup, seed: int, advice_deceleration: float) -> None:
+    def __init__(
+        self, fleet: Fleet, setup: DriverSetup, seed: int, advice_deceleration: float, sight: DriverSight | None = None
+    ) -> None:
         self.fog: FogAccess | None = None
         self._fleet = fleet
         self._setup = setup
         self._seed = seed
         self._deceleration = advice_deceleration
+        self._sight = sight
         self._traits: dict[str, DriverTraits] = {}
         self._hearing = AdviceHearing(HighwayVehiclePlaces(fleet))
         self._advised_since: dict[str, float] = {}
@@ -82,14 +88,15 @@ class HighwayDesiredSpeeds:
         self._advised_since = {v: self._advised_since.get(v, time) for v in advised}
         self._desired = {}
         for vehicle, visibility in zip(vehicles, self._visibilities(vehicles), strict=True):
-            self._shorten_headway(vehicle, visibility)
             vehicle_id = name(vehicle)
+            driver = self._traits_of(vehicle_id)
+            room = self._follow(vehicle, driver, visibility)
             own = min(self._own_speed.get(vehicle, vehicle.target_speed), speed_limit(vehicle.lane))
             desired = desired_speed(
                 self._setup,
-                self._traits_of(vehicle_id),
-                own,
-                visibility,
+                driver,
+                min(own, room),
+                drivers_visibility(self._sight, visibility),
                 advised.get(vehicle_id, math.inf),
                 time - self._advised_since.get(vehicle_id, time),
             )
@@ -102,11 +109,16 @@ class HighwayDesiredSpeeds:
         extinction = self.fog.extinction(np.array([front_bumper(v) for v in vehicles]))
         return [visibility_from_extinction(float(k)) for k in extinction]
 
-    def _shorten_headway(self, vehicle: Any, visibility: float) -> None:
-        """Divide the headway by the perceived over the true distance: who overestimates gaps keeps shorter ones."""
-        if self._setup.misjudgement > 0:
-            own = self._own_headway.setdefault(vehicle, vehicle.TIME_WANTED)
-            vehicle.TIME_WANTED = own / perceived_distance_factor(visibility, self._setup.misjudgement)
+    def _follow(self, vehicle: Any, driver: DriverTraits, visibility: float) -> float:
+        """Set a driver's wanted headway, and give the speed that is not exceeded for the room to a leader [m/s]."""
+        reach, model = leader_reach(self._sight, visibility), FOLLOWING_MODELS[driver.following]
+        own = self._own_headway.setdefault(vehicle, vehicle.TIME_WANTED)
+        seen = drivers_visibility(self._sight, visibility)
+        around = Surroundings(seen, reach, float(vehicle.speed), float(vehicle.DISTANCE_WANTED))
+        wanted = misjudged_headway(model.headway(own, around), around, self._setup.misjudgement)
+        if wanted != vehicle.TIME_WANTED:
+            vehicle.TIME_WANTED = wanted
+        return model.top_speed(reach)
 
     def _traits_of(self, vehicle: str) -> DriverTraits:
         if vehicle not in self._traits:

@@ -6,7 +6,7 @@ and it ends with the vehicle.
 """
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -17,7 +17,38 @@ SOLE_SESSION = "1"
 
 _SESSIONS = "fogsim.sessions"
 _OWN = "own"
+_LEAST = 1e-6
 _Value = TypeVar("_Value")
+
+
+Rule = Callable[[float, Collection[float]], float]
+"""From a vehicle's own value and what sessions claim, which may be nothing, to the value that is in force."""
+
+
+def lowest(own: float, claims: Collection[float]) -> float:
+    """The lowest claim holds, unless the vehicle's own value is lower.
+
+    Parameters
+    ----------
+    own : float
+        The vehicle's own value.
+    claims : collection of float
+        Values that sessions claim.
+    """
+    return min(own, *claims) if claims else own
+
+
+def farthest(own: float, claims: Collection[float]) -> float:
+    """The claim that is farthest from the vehicle's own value by ratio holds; the lower of two that are as far.
+
+    Parameters
+    ----------
+    own : float
+        The vehicle's own value.
+    claims : collection of float
+        Values that sessions claim.
+    """
+    return max(claims, key=lambda claim: (max(claim, own) / max(min(claim, own), _LEAST), -claim)) if claims else own
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,18 +63,26 @@ class Attribute:
         From SUMO's domain of vehicles and a vehicle's id to the value.
     write : callable
         Sets a vehicle's value.
+    rule : callable
+        Which value is in force where sessions claim some.
     """
 
     name: str
     read: Callable[[Api, str], float]
     write: Callable[[Api, str, float], None]
+    rule: Rule = lowest
 
 
 TOP_SPEED = Attribute("maxSpeed", lambda get, v: float(get.getMaxSpeed(v)), lambda set_, v, x: set_.setMaxSpeed(v, x))
 """Top speed [m/s]."""
 
-TIME_HEADWAY = Attribute("tau", lambda get, v: float(get.getTau(v)), lambda set_, v, x: set_.setTau(v, x))
-"""Wanted time headway [s]."""
+TIME_HEADWAY = Attribute("tau", lambda get, v: float(get.getTau(v)), lambda set_, v, x: set_.setTau(v, x), farthest)
+"""Wanted time headway [s], which drivers shorten or lengthen."""
+
+SPEED_FACTOR = Attribute(
+    "speedFactor", lambda get, v: float(get.getSpeedFactor(v)), lambda set_, v, x: set_.setSpeedFactor(v, x)
+)
+"""Wanted speed over the speed limit of any lane [-]."""
 
 LANE_CHANGE_MODE = Attribute(
     "laneChangeMode",
@@ -135,8 +174,8 @@ class SessionValues(Generic[_Value]):
 class Claims:
     """One session's claims to one attribute of vehicles.
 
-    The lowest claim of all sessions holds, unless the vehicle's own value is lower. A value that somebody else has set
-    meanwhile is the vehicle's own from then on.
+    Which claim of all sessions holds is the attribute's rule: mostly the lowest, unless the vehicle's own value is
+    lower. A value that somebody else has set meanwhile is the vehicle's own from then on.
 
     Parameters
     ----------
@@ -167,12 +206,12 @@ class Claims:
     def _current(self, vehicle: str) -> tuple[float, dict[str, float]]:
         """The value in force, and all claims with the vehicle's own value."""
         now, values = self._attribute.read(self._vehicles, vehicle), self._values.read(vehicle)
-        if not values or now != min(values.values()):
+        if not values or now != self._in_force(values):
             values[_OWN] = now
         return now, values
 
     def claim(self, vehicle: str, value: float) -> None:
-        """Claim that the attribute be no higher than a value.
+        """Claim a value of the attribute.
 
         Parameters
         ----------
@@ -199,8 +238,11 @@ class Claims:
             del values[self._session]
             self._put_in_force(vehicle, now, values)
 
+    def _in_force(self, values: Mapping[str, float]) -> float:
+        return self._attribute.rule(values[_OWN], [value for name, value in values.items() if name != _OWN])
+
     def _put_in_force(self, vehicle: str, now: float, values: dict[str, float]) -> None:
-        value = min(values.values())
+        value = self._in_force(values)
         if value != now:
             self._attribute.write(self._vehicles, vehicle, value)
         self._values.write(vehicle, values if len(values) > 1 else {})

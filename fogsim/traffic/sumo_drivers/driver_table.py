@@ -6,8 +6,10 @@ from enum import IntEnum, auto
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.traffic.drivers.following import FOLLOWING_MODELS, FollowingModel
 from fogsim.traffic.drivers.speed_choice import DriverSetup, driver_traits
-from fogsim.traffic.sumo.claims import Claims
+from fogsim.traffic.sumo.claims import SPEED_FACTOR, TIME_HEADWAY, TOP_SPEED, Claims
+from fogsim.traffic.sumo.link import Api, vehicle_getter
 
 
 class Column(IntEnum):
@@ -15,27 +17,41 @@ class Column(IntEnum):
 
     Attributes
     ----------
-    FACTOR, FOLLOWS
-        The driver's factor on the chosen speed, and whether advice moves them, 0 or 1 [-].
-    TOP_SPEED, HEADWAY
-        Top speed [m/s] and wanted time headway [s] of the vehicle as it entered.
+    FACTOR, FOLLOWS, KIND
+        The driver's factor on the chosen speed, whether advice moves them, 0 or 1, and how they follow: a place in
+        `DriverTable.kinds` [-].
+    TOP_SPEED, HEADWAY, SPEED_FACTOR, MINIMUM_GAP
+        Top speed [m/s], wanted time headway [s], speed over the limit [-] and minimum gap [m] of the vehicle as it
+        entered.
     SPEED_SET, SPEED_DESIRED
         Top speed that was claimed, and the desired one that it changes to [m/s].
-    HEADWAY_FACTOR
-        Factor by which its headway was shortened [-].
-    EXTINCTION, CHOICE
-        Extinction coefficient where it was last [1/m], and the speed that goes with it [m/s].
+    SHARE_SET, SHARE_DESIRED
+        Share of the speed in clear air that was claimed, and the desired one that it changes to [-].
+    HEADWAY_SET
+        Time headway that was claimed, or the own one [s].
+    EXTINCTION, VISIBILITY, CHOICE, SHARE, LIMIT
+        Extinction coefficient where it was last [1/m]; what goes with it: the visibility that the driver goes by [m],
+        the speed [m/s] and the share of the speed in clear air [-] of the driver's choice, and the speed not exceeded
+        so as not to come too near to a leader [m/s].
     """
 
     FACTOR = 0
     FOLLOWS = auto()
+    KIND = auto()
     TOP_SPEED = auto()
     HEADWAY = auto()
+    SPEED_FACTOR = auto()
+    MINIMUM_GAP = auto()
     SPEED_SET = auto()
     SPEED_DESIRED = auto()
-    HEADWAY_FACTOR = auto()
+    SHARE_SET = auto()
+    SHARE_DESIRED = auto()
+    HEADWAY_SET = auto()
     EXTINCTION = auto()
+    VISIBILITY = auto()
     CHOICE = auto()
+    SHARE = auto()
+    LIMIT = auto()
 
 
 class DriverTable:
@@ -43,24 +59,35 @@ class DriverTable:
 
     Parameters
     ----------
+    api : Api
+        The simulation.
     setup : DriverSetup
         What drivers are like.
     seed : int
         With a vehicle's id it gives its driver's traits, so that they depend on nothing else.
-    top_speeds, headways : Claims
-        The session's claims to them.
+    session : str
+        Name of the session.
 
     Attributes
     ----------
     values : (m, len(Column)) float64
         The rows; another array when the table has grown.
+    kinds : tuple of FollowingModel
+        Kinds of drivers there are.
+    top_speeds, headways, speed_factors : Claims
+        The session's claims to what is set of vehicles.
     """
 
-    def __init__(self, setup: DriverSetup, seed: int, top_speeds: Claims, headways: Claims) -> None:
-        self._top_speeds = top_speeds
-        self._headways = headways
+    def __init__(self, api: Api, setup: DriverSetup, seed: int, session: str) -> None:
+        self.top_speeds = Claims(api, TOP_SPEED, session)
+        self.headways = Claims(api, TIME_HEADWAY, session)
+        self.speed_factors = Claims(api, SPEED_FACTOR, session)
+        self._minimum_gap = vehicle_getter(api, "getMinGap")
         self._setup = setup
         self._seed = seed
+        names = list(setup.following_shares)
+        self.kinds: tuple[FollowingModel, ...] = tuple(FOLLOWING_MODELS[name] for name in names)
+        self._kind = {name: place for place, name in enumerate(names)}
         self._row: dict[str, int] = {}
         self.values = np.empty((64, len(Column)))
 
@@ -90,13 +117,15 @@ class DriverTable:
         row = self._row.get(vehicle, len(self._row))
         if row == len(self.values):
             self.values = np.concatenate((self.values, np.empty_like(self.values)))
-        for claims in (self._top_speeds, self._headways):
+        for claims in (self.top_speeds, self.headways, self.speed_factors):
             claims.withdraw(vehicle)
-        driver, top_speed = driver_traits(self._setup, vehicle, self._seed), self._top_speeds.own_value(vehicle)
-        headway = self._headways.own_value(vehicle)
+        driver, top_speed = driver_traits(self._setup, vehicle, self._seed), self.top_speeds.own_value(vehicle)
+        headway = self.headways.own_value(vehicle)
         self.values[row] = (
-            *(driver.speed_factor, driver.follows_advice, top_speed, headway),
-            *(top_speed, top_speed, 1.0, -1.0, np.inf),
+            *(driver.speed_factor, driver.follows_advice, self._kind[driver.following]),
+            *(top_speed, headway, self.speed_factors.own_value(vehicle), self._minimum_gap(vehicle)),
+            *(top_speed, top_speed, 1.0, 1.0, headway),
+            *(-1.0, np.inf, np.inf, 1.0, np.inf),
         )
         self._row[vehicle] = row
         return row

@@ -11,24 +11,17 @@ from fogsim.kinematics import decelerated_speed
 from fogsim.traffic.drivers.advice_hearing import AdviceHearing
 from fogsim.traffic.drivers.events import Order
 from fogsim.traffic.drivers.sight import FogAccess
-from fogsim.traffic.drivers.speed_choice import (
-    CHOICE_PERIOD,
-    SPEED_CHOICES,
-    DriverSetup,
-    complied_speed,
-    perceived_distance_factor,
-)
-from fogsim.traffic.sumo.claims import TIME_HEADWAY, TOP_SPEED, Claims
+from fogsim.traffic.drivers.speed_choice import CHOICE_PERIOD, complied_speed
+from fogsim.traffic.setup import TrafficSetup
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.vehicle_places import SumoVehiclePlaces
 from fogsim.traffic.sumo_drivers.driver_table import Column, DriverTable
+from fogsim.traffic.sumo_drivers.fog_choices import FogChoices
+from fogsim.traffic.sumo_drivers.headways import HeadwayControl
+from fogsim.traffic.sumo_drivers.speed_shares import SpeedShareControl
 from fogsim.traffic.sumo_drivers.top_speeds import TopSpeedControl
-from fogsim.units import visibility_from_extinction
 from fogsim.values import Command
-
-UNNOTICED_FACTOR = 0.02
-"""Change of a headway's factor [-] that is not noticed; setting it costs a call."""
 
 _SUMO_DRIVES = -1.0
 
@@ -85,54 +78,40 @@ class SpeedControl:
 
 
 class SumoDesiredSpeeds:
-    """Sets the top speed of every vehicle but the ego by what its driver chooses and is advised.
+    """Sets the speed and the headway of every vehicle but the ego by what its driver chooses, sees and is advised.
 
     Parameters
     ----------
     api : Api
         The simulation.
-    setup : DriverSetup
-        What they are like.
+    setup : TrafficSetup
+        What drivers are like and see, how hard they slow down, and who is the ego, whose speed `SpeedControl` sets.
     fog : FogAccess
         The fog.
-    ego : str
-        The ego, whose speed `SpeedControl` sets.
     seed : int
         With a vehicle's id it gives its driver's traits, so that they depend on nothing else.
-    deceleration : float
-        How hard they slow down to a lower desired speed [m/s²].
     roster : Roster
         Which vehicles are on the road.
     session : str
         Name of the session.
     """
 
-    def __init__(
-        self,
-        api: Api,
-        setup: DriverSetup,
-        fog: FogAccess,
-        ego: str,
-        seed: int,
-        deceleration: float,
-        roster: Roster,
-        session: str,
-    ) -> None:
+    def __init__(self, api: Api, setup: TrafficSetup, fog: FogAccess, seed: int, roster: Roster, session: str) -> None:
         self._api = api
         self._position = vehicle_getter(api, "getPosition3D")
         self._departure = vehicle_getter(api, "getDeparture")
         self._step = float(api.simulation.getDeltaT())
-        self._setup = setup
-        self._choice = SPEED_CHOICES[setup.speed_choice]
+        self._compliance = setup.drivers.compliance
         self._fog = fog
         self._extinction = fog.minimum_extinction if fog.minimum_extinction == fog.maximum_extinction else None
-        self._ego = ego
+        self._ego = setup.ego
         self._roster = roster
-        top_speeds = Claims(api, TOP_SPEED, session)
-        self._headways = Claims(api, TIME_HEADWAY, session)
-        self._table = DriverTable(setup, seed, top_speeds, self._headways)
-        self._top_speeds = TopSpeedControl(api, self._table, top_speeds, deceleration, self._roster.time)
-        self._hearing = AdviceHearing(SumoVehiclePlaces(api, ego, roster))
+        table = self._table = DriverTable(api, setup.drivers, seed, session)
+        self._choices = FogChoices(table, setup.drivers, setup.sight)
+        self._headways = HeadwayControl(api, table, setup.drivers.misjudgement, setup.sight)
+        self._top_speeds = TopSpeedControl(api, table, table.top_speeds, setup.advice_deceleration, roster.time)
+        self._shares = SpeedShareControl(api, table, setup.advice_deceleration, roster.time)
+        self._hearing = AdviceHearing(SumoVehiclePlaces(api, setup.ego, roster))
         self._advised_since: dict[str, float] = {}
         self._next, self._chosen = 0.0, self._roster.time
         self._mark = 0
@@ -158,9 +137,12 @@ class SumoDesiredSpeeds:
             # In even fog and without advice, choices stay as they are.
             settled = self._extinction is not None and not advised and not self._advised_since
             self._advised_since = {v: self._advised_since.get(v, time) for v in advised}
+            others = [v for v in present if v != self._ego]
             if not settled:
-                self._update_choices([v for v in present if v != self._ego], advised)
+                self._update_choices(others, advised)
+            self._headways.update(others, self._table.rows(others))
         self._top_speeds.update(time, present)
+        self._shares.update(time, present)
 
     def _choose_on_entry(self, new: Sequence[str], command: Command) -> None:
         """Let new drivers choose; those who enter have driven in that fog before, past the signs with the advice."""
@@ -172,14 +154,17 @@ class SumoDesiredSpeeds:
             advised = self._hearing.enter(command, entering)
             self._advised_since.update(dict.fromkeys(advised, -math.inf))
             rows, desired = self._desired(entering, advised)
+            self._shares.set_at_entry(entering, rows, self._table.values[rows, Column.SHARE])
             self._top_speeds.set_at_entry(entering, rows, desired)
         if len(entering) < len(new):
             # They hear other advice than that to them by name when all listen again.
             self._update_choices([v for v in new if v not in set(entering)], command.advised_speeds)
+        self._headways.update(new, self._table.rows(new))
 
     def _update_choices(self, ids: Sequence[str], advised: Mapping[str, float]) -> None:
         if ids:
             rows, desired = self._desired(ids, advised)
+            self._shares.set_desired(ids, rows, self._table.values[rows, Column.SHARE])
             self._top_speeds.set_desired(ids, rows, desired)
 
     def _desired(
@@ -188,47 +173,29 @@ class SumoDesiredSpeeds:
         """Rows of vehicles and the top speeds that their drivers desire (n,) [m/s]."""
         table = self._table
         rows = table.rows(ids)
-        self._choose_in_fog(ids, rows)
-        if self._setup.misjudgement > 0:
-            self._shorten_headways(ids, rows)
-        top_speed = table.values[rows, Column.TOP_SPEED]
-        desired = np.minimum(table.values[rows, Column.FACTOR] * table.values[rows, Column.CHOICE], top_speed)
+        self._choices.update(rows, self._extinctions(ids))
+        values = table.values[rows]
+        desired = np.minimum(values[:, Column.FACTOR] * values[:, Column.CHOICE], values[:, Column.LIMIT])
+        desired = np.minimum(desired, values[:, Column.TOP_SPEED])
         if advised:
-            for i in np.flatnonzero(table.values[rows, Column.FOLLOWS]).tolist():
+            for i in np.flatnonzero(values[:, Column.FOLLOWS]).tolist():
                 if ids[i] in advised:
                     desired[i] = self._advised(ids[i], float(desired[i]), advised[ids[i]])
         return rows, desired
 
-    def _choose_in_fog(self, ids: Sequence[str], rows: NDArray[np.intp]) -> None:
-        """Choose a speed where the fog is another than at the last choice."""
+    def _extinctions(self, ids: Sequence[str]) -> NDArray[np.float64]:
+        """Extinction coefficients where vehicles are (n,) [1/m]."""
         if self._extinction is not None:
-            here = np.full(len(rows), self._extinction)
-        else:
-            flat = itertools.chain.from_iterable(map(self._position, ids))
-            here = self._fog.extinction(np.fromiter(flat, np.float64, 3 * len(ids)).reshape(-1, 3))
-        changed = np.flatnonzero(here != self._table.values[rows, Column.EXTINCTION])
-        self._table.values[rows[changed], Column.EXTINCTION] = here[changed]
-        values, which = np.unique(here[changed], return_inverse=True)
-        choices = np.array([self._choice(visibility_from_extinction(k)) for k in values.tolist()])
-        if len(changed):
-            self._table.values[rows[changed], Column.CHOICE] = choices[which]
-
-    def _shorten_headways(self, ids: Sequence[str], rows: NDArray[np.intp]) -> None:
-        """Divide headways by the perceived over the true distance: who overestimates gaps keeps shorter ones."""
-        table = self._table
-        columns = (table.values[rows, column] for column in (Column.EXTINCTION, Column.HEADWAY_FACTOR, Column.HEADWAY))
-        for vehicle, row, extinction, known, headway in zip(ids, rows, *columns, strict=True):
-            factor = perceived_distance_factor(visibility_from_extinction(extinction), self._setup.misjudgement)
-            if abs(factor - known) > UNNOTICED_FACTOR:
-                self._headways.claim(vehicle, float(headway) / factor)
-                table.values[int(row), Column.HEADWAY_FACTOR] = factor
+            return np.full(len(ids), self._extinction)
+        flat = itertools.chain.from_iterable(map(self._position, ids))
+        return self._fog.extinction(np.fromiter(flat, np.float64, 3 * len(ids)).reshape(-1, 3))
 
     def _advised(self, vehicle: str, own: float, advised: float) -> float:
         """Top speed [m/s] of a driver who follows advice, once the delay is over."""
         time = self._roster.time
-        if time - self._advised_since.get(vehicle, time) < self._setup.compliance.delay:
+        if time - self._advised_since.get(vehicle, time) < self._compliance.delay:
             return own
-        return complied_speed(min(own, self._allowed(vehicle)), advised, self._setup.compliance.strength)
+        return complied_speed(min(own, self._allowed(vehicle)), advised, self._compliance.strength)
 
     def _allowed(self, vehicle: str) -> float:
         """What the road allows a driver [m/s], whatever the top speed that the vehicle has been given."""
@@ -244,6 +211,5 @@ class SumoDesiredSpeeds:
         ids = [v for v in self._roster.present if v != self._ego]
         rows = self._table.rows(ids)
         self._top_speeds.release(ids, rows)
-        for i in np.flatnonzero(self._table.values[rows, Column.HEADWAY_FACTOR] != 1.0).tolist():
-            self._headways.withdraw(ids[i])
-        self._table.values[rows, Column.HEADWAY_FACTOR] = 1.0
+        self._shares.release(ids, rows)
+        self._headways.release(ids, rows)

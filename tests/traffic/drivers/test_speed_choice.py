@@ -5,15 +5,17 @@ import math
 import numpy as np
 import pytest
 
+from fogsim.kinematics import safe_speed
 from fogsim.traffic.drivers.speed_choice import (
     SPEED_CHOICES,
     Compliance,
     DriverSetup,
     DriverTraits,
+    chosen_speed,
     complied_speed,
     desired_speed,
     driver_traits,
-    perceived_distance_factor,
+    observed,
     too_fast,
     unaffected,
     within_sight,
@@ -25,14 +27,47 @@ def test_speed_choices() -> None:
     assert within_sight(50.0) * 3.6 == pytest.approx(42.5, abs=0.05)
     assert too_fast(200.0) == np.inf
     assert too_fast(100.0) == pytest.approx(1.4 * within_sight(100.0))
-    assert {"unaffected", "too_fast", "within_sight"} <= set(SPEED_CHOICES)
+    assert {"observed", "unaffected", "too_fast", "within_sight"} <= set(SPEED_CHOICES)
 
 
-def test_distances_seem_longer_in_dense_fog() -> None:
-    """Cavallo, Colomb & Doré 2001: up to 60 % at night in the densest fog."""
-    assert perceived_distance_factor(20.0, 0.6) == pytest.approx(1.6)
-    assert perceived_distance_factor(90.0, 0.6) == pytest.approx(1.3)
-    assert perceived_distance_factor(500.0, 0.6) == 1.0
+KMH = 3.6
+
+
+def test_observed_speeds_are_the_published_ones() -> None:
+    """A motorway whose drivers want 112 km/h; sources in `ObservedSpeed`."""
+    own = 112.0 / KMH
+
+    def speed(visibility: float) -> float:
+        return chosen_speed(observed, 1.0, own, visibility) * KMH
+
+    assert speed(200.0) == speed(np.inf) == pytest.approx(112.0)  # LR958: unaffected down to 200 m
+    assert speed(30.0) == pytest.approx(29.0, rel=0.03)  # A16 without signs, below 35 m: 29 km/h
+    assert speed(100.0) / 112.0 == pytest.approx(0.9, abs=0.02)  # SHRP2, near fog: -10 %
+    assert speed(160.0) / 112.0 == pytest.approx(0.96, abs=0.02)  # SHRP2, distant fog: -3 %
+    assert speed(50.0) == pytest.approx(2.0 * within_sight(50.0) * KMH)  # I-77: twice the safe speed
+    overdriving = {v: speed(v) / (within_sight(v) * KMH) for v in (20.0, 30.0, 40.0, 50.0, 60.0, 100.0, 150.0)}
+    assert max(overdriving, key=overdriving.__getitem__) in {40.0, 50.0, 60.0, 100.0}  # Hogema & van der Horst 1994
+
+
+def test_more_than_half_overdrive_what_they_see_at_50_m() -> None:
+    """TRL SR281; the Highway Code's stopping distance has 0.67 s and 6.57 m/s²."""
+    setup = DriverSetup()
+    factors = [driver_traits(setup, f"vehicle {i}", 2).speed_factor for i in range(2000)]
+    speeds = [chosen_speed(observed, factor, 112.0 / KMH, 50.0) for factor in factors]
+    assert np.mean(np.array(speeds) > safe_speed(50.0, 0.67, 6.57)) > 0.5
+    # And down to 150 m most can stop (LR958).
+    at_150 = [chosen_speed(observed, factor, 112.0 / KMH, 150.0) for factor in factors]
+    assert np.mean(np.array(at_150) < safe_speed(150.0, 0.67, 6.57)) > 0.9
+
+
+def test_in_a_town_they_slow_down_too() -> None:
+    """By a share of their own speed, from 200 m on; up to 18 % (Pretto et al. 2012) before sight limits it."""
+    own = 50.0 / KMH
+    speeds = [chosen_speed(observed, 1.0, own, visibility) for visibility in (200.0, 150.0, 100.0, 60.0, 40.0, 30.0)]
+    assert speeds[0] == own
+    assert all(np.diff(speeds) < 0.0)
+    assert speeds[4] / own == pytest.approx(0.83, abs=0.01)
+    assert chosen_speed(too_fast, 1.0, own, 60.0) == own  # which a choice that is not relative does not tell
 
 
 def test_drivers_advised_30_mph_who_drive_61_can_be_represented() -> None:

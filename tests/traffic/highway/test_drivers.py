@@ -12,7 +12,8 @@ import pytest
 from fogsim.atmosphere import FieldAccess, airlight_from_illuminance
 from fogsim.errors import InputError
 from fogsim.kinematics import safe_speed
-from fogsim.traffic import Compliance, DriverSetup
+from fogsim.traffic import Compliance, DriverSetup, DriverSight
+from fogsim.traffic.drivers.leader_reach import leader_reach
 from fogsim.traffic.drivers.speed_choice import desired_speed, driver_traits
 from fogsim.traffic.highway import HighwayTraffic
 from fogsim.units import extinction_from_visibility
@@ -32,9 +33,11 @@ def fog_of(visibility: float) -> FieldAccess:
 class Road:
     """Vehicles that drive 30 m/s by themselves, in fog or none."""
 
-    def __init__(self, setup: DriverSetup, visibility: float = math.inf, seed: int = 3) -> None:
+    def __init__(
+        self, setup: DriverSetup, visibility: float = math.inf, seed: int = 3, sight: DriverSight | None = None
+    ) -> None:
         self.environment: Any = gymnasium.make("highway-v0", config=CONFIG).unwrapped
-        self.traffic = HighwayTraffic(self.environment, None, drivers=setup)
+        self.traffic = HighwayTraffic(self.environment, sight, drivers=setup)
         if math.isfinite(visibility):
             self.traffic.enter_fog(fog_of(visibility))
         self.traffic.start(seed)
@@ -208,10 +211,18 @@ def test_advice_never_makes_anybody_faster() -> None:
 
 def test_who_misjudges_distances_keeps_a_shorter_headway() -> None:
     setup = DriverSetup("unaffected", spread=0.0, misjudgement=0.6)
-    road = Road(setup, 30.0).drive(1.0)
-    # IDM's wanted headway is 1.5 s.
-    assert [v.TIME_WANTED for v in road.others] == pytest.approx([1.5 / 1.6] * len(road.others))
-    road.traffic.enter_fog(fog_of(150.0))
+    sight = DriverSight(0.1)
+    road = Road(setup, 30.0, sight=sight)
+    speeds = [float(v.speed) for v in road.others]
+    road.drive(0.2)
+    # IDM's wanted headway is 1.5 s, its gap at a standstill 10 m; at night the outline is seen up to some 14 m.
+    outline = leader_reach(sight, 30.0).by_body
+    assert outline == pytest.approx(14.0, abs=3.0)
+    kept = [max((1.5 * v + 10.0) / 1.6, outline) for v in speeds]
+    wanted = [(gap - 10.0) / v for gap, v in zip(kept, speeds, strict=True)]
+    assert [v.TIME_WANTED for v in road.others] == pytest.approx(wanted, rel=0.01)
+    assert max(wanted) < 1.0
+    road.traffic.enter_fog(fog_of(math.inf))
     assert [v.TIME_WANTED for v in road.drive(1.5).others] == pytest.approx([1.5] * len(road.others))
     assert road.environment.vehicle.TIME_WANTED == 1.5
 

@@ -1,0 +1,98 @@
+"""Time headways of SUMO's vehicles, as their drivers want and misjudge them in fog."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.traffic.drivers.following import FollowingModel, Surroundings, misjudged_headway
+from fogsim.traffic.drivers.leader_reach import leader_reach
+from fogsim.traffic.drivers.sight import DriverSight
+from fogsim.traffic.drivers.speed_choice import UNAFFECTED_ABOVE
+from fogsim.traffic.sumo.link import Api, vehicle_getter
+from fogsim.traffic.sumo_drivers.driver_table import Column, DriverTable
+from fogsim.units import visibility_from_extinction
+
+UNNOTICED_RATIO = 0.03
+"""Change of a headway, as a share of it, that is not noticed [-]; setting it costs calls."""
+
+
+class HeadwayControl:
+    """Sets time headways; where the fog does not matter they are the vehicles' own.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    table : DriverTable
+        The drivers.
+    misjudgement : float
+        By which share they overestimate distances where they see lamps alone [-].
+    sight : DriverSight or None
+        Their eyes; None if they see through the fog.
+    """
+
+    def __init__(self, api: Api, table: DriverTable, misjudgement: float, sight: DriverSight | None) -> None:
+        self._speed = vehicle_getter(api, "getSpeed")
+        self._table = table
+        self._misjudgement = misjudgement
+        self._sight = sight
+        plain = type(FollowingModel())
+        self._matters = np.array([misjudgement > 0 or type(kind) is not plain for kind in table.kinds])
+
+    def update(self, vehicles: Sequence[str], rows: NDArray[np.intp]) -> None:
+        """Set the headways of drivers, by the fog and the speed at which they drive.
+
+        Parameters
+        ----------
+        vehicles : (n,) sequence of str
+            Their vehicles.
+        rows : (n,) intp
+            Their rows of the table.
+        """
+        if self._sight is None or not self._matters.any():
+            return
+        values = self._table.values[rows]
+        in_fog = (values[:, Column.VISIBILITY] < UNAFFECTED_ABOVE) & self._matters[
+            values[:, Column.KIND].astype(np.intp)
+        ]
+        for i in np.flatnonzero(in_fog | (values[:, Column.HEADWAY_SET] != values[:, Column.HEADWAY])).tolist():
+            own = float(values[i, Column.HEADWAY])
+            wanted = self._wanted(vehicles[i], values[i]) if in_fog[i] else own
+            if abs(wanted - values[i, Column.HEADWAY_SET]) > UNNOTICED_RATIO * own or wanted == own:
+                self._set(vehicles[i], int(rows[i]), wanted)
+
+    def _wanted(self, vehicle: str, values: NDArray[np.float64]) -> float:
+        """Time headway that a driver wants [s]."""
+        around = Surroundings(
+            float(values[Column.VISIBILITY]),
+            leader_reach(self._sight, visibility_from_extinction(float(values[Column.EXTINCTION]))),
+            float(self._speed(vehicle)),
+            float(values[Column.MINIMUM_GAP]),
+        )
+        wanted = self._table.kinds[int(values[Column.KIND])].headway(float(values[Column.HEADWAY]), around)
+        return misjudged_headway(wanted, around, self._misjudgement)
+
+    def _set(self, vehicle: str, row: int, headway: float) -> None:
+        table = self._table
+        if headway == table.values[row, Column.HEADWAY_SET]:
+            return
+        if headway == table.values[row, Column.HEADWAY]:
+            table.headways.withdraw(vehicle)
+        else:
+            table.headways.claim(vehicle, headway)
+        table.values[row, Column.HEADWAY_SET] = headway
+
+    def release(self, vehicles: Sequence[str], rows: NDArray[np.intp]) -> None:
+        """Give vehicles their own headways back.
+
+        Parameters
+        ----------
+        vehicles : (n,) sequence of str
+            Vehicles on the road.
+        rows : (n,) intp
+            Their rows of the table.
+        """
+        own = self._table.values[rows, Column.HEADWAY]
+        for i in np.flatnonzero(self._table.values[rows, Column.HEADWAY_SET] != own).tolist():
+            self._set(vehicles[i], int(rows[i]), float(own[i]))

@@ -125,7 +125,7 @@ def conduct(api: Any, vehicle: str) -> tuple[Any, ...]:
 
 
 def test_every_vehicle_gets_back_what_was_changed(libsumo: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """In dense fog with careful, misjudging drivers next to none is left as it was; afterwards all are."""
+    """In dense fog with careful drivers next to none is left as it was; afterwards all are."""
     # SUMO does not tell whom a driver ignores; so what it was told last counts.
     ignored: dict[str, str] = {}
     tell = libsumo.vehicle.setParameter
@@ -136,7 +136,7 @@ def test_every_vehicle_gets_back_what_was_changed(libsumo: Any, monkeypatch: pyt
         tell(vehicle, key, value)
 
     monkeypatch.setattr(libsumo.vehicle, "setParameter", told)
-    settings = (*SMALL, "drivers.speed_choice=within_sight", "drivers.distance_misjudgement=0.5")
+    settings = (*SMALL, "drivers.speed_choice=within_sight", "drivers.following=careful")
     session = fogsim.attach(libsumo, ego=EGO, visibility=20.0, settings=settings)
     before: dict[str, tuple[Any, ...]] = {}
     changed: set[int] = set()

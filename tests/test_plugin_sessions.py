@@ -16,7 +16,8 @@ GRID = Path(__file__).resolve().parent / "data" / "grid"
 ARGUMENTS = ["-c", str(GRID / "grid.sumocfg"), "--step-length", "0.5", "--no-step-log", "--seed", "1"]
 SMALL = ("camera.width=32", "camera.height=24")
 ADVISED = ("drivers.compliance.reached_share=1", "drivers.compliance.rate=1", "drivers.compliance.delay_s=0")
-MISJUDGING = ("drivers.speed_choice=within_sight", "drivers.distance_misjudgement=0.5")
+# Speeds, shares of the own speed and headways change.
+CHANGING = ("drivers.speed_choice=observed", "drivers.following=careful")
 EGO, OTHER_EGO = "veh0", "veh1"
 
 
@@ -55,7 +56,8 @@ def drive(api: Any, steps: int, *told: tuple[AttachedSession, float | None]) -> 
 def conduct(api: Any, vehicle: str) -> tuple[float, ...]:
     get = api.vehicle
     gain = float(get.getParameter(vehicle, "laneChangeModel.lcSpeedGain"))
-    return get.getMaxSpeed(vehicle), get.getTau(vehicle), get.getLaneChangeMode(vehicle), gain
+    headway, factor = get.getTau(vehicle), get.getSpeedFactor(vehicle)
+    return get.getMaxSpeed(vehicle), headway, get.getLaneChangeMode(vehicle), gain, factor
 
 
 def top_speeds(api: Any) -> dict[str, float]:
@@ -80,7 +82,7 @@ def test_the_lower_advice_holds_until_its_session_is_closed(api: Any, first: int
 
 def test_all_that_two_sessions_change_is_given_back(api: Any) -> None:
     before: dict[str, tuple[float, ...]] = {}
-    one, other = (session(api, ego, *MISJUDGING, visibility=20.0) for ego in (EGO, OTHER_EGO))
+    one, other = (session(api, ego, *CHANGING, visibility=20.0) for ego in (EGO, OTHER_EGO))
     changed: set[int] = set()
     for number in range(70):
         api.simulationStep()
@@ -93,9 +95,9 @@ def test_all_that_two_sessions_change_is_given_back(api: Any) -> None:
         advise(other, None)
         if number % 10 == 9:
             now = {v: conduct(api, v) for v in api.vehicle.getIDList()}
-            changed.update(part for v in now for part in range(4) if now[v][part] != before[v][part])
+            changed.update(part for v in now for part in range(5) if now[v][part] != before[v][part])
     other.close()
-    assert changed >= {0, 1, 3}
+    assert changed >= {0, 1, 3, 4}
     assert {v: conduct(api, v) for v in api.vehicle.getIDList()} == {v: before[v] for v in api.vehicle.getIDList()}
 
 

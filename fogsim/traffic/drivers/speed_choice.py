@@ -316,6 +316,7 @@ def desired_speed(
     visibility: float,
     advised: float = math.inf,
     advised_for: float = 0.0,
+    room: float = math.inf,
 ) -> float:
     """Speed that a driver wants to drive [m/s], never more than the own one.
 
@@ -333,7 +334,10 @@ def desired_speed(
         Advised speed [m/s]; ``inf`` for none.
     advised_for : float
         Time since there is advice for them [s].
+    room : float
+        Speed that they do not exceed so as not to come too near to a leader [m/s].
     """
     chosen = chosen_speed(SPEED_CHOICES[setup.speed_choice], driver.speed_factor, own, visibility)
+    chosen = min(chosen, room)
     heard = driver.follows_advice and advised_for >= setup.compliance.delay
     return complied_speed(chosen, advised, setup.compliance.strength) if heard and math.isfinite(advised) else chosen

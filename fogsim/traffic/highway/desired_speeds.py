@@ -95,10 +95,11 @@ class HighwayDesiredSpeeds:
             desired = desired_speed(
                 self._setup,
                 driver,
-                min(own, room),
+                own,
                 drivers_visibility(self._sight, visibility),
                 advised.get(vehicle_id, math.inf),
                 time - self._advised_since.get(vehicle_id, time),
+                room,
             )
             if desired < own:
                 self._desired[vehicle] = desired

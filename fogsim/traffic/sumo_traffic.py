@@ -336,8 +336,9 @@ def command_line(setup: TrafficSetup, seed: int) -> list[str]:
     quiet = ["--no-step-log", "true", "--duration-log.disable", "true", "--no-warnings", "true"]
     # Vehicles are not teleported: collisions stay where they happen and are counted. How jams dissolve in a simulation
     # of the user's own is left to its configuration.
-    patient = ["--time-to-teleport", "-1"] if setup.config is None else []
-    physical = [*patient, "--collision.action"]
+    # Nor is it changed whether it looks for collisions at junctions.
+    own = ["--time-to-teleport", "-1", "--collision.check-junctions", "true"] if setup.config is None else []
+    physical = [*own, "--collision.action"]
     if setup.after_collision is AfterCollision.STOP:
         return arguments + quiet + physical + ["warn", "--collision.stoptime", _FOR_EVER]
     return arguments + quiet + physical + ["remove"]

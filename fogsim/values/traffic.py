@@ -103,7 +103,7 @@ class Collision:
     collider, victim : str
         Their ids.
     impact_speed : float
-        Difference of their speeds [m/s].
+        Difference of their speeds [m/s]; at a junction, the size of that of their velocities.
     """
 
     time: float

@@ -91,6 +91,14 @@ LANE_CHANGE_MODE = Attribute(
 )
 """Bits of why a vehicle may change lane."""
 
+SPEED_MODE = Attribute(
+    "speedMode",
+    lambda get, v: float(get.getSpeedMode(v)),
+    lambda set_, v, x: set_.setSpeedMode(v, int(x)),
+)
+"""Bits of what a vehicle's speed regards; a claim must clear bits of its own mode, and all claims the same ones."""
+
+
 
 def _lane_change_parameter(name: str, sign: int = 1) -> Attribute:
     """Parameter of lane-change models that have it; with sign -1 its highest claim holds, as claims hold -x of it."""

@@ -248,7 +248,17 @@ class VehicleReader:
     def collisions(self) -> list[Collision]:
         """Collisions of the last step; SUMO tells one in every step while the vehicles overlap."""
         hits, time = self._hits(), self._api.simulation.getTime
-        return [Collision(time(), c.collider, c.victim, abs(c.colliderSpeed - c.victimSpeed)) for c in hits]
+        return [Collision(time(), c.collider, c.victim, self._impact_speed(c)) for c in hits]
+
+    def _impact_speed(self, hit: Any) -> float:
+        """Size of the difference of two velocities [m/s]; along one road, of two speeds."""
+        if hit.type != "junction":
+            return abs(float(hit.colliderSpeed - hit.victimSpeed))
+        vehicle, turn = self._api.vehicle, 0.5 * math.pi
+        # Those that SUMO has removed already show no headings: ways cross at about a right angle.
+        if {hit.collider, hit.victim}.issubset(vehicle.getIDList()):
+            turn = math.radians(vehicle.getAngle(hit.collider) - vehicle.getAngle(hit.victim))
+        return math.hypot(hit.colliderSpeed - hit.victimSpeed * math.cos(turn), hit.victimSpeed * math.sin(turn))
 
 
 class SubscribedReader(VehicleReader):

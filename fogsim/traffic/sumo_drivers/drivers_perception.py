@@ -6,9 +6,11 @@ from typing import Protocol
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.roster import Roster
+from fogsim.traffic.sumo_drivers.junction_sight import JunctionSight
 from fogsim.traffic.sumo_drivers.lane_changing import LaneChanging
 from fogsim.traffic.sumo_drivers.perception import Perception
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
+from fogsim.traffic.sumo_drivers.signal_sight import SignalSight
 from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
 from fogsim.values import Lamp
 
@@ -85,4 +87,11 @@ def drivers_perception(
     """
     leaders = Perception(api, fog, sight, roster, remote, session)
     vehicle_sight = VehicleSight(api, fog, sight, remote)
-    return DriversPerception((leaders, LaneChanging(api, fog, sight, roster, leaders, vehicle_sight, remote, session)))
+    return DriversPerception(
+        (
+            leaders,
+            LaneChanging(api, fog, sight, roster, leaders, vehicle_sight, remote, session),
+            JunctionSight(api, fog, sight, roster, vehicle_sight, remote, session),
+            SignalSight(api, fog, sight, roster, session),
+        )
+    )

@@ -1,0 +1,212 @@
+"""Drivers at junctions yield only to whom they can see.
+
+SUMO's drivers get the foes to ignore (``junctionModel.ignoreIDs``), and only when those change; so who has the right of
+way, which gaps are accepted and how a driver brakes for somebody in the way stay SUMO's. To a driver who does not see a
+foe the junction is free of it: a minor road's driver pulls out, and one with priority does not brake for somebody who
+crosses until that one can be seen, and the reaction time is over.
+"""
+
+import itertools
+import math
+from collections.abc import Iterable, Mapping
+
+from fogsim.traffic.appearance import OTHERS_LAMPS
+from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST, intensity_toward
+from fogsim.traffic.drivers.sight import DriverSight, FogAccess
+from fogsim.traffic.sumo.link import Api, vehicle_getter
+from fogsim.traffic.sumo.roster import Roster
+from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
+from fogsim.traffic.sumo_drivers.due_vehicles import DueVehicles
+from fogsim.traffic.sumo_drivers.ignored_foes import IgnoredFoes
+from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
+from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
+
+FARTHEST_FOE = 250.0
+"""Foes whose ways to the junction and the driver's add up to more than this do not matter [m]."""
+
+STANDING_REACH = 12.0
+"""A driver who stands looks out for foes up to this distance from where the ways cross [m]."""
+
+ON_JUNCTION = 15.0
+"""A foe with so much way to where the ways cross, or less, may be on the junction [m]."""
+
+BRAKING = 4.5
+"""SUMO's drivers begin to brake for a foe on the junction where this deceleration is enough [m/s²]."""
+
+MAX_PAUSE = 0.5
+"""A driver near a junction looks for foes at least this often [s]."""
+
+PAUSE_IN_DOUBT = 0.2
+"""And for a foe on the way there who may come into sight or get out of it at least this often [s].
+
+For one who may be on the junction, in each step.
+"""
+
+LONGEST_VEHICLE = 25.0
+"""No part of a vehicle is farther from its front than this [m]."""
+
+ALONG_A_LANE = 2.0
+"""A driver for whom no junction can come near looks at least this often [s]."""
+
+FASTEST_GAIN = 10.0
+"""Nobody is faster by more than this after `ALONG_A_LANE` [m/s]."""
+
+# Of the lamps that others light, on any side of a vehicle.
+_BRIGHTEST = max(BRIGHTEST, intensity_toward(int(OTHERS_LAMPS), 0.0, 1.0, 0.0))
+_NOT_SEEN = math.inf
+
+
+class JunctionSight:
+    """Decides which foes at junctions are seen.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    fog : FogAccess
+        The fog.
+    sight : DriverSight
+        The drivers' eyes.
+    roster : Roster
+        Who is on the road.
+    vehicle_sight : VehicleSight
+        Tells whom they see.
+    remote : bool
+        True where every call is a message to another process.
+    session : str
+        Name of the session.
+    """
+
+    def __init__(
+        self,
+        api: Api,
+        fog: FogAccess,
+        sight: DriverSight,
+        roster: Roster,
+        vehicle_sight: VehicleSight,
+        remote: bool,
+        session: str,
+    ) -> None:
+        self._roster = roster
+        self._reaction_time = sight.reaction_time
+        self._foes = vehicle_getter(api, "getJunctionFoes")
+        self._speed, self._position = vehicle_getters(api, remote, ("getSpeed", "getPosition3D"))
+        self._lane = vehicle_getter(api, "getLaneID")
+        self._lane_position = vehicle_getter(api, "getLanePosition")
+        self._lane_length = api.lane.getLength
+        self._lane_lengths: dict[str, float] = {}
+        self._vehicle_sight = vehicle_sight
+        self._certainly_seen = self._vehicle_sight.certainly_seen
+        self._certainly_hidden = sight.hidden_distance(fog.minimum_extinction, _BRIGHTEST) + LONGEST_VEHICLE
+        self._ignored_foes = IgnoredFoes(api, session)
+        self._due = DueVehicles(roster, float(api.simulation.getDeltaT()))
+        self._unseen: dict[str, dict[str, float]] = {}
+
+    @property
+    def ignored(self) -> dict[str, frozenset[str]]:
+        """Foes that are not reacted to, by driver."""
+        return {driver: frozenset(foes) for driver, foes in self._unseen.items() if foes}
+
+    def update(self, own_lamps: OwnLamps) -> None:
+        """Tell SUMO's drivers which foes at junctions they do not see.
+
+        Parameters
+        ----------
+        own_lamps : dict
+            Lamps of vehicles whose lamps are not SUMO's.
+        """
+        if self._certainly_seen >= FARTHEST_FOE:
+            return
+        due = self._due.take()
+        if due.gone:
+            self._forget(due.gone)
+            # A vehicle that comes back from a teleport still ignores its foes.
+            for driver in due.new:
+                self._ignored_foes.ignore(driver, ())
+        doubts = {driver: foes for driver in due.vehicles if (foes := self._foes_in_doubt(driver))}
+        if doubts:
+            self._decide(doubts, own_lamps)
+
+    def _forget(self, vehicles: Iterable[str]) -> None:
+        self._vehicle_sight.forget(vehicles)
+        for vehicle in vehicles:
+            self._unseen.pop(vehicle, None)
+
+    def _foes_in_doubt(self, driver: str) -> dict[str, float]:
+        """Foes that matter to a driver and may be out of sight, and when to look for them again [s].
+
+        Without any, the driver is scheduled.
+        """
+        speed = self._speed(driver)
+        yielding = STANDING_REACH + speed * (self._reaction_time + 2.0 * MAX_PAUSE)
+        unseen = self._unseen.get(driver, ())
+        doubtful: dict[str, float] = {}
+        near = self._foes(driver, yielding + speed * speed / (2.0 * BRAKING))
+        for foe, way, foe_way, _, _, _, _, must_yield, _ in near:
+            is_there = foe_way <= ON_JUNCTION
+            # No straight line is longer than a way between the same places.
+            if (is_there or (must_yield and way <= yielding)) and (
+                foe in unseen or abs(way) + abs(foe_way) > self._certainly_seen
+            ):
+                doubtful[foe] = 0.0 if is_there else PAUSE_IN_DOUBT
+        if not doubtful:
+            if unseen:
+                self._ignore(driver, {})
+            self._due.schedule((driver,), MAX_PAUSE if near else self._pause_along_lane(driver, speed))
+        return doubtful
+
+    def _pause_along_lane(self, driver: str, speed: float) -> float:
+        """How long a driver near no foe need not look for any [s]."""
+        lane = self._lane(driver)
+        length = self._lane_lengths.get(lane)
+        if length is None:
+            length = self._lane_lengths[lane] = float(self._lane_length(lane)) if lane else 0.0
+        fastest = speed + FASTEST_GAIN
+        reach = STANDING_REACH + fastest * (self._reaction_time + 2.0 * MAX_PAUSE + ALONG_A_LANE)
+        is_far = length - self._lane_position(driver) > reach + fastest * fastest / (2.0 * BRAKING)
+        return ALONG_A_LANE if is_far else MAX_PAUSE
+
+    def _decide(self, doubts: Mapping[str, Mapping[str, float]], own_lamps: OwnLamps) -> None:
+        seen = self._seen([(driver, foe) for driver, foes in doubts.items() for foe in foes], own_lamps)
+        now = self._roster.time
+        for driver, foes in doubts.items():
+            before = self._unseen.get(driver, {})
+            unseen: dict[str, float] = {}
+            for foe in foes:
+                if (driver, foe) not in seen:
+                    unseen[foe] = _NOT_SEEN
+                elif foe in before and now - (since := min(before[foe], now)) < self._reaction_time:
+                    # Seen now, but not for long enough to react.
+                    unseen[foe] = since
+            if unseen or before:
+                self._ignore(driver, unseen)
+            is_emerging = any(since <= now for since in unseen.values())
+            self._due.schedule((driver,), 0.0 if is_emerging else min(foes.values()))
+
+    def _seen(self, pairs: Iterable[tuple[str, str]], own_lamps: OwnLamps) -> set[tuple[str, str]]:
+        """Those of some pairs of a driver and a foe in which the driver sees the foe."""
+        seen: set[tuple[str, str]] = set()
+        doubtful: list[tuple[str, str]] = []
+        for pair in pairs:
+            distance = math.dist(self._position(pair[0]), self._position(pair[1]))
+            if distance <= self._certainly_seen:
+                seen.add(pair)
+            elif distance <= self._certainly_hidden or pair[1] in own_lamps:
+                doubtful.append(pair)
+        seen.update(itertools.compress(doubtful, self._vehicle_sight.sees(doubtful, own_lamps)))
+        return seen
+
+    def _ignore(self, driver: str, unseen: dict[str, float]) -> None:
+        """From now on a driver does not react to these foes, and to all others."""
+        if unseen.keys() != self._unseen.get(driver, {}).keys():
+            self._ignored_foes.ignore(driver, unseen.keys())
+        if unseen:
+            self._unseen[driver] = unseen
+        else:
+            self._unseen.pop(driver, None)
+
+    def release(self) -> None:
+        """Let everybody on the road yield to everybody again."""
+        for driver in self._roster.present.intersection(self._unseen):
+            self._ignored_foes.ignore(driver, ())
+        self._unseen.clear()

@@ -1,0 +1,202 @@
+"""Drivers obey traffic lights only once they can see them.
+
+To a driver who does not see the light it is not there: SUMO's speed mode lets the vehicle pass a red or yellow light,
+and only that is set, when sight changes. A light that has come into view is obeyed after the reaction time. Who cannot
+stop any more brakes as hard as the vehicle can, passes the stop line with the speed that is left, and leaves the
+junction; SUMO itself would stop the vehicle at the line in one step.
+
+Vehicles on rails are left alone, for their drivers are signalled in the cab or know the line.
+"""
+
+import math
+
+import numpy as np
+
+from fogsim.traffic.drivers.sight import DriverSight, FogAccess
+from fogsim.traffic.sumo.claims import SPEED_MODE, Claims
+from fogsim.traffic.sumo.link import Api, vehicle_getter
+from fogsim.traffic.sumo.roster import Roster
+from fogsim.traffic.sumo_drivers.due_vehicles import DueVehicles
+from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
+
+SIGNAL_INTENSITY = 200.0
+"""Luminous intensity of a signal head toward the drivers for whom it is meant, by day and by night [cd].
+
+Asked for by day: at least 100, 200 or 400 cd (EN 12368, levels 1 to 3), 240 cd (Japan), in red 165 cd for 200 mm and
+365 cd for 300 mm (ITE VTCSH-LED 2005), 200 cd (CIE 1980); gathered by the Lighting Research Center, Rensselaer.
+"""
+
+SIGNAL_HEIGHT = 2.0
+"""Height above the road of the line of sight: between eyes and signal heads [m]."""
+
+REACH = 250.0
+"""Nobody brakes for a light farther ahead than this [m]."""
+
+MAX_PAUSE = 0.5
+"""A driver within reach of a light looks at least this often [s]."""
+
+PAUSE_IN_DOUBT = 0.2
+"""And one to whom uneven fog may show it at any time, at least this often [s]."""
+
+FAR_PAUSE = 2.0
+"""And one who is not, at least this often [s]."""
+
+FASTEST = 70.0
+"""Nobody drives faster than this [m/s]."""
+
+_OBEY_LIGHTS = 16
+_STOPPING = frozenset("ryu")
+_RAILWAYS = frozenset({"tram", "rail_urban", "rail", "rail_electric", "rail_fast", "subway", "cable_car"})
+_NOT_SEEN = math.inf
+
+Light = tuple[str, int, float, str]
+"""Of a light ahead: its id, its index, the way to its stop line [m], and what it shows."""
+
+
+class SignalSight:
+    """Decides which drivers see the light ahead of them.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    fog : FogAccess
+        The fog.
+    sight : DriverSight
+        The drivers' eyes.
+    roster : Roster
+        Who is on the road.
+    session : str
+        Name of the session.
+    """
+
+    def __init__(self, api: Api, fog: FogAccess, sight: DriverSight, roster: Roster, session: str) -> None:
+        self._api = api
+        self._fog = fog
+        self._sight = sight
+        self._roster = roster
+        self._lights = vehicle_getter(api, "getNextTLS")
+        self._speed = vehicle_getter(api, "getSpeed")
+        self._deceleration = vehicle_getter(api, "getEmergencyDecel")
+        self._modes = Claims(api, SPEED_MODE, session)
+        self._step = float(api.simulation.getDeltaT())
+        self._due = DueVehicles(roster, self._step)
+        self._certainly_seen = self._seen_distance(fog.maximum_extinction)
+        self._certainly_hidden = self._seen_distance(fog.minimum_extinction)
+        self._is_idle = self._certainly_seen >= REACH or not api.trafficlight.getIDCount()
+        self._unseen: dict[str, float] = {}
+        self._braking_late: dict[str, str] = {}
+        self._stop_lines: dict[tuple[str, int], tuple[float, float]] = {}
+
+    @property
+    def unseen(self) -> frozenset[str]:
+        """Vehicles whose drivers do not react to the light ahead."""
+        return frozenset(self._unseen)
+
+    def _seen_distance(self, extinction: float) -> float:
+        return self._sight.seen_distance(extinction, 0.0, SIGNAL_INTENSITY, head_lamps=0.0)
+
+    def update(self, own_lamps: OwnLamps) -> None:  # noqa: ARG002 - every part is told the lamps
+        """Tell SUMO's drivers which lights they do not see.
+
+        Parameters
+        ----------
+        own_lamps : dict
+            Lamps of vehicles whose lamps are not SUMO's.
+        """
+        if self._is_idle:
+            return
+        due = self._due.take()
+        for vehicle in due.gone:
+            self._unseen.pop(vehicle, None)
+            self._braking_late.pop(vehicle, None)
+        railways = {v for v in due.new if self._api.vehicle.getVehicleClass(v) in _RAILWAYS}
+        for vehicle in railways.symmetric_difference(due.new):
+            # A vehicle that comes back from a teleport still passes lights.
+            self._modes.withdraw(vehicle)
+        for driver in due.vehicles:
+            if driver not in railways:
+                self._due.schedule((driver,), self._look(driver))
+
+    def _look(self, driver: str) -> float:
+        """Decide for one driver, who need not look again for so long [s]."""
+        light = next(iter(self._lights(driver)), None)
+        if driver in self._braking_late:
+            return self._brake_late(driver, light)
+        if light is None or light[2] > REACH:
+            self._obey(driver)
+            beyond = math.inf if light is None else light[2] - REACH
+            return min(max(beyond / FASTEST, MAX_PAUSE), FAR_PAUSE)
+        return self._notice(driver, light) if self._sees(driver, light) else self._overlook(driver, light[2])
+
+    def _overlook(self, driver: str, way: float) -> float:
+        if self._unseen.get(driver) != _NOT_SEEN:
+            self._unseen[driver] = _NOT_SEEN
+            self._pass_lights(driver)
+        certain = way - self._certainly_hidden
+        return min(certain / FASTEST, MAX_PAUSE) if certain > 0.0 else PAUSE_IN_DOUBT
+
+    def _notice(self, driver: str, light: Light) -> float:
+        if driver not in self._unseen:
+            return MAX_PAUSE
+        now = self._roster.time
+        since = self._unseen[driver] = min(self._unseen[driver], now)
+        if now - since < self._sight.reaction_time:
+            return 0.0
+        self._obey(driver)
+        if light[3].lower() not in _STOPPING or self._can_stop(driver, light[2]):
+            return MAX_PAUSE
+        self._braking_late[driver] = light[0]
+        return self._brake_late(driver, light)
+
+    def _sees(self, driver: str, light: Light) -> bool:
+        way = light[2]
+        if way <= self._certainly_seen:
+            return True
+        if way > self._certainly_hidden:
+            return False
+        x, y, z = self._api.vehicle.getPosition3D(driver)
+        end_x, end_y = self._stop_line(light[0], light[1])
+        straight = max(math.hypot(end_x - x, end_y - y), 0.1)
+        # The light is as far as the way to it is long, as leaders are.
+        along = np.array([end_x - x, end_y - y, 0.0]) * (way / straight)
+        eyes = np.array([x, y, z + SIGNAL_HEIGHT])
+        depth = float(self._fog.optical_depth(eyes, eyes + along))
+        return depth <= self._sight.depth_limit(way, 0.0, SIGNAL_INTENSITY, head_lamps=0.0)
+
+    def _stop_line(self, light: str, index: int) -> tuple[float, float]:
+        known = self._stop_lines.get((light, index))
+        if known is None:
+            lane = self._api.trafficlight.getControlledLinks(light)[index][0][0]
+            known = self._stop_lines[light, index] = tuple(self._api.lane.getShape(lane)[-1][:2])
+        return known
+
+    def _can_stop(self, driver: str, way: float) -> bool:
+        speed, deceleration = float(self._speed(driver)), float(self._deceleration(driver))
+        return speed * (speed / (2.0 * deceleration) - 0.5 * self._step) <= way
+
+    def _brake_late(self, driver: str, light: Light | None) -> float:
+        """Let the vehicle brake for the light that was seen too late, and pass its stop line."""
+        if light is None or light[0] != self._braking_late[driver]:
+            del self._braking_late[driver]
+            self._modes.withdraw(driver)
+        elif (self._speed(driver) - self._deceleration(driver) * self._step) * self._step >= light[2]:
+            self._pass_lights(driver)
+        return 0.0
+
+    def _pass_lights(self, driver: str) -> None:
+        mode = int(self._modes.own_value(driver))
+        if mode & _OBEY_LIGHTS:
+            self._modes.claim(driver, mode - _OBEY_LIGHTS)
+
+    def _obey(self, driver: str) -> None:
+        """From now on a driver obeys lights."""
+        if self._unseen.pop(driver, None) is not None:
+            self._modes.withdraw(driver)
+
+    def release(self) -> None:
+        """Let everybody on the road obey lights again."""
+        for driver in self._roster.present.intersection({*self._unseen, *self._braking_late}):
+            self._modes.withdraw(driver)
+        self._unseen.clear()
+        self._braking_late.clear()

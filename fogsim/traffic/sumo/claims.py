@@ -99,7 +99,6 @@ SPEED_MODE = Attribute(
 """Bits of what a vehicle's speed regards; a claim must clear bits of its own mode, and all claims the same ones."""
 
 
-
 def _lane_change_parameter(name: str, sign: int = 1) -> Attribute:
     """Parameter of lane-change models that have it; with sign -1 its highest claim holds, as claims hold -x of it."""
     key = f"laneChangeModel.{name}"

@@ -10,6 +10,8 @@ _VARIABLES = {
     "getPosition3D": 0x39,
     "getAngle": 0x43,
     "getSignals": 0x5B,
+    "getLaneID": 0x51,
+    "getLanePosition": 0x56,
     "getLeader": 0x68,
     "getNeighbors": 0xBF,
 }

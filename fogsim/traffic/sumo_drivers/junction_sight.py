@@ -16,7 +16,7 @@ from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
-from fogsim.traffic.sumo_drivers.due_vehicles import DueVehicles
+from fogsim.traffic.sumo_drivers.due_vehicles import Due, DueVehicles
 from fogsim.traffic.sumo_drivers.ignored_foes import IgnoredFoes
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
 from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
@@ -47,6 +47,9 @@ LONGEST_VEHICLE = 25.0
 
 ALONG_A_LANE = 2.0
 """A driver for whom no junction can come near looks at least this often [s]."""
+
+LONG_LANE = 150.0
+"""On shorter lanes a junction is always near [m]."""
 
 FASTEST_GAIN = 10.0
 """Nobody is faster by more than this after `ALONG_A_LANE` [m/s]."""
@@ -90,9 +93,9 @@ class JunctionSight:
         self._roster = roster
         self._reaction_time = sight.reaction_time
         self._foes = vehicle_getter(api, "getJunctionFoes")
-        self._speed, self._position = vehicle_getters(api, remote, ("getSpeed", "getPosition3D"))
-        self._lane = vehicle_getter(api, "getLaneID")
-        self._lane_position = vehicle_getter(api, "getLanePosition")
+        self._speed, self._position, self._lane, self._lane_position = vehicle_getters(
+            api, remote, ("getSpeed", "getPosition3D", "getLaneID", "getLanePosition")
+        )
         self._lane_length = api.lane.getLength
         self._lane_lengths: dict[str, float] = {}
         self._vehicle_sight = vehicle_sight
@@ -101,6 +104,7 @@ class JunctionSight:
         self._ignored_foes = IgnoredFoes(api, session)
         self._due = DueVehicles(roster, float(api.simulation.getDeltaT()))
         self._unseen: dict[str, dict[str, float]] = {}
+        self._left_ignoring: set[str] = set()
 
     @property
     def ignored(self) -> dict[str, frozenset[str]]:
@@ -119,18 +123,18 @@ class JunctionSight:
             return
         due = self._due.take()
         if due.gone:
-            self._forget(due.gone)
-            # A vehicle that comes back from a teleport still ignores its foes.
-            for driver in due.new:
-                self._ignored_foes.ignore(driver, ())
+            self._forget(due)
         doubts = {driver: foes for driver in due.vehicles if (foes := self._foes_in_doubt(driver))}
         if doubts:
             self._decide(doubts, own_lamps)
 
-    def _forget(self, vehicles: Iterable[str]) -> None:
-        self._vehicle_sight.forget(vehicles)
-        for vehicle in vehicles:
-            self._unseen.pop(vehicle, None)
+    def _forget(self, due: Due) -> None:
+        self._vehicle_sight.forget(due.gone)
+        self._left_ignoring.update(v for v in due.gone if self._unseen.pop(v, None))
+        # A vehicle that comes back from a teleport still ignores its foes.
+        for driver in self._left_ignoring.intersection(due.new) if self._left_ignoring else ():
+            self._left_ignoring.discard(driver)
+            self._ignored_foes.ignore(driver, ())
 
     def _foes_in_doubt(self, driver: str) -> dict[str, float]:
         """Foes that matter to a driver and may be out of sight, and when to look for them again [s].
@@ -140,6 +144,9 @@ class JunctionSight:
         speed = self._speed(driver)
         yielding = STANDING_REACH + speed * (self._reaction_time + 2.0 * MAX_PAUSE)
         unseen = self._unseen.get(driver, ())
+        if not unseen and self._is_far(driver, speed):
+            self._due.schedule((driver,), ALONG_A_LANE)
+            return {}
         doubtful: dict[str, float] = {}
         near = self._foes(driver, yielding + speed * speed / (2.0 * BRAKING))
         for foe, way, foe_way, _, _, _, _, must_yield, _ in near:
@@ -152,19 +159,20 @@ class JunctionSight:
         if not doubtful:
             if unseen:
                 self._ignore(driver, {})
-            self._due.schedule((driver,), MAX_PAUSE if near else self._pause_along_lane(driver, speed))
+            self._due.schedule((driver,), MAX_PAUSE)
         return doubtful
 
-    def _pause_along_lane(self, driver: str, speed: float) -> float:
-        """How long a driver near no foe need not look for any [s]."""
+    def _is_far(self, driver: str, speed: float) -> bool:
+        """Whether no junction can come near a driver for `ALONG_A_LANE`."""
         lane = self._lane(driver)
         length = self._lane_lengths.get(lane)
         if length is None:
             length = self._lane_lengths[lane] = float(self._lane_length(lane)) if lane else 0.0
+        if length < LONG_LANE:
+            return False
         fastest = speed + FASTEST_GAIN
         reach = STANDING_REACH + fastest * (self._reaction_time + 2.0 * MAX_PAUSE + ALONG_A_LANE)
-        is_far = length - self._lane_position(driver) > reach + fastest * fastest / (2.0 * BRAKING)
-        return ALONG_A_LANE if is_far else MAX_PAUSE
+        return bool(length - self._lane_position(driver) > reach + fastest * fastest / (2.0 * BRAKING))
 
     def _decide(self, doubts: Mapping[str, Mapping[str, float]], own_lamps: OwnLamps) -> None:
         seen = self._seen([(driver, foe) for driver, foes in doubts.items() for foe in foes], own_lamps)

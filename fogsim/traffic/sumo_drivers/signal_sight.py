@@ -16,7 +16,7 @@ from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo.claims import SPEED_MODE, Claims
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo_drivers.due_vehicles import DueVehicles
+from fogsim.traffic.sumo_drivers.due_vehicles import Due, DueVehicles
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
 
 SIGNAL_INTENSITY = 200.0
@@ -81,11 +81,13 @@ class SignalSight:
         self._modes = Claims(api, SPEED_MODE, session)
         self._step = float(api.simulation.getDeltaT())
         self._due = DueVehicles(roster, self._step)
-        self._certainly_seen = self._seen_distance(fog.maximum_extinction)
-        self._certainly_hidden = self._seen_distance(fog.minimum_extinction)
-        self._is_idle = self._certainly_seen >= REACH or not api.trafficlight.getIDCount()
+        self._certainly_seen = self._certainly_hidden = math.inf
+        if api.trafficlight.getIDCount():
+            self._certainly_seen = self._seen_distance(fog.maximum_extinction)
+            self._certainly_hidden = self._seen_distance(fog.minimum_extinction)
         self._unseen: dict[str, float] = {}
         self._braking_late: dict[str, str] = {}
+        self._left_passing: set[str] = set()
         self._stop_lines: dict[tuple[str, int], tuple[float, float]] = {}
 
     @property
@@ -104,19 +106,24 @@ class SignalSight:
         own_lamps : dict
             Lamps of vehicles whose lamps are not SUMO's.
         """
-        if self._is_idle:
+        if self._certainly_seen >= REACH:
             return
         due = self._due.take()
-        for vehicle in due.gone:
-            self._unseen.pop(vehicle, None)
-            self._braking_late.pop(vehicle, None)
-        railways = {v for v in due.new if self._api.vehicle.getVehicleClass(v) in _RAILWAYS}
-        for vehicle in railways.symmetric_difference(due.new):
-            # A vehicle that comes back from a teleport still passes lights.
-            self._modes.withdraw(vehicle)
+        railways = self._forget(due) if due.gone else ()
         for driver in due.vehicles:
             if driver not in railways:
                 self._due.schedule((driver,), self._look(driver))
+
+    def _forget(self, due: Due) -> set[str]:
+        """Forget who has left; new vehicles on rails, which are not looked at again."""
+        for vehicle in due.gone:
+            if self._unseen.pop(vehicle, None) is not None or self._braking_late.pop(vehicle, None) is not None:
+                self._left_passing.add(vehicle)
+        # A vehicle that comes back from a teleport still passes lights.
+        for vehicle in self._left_passing.intersection(due.new):
+            self._left_passing.discard(vehicle)
+            self._modes.withdraw(vehicle)
+        return {v for v in due.new if self._api.vehicle.getVehicleClass(v) in _RAILWAYS}
 
     def _look(self, driver: str) -> float:
         """Decide for one driver, who need not look again for so long [s]."""

@@ -68,7 +68,7 @@ def patches(ahead: np.ndarray, left: np.ndarray, seed: int) -> np.ndarray:
     total = np.zeros(ahead.shape)
     for size in sizes:
         table = rng.standard_normal((64, 64))
-        total += table[(ahead / size).astype(int) % 64, np.floor(left / size).astype(int) % 64]
+        total += table[(ahead / size).astype(np.int32) & 63, np.floor(left / size).astype(np.int32) & 63]
     return total / np.sqrt(len(sizes))
 
 

@@ -53,13 +53,19 @@ def hash_noise(x, y, seed):
     fx, fy = x - i, y - j
     fx, fy = fx * fx * (3 - 2 * fx), fy * fy * (3 - 2 * fy)
 
-    def at(a, b):
-        mixed = (a.astype(np.int64) * 73856093) ^ (b.astype(np.int64) * 19349663) ^ (seed * 83492791)
-        mixed = (mixed ^ (mixed >> 13)) * 1274126177
-        return ((mixed ^ (mixed >> 16)) & 0xFFFF) / 65535.0 - 0.5
+    left, top = i.astype(np.int64) * 73856093, (j.astype(np.int64) * 19349663) ^ (seed * 83492791)
+    right, bottom = left + 73856093, ((j.astype(np.int64) + 1) * 19349663) ^ (seed * 83492791)
 
-    near = at(i, j) * (1 - fx) + at(i + 1, j) * fx
-    far = at(i, j + 1) * (1 - fx) + at(i + 1, j + 1) * fx
+    def at(a, b):
+        mixed = a ^ b
+        mixed ^= mixed >> 13
+        mixed *= 1274126177
+        mixed ^= mixed >> 16
+        mixed &= 0xFFFF
+        return mixed / 65535.0 - 0.5
+
+    near = at(left, top) * (1 - fx) + at(right, top) * fx
+    far = at(left, bottom) * (1 - fx) + at(right, bottom) * fx
     return (near * (1 - fy) + far * fy) / 0.17
 
 

@@ -4,6 +4,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
+from fogsim.traffic.appearance import OTHERS_LAMPS
 from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST, rear_intensity
 from fogsim.traffic.drivers.sight import BODY_MIDDLE, DriverSight, FogAccess
 from fogsim.traffic.sumo.link import Api, Getter, vehicle_getter
@@ -17,6 +18,9 @@ LEAST_EXTINCTION = 1e-6
 
 FASTEST_DRIFT = 30.0
 """Fog drifts and changes no faster than if a wind of this speed carried it [m/s]."""
+
+STEADY_INTENSITY = rear_intensity(int(OTHERS_LAMPS))
+"""Of the rear lamps that other drivers always light [cd]."""
 
 Pair = tuple[str, str, float]
 """Follower, leader, and SUMO's gap between them [m], which leaves out the follower's minimum gap."""
@@ -89,16 +93,24 @@ class LeaderSight:
         # Plain numbers: mostly there is a pair or two, and making arrays of them would cost more than all the rest.
         follower, leader, _ = pair
         sight, contrast = self._sight, self._vehicles.body(leader).contrast
-        # What lamps show may go dark at once; the body in the light of the sky stays.
-        if depth < sight.depth_limit(distance, contrast, 0.0, 0.0, self._most_glare):
+        # Lamps that are commanded may go dark at once; what the others light stays.
+        steady = 0.0 if leader in own_lamps else STEADY_INTENSITY
+        own = 0.0 if follower in own_lamps else 1.0
+        if depth < sight.depth_limit(distance, contrast, steady, own, self._most_glare):
             closing, deepening = self._rates(follower, leader, horizon)
-            spare = sight.depth_limit(distance + closing * horizon, contrast, 0.0, 0.0, self._most_glare) - depth
+            farthest = distance + closing * horizon
+            spare = sight.depth_limit(farthest, contrast, steady, own, self._most_glare) - depth
             return True, min(max(spare, 0.0) / deepening, horizon)
         lamps = self._vehicles.lamps(leader, own_lamps)
-        head_lamps = 1.0 if self._vehicles.has_head_lamps(follower, own_lamps) else 0.0
-        glare = self._glare.veil(follower, leader, own_lamps) if self._most_glare else 0.0
-        if depth <= sight.depth_limit(distance, contrast, rear_intensity(lamps), head_lamps, glare):
-            return True, 0.0
+        own = 1.0 if self._vehicles.has_head_lamps(follower, own_lamps) else 0.0
+        intensity = rear_intensity(lamps)
+        if depth <= sight.depth_limit(distance, contrast, intensity, own):
+            # Glare costs more than all the rest, and seldom decides.
+            glare = self._most_glare
+            if glare and depth > sight.depth_limit(distance, contrast, intensity, own, glare):
+                glare = self._glare.veil(follower, leader, own_lamps)
+            if depth <= sight.depth_limit(distance, contrast, intensity, own, glare):
+                return True, 0.0
         closing, deepening = self._rates(follower, leader, horizon)
         nearest = max(distance - closing * horizon, 0.1)
         # Lamps that are commanded may be commanded otherwise in any step.

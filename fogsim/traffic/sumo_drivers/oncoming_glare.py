@@ -3,6 +3,9 @@
 import math
 from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fogsim.traffic.drivers.lamp_intensity import HEAD_LAMPS, beam_intensity
 from fogsim.traffic.drivers.sight import FogAccess
 from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
@@ -14,6 +17,9 @@ from fogsim.values.eye import veiling_luminance
 FARTHEST_SOURCE = 200.0
 """Lamps farther away than this are left out [m]."""
 
+DEEPEST_SOURCE = 5.0
+"""Lamps behind fog of more than this optical depth are left out [-]: less than 1 % of their light comes through."""
+
 MOST_GLARE = 10.0
 """A veil of glare counts up to this [cd/m²]: the low beams of one car on the next lane
 lay 0.2 … 0.3 cd/m² over the eye, high beams 10 and more."""
@@ -22,6 +28,8 @@ LAMP_HEIGHT = 0.65
 """Of head lamps above the road [m]."""
 
 LAMPS_OF_A_PAIR = 2.0
+
+_Point = tuple[float, float, float]
 
 
 def most_glare(illuminance: float) -> float:
@@ -84,6 +92,7 @@ class OncomingGlare:
     def __init__(self, api: Api, fog: FogAccess, vehicles: SeenVehicles, remote: bool = False) -> None:
         self._fog = fog
         self._vehicles = vehicles
+        self._farthest = min(FARTHEST_SOURCE, DEEPEST_SOURCE / max(fog.minimum_extinction, 1e-6))
         self._opposite = OppositeEdges(api)
         self._road = vehicle_getter(api, "getRoadID")
         self._on_edge = getter(api, "edge", "getLastStepVehicleIDs")
@@ -105,25 +114,31 @@ class OncomingGlare:
 
     def _veil_of(self, observer: str, target: str, oncoming: Sequence[str], own_lamps: OwnLamps) -> float:
         x, y, z = self._position(observer)
-        eyes = (x, y, z + self._vehicles.eye_height(observer))
+        height = self._vehicles.eye_height(observer)
         target_x, target_y, _ = self._position(target)
         looking = math.atan2(target_y - y, target_x - x)
-        ends, light, angles = [], [], []
+        ends: list[_Point] = []
+        light: list[float] = []
+        angles: list[float] = []
         for vehicle in oncoming:
             lamp_x, lamp_y, lamp_z = self._position(vehicle)
-            end = (lamp_x, lamp_y, lamp_z + LAMP_HEIGHT)
-            distance = math.dist(eyes, end)
+            distance = math.dist((x, y, z + height), (lamp_x, lamp_y, lamp_z + LAMP_HEIGHT))
             bearing = math.atan2(lamp_y - y, lamp_x - x)
-            heading = math.radians(90.0 - self._angle(vehicle))
-            aside = abs(math.remainder(bearing + math.pi - heading, math.tau))
             angle = abs(math.remainder(bearing - looking, math.tau))
+            if not 0.0 < distance < self._farthest or angle > 0.5 * math.pi:
+                continue
+            off_axis = abs(math.remainder(bearing + math.pi - math.radians(90.0 - self._angle(vehicle)), math.tau))
             lit = self._vehicles.lamps(vehicle, own_lamps) & HEAD_LAMPS
-            if lit and 0.0 < distance < FARTHEST_SOURCE and max(aside, angle) < 0.5 * math.pi:
-                ends.append(end)
-                light.append(LAMPS_OF_A_PAIR * beam_intensity(lit, math.degrees(aside)) / distance**2)
+            if lit and off_axis < 0.5 * math.pi:
+                ends.append((lamp_x, lamp_y, lamp_z + LAMP_HEIGHT))
+                light.append(LAMPS_OF_A_PAIR * beam_intensity(lit, math.degrees(off_axis)) / distance**2)
                 angles.append(angle)
         if not ends:
             return 0.0
-        depths = self._fog.optical_depth([eyes] * len(ends), ends).tolist()
-        dimmed = [e * math.exp(-depth) for e, depth in zip(light, depths, strict=True)]
+        dimmed = light * np.exp(-self._optical_depths((x, y, z + height), ends))
         return float(veiling_luminance(dimmed, angles).sum())
+
+    def _optical_depths(self, eyes: _Point, ends: Sequence[_Point]) -> NDArray[np.float64]:
+        if self._fog.minimum_extinction == self._fog.maximum_extinction:
+            return self._fog.maximum_extinction * np.array([math.dist(eyes, end) for end in ends])
+        return self._fog.optical_depth([eyes] * len(ends), ends)

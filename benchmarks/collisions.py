@@ -1,15 +1,19 @@
 """What fog and advice do to safety: collisions of the motorway's traffic around its standing lead vehicle.
 
-Traffic alone, without a camera: for each visibility, policy and seed, the motorway in homogeneous fog. The ego and the
-lead ahead of it are its first vehicles; the road fills behind them and the other way for 120 s, then the lead stops in
-the middle lane for 90 s, and 30 s later the run ends. Collisions of the whole 240 s count. Policies: ``none`` (drivers
-are left alone, with the speed choice given), ``oracle`` (every driver is advised the speed from which one can stop
-within the true visibility, from the beginning and as they enter, and complies without delay).
+Traffic alone, without a camera: for each visibility, protocol, policy and seed, the motorway in homogeneous fog, where
+the lead stands in the middle lane for 90 s. Policies: ``none`` (drivers are left alone, with the speed choice given),
+``oracle`` (every driver is advised the speed from which one can stop within the true visibility, hears it in the car or
+as they enter, and complies without delay). Protocols:
+
+- ``from_the_beginning``: the ego and the lead ahead of it are the first vehicles, so that advice is in force while the
+  road fills behind them and the other way; after 120 s the lead stops, after 240 s the run ends.
+- ``full_road``: the scenario's own demand. The road has filled for 180 s when the ego comes and advice begins, for all
+  on it and for all who enter; after 160 s the run ends.
 
     python benchmarks/collisions.py [--json] [--seeds 20] [--visibility 60 --visibility 1000]
-                                    [--speed-choice unaffected]
+                                    [--protocol from_the_beginning --protocol full_road] [--speed-choice unaffected]
 
-Intervals are 95 % bootstrap intervals of the mean over seeds.
+Collisions of the whole run count. Intervals are 95 % bootstrap intervals of the mean over seeds.
 """
 
 import argparse
@@ -24,13 +28,16 @@ import numpy as np
 
 import fogsim
 from fogsim.atmosphere import FieldAccess
-from fogsim.scenario import build
-from fogsim.traffic import BrakeEvent, Traffic, Trigger, libsumo_traffic
+from fogsim.scenario import Scenario, build
+from fogsim.traffic import BrakeEvent, TrafficSetup, Trigger, libsumo_traffic
 from fogsim.traffic.drivers.speed_choice import within_sight
 from fogsim.values import Collision, Command, SpeedAdvice
 
-SECONDS, FILLING, STANDING = 240, 120, 90
-"""Time of a run, time before the lead stops, and time for which it stands [s]."""
+FILLING, STANDING = 120, 90
+"""Time before the lead stops where it comes first, and time for which it stands [s]."""
+
+SECONDS = {"from_the_beginning": 240, "full_road": 160}
+"""Time of a run by protocol [s]."""
 
 DEMAND = Path(__file__).resolve().parents[1] / "scenarios" / "motorway_fog_bank" / "motorway.rou.xml"
 
@@ -46,53 +53,55 @@ def early_ego(folder: Path) -> Path:
     return path
 
 
-def one_run(visibility: float, oracle: bool, speed_choice: str, seed: int) -> list[Collision]:
+def motorway(visibility: float, protocol: str, speed_choice: str, folder: Path) -> tuple[Scenario, TrafficSetup]:
+    """The scenario, and the traffic with the lead's stop."""
+    early = protocol == "from_the_beginning"
+    settings = [
+        f"fog.visibility_m={visibility}",
+        f"drivers.speed_choice={speed_choice}",
+        "drivers.compliance.delay_s=0",
+        f"traffic.events.0.hold_s={STANDING}",
+        *([f"traffic.routes=[{early_ego(folder)}]"] if early else []),
+    ]
+    scenario = fogsim.load_scenario("motorway_fog_bank", settings)
+    setup = build.traffic_setup(scenario)
+    stop = BrakeEvent("lead", Trigger(at_time=FILLING), deceleration=6.0, hold=STANDING)
+    return scenario, replace(setup, events=(stop,)) if early else setup
+
+
+def one_run(visibility: float, protocol: str, oracle: bool, speed_choice: str, seed: int) -> list[Collision]:
     """Collisions of one run."""
     with tempfile.TemporaryDirectory() as folder:
-        scenario = fogsim.load_scenario(
-            "motorway_fog_bank",
-            [
-                f"fog.visibility_m={visibility}",
-                f"drivers.speed_choice={speed_choice}",
-                "drivers.compliance.delay_s=0",
-                f"traffic.routes=[{early_ego(Path(folder))}]",
-                "traffic.reading_radius_m=100000",
-            ],
-        )
-        stop = BrakeEvent("lead", Trigger(at_time=FILLING), deceleration=6.0, hold=STANDING)
-        traffic = libsumo_traffic(replace(build.traffic_setup(scenario), events=(stop,)))
+        scenario, setup = motorway(visibility, protocol, speed_choice, Path(folder))
+        traffic = libsumo_traffic(setup)
         # Homogeneous fog lies everywhere: the route that banks are laid along does not matter.
         traffic.enter_fog(FieldAccess(build.fog_field(scenario, np.zeros((2, 3)))))
+        advice = SpeedAdvice(within_sight(visibility))
+        command = Command(advice, advice_reach=math.inf) if oracle else Command()
+        collisions: list[Collision] = []
         try:
             traffic.start(seed)
-            steps = round(SECONDS / scenario.clocks.traffic_step_s)
-            return drive(traffic, steps, within_sight(visibility) if oracle else math.inf)
+            for _ in range(round(SECONDS[protocol] / setup.step_length)):
+                snapshot = traffic.observe()
+                if snapshot is None:
+                    break
+                collisions += snapshot.collisions
+                traffic.advance(command)
         finally:
             traffic.close()
+        return collisions
 
 
-def drive(traffic: Traffic, steps: int, advised: float) -> list[Collision]:
-    """Collisions of so many steps; everybody on the road, who has just come included, is advised a speed [m/s]."""
-    collisions: list[Collision] = []
-    for _ in range(steps):
-        snapshot = traffic.observe()
-        if snapshot is None:
-            break
-        collisions += snapshot.collisions
-        everybody = snapshot.state.ids if math.isfinite(advised) else ()
-        traffic.advance(Command(SpeedAdvice(advised), advised_speeds=dict.fromkeys(everybody, advised)))
-    return collisions
-
-
-def measure(visibility: float, oracle: bool, speed_choice: str, seeds: int) -> dict[str, Any]:
+def measure(visibility: float, protocol: str, oracle: bool, speed_choice: str, seeds: int) -> dict[str, Any]:
     """One record over all seeds."""
-    runs = [one_run(visibility, oracle, speed_choice, seed) for seed in range(seeds)]
+    runs = [one_run(visibility, protocol, oracle, speed_choice, seed) for seed in range(seeds)]
     counts = np.array([len(run) for run in runs])
     rng = np.random.default_rng(0)
     means = rng.choice(counts, (10_000, seeds)).mean(axis=1)
     impacts = [c.impact_speed for run in runs for c in run]
     return {
         "visibility": visibility,
+        "protocol": protocol,
         "policy": "oracle" if oracle else "none",
         "speed_choice": speed_choice,
         "seeds": seeds,
@@ -110,11 +119,13 @@ def main() -> None:
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
     parser.add_argument("--seeds", type=int, default=20, help="seeds for each visibility and policy")
     parser.add_argument("--visibility", type=float, action="append", help="visibility [m] (default 60 and 1000)")
+    parser.add_argument("--protocol", choices=SECONDS, action="append", help="when advice begins (default both)")
     parser.add_argument("--speed-choice", default="unaffected", help="how fast drivers drive in fog by themselves")
     arguments = parser.parse_args()
     records = [
-        measure(visibility, oracle, arguments.speed_choice, arguments.seeds)
+        measure(visibility, protocol, oracle, arguments.speed_choice, arguments.seeds)
         for visibility in arguments.visibility or [60.0, 1000.0]
+        for protocol in arguments.protocol or SECONDS
         for oracle in (False, True)
     ]
     if arguments.json:

@@ -10,7 +10,7 @@ import traci
 import fogsim
 from fogsim.plugin import AttachedSession
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
-from fogsim.values import Command
+from fogsim.values import Command, Stretch, StretchAdvice
 
 GRID = Path(__file__).resolve().parent / "data" / "grid"
 ARGUMENTS = ["-c", str(GRID / "grid.sumocfg"), "--step-length", "0.5", "--no-step-log", "--seed", "1"]
@@ -77,6 +77,27 @@ def test_the_lower_advice_holds_until_its_session_is_closed(api: Any, first: int
     drive(api, 4, (sessions[1 - first], speeds[1 - first]))
     assert set(top_speeds(api).values()) == {speeds[1 - first]}
     sessions[1 - first].close()
+    assert min(top_speeds(api).values()) > 50.0
+
+
+def test_all_on_a_stretch_are_advised_as_long_as_they_are_there(api: Any) -> None:
+    drive(api, 20)
+    one = session(api, EGO, *ADVISED)
+    here = StretchAdvice(4.0, Stretch(edges=("bottom2C0", "C0C1")))
+    advised, crossed = set(), set()
+    for _ in range(60):
+        api.simulationStep()
+        step = one.observe()
+        if step is not None:
+            one.advise(step, Command(stretches=(here,)))
+            slow = {v for v, speed in top_speeds(api).items() if speed == 4.0}
+            advised |= slow
+            crossed |= {v for v in slow if api.vehicle.getRoadID(v).startswith(":C0")}
+            # Those who have just left it, too.
+            assert len(slow) <= 6
+    assert advised
+    assert crossed
+    one.close()
     assert min(top_speeds(api).values()) > 50.0
 
 

@@ -74,9 +74,9 @@ def test_records(name: str, arguments: tuple[str, ...], keys: set[str], records:
 
 def test_fog_costs_lives_and_an_oracle_saves_some(records: Records) -> None:
     """The scenario that the closing figures come from, with few seeds; the full study is the benchmark itself."""
-    dense = records("collisions.py", "--seeds", "2", "--visibility", "60")
+    dense = records("collisions.py", "--seeds", "1", "--visibility", "40", "--protocol", "from_the_beginning")
     none, oracle = (next(r for r in dense if r["policy"] == p) for p in ("none", "oracle"))
     assert none["collisions_mean"] > 0
     assert oracle["collisions_mean"] < none["collisions_mean"]
-    thin = records("collisions.py", "--seeds", "1", "--visibility", "1000")
+    thin = records("collisions.py", "--seeds", "1", "--visibility", "1000", "--protocol", "full_road")
     assert all(r["collisions_mean"] == 0 for r in thin)

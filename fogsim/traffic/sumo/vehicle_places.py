@@ -44,7 +44,7 @@ class SumoVehiclePlaces:
         self.speed = vehicle_getter(api, "getSpeed")
         self._on_edge = getter(api, "edge", "getLastStepVehicleIDs")
         self._route: tuple[str, tuple[str, ...]] = ("", ())
-        self._pieces: dict[tuple[Stretch, tuple[str, ...]], tuple[_Piece, ...]] = {}
+        self._roads: dict[tuple[str, ...], tuple[_Piece, ...]] = {}
 
     def on_stretch(self, stretch: Stretch, among: Collection[str] | None = None) -> dict[str, float]:
         """Vehicles on a stretch, and how far past its beginning they are [m]; see `VehiclePlaces.on_stretch`.
@@ -61,12 +61,8 @@ class SumoVehiclePlaces:
         InputError
             If the network has no such edge, edges do not follow one another, or the stretch begins behind their end.
         """
-        edges = stretch.edges or self._ego_route()
-        key = (stretch, edges)
-        if key not in self._pieces:
-            self._pieces[key] = tuple(self._find_pieces(stretch, edges)) if edges else ()
         past = {}
-        for vehicle, piece in self._on_pieces(self._pieces[key], among):
+        for vehicle, piece in self._on_pieces(self._find_pieces(stretch), among):
             position = piece.start + float(self._station(vehicle))
             if stretch.start <= position < stretch.end:
                 past[vehicle] = position - stretch.start
@@ -80,19 +76,22 @@ class SumoVehiclePlaces:
         return ((v, piece) for piece in pieces for v, edge in edges if edge == piece.edge)
 
     def _ego_route(self) -> tuple[str, ...]:
-        """Edges of the ego's route; of its last one when it is not on the road."""
-        if self._ego in self._roster.present:
+        """Edges of the ego's route; of its last one when it has left the road."""
+        if self._ego in self._roster.present or not self._route[1]:
             route = self._api.vehicle.getRouteID(self._ego)
             if route != self._route[0]:
                 self._route = (route, tuple(self._api.vehicle.getRoute(self._ego)))
         return self._route[1]
 
-    def _find_pieces(self, stretch: Stretch, edges: Sequence[str]) -> Iterator[_Piece]:
+    def _find_pieces(self, stretch: Stretch) -> list[_Piece]:
         """What of a road lies on a stretch of it."""
-        check_edges(stretch, frozenset(self._api.edge.getIDList()))
-        pieces = list(self._pieces_along(edges, must_follow=bool(stretch.edges)))
-        check_start(stretch, pieces[-1].end)
-        return (piece for piece in pieces if piece.start < stretch.end and piece.end > stretch.start)
+        edges = stretch.edges or self._ego_route()
+        if edges not in self._roads:
+            check_edges(stretch, frozenset(self._api.edge.getIDList()))
+            self._roads[edges] = tuple(self._pieces_along(edges, must_follow=bool(stretch.edges)))
+        road = self._roads[edges]
+        check_start(stretch, road[-1].end)
+        return [piece for piece in road if piece.start < stretch.end and piece.end > stretch.start]
 
     def _pieces_along(self, edges: Sequence[str], must_follow: bool) -> Iterator[_Piece]:
         begin = 0.0

@@ -20,10 +20,7 @@ LUMINANCE_WEIGHTS = (0.2126, 0.7152, 0.0722)
 
 DAY_ILLUMINANCE = 1000.0
 """Horizontal illuminance from which it is day [lx]: UNECE R48 lights the dipped beam by itself below it, the veil of
-own lamps is less than 1 % of the airlight above it, and eyes are adapted to daylight."""
-
-NIGHT_ILLUMINANCE = 1.0
-"""Horizontal illuminance up to which it is night [lx]: eyes are adapted to it; from there to day is twilight."""
+own lamps is less than 1 % of the airlight above it, and eyes are adapted to daylight; below is twilight, then night."""
 
 _CLOCK_DIGITS = 9
 

@@ -23,7 +23,7 @@ HEAD_LAMP_LUMINANCE = 0.28
 
 A road lit by halogen low beams has 0.5, 0.2, 0.05 cd/m² at 10, 20, 40 m (FHWA, Enhanced Night Visibility Series VII,
 appendix I). With it Adrian's φ takes `DAY_EYE_THRESHOLD` to 1.0·10⁻⁵ lx at night, where 10⁻⁶ … 10⁻⁵ lx are known for
-roads at night.
+roads at night. It counts for drivers whose own head lamps are dark, too: eyes take minutes to adapt further.
 """
 
 AIRLIGHT_REFLECTANCE = 0.95

@@ -8,6 +8,7 @@ from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_drivers.junction_sight import JunctionSight
 from fogsim.traffic.sumo_drivers.lane_changing import LaneChanging
+from fogsim.traffic.sumo_drivers.pedestrian_sight import PedestrianSight
 from fogsim.traffic.sumo_drivers.perception import Perception
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
 from fogsim.traffic.sumo_drivers.signal_sight import SignalSight
@@ -93,5 +94,6 @@ def drivers_perception(
             LaneChanging(api, fog, sight, roster, leaders, vehicle_sight, remote, session),
             JunctionSight(api, fog, sight, roster, vehicle_sight, remote, session),
             SignalSight(api, fog, sight, roster, session),
+            PedestrianSight(api, fog, sight, roster, session),
         )
     )

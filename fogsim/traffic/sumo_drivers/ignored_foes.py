@@ -1,10 +1,13 @@
-"""Making drivers ignore vehicles and persons at junctions, by what SUMO offers for it."""
+"""Making drivers ignore vehicles and persons at junctions until they have seen them, by what SUMO offers for it."""
 
-from collections.abc import Collection
+import math
+from collections.abc import Collection, Mapping
 
 from fogsim.traffic.sumo.claims import SessionValues
 from fogsim.traffic.sumo.link import Api
+from fogsim.traffic.sumo_drivers.due_vehicles import Due
 
+_NOT_SEEN = math.inf
 _IGNORED = "junctionModel.ignoreIDs"
 _OWN = "own"
 
@@ -48,3 +51,96 @@ class IgnoredFoes:
         ignored = set().union(*values.values())
         self._vehicles.setParameter(vehicle, _IGNORED, " ".join(sorted(ignored)))
         self._values.write(vehicle, values if len(values) > 1 else {})
+
+
+class UnseenFoes:
+    """Whom drivers do not react to at junctions: who is out of sight, and who has come into view only just now.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    session : str
+        Name of the session, or of a part of it.
+    reaction_time : float
+        Time from the first sight to the first reaction [s].
+    """
+
+    def __init__(self, api: Api, session: str, reaction_time: float) -> None:
+        self._ignored = IgnoredFoes(api, session)
+        self._reaction_time = reaction_time
+        self._since: dict[str, dict[str, float]] = {}
+        self._left: set[str] = set()
+
+    def of(self, driver: str) -> Collection[str]:
+        """Those to whom a driver does not react.
+
+        Parameters
+        ----------
+        driver : str
+            The driver's vehicle.
+        """
+        return self._since.get(driver, ())
+
+    @property
+    def drivers(self) -> Collection[str]:
+        """Drivers who do not react to somebody."""
+        return self._since.keys()
+
+    def decide(self, driver: str, is_seen: Mapping[str, bool], now: float) -> bool:
+        """Decide to whom of those near a driver reacts; to all others he does.
+
+        Parameters
+        ----------
+        driver : str
+            The driver's vehicle.
+        is_seen : mapping from str to bool
+            Those near, and whether he sees them.
+        now : float
+            Simulated time [s].
+
+        Returns
+        -------
+        bool
+            Whether one of them has come into view and is soon reacted to.
+        """
+        before = self._since.get(driver, {})
+        unseen: dict[str, float] = {}
+        for foe, seen in is_seen.items():
+            if not seen:
+                unseen[foe] = _NOT_SEEN
+            elif foe in before and now - (since := min(before[foe], now)) < self._reaction_time:
+                unseen[foe] = since
+        if unseen.keys() != before.keys():
+            self._ignored.ignore(driver, unseen.keys())
+        if unseen:
+            self._since[driver] = unseen
+        elif before:
+            del self._since[driver]
+        return any(since <= now for since in unseen.values())
+
+    def forget(self, due: Due) -> None:
+        """Forget vehicles that have left the road.
+
+        Parameters
+        ----------
+        due : Due
+            Vehicles of this step.
+        """
+        self._left.update(v for v in due.gone if self._since.pop(v, None))
+        # One that comes back from a teleport still ignores whom it ignored.
+        for driver in self._left.intersection(due.new) if self._left else ():
+            self._left.discard(driver)
+            self._ignored.ignore(driver, ())
+
+    def release(self, present: Collection[str]) -> None:
+        """Let everybody react to everybody again.
+
+        Parameters
+        ----------
+        present : collection of str
+            Vehicles on the road.
+        """
+        for driver in self._since.keys() & set(present):
+            self._ignored.ignore(driver, ())
+        self._since.clear()

@@ -16,8 +16,8 @@ from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
-from fogsim.traffic.sumo_drivers.due_vehicles import Due, DueVehicles
-from fogsim.traffic.sumo_drivers.ignored_foes import IgnoredFoes
+from fogsim.traffic.sumo_drivers.due_vehicles import DueVehicles
+from fogsim.traffic.sumo_drivers.ignored_foes import UnseenFoes
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
 from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
 
@@ -56,7 +56,6 @@ FASTEST_GAIN = 10.0
 
 # Of the lamps that others light, on any side of a vehicle.
 _BRIGHTEST = max(BRIGHTEST, intensity_toward(int(OTHERS_LAMPS), 0.0, 1.0, 0.0))
-_NOT_SEEN = math.inf
 
 
 class JunctionSight:
@@ -101,15 +100,13 @@ class JunctionSight:
         self._vehicle_sight = vehicle_sight
         self._certainly_seen = self._vehicle_sight.certainly_seen
         self._certainly_hidden = sight.hidden_distance(fog.minimum_extinction, _BRIGHTEST) + LONGEST_VEHICLE
-        self._ignored_foes = IgnoredFoes(api, session)
+        self._unseen = UnseenFoes(api, session, sight.reaction_time)
         self._due = DueVehicles(roster, float(api.simulation.getDeltaT()))
-        self._unseen: dict[str, dict[str, float]] = {}
-        self._left_ignoring: set[str] = set()
 
     @property
     def ignored(self) -> dict[str, frozenset[str]]:
         """Foes that are not reacted to, by driver."""
-        return {driver: frozenset(foes) for driver, foes in self._unseen.items() if foes}
+        return {driver: frozenset(self._unseen.of(driver)) for driver in self._unseen.drivers}
 
     def update(self, own_lamps: OwnLamps) -> None:
         """Tell SUMO's drivers which foes at junctions they do not see.
@@ -123,18 +120,11 @@ class JunctionSight:
             return
         due = self._due.take()
         if due.gone:
-            self._forget(due)
+            self._vehicle_sight.forget(due.gone)
+            self._unseen.forget(due)
         doubts = {driver: foes for driver in due.vehicles if (foes := self._foes_in_doubt(driver))}
         if doubts:
             self._decide(doubts, own_lamps)
-
-    def _forget(self, due: Due) -> None:
-        self._vehicle_sight.forget(due.gone)
-        self._left_ignoring.update(v for v in due.gone if self._unseen.pop(v, None))
-        # A vehicle that comes back from a teleport still ignores its foes.
-        for driver in self._left_ignoring.intersection(due.new) if self._left_ignoring else ():
-            self._left_ignoring.discard(driver)
-            self._ignored_foes.ignore(driver, ())
 
     def _foes_in_doubt(self, driver: str) -> dict[str, float]:
         """Foes that matter to a driver and may be out of sight, and when to look for them again [s].
@@ -143,7 +133,7 @@ class JunctionSight:
         """
         speed = self._speed(driver)
         yielding = STANDING_REACH + speed * (self._reaction_time + 2.0 * MAX_PAUSE)
-        unseen = self._unseen.get(driver, ())
+        unseen = self._unseen.of(driver)
         if not unseen and self._is_far(driver, speed):
             self._due.schedule((driver,), ALONG_A_LANE)
             return {}
@@ -158,7 +148,7 @@ class JunctionSight:
                 doubtful[foe] = 0.0 if is_there else PAUSE_IN_DOUBT
         if not doubtful:
             if unseen:
-                self._ignore(driver, {})
+                self._unseen.decide(driver, {}, self._roster.time)
             self._due.schedule((driver,), MAX_PAUSE)
         return doubtful
 
@@ -176,19 +166,9 @@ class JunctionSight:
 
     def _decide(self, doubts: Mapping[str, Mapping[str, float]], own_lamps: OwnLamps) -> None:
         seen = self._seen([(driver, foe) for driver, foes in doubts.items() for foe in foes], own_lamps)
-        now = self._roster.time
         for driver, foes in doubts.items():
-            before = self._unseen.get(driver, {})
-            unseen: dict[str, float] = {}
-            for foe in foes:
-                if (driver, foe) not in seen:
-                    unseen[foe] = _NOT_SEEN
-                elif foe in before and now - (since := min(before[foe], now)) < self._reaction_time:
-                    # Seen now, but not for long enough to react.
-                    unseen[foe] = since
-            if unseen or before:
-                self._ignore(driver, unseen)
-            is_emerging = any(since <= now for since in unseen.values())
+            is_seen = {foe: (driver, foe) in seen for foe in foes}
+            is_emerging = self._unseen.decide(driver, is_seen, self._roster.time)
             self._due.schedule((driver,), 0.0 if is_emerging else min(foes.values()))
 
     def _seen(self, pairs: Iterable[tuple[str, str]], own_lamps: OwnLamps) -> set[tuple[str, str]]:
@@ -204,17 +184,6 @@ class JunctionSight:
         seen.update(itertools.compress(doubtful, self._vehicle_sight.sees(doubtful, own_lamps)))
         return seen
 
-    def _ignore(self, driver: str, unseen: dict[str, float]) -> None:
-        """From now on a driver does not react to these foes, and to all others."""
-        if unseen.keys() != self._unseen.get(driver, {}).keys():
-            self._ignored_foes.ignore(driver, unseen.keys())
-        if unseen:
-            self._unseen[driver] = unseen
-        else:
-            self._unseen.pop(driver, None)
-
     def release(self) -> None:
         """Let everybody on the road yield to everybody again."""
-        for driver in self._roster.present.intersection(self._unseen):
-            self._ignored_foes.ignore(driver, ())
-        self._unseen.clear()
+        self._unseen.release(self._roster.present)

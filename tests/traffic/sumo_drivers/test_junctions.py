@@ -278,3 +278,27 @@ def test_over_a_connection_drivers_see_what_they_see_in_process(
         link.end()
     assert here.entered
     assert (there.entered, there.hits) == (here.entered, here.hits)
+
+
+def test_a_pedestrian_out_of_sight_is_not_yielded_to(setup_of: Callable[..., TrafficSetup]) -> None:
+    """A car turns right, across the way of somebody who has green, too."""
+    setup = setup_of("lights.net.xml", vehicle("ego", "SC CE", 150.0))
+    routes = setup.routes[0]
+    person = '<person id="p" depart="0" departPos="284"><walk edges="SC CN" arrivalPos="10"/></person>'
+    routes.write_text(routes.read_text().replace("</routes>", person + "</routes>"), encoding="utf-8")
+    speeds: list[float] = []
+
+    def watch(_: int) -> None:
+        api = load_libsumo()
+        api.trafficlight.setRedYellowGreenState("C", "gGgrrrgGgrrrrGrG")
+        speeds.append(api.vehicle.getSpeed("ego"))
+
+    (hit,) = drive(setup, 4.0, each=watch).hits
+    assert {hit.collider, hit.victim} == {"ego", "p"}
+    assert hit.impact_speed > 5.0
+    assert min(speeds) > 5.0
+    speeds.clear()
+    assert drive(setup, CLEAR, each=watch).hits == []
+    assert min(speeds) == pytest.approx(0.0, abs=0.1)
+    speeds.clear()
+    assert drive(setup, 60.0, each=watch).hits == []

@@ -1,0 +1,141 @@
+"""Drivers yield only to those pedestrians on crossings whom they can see.
+
+SUMO lets drivers ignore persons in the same way as vehicles (``junctionModel.ignoreIDs``). Looked at are the persons on
+the crossings and walking areas of a junction, or about to step on one, and the drivers on the junction or on the roads
+that lead to it. Pedestrians themselves look, or listen, through any fog.
+"""
+
+import math
+from collections.abc import Iterable, Iterator
+
+from fogsim.traffic.appearance import OTHERS_LAMPS
+from fogsim.traffic.drivers.lamp_intensity import HEAD_LAMPS, head_lamp_share
+from fogsim.traffic.drivers.sight import DriverSight, FogAccess
+from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
+from fogsim.traffic.sumo.roster import Roster
+from fogsim.traffic.sumo_drivers.due_vehicles import DueVehicles
+from fogsim.traffic.sumo_drivers.ignored_foes import UnseenFoes
+from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
+
+LOOK_PERIOD = 0.2
+"""Time between two looks at pedestrians [s]."""
+
+FARTHEST_PERSON = 100.0
+"""Nobody yields to a pedestrian farther away than this [m]."""
+
+CONTRAST = 0.6
+"""Contrast of a person in everyday clothes to the airlight [-]; FogSim's choice."""
+
+HEAD_LAMP_SHARE = 0.3
+"""Light that clothes send back over that of an unlit vehicle with its reflectors [-]: at night a person is seen at 30 m
+where such a vehicle is at 55 m; FogSim's choice."""
+
+BODY_MIDDLE = 1.0
+"""Height of eyes and persons above the road [m]."""
+
+_OWN_PART = "persons"
+_PLACES_ON_FOOT = ("c", "w")
+
+
+class PedestrianSight:
+    """Decides which pedestrians at junctions are seen.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    fog : FogAccess
+        The fog.
+    sight : DriverSight
+        The drivers' eyes.
+    roster : Roster
+        Who is on the road.
+    session : str
+        Name of the session.
+    """
+
+    def __init__(self, api: Api, fog: FogAccess, sight: DriverSight, roster: Roster, session: str) -> None:
+        self._api = api
+        self._fog = fog
+        self._sight = sight
+        self._roster = roster
+        self._position = vehicle_getter(api, "getPosition3D")
+        self._person_position = getter(api, "person", "getPosition3D")
+        self._person_count = getter(api, "person", "getIDCount")
+        self._unseen = UnseenFoes(api, f"{session} {_OWN_PART}", sight.reaction_time)
+        self._certainly_seen = sight.seen_distance(fog.maximum_extinction, CONTRAST, head_lamps=0.0)
+        self._due = DueVehicles(roster, float(api.simulation.getDeltaT()))
+        self._roads: dict[str, tuple[str, ...]] = {}
+        self._next = 0.0
+
+    def update(self, own_lamps: OwnLamps) -> None:
+        """Tell SUMO's drivers which pedestrians they do not see.
+
+        Parameters
+        ----------
+        own_lamps : dict
+            Lamps of vehicles whose lamps are not SUMO's.
+        """
+        now = self._roster.time
+        if self._certainly_seen >= FARTHEST_PERSON or now < self._next:
+            return
+        self._next = now + LOOK_PERIOD
+        # Nobody is scheduled: this tells who has left and who is new.
+        self._unseen.forget(self._due.take())
+        doubts: dict[str, list[str]] = {driver: [] for driver in self._unseen.drivers}
+        if self._person_count():
+            for driver, person in self._pairs_near():
+                doubts.setdefault(driver, []).append(person)
+        for driver, persons in doubts.items():
+            self._unseen.decide(driver, {p: self._sees(driver, p, own_lamps) for p in persons}, now)
+
+    def _pairs_near(self) -> Iterator[tuple[str, str]]:
+        """Drivers on a junction or the roads to it, and persons on foot there."""
+        persons: dict[str, list[str]] = {}
+        for person in self._api.person.getIDList():
+            junction = self._junction(person)
+            if junction:
+                persons.setdefault(junction, []).append(person)
+        for junction, there in persons.items():
+            for road in self._roads_to(junction):
+                for driver in self._api.edge.getLastStepVehicleIDs(road):
+                    if driver in self._roster.present:
+                        yield from ((driver, person) for person in self._near(driver, there))
+
+    def _junction(self, person: str) -> str:
+        """Where a person crosses, or is about to; empty if nowhere."""
+        place = self._api.person.getRoadID(person)
+        if not place.startswith(":"):
+            place = self._api.person.getNextEdge(person)
+        junction, _, part = place.rpartition("_")
+        return junction[1:] if junction.startswith(":") and part.startswith(_PLACES_ON_FOOT) else ""
+
+    def _roads_to(self, junction: str) -> tuple[str, ...]:
+        known = self._roads.get(junction)
+        if known is None:
+            roads: Iterable[str] = self._api.junction.getIncomingEdges(junction)
+            on_foot = tuple(f":{junction}_{part}" for part in _PLACES_ON_FOOT)
+            known = self._roads[junction] = tuple(road for road in roads if not road.startswith(on_foot))
+        return known
+
+    def _near(self, driver: str, persons: Iterable[str]) -> list[str]:
+        """Those who are near enough to be yielded to, and far enough to be out of sight, or have been."""
+        here, unseen = self._position(driver), self._unseen.of(driver)
+        distances = {person: math.dist(here, self._person_position(person)) for person in persons}
+        return [p for p, d in distances.items() if p in unseen or self._certainly_seen < d <= FARTHEST_PERSON]
+
+    def _sees(self, driver: str, person: str, own_lamps: OwnLamps) -> bool:
+        (x, y, z), (end_x, end_y, end_z) = self._position(driver), self._person_position(person)
+        eyes, end = (x, y, z + BODY_MIDDLE), (end_x, end_y, end_z + BODY_MIDDLE)
+        distance = math.dist(eyes, end)
+        if distance <= self._certainly_seen:
+            return True
+        lamps = own_lamps.get(driver, int(OTHERS_LAMPS)) or 0
+        bearing = math.atan2(end_y - y, end_x - x) - math.radians(90.0 - self._api.vehicle.getAngle(driver))
+        share = HEAD_LAMP_SHARE * head_lamp_share(math.remainder(bearing, math.tau)) if lamps & HEAD_LAMPS else 0.0
+        limit = self._sight.depth_limit(distance, CONTRAST, 0.0, share)
+        return float(self._fog.optical_depth(eyes, end)) <= limit
+
+    def release(self) -> None:
+        """Let everybody yield to every pedestrian again."""
+        self._unseen.release(self._roster.present)

@@ -6,12 +6,12 @@ from typing import Protocol
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo_drivers.junction_sight import JunctionSight
+from fogsim.traffic.sumo_drivers.junctions.junction_sight import JunctionSight
+from fogsim.traffic.sumo_drivers.junctions.pedestrian_sight import PedestrianSight
+from fogsim.traffic.sumo_drivers.junctions.signal_sight import SignalSight
 from fogsim.traffic.sumo_drivers.lane_changing import LaneChanging
-from fogsim.traffic.sumo_drivers.pedestrian_sight import PedestrianSight
 from fogsim.traffic.sumo_drivers.perception import Perception
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
-from fogsim.traffic.sumo_drivers.signal_sight import SignalSight
 from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
 from fogsim.values import Lamp
 

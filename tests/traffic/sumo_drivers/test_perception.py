@@ -82,6 +82,9 @@ class SeesFrom:
     def hidden_distance(self, *_: float) -> float:
         return self.distance + 10.0
 
+    def seen_distance(self, *_: float, **__: float) -> float:
+        return self.distance
+
     def depth_limit(self, distance: float, *_: float) -> float:
         return math.inf if distance <= self.distance else -math.inf
 

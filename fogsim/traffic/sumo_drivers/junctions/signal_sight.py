@@ -14,9 +14,9 @@ import numpy as np
 
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo.claims import SPEED_MODE, Claims
+from fogsim.traffic.sumo.due_vehicles import Due, DueVehicles
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo_drivers.due_vehicles import Due, DueVehicles
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
 
 SIGNAL_INTENSITY = 200.0

@@ -13,11 +13,11 @@ from collections.abc import Iterable, Mapping
 from fogsim.traffic.appearance import OTHERS_LAMPS
 from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST, intensity_toward
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
+from fogsim.traffic.sumo.due_vehicles import DueVehicles
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
-from fogsim.traffic.sumo_drivers.due_vehicles import DueVehicles
-from fogsim.traffic.sumo_drivers.ignored_foes import UnseenFoes
+from fogsim.traffic.sumo_drivers.junctions.unseen_foes import UnseenFoes
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
 from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
 

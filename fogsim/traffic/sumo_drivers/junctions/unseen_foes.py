@@ -4,8 +4,8 @@ import math
 from collections.abc import Collection, Mapping
 
 from fogsim.traffic.sumo.claims import SessionValues
+from fogsim.traffic.sumo.due_vehicles import Due
 from fogsim.traffic.sumo.link import Api
-from fogsim.traffic.sumo_drivers.due_vehicles import Due
 
 _NOT_SEEN = math.inf
 _IGNORED = "junctionModel.ignoreIDs"

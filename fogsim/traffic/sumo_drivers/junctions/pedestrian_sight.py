@@ -11,10 +11,10 @@ from collections.abc import Iterable, Iterator
 from fogsim.traffic.appearance import OTHERS_LAMPS
 from fogsim.traffic.drivers.lamp_intensity import HEAD_LAMPS, head_lamp_share
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
+from fogsim.traffic.sumo.due_vehicles import DueVehicles
 from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo_drivers.due_vehicles import DueVehicles
-from fogsim.traffic.sumo_drivers.ignored_foes import UnseenFoes
+from fogsim.traffic.sumo_drivers.junctions.unseen_foes import UnseenFoes
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
 
 LOOK_PERIOD = 0.2

@@ -164,7 +164,7 @@ class SumoTraffic:
                 perception=None
                 if setup.sight is None
                 else drivers_perception(api, fog, setup.sight, roster, self._link.remote, session),
-                drivers=SumoDesiredSpeeds(api, setup, fog, self._seed, roster, session),
+                drivers=SumoDesiredSpeeds(api, setup, fog, self._seed, roster, session, self._link.remote),
             )
 
     @_translates_errors

@@ -19,6 +19,7 @@ from fogsim.traffic.sumo.vehicle_places import SumoVehiclePlaces
 from fogsim.traffic.sumo_drivers.driver_table import Column, DriverTable
 from fogsim.traffic.sumo_drivers.fog_choices import FogChoices
 from fogsim.traffic.sumo_drivers.headways import HeadwayControl
+from fogsim.traffic.sumo_drivers.keeping_up import KeepingUp
 from fogsim.traffic.sumo_drivers.speed_shares import SpeedShareControl
 from fogsim.traffic.sumo_drivers.top_speeds import TopSpeedControl
 from fogsim.values import Command
@@ -94,9 +95,20 @@ class SumoDesiredSpeeds:
         Which vehicles are on the road.
     session : str
         Name of the session.
+    remote : bool
+        True where every call is a message to another process.
     """
 
-    def __init__(self, api: Api, setup: TrafficSetup, fog: FogAccess, seed: int, roster: Roster, session: str) -> None:
+    def __init__(
+        self,
+        api: Api,
+        setup: TrafficSetup,
+        fog: FogAccess,
+        seed: int,
+        roster: Roster,
+        session: str,
+        remote: bool = False,
+    ) -> None:
         self._api = api
         self._position = vehicle_getter(api, "getPosition3D")
         self._departure = vehicle_getter(api, "getDeparture")
@@ -108,6 +120,7 @@ class SumoDesiredSpeeds:
         self._roster = roster
         table = self._table = DriverTable(api, setup.drivers, seed, session)
         self._choices = FogChoices(table, setup.drivers, setup.sight)
+        self._keeping_up = KeepingUp(api, table, setup.sight, remote)
         self._headways = HeadwayControl(api, table, setup.drivers.misjudgement, setup.sight)
         self._top_speeds = TopSpeedControl(api, table, table.top_speeds, setup.advice_deceleration, roster.time)
         self._shares = SpeedShareControl(api, table, setup.advice_deceleration, roster.time)
@@ -134,13 +147,14 @@ class SumoDesiredSpeeds:
             elapsed, self._chosen = time - self._chosen, time
             self._next = time + CHOICE_PERIOD
             advised = self._hearing.listen(command, elapsed)
-            # In even fog and without advice, choices stay as they are.
+            # In even fog and without advice, choices stay as they are, but for those who go by their leader.
             settled = self._extinction is not None and not advised and not self._advised_since
             self._advised_since = {v: self._advised_since.get(v, time) for v in advised}
             others = [v for v in present if v != self._ego]
-            if not settled:
-                self._update_choices(others, advised)
-            self._headways.update(others, self._table.rows(others))
+            rows = self._table.rows(others)
+            choosing = [others[i] for i in self._keeping_up.keepers(rows).tolist()] if settled else others
+            self._update_choices(choosing, advised)
+            self._headways.update(others, rows)
         self._top_speeds.update(time, present)
         self._shares.update(time, present)
 
@@ -153,8 +167,8 @@ class SumoDesiredSpeeds:
         if entering:
             advised = self._hearing.enter(command, entering)
             self._advised_since.update(dict.fromkeys(advised, -math.inf))
-            rows, desired = self._desired(entering, advised)
-            self._shares.set_at_entry(entering, rows, self._table.values[rows, Column.SHARE])
+            rows, desired, shares = self._desired(entering, advised)
+            self._shares.set_at_entry(entering, rows, shares)
             self._top_speeds.set_at_entry(entering, rows, desired)
         if len(entering) < len(new):
             # They hear other advice than that to them by name when all listen again.
@@ -163,25 +177,31 @@ class SumoDesiredSpeeds:
 
     def _update_choices(self, ids: Sequence[str], advised: Mapping[str, float]) -> None:
         if ids:
-            rows, desired = self._desired(ids, advised)
-            self._shares.set_desired(ids, rows, self._table.values[rows, Column.SHARE])
+            rows, desired, shares = self._desired(ids, advised)
+            self._shares.set_desired(ids, rows, shares)
             self._top_speeds.set_desired(ids, rows, desired)
 
     def _desired(
         self, ids: Sequence[str], advised: Mapping[str, float]
-    ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        """Rows of vehicles and the top speeds that their drivers desire (n,) [m/s]."""
+    ) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.float64]]:
+        """Rows of vehicles, and what their drivers desire: top speeds (n,) [m/s], shares of the speed in clear air."""
         table = self._table
         rows = table.rows(ids)
         self._choices.update(rows, self._extinctions(ids))
         values = table.values[rows]
         desired = np.minimum(values[:, Column.FACTOR] * values[:, Column.CHOICE], values[:, Column.LIMIT])
-        desired = np.minimum(desired, values[:, Column.TOP_SPEED])
+        desired, shares = np.minimum(desired, values[:, Column.TOP_SPEED]), values[:, Column.SHARE]
+        keepers = self._keeping_up.keepers(rows)
+        if len(keepers):
+            kept = self._keeping_up.kept_speeds([ids[i] for i in keepers], rows[keepers])
+            in_clear_air = [self._allowed(ids[i]) for i in keepers] / values[keepers, Column.SHARE_SET]
+            desired[keepers] = np.maximum(desired[keepers], np.minimum(kept, values[keepers, Column.TOP_SPEED]))
+            shares[keepers] = np.maximum(shares[keepers], np.minimum(kept / in_clear_air, 1.0))
         if advised:
             for i in np.flatnonzero(values[:, Column.FOLLOWS]).tolist():
                 if ids[i] in advised:
                     desired[i] = self._advised(ids[i], float(desired[i]), advised[ids[i]])
-        return rows, desired
+        return rows, desired, shares
 
     def _extinctions(self, ids: Sequence[str]) -> NDArray[np.float64]:
         """Extinction coefficients where vehicles are (n,) [1/m]."""

@@ -1,0 +1,72 @@
+"""Drivers who keep up with the leader whom they see, though by themselves they would drive slower in fog."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.traffic.drivers.leader_reach import leader_reach
+from fogsim.traffic.drivers.sight import DriverSight
+from fogsim.traffic.drivers.speed_choice import UNAFFECTED_ABOVE
+from fogsim.traffic.sumo.link import Api
+from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
+from fogsim.traffic.sumo_drivers.driver_table import Column, DriverTable
+from fogsim.traffic.sumo_drivers.perception import REACH
+from fogsim.units import visibility_from_extinction
+
+CATCHING_UP = 1.0
+"""They drive so much faster than the leader if they must, so as to stay near [m/s]."""
+
+
+class KeepingUp:
+    """Tells how fast leaders are who are kept up with.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    table : DriverTable
+        The drivers.
+    sight : DriverSight or None
+        Their eyes; None if they see through the fog.
+    remote : bool
+        True where every call is a message to another process: leaders and speeds are subscribed to.
+    """
+
+    def __init__(self, api: Api, table: DriverTable, sight: DriverSight | None, remote: bool) -> None:
+        self._leader, self._speed = vehicle_getters(api, remote, ("getLeader", "getSpeed"), {"getLeader": ("d", REACH)})
+        self._table = table
+        self._sight = sight
+        self._keeps_up = np.array([kind.keeps_up for kind in table.kinds])
+
+    def keepers(self, rows: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Which of some drivers keep up with a leader in the fog where they are.
+
+        Parameters
+        ----------
+        rows : (n,) intp
+            Their rows of the table.
+        """
+        if self._sight is None or not self._keeps_up.any():
+            return np.empty(0, dtype=np.intp)
+        values = self._table.values[rows]
+        in_fog = values[:, Column.VISIBILITY] < UNAFFECTED_ABOVE
+        return np.flatnonzero(in_fog & self._keeps_up[values[:, Column.KIND].astype(np.intp)])
+
+    def kept_speeds(self, vehicles: Sequence[str], rows: NDArray[np.intp]) -> NDArray[np.float64]:
+        """Speeds at which drivers keep up with their leaders (n,) [m/s]; 0 where none is seen.
+
+        Parameters
+        ----------
+        vehicles : (n,) sequence of str
+            Vehicles of `keepers`.
+        rows : (n,) intp
+            Their rows of the table.
+        """
+        extinctions = self._table.values[rows, Column.EXTINCTION].tolist()
+        return np.array([self._kept_speed(v, k) for v, k in zip(vehicles, extinctions, strict=True)])
+
+    def _kept_speed(self, vehicle: str, extinction: float) -> float:
+        seen = leader_reach(self._sight, visibility_from_extinction(extinction)).farthest
+        leader, gap = self._leader(vehicle, REACH) or ("", 0.0)
+        return float(self._speed(leader)) + CATCHING_UP if leader and gap <= seen else 0.0

@@ -24,8 +24,8 @@ from fogsim.traffic.sumo.loaded_files import check_step_length, describe_seen, l
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.route_position import GapToEgo, RoutePosition
 from fogsim.traffic.sumo.vehicle_reader import SubscribedReader, VehicleReader
+from fogsim.traffic.sumo_behaviour.speed_control import SpeedControl, SumoDesiredSpeeds
 from fogsim.traffic.sumo_drivers.drivers_perception import DriversPerception, drivers_perception
-from fogsim.traffic.sumo_drivers.speed_control import SpeedControl, SumoDesiredSpeeds
 from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot, TrafficState, Unplayed
 
 _NO_ADVICE = Command()

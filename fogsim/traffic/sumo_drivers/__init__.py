@@ -1,1 +1,1 @@
-"""SUMO's drivers: which leaders they see, and how fast they drive."""
+"""What SUMO's drivers see, and whom they react to."""

@@ -16,12 +16,12 @@ from fogsim.traffic.setup import TrafficSetup
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.vehicle_places import SumoVehiclePlaces
-from fogsim.traffic.sumo_drivers.driver_table import Column, DriverTable
-from fogsim.traffic.sumo_drivers.fog_choices import FogChoices
-from fogsim.traffic.sumo_drivers.headways import HeadwayControl
-from fogsim.traffic.sumo_drivers.keeping_up import KeepingUp
-from fogsim.traffic.sumo_drivers.speed_shares import SpeedShareControl
-from fogsim.traffic.sumo_drivers.top_speeds import TopSpeedControl
+from fogsim.traffic.sumo_behaviour.driver_table import Column, DriverTable
+from fogsim.traffic.sumo_behaviour.fog_choices import FogChoices
+from fogsim.traffic.sumo_behaviour.headways import HeadwayControl
+from fogsim.traffic.sumo_behaviour.keeping_up import KeepingUp
+from fogsim.traffic.sumo_behaviour.speed_shares import SpeedShareControl
+from fogsim.traffic.sumo_behaviour.top_speeds import TopSpeedControl
 from fogsim.values import Command
 
 _SUMO_DRIVES = -1.0

@@ -10,7 +10,7 @@ from fogsim.traffic.drivers.leader_reach import leader_reach
 from fogsim.traffic.drivers.sight import DriverSight
 from fogsim.traffic.drivers.speed_choice import UNAFFECTED_ABOVE
 from fogsim.traffic.sumo.link import Api, vehicle_getter
-from fogsim.traffic.sumo_drivers.driver_table import Column, DriverTable
+from fogsim.traffic.sumo_behaviour.driver_table import Column, DriverTable
 from fogsim.units import visibility_from_extinction
 
 UNNOTICED_RATIO = 0.03

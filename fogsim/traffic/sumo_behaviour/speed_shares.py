@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.traffic.sumo.link import Api, vehicle_getter
-from fogsim.traffic.sumo_drivers.driver_table import Column, DriverTable
-from fogsim.traffic.sumo_drivers.top_speeds import MAX_INTERVAL
+from fogsim.traffic.sumo_behaviour.driver_table import Column, DriverTable
+from fogsim.traffic.sumo_behaviour.top_speeds import MAX_INTERVAL
 
 UNNOTICED_SHARE = 0.01
 """Change of a share [-] that is not noticed; setting it costs calls."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from fogsim.kinematics import decelerated_speed
 from fogsim.traffic.sumo.claims import Claims
 from fogsim.traffic.sumo.link import Api, vehicle_getter
-from fogsim.traffic.sumo_drivers.driver_table import Column, DriverTable
+from fogsim.traffic.sumo_behaviour.driver_table import Column, DriverTable
 
 UNNOTICED_SPEED = 0.3
 """Change of a desired speed [m/s] that is not noticed; setting it costs calls."""

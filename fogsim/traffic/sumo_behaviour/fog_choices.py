@@ -7,7 +7,7 @@ from fogsim.traffic.drivers.following import FollowingModel
 from fogsim.traffic.drivers.leader_reach import drivers_visibility, leader_reach
 from fogsim.traffic.drivers.sight import DriverSight
 from fogsim.traffic.drivers.speed_choice import SPEED_CHOICES, DriverSetup, speed_share, unaffected
-from fogsim.traffic.sumo_drivers.driver_table import Column, DriverTable
+from fogsim.traffic.sumo_behaviour.driver_table import Column, DriverTable
 from fogsim.units import visibility_from_extinction
 
 

@@ -10,7 +10,7 @@ from fogsim.traffic.drivers.sight import DriverSight
 from fogsim.traffic.drivers.speed_choice import UNAFFECTED_ABOVE
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
-from fogsim.traffic.sumo_drivers.driver_table import Column, DriverTable
+from fogsim.traffic.sumo_behaviour.driver_table import Column, DriverTable
 from fogsim.traffic.sumo_drivers.perception import REACH
 from fogsim.units import visibility_from_extinction
 

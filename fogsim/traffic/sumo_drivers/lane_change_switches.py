@@ -1,7 +1,7 @@
 """Parameters of SUMO's lane-change models that are turned to one value for some drivers, and back."""
 
 import contextlib
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 
 from fogsim.traffic.sumo.claims import Attribute, Claims
 from fogsim.traffic.sumo.link import Api
@@ -42,26 +42,48 @@ class LaneChangeSwitch:
         self._refusal = refusal_of(api)
         self._turned: set[str] = set()
 
-    def turn(self, vehicle: str, on: bool) -> None:
-        """Turn it on or off; nothing is asked of SUMO if it is so already.
+    def turn_on(self, vehicle: str) -> None:
+        """Turn it on for a vehicle on the road; nothing is asked of SUMO if it is on already.
 
         Parameters
         ----------
         vehicle : str
-            Id of a vehicle on the road.
-        on : bool
-            Whether the value is to hold.
+            Its id.
         """
-        if on and vehicle not in self._turned:
+        if vehicle not in self._turned:
             self._turned.add(vehicle)
             with contextlib.suppress(self._refusal):
                 self._claims.claim(vehicle, self._value)
-        elif not on and vehicle in self._turned:
+
+    def turn_off(self, vehicle: str) -> None:
+        """Turn it off for a vehicle on the road; nothing is asked of SUMO if it is off already.
+
+        Parameters
+        ----------
+        vehicle : str
+            Its id.
+        """
+        if vehicle in self._turned:
             self._turned.remove(vehicle)
             self._claims.withdraw(vehicle)
 
-    def turn_off(self, vehicles: Iterable[str], present: Collection[str]) -> None:
-        """Turn it off for some vehicles, and forget those that have left.
+    def decide(self, vehicles: Sequence[str], on: Collection[str]) -> None:
+        """Turn it on for some of those for whom it is decided anew, and off for the others.
+
+        Parameters
+        ----------
+        vehicles : sequence of str
+            Ids of vehicles on the road.
+        on : collection of str
+            Those of them for whom the value is to hold.
+        """
+        for vehicle in self._turned.intersection(vehicles).difference(on) if self._turned else ():
+            self.turn_off(vehicle)
+        for vehicle in on:
+            self.turn_on(vehicle)
+
+    def begin_anew(self, vehicles: Iterable[str], present: Collection[str]) -> None:
+        """Turn it off for vehicles that have entered or left.
 
         Parameters
         ----------
@@ -70,9 +92,9 @@ class LaneChangeSwitch:
         present : collection of str
             Vehicles on the road.
         """
-        for vehicle in self._turned.intersection(vehicles):
+        for vehicle in self._turned.intersection(vehicles) if self._turned else ():
             if vehicle in present:
-                self.turn(vehicle, False)
+                self.turn_off(vehicle)
             else:
                 self._turned.remove(vehicle)
 
@@ -84,4 +106,4 @@ class LaneChangeSwitch:
         present : collection of str
             Vehicles on the road.
         """
-        self.turn_off(tuple(self._turned), present)
+        self.begin_anew(tuple(self._turned), present)

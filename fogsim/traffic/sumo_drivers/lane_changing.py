@@ -14,7 +14,7 @@ SUMO's lane-change models look through any fog. Here, for the drivers for whom t
 Drivers look each `LOOK_PERIOD`; who has nobody unseen about is not touched.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo.claims import (
@@ -75,9 +75,8 @@ class StandingLeaders:
         drivers : sequence of str
             Their vehicles.
         """
-        for driver in drivers:
-            hidden = self._leaders.hidden_leader(driver)
-            self._strategic.turn(driver, hidden is not None and self._would_be_left_for(driver, hidden))
+        hidden = self._leaders.hidden
+        self._strategic.decide(drivers, [v for v in drivers if v in hidden and self._would_be_left_for(v, hidden[v])])
 
     def expect_unseen(self, driver: str, leader: str) -> None:
         """Keep a driver in the lane to which he changes until the next look, if he does not see who stands there.
@@ -87,23 +86,26 @@ class StandingLeaders:
         driver, leader : str
             Their vehicles.
         """
-        self._strategic.turn(driver, self._may_soon_stand(leader))
+        if self._may_soon_stand(leader):
+            self._strategic.turn_on(driver)
 
     def _may_soon_stand(self, vehicle: str) -> bool:
         return float(self._leaders.speed(vehicle)) < SOON_STANDING
 
     def _would_be_left_for(self, driver: str, hidden: str) -> bool:
         """Whether a hidden leader stands so near that SUMO's driver would leave a lane that leads on."""
+        if not self._may_soon_stand(hidden):
+            return False
         leader, gap = self._leaders.leader(driver, REACH) or ("", 0.0)
-        if leader != hidden or gap > STANDING_REACH or not self._may_soon_stand(hidden):
+        if leader != hidden or gap > STANDING_REACH:
             return False
         lane = self._vehicles.getLaneID(driver)
         # SUMO tells of each lane of the edge how many lanes away the best one for the route is.
         return any(best[0] == lane and best[3] == 0 for best in self._vehicles.getBestLanes(driver))
 
-    def turn_off(self, drivers: Sequence[str], present: set[str]) -> None:
-        """Give some drivers their own behaviour back; see `LaneChangeSwitch.turn_off`."""
-        self._strategic.turn_off(drivers, present)
+    def begin_anew(self, drivers: Sequence[str], present: set[str]) -> None:
+        """Give some drivers their own behaviour back; see `LaneChangeSwitch.begin_anew`."""
+        self._strategic.begin_anew(drivers, present)
 
     def release(self, present: set[str]) -> None:
         """Give everybody their own behaviour back; see `LaneChangeSwitch.release`."""
@@ -234,27 +236,27 @@ class LaneChanging:
         if due:
             self._standing.update(due)
             free_to_their_eyes = self._free_to_the_left(due, own_lamps)
-            for driver in due:
-                self._overtake_right.turn(driver, driver in free_to_their_eyes)
-            wishes = self._wishes.update(v for v in free_to_their_eyes if self._leaders.hidden_leader(v) is None)
+            self._overtake_right.decide(due, free_to_their_eyes)
+            hidden = self._leaders.hidden
+            wishes = self._wishes.update([v for v in free_to_their_eyes if v not in hidden])
             self._change_lanes(due, wishes, own_lamps)
 
     def _due(self) -> list[str]:
         roster, schedule = self._roster, self._schedule
-        waiting = schedule.pop_due(roster.time)
+        due = schedule.pop_due(roster.time)
         new, self._mark = roster.entered_since(self._mark)
-        self._vehicle_sight.forget(new)
-        self._turn_off([*new, *(v for v in waiting if v not in roster.present)])
-        due = [v for v in dict.fromkeys([*waiting, *schedule.unscheduled(new)]) if v in roster.present]
+        if new or not roster.present.issuperset(due):
+            self._begin_anew([*new, *(v for v in due if v not in roster.present)])
+            due = [v for v in dict.fromkeys([*due, *schedule.unscheduled(new)]) if v in roster.present]
         schedule.add(due, roster.time + LOOK_PERIOD)
         return due
 
-    def _turn_off(self, drivers: Sequence[str]) -> None:
-        """Forget drivers that have left, and begin anew with those who have entered."""
-        if drivers:
-            self._standing.turn_off(drivers, self._roster.present)
-            for switch in (self._overtake_right, *self._unhelpful):
-                switch.turn_off(drivers, self._roster.present)
+    def _begin_anew(self, drivers: Sequence[str]) -> None:
+        """Forget drivers that have left, and whom those who have entered may be taken for."""
+        self._vehicle_sight.forget(drivers)
+        self._standing.begin_anew(drivers, self._roster.present)
+        for switch in (self._overtake_right, *self._unhelpful):
+            switch.begin_anew(drivers, self._roster.present)
 
     def _free_to_the_left(self, drivers: Sequence[str], own_lamps: OwnLamps) -> dict[str, None]:
         """Drivers to whom the lane to the left looks free ahead, though there is somebody."""
@@ -271,32 +273,38 @@ class LaneChanging:
 
     def _change_lanes(self, drivers: Sequence[str], wishes: Iterable[str], own_lamps: OwnLamps) -> None:
         """Let those change lanes who are blocked by nobody whom they perceive, and whom nobody helps whom they see."""
-        for switch in self._unhelpful:
-            switch.turn_off(drivers, self._roster.present)
-        changes = [change for change in self._neighbours.wanted_changes(drivers, wishes) if not change.near]
-        pairs = [pair for change in changes for pair in change.pairs]
+        wanted = self._neighbours.wanted_changes(drivers, wishes)
+        doubtful = [change for change in wanted if not self._is_held_back_for_certain(change)]
+        ahead = [self._neighbours.ahead(change) for change in doubtful]
+        pairs = [pair for change, leader in zip(doubtful, ahead, strict=True) for pair in _sights(change, leader)]
         perceived = self._sight.perceive(pairs, own_lamps, self._roster.time)
-        for change in changes:
-            if not any(perceived[change.driver, other] for other in change.blockers):
-                self._change(change, perceived)
+        unhelpful: set[str] = set()
+        for change, leader in zip(doubtful, ahead, strict=True):
+            if not any(perceived[change.driver, other] for other, _ in change.blockers):
+                self._change(change, leader, perceived)
             elif change.is_urgent:
-                self._deny_help([other for other in change.blockers if not perceived[other, change.driver]])
+                # The route needs it, so SUMO's driver asks others to make room.
+                unhelpful.update(other for other, _ in change.blockers if not perceived[other, change.driver])
+        for switch in self._unhelpful:
+            switch.decide(drivers, unhelpful)
 
-    def _change(self, change: WantedChange, perceived: Mapping[tuple[str, str], bool]) -> None:
+    def _is_held_back_for_certain(self, change: WantedChange) -> bool:
+        """Whether somebody is in the way who is near enough to be seen in any case."""
+        return any(
+            gap < NEAR or (gap <= self._certainly_seen and not self._sight.was_hidden(change.driver, other))
+            for other, gap in change.blockers
+        )
+
+    def _change(self, change: WantedChange, leader: str | None, perceived: Mapping[tuple[str, str], bool]) -> None:
         if not self._requests.ask(change.driver, change.side.offset):
             return
         # SUMO's drivers would see their new leaders until they look again.
-        if change.ahead is not None and not perceived[change.driver, change.ahead]:
-            self._leaders.expect_unseen(change.driver, change.ahead)
-            self._standing.expect_unseen(change.driver, change.ahead)
-        for follower in change.followers:
+        if leader is not None and not perceived[change.driver, leader]:
+            self._leaders.expect_unseen(change.driver, leader)
+            self._standing.expect_unseen(change.driver, leader)
+        for follower, _ in change.followers:
             if not perceived[follower, change.driver]:
                 self._leaders.expect_unseen(follower, change.driver)
-
-    def _deny_help(self, drivers: Sequence[str]) -> None:
-        for switch in self._unhelpful:
-            for driver in drivers:
-                switch.turn(driver, True)
 
     def release(self) -> None:
         """Give everybody on the road their own lane changing back."""
@@ -305,3 +313,10 @@ class LaneChanging:
         self._standing.release(present)
         for switch in (self._overtake_right, *self._unhelpful):
             switch.release(present)
+
+
+def _sights(change: WantedChange, leader: str | None) -> Iterator[tuple[str, str]]:
+    """Who is to be seen by whom before a change: others by the driver, and the driver by them."""
+    for other in (*(name for name, _ in change.blockers), *(() if leader is None else (leader,))):
+        yield change.driver, other
+        yield other, change.driver

@@ -1,6 +1,6 @@
 """Vehicles in the neighbouring lanes: which of them block a change that is wanted, and which the driver perceives."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from fogsim.traffic.sumo.link import Api, vehicle_getter
@@ -13,7 +13,7 @@ NEAR = 5.0
 
 # Bits of signals, states and modes in SUMO's TraCI protocol.
 _BLINKERS = 1 | 2
-_TRACI, _URGENT, _OVERLAPPING = 128, 256, 8192
+_TRACI, _URGENT = 128, 256
 _LEADERS, _BLOCKING = 2, 4
 _LEFT_LEADERS = _LEADERS
 
@@ -55,33 +55,20 @@ class WantedChange:
         Where to.
     is_urgent : bool
         True if the route needs it, for which drivers ask others to make room.
-    leaders, followers : tuple of str
-        Vehicles that are in the way in the other lane.
-    ahead : str or None
-        The next vehicle ahead there, in the way or not.
-    near : bool
-        True if one of them is beside it, where it is seen in any fog.
+    leaders, followers : tuple of (str, float)
+        Vehicles that are in the way in the other lane, and the gaps to them [m].
     """
 
     driver: str
     side: Side
     is_urgent: bool
-    leaders: tuple[str, ...]
-    followers: tuple[str, ...]
-    ahead: str | None
-    near: bool
+    leaders: tuple[tuple[str, float], ...]
+    followers: tuple[tuple[str, float], ...]
 
     @property
-    def blockers(self) -> tuple[str, ...]:
-        """All vehicles that are in the way."""
+    def blockers(self) -> tuple[tuple[str, float], ...]:
+        """All vehicles that are in the way, and the gaps to them [m]."""
         return self.leaders + self.followers
-
-    @property
-    def pairs(self) -> Iterator[tuple[str, str]]:
-        """Who must be seen by whom: the others by the driver, and the driver by them."""
-        for other in (*self.blockers, *(() if self.ahead is None else (self.ahead,))):
-            yield self.driver, other
-            yield other, self.driver
 
 
 class Neighbours:
@@ -137,20 +124,22 @@ class Neighbours:
         return wanted + [self._change(*change) for change in more if not change[2] & _TRACI]
 
     def _change(self, vehicle: str, side: Side, state: int) -> WantedChange:
-        ahead = self._neighbours(vehicle, side.neighbours | _LEADERS)
         leaders, followers = (
-            self._neighbours(vehicle, side.neighbours | mode) if state & bit else ()
+            tuple(self._neighbours(vehicle, side.neighbours | mode)) if state & bit else ()
             for bit, mode in ((side.leader, _LEADERS | _BLOCKING), (side.follower, _BLOCKING))
         )
-        return WantedChange(
-            driver=vehicle,
-            side=side,
-            is_urgent=bool(state & _URGENT),
-            leaders=tuple(v for v, _ in leaders),
-            followers=tuple(v for v, _ in followers),
-            ahead=_nearest(ahead)[0] if ahead else None,
-            near=bool(state & _OVERLAPPING) or any(gap < NEAR for _, gap in (*leaders, *followers)),
-        )
+        return WantedChange(vehicle, side, bool(state & _URGENT), leaders, followers)
+
+    def ahead(self, change: WantedChange) -> str | None:
+        """Next vehicle ahead in the other lane, in the way or not.
+
+        Parameters
+        ----------
+        change : WantedChange
+            The change.
+        """
+        found = self._neighbours(change.driver, change.side.neighbours | _LEADERS)
+        return str(_nearest(found)[0]) if found else None
 
 
 def _nearest(neighbours: Sequence[tuple[str, float]]) -> tuple[str, float]:
@@ -178,6 +167,16 @@ class NeighbourSight:
         self._reaction_time = reaction_time
         self._hidden_at: dict[tuple[str, str], float] = {}
 
+    def was_hidden(self, observer: str, target: str) -> bool:
+        """Whether a target was out of sight at a look that is no longer ago than the reaction time.
+
+        Parameters
+        ----------
+        observer, target : str
+            The vehicles.
+        """
+        return (observer, target) in self._hidden_at
+
     def perceive(
         self, pairs: Iterable[tuple[str, str]], own_lamps: OwnLamps, time: float
     ) -> dict[tuple[str, str], bool]:
@@ -192,9 +191,10 @@ class NeighbourSight:
         time : float
             Simulated time [s].
         """
+        if self._hidden_at:
+            self._hidden_at = {pair: at for pair, at in self._hidden_at.items() if time - at < self._reaction_time}
         asked = tuple(dict.fromkeys(pairs))
         seen = self._sight.sees(asked, own_lamps) if asked else []
-        self._hidden_at = {pair: at for pair, at in self._hidden_at.items() if time - at < self._reaction_time}
         perceived = {pair: is_seen and pair not in self._hidden_at for pair, is_seen in zip(asked, seen, strict=True)}
         self._hidden_at.update((pair, time) for pair, is_seen in zip(asked, seen, strict=True) if not is_seen)
         return perceived

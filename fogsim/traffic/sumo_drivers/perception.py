@@ -13,6 +13,7 @@ is new (one of the two has changed lane, or somebody came within `REACH`) is not
 
 import itertools
 from collections.abc import Iterable, Sequence
+from types import MappingProxyType
 
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo.claims import SOLE_SESSION, SPEED_GAIN, SessionValues
@@ -74,7 +75,7 @@ class IgnoredLeaders:
         leaders = self._ignored.read(follower)
         leaders[self._session] = leader
         self._set(follower, leaders)
-        self._speed_gain.turn(follower, True)
+        self._speed_gain.turn_on(follower)
 
     def stop_ignoring(self, follower: str) -> None:
         """Let a follower react again to the vehicle that this session had it ignore, and change lanes as before.
@@ -87,7 +88,7 @@ class IgnoredLeaders:
         leaders = self._ignored.read(follower)
         if leaders.pop(self._session, None) is not None:
             self._set(follower, leaders)
-        self._speed_gain.turn(follower, False)
+        self._speed_gain.turn_off(follower)
 
     def _set(self, follower: str, leaders: dict[str, str]) -> None:
         self._vehicles.setParameter(follower, _IGNORED, " ".join(sorted(set(leaders.values()))))
@@ -116,6 +117,8 @@ class Perception:
     ----------
     leader, speed : Getter
         SUMO's ``getLeader``, to be asked with `REACH`, and ``getSpeed``.
+    hidden : mapping from str to str
+        Leaders that are not reacted to, by follower, as they are at any time.
     """
 
     def __init__(
@@ -135,6 +138,7 @@ class Perception:
         self._schedule = UpdateSchedule(float(api.simulation.getDeltaT()), self._roster.time)
         self._mark = 0
         self._ignored: dict[str, str] = {}
+        self.hidden = MappingProxyType(self._ignored)
         self._emerging: dict[str, tuple[str, float]] = {}
         # No leader nearer than this is hidden, wherever the fog is densest: for them nothing need be computed.
         self._certainly_seen = (
@@ -149,16 +153,6 @@ class Perception:
     def ignored(self) -> dict[str, str]:
         """Leaders that are not reacted to, by follower."""
         return dict(self._ignored)
-
-    def hidden_leader(self, follower: str) -> str | None:
-        """Leader that a driver does not react to; None if there is none.
-
-        Parameters
-        ----------
-        follower : str
-            Id of the driver's vehicle.
-        """
-        return self._ignored.get(follower)
 
     def expect_unseen(self, follower: str, leader: str) -> None:
         """Hide a vehicle that is about to come before a driver who does not see it, and look again in the next step.

@@ -7,16 +7,43 @@ from pathlib import Path
 
 import pytest
 
+from fogsim.traffic import DriverSight
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.roster import Roster
+from fogsim.traffic.sumo_drivers.drivers_perception import drivers_perception
 from fogsim.traffic.sumo_drivers.lane_changing import LaneChanging
 from fogsim.traffic.sumo_drivers.perception import Perception
+from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
 from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
+from fogsim.values import Lamp
 from tests.traffic.sumo_drivers.test_perception import NET, Fog, SeesFrom
 
+CROWD = (
+    *("--net-file", str(NET), "--route-files", str(NET.parent / "motorway.rou.xml")),
+    *("--step-length", "0.1", "--seed", "5", "--no-step-log", "true", "--no-warnings", "true"),
+)
 FREE, IN_LANE = 1621, 0
 CLEAR = 1000.0
+
+
+class NeverSure(SeesFrom):
+    """Eyes for which nothing is near enough to be seen for certain, as at night."""
+
+    def sure_distance(self, *_: float) -> float:
+        return 0.0
+
+
+class SeesNobody(VehicleSight):
+    """What drivers see, but for some who see nobody."""
+
+    def __init__(self, api: Api, fog: Fog, sight: SeesFrom, blind: Sequence[str]) -> None:
+        super().__init__(api, fog, sight)
+        self._blind = blind
+
+    def sees(self, pairs: Sequence[tuple[str, str]], own_lamps: OwnLamps) -> list[bool]:
+        seen = super().sees(pairs, own_lamps)
+        return [is_seen and pair[0] not in self._blind for pair, is_seen in zip(pairs, seen, strict=True)]
 
 
 @dataclass
@@ -28,7 +55,7 @@ class Road:
     api: Api = None
     parts: list[Perception | LaneChanging] = field(default_factory=list)
 
-    def enter(self, vehicles: str, reach: float, free: Sequence[str] = ("ego",), options: Sequence[str] = ()) -> Api:
+    def enter(self, vehicles: str, reach: float, free: Sequence[str] = ("ego",), blind: Sequence[str] = ()) -> Api:
         """Put vehicles on the motorway; all but those that are free keep their lanes."""
         routes = self.folder / "lanes.rou.xml"
         routes.write_text(
@@ -38,14 +65,14 @@ class Road:
         )
         files = ["--net-file", str(NET), "--route-files", str(routes), "--step-length", "0.1"]
         quiet = ["--no-step-log", "true", "--no-warnings", "true", "--collision.action", "warn"]
-        self.api = api = self.link.begin([*files, *quiet, "--collision.stoptime", "1000", *options])
+        self.api = api = self.link.begin([*files, *quiet, "--collision.stoptime", "1000"])
         self.link.step()
         for vehicle in api.vehicle.getIDList():
             api.vehicle.setLaneChangeMode(vehicle, FREE if vehicle in free else IN_LANE)
-        roster, sight, fog = Roster(api), SeesFrom(reach), Fog(0.05)
+        roster, sight, fog = Roster(api), (NeverSure if blind else SeesFrom)(reach), Fog(0.05)
         leaders = Perception(api, fog, sight, roster)
 
-        eyes = VehicleSight(api, fog, sight)
+        eyes = SeesNobody(api, fog, sight, blind)
         self.parts = [leaders, LaneChanging(api, fog, sight, roster, leaders, eyes, False, "1")]
         return api
 
@@ -167,6 +194,46 @@ def test_nobody_falls_back_behind_whom_they_do_not_see_in_the_lane_to_the_left(r
         speeds.append(api.vehicle.getSpeed("ego"))
     assert speeds[0] < 20.0
     assert speeds[1] == pytest.approx(30.0)
+
+
+def test_nobody_makes_room_for_whom_they_do_not_see(road: Road) -> None:
+    """Who must get to the left for the stop there sees who comes from behind in that lane."""
+    stop = '<stop lane="approach_1" endPos="600" duration="100"/>'
+    vehicles = vehicle("asker", 400, 15, 0, inside=stop) + vehicle("helper", 340, 30, 1)
+    speeds = []
+    for blind in ((), ("helper",)):
+        api = road.enter(vehicles, 80.0, free=("asker",), blind=blind)
+        assert not road.until(road.collided, 15)
+        speeds.append(api.vehicle.getSpeed("helper"))
+    # It was asked before its first look, too.
+    assert speeds[0] < 25.0
+    assert speeds[1] > 28.0
+
+
+@pytest.mark.parametrize("reach", [5.0, 30.0])
+def test_who_keeps_the_lane_keeps_it(road: Road, reach: float) -> None:
+    api = road.enter(OVERTAKER + standing("wreck", 300, 1) + vehicle("fast", 150, 33, 1), reach, free=())
+    assert not road.until(lambda: api.vehicle.getLaneIndex("ego") != 0, 100)
+
+
+@pytest.mark.parametrize("illuminance", [0.1, 10_000.0])
+def test_in_clear_air_traffic_is_that_of_sumo_alone(road: Road, illuminance: float) -> None:
+    """To the last bit, by night too, when nothing is sure to be seen before it is looked at."""
+
+    def drive(parts: bool) -> list[tuple[str, str, float]]:
+        api = road.link.begin(CROWD)
+        for _ in range(300):
+            road.link.step()
+        sight, roster = DriverSight(illuminance), Roster(api)
+        perception = drivers_perception(api, Fog(0.0), sight, roster, False, "1") if parts else None
+        for _ in range(200):
+            if perception is not None:
+                perception.update("ego", Lamp.NONE, frozenset())
+            road.link.step()
+        get = api.vehicle
+        return [(v, get.getLaneID(v), get.getLanePosition(v)) for v in get.getIDList()]
+
+    assert drive(True) == drive(False)
 
 
 def test_everything_is_given_back(road: Road) -> None:

@@ -1,16 +1,17 @@
-"""highway-env's drivers react to a leader only once they can see it.
+"""highway-env's drivers react to others only once they can see them.
 
-Its drivers ask their road for the vehicle ahead; in fog, a road answers with none where the driver sees none. IDM and
-MOBIL stay as they are.
+Its drivers ask their road for the vehicles ahead and behind, in their own lane and in those to which they could change;
+in fog, a road answers with none where the driver sees none. IDM and MOBIL stay as they are.
 """
 
 import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fogsim.traffic.drivers.eye_heights import EYE_HEIGHTS
-from fogsim.traffic.drivers.lamp_intensity import HEAD_LAMPS, rear_intensity
+from fogsim.traffic.drivers.lamp_intensity import HEAD_LAMPS, intensity_toward
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess, inherent_contrast
 from fogsim.traffic.highway.fleet import Fleet
 from fogsim.traffic.highway.snapshot import front_bumper, rear_bumper
@@ -49,28 +50,35 @@ class VisibleNeighbours:
         self._last_hidden: dict[tuple[Any, Any], float] = {}
 
     def __call__(self, vehicle: Any, lane_index: Any = None) -> tuple[Any, Any]:
-        """Vehicle ahead, or None if the driver has not perceived it; and vehicle behind, in a lane."""
+        """Vehicles ahead and behind in a lane; None where the driver has perceived none."""
         road = self._fleet.environment.road
         front, rear = type(road).neighbour_vehicles(road, vehicle, lane_index)
-        if front is None or self._perceives(vehicle, front):
-            return front, rear
-        return None, rear
+        return (
+            front if front is not None and self._perceives(vehicle, front, rear_bumper(front)) else None,
+            rear if rear is not None and self._perceives(vehicle, rear, front_bumper(rear)) else None,
+        )
 
-    def _perceives(self, vehicle: Any, front: Any) -> bool:
-        """Tell whether a driver sees what is ahead, and has done so for the reaction time if it was hidden before."""
-        pair, now = (vehicle, front), self._fleet.time
-        if not self._sees(vehicle, front):
+    def _perceives(self, vehicle: Any, other: Any, end: NDArray[np.float64]) -> bool:
+        """Tell whether a driver sees another's near end, and has for the reaction time if it was hidden before."""
+        pair, now = (vehicle, other), self._fleet.time
+        if not self._sees(vehicle, other, end):
             self._last_hidden[pair] = now
             return False
         return now - self._last_hidden.get(pair, -np.inf) >= self._sight.reaction_time
 
-    def _sees(self, vehicle: Any, front: Any) -> bool:
+    def _sees(self, vehicle: Any, other: Any, end: NDArray[np.float64]) -> bool:
         lift = np.array([0.0, 0.0, EYE_HEIGHTS["car"]])
-        eye, rear = front_bumper(vehicle) + lift, rear_bumper(front) + lift
-        distance = max(math.dist(eye, rear), 0.1)
+        eye = front_bumper(vehicle)
+        distance = max(math.dist(eye, end), 0.1)
         if distance <= self._certainly_seen:
             return True
-        depth, fleet = float(self._fog.optical_depth(eye, rear)), self._fleet
-        lit = rear_intensity(int(fleet.lamps(front)))
-        head_lamps = 1.0 if int(fleet.lamps(vehicle)) & HEAD_LAMPS else 0.0
-        return depth <= self._sight.depth_limit(distance, inherent_contrast(fleet.paint(front)), lit, head_lamps)
+        depth, fleet = float(self._fog.optical_depth(eye + lift, end + lift)), self._fleet
+        east, north, _ = eye - front_bumper(other)
+        forward_east, forward_north = other.direction
+        ahead = float(east * forward_east + north * forward_north)
+        aside = float(north * forward_east - east * forward_north)
+        lit = intensity_toward(int(fleet.lamps(other)), other.LENGTH, ahead, aside)
+        # What is behind stands in nobody's own head lamps.
+        lights_it = ahead < 0.0 and int(fleet.lamps(vehicle)) & HEAD_LAMPS
+        contrast = inherent_contrast(fleet.paint(other))
+        return depth <= self._sight.depth_limit(distance, contrast, lit, 1.0 if lights_it else 0.0)

@@ -186,6 +186,24 @@ def test_the_egos_driver_is_as_blind_as_the_others() -> None:
     assert not ends_in_collision(10_000.0)
 
 
+@pytest.mark.parametrize(("visibility", "pulls_out"), [(2000.0, False), (15.0, True)])
+def test_who_comes_from_behind_unseen_holds_no_overtaker_back(visibility: float, pulls_out: bool) -> None:
+    """MOBIL refuses to make a new follower brake by more than 2 m/s²; that follower is 40 m behind it and faster."""
+    traffic, environment = traffic_on({"vehicles_count": 0, "lanes_count": 2, "initial_lane_id": 0})
+    traffic.start(1)
+    road, ego = environment.road, environment.vehicle
+    slow = IDMVehicle(road, beside(ego, 113.0, 4.0), speed=15.0, target_speed=15.0, enable_lane_change=False)
+    driver = IDMVehicle(road, beside(ego, 100.0, 4.0), speed=20.0, target_speed=30.0)
+    fast = IDMVehicle(road, beside(ego, 55.0, 0.0), speed=32.0, target_speed=32.0, enable_lane_change=False)
+    road.vehicles += [slow, driver, fast]
+    traffic.enter_fog(fog_of(visibility))
+    lane = driver.lane_index
+    for _ in range(20):
+        traffic.advance(Command())
+    traffic.close()
+    assert (driver.target_lane_index != lane) == pulls_out
+
+
 def test_fog_of_one_environment_stays_there() -> None:
     foggy, in_fog = traffic_on(EMPTY)
     clear, in_clear_air = traffic_on(EMPTY)

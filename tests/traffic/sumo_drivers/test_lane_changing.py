@@ -4,6 +4,7 @@ import functools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import cast
 
 import pytest
 
@@ -13,6 +14,7 @@ from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_drivers.drivers_perception import drivers_perception
 from fogsim.traffic.sumo_drivers.lane_changing import LaneChanging
+from fogsim.traffic.sumo_drivers.neighbour_sight import NeighbourSight
 from fogsim.traffic.sumo_drivers.perception import Perception
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
 from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
@@ -250,3 +252,17 @@ def test_everything_is_given_back(road: Road) -> None:
     for part in road.parts:
         part.release()
     assert state() == own
+
+
+def test_who_has_come_into_view_is_reacted_to_after_the_reaction_time() -> None:
+    class Eyes:
+        seen = False
+
+        def sees(self, pairs: Sequence[tuple[str, str]], _: OwnLamps) -> list[bool]:
+            return [self.seen] * len(pairs)
+
+    eyes, pair = Eyes(), ("driver", "other")
+    sight = NeighbourSight(cast("VehicleSight", eyes), reaction_time=1.0)
+    assert not sight.perceive([pair], {}, 0.0)[pair]
+    eyes.seen = True
+    assert [sight.perceive([pair], {}, time)[pair] for time in (0.5, 0.9, 1.0, 1.5)] == [False, False, True, True]

@@ -22,6 +22,10 @@ FRONT_SIGNAL_LAMPS = ((int(Lamp.DAYTIME), 600.0), (int(Lamp.POSITION), 10.0))
 LEAST_INTENSITY = 0.05
 """What lit position lamps send wherever they are to be seen at all [cd] (UNECE R148)."""
 
+LIT_ROAD_INTENSITY = 0.2
+"""Of the road before lit head lamps, seen from any side [cd]: Φ ρ / π · h / d, for two low beams of 315 lm each
+(UMTRI-2004-23), asphalt of reflectance 0.1, and eyes 1.1 m high at 100 m."""
+
 SIDE_MARKER = 4.0
 """Luminous intensity of a side marker lamp [cd]: UNECE R148 asks for 4–25."""
 
@@ -61,13 +65,14 @@ def intensity_toward(lamps: int, length: float, ahead: float, aside: float) -> f
     """
     if not lamps:
         return 0.0
-    least = LEAST_INTENSITY if lamps & int(Lamp.POSITION) else 0.0
+    has_position_lamps = bool(lamps & int(Lamp.POSITION))
+    least = LIT_ROAD_INTENSITY if lamps & HEAD_LAMPS else LEAST_INTENSITY if has_position_lamps else 0.0
     aside = abs(aside)
     if ahead > 0.0:
         return max(_front_intensity(lamps, math.atan2(aside, ahead)), least)
     if ahead < -length:
         return max(rear_intensity(lamps) * _dimming(math.atan2(aside, -length - ahead)), least)
-    return SIDE_MARKER if least and length > SHORTEST_WITH_MARKERS else least
+    return SIDE_MARKER if has_position_lamps and length > SHORTEST_WITH_MARKERS else least
 
 
 def head_lamp_share(bearing: float) -> float:

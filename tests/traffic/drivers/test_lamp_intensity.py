@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from fogsim.lighting.beams import high_beam, low_beam
+from fogsim.lighting.beams import high_beam, low_beam, luminous_flux
 from fogsim.traffic.drivers.lamp_intensity import (
     LEAST_INTENSITY,
+    LIT_ROAD_INTENSITY,
     SIDE_MARKER,
     beam_intensity,
     head_lamp_share,
@@ -44,11 +45,17 @@ def test_each_side_shows_its_own_lamps() -> None:
     everything = LIT | int(Lamp.STOP | Lamp.REAR_FOG)
     assert intensity_toward(everything, 5.0, 30.0, 0.0) == beam_intensity(LIT, 0.0)
     assert intensity_toward(everything, 5.0, -35.0, 0.0) == rear_intensity(everything) == 200.0
-    assert intensity_toward(everything, 5.0, -2.5, 30.0) == LEAST_INTENSITY
+    assert intensity_toward(everything, 5.0, -2.5, 30.0) == LIT_ROAD_INTENSITY
+    assert intensity_toward(int(Lamp.POSITION), 5.0, -2.5, 30.0) == LEAST_INTENSITY
     assert intensity_toward(everything, 12.0, -2.5, -30.0) == SIDE_MARKER
     assert intensity_toward(int(Lamp.STOP), 5.0, 30.0, 0.0) == 0.0
     assert intensity_toward(0, 12.0, -2.5, 30.0) == 0.0
     assert intensity_toward(int(Lamp.POSITION), 5.0, 30.0, 30.0) == pytest.approx(10.0 / 4.0)
+
+
+def test_the_lit_road_is_as_bright_as_the_flux_of_measured_low_beams_makes_it() -> None:
+    flux = 2.0 * luminous_flux(low_beam(), (np.radians(-45.0), np.radians(45.0)), (np.radians(-5.0), np.radians(7.0)))
+    assert flux * 0.1 / np.pi * 1.1 / 100.0 == pytest.approx(LIT_ROAD_INTENSITY, rel=0.15)
 
 
 def test_lamps_are_as_bright_from_the_left_as_from_the_right_and_dimmer_off_their_axis() -> None:

@@ -144,10 +144,22 @@ class DriversFog:
     def __init__(self) -> None:
         self._fog: FogNow | None = None
 
+        self._field: FogField | None = None
+
     @property
     def is_entered(self) -> bool:
         """Whether the traffic has been told of the fog."""
         return self._fog is not None
+
+    def is_about(self, fog: FogField) -> bool:
+        """Whether drivers have about them what a fog is; clear air needs not be entered.
+
+        Parameters
+        ----------
+        fog : FogField
+            The fog over time.
+        """
+        return self._field == fog or (self._field is None and fog.extinction == 0 and not fog.banks)
 
     def enter(self, fog: FogField, traffic: EntersFog) -> None:
         """Tell a traffic of the fog, whose place is known only when the ego's route is.
@@ -159,7 +171,7 @@ class DriversFog:
         traffic : Traffic
             Or something else with `Traffic.enter_fog`.
         """
-        self._fog = FogNow(fog)
+        self._fog, self._field = FogNow(fog), fog
         traffic.enter_fog(self._fog)
 
     def set_time(self, time: float) -> None:
@@ -213,18 +225,28 @@ class ClosedLoop:
         streams = spawn_streams(seed)
         self._step = None
         self._drivers_fog.set_time(0.0)
+        if self._replays and not self._drivers_fog.is_entered:
+            self._enter_planned_fog()
         self._traffic.start(streams.traffic_seed)
         snapshot = self._observe_ego()
         body = snapshot.state.types[snapshot.ego]
         fog = self._fog = self._equipment.start_run(streams, self._traffic.network, body)
-        if not self._drivers_fog.is_entered and (fog.extinction > 0 or fog.banks):
+        if not self._drivers_fog.is_about(fog):
             self._drivers_fog.enter(fog, self._traffic)
             if self._replays:
-                # Drivers must have had the fog about them while the road filled: begin once more, with it.
+                # The ego's way was not known before. Drivers must have had the fog about them while the road filled.
                 self._traffic.start(streams.traffic_seed)
                 snapshot = self._observe_ego()
         self._step = self._with_unplayed(self._complete_step(0, snapshot, Command()))
         return self._step
+
+    def _enter_planned_fog(self) -> None:
+        """Have drivers in the fog from the beginning, where the ego's way, along which it lies, is known already."""
+        planned = self._traffic.planned_network()
+        if planned is not None:
+            fog = build.fog_field(self._scenario, planned[0].route)
+            if not self._drivers_fog.is_about(fog):
+                self._drivers_fog.enter(fog, self._traffic)
 
     def _observe_ego(self) -> TrafficSnapshot:
         snapshot = self._traffic.observe()

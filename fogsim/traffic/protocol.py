@@ -32,6 +32,9 @@ class Traffic(Protocol):
             The fog.
         """
 
+    def planned_network(self) -> tuple[RoadNetwork, SignMap] | None:
+        """Roads and signs along the ego's way before `start`; None where no file has it written out."""
+
     def network(self) -> tuple[RoadNetwork, SignMap]:
         """Roads and signs; after `start`."""
 

@@ -12,6 +12,7 @@ from fogsim.traffic.collision_log import CollisionLog
 from fogsim.traffic.drivers.events import Order, Script, Situation
 from fogsim.traffic.drivers.sight import FogAccess
 from fogsim.traffic.road.configuration import OVERRIDES
+from fogsim.traffic.road.demand import read_demand
 from fogsim.traffic.road.network import read_net, road_network
 from fogsim.traffic.road.opendrive import is_opendrive
 from fogsim.traffic.road.signs import sign_map
@@ -90,6 +91,7 @@ class SumoTraffic:
         self._route: RoutePosition | None = None
         self._mark = 0
         self._teleported = False
+        self._planned: tuple[tuple[str, ...], tuple[RoadNetwork, SignMap]] | None = None
 
     @property
     def _running(self) -> _Run:
@@ -167,12 +169,27 @@ class SumoTraffic:
                 drivers=SumoDesiredSpeeds(api, setup, fog, self._seed, roster, session, self._link.remote),
             )
 
+    def planned_network(self) -> tuple[RoadNetwork, SignMap] | None:
+        """Roads and signs along the ego's written way; see `Traffic.planned_network`."""
+        setup = self._setup
+        if setup.net is None:
+            return None
+        written = read_demand((*setup.additional, *setup.routes), (setup.ego,)).routes.get(setup.ego)
+        net = None if written is None else read_net(setup.net)
+        if net is None or written is None or not all(map(net.hasEdge, written.edges)):
+            return None
+        roads = road_network(net, written.edges), sign_map(net, setup.additional)
+        self._planned = written.edges, roads
+        return roads
+
     @_translates_errors
     def network(self) -> tuple[RoadNetwork, SignMap]:
         """Roads and signs; see `Traffic.network`."""
         api = self._running.api
+        route = tuple(api.vehicle.getRoute(self._setup.ego))
+        if self._planned is not None and self._planned[0] == route:
+            return self._planned[1]
         net = read_net(self._setup.net or loaded_net(api))
-        route = api.vehicle.getRoute(self._setup.ego)
         return road_network(net, route), sign_map(net, self._setup.additional or loaded_additional(api))
 
     @_translates_errors

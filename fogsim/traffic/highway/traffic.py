@@ -148,6 +148,9 @@ class HighwayTraffic:
             if isinstance(vehicles.get(name), IDMVehicle):
                 vehicles[name].enable_lane_change = False
 
+    def planned_network(self) -> None:
+        """Nothing: the road is made at the start; see `Traffic.planned_network`."""
+
     def network(self) -> tuple[RoadNetwork, SignMap]:
         """Roads, and no signs: highway-env has none; after `start`."""
         if self._network is None:

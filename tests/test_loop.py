@@ -16,6 +16,7 @@ import fogsim
 from fogsim.errors import SimulationError
 from fogsim.loop import ClosedLoop, DriversFog, spread_advice
 from fogsim.scenario import Scenario
+from fogsim.traffic.sumo_traffic import SumoTraffic
 from fogsim.values import Command, Display, Ending, FogChange, FogField, SpeedAdvice, Step, Stretch, StretchAdvice
 
 SMALL = ("camera.width=160", "camera.height=120", "duration_s=4")
@@ -55,6 +56,28 @@ def test_others_follow_advice_in_clear_air_too() -> None:
         for _ in range(40):
             step = loop.advance(Command(SpeedAdvice(15.0), stretches=(advice,)))
     assert step.traffic.speed.mean() < before - 3.0
+
+
+def test_the_road_fills_once_where_the_way_is_written_and_anew_where_it_is_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    starts: list[int] = []
+    start = SumoTraffic.start
+    monkeypatch.setattr(SumoTraffic, "start", lambda self, seed: starts.append(seed) or start(self, seed))
+    scenario = small("fog.visibility_m=80", "duration_s=0.5")
+    written = [step.traffic.position for step in fogsim.run(scenario, seed=1)]
+    assert len(starts) == 1
+
+    # The same way as a trip, which SUMO routes itself, so that no file tells it.
+    demand = (scenario.directory / "motorway.rou.xml").read_text(encoding="utf-8")
+    trip = demand.replace('<vehicle id="ego"', '<trip id="ego" from="approach" to="exit"').replace(
+        'type="ego_car" route="eastbound"', 'type="ego_car"'
+    )
+    (tmp_path / "trip.rou.xml").write_text(trip, encoding="utf-8")
+    routed = small("fog.visibility_m=80", "duration_s=0.5", f"traffic.routes=[{tmp_path / 'trip.rou.xml'}]")
+    found = [step.traffic.position for step in fogsim.run(routed, seed=1)]
+    assert len(starts) == 3
+    np.testing.assert_array_equal(found, written)
 
 
 def test_the_camera_period_may_be_longer_than_the_traffic_step() -> None:

@@ -25,9 +25,9 @@ from fogsim.traffic.sumo.claims import (
     STRATEGIC,
     Claims,
 )
+from fogsim.traffic.sumo.due_vehicles import DueVehicles
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo.update_schedule import UpdateSchedule
 from fogsim.traffic.sumo_drivers.lane_change_switches import LaneChangeSwitch
 from fogsim.traffic.sumo_drivers.neighbour_sight import NEAR, Neighbours, NeighbourSight, WantedChange
 from fogsim.traffic.sumo_drivers.overtaking_wish import OvertakingWishes
@@ -67,16 +67,19 @@ class StandingLeaders:
         self._leaders = leaders
         self._strategic = LaneChangeSwitch(api, STRATEGIC, _NEVER, session)
 
-    def update(self, drivers: Sequence[str]) -> None:
+    def update(self, drivers: Sequence[str], present: set[str]) -> None:
         """Decide anew for some drivers.
 
         Parameters
         ----------
         drivers : sequence of str
             Their vehicles.
+        present : set of str
+            Vehicles on the road.
         """
-        hidden = self._leaders.hidden
-        self._strategic.decide(drivers, [v for v in drivers if v in hidden and self._would_be_left_for(v, hidden[v])])
+        # A hidden leader may have left since the driver's last look ahead.
+        behind = [(v, leader) for v in drivers if (leader := self._leaders.hidden.get(v)) in present]
+        self._strategic.decide(drivers, [v for v, leader in behind if leader and self._would_be_left_for(v, leader)])
 
     def expect_unseen(self, driver: str, leader: str) -> None:
         """Keep a driver in the lane to which he changes until the next look, if he does not see who stands there.
@@ -217,8 +220,7 @@ class LaneChanging:
             LaneChangeSwitch(api, attribute, value, session)
             for attribute, value in ((COOPERATIVE, _NEVER), (COOPERATIVE_SPEED, 0.0))
         )
-        self._schedule = UpdateSchedule(float(api.simulation.getDeltaT()), roster.time)
-        self._mark = 0
+        self._due = DueVehicles(roster, float(api.simulation.getDeltaT()))
 
     def update(self, own_lamps: OwnLamps) -> None:
         """Let those who are due look at the lanes beside them.
@@ -230,33 +232,25 @@ class LaneChanging:
         """
         if self._certainly_seen >= REACH:
             return
-        self._roster.update()
+        due, _, gone = self._due.take()
         self._requests.end(self._roster.present)
-        due = self._due()
+        self._begin_anew(gone)
+        self._due.schedule(due, LOOK_PERIOD)
         if due:
-            self._standing.update(due)
+            self._standing.update(due, self._roster.present)
             free_to_their_eyes = self._free_to_the_left(due, own_lamps)
             self._overtake_right.decide(due, free_to_their_eyes)
             hidden = self._leaders.hidden
             wishes = self._wishes.update([v for v in free_to_their_eyes if v not in hidden])
             self._change_lanes(due, wishes, own_lamps)
 
-    def _due(self) -> list[str]:
-        roster, schedule = self._roster, self._schedule
-        due = schedule.pop_due(roster.time)
-        new, self._mark = roster.entered_since(self._mark)
-        if new or not roster.present.issuperset(due):
-            self._begin_anew([*new, *(v for v in due if v not in roster.present)])
-            due = [v for v in dict.fromkeys([*due, *schedule.unscheduled(new)]) if v in roster.present]
-        schedule.add(due, roster.time + LOOK_PERIOD)
-        return due
-
     def _begin_anew(self, drivers: Sequence[str]) -> None:
         """Forget drivers that have left, and whom those who have entered may be taken for."""
-        self._vehicle_sight.forget(drivers)
-        self._standing.begin_anew(drivers, self._roster.present)
-        for switch in (self._overtake_right, *self._unhelpful):
-            switch.begin_anew(drivers, self._roster.present)
+        if drivers:
+            self._vehicle_sight.forget(drivers)
+            self._standing.begin_anew(drivers, self._roster.present)
+            for switch in (self._overtake_right, *self._unhelpful):
+                switch.begin_anew(drivers, self._roster.present)
 
     def _free_to_the_left(self, drivers: Sequence[str], own_lamps: OwnLamps) -> dict[str, None]:
         """Drivers to whom the lane to the left looks free ahead, though there is somebody."""

@@ -266,3 +266,16 @@ def test_who_has_come_into_view_is_reacted_to_after_the_reaction_time() -> None:
     assert not sight.perceive([pair], {}, 0.0)[pair]
     eyes.seen = True
     assert [sight.perceive([pair], {}, time)[pair] for time in (0.5, 0.9, 1.0, 1.5)] == [False, False, True, True]
+
+
+def test_a_hidden_leader_may_have_left_since_the_last_look_ahead(road: Road) -> None:
+    api = road.enter(vehicle("ego", 200, 20, 1) + standing("wreck", 300, 1), 30.0)
+    leaders, lanes = road.parts
+    road.step()
+    api.vehicle.remove("wreck")
+    for _ in range(6):
+        road.link.step()
+        lanes.update({})
+    assert isinstance(leaders, Perception)
+    assert leaders.hidden == {"ego": "wreck"}
+    assert road.until(lambda: leaders.hidden == {}, 8)

@@ -70,9 +70,12 @@ def _allowed(schema: dict[str, Any], definitions: dict[str, Any]) -> str:
     if schema["type"] == "array":
         inner = schema["items"] if "items" in schema else schema["prefixItems"][0]
         return f"list of {_allowed(inner, definitions)}"
+    shares = schema.get("additionalProperties")
+    if isinstance(shares, dict) and "minimum" in shares:
+        schema = shares
     if "minimum" not in schema:
         return {"boolean": "true, false", "string": schema.get("format", "text")}.get(schema["type"], "method")
-    kind = "whole, " if schema["type"] == "integer" else ""
+    kind = "whole, " if schema["type"] == "integer" else "by name, each " if shares else ""
     return f"{kind}{schema['minimum']:.6g} … {schema['maximum']:.6g}" + (" or inf" if "or" in schema else "")
 
 

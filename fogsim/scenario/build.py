@@ -165,6 +165,8 @@ def _driver_setup(scenario: Scenario) -> DriverSetup:
         drivers.compliance.rate,
         drivers.compliance.strength,
         drivers.compliance.delay_s,
+        drivers.compliance.trust,
+        drivers.compliance.foreseen,
     )
     return DriverSetup(
         drivers.speed_choice, drivers.speed_spread, compliance, drivers.distance_misjudgement, drivers.following

@@ -1,5 +1,6 @@
 """The schema of the blocks ``traffic`` and ``drivers``: who drives where, what is scripted, what drivers are like."""
 
+import dataclasses
 import math
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -22,7 +23,7 @@ from fogsim.scenario.section import (
     Time,
     Whole,
 )
-from fogsim.traffic import FOLLOWING_MODELS, SPEED_CHOICES, AfterCollision
+from fogsim.traffic import COMPLIANCES, FOLLOWING_MODELS, SPEED_CHOICES, AfterCollision, Compliance
 from fogsim.values import Display
 
 _ROUNDING = 1e-6
@@ -159,8 +160,16 @@ class Traffic(Section):
         return self
 
 
+def _compliance_keys(compliance: Compliance) -> dict[str, float]:
+    written = {field.name: getattr(compliance, field.name) for field in dataclasses.fields(compliance)}
+    return {**{key: value for key, value in written.items() if key != "delay"}, "delay_s": compliance.delay}
+
+
 class ComplianceSection(Section):
     """Who follows advice, and how far."""
+
+    like: str = "full"
+    """Kind of advice whose compliance, as far as it has been measured, the keys below begin with."""
 
     reached_share: Share = 1.0
     """Share of drivers whom advice reaches."""
@@ -169,10 +178,28 @@ class ComplianceSection(Section):
     """Share of those who follow it."""
 
     strength: Share = 1.0
-    """How far they go from their own speed towards the advised one."""
+    """How far they go from their own speed down to the advised one."""
 
     delay_s: Time = 2.0
     """Time before they do."""
+
+    trust: Share = 0.0
+    """How far those who are slower in fog by themselves go up to the advised speed."""
+
+    foreseen: Share = 1.0
+    """Share of strength and trust where they do not see the fog yet (200 m and more)."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _begin_with_what_is_measured(cls, value: object) -> object:
+        if not isinstance(value, dict) or not isinstance(value.get("like"), str):
+            return value
+        try:
+            measured = COMPLIANCES[value["like"]]
+        except UnknownNameError as error:
+            # Only a plain ValueError is a message to pydantic's user.
+            raise ValueError(str(error)) from None
+        return {**_compliance_keys(measured), **value}
 
 
 class AdvisedStretch(Section):

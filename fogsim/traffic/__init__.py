@@ -2,10 +2,11 @@
 
 import warnings
 
+from fogsim.traffic.drivers.compliance import COMPLIANCES, Compliance
 from fogsim.traffic.drivers.events import BrakeEvent, Event, LampFailureEvent, LaneChangeEvent, Trigger
 from fogsim.traffic.drivers.following import FOLLOWING_MODELS
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
-from fogsim.traffic.drivers.speed_choice import SPEED_CHOICES, Compliance, DriverSetup
+from fogsim.traffic.drivers.speed_choice import SPEED_CHOICES, DriverSetup
 from fogsim.traffic.protocol import Traffic
 from fogsim.traffic.road.configuration import configured_files, ignored_options
 from fogsim.traffic.road.demand import Demand, VehicleRoute, read_configured_demand, read_demand
@@ -49,6 +50,7 @@ def traci_traffic(setup: TrafficSetup, link: TraciLink) -> Traffic:
 
 
 __all__ = [
+    "COMPLIANCES",
     "FOLLOWING_MODELS",
     "SPEED_CHOICES",
     "AfterCollision",

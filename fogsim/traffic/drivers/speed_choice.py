@@ -1,10 +1,9 @@
-"""How fast drivers drive in fog by themselves, and how they follow advice.
+"""How fast drivers drive in fog by themselves, and what sets one apart from another.
 
 Sources, of which only abstracts and summaries have been seen: White & Jeffery 1980 (TRL LR958) and TRL SR281 on the M4;
 Hogema & van der Horst 1994 (TNO-TM C-6, C-7) and 1997 (A16); McCann & Fontaine 2016 (VTRC 17-R4) and Gonzales &
 Fontaine 2018 (VTRC 19-R6) on I-77; Pretto, Bresciani, Rainer & Bülthoff 2012 (eLife 1:e00031); the SHRP2 naturalistic
-study (Transportation Research Record 2018, doi 10.1177/0361198118774748); MacCarley, Ackles & Watts 2006 (TRB; mean
-speeds averaged 61 mph where signs of Caltrans' CAWS advised 30 mph in dense fog).
+study (Transportation Research Record 2018, doi 10.1177/0361198118774748).
 """
 
 import math
@@ -17,6 +16,7 @@ import numpy as np
 
 from fogsim.kinematics import DECELERATION, REACTION_TIME, safe_speed
 from fogsim.registry import Registry
+from fogsim.traffic.drivers.compliance import FULL, Compliance, complied_speed
 from fogsim.traffic.drivers.following import OBSERVED_MIXTURE
 
 UNAFFECTED_ABOVE = 200.0
@@ -165,45 +165,10 @@ def _clipped(share: float) -> float:
     return min(max(share, 0.0), 1.0)
 
 
-def complied_speed(own: float, advised: float, strength: float) -> float:
-    """Speed of a driver who goes some way from the own speed down to an advised one [m/s].
-
-    Parameters
-    ----------
-    own, advised : float
-        Speeds [m/s].
-    strength : float
-        How far, 0 (not at all) … 1 (all the way).
-    """
-    return own + strength * min(0.0, advised - own)
-
-
 SPEED_CHOICES: Registry[Choice] = Registry(
     "speed choice",
     {"observed": observed, "unaffected": unaffected, "too_fast": too_fast, "within_sight": within_sight},
 )
-
-
-@dataclass(frozen=True, slots=True)
-class Compliance:
-    """Who follows an advised speed, and how far.
-
-    Attributes
-    ----------
-    reached_share : float
-        Share of drivers whom the advice reaches (a sign that they pass, a device on board), 0 … 1.
-    rate : float
-        Share of those who follow it, 0 … 1.
-    strength : float
-        How far they go from their own speed towards the advised one, 0 … 1.
-    delay : float
-        Time before they do [s].
-    """
-
-    reached_share: float = 1.0
-    rate: float = 1.0
-    strength: float = 1.0
-    delay: float = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,7 +193,7 @@ class DriverSetup:
 
     speed_choice: str = "observed"
     spread: float = 0.1
-    compliance: Compliance = Compliance()
+    compliance: Compliance = FULL
     misjudgement: float = 0.0
     following: Mapping[str, float] | None = None
 
@@ -339,5 +304,8 @@ def desired_speed(
     """
     chosen = chosen_speed(SPEED_CHOICES[setup.speed_choice], driver.speed_factor, own, visibility)
     chosen = min(chosen, room)
-    heard = driver.follows_advice and advised_for >= setup.compliance.delay
-    return complied_speed(chosen, advised, setup.compliance.strength) if heard and math.isfinite(advised) else chosen
+    compliance = setup.compliance
+    if not driver.follows_advice or advised_for < compliance.delay or math.isinf(advised):
+        return chosen
+    belief = compliance.foreseen if visibility >= UNAFFECTED_ABOVE else 1.0
+    return min(complied_speed(chosen, advised, belief * compliance.strength, belief * compliance.trust), own)

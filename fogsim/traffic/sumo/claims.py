@@ -79,9 +79,15 @@ TOP_SPEED = Attribute("maxSpeed", lambda get, v: float(get.getMaxSpeed(v)), lamb
 TIME_HEADWAY = Attribute("tau", lambda get, v: float(get.getTau(v)), lambda set_, v, x: set_.setTau(v, x), farthest)
 """Wanted time headway [s], which drivers shorten or lengthen."""
 
-SPEED_FACTOR = Attribute(
-    "speedFactor", lambda get, v: float(get.getSpeedFactor(v)), lambda set_, v, x: set_.setSpeedFactor(v, x)
-)
+
+def _set_speed_factor(vehicles: Api, vehicle: str, factor: float) -> None:
+    # With the first change of what its type says a vehicle gets a type of its own, and SUMO draws its factor anew if
+    # the type's has no deviation. So that comes before.
+    vehicles.setTau(vehicle, vehicles.getTau(vehicle))
+    vehicles.setSpeedFactor(vehicle, factor)
+
+
+SPEED_FACTOR = Attribute("speedFactor", lambda get, v: float(get.getSpeedFactor(v)), _set_speed_factor)
 """Wanted speed over the speed limit of any lane [-]."""
 
 LANE_CHANGE_MODE = Attribute(

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from fogsim.kinematics import decelerated_speed
 from fogsim.traffic.drivers.advice_hearing import AdviceHearing
+from fogsim.traffic.drivers.compliance import complied_speed
 from fogsim.traffic.drivers.events import Order
 from fogsim.traffic.drivers.sight import FogAccess
-from fogsim.traffic.drivers.speed_choice import CHOICE_PERIOD, complied_speed
+from fogsim.traffic.drivers.speed_choice import CHOICE_PERIOD, UNAFFECTED_ABOVE
 from fogsim.traffic.setup import TrafficSetup
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
@@ -200,7 +201,7 @@ class SumoDesiredSpeeds:
         if advised:
             for i in np.flatnonzero(values[:, Column.FOLLOWS]).tolist():
                 if ids[i] in advised:
-                    desired[i] = self._advised(ids[i], float(desired[i]), advised[ids[i]])
+                    desired[i] = self._advised(ids[i], int(rows[i]), float(desired[i]), advised[ids[i]])
         return rows, desired, shares
 
     def _extinctions(self, ids: Sequence[str]) -> NDArray[np.float64]:
@@ -210,12 +211,15 @@ class SumoDesiredSpeeds:
         flat = itertools.chain.from_iterable(map(self._position, ids))
         return self._fog.extinction(np.fromiter(flat, np.float64, 3 * len(ids)).reshape(-1, 3))
 
-    def _advised(self, vehicle: str, own: float, advised: float) -> float:
+    def _advised(self, vehicle: str, row: int, own: float, advised: float) -> float:
         """Top speed [m/s] of a driver who follows advice, once the delay is over."""
         time = self._roster.time
         if time - self._advised_since.get(vehicle, time) < self._compliance.delay:
             return own
-        return complied_speed(min(own, self._allowed(vehicle)), advised, self._compliance.strength)
+        compliance, visibility = self._compliance, self._table.values[row, Column.VISIBILITY]
+        belief = compliance.foreseen if visibility >= UNAFFECTED_ABOVE else 1.0
+        own = min(own, self._allowed(vehicle))
+        return complied_speed(own, advised, belief * compliance.strength, belief * compliance.trust)
 
     def _allowed(self, vehicle: str) -> float:
         """What the road allows a driver [m/s], whatever the top speed that the vehicle has been given."""

@@ -1,18 +1,18 @@
 """How fast drivers drive in fog, and how they follow advice; no simulation runs."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from fogsim.kinematics import safe_speed
+from fogsim.traffic.drivers.compliance import COMPLIANCES, Compliance, complied_speed
 from fogsim.traffic.drivers.speed_choice import (
     SPEED_CHOICES,
-    Compliance,
     DriverSetup,
     DriverTraits,
     chosen_speed,
-    complied_speed,
     desired_speed,
     driver_traits,
     observed,
@@ -78,6 +78,43 @@ def test_drivers_advised_30_mph_who_drive_61_can_be_represented() -> None:
     assert complied_speed(65 * mph, 30 * mph, 1.0) == pytest.approx(30 * mph)
     assert complied_speed(65 * mph, 30 * mph, 0.0) == pytest.approx(65 * mph)
     assert complied_speed(20 * mph, 30 * mph, 1.0) == pytest.approx(20 * mph)  # nobody is advised to go faster
+
+
+def test_measured_compliances_give_what_was_measured() -> None:
+    """Means over a population, in kinds of advice of `COMPLIANCES`; sources there."""
+
+    def mean(kind: str, own: float, advised: float, visibility: float) -> float:
+        setup = DriverSetup("unaffected", compliance=COMPLIANCES[kind])
+        drivers = [driver_traits(setup, f"vehicle {i}", 1) for i in range(4000)]
+        return float(np.mean([desired_speed(setup, d, own, visibility, advised, advised_for=10.0) for d in drivers]))
+
+    mph = 0.44704
+    # CAWS: 61 mph where 30 mph are advised, 1.1 mph less than without.
+    assert mean("advisory_sign", 62.1 * mph, 30.0 * mph, 50.0) == pytest.approx(61.0 * mph, rel=0.005)
+    # A16: 8 to 10 km/h less by a limit of 80 km/h; where drivers would drive 95 without.
+    assert 8.0 < 95.0 - mean("speed_limit_sign", 95.0 / KMH, 80.0 / KMH, 100.0) * KMH < 10.0
+    assert mean("full", 95.0 / KMH, 80.0 / KMH, 100.0) == pytest.approx(80.0 / KMH)
+    # By vehicles that are equipped alone.
+    assert 95.0 - mean("vehicle_to_vehicle", 95.0 / KMH, 80.0 / KMH, 100.0) * KMH == pytest.approx(
+        0.3 * (95.0 - mean("in_car", 95.0 / KMH, 80.0 / KMH, 100.0) * KMH), rel=0.08
+    )
+
+
+def test_who_trusts_a_sign_takes_its_speed_for_safe() -> None:
+    """A16 below 35 m: 29 km/h without signs, 60 km/h with signs that say 60."""
+    setup = DriverSetup(spread=0.0, compliance=replace(COMPLIANCES["speed_limit_sign"], rate=1.0))
+    driver, own = DriverTraits(1.0, follows_advice=True), 112.0 / KMH
+    assert desired_speed(setup, driver, own, 30.0) * KMH == pytest.approx(29.0, rel=0.03)
+    assert desired_speed(setup, driver, own, 30.0, 60.0 / KMH, 10.0) * KMH == pytest.approx(60.0)
+    assert desired_speed(setup, driver, 12.0, 30.0, 60.0 / KMH, 10.0) == 12.0  # but not faster than in clear air
+    distrusting = replace(setup, compliance=Compliance())
+    assert desired_speed(distrusting, driver, own, 30.0, 60.0 / KMH, 10.0) * KMH == pytest.approx(29.0, rel=0.03)
+
+
+def test_advice_may_be_believed_less_before_the_fog_is_seen() -> None:
+    setup, driver = DriverSetup("unaffected", compliance=Compliance(foreseen=0.25)), DriverTraits(1.0, True)
+    assert desired_speed(setup, driver, 30.0, math.inf, 20.0, 10.0) == pytest.approx(27.5)
+    assert desired_speed(setup, driver, 30.0, 100.0, 20.0, 10.0) == pytest.approx(20.0)
 
 
 def test_a_driver_desires_the_least_of_own_speed_choice_and_advice() -> None:

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from fogsim.traffic.sumo.claims import TOP_SPEED, Claims, SessionValues, new_session
+from fogsim.traffic.sumo.claims import TIME_HEADWAY, TOP_SPEED, Claims, SessionValues, new_session
 
 OWN = 30.0
 
@@ -44,6 +44,27 @@ def test_the_lowest_claim_holds_and_the_own_value_comes_back(api: Any) -> None:
     other.withdraw("v")
     assert api.vehicle.top_speed == 20.0
     one.withdraw("v")
+    assert api.vehicle.top_speed == OWN
+    assert not any(api.vehicle.parameters.values())
+
+
+def test_a_headway_grows_and_shrinks_and_comes_back(api: Any) -> None:
+    """The claim that is farthest from the own value holds."""
+    api.vehicle.getTau = lambda _: api.vehicle.top_speed
+    api.vehicle.setTau = api.vehicle.setMaxSpeed
+    one, other = (Claims(api, TIME_HEADWAY, session) for session in "12")
+    one.claim("v", 1.3 * OWN)
+    assert api.vehicle.top_speed == 1.3 * OWN
+    other.claim("v", 1.5 * OWN)
+    assert api.vehicle.top_speed == 1.5 * OWN
+    one.claim("v", 0.5 * OWN)
+    assert api.vehicle.top_speed == 0.5 * OWN
+    other.claim("v", 2.0 * OWN)  # as far as the half: the lower holds
+    assert api.vehicle.top_speed == 0.5 * OWN
+    assert one.own_value("v") == other.own_value("v") == OWN
+    one.withdraw("v")
+    assert api.vehicle.top_speed == 2.0 * OWN
+    other.withdraw("v")
     assert api.vehicle.top_speed == OWN
     assert not any(api.vehicle.parameters.values())
 

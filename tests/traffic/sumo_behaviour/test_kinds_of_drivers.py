@@ -1,0 +1,125 @@
+"""Kinds of drivers behind a leader in SUMO: who stays in sight, who falls back, and what is given back."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fogsim.atmosphere import FieldAccess
+from fogsim.traffic import DriverSetup, DriverSight, TraciLink, Traffic, TrafficSetup, libsumo_traffic, traci_traffic
+from fogsim.traffic.drivers.leader_reach import leader_reach
+from fogsim.traffic.drivers.speed_choice import observed
+from fogsim.traffic.sumo.libsumo_link import load_libsumo
+from fogsim.traffic.sumo_traffic import command_line
+from fogsim.units import extinction_from_visibility
+from fogsim.values import Command, FogField
+
+NET = Path(__file__).resolve().parents[3] / "scenarios" / "motorway_fog_bank" / "motorway.net.xml"
+SLOW, FAST = 13.4, 22.4
+VISIBILITY = 40.0
+SIGHT = DriverSight(10_000.0)
+STEP = 0.2
+# The leader is the ego, whose speed is no choice of FogSim's drivers.
+ROUTES = """<routes>
+  <vType id="leader" maxSpeed="{speed}" speedDev="0" sigma="0"/>
+  <vType id="c" tau="1.2" speedDev="0" sigma="0"/>
+  <route id="r" edges="approach bank exit"/>
+  <vehicle id="ego" type="leader" route="r" depart="0" departPos="60" departSpeed="{speed}" departLane="1"/>
+  <vehicle id="behind" type="c" route="r" depart="0" departPos="28" departSpeed="{speed}" departLane="1"/>
+</routes>"""
+
+
+def fog(visibility: float) -> FieldAccess:
+    return FieldAccess(FogField(extinction_from_visibility(visibility), (3000.0, 3000.0, 3000.0)))
+
+
+def setup_of(folder: Path, speed: float, drivers: DriverSetup) -> TrafficSetup:
+    routes = folder / "pair.rou.xml"
+    routes.write_text(ROUTES.format(speed=speed), encoding="utf-8")
+    return TrafficSetup(
+        net=NET,
+        routes=(routes,),
+        additional=(),
+        ego="ego",
+        step_length=STEP,
+        keep_lane=("ego", "behind"),
+        warm_up_limit=10.0,
+        advice_deceleration=2.0,
+        reading_radius=5000.0,
+        sight=SIGHT,
+        drivers=drivers,
+    )
+
+
+def gap_after(traffic: Traffic, seconds: float) -> float:
+    """Gap from the follower to its leader [m]."""
+    for _ in range(round(seconds / STEP)):
+        traffic.advance(Command())
+    snapshot = traffic.observe()
+    assert snapshot is not None
+    state = snapshot.state
+    front, behind = (state.position[state.row(v)][0] for v in ("ego", "behind"))
+    return float(front - behind) - 5.0
+
+
+def gap_of(kind: str, setup: TrafficSetup) -> float:
+    traffic = libsumo_traffic(setup)
+    traffic.enter_fog(fog(VISIBILITY))
+    try:
+        traffic.start(1)
+        return gap_after(traffic, 60.0)
+    finally:
+        traffic.close()
+
+
+@pytest.mark.parametrize("kind", ["in_sight", "unaffected", "careful", "out_of_sight"])
+def test_fog_parts_drivers_behind_a_fast_leader_and_not_behind_a_slow_one(tmp_path: Path, kind: str) -> None:
+    """Broughton, Switzer & Scott 2007: at 22.4 m/s some stay in sight, at less than 2 s, others lag out of it."""
+    drivers = DriverSetup(spread=0.0, following={kind: 1.0})
+    seen = leader_reach(SIGHT, VISIBILITY).farthest
+    assert SLOW < observed(VISIBILITY) < FAST
+    slow, fast = (gap_of(kind, setup_of(tmp_path, speed, drivers)) for speed in (SLOW, FAST))
+    assert slow < seen
+    if kind == "in_sight":
+        assert 0.5 * FAST < fast < min(seen, 2.0 * FAST)
+    else:
+        assert fast > 3.0 * seen
+
+
+def conduct(vehicle: str = "behind") -> tuple[float, ...]:
+    get = load_libsumo().vehicle
+    return get.getTau(vehicle), get.getSpeedFactor(vehicle), get.getMaxSpeed(vehicle)
+
+
+def test_headways_grow_and_are_given_back(tmp_path: Path) -> None:
+    traffic: Any = libsumo_traffic(setup_of(tmp_path, SLOW, DriverSetup(following={"careful": 1.0})))
+    traffic.enter_fog(fog(VISIBILITY))
+    try:
+        traffic.start(1)
+        gap_after(traffic, 4.0)
+        headway, factor, top_speed = conduct()
+        assert headway == pytest.approx(2.0)
+        assert factor == pytest.approx(observed.share(VISIBILITY))
+        assert top_speed < 25.0
+        traffic.enter_fog(fog(10_000.0))
+        gap_after(traffic, 3.0)
+        assert conduct()[:2] == (1.2, 1.0)
+        traffic.enter_fog(fog(VISIBILITY))
+        gap_after(traffic, 3.0)
+        assert conduct()[0] == pytest.approx(2.0)
+        traffic._release()
+        assert conduct() == (1.2, 1.0, pytest.approx(55.56, abs=0.01))
+    finally:
+        traffic.close()
+
+
+def test_over_a_connection_kinds_of_drivers_do_the_same(tmp_path: Path, sumo_process: Any) -> None:
+    setup = setup_of(tmp_path, FAST, DriverSetup(spread=0.0, following={"in_sight": 1.0}))
+    here = gap_of("in_sight", setup)
+    with sumo_process(command_line(setup, 1)) as (port, _):
+        link = TraciLink("127.0.0.1", port)
+        traffic = traci_traffic(setup, link)
+        traffic.enter_fog(fog(VISIBILITY))
+        traffic.start(1)
+        assert gap_after(traffic, 60.0) == pytest.approx(here, abs=1e-6)
+        link.end()

@@ -61,7 +61,8 @@ IN_CAR = Compliance(strength=0.55)
 """Advice on a display in the car.
 
 Guan et al. 2022, in a simulator (table 3): 92.2 km/h in place of 107.2 on the way into the fog and 64.8 in place of
-70.4 in dense fog, lower than with a sign beside. The advised speeds are not in what we have seen: 0.55 supposes 60 km/h.
+70.4 in dense fog, lower than with a sign beside. The advised speeds are not in what we have seen: 0.55 supposes
+60 km/h.
 """
 
 VEHICLE_TO_VEHICLE = Compliance(reached_share=0.3, strength=0.55)

@@ -1,15 +1,17 @@
 """Write those tables of the docs that are measured: ``python docs/make_measured_tables.py [--check] [NAME …]``.
 
-Without names all of them (minutes, for zhu2015). ``--check`` writes nothing and says which are not up to date; the last
-digit may differ by one, as rounding on another processor may. Three benchmarks write their own tables:
+Without names all of them (minutes, for zhu2015 and drivers). ``--check`` writes nothing and says which are out of date;
+the last digit may differ by one, as rounding on another processor may. Three benchmarks write their own tables:
 ``python benchmarks/estimator_accuracy.py --docs``, ``estimator_targets.py``, ``lead_accuracy.py``. The README has an
 excerpt of the first, so write it after that. ``make figures`` does all of it in order.
 """
 
 import argparse
+import functools
 import re
 import sys
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from make_tables import END, HERE, filled
 
@@ -17,6 +19,9 @@ ROOT = HERE.parent
 sys.path.insert(0, str(ROOT / "benchmarks"))
 
 import night_deviations  # noqa: E402 - from the folder that was just named
+
+if TYPE_CHECKING:
+    from fogsim.reproduce import Reproduction
 
 Rows = list[tuple[str, ...]]
 
@@ -55,6 +60,24 @@ def zhu2015() -> Rows:
     return list(REPRODUCTIONS["zhu2015"]().table)
 
 
+@functools.cache
+def reproduced_drivers() -> "Reproduction":
+    """What `fogsim reproduce drivers` tells; minutes."""
+    from fogsim.reproduce import REPRODUCTIONS  # noqa: PLC0415 - heavy, and the other tables do not need it
+
+    return REPRODUCTIONS["drivers"]()
+
+
+def drivers() -> Rows:
+    """Published findings of traffic in fog, and ours."""
+    return list(reproduced_drivers().table)
+
+
+def drivers_traffic() -> Rows:
+    """The default drivers' traffic by demand and visibility."""
+    return list(reproduced_drivers().tables[1].rows)
+
+
 TABLES: dict[str, tuple[str, Callable[[], Rows]]] = {
     "readme": ("README.md", readme),
     "night-veils": ("docs/night.md", night_deviations.veils),
@@ -63,6 +86,8 @@ TABLES: dict[str, tuple[str, Callable[[], Rows]]] = {
     "night-limits": ("docs/night.md", night_deviations.limits),
     "night-directions": ("docs/night.md", night_deviations.directions),
     "zhu2015": ("docs/estimators.md", zhu2015),
+    "drivers-published": ("docs/drivers.md", drivers),
+    "drivers-traffic": ("docs/drivers.md", drivers_traffic),
 }
 """Page and rows of each table, by its name and marker."""
 

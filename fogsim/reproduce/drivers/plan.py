@@ -15,7 +15,7 @@ DEFAULT, SEEING, SIGNED = "default", "see_through_fog", "with signs"
 POPULATIONS: Mapping[str, tuple[str, ...]] = {DEFAULT: (), SEEING: ("drivers.see_through_fog=true",)}
 """Who drives, by what is set in their scenario."""
 
-SPARSE, MEDIUM, DENSE = 600.0, 1200.0, 2400.0
+SPARSE, MEDIUM, DENSE = 600.0, 1200.0, 1800.0
 """Demands on both lanes [vehicles/h]."""
 
 CLEAR = math.inf

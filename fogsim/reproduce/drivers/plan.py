@@ -28,7 +28,10 @@ PAIRS_IN = 40.0
 """V_met in which drivers follow one leader each [m]; the study's fogs are not told in what we have seen."""
 
 SIGNS: Mapping[float, float] = {100.0: 80.0, 50.0: 60.0, 30.0: 60.0}
-"""What the A16's signs advise [km/h] by V_met [m]: 80 from 70 to 140 m, 60 below (Hogema & van der Horst 1997)."""
+"""What the A16's signs show [km/h] by V_met [m]: 80 from 70 to 140 m, 60 below (Hogema & van der Horst 1997)."""
+
+SIGNED_COMPLIANCE = "drivers.compliance.like=speed_limit_sign"
+"""How the default drivers follow them."""
 
 
 @dataclass(frozen=True, slots=True)

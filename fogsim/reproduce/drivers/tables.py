@@ -13,7 +13,6 @@ from fogsim.reproduce.result import Cell, Rows, TitledTable
 from fogsim.units import finite_or_none
 
 _COLUMNS: Mapping[str, tuple[str, float, int]] = {
-    "flow": ("flow, 1/h", 1.0, 0),
     "free_speed": ("free speed, km/h", 1.0, 1),
     "free_speed_sd": ("its sd", 1.0, 1),
     "overdriving": ("overdrives, %", 100.0, 0),
@@ -25,7 +24,6 @@ _COLUMNS: Mapping[str, tuple[str, float, int]] = {
     "following_distance": ("and gap, m", 1.0, 1),
     "ttc_15": ("TTC 15 %, s", 1.0, 0),
     "ttc_50": ("TTC 50 %, s", 1.0, 0),
-    "ttc_below_10": ("TTC < 10 s, %", 100.0, 1),
 }
 """Heading, factor and digits of what the tables of traffic show."""
 
@@ -40,10 +38,13 @@ def tables(results: Results, plan: Plan) -> tuple[TitledTable, ...]:
     plan : Plan
         What was run.
     """
-    seeds = f"{len(plan.seeds)} seeds, mean [95 % interval]"
-    found = TitledTable(f"What is published, and ours ({seeds})", findings_table(results, tuple(plan.populations)))
-    names = [*plan.populations, *({case.population for case in plan.cases} - {*plan.populations})]
-    traffic = (TitledTable(f"Traffic: {name} ({seeds})", _traffic(results, plan, name)) for name in names)
+    seeds, populations = f"{len(plan.seeds)} seeds", tuple(plan.populations)
+    found = TitledTable(
+        f"What is published, and ours ({seeds}, mean [95 % interval])", findings_table(results, populations)
+    )
+    names = [*populations, *dict.fromkeys(c.population for c in plan.cases if c.population not in populations)]
+    told = f"({seeds}, mean ± half the 95 % interval)"
+    traffic = (TitledTable(f"Traffic: {name} {told}", _traffic(results, plan, name)) for name in names)
     return (found, *traffic)
 
 
@@ -95,12 +96,18 @@ def _cell(value: Interval, factor: float, digits: int) -> str:
     return f"{mean} [{low}, {high}]"
 
 
+def _spread(value: Interval, factor: float, digits: int) -> str:
+    if math.isnan(value.mean):
+        return "—"
+    return f"{factor * value.mean:.{digits}f} ± {0.5 * factor * (value.high - value.low):.{digits}f}"
+
+
 def _traffic(results: Results, plan: Plan, population: str) -> Rows:
     rows = [("demand, 1/h", "V_met, m", *(heading for heading, _, _ in _COLUMNS.values()))]
     for case in plan.cases:
         if case.population == population:
             cells = (
-                _cell(interval(results.over_seeds(case, name)), factor, digits)
+                _spread(interval(results.over_seeds(case, name)), factor, digits)
                 for name, (_, factor, digits) in _COLUMNS.items()
             )
             rows.append((f"{case.demand:.0f}", _metres(case.visibility), *cells))

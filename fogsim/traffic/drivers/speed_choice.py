@@ -105,10 +105,13 @@ class ObservedSpeed:
     Two tendencies, of which the slower holds. Fog makes people drive slower than they otherwise would, by a share that
     grows from nothing at 200 m (White & Jeffery 1980) to 18 % in severe fog (Pretto et al. 2012: 70 km/h where 85 km/h
     was to be driven; SHRP2: 10 % in near fog, 3 % in distant fog); so it does in a town, too. And they drive no faster
-    than so many times the safe speed: twice (I-77: mean speeds were twice the safe speed), but not more than once where
-    they see next to nothing (A16 without signs below 35 m: 29 km/h on average, which is the safe speed at 30 m).
+    than so many times the safe speed: about twice (I-77: mean speeds were twice the safe speed), but not more than once
+    where they see next to nothing (A16 without signs below 35 m: 29 km/h on average, which is the safe speed at 30 m).
     Between, the ratio is linear in visibility: FogSim's own link. So overdriving is worst between 40 and 100 m (Hogema
     & van der Horst 1994), and at 50 m more than half drive faster than they can stop within what they see (SR281).
+
+    How the share bends, and the ratio of 2.1, were calibrated to these sizes in motorway traffic (`fogsim reproduce
+    drivers` with its calibration seeds): vehicles behind slower ones drive slower than they would by themselves.
 
     Attributes
     ----------
@@ -124,14 +127,17 @@ class ObservedSpeed:
         Visibility from which they drive so much faster than is safe [m].
     safe_up_to : float
         Visibility up to which they drive no faster than is safe [m].
+    curvature : float
+        Power of the density with which that share falls [-]; 1 is linear.
     """
 
     unaffected_above: float = UNAFFECTED_ABOVE
     slowest_share: float = 0.82
     severe: float = 30.0
-    overdriving: float = 2.0
+    overdriving: float = 2.1
     overdriving_from: float = 50.0
     safe_up_to: float = 30.0
+    curvature: float = 1.5
 
     def __call__(self, visibility: float) -> float:
         """Speed that a driver will not exceed [m/s]; ``inf`` where fog does not matter.
@@ -155,7 +161,7 @@ class ObservedSpeed:
             Meteorological visibility [m].
         """
         density = _clipped((self.unaffected_above - visibility) / (self.unaffected_above - self.severe))
-        return 1.0 - (1.0 - self.slowest_share) * density
+        return 1.0 - (1.0 - self.slowest_share) * density**self.curvature
 
 
 observed = ObservedSpeed()

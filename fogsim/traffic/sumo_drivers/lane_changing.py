@@ -44,6 +44,9 @@ STANDING_REACH = 150.0
 SOON_STANDING = 5.0
 """Who drives slower than this may stand before the next look [m/s]: braking hard, or after a collision."""
 
+MUCH_FASTER = 2.0
+"""Who drives so much faster in the lane to the left holds nobody back, seen or not [m/s]."""
+
 _NEVER, _ALWAYS = -1.0, 1.0
 _RESPECT = 0x300
 _NO_OVERLAP = 0x100
@@ -253,14 +256,17 @@ class LaneChanging:
                 switch.begin_anew(drivers, self._roster.present)
 
     def _free_to_the_left(self, drivers: Sequence[str], own_lamps: OwnLamps) -> dict[str, None]:
-        """Drivers to whom the lane to the left looks free ahead, though there is somebody."""
+        """Drivers to whom the lane to the left looks free ahead, though there is somebody who is hardly faster."""
         unseen: dict[str, None] = {}
         doubtful: list[tuple[str, str]] = []
+        left_leader, speed, sure = self._neighbours.left_leader, self._leaders.speed, self._certainly_seen
         for driver in drivers:
-            ahead = self._neighbours.left_leader(driver)
-            if ahead is not None and ahead[1] > self._certainly_hidden:
+            ahead = left_leader(driver)
+            if ahead is None or ahead[1] <= sure or speed(ahead[0]) > speed(driver) + MUCH_FASTER:
+                continue
+            if ahead[1] > self._certainly_hidden:
                 unseen[driver] = None
-            elif ahead is not None and ahead[1] > self._certainly_seen:
+            else:
                 doubtful.append((driver, ahead[0]))
         perceived = self._sight.perceive(doubtful, own_lamps, self._roster.time)
         return unseen | {driver: None for (driver, _), is_perceived in perceived.items() if not is_perceived}

@@ -214,14 +214,15 @@ def trips(
         ``roundabout`` for traffic that drives through the network's first one.
     """
     rng = np.random.default_rng(1)
-    usable, ring = _edges(net)
+    root = _root(net)
+    usable, ring = _edges(root)
     rows = [f'<vType id="{name}" {told}/>' for name, told in TYPES.items()]
     users = [user for user in ROAD_USERS if usable[user]]
     for number, user in zip(range(int(per_hour * seconds / 3600.0)), itertools.cycle(users), strict=False):
         depart, edges = number * 3600.0 / per_hour, usable[user]
         start, end = (quoteattr(edges[place]) for place in rng.choice(len(edges), 2, replace=len(edges) < 2))
         # A bus halts for a while wherever its way ends.
-        inner = f'<stop lane={quoteattr(_lane(net, end[1:-1]))} duration="20"/>' if user == "bus" else ""
+        inner = f'<stop lane={quoteattr(_lane(root, end[1:-1]))} duration="20"/>' if user == "bus" else ""
         via = f" via={quoteattr(ring[number % len(ring)])}" if through else ""
         rows.append(
             f'<trip id="{user}{number}" type="{user}" depart="{depart:.1f}" from={start} to={end}{via}'
@@ -239,9 +240,8 @@ def _root(net: Path) -> ET.Element:
         return ET.parse(file).getroot()  # noqa: S314 - a file of an installed package, or made here
 
 
-def _edges(net: Path) -> tuple[dict[str, list[str]], list[str]]:
+def _edges(root: ET.Element) -> tuple[dict[str, list[str]], list[str]]:
     """Edges on which each type may drive, and those of the first roundabout."""
-    root = _root(net)
     usable: dict[str, list[str]] = {name: [] for name in TYPES}
     classes = {name: told.split('"')[1] for name, told in TYPES.items()}
     for edge in root.iterfind("edge"):
@@ -259,9 +259,9 @@ def _admits(lane: ET.Element, vehicle_class: str) -> bool:
     return vehicle_class in allowed.split() if allowed else vehicle_class not in barred.split() and barred != "all"
 
 
-def _lane(net: Path, edge: str) -> str:
+def _lane(root: ET.Element, edge: str) -> str:
     """A lane of an edge on which a bus may stop."""
-    found = next(found for found in _root(net).iterfind("edge") if found.get("id") == edge)
+    found = next(found for found in root.iterfind("edge") if found.get("id") == edge)
     return next(lane.get("id", "") for lane in found.iterfind("lane") if _admits(lane, "bus"))
 
 

@@ -1,9 +1,11 @@
 """Cost of reading, perceiving and obeying, as a ratio to the bare SUMO step of the same run.
 
-A straight road with three lanes carries a number of vehicles on 10 km, the ego in their middle; step 0.1 s, homogeneous
-fog with a visibility of 100 m by day. Blocks of bare SUMO steps alternate with blocks of whole traffic steps: drivers
-look (perception) and choose their speed, SUMO steps, collisions are watched, and all vehicles within 1000 m of the ego
-are read. After 50 s the traffic starts anew, before any vehicle arrives.
+On ``motorway`` a straight road with three lanes carries a number of vehicles on 10 km, the ego in their middle; in
+``town`` they wander through a grid of junctions with lights, as large as they need, the ego from its middle on. Step
+0.1 s, homogeneous fog with a visibility of 100 m by day, drivers as they are by default. Blocks of bare SUMO steps
+alternate with blocks of whole traffic steps: drivers look (perception) and choose their speed, SUMO steps, collisions
+are watched, and all vehicles within 1000 m of the ego are read. After 50 s the traffic starts anew, before any vehicle
+arrives.
 
 Times are medians over blocks [ms]. ``ratio`` is the median of the ratios of neighbouring blocks; a quarter of them lie
 below ``ratio_low``, a quarter above ``ratio_high``. ``ratio_quiet`` is that of the least times of either kind, which
@@ -11,21 +13,29 @@ other work on the machine disturbs least. ``ms_state`` is the share of the readi
 
 The simulation is a .sumocfg with SUMO's own defaults, which FogSim's own scenarios share.
 
-    python benchmarks/traffic.py [--json] [--vehicles 20 --vehicles 100 …] [--seconds 10] [--blind]
+    python benchmarks/traffic.py [--json] [--network town] [--vehicles 20 --vehicles 100 …] [--seconds 10] [--blind]
+        [--visibility 100] [--profile]
 
-``--blind`` leaves perception and speed choice out.
+``--blind`` leaves perception and speed choice out; ``--profile`` tells where the time of the whole steps goes.
 """
 
 import argparse
+import cProfile
+import dataclasses
 import json
+import pstats
 import statistics
 import tempfile
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from traffic_town import town_configuration
+
 from fogsim.atmosphere import FieldAccess
-from fogsim.traffic import DriverSetup, DriverSight, TrafficSetup
+from fogsim.scenario import build
+from fogsim.scenario.loading import clock_settings, scenario_from_config
+from fogsim.traffic import DriverSetup, TrafficSetup
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo_traffic import SumoTraffic
 from fogsim.units import extinction_from_visibility
@@ -100,15 +110,30 @@ def timed(call: Callable[[], object]) -> float:
     return 1e3 * (time.perf_counter() - started)
 
 
-def measure(vehicles: int, seconds: float, blind: bool) -> dict[str, float]:
+CONFIGURATIONS = {"motorway": configuration, "town": town_configuration}
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Task:
+    """What is measured: a network, for a time [s], in a visibility [m], with drivers who see through it or not."""
+
+    network: str
+    seconds: float
+    visibility: float
+    blind: bool
+
+
+def measure(task: Task, vehicles: int, profile: cProfile.Profile | None) -> dict[str, float]:
     """One record."""
     link = LibsumoLink()
     blocks: list[Block] = []
-    until = time.perf_counter() + seconds
+    until = time.perf_counter() + task.seconds
+    fog = FogField(extinction_from_visibility(task.visibility), (3000.0, 3000.0, 3000.0))
     with tempfile.TemporaryDirectory() as name:
-        traffic = SumoTraffic(setup(Path(name), vehicles, blind), link)
-        if not blind:
-            traffic.enter_fog(FieldAccess(FogField(extinction_from_visibility(100.0), (3000.0, 3000.0, 3000.0))))
+        config = CONFIGURATIONS[task.network](Path(name), vehicles)
+        traffic = SumoTraffic(setup(config, task.blind), link)
+        if not task.blind:
+            traffic.enter_fog(FieldAccess(fog))
         for number in range(ROUNDS):
             if number and time.perf_counter() > until:
                 break
@@ -116,35 +141,27 @@ def measure(vehicles: int, seconds: float, blind: bool) -> dict[str, float]:
             for _ in range(100):
                 traffic.advance(Command())
                 traffic.observe()
-            blocks += [block(traffic, link) for _ in range(BLOCKS)]
+            blocks += [block(traffic, link, profile) for _ in range(BLOCKS)]
         snapshot = traffic.observe()
         traffic.close()
     return {**summary(blocks), "vehicles_read": 0 if snapshot is None else len(snapshot.state.ids)}
 
 
-def setup(folder: Path, vehicles: int, blind: bool) -> TrafficSetup:
+def setup(config: Path, blind: bool) -> TrafficSetup:
     """The simulation."""
-    return TrafficSetup(
-        net=None,
-        config=configuration(folder, vehicles),
-        routes=(),
-        additional=(),
-        ego="ego",
-        step_length=STEP,
-        keep_lane=(),
-        warm_up_limit=60.0,
-        advice_deceleration=2.0,
-        reading_radius=1000.0,
-        sight=None if blind else DriverSight(illuminance=10_000.0),
-        drivers=DriverSetup(speed_choice="unaffected" if blind else "too_fast"),
-    )
+    clocks = clock_settings(STEP, STEP, STEP)
+    usual = build.traffic_setup(scenario_from_config(config, "ego", [*clocks, "fog.visibility_m=100"]))
+    usual = dataclasses.replace(usual, reading_radius=1000.0)
+    if not blind:
+        return usual
+    return dataclasses.replace(usual, sight=None, drivers=DriverSetup(speed_choice="unaffected"))
 
 
 Block = tuple[float, float, float]
 """Milliseconds that a bare SUMO step, a whole step, and the reading in it take on average."""
 
 
-def block(traffic: SumoTraffic, link: LibsumoLink) -> Block:
+def block(traffic: SumoTraffic, link: LibsumoLink, profile: cProfile.Profile | None) -> Block:
     """A block of bare and one of whole steps."""
     command = Command()
     bare = sum(timed(link.step) for _ in range(STEPS))
@@ -152,9 +169,13 @@ def block(traffic: SumoTraffic, link: LibsumoLink) -> Block:
     traffic.advance(command)
     traffic.observe()
     moving = reading = 0.0
+    if profile is not None:
+        profile.enable()
     for _ in range(STEPS):
         moving += timed(lambda: traffic.advance(command))
         reading += timed(traffic.observe)
+    if profile is not None:
+        profile.disable()
     return bare / STEPS, (moving + reading) / STEPS, reading / STEPS
 
 
@@ -179,17 +200,26 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
     parser.add_argument("--vehicles", action="append", type=int, help="vehicles (default 20, 100, 500 and 2000)")
+    parser.add_argument("--network", action="append", choices=[*CONFIGURATIONS], help="which (default both)")
+    parser.add_argument("--visibility", type=float, default=100.0, help="V_met [m]")
+    parser.add_argument("--profile", action="store_true", help="tell where the time goes, and no ratio to be trusted")
     parser.add_argument("--seconds", type=float, default=10.0, help="time to measure for each number")
     parser.add_argument("--blind", action="store_true", help="leave perception and speed choice out")
     arguments = parser.parse_args()
     counts = arguments.vehicles or [20, 100, 500, 2000]
-    records = [{"vehicles": n, **measure(n, arguments.seconds, arguments.blind)} for n in counts]
+    profile = cProfile.Profile() if arguments.profile else None
+    records = []
+    for network in arguments.network or [*CONFIGURATIONS]:
+        task = Task(network, arguments.seconds, arguments.visibility, arguments.blind)
+        records += [{"network": network, "vehicles": n, **measure(task, n, profile)} for n in counts]
     if arguments.json:
         print(json.dumps(records, indent=2))
         return
     print("  ".join(f"{key:>13}" for key in records[0]))
     for record in records:
         print("  ".join(f"{value:>13}" for value in record.values()))
+    if profile is not None:
+        pstats.Stats(profile).sort_stats("tottime").print_stats(40)
 
 
 if __name__ == "__main__":

@@ -25,7 +25,9 @@ import tempfile
 import time
 import traceback
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -187,13 +189,18 @@ def measured(networks: Sequence[Network], task: Task, jobs: int) -> Iterator[Rec
         for network in networks:
             yield from measure(network, task)
         return
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(jobs, mp_context=context, max_tasks_per_child=1) as pool:
-        for network, running in [(network, pool.submit(measure_named, network.name, task)) for network in networks]:
-            try:
-                yield from running.result()
-            except Exception as error:  # noqa: BLE001 - also the end of that process
-                yield {"network": network.name, "error": repr(error)}
+    with ThreadPoolExecutor(jobs) as pool:
+        for records in pool.map(partial(measure_apart, task), networks):
+            yield from records
+
+
+def measure_apart(task: Task, network: Network) -> list[Record]:
+    """Records of a network, measured in a process of its own."""
+    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+        try:
+            return pool.submit(measure_named, network.name, task).result()
+        except BrokenProcessPool as end:
+            return [{"network": network.name, "error": f"{network.name}: {end!r}"}]
 
 
 def measure_named(name: str, task: Task) -> list[Record]:

@@ -14,7 +14,7 @@ BLOCK = 150.0
 PER_BLOCK = 2.5
 """Vehicles a street between two junctions, both ways together: as many as flow."""
 
-WAY = 80
+WAY = 25
 """Streets on a vehicle's way, more than it comes through in the time of a round."""
 
 STRAIGHT_ON = 0.7

@@ -14,9 +14,10 @@ from fogsim.traffic.appearance import OTHERS_LAMPS
 from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST, intensity_toward
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo.due_vehicles import DueVehicles
-from fogsim.traffic.sumo.link import Api, vehicle_getter
+from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
+from fogsim.traffic.sumo_drivers.junctions.junction_foes import JunctionFoes
 from fogsim.traffic.sumo_drivers.junctions.unseen_foes import UnseenFoes
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
 from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
@@ -91,7 +92,7 @@ class JunctionSight:
     ) -> None:
         self._roster = roster
         self._reaction_time = sight.reaction_time
-        self._foes = vehicle_getter(api, "getJunctionFoes")
+        self._foes = JunctionFoes(api)
         self._speed, self._position, self._lane, self._lane_position = vehicle_getters(
             api, remote, ("getSpeed", "getPosition3D", "getLaneID", "getLanePosition")
         )
@@ -138,7 +139,7 @@ class JunctionSight:
             self._due.schedule((driver,), ALONG_A_LANE)
             return {}
         doubtful: dict[str, float] = {}
-        near = self._foes(driver, yielding + speed * speed / (2.0 * BRAKING))
+        near = self._foes.ahead_of(driver, yielding + speed * speed / (2.0 * BRAKING))
         for foe, way, foe_way, _, _, _, _, must_yield, _ in near:
             is_there = foe_way <= ON_JUNCTION
             # No straight line is longer than a way between the same places.

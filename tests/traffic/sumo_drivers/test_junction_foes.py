@@ -1,0 +1,55 @@
+"""Foes at junctions: SUMO's own answer, and none where nobody has the right of way, for there SUMO would crash."""
+
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import sumo
+
+from fogsim.traffic.sumo.libsumo_link import load_libsumo
+from fogsim.traffic.sumo_drivers.junctions.junction_foes import JunctionFoes, unregulated_junctions
+
+CROSSING_WAYS = (("A1B1", "B1C1"), ("B0B1", "B1B2"), ("C1B1", "B1A1"))
+
+
+@contextmanager
+def crossing(folder: Path, kind: str) -> Iterator[Any]:
+    """Cars that meet at junctions of a kind."""
+    net, routes = folder / "cross.net.xml", folder / "cross.rou.xml"
+    grid = ["--grid", "--grid.number", "3", "--default-junction-type", kind, "-o", str(net)]
+    subprocess.run([Path(sumo.SUMO_HOME, "bin", "netgenerate"), *grid], check=True, capture_output=True)
+    cars = (f'<vehicle id="{a}" depart="0"><route edges="{a} {b}"/></vehicle>' for a, b in CROSSING_WAYS)
+    routes.write_text(f"<routes>{''.join(cars)}</routes>", encoding="utf-8")
+    libsumo = load_libsumo()
+    libsumo.start(["sumo", "-n", str(net), "-r", str(routes), "--no-step-log", "--no-warnings"])
+    try:
+        yield libsumo
+    finally:
+        libsumo.close()
+
+
+def foes_met(libsumo: Any) -> set[str]:
+    """Everybody who is anybody's foe on the way."""
+    foes, met = JunctionFoes(libsumo), set()
+    for _ in range(25):
+        libsumo.simulationStep()
+        met.update(foe[0] for driver in libsumo.vehicle.getIDList() for foe in foes.ahead_of(driver, 80.0))
+    return met
+
+
+def test_foes_are_sumos_own(tmp_path: Path) -> None:
+    with crossing(tmp_path, "priority") as libsumo:
+        assert not unregulated_junctions(tmp_path / "cross.net.xml")
+        assert foes_met(libsumo) == {first for first, _ in CROSSING_WAYS}
+
+
+def test_where_nobody_has_the_right_of_way_there_are_none(tmp_path: Path) -> None:
+    with crossing(tmp_path, "unregulated") as libsumo:
+        assert "B1" in unregulated_junctions(tmp_path / "cross.net.xml")
+        assert foes_met(libsumo) == set()
+
+
+def test_a_network_that_is_elsewhere_is_not_looked_into(tmp_path: Path) -> None:
+    assert unregulated_junctions(tmp_path / "elsewhere.net.xml") == frozenset()

@@ -13,6 +13,9 @@ from dataclasses import dataclass, field
 from fogsim.registry import Registry
 from fogsim.traffic.drivers.leader_reach import LeaderReach
 
+CATCHING_UP = 5.0
+"""Who keeps up with a leader is ready to drive so much faster, as IDM must be to hold a gap [m/s]; FogSim's own."""
+
 RECOMMENDED_HEADWAY = 2.0
 """Time headway that traffic education recommends [s] (the two-second rule)."""
 
@@ -92,7 +95,7 @@ class InSight(FollowingModel):
         No headway is shorter for that [s]; FogSim's own.
     """
 
-    kept_share: float = 0.9
+    kept_share: float = 0.7
     shortest: float = 0.5
     keeps_up: bool = field(default=True, kw_only=True)
 

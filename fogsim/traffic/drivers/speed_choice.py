@@ -288,6 +288,7 @@ def desired_speed(
     advised: float = math.inf,
     advised_for: float = 0.0,
     room: float = math.inf,
+    kept: float = 0.0,
 ) -> float:
     """Speed that a driver wants to drive [m/s], never more than the own one.
 
@@ -307,9 +308,11 @@ def desired_speed(
         Time since there is advice for them [s].
     room : float
         Speed that they do not exceed so as not to come too near to a leader [m/s].
+    kept : float
+        Speed at which they keep up with a leader [m/s]; 0 if they do not.
     """
     chosen = chosen_speed(SPEED_CHOICES[setup.speed_choice], driver.speed_factor, own, visibility)
-    chosen = min(chosen, room)
+    chosen = min(max(min(chosen, room), kept), own)
     compliance = setup.compliance
     if not driver.follows_advice or advised_for < compliance.delay or math.isinf(advised):
         return chosen

@@ -8,11 +8,12 @@ import numpy as np
 from highway_env.vehicle.behavior import IDMVehicle
 
 from fogsim.traffic.drivers.advice_hearing import AdviceHearing
-from fogsim.traffic.drivers.following import FOLLOWING_MODELS, Surroundings, misjudged_headway
+from fogsim.traffic.drivers.following import CATCHING_UP, FOLLOWING_MODELS, Surroundings, misjudged_headway
 from fogsim.traffic.drivers.leader_reach import drivers_visibility, leader_reach
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.drivers.speed_choice import (
     CHOICE_PERIOD,
+    UNAFFECTED_ABOVE,
     DriverSetup,
     DriverTraits,
     desired_speed,
@@ -90,7 +91,7 @@ class HighwayDesiredSpeeds:
         for vehicle, visibility in zip(vehicles, self._visibilities(vehicles), strict=True):
             vehicle_id = name(vehicle)
             driver = self._traits_of(vehicle_id)
-            room = self._follow(vehicle, driver, visibility)
+            room, kept = self._follow(vehicle, driver, visibility)
             own = min(self._own_speed.get(vehicle, vehicle.target_speed), speed_limit(vehicle.lane))
             desired = desired_speed(
                 self._setup,
@@ -100,6 +101,7 @@ class HighwayDesiredSpeeds:
                 advised.get(vehicle_id, math.inf),
                 time - self._advised_since.get(vehicle_id, time),
                 room,
+                kept,
             )
             if desired < own:
                 self._desired[vehicle] = desired
@@ -110,8 +112,8 @@ class HighwayDesiredSpeeds:
         extinction = self.fog.extinction(np.array([front_bumper(v) for v in vehicles]))
         return [visibility_from_extinction(float(k)) for k in extinction]
 
-    def _follow(self, vehicle: Any, driver: DriverTraits, visibility: float) -> float:
-        """Set a driver's wanted headway, and give the speed that is not exceeded for the room to a leader [m/s]."""
+    def _follow(self, vehicle: Any, driver: DriverTraits, visibility: float) -> tuple[float, float]:
+        """Set a driver's wanted headway; the speed not exceeded for the room to a leader, and that to keep up [m/s]."""
         reach, model = leader_reach(self._sight, visibility), FOLLOWING_MODELS[driver.following]
         own = self._own_headway.setdefault(vehicle, vehicle.TIME_WANTED)
         seen = drivers_visibility(self._sight, visibility)
@@ -119,7 +121,10 @@ class HighwayDesiredSpeeds:
         wanted = misjudged_headway(model.headway(own, around), around, self._setup.misjudgement)
         if wanted != vehicle.TIME_WANTED:
             vehicle.TIME_WANTED = wanted
-        return model.top_speed(reach)
+        # A road in fog names only a leader whom the driver perceives.
+        keeps_up = model.keeps_up and self._sight is not None and seen < UNAFFECTED_ABOVE
+        leader = self._fleet.environment.road.neighbour_vehicles(vehicle)[0] if keeps_up else None
+        return model.top_speed(reach), 0.0 if leader is None else float(leader.speed) + CATCHING_UP
 
     def _traits_of(self, vehicle: str) -> DriverTraits:
         if vehicle not in self._traits:

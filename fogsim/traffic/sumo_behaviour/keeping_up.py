@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.traffic.drivers.following import CATCHING_UP
 from fogsim.traffic.drivers.leader_reach import leader_reach
 from fogsim.traffic.drivers.sight import DriverSight
 from fogsim.traffic.drivers.speed_choice import UNAFFECTED_ABOVE
@@ -13,9 +14,6 @@ from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
 from fogsim.traffic.sumo_behaviour.driver_table import Column, DriverTable
 from fogsim.traffic.sumo_drivers.perception import REACH
 from fogsim.units import visibility_from_extinction
-
-CATCHING_UP = 1.0
-"""They drive so much faster than the leader if they must, so as to stay near [m/s]."""
 
 
 class KeepingUp:

@@ -45,9 +45,9 @@ def test_fog_parts_drivers_above_some_speed() -> None:
     assert SLOW < out_of_sight.top_speed(slow.reach) < FAST
     # Those who keep the leader in sight do so at less than the recommended 2 s.
     kept = in_sight.headway(2.0, fast)
-    assert kept * FAST + GAP == pytest.approx(0.9 * fast.reach.farthest)
+    assert kept * FAST + GAP == pytest.approx(0.7 * fast.reach.farthest)
     assert kept < 2.0
-    assert in_sight.headway(2.0, slow) == 2.0
+    assert in_sight.headway(2.0, slow) == pytest.approx(2.0, rel=0.01)
     assert in_sight.headway(1.0, fast) == 1.0  # who is near by himself sees the leader
     assert in_sight.headway(2.0, around(5.0, FAST)) == in_sight.shortest
 

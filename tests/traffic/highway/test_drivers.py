@@ -237,3 +237,24 @@ def test_the_same_seed_gives_the_same_run_and_another_other_drivers() -> None:
     assert np.array_equal(run(5), run(5))
     assert not np.array_equal(run(5), run(6))
     assert driver_traits(setup, "lead", 5) != driver_traits(setup, "lead", 6)
+
+
+@pytest.mark.parametrize(("kind", "stays"), [("in_sight", True), ("out_of_sight", False)])
+def test_fog_parts_drivers_behind_a_fast_leader(kind: str, stays: bool) -> None:
+    """Broughton, Switzer & Scott 2007; the leader is the ego, which drives 22.4 m/s in fog of 40 m."""
+    sight = DriverSight(DAY)
+    road = Road(DriverSetup(spread=0.0, following={kind: 1.0}), 40.0, sight=sight)
+    ego, follower = road.environment.vehicle, road.others[0]
+    follower.position = ego.position - np.array([35.0, 0.0])
+    follower.heading, follower.lane_index, follower.target_lane_index = ego.heading, ego.lane_index, ego.lane_index
+    # A car and its IDM; the others are out of the way.
+    road.environment.road.vehicles[:] = [ego, follower]
+    for vehicle in (ego, follower):
+        vehicle.speed = vehicle.target_speed = 22.4
+        vehicle.enable_lane_change = False
+    follower.target_speed = FAST
+    road.drive(30.0, Command(SpeedAdvice(22.4)))
+    gap = float(ego.position[0] - follower.position[0]) - 5.0
+    assert (gap < leader_reach(sight, 40.0).farthest) == stays
+    # IDM wants 1.5 s in clear air.
+    assert (follower.TIME_WANTED < 1.5) == stays

@@ -25,7 +25,7 @@ PART = Plan(
 def done() -> Reproduction:
     told = []
     done = reproduce(PART, watch=lambda step, total: told.append((step, total)))
-    assert told == [(step, 9) for step in range(10)]
+    assert told == [(step, 13) for step in range(14)]
     return done
 
 
@@ -50,6 +50,7 @@ def test_what_was_not_run_is_not_compared(done) -> None:
     verdicts = {r["measure"]: r["verdict"] for r in done.records if "verdict" in r and r["population"] == DEFAULT}
     assert verdicts["signs_at_100m"] == Verdict.UNKNOWN
     assert verdicts["speed_in_near_fog"] != Verdict.UNKNOWN
+    assert verdicts["headway_of_careful"] == verdicts["headway_of_misjudging"] == Verdict.RIGHT
 
 
 def test_drivers_slow_down_in_fog_and_pass_as_often_as_they_come(done) -> None:

@@ -6,7 +6,7 @@ from fogsim.reproduce.drivers.motorway import drive
 from fogsim.reproduce.drivers.pairs import PairMeasures, follow
 from fogsim.reproduce.drivers.passages import Measures, measured
 from fogsim.reproduce.drivers.picture import picture
-from fogsim.reproduce.drivers.plan import DEFAULT, SIGNED, SIGNED_COMPLIANCE, SIGNS, Case, Pair, Plan
+from fogsim.reproduce.drivers.plan import SIGNED, SIGNS, Case, Pair, Plan
 from fogsim.reproduce.drivers.results import Results
 from fogsim.reproduce.drivers.tables import records, tables
 from fogsim.reproduce.result import Reproduction, Steps, Watch, unwatched
@@ -55,10 +55,9 @@ def reproduce(plan: Plan | None = None, *, watch: Watch = unwatched) -> Reproduc
 
 
 def _run(case: Case | Pair, seed: int, plan: Plan) -> Measures | PairMeasures:
+    overrides = plan.overrides(case)
     if isinstance(case, Pair):
-        return follow(plan.populations[case.population], case.leader_speed, case.visibility, seed, plan.followers)
-    signed = case.population == SIGNED
-    overrides = (*plan.populations[DEFAULT], SIGNED_COMPLIANCE) if signed else plan.populations[case.population]
-    advised = SIGNS[case.visibility] / KMH_PER_MPS if signed else math.inf
+        return follow(overrides, case.leader_speed, case.visibility, seed, plan.followers)
+    advised = SIGNS[case.visibility] / KMH_PER_MPS if case.population == SIGNED else math.inf
     seen = drive(overrides, case.demand, case.visibility, seed, plan.seconds, advised)
     return measured(seen, case.visibility, plan.seconds)

@@ -8,6 +8,8 @@ Of the reports only abstracts and summaries have been seen:
 - C-6: Hogema & van der Horst 1994, TNO-TM; loops on a two-lane motorway near Breda, by day, a year
 - A16: Hogema & van der Horst 1997, as the US DOT's database of benefits tells it
 - Broughton: Broughton, Switzer & Scott 2007, a simulator, behind leaders of 13.4 and 22.4 m/s; its fogs are not told
+- van der Hulst: van der Hulst, Rothengatter & Meijman 1999, a simulator
+- Cavallo: Cavallo & Beaudoin, a simulator; leaders of 50 to 90 km/h in a visibility of 30 m, by night
 - SHRP2: Transportation Research Record 2018, doi 10.1177/0361198118774748; how near its "near fog" is, is not told
 """
 
@@ -17,7 +19,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.reproduce.drivers.plan import CLEAR, FAST, PAIRS_IN, SLOW, SPARSE
+from fogsim.reproduce.drivers.plan import CAREFUL, CLEAR, FAST, MISJUDGING, PAIRS_IN, SLOW, SPARSE
 from fogsim.reproduce.drivers.published import Bound, Finding, Look, Sign, Size
 
 Values = NDArray[np.float64]
@@ -60,6 +62,11 @@ def _sign_effect(measure: str, visibility: float) -> Ours:
 def _over_clear(measure: str) -> Ours:
     """Mean over 50 to 100 m, over that in clear air [-]."""
     return lambda look: _mean_over(DENSE_FOGS, lambda v: look(measure, v)) / look(measure, CLEAR)
+
+
+def _kind_over_clear(kind: str) -> Ours:
+    """Headway of a kind of drivers behind a slow leader, over that in clear air [-]."""
+    return lambda look: look.kind(kind, "headway", SLOW, PAIRS_IN) / look.kind(kind, "headway", SLOW, CLEAR)
 
 
 def _least_fall(look: Look) -> Values:
@@ -245,6 +252,20 @@ FOLLOWERS: tuple[Finding, ...] = (
         "Broughton",
         Bound(0.0, 2.0, "s"),
         lambda look: look.pair("headway_in_sight", FAST, PAIRS_IN),
+    ),
+    Finding(
+        "headway_of_careful",
+        "headways grow in fog without time pressure (ours: `careful` drivers behind 13.4 m/s, 40 m)",
+        "van der Hulst",
+        Sign(rises=True, unit="of clear air", origin=1.0),
+        _kind_over_clear(CAREFUL),
+    ),
+    Finding(
+        "headway_of_misjudging",
+        "headways shorten where only lamps are seen (ours: misjudgement 0.45, night, behind 13.4 m/s, 40 m)",
+        "Cavallo",
+        Sign(rises=False, unit="of clear air", origin=1.0),
+        _kind_over_clear(MISJUDGING),
     ),
 )
 

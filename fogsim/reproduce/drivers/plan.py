@@ -15,6 +15,14 @@ DEFAULT, SEEING, SIGNED = "default", "see_through_fog", "with signs"
 POPULATIONS: Mapping[str, tuple[str, ...]] = {DEFAULT: (), SEEING: ("drivers.see_through_fog=true",)}
 """Who drives, by what is set in their scenario."""
 
+CAREFUL, MISJUDGING = "careful", "misjudging, by night"
+
+KINDS: Mapping[str, tuple[str, ...]] = {
+    CAREFUL: ("drivers.following=careful",),
+    MISJUDGING: ("light.illuminance_lx=0", "drivers.distance_misjudgement=0.45"),
+}
+"""Kinds of drivers who follow one slow leader each, and nothing else."""
+
 SPARSE, MEDIUM, DENSE = 600.0, 1200.0, 1800.0
 """Demands on both lanes [vehicles/h]."""
 
@@ -60,7 +68,7 @@ class Pair:
     Attributes
     ----------
     population : str
-        Who follows: a name of the plan's populations.
+        Who follows: a name of the plan's populations or kinds.
     leader_speed : float
         Speed of the leaders [m/s].
     visibility : float
@@ -92,6 +100,8 @@ class Plan:
         Speeds of leaders whom one driver each follows [m/s].
     followers : int
         How many such drivers there are in a run.
+    kinds : mapping of str to tuple of str
+        Drivers who follow one leader of the first of these speeds each, as `populations`.
     """
 
     seeds: tuple[int, ...] = REPORT_SEEDS
@@ -101,6 +111,7 @@ class Plan:
     seconds: float = 600.0
     leader_speeds: tuple[float, ...] = (SLOW, FAST)
     followers: int = 20
+    kinds: Mapping[str, tuple[str, ...]] = field(default_factory=lambda: KINDS)
 
     @property
     def cases(self) -> tuple[Case, ...]:
@@ -117,9 +128,18 @@ class Plan:
     @property
     def pairs(self) -> tuple[Pair, ...]:
         """Every case of drivers behind one leader once."""
-        return tuple(
-            Pair(population, speed, visibility)
-            for population in self.populations
-            for speed in self.leader_speeds
-            for visibility in (CLEAR, PAIRS_IN)
-        )
+        followers = [(population, speed) for population in self.populations for speed in self.leader_speeds]
+        followers += [(kind, self.leader_speeds[0]) for kind in self.kinds if self.leader_speeds]
+        return tuple(Pair(who, speed, visibility) for who, speed in followers for visibility in (CLEAR, PAIRS_IN))
+
+    def overrides(self, case: Case | Pair) -> tuple[str, ...]:
+        """What is set in the scenario of a case's drivers.
+
+        Parameters
+        ----------
+        case : Case or Pair
+            One of the plan's.
+        """
+        if case.population == SIGNED:
+            return (*self.populations[DEFAULT], SIGNED_COMPLIANCE)
+        return {**self.kinds, **self.populations}[case.population]

@@ -196,6 +196,24 @@ class Look:
         """
         return self.results.over_seeds(Pair(self.population, leader_speed, visibility), measure)
 
+    def kind(self, name: str, measure: str, leader_speed: float, visibility: float) -> NDArray[np.float64]:
+        """Values of a kind of drivers behind one leader (n,), which stand beside the default drivers alone.
+
+        Parameters
+        ----------
+        name : str
+            The kind.
+        measure, leader_speed, visibility
+            As of `pair`.
+
+        Raises
+        ------
+        KeyError
+            If that was not run.
+        """
+        who = name if self.population == DEFAULT else f"{self.population} {name}"
+        return self.results.over_seeds(Pair(who, leader_speed, visibility), measure)
+
 
 @dataclass(frozen=True, slots=True)
 class Finding:

@@ -53,9 +53,12 @@ class FollowingModel:
     ----------
     keeps_up : bool
         Whether they drive as fast as a leader whom they see, where by themselves they would be slower in fog.
+    kept_share : float
+        Gap that they do not exceed, as a share of how far away they see the leader [-]; ``inf`` if they do.
     """
 
     keeps_up: bool = field(default=False, kw_only=True)
+    kept_share: float = field(default=math.inf, kw_only=True)
 
     def headway(self, own: float, around: Surroundings) -> float:  # noqa: ARG002 - kinds of drivers look around
         """Time headway that is wanted [s], over which the minimum gap comes.
@@ -89,15 +92,13 @@ class InSight(FollowingModel):
 
     Attributes
     ----------
-    kept_share : float
-        Gap that they do not exceed, as a share of how far away they see the leader [-]; FogSim's own.
     shortest : float
-        No headway is shorter for that [s]; FogSim's own.
+        No headway is shorter for that [s]; so much is FogSim's own, and so is the share of sight.
     """
 
-    kept_share: float = 0.7
     shortest: float = 0.5
     keeps_up: bool = field(default=True, kw_only=True)
+    kept_share: float = field(default=0.7, kw_only=True)
 
     def headway(self, own: float, around: Surroundings) -> float:
         """Headway at which the leader is in sight, at most the own one [s].

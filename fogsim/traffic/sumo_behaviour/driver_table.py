@@ -27,12 +27,14 @@ class Column(IntEnum):
         Top speed that was claimed, and the desired one that it changes to [m/s].
     SHARE_SET, SHARE_DESIRED
         Share of the speed in clear air that was claimed, and the desired one that it changes to [-].
-    HEADWAY_SET
-        Time headway that was claimed, or the own one [s].
-    EXTINCTION, VISIBILITY, CHOICE, SHARE, LIMIT
-        Extinction coefficient where it was last [1/m]; what goes with it: the visibility that the driver goes by [m],
-        the speed [m/s] and the share of the speed in clear air [-] of the driver's choice, and the speed not exceeded
-        so as not to come too near to a leader [m/s].
+    HEADWAY_SET, HEADWAY_EXTINCTION
+        Time headway that was claimed, or the own one [s], and the extinction coefficient that went with it [1/m].
+    EXTINCTION, VISIBILITY, BODY_REACH, REACH
+        Extinction coefficient where it was last [1/m]; what goes with it: the visibility that the driver goes by, and
+        how far away a leader's body, and anything of it, is seen [m].
+    CHOICE, SHARE, LIMIT
+        What goes with that: the speed [m/s] and the share of the speed in clear air [-] of the driver's choice, and the
+        speed not exceeded so as not to come too near to a leader [m/s].
     """
 
     FACTOR = 0
@@ -47,8 +49,11 @@ class Column(IntEnum):
     SHARE_SET = auto()
     SHARE_DESIRED = auto()
     HEADWAY_SET = auto()
+    HEADWAY_EXTINCTION = auto()
     EXTINCTION = auto()
     VISIBILITY = auto()
+    BODY_REACH = auto()
+    REACH = auto()
     CHOICE = auto()
     SHARE = auto()
     LIMIT = auto()
@@ -124,8 +129,8 @@ class DriverTable:
         self.values[row] = (
             *(driver.speed_factor, driver.follows_advice, self._kind[driver.following]),
             *(top_speed, headway, self.speed_factors.own_value(vehicle), self._minimum_gap(vehicle)),
-            *(top_speed, top_speed, 1.0, 1.0, headway),
-            *(-1.0, np.inf, np.inf, 1.0, np.inf),
+            *(top_speed, top_speed, 1.0, 1.0, headway, 0.0),
+            *(-1.0, np.inf, np.inf, np.inf, np.inf, 1.0, np.inf),
         )
         self._row[vehicle] = row
         return row

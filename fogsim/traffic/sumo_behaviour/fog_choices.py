@@ -27,8 +27,8 @@ class FogChoices:
     def __init__(self, table: DriverTable, setup: DriverSetup, sight: DriverSight | None) -> None:
         self._table = table
         self._choice = SPEED_CHOICES[setup.speed_choice]
-        indifferent = self._choice is unaffected and set(table.kinds) == {FollowingModel()}
-        self._sight = None if indifferent else sight
+        plain = self._choice is unaffected and set(table.kinds) == {FollowingModel()}
+        self._sight = None if plain and setup.misjudgement == 0.0 else sight
 
     def update(self, rows: NDArray[np.intp], extinction: NDArray[np.float64]) -> None:
         """Choose where the fog is another than at the last choice.
@@ -53,6 +53,8 @@ class FogChoices:
         kinds = table.values[of, Column.KIND].astype(np.intp)
         table.values[of, Column.EXTINCTION] = here
         table.values[of, Column.VISIBILITY] = np.array(seen)[which]
+        table.values[of, Column.BODY_REACH] = np.array([reach.by_body for reach in reaches])[which]
+        table.values[of, Column.REACH] = np.array([reach.farthest for reach in reaches])[which]
         table.values[of, Column.CHOICE] = np.array([self._choice(visibility) for visibility in seen])[which]
         table.values[of, Column.SHARE] = np.array([speed_share(self._choice, v) for v in seen])[which]
         table.values[of, Column.LIMIT] = limits[kinds, which]

@@ -6,14 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.traffic.drivers.following import CATCHING_UP
-from fogsim.traffic.drivers.leader_reach import leader_reach
 from fogsim.traffic.drivers.sight import DriverSight
 from fogsim.traffic.drivers.speed_choice import UNAFFECTED_ABOVE
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
 from fogsim.traffic.sumo_behaviour.driver_table import Column, DriverTable
 from fogsim.traffic.sumo_drivers.perception import REACH
-from fogsim.units import visibility_from_extinction
 
 
 class KeepingUp:
@@ -61,10 +59,9 @@ class KeepingUp:
         rows : (n,) intp
             Their rows of the table.
         """
-        extinctions = self._table.values[rows, Column.EXTINCTION].tolist()
-        return np.array([self._kept_speed(v, k) for v, k in zip(vehicles, extinctions, strict=True)])
+        reaches = self._table.values[rows, Column.REACH].tolist()
+        return np.array([self._kept_speed(v, reach) for v, reach in zip(vehicles, reaches, strict=True)])
 
-    def _kept_speed(self, vehicle: str, extinction: float) -> float:
-        seen = leader_reach(self._sight, visibility_from_extinction(extinction)).farthest
+    def _kept_speed(self, vehicle: str, seen: float) -> float:
         leader, gap = self._leader(vehicle, REACH) or ("", 0.0)
         return float(self._speed(leader)) + CATCHING_UP if leader and gap <= seen else 0.0

@@ -14,6 +14,7 @@ SUMO's lane-change models look through any fog. Here, for the drivers for whom t
 Drivers look each `LOOK_PERIOD`; who has nobody unseen about is not touched.
 """
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
@@ -43,6 +44,9 @@ STANDING_REACH = 150.0
 
 SOON_STANDING = 5.0
 """Who drives slower than this may stand before the next look [m/s]: braking hard, or after a collision."""
+
+SUBLANE_CHANGE = 4.0
+"""Time for which SUMO's sublane model is asked to change lanes, at up to 1 m/s to the side [s]."""
 
 MUCH_FASTER = 2.0
 """Who drives so much faster in the lane to the left holds nobody back, seen or not [m/s]."""
@@ -119,7 +123,7 @@ class StandingLeaders:
 
 
 class RequestedChanges:
-    """Changes of lane that are asked of SUMO, each for one step.
+    """Changes of lane that are asked of SUMO, each for one step; in the sublane model for as long as a change takes.
 
     Parameters
     ----------
@@ -134,10 +138,11 @@ class RequestedChanges:
         self._edges = api.edge
         # Apart from the session's other claim, that vehicles keep their lanes.
         self._modes = Claims(api, LANE_CHANGE_MODE, f"{session} changes")
-        self._asked: list[str] = []
+        self._duration = SUBLANE_CHANGE if float(api.simulation.getOption("lateral-resolution")) > 0.0 else 0.0
+        self._asked: dict[str, float] = {}
 
-    def ask(self, driver: str, lanes: int) -> bool:
-        """Let a driver change lane in the next step, whoever is there, but not into an overlap.
+    def ask(self, driver: str, lanes: int, time: float) -> bool:
+        """Let a driver change lane from the next step on, whoever is there, but not into an overlap.
 
         Parameters
         ----------
@@ -145,6 +150,8 @@ class RequestedChanges:
             Id of the vehicle.
         lanes : int
             1 to the left, -1 to the right.
+        time : float
+            Simulated time [s].
 
         Returns
         -------
@@ -156,22 +163,24 @@ class RequestedChanges:
         if edge.startswith(":") or not 0 <= lane < int(self._edges.getLaneNumber(edge)):
             return False
         self._modes.claim(driver, int(self._modes.own_value(driver)) & ~_RESPECT | _NO_OVERLAP)
-        self._vehicles.changeLane(driver, lane, 0.0)
-        self._asked.append(driver)
+        self._vehicles.changeLane(driver, lane, self._duration)
+        self._asked[driver] = time + self._duration
         return True
 
-    def end(self, present: set[str]) -> None:
-        """Give back the lane-change modes of those who were asked before the last step.
+    def end(self, present: set[str], time: float) -> None:
+        """Give back the lane-change modes of those whose changes have had their time.
 
         Parameters
         ----------
         present : set of str
             Vehicles on the road.
+        time : float
+            Simulated time [s]; ``inf`` for all.
         """
-        for driver in self._asked:
+        for driver in [v for v, until in self._asked.items() if until < time] if self._asked else ():
+            del self._asked[driver]
             if driver in present:
                 self._modes.withdraw(driver)
-        self._asked.clear()
 
 
 class LaneChanging:
@@ -236,7 +245,7 @@ class LaneChanging:
         if self._certainly_seen >= REACH:
             return
         due, _, gone = self._due.take()
-        self._requests.end(self._roster.present)
+        self._requests.end(self._roster.present, self._roster.time)
         self._begin_anew(gone)
         self._due.schedule(due, LOOK_PERIOD)
         if due:
@@ -296,7 +305,7 @@ class LaneChanging:
         )
 
     def _change(self, change: WantedChange, leader: str | None, perceived: Mapping[tuple[str, str], bool]) -> None:
-        if not self._requests.ask(change.driver, change.side.offset):
+        if not self._requests.ask(change.driver, change.side.offset, self._roster.time):
             return
         # SUMO's drivers would see their new leaders until they look again.
         if leader is not None and not perceived[change.driver, leader]:
@@ -309,7 +318,7 @@ class LaneChanging:
     def release(self) -> None:
         """Give everybody on the road their own lane changing back."""
         present = self._roster.present
-        self._requests.end(present)
+        self._requests.end(present, math.inf)
         self._standing.release(present)
         for switch in (self._overtake_right, *self._unhelpful):
             switch.release(present)

@@ -54,6 +54,7 @@ class Road:
 
     link: LibsumoLink
     folder: Path
+    options: Sequence[str] = ()
     api: Api = None
     parts: list[Perception | LaneChanging] = field(default_factory=list)
 
@@ -67,7 +68,7 @@ class Road:
         )
         files = ["--net-file", str(NET), "--route-files", str(routes), "--step-length", "0.1"]
         quiet = ["--no-step-log", "true", "--no-warnings", "true", "--collision.action", "warn"]
-        self.api = api = self.link.begin([*files, *quiet, "--collision.stoptime", "1000"])
+        self.api = api = self.link.begin([*files, *quiet, "--collision.stoptime", "1000", *self.options])
         self.link.step()
         for vehicle in api.vehicle.getIDList():
             api.vehicle.setLaneChangeMode(vehicle, FREE if vehicle in free else IN_LANE)
@@ -95,6 +96,9 @@ class Road:
         """Whether one has come so near to another that is ahead."""
         place = self.api.vehicle.getLanePosition
         return bool(place(leader) - place(follower) < distance)
+
+    def is_in_lane(self, name: str, lane: int) -> bool:
+        return bool(self.api.vehicle.getLaneIndex(name) == lane)
 
     def collided(self) -> bool:
         return bool(self.api.simulation.getCollisions())
@@ -136,6 +140,19 @@ def test_an_overtaker_pulls_out_before_who_comes_unseen_from_behind(road: Road) 
     # What it does from now on belongs to a driver who was not asked to let anybody in.
     assert api.vehicle.getSpeed("fast") == pytest.approx(33.0)
     assert road.until(lambda: api.vehicle.getAcceleration("fast") < -4.0)
+
+
+def test_so_does_an_overtaker_of_the_sublane_model(road: Road) -> None:
+    road.options = ("--lateral-resolution", "0.8")
+    vehicles = (OVERTAKER + vehicle("fast", 130, 33, 1)).replace("<vType ", '<vType laneChangeModel="SL2015" ')
+    is_ahead = []
+    for reach in (CLEAR, 30.0):
+        api = road.enter(vehicles, reach)
+        assert road.until(functools.partial(road.is_in_lane, "ego", 1))
+        is_ahead.append(road.is_within(500.0, "fast", "ego") and not road.is_within(0.0, "fast", "ego"))
+        assert not road.until(road.collided, 50)
+        assert api.vehicle.getLaneChangeMode("ego") == FREE
+    assert is_ahead == [False, True]
 
 
 @pytest.mark.parametrize("place", [320.0, 350.0])

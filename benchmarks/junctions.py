@@ -1,0 +1,210 @@
+"""Gaps that drivers accept at an unsignalised crossing in fog, and what comes of it.
+
+A road with priority (700 vehicles an hour in one direction, Poisson arrivals, 50 km/h) is crossed by another one (200
+an hour); by day, step 0.1 s, drivers who do not slow down for the fog unless another choice is named. A gap is the time
+between two vehicles of the first road at the crossing; it is accepted by who drives onto the crossing in it, and
+refused by who has come within 10 m of the crossing before it begins and enters after its end.
+
+Of all seeds together: accepted gaps at the quantiles 0 (smallest), 15 % and 50 % [s], the largest refused one [s], the
+share of gaps below 5 s that are accepted, collisions in 1000 crossings with the mean of their impact speeds [m/s], and
+vehicles of the first road that brake harder than 4.5 m/s², in 1000 crossings.
+
+    python benchmarks/junctions.py [--json] [--visibility inf --visibility 60 …] [--seeds 5] [--minutes 30]
+        [--speed-choice unaffected] [--see-through-fog]
+"""
+
+import argparse
+import itertools
+import json
+import math
+import statistics
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from fogsim.atmosphere import FieldAccess
+from fogsim.traffic import AfterCollision, DriverSetup, DriverSight, TrafficSetup, libsumo_traffic
+from fogsim.traffic.sumo.libsumo_link import load_libsumo
+from fogsim.traffic.sumo.link import Api
+from fogsim.units import extinction_from_visibility
+from fogsim.values import Command, FogField
+
+NET = Path(__file__).resolve().parents[1] / "tests" / "data" / "crossing" / "priority.net.xml"
+STEP = 0.1
+MAJOR_FLOW, MINOR_FLOW = 700.0, 200.0
+"""Vehicles an hour."""
+MAJOR_WAY, MINOR_WAY = ":C_10", ":C_7"
+"""Where the two roads cross, straight on."""
+WAITING_PLACE = 10.0
+"""Who is nearer to the crossing than this has come to it [m]."""
+HARD = 4.5
+"""SUMO's comfortable deceleration of a passenger car [m/s²]."""
+SHORT_GAP = 5.0
+
+
+@dataclass
+class Crossings:
+    """What was seen of all seeds.
+
+    Attributes
+    ----------
+    accepted, refused : list of float
+        Gaps [s].
+    impacts : list of float
+        Impact speeds of collisions [m/s].
+    crossings, hard : int
+        Vehicles of the second road that have crossed; vehicles of the first one that have braked hard.
+    """
+
+    accepted: list[float] = field(default_factory=list)
+    refused: list[float] = field(default_factory=list)
+    impacts: list[float] = field(default_factory=list)
+    crossings: int = 0
+    hard: int = 0
+
+    def record(self) -> dict[str, float]:
+        """The figures."""
+        smallest, low, middle = (quantile(self.accepted, q) for q in (0.0, 0.15, 0.5))
+        short = [sum(gap < SHORT_GAP for gap in gaps) for gaps in (self.accepted, self.refused)]
+        return {
+            "crossings": self.crossings,
+            "accepted_least_s": smallest,
+            "accepted_15_s": low,
+            "accepted_50_s": middle,
+            "refused_most_s": quantile(self.refused, 1.0),
+            "short_accepted": round(short[0] / max(sum(short), 1), 2),
+            "collisions_per_1000": round(1000.0 * len(self.impacts) / self.crossings, 1),
+            "impact_mps": round(statistics.mean(self.impacts), 1) if self.impacts else 0.0,
+            "hard_braking_per_1000": round(1000.0 * self.hard / self.crossings, 1),
+        }
+
+
+def quantile(values: Sequence[float], share: float) -> float:
+    """A value that so large a share of others do not exceed [s]."""
+    ordered = sorted(values)
+    return round(ordered[min(int(share * len(ordered)), len(ordered) - 1)], 1) if ordered else math.nan
+
+
+def departures(flow: float, duration: float, rng: np.random.Generator) -> Iterator[float]:
+    """Times of Poisson arrivals, at least 1.5 s apart [s]."""
+    time = 0.0
+    while (time := time + 1.5 + float(rng.exponential(3600.0 / flow - 1.5))) < duration:
+        yield time
+
+
+def routes(folder: Path, duration: float, seed: int) -> Path:
+    """The vehicles of one run."""
+    rng = np.random.default_rng(seed)
+    rows = [(time, "major", "WC CE") for time in departures(MAJOR_FLOW, duration, rng)]
+    rows += [(time, "minor", "SC CN") for time in departures(MINOR_FLOW, duration, rng)]
+    vehicles = "".join(
+        f'<vehicle id="{kind}{n}" type="car" depart="{time:.1f}" departSpeed="max"><route edges="{edges}"/></vehicle>'
+        for n, (time, kind, edges) in enumerate(sorted(rows))
+    )
+    path = folder / "crossing.rou.xml"
+    # The ego, which a simulation must have, stands out of the way.
+    path.write_text(
+        '<routes><vType id="car" speedFactor="normc(1,0.1,0.8,1.2)"/>'
+        '<vehicle id="ego" type="car" depart="0"><route edges="CS"/><stop lane="CS_0" endPos="250" duration="1e6"/>'
+        f"</vehicle>{vehicles}</routes>",
+        encoding="utf-8",
+    )
+    return path
+
+
+def run(visibility: float, setup: TrafficSetup, duration: float, seed: int, seen: Crossings) -> None:
+    """Drive one seed."""
+    traffic = libsumo_traffic(setup)
+    k = extinction_from_visibility(visibility)
+    traffic.enter_fog(FieldAccess(FogField(k, (3000.0, 3000.0, 3000.0))))
+    traffic.start(seed)
+    major: dict[str, float] = {}
+    minor: dict[str, float] = {}
+    waiting: dict[str, float] = {}
+    hard: set[str] = set()
+    api = load_libsumo()
+    try:
+        for step in range(round(duration / STEP)):
+            traffic.advance(Command())
+            time = step * STEP
+            enter(api, MAJOR_WAY, time, major)
+            enter(api, MINOR_WAY, time, minor)
+            near = api.lane.getLength("SC_0") - WAITING_PLACE
+            for vehicle in api.lane.getLastStepVehicleIDs("SC_0"):
+                if api.vehicle.getLanePosition(vehicle) > near:
+                    waiting.setdefault(vehicle, time)
+            hard.update(
+                v for v in api.lane.getLastStepVehicleIDs("WC_0") if api.vehicle.getAcceleration(v) < -HARD - 0.1
+            )
+            snapshot = traffic.observe()
+            seen.impacts += [hit.impact_speed for hit in snapshot.collisions] if snapshot else []
+    finally:
+        traffic.close()
+    count(sorted(major.values()), minor, waiting, seen)
+    seen.hard += len(hard)
+
+
+def enter(api: Api, way: str, time: float, entered: dict[str, float]) -> None:
+    """Note who has come onto the crossing."""
+    for vehicle in api.edge.getLastStepVehicleIDs(way):
+        entered.setdefault(vehicle, time)
+
+
+def count(major: Sequence[float], minor: dict[str, float], waiting: dict[str, float], seen: Crossings) -> None:
+    """Sort gaps into those that were accepted and those that were refused."""
+    seen.crossings += len(minor)
+    for before, after in itertools.pairwise(major):
+        gap = after - before
+        if any(before <= time < after for time in minor.values()):
+            seen.accepted.append(gap)
+        elif any(came <= before and minor.get(vehicle, math.inf) >= after for vehicle, came in waiting.items()):
+            seen.refused.append(gap)
+
+
+def measure(visibility: float, arguments: argparse.Namespace) -> dict[str, float | str]:
+    """One record."""
+    seen, duration = Crossings(), 60.0 * arguments.minutes
+    for seed in range(1, arguments.seeds + 1):
+        with tempfile.TemporaryDirectory() as name:
+            setup = TrafficSetup(
+                net=NET,
+                routes=(routes(Path(name), duration, seed),),
+                additional=(),
+                ego="ego",
+                step_length=STEP,
+                keep_lane=(),
+                warm_up_limit=10.0,
+                advice_deceleration=2.0,
+                reading_radius=10.0,
+                sight=None if arguments.see_through_fog else DriverSight(illuminance=10_000.0),
+                drivers=DriverSetup(speed_choice=arguments.speed_choice),
+                after_collision=AfterCollision.REMOVE,
+            )
+            run(visibility, setup, duration, seed, seen)
+    return {"visibility_m": "inf" if math.isinf(visibility) else visibility, **seen.record()}
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", action="store_true", help="print a list of flat records")
+    parser.add_argument("--visibility", action="append", type=float, help="V_met [m] (default inf, 60 and 20)")
+    parser.add_argument("--seeds", type=int, default=5, help="seeds 1, 2, …")
+    parser.add_argument("--minutes", type=float, default=30.0, help="simulated time of each seed")
+    parser.add_argument("--speed-choice", default="unaffected", help="how drivers choose their speed in fog")
+    parser.add_argument("--see-through-fog", action="store_true", help="SUMO's own drivers")
+    arguments = parser.parse_args()
+    records = [measure(visibility, arguments) for visibility in arguments.visibility or [math.inf, 60.0, 20.0]]
+    if arguments.json:
+        print(json.dumps(records, indent=2))
+        return
+    print("  ".join(f"{key:>{max(len(key), 6)}}" for key in records[0]))
+    for record in records:
+        print("  ".join(f"{value:>{max(len(key), 6)}}" for key, value in record.items()))
+
+
+if __name__ == "__main__":
+    main()

@@ -123,21 +123,29 @@ class JunctionSight:
         if due.gone:
             self._vehicle_sight.forget(due.gone)
             self._unseen.forget(due)
-        doubts = {driver: foes for driver in due.vehicles if (foes := self._foes_in_doubt(driver))}
+        doubts: dict[str, dict[str, float]] = {}
+        certain: dict[float, list[str]] = {MAX_PAUSE: [], ALONG_A_LANE: []}
+        for driver in due.vehicles:
+            pause, foes = self._foes_in_doubt(driver)
+            if foes:
+                doubts[driver] = foes
+            else:
+                certain[pause].append(driver)
+        for pause, drivers in certain.items():
+            self._due.schedule(drivers, pause)
         if doubts:
             self._decide(doubts, own_lamps)
 
-    def _foes_in_doubt(self, driver: str) -> dict[str, float]:
-        """Foes that matter to a driver and may be out of sight, and when to look for them again [s].
+    def _foes_in_doubt(self, driver: str) -> tuple[float, dict[str, float]]:
+        """When to look again if there are none [s]; and foes that matter to a driver and may be out of sight.
 
-        Without any, the driver is scheduled.
+        With each, when to look for it again [s].
         """
         speed = self._speed(driver)
         yielding = STANDING_REACH + speed * (self._reaction_time + 2.0 * MAX_PAUSE)
         unseen = self._unseen.of(driver)
         if not unseen and self._is_far(driver, speed):
-            self._due.schedule((driver,), ALONG_A_LANE)
-            return {}
+            return ALONG_A_LANE, {}
         doubtful: dict[str, float] = {}
         near = self._foes.ahead_of(driver, yielding + speed * speed / (2.0 * BRAKING))
         for foe, way, foe_way, _, _, _, _, must_yield, _ in near:
@@ -147,11 +155,9 @@ class JunctionSight:
                 foe in unseen or abs(way) + abs(foe_way) > self._certainly_seen
             ):
                 doubtful[foe] = 0.0 if is_there else PAUSE_IN_DOUBT
-        if not doubtful:
-            if unseen:
-                self._unseen.decide(driver, {}, self._roster.time)
-            self._due.schedule((driver,), MAX_PAUSE)
-        return doubtful
+        if unseen and not doubtful:
+            self._unseen.decide(driver, {}, self._roster.time)
+        return MAX_PAUSE, doubtful
 
     def _is_far(self, driver: str, speed: float) -> bool:
         """Whether no junction can come near a driver for `ALONG_A_LANE`."""

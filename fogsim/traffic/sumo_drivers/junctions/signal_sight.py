@@ -41,8 +41,8 @@ PAUSE_IN_DOUBT = 0.2
 FAR_PAUSE = 2.0
 """And one who is not, at least this often [s]."""
 
-FASTEST = 70.0
-"""Nobody drives faster than this [m/s]."""
+FASTEST_GAIN = 10.0
+"""Nobody is faster by more than this after `FAR_PAUSE` [m/s]."""
 
 _OBEY_LIGHTS = 16
 _STOPPING = frozenset("ryu")
@@ -110,9 +110,12 @@ class SignalSight:
             return
         due = self._due.take()
         railways = self._forget(due) if due.gone else ()
+        pauses: dict[float, list[str]] = {}
         for driver in due.vehicles:
             if driver not in railways:
-                self._due.schedule((driver,), self._look(driver))
+                pauses.setdefault(self._look(driver), []).append(driver)
+        for pause, drivers in pauses.items():
+            self._due.schedule(drivers, pause)
 
     def _forget(self, due: Due) -> set[str]:
         """Forget who has left; new vehicles on rails, which are not looked at again."""
@@ -132,8 +135,7 @@ class SignalSight:
             return self._brake_late(driver, light)
         if light is None or light[2] > REACH:
             self._obey(driver)
-            beyond = math.inf if light is None else light[2] - REACH
-            return min(max(beyond / FASTEST, MAX_PAUSE), FAR_PAUSE)
+            return FAR_PAUSE if light is None else max(self._time_for(driver, light[2] - REACH), MAX_PAUSE)
         return self._notice(driver, light) if self._sees(driver, light) else self._overlook(driver, light[2])
 
     def _overlook(self, driver: str, way: float) -> float:
@@ -141,11 +143,17 @@ class SignalSight:
             self._unseen[driver] = _NOT_SEEN
             self._pass_lights(driver)
         certain = way - self._certainly_hidden
-        return min(certain / FASTEST, MAX_PAUSE) if certain > 0.0 else PAUSE_IN_DOUBT
+        return self._time_for(driver, certain) if certain > 0.0 else PAUSE_IN_DOUBT
+
+    def _time_for(self, driver: str, way: float) -> float:
+        """What a driver needs for a way at least, if it is less than `FAR_PAUSE` [s]."""
+        return min(way / (float(self._speed(driver)) + FASTEST_GAIN), FAR_PAUSE)
 
     def _notice(self, driver: str, light: Light) -> float:
         if driver not in self._unseen:
-            return MAX_PAUSE
+            # What is certainly seen is so until it is passed.
+            certain = light[2] if light[2] <= self._certainly_seen else 0.0
+            return max(self._time_for(driver, certain), MAX_PAUSE)
         now = self._roster.time
         since = self._unseen[driver] = min(self._unseen[driver], now)
         if now - since < self._sight.reaction_time:

@@ -165,7 +165,7 @@ class SumoTraffic:
                 self._run,
                 perception=None
                 if setup.sight is None
-                else drivers_perception(api, fog, setup.sight, roster, self._link.remote, session),
+                else drivers_perception(api, fog, setup.sight, roster, self._link.remote, session, setup.net),
                 drivers=SumoDesiredSpeeds(api, setup, fog, self._seed, roster, session, self._link.remote),
             )
 

@@ -1,11 +1,13 @@
 """All that SUMO's drivers perceive through the fog only as far as it can be seen, part by part."""
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Protocol
 
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.roster import Roster
+from fogsim.traffic.sumo_drivers.junctions.junction_foes import JunctionFoes
 from fogsim.traffic.sumo_drivers.junctions.junction_sight import JunctionSight
 from fogsim.traffic.sumo_drivers.junctions.pedestrian_sight import PedestrianSight
 from fogsim.traffic.sumo_drivers.junctions.signal_sight import SignalSight
@@ -67,7 +69,13 @@ class DriversPerception:
 
 
 def drivers_perception(
-    api: Api, fog: FogAccess, sight: DriverSight, roster: Roster, remote: bool, session: str
+    api: Api,
+    fog: FogAccess,
+    sight: DriverSight,
+    roster: Roster,
+    remote: bool,
+    session: str,
+    net: Path | None = None,
 ) -> DriversPerception:
     """All parts.
 
@@ -85,6 +93,8 @@ def drivers_perception(
         True where every call is a message to another process.
     session : str
         Name of the session.
+    net : Path or None
+        Its network; None for the file that it says it has loaded.
     """
     leaders = Perception(api, fog, sight, roster, remote, session)
     vehicle_sight = VehicleSight(api, fog, sight, remote)
@@ -92,7 +102,7 @@ def drivers_perception(
         (
             leaders,
             LaneChanging(api, fog, sight, roster, leaders, vehicle_sight, remote, session),
-            JunctionSight(api, fog, sight, roster, vehicle_sight, remote, session),
+            JunctionSight(api, fog, sight, roster, JunctionFoes(api, net), vehicle_sight, remote, session),
             SignalSight(api, fog, sight, roster, session),
             PedestrianSight(api, fog, sight, roster, session),
         )

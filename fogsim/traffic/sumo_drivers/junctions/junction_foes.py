@@ -4,6 +4,7 @@ Where nobody has the right of way (junctions of type ``unregulated``, also those
 have too many lanes), nobody yields; SUMO 1.28 ends with a segmentation fault if it is asked for foes there.
 """
 
+import functools
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -25,15 +26,27 @@ class JunctionFoes:
     ----------
     api : Api
         The simulation.
+    net : Path or None
+        Its network; None for the file that it says it has loaded.
     """
 
-    def __init__(self, api: Api) -> None:
+    def __init__(self, api: Api, net: Path | None = None) -> None:
+        self._api = api
+        self._net = net
         self._foes = vehicle_getter(api, "getJunctionFoes")
         self._vehicles = api.vehicle
         self._lanes = api.lane
-        self._unregulated = unregulated_junctions(Path(api.simulation.getOption("net-file")))
-        self._leading_there = {edge for name in self._unregulated for edge in api.junction.getIncomingEdges(name)}
         self._lengths: dict[str, float] = {}
+
+    @functools.cached_property
+    def _unregulated(self) -> frozenset[str]:
+        # Only in fog need the file be read.
+        return unregulated_junctions(self._net or Path(self._api.simulation.getOption("net-file")))
+
+    @functools.cached_property
+    def _leading_there(self) -> frozenset[str]:
+        get = self._api.junction.getIncomingEdges
+        return frozenset(edge for name in self._unregulated for edge in get(name))
 
     def ahead_of(self, driver: str, reach: float) -> Sequence[Foe]:
         """Foes of a driver at the junctions within reach.

@@ -72,6 +72,8 @@ class JunctionSight:
         The drivers' eyes.
     roster : Roster
         Who is on the road.
+    foes : JunctionFoes
+        Tells who may be in the way.
     vehicle_sight : VehicleSight
         Tells whom they see.
     remote : bool
@@ -86,13 +88,14 @@ class JunctionSight:
         fog: FogAccess,
         sight: DriverSight,
         roster: Roster,
+        foes: JunctionFoes,
         vehicle_sight: VehicleSight,
         remote: bool,
         session: str,
     ) -> None:
         self._roster = roster
         self._reaction_time = sight.reaction_time
-        self._foes = JunctionFoes(api)
+        self._foes = foes
         self._speed, self._position, self._lane, self._lane_position = vehicle_getters(
             api, remote, ("getSpeed", "getPosition3D", "getLaneID", "getLanePosition")
         )
@@ -122,7 +125,7 @@ class JunctionSight:
         due = self._due.take()
         if due.gone:
             self._vehicle_sight.forget(due.gone)
-            self._unseen.forget(due)
+            self._unseen.forget(due.gone, due.new)
         doubts: dict[str, dict[str, float]] = {}
         certain: dict[float, list[str]] = {MAX_PAUSE: [], ALONG_A_LANE: []}
         for driver in due.vehicles:

@@ -11,7 +11,6 @@ from collections.abc import Iterable, Iterator
 from fogsim.traffic.appearance import OTHERS_LAMPS
 from fogsim.traffic.drivers.lamp_intensity import HEAD_LAMPS, head_lamp_share
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
-from fogsim.traffic.sumo.due_vehicles import DueVehicles
 from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_drivers.junctions.unseen_foes import UnseenFoes
@@ -64,7 +63,7 @@ class PedestrianSight:
         self._person_count = getter(api, "person", "getIDCount")
         self._unseen = UnseenFoes(api, f"{session} {_OWN_PART}", sight.reaction_time)
         self._certainly_seen = sight.seen_distance(fog.maximum_extinction, CONTRAST, head_lamps=0.0)
-        self._due = DueVehicles(roster, float(api.simulation.getDeltaT()))
+        self._mark = 0
         self._roads: dict[str, tuple[str, ...]] = {}
         self._next = 0.0
 
@@ -76,12 +75,14 @@ class PedestrianSight:
         own_lamps : dict
             Lamps of vehicles whose lamps are not SUMO's.
         """
+        self._roster.update()
         now = self._roster.time
         if self._certainly_seen >= FARTHEST_PERSON or now < self._next:
             return
         self._next = now + LOOK_PERIOD
-        # Nobody is scheduled: this tells who has left and who is new.
-        self._unseen.forget(self._due.take())
+        new, self._mark = self._roster.entered_since(self._mark)
+        present = self._roster.present
+        self._unseen.forget([v for v in self._unseen.drivers if v not in present] + new, present.intersection(new))
         doubts: dict[str, list[str]] = {driver: [] for driver in self._unseen.drivers}
         if self._person_count():
             for driver, person in self._pairs_near():

@@ -1,10 +1,9 @@
 """Making drivers ignore vehicles and persons at junctions until they have seen them, by what SUMO offers for it."""
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 
 from fogsim.traffic.sumo.claims import SessionValues
-from fogsim.traffic.sumo.due_vehicles import Due
 from fogsim.traffic.sumo.link import Api
 
 _NOT_SEEN = math.inf
@@ -119,17 +118,17 @@ class UnseenFoes:
             del self._since[driver]
         return any(since <= now for since in unseen.values())
 
-    def forget(self, due: Due) -> None:
+    def forget(self, gone: Iterable[str], new: Iterable[str]) -> None:
         """Forget vehicles that have left the road.
 
         Parameters
         ----------
-        due : Due
-            Vehicles of this step.
+        gone, new : iterable of str
+            Vehicles that have left it, and those that have come, among them those that have come back.
         """
-        self._left.update(v for v in due.gone if self._since.pop(v, None))
+        self._left.update([v for v in gone if self._since.pop(v, None)])
         # One that comes back from a teleport still ignores whom it ignored.
-        for driver in self._left.intersection(due.new) if self._left else ():
+        for driver in self._left.intersection(new) if self._left else ():
             self._left.discard(driver)
             self._ignored.ignore(driver, ())
 

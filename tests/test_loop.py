@@ -77,7 +77,9 @@ def test_the_road_fills_once_where_the_way_is_written_and_anew_where_it_is_not(
     routed = small("fog.visibility_m=80", "duration_s=0.5", f"traffic.routes=[{tmp_path / 'trip.rou.xml'}]")
     found = [step.traffic.position for step in fogsim.run(routed, seed=1)]
     assert len(starts) == 3
-    np.testing.assert_array_equal(found, written)
+    # Not all of them have the same vehicles near the ego.
+    for one, other in zip(found, written, strict=True):
+        np.testing.assert_array_equal(one, other)
 
 
 def test_the_camera_period_may_be_longer_than_the_traffic_step() -> None:

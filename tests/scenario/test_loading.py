@@ -281,3 +281,28 @@ def test_a_resolved_scenario_loads_again(folder: Path) -> None:
 def test_advised_stretches_that_do_not_fit(settings: list[str], message: str) -> None:
     with pytest.raises(InputError, match=message):
         load_scenario("motorway_fog_bank", settings)
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("following={in_sight: 0.6, careful: 0.5}", "drivers.following: shares .* must together be 1, and are 1.1"),
+        ("following={}", "must together be 1, and are 0"),
+        ("following=nobody", "drivers.following: unknown following model 'nobody'; known: .*in_sight"),
+        ("following={in_sight: 1.5, careful: -0.5}", "drivers.following.in_sight: .* less than or equal to 1; got 1.5"),
+        ("speed_choice=slow", "drivers.speed_choice: unknown speed choice 'slow'; known: .*observed"),
+        ("compliance.like=radio", "drivers.compliance: unknown compliance 'radio'; known: .*in_car"),
+        ("compliance.trust=2", "drivers.compliance.trust: .* less than or equal to 1"),
+    ],
+)
+def test_drivers_that_there_are_not(setting: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        load_scenario("motorway_fog_bank", [f"drivers.{setting}"])
+
+
+def test_a_kind_of_driver_stands_for_all_and_a_kind_of_advice_for_keys_that_are_not_given() -> None:
+    drivers = load_scenario("motorway_fog_bank", ["drivers.following=careful"]).drivers
+    assert drivers.following == {"careful": 1.0}
+    assert drivers.compliance.rate == drivers.compliance.strength == 1.0
+    like = load_scenario("motorway_fog_bank", ["drivers.compliance={like: speed_limit_sign, strength: 0.3}"]).drivers
+    assert (like.compliance.rate, like.compliance.strength, like.compliance.trust) == (0.8, 0.3, 1.0)

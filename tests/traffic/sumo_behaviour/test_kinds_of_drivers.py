@@ -1,5 +1,6 @@
 """Kinds of drivers behind a leader in SUMO: who stays in sight, who falls back, and what is given back."""
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -123,3 +124,18 @@ def test_over_a_connection_kinds_of_drivers_do_the_same(tmp_path: Path, sumo_pro
         traffic.start(1)
         assert gap_after(traffic, 60.0) == pytest.approx(here, abs=1e-6)
         link.end()
+
+
+def test_in_clear_air_nothing_is_set(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drivers = DriverSetup(misjudgement=0.5, following={"in_sight": 0.5, "out_of_sight": 0.5})
+    traffic = libsumo_traffic(setup_of(tmp_path, FAST, drivers))
+    traffic.enter_fog(fog(math.inf))
+    vehicles = load_libsumo().vehicle
+    try:
+        traffic.start(1)
+        for name in ("setTau", "setSpeedFactor", "setMaxSpeed", "setPreviousSpeed"):
+            monkeypatch.setattr(vehicles, name, lambda *_: pytest.fail("a vehicle was changed"))
+        gap_after(traffic, 5.0)
+        assert conduct() == (1.2, 1.0, pytest.approx(55.56, abs=0.01))
+    finally:
+        traffic.close()

@@ -39,6 +39,9 @@ from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
 LOOK_PERIOD = 0.5
 """Time between two looks of a driver [s]."""
 
+CERTAIN_PERIOD = 1.0
+"""Who has somebody in sight for certain ahead in the lane to the left, or nobody, looks there again after this [s]."""
+
 STANDING_REACH = 150.0
 """SUMO's drivers leave the lane for who stands within 100 m; between two looks they drive less than the rest [m]."""
 
@@ -233,6 +236,7 @@ class LaneChanging:
             for attribute, value in ((COOPERATIVE, _NEVER), (COOPERATIVE_SPEED, 0.0))
         )
         self._due = DueVehicles(roster, float(api.simulation.getDeltaT()))
+        self._certain_until: dict[str, float] = {}
 
     def update(self, own_lamps: OwnLamps) -> None:
         """Let those who are due look at the lanes beside them.
@@ -260,6 +264,8 @@ class LaneChanging:
         """Forget drivers that have left, and whom those who have entered may be taken for."""
         if drivers:
             self._vehicle_sight.forget(drivers)
+            for driver in drivers:
+                self._certain_until.pop(driver, None)
             self._standing.begin_anew(drivers, self._roster.present)
             for switch in (self._overtake_right, *self._unhelpful):
                 switch.begin_anew(drivers, self._roster.present)
@@ -269,9 +275,16 @@ class LaneChanging:
         unseen: dict[str, None] = {}
         doubtful: list[tuple[str, str]] = []
         left_leader, speed, sure = self._neighbours.left_leader, self._leaders.speed, self._certainly_seen
+        soon, later = self._roster.time + 0.5 * LOOK_PERIOD, self._roster.time + CERTAIN_PERIOD
+        certain_until = self._certain_until
         for driver in drivers:
+            if certain_until.get(driver, 0.0) > soon:
+                continue
             ahead = left_leader(driver)
-            if ahead is None or ahead[1] <= sure or speed(ahead[0]) > speed(driver) + MUCH_FASTER:
+            if ahead is None or ahead[1] <= sure:
+                certain_until[driver] = later
+                continue
+            if speed(ahead[0]) > speed(driver) + MUCH_FASTER:
                 continue
             if ahead[1] > self._certainly_hidden:
                 unseen[driver] = None

@@ -305,4 +305,4 @@ def test_a_kind_of_driver_stands_for_all_and_a_kind_of_advice_for_keys_that_are_
     assert drivers.following == {"careful": 1.0}
     assert drivers.compliance.rate == drivers.compliance.strength == 1.0
     like = load_scenario("motorway_fog_bank", ["drivers.compliance={like: speed_limit_sign, strength: 0.3}"]).drivers
-    assert (like.compliance.rate, like.compliance.strength, like.compliance.trust) == (0.8, 0.3, 1.0)
+    assert (like.compliance.rate, like.compliance.strength, like.compliance.trust) == (1.0, 0.3, 1.0)

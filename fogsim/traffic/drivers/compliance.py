@@ -41,7 +41,7 @@ class Compliance:
 FULL = Compliance()
 """Everybody is reached and goes all the way down, and nobody up: the best case."""
 
-SPEED_LIMIT_SIGN = Compliance(rate=0.8, strength=0.75, trust=1.0)
+SPEED_LIMIT_SIGN = Compliance(strength=0.6, trust=1.0)
 """Signs with a speed limit for the visibility, above every lane, which drivers know and trust.
 
 A16 (Hogema & van der Horst 1997): 80 km/h for 70 to 140 m, 60 km/h below; mean speeds 8 to 10 km/h lower than without

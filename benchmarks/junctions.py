@@ -65,7 +65,7 @@ class Crossings:
     crossings: int = 0
     hard: int = 0
 
-    def record(self) -> dict[str, float]:
+    def record(self) -> dict[str, float | None]:
         """The figures."""
         smallest, low, middle = (quantile(self.accepted, q) for q in (0.0, 0.15, 0.5))
         short = [sum(gap < SHORT_GAP for gap in gaps) for gaps in (self.accepted, self.refused)]
@@ -76,16 +76,16 @@ class Crossings:
             "accepted_50_s": middle,
             "refused_most_s": quantile(self.refused, 1.0),
             "short_accepted": round(short[0] / max(sum(short), 1), 2),
-            "collisions_per_1000": round(1000.0 * len(self.impacts) / self.crossings, 1),
+            "collisions_per_1000": round(1000.0 * len(self.impacts) / max(self.crossings, 1), 1),
             "impact_mps": round(statistics.mean(self.impacts), 1) if self.impacts else 0.0,
-            "hard_braking_per_1000": round(1000.0 * self.hard / self.crossings, 1),
+            "hard_braking_per_1000": round(1000.0 * self.hard / max(self.crossings, 1), 1),
         }
 
 
-def quantile(values: Sequence[float], share: float) -> float:
-    """A value that so large a share of others do not exceed [s]."""
+def quantile(values: Sequence[float], share: float) -> float | None:
+    """A value that so large a share of others do not exceed [s]; None of none."""
     ordered = sorted(values)
-    return round(ordered[min(int(share * len(ordered)), len(ordered) - 1)], 1) if ordered else math.nan
+    return round(ordered[min(int(share * len(ordered)), len(ordered) - 1)], 1) if ordered else None
 
 
 def departures(flow: float, duration: float, rng: np.random.Generator) -> Iterator[float]:
@@ -164,7 +164,7 @@ def count(major: Sequence[float], minor: dict[str, float], waiting: dict[str, fl
             seen.refused.append(gap)
 
 
-def measure(visibility: float, arguments: argparse.Namespace) -> dict[str, float | str]:
+def measure(visibility: float, arguments: argparse.Namespace) -> dict[str, float | str | None]:
     """One record."""
     seen, duration = Crossings(), 60.0 * arguments.minutes
     for seed in range(1, arguments.seeds + 1):
@@ -203,7 +203,7 @@ def main() -> None:
         return
     print("  ".join(f"{key:>{max(len(key), 6)}}" for key in records[0]))
     for record in records:
-        print("  ".join(f"{value:>{max(len(key), 6)}}" for key, value in record.items()))
+        print("  ".join(f"{value!s:>{max(len(key), 6)}}" for key, value in record.items()))
 
 
 if __name__ == "__main__":

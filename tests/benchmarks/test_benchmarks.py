@@ -32,6 +32,11 @@ def records(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
     ("name", "arguments", "keys"),
     [
         ("loop.py", ("--size", "64x48", "--steps", "3", "--repeat", "1"), {"env", "camera", "vehicles", "steps_per_s"}),
+        (
+            "junctions.py",
+            ("--seeds", "1", "--minutes", "2", "--visibility", "20"),
+            {"visibility_m", "crossings", "accepted_least_s", "refused_most_s", "collisions_per_1000", "impact_mps"},
+        ),
         ("resets.py", ("--resets", "2"), {"ms_median", "growth_kib_per_reset"}),
         (
             "estimator_accuracy.py",

@@ -32,6 +32,9 @@ BODY_KINDS = {
 }
 """Body kind of a SUMO vehicle class, or what comes nearest to it; every other class is a car."""
 
+TRAINS = frozenset({"rail_urban", "rail", "rail_electric", "rail_fast", "subway", "cable_car"})
+"""SUMO's vehicle classes whose drivers go by signals and not by what they see of the way; trams are not among them."""
+
 SHAPE_KINDS = {
     "passenger/van": "van",
     "delivery": "van",

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.kinematics import decelerated_speed
+from fogsim.traffic.appearance import TRAINS
 from fogsim.traffic.drivers.advice_hearing import AdviceHearing
 from fogsim.traffic.drivers.compliance import complied_speed
 from fogsim.traffic.drivers.events import Order
@@ -129,6 +130,7 @@ class SumoDesiredSpeeds:
         self._advised_since: dict[str, float] = {}
         self._next, self._chosen = 0.0, self._roster.time
         self._mark = 0
+        self._trains: set[str] = set()
 
     def update(self, command: Command) -> None:
         """Let new drivers choose a speed, and all drivers if it is time to choose again.
@@ -143,7 +145,10 @@ class SumoDesiredSpeeds:
         time, present = roster.time, roster.present
         new, self._mark = roster.entered_since(self._mark)
         if new:
-            self._choose_on_entry([v for v in new if v != self._ego and v in present], command)
+            entered = [v for v in new if v != self._ego and v in present]
+            self._trains.difference_update(new)
+            self._trains.update(v for v in entered if self._api.vehicle.getVehicleClass(v) in TRAINS)
+            self._choose_on_entry([v for v in entered if v not in self._trains], command)
         if time >= self._next:
             elapsed, self._chosen = time - self._chosen, time
             self._next = time + CHOICE_PERIOD
@@ -151,13 +156,17 @@ class SumoDesiredSpeeds:
             # In even fog and without advice, choices stay as they are, but for those who go by their leader.
             settled = self._extinction is not None and not advised and not self._advised_since
             self._advised_since = {v: self._advised_since.get(v, time) for v in advised}
-            others = [v for v in present if v != self._ego]
+            others = self._drivers()
             rows = self._table.rows(others)
             choosing = [others[i] for i in self._keeping_up.keepers(rows).tolist()] if settled else others
             self._update_choices(choosing, advised)
             self._headways.update(others, rows)
         self._top_speeds.update(time, present)
         self._shares.update(time, present)
+
+    def _drivers(self) -> list[str]:
+        """Everybody on the road but the ego and trains, which go by their signals."""
+        return [v for v in self._roster.present if v != self._ego and v not in self._trains]
 
     def _choose_on_entry(self, new: Sequence[str], command: Command) -> None:
         """Let new drivers choose; those who enter have driven in that fog before, past the signs with the advice."""
@@ -232,7 +241,7 @@ class SumoDesiredSpeeds:
 
     def release(self) -> None:
         """Withdraw from every vehicle on the road what was claimed of its top speed and headway."""
-        ids = [v for v in self._roster.present if v != self._ego]
+        ids = self._drivers()
         rows = self._table.rows(ids)
         self._top_speeds.release(ids, rows)
         self._shares.release(ids, rows)

@@ -15,6 +15,7 @@ import itertools
 from collections.abc import Iterable, Sequence
 from types import MappingProxyType
 
+from fogsim.traffic.appearance import TRAINS
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo.claims import SOLE_SESSION, SPEED_GAIN, SessionValues
 from fogsim.traffic.sumo.link import Api
@@ -136,6 +137,7 @@ class Perception:
         self._reaction_time = sight.reaction_time
         self._leader_sight = LeaderSight(api, fog, sight, self.speed, remote)
         self._schedule = UpdateSchedule(float(api.simulation.getDeltaT()), self._roster.time)
+        self._vehicle_class = api.vehicle.getVehicleClass
         self._mark = 0
         self._ignored: dict[str, str] = {}
         self.hidden = MappingProxyType(self._ignored)
@@ -191,7 +193,10 @@ class Perception:
         # A vehicle that comes back from a teleport still ignores its leader.
         for follower in roster.present.intersection(new) if new else ():
             self._ignored_leaders.stop_ignoring(follower)
-        return due + [v for v in schedule.unscheduled(new) if v in roster.present and v not in due] if new else due
+        if not new:
+            return due
+        unscheduled = [v for v in schedule.unscheduled(new) if v in roster.present and v not in due]
+        return due + [v for v in unscheduled if self._vehicle_class(v) not in TRAINS]
 
     def _forget(self, vehicles: Iterable[str]) -> None:
         for follower in vehicles:

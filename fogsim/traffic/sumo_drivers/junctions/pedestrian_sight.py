@@ -5,6 +5,7 @@ the crossings and walking areas of a junction, or about to step on one, and the 
 that lead to it. Pedestrians themselves look, or listen, through any fog.
 """
 
+import functools
 import math
 from collections.abc import Iterable, Iterator
 
@@ -33,7 +34,8 @@ BODY_MIDDLE = 1.0
 """Height of eyes and persons above the road [m]."""
 
 _OWN_PART = "persons"
-_PLACES_ON_FOOT = ("c", "w")
+_CROSSING, _WALKING_AREA = "c", "w"
+_PLACES_ON_FOOT = (_CROSSING, _WALKING_AREA)
 
 
 class PedestrianSight:
@@ -84,11 +86,17 @@ class PedestrianSight:
         present = self._roster.present
         self._unseen.forget([v for v in self._unseen.drivers if v not in present] + new, present.intersection(new))
         doubts: dict[str, list[str]] = {driver: [] for driver in self._unseen.drivers}
-        if self._person_count():
+        if self._person_count() and self._has_crossings:
             for driver, person in self._pairs_near():
                 doubts.setdefault(driver, []).append(person)
         for driver, persons in doubts.items():
             self._unseen.decide(driver, {p: self._sees(driver, p, own_lamps) for p in persons}, now)
+
+    @functools.cached_property
+    def _has_crossings(self) -> bool:
+        """Whether there is a crossing in the network; asked for once, as lists of many persons take long."""
+        parts = (edge.rpartition("_")[2] for edge in self._api.edge.getIDList() if edge.startswith(":"))
+        return any(part.startswith(_CROSSING) for part in parts)
 
     def _pairs_near(self) -> Iterator[tuple[str, str]]:
         """Drivers on a junction or the roads to it, and persons on foot there."""

@@ -42,20 +42,20 @@ def picture(results: Results, plan: Plan) -> NDArray[np.uint8]:
     _draw_headways(panels[1, 0], results, plan)
     _draw_ttc(panels[1, 1], results, plan)
     for axes in panels.flat:
-        _label_visibilities(axes, plan)
+        _finish(axes, plan, columns=2 if axes in panels[1] else 1)
     drawn = BytesIO()
     figure.savefig(drawn, format="png")
     return np.asarray(Image.open(drawn).convert("RGB"))
 
 
-def _label_visibilities(axes: Axes, plan: Plan) -> None:
+def _finish(axes: Axes, plan: Plan, columns: int) -> None:
     axes.set_xscale("log")
     places = [_place(v) for v in plan.visibilities]
     axes.set_xticks(places, [f"{v:.0f}" if np.isfinite(v) else "∞" for v in plan.visibilities])
     axes.set_xticks([], minor=True)
     axes.set_xlabel("V_met [m]")
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=8)
+    axes.legend(fontsize=8, ncols=columns)
 
 
 def _place(visibility: float) -> float:
@@ -107,7 +107,7 @@ def _draw_headways(axes: Axes, results: Results, plan: Plan) -> None:
         for demand, style in zip(plan.demands, ("o-", "s--", "^:"), strict=False):
             _curve(axes, results, plan, Case(population, demand, np.inf), "headway_below_2", 100.0, style)
     axes.plot([150.0], [100.0 / 3.0], "k*", markersize=11, label="LR958: one third at 150 m")
-    axes.set_ylim(bottom=0.0)
+    axes.set_ylim(0.0, 1.4 * axes.get_ylim()[1])
     axes.set_ylabel("time headways below 2 s [%]")
 
 
@@ -115,5 +115,5 @@ def _draw_ttc(axes: Axes, results: Results, plan: Plan) -> None:
     for population in plan.populations:
         for demand, style in zip(plan.demands, ("o-", "s--", "^:"), strict=False):
             _curve(axes, results, plan, Case(population, demand, np.inf), "ttc_50", 1.0, style)
-    axes.set_ylim(bottom=0.0)
+    axes.set_ylim(0.0, 1.4 * axes.get_ylim()[1])
     axes.set_ylabel("median time to collision of closing followers [s]")

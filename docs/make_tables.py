@@ -113,13 +113,27 @@ def parameters() -> list[tuple[str, ...]]:
     rows = []
     for registry in (ESTIMATORS, FUSIONS, ADVISERS, LIGHTING_POLICIES):
         for name, method in registry.items():
-            meanings = _described(method)
+            meanings = _meanings(method)
             for key, parameter in accepted_parameters(method, GIVEN_BY_THE_LOOP).items():
-                default = parameter.default
-                told = "none" if default is None else f"`{default:.4g}`" if type(default) is float else f"`{default}`"
+                default = _shown_default(parameter.default)
                 allowed = (mismatch(parameter.annotation, object()) or "").replace("a whole number", "whole,")
-                rows.append((f"`{name}`", f"`{key}`", told, allowed.removeprefix("a number "), meanings[key]))
+                rows.append((f"`{name}`", f"`{key}`", default, allowed.removeprefix("a number "), meanings[key]))
     return rows
+
+
+def _shown_default(default: object) -> str:
+    """A parameter's default value as a table shows it."""
+    if default is None or default is inspect.Parameter.empty:
+        return "none" if default is None else "required"
+    if isinstance(default, tuple):
+        return f"`[{', '.join(f'{number:.4g}' for number in default)}]`"
+    return f"`{default:.4g}`" if type(default) is float else f"`{default}`"
+
+
+def _meanings(method: object) -> dict[str, str]:
+    """Meaning of each parameter, those that a class has from its bases included."""
+    bases = reversed(method.__mro__) if isinstance(method, type) else (method,)
+    return {key: meaning for base in bases for key, meaning in _described(base).items()}
 
 
 def _described(method: object) -> dict[str, str]:

@@ -12,6 +12,9 @@ OPTICAL_DEPTH_AT_VISIBILITY = -math.log(CONTRAST_THRESHOLD)
 KMH_PER_MPS = 3.6
 """Kilometres an hour in one metre a second."""
 
+METRES_PER_MILE = 1609.344
+"""International mile [m]."""
+
 GRAVITY = 9.80665
 """Standard acceleration of free fall [m/s²]."""
 

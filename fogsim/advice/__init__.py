@@ -4,10 +4,32 @@ from collections.abc import Callable
 
 from fogsim.advice.protocol import Adviser
 from fogsim.advice.sight_distance import FixedSpeed, NoAdvice, StoppingSightDistance
+from fogsim.advice.step_tables import (
+    AlabamaI10,
+    ChinaArticle81,
+    FiftyBelowFifty,
+    NetherlandsA16,
+    StepTable,
+    TennesseeI75,
+    VirginiaI77,
+)
 from fogsim.registry import Registry
 
 ADVISERS: Registry[Callable[..., Adviser]] = Registry(
-    "adviser", {"stopping_sight_distance": StoppingSightDistance, "fixed_speed": FixedSpeed, "none": NoAdvice}
+    "adviser",
+    {
+        "stopping_sight_distance": StoppingSightDistance,
+        "step_table": StepTable,
+        "netherlands_a16": NetherlandsA16,
+        "alabama_i10": AlabamaI10,
+        "tennessee_i75": TennesseeI75,
+        "virginia_i77": VirginiaI77,
+        "china_article_81": ChinaArticle81,
+        "france_r413_4": FiftyBelowFifty,
+        "germany_stvo_3": FiftyBelowFifty,
+        "fixed_speed": FixedSpeed,
+        "none": NoAdvice,
+    },
 )
 
-__all__ = ["ADVISERS", "Adviser", "FixedSpeed", "NoAdvice", "StoppingSightDistance"]
+__all__ = ["ADVISERS", "Adviser", "FixedSpeed", "NoAdvice", "StepTable", "StoppingSightDistance"]

@@ -4,9 +4,10 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
+from fogsim.advice.raising import hold_rises
 from fogsim.kinematics import DECELERATION, REACTION_TIME, safe_speed
 from fogsim.parameters import Range, checked_parameters
-from fogsim.units import KMH_PER_MPS
+from fogsim.units import GRAVITY, KMH_PER_MPS
 from fogsim.values import Belief, SpeedAdvice
 
 
@@ -22,7 +23,12 @@ class StoppingSightDistance:
     reaction_time : float
         Perception and reaction time [s].
     deceleration : float
-        Deceleration while stopping [m/s²].
+        Deceleration while stopping on level road [m/s²].
+    friction : float
+        Coefficient of friction between tyres and road [-], which no deceleration exceeds; 0.28 … 0.4 on wet roads by
+        speed (AASHTO 1990), down to 0.1 on ice.
+    grade : float
+        Slope of the road [-], positive uphill.
     quantile : float
         Which quantile of the believed visibility counts as sight distance, 0 … 1; 0.5 is the median, less is careful.
     sight_share : float
@@ -46,6 +52,8 @@ class StoppingSightDistance:
 
     reaction_time: Annotated[float, Range(0.0, 60.0, "s")] = REACTION_TIME
     deceleration: Annotated[float, Range(0.1, 15.0, "m/s²")] = DECELERATION
+    friction: Annotated[float, Range(0.05, 1.5)] = 1.0
+    grade: Annotated[float, Range(-0.2, 0.2)] = 0.0
     quantile: Annotated[float, Range(0.0, 1.0)] = 0.25
     sight_share: Annotated[float, Range(0.01, 1.0)] = 1.0
     rounding: Annotated[float, Range(0.01, 50.0, "m/s")] = 10.0 / KMH_PER_MPS
@@ -64,14 +72,11 @@ class StoppingSightDistance:
         if belief.log_standard_deviation > self.widest_belief:
             return SpeedAdvice(previous.speed)
         sight = self.sight_share * belief.visibility_quantile(self.quantile)
-        safe = safe_speed(sight, self.reaction_time, self.deceleration)
+        braking = min(self.deceleration, self.friction * GRAVITY)
+        stoppable = braking + GRAVITY * self.grade > 0.0
+        safe = safe_speed(sight, self.reaction_time, braking, self.grade) if stoppable else 0.0
         target = math.inf if safe >= speed_limit else self._rounded(safe)
-        if target <= previous.speed:
-            return SpeedAdvice(target)
-        since = time if previous.raise_since is None else previous.raise_since
-        if time - since >= self.hold:
-            return SpeedAdvice(target)
-        return SpeedAdvice(previous.speed, raise_since=since)
+        return hold_rises(target, time, previous, self.hold)
 
     def _rounded(self, speed: float) -> float:
         # A hair of tolerance keeps exact multiples from being rounded down a whole step.

@@ -27,7 +27,7 @@ _UNITS: Mapping[str, str] = {
 }
 """Unit by the end of a key."""
 
-_STYLE = """
+PAGE_STYLE = """
 :root { color-scheme: light; }
 body { font: 15px/1.5 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; color: #1c2733; background: #fff;
   max-width: 62rem; margin: 2.5rem auto; padding: 0 1.25rem; }
@@ -100,7 +100,7 @@ def render_report(content: ReportContent) -> str:
         [
             '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">',
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            f"<title>{title} – FogSim</title>\n<style>{_STYLE}</style>\n</head>\n<body>",
+            f"<title>{title} – FogSim</title>\n<style>{PAGE_STYLE}</style>\n</head>\n<body>",
             f'<h1>{title}</h1>\n<p class="lead">{escape(content.description)}</p>',
             _banner(content.interrupted_at),
             *(f'<p class="note">Not played: {escape(line)}</p>' for line in content.not_played),

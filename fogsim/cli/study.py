@@ -1,0 +1,54 @@
+"""``fogsim study``: policies compared over seeds."""
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fogsim.cli.printing import INTERRUPTED, escape, stderr, stdout
+from fogsim.cli.progress import STARTING, progress_bar
+
+
+def study_command(
+    study: Annotated[Path, typer.Argument(help="The study file.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Directory; one that was interrupted is continued. [runs/STUDY]")
+    ] = None,
+    processes: Annotated[
+        int | None, typer.Option("-j", "--processes", min=1, help="Runs at once. [one a core]")
+    ] = None,
+    check: Annotated[
+        bool, typer.Option("--check", help="Check the file and say how many runs it has; run none.")
+    ] = False,
+) -> None:
+    """Run a grid of policies, fogs, drivers and seeds, and write a table, differences with intervals, and a report."""
+    from fogsim.study import load_study, run_study
+
+    loaded = load_study(study)
+    shape = " × ".join(f"{len(levels)} {name}" for name, levels in loaded.factors.items())
+    cells = len({tuple(run.levels.values()) for run in loaded.runs})
+    stdout.print(f"{loaded.name}: {escape(shape)} × {len(loaded.runs) // cells} seeds = {len(loaded.runs)} runs")
+    if check:
+        return
+    directory = out or Path("runs", loaded.name)
+    failed: list[str] = []
+    try:
+        with progress_bar(stderr, stays=True) as progress:
+            task = progress.add_task(STARTING, total=len(loaded.runs))
+
+            def show(done: int, message: str | None) -> None:
+                failed.extend([message] if message else [])
+                said = f", {len(failed)} failed" if failed else ""
+                progress.update(task, completed=done, description=f"{done} of {len(loaded.runs)} runs{said}")
+
+            rows = run_study(loaded, directory, processes=processes or os.cpu_count(), watch=show)
+    except KeyboardInterrupt:
+        stdout.print("Interrupted; finished runs are kept, and the same command goes on.")
+        raise typer.Exit(INTERRUPTED) from None
+    missing = [row for row in rows if row["status"] != "complete"]
+    for row in missing[:10]:
+        stdout.print(f"[yellow]run {row['run']} failed:[/] {escape(str(row['message']))}", soft_wrap=True)
+    stdout.print("Results:")
+    for name in ("study.parquet", "study.csv", "comparison.csv", "report.html"):
+        stdout.print(f"  {escape(directory / name)}", soft_wrap=True)

@@ -1,0 +1,188 @@
+"""Differences to the baseline: the same seeds under two policies, with intervals and a paired test.
+
+Every comparison changes the levels of the factors that the baseline names, and leaves all others as they are. Runs of
+the same seed have the same traffic and the same noise, so that the difference is taken run by run.
+"""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from fogsim.study.plan import Study
+from fogsim.study.table import Row
+
+RESAMPLES = 9_999
+"""Resamples of bootstraps and permutation tests."""
+
+SATURATED_SHARE = 0.9
+"""A metric whose extreme value this share of all runs has says little about the rest [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """One metric under one policy, compared to the baseline with the same seeds.
+
+    Attributes
+    ----------
+    metric : str
+        The metric; its name ends in its unit.
+    levels : mapping from str to str
+        Levels of all factors of what is compared.
+    baseline_mean, mean : float
+        Means under the baseline and here, in the metric's unit.
+    difference : float
+        Mean of the differences of runs with the same seed.
+    low, high : float or None
+        Ends of its bootstrap interval (BCa; Efron 1987); None where no two differences differ.
+    p_value : float or None
+        Of a paired permutation test of no difference, two-sided; None where no run differs.
+    pairs : int
+        Seeds of which both runs have a value.
+    seeds_for_half_width : int or None
+        Seeds that an interval as wide as a tenth of the baseline's mean on either side would need, by the normal law.
+    """
+
+    metric: str
+    levels: Mapping[str, str]
+    baseline_mean: float
+    mean: float
+    difference: float
+    low: float | None
+    high: float | None
+    p_value: float | None
+    pairs: int
+    seeds_for_half_width: int | None
+
+
+def numeric_metrics(rows: Sequence[Row], factors: Iterable[str]) -> list[str]:
+    """Metrics that are numbers in at least one run.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+        The table.
+    factors : iterable of str
+        Columns that are no metrics, beside the run's own.
+    """
+    others = {*factors, "run", "seed", "status", "message"}
+    names = dict.fromkeys(key for row in rows for key, v in row.items() if _number(v) is not None)
+    return [name for name in names if name not in others]
+
+
+def _number(value: object) -> float | None:
+    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
+
+
+def compare_to_baseline(study: Study, rows: Sequence[Row], metrics: Sequence[str]) -> list[Difference]:
+    """Compare every policy to the baseline.
+
+    Parameters
+    ----------
+    study : Study
+        What was planned.
+    rows : sequence of Row
+        Its table.
+    metrics : sequence of str
+        What is compared.
+
+    Returns
+    -------
+    list of Difference
+        By metric, then in the order of the grid; none for pairs of which no seed has both values.
+    """
+    by_cell: dict[tuple[str, ...], dict[int, Row]] = {}
+    for row in rows:
+        cell = tuple(str(row[name]) for name in study.factors)
+        by_cell.setdefault(cell, {})[int(str(row["seed"]))] = row
+    found = []
+    for metric in metrics:
+        for cell, runs in by_cell.items():
+            levels = dict(zip(study.factors, cell, strict=True))
+            of_baseline = tuple({**levels, **study.baseline}.values())
+            if of_baseline != cell and of_baseline in by_cell:
+                difference = _difference(study, metric, levels, runs, by_cell[of_baseline])
+                found += [difference] if difference is not None else []
+    return found
+
+
+def _difference(
+    study: Study, metric: str, levels: Mapping[str, str], runs: Mapping[int, Row], baseline: Mapping[int, Row]
+) -> Difference | None:
+    pairs = [(_number(baseline[s].get(metric)), _number(runs[s].get(metric))) for s in runs if s in baseline]
+    values = np.array([pair for pair in pairs if None not in pair], dtype=np.float64).reshape(-1, 2)
+    if not len(values):
+        return None
+    differences = values[:, 1] - values[:, 0]
+    low, high = _interval(differences, study.confidence)
+    baseline_mean = float(values[:, 0].mean())
+    return Difference(
+        metric=metric,
+        levels=levels,
+        baseline_mean=baseline_mean,
+        mean=float(values[:, 1].mean()),
+        difference=float(differences.mean()),
+        low=low,
+        high=high,
+        p_value=_p_value(differences),
+        pairs=len(values),
+        seeds_for_half_width=_seeds_wanted(differences, 0.1 * abs(baseline_mean), study.confidence),
+    )
+
+
+def _interval(differences: NDArray[np.float64], confidence: float) -> tuple[float | None, float | None]:
+    """Bootstrap interval of a mean; (None, None) where resampling gives but one value."""
+    if np.ptp(differences) == 0.0:
+        return None, None
+    ends = stats.bootstrap(
+        (differences,), np.mean, n_resamples=RESAMPLES, confidence_level=confidence, rng=np.random.default_rng(0)
+    ).confidence_interval
+    return (float(ends.low), float(ends.high)) if math.isfinite(ends.low) and math.isfinite(ends.high) else (None, None)
+
+
+def _p_value(differences: NDArray[np.float64]) -> float | None:
+    """Two-sided paired permutation test: under no difference each sign is as likely as the other."""
+    if not differences.any():
+        return None
+    test = stats.permutation_test(
+        (differences, np.zeros_like(differences)),
+        lambda x, y, axis: np.mean(x - y, axis=axis),
+        permutation_type="samples",
+        vectorized=True,
+        n_resamples=RESAMPLES,
+        rng=np.random.default_rng(0),
+    )
+    return float(test.pvalue)
+
+
+def _seeds_wanted(differences: NDArray[np.float64], half_width: float, confidence: float) -> int | None:
+    if len(differences) < 2 or half_width == 0.0:
+        return None
+    quantile = float(stats.norm.ppf(0.5 + 0.5 * confidence))
+    return max(2, math.ceil((quantile * float(differences.std(ddof=1)) / half_width) ** 2))
+
+
+def uninformative(rows: Sequence[Row], metrics: Sequence[str]) -> dict[str, str]:
+    """Metrics that cannot tell policies apart, and why: they do not vary, or nearly all runs are at their end.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+        The table.
+    metrics : sequence of str
+        What is looked at.
+    """
+    said = {}
+    for metric in metrics:
+        values = np.array([v for row in rows if (v := _number(row.get(metric))) is not None])
+        if not len(values) or np.ptp(values) == 0.0:
+            said[metric] = "does not vary"
+            continue
+        for end, word in ((values.min(), "least"), (values.max(), "highest")):
+            share = float(np.mean(np.isclose(values, end, rtol=1e-3, atol=1e-9)))
+            if share >= SATURATED_SHARE:
+                said[metric] = f"saturated: {share:.0%} of the runs have the {word} value, {end:.4g}"
+    return said

@@ -1,0 +1,100 @@
+"""The directory of a study: what it is about, and a file for each run that is done."""
+
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from fogsim.errors import InputError, shown
+from fogsim.files.atomic import write_json
+from fogsim.recorders.manifest import versions
+from fogsim.study.execution import Value
+from fogsim.study.plan import Study, StudyRun
+from fogsim.study.pool import result_file
+from fogsim.study.table import Row
+
+_MOST_TOLD = 5
+
+
+class StudyDirectory:
+    """Where a study's results are; one that is there is continued if it is of the same study.
+
+    Parameters
+    ----------
+    path : Path
+        The directory; it is made where it is not there.
+    study : Study
+        The study.
+
+    Attributes
+    ----------
+    results : Path
+        Folder of the runs that are done.
+
+    Raises
+    ------
+    InputError
+        If the directory holds something else, or a study with other runs; the message names the differences.
+    """
+
+    def __init__(self, path: Path, study: Study) -> None:
+        self._study = study
+        self.path, self.results = path, path / "runs"
+        if path.exists() and not path.is_dir():
+            raise InputError(f"--out {path} is a file; give the name of a directory")
+        described = {"study": study.name, **study.description()}
+        manifest = path / "study.json"
+        if manifest.exists():
+            self._check_same(manifest, described)
+        elif path.exists() and any(path.iterdir()):
+            raise InputError(f"--out {path} holds something else than a study; choose another directory")
+        self.results.mkdir(parents=True, exist_ok=True)
+        if not manifest.exists():
+            write_json(manifest, {**described, "versions": versions()})
+
+    def _check_same(self, manifest: Path, described: dict[str, Any]) -> None:
+        try:
+            there = json.loads(manifest.read_text(encoding="utf-8"))
+        except ValueError as error:
+            raise InputError(f"{manifest}: cannot be read: {error}") from error
+        # The baseline and the number of seeds may change: runs that are done stay what they are.
+        changed = [change for key in ("files", "cells") for change in _changes(there.get(key, {}), described[key])]
+        if changed:
+            more = f"; and {len(changed) - _MOST_TOLD} more" if len(changed) > _MOST_TOLD else ""
+            raise InputError(
+                f"--out {self.path} holds another study, whose results would be mixed with these: "
+                f"{'; '.join(changed[:_MOST_TOLD])}{more}. Choose another directory, or undo the change"
+            )
+
+    def missing(self) -> list[StudyRun]:
+        """Runs without a result; those that failed are tried again."""
+        return [run for run in self._study.runs if self._result(run).get("status") != "complete"]
+
+    def _result(self, run: StudyRun) -> dict[str, Any]:
+        try:
+            found = json.loads(result_file(self.results, run).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return {}
+        return found if isinstance(found, dict) else {}
+
+    def rows(self) -> list[Row]:
+        """The table: a row for each run, those without a result included."""
+        return [self._row(run) for run in self._study.runs]
+
+    def _row(self, run: StudyRun) -> Row:
+        found = self._result(run)
+        metrics: dict[str, Value] = found.get("metrics", {})
+        about = {"seed": run.seed, "status": found.get("status", "missing"), "message": found.get("message")}
+        return {"run": run.number, **run.levels, **about, **metrics}
+
+
+def _changes(before: object, now: object, place: Sequence[str] = ()) -> Iterator[str]:
+    """What differs between two trees of plain data, in words."""
+    if isinstance(before, dict) and isinstance(now, dict):
+        for key in dict.fromkeys((*before, *now)):
+            if key not in before or key not in now:
+                yield f"{' · '.join((*place, str(key)))} is {'new' if key in now else 'gone'}"
+            else:
+                yield from _changes(before[key], now[key], (*place, str(key)))
+    elif before != now:
+        yield f"{' · '.join(place)} was {shown(before)} and is {shown(now)}"

@@ -1,0 +1,226 @@
+"""A study file: a scenario, what is varied about it, how often, and what the rest is compared to."""
+
+import functools
+import hashlib
+import itertools
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+from pydantic import Field, ValidationError, model_validator
+
+from fogsim.errors import InputError, suggest
+from fogsim.scenario import Scenario, load_scenario, resolved, scenario_from_config
+from fogsim.scenario.document import Document, read_document
+from fogsim.scenario.mistakes import mistake_lines
+from fogsim.scenario.section import Id, Section, Seed, Share, Text
+from fogsim.traffic.road.configuration import configured_files
+
+MOST_RUNS = 1_000_000
+"""Most runs of a study."""
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+ -]{0,59}$")]
+"""Name of a factor or a level: it becomes a column or a legend."""
+
+RESERVED = frozenset({"run", "seed", "status", "message"})
+"""Columns of the table that no factor may be named like."""
+
+
+class StudyFile(Section):
+    """What stands in a study file."""
+
+    scenario: Text | None = None
+    """A scenario of the catalogue, or a file or folder relative to the study's."""
+
+    sumocfg: Path | None = None
+    """In its place: a SUMO configuration, relative to the study's folder."""
+
+    ego: Id | None = None
+    """With `sumocfg`: id of the ego vehicle."""
+
+    settings: tuple[Text, ...] = ()
+    """`key.path=value` each, put in place of the scenario's in every run."""
+
+    factors: Annotated[dict[Name, dict[Name, tuple[Text, ...]]], Field(min_length=1)]
+    """What is varied: a name and the levels of each factor, each level with the settings that make it."""
+
+    seeds: Annotated[int, Field(strict=True, ge=1, le=100_000)] | Annotated[tuple[Seed, ...], Field(min_length=1)] = 10
+    """How many seeds, from 0 on, or a list of them; every cell of the grid has the same ones."""
+
+    baseline: dict[Name, Name] = Field(default_factory=dict)
+    """Level of one factor or several to which the others are compared; by default the first factor's first level."""
+
+    confidence: Annotated[Share, Field(ge=0.5, le=0.999)] = 0.95
+    """Confidence of the intervals."""
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        if (self.scenario is None) == (self.sumocfg is None):
+            raise ValueError("give either scenario, or sumocfg with ego")
+        if self.sumocfg is not None and self.ego is None:
+            raise ValueError("ego is missing: which vehicle of the SUMO configuration is the ego?")
+        return self
+
+    @model_validator(mode="after")
+    def _known_levels(self) -> Self:
+        for name, levels in self.factors.items():
+            if name in RESERVED:
+                raise ValueError(f"factors.{name}: the table has a column of that name; take another")
+            if not levels:
+                raise ValueError(f"factors.{name}: a factor needs at least one level")
+        for name, level in self.baseline.items():
+            if name not in self.factors:
+                raise ValueError(f"baseline.{name}: unknown factor; {suggest(name, self.factors)}")
+            if level not in self.factors[name]:
+                raise ValueError(f"baseline.{name}: unknown level {level!r}; {suggest(level, self.factors[name])}")
+        seeds = self.seeds
+        if not isinstance(seeds, int) and len(set(seeds)) < len(seeds):
+            raise ValueError("seeds: a seed stands twice")
+        return self
+
+
+@dataclass(frozen=True, slots=True)
+class StudyRun:
+    """One run of a study.
+
+    Attributes
+    ----------
+    number : int
+        Its place in the table, from 0.
+    levels : mapping from str to str
+        Level of each factor.
+    seed : int
+        Seed of the run.
+    scenario : Scenario
+        What is run.
+    key : str
+        A digest of the scenario and the seed, by which its result is found again.
+    """
+
+    number: int
+    levels: Mapping[str, str]
+    seed: int
+    scenario: Scenario
+    key: str
+
+
+@dataclass(frozen=True, slots=True)
+class Study:
+    """A study that has been checked.
+
+    Attributes
+    ----------
+    name : str
+        Name of its file, without its ending.
+    factors : mapping from str to tuple of str
+        Levels of each factor, in the order of the file.
+    baseline : mapping from str to str
+        To what the others are compared.
+    confidence : float
+        Confidence of the intervals, 0 … 1.
+    runs : tuple of StudyRun
+        All runs, in the order of the table.
+    """
+
+    name: str
+    factors: Mapping[str, tuple[str, ...]]
+    baseline: Mapping[str, str]
+    confidence: float
+    runs: tuple[StudyRun, ...]
+
+    def description(self) -> dict[str, Any]:
+        """All that decides its runs, as JSON can hold it: each cell's scenario by its levels, and the seeds."""
+        cells = {_label(run.levels): resolved(run.scenario) for run in self.runs}
+        seeds = list(dict.fromkeys(run.seed for run in self.runs))
+        factors = {name: list(levels) for name, levels in self.factors.items()}
+        files = dict(item for run in self.runs for item in file_digests(run.scenario).items())
+        return {"factors": factors, "baseline": dict(self.baseline), "seeds": seeds, "files": files, "cells": cells}
+
+
+def _label(levels: Mapping[str, str]) -> str:
+    return ", ".join(f"{name}={level}" for name, level in levels.items())
+
+
+def file_digests(scenario: Scenario) -> dict[str, str]:
+    """Digest of the content of each of SUMO's files that a scenario names, by its name.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+    traffic, folder = scenario.traffic, scenario.directory
+    named = [path for path in (traffic.config, traffic.net, *traffic.routes, *traffic.additional) if path is not None]
+    if traffic.config is not None:
+        net, additional = configured_files(folder / traffic.config)
+        named += [net, *additional]
+    return {path.name: _digest(folder / path) for path in named}
+
+
+@functools.lru_cache
+def _digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()[:20]
+
+
+def load_study(path: Path) -> Study:
+    """Read a study file and check every scenario of its grid, before anything is run.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If anything does not fit; one line for each mistake, with file, line, key path, value and what is allowed.
+    """
+    document = read_document(path)
+    try:
+        written = StudyFile.model_validate(document.data)
+    except ValidationError as error:
+        raise InputError(mistake_lines(document, StudyFile, error)) from error
+    seeds = tuple(range(written.seeds)) if isinstance(written.seeds, int) else written.seeds
+    grid = [dict(zip(written.factors, cell, strict=True)) for cell in itertools.product(*written.factors.values())]
+    if len(grid) * len(seeds) > MOST_RUNS:
+        raise InputError(f"{path}: {len(grid)} cells × {len(seeds)} seeds are more than {MOST_RUNS} runs")
+    runs = tuple(_runs(document, written, grid, seeds))
+    first, levels = next(iter(written.factors.items()))
+    return Study(
+        name=path.stem,
+        factors={name: tuple(levels) for name, levels in written.factors.items()},
+        baseline=written.baseline or {first: next(iter(levels))},
+        confidence=written.confidence,
+        runs=runs,
+    )
+
+
+def _runs(
+    document: Document, written: StudyFile, grid: list[dict[str, str]], seeds: tuple[int, ...]
+) -> Iterator[StudyRun]:
+    number = 0
+    for levels in grid:
+        scenario = _scenario(document, written, levels)
+        text = json.dumps([resolved(scenario), file_digests(scenario)], sort_keys=True)
+        for seed in seeds:
+            key = hashlib.sha256(f"{text} {seed}".encode()).hexdigest()[:20]
+            yield StudyRun(number, levels, seed, scenario, key)
+            number += 1
+
+
+def _scenario(document: Document, written: StudyFile, levels: Mapping[str, str]) -> Scenario:
+    settings = [*written.settings]
+    for factor, level in levels.items():
+        settings += written.factors[factor][level]
+    folder = document.path.parent
+    try:
+        if written.sumocfg is not None:
+            return scenario_from_config(folder / written.sumocfg, str(written.ego), settings)
+        name = str(written.scenario)
+        beside = folder / name
+        return load_scenario(beside if beside.exists() else name, settings)
+    except InputError as error:
+        raise InputError(f"{document.path}: {_label(levels)}: {error}") from error

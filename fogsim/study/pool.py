@@ -1,0 +1,117 @@
+"""Runs of a study in parallel processes of this machine; whatever ends them, finished runs are kept."""
+
+import contextlib
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+
+from fogsim.files.atomic import write_json
+from fogsim.scenario import Scenario
+from fogsim.study.execution import run_to_file
+from fogsim.study.plan import StudyRun
+
+RunWatch = Callable[[StudyRun, str | None], None]
+"""Called with each run that is done, and what went wrong with it."""
+
+Work = Callable[[Scenario, int, Path], str | None]
+"""Runs a scenario with a seed, writes the result into a file, and tells what went wrong, if anything did."""
+
+
+def run_in_pool(
+    runs: Iterable[StudyRun], folder: Path, processes: int, watch: RunWatch, work: Work = run_to_file
+) -> None:
+    """Run what is given, each run's result in a file of its key.
+
+    A process that dies takes its run with it and no other: those that were under way are run again, each alone, and
+    the one that dies again is noted as failed.
+
+    Parameters
+    ----------
+    runs : iterable of StudyRun
+        What is to be run.
+    folder : Path
+        Where the results go, ``KEY.json`` each.
+    processes : int
+        How many run at once.
+    watch : RunWatch
+        Who is told of each run that is done, in this process.
+    work : Work
+        What is done with each, in another process; a function of a module.
+    """
+    waiting = list(reversed(list(runs)))
+    while waiting:
+        for suspect in _run_until_broken(waiting, folder, processes, watch, work):
+            if _run_until_broken([suspect], folder, 1, watch, work):
+                message = "the process that ran it died"
+                write_json(result_file(folder, suspect), {"status": "failed", "message": message})
+                watch(suspect, message)
+
+
+def result_file(folder: Path, run: StudyRun) -> Path:
+    """Where the result of a run is.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the results.
+    run : StudyRun
+        The run.
+    """
+    return folder / f"{run.key}.json"
+
+
+def _run_until_broken(
+    waiting: list[StudyRun], folder: Path, processes: int, watch: RunWatch, work: Work
+) -> list[StudyRun]:
+    """Run from the end of a list, which becomes shorter; gives back what was under way when a process died."""
+    with _pool(processes) as pool:
+        under_way: dict[Future[str | None], StudyRun] = {}
+        try:
+            while waiting or under_way:
+                while waiting and len(under_way) < processes:
+                    run = waiting[-1]
+                    future = pool.submit(work, run.scenario, run.seed, result_file(folder, run))
+                    under_way[future] = waiting.pop()
+                for done in wait(under_way, return_when=FIRST_COMPLETED).done:
+                    message = done.result()
+                    watch(under_way.pop(done), message)
+        except BrokenProcessPool:
+            return list(under_way.values())
+    return []
+
+
+@contextlib.contextmanager
+def _pool(processes: int) -> Iterator[ProcessPoolExecutor]:
+    # One SUMO a process, and none of this process's threads or contexts in it: all are forked from a process that has
+    # imported what they need and done nothing else.
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["fogsim.study.execution"])
+    pool = ProcessPoolExecutor(processes, mp_context=context, initializer=_leave_signals_to_parent)
+    try:
+        yield pool
+    except BaseException:
+        for worker in multiprocessing.active_children():
+            worker.terminate()
+        pool.shutdown(wait=True, cancel_futures=True)
+        raise
+    pool.shutdown(wait=True)
+
+
+def _leave_signals_to_parent() -> None:
+    """Let Ctrl-C, which a terminal sends to all, end the process that waits for the runs, and it end this one."""
+    for signum in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(signum, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """End this process when the one that waits for it is killed, so that nothing goes on unseen."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

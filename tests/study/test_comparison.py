@@ -1,0 +1,83 @@
+import numpy as np
+import pytest
+
+from fogsim.study.comparison import compare_to_baseline, numeric_metrics, uninformative
+from fogsim.study.plan import Study
+
+STUDY = Study("s", {"policy": ("none", "slow"), "fog": ("thin", "thick")}, {"policy": "none"}, 0.95, ())
+
+
+def table(effect: float, seeds: int = 20) -> list[dict[str, str | float | int | None]]:
+    """Runs whose seeds differ much and whose policies differ by the effect, with a little noise."""
+    rng = np.random.default_rng(3)
+    of_seed, noise = rng.normal(30.0, 5.0, seeds), rng.normal(0.0, 0.5, (2, 2, seeds))
+    return [
+        {
+            "run": 0,
+            "policy": policy,
+            "fog": fog,
+            "seed": seed,
+            "status": "complete",
+            "message": None,
+            "speed_mps": of_seed[seed] + effect * p + noise[p, f, seed],
+            "crashes": 0,
+            "ending": "time",
+        }
+        for p, policy in enumerate(STUDY.factors["policy"])
+        for f, fog in enumerate(STUDY.factors["fog"])
+        for seed in range(seeds)
+    ]
+
+
+def test_a_difference_is_found_seed_by_seed() -> None:
+    rows = table(-2.0)
+    found = compare_to_baseline(STUDY, rows, ["speed_mps"])
+    assert [one.levels for one in found] == [{"policy": "slow", "fog": f} for f in ("thin", "thick")]
+    for one in found:
+        assert one.pairs == 20
+        assert one.difference == pytest.approx(one.mean - one.baseline_mean)
+        assert one.low is not None
+        assert one.high is not None
+        assert one.low < -2.0 < one.high
+        # Between seeds the spread is 5 m/s; paired, the interval is that of the noise, 0.5 √2 / √20 to either side.
+        assert one.high - one.low == pytest.approx(2 * 1.96 * 0.5 * np.sqrt(2 / 20), rel=0.4)
+        assert one.p_value == pytest.approx(2 / 10_000, abs=1e-4)
+        assert one.seeds_for_half_width == 2
+
+
+def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
+    rng = np.random.default_rng(0)
+    inside = 0
+    for _ in range(100):
+        rows = [
+            {"policy": policy, "fog": "thin", "seed": seed, "v": rng.normal(1.0 if policy == "slow" else 0.0, 1.0)}
+            for policy in ("none", "slow")
+            for seed in range(15)
+        ]
+        (one,) = compare_to_baseline(STUDY, rows, ["v"])
+        assert one.low is not None
+        assert one.high is not None
+        inside += one.low <= 1.0 <= one.high
+    assert 86 <= inside <= 99
+
+
+def test_where_nothing_differs_nothing_is_claimed() -> None:
+    (one, _) = compare_to_baseline(STUDY, table(0.0), ["crashes"])
+    assert (one.difference, one.low, one.high, one.p_value) == (0.0, None, None, None)
+    assert one.seeds_for_half_width is None
+
+
+def test_only_seeds_of_which_both_runs_have_a_value_count() -> None:
+    rows = [row for row in table(-2.0) if not (row["policy"] == "slow" and int(str(row["seed"])) < 5)]
+    rows[0] = {**rows[0], "speed_mps": None}
+    assert {one.pairs for one in compare_to_baseline(STUDY, rows, ["speed_mps"])} == {15}
+    assert not compare_to_baseline(STUDY, [row for row in rows if row["policy"] == "slow"], ["speed_mps"])
+
+
+def test_metrics_that_say_nothing_are_called_so() -> None:
+    rows = table(-2.0)
+    for number, row in enumerate(rows):
+        row["gap_m"] = 2.5 if number % 20 else 3.0
+    assert numeric_metrics(rows, STUDY.factors) == ["speed_mps", "crashes", "gap_m"]
+    said = uninformative(rows, ["speed_mps", "crashes", "gap_m"])
+    assert said == {"crashes": "does not vary", "gap_m": "saturated: 95% of the runs have the least value, 2.5"}

@@ -1,0 +1,83 @@
+from pathlib import Path
+
+import pytest
+
+from fogsim.errors import InputError
+from fogsim.study import load_study
+
+STUDY = """
+scenario: motorway_fog_bank
+settings: [duration_s=2]
+factors:
+  policy:
+    none: [advice=none]
+    ssd: [advice=stopping_sight_distance]
+  visibility:
+    v60: [fog.visibility_m=60]
+    v100: [fog.visibility_m=100]
+seeds: 3
+"""
+
+
+def written(folder: Path, text: str = STUDY) -> Path:
+    path = folder / "mine.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_the_grid_has_every_cell_with_the_same_seeds(tmp_path: Path) -> None:
+    study = load_study(written(tmp_path))
+    assert study.factors == {"policy": ("none", "ssd"), "visibility": ("v60", "v100")}
+    assert study.baseline == {"policy": "none"}
+    assert [run.number for run in study.runs] == list(range(12))
+    cells = [tuple(run.levels.values()) for run in study.runs]
+    assert cells == [(p, v) for p in ("none", "ssd") for v in ("v60", "v100") for _ in range(3)]
+    assert [run.seed for run in study.runs] == [0, 1, 2] * 4
+    assert len({run.key for run in study.runs}) == 12
+    assert study.runs[3].scenario.fog.visibility_m == 100.0
+    assert study.runs[0].scenario.duration_s == 2.0
+
+
+def test_keys_follow_what_is_run_and_nothing_else(tmp_path: Path) -> None:
+    study = load_study(written(tmp_path))
+    other = load_study(written(tmp_path, STUDY.replace("ssd:", "sight:").replace("seeds: 3", "seeds: [2, 1, 0]")))
+    assert {run.key for run in study.runs} == {run.key for run in other.runs}
+    longer = load_study(written(tmp_path, STUDY.replace("duration_s=2", "duration_s=3")))
+    assert not {run.key for run in study.runs} & {run.key for run in longer.runs}
+
+
+def test_a_scenario_beside_the_study_is_found(tmp_path: Path) -> None:
+    config = tmp_path / "no.sumocfg"
+    with pytest.raises(InputError, match=r"mine\.yaml: policy=none: .*no\.sumocfg"):
+        load_study(written(tmp_path, f"sumocfg: {config.name}\nego: e\nfactors: {{policy: {{none: [advice=none]}}}}"))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("factors:", "factor:"), r"mine\.yaml:4: factor: .*did you mean 'factors'"),
+        (("advice=none", "advice=non"), r"policy=none, visibility=v60: .*unknown adviser 'non'; did you mean 'none'"),
+        (("seeds: 3", "seeds: 0"), r"seeds"),
+        (("seeds: 3", "seeds: [1, 1]"), r"a seed stands twice"),
+        (("seeds: 3", "seeds: []"), r"seeds"),
+        (("seeds: 3", "baseline: {police: none}"), r"baseline\.police: unknown factor; did you mean 'policy'"),
+        (("seeds: 3", "baseline: {policy: non}"), r"baseline\.policy: unknown level 'non'; did you mean 'none'"),
+        (("  visibility:", "  seed:"), r"factors\.seed: the table has a column of that name"),
+        (("scenario: motorway_fog_bank", "scenario: motorway"), r"unknown scenario 'motorway'"),
+        (("scenario: motorway_fog_bank", "ego: x"), r"give either scenario, or sumocfg"),
+        (("scenario: motorway_fog_bank", "sumocfg: a.sumocfg"), r"ego is missing"),
+        (("fog.visibility_m=60", "fog.visibility_m=sixty"), r"visibility=v60: .*fog\.visibility_m"),
+    ],
+)
+def test_mistakes_are_named_with_their_place(tmp_path: Path, change: tuple[str, str], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        load_study(written(tmp_path, STUDY.replace(*change, 1)))
+
+
+def test_an_empty_study_says_what_is_missing(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"mine\.yaml: .*mapping"):
+        load_study(written(tmp_path, ""))
+    with pytest.raises(InputError, match="factors"):
+        load_study(written(tmp_path, "scenario: motorway_fog_bank"))
+    with pytest.raises(InputError, match="factors"):
+        load_study(written(tmp_path, "scenario: motorway_fog_bank\nfactors: {}"))

@@ -1,0 +1,59 @@
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from fogsim.scenario import load_scenario
+from fogsim.study import StudyRun
+from fogsim.study.pool import result_file, run_in_pool
+
+SCENARIO = load_scenario("motorway_fog_bank")
+WORK = """
+import json, os, signal
+def work(scenario, seed, result):
+    mark = result.with_suffix(".begun")
+    if seed == 3 or (seed == 1 and not mark.exists()):
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    result.write_text(json.dumps({"status": "complete", "seed": seed}))
+    return "odd" if seed == 2 else None
+"""
+"""Seed 3 kills its process always, seed 1 the first time."""
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_a_process_that_dies_costs_no_other_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, processes: int
+) -> None:
+    name = f"work_of_{tmp_path.name.replace('-', '_')}"
+    (tmp_path / f"{name}.py").write_text(WORK, encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    work = __import__(name).work
+    runs = [StudyRun(seed, {"policy": "none"}, seed, SCENARIO, f"k{seed}") for seed in range(6)]
+    told: dict[int, str | None] = {}
+    run_in_pool(runs, tmp_path, processes, lambda run, message: told.update({run.seed: message}), work)
+    assert told == {0: None, 1: None, 2: "odd", 3: "the process that ran it died", 4: None, 5: None}
+    for run in runs:
+        status = json.loads(result_file(tmp_path, run).read_text(encoding="utf-8"))["status"]
+        assert status == ("failed" if run.seed == 3 else "complete")
+    sys.modules.pop(name)
+
+
+def test_ctrl_c_ends_all_processes_and_keeps_what_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "slow_work.py").write_text(
+        WORK.replace("seed == 3 or (seed == 1 and not mark.exists())", "False").replace(
+            "    result", "    import time; time.sleep(0 if seed == 0 else 60)\n    result"
+        ),
+        encoding="utf-8",
+    )
+    monkeypatch.syspath_prepend(str(tmp_path))
+    runs = [StudyRun(seed, {}, seed, SCENARIO, f"k{seed}") for seed in range(3)]
+
+    def interrupt(run: StudyRun, _: str | None) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_in_pool(runs, tmp_path, 2, interrupt, __import__("slow_work").work)
+    assert result_file(tmp_path, runs[0]).exists()
+    assert not result_file(tmp_path, runs[1]).exists()

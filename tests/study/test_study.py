@@ -1,0 +1,88 @@
+import json
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from fogsim.errors import InputError
+from fogsim.study import load_study, run_study
+from fogsim.study.directory import StudyDirectory
+
+STUDY = """
+scenario: motorway_fog_bank
+settings: [duration_s=1, camera.width=80, camera.height=60, clocks.camera_period_s=0.5]
+factors:
+  policy:
+    none: [advice=none]
+    fixed: ['advice={method: fixed_speed, parameters: {speed: 20}}']
+seeds: 2
+"""
+
+
+def study_file(folder: Path, text: str = STUDY) -> Path:
+    path = folder / "mine.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_study_is_run_continued_and_reported(tmp_path: Path) -> None:
+    # An ego that never appears breaks the runs of one policy.
+    text = STUDY.replace("seeds: 2", "    late: [traffic.warm_up_limit_s=1]\nseeds: 2")
+    study, out = load_study(study_file(tmp_path, text)), tmp_path / "out"
+    done: list[int] = []
+    rows = run_study(study, out, processes=1, watch=lambda number, _: done.append(number))
+    assert done == [0, 1, 2, 3, 4, 5, 6]
+    assert [(row["policy"], row["seed"], row["status"]) for row in rows] == [
+        (policy, seed, "failed" if policy == "late" else "complete")
+        for policy in study.factors["policy"]
+        for seed in (0, 1)
+    ]
+    assert "did not appear within" in str(rows[-1]["message"])
+    table = pq.read_table(out / "study.parquet").to_pylist()
+    assert [row["mean_speed_mps"] for row in table[:4]] == [row["mean_speed_mps"] for row in rows[:4]]
+    assert {path.name for path in out.iterdir()} == {
+        *("study.json", "study.parquet", "study.csv", "comparison.csv", "report.html", "figures", "runs")
+    }
+    assert "difference to none" in (out / "figures" / "mean_speed_mps.svg").read_text(encoding="utf-8")
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "PARTIAL: 2 runs are missing or failed" in page
+    assert "did not appear within" in page
+
+    # As if the command had been killed: what is done is not run again, what failed is, and the table is the same.
+    table_bytes = (out / "study.parquet").read_bytes()
+    (out / "runs" / f"{study.runs[1].key}.json").unlink()
+    (out / "study.parquet").unlink()
+    again: list[int] = []
+    run_study(study, out, processes=1, watch=lambda number, _: again.append(number))
+    assert again == [3, 4, 5, 6]
+    assert (out / "study.parquet").read_bytes() == table_bytes
+
+
+def test_a_changed_study_is_refused_with_the_difference(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    StudyDirectory(out, load_study(study_file(tmp_path)))
+    changed = load_study(study_file(tmp_path, STUDY.replace("duration_s=1", "duration_s=2")))
+    with pytest.raises(InputError, match=r"policy=none · duration_s was 1\.0 and is 2\.0"):
+        StudyDirectory(out, changed)
+    # More seeds, or another baseline, are the same study.
+    more = load_study(study_file(tmp_path, STUDY.replace("seeds: 2", "seeds: 5\nbaseline: {policy: fixed}")))
+    assert len(StudyDirectory(out, more).missing()) == 10
+
+
+def test_directories_of_something_else_are_left_alone(tmp_path: Path) -> None:
+    study = load_study(study_file(tmp_path))
+    with pytest.raises(InputError, match="something else than a study"):
+        StudyDirectory(tmp_path, study)
+    with pytest.raises(InputError, match="is a file"):
+        StudyDirectory(study_file(tmp_path), study)
+
+
+def test_a_result_that_is_broken_is_run_again(tmp_path: Path) -> None:
+    study = load_study(study_file(tmp_path))
+    directory = StudyDirectory(tmp_path / "out", study)
+    file = tmp_path / "out" / "runs" / f"{study.runs[0].key}.json"
+    for content in ("{", "[]", json.dumps({"status": "failed", "message": "no"})):
+        file.write_text(content, encoding="utf-8")
+        assert len(directory.missing()) == 4
+    file.write_text(json.dumps({"status": "complete", "metrics": {}}), encoding="utf-8")
+    assert len(directory.missing()) == 3

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from fogsim.errors import SimulationError
 from fogsim.metrics.estimation import BeliefError, EstimatorErrors
+from fogsim.metrics.everybody import Everybody
 from fogsim.metrics.metric import JsonValue, Metric, Sample
 from fogsim.metrics.motion import Comfort, Compliance, Motion
 from fogsim.metrics.safety import Collisions, Conflict, Sight
@@ -24,6 +25,7 @@ METRICS: Registry[MetricFactory] = Registry(
         "motion": lambda _: Motion(),
         "collisions": lambda _: Collisions(),
         "conflict": lambda standard: Conflict(standard.time_to_collision),
+        "everybody": lambda standard: Everybody(standard.time_to_collision),
         "sight": lambda standard: Sight(standard.reaction_time, standard.deceleration),
         "compliance": lambda standard: Compliance(standard.advice_tolerance),
         "comfort": lambda _: Comfort(),

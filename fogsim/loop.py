@@ -13,8 +13,10 @@ from fogsim.ego.view_rendering import Surrounding
 from fogsim.errors import SimulationError, UnplayedWarning
 from fogsim.randomness import spawn_streams
 from fogsim.scenario import Scenario, build
+from fogsim.scenario.schema import InformedMethod
 from fogsim.traffic import FogAccess, Traffic, libsumo_traffic
-from fogsim.values import Command, Ending, FogField, Step, TrafficSnapshot
+from fogsim.values import Belief, Command, Ending, FogField, Step, TrafficSnapshot
+from fogsim.values.belief import certain_belief
 from fogsim.values.result_checks import checked_advice, checked_command, checked_lamps
 
 
@@ -102,10 +104,25 @@ class AdvisedDriving:
         if step.index % self._frames:
             return step.command
         previous = step.command
-        advised = self._adviser.advise(step.belief, step.speed_limit, step.time, previous.advice)
+        informed = known_fog(step, self._scenario.advice)
+        advised = self._adviser.advise(informed, step.speed_limit, step.time, previous.advice)
         advice = checked_advice(self._scenario.advice.method, advised)
-        lamps = checked_lamps(self._scenario.lighting.method, self._lighting.lamps(step.belief, previous.lamps))
+        informed = known_fog(step, self._scenario.lighting)
+        lamps = checked_lamps(self._scenario.lighting.method, self._lighting.lamps(informed, previous.lamps))
         return spread_advice(Command(advice=advice, lamps=lamps), self._scenario)
+
+
+def known_fog(step: Step, method: InformedMethod) -> Belief:
+    """What a method goes by: what the ego believes, or the truth, as a visibility meter at the road has it.
+
+    Parameters
+    ----------
+    step : Step
+        What was finished last.
+    method : InformedMethod
+        The method of the scenario.
+    """
+    return step.belief if method.informed_by == "belief" else certain_belief(step.truth.extinction_ahead)
 
 
 def spread_advice(command: Command, scenario: Scenario) -> Command:

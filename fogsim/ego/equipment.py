@@ -7,10 +7,11 @@ import numpy as np
 
 from fogsim.atmosphere import extinction, field_at, optical_depth_along
 from fogsim.camera import mounted_pose
-from fogsim.ego.view_rendering import Surrounding, ViewRenderer
+from fogsim.ego.view_rendering import EgoView, NoView, Surrounding, ViewRenderer
 from fogsim.errors import SimulationError
 from fogsim.randomness import Streams
 from fogsim.scenario import Scenario, build
+from fogsim.scenario.schema import NO_RENDERER
 from fogsim.sensors import measure_lead, signs_ahead
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import (
@@ -49,7 +50,7 @@ class EgoEquipment:
         self._body_pitch = build.body_pitch(scenario)
         self._lead_sensor = build.lead_sensor(scenario)
         self._fusion = build.fusion(scenario)
-        self._view_renderer: ViewRenderer | None = None
+        self._view_renderer: EgoView | None = None
         self._streams: Streams | None = None
         self._mount_camera(build.CAR)
 
@@ -90,7 +91,8 @@ class EgoEquipment:
             self.close()
             self._mount_camera(body)
         if self._view_renderer is None:
-            self._view_renderer = ViewRenderer(self._scenario, *network(), body)
+            kind = NoView if self._scenario.renderer == NO_RENDERER else ViewRenderer
+            self._view_renderer = kind(self._scenario, *network(), body)
         for estimator in self._estimators:
             estimator.reset()
         self._fusion.reset()

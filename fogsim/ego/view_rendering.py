@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere import Air
 from fogsim.camera import averaged, middle_samples, supersampled
+from fogsim.errors import InputError
 from fogsim.lighting import LampMount, own_head_lamps
 from fogsim.render import Renderer, RenderError, make_renderer
 from fogsim.scenario import Scenario, build
@@ -76,6 +77,71 @@ class Surrounding(NamedTuple):
     pose: CameraPose
     lights: Lights
     illuminance: float
+
+
+class EgoView(Protocol):
+    """What the ego's camera gets.
+
+    Attributes
+    ----------
+    signs : SignMap
+        The signs.
+    fog : FogField
+        The fog at the start of a run.
+    """
+
+    signs: SignMap
+    fog: FogField
+
+    def render(self, state: TrafficState, ego: int, pose: CameraPose, time: float) -> tuple[View, NDArray[np.float32]]:
+        """Draw; see `ViewRenderer.render`."""
+
+    def surrounding(self, state: TrafficState, ego: int, pose: CameraPose) -> Surrounding:
+        """What is drawn; see `ViewRenderer.surrounding`."""
+
+    def close(self) -> None:
+        """Free what draws; closing twice is allowed."""
+
+
+class NoView:
+    """A view in which nothing is drawn and no scene is built, for runs that need no camera: the sensor looks into darkness.
+
+    Parameters
+    ----------
+    scenario, network, signs, body
+        See `ViewRenderer`.
+
+    Attributes
+    ----------
+    signs, fog
+        See `ViewRenderer`.
+    """
+
+    def __init__(self, scenario: Scenario, network: RoadNetwork, signs: SignMap, body: str = build.CAR) -> None:
+        self.signs = signs
+        self.fog: FogField = build.fog_field(scenario, network.route)
+        camera = build.camera(scenario, body)
+        size = (camera.height, camera.width)
+        empty = np.full(size, np.inf, np.float32), np.zeros(size, np.int32)
+        self._black = np.zeros((*size, 3), np.float32)
+        self._view = View(self._black, *empty)
+
+    def render(self, *_: object) -> tuple[View, NDArray[np.float32]]:
+        """Draw nothing; see `ViewRenderer.render`."""
+        return self._view, self._black
+
+    def surrounding(self, *_: object) -> Surrounding:
+        """Refuse; see `ViewRenderer.surrounding`.
+
+        Raises
+        ------
+        InputError
+            Always: there is no scene.
+        """
+        raise InputError("renderer: none builds no scene that could be shown; choose another renderer")
+
+    def close(self) -> None:
+        """Do nothing: there is nothing to be freed."""
 
 
 class ViewRenderer:

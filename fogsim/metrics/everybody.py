@@ -37,7 +37,7 @@ class Everybody:
         "traffic_speed_standard_deviation_mps": "standard deviation of speed over that time",
         "traffic_exposed_time_share": "share with a time to collision below the threshold, the leader moving (TET)",
         "traffic_integrated_time_to_collision_s2_per_h": "what was missing to that threshold (TIT), per hour",
-        "traffic_serious_conflict_time_share": "share with a deceleration to avoid a crash above 3.4 m/s², the leader moving",
+        "traffic_serious_conflict_time_share": "share with a deceleration to avoid a crash above 3.4 m/s², likewise",
         "traffic_queue_exposed_time_share": "the first of these for leaders slower than 5 m/s: closing up to a queue",
         "traffic_headway_below_1_s_share": "share of the time of moving followers at less than 1 s behind the leader",
         "traffic_headway_below_2_s_share": "the same at less than 2 s",

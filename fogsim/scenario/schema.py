@@ -5,7 +5,7 @@ Everything inside FogSim is SI and radians; `fogsim.scenario.build` converts, on
 
 import warnings
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 from pydantic_core import PydanticCustomError
@@ -20,6 +20,15 @@ from fogsim.scenario.camera_schema import CameraSection
 from fogsim.scenario.fog import Fog
 from fogsim.scenario.section import Distance, Flag, Length, Method, Number, Period, Section, Seed, Text, method_of
 from fogsim.scenario.traffic_schema import DriversSection, Traffic
+
+NO_RENDERER = "none"
+"""Name that stands for drawing nothing, in runs that need no camera."""
+
+
+class InformedMethod(Method):
+    """A method that goes by the fog, known from the ego's belief or, as of a meter beside the road, in truth."""
+
+    informed_by: Literal["belief", "truth"] = "belief"
 
 
 class Clocks(Section):
@@ -111,7 +120,7 @@ class Scenario(Section):
     """The camera."""
 
     renderer: Annotated[str, Field(default="auto")]
-    """`auto`, `opengl`, `cpu`, or `reference` (pyrender's own drawing: slow, by day only)."""
+    """`auto`, `opengl`, `cpu`, `reference` (pyrender's own drawing: slow, by day only), or `none` for no frames."""
 
     street_lamps: Flag = False
     """Whether lamps stand along the roads, about every 35 m."""
@@ -122,19 +131,17 @@ class Scenario(Section):
     sensors: Sensors = Sensors()
     """The other sensors."""
 
-    estimators: tuple[Annotated[Method, method_of(ESTIMATORS)], ...] = Field(
-        default=(Method(method="negru2013"),), min_length=1
-    )
-    """Estimators that read every frame; the agent sees the first one's estimate."""
+    estimators: tuple[Annotated[Method, method_of(ESTIMATORS)], ...] = (Method(method="negru2013"),)
+    """Estimators that read every frame; the agent sees the first one's estimate. None, `[]`, with `renderer: none`."""
 
     fusion: Annotated[Method, method_of(FUSIONS)] = Method(method="grid_filter")
     """How estimates become a belief."""
 
-    advice: Annotated[Method, method_of(ADVISERS)] = Method(method="stopping_sight_distance")
-    """How the belief becomes a speed advice."""
+    advice: Annotated[InformedMethod, method_of(ADVISERS)] = InformedMethod(method="stopping_sight_distance")
+    """How the belief becomes a speed advice; with `informed_by: truth`, how the true visibility does."""
 
-    lighting: Annotated[Method, method_of(LIGHTING_POLICIES)] = Method(method="fog_lamp_rules")
-    """How the belief becomes lamps."""
+    lighting: Annotated[InformedMethod, method_of(LIGHTING_POLICIES)] = InformedMethod(method="fog_lamp_rules")
+    """How the belief becomes lamps; with `informed_by: truth`, how the true visibility does."""
 
     directory: Path = Field(default=Path(), exclude=True)
 
@@ -156,10 +163,18 @@ class Scenario(Section):
                 stacklevel=2,
             )
             return "opengl"
-        known = [*ROLES, *(name for name in RENDERERS if name != "pyrender")]
+        known = [*ROLES, NO_RENDERER, *(name for name in RENDERERS if name != "pyrender")]
         if value not in known:
             raise ValueError(str(UnknownNameError("renderer", value, known)))
         return value
+
+    @model_validator(mode="after")
+    def _frames_for_estimators(self) -> Self:
+        if self.renderer == NO_RENDERER and self.estimators:
+            raise ValueError("renderer: none draws no frames that estimators could read; write estimators: [] with it")
+        if self.renderer != NO_RENDERER and not self.estimators:
+            raise ValueError("estimators must have at least one entry, but with renderer: none")
+        return self
 
     @model_validator(mode="after")
     def _distinct_estimators(self) -> Self:

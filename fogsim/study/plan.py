@@ -7,14 +7,15 @@ import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
 from fogsim.errors import InputError, suggest
-from fogsim.scenario import Scenario, load_scenario, resolved, scenario_from_config
+from fogsim.scenario import Scenario, load_scenario, override, resolved, scenario_from_config
 from fogsim.scenario.document import Document, read_document
 from fogsim.scenario.mistakes import mistake_lines
+from fogsim.scenario.schema import NO_RENDERER
 from fogsim.scenario.section import Id, Section, Seed, Share, Text
 from fogsim.traffic.road.configuration import configured_files
 
@@ -54,6 +55,9 @@ class StudyFile(Section):
 
     confidence: Annotated[Share, Field(ge=0.5, le=0.999)] = 0.95
     """Confidence of the intervals."""
+
+    frames: Literal["where_needed", "always"] = "where_needed"
+    """Whether runs draw frames in which neither advice nor lamps go by what the camera sees."""
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
@@ -218,9 +222,26 @@ def _scenario(document: Document, written: StudyFile, levels: Mapping[str, str])
     folder = document.path.parent
     try:
         if written.sumocfg is not None:
-            return scenario_from_config(folder / written.sumocfg, str(written.ego), settings)
-        name = str(written.scenario)
-        beside = folder / name
-        return load_scenario(beside if beside.exists() else name, settings)
+            scenario = scenario_from_config(folder / written.sumocfg, str(written.ego), settings)
+        else:
+            name = str(written.scenario)
+            beside = folder / name
+            scenario = load_scenario(beside if beside.exists() else name, settings)
+        if written.frames == "where_needed" and not needs_camera(scenario):
+            scenario = override(scenario, [f"renderer={NO_RENDERER}", "estimators=[]"])
     except InputError as error:
         raise InputError(f"{document.path}: {_label(levels)}: {error}") from error
+    return scenario
+
+
+def needs_camera(scenario: Scenario) -> bool:
+    """Whether what the camera sees changes what happens: advice or lamps go by it.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+    deaf = scenario.advice.method in ("none", "fixed_speed"), scenario.lighting.method == "low_beam"
+    methods = (scenario.advice, scenario.lighting)
+    return any(m.informed_by == "belief" and not d for m, d in zip(methods, deaf, strict=True))

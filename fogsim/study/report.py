@@ -6,6 +6,7 @@ from pathlib import Path
 
 from fogsim.files.atomic import write_text
 from fogsim.recorders.report import PAGE_STYLE
+from fogsim.scenario.schema import NO_RENDERER
 from fogsim.study.comparison import Difference, compare_to_baseline, numeric_metrics, uninformative
 from fogsim.study.figures import differences_figure, trade_off_figure
 from fogsim.study.plan import Study
@@ -107,6 +108,7 @@ def _page(
             f"{escape(' · '.join(study.baseline.values()))}, seed by seed.</p>",
             *([f'<div class="partial">PARTIAL: {len(failed)} runs are missing or failed</div>'] if failed else []),
             *(_failures(study, failed)),
+            _cameraless(study),
             _differences_table(study, [one for one in differences if one.metric in SHOWN], remarks),
             "<h2>Figures</h2>" if figures else "",
             *(
@@ -117,6 +119,14 @@ def _page(
             "</body>\n</html>\n",
         ]
     )
+
+
+def _cameraless(study: Study) -> str:
+    """Say which cells were run without frames, since nothing in them goes by what a camera sees."""
+    cells = dict.fromkeys(" · ".join(r.levels.values()) for r in study.runs if r.scenario.renderer == NO_RENDERER)
+    if not cells:
+        return ""
+    return f'<p class="note">Run without camera, which nothing in them goes by: {escape("; ".join(cells))}.</p>'
 
 
 def _embedded(svg: str) -> str:

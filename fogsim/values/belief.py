@@ -46,3 +46,18 @@ class Belief:
         """Standard deviation of ln k [-]."""
         mean = float(matrix_product(self.probability, self.log_extinction))
         return float(np.sqrt(matrix_product(self.probability, (self.log_extinction - mean) ** 2)))
+
+
+THINNEST = 1e-6
+"""Extinction coefficient of what counts as clear air in a belief, whose cells are logarithms [1/m]."""
+
+
+def certain_belief(extinction: float) -> Belief:
+    """Belief of somebody who knows the fog, as a visibility meter beside the road does.
+
+    Parameters
+    ----------
+    extinction : float
+        Extinction coefficient [1/m]; 0 in clear air.
+    """
+    return Belief(np.log([max(extinction, THINNEST)]), np.ones(1))

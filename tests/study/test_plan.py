@@ -81,3 +81,16 @@ def test_an_empty_study_says_what_is_missing(tmp_path: Path) -> None:
         load_study(written(tmp_path, "scenario: motorway_fog_bank"))
     with pytest.raises(InputError, match="factors"):
         load_study(written(tmp_path, "scenario: motorway_fog_bank\nfactors: {}"))
+
+
+def test_runs_that_nothing_sees_draw_no_frames(tmp_path: Path) -> None:
+    text = STUDY.replace("duration_s=2]", "lighting=low_beam]").replace(
+        "  visibility:", "    meter: ['advice={method: netherlands_a16, informed_by: truth}']\n  visibility:"
+    )
+    drawn = {run.levels["policy"]: run.scenario.renderer for run in load_study(written(tmp_path, text)).runs}
+    assert drawn == {"none": "none", "ssd": "auto", "meter": "none"}
+    always = load_study(written(tmp_path, text + "frames: always\n"))
+    assert {run.scenario.renderer for run in always.runs} == {"auto"}
+    # Lamps that go by the camera's fog need it, too.
+    lamps = load_study(written(tmp_path, text.replace("low_beam", "fog_lamp_rules")))
+    assert {run.scenario.renderer for run in lamps.runs} == {"auto"}

@@ -5,6 +5,7 @@ import pytest
 
 import fogsim
 from fogsim.errors import InputError
+from fogsim.values import Lamp
 
 SETTINGS = (
     "advice={method: netherlands_a16, informed_by: truth}",
@@ -23,7 +24,7 @@ def test_what_needs_no_camera_happens_without_one_just_so() -> None:
         assert one.command == other.command
         assert other.estimates == ()
     assert unseen[-1].command.advice.speed == pytest.approx(60 / 3.6)
-    assert fogsim.Lamp.REAR_FOG not in unseen[-1].command.lamps
+    assert Lamp.REAR_FOG not in unseen[-1].command.lamps
 
 
 def test_frames_are_for_estimators_and_estimators_for_frames() -> None:

@@ -66,6 +66,7 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
 
     def _act_in(self, scenario: Scenario) -> None:
         """Take up what a scenario says of clocks and safety, which an episode may change."""
+        build.check_frames(scenario, "the agent")
         self._active = scenario
         self._frames = build.periods(scenario).decision_frames
         self._standard = build.safety_standard(scenario)

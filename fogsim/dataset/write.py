@@ -15,7 +15,7 @@ from fogsim.dataset.inputs import identity
 from fogsim.errors import InputError
 from fogsim.interruption import Interruption
 from fogsim.loop import AdvisedDriving, ClosedLoop
-from fogsim.scenario import Scenario
+from fogsim.scenario import Scenario, build
 from fogsim.values import Ending, Step
 
 
@@ -84,6 +84,7 @@ def write_dataset(
     FogSimError
         If a part of the loop cannot start or fails.
     """
+    build.check_frames(scenario, "a dataset")
     for name, value, least in (("frames", frames, 1), ("every", every, 1), ("seed", seed, 0)):
         if value < least:
             raise InputError(f"{name} must be at least {least}, got {value}")

@@ -104,7 +104,7 @@ class EgoView(Protocol):
 
 
 class NoView:
-    """A view in which nothing is drawn and no scene is built, for runs that need no camera: the sensor looks into darkness.
+    """A view without a scene, for runs that need no camera: the sensor looks into darkness.
 
     Parameters
     ----------

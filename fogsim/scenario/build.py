@@ -18,12 +18,13 @@ from fogsim.camera import (
     Sensor,
     Suspension,
 )
+from fogsim.errors import InputError
 from fogsim.estimators import ESTIMATORS, Estimator
 from fogsim.fusion import FUSIONS, Fusion
 from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy
 from fogsim.metrics import SafetyStandard
 from fogsim.scenario.fog import fog_along
-from fogsim.scenario.schema import Scenario
+from fogsim.scenario.schema import NO_RENDERER, Scenario
 from fogsim.scenario.traffic_schema import AnyEvent, Brake, BreakDown, ChangeLane, LampsFail
 from fogsim.sensors import LeadSensor
 from fogsim.traffic import (
@@ -337,6 +338,25 @@ def fog_field(scenario: Scenario, route: NDArray[np.float64]) -> FogField:
         Polyline along the route [m].
     """
     return fog_along(scenario.fog, airlight_from_illuminance(scenario.light.illuminance_lx), route)
+
+
+def check_frames(scenario: Scenario, who: str) -> None:
+    """Refuse a scenario that draws no frames.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    who : str
+        Who needs them, for the message.
+
+    Raises
+    ------
+    InputError
+        If its renderer is "none".
+    """
+    if scenario.renderer == NO_RENDERER:
+        raise InputError(f"{who} needs frames, and renderer: none draws none; choose auto, opengl, cpu or reference")
 
 
 def estimators(scenario: Scenario, assumed: Camera) -> tuple[Estimator, ...]:

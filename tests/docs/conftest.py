@@ -72,6 +72,9 @@ def readers_folder(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Ca
         if "camera.yaml" in page:
             (calibration,) = re.findall(r"```yaml\n(width: .*?)```", page, re.DOTALL) or (CAMERA,)
             put_pictures(made, calibration)
+        if "policies.yaml" in page:
+            (text,) = re.findall(r"```yaml\n(# policies\.yaml\n.*?)```", page, re.DOTALL)
+            (made / "policies.yaml").write_text(text, encoding="utf-8")
         if "my/scenario.yaml" in page:
             put_scenario(made)
         return made

@@ -1,11 +1,15 @@
 """Runs without a camera: the same traffic, and frames of darkness that nobody reads."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import fogsim
+from fogsim.dataset import write_dataset
 from fogsim.errors import InputError
 from fogsim.values import Lamp
+from fogsim_envs.advisory import FogAdvisoryEnv
 
 SETTINGS = (
     "advice={method: netherlands_a16, informed_by: truth}",
@@ -34,3 +38,11 @@ def test_frames_are_for_estimators_and_estimators_for_frames() -> None:
         fogsim.load_scenario("motorway_fog_bank", ["estimators=[]"])
     with pytest.raises(InputError, match="informed_by"):
         fogsim.load_scenario("motorway_fog_bank", ["advice={method: none, informed_by: nobody}"])
+
+
+def test_who_needs_frames_says_so(tmp_path: Path) -> None:
+    scenario = fogsim.load_scenario("motorway_fog_bank", (*SETTINGS, *BLIND))
+    with pytest.raises(InputError, match="a dataset needs frames, and renderer: none draws none"):
+        write_dataset(scenario, tmp_path / "out", 1)
+    with pytest.raises(InputError, match="the agent needs frames"):
+        FogAdvisoryEnv("motorway_fog_bank", overrides=BLIND)

@@ -3,7 +3,7 @@
 import functools
 import inspect
 import sys
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Integral, Real
 from types import NoneType, UnionType
@@ -44,8 +44,8 @@ def checked_parameters(cls: type[T]) -> type[T]:
     """Class decorator: the constructor refuses arguments that its annotations do not allow.
 
     Checked are ``float`` (finite, of any type of real number), ``int``, ``bool``, ``str`` and ``Literal``, with a
-    `Range` in ``Annotated``, and unions of them; arguments of other types are left to the class. The constructor then
-    raises InputError.
+    `Range` in ``Annotated``, unions and sequences of them; arguments of other types are left to the class. The
+    constructor then raises InputError.
     """
     construct = cls.__init__
     signature = inspect.signature(construct, eval_str=True)
@@ -110,7 +110,7 @@ def mismatch(annotation: object, value: object) -> str | None:
     Parameters
     ----------
     annotation : object
-        Of a parameter: a type, a union, a Literal, or Annotated with a `Range`.
+        Of a parameter: a type, a union, a Literal, a Sequence of one of them, or Annotated with a `Range`.
     value : object
         What was given.
 
@@ -127,6 +127,10 @@ def mismatch(annotation: object, value: object) -> str | None:
     if origin is Literal:
         fits = any(type(value) is type(part) and value == part for part in parts)
         return None if fits else " or ".join(map(repr, parts))
+    if origin is Sequence:
+        is_list = isinstance(value, list | tuple) and len(value) > 0
+        fitting = is_list and all(mismatch(parts[0], one) is None for one in value)
+        return None if fitting else f"a list, each {mismatch(parts[0], object())}"
     interval = next((part for part in parts if isinstance(part, Range)), FINITE)
     return _plain_mismatch(parts[0] if origin is Annotated else annotation, interval, value)
 

@@ -19,12 +19,8 @@ _KMH = 1.0 / KMH_PER_MPS
 _CLOSED = 20.0 * _KMH  # A road that is closed is left by its next exit at this speed [m/s]: FogSim's own choice.
 _I77_VISIBILITY = 198.1  # 650 ft [m]
 
-
-def _is_ascending(values: object) -> bool:
-    """Whether a value is a sequence of finite positive numbers, at least one, in ascending order."""
-    if not isinstance(values, list | tuple) or not all(isinstance(v, int | float) for v in values):
-        return False
-    return bool(values) and all(low < high for low, high in pairwise((0.0, *values, math.inf)))
+Visibilities = Sequence[Annotated[float, Range(1.0, 10_000.0, "m")]]
+Speeds = Sequence[Annotated[float, Range(0.1, 140.0, "m/s")]]
 
 
 @checked_parameters
@@ -37,7 +33,7 @@ class StepTable:
     Attributes
     ----------
     visibilities : sequence of float
-        Ends of the steps, ascending [m]: a speed holds below its end.
+        Ends of the steps, ascending [m]: a speed holds below its end; by default those of the A16.
     speeds : sequence of float
         Advised speed of each step, ascending too [m/s].
     quantile : float
@@ -53,16 +49,16 @@ class StepTable:
         If steps and speeds are not as many or do not ascend, or a parameter is out of the range in its annotation.
     """
 
-    visibilities: Sequence[float]
-    speeds: Sequence[float]
+    visibilities: Visibilities = (70.0, 140.0)
+    speeds: Speeds = (60.0 * _KMH, 80.0 * _KMH)
     quantile: Annotated[float, Range(0.0, 1.0)] = 0.5
     hold: Annotated[float, Range(0.0, 3600.0, "s")] = 60.0
     widest_belief: Annotated[float, Range(0.01, 10.0)] = 0.7
 
     def __post_init__(self) -> None:
         for name, values in (("visibilities", self.visibilities), ("speeds", self.speeds)):
-            if not _is_ascending(values):
-                raise InputError(f"{type(self).__name__}: {name} must be ascending positive numbers, got {values!r}")
+            if any(low >= high for low, high in pairwise(values)):
+                raise InputError(f"{type(self).__name__}: {name} must be in ascending order, got {values!r}")
         if len(self.visibilities) != len(self.speeds):
             raise InputError(
                 f"{type(self).__name__}: there must be a speed for each visibility, got {len(self.visibilities)} "
@@ -89,9 +85,6 @@ class StepTable:
 class NetherlandsA16(StepTable):
     """Advise as the A16 near Breda: below 140 m 80 km/h, below 70 m 60 km/h (Hogema & van der Horst 1997)."""
 
-    visibilities: Sequence[float] = (70.0, 140.0)
-    speeds: Sequence[float] = (60.0 * _KMH, 80.0 * _KMH)
-
 
 @checked_parameters
 @dataclass(frozen=True, slots=True)
@@ -102,8 +95,8 @@ class AlabamaI10(StepTable):
     exit, here at 20 km/h.
     """
 
-    visibilities: Sequence[float] = (53.3, 85.3, 137.2, 201.2, 274.3)
-    speeds: Sequence[float] = (_CLOSED, 35.0 * _MPH, 45.0 * _MPH, 55.0 * _MPH, 65.0 * _MPH)
+    visibilities: Visibilities = (53.3, 85.3, 137.2, 201.2, 274.3)
+    speeds: Speeds = (_CLOSED, 35.0 * _MPH, 45.0 * _MPH, 55.0 * _MPH, 65.0 * _MPH)
 
 
 @checked_parameters
@@ -115,8 +108,8 @@ class TennesseeI75(StepTable):
     the two speeds begin is not in it: 50 mph below 402 m and 35 mph below 146 m are FogSim's choice.
     """
 
-    visibilities: Sequence[float] = (73.2, 146.3, 402.3)
-    speeds: Sequence[float] = (_CLOSED, 35.0 * _MPH, 50.0 * _MPH)
+    visibilities: Visibilities = (73.2, 146.3, 402.3)
+    speeds: Speeds = (_CLOSED, 35.0 * _MPH, 50.0 * _MPH)
 
 
 @checked_parameters
@@ -124,8 +117,8 @@ class TennesseeI75(StepTable):
 class ChinaArticle81(StepTable):
     """Advise as article 81 of China's road safety regulations: 60, 40, 20 km/h below 200, 100, 50 m."""
 
-    visibilities: Sequence[float] = (50.0, 100.0, 200.0)
-    speeds: Sequence[float] = (20.0 * _KMH, 40.0 * _KMH, 60.0 * _KMH)
+    visibilities: Visibilities = (50.0, 100.0, 200.0)
+    speeds: Speeds = (20.0 * _KMH, 40.0 * _KMH, 60.0 * _KMH)
 
 
 @checked_parameters
@@ -133,8 +126,8 @@ class ChinaArticle81(StepTable):
 class FiftyBelowFifty(StepTable):
     """Advise 50 km/h below 50 m: France's Code de la route R413-4, Germany's StVO § 3."""
 
-    visibilities: Sequence[float] = (50.0,)
-    speeds: Sequence[float] = (50.0 * _KMH,)
+    visibilities: Visibilities = (50.0,)
+    speeds: Speeds = (50.0 * _KMH,)
 
 
 @checked_parameters

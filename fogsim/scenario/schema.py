@@ -7,7 +7,7 @@ import warnings
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from fogsim.advice import ADVISERS
@@ -131,7 +131,9 @@ class Scenario(Section):
     sensors: Sensors = Sensors()
     """The other sensors."""
 
-    estimators: tuple[Annotated[Method, method_of(ESTIMATORS)], ...] = (Method(method="negru2013"),)
+    estimators: tuple[Annotated[Method, method_of(ESTIMATORS)], ...] = Field(
+        default=(Method(method="negru2013"),), validate_default=True
+    )
     """Estimators that read every frame; the agent sees the first one's estimate. None, `[]`, with `renderer: none`."""
 
     fusion: Annotated[Method, method_of(FUSIONS)] = Method(method="grid_filter")
@@ -168,13 +170,15 @@ class Scenario(Section):
             raise ValueError(str(UnknownNameError("renderer", value, known)))
         return value
 
-    @model_validator(mode="after")
-    def _frames_for_estimators(self) -> Self:
-        if self.renderer == NO_RENDERER and self.estimators:
+    @field_validator("estimators")
+    @classmethod
+    def _frames_for_estimators(cls, value: tuple[Method, ...], info: ValidationInfo) -> tuple[Method, ...]:
+        draws = info.data.get("renderer") != NO_RENDERER
+        if value and not draws:
             raise ValueError("renderer: none draws no frames that estimators could read; write estimators: [] with it")
-        if self.renderer != NO_RENDERER and not self.estimators:
-            raise ValueError("estimators must have at least one entry, but with renderer: none")
-        return self
+        if draws and not value:
+            raise PydanticCustomError("too_short", "must have at least one entry")
+        return value
 
     @model_validator(mode="after")
     def _distinct_estimators(self) -> Self:

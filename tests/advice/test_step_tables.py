@@ -76,14 +76,14 @@ def test_a_belief_that_says_nothing_changes_no_step() -> None:
 @pytest.mark.parametrize(
     ("visibilities", "speeds", "said"),
     [
-        ((140.0, 70.0), (10.0, 20.0), "visibilities must be ascending positive numbers"),
-        ((70.0, 140.0), (20.0, 10.0), "speeds must be ascending"),
+        ((140.0, 70.0), (10.0, 20.0), "visibilities must be in ascending order, got"),
+        ((70.0, 140.0), (20.0, 10.0), "speeds must be in ascending order"),
         ((70.0,), (10.0, 20.0), "a speed for each visibility, got 1 visibilities and 2 speeds"),
-        ((), (), "visibilities must be ascending"),
-        ((0.0,), (10.0,), "visibilities must be"),
-        ((math.inf,), (10.0,), "visibilities must be"),
-        ("70", (10.0,), "visibilities must be"),
-        (("70",), (10.0,), "visibilities must be"),
+        ((), (), "visibilities must be a list, each a number 1 … 10000 m, got"),
+        ((0.0,), (10.0,), "visibilities must be a list, each"),
+        ((math.inf,), (10.0,), "visibilities must be a list, each"),
+        ("70", (10.0,), "visibilities must be a list, each"),
+        (("70",), (10.0,), "visibilities must be a list, each"),
     ],
 )
 def test_bad_tables_are_refused(visibilities: tuple[float, ...], speeds: tuple[float, ...], said: str) -> None:

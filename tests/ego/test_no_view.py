@@ -34,7 +34,7 @@ def test_what_needs_no_camera_happens_without_one_just_so() -> None:
 def test_frames_are_for_estimators_and_estimators_for_frames() -> None:
     with pytest.raises(InputError, match=r"write estimators: \[\] with it"):
         fogsim.load_scenario("motorway_fog_bank", ["renderer=none"])
-    with pytest.raises(InputError, match="estimators must have at least one entry"):
+    with pytest.raises(InputError, match="estimators: must have at least one entry"):
         fogsim.load_scenario("motorway_fog_bank", ["estimators=[]"])
     with pytest.raises(InputError, match="informed_by"):
         fogsim.load_scenario("motorway_fog_bank", ["advice={method: none, informed_by: nobody}"])

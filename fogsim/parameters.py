@@ -128,8 +128,8 @@ def mismatch(annotation: object, value: object) -> str | None:
         fits = any(type(value) is type(part) and value == part for part in parts)
         return None if fits else " or ".join(map(repr, parts))
     if origin is Sequence:
-        is_list = isinstance(value, list | tuple) and len(value) > 0
-        fitting = is_list and all(mismatch(parts[0], one) is None for one in value)
+        entries = value if isinstance(value, list | tuple) else ()
+        fitting = len(entries) > 0 and all(mismatch(parts[0], one) is None for one in entries)
         return None if fitting else f"a list, each {mismatch(parts[0], object())}"
     interval = next((part for part in parts if isinstance(part, Range)), FINITE)
     return _plain_mismatch(parts[0] if origin is Annotated else annotation, interval, value)

@@ -82,6 +82,15 @@ def test_the_road_fills_once_where_the_way_is_written_and_anew_where_it_is_not(
         np.testing.assert_array_equal(one, other)
 
 
+def test_drivers_who_see_through_fog_drive_in_it_as_in_clear_air() -> None:
+    settings = ("clocks.camera_period_s=0.5", "duration_s=3", "advice=none", "renderer=none", "estimators=[]")
+    seeing = small(*settings, "fog.visibility_m=30", "drivers.see_through_fog=true")
+    clear = small(*settings, "fog.visibility_m=inf", "drivers.see_through_fog=true")
+    in_fog = [step.traffic.position for step in fogsim.run(seeing, seed=1)]
+    for position, step in zip(in_fog, fogsim.run(clear, seed=1), strict=True):
+        np.testing.assert_array_equal(position, step.traffic.position)
+
+
 def test_the_camera_period_may_be_longer_than_the_traffic_step() -> None:
     steps = list(fogsim.run(small("clocks.camera_period_s=0.5"), seed=1))
     assert len(steps) == 9

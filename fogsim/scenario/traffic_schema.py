@@ -246,7 +246,7 @@ class DriversSection(Section):
     """The drivers of all vehicles but, for speed, the ego."""
 
     see_through_fog: Flag = False
-    """True for SUMO's own drivers, who see their leader through any fog."""
+    """True for SUMO's own drivers: they see through fog, and drive as in clear air unless a `speed_choice` is given."""
 
     reaction_time_s: Annotated[Time, Field(le=60)] = 1.0
     """Time from the first sight of a leader that was hidden to the first reaction."""
@@ -276,6 +276,14 @@ class DriversSection(Section):
 
     advised_stretch: AdvisedStretch = AdvisedStretch()
     """That stretch, with `advised: stretch`."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _as_in_clear_air(cls, written: object) -> object:
+        # What is written stays; without it, drivers who see through fog are SUMO's own in every respect.
+        if isinstance(written, dict) and written.get("see_through_fog") is True:
+            return {"speed_choice": "unaffected", **written}
+        return written
 
     @field_validator("speed_choice")
     @classmethod

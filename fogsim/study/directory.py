@@ -1,7 +1,7 @@
 """The directory of a study: what it is about, and a file for each run that is done."""
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -58,7 +58,10 @@ class StudyDirectory:
         except ValueError as error:
             raise InputError(f"{manifest}: cannot be read: {error}") from error
         # The baseline and the number of seeds may change: runs that are done stay what they are.
-        changed = [change for key in ("files", "cells") for change in _changes(there.get(key, {}), described[key])]
+        now = {**described, "versions": _deciding_versions(versions())}
+        before = {**there, "versions": _deciding_versions(there.get("versions", {}))}
+        kinds = ("versions", "files", "cells")
+        changed = [change for kind in kinds for change in _changes(before.get(kind, {}), now[kind])]
         if changed:
             more = f"; and {len(changed) - _MOST_TOLD} more" if len(changed) > _MOST_TOLD else ""
             raise InputError(
@@ -86,6 +89,11 @@ class StudyDirectory:
         metrics: dict[str, Value] = found.get("metrics", {})
         about = {"seed": run.seed, "status": found.get("status", "missing"), "message": found.get("message")}
         return {"run": run.number, **run.levels, **about, **metrics}
+
+
+def _deciding_versions(found: Mapping[str, str | None]) -> dict[str, str | None]:
+    """Versions with which runs may not be mixed: those of FogSim and of SUMO."""
+    return {f"version of {name}": found.get(name) for name in ("fogsim", "libsumo")}
 
 
 def _changes(before: object, now: object, place: Sequence[str] = ()) -> Iterator[str]:

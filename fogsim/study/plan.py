@@ -4,6 +4,7 @@ import functools
 import hashlib
 import itertools
 import json
+import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,7 @@ from fogsim.scenario.document import Document, read_document
 from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.schema import NO_RENDERER
 from fogsim.scenario.section import Id, Section, Seed, Share, Text
-from fogsim.traffic.road.configuration import configured_files
+from fogsim.traffic.road.configuration import configured_demand, configured_files
 
 MOST_RUNS = 1_000_000
 """Most runs of a study."""
@@ -157,14 +158,18 @@ def file_digests(scenario: Scenario) -> dict[str, str]:
     """
     traffic, folder = scenario.traffic, scenario.directory
     named = [path for path in (traffic.config, traffic.net, *traffic.routes, *traffic.additional) if path is not None]
+    files = [folder / path for path in named]
     if traffic.config is not None:
-        net, additional = configured_files(folder / traffic.config)
-        named += [net, *additional]
-    return {path.name: _digest(folder / path) for path in named}
+        config = folder / traffic.config
+        net, additional = configured_files(config)
+        files += [net, *additional, *configured_demand(config).files]
+    there = [path for path in dict.fromkeys(files) if path.is_file()]
+    return {os.path.relpath(path, folder): _digest(path, path.stat().st_mtime_ns) for path in there}
 
 
 @functools.lru_cache
-def _digest(path: Path) -> str:
+def _digest(path: Path, _: int) -> str:
+    """Digest of a file's content, asked for anew when the file has been written anew."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()[:20]
 

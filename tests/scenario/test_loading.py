@@ -306,3 +306,12 @@ def test_a_kind_of_driver_stands_for_all_and_a_kind_of_advice_for_keys_that_are_
     assert drivers.compliance.rate == drivers.compliance.strength == 1.0
     like = load_scenario("motorway_fog_bank", ["drivers.compliance={like: speed_limit_sign, strength: 0.3}"]).drivers
     assert (like.compliance.rate, like.compliance.strength, like.compliance.trust) == (1.0, 0.3, 1.0)
+
+
+def test_who_sees_through_fog_drives_as_in_clear_air_unless_told_otherwise() -> None:
+    def choice(*overrides: str) -> str:
+        return load_scenario("motorway_fog_bank", overrides).drivers.speed_choice
+
+    assert choice() == "observed"
+    assert choice("drivers.see_through_fog=true") == "unaffected"
+    assert choice("drivers.see_through_fog=true", "drivers.speed_choice=too_fast") == "too_fast"

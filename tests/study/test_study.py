@@ -1,4 +1,5 @@
 import json
+import shutil
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -67,6 +68,24 @@ def test_a_changed_study_is_refused_with_the_difference(tmp_path: Path) -> None:
     # More seeds, or another baseline, are the same study.
     more = load_study(study_file(tmp_path, STUDY.replace("seeds: 2", "seeds: 5\nbaseline: {policy: fixed}")))
     assert len(StudyDirectory(out, more).missing()) == 10
+
+
+def test_other_versions_and_changed_files_are_refused(tmp_path: Path) -> None:
+    shutil.copytree(Path(__file__).parents[1] / "data" / "grid", tmp_path / "town")
+    text = (
+        "sumocfg: town/grid.sumocfg\nego: veh18\nsettings: [fog.visibility_m=80]\nfactors: {p: {none: [advice=none]}}"
+    )
+    StudyDirectory(tmp_path / "out", load_study(study_file(tmp_path, text)))
+    demand = tmp_path / "town" / "grid.trips.xml"
+    demand.write_text(demand.read_text(encoding="utf-8") + "\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"grid\.trips\.xml was '\w+' and is"):
+        StudyDirectory(tmp_path / "out", load_study(study_file(tmp_path, text)))
+    manifest = tmp_path / "out" / "study.json"
+    told = json.loads(manifest.read_text(encoding="utf-8"))
+    told["versions"]["libsumo"] = "1.0"
+    manifest.write_text(json.dumps(told), encoding="utf-8")
+    with pytest.raises(InputError, match=r"version of libsumo was '1\.0' and is"):
+        StudyDirectory(tmp_path / "out", load_study(study_file(tmp_path, text)))
 
 
 def test_directories_of_something_else_are_left_alone(tmp_path: Path) -> None:

@@ -12,7 +12,10 @@ REPORT_SEEDS = tuple(range(1, 11))
 
 DEFAULT, SEEING, SIGNED = "default", "see_through_fog", "with signs"
 
-POPULATIONS: Mapping[str, tuple[str, ...]] = {DEFAULT: (), SEEING: ("drivers.see_through_fog=true",)}
+POPULATIONS: Mapping[str, tuple[str, ...]] = {
+    DEFAULT: (),
+    SEEING: ("drivers.see_through_fog=true", "drivers.speed_choice=observed"),
+}
 """Who drives, by what is set in their scenario."""
 
 CAREFUL, MISJUDGING = "careful", "misjudging, by night"

@@ -18,6 +18,7 @@ from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.metrics import RunMetrics
 from fogsim.parameters import accepted_parameters, mismatch
 from fogsim.recorders.table import table_columns
+from fogsim.recorders.trajectories import TRAJECTORY_COLUMNS
 from fogsim.scenario.schema import Scenario
 from fogsim.scenario.section import GIVEN_BY_THE_LOOP, Method
 from fogsim.scene import SIGN_KINDS
@@ -91,6 +92,11 @@ def _models_in(annotation: Any) -> list[type[BaseModel]]:
 def columns() -> list[tuple[str, ...]]:
     """Columns of steps.parquet, with those of one estimator."""
     return [(f"`{c.name}`", str(c.kind), c.meaning) for c in table_columns(["METHOD"])]
+
+
+def trajectory_columns() -> list[tuple[str, ...]]:
+    """Columns of ``trajectories.parquet``."""
+    return [(f"`{name}`", str(kind), told) for name, (kind, told) in TRAJECTORY_COLUMNS.items()]
 
 
 def metrics() -> list[tuple[str, ...]]:
@@ -190,6 +196,7 @@ TABLES = {
     },
     "results.md": {
         "columns": (("column", "type", "meaning"), columns),
+        "trajectories": (("column", "type", "meaning"), trajectory_columns),
         "metrics": (("key", "meaning"), metrics),
     },
 }

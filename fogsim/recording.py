@@ -13,6 +13,7 @@ from fogsim.loop import run, warn_of_unplayed
 from fogsim.metrics import RunMetrics, RunSummary, step_metrics
 from fogsim.recorders import (
     RECORDERS,
+    USUAL_RECORDERS,
     Manifest,
     Recorder,
     RunDirectory,
@@ -62,7 +63,7 @@ def record_run(
     out: Path,
     *,
     overwrite: bool = False,
-    recorders: Iterable[str] = RECORDERS,
+    recorders: Iterable[str] = USUAL_RECORDERS,
     command_line: Sequence[str] = (),
     watch: Callable[[Step], None] = lambda _: None,
 ) -> RecordedRun:
@@ -75,6 +76,7 @@ def record_run(
       Its status is "running" from the first step to the end.
     - ``metrics.json``, always, at the end: `RunSummary`'s keys, which end in their units, and ``complete``.
     - ``steps.parquet``, by the recorder ``table``: a row for each step, columns in SI units and radians.
+    - ``trajectories.parquet``, by ``trajectories``: a row for each vehicle and step, in SUMO's FCD columns.
     - ``video.mp4``, by ``video``: a frame of 1024×480 px (H.264) for each step, at real speed.
     - ``report.html``, by ``report``: metrics, figures and pictures in one file.
 
@@ -89,7 +91,7 @@ def record_run(
     overwrite : bool
         True to replace the results that are there, once the run is over; files that are not FogSim's stay.
     recorders : iterable of str
-        Which of `RECORDERS` write, each at most once; all by default.
+        Which of `RECORDERS` write, each at most once; by default all but ``trajectories``.
     command_line : sequence of str
         Program and arguments of the command that started it, for the manifest; empty if none did.
     watch : callable

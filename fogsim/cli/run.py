@@ -49,12 +49,14 @@ def run_command(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace results that are there already.")] = False,
     video: Annotated[bool, typer.Option(help="Write video.mp4.")] = True,
     report: Annotated[bool, typer.Option(help="Write report.html.")] = True,
+    trajectories: Annotated[bool, typer.Option(help="Write trajectories.parquet, all vehicles.")] = False,
 ) -> None:
     """Run a scenario and write manifest.json, steps.parquet, metrics.json, video.mp4 and report.html."""
     from fogsim.recording import record_run
 
     loaded = chosen_scenario(scenario, sumocfg, ego, visibility, settings)
     recorders = ["table", *(["video"] if video else []), *(["report"] if report else [])]
+    recorders += ["trajectories"] if trajectories else []
     directory = out or Path("runs", f"{loaded.name}-seed{seed}")
     with warnings.catch_warnings(), SimulationProgress(stderr, loaded.duration_s) as progress:
         # The summary names all of it.

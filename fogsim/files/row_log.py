@@ -1,8 +1,8 @@
 """Rows in a file that can be read however the process ends that writes it."""
 
-import contextlib
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 import pyarrow as pa
@@ -78,6 +78,55 @@ class RowLog:
         self.path.unlink(missing_ok=True)
 
 
+def row_schema(path: Path) -> Any:
+    """Columns of a log, as a pyarrow.Schema.
+
+    Parameters
+    ----------
+    path : Path
+        The log.
+
+    Raises
+    ------
+    InputError
+        If it is no log.
+    """
+    with path.open("rb") as file:
+        return _reader(path, file).schema
+
+
+def row_batches(path: Path) -> Iterator[Any]:
+    """Batches of rows of a log (pyarrow.RecordBatch), as they were written, up to where it was cut off.
+
+    Parameters
+    ----------
+    path : Path
+        The log.
+
+    Raises
+    ------
+    InputError
+        If it is no log.
+    """
+    # Opened here, for Arrow takes no name that is not UTF-8.
+    with path.open("rb") as file:
+        # What cannot be read is the end of a log that was cut off.
+        reader = _reader(path, file)
+        while True:
+            try:
+                batch = reader.read_next_batch()
+            except (StopIteration, pa.ArrowInvalid, OSError):
+                return
+            yield batch
+
+
+def _reader(path: Path, file: IO[bytes]) -> Any:
+    try:
+        return pa.ipc.open_stream(file)
+    except pa.ArrowInvalid as error:
+        raise InputError(f"{path} holds no rows that can be read: {error}") from error
+
+
 def read_rows(path: Path) -> Any:
     """Rows of a log, also of one that was cut off in the middle of a row.
 
@@ -98,18 +147,8 @@ def read_rows(path: Path) -> Any:
     InputError
         If it is no log.
     """
-    batches = []
-    # Opened here, for Arrow takes no name that is not UTF-8.
-    with path.open("rb") as file:
-        try:
-            reader = pa.ipc.open_stream(file)
-        except pa.ArrowInvalid as error:
-            raise InputError(f"{path} holds no rows that can be read: {error}") from error
-        # What cannot be read is the end of a log that was cut off.
-        with contextlib.suppress(pa.ArrowInvalid, OSError):
-            for batch in reader:
-                batches.append(batch)  # noqa: PERF402 - those before the end count too
-        table = pa.Table.from_batches(batches, schema=reader.schema)
+    schema = row_schema(path)
+    table = pa.Table.from_batches(row_batches(path), schema=schema)
     index = table["index"].to_numpy()
     least_behind = np.minimum.accumulate(index[::-1])[::-1]
     last = np.append(index[:-1] < least_behind[1:], True)[: len(index)]

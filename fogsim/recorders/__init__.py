@@ -11,6 +11,7 @@ from fogsim.recorders.report import ReportRecorder
 from fogsim.recorders.run_directory import RunDirectory
 from fogsim.recorders.sign_map import write_sign_map
 from fogsim.recorders.table import TableRecorder
+from fogsim.recorders.trajectories import TrajectoryRecorder, with_trajectories
 from fogsim.recorders.video import VideoRecorder, encoder_report
 from fogsim.registry import Registry
 
@@ -23,13 +24,18 @@ RECORDERS: Registry[RecorderFactory] = Registry(
         "table": lambda run: TableRecorder(run.directory.table, run.methods),
         "video": lambda run: VideoRecorder(run.directory.video, run.frame_period),
         "report": ReportRecorder,
+        "trajectories": lambda run: TrajectoryRecorder(run.directory.trajectories),
     },
 )
 """Every recorder by name."""
 
+USUAL_RECORDERS = ("table", "video", "report")
+"""Those that write where nobody has chosen."""
+
 __all__ = [
     "DERIVED_QUANTITIES",
     "RECORDERS",
+    "USUAL_RECORDERS",
     "Derived",
     "FramePanel",
     "Manifest",
@@ -40,10 +46,12 @@ __all__ = [
     "RunInformation",
     "Status",
     "TableRecorder",
+    "TrajectoryRecorder",
     "VideoRecorder",
     "encoder_report",
     "recover_run",
     "versions",
+    "with_trajectories",
     "write_json",
     "write_sign_map",
 ]

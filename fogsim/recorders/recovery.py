@@ -10,6 +10,7 @@ from fogsim.files.writer_lock import WriterLock
 from fogsim.recorders.manifest import Status
 from fogsim.recorders.run_directory import (
     ROW_LOG,
+    TRAJECTORY_LOG,
     UNFINISHED,
     finish_folder,
     read_manifest,
@@ -17,12 +18,14 @@ from fogsim.recorders.run_directory import (
     whole_files,
 )
 from fogsim.recorders.table import write_table
+from fogsim.recorders.trajectories import write_trajectory_table
 
 
 def recover_run(path: Path, overwrite: bool = False) -> list[str]:
     """Make readable what a run has left that was killed, or could not close its table.
 
-    Its rows become ``steps.parquet``, marked as partial, and its manifest says "dead"; video and report are lost.
+    Its rows become ``steps.parquet`` and ``trajectories.parquet``, marked as partial, and its manifest says "dead";
+    video and report are lost.
 
     Parameters
     ----------
@@ -55,15 +58,24 @@ def recover_run(path: Path, overwrite: bool = False) -> list[str]:
                 f"{path} holds results of an earlier run ({', '.join(earlier)}), which would give way; "
                 "copy what you need, and replace them with --overwrite"
             )
-        log = folder / ROW_LOG
-        if log.exists():
-            # Without a head it is of a process that was killed as it began.
-            with contextlib.suppress(InputError):
-                write_table(folder / "steps.parquet", read_rows(log), complete=False)
-            log.unlink()
+        _make_readable(folder)
         if dead:
             message = "the process has died; rows are there until then"
             ended = datetime.now(UTC).isoformat(timespec="seconds")
             manifest |= {"status": Status.DEAD.value, "message": message, "ended": ended}
         finish_folder(path, manifest)
     return whole_files(path)
+
+
+def _make_readable(folder: Path) -> None:
+    """Make tables of the rows in a folder."""
+    rows, trajectories = folder / ROW_LOG, folder / TRAJECTORY_LOG
+    # A log without a head is of a process that was killed as it began.
+    if rows.exists():
+        with contextlib.suppress(InputError):
+            write_table(folder / "steps.parquet", read_rows(rows), complete=False)
+        rows.unlink()
+    if trajectories.exists():
+        with contextlib.suppress(InputError):
+            write_trajectory_table(folder / "trajectories.parquet", trajectories, complete=False)
+        trajectories.unlink()

@@ -14,13 +14,20 @@ from fogsim.files.writer_lock import WriterLock, WritingProcess
 UNFINISHED = "unfinished"
 """Folder in the directory that holds the results of a run until its end."""
 
-ROW_LOG = "steps.arrows"
-"""Rows in the unfinished folder, until they are made ``steps.parquet``."""
+LOG_SUFFIX = ".arrows"
+"""What names of files of rows in the unfinished folder end in, until they are made ``….parquet``."""
+
+ROW_LOG = "steps" + LOG_SUFFIX
+"""Rows of ``steps.parquet``."""
+
+TRAJECTORY_LOG = "trajectories" + LOG_SUFFIX
+"""Rows of ``trajectories.parquet``."""
 
 _NAMES = {
     "manifest": "manifest.json",
     "metrics": "metrics.json",
     "table": "steps.parquet",
+    "trajectories": "trajectories.parquet",
     "video": "video.mp4",
     "report": "report.html",
 }
@@ -184,6 +191,11 @@ class RunDirectory:
         return self.unfinished / _NAMES["table"]
 
     @property
+    def trajectories(self) -> Path:
+        """One row a vehicle and step."""
+        return self.unfinished / _NAMES["trajectories"]
+
+    @property
     def video(self) -> Path:
         """What the camera saw, with a panel beside it."""
         return self.unfinished / _NAMES["video"]
@@ -239,7 +251,7 @@ def finish_folder(path: Path, manifest: Mapping[str, object]) -> None:
     # What a call before this one has moved already is named by the manifest that it wrote.
     names = {_NAMES["manifest"], *whole_files(folder), *_moved(folder)}
     write_json(folder / _NAMES["manifest"], {**manifest, "files": sorted(names)})
-    if (folder / ROW_LOG).exists():
+    if any((folder / log).exists() for log in (ROW_LOG, TRAJECTORY_LOG)):
         return
     # Without a manifest the directory claims nothing while old files give way to new ones.
     (path / _NAMES["manifest"]).unlink(missing_ok=True)

@@ -16,4 +16,10 @@ def test_every_registered_recorder_writes_its_file(tmp_path: Path) -> None:
         for recorder in recorders:
             recorder.close(complete=True)
         directory.finish({})
-        assert directory.files() == ["manifest.json", "report.html", "steps.parquet", "video.mp4"]
+        assert directory.files() == [
+            "manifest.json",
+            "report.html",
+            "steps.parquet",
+            "trajectories.parquet",
+            "video.mp4",
+        ]

@@ -1,0 +1,242 @@
+"""Every vehicle at every camera period, in the columns of SUMO's own floating car data."""
+
+import json
+import math
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from fogsim.files.atomic import naming, partial_path, publish
+from fogsim.files.row_log import RowLog, row_batches, row_schema
+from fogsim.recorders.protocol import Derived
+from fogsim.recorders.run_directory import LOG_SUFFIX
+from fogsim.recorders.table import LOG_PERIOD
+from fogsim.values import Step
+
+MOST_ROWS_HELD = 50_000
+"""Rows of one batch at most: some megabytes."""
+
+ROWS_PER_GROUP = 200_000
+"""Rows of one row group at least, but for the last: what a reader has in memory at once."""
+
+TRAJECTORY_COLUMNS: Mapping[str, tuple[Any, str]] = {
+    "index": (pa.int64(), "number of the camera period, as in steps.parquet"),
+    "timestep_time": (pa.float64(), "SUMO's time after its step [s]; fcd-output has the time before it"),
+    "vehicle_id": (pa.string(), "vehicle"),
+    "vehicle_x": (pa.float64(), "east, middle of the front bumper [m]; a change of lane takes time here"),
+    "vehicle_y": (pa.float64(), "north, likewise [m]"),
+    "vehicle_z": (pa.float64(), "height of the road there [m]"),
+    "vehicle_angle": (pa.float64(), "heading, clockwise from north [°]"),
+    "vehicle_type": (pa.string(), "kind of body (car, van, truck, bus, motorcycle), not SUMO's vType"),
+    "vehicle_speed": (pa.float64(), "speed [m/s]"),
+    "vehicle_lane": (pa.string(), "SUMO's lane; a change of lane is made at once here"),
+    "vehicle_slope": (pa.float64(), "slope of the road, positive uphill [°]"),
+    "vehicle_acceleration": (pa.float64(), "acceleration [m/s²]"),
+}
+"""Columns of ``trajectories.parquet``: their types and meanings, named as in SUMO's fcd-output."""
+
+
+class TrajectoryRecorder:
+    """Writes ``trajectories.parquet``: a row for each vehicle that is read and each step.
+
+    Rows go by time, and within a time as the traffic lists the vehicles; equal steps give equal bytes. Until it is
+    closed, rows are in a log beside it (``trajectories.arrows``), at most 0.5 s after they were recorded, whatever ends
+    the process. Memory does not grow with the run.
+
+    Parameters
+    ----------
+    path : Path
+        The file; its name ends in ``.parquet``. Nothing is written before the first step.
+    clock : callable
+        Gives the time that passes [s].
+    """
+
+    def __init__(self, path: Path, clock: Callable[[], float] = time.monotonic) -> None:
+        self._path = path
+        self._clock = clock
+        self._schema = pa.schema(
+            [(name, kind) for name, (kind, _) in TRAJECTORY_COLUMNS.items()],
+            metadata={"fogsim.columns": json.dumps({name: told for name, (_, told) in TRAJECTORY_COLUMNS.items()})},
+        )
+        self._log: RowLog | None = None
+        self._logged = -math.inf
+        self._last = -math.inf
+        self._held: list[Step] = []
+        self._rows_held = 0
+        self._open = True
+
+    def record(self, step: Step, _derived: Derived | None = None) -> None:
+        """Add the vehicles of a step; one in which no time has passed adds nothing.
+
+        Parameters
+        ----------
+        step : Step
+            The finished step.
+        _derived : mapping from str to float or None
+            Not needed.
+
+        Raises
+        ------
+        OSError
+            If the disk is full; the message names the file.
+        """
+        traffic = step.traffic
+        # The step that ends a run may show once more what was last seen.
+        if traffic.time > self._last:
+            self._held.append(step)
+            self._rows_held += len(traffic.ids)
+            self._last = traffic.time
+        now = self._clock()
+        if now - self._logged >= LOG_PERIOD or self._rows_held >= MOST_ROWS_HELD:
+            self._flush()
+            self._logged = now
+
+    def _flush(self) -> RowLog:
+        if self._log is None:
+            self._log = RowLog(self._path.with_suffix(LOG_SUFFIX), self._schema)
+        if self._held:
+            self._log.append(_batch(self._held, self._schema))
+            # A Ctrl-C before this line has them written twice; `write_trajectory_table` leaves out the second.
+            self._held, self._rows_held = [], 0
+        return self._log
+
+    def close(self, complete: bool) -> None:
+        """Make the parquet file of the rows, and say in it whether the run was complete.
+
+        Parameters
+        ----------
+        complete : bool
+            False if the run was cut short.
+        """
+        if not self._open:
+            return
+        if self._log is not None:
+            self._log.release_reserve()
+        log = self._flush()
+        log.release_reserve()
+        write_trajectory_table(self._path, log.path, complete)
+        log.remove()
+        self._open = False
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self.close(complete=kind is None)
+
+
+def with_trajectories(steps: Iterable[Step], path: Path) -> Iterator[Step]:
+    """Pass steps on, and write the trajectories of all vehicles in them into a parquet file.
+
+    Parameters
+    ----------
+    steps : iterable of Step
+        Steps of one run, as `fogsim.run` yields them.
+    path : Path
+        The file, ``….parquet``, in a folder that is there. It is whole when the last step was taken, and also, marked
+        as partial, when whoever takes them leaves off or something fails.
+
+    Yields
+    ------
+    Step
+        The steps.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    with TrajectoryRecorder(path) as recorder:
+        for step in steps:
+            recorder.record(step)
+            yield step
+
+
+def _batch(steps: list[Step], schema: Any) -> Any:
+    """Rows of some instants (pyarrow.RecordBatch)."""
+    states = [step.traffic for step in steps]
+    counts = [len(state.ids) for state in states]
+    position = np.concatenate([state.position for state in states])
+
+    def of_all(name: str) -> Any:
+        return np.concatenate([getattr(state, name) for state in states])
+
+    def texts(name: str) -> list[str]:
+        return [text for state in states for text in getattr(state, name)]
+
+    columns = {
+        "index": np.repeat([step.index for step in steps], counts),
+        "timestep_time": np.repeat([state.time for state in states], counts),
+        "vehicle_id": texts("ids"),
+        "vehicle_x": position[:, 0],
+        "vehicle_y": position[:, 1],
+        "vehicle_z": position[:, 2],
+        "vehicle_angle": np.mod(90.0 - np.degrees(of_all("heading")), 360.0),
+        "vehicle_type": texts("types"),
+        "vehicle_speed": of_all("speed"),
+        "vehicle_lane": texts("lane"),
+        "vehicle_slope": np.degrees(of_all("grade")),
+        "vehicle_acceleration": of_all("acceleration"),
+    }
+    arrays = [pa.array(columns[field.name], type=field.type) for field in schema]
+    return pa.RecordBatch.from_arrays(arrays, schema=schema)
+
+
+def write_trajectory_table(path: Path, log: Path, complete: bool) -> None:
+    """Make a parquet file of a log of trajectories, whole or not at all, group of rows by group.
+
+    Parameters
+    ----------
+    path : Path
+        The parquet file.
+    log : Path
+        The log, which may have been cut off.
+    complete : bool
+        Whether it is of a whole run.
+
+    Raises
+    ------
+    InputError
+        If it is no log.
+    OSError
+        If the file cannot be written; the message names it.
+    """
+    schema, part = row_schema(log), partial_path(path)
+    plain = schema.remove_metadata()
+    try:
+        with (
+            naming(part),
+            part.open("wb") as file,
+            # As of ``steps.parquet``: without a stored schema readers take the metadata from the end of the file.
+            pq.ParquetWriter(file, plain, compression="zstd", store_schema=False) as writer,
+        ):
+            for group in _row_groups(log):
+                writer.write_table(group.replace_schema_metadata(None), row_group_size=len(group))
+            writer.add_key_value_metadata({"fogsim.complete": "true" if complete else "false", **schema.metadata})
+        publish(path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+
+
+def _row_groups(log: Path) -> Iterator[Any]:
+    """Rows of a log, in tables of `ROWS_PER_GROUP` or a little more; of rows that stand there twice the first count."""
+    held: list[Any] = []
+    last = -math.inf
+    for batch in row_batches(log):
+        times = batch["timestep_time"].to_numpy()
+        new = batch.filter(pa.array(times > last))
+        if not len(new):
+            continue
+        last = float(times[-1])
+        held.append(new)
+        if sum(len(b) for b in held) >= ROWS_PER_GROUP:
+            yield pa.Table.from_batches(held).combine_chunks()
+            held = []
+    if held:
+        yield pa.Table.from_batches(held).combine_chunks()

@@ -120,10 +120,10 @@ class TrackedVehicle(ABC, Generic[D]):
             del self.detections[oldest]
 
     def _compare_all(self, reference: D) -> None:
-        """Take another reference."""
+        """Take another reference; none if nothing can be compared with it, not even itself."""
         compared = [self._compare(reference, one) for one in self.detections]
-        self.reference = reference
         self.detections = [one for one in compared if one is not None]
+        self.reference = reference if self.detections else None
 
 
 class SmoothedRanges:

@@ -105,6 +105,14 @@ def test_all_are_compared_with_the_reference_and_what_cannot_be_is_dropped():
     assert [(one.distance, one.ratio) for one in track.detections] == [(10.0, 1.0), (20.0, 2.0)]
 
 
+def test_with_a_picture_that_shows_nothing_the_track_begins_anew():
+    track = Track(SmoothedRanges(0.0), 9)
+    track.see(10.0, 12.0)
+    track._compare_all(Look(2, 1.0, object()))
+    assert not track.detections
+    assert track.reference is None
+
+
 @pytest.mark.parametrize(("keeps_reference", "kept"), [(False, [2.0, 3.0]), (True, [1.0, 3.0])])
 def test_the_oldest_gives_way(keeps_reference, kept):
     track = Track(SmoothedRanges(0.0), 2, keeps_reference=keeps_reference)

@@ -27,6 +27,7 @@ from fogsim.traffic.sumo_behaviour.top_speeds import TopSpeedControl
 from fogsim.values import Command
 
 _SUMO_DRIVES = -1.0
+_SAME = 1e-6  # [m/s], [m/s²]
 
 
 class SpeedControl:
@@ -73,11 +74,24 @@ class SpeedControl:
         self._held.clear()
 
     def _hold(self, vehicle: str, target: float, deceleration: float) -> None:
+        self._held.add(vehicle)
+        if self._brakes_hard(vehicle):
+            self._vehicles.setSpeed(vehicle, _SUMO_DRIVES)
+            return
         # Advice does not make a driver faster than the road and the vehicle allow.
         allowed = min(target, self._vehicles.getAllowedSpeed(vehicle))
         speed = self._vehicles.getSpeed(vehicle)
         self._vehicles.setSpeed(vehicle, decelerated_speed(speed, allowed, deceleration, self._step_length))
-        self._held.add(vehicle)
+
+    def _brakes_hard(self, vehicle: str) -> bool:
+        """Whether the driver brakes as hard by himself as SUMO lets a vehicle whose speed is set.
+
+        That is the type's ``decel``, and in an emergency a driver needs ``emergencyDecel``.
+        """
+        get = self._vehicles
+        if get.getAcceleration(vehicle) > -get.getDecel(vehicle) + _SAME:
+            return False
+        return bool(get.getSpeedWithoutTraCI(vehicle) <= get.getSpeed(vehicle) + _SAME)
 
 
 class SumoDesiredSpeeds:

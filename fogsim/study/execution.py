@@ -1,21 +1,23 @@
-"""One run of a study: its metrics in a row of plain values."""
+"""One run of a study: its metrics in a row of plain values, and its profiles."""
 
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from fogsim.errors import FogSimError, UnplayedWarning
 from fogsim.files.atomic import write_json
 from fogsim.loop import run
 from fogsim.metrics import RunMetrics
 from fogsim.scenario import Scenario, build
+from fogsim.study.profiles import RunProfiles
 
 Value = str | float | int | None
 """What a cell of the table holds."""
 
 
-def run_metrics(scenario: Scenario, seed: int) -> dict[str, Value]:
-    """Metrics of one run, flat: those of a method have its name before theirs, with a point between.
+def measure_run(scenario: Scenario, seed: int) -> dict[str, Any]:
+    """Metrics and profiles of one run.
 
     Parameters
     ----------
@@ -23,13 +25,20 @@ def run_metrics(scenario: Scenario, seed: int) -> dict[str, Value]:
         What is run.
     seed : int
         Its seed.
+
+    Returns
+    -------
+    dict
+        ``metrics``, flat: those of a method have its name before theirs, with a point between; and ``profiles``, of
+        `RunProfiles.to_json`.
     """
-    metrics = RunMetrics(build.safety_standard(scenario))
+    metrics, profiles = RunMetrics(build.safety_standard(scenario)), RunProfiles()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnplayedWarning)
         for step in run(scenario, seed):
             metrics.update(step)
-    return dict(_flat(metrics.summary().to_json()))
+            profiles.update(step)
+    return {"metrics": dict(_flat(metrics.summary().to_json())), "profiles": profiles.to_json()}
 
 
 def _flat(values: Mapping[str, object], prefix: str = "") -> list[tuple[str, Value]]:
@@ -65,7 +74,7 @@ def run_to_file(scenario: Scenario, seed: int, result: Path) -> str | None:
         If the file cannot be written, as on a full disk.
     """
     try:
-        found = {"status": "complete", "metrics": run_metrics(scenario, seed)}
+        found = {"status": "complete", **measure_run(scenario, seed)}
     except FogSimError as error:
         found = {"status": "failed", "message": str(error)}
     except Exception as error:  # noqa: BLE001 - a broken run, of a user's own method perhaps, must not stop the others

@@ -1,19 +1,27 @@
 """Stopping and slowing down: the formulas that advice, metrics and traffic share."""
 
 import math
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from fogsim.units import GRAVITY
 
 REACTION_TIME, DECELERATION = 2.5, 3.4
 """Design values of the stopping sight distance [s], [m/s²] (AASHTO Green Book), where nothing else is said."""
 
+_Quantity = TypeVar("_Quantity", float, NDArray[np.float64])
 
-def stopping_sight_distance(speed: float, reaction_time: float, deceleration: float, grade: float = 0.0) -> float:
+
+def stopping_sight_distance(
+    speed: _Quantity, reaction_time: float, deceleration: float, grade: float = 0.0
+) -> _Quantity:
     """Distance to react and stop, v t + v² / 2(a + g G) [m] (AASHTO Green Book with t = 2.5 s, a = 3.4 m/s²).
 
     Parameters
     ----------
-    speed : float
+    speed : float or ndarray
         Speed v [m/s].
     reaction_time : float
         Perception and reaction time t [s].

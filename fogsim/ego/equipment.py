@@ -34,6 +34,9 @@ from fogsim.values.result_checks import checked_belief, checked_estimate
 _SIGHT_LINE = np.geomspace(1.0, 20_000.0, 400)
 """Distances ahead at which the optical depth is looked up to find how far one sees [m]."""
 
+_EYES = np.array([0.0, 0.0, 1.2])
+"""Where eyes are above the road, whatever the vehicle [m]; fog over a road changes little over a truck's height."""
+
 
 class EgoEquipment:
     """The ego's camera, sensors, estimators and belief, in the fog of a scenario.
@@ -145,7 +148,7 @@ class EgoEquipment:
             speed_limit=snapshot.speed_limit,
             leader=snapshot.leader,
             collisions=snapshot.collisions,
-            truth=fog_truth(field_at(renderer.fog, time), pose, self._camera, renderer.signs),
+            truth=fog_truth(field_at(renderer.fog, time), pose, self._camera, renderer.signs, state),
             view=view,
             observation=observation,
             estimates=estimates,
@@ -197,7 +200,9 @@ class EgoEquipment:
         self._view_renderer, self._streams = None, None
 
 
-def fog_truth(fog: FogField, pose: CameraPose, camera: Camera, signs: SignMap) -> Truth:
+def fog_truth(
+    fog: FogField, pose: CameraPose, camera: Camera, signs: SignMap, traffic: TrafficState | None = None
+) -> Truth:
     """The fog at a camera, and as far as it sees along its heading, parallel to the road under it.
 
     Parameters
@@ -210,6 +215,8 @@ def fog_truth(fog: FogField, pose: CameraPose, camera: Camera, signs: SignMap) -
         Its true calibration.
     signs : SignMap
         The signs that stand in the world.
+    traffic : TrafficState or None
+        Vehicles whose drivers have fog about them, too.
     """
     eye, level = np.array(pose.position), math.cos(pose.road_grade)
     direction = np.array([math.cos(pose.heading) * level, math.sin(pose.heading) * level, math.sin(pose.road_grade)])
@@ -224,4 +231,5 @@ def fog_truth(fog: FogField, pose: CameraPose, camera: Camera, signs: SignMap) -
         pose=pose,
         fog=fog,
         signs=signs,
+        vehicle_extinctions=None if traffic is None else extinction(fog, traffic.position + _EYES),
     )

@@ -1,4 +1,4 @@
-"""Surrogate safety, comfort and estimator error."""
+"""Safety, comfort and delay of the ego and of everybody near it, and how right estimators were."""
 
 from fogsim.kinematics import stopping_sight_distance
 from fogsim.metrics.metric import JsonValue, Metric, Sample
@@ -8,6 +8,7 @@ from fogsim.metrics.surrogate import (
     SafetyStandard,
     deceleration_rate_to_avoid_crash,
     modified_deceleration_rate_to_avoid_crash,
+    potential_collision_speed,
     time_exposed_time_to_collision,
     time_headway,
     time_integrated_time_to_collision,
@@ -26,6 +27,7 @@ __all__ = [
     "Sample",
     "deceleration_rate_to_avoid_crash",
     "modified_deceleration_rate_to_avoid_crash",
+    "potential_collision_speed",
     "step_metrics",
     "stopping_sight_distance",
     "time_exposed_time_to_collision",

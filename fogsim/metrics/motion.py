@@ -106,8 +106,14 @@ class Compliance:
         "advised_time_share": "share of the time in which there was a speed advice",
         "mean_advised_speed_mps": "mean advice over the time in which there was one",
         "above_advice_time_share": "share of all time in which the ego was faster than advised",
+        "advice_compliance_share": "share of the time with an advice in which the ego drove at it, or slower; 1 km/h "
+        "above it counts",
+        "advice_changes_per_km": "how often the advice appeared, changed by 1 km/h or more, or ended, per kilometre",
     }
     _time: float = 0.0
+    _distance: float = 0.0
+    _changes: int = 0
+    _shown: float = math.inf
     _advised_time: float = 0.0
     _advised_distance: float = 0.0
     _above_time: float = 0.0
@@ -122,6 +128,10 @@ class Compliance:
         """
         advised = sample.step.command.advice.speed
         self._time += sample.elapsed
+        self._distance += float(sample.step.traffic.speed[sample.step.ego]) * sample.elapsed
+        if advised != self._shown and not abs(advised - self._shown) < self.tolerance:
+            self._changes += 1
+            self._shown = advised
         if not math.isfinite(advised):
             return
         self._advised_time += sample.elapsed
@@ -135,4 +145,6 @@ class Compliance:
             "advised_time_share": share(self._advised_time, self._time),
             "mean_advised_speed_mps": share(self._advised_distance, self._advised_time),
             "above_advice_time_share": share(self._above_time, self._time),
+            "advice_compliance_share": share(self._advised_time - self._above_time, self._advised_time),
+            "advice_changes_per_km": share(1000.0 * self._changes, self._distance),
         }

@@ -5,12 +5,17 @@ from dataclasses import dataclass
 
 from fogsim.errors import SimulationError
 from fogsim.metrics.estimation import BeliefError, EstimatorErrors
-from fogsim.metrics.everybody import Everybody
 from fogsim.metrics.metric import JsonValue, Metric, Sample
 from fogsim.metrics.motion import Comfort, Compliance, Motion
 from fogsim.metrics.safety import Collisions, Conflict, Sight
 from fogsim.metrics.step_metrics import DEFAULT_STANDARD, step_metrics
 from fogsim.metrics.surrogate import SafetyStandard
+from fogsim.metrics.traffic_collisions import TrafficCollisions
+from fogsim.metrics.traffic_comfort import TrafficComfort
+from fogsim.metrics.traffic_conflicts import TrafficConflicts
+from fogsim.metrics.traffic_flow import TrafficFlow
+from fogsim.metrics.traffic_headways import TrafficHeadways
+from fogsim.metrics.traffic_sight import TrafficSight
 from fogsim.registry import Registry
 from fogsim.units import clock_time
 from fogsim.values import Step
@@ -25,12 +30,17 @@ METRICS: Registry[MetricFactory] = Registry(
         "motion": lambda _: Motion(),
         "collisions": lambda _: Collisions(),
         "conflict": lambda standard: Conflict(standard.time_to_collision),
-        "everybody": lambda standard: Everybody(standard.time_to_collision),
         "sight": lambda standard: Sight(standard.reaction_time, standard.deceleration),
         "compliance": lambda standard: Compliance(standard.advice_tolerance),
         "comfort": lambda _: Comfort(),
         "belief": lambda _: BeliefError(),
         "estimators": lambda _: EstimatorErrors(),
+        "traffic_collisions": lambda _: TrafficCollisions(),
+        "traffic_conflicts": lambda standard: TrafficConflicts(standard.time_to_collision),
+        "traffic_headways": lambda _: TrafficHeadways(),
+        "traffic_sight": lambda standard: TrafficSight(standard.reaction_time, standard.deceleration),
+        "traffic_flow": lambda _: TrafficFlow(),
+        "traffic_comfort": lambda _: TrafficComfort(),
     },
 )
 """Every metric by name, in the order of the summary."""

@@ -6,17 +6,43 @@ from typing import ClassVar
 
 from fogsim.metrics.metric import JsonValue, Sample, share
 from fogsim.metrics.surrogate import (
+    QUEUE_SPEED,
     time_exposed_time_to_collision,
     time_headway,
     time_integrated_time_to_collision,
 )
 from fogsim.units import clock_time, finite_or_none
-from fogsim.values import Collision
+from fogsim.values import Collision, Leader
+
+
+@dataclass(slots=True)
+class _Approach:
+    """How near the ego came to leaders of one sort."""
+
+    least_time_to_collision: float | None = None
+    exposed: float = 0.0
+    integrated: float = 0.0
+    max_drac: float | None = None
+    least_gap: float | None = None
+    least_headway: float | None = None
+
+    def add(self, sample: Sample, leader: Leader, threshold: float) -> None:
+        speed, remaining = float(sample.step.traffic.speed[sample.step.ego]), sample.derived["time_to_collision_s"]
+        self.least_gap = _least(self.least_gap, leader.gap)
+        self.least_headway = _least(self.least_headway, finite_or_none(float(time_headway(leader.gap, speed))))
+        self.max_drac = _most(self.max_drac, sample.derived["drac_mps2"])
+        self.least_time_to_collision = _least(self.least_time_to_collision, remaining)
+        if remaining is not None:
+            self.exposed += time_exposed_time_to_collision(remaining, sample.elapsed, threshold)
+            self.integrated += time_integrated_time_to_collision(remaining, sample.elapsed, threshold)
 
 
 @dataclass(slots=True)
 class Conflict:
     """Surrogate safety of the ego and its leader.
+
+    A leader slower than 5 m/s is a queue and counts apart, and only while the ego itself drives at 5 m/s or more: how
+    it closes up to a standing car says how the traffic simulation's drivers do so, whatever the policy.
 
     Attributes
     ----------
@@ -26,19 +52,21 @@ class Conflict:
 
     threshold: float
     meanings: ClassVar[Mapping[str, str]] = {
-        "minimum_time_to_collision_s": "least time to collision with the leader; none if never approached",
-        "time_exposed_time_to_collision_s": "time below the time-to-collision threshold (TET)",
-        "time_integrated_time_to_collision_s2": "what was missing to that threshold, over time (TIT)",
-        "max_drac_mps2": "highest deceleration rate to avoid a crash with the leader, before any contact",
-        "minimum_gap_m": "least gap to the leader",
-        "minimum_time_headway_s": "least gap over speed",
+        "minimum_time_to_collision_s": "least time to collision with a leader that moves (5 m/s or more); none if "
+        "never approached",
+        "time_exposed_time_to_collision_s": "time below the time-to-collision threshold (TET), likewise",
+        "time_integrated_time_to_collision_s2": "what was missing to that threshold, over time (TIT), likewise",
+        "max_drac_mps2": "highest deceleration rate to avoid a crash with such a leader, before any contact",
+        "minimum_gap_m": "least gap to such a leader",
+        "minimum_time_headway_s": "least gap over speed, likewise",
+        "minimum_queue_time_to_collision_s": "least time to collision of the ego at 5 m/s or more with a leader that "
+        "is slower than that",
+        "time_exposed_to_queue_s": "time below the time-to-collision threshold, likewise",
+        "max_queue_drac_mps2": "highest deceleration rate to avoid a crash, likewise",
+        "minimum_queue_gap_m": "least gap, likewise",
     }
-    _least_time_to_collision: float | None = None
-    _exposed: float = 0.0
-    _integrated: float = 0.0
-    _max_drac: float | None = None
-    _least_gap: float | None = None
-    _least_headway: float | None = None
+    _moving: _Approach = field(default_factory=_Approach)
+    _queue: _Approach = field(default_factory=_Approach)
 
     def update(self, sample: Sample) -> None:
         """Take in one step.
@@ -48,32 +76,28 @@ class Conflict:
         sample : Sample
             The step, and what is derived from it.
         """
-        leader = sample.step.leader
+        leader, speed = sample.step.leader, float(sample.step.traffic.speed[sample.step.ego])
         if leader is None:
             return
-        speed = float(sample.step.traffic.speed[sample.step.ego])
-        self._least_gap = _least(self._least_gap, leader.gap)
-        headway = finite_or_none(float(time_headway(leader.gap, speed)))
-        self._least_headway = _least(self._least_headway, headway)
-        self._max_drac = _most(self._max_drac, sample.derived["drac_mps2"])
-        self._add_time_to_collision(sample.derived["time_to_collision_s"], sample.elapsed)
-
-    def _add_time_to_collision(self, time_to_collision: float | None, elapsed: float) -> None:
-        if time_to_collision is None:
-            return
-        self._least_time_to_collision = _least(self._least_time_to_collision, time_to_collision)
-        self._exposed += time_exposed_time_to_collision(time_to_collision, elapsed, self.threshold)
-        self._integrated += time_integrated_time_to_collision(time_to_collision, elapsed, self.threshold)
+        if leader.speed >= QUEUE_SPEED:
+            self._moving.add(sample, leader, self.threshold)
+        elif speed >= QUEUE_SPEED:
+            self._queue.add(sample, leader, self.threshold)
 
     def result(self) -> dict[str, JsonValue]:
         """Say how near a collision was."""
+        moving, queue = self._moving, self._queue
         return {
-            "minimum_time_to_collision_s": self._least_time_to_collision,
-            "time_exposed_time_to_collision_s": clock_time(self._exposed),
-            "time_integrated_time_to_collision_s2": self._integrated,
-            "max_drac_mps2": self._max_drac,
-            "minimum_gap_m": self._least_gap,
-            "minimum_time_headway_s": self._least_headway,
+            "minimum_time_to_collision_s": moving.least_time_to_collision,
+            "time_exposed_time_to_collision_s": clock_time(moving.exposed),
+            "time_integrated_time_to_collision_s2": moving.integrated,
+            "max_drac_mps2": moving.max_drac,
+            "minimum_gap_m": moving.least_gap,
+            "minimum_time_headway_s": moving.least_headway,
+            "minimum_queue_time_to_collision_s": queue.least_time_to_collision,
+            "time_exposed_to_queue_s": clock_time(queue.exposed),
+            "max_queue_drac_mps2": queue.max_drac,
+            "minimum_queue_gap_m": queue.least_gap,
         }
 
 

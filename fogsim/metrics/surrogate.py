@@ -10,6 +10,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from fogsim.kinematics import DECELERATION, REACTION_TIME
 
+QUEUE_SPEED = 5.0
+"""Who is slower stands in a queue, or is about to [m/s]: closing up to it is no conflict, driving into it is another
+one than with a leader that moves."""
+
+CRITICAL_DECELERATION = 3.4
+"""Deceleration to avoid a crash from which a conflict is serious [m/s²] (threshold of SUMO's SSM device for MDRAC)."""
+
+ALERT_REACTION_TIME = 1.0
+"""Perception and reaction time of a driver who looks ahead [s] (default of SUMO's SSM device)."""
+
+FULL_BRAKING = 6.43
+"""Deceleration that the brakes of a passenger car must reach at least [m/s²] (UN R13-H, mean fully developed)."""
+
 
 @dataclass(frozen=True, slots=True)
 class SafetyStandard:
@@ -73,7 +86,7 @@ def deceleration_rate_to_avoid_crash(gap: ArrayLike, speed: ArrayLike, leader_sp
 
 
 def modified_deceleration_rate_to_avoid_crash(
-    gap: ArrayLike, speed: ArrayLike, leader_speed: ArrayLike, reaction_time: float = 1.0
+    gap: ArrayLike, speed: ArrayLike, leader_speed: ArrayLike, reaction_time: float = ALERT_REACTION_TIME
 ) -> NDArray[np.float64]:
     """Deceleration to avoid a crash when it begins only after a reaction time, MDRAC = Δv / (2 (TTC − PRT)).
 
@@ -94,6 +107,46 @@ def modified_deceleration_rate_to_avoid_crash(
     approach = np.maximum(np.subtract(speed, leader_speed), 0.0)
     remaining = time_to_collision(gap, speed, leader_speed) - reaction_time
     return _quotient_where(remaining > 0, 0.5 * approach, remaining, np.inf)
+
+
+def potential_collision_speed(
+    gap: ArrayLike,
+    speed: ArrayLike,
+    leader_speed: ArrayLike,
+    reaction_time: float = ALERT_REACTION_TIME,
+    deceleration: float = FULL_BRAKING,
+) -> NDArray[np.float64]:
+    """Difference of speed at which a follower hits its leader if that brakes fully now, and it itself after reacting.
+
+    Both brake at b. Until the first of two instants, when the follower reacts (PRT) or the leader stands (v_L / b), the
+    closing speed v_F − v_L grows by b t; between them it is constant, u; after both it falls, to √(u² − 2 b s) over the
+    gap s that is then left. A leader speed of 0 is an obstacle that appears at the distance ``gap``.
+
+    Parameters
+    ----------
+    gap : array_like
+        Distance from the follower's front bumper to the leader's rear bumper [m].
+    speed, leader_speed : array_like
+        Speeds of follower and leader [m/s].
+    reaction_time : float
+        Perception and reaction time PRT [s].
+    deceleration : float
+        Deceleration b of both [m/s²], positive.
+
+    Returns
+    -------
+    ndarray
+        Speed of the impact [m/s], 0 where there is none.
+    """
+    closing, standing = np.subtract(speed, leader_speed), np.divide(leader_speed, deceleration)
+    growing = np.minimum(standing, reaction_time)
+    constant = np.maximum(closing + deceleration * growing, 0.0)
+    hit_growing = np.subtract(gap, (closing + 0.5 * deceleration * growing) * growing)
+    left = hit_growing - constant * np.abs(standing - reaction_time)
+    falling = np.sqrt(np.maximum(constant**2 - 2.0 * deceleration * np.maximum(left, 0.0), 0.0))
+    at_once = np.sqrt(closing**2 + np.multiply(2.0 * deceleration, gap))
+    impact: NDArray[np.float64] = np.where(hit_growing <= 0.0, at_once, falling)[()]
+    return impact
 
 
 def time_headway(gap: ArrayLike, speed: ArrayLike) -> NDArray[np.float64]:

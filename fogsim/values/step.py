@@ -3,6 +3,9 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fogsim.units import visibility_from_extinction
 from fogsim.values.belief import Belief
 from fogsim.values.camera import Camera, CameraPose
@@ -44,6 +47,8 @@ class Truth:
         The fog at this instant as a field, likewise.
     signs : SignMap or None
         Every sign that stands in the world, likewise.
+    vehicle_extinctions : (n,) float64 or None
+        Extinction coefficient at the eyes of each driver of `Step.traffic` [1/m]; None where nobody asked.
     """
 
     extinction: float
@@ -52,6 +57,7 @@ class Truth:
     pose: CameraPose | None = None
     fog: FogField | None = None
     signs: SignMap | None = None
+    vehicle_extinctions: NDArray[np.float64] | None = None
 
     @property
     def visibility(self) -> float:

@@ -37,6 +37,9 @@ class TrafficState:
     grade : (n,) float64
         Inclination along the heading of the road that a vehicle stands on, from its rear to its front bumper [rad];
         positive uphill. Left out, everybody stands on the level.
+    free_speed : (n,) float64
+        Speed at which a driver would travel alone in clear air [m/s]: the lane's limit times the driver's own factor,
+        and no more than the vehicle can. Empty where it is not known.
     """
 
     time: float
@@ -53,6 +56,7 @@ class TrafficState:
     lamps: NDArray[np.int32]
     paint: NDArray[np.float64]
     grade: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    free_speed: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         """Put everybody on the level where no grade is given."""

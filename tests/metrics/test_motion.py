@@ -46,3 +46,11 @@ def test_speed_above_the_advice_counts_only_while_there_is_one() -> None:
     assert summary["above_advice_time_share"] == pytest.approx(1 / 4)
     strict = summarise((make_step(i, time=float(i), advised=a) for i, a in enumerate(advised)), advice_tolerance=0.0)
     assert strict["above_advice_time_share"] == pytest.approx(2 / 4)
+
+
+def test_compliance_is_by_the_time_with_an_advice_and_changes_are_by_the_way() -> None:
+    advised = (math.inf, 20.0, 20.1, 25.0, 24.9, math.inf)
+    summary = summarise(make_step(i, time=float(i), speed=25.0, advised=a) for i, a in enumerate(advised))
+    assert summary["advice_compliance_share"] == pytest.approx(2 / 4)
+    # It appears, rises to 25 m/s and ends; a tenth of a metre a second is no change.
+    assert summary["advice_changes_per_km"] == pytest.approx(3 / 0.125)

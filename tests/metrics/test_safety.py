@@ -24,6 +24,24 @@ def test_conflicts_are_weighted_with_the_time_between_steps() -> None:
     assert summarise(steps, time_to_collision=1.5)["time_exposed_time_to_collision_s"] == pytest.approx(0.5)
 
 
+def test_a_queue_counts_apart_and_closing_up_to_it_nowhere() -> None:
+    """20 m/s towards a leader at 4 m/s, then behind one at 10 m/s, then creeping up to a standing one."""
+    seen = [(20.0, 32.0, 4.0), (20.0, 40.0, 10.0), (3.0, 2.5, 0.0)]
+    steps = [
+        make_step(i, time=0.5 * i, speed=speed, leader=Leader("other", gap, ahead))
+        for i, (speed, gap, ahead) in enumerate([seen[0], *seen])
+    ]
+    summary = summarise(steps)
+    assert summary["minimum_time_to_collision_s"] == pytest.approx(4.0)
+    assert summary["time_exposed_time_to_collision_s"] == 0.0
+    assert summary["minimum_gap_m"] == 40.0
+    assert summary["max_drac_mps2"] == pytest.approx(10.0**2 / 80.0)
+    assert summary["minimum_queue_time_to_collision_s"] == pytest.approx(2.0)
+    assert summary["time_exposed_to_queue_s"] == pytest.approx(0.5)
+    assert summary["minimum_queue_gap_m"] == 32.0
+    assert summary["max_queue_drac_mps2"] == pytest.approx(16.0**2 / 64.0)
+
+
 def test_share_of_time_in_which_the_ego_could_not_stop_in_sight() -> None:
     steps = [
         make_step(i, time=float(i), speed=20.0, visibility=v) for i, v in enumerate((300.0, 300.0, 50.0, math.inf))

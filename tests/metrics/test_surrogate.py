@@ -6,6 +6,7 @@ import pytest
 from fogsim.metrics import (
     deceleration_rate_to_avoid_crash,
     modified_deceleration_rate_to_avoid_crash,
+    potential_collision_speed,
     time_exposed_time_to_collision,
     time_headway,
     time_integrated_time_to_collision,
@@ -74,3 +75,34 @@ def test_integrated_time_of_an_even_approach_tends_to_the_triangle_under_the_thr
     times = np.arange(5.0, 0.0, -step)
     assert time_exposed_time_to_collision(times, step, 3.0) == pytest.approx(3.0, abs=2 * step)
     assert time_integrated_time_to_collision(times, step, 3.0) == pytest.approx(4.5, rel=1e-3)
+
+
+def simulated_collision_speed(gap: float, speed: float, leader_speed: float) -> float:
+    """Full braking of both at 6 m/s², the follower's after 1.5 s, by small steps."""
+    step = 1e-4
+    for number in range(200_000):
+        if gap <= 0.0 or speed <= 0.0:
+            break
+        leader_speed = max(leader_speed - 6.0 * step, 0.0)
+        speed -= 6.0 * step if number * step >= 1.5 else 0.0
+        gap -= (speed - leader_speed) * step
+    return speed - leader_speed if gap <= 0.0 else 0.0
+
+
+@pytest.mark.parametrize(
+    ("gap", "speed", "leader_speed"),
+    [
+        *((3.0, 20.0, 20.0), (5.0, 20.0, 20.0), (20.0, 20.0, 18.0), (34.0, 20.0, 18.0), (45.0, 20.0, 18.0)),
+        *((5.0, 20.0, 3.0), (20.0, 20.0, 3.0), (45.0, 20.0, 3.0), (80.0, 20.0, 3.0), (10.0, 5.0, 20.0)),
+        *((25.0, 20.0, 0.0), (45.0, 20.0, 0.0), (70.0, 20.0, 0.0)),
+    ],
+)
+def test_potential_collision_speed_is_that_of_a_simulation(gap: float, speed: float, leader_speed: float) -> None:
+    """Hits while the leader brakes, while both do, while neither or one does, on a standing leader, and none."""
+    expected = simulated_collision_speed(gap, speed, leader_speed)
+    assert potential_collision_speed(gap, speed, leader_speed, 1.5, 6.0) == pytest.approx(expected, abs=0.02)
+
+
+def test_an_obstacle_within_the_reaction_distance_is_hit_at_full_speed_and_one_without_end_never() -> None:
+    found = potential_collision_speed(np.array([19.0, np.inf]), np.array([20.0, 20.0]), np.zeros(2))
+    assert found.tolist() == [20.0, 0.0]

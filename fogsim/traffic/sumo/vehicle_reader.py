@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.traffic.appearance import OTHERS_LAMPS, body_kind, cross_section, lamps_from_many_signals, paint
+from fogsim.traffic.sumo.claims import SPEED_FACTOR, TOP_SPEED, Claims
 from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
 from fogsim.traffic.sumo.nearby_vehicles import NearbyVehicles
 from fogsim.traffic.sumo.roster import Roster
@@ -78,10 +79,12 @@ class _Constants(NamedTuple):
     width: NDArray[np.float64]
     height: NDArray[np.float64]
     paint: NDArray[np.float64]
+    speed_factor: NDArray[np.float64]
+    top_speed: NDArray[np.float64]
 
 
 class VehicleBodies:
-    """Kinds, sizes and paints of vehicles as a table that grows with every vehicle.
+    """Kinds, sizes, paints and wishes of vehicles as a table that grows with every vehicle.
 
     Parameters
     ----------
@@ -93,10 +96,15 @@ class VehicleBodies:
         self._api = api
         self._row: dict[str, int] = {}
         self._kinds: list[str] = []
-        self._numbers = np.empty((64, 6))
+        self._numbers = np.empty((64, 8))
+        # What drivers do to these in fog is not their own.
+        self._wishes = tuple(Claims(api, attribute, "") for attribute in (SPEED_FACTOR, TOP_SPEED))
 
     def look_up(self, ids: Sequence[str]) -> tuple[tuple[str, ...], NDArray[np.float64]]:
-        """Body kinds, and (n, 6) length, width, height [m] and linear reflectances red, green, blue of the paint.
+        """Body kinds, and (n, 8) numbers.
+
+        These are length, width, height [m], linear reflectances red, green, blue of the paint, the driver's own speed
+        over the limit [-] and the vehicle's own top speed [m/s].
 
         Parameters
         ----------
@@ -129,7 +137,8 @@ class VehicleBodies:
         length = get.getLength(vehicle)
         kind = body_kind(get.getVehicleClass(vehicle), get.getShapeClass(vehicle), length)
         self._numbers[row, :3] = length, *cross_section(kind, get.getWidth(vehicle), get.getHeight(vehicle))
-        self._numbers[row, 3:] = paint(vehicle, get.getColor(vehicle))
+        self._numbers[row, 3:6] = paint(vehicle, get.getColor(vehicle))
+        self._numbers[row, 6:] = [wish.own_value(vehicle) for wish in self._wishes]
         self._kinds.append(kind)
         self._row[vehicle] = row
         return row
@@ -164,6 +173,9 @@ class VehicleReader:
         self._speed = vehicle_getter(api, "getSpeed")
         self._minimum_gap = vehicle_getter(api, "getMinGap")
         self._hits = getter(api, "simulation", "getCollisions")
+        self._lane_limit = getter(api, "lane", "getMaxSpeed")
+        # Who is between lanes is limited by nothing but the vehicle.
+        self._lane_limits = {"": math.inf}
         self._mark = 0
         self._constants: _Constants | None = None
         self._signals: tuple[Sequence[int], NDArray[np.int32]] = ([], np.zeros(0, dtype=np.int32))
@@ -199,7 +211,15 @@ class VehicleReader:
             lamps=lamps,
             paint=constants.paint,
             grade=np.radians(now.slope),
+            free_speed=np.minimum(self._limits(now.lane) * constants.speed_factor, constants.top_speed),
         )
+
+    def _limits(self, lanes: Sequence[str]) -> NDArray[np.float64]:
+        """Speed limits (n,) [m/s], as they were when the ego first came near: those of signs that change are advice."""
+        known = self._lane_limits
+        for lane in {*lanes}.difference(known):
+            known[lane] = float(self._lane_limit(lane))
+        return np.array([known[lane] for lane in lanes])
 
     def _lamps(self, signals: Sequence[int]) -> NDArray[np.int32]:
         """Lamps of all by their own signals; computed anew when a signal has changed."""
@@ -212,7 +232,8 @@ class VehicleReader:
         if self._constants is None or self._constants.ids is not ids:
             kinds, numbers = self._bodies.look_up(ids)
             length, width, height = numbers[:, :3].T
-            self._constants = _Constants(ids, ids.index(self._ego), kinds, length, width, height, numbers[:, 3:])
+            body = (kinds, length, width, height, numbers[:, 3:6])
+            self._constants = _Constants(ids, ids.index(self._ego), *body, *numbers[:, 6:].T)
         return self._constants
 
     def _dynamic_state(self) -> DynamicState:

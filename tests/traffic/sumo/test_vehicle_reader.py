@@ -58,6 +58,7 @@ def read_everything(api: Any, ego_lamps: Lamp, radius: float) -> TrafficState:
         lamps=np.array(lamps, dtype=np.int32),
         paint=np.array([paint(v, get.getColor(v)) for v in ids]),
         grade=np.array([np.radians(get.getSlope(v)) for v in ids]),
+        free_speed=np.array([min(get.getAllowedSpeed(v), get.getMaxSpeed(v)) for v in ids]),
     )
 
 
@@ -169,7 +170,7 @@ def test_the_table_of_bodies_grows(link: LibsumoLink) -> None:
         link.step()
         ids = api.vehicle.getIDList()
         kinds, numbers = bodies.look_up(ids)
-        assert numbers.shape == (len(ids), 6)
+        assert numbers.shape == (len(ids), 8)
     assert len(bodies._numbers) > 64
     assert numbers[:, 0].tolist() == [api.vehicle.getLength(v) for v in ids]
     assert list(kinds) == [body_kind(api.vehicle.getVehicleClass(v)) for v in ids]

@@ -1,0 +1,64 @@
+"""Time spent at each value of a quantity, for shares and quantiles over all vehicles of a run."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.metrics.metric import share
+
+
+class Histogram:
+    """Time by value, in bins of equal width; what lies beyond the ends is in the outermost two.
+
+    Parameters
+    ----------
+    low, high : float
+        Ends of the range.
+    width : float
+        Width of a bin, a whole part of the range; quantiles are as exact as that.
+    """
+
+    def __init__(self, low: float, high: float, width: float) -> None:
+        self._low, self._width = low, width
+        self._bins = round((high - low) / width)
+        self._time = np.zeros(self._bins + 2)
+
+    def add(self, values: NDArray[np.float64], elapsed: float) -> None:
+        """Add a time at each of some values.
+
+        Parameters
+        ----------
+        values : (n,) float64
+            The values; infinity is allowed.
+        elapsed : float
+            The time [s].
+        """
+        # A value on an edge is above it, whatever the quotient's last bit.
+        place = np.clip((values - self._low) / self._width + (1.0 + 1e-9), 0.0, self._bins + 1.0)
+        self._time += elapsed * np.bincount(place.astype(np.intp), minlength=self._bins + 2)
+
+    def share_below(self, value: float) -> float | None:
+        """Share of the time below a value [-]; None without any.
+
+        Parameters
+        ----------
+        value : float
+            An edge of a bin.
+        """
+        until = round((value - self._low) / self._width) + 1
+        return share(float(self._time[:until].sum()), float(self._time.sum()))
+
+    def quantile(self, probability: float) -> float | None:
+        """Value below which a share of the time was spent; None without any, or beyond the range.
+
+        Parameters
+        ----------
+        probability : float
+            The share [-], between 0 and 1.
+        """
+        total = np.cumsum(self._time)
+        wanted = probability * total[-1]
+        place = int(np.searchsorted(total, wanted))
+        if not wanted or not 1 <= place <= self._bins:
+            return None
+        part = (wanted - total[place - 1]) / self._time[place]
+        return float(self._low + self._width * (place - 1 + part))

@@ -1,0 +1,63 @@
+"""Distances in time between everybody and the vehicle ahead."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.metrics.histogram import Histogram
+from fogsim.metrics.metric import JsonValue, Sample
+from fogsim.metrics.surrogate import QUEUE_SPEED, time_headway
+
+
+@dataclass(slots=True)
+class TrafficHeadways:
+    """Time headways of all followers near the ego that drive at 5 m/s or more.
+
+    The headway is between bumpers, gap / v_F. It is also the post-encroachment time (PET, Allen, Shin & Cooper 1978) of
+    vehicles in one lane: the time from when the leader's rear bumper leaves a place to when the follower's front bumper
+    comes there, at the speed that it has.
+    """
+
+    meanings: ClassVar[Mapping[str, str]] = {
+        "traffic_headway_below_1_s_share": "share of the time of moving followers (5 m/s or more) at less than 1 s "
+        "from their front bumper to the leader's rear one; it is their post-encroachment time (PET), too",
+        "traffic_headway_below_2_s_share": "the same at less than 2 s",
+        "traffic_headway_below_3_s_share": "the same at less than 3 s",
+        "traffic_headway_p05_s": "time headway that they are below for 5 % of that time; none above 10 s",
+        "traffic_median_headway_s": "and for half of it",
+    }
+    _headways: Histogram = field(default_factory=lambda: Histogram(0.0, 10.0, 0.05))
+
+    def update(self, sample: Sample) -> None:
+        """Take in one step.
+
+        Parameters
+        ----------
+        sample : Sample
+            The step, and what is derived from it.
+        """
+        self._headways.add(moving_headways(sample), sample.elapsed)
+
+    def result(self) -> dict[str, JsonValue]:
+        """Say how the headways are distributed."""
+        return {
+            **{f"traffic_headway_below_{s}_s_share": self._headways.share_below(s) for s in (1, 2, 3)},
+            "traffic_headway_p05_s": self._headways.quantile(0.05),
+            "traffic_median_headway_s": self._headways.quantile(0.5),
+        }
+
+
+def moving_headways(sample: Sample) -> NDArray[np.float64]:
+    """Time headways of followers that move (m,) [s].
+
+    Parameters
+    ----------
+    sample : Sample
+        The step.
+    """
+    found = sample.following
+    moving = found.speed >= QUEUE_SPEED
+    return time_headway(found.gap[moving], found.speed[moving])

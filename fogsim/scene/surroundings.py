@@ -59,12 +59,11 @@ def surroundings(network: RoadNetwork, signs: SignMap, line: Points) -> Surround
     lanes = _chosen(network.lanes, near.reaches([lane.centreline for lane in network.lanes]))
     areas = _chosen(network.areas, near.reaches([area.outline for area in network.areas]))
     posts = _chosen(signs.signs, near.reaches([np.array([sign.position]) for sign in signs.signs]))
+    if origin.any():
+        lanes = [replace(lane, centreline=lane.centreline - origin) for lane in lanes]
+        areas = [replace(area, outline=area.outline - origin) for area in areas]
     return Surroundings(
-        RoadNetwork(
-            tuple(replace(lane, centreline=lane.centreline - origin) for lane in lanes),
-            network.route - origin,
-            tuple(replace(area, outline=area.outline - origin) for area in areas),
-        ),
+        RoadNetwork(tuple(lanes), network.route - origin, tuple(areas)),
         SignMap(tuple(replace(sign, position=_moved(sign.position, origin)) for sign in posts)),
         origin,
         whole=len(lanes) == len(network.lanes) and len(areas) == len(network.areas) and len(posts) == len(signs.signs),

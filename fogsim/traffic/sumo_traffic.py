@@ -12,7 +12,6 @@ from fogsim.traffic.collision_log import CollisionLog
 from fogsim.traffic.drivers.events import Order, Script, Situation
 from fogsim.traffic.drivers.sight import FogAccess
 from fogsim.traffic.road.configuration import OVERRIDES
-from fogsim.traffic.road.demand import read_demand
 from fogsim.traffic.road.network import read_net, road_network
 from fogsim.traffic.road.opendrive import is_opendrive
 from fogsim.traffic.road.signs import sign_map
@@ -22,6 +21,7 @@ from fogsim.traffic.sumo.lane_changes import LaneChangeSmoothing
 from fogsim.traffic.sumo.lane_keeping import LaneKeeping
 from fogsim.traffic.sumo.link import Api, SumoLink
 from fogsim.traffic.sumo.loaded_files import check_step_length, describe_seen, loaded_additional, loaded_net
+from fogsim.traffic.sumo.planned_way import planned_way
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.route_position import GapToEgo, RoutePosition
 from fogsim.traffic.sumo.vehicle_reader import SubscribedReader, VehicleReader
@@ -172,14 +172,14 @@ class SumoTraffic:
     def planned_network(self) -> tuple[RoadNetwork, SignMap] | None:
         """Roads and signs along the ego's written way; see `Traffic.planned_network`."""
         setup = self._setup
-        if setup.net is None:
+        planned = planned_way(setup)
+        if planned is None:
             return None
-        written = read_demand((*setup.additional, *setup.routes), (setup.ego,)).routes.get(setup.ego)
-        net = None if written is None else read_net(setup.net)
-        if net is None or written is None or not all(map(net.hasEdge, written.edges)):
+        net = read_net(planned.net)
+        if not net.edges.keys() >= set(planned.edges):
             return None
-        roads = road_network(net, written.edges), sign_map(net, setup.additional)
-        self._planned = written.edges, roads
+        roads = road_network(net, planned.edges), sign_map(net, planned.additional)
+        self._planned = planned.edges, roads
         return roads
 
     @_translates_errors

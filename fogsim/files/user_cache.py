@@ -1,0 +1,22 @@
+"""Where what can be made again is kept between runs."""
+
+import os
+import sys
+from pathlib import Path
+
+VARIABLE = "FOGSIM_CACHE_DIR"
+"""Name of the environment variable that names another directory."""
+
+
+def cache_directory() -> Path:
+    """FogSim's folder in the user's cache directory, which may not exist yet.
+
+    That is `FOGSIM_CACHE_DIR` where it is set; else the folder ``fogsim`` in ``XDG_CACHE_HOME``, or where the operating
+    system has caches: ``~/.cache``, ``~/Library/Caches`` (macOS), ``%LOCALAPPDATA%`` (Windows).
+    """
+    named = os.environ.get(VARIABLE)
+    if named:
+        return Path(named)
+    home = os.path.expanduser("~")  # noqa: PTH111 - without a home, Path.home() raises
+    system = {"darwin": f"{home}/Library/Caches", "win32": os.environ.get("LOCALAPPDATA", f"{home}/AppData/Local")}
+    return Path(os.environ.get("XDG_CACHE_HOME") or system.get(sys.platform, f"{home}/.cache")) / "fogsim"

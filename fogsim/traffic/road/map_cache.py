@@ -1,0 +1,174 @@
+"""Maps of large networks, kept in the user's cache directory, so that a city is parsed once.
+
+A file of the cache is named after the content of the network's file and the version of what made the map, down to its
+source, so that no other version reads it. It holds arrays of numbers and texts only. What is damaged, or cannot be
+read or written, is as if it were not there.
+"""
+
+import contextlib
+import functools
+import hashlib
+import os
+import zipfile
+import zlib
+from collections.abc import Mapping, Sequence
+from importlib import metadata
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.files.user_cache import cache_directory
+from fogsim.traffic.road.road_map import RoadMap, edge_ranges
+from fogsim.values import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea, Sign
+
+_WORTHWHILE = 1_000_000  # bytes of a network's file, from which on reading takes a fifth of a second
+_MOST_FILES = 16  # of the cache; the oldest go
+_MADE_BY = ("limit_signs.py", "map_cache.py", "net_lanes.py", "network.py", "road_map.py")
+_MARKINGS, _KINDS, _ENDS = tuple(LaneMarking), tuple(LaneKind), tuple(LaneEnd)
+_UNREADABLE = (OSError, ValueError, KeyError, IndexError, TypeError, EOFError, zipfile.BadZipFile, zlib.error)
+
+Arrays = dict[str, NDArray[Any]]
+
+
+def is_worth_caching(net: Path) -> bool:
+    """Tell whether reading a network takes so long that its map is kept.
+
+    Parameters
+    ----------
+    net : Path
+        The network's file.
+    """
+    with contextlib.suppress(OSError):
+        return net.stat().st_size >= _WORTHWHILE
+    return False
+
+
+def cached_map(net: Path) -> RoadMap | None:
+    """Map of a network that has been kept; None where there is none.
+
+    Parameters
+    ----------
+    net : Path
+        The network's file.
+    """
+    try:
+        with _place(net).open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+            return _map_of(arrays)
+    except _UNREADABLE:
+        return None
+
+
+def keep_map(net: Path, roads: RoadMap) -> None:
+    """Keep a map, if the user's cache directory can be written.
+
+    Parameters
+    ----------
+    net : Path
+        The network's file.
+    roads : RoadMap
+        Its map.
+    """
+    with contextlib.suppress(OSError):
+        place = _place(net)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        # Several processes may do so at once.
+        part = place.with_name(f"{place.stem}.{os.getpid()}.part")
+        try:
+            with part.open("wb") as file:
+                np.savez(file, allow_pickle=False, **_arrays_of(roads))
+            part.replace(place)
+        finally:
+            part.unlink(missing_ok=True)
+        for old in sorted(place.parent.glob("*.npz"), key=lambda path: path.stat().st_mtime)[:-_MOST_FILES]:
+            old.unlink(missing_ok=True)
+
+
+def _place(net: Path) -> Path:
+    digest = hashlib.sha256(_version())
+    with net.open("rb") as file:
+        while chunk := file.read(1 << 20):
+            digest.update(chunk)
+    return cache_directory() / "networks" / f"{digest.hexdigest()[:32]}.npz"
+
+
+@functools.cache
+def _version() -> bytes:
+    """What made a map: the versions of FogSim and sumolib, and the source."""
+    sources = [Path(__file__).with_name(name).read_bytes() for name in _MADE_BY]
+    versions = [metadata.version(name).encode() for name in ("fogsim", "eclipse-sumo")]
+    return hashlib.sha256(b"\0".join((*versions, *sources))).digest()
+
+
+def _arrays_of(roads: RoadMap) -> Arrays:
+    lanes, areas, signs = roads.lanes, roads.areas, roads.limit_signs
+    return {
+        "edges": _text(list(roads.edges)),
+        "lane_counts": np.array([len(places) for places in roads.edges.values()], np.int64),
+        "sizes": np.array([(lane.width, lane.speed_limit) for lane in lanes], np.float64).reshape(-1, 2),
+        "codes": np.array([_codes(lane) for lane in lanes], np.uint8).reshape(-1, 5),
+        "drawn": roads.drawn,
+        "between": roads.between,
+        **_lines("centrelines", [lane.centreline for lane in lanes]),
+        **_lines("outlines", [area.outline for area in areas]),
+        "areas": _text([area.area_id for area in areas]),
+        "area_kinds": np.array([_KINDS.index(area.kind) for area in areas], np.uint8),
+        "signs": _text([text for sign in signs for text in (sign.sign_id, sign.kind)]),
+        "sign_places": np.array([(s.value, *s.position, s.heading, s.diameter) for s in signs]).reshape(-1, 6),
+        "location": _text(roads.location or ()),
+    }
+
+
+def _codes(lane: Lane) -> tuple[int, int, int, int, int]:
+    left, right = _MARKINGS.index(lane.left), _MARKINGS.index(lane.right)
+    return left, right, int(lane.outermost), _KINDS.index(lane.kind), _ENDS.index(lane.end)
+
+
+def _map_of(arrays: Mapping[str, NDArray[Any]]) -> RoadMap:
+    edges = _texts(arrays["edges"])
+    ranges = edge_ranges(edges, arrays["lane_counts"].tolist())
+    names = [(f"{edge}_{number}", edge) for edge, places in ranges.items() for number in range(len(places))]
+    rows = zip(names, _cut(arrays, "centrelines"), arrays["sizes"].tolist(), arrays["codes"].tolist(), strict=True)
+    outlines = zip(_texts(arrays["areas"]), _cut(arrays, "outlines"), arrays["area_kinds"].tolist(), strict=True)
+    signs = _texts(arrays["signs"])
+    places = zip(signs[::2], signs[1::2], arrays["sign_places"].tolist(), strict=True)
+    location = _texts(arrays["location"])
+    return RoadMap(
+        edges=ranges,
+        lanes=tuple(_lane(*row) for row in rows),
+        drawn=arrays["drawn"],
+        between=arrays["between"],
+        areas=tuple(PavedArea(name, outline, _KINDS[kind]) for name, outline, kind in outlines),
+        limit_signs=tuple(Sign(name, kind, p[0], (p[1], p[2], p[3]), p[4], p[5]) for name, kind, p in places),
+        location=(location[0], location[1]) if location else None,
+    )
+
+
+def _lane(name: tuple[str, str], line: NDArray[np.float64], sizes: Sequence[float], codes: Sequence[int]) -> Lane:
+    width, speed_limit = sizes
+    left, right, outermost, kind, end = codes
+    markings = _MARKINGS[left], _MARKINGS[right]
+    return Lane(*name, line, width, speed_limit, *markings, bool(outermost), _KINDS[kind], _ENDS[end])
+
+
+def _lines(name: str, lines: Sequence[NDArray[np.float64]]) -> Arrays:
+    points = np.concatenate([np.zeros((0, 3)), *lines])
+    return {name: points, f"{name}_counts": np.array([len(line) for line in lines], np.int64)}
+
+
+def _cut(arrays: Mapping[str, NDArray[Any]], name: str) -> list[NDArray[np.float64]]:
+    points, ends = arrays[name], np.cumsum(np.append(0, arrays[f"{name}_counts"])).tolist()
+    if ends[-1] != len(points):
+        raise ValueError(f"{name}: {ends[-1]} points expected, got {len(points)}")
+    return [points[start:end] for start, end in pairwise(ends)]
+
+
+def _text(texts: Sequence[str]) -> NDArray[np.uint8]:
+    # No text of XML has a NUL in it.
+    return np.frombuffer("".join(f"{text}\0" for text in texts).encode(), np.uint8)
+
+
+def _texts(array: NDArray[np.uint8]) -> list[str]:
+    return array.tobytes().decode().split("\0")[:-1]

@@ -1,0 +1,142 @@
+"""What sumolib reads of a SUMO network, as a map of roads and signs."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.traffic.road.limit_signs import limit_sign
+from fogsim.traffic.road.road_map import RoadMap, edge_ranges
+from fogsim.values import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea
+
+_WALKING_AREA = "walkingarea"
+_OFF_ROAD = frozenset(
+    ("rail", "rail_urban", "rail_electric", "rail_fast", "tram", "subway", "cable_car", "ship", "aircraft", "drone")
+)
+_STOP_STATES = frozenset(("s", "w", "a"))  # stop sign, all-way stop, traffic light that turns right on red
+_ADJOINING = 0.6  # two carriageways whose borders lie nearer than this share a line [m]
+
+
+def map_of(net: Any, lefthand: bool) -> RoadMap:
+    """Map of a network.
+
+    In one without any road or footway, the tracks or waterways are drawn in their place, as lanes without lines.
+
+    Parameters
+    ----------
+    net : sumolib.net.Net
+        The network, with what lies within junctions.
+    lefthand : bool
+        Whether vehicles keep to the left.
+    """
+    edges = net.getEdges()
+    lanes = [lane for edge in edges for lane in edge.getLanes()]
+    walked = np.array([lane.getEdge().getFunction() == _WALKING_AREA for lane in lanes], np.bool_)
+    drawn = ~walked & np.array([_kind(lane) is not None for lane in lanes], np.bool_)
+    between = [not lane.getEdge().getFunction() and set(lane.getPermissions()) != {"pedestrian"} for lane in lanes]
+    side = 1.0 if lefthand else -1.0
+    signs = (limit_sign(edge, side) for edge in net.getEdges(withInternal=False))
+    return RoadMap(
+        edges=edge_ranges([edge.getID() for edge in edges], [len(edge.getLanes()) for edge in edges]),
+        lanes=tuple(_lane(lane, lefthand) for lane in lanes),
+        drawn=drawn if drawn.any() else ~walked,
+        between=np.array(between, np.bool_),
+        areas=(*_junctions(net), *_walking_areas(net)),
+        limit_signs=tuple(sign for sign in signs if sign is not None),
+        location=_location(net),
+    )
+
+
+def _location(net: Any) -> tuple[str, str] | None:
+    """Offset and projection as they are written; None where the network says nothing about where it is."""
+    written: dict[str, str] = net._location  # of the two, sumolib tells only what it makes of them
+    return (written["netOffset"], written["projParameter"]) if written else None
+
+
+def _kind(lane: Any) -> LaneKind | None:
+    """What a lane is for; None for rails and waterways."""
+    function = lane.getEdge().getFunction()
+    if function == "crossing":
+        return LaneKind.CROSSING
+    allowed = set(lane.getPermissions())
+    if allowed and allowed <= _OFF_ROAD:
+        return None
+    if allowed == {"pedestrian"}:
+        return LaneKind.FOOTWAY
+    return LaneKind.JUNCTION if function == "internal" else LaneKind.CARRIAGEWAY
+
+
+def _lane(lane: Any, lefthand: bool) -> Lane:
+    """A lane as it is drawn, whatever it is for."""
+    kind = _kind(lane)
+    inner, outer = _markings(lane) if kind is LaneKind.CARRIAGEWAY else (LaneMarking.NONE, LaneMarking.NONE)
+    # Lanes are counted from the side that vehicles keep to.
+    left, right = (outer, inner) if lefthand else (inner, outer)
+    rightmost = _carriageway(lane.getEdge())[-1 if lefthand else 0] if kind is LaneKind.CARRIAGEWAY else None
+    return Lane(
+        lane_id=lane.getID(),
+        edge_id=lane.getEdge().getID(),
+        centreline=_shape(lane),
+        width=float(lane.getWidth()),
+        speed_limit=float(lane.getSpeed()),
+        left=left,
+        right=right,
+        outermost=lane is rightmost,
+        kind=kind or LaneKind.CARRIAGEWAY,
+        end=_end(lane) if kind is LaneKind.CARRIAGEWAY else LaneEnd.OPEN,
+    )
+
+
+def _shape(lane: Any) -> NDArray[np.float64]:
+    return np.array(lane.getShape3D(), dtype=np.float64).reshape(-1, 3)
+
+
+def _carriageway(edge: Any) -> list[Any]:
+    """Lanes of an edge that vehicles drive on, from the side that they keep to."""
+    return [lane for lane in edge.getLanes() if _kind(lane) in {LaneKind.CARRIAGEWAY, LaneKind.JUNCTION}]
+
+
+def _markings(lane: Any) -> tuple[LaneMarking, LaneMarking]:
+    """Lines on the side of the other direction and on the side that vehicles keep to."""
+    lanes = _carriageway(lane.getEdge())
+    left = _between_directions(lanes) if lane is lanes[-1] else LaneMarking.DASHED
+    return left, LaneMarking.SOLID if lane is lanes[0] else LaneMarking.DASHED
+
+
+def _between_directions(lanes: Sequence[Any]) -> LaneMarking:
+    """Line towards the other direction: it may be overtaken on a road of two lanes, not on one of more."""
+    edge = lanes[-1].getEdge()
+    here = _shape(lanes[-1])
+    for other in edge.getToNode().getOutgoing():
+        opposite = _carriageway(other)
+        if other.getToNode() is not edge.getFromNode() or other is edge or not opposite:
+            continue
+        there = _shape(opposite[-1])
+        if not (len(here) and len(there)):
+            continue
+        apart = 0.5 * (lanes[-1].getWidth() + opposite[-1].getWidth())
+        if abs(math.dist(here[0, :2], there[-1, :2]) - apart) < _ADJOINING:
+            return LaneMarking.DASHED if len(lanes) == len(opposite) == 1 else LaneMarking.DOUBLE
+    return LaneMarking.SOLID
+
+
+def _end(lane: Any) -> LaneEnd:
+    """Line across the end of a lane: at traffic lights and stop signs, or where it must give way."""
+    states = {(connection.getState(), bool(connection.getTLSID())) for connection in lane.getOutgoing()}
+    if any(controlled or state in _STOP_STATES for state, controlled in states):
+        return LaneEnd.STOP
+    # Who must give way only when turning has no line to wait behind.
+    return LaneEnd.YIELD if states and all(state == "m" for state, _ in states) else LaneEnd.OPEN
+
+
+def _junctions(net: Any) -> list[PavedArea]:
+    outlines = [(node.getID(), np.array(node.getShape3D(), dtype=np.float64)) for node in net.getNodes()]
+    return [PavedArea(name, outline) for name, outline in outlines if len(outline) > 2]
+
+
+def _walking_areas(net: Any) -> list[PavedArea]:
+    lanes = [lane for edge in net.getEdges() if edge.getFunction() == _WALKING_AREA for lane in edge.getLanes()]
+    shapes = [(lane.getID(), np.array(lane.getShape3D(), dtype=np.float64)) for lane in lanes]
+    return [PavedArea(name, shape, LaneKind.FOOTWAY) for name, shape in shapes if len(shape) > 2]

@@ -1,0 +1,110 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fogsim.traffic.road import map_cache, network
+from fogsim.traffic.road.network import read_net
+from fogsim.traffic.road.road_map import RoadMap
+
+ROOT = Path(__file__).resolve().parents[3]
+GRID = ROOT / "tests" / "data" / "grid" / "grid.net.xml"
+MOTORWAY = ROOT / "scenarios" / "motorway_fog_bank" / "motorway.net.xml"
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A cache of its own, for networks of any size."""
+    monkeypatch.setenv("FOGSIM_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr(map_cache, "_WORTHWHILE", 0)
+    return tmp_path / "cache" / "networks"
+
+
+@pytest.fixture
+def parsed(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
+    """Networks that have been parsed."""
+    paths, parse = list[Path](), network._parsed
+
+    def count(path: Path) -> RoadMap:
+        paths.append(path)
+        return parse(path)
+
+    monkeypatch.setattr(network, "_parsed", count)
+    return paths
+
+
+def told(roads: RoadMap) -> list[object]:
+    """All that a map says, to be compared."""
+    lanes = [(lane.lane_id, lane.edge_id, lane.width, lane.speed_limit, lane.outermost) for lane in roads.lanes]
+    painted = [(lane.left, lane.right, lane.kind, lane.end, lane.centreline.tolist()) for lane in roads.lanes]
+    areas = [(area.area_id, area.kind, area.outline.tolist()) for area in roads.areas]
+    chosen = [roads.drawn.tolist(), roads.between.tolist()]
+    return [roads.edges, lanes, painted, areas, chosen, roads.limit_signs, roads.location]
+
+
+@pytest.mark.parametrize("net", [GRID, MOTORWAY])
+@pytest.mark.usefixtures("cache")
+def test_a_network_is_parsed_once_and_comes_back_as_it_was(net: Path, parsed: list[Path]) -> None:
+    first, second = read_net(net), read_net(net)
+    assert parsed == [net]
+    assert told(first) == told(second)
+    # Types as well: identity of markings and plain numbers, which dictionaries and texts show.
+    assert repr(first.lanes[0]) == repr(second.lanes[0])
+
+
+def test_what_has_been_damaged_or_made_by_others_is_parsed_anew(
+    cache: Path, parsed: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read_net(GRID)
+    (kept,) = cache.iterdir()
+    whole = kept.read_bytes()
+    for damaged in (b"", whole[:1000], whole[:-3000], whole[:500] + b"\xff" * 300 + whole[800:]):
+        kept.write_bytes(damaged)
+        assert len(read_net(GRID).lanes) == len(network._parsed(GRID).lanes)
+        del parsed[-1]
+    assert len(parsed) == 5
+    kept.write_bytes(whole)
+    read_net(GRID)
+    assert len(parsed) == 5
+    monkeypatch.setattr(map_cache, "_version", lambda: b"another version of FogSim")
+    read_net(GRID)
+    assert len(parsed) == 6
+    assert len(list(cache.iterdir())) == 2
+
+
+def test_no_objects_are_read_from_the_cache(cache: Path, parsed: list[Path]) -> None:
+    read_net(GRID)
+    (kept,) = cache.iterdir()
+    with np.load(kept) as arrays:
+        pickled = {**arrays, "edges": np.array([print], object)}
+    np.savez(kept, **pickled)
+    read_net(GRID)
+    assert len(parsed) == 2
+
+
+def test_a_cache_that_cannot_be_written_is_done_without(cache: Path, parsed: list[Path]) -> None:
+    cache.parent.parent.mkdir(exist_ok=True)
+    cache.parent.write_text("a file where the folder should be", encoding="utf-8")
+    assert read_net(GRID).lanes
+    assert read_net(GRID).lanes
+    assert len(parsed) == 2
+
+
+def test_a_changed_network_is_another_and_the_oldest_maps_go(
+    cache: Path, parsed: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(map_cache, "_MOST_FILES", 2)
+    net, text = tmp_path / "net.net.xml", MOTORWAY.read_text(encoding="utf-8")
+    for number in range(4):
+        net.write_text(f"{text}<!-- {number} -->", encoding="utf-8")
+        read_net(net)
+    assert len(parsed) == 4
+    assert len(list(cache.iterdir())) == 2
+
+
+def test_where_the_cache_is(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.delenv("FOGSIM_CACHE_DIR", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert map_cache.cache_directory() == tmp_path / "fogsim"
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    assert map_cache.cache_directory().name == "fogsim"

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from fogsim.metrics.everybody import QUEUE_SPEED
 from fogsim.metrics.following import find_following
-from fogsim.metrics.surrogate import time_to_collision
+from fogsim.metrics.surrogate import QUEUE_SPEED, time_to_collision
 from fogsim.units import clock_time
 from fogsim.values import Step, TrafficState
 
@@ -73,9 +72,9 @@ class RunProfiles:
                 self._collisions.append((hit.time, x, y, hit.impact_speed, hit.collider, hit.victim))
 
     def _add_times_to_collision(self, traffic: TrafficState, elapsed: float) -> None:
-        follower, leader, gap = find_following(traffic)
-        remaining = time_to_collision(gap, traffic.speed[follower], traffic.speed[leader])
-        queue = traffic.speed[leader] < QUEUE_SPEED
+        found = find_following(traffic)
+        remaining = time_to_collision(found.gap, found.speed, found.leader_speed)
+        queue = found.leader_speed < QUEUE_SPEED
         short = remaining < CLASS_WIDTH * CLASSES
         place = (remaining[short] / CLASS_WIDTH).astype(np.intp)
         np.add.at(self._by_class, (queue[short].astype(np.intp), place), elapsed)

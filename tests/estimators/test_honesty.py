@@ -25,6 +25,7 @@ from fogsim.values import (
     SignMap,
     SignSighting,
     Step,
+    TrafficState,
     Truth,
 )
 
@@ -93,11 +94,12 @@ def test_a_false_truth_changes_nothing(as_it_is: list[Step], monkeypatch: pytest
     rng = np.random.default_rng(4)
     render = ViewRenderer.render
 
-    def false_truth(fog: FogField, pose: CameraPose, camera: Camera, signs: SignMap) -> Truth:
+    def false_truth(fog: FogField, pose: CameraPose, camera: Camera, signs: SignMap, traffic: TrafficState) -> Truth:
         k = float(rng.uniform(0.0, 0.2))
         wrong = dataclasses.replace(camera, pitch=-camera.pitch, mount_height=9.0, focal_length=77.0)
         place = dataclasses.replace(pose, position=(0.0, 0.0, 50.0), heading=pose.heading + 1.0)
-        return Truth(k, 0.5 * k, wrong, place, dataclasses.replace(fog, extinction=k), dataclasses.replace(signs))
+        false_fog, others = dataclasses.replace(fog, extinction=k), np.full(len(traffic.ids), k)
+        return Truth(k, 0.5 * k, wrong, place, false_fog, dataclasses.replace(signs), others)
 
     def render_falsely(self, *arguments):
         view, radiance = render(self, *arguments)

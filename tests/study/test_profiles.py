@@ -10,7 +10,7 @@ from fogsim.study import profiles
 from fogsim.study.profiles import RunProfiles
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Collision, Step, TrafficState
-from tests.metrics.test_everybody import traffic
+from tests.metrics.roads import lanes as traffic
 from tests.recorders.synthetic import make_step
 
 

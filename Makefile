@@ -2,6 +2,9 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# Packages are installed without bytecode, and it is written as modules are used: also where the environment forbids it,
+# as containers do. Otherwise each of the tests' hundred processes would compile all that it imports anew.
+export PYTHONDONTWRITEBYTECODE :=
 
 .DEFAULT_GOAL := help
 .PHONY: help check demo test quick hooks portability lint types contracts ci figures clean

@@ -20,12 +20,18 @@ if TYPE_CHECKING:
 _SIZES = ((160, 120), (640, 480))
 """Pictures that are estimated: methods choose what they do by size [px]."""
 
-_BY_DAY = (
-    (),
-    ("camera.samples=2", "fog.patches={correlation_length_m: 20}", "fog.forward_scatter=0.1"),
-)
-_BY_NIGHT = ((), ("street_lamps=true", "fog.patches={correlation_length_m: 20}", "camera.lens_glare=0.05"))
-"""What is set in one drive after the other, since it is drawn by kernels of its own."""
+_DRIVES: dict[str, tuple[str, tuple[tuple[str, ...], ...]]] = {
+    "drives by day": ("motorway_fog_bank", ((),)),
+    "drives by night": (
+        "night_motorway_fog",
+        ((), ("street_lamps=true", "fog.patches={correlation_length_m: 20}", "camera.lens_glare=0.05")),
+    ),
+    "drives in patches of fog": (
+        "motorway_fog_bank",
+        (("camera.samples=2", "fog.patches={correlation_length_m: 20}", "fog.forward_scatter=0.1"),),
+    ),
+}
+"""Scenario, and what is set in one drive after the other, since it is drawn by kernels of its own."""
 
 _SKY = 1e6
 """Distance of the sky in those pictures [m]."""
@@ -54,17 +60,18 @@ def compile_kernels() -> Iterator[str]:
     from fogsim.jit import processors
 
     with ProcessPoolExecutor(min(2, processors()), multiprocessing.get_context("spawn"), _be_quiet) as pool:
-        # The estimators share hardly a kernel with the drawing; drawing by night shares many with drawing by day.
+        # The estimators share hardly a kernel with the drawing; the other drives share many with the first.
+        first, *others = _DRIVES
         pending: dict[Future[None], str] = {
-            pool.submit(_drive, "motorway_fog_bank", _BY_DAY): "drives by day",
+            pool.submit(_drive, *_DRIVES[first]): first,
             pool.submit(_estimate_visibility): "estimators",
         }
         while pending:
             for done in wait(pending, return_when=FIRST_COMPLETED).done:
                 done.result()
                 ready = pending.pop(done)
-                if ready == "drives by day":
-                    pending[pool.submit(_drive, "night_motorway_fog", _BY_NIGHT)] = "drives by night"
+                if ready == first:
+                    pending |= {pool.submit(_drive, *_DRIVES[name]): name for name in others}
                 yield ready
 
 

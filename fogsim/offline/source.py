@@ -253,4 +253,5 @@ def _frames(pipe: IO[bytes]) -> Iterator[NDArray[np.uint8]]:
         data = pipe.read(3 * cols * rows)
         if len(data) < 3 * cols * rows:
             return
-        yield np.frombuffer(data, np.uint8).reshape(rows, cols, 3)
+        # A copy, since kernels are compiled anew for an array that cannot be written.
+        yield np.frombuffer(data, np.uint8).reshape(rows, cols, 3).copy()

@@ -16,6 +16,7 @@ from fogsim.vision.region.road_region import (
 
 CAMERA = Camera(640, 480, 577.0, (319.5, 239.5), 1.38, np.radians(2.0))
 EVEN = np.ones((50, 60), np.float32)
+NARROW = np.ones((50, 20), np.float32)
 
 
 def even(image):
@@ -100,14 +101,14 @@ def test_of_two_bands_alike_but_for_their_side_the_darker_is_taken():
 def test_short_gaps_are_stepped_over_and_long_ones_end_the_band():
     region = np.ones((50, 20), np.uint8)
     region[30:32] = 0
-    assert crossing_band(region, EVEN[:, :20], 9.5, 3, 20, hole=2).top == 0
-    assert crossing_band(region, EVEN[:, :20], 9.5, 3, 20, hole=1).top == 32
+    assert crossing_band(region, NARROW, 9.5, 3, 20, hole=2).top == 0
+    assert crossing_band(region, NARROW, 9.5, 3, 20, hole=1).top == 32
 
 
 def test_no_band_without_a_bottom():
     region = np.ones((50, 20), np.uint8)
     region[40:] = 0
-    assert crossing_band(region, EVEN[:, :20], 9.5, 3, 20) is None
+    assert crossing_band(region, NARROW, 9.5, 3, 20) is None
 
 
 def test_fog_draws_no_edges_but_a_mark_does():

@@ -4,6 +4,7 @@ import dataclasses
 import math
 import warnings
 from collections.abc import Generator
+from pathlib import Path
 from types import TracebackType
 from typing import Protocol, Self
 
@@ -20,7 +21,9 @@ from fogsim.values.belief import certain_belief
 from fogsim.values.result_checks import checked_advice, checked_command, checked_lamps
 
 
-def run(scenario: Scenario, seed: int = 0, traffic: Traffic | None = None) -> Generator[Step, None, None]:
+def run(
+    scenario: Scenario, seed: int = 0, traffic: Traffic | None = None, *, sumo_outputs: Path | None = None
+) -> Generator[Step, None, None]:
     """Run a scenario with its own advice and lighting policy.
 
     Parameters
@@ -31,6 +34,9 @@ def run(scenario: Scenario, seed: int = 0, traffic: Traffic | None = None) -> Ge
         The same seed gives the same run, bit for bit.
     traffic : Traffic or None
         The traffic simulation; None for SUMO in this process, as the scenario describes it.
+    sumo_outputs : Path or None
+        Folder of the files that SUMO in this process writes where its files or options ask for outputs; None to keep
+        none of them. Those of an earlier run with the same names are replaced.
 
     Yields
     ------
@@ -44,12 +50,14 @@ def run(scenario: Scenario, seed: int = 0, traffic: Traffic | None = None) -> Ge
 
     Warns
     -----
+    UserWarning
+        If SUMO writes files that are not kept.
     UnplayedWarning
         After the last step, if something of the script was not played and a longer run would not have played it
         either; `Step.unplayed` of the last step has all that was not played.
     """
     policy = AdvisedDriving(scenario)
-    with ClosedLoop(scenario, traffic) as loop:
+    with ClosedLoop(scenario, traffic, sumo_outputs) as loop:
         step = loop.start(seed)
         yield step
         while step.ending is None:
@@ -212,12 +220,14 @@ class ClosedLoop:
         The scenario.
     traffic : Traffic or None
         The traffic simulation; None for SUMO in this process, as the scenario describes it.
+    sumo_outputs : Path or None
+        As of `run`.
     """
 
-    def __init__(self, scenario: Scenario, traffic: Traffic | None = None) -> None:
+    def __init__(self, scenario: Scenario, traffic: Traffic | None = None, sumo_outputs: Path | None = None) -> None:
         self._scenario = scenario
         self._periods = build.periods(scenario)
-        self._traffic = traffic or libsumo_traffic(build.traffic_setup(scenario))
+        self._traffic = traffic or libsumo_traffic(build.traffic_setup(scenario), sumo_outputs)
         self._replays = traffic is None
         self._equipment = EgoEquipment(scenario)
         self._drivers_fog = DriversFog()

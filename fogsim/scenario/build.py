@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,7 @@ from fogsim.traffic import (
     TrafficSetup,
     Trigger,
 )
+from fogsim.traffic.sumo.options import OptionValue
 from fogsim.units import KMH_PER_MPS, clock_time
 from fogsim.values import Camera, FogField, Stretch, StretchAdvice
 
@@ -127,7 +129,17 @@ def traffic_setup(scenario: Scenario) -> TrafficSetup:
         drivers=_driver_setup(scenario),
         after_collision=traffic.after_collision,
         config=None if traffic.config is None else folder / traffic.config,
+        sumo_options=tuple((name, _option_text(value, folder)) for name, value in traffic.sumo_options.items()),
     )
+
+
+def _option_text(value: OptionValue, folder: Path) -> str:
+    """Value of an option on SUMO's command line; files that lie in the scenario's folder are named by their place."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if not isinstance(value, str):
+        return str(value)
+    return ",".join(str(folder / name) if name and (folder / name).is_file() else name for name in value.split(","))
 
 
 def _events(written: AnyEvent, place: int) -> tuple[Event, ...]:

@@ -13,7 +13,7 @@ from fogsim.scenario.document import Document, apply_overrides, read_document
 from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.schema import Scenario
-from fogsim.scenario.sumo_check import demand_mistakes, step_mistake
+from fogsim.scenario.sumo_check import demand_mistakes, option_lines, step_mistake
 from fogsim.scenario.traffic_schema import Traffic
 from fogsim.traffic.road.configuration import configured_files
 
@@ -240,6 +240,9 @@ def _checked(
         mistakes.append(f"{document.where(key_path)}: {dotted(key_path)}: {uncountable}")
     if mistakes:
         raise InputError("\n".join(mistakes))
+    refused = option_lines(document, scenario, own_simulation=named_files)
+    if refused:
+        raise InputError("\n".join(refused))
     _check_files(document, scenario)
     unknown = demand_mistakes(document, scenario) if named_files and closed_demand else []
     if unknown:

@@ -19,6 +19,7 @@ from fogsim.traffic import (
     read_net_edges,
 )
 from fogsim.traffic.sumo.loaded_files import CLOCK_TICK
+from fogsim.traffic.sumo.options import option_mistakes
 
 _ROUNDING = 1e-6  # of a tick: what writing a number in decimals may cost
 
@@ -50,6 +51,27 @@ def step_mistake(clocks: Clocks) -> str | None:
 
 def _is_whole(ticks: float) -> bool:
     return abs(ticks - round(ticks)) < _ROUNDING
+
+
+def option_lines(document: Document, scenario: Scenario, *, own_simulation: bool) -> list[str]:
+    """Say which of a scenario's options of SUMO it does not take, each in one line.
+
+    Parameters
+    ----------
+    document : Document
+        Where its keys stand.
+    scenario : Scenario
+        The scenario.
+    own_simulation : bool
+        False if SUMO runs already, and not as the scenario has it.
+    """
+    options = scenario.traffic.sumo_options
+    if own_simulation:
+        told = option_mistakes(options)
+    else:
+        told = dict.fromkeys(options, "the simulation runs already; give the option to SUMO when it is started")
+    at = ("traffic", "sumo_options")
+    return [f"{document.where((*at, name))}: {dotted((*at, name))}: {text}" for name, text in told.items()]
 
 
 MOST_SHOWN = 10

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -20,6 +21,7 @@ from fogsim.scenario.section import (
     Section,
     Share,
     SpeedKmh,
+    Text,
     Time,
     Whole,
 )
@@ -103,6 +105,26 @@ class LampsFail(Event):
 AnyEvent = Annotated[Brake | BreakDown | ChangeLane | LampsFail, Field(discriminator="kind")]
 
 
+def _dotted_options(value: object) -> object:
+    """Let options whose names have dots be written as blocks in blocks, as ``--set`` makes them."""
+    return dict(_flat("", value)) if isinstance(value, dict) else value
+
+
+def _flat(prefix: str, block: Mapping[object, object]) -> Iterator[tuple[str, object]]:
+    for name, value in block.items():
+        if isinstance(value, Mapping):
+            yield from _flat(f"{prefix}{name}.", value)
+        else:
+            yield f"{prefix}{name}", value
+
+
+SumoOptions = Annotated[
+    dict[Annotated[str, Field(pattern="^[A-Za-z][A-Za-z0-9._-]{0,99}$")], Flag | Whole | Number | Text],
+    BeforeValidator(_dotted_options),
+]
+"""Options of SUMO's command line by name."""
+
+
 class Traffic(Section):
     """A SUMO simulation and its ego."""
 
@@ -141,6 +163,10 @@ class Traffic(Section):
 
     stop_before_end_m: Distance = 60.0
     """The ego has arrived when it is this near to the end of its route."""
+
+    sumo_options: SumoOptions = Field(default_factory=dict)
+    """Further options of SUMO by their names: `{tripinfo-output: trips.xml, device.ssm.probability: 1}`. Outputs go into
+    the run's directory; files that are read are named relative to the scenario's folder."""
 
     @model_validator(mode="after")
     def _no_gap_to_itself(self) -> Self:

@@ -1,6 +1,7 @@
 """Where every vehicle is, how it moves and how it obeys advice."""
 
 import warnings
+from pathlib import Path
 
 from fogsim.traffic.drivers.compliance import COMPLIANCES, Compliance
 from fogsim.traffic.drivers.events import BrakeEvent, Event, LampFailureEvent, LaneChangeEvent, Trigger
@@ -12,28 +13,34 @@ from fogsim.traffic.road.configuration import configured_files, ignored_options
 from fogsim.traffic.road.demand import Demand, VehicleRoute, read_configured_demand, read_demand
 from fogsim.traffic.road.net_edges import NetEdges, read_net_edges
 from fogsim.traffic.setup import AfterCollision, TrafficSetup
+from fogsim.traffic.sumo.command_line import output_prefix
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
+from fogsim.traffic.sumo.output_folder import OutputFolder
 from fogsim.traffic.sumo.traci_link import TraciLink
 from fogsim.traffic.sumo_traffic import SumoTraffic
 from fogsim.traffic.user_simulation import AttachedTraffic, step_length
 
 
-def libsumo_traffic(setup: TrafficSetup) -> Traffic:
+def libsumo_traffic(setup: TrafficSetup, outputs: Path | None = None) -> Traffic:
     """SUMO inside this process; one at a time.
 
     Parameters
     ----------
     setup : TrafficSetup
         The simulation and its ego.
+    outputs : Path or None
+        Folder of all files that SUMO writes, whatever folders its configuration and its detectors name; None to keep
+        none of them.
 
     Warns
     -----
     UserWarning
-        If its configuration has options that cannot hold here and are left out.
+        If its configuration has options that cannot hold here and are left out; later, if SUMO writes files that are
+        not kept.
     """
     for option in ignored_options(setup.config) if setup.config else ():
         warnings.warn(f"{setup.config}: {option}", stacklevel=2)
-    return SumoTraffic(setup, LibsumoLink())
+    return SumoTraffic(setup, LibsumoLink(OutputFolder(outputs, output_prefix(setup))))
 
 
 def traci_traffic(setup: TrafficSetup, link: TraciLink) -> Traffic:

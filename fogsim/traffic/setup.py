@@ -51,6 +51,8 @@ class TrafficSetup:
         What becomes of vehicles that have collided.
     config : Path or None
         SUMO configuration, in place of net, routes and additional files.
+    sumo_options : tuple of (str, str)
+        Further options of SUMO, named without dashes, and their values as on its command line.
     """
 
     net: Path | None
@@ -67,3 +69,4 @@ class TrafficSetup:
     drivers: DriverSetup = UNTOUCHED
     after_collision: AfterCollision = AfterCollision.STOP
     config: Path | None = None
+    sumo_options: tuple[tuple[str, str], ...] = ()

@@ -11,12 +11,11 @@ from fogsim.errors import SimulationError
 from fogsim.traffic.collision_log import CollisionLog
 from fogsim.traffic.drivers.events import Order, Script, Situation
 from fogsim.traffic.drivers.sight import FogAccess
-from fogsim.traffic.road.configuration import OVERRIDES
 from fogsim.traffic.road.network import read_net, road_network
-from fogsim.traffic.road.opendrive import is_opendrive
 from fogsim.traffic.road.signs import sign_map
-from fogsim.traffic.setup import AfterCollision, TrafficSetup
+from fogsim.traffic.setup import TrafficSetup
 from fogsim.traffic.sumo.claims import new_session
+from fogsim.traffic.sumo.command_line import command_line
 from fogsim.traffic.sumo.lane_changes import LaneChangeSmoothing
 from fogsim.traffic.sumo.lane_keeping import LaneKeeping
 from fogsim.traffic.sumo.link import Api, SumoLink
@@ -30,7 +29,6 @@ from fogsim.traffic.sumo_drivers.drivers_perception import DriversPerception, dr
 from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot, TrafficState, Unplayed
 
 _NO_ADVICE = Command()
-_FOR_EVER = "1e6"
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
@@ -328,34 +326,3 @@ def _with_failed_lamps(state: TrafficState, dark: frozenset[str]) -> TrafficStat
     if not dark:
         return state
     return replace(state, lamps=np.where([v in dark for v in state.ids], 0, state.lamps).astype(np.int32))
-
-
-def command_line(setup: TrafficSetup, seed: int) -> list[str]:
-    """SUMO's command line, without the program's name.
-
-    Parameters
-    ----------
-    setup : TrafficSetup
-        The simulation.
-    seed : int
-        Its seed.
-    """
-    if setup.config is None:
-        source = ["--net-file", str(setup.net)]
-    else:
-        source = ["--configuration-file", str(setup.config), *OVERRIDES]
-    arguments = [*source, "--step-length", repr(setup.step_length), "--seed", str(seed)]
-    # OpenDRIVE files among them are the sign map's; SUMO cannot read them here.
-    additional = tuple(path for path in setup.additional if not is_opendrive(path))
-    for option, paths in (("--route-files", setup.routes), ("--additional-files", additional)):
-        if paths:
-            arguments += [option, ",".join(map(str, paths))]
-    quiet = ["--no-step-log", "true", "--duration-log.disable", "true", "--no-warnings", "true"]
-    # Vehicles are not teleported: collisions stay where they happen and are counted. How jams dissolve in a simulation
-    # of the user's own is left to its configuration.
-    # Nor is it changed whether it looks for collisions at junctions.
-    own = ["--time-to-teleport", "-1", "--collision.check-junctions", "true"] if setup.config is None else []
-    physical = [*own, "--collision.action"]
-    if setup.after_collision is AfterCollision.STOP:
-        return arguments + quiet + physical + ["warn", "--collision.stoptime", _FOR_EVER]
-    return arguments + quiet + physical + ["remove"]

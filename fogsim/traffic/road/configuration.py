@@ -120,6 +120,22 @@ def ignored_options(config: Path) -> tuple[str, ...]:
     )
 
 
+def configured_prefix(config: Path) -> str:
+    """What a SUMO configuration has the names of its outputs begin with.
+
+    Parameters
+    ----------
+    config : Path
+        The ``.sumocfg`` file.
+
+    Raises
+    ------
+    InputError
+        If it is no SUMO configuration.
+    """
+    return next(_values(_root(config), ("output-prefix",)), "")
+
+
 def input_files(config: Path) -> tuple[Path, ...]:
     """Every file that a SUMO configuration has the simulation read: network, routes, additional, weights, state.
 

@@ -10,6 +10,7 @@ from types import ModuleType
 
 from fogsim.errors import MissingDependencyError, SimulationError, SimulationRunningError
 from fogsim.traffic.sumo.link import Api, translated_errors
+from fogsim.traffic.sumo.output_folder import OutputFolder
 
 
 def load_libsumo() -> ModuleType:
@@ -34,12 +35,19 @@ def load_libsumo() -> ModuleType:
 
 
 class LibsumoLink:
-    """SUMO inside this process, through libsumo; one at a time."""
+    """SUMO inside this process, through libsumo; one at a time.
+
+    Parameters
+    ----------
+    outputs : OutputFolder or None
+        Where what SUMO writes goes; None for where SUMO's own files say.
+    """
 
     remote = False
     shared = False
 
-    def __init__(self) -> None:
+    def __init__(self, outputs: OutputFolder | None = None) -> None:
+        self._outputs = outputs
         self._sumo: ModuleType | None = None
 
     def begin(self, arguments: Sequence[str]) -> Api:
@@ -56,6 +64,13 @@ class LibsumoLink:
             If another simulation runs in this process.
         SimulationError
             If SUMO refuses its input; the message holds SUMO's own words.
+        InputError
+            If there is no folder for what SUMO writes.
+
+        Warns
+        -----
+        UserWarning
+            If what SUMO writes is not kept.
         """
         sumo = load_libsumo()
         if sumo.isLoaded() and self._sumo is None:
@@ -64,6 +79,8 @@ class LibsumoLink:
                 "first, or run this one in its own process (gymnasium.make_vec and AsyncVectorEnv do that for "
                 "environments)"
             )
+        if self._outputs is not None:
+            arguments = [*arguments, *self._outputs.open()]
         with captured_stderr() as words:
             try:
                 if self._sumo is None:
@@ -73,11 +90,16 @@ class LibsumoLink:
             except sumo.TraCIException as error:
                 failure = error
             else:
-                self._sumo = sumo
-                return sumo
+                failure = None
         self._sumo = sumo
+        if failure is None:
+            if self._outputs is not None:
+                self._outputs.tell_lost()
+            return sumo
         self.end()
         said = " ".join(line.strip() for line in words if line.strip()) or str(failure)
+        if self._outputs is not None:
+            said = self._outputs.shorten(said)
         raise SimulationError(f"SUMO cannot load the scenario: {said}")
 
     def step(self) -> None:
@@ -90,6 +112,8 @@ class LibsumoLink:
         if self._sumo is not None and self._sumo.isLoaded():
             self._sumo.close()
         self._sumo = None
+        if self._outputs is not None:
+            self._outputs.close()
 
     def translated_errors(self) -> contextlib.AbstractContextManager[None]:
         """Turn what libsumo refuses into an error of ours; see `SumoLink.translated_errors`."""

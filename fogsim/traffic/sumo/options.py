@@ -1,0 +1,128 @@
+"""Options of SUMO's command line: which the installed SUMO knows, what they take, and which FogSim sets itself."""
+
+import functools
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+from fogsim.errors import MissingDependencyError, nearest, shown
+from fogsim.traffic.sumo.libsumo_link import load_libsumo
+
+OptionValue = bool | int | float | str
+"""What an option is set to."""
+
+_SEED = "a run must depend on its own seed alone (fogsim run --seed)"
+_NO_RUN = "SUMO would write that file and end"
+_TRACI = "SUMO runs inside FogSim, and waits for nobody"
+_WINDOW = "SUMO has no window here"
+
+OWN_OPTIONS: Mapping[str, str] = {
+    "configuration-file": "give traffic.config",
+    "save-configuration": _NO_RUN,
+    "save-template": _NO_RUN,
+    "save-schema": _NO_RUN,
+    "help": _NO_RUN,
+    "version": _NO_RUN,
+    "net-file": "give traffic.net",
+    "route-files": "give traffic.routes",
+    "additional-files": "give traffic.additional",
+    "load-state": "give it in a SUMO configuration (traffic.config)",
+    "step-length": "give clocks.traffic_step_s",
+    "end": "give duration_s, which counts from the ego's appearance",
+    "collision.action": "give traffic.after_collision",
+    "collision.stoptime": "give traffic.after_collision",
+    "seed": _SEED,
+    "random": _SEED,
+    "abs-rand": _SEED,
+    "remote-port": _TRACI,
+    "num-clients": _TRACI,
+    "start": _WINDOW,
+    "quit-on-end": _WINDOW,
+    "gui-settings-file": _WINDOW,
+    "breakpoints": _WINDOW,
+}
+"""Options that are FogSim's to set, or make no sense in a run, and what to do instead."""
+
+_NUMBERS = {"INT": "a whole number", "FLOAT": "a number"}
+
+
+@dataclass(frozen=True, slots=True)
+class KnownOption:
+    """An option of the installed SUMO.
+
+    Attributes
+    ----------
+    name : str
+        Its first name; synonyms are known by theirs.
+    kind : str
+        What it takes, in SUMO's words: BOOL, INT, FLOAT, TIME, STR, FILE, …
+    """
+
+    name: str
+    kind: str
+
+
+def option_mistakes(options: Mapping[str, OptionValue]) -> dict[str, str]:
+    """Say why options cannot be handed to SUMO, by their names; nothing of those that can.
+
+    Where SUMO is not installed, or runs in this process, so that it cannot be asked what it knows, only options of
+    FogSim's own are told; SUMO itself refuses what it does not know when it starts.
+
+    Parameters
+    ----------
+    options : mapping from str to bool, int, float or str
+        Options, named without the two dashes.
+    """
+    known = known_options() if options else {}
+    told = {name: _mistake(name, value, known) for name, value in options.items()}
+    return {name: mistake for name, mistake in told.items() if mistake is not None}
+
+
+def _mistake(name: str, value: OptionValue, known: Mapping[str, KnownOption]) -> str | None:
+    option = known.get(name)
+    first = name if option is None else option.name
+    if first in OWN_OPTIONS:
+        return f"this option of SUMO is not set here: {OWN_OPTIONS[first]}"
+    if first == "output-prefix" and "/" in str(value):
+        return "SUMO's outputs go into the run's directory; the prefix must hold no folder"
+    if not known:
+        return None
+    if option is None:
+        near = nearest(name, known)
+        return f"SUMO has no such option; {f'did you mean {near!r}? ' if near else ''}`sumo --help` lists them"
+    if option.kind == "BOOL":
+        expected = None if isinstance(value, bool) else "true or false"
+    else:
+        expected = _NUMBERS.get(option.kind)
+        is_number = isinstance(value, int if option.kind == "INT" else int | float)
+        expected = expected if isinstance(value, bool) or not is_number else None
+        if isinstance(value, bool):
+            expected = expected or "no truth value"
+    return None if expected is None else f"must be {expected}, got {shown(value)}"
+
+
+def known_options() -> Mapping[str, KnownOption]:
+    """Every option of the installed SUMO by each of its names; none where it cannot be asked now."""
+    try:
+        # SUMO's options are global: asking would end a simulation that runs.
+        return {} if load_libsumo().isLoaded() else _options_of_template()
+    except MissingDependencyError:
+        return {}
+
+
+@functools.cache
+def _options_of_template() -> Mapping[str, KnownOption]:
+    with tempfile.TemporaryDirectory(prefix="fogsim-") as folder:
+        template = Path(folder, "options.xml")
+        # Six milliseconds, in which nothing is simulated.
+        load_libsumo().start(["sumo", "--save-template", str(template)])
+        root = ET.parse(template).getroot()  # noqa: S314 - written by SUMO just now
+    found: dict[str, KnownOption] = {}
+    for element in root.iter():
+        kind = element.get("type")
+        if kind is not None:
+            option = KnownOption(element.tag, kind)
+            found |= dict.fromkeys((element.tag, *element.get("synonymes", "").split()), option)
+    return found

@@ -1,0 +1,155 @@
+"""Where the files go that SUMO writes: into one folder, whatever their names in SUMO's own files are."""
+
+import shutil
+import tempfile
+import warnings
+import weakref
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+from fogsim.errors import InputError
+
+_TO_THE_ROOT = "../" * 40
+"""From any folder to the root: there is nothing above it."""
+
+_TOKEN = "TIME"  # noqa: S105 - what SUMO puts the time for, in a prefix
+_END_OF_XML = 200
+MOST_NAMED = 6
+"""Files that a message names."""
+
+
+class OutputFolder:
+    """A folder for all that SUMO writes: by options, by detectors, by devices.
+
+    SUMO puts its option ``output-prefix`` before the last part of every name of an output, of absolute names too, so
+    that a prefix that leads through the root to this folder brings all of them there. Files of one name from different
+    folders become one; sockets, ``stdout`` and ``/dev/null`` stay what they are.
+
+    Parameters
+    ----------
+    folder : Path or None
+        The folder, made where it is not there; None for one that is removed at the end, with a warning if anything is
+        in it.
+    prefix : str
+        What the names of files begin with.
+    """
+
+    def __init__(self, folder: Path | None, prefix: str = "") -> None:
+        self._folder = folder
+        self._prefix = prefix
+        self._own: Path | None = None
+        self._way = ""
+        self._told: set[str] = set()
+
+    def open(self) -> list[str]:
+        """Make the folder, and give the arguments of SUMO's command line that lead there.
+
+        Raises
+        ------
+        InputError
+            If it cannot be made, or not be written.
+        """
+        if self._own is None and (self._folder is None or _TOKEN in str(self._folder.resolve())):
+            self._own = Path(tempfile.mkdtemp(prefix="fogsim-"))
+            # Also where nobody closes it.
+            self._removal = weakref.finalize(self, shutil.rmtree, self._own, ignore_errors=True)
+        leads = self._writable() if self._own is None or self._folder is None else self._link(self._own)
+        self._way = f"{_TO_THE_ROOT}{str(leads)[1:]}/{self._prefix}"
+        return ["--output-prefix", self._way]
+
+    @property
+    def _place(self) -> Path:
+        place = self._folder if self._folder is not None else self._own
+        if place is None:
+            raise InputError("the folder for SUMO's outputs has not been opened")
+        return place
+
+    def _writable(self) -> Path:
+        place = self._place
+        try:
+            place.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=place):
+                pass
+        except OSError as error:
+            raise InputError(f"cannot write SUMO's outputs into {place}: {error.strerror}") from error
+        return place.resolve()
+
+    def _link(self, own: Path) -> Path:
+        """A way to the folder without the word for which SUMO would put the time."""
+        link, target = own / "outputs", self._writable()
+        if not link.is_symlink():
+            link.symlink_to(target)
+        return link
+
+    def shorten(self, message: str) -> str:
+        """A message of SUMO's with the names of files as they were asked for.
+
+        Parameters
+        ----------
+        message : str
+            The message.
+        """
+        return message.replace(self._way, self._prefix) if self._way else message
+
+    def tell_lost(self) -> None:
+        """Warn of outputs that will not be kept, each once.
+
+        Warns
+        -----
+        UserWarning
+            If no folder was named and SUMO has begun to write.
+        """
+        if self._folder is not None or self._own is None:
+            return
+        lost = [name for name in _names(self._own) if name not in self._told]
+        if lost:
+            self._told.update(lost)
+            more = f" and {len(lost) - MOST_NAMED} more" if len(lost) > MOST_NAMED else ""
+            warnings.warn(
+                f"SUMO writes {', '.join(lost[:MOST_NAMED])}{more}, which will not be kept: every run would replace the "
+                "files of the one before. Name a folder for them (fogsim.run(…, sumo_outputs=folder)), or use fogsim run",
+                stacklevel=2,
+            )
+
+    def close(self) -> None:
+        """Remove what is not kept; twice does nothing.
+
+        Warns
+        -----
+        UserWarning
+            If SUMO, which does not tell, could not write all of a file, or outputs were lost of which nobody knew.
+        """
+        try:
+            self.tell_lost()
+            if self._folder is not None:
+                self._tell_cut_off(self._folder)
+        finally:
+            if self._own is not None:
+                self._removal()
+                self._own = None
+
+    def _tell_cut_off(self, folder: Path) -> None:
+        cut = [name for name in _names(folder) if name.endswith(".xml") and not _is_whole(folder / name)]
+        if cut:
+            warnings.warn(
+                f"SUMO could not write all of {', '.join(cut[:MOST_NAMED])} in {folder}, and does not say why: is the "
+                "disk full?",
+                stacklevel=2,
+            )
+
+
+def _names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
+
+
+def _is_whole(path: Path) -> bool:
+    """Whether an XML file ends with the end of the element that it begins with."""
+    try:
+        _, root = next(iter(ET.iterparse(path, events=("start",))))  # noqa: S314 - written by SUMO just now
+    except (ET.ParseError, StopIteration):
+        return False
+    with path.open("rb") as file:
+        file.seek(max(0, file.seek(0, 2) - _END_OF_XML))
+        last = file.read().rstrip().rpartition(b"<")[2]
+    name = root.tag.encode()
+    return last == b"/" + name + b">" or (last.startswith(name) and last.endswith(b"/>"))

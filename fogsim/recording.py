@@ -79,6 +79,7 @@ def record_run(
     - ``trajectories.parquet``, by ``trajectories``: a row for each vehicle and step, in SUMO's FCD columns.
     - ``video.mp4``, by ``video``: a frame of 1024×480 px (H.264) for each step, at real speed.
     - ``report.html``, by ``report``: metrics, figures and pictures in one file.
+    - ``sumo_outputs``, a folder: what SUMO writes, where its files or options ask for outputs.
 
     Parameters
     ----------
@@ -139,7 +140,9 @@ def record_run(
         )
         status, last, message = Status.FAILED, None, ""
         try:
-            with contextlib.closing(run(scenario, seed)) as steps, interruption.allowed():
+            directory.clear_sumo_outputs()
+            steps_of_run = run(scenario, seed, sumo_outputs=directory.sumo_outputs)
+            with contextlib.closing(steps_of_run) as steps, interruption.allowed():
                 for step in steps:
                     recording.record(step)
                     watch(step)
@@ -249,6 +252,7 @@ class Recording:
             How it ended now.
         """
         if not self._begun:
+            self._directory.clear_sumo_outputs()
             return manifest.status
         status = manifest.status
         for name, recorder in reversed(list(self._recorders.items())):

@@ -23,6 +23,9 @@ ROW_LOG = "steps" + LOG_SUFFIX
 TRAJECTORY_LOG = "trajectories" + LOG_SUFFIX
 """Rows of ``trajectories.parquet``."""
 
+SUMO_OUTPUTS = "sumo_outputs"
+"""Folder of the files that SUMO itself has written; ``sumo_outputs.part`` until the end of the run."""
+
 _NAMES = {
     "manifest": "manifest.json",
     "metrics": "metrics.json",
@@ -90,6 +93,9 @@ class RunDirectory:
             if there.exists() and there.is_dir() != (name == UNFINISHED):
                 raise InputError(f"{there} is in the way of the results; choose another directory with --out")
         refuse_living(self.unfinished)
+        outputs = self.path / SUMO_OUTPUTS
+        if outputs.exists() and SUMO_OUTPUTS not in (*_listed(self.path), *_listed(self.unfinished)):
+            raise InputError(f"{outputs} is not of an earlier run; move it, or choose another directory with --out")
         if overwrite:
             return
         if self.unfinished.exists():
@@ -113,6 +119,25 @@ class RunDirectory:
     def unfinished(self) -> Path:
         """Folder of what is being written."""
         return self.path / UNFINISHED
+
+    @property
+    def sumo_outputs(self) -> Path:
+        """Folder of what SUMO itself writes, from before the first step on."""
+        return partial_path(self.path / SUMO_OUTPUTS)
+
+    def clear_sumo_outputs(self) -> None:
+        """Remove what SUMO has written for a run that never came to its end.
+
+        Raises
+        ------
+        InputError
+            If it cannot be removed.
+        """
+        try:
+            if self.sumo_outputs.exists():
+                shutil.rmtree(self.sumo_outputs)
+        except OSError as error:
+            raise InputError(f"cannot remove {self.sumo_outputs}: {error.strerror}") from error
 
     def begin(self, manifest: Mapping[str, object]) -> None:
         """Make the folder for what is written, in place of that of a run that was never finished.
@@ -211,14 +236,15 @@ class RunDirectory:
 
 
 def whole_files(folder: Path) -> list[str]:
-    """Names of the whole result files in a folder, sorted.
+    """Names of the whole result files in a folder, and of that of SUMO's outputs, sorted.
 
     Parameters
     ----------
     folder : Path
         The folder.
     """
-    return sorted(name for name in _NAMES.values() if (folder / name).is_file())
+    files = [name for name in _NAMES.values() if (folder / name).is_file()]
+    return sorted([*files, *([SUMO_OUTPUTS] if (folder / SUMO_OUTPUTS).is_dir() else [])])
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
@@ -249,7 +275,10 @@ def finish_folder(path: Path, manifest: Mapping[str, object]) -> None:
     folder = path / UNFINISHED
     (folder / _RESERVE).unlink(missing_ok=True)
     # What a call before this one has moved already is named by the manifest that it wrote.
-    names = {_NAMES["manifest"], *whole_files(folder), *_moved(folder)}
+    names = {_NAMES["manifest"], *whole_files(folder), *_listed(folder)}
+    outputs = partial_path(path / SUMO_OUTPUTS)
+    if outputs.is_dir() and any(outputs.iterdir()):
+        names.add(SUMO_OUTPUTS)
     write_json(folder / _NAMES["manifest"], {**manifest, "files": sorted(names)})
     if any((folder / log).exists() for log in (ROW_LOG, TRAJECTORY_LOG)):
         return
@@ -263,13 +292,26 @@ def finish_folder(path: Path, manifest: Mapping[str, object]) -> None:
             (folder / name).replace(path / name)
         elif name not in names:
             (path / name).unlink(missing_ok=True)
+    _place_sumo_outputs(path, SUMO_OUTPUTS in names)
     (folder / _NAMES["manifest"]).replace(path / _NAMES["manifest"])
     shutil.rmtree(folder)
 
 
-def _moved(folder: Path) -> list[str]:
+def _place_sumo_outputs(path: Path, there_are: bool) -> None:
+    """Let what SUMO has written take the place of that of an earlier run; where it wrote nothing, nothing stays."""
+    outputs, final = partial_path(path / SUMO_OUTPUTS), path / SUMO_OUTPUTS
+    if outputs.exists() or not there_are:
+        shutil.rmtree(final, ignore_errors=True)
+    if there_are and outputs.exists():
+        outputs.rename(final)
+    shutil.rmtree(outputs, ignore_errors=True)
+
+
+def _listed(folder: Path) -> list[str]:
+    """Results that a folder's manifest names."""
     listed = read_manifest(folder).get("files", [])
-    return [name for name in listed if name in _NAMES.values()] if isinstance(listed, list) else []
+    known = (*_NAMES.values(), SUMO_OUTPUTS)
+    return [name for name in listed if name in known] if isinstance(listed, list) else []
 
 
 def refuse_living(folder: Path) -> None:

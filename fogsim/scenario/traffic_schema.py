@@ -165,8 +165,8 @@ class Traffic(Section):
     """The ego has arrived when it is this near to the end of its route."""
 
     sumo_options: SumoOptions = Field(default_factory=dict)
-    """Further options of SUMO by their names: `{tripinfo-output: trips.xml, device.ssm.probability: 1}`. Outputs go into
-    the run's directory; files that are read are named relative to the scenario's folder."""
+    """Further options of SUMO by name: `{tripinfo-output: trips.xml, device.ssm.probability: 1}`. Outputs go into the
+    run's directory; files that are read are named relative to the scenario's folder."""
 
     @model_validator(mode="after")
     def _no_gap_to_itself(self) -> Self:

@@ -16,7 +16,7 @@ Value = str | float | int | None
 """What a cell of the table holds."""
 
 
-def measure_run(scenario: Scenario, seed: int) -> dict[str, Any]:
+def measure_run(scenario: Scenario, seed: int, sumo_outputs: Path | None = None) -> dict[str, Any]:
     """Metrics and profiles of one run.
 
     Parameters
@@ -25,6 +25,8 @@ def measure_run(scenario: Scenario, seed: int) -> dict[str, Any]:
         What is run.
     seed : int
         Its seed.
+    sumo_outputs : Path or None
+        Folder of what SUMO writes, as of `run`.
 
     Returns
     -------
@@ -35,7 +37,7 @@ def measure_run(scenario: Scenario, seed: int) -> dict[str, Any]:
     metrics, profiles = RunMetrics(build.safety_standard(scenario)), RunProfiles()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnplayedWarning)
-        for step in run(scenario, seed):
+        for step in run(scenario, seed, sumo_outputs=sumo_outputs):
             metrics.update(step)
             profiles.update(step)
     return {"metrics": dict(_flat(metrics.summary().to_json())), "profiles": profiles.to_json()}
@@ -61,7 +63,7 @@ def run_to_file(scenario: Scenario, seed: int, result: Path) -> str | None:
     seed : int
         Its seed.
     result : Path
-        The file, written whole or not at all.
+        The file, written whole or not at all; what SUMO writes is in a folder of its name beside it.
 
     Returns
     -------
@@ -74,7 +76,7 @@ def run_to_file(scenario: Scenario, seed: int, result: Path) -> str | None:
         If the file cannot be written, as on a full disk.
     """
     try:
-        found = {"status": "complete", **measure_run(scenario, seed)}
+        found = {"status": "complete", **measure_run(scenario, seed, result.with_suffix(""))}
     except FogSimError as error:
         found = {"status": "failed", "message": str(error)}
     except Exception as error:  # noqa: BLE001 - a broken run, of a user's own method perhaps, must not stop the others

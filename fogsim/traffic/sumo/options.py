@@ -35,7 +35,6 @@ OWN_OPTIONS: Mapping[str, str] = {
     "collision.stoptime": "give traffic.after_collision",
     "seed": _SEED,
     "random": _SEED,
-    "abs-rand": _SEED,
     "remote-port": _TRACI,
     "num-clients": _TRACI,
     "start": _WINDOW,
@@ -45,7 +44,14 @@ OWN_OPTIONS: Mapping[str, str] = {
 }
 """Options that are FogSim's to set, or make no sense in a run, and what to do instead."""
 
-_NUMBERS = {"INT": "a whole number", "FLOAT": "a number"}
+_EXPECTED: Mapping[str, tuple[str, tuple[type, ...]]] = {
+    "BOOL": ("true or false", (bool,)),
+    "INT": ("a whole number", (int,)),
+    "FLOAT": ("a number", (int, float)),
+    "TIME": ("a time [s]", (int, float, str)),
+    "STR": ("text", (int, float, str)),
+}
+"""What values kinds of options take, in words and in Python; all further kinds are texts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,15 +98,9 @@ def _mistake(name: str, value: OptionValue, known: Mapping[str, KnownOption]) ->
     if option is None:
         near = nearest(name, known)
         return f"SUMO has no such option; {f'did you mean {near!r}? ' if near else ''}`sumo --help` lists them"
-    if option.kind == "BOOL":
-        expected = None if isinstance(value, bool) else "true or false"
-    else:
-        expected = _NUMBERS.get(option.kind)
-        is_number = isinstance(value, int if option.kind == "INT" else int | float)
-        expected = expected if isinstance(value, bool) or not is_number else None
-        if isinstance(value, bool):
-            expected = expected or "no truth value"
-    return None if expected is None else f"must be {expected}, got {shown(value)}"
+    expected, kinds = _EXPECTED.get(option.kind, _EXPECTED["STR"])
+    fits = isinstance(value, kinds) and (option.kind == "BOOL" or not isinstance(value, bool))
+    return None if fits else f"must be {expected}, got {shown(value)}"
 
 
 def known_options() -> Mapping[str, KnownOption]:

@@ -106,13 +106,13 @@ class OutputFolder:
             self._told.update(lost)
             more = f" and {len(lost) - MOST_NAMED} more" if len(lost) > MOST_NAMED else ""
             warnings.warn(
-                f"SUMO writes {', '.join(lost[:MOST_NAMED])}{more}, which will not be kept: every run would replace the "
-                "files of the one before. Name a folder for them (fogsim.run(…, sumo_outputs=folder)), or use fogsim run",
+                f"SUMO writes {', '.join(lost[:MOST_NAMED])}{more}, which will not be kept: each run would replace the "
+                "files of the one before. Name a folder for them (fogsim.run(…, sumo_outputs=…)), or use fogsim run",
                 stacklevel=2,
             )
 
     def close(self) -> None:
-        """Remove what is not kept; twice does nothing.
+        """Remove what is not kept, and a folder in which nothing is; twice does nothing.
 
         Warns
         -----
@@ -123,6 +123,8 @@ class OutputFolder:
             self.tell_lost()
             if self._folder is not None:
                 self._tell_cut_off(self._folder)
+                if self._folder.is_dir() and not any(self._folder.iterdir()):
+                    self._folder.rmdir()
         finally:
             if self._own is not None:
                 self._removal()

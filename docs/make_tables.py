@@ -50,7 +50,7 @@ def scenario_keys(model: type[BaseModel] = Scenario, prefix: str = "") -> list[t
 
 
 def _default(field: FieldInfo) -> str:
-    value = field.default
+    value = field.get_default(call_default_factory=True)
     if value is PydanticUndefined:
         return "required"
     if value is None:
@@ -74,11 +74,12 @@ def _allowed(schema: dict[str, Any], definitions: dict[str, Any]) -> str:
     if schema["type"] == "array":
         inner = schema["items"] if "items" in schema else schema["prefixItems"][0]
         return f"list of {_allowed(inner, definitions)}"
-    shares = schema.get("additionalProperties")
+    shares = next(iter(schema.get("patternProperties", {}).values()), schema.get("additionalProperties"))
     if isinstance(shares, dict) and "minimum" in shares:
         schema = shares
     if "minimum" not in schema:
-        return {"boolean": "true, false", "string": schema.get("format", "text")}.get(schema["type"], "method")
+        words = {"boolean": "true, false", "string": schema.get("format", "text")}
+        return words.get(schema["type"], "by name, each a truth value, number or text" if shares else "method")
     kind = "whole, " if schema["type"] == "integer" else "by name, each " if shares else ""
     return f"{kind}{schema['minimum']:.6g} … {schema['maximum']:.6g}" + (" or inf" if "or" in schema else "")
 

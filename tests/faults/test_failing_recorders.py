@@ -21,7 +21,7 @@ STEPS = 30
 
 @pytest.fixture(autouse=True)
 def drawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(recording, "run", lambda _scenario, _seed: drawn_run(STEPS))
+    monkeypatch.setattr(recording, "run", lambda *_, **__: drawn_run(STEPS))
 
 
 def record(out: Path, **options: object) -> RecordedRun:

@@ -20,7 +20,7 @@ STEPS = 300
 @pytest.fixture(autouse=True)
 def drawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Steps without a simulation, and every row written at once."""
-    monkeypatch.setattr(recording, "run", lambda _scenario, _seed: drawn_run(STEPS))
+    monkeypatch.setattr(recording, "run", lambda *_, **__: drawn_run(STEPS))
     monkeypatch.setattr("fogsim.recorders.table.LOG_PERIOD", 0.0)
 
 

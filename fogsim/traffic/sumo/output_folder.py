@@ -49,7 +49,7 @@ class OutputFolder:
         InputError
             If it cannot be made, or not be written.
         """
-        if self._own is None and (self._folder is None or _TOKEN in str(self._folder.resolve())):
+        if self._own is None and (self._folder is None or not _can_be_named(self._folder)):
             self._own = Path(tempfile.mkdtemp(prefix="fogsim-"))
             # Also where nobody closes it.
             self._removal = weakref.finalize(self, shutil.rmtree, self._own, ignore_errors=True)
@@ -75,7 +75,7 @@ class OutputFolder:
         return place.resolve()
 
     def _link(self, own: Path) -> Path:
-        """A way to the folder without the word for which SUMO would put the time."""
+        """A way to a folder whose own name SUMO does not take."""
         link, target = own / "outputs", self._writable()
         if not link.is_symlink():
             link.symlink_to(target)
@@ -138,6 +138,12 @@ class OutputFolder:
                 "disk full?",
                 stacklevel=2,
             )
+
+
+def _can_be_named(folder: Path) -> bool:
+    """Whether SUMO takes the name of a folder in a prefix: as Unicode, without the word for which it puts the time."""
+    name = str(folder.resolve())
+    return _TOKEN not in name and name.encode(errors="replace").decode() == name
 
 
 def _names(folder: Path) -> list[str]:

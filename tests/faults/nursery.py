@@ -36,7 +36,7 @@ def _command(command: dict[str, Any]) -> None:
     os.dup2(log, 1)
     os.dup2(log, 2)
     seen = Path(command["log"]).with_suffix(".seen")
-    fogsim.recording.run = lambda _scenario, _seed: drawn_run(pause=0.002, seen=seen, hold=command["hold"])
+    fogsim.recording.run = lambda *_, **__: drawn_run(pause=0.002, seen=seen, hold=command["hold"])
     leave_on_signals()
     signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
     sys.argv = ["fogsim", *command["arguments"]]
@@ -76,7 +76,7 @@ def _send(child: int, command: dict[str, Any]) -> None:
 if __name__ == "__main__":
     RECORDERS._entries["table"] = _table
     # Whatever a run imports on its way is imported once.
-    fogsim.recording.run = lambda _scenario, _seed: drawn_run(2)
+    fogsim.recording.run = lambda *_, **__: drawn_run(2)
     with tempfile.TemporaryDirectory() as folder:
         record_run(load_scenario("motorway_fog_bank"), 0, Path(folder), recorders=("table",))
     for line in sys.stdin:

@@ -29,6 +29,25 @@ class Following(NamedTuple):
 
 
 def find_following(traffic: TrafficState) -> Following:
+    """Pair each vehicle with the nearest one ahead of it in its lane; see `pair_in_lanes`.
+
+    Parameters
+    ----------
+    traffic : TrafficState
+        Every vehicle.
+    """
+    known: dict[str, int] = {}
+    lane = np.array([known.setdefault(lane, len(known)) for lane in traffic.lane], dtype=np.intp)
+    return pair_in_lanes(traffic.position, traffic.heading, traffic.length, traffic.speed, lane)
+
+
+def pair_in_lanes(
+    position: NDArray[np.float64],
+    heading: NDArray[np.float64],
+    length: NDArray[np.float64],
+    speed: NDArray[np.float64],
+    lane: NDArray[np.intp],
+) -> Following:
     """Pair each vehicle with the nearest one ahead of it in its lane; lanes end where SUMO's edges end.
 
     Vehicles of a lane are in the order of their places along the mean of their headings, so a lane may turn by up to
@@ -37,29 +56,20 @@ def find_following(traffic: TrafficState) -> Following:
 
     Parameters
     ----------
-    traffic : TrafficState
-        Every vehicle.
+    position : (n, 3) float64
+        Middle of the front bumper [m].
+    heading, length, speed : (n,) float64
+        Headings [rad], lengths [m] and speeds [m/s].
+    lane : (n,) intp
+        Numbers of lanes, from 0; one number for each lane at each instant.
     """
-    place, lane = traffic.position, lane_numbers(traffic.lane)
-    cosine, sine = np.cos(traffic.heading), np.sin(traffic.heading)
+    _, lane = np.unique(lane, return_inverse=True)
+    cosine, sine = np.cos(heading), np.sin(heading)
     # The sum of the headings' unit vectors need not have the length 1 to give the order.
-    along = place[:, 0] * np.bincount(lane, cosine)[lane] + place[:, 1] * np.bincount(lane, sine)[lane]
+    along = position[:, 0] * np.bincount(lane, cosine)[lane] + position[:, 1] * np.bincount(lane, sine)[lane]
     order = np.lexsort((along, lane))
     same = lane[order[1:]] == lane[order[:-1]]
     follower, leader = order[:-1][same], order[1:][same]
-    way = place[leader] - place[follower]
+    way = position[leader] - position[follower]
     distance = np.sqrt(way[:, 0] ** 2 + way[:, 1] ** 2 + way[:, 2] ** 2)
-    gap = np.maximum(distance - traffic.length[leader], 0.0)
-    return Following(follower, leader, gap, traffic.speed[follower], traffic.speed[leader])
-
-
-def lane_numbers(lanes: tuple[str, ...]) -> NDArray[np.intp]:
-    """A number for each name (n,), the same for the same name.
-
-    Parameters
-    ----------
-    lanes : (n,) tuple of str
-        Lane of each vehicle.
-    """
-    known: dict[str, int] = {}
-    return np.array([known.setdefault(lane, len(known)) for lane in lanes], dtype=np.intp)
+    return Following(follower, leader, np.maximum(distance - length[leader], 0.0), speed[follower], speed[leader])

@@ -22,19 +22,19 @@ class Histogram:
         self._bins = round((high - low) / width)
         self._time = np.zeros(self._bins + 2)
 
-    def add(self, values: NDArray[np.float64], elapsed: float) -> None:
-        """Add a time at each of some values.
+    def add(self, values: NDArray[np.float64], elapsed: NDArray[np.float64]) -> None:
+        """Add times at values.
 
         Parameters
         ----------
         values : (n,) float64
             The values; infinity is allowed.
-        elapsed : float
-            The time [s].
+        elapsed : (n,) float64
+            The times [s].
         """
         # A value on an edge is above it, whatever the quotient's last bit.
         place = np.clip((values - self._low) / self._width + (1.0 + 1e-9), 0.0, self._bins + 1.0)
-        self._time += elapsed * np.bincount(place.astype(np.intp), minlength=self._bins + 2)
+        self._time += np.bincount(place.astype(np.intp), elapsed, minlength=self._bins + 2)
 
     def share_below(self, value: float) -> float | None:
         """Share of the time below a value [-]; None without any.

@@ -2,17 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import ClassVar, Protocol
 
-from fogsim.metrics.following import Following, find_following
 from fogsim.values import Step
 
 JsonValue = float | int | str | None | Mapping[str, "JsonValue"]
 """What a metric may say: None where it is undefined, never NaN or infinity."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Sample:
     """A step as the metrics get it.
 
@@ -29,11 +27,6 @@ class Sample:
     step: Step
     elapsed: float
     derived: Mapping[str, float | None]
-
-    @cached_property
-    def following(self) -> Following:
-        """Who follows whom, found once for all metrics."""
-        return find_following(self.step.traffic)
 
 
 class Metric(Protocol):

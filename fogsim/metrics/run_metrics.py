@@ -16,12 +16,13 @@ from fogsim.metrics.traffic_conflicts import TrafficConflicts
 from fogsim.metrics.traffic_flow import TrafficFlow
 from fogsim.metrics.traffic_headways import TrafficHeadways
 from fogsim.metrics.traffic_sight import TrafficSight
+from fogsim.metrics.traffic_span import TrafficGathering, TrafficMetric
 from fogsim.registry import Registry
 from fogsim.units import clock_time
 from fogsim.values import Step
 from fogsim.values.result_checks import checked_values
 
-MetricFactory = Callable[[SafetyStandard], Metric]
+MetricFactory = Callable[[SafetyStandard], Metric | TrafficMetric]
 """Makes a metric that has seen nothing yet."""
 
 METRICS: Registry[MetricFactory] = Registry(
@@ -100,6 +101,9 @@ class RunMetrics:
     def __init__(self, standard: SafetyStandard = DEFAULT_STANDARD, names: Iterable[str] = METRICS) -> None:
         self.standard = standard
         self._metrics = {name: METRICS[name](standard) for name in names}
+        self._of_ego = [metric for metric in self._metrics.values() if not isinstance(metric, TrafficMetric)]
+        self._of_traffic = [metric for metric in self._metrics.values() if isinstance(metric, TrafficMetric)]
+        self._gathering = TrafficGathering()
         self._last: Step | None = None
 
     def update(self, step: Step) -> None:
@@ -124,11 +128,22 @@ class RunMetrics:
         if last is not None and not elapsed > 0:
             raise SimulationError(f"steps must follow in time, got {step.time!r} s after {last.time!r} s")
         sample = Sample(step, elapsed, step_metrics(step, self.standard))
-        for metric in self._metrics.values():
+        for metric in self._of_ego:
             metric.update(sample)
+        if self._of_traffic:
+            self._gathering.add(step, elapsed)
+            if self._gathering.is_full:
+                self._take_in_traffic()
+
+    def _take_in_traffic(self) -> None:
+        span = self._gathering.take()
+        if span is not None:
+            for metric in self._of_traffic:
+                metric.add(span)
 
     def summary(self) -> RunSummary:
         """Say what the steps so far amount to."""
+        self._take_in_traffic()
         ending = None if self._last is None else self._last.ending
         values: dict[str, JsonValue] = {"ending": None if ending is None else ending.value}
         meanings = {"ending": "why the run was over; none if it was cut short"}

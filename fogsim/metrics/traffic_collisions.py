@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from fogsim.metrics.exposure import Exposure
-from fogsim.metrics.metric import JsonValue, Sample, share
+from fogsim.metrics.metric import JsonValue, share
+from fogsim.metrics.traffic_span import Exposure, TrafficMetric, TrafficSpan
 
 
 @dataclass(slots=True)
-class TrafficCollisions:
+class TrafficCollisions(TrafficMetric):
     """Collisions near the ego, each pair of vehicles once.
 
     One of the two was near at the step, or at the one before: the simulation may remove both. Only the way of those
@@ -23,23 +23,18 @@ class TrafficCollisions:
         "traffic_max_impact_speed_mps": "highest difference of speed in them",
     }
     _exposure: Exposure = field(default_factory=Exposure)
-    _ids: tuple[str, ...] = ()
     _impacts: list[float] = field(default_factory=list)
 
-    def update(self, sample: Sample) -> None:
-        """Take in one step.
+    def add(self, span: TrafficSpan) -> None:
+        """Take in some steps.
 
         Parameters
         ----------
-        sample : Sample
-            The step, and what is derived from it.
+        span : TrafficSpan
+            The next steps.
         """
-        step = sample.step
-        self._exposure.add(sample)
-        if step.collisions:
-            near = {*self._ids, *step.traffic.ids}
-            self._impacts += [hit.impact_speed for hit in step.collisions if near & {hit.collider, hit.victim}]
-        self._ids = step.traffic.ids
+        self._exposure.add(span)
+        self._impacts += [hit.impact_speed for hit in span.collisions]
 
     def result(self) -> dict[str, JsonValue]:
         """Say how many there were and how hard."""

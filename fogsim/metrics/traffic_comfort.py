@@ -8,13 +8,13 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.metrics.exposure import Exposure
-from fogsim.metrics.metric import JsonValue, Sample, share
+from fogsim.metrics.metric import JsonValue, share
 from fogsim.metrics.surrogate import CRITICAL_DECELERATION
+from fogsim.metrics.traffic_span import Exposure, TrafficMetric, TrafficSpan
 
 
 @dataclass(slots=True)
-class TrafficComfort:
+class TrafficComfort(TrafficMetric):
     """Jerk, the change of acceleration between two steps, and hard braking of everybody near the ego."""
 
     meanings: ClassVar[Mapping[str, str]] = {
@@ -23,36 +23,37 @@ class TrafficComfort:
         "traffic_hard_braking_time_share": "share of that time in which they brake harder than 3.4 m/s²",
     }
     _exposure: Exposure = field(default_factory=Exposure)
-    _ids: tuple[str, ...] = ()
-    _acceleration: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    _last: tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64], NDArray[np.float64]] = field(
+        default_factory=lambda: (np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros(0), np.zeros(0))
+    )
     _squared_jerk_time: float = 0.0
     _time: float = 0.0
     _braking: float = 0.0
 
-    def update(self, sample: Sample) -> None:
-        """Take in one step.
+    def add(self, span: TrafficSpan) -> None:
+        """Take in some steps.
 
         Parameters
         ----------
-        sample : Sample
-            The step, and what is derived from it.
+        span : TrafficSpan
+            The next steps.
         """
-        ids, acceleration, elapsed = sample.step.traffic.ids, sample.step.traffic.acceleration, sample.elapsed
-        self._exposure.add(sample)
-        self._braking += elapsed * float((acceleration < -CRITICAL_DECELERATION).sum())
-        if elapsed > 0:
-            change = acceleration - self._before(ids)
-            known = change[~np.isnan(change)]
-            self._squared_jerk_time += float((known**2).sum()) / elapsed
-            self._time += elapsed * len(known)
-        self._ids, self._acceleration = ids, acceleration
-
-    def _before(self, ids: tuple[str, ...]) -> NDArray[np.float64]:
-        """Accelerations at the step before [m/s²]; nan for who was not near then."""
-        if ids == self._ids:
-            return self._acceleration
-        last = dict(zip(self._ids, self._acceleration.tolist(), strict=True))
-        return np.array([last.get(vehicle, math.nan) for vehicle in ids])
+        self._exposure.add(span)
+        self._braking += float(span.elapsed[span.acceleration < -CRITICAL_DECELERATION].sum())
+        # The last step of the span before comes first.
+        moment, vehicle, elapsed, acceleration = (
+            np.concatenate(parts)
+            for parts in zip(self._last, (span.moment, span.vehicle, span.elapsed, span.acceleration), strict=True)
+        )
+        order = np.lexsort((moment, vehicle))
+        before, after = order[:-1], order[1:]
+        follows = (vehicle[before] == vehicle[after]) & (moment[before] + 1 == moment[after]) & (elapsed[after] > 0.0)
+        change = np.diff(acceleration[order])[follows]
+        passed = elapsed[after][follows]
+        self._squared_jerk_time += float((change**2 / passed).sum())
+        self._time += float(passed.sum())
+        last = moment == moment.max(initial=-1)
+        self._last = moment[last], vehicle[last], elapsed[last], acceleration[last]
 
     def result(self) -> dict[str, JsonValue]:
         """Say how rough everybody's drive was."""

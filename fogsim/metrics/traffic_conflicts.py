@@ -7,8 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.metrics.exposure import Exposure
-from fogsim.metrics.metric import JsonValue, Sample, share
+from fogsim.metrics.metric import JsonValue, share
 from fogsim.metrics.surrogate import (
     CRITICAL_DECELERATION,
     QUEUE_SPEED,
@@ -17,11 +16,15 @@ from fogsim.metrics.surrogate import (
     potential_collision_speed,
     time_to_collision,
 )
+from fogsim.metrics.traffic_span import Exposure, TrafficMetric, TrafficSpan
 from fogsim.units import finite_or_none
+
+_MOMENTS = 1 << 32
+"""More than a run has moments."""
 
 
 @dataclass(slots=True)
-class TrafficConflicts:
+class TrafficConflicts(TrafficMetric):
     """Conflicts between followers and leaders of one lane.
 
     Leaders slower than 5 m/s are a queue, and count apart; who is slower than that itself only closes up to one, which
@@ -59,23 +62,23 @@ class TrafficConflicts:
     _exposure: Exposure = field(default_factory=Exposure)
     _times: NDArray[np.float64] = field(default_factory=lambda: np.zeros(10))
     _episodes: int = 0
-    _exposed_now: frozenset[str] = frozenset()
+    _exposed_before: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp))
     _least: float = np.inf
     _most: float = 0.0
 
-    def update(self, sample: Sample) -> None:
-        """Take in one step.
+    def add(self, span: TrafficSpan) -> None:
+        """Take in some steps.
 
         Parameters
         ----------
-        sample : Sample
-            The step, and what is derived from it.
+        span : TrafficSpan
+            The next steps.
         """
-        self._exposure.add(sample)
-        found = sample.following
+        self._exposure.add(span)
+        found = span.following
         driving = found.speed >= QUEUE_SPEED
-        gap, own, ahead = found.gap[driving], found.speed[driving], found.leader_speed[driving]
-        moving = ahead >= QUEUE_SPEED
+        row, gap, own, ahead = (part[driving] for part in (found.follower, found.gap, found.speed, found.leader_speed))
+        elapsed, moving = span.elapsed[row], ahead >= QUEUE_SPEED
         remaining = time_to_collision(gap, own, ahead)
         exposed = remaining <= self.threshold
         drac = deceleration_rate_to_avoid_crash(gap, own, ahead)
@@ -84,26 +87,25 @@ class TrafficConflicts:
         impact = potential_collision_speed(gap, own, ahead)
         self._least = float(remaining[moving].min(initial=self._least))
         self._most = float(drac[moving & (gap > 0.0)].max(initial=self._most))
-        self._count_episodes(sample.step.traffic.ids, found.follower[driving][exposed & moving])
-        self._times += sample.elapsed * np.array(
-            [
-                (exposed & moving).sum(),
-                np.maximum(self.threshold - remaining, 0.0)[moving].sum(),
-                (serious & moving).sum(),
-                (late & moving).sum(),
-                (exposed & ~moving).sum(),
-                (serious & ~moving).sum(),
-                len(own),
-                impact.sum(),
-                (impact > 0.0).sum(),
-                np.maximum(own - ahead, 0.0).sum(),
-            ]
-        )
+        begun = row[exposed & moving]
+        self._count_episodes(span.vehicle[begun] * _MOMENTS + span.moment[begun], int(span.moment.max(initial=0)))
+        self._times += [
+            elapsed[exposed & moving].sum(),
+            (elapsed * np.maximum(self.threshold - remaining, 0.0))[moving].sum(),
+            elapsed[serious & moving].sum(),
+            elapsed[late & moving].sum(),
+            elapsed[exposed & ~moving].sum(),
+            elapsed[serious & ~moving].sum(),
+            elapsed.sum(),
+            (elapsed * impact).sum(),
+            elapsed[impact > 0.0].sum(),
+            (elapsed * np.maximum(own - ahead, 0.0)).sum(),
+        ]
 
-    def _count_episodes(self, ids: tuple[str, ...], exposed: NDArray[np.intp]) -> None:
-        now = frozenset([ids[row] for row in exposed.tolist()])
-        self._episodes += len(now - self._exposed_now)
-        self._exposed_now = now
+    def _count_episodes(self, exposed: NDArray[np.intp], last: int) -> None:
+        """Count those who are exposed (vehicle and moment in one number) and were not so a moment before."""
+        self._episodes += int((~np.isin(exposed - 1, np.concatenate((self._exposed_before, exposed)))).sum())
+        self._exposed_before = exposed[exposed % _MOMENTS == last]
 
     def result(self) -> dict[str, JsonValue]:
         """Say what everybody's time amounts to."""

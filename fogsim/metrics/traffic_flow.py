@@ -8,35 +8,31 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.metrics.exposure import HOUR, KILOMETRE, Exposure
-from fogsim.metrics.metric import JsonValue, Sample, share
+from fogsim.metrics.metric import JsonValue, share
+from fogsim.metrics.traffic_span import HOUR, KILOMETRE, Exposure, TrafficMetric, TrafficSpan
 
 
-class SpeedsByName:
-    """Time and way of each vehicle, or in each lane."""
+class SpeedsByNumber:
+    """Time and way of each vehicle, or in each lane, by its number."""
 
     def __init__(self) -> None:
-        self._rows: dict[str, int] = {}
-        self._sums = np.zeros((2, 64))
+        self._time = np.zeros(0)
+        self._way = np.zeros(0)
 
-    def add(self, names: Sequence[str], speed: NDArray[np.float64], elapsed: float) -> None:
-        """Take in the speeds of one instant.
+    def add(self, number: NDArray[np.intp], elapsed: NDArray[np.float64], way: NDArray[np.float64]) -> None:
+        """Take in times and ways.
 
         Parameters
         ----------
-        names : (n,) sequence of str
+        number : (n,) intp
             Vehicles or lanes.
-        speed : (n,) float64
-            Speeds [m/s].
-        elapsed : float
-            How long they are held to have been so [s].
+        elapsed, way : (n,) float64
+            Their times [s] and ways [m].
         """
-        rows = np.array([self._rows.setdefault(name, len(self._rows)) for name in names], dtype=np.intp)
-        while len(self._rows) > self._sums.shape[1]:
-            self._sums = np.concatenate((self._sums, np.zeros_like(self._sums)), axis=1)
-        size = self._sums.shape[1]
-        self._sums[0] += elapsed * np.bincount(rows, minlength=size)
-        self._sums[1] += elapsed * np.bincount(rows, speed, minlength=size)
+        size = max(len(self._time), int(number.max(initial=-1)) + 1)
+        grown = (0, size - len(self._time))
+        self._time = np.pad(self._time, grown) + np.bincount(number, elapsed, minlength=size)
+        self._way = np.pad(self._way, grown) + np.bincount(number, way, minlength=size)
 
     def variance_between(self, group: Sequence[int] | None = None) -> float | None:
         """Variance of the mean speeds about that of their group, by time [m²/s²]; None without time.
@@ -44,23 +40,18 @@ class SpeedsByName:
         Parameters
         ----------
         group : (n,) sequence of int or None
-            Group of each name in the order of `names`; None for one of all.
+            Group of each number; None for one of all.
         """
-        time, way = self._sums[:, : len(self._rows)]
-        groups = np.zeros(len(time), np.intp) if group is None else np.array(group, dtype=np.intp)
-        whole = np.bincount(groups, time)[groups], np.bincount(groups, way)[groups]
-        been = time > 0.0
-        deviation = way[been] / time[been] - whole[1][been] / whole[0][been]
-        return share(float((time[been] * deviation**2).sum()), float(time.sum()))
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Who has been taken in."""
-        return tuple(self._rows)
+        groups = np.zeros(len(self._time), np.intp) if group is None else np.array(group, dtype=np.intp)
+        times, ways = np.bincount(groups, self._time)[groups], np.bincount(groups, self._way)[groups]
+        been = self._time > 0.0
+        time = self._time[been]
+        deviation = self._way[been] / time - ways[been] / times[been]
+        return share(float((time * deviation**2).sum()), float(time.sum()))
 
 
 @dataclass(slots=True)
-class TrafficFlow:
+class TrafficFlow(TrafficMetric):
     """Speeds, their spread, delay and throughput of all vehicles near the ego.
 
     The variance of speed over the time of all vehicles is the sum of two: within vehicles (about each one's own mean
@@ -87,27 +78,32 @@ class TrafficFlow:
     _duration: float = 0.0
     _squares: float = 0.0
     _lost: float = 0.0
-    _lost_known: bool = False
-    _vehicles: SpeedsByName = field(default_factory=SpeedsByName)
-    _lanes: SpeedsByName = field(default_factory=SpeedsByName)
+    _free_time: float = 0.0
+    _free_way: float = 0.0
+    _vehicles: SpeedsByNumber = field(default_factory=SpeedsByNumber)
+    _lanes: SpeedsByNumber = field(default_factory=SpeedsByNumber)
+    _lane_names: tuple[str, ...] = ()
 
-    def update(self, sample: Sample) -> None:
-        """Take in one step.
+    def add(self, span: TrafficSpan) -> None:
+        """Take in some steps.
 
         Parameters
         ----------
-        sample : Sample
-            The step, and what is derived from it.
+        span : TrafficSpan
+            The next steps.
         """
-        traffic, elapsed = sample.step.traffic, sample.elapsed
-        self._exposure.add(sample)
-        self._duration += elapsed
-        self._squares += elapsed * float((traffic.speed**2).sum())
-        self._vehicles.add(traffic.ids, traffic.speed, elapsed)
-        self._lanes.add(traffic.lane, traffic.speed, elapsed)
-        if len(traffic.free_speed):
-            self._lost_known = True
-            self._lost += elapsed * float((1.0 - traffic.speed / np.maximum(traffic.free_speed, 0.1)).sum())
+        self._exposure.add(span)
+        self._duration += span.duration
+        way = span.elapsed * span.speed
+        self._squares += float((way * span.speed).sum())
+        self._vehicles.add(span.vehicle, span.elapsed, way)
+        self._lanes.add(span.lane, span.elapsed, way)
+        self._lane_names = span.lane_names
+        known = ~np.isnan(span.free_speed)
+        elapsed, free = span.elapsed[known], np.maximum(span.free_speed[known], 0.1)
+        self._free_time += float(elapsed.sum())
+        self._free_way += float(way[known].sum())
+        self._lost += float((elapsed - way[known] / free).sum())
 
     def result(self) -> dict[str, JsonValue]:
         """Say how everybody got on."""
@@ -117,7 +113,7 @@ class TrafficFlow:
         between = self._vehicles.variance_between()
         within = None if variance is None or between is None else max(variance - between, 0.0)
         edges: dict[str, int] = {}
-        edge_of = [edges.setdefault(lane.rpartition("_")[0], len(edges)) for lane in self._lanes.names]
+        edge_of = [edges.setdefault(lane.rpartition("_")[0], len(edges)) for lane in self._lane_names]
         return {
             "traffic_vehicle_time_s": total,
             "traffic_vehicle_distance_m": way,
@@ -128,8 +124,8 @@ class TrafficFlow:
             "traffic_speed_standard_deviation_within_vehicles_mps": _root(within),
             "traffic_speed_standard_deviation_between_vehicles_mps": _root(between),
             "traffic_speed_standard_deviation_between_lanes_mps": _root(self._lanes.variance_between(edge_of)),
-            "traffic_delay_s_per_vehicle_km": self._exposure.per_kilometre(self._lost) if self._lost_known else None,
-            "traffic_delay_share": share(self._lost, total) if self._lost_known else None,
+            "traffic_delay_s_per_vehicle_km": share(KILOMETRE * self._lost, self._free_way),
+            "traffic_delay_share": share(self._lost, self._free_time),
         }
 
 

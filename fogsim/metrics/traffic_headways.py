@@ -4,16 +4,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from fogsim.metrics.histogram import Histogram
-from fogsim.metrics.metric import JsonValue, Sample
+from fogsim.metrics.metric import JsonValue
 from fogsim.metrics.surrogate import QUEUE_SPEED, time_headway
+from fogsim.metrics.traffic_span import TrafficMetric, TrafficSpan
 
 
 @dataclass(slots=True)
-class TrafficHeadways:
+class TrafficHeadways(TrafficMetric):
     """Time headways of all followers near the ego that drive at 5 m/s or more.
 
     The headway is between bumpers, gap / v_F. It is also the post-encroachment time (PET, Allen, Shin & Cooper 1978) of
@@ -31,15 +29,18 @@ class TrafficHeadways:
     }
     _headways: Histogram = field(default_factory=lambda: Histogram(0.0, 10.0, 0.05))
 
-    def update(self, sample: Sample) -> None:
-        """Take in one step.
+    def add(self, span: TrafficSpan) -> None:
+        """Take in some steps.
 
         Parameters
         ----------
-        sample : Sample
-            The step, and what is derived from it.
+        span : TrafficSpan
+            The next steps.
         """
-        self._headways.add(moving_headways(sample), sample.elapsed)
+        found = span.following
+        moving = found.speed >= QUEUE_SPEED
+        headways = time_headway(found.gap[moving], found.speed[moving])
+        self._headways.add(headways, span.elapsed[found.follower[moving]])
 
     def result(self) -> dict[str, JsonValue]:
         """Say how the headways are distributed."""
@@ -48,16 +49,3 @@ class TrafficHeadways:
             "traffic_headway_p05_s": self._headways.quantile(0.05),
             "traffic_median_headway_s": self._headways.quantile(0.5),
         }
-
-
-def moving_headways(sample: Sample) -> NDArray[np.float64]:
-    """Time headways of followers that move (m,) [s].
-
-    Parameters
-    ----------
-    sample : Sample
-        The step.
-    """
-    found = sample.following
-    moving = found.speed >= QUEUE_SPEED
-    return time_headway(found.gap[moving], found.speed[moving])

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 from fogsim.kinematics import stopping_sight_distance
 from fogsim.metrics.estimation import FOG_LIMIT
 from fogsim.metrics.histogram import Histogram
-from fogsim.metrics.metric import JsonValue, Sample, share
+from fogsim.metrics.metric import JsonValue, share
 from fogsim.metrics.surrogate import potential_collision_speed
+from fogsim.metrics.traffic_span import TrafficMetric, TrafficSpan
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 
 
 @dataclass(slots=True)
-class TrafficSight:
+class TrafficSight(TrafficMetric):
     """Meteorological visibility where each driver is against the distance in which they could stop.
 
     Attributes
@@ -41,25 +42,28 @@ class TrafficSight:
     _times: NDArray[np.float64] = field(default_factory=lambda: np.zeros(5))
     _margins: Histogram = field(default_factory=lambda: Histogram(-FOG_LIMIT, FOG_LIMIT, 0.5))
 
-    def update(self, sample: Sample) -> None:
-        """Take in one step.
+    def add(self, span: TrafficSpan) -> None:
+        """Take in some steps.
 
         Parameters
         ----------
-        sample : Sample
-            The step, and what is derived from it.
+        span : TrafficSpan
+            The next steps.
         """
-        extinction, speed = sample.step.truth.vehicle_extinctions, sample.step.traffic.speed
-        if extinction is None:
-            return
-        foggy = extinction > OPTICAL_DEPTH_AT_VISIBILITY / FOG_LIMIT
-        visibility, fast = OPTICAL_DEPTH_AT_VISIBILITY / extinction[foggy], speed[foggy]
+        # Nothing is greater than nan, which stands for fog that is not known.
+        foggy = span.extinction > OPTICAL_DEPTH_AT_VISIBILITY / FOG_LIMIT
+        visibility, fast = OPTICAL_DEPTH_AT_VISIBILITY / span.extinction[foggy], span.speed[foggy]
+        elapsed = span.elapsed[foggy]
         margin = visibility - stopping_sight_distance(fast, self.reaction_time, self.deceleration)
         impact = potential_collision_speed(visibility, fast, np.zeros(len(fast)))
-        self._margins.add(margin, sample.elapsed)
-        self._times += sample.elapsed * np.array(
-            [len(speed), len(fast), (margin < 0.0).sum(), margin.sum(), impact.sum()]
-        )
+        self._margins.add(margin, elapsed)
+        self._times += [
+            span.elapsed[~np.isnan(span.extinction)].sum(),
+            elapsed.sum(),
+            elapsed[margin < 0.0].sum(),
+            (elapsed * margin).sum(),
+            (elapsed * impact).sum(),
+        ]
 
     def result(self) -> dict[str, JsonValue]:
         """Say how far everybody saw, against how far they needed to."""

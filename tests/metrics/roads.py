@@ -6,7 +6,8 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.metrics.metric import JsonValue, Metric, Sample
+from fogsim.metrics.metric import JsonValue
+from fogsim.metrics.traffic_span import TrafficGathering, TrafficMetric
 from fogsim.values import Collision, TrafficState
 from tests.recorders.synthetic import make_step
 
@@ -33,15 +34,20 @@ def lanes(*vehicles: tuple[str, float, float], heading: float = 0.0) -> TrafficS
 
 
 def watched(
-    metric: Metric,
+    metric: TrafficMetric,
     roads: Iterable[tuple[float, TrafficState]],
     extinctions: NDArray[np.float64] | None = None,
     collisions: tuple[Collision, ...] = (),
 ) -> Mapping[str, JsonValue]:
-    """What a metric says of states that each held for a time [s], with collisions in the last."""
-    roads = list(roads)
+    """What a metric says of states that each held for a time [s], with collisions in the last; in spans of two."""
+    roads, gathering = list(roads), TrafficGathering()
     for number, (elapsed, road) in enumerate(roads):
         step = make_step(number, collisions=collisions if number == len(roads) - 1 else ())
         truth = dataclasses.replace(step.truth, vehicle_extinctions=extinctions)
-        metric.update(Sample(dataclasses.replace(step, traffic=road, truth=truth), elapsed, {}))
+        gathering.add(dataclasses.replace(step, traffic=road, truth=truth), elapsed)
+        if number % 2 or number == len(roads) - 1:
+            span = gathering.take()
+            assert span is not None
+            metric.add(span)
+    assert gathering.take() is None
     return metric.result()

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from fogsim.metrics.histogram import Histogram
-from fogsim.metrics.metric import Metric
 from fogsim.metrics.traffic_collisions import TrafficCollisions
 from fogsim.metrics.traffic_comfort import TrafficComfort
 from fogsim.metrics.traffic_conflicts import TrafficConflicts
 from fogsim.metrics.traffic_flow import TrafficFlow
 from fogsim.metrics.traffic_headways import TrafficHeadways
 from fogsim.metrics.traffic_sight import TrafficSight
+from fogsim.metrics.traffic_span import TrafficMetric
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Collision
 from tests.metrics.roads import lanes, watched
@@ -146,7 +146,7 @@ def test_collisions_by_what_was_driven() -> None:
     ],
     ids=lambda metric: type(metric).__name__,
 )
-def test_without_anybody_nothing_is_said(metric: Metric) -> None:
+def test_without_anybody_nothing_is_said(metric: TrafficMetric) -> None:
     assert {*metric.result().values()} <= {None, 0}
     assert {*watched(metric, [(1.0, lanes()), (1.0, lanes())], np.zeros(0)).values()} <= {None, 0}
 
@@ -155,7 +155,7 @@ def test_histogram_of_what_lies_within_and_beyond() -> None:
     found = Histogram(0.0, 10.0, 0.5)
     assert found.quantile(0.5) is None
     assert found.share_below(1.0) is None
-    found.add(np.linspace(-5.0, 15.0, 20_001), 0.1)
+    found.add(np.linspace(-5.0, 15.0, 20_001), np.full(20_001, 0.1))
     assert [found.quantile(p) for p in (0.1, 0.3, 0.5, 0.7, 0.9)] == [
         None,
         *(pytest.approx(x, abs=2e-3) for x in (1.0, 5.0, 9.0)),
@@ -163,5 +163,5 @@ def test_histogram_of_what_lies_within_and_beyond() -> None:
     ]
     assert found.share_below(5.0) == pytest.approx(0.5, abs=1e-4)
     edge = Histogram(0.0, 10.0, 0.05)
-    edge.add(np.array([3.0, math.inf]), 1.0)
+    edge.add(np.array([3.0, math.inf]), np.ones(2))
     assert edge.share_below(3) == 0.0

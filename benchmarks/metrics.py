@@ -1,0 +1,129 @@
+"""Cost of a run's metrics, as a share of the run itself.
+
+A straight road with three lanes carries a number of vehicles on 10 km (that of ``benchmarks/traffic.py``), all of which
+are read, in fog of 100 m by day. The loop goes round as `fogsim.run` does; after each step `RunMetrics.update` takes it
+in. Both are timed in the same run, in blocks of 80 steps: ``share`` is the median of the blocks' ratios of metrics to
+everything else, a quarter of them lie below ``share_low``, a quarter above ``share_high``.
+
+``frames`` says what is run: ``none`` is without frames at 2 Hz (the cheapest run that a study can have),
+``small`` draws 160 × 120 pixels at 2 Hz by the processor, with an estimator; ``none_10_hz`` is without frames at SUMO's
+own step, where nothing is left out between two steps that are measured. Times are the processor's [ms].
+
+    python benchmarks/metrics.py [--json] [--vehicles 100 …] [--seconds 200] [--profile]
+
+``--profile`` tells where the metrics' time goes, by metric.
+"""
+
+import argparse
+import json
+import statistics
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from traffic import configuration
+
+from fogsim.loop import run
+from fogsim.metrics import METRICS, RunMetrics
+from fogsim.scenario import build
+from fogsim.scenario.loading import clock_settings, scenario_from_config
+from fogsim.values import Step
+
+FRAMELESS = (
+    *("renderer=none", "estimators=[]", "advice={method: stopping_sight_distance, informed_by: truth}"),
+    "lighting={method: fog_lamp_rules, informed_by: truth}",
+)
+BLOCK = 80
+"""Steps in a block: what is gathered before vehicles are counted comes once or twice in each."""
+RUNS = {
+    "none": (0.5, FRAMELESS),
+    "small": (0.5, ("renderer=cpu", "camera.width=160", "camera.height=120", "estimators=[joint_road]")),
+    "none_10_hz": (0.1, FRAMELESS),
+}
+"""Camera period [s] and settings of each kind of run."""
+
+
+def timed(call: Callable[[], object]) -> float:
+    """Milliseconds of the processor that a call takes."""
+    started = time.thread_time_ns()
+    call()
+    return 1e-6 * (time.thread_time_ns() - started)
+
+
+def measure(frames: str, vehicles: int, seconds: float) -> dict[str, float | str]:
+    """One record of so many seconds of simulated time."""
+    period, settings = RUNS[frames]
+    blocks: list[tuple[float, float]] = []
+    with tempfile.TemporaryDirectory() as folder:
+        config = configuration(Path(folder), vehicles)
+        told = ["fog.visibility_m=100", "traffic.reading_radius_m=6000", f"duration_s={seconds}", *settings]
+        scenario = scenario_from_config(config, "ego", [*clock_settings(0.1, period, period), *told])
+        metrics = RunMetrics(build.safety_standard(scenario))
+        steps = run(scenario, 1)
+        last = [next(steps)]
+        metrics.update(last[0])
+
+        def go_on() -> None:
+            last[0] = next(steps)
+
+        while last[0].ending is None:
+            others = own = 0.0
+            for _ in range(BLOCK):
+                if last[0].ending is None:
+                    others += timed(go_on)
+                    own += timed(lambda: metrics.update(last[0]))
+            blocks.append((others / BLOCK, own / BLOCK))
+        steps.close()
+    # The first block has what is made once.
+    others, own = zip(*blocks[1:], strict=True)
+    low, middle, high = statistics.quantiles([b / a for a, b in zip(others, own, strict=True)], n=4)
+    return {
+        "frames": frames,
+        "vehicles": vehicles,
+        "vehicles_read": len(last[0].traffic.ids),
+        "ms_step": round(statistics.median(others), 3),
+        "ms_metrics": round(statistics.median(own), 4),
+        "share": round(middle, 4),
+        "share_low": round(low, 4),
+        "share_high": round(high, 4),
+        "blocks": len(blocks) - 1,
+    }
+
+
+def by_metric(vehicles: int) -> dict[str, float]:
+    """Milliseconds that each metric alone takes for a step, the following of vehicles included."""
+    with tempfile.TemporaryDirectory() as folder:
+        told = ["fog.visibility_m=100", "traffic.reading_radius_m=6000", "duration_s=20", *RUNS["none"][1]]
+        config = configuration(Path(folder), vehicles)
+        steps: list[Step] = list(run(scenario_from_config(config, "ego", [*clock_settings(0.1, 0.1, 0.1), *told]), 1))
+    costs = {}
+    for name in METRICS:
+        metrics = RunMetrics(names=[name])
+        costs[name] = round(sum(timed(lambda s=s, m=metrics: m.update(s)) for s in steps) / len(steps), 4)
+    return costs
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", action="store_true", help="print a list of flat records")
+    parser.add_argument("--vehicles", action="append", type=int, help="vehicles (default 100)")
+    parser.add_argument("--frames", action="append", choices=[*RUNS], help="which runs (default all)")
+    parser.add_argument("--seconds", type=float, default=200.0, help="simulated time of each run")
+    parser.add_argument("--profile", action="store_true", help="tell the cost of each metric alone")
+    arguments = parser.parse_args()
+    counts = arguments.vehicles or [100]
+    if arguments.profile:
+        records: list[dict[str, float | str]] = [{"vehicles": n, **by_metric(n)} for n in counts]
+    else:
+        records = [measure(kind, n, arguments.seconds) for n in counts for kind in arguments.frames or [*RUNS]]
+    if arguments.json:
+        print(json.dumps(records, indent=2))
+        return
+    for record in records:
+        print("  ".join(f"{key} {value}" for key, value in record.items()))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,230 @@
+"""All vehicles near the ego over several steps, as arrays: together they cost a fraction of one by one."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.metrics.following import Following, pair_in_lanes
+from fogsim.metrics.metric import JsonValue, share
+from fogsim.values import Collision, Step, TrafficState
+
+MOST_ROWS = 4096
+"""Rows that are gathered before the metrics get them."""
+
+HOUR = 3600.0
+"""Seconds in an hour."""
+
+KILOMETRE = 1000.0
+"""Metres in a kilometre."""
+
+
+@dataclass(frozen=True)
+class TrafficSpan:
+    """Some consecutive steps; row i is one vehicle in one of them.
+
+    Attributes
+    ----------
+    moment : (n,) intp
+        Number of the step, counted on from span to span.
+    vehicle, lane : (n,) intp
+        Numbers of vehicle and lane, the same throughout a run.
+    elapsed : (n,) float64
+        Time since the step before [s]: what was found at the step is held to be true for it.
+    position : (n, 3) float64
+        As of `TrafficState`, and so are the next six.
+    heading, speed, acceleration, length : (n,) float64
+        As of `TrafficState`.
+    free_speed : (n,) float64
+        As of `TrafficState`; nan where it is not known.
+    extinction : (n,) float64
+        Extinction coefficient at the driver's eyes [1/m]; nan where it is not known.
+    duration : float
+        Length of the span [s].
+    collisions : tuple of Collision
+        What happened in it, between vehicles of which one was near the ego.
+    lane_names : tuple of str
+        Lanes so far, by their numbers.
+    """
+
+    moment: NDArray[np.intp]
+    vehicle: NDArray[np.intp]
+    lane: NDArray[np.intp]
+    elapsed: NDArray[np.float64]
+    position: NDArray[np.float64]
+    heading: NDArray[np.float64]
+    speed: NDArray[np.float64]
+    acceleration: NDArray[np.float64]
+    length: NDArray[np.float64]
+    free_speed: NDArray[np.float64]
+    extinction: NDArray[np.float64]
+    duration: float
+    collisions: tuple[Collision, ...]
+    lane_names: tuple[str, ...]
+
+    @cached_property
+    def following(self) -> Following:
+        """Who follows whom, found once for all metrics."""
+        lanes = len(self.lane_names)
+        return pair_in_lanes(self.position, self.heading, self.length, self.speed, self.moment * lanes + self.lane)
+
+    @cached_property
+    def vehicle_time(self) -> float:
+        """Time of all vehicles together [s]."""
+        return float(self.elapsed.sum())
+
+    @cached_property
+    def vehicle_distance(self) -> float:
+        """Way of all vehicles together [m]."""
+        return float((self.elapsed * self.speed).sum())
+
+
+class TrafficMetric(ABC):
+    """A few numbers about everybody near the ego."""
+
+    meanings: ClassVar[Mapping[str, str]]
+    """One line on each key of the result; a key ends in its unit."""
+
+    @abstractmethod
+    def add(self, span: TrafficSpan) -> None:
+        """Take in some steps.
+
+        Parameters
+        ----------
+        span : TrafficSpan
+            The next steps.
+        """
+
+    @abstractmethod
+    def result(self) -> Mapping[str, JsonValue]:
+        """Say what the steps so far amount to; the keys are those of `meanings`."""
+
+
+@dataclass(slots=True)
+class Exposure:
+    """On how much driving rates are based: time and way of all vehicles near the ego together.
+
+    Attributes
+    ----------
+    time : float
+        Vehicle-seconds [s].
+    distance : float
+        Vehicle-metres [m].
+    """
+
+    time: float = 0.0
+    distance: float = 0.0
+
+    def add(self, span: TrafficSpan) -> None:
+        """Take in some steps.
+
+        Parameters
+        ----------
+        span : TrafficSpan
+            The next steps.
+        """
+        self.time += span.vehicle_time
+        self.distance += span.vehicle_distance
+
+    def per_hour(self, amount: float) -> float | None:
+        """Amount per vehicle-hour; None without time.
+
+        Parameters
+        ----------
+        amount : float
+            Of anything.
+        """
+        return share(HOUR * amount, self.time)
+
+    def per_kilometre(self, amount: float) -> float | None:
+        """Amount per vehicle-kilometre; None without way.
+
+        Parameters
+        ----------
+        amount : float
+            Of anything.
+        """
+        return share(KILOMETRE * amount, self.distance)
+
+
+class TrafficGathering:
+    """Gathers steps until they are worth a span."""
+
+    def __init__(self) -> None:
+        self._vehicles: dict[str, int] = {}
+        self._lanes: dict[str, int] = {}
+        self._states: list[tuple[TrafficState, float, NDArray[np.float64] | None]] = []
+        self._numbers: list[tuple[NDArray[np.intp], NDArray[np.intp]]] = []
+        self._collisions: list[Collision] = []
+        self._last_ids: tuple[str, ...] = ()
+        self._last_lanes: tuple[str, ...] = ()
+        self._last = np.zeros(0, np.intp), np.zeros(0, np.intp)
+        self._rows = self._moments = 0
+
+    @property
+    def is_full(self) -> bool:
+        """True if a span is worth making."""
+        return self._rows >= MOST_ROWS
+
+    def add(self, step: Step, elapsed: float) -> None:
+        """Take in a step.
+
+        Parameters
+        ----------
+        step : Step
+            The next step.
+        elapsed : float
+            Time since the one before [s].
+        """
+        traffic = step.traffic
+        if step.collisions:
+            # The simulation may have removed both; then they were near at the step before.
+            near = {*self._last_ids, *traffic.ids}
+            self._collisions += [hit for hit in step.collisions if near & {hit.collider, hit.victim}]
+        vehicles, lanes = self._last
+        if traffic.ids != self._last_ids:
+            vehicles, self._last_ids = _numbers(self._vehicles, traffic.ids), traffic.ids
+        if traffic.lane != self._last_lanes:
+            lanes, self._last_lanes = _numbers(self._lanes, traffic.lane), traffic.lane
+        self._last = vehicles, lanes
+        self._numbers.append(self._last)
+        self._states.append((traffic, elapsed, step.truth.vehicle_extinctions))
+        self._rows += len(vehicles) + 1
+
+    def take(self) -> TrafficSpan | None:
+        """All steps since the last call; None if there were none."""
+        if not self._states:
+            return None
+        states, times, extinctions = zip(*self._states, strict=True)
+        vehicles, lanes = zip(*self._numbers, strict=True)
+        counts = [len(state.ids) for state in states]
+        free = [state.free_speed if len(state.free_speed) else np.full(len(state.ids), np.nan) for state in states]
+        fog = [np.full(n, np.nan) if k is None else k for k, n in zip(extinctions, counts, strict=True)]
+        span = TrafficSpan(
+            moment=np.repeat(np.arange(self._moments, self._moments + len(states)), counts),
+            vehicle=np.concatenate(vehicles),
+            lane=np.concatenate(lanes),
+            elapsed=np.repeat(np.array(times), counts),
+            position=np.concatenate([state.position.reshape(-1, 3) for state in states]),
+            heading=np.concatenate([state.heading for state in states]),
+            speed=np.concatenate([state.speed for state in states]),
+            acceleration=np.concatenate([state.acceleration for state in states]),
+            length=np.concatenate([state.length for state in states]),
+            free_speed=np.concatenate(free),
+            extinction=np.concatenate(fog),
+            duration=float(sum(times)),
+            collisions=tuple(self._collisions),
+            lane_names=tuple(self._lanes),
+        )
+        self._moments += len(states)
+        self._rows, self._states, self._numbers, self._collisions = 0, [], [], []
+        return span
+
+
+def _numbers(known: dict[str, int], names: tuple[str, ...]) -> NDArray[np.intp]:
+    """Numbers of names (n,), which new ones get."""
+    return np.array([known.setdefault(name, len(known)) for name in names], dtype=np.intp)

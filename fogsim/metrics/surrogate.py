@@ -213,6 +213,6 @@ def _quotient_where(
     defined: ArrayLike, numerator: ArrayLike, denominator: ArrayLike, elsewhere: float
 ) -> NDArray[np.float64]:
     """Divide only where the quotient is defined, so that no division by zero is ever made."""
-    shape = np.broadcast_shapes(np.shape(defined), np.shape(numerator), np.shape(denominator))
+    shape = np.broadcast(defined, numerator, denominator).shape
     result = np.full(shape, elsewhere, dtype=np.float64)
     return np.divide(numerator, denominator, out=result, where=np.asarray(defined, dtype=bool))[()]

@@ -37,6 +37,11 @@ def records(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
             ("--seeds", "1", "--minutes", "2", "--visibility", "20"),
             {"visibility_m", "crossings", "accepted_least_s", "refused_most_s", "collisions_per_1000", "impact_mps"},
         ),
+        (
+            "metrics.py",
+            ("--frames", "none", "--vehicles", "6", "--seconds", "121"),
+            {"frames", "vehicles_read", "ms_step", "ms_metrics", "share", "share_low", "share_high", "blocks"},
+        ),
         ("resets.py", ("--resets", "2"), {"ms_median", "growth_kib_per_reset"}),
         (
             "estimator_accuracy.py",

@@ -7,6 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
+from early_motorway import EARLY
 
 import fogsim
 from fogsim import interruption
@@ -37,7 +38,9 @@ def test_a_data_set_that_is_interrupted_in_a_kernel_is_whole(tmp_path: Path) -> 
         if done == 2:
             raise_as_numba_does()
 
-    scenario = fogsim.load_scenario("motorway_fog_bank", ["camera.width=160", "camera.height=120", "duration_s=2"])
+    scenario = fogsim.load_scenario(
+        "motorway_fog_bank", [EARLY, "camera.width=160", "camera.height=120", "duration_s=2"]
+    )
     written = fogsim.write_dataset(scenario, tmp_path / "data", frames=4, watch=watch)
     assert (written.frames, written.complete) == (2, False)
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import traci
+from early_motorway import EARLY
 
 import fogsim
 from fogsim.errors import InputError, SimulationError, UnplayedWarning
@@ -234,7 +235,7 @@ def test_a_simulation_that_is_lost(connection: Any) -> None:
 
 
 def test_a_run_over_a_connection_is_the_run_in_process(sumo_process: Callable) -> None:
-    scenario = fogsim.load_scenario("motorway_fog_bank", [*SMALL, "fog.visibility_m=inf", "duration_s=1"])
+    scenario = fogsim.load_scenario("motorway_fog_bank", [*SMALL, EARLY, "fog.visibility_m=inf", "duration_s=1"])
     here = list(fogsim.run(scenario, seed=3))
     arguments = command_line(build.traffic_setup(scenario), spawn_streams(3).traffic_seed)
     with sumo_process(arguments) as (port, _):
@@ -246,7 +247,7 @@ def test_a_run_over_a_connection_is_the_run_in_process(sumo_process: Callable) -
 
 
 def test_a_connection_that_is_lost_on_the_way_is_one_error(sumo_process: Callable) -> None:
-    scenario = fogsim.load_scenario("motorway_fog_bank", [*SMALL, "fog.visibility_m=80"])
+    scenario = fogsim.load_scenario("motorway_fog_bank", [*SMALL, EARLY, "fog.visibility_m=80"])
     arguments = command_line(build.traffic_setup(scenario), 1)
     with sumo_process(arguments) as (port, process):
         steps = fogsim.run(scenario, 3, fogsim.connect(scenario, "127.0.0.1", port))

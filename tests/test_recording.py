@@ -5,6 +5,7 @@ import os
 from pathlib import Path
 
 import pytest
+from early_motorway import EARLY
 from pyarrow import parquet
 
 import fogsim
@@ -16,7 +17,7 @@ from fogsim.values import Step
 
 
 def short() -> Scenario:
-    return fogsim.load_scenario("motorway_fog_bank", ["camera.width=64", "camera.height=48", "duration_s=1"])
+    return fogsim.load_scenario("motorway_fog_bank", [EARLY, "camera.width=64", "camera.height=48", "duration_s=1"])
 
 
 def status(out: Path) -> dict[str, object]:

@@ -4,11 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from early_motorway import EARLY
 
 import fogsim
 from fogsim.values import Frame, Step
 
-SMALL = ("camera.width=160", "camera.height=120", "duration_s=0.6", "fog.visibility_m=100")
+SMALL = (EARLY, "camera.width=160", "camera.height=120", "duration_s=0.6", "fog.visibility_m=100")
 
 
 def steps(*overrides: str) -> list[Step]:

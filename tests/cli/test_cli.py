@@ -12,13 +12,14 @@ from pathlib import Path
 
 import imageio.v3 as imageio
 import pytest
+from early_motorway import EARLY
 from pyarrow import parquet
 
 from fogsim.scenario import catalogue
 
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
 FOGSIM = (sys.executable, "-m", "fogsim")
-SMALL = ("--set", "camera.width=160", "--set", "camera.height=120", "--set", "duration_s=3")
+SMALL = ("--set", "camera.width=160", "--set", "camera.height=120", "--set", "duration_s=3", "--set", EARLY)
 TOWN = str(Path(__file__).resolve().parents[1] / "data" / "grid" / "grid.sumocfg")
 FILES = {"manifest.json", "metrics.json", "steps.parquet", "video.mp4", "report.html"}
 
@@ -77,7 +78,7 @@ def test_results_are_not_overwritten_unasked(finished: Path, command: Command) -
 
 def test_an_interrupted_run_leaves_readable_results_that_say_they_are_partial(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    size = ("--set", "camera.width=160", "--set", "camera.height=120")
+    size = ("--set", EARLY, "--set", "camera.width=160", "--set", "camera.height=120")
     process = subprocess.Popen(
         [*FOGSIM, "run", "motorway_fog_bank", "--out", str(out), *size],
         stdout=subprocess.PIPE,

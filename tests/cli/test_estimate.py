@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from early_motorway import EARLY
 from PIL import Image
 
 import fogsim
@@ -34,7 +35,7 @@ KEYS = {"frame", "method", "valid", "visibility_m", "visibility_low_m", "visibil
 @pytest.fixture(scope="module")
 def drawn() -> list[np.ndarray]:
     """Three frames in fog of 80 m."""
-    settings = ["fog.visibility_m=80", "duration_s=0.2", "camera.width=320", "camera.height=240"]
+    settings = [EARLY, "fog.visibility_m=80", "duration_s=0.2", "camera.width=320", "camera.height=240"]
     scenario = fogsim.load_scenario("motorway_fog_bank", settings)
     return [step.observation.image for step in fogsim.run(scenario, seed=2)]
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from early_motorway import EARLY
 from PIL import Image
 
 from fogsim.cli.view import view_command
@@ -14,7 +15,7 @@ from fogsim.scenario import load_scenario
 
 def test_the_picture_is_that_of_the_ego_in_clear_air(tmp_path: Path) -> None:
     out = tmp_path / "view.png"
-    settings = ["camera.width=160", "camera.height=120", "fog.visibility_m=30"]
+    settings = [EARLY, "camera.width=160", "camera.height=120", "fog.visibility_m=30"]
     view_command("motorway_fog_bank", at=0.2, out=out, settings=settings)
     picture = np.asarray(Image.open(out)).astype(float)
     assert picture.shape == (120, 160, 3)
@@ -49,12 +50,12 @@ def test_an_instant_after_the_end_is_refused(tmp_path: Path) -> None:
             "motorway_fog_bank",
             at=60.0,
             out=tmp_path / "view.png",
-            settings=["camera.width=32", "camera.height=24", "duration_s=0.2"],
+            settings=[EARLY, "camera.width=32", "camera.height=24", "duration_s=0.2"],
         )
 
 
 def test_what_is_around_the_ego_is_what_its_camera_sees() -> None:
-    scenario = load_scenario("motorway_fog_bank", ["renderer=cpu", "camera.width=64", "camera.height=48"])
+    scenario = load_scenario("motorway_fog_bank", [EARLY, "renderer=cpu", "camera.width=64", "camera.height=48"])
     with ClosedLoop(scenario) as loop:
         step = loop.start(0)
         around = loop.surrounding()

@@ -10,9 +10,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from early_motorway import EARLY
 
 FOGSIM = (sys.executable, "-m", "fogsim", "dataset", "motorway_fog_bank")
-SMALL = ("--set", "camera.width=96", "--set", "camera.height=72", "--visibility", "80")
+SMALL = ("--set", EARLY, "--set", "camera.width=96", "--set", "camera.height=72", "--visibility", "80")
 
 
 def fogsim(*arguments: str) -> subprocess.CompletedProcess[str]:

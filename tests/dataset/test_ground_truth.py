@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from early_motorway import EARLY
 
 import fogsim
 from fogsim.atmosphere import optical_depth
@@ -29,6 +30,7 @@ from fogsim.values.pinhole import ray_from_pixel
 from tests.recorders.synthetic import make_step
 
 BANK = (
+    EARLY,
     "camera.width=96",
     "camera.height=72",
     "duration_s=0.2",

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from early_motorway import EARLY, ROUTES
 
 import fogsim
 from fogsim.dataset import read_png
@@ -24,7 +25,7 @@ FRAMES, EVERY = 5, 2
 
 
 def small(*overrides: str) -> Scenario:
-    settings = ("camera.width=96", "camera.height=72", "duration_s=0.5", "fog.visibility_m=120", *overrides)
+    settings = (EARLY, "camera.width=96", "camera.height=72", "duration_s=0.5", "fog.visibility_m=120", *overrides)
     return fogsim.load_scenario("motorway_fog_bank", settings)
 
 
@@ -124,17 +125,18 @@ def test_another_data_set_is_refused(whole: Path) -> None:
     assert contents(whole) == before
 
 
-def test_a_data_set_is_not_continued_with_other_inputs(whole: Path, tmp_path: Path) -> None:
+def test_a_data_set_is_not_continued_with_other_inputs(tmp_path: Path) -> None:
     folder = Path(shutil.copytree(small().directory, tmp_path / "mine"))
+    shutil.copy(ROUTES, folder / "motorway.rou.xml")
     settings = ("camera.width=96", "camera.height=72", "duration_s=0.5", "fog.visibility_m=120")
     load = functools.partial(fogsim.load_scenario, str(folder), settings)
-    out = Path(shutil.copytree(whole, tmp_path / "data"))
-    assert fogsim.write_dataset(load(), out, FRAMES, seed=4, every=EVERY).written == 0
+    out = tmp_path / "data"
+    assert [fogsim.write_dataset(load(), out, 2).written for _ in range(2)] == [2, 0]
     before = contents(out)
     (routes,) = (folder / path for path in load().traffic.routes)
     routes.write_text(routes.read_text(encoding="utf-8") + "<!-- changed -->", encoding="utf-8")
     with pytest.raises(InputError, match=rf"holds another data set: inputs\.{routes.name} is .* there"):
-        fogsim.write_dataset(load(), out, FRAMES + 1, seed=4, every=EVERY)
+        fogsim.write_dataset(load(), out, 3)
     assert contents(out) == before
 
 
@@ -142,7 +144,7 @@ def test_its_manifest_names_every_input_and_version(whole: Path) -> None:
     identity = json.loads((whole / "dataset.json").read_text(encoding="utf-8"))
     scenario = small()
     files = [scenario.traffic.net, *scenario.traffic.routes, *scenario.traffic.additional]
-    digests = {str(f): hashlib.sha256((scenario.directory / str(f)).read_bytes()).hexdigest() for f in files}
+    digests = {Path(f).name: hashlib.sha256((scenario.directory / str(f)).read_bytes()).hexdigest() for f in files}
     assert identity["inputs"] == digests
     assert {"fogsim", "libsumo", "numpy", "python"} <= set(identity["versions"])
 

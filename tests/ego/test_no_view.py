@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from early_motorway import EARLY
 
 import fogsim
 from fogsim.dataset import write_dataset
@@ -12,6 +13,7 @@ from fogsim.values import Lamp
 from fogsim_envs.advisory import FogAdvisoryEnv
 
 SETTINGS = (
+    EARLY,
     "advice={method: netherlands_a16, informed_by: truth}",
     "lighting={method: fog_lamp_rules, informed_by: truth}",
     *("duration_s=3", "camera.width=32", "camera.height=24", "clocks.camera_period_s=0.5", "fog.visibility_m=60"),

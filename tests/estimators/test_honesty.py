@@ -11,6 +11,7 @@ from pathlib import Path
 import grimp
 import numpy as np
 import pytest
+from early_motorway import EARLY
 
 import fogsim
 from fogsim.estimators import ESTIMATORS
@@ -45,7 +46,7 @@ UNSEEN = {"Truth", "Step", "View", "FogField", "FogBank", "FogChange", "FogPatch
 def drive() -> list[Step]:
     """A few frames in traffic with every method that is registered."""
     methods = ", ".join(f"{{method: {name}}}" for name in METHODS)
-    size = ("camera.width=320", "camera.height=240", "duration_s=2", "fog.visibility_m=80")
+    size = (EARLY, "camera.width=320", "camera.height=240", "duration_s=2", "fog.visibility_m=80")
     scenario = fogsim.load_scenario("motorway_fog_bank", [*size, f"estimators=[{methods}]"])
     return list(fogsim.run(scenario, seed=1))
 

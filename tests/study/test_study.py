@@ -4,18 +4,19 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
+from early_motorway import EARLY
 
 from fogsim.errors import InputError
 from fogsim.study import load_study, run_study
 from fogsim.study.directory import StudyDirectory
 
-STUDY = """
+STUDY = f"""
 scenario: motorway_fog_bank
-settings: [duration_s=1, camera.width=80, camera.height=60, clocks.camera_period_s=0.5]
+settings: ["{EARLY}", duration_s=1, camera.width=80, camera.height=60, clocks.camera_period_s=0.5]
 factors:
   policy:
     none: [advice=none]
-    fixed: ['advice={method: fixed_speed, parameters: {speed: 20}}']
+    fixed: ['advice={{method: fixed_speed, parameters: {{speed: 20}}}}']
 seeds: 2
 """
 

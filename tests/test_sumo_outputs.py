@@ -9,9 +9,10 @@ import pytest
 
 import fogsim
 from fogsim.errors import InputError
-from fogsim.recorders import RunDirectory
+from fogsim.recorders import RunDirectory, recover_run
 from fogsim.recording import record_run
 from fogsim.scenario import override, scenario_from_config
+from fogsim.study.execution import run_to_file
 from fogsim.traffic.sumo.output_folder import OutputFolder
 
 GRID = Path(__file__).parent / "data" / "grid"
@@ -21,7 +22,7 @@ DETECTORS = """<additional>
 </additional>"""
 CONFIG = """<configuration>
   <net-file value="grid.net.xml"/><route-files value="grid.trips.xml"/><additional-files value="more/loop.add.xml"/>
-  <output-prefix value="mine_"/><fcd-output value="fcd.xml"/><fcd-output.acceleration value="true"/>
+  <output-prefix value="elsewhere/mine_"/><fcd-output value="fcd.xml"/><fcd-output.acceleration value="true"/>
   <tripinfo-output value="{absolute}"/><precision value="6"/>
   <device.ssm.probability value="1"/><device.ssm.file value="ssm.xml"/>
 </configuration>"""
@@ -97,6 +98,13 @@ def test_in_python_they_are_kept_where_a_folder_is_named_and_else_warned_of(town
     assert content(folder) == before
 
 
+def test_each_run_of_a_study_has_its_own(town: Source, tmp_path: Path) -> None:
+    short = override(town[0], ["duration_s=1"])
+    assert [run_to_file(short, seed, tmp_path / f"run{seed}.json") for seed in (1, 2)] == [None, None]
+    for seed in (1, 2):
+        assert sorted(path.name for path in (tmp_path / f"run{seed}").iterdir()) == WRITTEN
+
+
 def test_a_run_without_outputs_leaves_no_folder(tmp_path: Path) -> None:
     scenario = scenario_from_config(GRID / "grid.sumocfg", "veh5", [*SETTINGS, *NO_FRAMES, "duration_s=1"])
     done = record_run(scenario, 1, tmp_path, recorders=("table",))
@@ -125,6 +133,26 @@ def test_a_folder_that_sumo_cannot_write_to_is_told_in_its_words_without_our_det
     (folder / "file").touch()
     with pytest.raises(InputError, match=r"cannot write SUMO's outputs into .*file/out: Not a directory"):
         next(fogsim.run(scenario, 1, sumo_outputs=folder / "file" / "out"))
+
+
+def test_outputs_of_one_name_from_different_folders_are_refused(town: Source) -> None:
+    scenario, folder = town
+    both = override(scenario, ["traffic.sumo_options.edgedata-output=edges.xml"])
+    with pytest.raises(fogsim.SimulationError, match=r"several outputs into one file: mine_edges\.xml\."):
+        next(fogsim.run(both, 1, sumo_outputs=folder / "out"))
+    with pytest.warns(UserWarning, match="will not be kept"):
+        next(fogsim.run(both, 1))
+
+
+def test_a_run_that_was_killed_leaves_its_outputs_to_be_recovered(tmp_path: Path) -> None:
+    (tmp_path / "unfinished").mkdir()
+    (tmp_path / "unfinished" / "manifest.json").write_text('{"status": "running"}')
+    (tmp_path / "sumo_outputs.part").mkdir()
+    (tmp_path / "sumo_outputs.part" / "fcd.xml").write_text("<fcd-export>")
+    assert recover_run(tmp_path) == ["manifest.json", "sumo_outputs"]
+    assert [path.name for path in (tmp_path / "sumo_outputs").iterdir()] == ["fcd.xml"]
+    # They may be replaced: the manifest names them.
+    RunDirectory(tmp_path, overwrite=True).close()
 
 
 def test_a_folder_of_somebody_elses_is_not_touched(tmp_path: Path) -> None:

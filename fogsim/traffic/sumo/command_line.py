@@ -55,4 +55,5 @@ def output_prefix(setup: TrafficSetup) -> str:
     """
     chosen = dict(setup.sumo_options).get(_PREFIX)
     configured = "" if setup.config is None else configured_prefix(setup.config)
-    return configured if chosen is None else chosen
+    # A folder in it counts as little as those of the outputs themselves.
+    return (configured if chosen is None else chosen).rpartition("/")[2]

@@ -63,7 +63,7 @@ class LibsumoLink:
         SimulationRunningError
             If another simulation runs in this process.
         SimulationError
-            If SUMO refuses its input; the message holds SUMO's own words.
+            If SUMO refuses its input; the message holds SUMO's own words. If two outputs would be one file.
         InputError
             If there is no folder for what SUMO writes.
 
@@ -93,14 +93,25 @@ class LibsumoLink:
                 failure = None
         self._sumo = sumo
         if failure is None:
-            if self._outputs is not None:
-                self._outputs.tell_lost()
+            self._check_outputs()
             return sumo
         self.end()
         said = " ".join(line.strip() for line in words if line.strip()) or str(failure)
         if self._outputs is not None:
             said = self._outputs.shorten(said)
         raise SimulationError(f"SUMO cannot load the scenario: {said}")
+
+    def _check_outputs(self) -> None:
+        if self._outputs is None:
+            return
+        self._outputs.tell_lost()
+        twice = self._outputs.twice()
+        if twice:
+            self.end()
+            raise SimulationError(
+                f"SUMO would write several outputs into one file: {', '.join(twice)}. All go into one folder, so give "
+                "those that lie in different ones different names"
+            )
 
     def step(self) -> None:
         """Move the simulation by one step; see `SumoLink.step`."""

@@ -1,5 +1,6 @@
 """Where the files go that SUMO writes: into one folder, whatever their names in SUMO's own files are."""
 
+import collections
 import shutil
 import tempfile
 import warnings
@@ -14,6 +15,7 @@ _TO_THE_ROOT = "../" * 40
 
 _TOKEN = "TIME"  # noqa: S105 - what SUMO puts the time for, in a prefix
 _END_OF_XML = 200
+_OPEN_FILES = Path("/proc/self/fd")
 MOST_NAMED = 6
 """Files that a message names."""
 
@@ -81,6 +83,17 @@ class OutputFolder:
             link.symlink_to(target)
         return link
 
+    def twice(self) -> list[str]:
+        """Names of files that SUMO has open more than once, for outputs of one name in different folders.
+
+        Where the system does not tell what is open, and where nothing is kept, none.
+        """
+        if self._folder is None or not _OPEN_FILES.is_dir():
+            return []
+        place = str(self._folder.resolve())
+        targets = collections.Counter(map(_target, _OPEN_FILES.iterdir()))
+        return sorted(Path(name).name for name, times in targets.items() if times > 1 and name.startswith(place))
+
     def shorten(self, message: str) -> str:
         """A message of SUMO's with the names of files as they were asked for.
 
@@ -138,6 +151,13 @@ class OutputFolder:
                 "disk full?",
                 stacklevel=2,
             )
+
+
+def _target(descriptor: Path) -> str:
+    try:
+        return str(descriptor.readlink())
+    except OSError:
+        return ""  # that of the listing itself, which is closed by now
 
 
 def _can_be_named(folder: Path) -> bool:

@@ -88,7 +88,9 @@ class StudyDirectory:
         found = self._result(run)
         metrics: dict[str, Value] = found.get("metrics", {})
         about = {"seed": run.seed, "status": found.get("status", "missing"), "message": found.get("message")}
-        return {"run": run.number, **run.levels, **about, **metrics}
+        outputs = result_file(self.results, run).with_suffix("")
+        kept: dict[str, Value] = {"sumo_outputs": f"{self.results.name}/{outputs.name}"} if outputs.is_dir() else {}
+        return {"run": run.number, **run.levels, **about, **kept, **metrics}
 
 
 def _deciding_versions(found: Mapping[str, str | None]) -> dict[str, str | None]:

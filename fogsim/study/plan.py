@@ -26,7 +26,7 @@ MOST_RUNS = 1_000_000
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+ -]{0,59}$")]
 """Name of a factor or a level: it becomes a column or a legend."""
 
-RESERVED = frozenset({"run", "seed", "status", "message"})
+RESERVED = frozenset({"run", "seed", "status", "message", "sumo_outputs"})
 """Columns of the table that no factor may be named like."""
 
 

@@ -9,6 +9,7 @@ from fogsim.study.comparison import Difference
 from fogsim.study.directory import StudyDirectory
 from fogsim.study.plan import Study, StudyRun, load_study
 from fogsim.study.pool import run_in_pool
+from fogsim.study.pooled_profiles import pool_profiles
 from fogsim.study.report import write_report
 from fogsim.study.table import Row, write_table
 
@@ -32,7 +33,7 @@ def run_study(study: Study, out: Path, *, processes: int | None = None, watch: W
         From `load_study`.
     out : Path
         Directory: ``study.parquet`` and ``study.csv`` (a row for each run: factors, seed, metrics), ``comparison.csv``,
-        ``report.html``, ``figures/*.svg``; ``runs/`` holds a file for each run, by which a study is continued.
+        ``report.html``, ``figures/`` (SVG and CSV); ``runs/`` holds a file for each run, by which a study is continued.
     processes : int or None
         Runs at once; None for one a core.
     watch : callable
@@ -65,5 +66,5 @@ def run_study(study: Study, out: Path, *, processes: int | None = None, watch: W
         run_in_pool(missing, directory.results, processes or os.cpu_count() or 1, count)
         rows = directory.rows()
         write_table(rows, out)
-        write_report(study, rows, out)
+        write_report(study, rows, pool_profiles(directory.profiles()), out)
     return rows

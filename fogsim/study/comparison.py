@@ -6,7 +6,7 @@ the same seed have the same traffic and the same noise, so that the difference i
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,11 +39,13 @@ class Difference:
     low, high : float or None
         Ends of its bootstrap interval (BCa; Efron 1987); None where no two differences differ.
     p_value : float or None
-        Of a paired permutation test of no difference, two-sided; None where no run differs.
+        Of a paired permutation test of no difference, two-sided; None where no run differs, or there is but one.
     pairs : int
         Seeds of which both runs have a value.
     seeds_for_half_width : int or None
-        Seeds that an interval as wide as a tenth of the baseline's mean on either side would need, by the normal law.
+        Seeds that an interval of the study's wanted half-width would need, by the normal law.
+    adjusted_p_value : float or None
+        The p-value for a family of comparisons (Benjamini & Hochberg 1995), once `adjust_p_values` has found it.
     """
 
     metric: str
@@ -56,6 +58,22 @@ class Difference:
     p_value: float | None
     pairs: int
     seeds_for_half_width: int | None
+    adjusted_p_value: float | None = None
+
+    def is_shown(self, confidence: float) -> bool:
+        """Whether the data show that there is a difference: the interval excludes 0, and the test agrees.
+
+        Of few seeds, the bootstrap alone would claim too much: three differences of one sign exclude 0, and happen by
+        chance in one case of four.
+
+        Parameters
+        ----------
+        confidence : float
+            Confidence of the interval.
+        """
+        if self.low is None or self.high is None or self.p_value is None:
+            return False
+        return (self.low > 0.0 or self.high < 0.0) and self.p_value <= 1.0 - confidence
 
 
 def numeric_metrics(rows: Sequence[Row], factors: Iterable[str]) -> list[str]:
@@ -69,11 +87,18 @@ def numeric_metrics(rows: Sequence[Row], factors: Iterable[str]) -> list[str]:
         Columns that are no metrics, beside the run's own.
     """
     others = {*factors, "run", "seed", "status", "message"}
-    names = dict.fromkeys(key for row in rows for key, v in row.items() if _number(v) is not None)
+    names = dict.fromkeys(key for row in rows for key, v in row.items() if number_of(v) is not None)
     return [name for name in names if name not in others]
 
 
-def _number(value: object) -> float | None:
+def number_of(value: object) -> float | None:
+    """Value of a cell as a number; None if it is none.
+
+    Parameters
+    ----------
+    value : object
+        The cell.
+    """
     return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
 
 
@@ -112,12 +137,12 @@ def compare_to_baseline(study: Study, rows: Sequence[Row], metrics: Sequence[str
 def _difference(
     study: Study, metric: str, levels: Mapping[str, str], runs: Mapping[int, Row], baseline: Mapping[int, Row]
 ) -> Difference | None:
-    pairs = [(_number(baseline[s].get(metric)), _number(runs[s].get(metric))) for s in runs if s in baseline]
+    pairs = [(number_of(baseline[s].get(metric)), number_of(runs[s].get(metric))) for s in runs if s in baseline]
     values = np.array([pair for pair in pairs if None not in pair], dtype=np.float64).reshape(-1, 2)
     if not len(values):
         return None
     differences = values[:, 1] - values[:, 0]
-    low, high = _interval(differences, study.confidence)
+    low, high = mean_interval(differences, study.confidence)
     baseline_mean = float(values[:, 0].mean())
     return Difference(
         metric=metric,
@@ -129,23 +154,46 @@ def _difference(
         high=high,
         p_value=_p_value(differences),
         pairs=len(values),
-        seeds_for_half_width=_seeds_wanted(differences, 0.1 * abs(baseline_mean), study.confidence),
+        seeds_for_half_width=_seeds_wanted(differences, study.wanted_interval * abs(baseline_mean), study.confidence),
     )
 
 
-def _interval(differences: NDArray[np.float64], confidence: float) -> tuple[float | None, float | None]:
-    """Bootstrap interval of a mean; (None, None) where resampling gives but one value."""
-    if np.ptp(differences) == 0.0:
+def adjust_p_values(differences: Sequence[Difference]) -> list[Difference]:
+    """Adjust the p-values of a family of comparisons to their number, by Benjamini & Hochberg (1995).
+
+    Of the differences whose adjusted value is at most 0.05, one in twenty is expected to be none.
+
+    Parameters
+    ----------
+    differences : sequence of Difference
+        The family.
+    """
+    found = [one.p_value for one in differences if one.p_value is not None]
+    adjusted = iter(stats.false_discovery_control(found).tolist() if found else [])
+    return [one if one.p_value is None else replace(one, adjusted_p_value=next(adjusted)) for one in differences]
+
+
+def mean_interval(values: NDArray[np.float64], confidence: float) -> tuple[float | None, float | None]:
+    """Bootstrap interval of a mean (BCa); (None, None) where resampling gives but one value.
+
+    Parameters
+    ----------
+    values : (n,) float64
+        One for each seed.
+    confidence : float
+        Confidence of the interval, 0 … 1.
+    """
+    if len(values) < 2 or np.ptp(values) == 0.0:
         return None, None
     ends = stats.bootstrap(
-        (differences,), np.mean, n_resamples=RESAMPLES, confidence_level=confidence, rng=np.random.default_rng(0)
+        (values,), np.mean, n_resamples=RESAMPLES, confidence_level=confidence, rng=np.random.default_rng(0)
     ).confidence_interval
     return (float(ends.low), float(ends.high)) if math.isfinite(ends.low) and math.isfinite(ends.high) else (None, None)
 
 
 def _p_value(differences: NDArray[np.float64]) -> float | None:
     """Two-sided paired permutation test: under no difference each sign is as likely as the other."""
-    if not differences.any():
+    if len(differences) < 2 or not differences.any():
         return None
     test = stats.permutation_test(
         (differences, np.zeros_like(differences)),
@@ -177,7 +225,7 @@ def uninformative(rows: Sequence[Row], metrics: Sequence[str]) -> dict[str, str]
     """
     said = {}
     for metric in metrics:
-        values = np.array([v for row in rows if (v := _number(row.get(metric))) is not None])
+        values = np.array([v for row in rows if (v := number_of(row.get(metric))) is not None])
         if not len(values) or np.ptp(values) == 0.0:
             said[metric] = "does not vary"
             continue

@@ -11,6 +11,7 @@ from fogsim.recorders.manifest import versions
 from fogsim.study.execution import Value
 from fogsim.study.plan import Study, StudyRun
 from fogsim.study.pool import result_file
+from fogsim.study.profiles import Profiles
 from fogsim.study.table import Row
 
 _MOST_TOLD = 5
@@ -83,6 +84,13 @@ class StudyDirectory:
     def rows(self) -> list[Row]:
         """The table: a row for each run, those without a result included."""
         return [self._row(run) for run in self._study.runs]
+
+    def profiles(self) -> Iterator[tuple[Mapping[str, str], int, Profiles]]:
+        """Levels, seed and profiles of each run that is done."""
+        for run in self._study.runs:
+            found = self._result(run)
+            if found.get("status") == "complete" and "profiles" in found:
+                yield run.levels, run.seed, found["profiles"]
 
     def _row(self, run: StudyRun) -> Row:
         found = self._result(run)

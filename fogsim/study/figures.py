@@ -1,22 +1,18 @@
-"""Figures of a study, drawn without any of matplotlib's global state, as SVG for papers."""
+"""Figures of metrics: differences to the baseline, and safety against delay."""
 
-import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.figure import Figure
+import numpy as np
 
-from fogsim.study.comparison import Difference
+from fogsim.study.comparison import Difference, mean_interval, number_of
+from fogsim.study.drawing import MUTED, Grid, StudyFigure, label_figure, svg_of
+from fogsim.study.main_metrics import metric_words
 from fogsim.study.plan import Study
 from fogsim.study.table import Row
 
-_INK, _MUTED, _GRID = "#1c2733", "#7b8794", "#e3e8ed"
-_COLOURS = ("#1f6fd0", "#c28a00", "#1f9d61", "#cf3a34", "#7d4bc2", "#0f8b8d", "#8a5a44", "#b0447c")
 
-
-def differences_figure(study: Study, metric: str, differences: Sequence[Difference]) -> str:
-    """Differences of one metric to the baseline with their intervals, a line each, as SVG.
+def differences_figure(study: Study, metric: str, differences: Sequence[Difference]) -> StudyFigure:
+    """Differences of one metric to the baseline with their intervals: a line each policy, a panel each fog.
 
     Parameters
     ----------
@@ -27,78 +23,106 @@ def differences_figure(study: Study, metric: str, differences: Sequence[Differen
     differences : sequence of Difference
         Of this metric, at least one.
     """
-    figure = Figure(figsize=(7.0, 0.7 + 0.3 * len(differences)), layout="constrained")
-    axes = figure.subplots()
-    first = next(iter(study.baseline))
-    colours = _colours(study, first)
-    for place, one in enumerate(reversed(differences)):
-        colour = colours[one.levels[first]]
-        if one.low is not None and one.high is not None:
-            axes.plot((one.low, one.high), (place, place), color=colour, linewidth=2.0, solid_capstyle="butt")
-        axes.plot(one.difference, place, "o", color=colour, markersize=5.0)
-    axes.axvline(0.0, color=_MUTED, linewidth=1.0)
-    labels = [" · ".join(one.levels.values()) for one in reversed(differences)]
-    axes.set_yticks(range(len(labels)), labels)
-    axes.set_ylim(-0.6, len(labels) - 0.4)
-    against = " · ".join(study.baseline.values())
-    axes.set_xlabel(f"{metric}, difference to {against}, {study.confidence:.0%} interval", fontsize=9)
-    _dress(axes)
-    return _svg(figure)
+    grid, words = Grid(study), metric_words(metric)
+    by_cell = {tuple(one.levels.values()): one for one in differences}
+    compared = [
+        policy for policy in reversed(grid.policies) if policy in {d.levels[grid.policy_factor] for d in differences}
+    ]
+    figure, panels = grid.figure(0.35 + 0.19 * len(compared), across=4)
+    for panel, axes in panels:
+        for place, policy in enumerate(compared):
+            one = by_cell.get(grid.cell(policy, panel))
+            if one is None:
+                continue
+            look = grid.looks[policy]
+            if one.low is not None and one.high is not None:
+                ends = (words.scale * one.low, words.scale * one.high)
+                axes.plot(ends, (place, place), color=look.colour, linewidth=2.0, solid_capstyle="butt")
+            filled = look.colour if one.is_shown(study.confidence) else "white"
+            axes.plot(
+                words.scale * one.difference,
+                place,
+                look.marker,
+                color=look.colour,
+                markersize=5.5,
+                markerfacecolor=filled,
+            )
+        axes.axvline(0.0, color=MUTED, linewidth=0.9, zorder=0.5)
+        axes.set_yticks(range(len(compared)), compared)
+        axes.set_ylim(-0.6, len(compared) - 0.4)
+        axes.grid(visible=False, axis="y")
+        axes.locator_params(axis="x", nbins=4)
+    figure.supxlabel(f"{words.axis}, difference to {grid.baseline}", fontsize=8.5)
+    caption = (
+        f"{words.label}: difference to {grid.baseline} of runs with the same seed, mean and {study.confidence:.0%} "
+        "interval. Filled: a difference is shown; open: none could be shown."
+    )
+    columns = [*study.factors, "difference", "low", "high"]
+    rows = [[*one.levels.values(), one.difference, one.low, one.high] for one in differences]
+    return StudyFigure(metric, caption, svg_of(figure, metric), columns, rows)
 
 
-def trade_off_figure(study: Study, rows: Sequence[Row], across: str, upwards: str) -> str:
-    """Means of two metrics for each cell of the grid, a colour for each policy, as SVG.
+def trade_off_figure(study: Study, rows: Sequence[Row], across: str, upwards: str) -> StudyFigure:
+    """Means of two metrics with their intervals: a point each policy, a panel each fog.
 
     Parameters
     ----------
     study : Study
         The study.
     rows : sequence of Row
-        Its table.
+        Its table, of runs that are done.
     across, upwards : str
         Metrics of the horizontal and the vertical axis.
     """
-    figure = Figure(figsize=(7.0, 4.2), layout="constrained")
-    axes = figure.subplots()
-    first = next(iter(study.baseline))
-    others = [name for name in study.factors if name != first]
-    colours = _colours(study, first)
-    for level, colour in colours.items():
-        points: list[tuple[float, float, str]] = []
-        for cell in dict.fromkeys(tuple(str(row[name]) for name in others) for row in rows):
-            of_cell = [r for r in rows if r[first] == level and tuple(str(r[name]) for name in others) == cell]
-            x, y = _mean(of_cell, across), _mean(of_cell, upwards)
-            if x is not None and y is not None:
-                points.append((x, y, " · ".join(cell)))
-        axes.plot([p[0] for p in points], [p[1] for p in points], "o-", color=colour, label=level, linewidth=1.0)
-        for x, y, label in points:
-            axes.annotate(label, (x, y), xytext=(4, 4), textcoords="offset points", fontsize=7, color=_MUTED)
-    axes.set_xlabel(across, fontsize=9)
-    axes.set_ylabel(upwards, fontsize=9)
-    axes.legend(frameon=False, fontsize=8)
-    _dress(axes)
-    return _svg(figure)
+    grid = Grid(study)
+    by_cell: dict[tuple[str, ...], list[Row]] = {}
+    for row in rows:
+        by_cell.setdefault(tuple(str(row[name]) for name in study.factors), []).append(row)
+    figure, panels = grid.figure(2.4, same_axes=False)
+    scales = metric_words(across).scale, metric_words(upwards).scale
+    table = []
+    for panel, axes in panels:
+        for policy, look in grid.looks.items():
+            cell = grid.cell(policy, panel)
+            found = [
+                _mean_and_interval(by_cell.get(cell, []), metric, study.confidence) for metric in (across, upwards)
+            ]
+            (x, *of_x), (y, *of_y) = found
+            if x is None or y is None:
+                continue
+            table.append([*cell, x, *of_x, y, *of_y])
+            errors = [_errors(mean, ends, scale) for (mean, *ends), scale in zip(found, scales, strict=True)]
+            axes.errorbar(
+                *(scales[0] * x, scales[1] * y, errors[1], errors[0]),
+                fmt=look.marker,
+                color=look.colour,
+                markersize=6.0,
+                elinewidth=0.9,
+                alpha=0.9,
+                label=policy,
+            )
+    label_figure(figure, metric_words(across).axis, metric_words(upwards).axis)
+    name = f"trade_off_{upwards}"
+    caption = (
+        f"{metric_words(upwards).label} against {metric_words(across).label}: mean of all seeds; bars are its "
+        f"{study.confidence:.0%} bootstrap intervals. The panels' axes differ."
+    )
+    ends = [f"{metric}{end}" for metric in (across, upwards) for end in ("", "_low", "_high")]
+    return StudyFigure(name, caption, svg_of(figure, name), [*study.factors, *ends], table)
 
 
-def _colours(study: Study, factor: str) -> Mapping[str, str]:
-    return {level: _COLOURS[i % len(_COLOURS)] for i, level in enumerate(study.factors[factor])}
+def _mean_and_interval(
+    rows: Sequence[Row], metric: str, confidence: float
+) -> tuple[float | None, float | None, float | None]:
+    values = np.array([v for row in rows if (v := number_of(row.get(metric))) is not None])
+    if not len(values):
+        return None, None, None
+    return float(values.mean()), *mean_interval(values, confidence)
 
 
-def _mean(rows: Sequence[Row], metric: str) -> float | None:
-    values = [float(v) for row in rows if isinstance(v := row.get(metric), int | float)]
-    return sum(values) / len(values) if values else None
-
-
-def _dress(axes: Axes) -> None:
-    axes.grid(visible=True, color=_GRID, linewidth=0.7)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.tick_params(colors=_INK, labelsize=8)
-
-
-def _svg(figure: Figure) -> str:
-    text = io.StringIO()
-    FigureCanvasSVG(figure)
-    # No date: the same study gives the same bytes.
-    figure.savefig(text, format="svg", metadata={"Date": None})
-    return text.getvalue()
+def _errors(mean: float | None, ends: Sequence[float | None], scale: float) -> list[list[float]] | None:
+    """Lengths of the two bars at a point, as matplotlib takes them."""
+    low, high = ends
+    if mean is None or low is None or high is None:
+        return None
+    return [[scale * (mean - low)], [scale * (high - mean)]]

@@ -6,7 +6,7 @@ import itertools
 import json
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -18,6 +18,7 @@ from fogsim.scenario.document import Document, read_document
 from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.schema import NO_RENDERER
 from fogsim.scenario.section import Id, Section, Seed, Share, Text
+from fogsim.study.main_metrics import unknown_metrics
 from fogsim.traffic.road.configuration import configured_demand, configured_files
 
 MOST_RUNS = 1_000_000
@@ -59,6 +60,21 @@ class StudyFile(Section):
 
     frames: Literal["where_needed", "always"] = "where_needed"
     """Whether runs draw frames in which neither advice nor lamps go by what the camera sees."""
+
+    metrics: tuple[Text, ...] = ()
+    """Metrics of the comparison and the report; by default all, the main ones first."""
+
+    wanted_interval: Annotated[float, Field(gt=0, le=10)] = 0.1
+    """Half-width of an interval, as a share of the baseline's mean, for which the seeds needed are told."""
+
+    @model_validator(mode="after")
+    def _known_metrics(self) -> Self:
+        wrong = unknown_metrics(self.metrics)
+        if wrong:
+            raise ValueError("\n".join(f"metrics: {line}" for line in wrong))
+        if len(set(self.metrics)) < len(self.metrics):
+            raise ValueError("metrics: a metric stands twice")
+        return self
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
@@ -127,6 +143,14 @@ class Study:
         Confidence of the intervals, 0 … 1.
     runs : tuple of StudyRun
         All runs, in the order of the table.
+    metrics : tuple of str
+        Metrics of the comparison and the report; empty for all, the main ones first.
+    wanted_interval : float
+        Half-width of an interval, as a share of the baseline's mean, for which the seeds needed are told.
+    level_settings : mapping from str to mapping
+        Settings that make each level of each factor.
+    file : Path
+        The study file.
     """
 
     name: str
@@ -134,6 +158,10 @@ class Study:
     baseline: Mapping[str, str]
     confidence: float
     runs: tuple[StudyRun, ...]
+    metrics: tuple[str, ...] = ()
+    wanted_interval: float = 0.1
+    level_settings: Mapping[str, Mapping[str, tuple[str, ...]]] = field(default_factory=dict)
+    file: Path = Path("study.yaml")
 
     def description(self) -> dict[str, Any]:
         """All that decides its runs, as JSON can hold it: each cell's scenario by its levels, and the seeds."""
@@ -204,6 +232,10 @@ def load_study(path: Path) -> Study:
         baseline=written.baseline or {first: next(iter(levels))},
         confidence=written.confidence,
         runs=runs,
+        metrics=written.metrics,
+        wanted_interval=written.wanted_interval,
+        level_settings=written.factors,
+        file=path,
     )
 
 

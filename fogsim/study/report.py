@@ -1,41 +1,69 @@
 """A study as a page to read: what was compared, what came out, and how sure that is."""
 
-from collections.abc import Sequence
+import base64
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
 from fogsim.files.atomic import write_text
+from fogsim.recorders.manifest import versions
 from fogsim.recorders.report import PAGE_STYLE
 from fogsim.scenario.schema import NO_RENDERER
-from fogsim.study.comparison import Difference, compare_to_baseline, numeric_metrics, uninformative
+from fogsim.study.comparison import Difference, adjust_p_values, compare_to_baseline, numeric_metrics, uninformative
+from fogsim.study.drawing import StudyFigure
 from fogsim.study.figures import differences_figure, trade_off_figure
+from fogsim.study.main_metrics import DELAY_METRICS, SAFETY_METRICS, main_metrics
 from fogsim.study.plan import Study
+from fogsim.study.pooled_profiles import Cell, PooledProfiles
+from fogsim.study.profile_figures import collisions_figure, speed_figure, survival_figure
+from fogsim.study.report_tables import comparison_table, main_tables, plain_table
+from fogsim.study.report_words import summary
 from fogsim.study.table import Row, write_csv
 
-SHOWN = (
-    "collisions",
-    "ego_collisions",
-    "max_impact_speed_mps",
-    "time_exposed_time_to_collision_s",
-    "max_drac_mps2",
-    "negative_margin_time_share",
-    "minimum_visibility_margin_m",
-    "mean_speed_mps",
-    "max_deceleration_mps2",
-    "above_advice_time_share",
-    "belief_median_error_percent",
-)
-"""Metrics that have a figure in the report; comparison.csv has all of them."""
+_STYLE = """
+body { max-width: 76rem; }
+h3 { font-size: 1rem; margin: 1.2rem 0 .3rem; }
+.scrolls { overflow-x: auto; }
+.scrolls small { color: #5d6975; } .scrolls small b { color: #1c2733; }
+figure { max-width: 52rem; }
+details { margin: .8rem 0; } summary { cursor: pointer; font-weight: 600; color: #44505c; }
+ul { margin: .2rem 0; padding-left: 1.2rem; } code { overflow-wrap: anywhere; }
+"""
 
-_TRADE_OFFS = (("mean_speed_mps", "negative_margin_time_share"), ("mean_speed_mps", "collisions"))
-_COMPARISON = (
-    *("metric", "baseline_mean", "mean", "difference", "low", "high", "p_value", "pairs", "seeds_for_10_percent"),
-    "remark",
-)
+_MOST_FAILURES = 50
 
 
-def write_report(study: Study, rows: Sequence[Row], folder: Path) -> list[Difference]:
-    """Write ``comparison.csv``, ``report.html``, and the figures as SVG in ``figures``.
+@dataclass(frozen=True, slots=True)
+class _Findings:
+    """What the page shows.
+
+    Attributes
+    ----------
+    main : sequence of str
+        Metrics that are shown first.
+    differences : sequence of Difference
+        Of all metrics.
+    remarks : mapping from str to str
+        Metrics that cannot tell policies apart, and why.
+    figures : sequence of StudyFigure
+        All figures.
+    """
+
+    main: Sequence[str]
+    differences: Sequence[Difference]
+    remarks: Mapping[str, str]
+    figures: Sequence[StudyFigure]
+
+    def of_main(self) -> list[Difference]:
+        return [one for one in self.differences if one.metric in self.main]
+
+    def of_others(self) -> list[Difference]:
+        return [one for one in self.differences if one.metric not in self.main]
+
+
+def write_report(study: Study, rows: Sequence[Row], profiles: Mapping[Cell, PooledProfiles], folder: Path) -> None:
+    """Write ``comparison.csv``, ``report.html``, and the figures as SVG and CSV in ``figures``.
 
     Parameters
     ----------
@@ -43,131 +71,157 @@ def write_report(study: Study, rows: Sequence[Row], folder: Path) -> list[Differ
         The study.
     rows : sequence of Row
         Its table.
+    profiles : mapping from tuple of str to PooledProfiles
+        Profiles of each cell that has any.
     folder : Path
         Where they go.
-
-    Returns
-    -------
-    list of Difference
-        What the page shows.
     """
     done = [row for row in rows if row["status"] == "complete"]
-    metrics = numeric_metrics(done, study.factors)
-    remarks = uninformative(done, metrics)
-    differences = compare_to_baseline(study, done, metrics)
-    write_csv(
-        folder / "comparison.csv",
-        [*study.factors, *_COMPARISON],
-        [_comparison_row(study, one, remarks.get(one.metric)) for one in differences],
-    )
-    figures = _figures(study, done, [one for one in differences if one.metric not in remarks])
+    known = numeric_metrics(done, study.factors)
+    main = main_metrics(study.metrics, known)
+    others = [] if study.metrics else [name for name in known if name not in main]
+    remarks = uninformative(done, [*main, *others])
+    differences = adjust_p_values(compare_to_baseline(study, done, main)) + compare_to_baseline(study, done, others)
+    _write_comparison(study, differences, remarks, folder)
+    telling = [one for one in differences if one.metric in main and one.metric not in remarks]
+    figures = [*_figures(study, done, remarks, profiles, telling)]
     (folder / "figures").mkdir(exist_ok=True)
-    for name, svg in figures.items():
-        write_text(folder / "figures" / f"{name}.svg", svg)
-    write_text(folder / "report.html", _page(study, rows, differences, remarks, figures))
-    return differences
+    for figure in figures:
+        write_text(folder / "figures" / f"{figure.name}.svg", figure.svg)
+        write_csv(folder / "figures" / f"{figure.name}.csv", figure.columns, figure.rows)
+    write_text(folder / "report.html", _page(study, rows, _Findings(main, differences, remarks, figures), folder))
 
 
-def _comparison_row(study: Study, one: Difference, remark: str | None) -> list[object]:
-    return [
-        *(one.levels[name] for name in study.factors),
-        *(one.metric, one.baseline_mean, one.mean, one.difference, one.low, one.high, one.p_value, one.pairs),
-        *(one.seeds_for_half_width, remark),
+def _write_comparison(
+    study: Study, differences: Sequence[Difference], remarks: Mapping[str, str], folder: Path
+) -> None:
+    names = ("metric", "baseline_mean", "mean", "difference", "low", "high", "p_value", "p_value_adjusted", "pairs")
+    seeds = f"seeds_for_{100 * study.wanted_interval:g}_percent"
+    rows = [
+        [
+            *(one.levels[name] for name in study.factors),
+            *(one.metric, one.baseline_mean, one.mean, one.difference, one.low, one.high),
+            *(one.p_value, one.adjusted_p_value, one.pairs, one.seeds_for_half_width, remarks.get(one.metric)),
+        ]
+        for one in differences
     ]
+    write_csv(folder / "comparison.csv", [*study.factors, *names, seeds, "remark"], rows)
 
 
-def _figures(study: Study, rows: Sequence[Row], differences: Sequence[Difference]) -> dict[str, str]:
-    figures = {}
-    known = {key for row in rows for key in row}
-    for across, upwards in _TRADE_OFFS:
-        if {across, upwards} <= known:
-            figures[f"{upwards}_against_{across}"] = trade_off_figure(study, rows, across, upwards)
-    for metric in SHOWN:
-        of_metric = [one for one in differences if one.metric == metric]
-        if of_metric:
-            figures[metric] = differences_figure(study, metric, of_metric)
-    return figures
-
-
-def _page(
+def _figures(
     study: Study,
     rows: Sequence[Row],
+    remarks: Mapping[str, str],
+    profiles: Mapping[Cell, PooledProfiles],
     differences: Sequence[Difference],
-    remarks: dict[str, str],
-    figures: dict[str, str],
-) -> str:
+) -> Iterator[StudyFigure]:
+    """All figures of which there is something to draw."""
+    drawable = [name for name in numeric_metrics(rows, study.factors) if remarks.get(name) != "does not vary"]
+    across = next((name for name in DELAY_METRICS if name in drawable), None)
+    for group in SAFETY_METRICS:
+        upwards = next((name for name in group if name in drawable), None)
+        if across is not None and upwards is not None:
+            yield trade_off_figure(study, rows, across, upwards)
+    if profiles:
+        yield survival_figure(study, profiles)
+        yield speed_figure(study, profiles)
+        collisions = collisions_figure(study, profiles)
+        if collisions is not None:
+            yield collisions
+    for metric in dict.fromkeys(one.metric for one in differences):
+        yield differences_figure(study, metric, [one for one in differences if one.metric == metric])
+
+
+def _page(study: Study, rows: Sequence[Row], found: _Findings, folder: Path) -> str:
     title = escape(study.name)
-    done = sum(row["status"] == "complete" for row in rows)
-    factors = "; ".join(f"{name}: {', '.join(levels)}" for name, levels in study.factors.items())
     failed = [row for row in rows if row["status"] != "complete"]
+    done = [row for row in rows if row["status"] == "complete"]
     return "\n".join(
         [
             '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">',
-            f"<title>{title} – FogSim</title>\n<style>{PAGE_STYLE}</style>\n</head>\n<body>",
-            f'<h1>{title}</h1>\n<p class="lead">{done} of {len(rows)} runs. {escape(factors)}. Compared to '
-            f"{escape(' · '.join(study.baseline.values()))}, seed by seed.</p>",
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            f"<title>{title} – FogSim</title>\n<style>{PAGE_STYLE}{_STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>",
             *([f'<div class="partial">PARTIAL: {len(failed)} runs are missing or failed</div>'] if failed else []),
-            *(_failures(study, failed)),
-            _cameraless(study),
-            _differences_table(study, [one for one in differences if one.metric in SHOWN], remarks),
-            "<h2>Figures</h2>" if figures else "",
-            *(
-                f"<figure>{_embedded(svg)}<figcaption>{escape(name)}</figcaption></figure>"
-                for name, svg in figures.items()
-            ),
-            _remarks(remarks),
+            summary(study, rows, found.of_main(), found.remarks),
+            *_failures(study, failed),
+            main_tables(study, done, found.main, found.of_main(), found.remarks),
+            "<h2>Figures</h2>" if found.figures else "",
+            *(_embedded(figure) for figure in found.figures),
+            *_details(study, found),
+            _how_it_was_run(study, folder),
             "</body>\n</html>\n",
         ]
     )
 
 
-def _cameraless(study: Study) -> str:
-    """Say which cells were run without frames, since nothing in them goes by what a camera sees."""
-    cells = dict.fromkeys(" · ".join(r.levels.values()) for r in study.runs if r.scenario.renderer == NO_RENDERER)
-    if not cells:
-        return ""
-    return f'<p class="note">Run without camera, which nothing in them goes by: {escape("; ".join(cells))}.</p>'
-
-
-def _embedded(svg: str) -> str:
-    return svg[svg.index("<svg") :]
+def _embedded(figure: StudyFigure) -> str:
+    """A figure as a picture of its own, so that names of parts within two figures do not meet."""
+    data = base64.b64encode(figure.svg.encode()).decode("ascii")
+    caption = f'{escape(figure.caption)} <a href="figures/{escape(figure.name)}.svg">SVG</a> '
+    caption += f'<a href="figures/{escape(figure.name)}.csv">CSV</a>'
+    picture = f'<img alt="{escape(figure.caption)}" src="data:image/svg+xml;base64,{data}">'
+    return f"<figure>{picture}<figcaption>{caption}</figcaption></figure>"
 
 
 def _failures(study: Study, failed: Sequence[Row]) -> list[str]:
-    told = [row for row in failed if row["message"]]
+    if not failed:
+        return []
+    rows = [
+        [
+            str(row["run"]),
+            *(str(row[name]) for name in study.factors),
+            str(row["seed"]),
+            str(row["message"] or "missing"),
+        ]
+        for row in failed[:_MOST_FAILURES]
+    ]
+    more = len(failed) - len(rows)
     return [
-        f'<p class="note">Run {row["run"]} ({escape(" · ".join(str(row[name]) for name in study.factors))}, seed '
-        f"{row['seed']}): {escape(str(row['message']))}</p>"
-        for row in told[:20]
+        "<h2>Runs that failed</h2>",
+        plain_table(["run", *study.factors, "seed", "message"], rows),
+        f'<p class="note">And {more} more; study.csv has all.</p>' if more else "",
     ]
 
 
-def _differences_table(study: Study, differences: Sequence[Difference], remarks: dict[str, str]) -> str:
-    head = "".join(f"<th>{escape(name)}</th>" for name in ("metric", *study.factors))
-    numbers = ("baseline", "mean", "difference", f"{study.confidence:.0%} interval", "p", "seeds", "seeds for ± 10 %")
-    head += "".join(f'<th class="value">{escape(name)}</th>' for name in numbers)
-    body = []
-    for one in differences:
-        cells = "".join(f"<td>{escape(text)}</td>" for text in (one.metric, *one.levels.values()))
-        interval = remarks.get(one.metric, "–") if one.low is None else f"{one.low:.3g} … {one.high:.3g}"
-        values = (
-            *(f"{one.baseline_mean:.3g}", f"{one.mean:.3g}", f"{one.difference:+.3g}", interval),
-            *(_shown(one.p_value), str(one.pairs), _shown(one.seeds_for_half_width)),
-        )
-        body.append(f"<tr>{cells}" + "".join(f'<td class="value">{escape(v)}</td>' for v in values) + "</tr>")
-    note = (
-        "Differences are of runs with the same seed; intervals by bootstrap (BCa, 9999 resamples), p by a paired "
-        "permutation test. The last column says how many seeds an interval of ± 10 % of the baseline's mean would need."
+def _details(study: Study, found: _Findings) -> Iterator[str]:
+    """What few will want to read, folded."""
+    yield "<h2>All comparisons</h2>"
+    for title, differences in (("Main metrics", found.of_main()), ("All other metrics", found.of_others())):
+        if differences:
+            table = comparison_table(study, differences, found.remarks)
+            yield f"<details><summary>{title}</summary>{table}</details>"
+    yield (
+        '<p class="note">In the metrics\' own units. Differences are of runs with the same seed; intervals by '
+        "bootstrap (BCa; Efron 1987; 9999 resamples), p by a paired permutation test, adjusted among the main metrics "
+        "by Benjamini &amp; Hochberg (1995); seeds needed by the normal law.</p>"
     )
-    return f'<h2>Differences</h2><table><tr>{head}</tr>{"".join(body)}</table><p class="note">{note}</p>'
+    absent = [name for name in study.metrics if name not in found.main]
+    told = {**dict.fromkeys(absent, "no run has a value"), **found.remarks}
+    if told:
+        yield "<details><summary>Metrics that cannot tell the policies apart</summary>"
+        yield plain_table(["metric", "why"], told.items()) + "</details>"
 
 
-def _shown(value: float | None) -> str:
-    return "–" if value is None else f"{value:.2g}" if value < 1 else f"{value:.0f}"
-
-
-def _remarks(remarks: dict[str, str]) -> str:
-    if not remarks:
-        return ""
-    rows = "".join(f"<tr><td>{escape(name)}</td><td>{escape(why)}</td></tr>" for name, why in remarks.items())
-    return f"<h2>Metrics that cannot tell the policies apart</h2><table>{rows}</table>"
+def _how_it_was_run(study: Study, folder: Path) -> str:
+    settings = [
+        [factor, level, ", ".join(given) or "–"]
+        for factor, levels in study.level_settings.items()
+        for level, given in levels.items()
+    ]
+    of_cells = {" · ".join(run.levels.values()): run.scenario.renderer == NO_RENDERER for run in study.runs}
+    without = [cell for cell, is_blind in of_cells.items() if is_blind]
+    if not without:
+        cameras = "All runs had a camera."
+    else:
+        which = "all" if len(without) == len(of_cells) else "; ".join(without)
+        cameras = f"Run without a camera, which nothing in them goes by: {which}."
+    command = f"fogsim study {study.file} --out {folder}"
+    known = "; ".join(f"{name} {version}" for name, version in versions().items() if version)
+    return "\n".join(
+        [
+            "<h2>How it was run</h2>",
+            plain_table(["factor", "level", "settings"], settings) if settings else "",
+            f"<p>{escape(cameras)}</p>\n<p>Again, or on, if runs are missing: <code>{escape(command)}</code></p>",
+            f"<footer>{escape(known)}</footer>",
+        ]
+    )

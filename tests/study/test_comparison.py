@@ -1,7 +1,9 @@
+import dataclasses
+
 import numpy as np
 import pytest
 
-from fogsim.study.comparison import compare_to_baseline, numeric_metrics, uninformative
+from fogsim.study.comparison import adjust_p_values, compare_to_baseline, numeric_metrics, uninformative
 from fogsim.study.plan import Study
 
 STUDY = Study("s", {"policy": ("none", "slow"), "fog": ("thin", "thick")}, {"policy": "none"}, 0.95, ())
@@ -65,6 +67,31 @@ def test_where_nothing_differs_nothing_is_claimed() -> None:
     (one, _) = compare_to_baseline(STUDY, table(0.0), ["crashes"])
     assert (one.difference, one.low, one.high, one.p_value) == (0.0, None, None, None)
     assert one.seeds_for_half_width is None
+
+
+def test_few_seeds_show_nothing_and_one_pair_has_no_test() -> None:
+    # Three differences of one sign: the bootstrap excludes 0, the test cannot.
+    (three, _) = compare_to_baseline(STUDY, table(-2.0, seeds=3), ["speed_mps"])
+    assert three.high is not None
+    assert three.high < 0.0
+    assert three.p_value == pytest.approx(0.25)
+    assert not three.is_shown(0.95)
+    (many, _) = compare_to_baseline(STUDY, table(-2.0), ["speed_mps"])
+    assert many.is_shown(0.95)
+    (one, _) = compare_to_baseline(STUDY, table(-2.0, seeds=1), ["speed_mps"])
+    assert (one.pairs, one.low, one.p_value, one.seeds_for_half_width) == (1, None, None, None)
+    assert not one.is_shown(0.95)
+
+
+def test_p_values_are_adjusted_to_the_number_of_comparisons() -> None:
+    (one, _) = compare_to_baseline(STUDY, table(-2.0), ["speed_mps"])
+    family = [dataclasses.replace(one, p_value=p) for p in (0.01, None, 0.04, 0.03)]
+    # Benjamini & Hochberg 1995: p · m / rank, made monotonous from the largest on.
+    assert [each.adjusted_p_value for each in adjust_p_values(family)] == [
+        pytest.approx(0.03),
+        None,
+        *(pytest.approx(0.04), pytest.approx(0.04)),
+    ]
 
 
 def test_only_seeds_of_which_both_runs_have_a_value_count() -> None:

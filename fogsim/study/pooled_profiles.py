@@ -1,0 +1,127 @@
+"""Profiles of all runs of a cell of the grid, added up."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.study.profiles import CLASSES, Profiles
+
+Cell = tuple[str, ...]
+"""Levels of all factors, in their order."""
+
+_SUMS = ("ego_time_s", "ego_way_m", "ego_extinction_time_s_per_m", "vehicle_time_s", "vehicle_way_m")
+
+
+class CollisionPlace(NamedTuple):
+    """Where a collision was and how hard.
+
+    Attributes
+    ----------
+    seed : int
+        Seed of its run.
+    time : float
+        Instant [s].
+    x, y : float or None
+        East and north [m]; None where neither vehicle was near the ego.
+    impact_speed : float
+        Difference of speeds [m/s].
+    """
+
+    seed: int
+    time: float
+    x: float | None
+    y: float | None
+    impact_speed: float
+
+
+@dataclass(slots=True)
+class PooledProfiles:
+    """What the profiles of some runs add up to.
+
+    Attributes
+    ----------
+    vehicle_time : float
+        Time of all vehicles [s].
+    moving, queue : (n,) float64
+        That in each class of time to collision, with a leader that moves and with one that is slower than 5 m/s [s].
+    road : mapping from float to (5,) float64
+        By place along the ego's route [m]: time, way and extinction over time of the ego, time and way of everybody.
+    path : (n, 2) float64
+        The longest way of the ego in plan [m].
+    collisions : list of CollisionPlace
+        Those that were kept.
+    """
+
+    vehicle_time: float = 0.0
+    moving: NDArray[np.float64] = field(default_factory=lambda: np.zeros(CLASSES))
+    queue: NDArray[np.float64] = field(default_factory=lambda: np.zeros(CLASSES))
+    road: dict[float, NDArray[np.float64]] = field(default_factory=dict)
+    path: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
+    collisions: list[CollisionPlace] = field(default_factory=list)
+
+    def add(self, seed: int, profiles: Profiles) -> None:
+        """Add those of one run.
+
+        Parameters
+        ----------
+        seed : int
+            Its seed.
+        profiles : mapping
+            Of `RunProfiles.to_json`.
+        """
+        self.vehicle_time += profiles["vehicle_time_s"]
+        classes, road, hits = profiles["time_to_collision"], profiles["road"], profiles["collisions"]
+        self.moving += np.array(classes["moving_s"])
+        self.queue += np.array(classes["queue_s"])
+        for place, *sums in zip(road["place_m"], *(road[name] for name in _SUMS), strict=True):
+            self.road[place] = self.road.get(place, np.zeros(len(_SUMS))) + np.array(sums)
+        path = np.array([profiles["path"]["x_m"], profiles["path"]["y_m"]]).T
+        self.path = path if len(path) > len(self.path) else self.path
+        columns = (hits[name] for name in ("time_s", "x_m", "y_m", "impact_speed_mps"))
+        self.collisions += [CollisionPlace(seed, *values) for values in zip(*columns, strict=True)]
+
+    def survival(self) -> NDArray[np.float64]:
+        """Share of the time of all vehicles with a time to collision above the upper end of each class [-].
+
+        Time behind leaders that are slower than 5 m/s, which is closing up to a queue, counts as above.
+        """
+        if self.vehicle_time <= 0.0:
+            return np.full(CLASSES, np.nan)
+        return np.asarray(1.0 - np.cumsum(self.moving) / self.vehicle_time)
+
+    def speeds(self, *, ego_only: bool = False) -> NDArray[np.float64]:
+        """Place along the ego's route [m], mean speed there [m/s] and time on which it is based [s], as columns.
+
+        Parameters
+        ----------
+        ego_only : bool
+            Whether of the ego alone, in place of everybody on its road.
+        """
+        time, way = (0, 1) if ego_only else (3, 4)
+        found = [(place, sums[way] / sums[time], sums[time]) for place, sums in self._road() if sums[time] > 0.0]
+        return np.array(found).reshape(-1, 3)
+
+    def extinctions(self) -> NDArray[np.float64]:
+        """Place along the ego's route [m] and mean extinction at the ego there [1/m], as columns."""
+        found = [(place, sums[2] / sums[0]) for place, sums in self._road() if sums[0] > 0.0]
+        return np.array(found).reshape(-1, 2)
+
+    def _road(self) -> Iterator[tuple[float, NDArray[np.float64]]]:
+        return iter(sorted(self.road.items()))
+
+
+def pool_profiles(found: Iterable[tuple[Mapping[str, str], int, Profiles]]) -> dict[Cell, PooledProfiles]:
+    """Add up the profiles of all runs of each cell.
+
+    Parameters
+    ----------
+    found : iterable of (mapping, int, mapping)
+        Levels, seed and profiles of each run that is done.
+    """
+    cells: dict[Cell, PooledProfiles] = {}
+    for levels, seed, profiles in found:
+        cells.setdefault(tuple(levels.values()), PooledProfiles()).add(seed, profiles)
+    return cells

@@ -1,0 +1,123 @@
+"""Tables of a study's report."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+
+from fogsim.study.comparison import Difference, number_of
+from fogsim.study.drawing import Grid
+from fogsim.study.main_metrics import metric_words, signed
+from fogsim.study.plan import Study
+from fogsim.study.table import Row
+
+
+def main_tables(
+    study: Study,
+    rows: Sequence[Row],
+    metrics: Sequence[str],
+    differences: Sequence[Difference],
+    remarks: Mapping[str, str],
+) -> str:
+    """Means and differences of chosen metrics: a table for each cell of the other factors, a column for each policy.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    rows : sequence of Row
+        Its table, of runs that are done.
+    metrics : sequence of str
+        What is shown.
+    differences : sequence of Difference
+        Of these metrics.
+    remarks : mapping from str to str
+        Metrics that cannot tell policies apart, and why.
+    """
+    grid = Grid(study)
+    of_cell: dict[tuple[str, ...], list[Row]] = {}
+    for row in rows:
+        of_cell.setdefault(tuple(str(row[name]) for name in study.factors), []).append(row)
+    found = {(one.metric, tuple(one.levels.values())): one for one in differences}
+    parts = ["<h2>Main metrics</h2>"]
+    for panel, title in grid.panels.items():
+        head = ["metric", *grid.policies]
+        body = []
+        for metric in metrics:
+            cells = [grid.cell(policy, panel) for policy in grid.policies]
+            values = [_mean_cell(study, metric, of_cell.get(cell, []), found.get((metric, cell))) for cell in cells]
+            remark = f"<br><small>{escape(remarks[metric])}</small>" if metric in remarks else ""
+            label = f'<span title="{escape(metric)}">{escape(metric_words(metric).axis)}</span>{remark}'
+            body.append([label, *values])
+        parts += [f"<h3>{escape(title)}</h3>" if title else "", _table(head, body, texts=1)]
+    note = (
+        "Mean over the seeds; below, the difference to the baseline with its interval; bold where a difference is "
+        "shown. Shares in percent, their differences in percentage points."
+    )
+    return "\n".join([*parts, f'<p class="note">{note}</p>'])
+
+
+def _mean_cell(study: Study, metric: str, rows: Sequence[Row], one: Difference | None) -> str:
+    scale = metric_words(metric).scale
+    values = [v for row in rows if (v := number_of(row.get(metric))) is not None]
+    text = f"{scale * sum(values) / len(values):.3g}" if values else "–"
+    if one is None:
+        return text
+    said = signed(scale * one.difference)
+    if one.low is not None and one.high is not None:
+        said += f" ({signed(scale * one.low, 2)} … {signed(scale * one.high, 2)})"
+    return f"{text}<br><small>{f'<b>{said}</b>' if one.is_shown(study.confidence) else said}</small>"
+
+
+def comparison_table(study: Study, differences: Sequence[Difference], remarks: Mapping[str, str]) -> str:
+    """Every comparison with its interval, p-values and the seeds that are needed, in the metric's own unit.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    differences : sequence of Difference
+        What is shown.
+    remarks : mapping from str to str
+        Metrics that cannot tell policies apart, and why.
+    """
+    numbers = ("baseline", "mean", "difference", f"{study.confidence:.0%} interval", "p", "p adjusted", "seeds")
+    head = ["metric", *study.factors, *numbers, f"seeds for ± {study.wanted_interval:.0%}"]
+    body = []
+    for one in differences:
+        interval = remarks.get(one.metric, "–") if one.low is None else f"{one.low:.3g} … {one.high:.3g}"
+        body.append(
+            [
+                *(escape(text) for text in (one.metric, *one.levels.values())),
+                *(f"{one.baseline_mean:.3g}", f"{one.mean:.3g}", f"{one.difference:+.3g}", escape(interval)),
+                *(_shown(one.p_value), _shown(one.adjusted_p_value), str(one.pairs)),
+                "–" if one.seeds_for_half_width is None else str(one.seeds_for_half_width),
+            ]
+        )
+    return _table(head, body, texts=1 + len(study.factors))
+
+
+def plain_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table of text.
+
+    Parameters
+    ----------
+    head : sequence of str
+        Its columns.
+    rows : iterable of sequences
+        Its rows.
+    """
+    return _table(head, [[escape(text) for text in row] for row in rows], texts=len(head))
+
+
+def _table(head: Sequence[str], body: Sequence[Sequence[str]], texts: int) -> str:
+    """A table whose first columns are text, and the others numbers; it scrolls by itself where it is too wide."""
+    kinds = ["" if i < texts else ' class="value"' for i in range(len(head))]
+    top = "".join(f"<th{kind}>{escape(name)}</th>" for name, kind in zip(head, kinds, strict=True))
+    lines = "\n".join(
+        "<tr>" + "".join(f"<td{kind}>{cell}</td>" for cell, kind in zip(row, kinds, strict=True)) + "</tr>"
+        for row in body
+    )
+    return f'<div class="scrolls"><table><tr>{top}</tr>\n{lines}</table></div>'
+
+
+def _shown(value: float | None) -> str:
+    return "–" if value is None else f"{value:.2g}"

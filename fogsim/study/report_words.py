@@ -1,0 +1,114 @@
+"""What a study found, in words: signs only where there is something to show."""
+
+from collections.abc import Mapping, Sequence
+from html import escape
+
+from fogsim.study.comparison import Difference
+from fogsim.study.drawing import Grid
+from fogsim.study.main_metrics import MetricWords, metric_words, signed
+from fogsim.study.plan import Study
+from fogsim.study.table import Row
+
+
+def summary(study: Study, rows: Sequence[Row], differences: Sequence[Difference], remarks: Mapping[str, str]) -> str:
+    """The summary of the report, as HTML.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    rows : sequence of Row
+        Its table.
+    differences : sequence of Difference
+        Of the metrics that the report shows first.
+    remarks : mapping from str to str
+        Metrics that cannot tell policies apart, and why.
+    """
+    telling = [one for one in differences if one.metric not in remarks]
+    return "\n".join(
+        [
+            "<h2>Summary</h2>",
+            f"<p>{escape(_compared(study, rows))}</p>",
+            *_findings(study, telling),
+            *_doubts(study, telling),
+        ]
+    )
+
+
+def _compared(study: Study, rows: Sequence[Row]) -> str:
+    shape = " × ".join(f"{len(levels)} {name}" for name, levels in study.factors.items())
+    seeds = len({run.seed for run in study.runs})
+    done = sum(row["status"] == "complete" for row in rows)
+    return (
+        f"{shape} × {seeds} seeds = {len(rows)} runs, of which {'all' if done == len(rows) else done} are complete. "
+        f"Everything is compared to {' · '.join(study.baseline.values())}, run by run with the same seed."
+    )
+
+
+def _findings(study: Study, differences: Sequence[Difference]) -> list[str]:
+    """What is shown of each policy, in a list for each cell of the other factors."""
+    grid = Grid(study)
+    lines = []
+    for panel, title in grid.panels.items():
+        items = []
+        for policy in grid.policies:
+            cell = grid.cell(policy, panel)
+            of_policy = [one for one in differences if tuple(one.levels.values()) == cell]
+            if of_policy:
+                items.append(f"<li><b>{escape(policy)}</b>: {escape(_finding(study, of_policy))}</li>")
+        heading = f"<h3>{escape(title)}</h3>" if title else ""
+        lines += [heading, f"<ul>{''.join(items)}</ul>"] if items else []
+    return lines
+
+
+def _finding(study: Study, differences: Sequence[Difference]) -> str:
+    shown = [one for one in differences if one.is_shown(study.confidence)]
+    if not shown:
+        return "no difference could be shown in any of the main metrics."
+    others = [metric_words(one.metric).label for one in differences if one not in shown]
+    said = "; ".join(_said(one, metric_words(one.metric)) for one in shown) + "."
+    return said + (f" No difference could be shown in: {', '.join(others)}." if others else "")
+
+
+def _said(one: Difference, words: MetricWords) -> str:
+    """One difference that is shown, with its interval, and whether it is for the better."""
+    judged = {"less": one.difference < 0, "more": one.difference > 0}.get(words.better)
+    verdict = "" if judged is None else ", better" if judged else ", worse"
+    low, high = (words.scale * (end or 0.0) for end in (one.low, one.high))
+    unit = "%-points" if words.unit == "%" else words.unit
+    size = f"{words.label} {signed(words.scale * one.difference)} {unit}".rstrip()
+    return f"{size} ({signed(low)} … {signed(high)}){verdict}"
+
+
+def _doubts(study: Study, differences: Sequence[Difference]) -> list[str]:
+    """How many comparisons there are, and what so many or so few seeds cannot tell."""
+    tested = [one for one in differences if one.p_value is not None]
+    if not tested:
+        return ['<p class="note">Nothing was compared.</p>']
+    level = 1.0 - study.confidence
+    shown = sum(one.is_shown(study.confidence) for one in tested)
+    kept = sum((one.adjusted_p_value or 1.0) <= level for one in tested)
+    said = [
+        f"A difference counts as shown where its {study.confidence:.0%} interval excludes 0 and the paired permutation "
+        f"test has p ≤ {level:.2g}: {shown} of {len(tested)} comparisons that vary. If no policy did anything, about "
+        f"{level * len(tested):.0f} would by chance; adjusted to their number (Benjamini & Hochberg 1995), {kept} are."
+    ]
+    pairs = max(one.pairs for one in tested)
+    if 2.0 ** (1 - pairs) > level:
+        said.append(
+            f"Of {pairs} seeds, the test can show nothing at this confidence: its least p is {2.0 ** (1 - pairs):.2g}."
+        )
+    needed = _seeds_needed(tested)
+    if needed:
+        said.append(
+            f"Seeds for intervals of ± {study.wanted_interval:.0%} of the baseline's mean everywhere: {needed}."
+        )
+    return [f'<p class="note">{escape(line)}</p>' for line in said]
+
+
+def _seeds_needed(differences: Sequence[Difference]) -> str:
+    most: dict[str, int] = {}
+    for one in differences:
+        if one.seeds_for_half_width is not None:
+            most[one.metric] = max(most.get(one.metric, 0), one.seeds_for_half_width)
+    return "; ".join(f"{metric_words(metric).label} {seeds}" for metric, seeds in most.items())

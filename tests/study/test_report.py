@@ -1,0 +1,209 @@
+"""The report of a study, from made-up runs: what it says, and that its figures and tables are whole."""
+
+import csv
+import dataclasses
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fogsim.metrics import DEFAULT_STANDARD, METRICS
+from fogsim.scenario import load_scenario
+from fogsim.study.figures import trade_off_figure
+from fogsim.study.main_metrics import DELAY_METRICS, MAIN_METRICS, SAFETY_METRICS
+from fogsim.study.plan import Study, StudyRun
+from fogsim.study.pooled_profiles import PooledProfiles, pool_profiles
+from fogsim.study.profiles import CLASSES
+from fogsim.study.report import write_report
+
+FACTORS = {"policy": ("none", "slow <1>"), "fog": ("thin", "thick")}
+SEEDS = 8
+
+
+def profiles(speed: float, exposed: float) -> dict[str, object]:
+    """Of a run of 100 vehicle-seconds on 200 m of road, of which 150 m were driven on, with one collision."""
+    return {
+        "vehicle_time_s": 100.0,
+        "time_to_collision": {
+            "class_s": 0.25,
+            "moving_s": [0.0] * 8 + [exposed] + [0.0] * (CLASSES - 9),
+            "queue_s": [0.0] * CLASSES,
+        },
+        "road": {
+            "place_m": [25.0, 75.0, 175.0],
+            "ego_time_s": [2.0, 2.0, 2.0],
+            "ego_way_m": [2 * speed] * 3,
+            "ego_extinction_time_s_per_m": [0.02, 0.06, 0.12],
+            "vehicle_time_s": [10.0, 20.0, 10.0],
+            "vehicle_way_m": [10 * speed, 40 * speed, 10 * speed],
+        },
+        "path": {"place_m": [0.0, 50.0, 100.0], "x_m": [0.0, 40.0, 80.0], "y_m": [0.0, 30.0, 60.0]},
+        "collisions": {
+            "time_s": [3.0, 4.0],
+            "x_m": [40.0, None],
+            "y_m": [30.0, None],
+            "impact_speed_mps": [5.0, 1.0],
+            "collider": ["a", "b"],
+            "victim": ["c", "d"],
+        },
+        "collision_count": 2,
+    }
+
+
+@pytest.fixture(scope="module")
+def study() -> Study:
+    scenario = load_scenario("motorway_fog_bank", ["renderer=none", "estimators=[]"])
+    cells = [{"policy": p, "fog": f} for p in FACTORS["policy"] for f in FACTORS["fog"]]
+    runs = [StudyRun(0, cell, seed, scenario, "k") for cell in cells for seed in range(SEEDS)]
+    settings = {"policy": {"none": (), "slow <1>": ("advice=<slow>",)}, "fog": {"thin": (), "thick": ()}}
+    return Study("made & up", FACTORS, {"policy": "none"}, 0.95, tuple(runs), level_settings=settings)
+
+
+def rows_of(study: Study) -> list[dict[str, str | float | int | None]]:
+    """Runs in which the second policy is slower by 5 m/s and nothing else differs but by chance."""
+    rng = np.random.default_rng(1)
+    of_seed = rng.normal(30.0, 2.0, SEEDS)
+    rows = []
+    for number, run in enumerate(study.runs):
+        slow = run.levels["policy"] != "none"
+        metrics = {
+            "collisions": int(rng.integers(0, 3)),
+            "ego_collisions": 0,
+            "traffic_mean_speed_mps": float(of_seed[run.seed] - 5.0 * slow + rng.normal(0, 0.2)),
+            "traffic_exposed_time_share": 0.02 - 0.01 * slow + float(rng.normal(0, 0.001)),
+            "distance_m": 1000.0 + number,
+        }
+        about = {"seed": run.seed, "status": "complete", "message": None}
+        rows.append({"run": number, **run.levels, **about, **metrics})
+    return rows
+
+
+class Balanced(HTMLParser):
+    """Checks that what is opened is closed, and remembers what was opened and what is loaded."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.sources: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.sources += [str(value) for name, value in attrs if name in ("src", "href")]
+        if tag not in ("meta", "img", "br"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+@pytest.fixture(scope="module")
+def folder(study: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("report")
+    written(study, rows_of(study), made)
+    return made
+
+
+def written(study: Study, rows: list[dict[str, str | float | int | None]], folder: Path) -> str:
+    found = [(run.levels, run.seed, profiles(30.0 - 5.0 * (run.levels["policy"] != "none"), 2.0)) for run in study.runs]
+    write_report(study, rows, pool_profiles(found), folder)
+    return (folder / "report.html").read_text(encoding="utf-8")
+
+
+def table(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_the_report_says_what_is_shown_and_no_more(study: Study, folder: Path) -> None:
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    parser = Balanced()
+    parser.feed(page)
+    assert parser.open == []
+    assert all(source.startswith(("data:image/svg+xml;base64,", "figures/")) for source in parser.sources)
+    summary = page[page.index("<h2>Summary") : page.index("<h2>Main metrics")]
+    assert "2 policy × 2 fog × 8 seeds = 32 runs, of which all are complete" in summary
+    assert "slow &lt;1&gt;" in summary
+    assert len(re.findall(r"Time at TTC &lt; 3 s −(0\.9|1\.0)\d* %-points \(−[\d.]+ … −[\d.]+\), better", summary)) == 2
+    assert summary.count(", better") == 2
+    # Speed is neither better nor worse by itself, and collisions differ by chance alone.
+    assert summary.count("Mean speed of all −") == 2
+    assert summary.count("No difference could be shown in: Collisions of all.") == 2
+    assert "4 of 6 comparisons that vary" in summary
+    assert "Run without a camera, which nothing in them goes by: all." in page
+    assert "advice=&lt;slow&gt;" in page
+    assert "fogsim study study.yaml --out" in page
+    comparison = table(folder / "comparison.csv")
+    by_metric = {row["metric"]: row for row in comparison if row["fog"] == "thin"}
+    assert set(by_metric) == {*(name for name in MAIN_METRICS if name in rows_of(study)[0]), "distance_m"}
+    assert by_metric["ego_collisions"]["remark"] == "does not vary"
+    assert float(by_metric["traffic_mean_speed_mps"]["p_value_adjusted"]) <= 0.05
+    assert by_metric["distance_m"]["p_value_adjusted"] == ""
+    assert "seeds_for_10_percent" in comparison[0]
+
+
+def test_figures_are_there_as_svg_and_csv(study: Study, folder: Path) -> None:
+    names = {path.stem for path in (folder / "figures").iterdir()}
+    assert names == {
+        *("trade_off_collisions", "trade_off_traffic_exposed_time_share", "ttc_survival", "speed_over_road"),
+        *("collisions_map", "collisions", "traffic_mean_speed_mps", "traffic_exposed_time_share"),
+    }
+    survival = {
+        (row["policy"], float(row["time_to_collision_s"])): float(row["share_above"])
+        for row in table(folder / "figures" / "ttc_survival.csv")
+    }
+    assert survival["none", 2.0] == 1.0
+    assert survival["none", 2.25] == pytest.approx(0.98)
+    speeds = [row for row in table(folder / "figures" / "speed_over_road.csv") if row["fog"] == "thin"]
+    assert [float(row["mean_speed_mps"]) for row in speeds] == pytest.approx([30, 60, 30, 25, 50, 25])
+    hits = table(folder / "figures" / "collisions_map.csv")
+    assert len(hits) == 2 * len(study.runs)
+    assert (hits[0]["x_m"], hits[1]["x_m"]) == ("40.0", "")
+    for path in (folder / "figures").glob("*.svg"):
+        assert path.read_text(encoding="utf-8").rstrip().endswith("</svg>")
+    metrics = "traffic_mean_speed_mps", "collisions"
+    again = trade_off_figure(study, rows_of(study), *metrics)
+    assert (folder / "figures" / f"{again.name}.svg").read_text(encoding="utf-8") == again.svg
+
+
+def test_chosen_metrics_and_failed_runs(study: Study, tmp_path: Path) -> None:
+    chosen = dataclasses.replace(study, metrics=("distance_m", "max_drac_mps2"), wanted_interval=0.025)
+    rows = rows_of(study)
+    rows[3] = {**{k: rows[3][k] for k in ("run", "policy", "fog", "seed")}, "status": "failed", "message": "a < b"}
+    page = written(chosen, rows, tmp_path)
+    assert "PARTIAL: 1 runs are missing or failed" in page
+    assert "a &lt; b" in page
+    assert "<td>max_drac_mps2</td><td>no run has a value</td>" in page
+    comparison = table(tmp_path / "comparison.csv")
+    assert {row["metric"] for row in comparison} == {"distance_m"}
+    assert "seeds_for_2.5_percent" in comparison[0]
+
+
+def test_without_any_finished_run_there_is_a_report_too(study: Study, tmp_path: Path) -> None:
+    rows = [
+        {"run": i, **run.levels, "seed": run.seed, "status": "missing", "message": None}
+        for i, run in enumerate(study.runs)
+    ]
+    write_report(study, rows, {}, tmp_path)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "of which 0 are complete" in page
+    assert "PARTIAL: 32 runs" in page
+    assert list((tmp_path / "figures").iterdir()) == []
+
+
+def test_profiles_of_runs_add_up() -> None:
+    pooled = PooledProfiles()
+    pooled.add(0, profiles(20.0, 2.0))
+    pooled.add(1, profiles(40.0, 4.0))
+    assert pooled.survival()[-1] == pytest.approx(1 - 6 / 200)
+    assert pooled.speeds()[:, 1] == pytest.approx([30, 60, 30])
+    assert pooled.speeds(ego_only=True)[:, 1] == pytest.approx([30, 30, 30])
+    assert pooled.extinctions()[:, 1] == pytest.approx([0.01, 0.03, 0.06])
+    assert [hit.seed for hit in pooled.collisions] == [0, 0, 1, 1]
+    assert np.isnan(PooledProfiles().survival()).all()
+    assert PooledProfiles().speeds().shape == (0, 3)
+
+
+def test_metrics_that_the_report_shows_first_are_there() -> None:
+    known = {key for make in METRICS.values() for key in make(DEFAULT_STANDARD).meanings}
+    assert {*MAIN_METRICS, *DELAY_METRICS, *(name for group in SAFETY_METRICS for name in group)} <= known

@@ -3,7 +3,7 @@
 import dataclasses
 import math
 import warnings
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Protocol, Self
@@ -13,10 +13,12 @@ from fogsim.ego.equipment import EgoEquipment
 from fogsim.ego.view_rendering import Surrounding
 from fogsim.errors import SimulationError, UnplayedWarning
 from fogsim.randomness import spawn_streams
+from fogsim.road_advice import RoadAdvice, stretch_advices
 from fogsim.scenario import Scenario, build
+from fogsim.scenario.road_sections import DISPLAYS
 from fogsim.scenario.schema import InformedMethod
 from fogsim.traffic import FogAccess, Traffic, libsumo_traffic
-from fogsim.values import Belief, Command, Ending, FogField, Step, TrafficSnapshot
+from fogsim.values import Belief, Command, Ending, FogField, RoadSection, Step, TrafficSnapshot
 from fogsim.values.belief import certain_belief
 from fogsim.values.result_checks import checked_advice, checked_command, checked_lamps
 
@@ -100,6 +102,7 @@ class AdvisedDriving:
         self._adviser = build.adviser(scenario)
         self._lighting = build.lighting_policy(scenario)
         self._frames = build.periods(scenario).decision_frames
+        self._road = RoadAdvice(scenario) if scenario.drivers.advised in DISPLAYS else None
 
     def decide(self, step: Step) -> Command:
         """Command for the next camera period; the one in force between decisions.
@@ -112,11 +115,14 @@ class AdvisedDriving:
         if step.index % self._frames:
             return step.command
         previous = step.command
+        lit = known_fog(step, self._scenario.lighting)
+        lamps = checked_lamps(self._scenario.lighting.method, self._lighting.lamps(lit, previous.lamps))
+        if self._road is not None:
+            advice, stretches = self._road.advise(step)
+            return Command(advice=advice, lamps=lamps, stretches=stretches)
         informed = known_fog(step, self._scenario.advice)
         advised = self._adviser.advise(informed, step.speed_limit, step.time, previous.advice)
         advice = checked_advice(self._scenario.advice.method, advised)
-        informed = known_fog(step, self._scenario.lighting)
-        lamps = checked_lamps(self._scenario.lighting.method, self._lighting.lamps(informed, previous.lamps))
         return spread_advice(Command(advice=advice, lamps=lamps), self._scenario)
 
 
@@ -133,7 +139,7 @@ def known_fog(step: Step, method: InformedMethod) -> Belief:
     return step.belief if method.informed_by == "belief" else certain_belief(step.truth.extinction_ahead)
 
 
-def spread_advice(command: Command, scenario: Scenario) -> Command:
+def spread_advice(command: Command, scenario: Scenario, sections: Sequence[RoadSection] = ()) -> Command:
     """Let others hear the ego's advice too, if the scenario says so.
 
     Parameters
@@ -142,11 +148,17 @@ def spread_advice(command: Command, scenario: Scenario) -> Command:
         With the ego's advice.
     scenario : Scenario
         Its ``drivers.advised`` says whom the advice goes to.
+    sections : sequence of RoadSection
+        Sections of the route that are advised each by itself, as `Truth.sections` has them: all are told the same.
     """
     if scenario.drivers.advised == "ego" or not math.isfinite(command.advice.speed):
         return command
     if scenario.drivers.advised == "all":
         return dataclasses.replace(command, advice_reach=scenario.traffic.reading_radius_m)
+    if scenario.drivers.advised in DISPLAYS:
+        stretches, speeds = [section.stretch for section in sections], [command.advice.speed] * len(sections)
+        told = stretch_advices(stretches, speeds, DISPLAYS[scenario.drivers.advised])
+        return dataclasses.replace(command, stretches=told)
     return dataclasses.replace(command, stretches=(build.stretch_advice(scenario, command.advice.speed),))
 
 

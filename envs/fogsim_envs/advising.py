@@ -110,7 +110,8 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         """
         if self._simulation is None or self._step is None:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
-        before, command = self._step, spread_advice(command_of(action, self._continuous), self._active)
+        before, chosen = self._step, command_of(action, self._continuous)
+        command = spread_advice(chosen, self._active, before.truth.sections)
         for _ in range(self._frames):
             self._step = self._simulation.advance(command)
             if self._step.ending is not None:

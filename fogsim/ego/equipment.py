@@ -1,5 +1,6 @@
 """What rides in the ego: from a snapshot of the traffic to a finished step."""
 
+import dataclasses
 import math
 from collections.abc import Callable
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from fogsim.atmosphere import extinction, field_at, optical_depth_along
 from fogsim.camera import mounted_pose
+from fogsim.ego.road_meters import RoadMeters
 from fogsim.ego.view_rendering import EgoView, NoView, Surrounding, ViewRenderer
 from fogsim.errors import SimulationError
 from fogsim.randomness import Streams
@@ -55,6 +57,7 @@ class EgoEquipment:
         self._fusion = build.fusion(scenario)
         self._view_renderer: EgoView | None = None
         self._streams: Streams | None = None
+        self._meters: RoadMeters | None = None
         self._mount_camera(build.CAR)
 
     def _mount_camera(self, body: str) -> None:
@@ -95,7 +98,9 @@ class EgoEquipment:
             self._mount_camera(body)
         if self._view_renderer is None:
             kind = NoView if self._scenario.renderer == NO_RENDERER else ViewRenderer
-            self._view_renderer = kind(self._scenario, *network(), body)
+            road, signs = network()
+            self._view_renderer = kind(self._scenario, road, signs, body)
+            self._meters = RoadMeters(self._scenario, road.route)
         for estimator in self._estimators:
             estimator.reset()
         self._fusion.reset()
@@ -127,10 +132,11 @@ class EgoEquipment:
         SimulationError
             If `start_run` has not been called, or it is closed.
         """
-        if self._view_renderer is None or self._streams is None:
+        if self._view_renderer is None or self._streams is None or self._meters is None:
             raise SimulationError("the run has not been started, or is closed")
         renderer, state, ego = self._view_renderer, snapshot.state, snapshot.ego
-        pose = self._pose(state, ego)
+        pose, fog = self._pose(state, ego), field_at(self._view_renderer.fog, time)
+        truth = fog_truth(fog, pose, self._camera, renderer.signs, state)
         view, radiance = renderer.render(state, ego, pose, time)
         image = self._camera_sensor.take(radiance, self._streams.camera)
         frame = Frame(time, image, self._assumed_camera)
@@ -148,7 +154,7 @@ class EgoEquipment:
             speed_limit=snapshot.speed_limit,
             leader=snapshot.leader,
             collisions=snapshot.collisions,
-            truth=fog_truth(field_at(renderer.fog, time), pose, self._camera, renderer.signs, state),
+            truth=dataclasses.replace(truth, sections=self._meters.measure(fog)),
             view=view,
             observation=observation,
             estimates=estimates,

@@ -26,7 +26,7 @@ from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy
 from fogsim.metrics import SafetyStandard
 from fogsim.scenario.fog import fog_along
 from fogsim.scenario.schema import NO_RENDERER, Scenario
-from fogsim.scenario.traffic_schema import AnyEvent, Brake, BreakDown, ChangeLane, LampsFail
+from fogsim.scenario.traffic_schema import AnyEvent, Brake, BreakDown, ChangeLane, ComplianceSection, LampsFail
 from fogsim.sensors import LeadSensor
 from fogsim.traffic import (
     BrakeEvent,
@@ -41,7 +41,7 @@ from fogsim.traffic import (
 )
 from fogsim.traffic.sumo.options import OptionValue
 from fogsim.units import KMH_PER_MPS, clock_time
-from fogsim.values import Camera, FogField, Stretch, StretchAdvice
+from fogsim.values import Camera, Display, FogField, Stretch, StretchAdvice
 
 AIRLIGHT_EXPOSURE = 0.6
 """Share of saturation at which the fixed exposure puts the airlight: bright fog, yet room for lamps above it."""
@@ -173,16 +173,32 @@ def _driver_sight(scenario: Scenario) -> DriverSight | None:
 def _driver_setup(scenario: Scenario) -> DriverSetup:
     """How drivers choose their speed and follow advice."""
     drivers = scenario.drivers
-    compliance = Compliance(
-        drivers.compliance.reached_share,
-        drivers.compliance.rate,
-        drivers.compliance.strength,
-        drivers.compliance.delay_s,
-        drivers.compliance.trust,
-        drivers.compliance.foreseen,
-    )
+    compliance, given = _compliance(drivers.compliance), drivers.compliance_by_display
+    by_display = {
+        display: _compliance(own) for display in Display if (own := getattr(given, display.value)) is not None
+    }
+    if drivers.advised == "equipped":
+        in_car = by_display.get(Display.IN_CAR, compliance)
+        reached = drivers.equipped_share * in_car.reached_share
+        by_display[Display.IN_CAR] = dataclasses.replace(in_car, reached_share=reached)
     return DriverSetup(
-        drivers.speed_choice, drivers.speed_spread, compliance, drivers.distance_misjudgement, drivers.following
+        speed_choice=drivers.speed_choice,
+        spread=drivers.speed_spread,
+        compliance=compliance,
+        misjudgement=drivers.distance_misjudgement,
+        following=drivers.following,
+        compliance_by_display=by_display,
+    )
+
+
+def _compliance(written: ComplianceSection) -> Compliance:
+    return Compliance(
+        written.reached_share,
+        written.rate,
+        written.strength,
+        written.delay_s,
+        written.trust,
+        written.foreseen,
     )
 
 

@@ -170,11 +170,17 @@ def _places_aside(scenario: Scenario, way: VehicleRoute | None, edges: NetEdges)
     """Places along the ego's route that lie beyond its end, or before its beginning."""
     if way is None or not all(edges.axes.get(edge) for edge in way.edges):
         return {}
-    length, stretch = edges.route_length(way.edges), scenario.drivers.advised_stretch
+    length, drivers = edges.route_length(way.edges), scenario.drivers
+    stretch, signs = drivers.advised_stretch, drivers.signs
     told = {} if scenario.fog.wind is not None else _banks_aside(scenario, length)
     if stretch.start_m >= length:
         told["drivers", "advised_stretch", "start_m"] = (
             f"the stretch begins beyond the ego's route, which is {length:.0f} m long; got {stretch.start_m:g}"
+        )
+    first = min(signs.at_m, default=signs.from_m)
+    if drivers.advised == "signs" and first >= length:
+        told["drivers", "signs", "at_m" if signs.at_m else "from_m"] = (
+            f"the first sign stands beyond the ego's route, which is {length:.0f} m long; got {first:g}"
         )
     return told
 

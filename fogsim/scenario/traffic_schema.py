@@ -1,6 +1,7 @@
 """The schema of the blocks ``traffic`` and ``drivers``: who drives where, what is scripted, what drivers are like."""
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -29,6 +30,9 @@ from fogsim.traffic import COMPLIANCES, FOLLOWING_MODELS, SPEED_CHOICES, AfterCo
 from fogsim.values import Display
 
 _ROUNDING = 1e-6
+
+NEAREST_SIGNS = 10.0
+"""Smallest distance between two message signs [m]."""
 
 
 class Event(Section):
@@ -247,6 +251,56 @@ class AdvisedStretch(Section):
         return self
 
 
+class ComplianceByDisplay(Section):
+    """How they follow advice, by where they hear it; what is not written is as in `compliance`."""
+
+    message_sign: ComplianceSection | None = None
+    """Off a message sign."""
+
+    in_car: ComplianceSection | None = None
+    """In the car."""
+
+    law: ComplianceSection | None = None
+    """Nowhere: a law that they know."""
+
+
+class Signs(Section):
+    """Message signs along the ego's route, each with a visibility meter; what one says holds as far as the next."""
+
+    spacing_m: Annotated[Length, Field(ge=10)] = 500.0
+    """Distance from sign to sign."""
+
+    from_m: Distance = 0.0
+    """Position along the ego's route of the first."""
+
+    to_m: RoadEnd = math.inf
+    """Position as far as which the last one's advice holds; inf for the end of the route."""
+
+    at_m: tuple[Distance, ...] = ()
+    """Their positions, in place of the first one's and the spacing."""
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        placed = {"from_m", "spacing_m"} & self.model_fields_set
+        if self.at_m and placed and not {"from_m", "spacing_m", "to_m", "at_m"} <= self.model_fields_set:
+            raise ValueError(f"give at_m, or from_m with spacing_m, not both: beside at_m there is {min(placed)}")
+        if any(following - one < NEAREST_SIGNS for one, following in itertools.pairwise(self.at_m)):
+            raise ValueError(f"at_m must ascend by at least {NEAREST_SIGNS:g} m, got {list(self.at_m)!r}")
+        if not max((self.from_m, *self.at_m)) < self.to_m:
+            raise ValueError(f"to_m must be more than the position of every sign, got {self.to_m:g}")
+        return self
+
+
+class Harmonisation(Section):
+    """How advice to sections of road steps down towards the slow ones."""
+
+    largest_step_kmh: Annotated[SpeedKmh, Field(ge=1)] = 20.0
+    """Largest step from one section to the next."""
+
+    deceleration_mps2: Deceleration = 1.0
+    """How hard somebody has to brake steadily from the beginning of one section to that of the next, at most."""
+
+
 def _shares_of_kinds(value: object) -> object:
     """Let one kind of driver be written as its name; names that are not known are refused."""
     shares = {value: 1.0} if isinstance(value, str) else value
@@ -297,8 +351,22 @@ class DriversSection(Section):
     compliance: ComplianceSection = ComplianceSection()
     """How they follow advice."""
 
-    advised: Literal["ego", "all", "stretch"] = "ego"
-    """Who hears the advice: the ego alone, all vehicles near it as well, or all on a stretch of its route."""
+    compliance_by_display: ComplianceByDisplay = ComplianceByDisplay()
+    """The same by where they hear it, where that differs."""
+
+    advised: Literal["ego", "all", "stretch", "signs", "equipped", "law"] = "ego"
+    """Who hears the advice: the ego alone; all vehicles near it as well; all on a `stretch` of its route; all who pass
+    message `signs` along it; all `equipped` vehicles on it; all on it, as a `law` that they know."""
+
+    signs: Signs = Signs()
+    """Those signs."""
+
+    equipped_share: Share = 1.0
+    """Share of vehicles that are equipped, with `advised: equipped`."""
+
+    harmonisation: Harmonisation | None = None
+    """How advice steps down before slow sections, with `signs`, `equipped` and `law`; `{}` for usual steps, null for
+    none."""
 
     advised_stretch: AdvisedStretch = AdvisedStretch()
     """That stretch, with `advised: stretch`."""
@@ -310,6 +378,20 @@ class DriversSection(Section):
         if isinstance(written, dict) and written.get("see_through_fog") is True:
             return {"speed_choice": "unaffected", **written}
         return written
+
+    @model_validator(mode="before")
+    @classmethod
+    def _all_comply_alike_but_for(cls, written: object) -> object:
+        # Sections check what is no mapping; what names a kind of advice of its own begins with that.
+        usual = written.get("compliance") if isinstance(written, dict) else None
+        displays = written.get("compliance_by_display") if isinstance(written, dict) else None
+        if not isinstance(written, dict) or not isinstance(usual, dict) or not isinstance(displays, dict):
+            return written
+        own = {
+            name: {**usual, **given} if isinstance(given, dict) and "like" not in given else given
+            for name, given in displays.items()
+        }
+        return {**written, "compliance_by_display": own}
 
     @field_validator("speed_choice")
     @classmethod

@@ -10,7 +10,7 @@ from fogsim.values.light import Beam, HeadLamp, Lamp, Lights, LightSources, Stre
 from fogsim.values.observation import LeadMeasurement, Observation, SignSighting
 from fogsim.values.road import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea, RoadNetwork, Sign, SignMap
 from fogsim.values.scene import Batch, Mesh, Scene, Surface
-from fogsim.values.step import Ending, Step, Truth
+from fogsim.values.step import Ending, RoadSection, Step, Truth
 from fogsim.values.traffic import Collision, Leader, TrafficSnapshot, TrafficState
 from fogsim.values.unplayed import NOTHING_UNPLAYED, Reason, Unplayed, UnplayedEvent
 
@@ -48,6 +48,7 @@ __all__ = [
     "Reason",
     "Response",
     "RoadNetwork",
+    "RoadSection",
     "Scene",
     "Sign",
     "SignMap",

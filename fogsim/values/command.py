@@ -30,6 +30,8 @@ class Display(StrEnum):
     """Where the stretch begins, off a variable message sign; what was read there is kept to the stretch's end."""
     IN_CAR = "in_car"
     """In the car, wherever on the stretch it is, as long as the advice is in force."""
+    LAW = "law"
+    """Nowhere: a rule that drivers know and apply to what they see, wherever on the stretch they are."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fogsim.units import visibility_from_extinction
 from fogsim.values.belief import Belief
 from fogsim.values.camera import Camera, CameraPose
-from fogsim.values.command import Command
+from fogsim.values.command import Command, Stretch
 from fogsim.values.estimate import Estimate
 from fogsim.values.fog import FogField
 from fogsim.values.image import View
@@ -26,6 +26,22 @@ class Ending(StrEnum):
     COLLISION = "collision"
     TIME = "time"
     LEFT_NETWORK = "left the network"
+
+
+@dataclass(frozen=True, slots=True)
+class RoadSection:
+    """A section of the ego's route that is advised by itself, and what the visibility meter on it measures.
+
+    Attributes
+    ----------
+    stretch : Stretch
+        The section.
+    extinction : float
+        Extinction coefficient at the meter [1/m].
+    """
+
+    stretch: Stretch
+    extinction: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +63,8 @@ class Truth:
         The fog at this instant as a field, likewise.
     signs : SignMap or None
         Every sign that stands in the world, likewise.
+    sections : tuple of RoadSection
+        Visibility meters beside the ego's route, in the direction of travel, where sections of it are advised.
     vehicle_extinctions : (n,) float64 or None
         Extinction coefficient at the eyes of each driver of `Step.traffic` [1/m]; None where nobody asked.
     """
@@ -57,6 +75,7 @@ class Truth:
     pose: CameraPose | None = None
     fog: FogField | None = None
     signs: SignMap | None = None
+    sections: tuple[RoadSection, ...] = ()
     vehicle_extinctions: NDArray[np.float64] | None = None
 
     @property

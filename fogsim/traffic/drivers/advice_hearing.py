@@ -7,6 +7,9 @@ from typing import Protocol
 from fogsim.errors import InputError, suggest
 from fogsim.values import Command, Display, Stretch
 
+Heard = dict[Display, dict[str, float]]
+"""The lowest speed that each driver has heard, by where; nothing by where nobody has heard any [m/s]."""
+
 HARDEST_BRAKING = 9.0
 """No vehicle brakes harder than this for long [m/s²]."""
 
@@ -68,7 +71,7 @@ class AdviceHearing:
         self._readers: dict[Stretch, dict[str, float]] = {}
         self._last_on: dict[Stretch, Collection[str]] = {}
 
-    def enter(self, command: Command, entering: Collection[str]) -> dict[str, float]:
+    def enter(self, command: Command, entering: Collection[str]) -> Heard:
         """Advice in force where vehicles enter the road [m/s]: they have come past the signs of their stretch upstream.
 
         Parameters
@@ -78,18 +81,19 @@ class AdviceHearing:
         entering : collection of str
             Vehicles that have entered the road in the last step.
         """
-        by_name = command.advised_speeds
-        heard = {v: by_name[v] for v in entering if by_name.get(v, math.inf) < math.inf}
+        by_name = advised_by_name(command).get(Display.IN_CAR, {})
+        heard: Heard = {Display.IN_CAR: {v: by_name[v] for v in entering if v in by_name}}
         if command.advice_reach > 0.0:
-            _add_lower(heard, self._places.near_ego(command.advice_reach, entering), command.advice.speed)
+            near = self._places.near_ego(command.advice_reach, entering)
+            _add_lower(heard, Display.IN_CAR, near, command.advice.speed)
         for advice in command.stretches:
             on = self._places.on_stretch(advice.stretch, entering)
-            _add_lower(heard, on, advice.speed)
+            _add_lower(heard, advice.display, on, advice.speed)
             if on and advice.display == Display.MESSAGE_SIGN:
                 self._readers.setdefault(advice.stretch, {}).update(dict.fromkeys(on, advice.speed))
-        return heard
+        return _spoken(heard)
 
-    def listen(self, command: Command, elapsed: float) -> dict[str, float]:
+    def listen(self, command: Command, elapsed: float) -> Heard:
         """Advice that each driver now goes by, as far as there is any [m/s].
 
         Parameters
@@ -99,19 +103,20 @@ class AdviceHearing:
         elapsed : float
             Time since the last call [s]; signs that show something new are read by those who passed them meanwhile.
         """
-        heard = {v: speed for v, speed in command.advised_speeds.items() if speed < math.inf}
+        heard = advised_by_name(command)
         if command.advice_reach > 0.0:
-            _add_lower(heard, self._places.near_ego(command.advice_reach), command.advice.speed)
+            near = self._places.near_ego(command.advice_reach)
+            _add_lower(heard, Display.IN_CAR, near, command.advice.speed)
         shown: dict[Stretch, float] = {}
         for advice in command.stretches:
             if advice.display == Display.MESSAGE_SIGN:
                 shown[advice.stretch] = advice.speed
             else:
-                _add_lower(heard, self._places.on_stretch(advice.stretch), advice.speed)
+                _add_lower(heard, advice.display, self._places.on_stretch(advice.stretch), advice.speed)
         for stretch in {**self._readers, **shown}:
             for vehicle, speed in self._read_sign(stretch, shown.get(stretch), elapsed).items():
-                _add_lower(heard, (vehicle,), speed)
-        return heard
+                _add_lower(heard, Display.MESSAGE_SIGN, (vehicle,), speed)
+        return _spoken(heard)
 
     def _read_sign(self, stretch: Stretch, shown: float | None, elapsed: float) -> dict[str, float]:
         """What those on the stretch of a sign have read there [m/s]."""
@@ -129,10 +134,44 @@ class AdviceHearing:
         return readers
 
 
-def _add_lower(heard: dict[str, float], vehicles: Iterable[str], speed: float) -> None:
-    """Let vehicles have heard a speed [m/s], where they have heard none that is lower."""
+def advised_by_name(command: Command) -> Heard:
+    """Advice to single drivers by name, which is heard in the car.
+
+    Parameters
+    ----------
+    command : Command
+        What is in force.
+    """
+    return _spoken({Display.IN_CAR: {v: speed for v, speed in command.advised_speeds.items() if speed < math.inf}})
+
+
+def heard_since(heard: Heard, before: Heard, time: float) -> Heard:
+    """Instants since which drivers have heard any advice, by where [s].
+
+    Parameters
+    ----------
+    heard : Heard
+        What they hear now.
+    before : Heard
+        The instants as they were at the last call.
+    time : float
+        Instant [s].
+    """
+    return {
+        display: {vehicle: before.get(display, {}).get(vehicle, time) for vehicle in speeds}
+        for display, speeds in heard.items()
+    }
+
+
+def _spoken(heard: Heard) -> Heard:
+    return {display: speeds for display, speeds in heard.items() if speeds}
+
+
+def _add_lower(heard: Heard, display: Display, vehicles: Iterable[str], speed: float) -> None:
+    """Let vehicles have heard a speed [m/s], where they have heard none there that is lower."""
+    speeds = heard.setdefault(display, {})
     for vehicle in vehicles if speed < math.inf else ():
-        heard[vehicle] = min(heard.get(vehicle, speed), speed)
+        speeds[vehicle] = min(speeds.get(vehicle, speed), speed)
 
 
 def check_edges(stretch: Stretch, known: Collection[str]) -> None:

@@ -8,9 +8,9 @@ study (Transportation Research Record 2018, doi 10.1177/0361198118774748).
 
 import math
 import zlib
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from fogsim.kinematics import DECELERATION, REACTION_TIME, safe_speed
 from fogsim.registry import Registry
 from fogsim.traffic.drivers.compliance import FULL, Compliance, complied_speed
 from fogsim.traffic.drivers.following import OBSERVED_MIXTURE
+from fogsim.values import Display
 
 UNAFFECTED_ABOVE = 200.0
 """Visibility above which drivers do not slow down [m] (White & Jeffery 1980)."""
@@ -195,6 +196,8 @@ class DriverSetup:
     following : mapping from str to float, or None
         Shares of the kinds of drivers, by their names in `FOLLOWING_MODELS`, together 1. None stands for
         `OBSERVED_MIXTURE` if speeds are `observed` ones, and for drivers who follow as in clear air otherwise.
+    compliance_by_display : mapping from Display to Compliance
+        How they follow advice where that depends on where they hear it; the rest as `compliance` has it.
     """
 
     speed_choice: str = "observed"
@@ -202,6 +205,17 @@ class DriverSetup:
     compliance: Compliance = FULL
     misjudgement: float = 0.0
     following: Mapping[str, float] | None = None
+    compliance_by_display: Mapping[Display, Compliance] = field(default_factory=dict)
+
+    def compliance_with(self, display: Display) -> Compliance:
+        """How they follow advice that they hear in one way.
+
+        Parameters
+        ----------
+        display : Display
+            Where they hear it.
+        """
+        return self.compliance_by_display.get(display, self.compliance)
 
     @property
     def following_shares(self) -> Mapping[str, float]:
@@ -219,15 +233,45 @@ class DriverTraits:
     ----------
     speed_factor : float
         Factor on the speed that the setup's choice gives [-].
-    follows_advice : bool
-        Whether advice reaches and moves them.
+    reached_from, moved_from : float
+        Share of drivers reached, and of those who follow, from which on this one is among them, 0 … 1: whoever follows
+        in the car when few do follows signs, too, that more do.
     following : str
         How they follow, a name in `FOLLOWING_MODELS`.
     """
 
     speed_factor: float
-    follows_advice: bool
+    reached_from: float = 0.0
+    moved_from: float = 0.0
     following: str = "unaffected"
+
+    def follows(self, compliance: Compliance) -> bool:
+        """Whether advice reaches and moves them.
+
+        Parameters
+        ----------
+        compliance : Compliance
+            How drivers follow it.
+        """
+        return self.reached_from < compliance.reached_share and self.moved_from < compliance.rate
+
+
+class HeardAdvice(NamedTuple):
+    """Advice that a driver has heard.
+
+    Attributes
+    ----------
+    display : Display
+        Where.
+    speed : float
+        Advised speed [m/s].
+    since : float
+        Time for which there has been advice there [s].
+    """
+
+    display: Display
+    speed: float
+    since: float
 
 
 def driver_traits(setup: DriverSetup, vehicle: str, seed: int) -> DriverTraits:
@@ -247,7 +291,8 @@ def driver_traits(setup: DriverSetup, vehicle: str, seed: int) -> DriverTraits:
     reached, moved, kind = rng.random(3)
     return DriverTraits(
         speed_factor=speed_factor,
-        follows_advice=bool(reached < setup.compliance.reached_share and moved < setup.compliance.rate),
+        reached_from=float(reached),
+        moved_from=float(moved),
         following=_drawn_kind(setup.following_shares, kind),
     )
 
@@ -285,8 +330,7 @@ def desired_speed(
     driver: DriverTraits,
     own: float,
     visibility: float,
-    advised: float = math.inf,
-    advised_for: float = 0.0,
+    heard: Sequence[HeardAdvice] = (),
     room: float = math.inf,
     kept: float = 0.0,
 ) -> float:
@@ -302,10 +346,8 @@ def desired_speed(
         Speed that they would drive in clear air without advice [m/s].
     visibility : float
         Meteorological visibility where they are [m]; ``inf`` in clear air.
-    advised : float
-        Advised speed [m/s]; ``inf`` for none.
-    advised_for : float
-        Time since there is advice for them [s].
+    heard : sequence of HeardAdvice
+        Advice that there is for them; what makes them slowest counts.
     room : float
         Speed that they do not exceed so as not to come too near to a leader [m/s].
     kept : float
@@ -313,8 +355,25 @@ def desired_speed(
     """
     chosen = chosen_speed(SPEED_CHOICES[setup.speed_choice], driver.speed_factor, own, visibility)
     chosen = min(max(min(chosen, room), kept), own)
-    compliance = setup.compliance
-    if not driver.follows_advice or advised_for < compliance.delay or math.isinf(advised):
-        return chosen
+    wanted = []
+    for advice in heard:
+        compliance = setup.compliance_with(advice.display)
+        if driver.follows(compliance) and advice.since >= compliance.delay and advice.speed < math.inf:
+            wanted.append(min(speed_by_compliance(compliance, chosen, advice.speed, visibility), own))
+    return min(wanted, default=chosen)
+
+
+def speed_by_compliance(compliance: Compliance, own: float, advised: float, visibility: float) -> float:
+    """Speed of a driver who follows advice, as far as he believes it where he is [m/s].
+
+    Parameters
+    ----------
+    compliance : Compliance
+        How drivers follow it.
+    own, advised : float
+        Speed that is chosen without it, and the advised one [m/s].
+    visibility : float
+        Visibility that the driver goes by [m].
+    """
     belief = compliance.foreseen if visibility >= UNAFFECTED_ABOVE else 1.0
-    return min(complied_speed(chosen, advised, belief * compliance.strength, belief * compliance.trust), own)
+    return complied_speed(own, advised, belief * compliance.strength, belief * compliance.trust)

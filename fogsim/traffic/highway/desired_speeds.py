@@ -1,13 +1,12 @@
 """How fast highway-env's drivers desire to drive: by their own choice in fog, and when they are advised."""
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from highway_env.vehicle.behavior import IDMVehicle
 
-from fogsim.traffic.drivers.advice_hearing import AdviceHearing
+from fogsim.traffic.drivers.advice_hearing import AdviceHearing, Heard, heard_since
 from fogsim.traffic.drivers.following import CATCHING_UP, FOLLOWING_MODELS, Surroundings, misjudged_headway
 from fogsim.traffic.drivers.leader_reach import drivers_visibility, leader_reach
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
@@ -16,6 +15,7 @@ from fogsim.traffic.drivers.speed_choice import (
     UNAFFECTED_ABOVE,
     DriverSetup,
     DriverTraits,
+    HeardAdvice,
     desired_speed,
     driver_traits,
 )
@@ -55,7 +55,7 @@ class HighwayDesiredSpeeds:
         self._sight = sight
         self._traits: dict[str, DriverTraits] = {}
         self._hearing = AdviceHearing(HighwayVehiclePlaces(fleet))
-        self._advised_since: dict[str, float] = {}
+        self._advised_since: Heard = {}
         self._desired: dict[Any, float] = {}
         self._own_speed: dict[Any, float] = {}
         self._own_headway: dict[Any, float] = {}
@@ -83,10 +83,10 @@ class HighwayDesiredSpeeds:
             elif vehicle in self._own_speed:
                 vehicle.target_speed = self._own_speed.pop(vehicle)
 
-    def _choose(self, vehicles: list[Any], advised: Mapping[str, float]) -> None:
+    def _choose(self, vehicles: list[Any], advised: Heard) -> None:
         """Let every driver choose a speed."""
         time, name = self._fleet.time, self._fleet.name
-        self._advised_since = {v: self._advised_since.get(v, time) for v in advised}
+        self._advised_since = heard_since(advised, self._advised_since, time)
         self._desired = {}
         for vehicle, visibility in zip(vehicles, self._visibilities(vehicles), strict=True):
             vehicle_id = name(vehicle)
@@ -98,8 +98,11 @@ class HighwayDesiredSpeeds:
                 driver,
                 own,
                 drivers_visibility(self._sight, visibility),
-                advised.get(vehicle_id, math.inf),
-                time - self._advised_since.get(vehicle_id, time),
+                [
+                    HeardAdvice(display, speeds[vehicle_id], time - self._advised_since[display][vehicle_id])
+                    for display, speeds in advised.items()
+                    if vehicle_id in speeds
+                ],
                 room,
                 kept,
             )

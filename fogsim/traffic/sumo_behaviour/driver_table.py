@@ -17,9 +17,9 @@ class Column(IntEnum):
 
     Attributes
     ----------
-    FACTOR, FOLLOWS, KIND
-        The driver's factor on the chosen speed, whether advice moves them, 0 or 1, and how they follow: a place in
-        `DriverTable.kinds` [-].
+    FACTOR, REACHED_FROM, MOVED_FROM, KIND
+        The driver's factor on the chosen speed, from which shares on advice reaches and moves them, how they
+        follow: a place in `DriverTable.kinds` [-].
     TOP_SPEED, HEADWAY, SPEED_FACTOR, MINIMUM_GAP
         Top speed [m/s], wanted time headway [s], speed over the limit [-] and minimum gap [m] of the vehicle as it
         entered.
@@ -38,7 +38,8 @@ class Column(IntEnum):
     """
 
     FACTOR = 0
-    FOLLOWS = auto()
+    REACHED_FROM = auto()
+    MOVED_FROM = auto()
     KIND = auto()
     TOP_SPEED = auto()
     HEADWAY = auto()
@@ -127,7 +128,7 @@ class DriverTable:
         driver, top_speed = driver_traits(self._setup, vehicle, self._seed), self.top_speeds.own_value(vehicle)
         headway = self.headways.own_value(vehicle)
         self.values[row] = (
-            *(driver.speed_factor, driver.follows_advice, self._kind[driver.following]),
+            *(driver.speed_factor, driver.reached_from, driver.moved_from, self._kind[driver.following]),
             *(top_speed, headway, self.speed_factors.own_value(vehicle), self._minimum_gap(vehicle)),
             *(top_speed, top_speed, 1.0, 1.0, headway, 0.0),
             *(-1.0, np.inf, np.inf, np.inf, np.inf, 1.0, np.inf),

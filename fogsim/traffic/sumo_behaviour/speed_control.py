@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from fogsim.kinematics import decelerated_speed
 from fogsim.traffic.appearance import TRAINS
-from fogsim.traffic.drivers.advice_hearing import AdviceHearing
-from fogsim.traffic.drivers.compliance import complied_speed
+from fogsim.traffic.drivers.advice_hearing import AdviceHearing, Heard, advised_by_name, heard_since
+from fogsim.traffic.drivers.compliance import Compliance
 from fogsim.traffic.drivers.events import Order
 from fogsim.traffic.drivers.sight import FogAccess
-from fogsim.traffic.drivers.speed_choice import CHOICE_PERIOD, UNAFFECTED_ABOVE
+from fogsim.traffic.drivers.speed_choice import CHOICE_PERIOD, speed_by_compliance
 from fogsim.traffic.setup import TrafficSetup
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
@@ -24,7 +24,7 @@ from fogsim.traffic.sumo_behaviour.headways import HeadwayControl
 from fogsim.traffic.sumo_behaviour.keeping_up import KeepingUp
 from fogsim.traffic.sumo_behaviour.speed_shares import SpeedShareControl
 from fogsim.traffic.sumo_behaviour.top_speeds import TopSpeedControl
-from fogsim.values import Command
+from fogsim.values import Command, Display
 
 _SUMO_DRIVES = -1.0
 _SAME = 1e-6  # [m/s], [m/s²]
@@ -129,7 +129,7 @@ class SumoDesiredSpeeds:
         self._position = vehicle_getter(api, "getPosition3D")
         self._departure = vehicle_getter(api, "getDeparture")
         self._step = float(api.simulation.getDeltaT())
-        self._compliance = setup.drivers.compliance
+        self._compliance = {display: setup.drivers.compliance_with(display) for display in Display}
         self._fog = fog
         self._extinction = fog.minimum_extinction if fog.minimum_extinction == fog.maximum_extinction else None
         self._ego = setup.ego
@@ -141,7 +141,7 @@ class SumoDesiredSpeeds:
         self._top_speeds = TopSpeedControl(api, table, table.top_speeds, setup.advice_deceleration, roster.time)
         self._shares = SpeedShareControl(api, table, setup.advice_deceleration, roster.time)
         self._hearing = AdviceHearing(SumoVehiclePlaces(api, setup.ego, roster))
-        self._advised_since: dict[str, float] = {}
+        self._advised_since: Heard = {}
         self._next, self._chosen = 0.0, self._roster.time
         self._mark = 0
         self._trains: set[str] = set()
@@ -169,7 +169,7 @@ class SumoDesiredSpeeds:
             advised = self._hearing.listen(command, elapsed)
             # In even fog and without advice, choices stay as they are, but for those who go by their leader.
             settled = self._extinction is not None and not advised and not self._advised_since
-            self._advised_since = {v: self._advised_since.get(v, time) for v in advised}
+            self._advised_since = heard_since(advised, self._advised_since, time)
             others = self._drivers()
             rows = self._table.rows(others)
             choosing = [others[i] for i in self._keeping_up.keepers(rows).tolist()] if settled else others
@@ -190,23 +190,24 @@ class SumoDesiredSpeeds:
         entering = [v for v in new if self._departure(v) >= since]
         if entering:
             advised = self._hearing.enter(command, entering)
-            self._advised_since.update(dict.fromkeys(advised, -math.inf))
+            for display, speeds in advised.items():
+                self._advised_since.setdefault(display, {}).update(dict.fromkeys(speeds, -math.inf))
             rows, desired, shares = self._desired(entering, advised)
             self._shares.set_at_entry(entering, rows, shares)
             self._top_speeds.set_at_entry(entering, rows, desired)
         if len(entering) < len(new):
             # They hear other advice than that to them by name when all listen again.
-            self._update_choices([v for v in new if v not in set(entering)], command.advised_speeds)
+            self._update_choices([v for v in new if v not in set(entering)], advised_by_name(command))
         self._headways.update(new, self._table.rows(new))
 
-    def _update_choices(self, ids: Sequence[str], advised: Mapping[str, float]) -> None:
+    def _update_choices(self, ids: Sequence[str], advised: Heard) -> None:
         if ids:
             rows, desired, shares = self._desired(ids, advised)
             self._shares.set_desired(ids, rows, shares)
             self._top_speeds.set_desired(ids, rows, desired)
 
     def _desired(
-        self, ids: Sequence[str], advised: Mapping[str, float]
+        self, ids: Sequence[str], advised: Heard
     ) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.float64]]:
         """Rows of vehicles, and what their drivers desire: top speeds (n,) [m/s], shares of the speed in clear air."""
         table = self._table
@@ -221,10 +222,17 @@ class SumoDesiredSpeeds:
             in_clear_air = [self._allowed(ids[i]) for i in keepers] / values[keepers, Column.SHARE_SET]
             desired[keepers] = np.maximum(desired[keepers], np.minimum(kept, values[keepers, Column.TOP_SPEED]))
             shares[keepers] = np.maximum(shares[keepers], np.minimum(kept / in_clear_air, 1.0))
-        if advised:
-            for i in np.flatnonzero(values[:, Column.FOLLOWS]).tolist():
-                if ids[i] in advised:
-                    desired[i] = self._advised(ids[i], int(rows[i]), float(desired[i]), advised[ids[i]])
+        own = desired.copy()
+        followed: set[int] = set()
+        for display, speeds in advised.items():
+            compliance = self._compliance[display]
+            reached = values[:, Column.REACHED_FROM] < compliance.reached_share
+            for i in np.flatnonzero(reached & (values[:, Column.MOVED_FROM] < compliance.rate)).tolist():
+                if ids[i] in speeds and self._has_answered(ids[i], display):
+                    wanted = self._advised(ids[i], int(rows[i]), float(own[i]), compliance, speeds[ids[i]])
+                    # Of several, what makes the driver slowest counts.
+                    desired[i] = min(float(desired[i]), wanted) if i in followed else wanted
+                    followed.add(i)
         return rows, desired, shares
 
     def _extinctions(self, ids: Sequence[str]) -> NDArray[np.float64]:
@@ -234,15 +242,16 @@ class SumoDesiredSpeeds:
         flat = itertools.chain.from_iterable(map(self._position, ids))
         return self._fog.extinction(np.fromiter(flat, np.float64, 3 * len(ids)).reshape(-1, 3))
 
-    def _advised(self, vehicle: str, row: int, own: float, advised: float) -> float:
-        """Top speed [m/s] of a driver who follows advice, once the delay is over."""
+    def _has_answered(self, vehicle: str, display: Display) -> bool:
+        """Whether the delay is over in which a driver does not follow yet what is heard somewhere."""
         time = self._roster.time
-        if time - self._advised_since.get(vehicle, time) < self._compliance.delay:
-            return own
-        compliance, visibility = self._compliance, self._table.values[row, Column.VISIBILITY]
-        belief = compliance.foreseen if visibility >= UNAFFECTED_ABOVE else 1.0
-        own = min(own, self._allowed(vehicle))
-        return complied_speed(own, advised, belief * compliance.strength, belief * compliance.trust)
+        since = self._advised_since.get(display, {}).get(vehicle, time)
+        return time - since >= self._compliance[display].delay
+
+    def _advised(self, vehicle: str, row: int, own: float, compliance: Compliance, advised: float) -> float:
+        """Top speed [m/s] of a driver who follows advice."""
+        visibility = float(self._table.values[row, Column.VISIBILITY])
+        return speed_by_compliance(compliance, min(own, self._allowed(vehicle)), advised, visibility)
 
     def _allowed(self, vehicle: str) -> float:
         """What the road allows a driver [m/s], whatever the top speed that the vehicle has been given."""

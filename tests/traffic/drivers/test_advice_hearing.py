@@ -34,7 +34,7 @@ def drive(road: Road, hearing: AdviceHearing, *speeds: float, display: Display) 
     heard = []
     for speed in speeds:
         told = () if math.isnan(speed) else (StretchAdvice(speed, HERE, display),)
-        heard.append(hearing.listen(Command(stretches=told), 1.0))
+        heard.append(hearing.listen(Command(stretches=told), 1.0).get(display, {}))
         road.positions = {v: x + SPEED for v, x in road.positions.items()}
     return heard
 
@@ -52,7 +52,7 @@ def test_a_sign_is_read_where_the_stretch_begins_and_kept_in_mind_to_its_end() -
     # The one who was past the sign has not read it; what it shows later is read by those who come later.
     assert heard == [{}, {"first": 20.0}, {"first": 20.0, "second": 15.0}, {"first": 20.0, "second": 15.0}]
     road.positions["first"] = 2001.0
-    assert hearing.listen(Command(), 1.0) == {"second": 15.0}
+    assert hearing.listen(Command(), 1.0) == {Display.MESSAGE_SIGN: {"second": 15.0}}
     road.positions["second"] = 2001.0
     assert hearing.listen(Command(), 1.0) == {}
 
@@ -70,18 +70,18 @@ def test_who_enters_the_road_on_the_stretch_hears_what_is_in_force(display: Disp
     road = Road(new=1500.0, elsewhere=2500.0, old=1400.0)
     hearing = AdviceHearing(road)
     command = Command(stretches=(StretchAdvice(20.0, HERE, display),))
-    assert hearing.enter(command, ["new", "elsewhere"]) == {"new": 20.0}
-    assert hearing.listen(command, 0.0)["new"] == 20.0
+    assert hearing.enter(command, ["new", "elsewhere"]) == {display: {"new": 20.0}}
+    assert hearing.listen(command, 0.0)[display]["new"] == 20.0
     road.positions["new"] = 2100.0
-    assert "new" not in hearing.listen(command, 1.0)
+    assert "new" not in hearing.listen(command, 1.0).get(display, {})
 
 
 def test_the_egos_advice_is_passed_on_as_far_as_it_reaches() -> None:
     road = Road(near=200.0, far=400.0, new=100.0)
     hearing = AdviceHearing(road)
     command = Command(SpeedAdvice(20.0), advice_reach=300.0)
-    assert hearing.enter(command, ["new"]) == {"new": 20.0}
-    assert hearing.listen(command, 1.0) == {"near": 20.0, "new": 20.0}
+    assert hearing.enter(command, ["new"]) == {Display.IN_CAR: {"new": 20.0}}
+    assert hearing.listen(command, 1.0) == {Display.IN_CAR: {"near": 20.0, "new": 20.0}}
     assert hearing.listen(Command(SpeedAdvice(20.0)), 1.0) == {}
 
 
@@ -90,4 +90,5 @@ def test_the_lowest_advice_counts_and_none_is_none() -> None:
     stretches = (StretchAdvice(25.0, HERE), StretchAdvice(22.0, HERE), StretchAdvice(math.inf, HERE))
     command = Command(advised_speeds={"one": 18.0, "nobody": math.inf}, stretches=stretches, advice_reach=9000.0)
     hearing = AdviceHearing(road)
-    assert hearing.listen(command, 1.0) == hearing.enter(command, ["one", "other"]) == {"one": 18.0, "other": 22.0}
+    heard = {Display.IN_CAR: {"one": 18.0, "other": 22.0}}
+    assert hearing.listen(command, 1.0) == hearing.enter(command, ["one", "other"]) == heard

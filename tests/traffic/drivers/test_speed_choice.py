@@ -12,6 +12,7 @@ from fogsim.traffic.drivers.speed_choice import (
     SPEED_CHOICES,
     DriverSetup,
     DriverTraits,
+    HeardAdvice,
     chosen_speed,
     desired_speed,
     driver_traits,
@@ -20,6 +21,7 @@ from fogsim.traffic.drivers.speed_choice import (
     unaffected,
     within_sight,
 )
+from fogsim.values import Display
 
 
 def test_speed_choices() -> None:
@@ -70,6 +72,11 @@ def test_in_a_town_they_slow_down_too() -> None:
     assert chosen_speed(too_fast, 1.0, own, 60.0) == own  # which a choice that is not relative does not tell
 
 
+def told(speed: float, since: float = 10.0) -> tuple[HeardAdvice, ...]:
+    """Advice in the car, for longer than it takes to answer."""
+    return (HeardAdvice(Display.IN_CAR, speed, since),)
+
+
 def test_drivers_advised_30_mph_who_drive_61_can_be_represented() -> None:
     """The field result: advice of 30 mph, mean speed 61 mph; with 65 mph unadvised that is a strength of 4 in 35."""
     mph = 0.44704
@@ -86,7 +93,7 @@ def test_measured_compliances_give_what_was_measured() -> None:
     def mean(kind: str, own: float, advised: float, visibility: float) -> float:
         setup = DriverSetup("unaffected", compliance=COMPLIANCES[kind])
         drivers = [driver_traits(setup, f"vehicle {i}", 1) for i in range(4000)]
-        return float(np.mean([desired_speed(setup, d, own, visibility, advised, advised_for=10.0) for d in drivers]))
+        return float(np.mean([desired_speed(setup, d, own, visibility, told(advised)) for d in drivers]))
 
     mph = 0.44704
     # CAWS: 61 mph where 30 mph are advised, 1.1 mph less than without.
@@ -103,28 +110,28 @@ def test_measured_compliances_give_what_was_measured() -> None:
 def test_who_trusts_a_sign_takes_its_speed_for_safe() -> None:
     """A16 below 35 m: 29 km/h without signs, 60 km/h with signs that say 60."""
     setup = DriverSetup(spread=0.0, compliance=replace(COMPLIANCES["speed_limit_sign"], rate=1.0))
-    driver, own = DriverTraits(1.0, follows_advice=True), 112.0 / KMH
+    driver, own = DriverTraits(1.0), 112.0 / KMH
     assert desired_speed(setup, driver, own, 30.0) * KMH == pytest.approx(29.0, rel=0.03)
-    assert desired_speed(setup, driver, own, 30.0, 60.0 / KMH, 10.0) * KMH == pytest.approx(60.0)
-    assert desired_speed(setup, driver, 12.0, 30.0, 60.0 / KMH, 10.0) == 12.0  # but not faster than in clear air
+    assert desired_speed(setup, driver, own, 30.0, told(60.0 / KMH)) * KMH == pytest.approx(60.0)
+    assert desired_speed(setup, driver, 12.0, 30.0, told(60.0 / KMH)) == 12.0  # but not faster than in clear air
     distrusting = replace(setup, compliance=Compliance())
-    assert desired_speed(distrusting, driver, own, 30.0, 60.0 / KMH, 10.0) * KMH == pytest.approx(29.0, rel=0.03)
+    assert desired_speed(distrusting, driver, own, 30.0, told(60.0 / KMH)) * KMH == pytest.approx(29.0, rel=0.03)
 
 
 def test_advice_may_be_believed_less_before_the_fog_is_seen() -> None:
-    setup, driver = DriverSetup("unaffected", compliance=Compliance(foreseen=0.25)), DriverTraits(1.0, True)
-    assert desired_speed(setup, driver, 30.0, math.inf, 20.0, 10.0) == pytest.approx(27.5)
-    assert desired_speed(setup, driver, 30.0, 100.0, 20.0, 10.0) == pytest.approx(20.0)
+    setup, driver = DriverSetup("unaffected", compliance=Compliance(foreseen=0.25)), DriverTraits(1.0)
+    assert desired_speed(setup, driver, 30.0, math.inf, told(20.0)) == pytest.approx(27.5)
+    assert desired_speed(setup, driver, 30.0, 100.0, told(20.0)) == pytest.approx(20.0)
 
 
 def test_a_driver_desires_the_least_of_own_speed_choice_and_advice() -> None:
-    setup, driver = DriverSetup("within_sight", spread=0.0), DriverTraits(1.2, follows_advice=True)
+    setup, driver = DriverSetup("within_sight", spread=0.0), DriverTraits(1.2)
     chosen = 1.2 * within_sight(60.0)
     assert desired_speed(setup, driver, 40.0, math.inf) == 40.0
     assert desired_speed(setup, driver, 40.0, 60.0) == pytest.approx(chosen)
-    assert desired_speed(setup, driver, 40.0, 60.0, 8.0, advised_for=1.0) == pytest.approx(chosen)  # within the delay
-    assert desired_speed(setup, driver, 40.0, 60.0, 8.0, advised_for=3.0) == 8.0
-    assert desired_speed(setup, DriverTraits(1.2, follows_advice=False), 40.0, 60.0, 8.0, 3.0) == pytest.approx(chosen)
+    assert desired_speed(setup, driver, 40.0, 60.0, told(8.0, 1.0)) == pytest.approx(chosen)  # within the delay
+    assert desired_speed(setup, driver, 40.0, 60.0, told(8.0, 3.0)) == 8.0
+    assert desired_speed(setup, DriverTraits(1.2, moved_from=1.0), 40.0, 60.0, told(8.0)) == pytest.approx(chosen)
 
 
 def test_traits_depend_on_nothing_but_seed_and_id_and_have_the_spread_that_is_asked_for() -> None:
@@ -134,4 +141,22 @@ def test_traits_depend_on_nothing_but_seed_and_id_and_have_the_spread_that_is_as
     assert driver_traits(setup, "vehicle 7", 2) != drawn[7]
     logarithms = np.log([traits.speed_factor for traits in drawn])
     assert (np.mean(logarithms), np.std(logarithms)) == (pytest.approx(0.0, abs=0.02), pytest.approx(0.2, rel=0.05))
-    assert np.mean([traits.follows_advice for traits in drawn]) == pytest.approx(0.4, abs=0.02)
+    assert np.mean([traits.follows(setup.compliance) for traits in drawn]) == pytest.approx(0.4, abs=0.02)
+
+
+def test_who_follows_depends_on_where_it_is_heard_and_the_drivers_stay_the_same() -> None:
+    by_display = {Display.MESSAGE_SIGN: Compliance(rate=0.3), Display.IN_CAR: Compliance(rate=0.9, strength=0.5)}
+    setup = DriverSetup("unaffected", compliance_by_display=by_display)
+    heard = {display: (HeardAdvice(display, 20.0, 10.0),) for display in Display}
+    slow = {display: set[int]() for display in Display}
+    for i in range(1000):
+        driver = driver_traits(setup, f"vehicle {i}", 1)
+        for display, advice in heard.items():
+            if desired_speed(setup, driver, 30.0, 100.0, advice) < 30.0:
+                slow[display].add(i)
+    assert slow[Display.MESSAGE_SIGN] < slow[Display.IN_CAR] < slow[Display.LAW]
+    assert [len(slow[display]) for display in Display] == [pytest.approx(n, abs=40) for n in (300, 900, 1000)]
+    # Of several that are followed, what makes a driver slowest counts.
+    both = (*heard[Display.MESSAGE_SIGN], HeardAdvice(Display.IN_CAR, 15.0, 10.0))
+    assert desired_speed(setup, DriverTraits(1.0), 30.0, 100.0, both) == pytest.approx(20.0)
+    assert desired_speed(setup, DriverTraits(1.0, moved_from=0.5), 30.0, 100.0, both) == pytest.approx(22.5)

@@ -14,7 +14,7 @@ from fogsim.errors import InputError
 from fogsim.kinematics import safe_speed
 from fogsim.traffic import Compliance, DriverSetup, DriverSight
 from fogsim.traffic.drivers.leader_reach import leader_reach
-from fogsim.traffic.drivers.speed_choice import desired_speed, driver_traits
+from fogsim.traffic.drivers.speed_choice import HeardAdvice, desired_speed, driver_traits
 from fogsim.traffic.highway import HighwayTraffic
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Command, Display, FogField, SpeedAdvice, Stretch, StretchAdvice
@@ -134,18 +134,20 @@ def test_advice_that_all_follow_sets_every_target_speed() -> None:
 def test_those_whom_it_reaches_and_who_follow_are_the_share_that_is_asked_for() -> None:
     setup = exact(reached_share=0.5, rate=0.8)
     road = Road(setup)
-    followers = [driver_traits(setup, name, 3).follows_advice for name in road.ids]
+    followers = [driver_traits(setup, name, 3).follows(setup.compliance) for name in road.ids]
     assert 0 < sum(followers) < len(followers)
     targets = road.drive(20.0, advised(road)).targets()
     assert targets == pytest.approx([15.0 if follows else FAST for follows in followers])
-    shares = [driver_traits(setup, f"vehicle {i}", 1).follows_advice for i in range(4000)]
+    shares = [driver_traits(setup, f"vehicle {i}", 1).follows(setup.compliance) for i in range(4000)]
     assert np.mean(shares) == pytest.approx(0.4, abs=0.02)
 
 
 def test_the_field_result_that_advice_of_30_mph_gave_61() -> None:
     setup = exact(strength=4.0 / 35.0)
     driver = driver_traits(setup, "any", 1)
-    assert desired_speed(setup, driver, 65.0 * MPH, math.inf, 30.0 * MPH, 60.0) == pytest.approx(61.0 * MPH)
+    assert desired_speed(
+        setup, driver, 65.0 * MPH, math.inf, [HeardAdvice(Display.IN_CAR, 30.0 * MPH, 60.0)]
+    ) == pytest.approx(61.0 * MPH)
     road = Road(setup)
     for vehicle in road.others:
         vehicle.target_speed = 65.0 * MPH

@@ -1,0 +1,35 @@
+"""Speeds of successive sections of road that fall towards fog in steps, so that nobody brakes hard."""
+
+import math
+from collections.abc import Sequence
+
+
+def harmonised_speeds(
+    speeds: Sequence[float], lengths: Sequence[float], limit: float, largest_step: float, deceleration: float
+) -> tuple[float, ...]:
+    """Advised speeds, lowered where the next section downstream is advised much less.
+
+    A section shows no more than the next one and a step, and no more than √(v² + 2 a d), from which a steady
+    deceleration a along its length d comes down to the next one's v. Motorways step down likewise: Dutch gantries by
+    20 km/h (90, 70, 50), I-77 in Virginia by at most 15 mph from sign to sign (VTRC 19-R6, 2018).
+
+    Parameters
+    ----------
+    speeds : (n,) sequence of float
+        What each section is advised for itself, in the direction of travel [m/s]; ``inf`` for nothing.
+    lengths : (n,) sequence of float
+        Distance from each section's beginning to that of the next [m]; the last does not matter.
+    limit : float
+        Speed limit, from which on nothing needs to be advised [m/s].
+    largest_step : float
+        Largest difference between two sections on the way down [m/s].
+    deceleration : float
+        Deceleration a [m/s²].
+    """
+    shown = list(speeds)
+    for place in reversed(range(len(shown) - 1)):
+        down = shown[place + 1]
+        reached = min(down + largest_step, math.sqrt(down**2 + 2.0 * deceleration * lengths[place]))
+        if reached < limit:
+            shown[place] = min(shown[place], reached)
+    return tuple(shown)

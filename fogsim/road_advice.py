@@ -1,0 +1,103 @@
+"""Advice to sections of road: to each what its own visibility asks for, in steps down towards fog."""
+
+import itertools
+import math
+from collections.abc import Sequence
+
+from fogsim.advice import Adviser
+from fogsim.advice.harmonisation import harmonised_speeds
+from fogsim.scenario import Scenario, build
+from fogsim.scenario.road_sections import DISPLAYS
+from fogsim.units import KMH_PER_MPS
+from fogsim.values import Belief, Display, SpeedAdvice, Step, Stretch, StretchAdvice
+from fogsim.values.belief import certain_belief
+from fogsim.values.result_checks import checked_advice
+
+
+class RoadAdvice:
+    """What the sections of the ego's route are advised in one run; it remembers what each was advised last.
+
+    Informed by the truth, each section goes by the visibility meter on it, and the ego hears what others hear there.
+    Informed by the ego's belief, the ego goes by its own advice, and tells it to the section on which it is; a section
+    that it has left keeps what it told last, and one that it has not reached knows nothing.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario, whose ``drivers.advised`` is one of `DISPLAYS`.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._adviser: Adviser = build.adviser(scenario)
+        self._advice = scenario.advice
+        self._display = DISPLAYS[scenario.drivers.advised]
+        self._harmonisation = scenario.drivers.harmonisation
+        self._told: dict[Stretch, SpeedAdvice] = {}
+        self._egos = SpeedAdvice()
+        self._read: tuple[Stretch, float] | None = None
+
+    def advise(self, step: Step) -> tuple[SpeedAdvice, tuple[StretchAdvice, ...]]:
+        """Advice to the ego, and to all on the sections that have any.
+
+        Parameters
+        ----------
+        step : Step
+            What was finished last.
+        """
+        if step.index == 0:
+            self._told, self._egos, self._read = {}, SpeedAdvice(), None
+        sections = tuple(section.stretch for section in step.truth.sections)
+        here = next((s for s in sections if s.start <= step.route_position < s.end), None)
+        if self._advice.informed_by == "belief":
+            self._egos = self._ask(step, step.belief, self._egos)
+            if here is not None:
+                self._told[here] = self._egos
+        else:
+            for section in step.truth.sections:
+                previous = self._told.get(section.stretch, SpeedAdvice())
+                self._told[section.stretch] = self._ask(step, certain_belief(section.extinction), previous)
+        shown = self._shown(sections, step.speed_limit)
+        if self._advice.informed_by == "truth":
+            self._egos = SpeedAdvice(self._heard(here, dict(zip(sections, shown, strict=True))))
+        return self._egos, stretch_advices(sections, shown, self._display)
+
+    def _ask(self, step: Step, known: Belief, previous: SpeedAdvice) -> SpeedAdvice:
+        return checked_advice(self._advice.method, self._adviser.advise(known, step.speed_limit, step.time, previous))
+
+    def _shown(self, sections: Sequence[Stretch], limit: float) -> tuple[float, ...]:
+        speeds = tuple(self._told.get(section, SpeedAdvice()).speed for section in sections)
+        steps = self._harmonisation
+        if steps is None:
+            return speeds
+        lengths = [following.start - section.start for section, following in itertools.pairwise(sections)]
+        largest = steps.largest_step_kmh / KMH_PER_MPS
+        return harmonised_speeds(speeds, [*lengths, math.inf], limit, largest, steps.deceleration_mps2)
+
+    def _heard(self, here: Stretch | None, shown: dict[Stretch, float]) -> float:
+        """What the ego has heard where it is [m/s]; a sign says in passing what holds to the end of its section."""
+        if here is None:
+            self._read = None
+            return math.inf
+        if self._display != Display.MESSAGE_SIGN:
+            return shown[here]
+        if self._read is None or self._read[0] != here:
+            self._read = here, shown[here]
+        return self._read[1]
+
+
+def stretch_advices(
+    sections: Sequence[Stretch], speeds: Sequence[float], display: Display
+) -> tuple[StretchAdvice, ...]:
+    """Advice to all on sections of road, as far as there is any.
+
+    Parameters
+    ----------
+    sections : (n,) sequence of Stretch
+        The sections.
+    speeds : (n,) sequence of float
+        Advised speeds [m/s]; ``inf`` for none.
+    display : Display
+        How drivers hear it.
+    """
+    told = zip(sections, speeds, strict=True)
+    return tuple(StretchAdvice(speed, section, display) for section, speed in told if speed < math.inf)

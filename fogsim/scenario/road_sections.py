@@ -1,0 +1,82 @@
+"""Where along the ego's route advice is given to sections of road, each by itself."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.scenario.schema import Scenario
+from fogsim.values import Display, Stretch
+
+IN_CAR_SECTION = 100.0
+"""Length of the sections for which advice in cars, and drivers who apply a law, go each by one visibility [m]."""
+
+SHORTEST = 10.0
+"""No section begins nearer to the end of the route than this [m], which two ways of measuring it agree about."""
+
+EYES = (0.0, 0.0, 1.2)
+"""Where a meter beside the road measures, above it [m]: at drivers' eyes."""
+
+DISPLAYS = {"signs": Display.MESSAGE_SIGN, "equipped": Display.IN_CAR, "law": Display.LAW}
+"""How drivers hear advice that is given to sections of road, by `drivers.advised`."""
+
+
+def road_sections(scenario: Scenario, length: float) -> tuple[Stretch, ...]:
+    """Sections of the ego's route that are advised each by itself, in the direction of travel.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Its ``drivers.advised`` says whether there are any, and ``drivers.signs`` where signs stand.
+    length : float
+        Length of the route [m].
+    """
+    drivers = scenario.drivers
+    if drivers.advised not in DISPLAYS:
+        return ()
+    first, end, spacing = 0.0, length, IN_CAR_SECTION
+    if drivers.advised == "signs":
+        first, end, spacing = drivers.signs.from_m, min(drivers.signs.to_m, length), drivers.signs.spacing_m
+        starts = list(drivers.signs.at_m) or np.arange(first, end, spacing).tolist()
+    else:
+        starts = np.arange(first, end, spacing).tolist()
+    starts = [start for start in starts if start < end and start <= length - SHORTEST]
+    # What ends with the route has no end of its own: whoever is there has not left it.
+    last = math.inf if end >= length else end
+    return tuple(Stretch(start, stop) for start, stop in zip(starts, [*starts[1:], last], strict=True))
+
+
+def meter_places(scenario: Scenario, sections: tuple[Stretch, ...], route: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Where the visibility of each section is measured: at its sign; in the middle where there are none.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    sections : tuple of Stretch
+        From `road_sections`.
+    route : (n, 3) float64
+        Polyline along the route [m].
+
+    Returns
+    -------
+    (m, 3) float64
+        Places at the height of drivers' eyes [m].
+    """
+    if not sections:
+        return np.empty((0, 3))
+    station = stations(route)
+    aside = 0.0 if scenario.drivers.advised == "signs" else 0.5
+    at = [s.start + aside * (min(s.end, float(station[-1])) - s.start) for s in sections]
+    return np.stack([np.interp(at, station, route[:, axis]) for axis in range(3)], axis=-1) + EYES
+
+
+def stations(route: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Positions of a route's points along it (n,) [m].
+
+    Parameters
+    ----------
+    route : (n, 3) float64
+        Polyline along the route [m].
+    """
+    return np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(route, axis=0), axis=1))))

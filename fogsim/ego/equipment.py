@@ -1,6 +1,5 @@
 """What rides in the ego: from a snapshot of the traffic to a finished step."""
 
-import dataclasses
 import math
 from collections.abc import Callable
 
@@ -25,6 +24,7 @@ from fogsim.values import (
     Frame,
     Observation,
     RoadNetwork,
+    RoadSection,
     SignMap,
     Step,
     TrafficSnapshot,
@@ -136,7 +136,7 @@ class EgoEquipment:
             raise SimulationError("the run has not been started, or is closed")
         renderer, state, ego = self._view_renderer, snapshot.state, snapshot.ego
         pose, fog = self._pose(state, ego), field_at(self._view_renderer.fog, time)
-        truth = fog_truth(fog, pose, self._camera, renderer.signs, state)
+        truth = fog_truth(fog, pose, self._camera, renderer.signs, state, self._meters.measure(fog))
         view, radiance = renderer.render(state, ego, pose, time)
         image = self._camera_sensor.take(radiance, self._streams.camera)
         frame = Frame(time, image, self._assumed_camera)
@@ -154,7 +154,7 @@ class EgoEquipment:
             speed_limit=snapshot.speed_limit,
             leader=snapshot.leader,
             collisions=snapshot.collisions,
-            truth=dataclasses.replace(truth, sections=self._meters.measure(fog)),
+            truth=truth,
             view=view,
             observation=observation,
             estimates=estimates,
@@ -207,7 +207,12 @@ class EgoEquipment:
 
 
 def fog_truth(
-    fog: FogField, pose: CameraPose, camera: Camera, signs: SignMap, traffic: TrafficState | None = None
+    fog: FogField,
+    pose: CameraPose,
+    camera: Camera,
+    signs: SignMap,
+    traffic: TrafficState | None = None,
+    sections: tuple[RoadSection, ...] = (),
 ) -> Truth:
     """The fog at a camera, and as far as it sees along its heading, parallel to the road under it.
 
@@ -223,6 +228,8 @@ def fog_truth(
         The signs that stand in the world.
     traffic : TrafficState or None
         Vehicles whose drivers have fog about them, too.
+    sections : tuple of RoadSection
+        What meters beside the road measure.
     """
     eye, level = np.array(pose.position), math.cos(pose.road_grade)
     direction = np.array([math.cos(pose.heading) * level, math.sin(pose.heading) * level, math.sin(pose.road_grade)])
@@ -237,5 +244,6 @@ def fog_truth(
         pose=pose,
         fog=fog,
         signs=signs,
+        sections=sections,
         vehicle_extinctions=None if traffic is None else extinction(fog, traffic.position + _EYES),
     )

@@ -63,10 +63,10 @@ class Truth:
         The fog at this instant as a field, likewise.
     signs : SignMap or None
         Every sign that stands in the world, likewise.
-    sections : tuple of RoadSection
-        Visibility meters beside the ego's route, in the direction of travel, where sections of it are advised.
     vehicle_extinctions : (n,) float64 or None
         Extinction coefficient at the eyes of each driver of `Step.traffic` [1/m]; None where nobody asked.
+    sections : tuple of RoadSection
+        Visibility meters beside the ego's route, in the direction of travel, where sections of it are advised.
     """
 
     extinction: float
@@ -75,8 +75,8 @@ class Truth:
     pose: CameraPose | None = None
     fog: FogField | None = None
     signs: SignMap | None = None
-    sections: tuple[RoadSection, ...] = ()
     vehicle_extinctions: NDArray[np.float64] | None = None
+    sections: tuple[RoadSection, ...] = ()
 
     @property
     def visibility(self) -> float:

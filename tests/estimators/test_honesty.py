@@ -95,7 +95,9 @@ def test_a_false_truth_changes_nothing(as_it_is: list[Step], monkeypatch: pytest
     rng = np.random.default_rng(4)
     render = ViewRenderer.render
 
-    def false_truth(fog: FogField, pose: CameraPose, camera: Camera, signs: SignMap, traffic: TrafficState) -> Truth:
+    def false_truth(
+        fog: FogField, pose: CameraPose, camera: Camera, signs: SignMap, traffic: TrafficState, *_: object
+    ) -> Truth:
         k = float(rng.uniform(0.0, 0.2))
         wrong = dataclasses.replace(camera, pitch=-camera.pitch, mount_height=9.0, focal_length=77.0)
         place = dataclasses.replace(pose, position=(0.0, 0.0, 50.0), heading=pose.heading + 1.0)

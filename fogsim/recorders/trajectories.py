@@ -16,6 +16,7 @@ from fogsim.files.row_log import RowLog, row_batches, row_schema
 from fogsim.recorders.protocol import Derived
 from fogsim.recorders.run_directory import LOG_SUFFIX
 from fogsim.recorders.table import LOG_PERIOD
+from fogsim.units import visibility_from_extinction
 from fogsim.values import Step
 
 MOST_ROWS_HELD = 50_000
@@ -37,6 +38,7 @@ TRAJECTORY_COLUMNS: Mapping[str, tuple[Any, str]] = {
     "vehicle_lane": (pa.string(), "SUMO's lane; a change of lane is made at once here"),
     "vehicle_slope": (pa.float64(), "slope of the road, positive uphill [°]"),
     "vehicle_acceleration": (pa.float64(), "acceleration [m/s²]"),
+    "visibility": (pa.float64(), "true meteorological visibility at the driver's eyes [m]; null for clear air"),
 }
 """Columns of ``trajectories.parquet``: their types and meanings, named as in SUMO's fcd-output."""
 
@@ -182,9 +184,18 @@ def _batch(steps: list[Step], schema: Any) -> Any:
         "vehicle_lane": texts("lane"),
         "vehicle_slope": np.degrees(of_all("grade")),
         "vehicle_acceleration": of_all("acceleration"),
+        "visibility": [visibility for step in steps for visibility in _visibilities(step)],
     }
     arrays = [pa.array(columns[field.name], type=field.type) for field in schema]
     return pa.RecordBatch.from_arrays(arrays, schema=schema)
+
+
+def _visibilities(step: Step) -> list[float | None]:
+    """Visibility at each vehicle [m]; None in clear air, and where it is not known."""
+    extinctions = step.truth.vehicle_extinctions
+    if extinctions is None:
+        return [None] * len(step.traffic.ids)
+    return [visibility_from_extinction(k) if k > 0.0 else None for k in extinctions.tolist()]
 
 
 def write_trajectory_table(path: Path, log: Path, complete: bool) -> None:

@@ -1,4 +1,6 @@
+import dataclasses
 import json
+import math
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -41,6 +43,14 @@ def test_every_vehicle_of_every_step_is_a_row_in_sumos_units(tmp_path: Path) -> 
     assert metadata(path)[b"fogsim.complete"] == b"true"
     assert set(json.loads(metadata(path)[b"fogsim.columns"])) == set(TRAJECTORY_COLUMNS)
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
+
+
+def test_the_fog_at_each_vehicle_is_told_as_visibility(tmp_path: Path) -> None:
+    path = tmp_path / "trajectories.parquet"
+    unknown, step = drive(2)
+    truth = dataclasses.replace(step.truth, vehicle_extinctions=np.array([math.log(20.0) / 50.0, 0.0]))
+    list(with_trajectories([unknown, dataclasses.replace(step, truth=truth)], path))
+    assert [row["visibility"] for row in rows(path)] == [None, None, pytest.approx(50.0), None]
 
 
 def test_a_step_that_shows_again_what_was_last_seen_adds_nothing(tmp_path: Path) -> None:

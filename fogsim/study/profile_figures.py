@@ -70,8 +70,8 @@ def _scale_near_hundred(axes: Axes, values: NDArray[np.float64]) -> None:
     axes.yaxis.set_minor_locator(NullLocator())
 
 
-def speed_figure(study: Study, cells: Mapping[Cell, PooledProfiles]) -> StudyFigure:
-    """Mean speed of everybody along the ego's route, over the fog that is there.
+def speed_figure(study: Study, cells: Mapping[Cell, PooledProfiles]) -> StudyFigure | None:
+    """Mean speed of everybody along the ego's route, over the fog that is there; None where no ego drove.
 
     Parameters
     ----------
@@ -80,6 +80,8 @@ def speed_figure(study: Study, cells: Mapping[Cell, PooledProfiles]) -> StudyFig
     cells : mapping from tuple of str to PooledProfiles
         Profiles of each cell that has any.
     """
+    if not any(len(pooled.speeds()) for pooled in cells.values()):
+        return None
     grid = Grid(study)
     figure, panels = grid.figure(2.2)
     rows = []
@@ -136,7 +138,7 @@ def _shade_fog(axes: Axes, pooled: list[PooledProfiles]) -> None:
 
 
 def collisions_figure(study: Study, cells: Mapping[Cell, PooledProfiles]) -> StudyFigure | None:
-    """Where the collisions were, over the ego's way in plan; None where there were none.
+    """Where the collisions were, over the ego's way in plan; None where none has a place.
 
     Parameters
     ----------
@@ -146,14 +148,12 @@ def collisions_figure(study: Study, cells: Mapping[Cell, PooledProfiles]) -> Stu
         Profiles of each cell that has any.
     """
     rows = [[*cell, *hit] for cell, pooled in cells.items() for hit in pooled.collisions]
-    paths = [pooled.path for pooled in cells.values() if len(pooled.path)]
-    if not rows or not paths:
+    hits = [(hit.x, hit.y) for pooled in cells.values() for hit in pooled.collisions if hit.x is not None]
+    if not hits:
         return None
     grid = Grid(study)
-    places = np.concatenate(
-        [*paths, *(np.array([hit[2:4]]) for p in cells.values() for hit in p.collisions if hit.x is not None)]
-    )
-    x, y = padded(places[:, 0].astype(float)), padded(places[:, 1].astype(float))
+    places = np.concatenate([*(pooled.path for pooled in cells.values()), np.array(hits, dtype=np.float64)])
+    x, y = padded(places[:, 0]), padded(places[:, 1])
     shape = (y[1] - y[0]) / (x[1] - x[0])
     across = 1 if shape < 0.3 else 2
     figure, panels = grid.figure(min(4.5, 0.45 + 6.2 / across * shape), across=across)

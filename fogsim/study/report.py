@@ -124,10 +124,8 @@ def _figures(
             yield trade_off_figure(study, rows, across, upwards)
     if profiles:
         yield survival_figure(study, profiles)
-        yield speed_figure(study, profiles)
-        collisions = collisions_figure(study, profiles)
-        if collisions is not None:
-            yield collisions
+        over_road = speed_figure(study, profiles), collisions_figure(study, profiles)
+        yield from (figure for figure in over_road if figure is not None)
     for metric in dict.fromkeys(one.metric for one in differences):
         yield differences_figure(study, metric, [one for one in differences if one.metric == metric])
 

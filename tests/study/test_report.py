@@ -15,6 +15,7 @@ from fogsim.study.figures import trade_off_figure
 from fogsim.study.main_metrics import DELAY_METRICS, MAIN_METRICS, SAFETY_METRICS
 from fogsim.study.plan import Study, StudyRun
 from fogsim.study.pooled_profiles import PooledProfiles, pool_profiles
+from fogsim.study.profile_figures import collisions_figure, speed_figure
 from fogsim.study.profiles import CLASSES
 from fogsim.study.report import write_report
 
@@ -189,6 +190,17 @@ def test_without_any_finished_run_there_is_a_report_too(study: Study, tmp_path: 
     assert "of which 0 are complete" in page
     assert "PARTIAL: 32 runs" in page
     assert list((tmp_path / "figures").iterdir()) == []
+
+
+def test_without_an_ego_there_is_no_road_to_draw(study: Study) -> None:
+    alone = profiles(20.0, 2.0)
+    alone |= {"road": {name: [] for name in alone["road"]}, "path": {name: [] for name in alone["path"]}}
+    cells = pool_profiles((run.levels, run.seed, alone) for run in study.runs)
+    assert speed_figure(study, cells) is None
+    collisions = collisions_figure(study, cells)
+    assert collisions is not None
+    assert len(collisions.rows) == 2 * len(study.runs)
+    assert collisions_figure(study, {}) is None
 
 
 def test_profiles_of_runs_add_up() -> None:

@@ -9,7 +9,7 @@ everything else, a quarter of them lie below ``share_low``, a quarter above ``sh
 ``small`` draws 160 × 120 pixels at 2 Hz by the processor, with an estimator; ``none_10_hz`` is without frames at SUMO's
 own step, where nothing is left out between two steps that are measured. Times are the processor's [ms].
 
-    python benchmarks/metrics.py [--json] [--vehicles 100 …] [--seconds 200] [--profile]
+    python benchmarks/metrics.py [--json] [--vehicles 100 …] [--seconds 200] [--block 80] [--profile]
 
 ``--profile`` tells where the metrics' time goes, by metric.
 """
@@ -51,8 +51,8 @@ def timed(call: Callable[[], object]) -> float:
     return 1e-6 * (time.thread_time_ns() - started)
 
 
-def measure(frames: str, vehicles: int, seconds: float) -> dict[str, float | str]:
-    """One record of so many seconds of simulated time."""
+def measure(frames: str, vehicles: int, seconds: float, size: int) -> dict[str, float | str]:
+    """One record of so many seconds of simulated time, in blocks of so many steps."""
     period, settings = RUNS[frames]
     blocks: list[tuple[float, float]] = []
     with tempfile.TemporaryDirectory() as folder:
@@ -69,11 +69,11 @@ def measure(frames: str, vehicles: int, seconds: float) -> dict[str, float | str
 
         while last[0].ending is None:
             others = own = 0.0
-            for _ in range(BLOCK):
+            for _ in range(size):
                 if last[0].ending is None:
                     others += timed(go_on)
                     own += timed(lambda: metrics.update(last[0]))
-            blocks.append((others / BLOCK, own / BLOCK))
+            blocks.append((others / size, own / size))
         steps.close()
     # The first block has what is made once.
     others, own = zip(*blocks[1:], strict=True)
@@ -111,13 +111,15 @@ def main() -> None:
     parser.add_argument("--vehicles", action="append", type=int, help="vehicles (default 100)")
     parser.add_argument("--frames", action="append", choices=[*RUNS], help="which runs (default all)")
     parser.add_argument("--seconds", type=float, default=200.0, help="simulated time of each run")
+    parser.add_argument("--block", type=int, default=BLOCK, help="steps in a block")
     parser.add_argument("--profile", action="store_true", help="tell the cost of each metric alone")
     arguments = parser.parse_args()
     counts = arguments.vehicles or [100]
     if arguments.profile:
         records: list[dict[str, float | str]] = [{"vehicles": n, **by_metric(n)} for n in counts]
     else:
-        records = [measure(kind, n, arguments.seconds) for n in counts for kind in arguments.frames or [*RUNS]]
+        kinds, size = arguments.frames or [*RUNS], arguments.block
+        records = [measure(kind, n, arguments.seconds, size) for n in counts for kind in kinds]
     if arguments.json:
         print(json.dumps(records, indent=2))
         return

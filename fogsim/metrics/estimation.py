@@ -1,14 +1,14 @@
 """How right the estimators and the belief were."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
 
 from fogsim.metrics.metric import JsonValue, Sample, share
-from fogsim.units import finite_or_none
+from fogsim.units import finite_or_none, visibility_from_extinction
 
 FOG_LIMIT = 1000.0
 """Visibility below which the air is called fog [m] (WMO); errors are counted only there."""
@@ -25,12 +25,82 @@ def relative_error(visibility: float, truth: float) -> float:
     return abs(visibility - truth) / truth * 100.0
 
 
+NORMAL_90 = 1.6449
+"""Deviations from the mean within which 90 % of a normal distribution lie [-]."""
+
+LONGEST_LAG = 30.0
+"""Latencies are looked for up to this [s]."""
+
+LEAST_CHANGE = 0.1
+"""Standard deviation of ln V over a run from which a latency can be told; a tenth is a change of 10 %."""
+
+
 @dataclass(slots=True)
 class Errors:
-    """Errors of one source of visibilities, against the visibility ahead."""
+    """Errors of one source of visibilities, against the visibility ahead.
+
+    The bias is the median of ln (V / V_true), as errors of extinction are by ratio. The latency is the lag L, up to
+    30 s, by which the mean of |ln V(t) − ln V_true(t − L)| over the run is least: how long after a change of the fog
+    it is followed.
+    """
 
     asked: int = 0
     percent: list[float] = field(default_factory=list)
+    covered: int = 0
+    _ratios: list[float] = field(default_factory=list)
+    _said: list[tuple[float, float]] = field(default_factory=list)
+    _truths: list[tuple[float, float]] = field(default_factory=list)
+
+    def follow(self, time: float, truth: float, said: float | None) -> None:
+        """Take in how the fog is, and what was said of it, if anything.
+
+        Parameters
+        ----------
+        time : float
+            Simulated time [s].
+        truth : float
+            Visibility ahead [m].
+        said : float or None
+            What was said of it [m].
+        """
+        self._truths.append((time, math.log(min(truth, FOG_LIMIT))))
+        if said is not None:
+            self._said.append((time, math.log(min(said, FOG_LIMIT))))
+
+    def judge(self, truth: float, said: float, low: float, high: float) -> None:
+        """Take in one visibility that was said in fog.
+
+        Parameters
+        ----------
+        truth : float
+            Visibility ahead [m].
+        said : float
+            What was said of it [m]; ``inf`` for clear air.
+        low, high : float
+            Ends of the interval that was to hold the truth in 90 % of all cases [m].
+        """
+        self.percent.append(relative_error(said, truth))
+        self._ratios.append(math.log(said / truth))
+        self.covered += low <= truth <= high
+
+    @property
+    def bias_percent(self) -> float | None:
+        """Median of V / V_true − 1 in percent; None without any, or on clear air."""
+        ratio = quantile(self._ratios, 0.5)
+        return None if ratio is None else 100.0 * math.expm1(ratio)
+
+    @property
+    def latency(self) -> float | None:
+        """How long after a change of the fog it is followed [s]; None where the fog does not change."""
+        if len(self._said) < 2:
+            return None
+        (when, said), (times, truths) = np.array(self._said).T, np.array(self._truths).T
+        if truths.std() < LEAST_CHANGE:
+            return None
+        lags = np.arange(0.0, min(LONGEST_LAG, times[-1] - times[0]), float(np.diff(times).min()))
+        settled = when >= when[0] + (lags[-1] if len(lags) else 0.0)
+        costs = [np.abs(said[settled] - np.interp(when[settled] - lag, times, truths)).mean() for lag in lags]
+        return None if not settled.any() else float(lags[int(np.argmin(costs))])
 
     def result(self) -> dict[str, JsonValue]:
         """Say count, validity and quantiles; a quantile is None where it falls on "no fog at all"."""
@@ -38,15 +108,27 @@ class Errors:
             "count": self.asked,
             "valid_share": share(len(self.percent), self.asked),
             "clear_air_share": share(sum(map(math.isinf, self.percent)), len(self.percent)),
-            "median_error_percent": self._quantile(0.5),
-            "p95_error_percent": self._quantile(0.95),
+            "median_error_percent": quantile(self.percent, 0.5),
+            "p95_error_percent": quantile(self.percent, 0.95),
+            "bias_percent": self.bias_percent,
+            "coverage_share": share(self.covered, len(self.percent)),
+            "latency_s": self.latency,
         }
 
-    def _quantile(self, probability: float) -> float | None:
-        """Quantile without interpolation, so that an infinite error never makes a NaN of its neighbour."""
-        if not self.percent:
-            return None
-        return finite_or_none(float(np.quantile(self.percent, probability, method="inverted_cdf")))
+
+def quantile(values: Sequence[float], probability: float) -> float | None:
+    """Quantile without interpolation, so that an infinite value never makes a NaN of its neighbour.
+
+    Parameters
+    ----------
+    values : (n,) sequence of float
+        The values.
+    probability : float
+        Which quantile [-].
+    """
+    if not values:
+        return None
+    return finite_or_none(float(np.quantile(values, probability, method="inverted_cdf")))
 
 
 @dataclass(slots=True)
@@ -55,7 +137,9 @@ class EstimatorErrors:
 
     meanings: ClassVar[Mapping[str, str]] = {
         "estimators": "error |V − V_true| / V_true of each method against the true visibility ahead, in fog "
-        "(below 1000 m): frames, share with a valid estimate, share of those that said clear air, quantiles",
+        "(below 1000 m): frames, share with a valid estimate, share of those that said clear air, quantiles; bias (median of V / V_true − 1); "
+        "share of valid estimates whose 90 % interval (± 1.645 deviations of k) held the truth; latency (lag up to 30 s "
+        "at which they match the fog best; none where it hardly changes)",
     }
     _methods: dict[str, Errors] = field(default_factory=dict)
 
@@ -70,11 +154,14 @@ class EstimatorErrors:
         truth = sample.step.truth.visibility_ahead
         for estimate in sample.step.estimates:
             errors = self._methods.setdefault(estimate.method, Errors())
+            errors.follow(sample.step.time, truth, estimate.visibility if estimate.valid else None)
             if truth >= FOG_LIMIT:
                 continue
             errors.asked += 1
             if estimate.valid:
-                errors.percent.append(relative_error(estimate.visibility, truth))
+                reach = NORMAL_90 * estimate.standard_deviation
+                ends = (visibility_from_extinction(max(estimate.extinction + way, 0.0)) for way in (reach, -reach))
+                errors.judge(truth, estimate.visibility, *ends)
 
     def result(self) -> dict[str, JsonValue]:
         """Say the error of each method."""
@@ -89,10 +176,11 @@ class BeliefError:
         "belief_count": "number of steps in fog (true visibility ahead below 1000 m)",
         "belief_median_error_percent": "median over those steps of the error of the median belief",
         "belief_p95_error_percent": "95th percentile of the same",
+        "belief_bias_percent": "median over those steps of V / V_true − 1",
+        "belief_latency_s": "lag up to 30 s at which the belief matches the fog best; none where it hardly changes",
         "belief_coverage_share": "share of those steps in which the 90 % interval held the truth",
     }
     _errors: Errors = field(default_factory=Errors)
-    _covered: int = 0
 
     def update(self, sample: Sample) -> None:
         """Take in one step.
@@ -103,11 +191,12 @@ class BeliefError:
             The step, and what is derived from it.
         """
         truth, belief = sample.step.truth.visibility_ahead, sample.step.belief
+        said = belief.visibility
+        self._errors.follow(sample.step.time, truth, said)
         if truth >= FOG_LIMIT:
             return
         self._errors.asked += 1
-        self._errors.percent.append(relative_error(belief.visibility, truth))
-        self._covered += belief.visibility_quantile(0.05) <= truth <= belief.visibility_quantile(0.95)
+        self._errors.judge(truth, said, belief.visibility_quantile(0.05), belief.visibility_quantile(0.95))
 
     def result(self) -> dict[str, JsonValue]:
         """Say the error and the coverage."""
@@ -116,5 +205,7 @@ class BeliefError:
             "belief_count": errors["count"],
             "belief_median_error_percent": errors["median_error_percent"],
             "belief_p95_error_percent": errors["p95_error_percent"],
-            "belief_coverage_share": share(self._covered, self._errors.asked),
+            "belief_bias_percent": "median over those steps of V / V_true − 1",
+        "belief_latency_s": "lag up to 30 s at which the belief matches the fog best; none where it hardly changes",
+        "belief_coverage_share": share(self._covered, self._errors.asked),
         }

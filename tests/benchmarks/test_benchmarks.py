@@ -39,7 +39,7 @@ def records(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
         ),
         (
             "metrics.py",
-            ("--frames", "none", "--vehicles", "6", "--seconds", "121"),
+            ("--frames", "none", "--vehicles", "6", "--seconds", "4", "--block", "2"),
             {"frames", "vehicles_read", "ms_step", "ms_metrics", "share", "share_low", "share_high", "blocks"},
         ),
         ("resets.py", ("--resets", "2"), {"ms_median", "growth_kib_per_reset"}),

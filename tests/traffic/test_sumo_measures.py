@@ -1,0 +1,212 @@
+"""What SUMO's own outputs say of a run is what FogSim's metrics of everybody say: SSM device, trips, collisions."""
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+
+from fogsim.metrics.metric import JsonValue
+from fogsim.metrics.surrogate import CRITICAL_DECELERATION, QUEUE_SPEED
+from fogsim.metrics.traffic_collisions import TrafficCollisions
+from fogsim.metrics.traffic_conflicts import TrafficConflicts
+from fogsim.metrics.traffic_flow import TrafficFlow
+from fogsim.metrics.traffic_span import TrafficGathering, TrafficMetric
+from fogsim.traffic import DriverSetup, TrafficSetup
+from fogsim.traffic.sumo.libsumo_link import LibsumoLink
+from fogsim.traffic.sumo.link import Api
+from fogsim.traffic.sumo_traffic import SumoTraffic
+from fogsim.values import Collision, Command, TrafficState
+from tests.recorders.synthetic import make_step
+
+STEP = 0.1
+STEPS = 400
+LENGTH = 3000.0
+BRAKES_AT = 250
+"""Step in which the first vehicle begins to brake."""
+NET = (
+    f'<net version="1.20"><edge id="road" from="a" to="b" priority="1"><lane id="road_0" index="0" speed="30" '
+    f'length="{LENGTH}" shape="0,0 {LENGTH},0"/></edge>'
+    '<junction id="a" type="dead_end" x="0" y="0" incLanes="" intLanes="" shape="0,0 0,-3"/>'
+    f'<junction id="b" type="dead_end" x="{LENGTH}" y="0" incLanes="road_0" intLanes="" shape="{LENGTH},0 {LENGTH},-3"'
+    "/>"
+    "</net>"
+)
+SPEEDS = (1.1, 0.9, 1.2, 0.6, 1.05, 1.15, 0.8)
+"""Wanted speeds over the limit, from the last vehicle to the first."""
+
+
+class Told(NamedTuple):
+    """What the device wrote of a follower and its leader: speeds at that time are the run's own."""
+
+    time_to_collision: float
+    drac: float
+    mdrac: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Run:
+    """States of one run, its collisions, and the folder of SUMO's outputs."""
+
+    states: Sequence[TrafficState]
+    collisions: Sequence[Collision]
+    folder: Path
+
+    def watched(self, metric: TrafficMetric) -> Mapping[str, JsonValue]:
+        """What a metric says of the run."""
+        gathering = TrafficGathering()
+        for number, state in enumerate(self.states):
+            hits = tuple(hit for hit in self.collisions if hit.time == state.time)
+            step = dataclasses.replace(make_step(number, collisions=hits), traffic=state)
+            gathering.add(step, STEP if number else 0.0)
+        span = gathering.take()
+        assert span is not None
+        metric.add(span)
+        return metric.result()
+
+
+class WithOutputs(LibsumoLink):
+    """SUMO in this process with its outputs, and a hand on the simulation."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__()
+        self._folder = folder
+        self.api: Api = None
+
+    def begin(self, arguments: Sequence[str]) -> Api:
+        device = {"probability": "1", "measures": "TTC DRAC MDRAC PET", "thresholds": "1e9 0 0 1e9", "range": "200"}
+        device |= {"trajectories": "true", "extratime": "0", "mdrac.prt": "1", "file": str(self._folder / "ssm.xml")}
+        options = [part for key, value in device.items() for part in (f"--device.ssm.{key}", value)]
+        outputs = ["--tripinfo-output", str(self._folder / "trips.xml"), "--tripinfo-output.write-unfinished", "true"]
+        collisions = ["--collision-output", str(self._folder / "collisions.xml"), "--precision", "9"]
+        self.api = super().begin([*arguments, *options, *outputs, *collisions])
+        return self.api
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """The second sees late that the first brakes, but not too late."""
+    return drive(tmp_path_factory.mktemp("near"), wakes_at=BRAKES_AT + 25)
+
+
+def drive(folder: Path, wakes_at: int) -> Run:
+    """Seven vehicles close up to one another; the first brakes, and the second does not see it until some step."""
+    (folder / "road.net.xml").write_text(NET, encoding="utf-8")
+    vehicles = "".join(
+        f'<vehicle id="{name}" type="car" route="r" depart="0" departPos="{10 + 60 * i}" departSpeed="18" '
+        f'speedFactor="{factor}"/>'
+        for i, (name, factor) in enumerate(zip(["ego", *"bcdefg"], SPEEDS, strict=True))
+    )
+    demand = f'<routes><vType id="car" sigma="0"/><route id="r" edges="road"/>{vehicles}</routes>'
+    (folder / "road.rou.xml").write_text(demand, encoding="utf-8")
+    setup = TrafficSetup(
+        net=folder / "road.net.xml",
+        routes=(folder / "road.rou.xml",),
+        additional=(),
+        ego="ego",
+        step_length=STEP,
+        keep_lane=(),
+        warm_up_limit=10.0,
+        advice_deceleration=2.0,
+        reading_radius=LENGTH,
+        events=(),
+        sight=None,
+        drivers=DriverSetup(speed_choice="unaffected"),
+    )
+    link = WithOutputs(folder)
+    traffic = SumoTraffic(setup, link)
+    states, collisions = [], []
+    try:
+        traffic.start(1)
+        for number in range(STEPS):
+            if number == BRAKES_AT:
+                link.api.vehicle.slowDown("g", 6.0, 3.0)
+                link.api.vehicle.setSpeedMode("f", 0)
+                link.api.vehicle.setSpeed("f", link.api.vehicle.getSpeed("f"))
+            if number == wakes_at:
+                link.api.vehicle.setSpeedMode("f", 31)
+                link.api.vehicle.setSpeed("f", -1.0)
+            if number:
+                traffic.advance(Command())
+            snapshot = traffic.observe()
+            assert snapshot is not None
+            states.append(snapshot.state)
+            collisions += snapshot.collisions
+    finally:
+        traffic.close()
+    return Run(states, collisions, folder)
+
+
+@pytest.fixture(scope="module")
+def told(run: Run) -> dict[tuple[float, str, str], Told]:
+    """What the device wrote, by time, follower and leader."""
+    found = {}
+    for conflict in ET.parse(run.folder / "ssm.xml").getroot().iter("conflict"):  # noqa: S314 - the test's own run
+        spans = [
+            span.get("values", "").split()
+            for name in ("timeSpan", "typeSpan", "TTCSpan", "DRACSpan", "MDRACSpan")
+            for span in [conflict.find(name)]
+            if span is not None
+        ]
+        for time, kind, ttc, drac, mdrac in zip(*spans, strict=True):
+            if kind == "2":
+                # The device names a step by its beginning, the simulation's clock after it by its end.
+                key = (round(float(time) + STEP, 1), conflict.get("ego", ""), conflict.get("foe", ""))
+                found[key] = Told(*(float(x) if x != "NA" else y for x, y in ((ttc, math.inf), (drac, 0), (mdrac, 0))))
+    return found
+
+
+def test_conflicts_are_those_of_the_ssm_device(run: Run, told: dict[tuple[float, str, str], Told]) -> None:
+    """Sums over the same steps; the device writes nine digits."""
+    found = run.watched(TrafficConflicts(threshold=3.0))
+    rows = []
+    for state in run.states[1:]:
+        order = np.argsort(state.position[:, 0])
+        for follower, leader in itertools.pairwise(order.tolist()):
+            key = (round(state.time, 1), state.ids[follower], state.ids[leader])
+            if key in told and state.speed[follower] >= QUEUE_SPEED:
+                rows.append((*told[key], state.speed[leader]))
+    ttc, drac, mdrac, ahead = np.array(rows).T
+    moving, vehicle_time = ahead >= QUEUE_SPEED, len(SPEEDS) * (STEPS - 1) * STEP
+    assert found["traffic_exposed_time_share"] == pytest.approx((ttc[moving] <= 3.0).sum() * STEP / vehicle_time)
+    assert found["traffic_minimum_time_to_collision_s"] == pytest.approx(ttc[moving].min(), rel=1e-6)
+    assert found["traffic_max_drac_mps2"] == pytest.approx(drac[moving].max(), rel=1e-6)
+    serious = (drac[moving] > CRITICAL_DECELERATION).sum() * STEP / vehicle_time
+    assert found["traffic_serious_conflict_time_share"] == pytest.approx(serious)
+    # The device leaves MDRAC out once the reaction takes all the time to collision; FogSim says that nothing is enough.
+    late = ((mdrac > CRITICAL_DECELERATION) | (ttc <= 1.0))[moving].sum() * STEP / vehicle_time
+    assert found["traffic_serious_mdrac_time_share"] == pytest.approx(late)
+    assert (ttc[moving] <= 3.0).sum() > 10
+    assert serious > 0.0
+
+
+def test_way_and_delay_are_those_of_the_trips(run: Run) -> None:
+    """SUMO counts time loss in each step as FogSim does, in whole milliseconds for each vehicle."""
+    found = run.watched(TrafficFlow())
+    trips = [trip.attrib for trip in ET.parse(run.folder / "trips.xml").getroot()]  # noqa: S314 - the test's own run
+    assert len(trips) == len(SPEEDS)
+    way, lost, time = (sum(float(t[k]) for t in trips) for k in ("routeLength", "timeLoss", "duration"))
+    assert found["traffic_vehicle_distance_m"] == pytest.approx(way, rel=1e-6)
+    # The first step was over when they were first seen, before they moved.
+    assert found["traffic_vehicle_time_s"] == pytest.approx(time - len(SPEEDS) * STEP, rel=1e-6)
+    delay = found["traffic_delay_s_per_vehicle_km"]
+    assert isinstance(delay, float)
+    assert delay * way / 1000.0 == pytest.approx(lost, abs=0.5e-3 * len(SPEEDS))
+
+
+def test_collisions_are_those_of_sumos_output(tmp_path: Path) -> None:
+    run = drive(tmp_path, wakes_at=STEPS)
+    hits = list(ET.parse(run.folder / "collisions.xml").getroot())  # noqa: S314 - the test's own run
+    first = {}
+    for hit in hits:
+        first.setdefault(frozenset((hit.get("collider"), hit.get("victim"))), hit)
+    found = run.watched(TrafficCollisions())
+    assert found["traffic_collisions"] == len(first) > 0
+    speeds = [abs(float(hit.get("colliderSpeed", "")) - float(hit.get("victimSpeed", ""))) for hit in first.values()]
+    assert found["traffic_mean_impact_speed_mps"] == pytest.approx(np.mean(speeds), abs=1e-6)
+    assert found["traffic_max_impact_speed_mps"] == pytest.approx(max(speeds), abs=1e-6)

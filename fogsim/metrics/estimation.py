@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from fogsim.metrics.metric import JsonValue, Sample, share
-from fogsim.units import finite_or_none, visibility_from_extinction
+from fogsim.units import finite_or_none
 
 FOG_LIMIT = 1000.0
 """Visibility below which the air is called fog [m] (WMO); errors are counted only there."""
@@ -24,9 +24,6 @@ def relative_error(visibility: float, truth: float) -> float:
     """
     return abs(visibility - truth) / truth * 100.0
 
-
-NORMAL_90 = 1.6449
-"""Deviations from the mean within which 90 % of a normal distribution lie [-]."""
 
 LONGEST_LAG = 30.0
 """Latencies are looked for up to this [s]."""
@@ -97,10 +94,14 @@ class Errors:
         (when, said), (times, truths) = np.array(self._said).T, np.array(self._truths).T
         if truths.std() < LEAST_CHANGE:
             return None
-        lags = np.arange(0.0, min(LONGEST_LAG, times[-1] - times[0]), float(np.diff(times).min()))
-        settled = when >= when[0] + (lags[-1] if len(lags) else 0.0)
+        # At every lag the same part of the run is compared: that before which the longest lag reaches.
+        longest = min(LONGEST_LAG, 0.5 * (times[-1] - times[0]))
+        settled = when >= times[0] + longest
+        if not settled.any():
+            return None
+        lags = np.arange(0.0, longest, float(np.diff(times).min()))
         costs = [np.abs(said[settled] - np.interp(when[settled] - lag, times, truths)).mean() for lag in lags]
-        return None if not settled.any() else float(lags[int(np.argmin(costs))])
+        return float(lags[int(np.argmin(costs))])
 
     def result(self) -> dict[str, JsonValue]:
         """Say count, validity and quantiles; a quantile is None where it falls on "no fog at all"."""
@@ -137,9 +138,9 @@ class EstimatorErrors:
 
     meanings: ClassVar[Mapping[str, str]] = {
         "estimators": "error |V − V_true| / V_true of each method against the true visibility ahead, in fog "
-        "(below 1000 m): frames, share with a valid estimate, share of those that said clear air, quantiles; bias (median of V / V_true − 1); "
-        "share of valid estimates whose 90 % interval (± 1.645 deviations of k) held the truth; latency (lag up to 30 s "
-        "at which they match the fog best; none where it hardly changes)",
+        "(below 1000 m): frames, share with a valid estimate, share of those that said clear air, quantiles; bias "
+        "(median of V / V_true − 1); share of valid estimates whose 90 % interval (± 1.645 deviations of k) held the "
+        "truth; latency (lag up to 30 s at which they match the fog best; none where it hardly changes)",
     }
     _methods: dict[str, Errors] = field(default_factory=dict)
 
@@ -159,9 +160,7 @@ class EstimatorErrors:
                 continue
             errors.asked += 1
             if estimate.valid:
-                reach = NORMAL_90 * estimate.standard_deviation
-                ends = (visibility_from_extinction(max(estimate.extinction + way, 0.0)) for way in (reach, -reach))
-                errors.judge(truth, estimate.visibility, *ends)
+                errors.judge(truth, estimate.visibility, *estimate.visibility_interval)
 
     def result(self) -> dict[str, JsonValue]:
         """Say the error of each method."""
@@ -205,7 +204,7 @@ class BeliefError:
             "belief_count": errors["count"],
             "belief_median_error_percent": errors["median_error_percent"],
             "belief_p95_error_percent": errors["p95_error_percent"],
-            "belief_bias_percent": "median over those steps of V / V_true − 1",
-        "belief_latency_s": "lag up to 30 s at which the belief matches the fog best; none where it hardly changes",
-        "belief_coverage_share": share(self._covered, self._errors.asked),
+            "belief_bias_percent": errors["bias_percent"],
+            "belief_latency_s": errors["latency_s"],
+            "belief_coverage_share": errors["coverage_share"],
         }

@@ -55,3 +55,32 @@ def test_clear_air_is_no_fog_to_be_right_about() -> None:
     assert summary["belief_count"] == 0
     assert summary["belief_coverage_share"] is None
     assert method_errors(summary, "m")["median_error_percent"] is None
+
+
+def test_bias_is_of_the_ratio_and_coverage_of_the_interval_of_k() -> None:
+    """Deviations are 10 %: 1.645 of them reach from 110 m to 110 / 1.1645 … 110 / 0.8355 m, and hold 100 m."""
+    said = (110.0, 110.0, 130.0, 90.0, 130.0)
+    errors = method_errors(
+        summarise(make_step(i, time=float(i), estimates=(estimate("m", v),)) for i, v in enumerate(said)), "m"
+    )
+    assert errors["bias_percent"] == pytest.approx(10.0)
+    assert errors["coverage_share"] == pytest.approx(3 / 5)
+    assert errors["latency_s"] is None
+
+
+@pytest.mark.parametrize("lag", [0.0, 1.5, 6.0])
+def test_latency_is_the_lag_of_what_follows_the_fog(lag: float) -> None:
+    """Into a bank at 40 s and out of it at 70 s, at 2 Hz; the belief some seconds late, and 10 % off throughout."""
+
+    def visibility(time: float) -> float:
+        return 500.0 - 400.0 * (1 / (1 + math.exp(40.0 - time)) - 1 / (1 + math.exp(70.0 - time)))
+
+    times = [0.5 * i for i in range(240)]
+    steps = (
+        make_step(i, time=t, visibility=visibility(t), believed=belief(1.1 * visibility(t - lag), 0.02))
+        for i, t in enumerate(times)
+    )
+    summary = summarise(steps)
+    assert summary["belief_latency_s"] == lag
+    if not lag:
+        assert summary["belief_bias_percent"] == pytest.approx(10.0, abs=1.0)

@@ -21,7 +21,7 @@ Command = Callable[..., "subprocess.CompletedProcess[str]"]
 FOGSIM = (sys.executable, "-m", "fogsim")
 SMALL = ("--set", "camera.width=160", "--set", "camera.height=120", "--set", "duration_s=3", "--set", EARLY)
 TOWN = str(Path(__file__).resolve().parents[1] / "data" / "grid" / "grid.sumocfg")
-FILES = {"manifest.json", "metrics.json", "steps.parquet", "video.mp4", "report.html"}
+FILES = {"manifest.json", "metrics.json", "steps.parquet", "trajectories.parquet", "video.mp4", "report.html"}
 
 
 def fogsim(*arguments: str, **options: object) -> subprocess.CompletedProcess[str]:
@@ -34,7 +34,7 @@ def fogsim(*arguments: str, **options: object) -> subprocess.CompletedProcess[st
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("run") / "out"
-    done = fogsim("run", "motorway_fog_bank", "--seed", "3", "--out", str(out), *SMALL)
+    done = fogsim("run", "motorway_fog_bank", "--seed", "3", "--trajectories", "--out", str(out), *SMALL)
     assert done.returncode == 0, done.stderr
     assert "ended: time" in done.stdout
     return out
@@ -96,7 +96,7 @@ def test_an_interrupted_run_leaves_readable_results_that_say_they_are_partial(tm
     assert process.returncode == 130, stderr
     assert "Traceback" not in stderr
     assert "partial" in stdout
-    assert {p.name for p in out.iterdir()} == FILES
+    assert {p.name for p in out.iterdir()} == FILES - {"trajectories.parquet"}
     manifest = json.loads((out / "manifest.json").read_text(encoding="utf-8"))
     assert manifest["status"] == "interrupted"
     assert json.loads((out / "metrics.json").read_text(encoding="utf-8"))["complete"] is False

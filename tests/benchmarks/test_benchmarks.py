@@ -42,7 +42,11 @@ def records(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
             ("--frames", "none", "--vehicles", "6", "--seconds", "4", "--block", "2"),
             {"frames", "vehicles_read", "ms_step", "ms_metrics", "share", "share_low", "share_high", "blocks"},
         ),
-        ("resets.py", ("--resets", "2"), {"ms_median", "growth_kib_per_reset"}),
+        (
+            "resets.py",
+            ("--resets", "2", "--part", "sumo", "--part", "environment"),
+            {"ms_median", "growth_kib_per_reset"},
+        ),
         (
             "estimator_accuracy.py",
             ("--cameras", "1", "--scenes", "1", "--draws", "1"),

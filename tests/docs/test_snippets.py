@@ -77,6 +77,7 @@ def shortened(line: list[str]) -> list[str]:
         "dataset": ["fogsim", name, *SHORT, *rest, "--frames", "2", "--every", "1"],
         "estimate": [*line, "--overwrite"],
         "study": [*line, "--check"],
+        "view": [*line, *SHORT[:4]],
     }.get(name, line)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+from early_motorway import EARLY
 from gymnasium.utils.env_checker import check_env
 
 import fogsim
@@ -20,11 +21,12 @@ ID = "fogsim/FogAdvisory-v0"
 ROAD = str(Path(__file__).resolve().parents[1] / "data" / "road")
 """A scenario in which the ego is there at once: the motorway fills for three minutes first."""
 SMALL = {"image_size": (64, 48), "overrides": ("clocks.camera_period_s=0.5",)}
+MOTORWAY = {"image_size": (64, 48), "overrides": ("clocks.camera_period_s=0.5", EARLY)}
 
 
 @pytest.fixture
 def env() -> Iterator[gymnasium.Env[Any, Any]]:
-    made = gymnasium.make(ID, **SMALL)
+    made = gymnasium.make(ID, **MOTORWAY)
     yield made
     made.close()
 
@@ -132,7 +134,7 @@ def test_the_reward_counts_with_the_reaction_time_of_the_advice(env: gymnasium.E
 
 def test_time_truncates_and_tells_what_has_not_been_played() -> None:
     late = "traffic.events=[{kind: brake, vehicle: lead, at_time_s: 300}]"
-    env = gymnasium.make(ID, image_size=(64, 48), overrides=("duration_s=2", "clocks.camera_period_s=0.5", late))
+    env = gymnasium.make(ID, image_size=(64, 48), overrides=("duration_s=2", "clocks.camera_period_s=0.5", EARLY, late))
     env.reset(seed=1)
     steps = [env.step(np.array([12, 0])) for _ in range(4)]
     env.close()
@@ -142,7 +144,7 @@ def test_time_truncates_and_tells_what_has_not_been_played() -> None:
 
 
 def test_rendering_shows_the_frame_beside_a_panel() -> None:
-    env = gymnasium.make(ID, render_mode="rgb_array", **SMALL)
+    env = gymnasium.make(ID, render_mode="rgb_array", **MOTORWAY)
     env.reset(seed=1)
     picture = env.render()
     env.close()
@@ -165,13 +167,13 @@ def test_bad_arguments() -> None:
 
 def test_a_loaded_scenario_serves_as_well() -> None:
     scenario = fogsim.load_scenario("motorway_fog_bank", ["fog.visibility_m=120"])
-    env = gymnasium.make(ID, scenario=scenario, **SMALL)
+    env = gymnasium.make(ID, scenario=scenario, **MOTORWAY)
     assert env.reset(seed=1)[1]["truth"]["visibility_m"] == pytest.approx(120.0)
     env.close()
 
 
 def test_vector_environments_run_in_processes_of_their_own() -> None:
-    envs = gymnasium.make_vec(ID, num_envs=2, **SMALL)
+    envs = gymnasium.make_vec(ID, num_envs=2, **MOTORWAY)
     try:
         observation, _ = envs.reset(seed=[3, 3])
         assert observation["camera"].shape == (2, 48, 64, 3)

@@ -12,11 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sumo
+from early_motorway import ROUTES
 from flat_road import Road, photograph, scan
 from PIL import Image
 
 from fogsim.offline.camera_file import load_calibration
 from fogsim.recorders.video import Encoder, encoder_command
+from fogsim.scenario import catalogue
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 PLUGIN = (CHECKOUT / "docs" / "plugin.md").read_text(encoding="utf-8")
@@ -64,6 +66,15 @@ def python(folder: Path) -> Run:
 
 
 @pytest.fixture
+def early_motorway(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Copy of the file of the scenario motorway_fog_bank, in a folder where it begins early."""
+    file = catalogue()["motorway_fog_bank"]
+    folder = Path(shutil.copytree(file.parent, tmp_path_factory.mktemp("scenarios") / file.parent.name))
+    shutil.copy(ROUTES, folder / "motorway.rou.xml")
+    return folder / file.name
+
+
+@pytest.fixture
 def readers_folder(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     """Makes a folder with what the text of a page speaks of."""
 
@@ -101,7 +112,7 @@ def put_pictures(folder: Path, calibration: str) -> None:
 
 def put_scenario(folder: Path) -> None:
     """Put my/scenario.yaml, as the page on scenario files prints it, into a folder."""
-    (text,) = re.findall(r"```yaml\n(.*?)```", SCENARIOS, re.DOTALL)
+    (text,) = re.findall(r"```yaml\n(name: .*?)```", SCENARIOS, re.DOTALL)
     (folder / "my" / "scenario.yaml").write_text(text, encoding="utf-8")
     shutil.copy(folder / "my" / "grid.net.xml", folder / "my" / "my.net.xml")
     (folder / "my" / "my.rou.xml").write_text(TRIPS.replace("veh18", "ego"), encoding="utf-8")

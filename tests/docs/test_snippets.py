@@ -1,7 +1,8 @@
 """What the pages print runs as it is printed: every block of Python by itself, and the command lines.
 
-Stand-ins: a folder with the reader's own files for each page (see conftest.py), the port of a SUMO that is started, and
-for command lines a smaller camera, a shorter run and fewer frames than the page asks for. All runs in one process,
+Stand-ins: a folder with the reader's own files for each page (see conftest.py), a motorway on which the ego departs
+early, the port of a SUMO that is started, and for command lines a smaller camera, a shorter run and fewer frames than
+the page asks for. All runs in one process,
 since most of the time goes into its first frame.
 """
 
@@ -42,8 +43,12 @@ NOT_YET = {"test"}
 SHORT = ("--set", "camera.width=64", "--set", "camera.height=48", "--set", "duration_s=0.5")
 
 RUNNER = """
-import json, os, sys, traceback
+import json, os, pathlib, sys, traceback
 from fogsim.cli.app import main
+from fogsim.scenario import loading
+
+known = loading.catalogue()
+loading.catalogue = lambda: {**known, "motorway_fog_bank": pathlib.Path(early)}
 
 def command(line):
     sys.argv = line
@@ -52,8 +57,8 @@ def command(line):
     except SystemExit as end:
         assert not end.code, f"exit code {end.code}"
 
-failed = False
-for page, folder, item in json.loads(sys.argv[1]):
+failed, items, early = False, *sys.argv[1:3]
+for page, folder, item in json.loads(items):
     os.chdir(folder)
     for stream in (sys.stdout, sys.stderr):
         print(f"== {page}: {item!r}", file=stream, flush=True)
@@ -81,7 +86,9 @@ def shortened(line: list[str]) -> list[str]:
     }.get(name, line)
 
 
-def test_what_is_printed_runs(readers_folder: Callable[[str], Path], python: Run, listening: int) -> None:
+def test_what_is_printed_runs(
+    readers_folder: Callable[[str], Path], early_motorway: Path, python: Run, listening: int
+) -> None:
     items: list[tuple[str, str, str | list[str]]] = []
     for page, text in TEXTS.items():
         lines = [shlex.split(line, comments=True) for line in LINES[page]]
@@ -89,7 +96,7 @@ def test_what_is_printed_runs(readers_folder: Callable[[str], Path], python: Run
         quick += [block.replace("8813", str(listening)) for block in PYTHON[page]]
         folder = str(readers_folder(text)) if quick else ""
         items += [(page, folder, item) for item in quick]
-    done = python(RUNNER, json.dumps(items))
+    done = python(RUNNER, json.dumps(items), str(early_motorway))
     assert done.returncode == 0, done.stderr
     printed = dict.fromkeys(TEXTS, "")
     for part in re.split(r"^== ", done.stdout, flags=re.MULTILINE)[1:]:

@@ -13,6 +13,7 @@ from fogsim.metrics.surrogate import SafetyStandard
 from fogsim.metrics.traffic_collisions import TrafficCollisions
 from fogsim.metrics.traffic_comfort import TrafficComfort
 from fogsim.metrics.traffic_conflicts import TrafficConflicts
+from fogsim.metrics.traffic_emissions import TrafficEmissions
 from fogsim.metrics.traffic_flow import TrafficFlow
 from fogsim.metrics.traffic_headways import TrafficHeadways
 from fogsim.metrics.traffic_sight import TrafficSight
@@ -42,6 +43,7 @@ METRICS: Registry[MetricFactory] = Registry(
         "traffic_sight": lambda standard: TrafficSight(standard.reaction_time, standard.deceleration),
         "traffic_flow": lambda _: TrafficFlow(),
         "traffic_comfort": lambda _: TrafficComfort(),
+        "traffic_emissions": lambda _: TrafficEmissions(),
     },
 )
 """Every metric by name, in the order of the summary."""

@@ -31,8 +31,8 @@ class TrafficSpan:
     ----------
     moment : (n,) intp
         Number of the step, counted on from span to span.
-    vehicle, lane : (n,) intp
-        Numbers of vehicle and lane, the same throughout a run.
+    vehicle, lane, kind : (n,) intp
+        Numbers of vehicle, lane and body kind, the same throughout a run.
     elapsed : (n,) float64
         Time since the step before [s]: what was found at the step is held to be true for it.
     position : (n, 3) float64
@@ -47,13 +47,14 @@ class TrafficSpan:
         Length of the span [s].
     collisions : tuple of Collision
         What happened in it, between vehicles of which one was near the ego.
-    lane_names : tuple of str
-        Lanes so far, by their numbers.
+    lane_names, kind_names : tuple of str
+        Lanes and body kinds so far, by their numbers.
     """
 
     moment: NDArray[np.intp]
     vehicle: NDArray[np.intp]
     lane: NDArray[np.intp]
+    kind: NDArray[np.intp]
     elapsed: NDArray[np.float64]
     position: NDArray[np.float64]
     heading: NDArray[np.float64]
@@ -65,6 +66,7 @@ class TrafficSpan:
     duration: float
     collisions: tuple[Collision, ...]
     lane_names: tuple[str, ...]
+    kind_names: tuple[str, ...]
 
     @cached_property
     def following(self) -> Following:
@@ -157,12 +159,13 @@ class TrafficGathering:
     def __init__(self) -> None:
         self._vehicles: dict[str, int] = {}
         self._lanes: dict[str, int] = {}
+        self._kinds: dict[str, int] = {}
         self._states: list[tuple[TrafficState, float, NDArray[np.float64] | None]] = []
-        self._numbers: list[tuple[NDArray[np.intp], NDArray[np.intp]]] = []
+        self._numbers: list[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]] = []
         self._collisions: list[Collision] = []
         self._last_ids: tuple[str, ...] = ()
         self._last_lanes: tuple[str, ...] = ()
-        self._last = np.zeros(0, np.intp), np.zeros(0, np.intp)
+        self._last = np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros(0, np.intp)
         self._rows = self._moments = 0
 
     @property
@@ -185,12 +188,13 @@ class TrafficGathering:
             # The simulation may have removed both; then they were near at the step before.
             near = {*self._last_ids, *traffic.ids}
             self._collisions += [hit for hit in step.collisions if near & {hit.collider, hit.victim}]
-        vehicles, lanes = self._last
+        vehicles, lanes, kinds = self._last
         if traffic.ids != self._last_ids:
             vehicles, self._last_ids = _numbers(self._vehicles, traffic.ids), traffic.ids
+            kinds = _numbers(self._kinds, traffic.types)
         if traffic.lane != self._last_lanes:
             lanes, self._last_lanes = _numbers(self._lanes, traffic.lane), traffic.lane
-        self._last = vehicles, lanes
+        self._last = vehicles, lanes, kinds
         self._numbers.append(self._last)
         self._states.append((traffic, elapsed, step.truth.vehicle_extinctions))
         self._rows += len(vehicles) + 1
@@ -200,7 +204,7 @@ class TrafficGathering:
         if not self._states:
             return None
         states, times, extinctions = zip(*self._states, strict=True)
-        vehicles, lanes = zip(*self._numbers, strict=True)
+        vehicles, lanes, kinds = zip(*self._numbers, strict=True)
         counts = [len(state.ids) for state in states]
         free = [state.free_speed if len(state.free_speed) else np.full(len(state.ids), np.nan) for state in states]
         fog = [np.full(n, np.nan) if k is None else k for k, n in zip(extinctions, counts, strict=True)]
@@ -208,6 +212,7 @@ class TrafficGathering:
             moment=np.repeat(np.arange(self._moments, self._moments + len(states)), counts),
             vehicle=np.concatenate(vehicles),
             lane=np.concatenate(lanes),
+            kind=np.concatenate(kinds),
             elapsed=np.repeat(np.array(times), counts),
             position=np.concatenate([state.position.reshape(-1, 3) for state in states]),
             heading=np.concatenate([state.heading for state in states]),
@@ -219,6 +224,7 @@ class TrafficGathering:
             duration=float(sum(times)),
             collisions=tuple(self._collisions),
             lane_names=tuple(self._lanes),
+            kind_names=tuple(self._kinds),
         )
         self._moments += len(states)
         self._rows, self._states, self._numbers, self._collisions = 0, [], [], []

@@ -10,6 +10,7 @@ from fogsim.metrics.histogram import Histogram
 from fogsim.metrics.traffic_collisions import TrafficCollisions
 from fogsim.metrics.traffic_comfort import TrafficComfort
 from fogsim.metrics.traffic_conflicts import TrafficConflicts
+from fogsim.metrics.traffic_emissions import TrafficEmissions
 from fogsim.metrics.traffic_flow import TrafficFlow
 from fogsim.metrics.traffic_headways import TrafficHeadways
 from fogsim.metrics.traffic_sight import TrafficSight
@@ -127,6 +128,15 @@ def test_jerk_and_hard_braking_of_those_who_stay() -> None:
     assert found["traffic_hard_braking_time_share"] == pytest.approx(1 / 6)
 
 
+def test_emissions_of_a_car_that_keeps_its_speed_coasts_and_stands() -> None:
+    """SUMO's HBEFA 4 petrol Euro 4 car at 20 m/s: 1521 + 15.59 · 20 + 0.1199 · 20³ mg of CO2 a second."""
+    road = lanes(("a", 0, 20), ("b", 0, 20), ("c", 0, 0))
+    found = watched(TrafficEmissions(), [(1.0, dataclasses.replace(road, acceleration=np.array([0.0, -0.5, 0.0])))])
+    assert found["traffic_co2_g_per_vehicle_km"] == pytest.approx((2.792 + 0.0 + 1.521) / 0.040)
+    assert found["traffic_nox_mg_per_vehicle_km"] == pytest.approx((0.6117 + 5.485e-05 * 8000 + 0.6117) / 0.040)
+    assert found["traffic_fuel_g_per_vehicle_km"] == pytest.approx((0.4931 + 0.10108 + 0.31096 + 0.4931) / 0.040)
+
+
 def test_collisions_by_what_was_driven() -> None:
     road = lanes(("a", 0, 20), ("a", 50, 30))
     hits = (Collision(0.0, "v0", "v1", 12.0), Collision(0.0, "far", "away", 30.0), Collision(0.0, "x", "v1", 4.0))
@@ -142,7 +152,7 @@ def test_collisions_by_what_was_driven() -> None:
     "metric",
     [
         *(TrafficConflicts(3.0), TrafficHeadways(), TrafficFlow(), TrafficSight(2.5, 3.4), TrafficComfort()),
-        TrafficCollisions(),
+        *(TrafficCollisions(), TrafficEmissions()),
     ],
     ids=lambda metric: type(metric).__name__,
 )

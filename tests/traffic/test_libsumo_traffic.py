@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from early_motorway import ROUTES
 
 from fogsim.errors import SimulationError, SimulationRunningError
 from fogsim.traffic import (
@@ -23,7 +24,7 @@ from fogsim.values import Command, Lamp, SpeedAdvice, TrafficSnapshot
 FOLDER = Path(__file__).resolve().parents[2] / "scenarios" / "motorway_fog_bank"
 SETUP = TrafficSetup(
     net=FOLDER / "motorway.net.xml",
-    routes=(FOLDER / "motorway.rou.xml",),
+    routes=(ROUTES,),
     additional=(FOLDER / "signs.add.xml",),
     ego="ego",
     step_length=0.1,

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import traci
+from early_motorway import ROUTES
 
 from fogsim.atmosphere import FieldAccess
 from fogsim.errors import SimulationError
@@ -25,7 +26,7 @@ GRID = Path(__file__).resolve().parents[1] / "data" / "grid" / "grid.sumocfg"
 FOLDER = Path(__file__).resolve().parents[2] / "scenarios" / "motorway_fog_bank"
 SETUP = TrafficSetup(
     net=FOLDER / "motorway.net.xml",
-    routes=(FOLDER / "motorway.rou.xml",),
+    routes=(ROUTES,),
     additional=(FOLDER / "signs.add.xml",),
     ego="ego",
     step_length=0.1,

@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere import Air
 from fogsim.camera import averaged, middle_samples, supersampled
+from fogsim.ego.near_scene import FEW_LANES, NearScene
 from fogsim.errors import InputError
 from fogsim.lighting import LampMount, own_head_lamps
-from fogsim.render import Renderer, RenderError, make_renderer
+from fogsim.render import LIMITED, Renderer, RenderError, make_renderer
 from fogsim.scenario import Scenario, build
 from fogsim.scene import (
     Corridor,
-    build_scene,
+    ScenePlan,
     light_sources,
     street_lamp_heads,
     street_lighting,
@@ -182,25 +183,38 @@ class ViewRenderer:
         self._mount = LampMount()
         self._air = Air(self.fog, scenario.fog.droplets)
         self._renderer: Renderer | None = None
-        self._build_scene_along(network.route)
+        self._is_closed = False
+        self._plan_scene_along(network.route)
         if self._by_lamplight:
             self._air.prepare(self._drawn_camera, [self._own_lamps(lit) for lit in _USUAL])
 
-    def _build_scene_along(self, line: NDArray[np.float64]) -> Renderer:
-        """Build the scene along a line (n, 3) [m]."""
+    def _plan_scene_along(self, line: NDArray[np.float64]) -> None:
+        """Find out what there is in the scene along a line (n, 3) [m]."""
         scenario, around = self._scenario, surroundings(self._network, self.signs, line)
         rng = np.random.default_rng(scenario.scenery_seed)
-        scene = build_scene(around.network, around.signs, rng, street_lamps=scenario.street_lamps)
+        plan = ScenePlan(around.network, around.signs, rng, street_lamps=scenario.street_lamps)
         self._origin, self._shifted, self._streets = around.origin, bool(np.any(around.origin)), None
         self._known = None if around.whole else Corridor(line, _LEEWAY)
-        self._scene, self._sky = scene, scenario.light.illuminance_lx
-        self._street_lamps = street_lamp_heads(scene) + around.origin
+        # Other renderers may draw what is farther away.
+        self._near_scene = NearScene(plan, FEW_LANES if scenario.renderer in LIMITED else plan.lanes)
+        self._sky = scenario.light.illuminance_lx
+        self._street_lamps = street_lamp_heads(self._near_scene.scene) + around.origin
         if len(self._street_lamps) and self._by_lamplight:
             self._sky = max(self._sky, DARKEST_SKY)
             self._streets = street_lighting(self._street_lamps, self._sky)
-        self.close()
-        self._renderer = make_renderer(scenario.renderer, scene, self._sky)
+        self._free_renderer()
+        if self._near_scene.is_whole:
+            self._make_renderer()
+
+    def _make_renderer(self) -> Renderer:
+        self._free_renderer()
+        self._renderer = make_renderer(self._scenario.renderer, self._near_scene.scene, self._sky)
         return self._renderer
+
+    def _free_renderer(self) -> None:
+        if self._renderer is not None:
+            self._renderer.close()
+        self._renderer = None
 
     def render(self, state: TrafficState, ego: int, pose: CameraPose, time: float) -> tuple[View, NDArray[np.float32]]:
         """Draw what is there, and what of it reaches the camera through the air.
@@ -223,9 +237,10 @@ class ViewRenderer:
         (rows, cols, 3) float32
             Linear radiance at the camera [cd/m²], the mean of a pixel's samples.
         """
-        renderer = self._renderer_at(state.position[ego])
+        self._go_to(state.position[ego])
         camera, lights = self._drawn_camera, self._lights(state, ego, pose)
         near, viewpoint = self._from_origin(state, pose)
+        renderer = self._renderer_for(viewpoint)
         view = renderer.render(vehicle_batches(near, ego), camera, viewpoint, lamplight=bool(lights.own))
         radiance = self._air.radiance(view, camera, pose, lights, time)
         return middle_samples(view, self._samples), averaged(radiance, self._samples)
@@ -238,21 +253,27 @@ class ViewRenderer:
         state, ego, pose
             See `render`.
         """
-        self._renderer_at(state.position[ego])
+        self._go_to(state.position[ego])
         near, seen_from = self._from_origin(state, pose)
         lights = self._lights(state, ego, pose)
         places = lights.others.position - self._origin
         streets = lights.streets and replace(lights.streets, position=lights.streets.position - self._origin)
         lights = replace(lights, others=replace(lights.others, position=places), streets=streets)
-        return Surrounding(self._scene, vehicle_batches(near, ego), self._camera, seen_from, lights, self._sky)
+        return Surrounding(
+            self._near_scene.whole(), vehicle_batches(near, ego), self._camera, seen_from, lights, self._sky
+        )
 
-    def _renderer_at(self, place: NDArray[np.float64]) -> Renderer:
-        """The renderer of a scene that has what is around a place."""
-        if self._renderer is None:
+    def _go_to(self, place: NDArray[np.float64]) -> None:
+        """See to it that the scene is planned around a place."""
+        if self._is_closed:
             raise RenderError("this view renderer is closed; make a new one")
-        if self._known is None or self._known.contains(place[None, :])[0]:
-            return self._renderer
-        return self._build_scene_along(place[None, :])
+        if self._known is not None and not self._known.contains(place[None, :])[0]:
+            self._plan_scene_along(place[None, :])
+
+    def _renderer_for(self, viewpoint: CameraPose) -> Renderer:
+        """The renderer of a scene that has what is seen from a viewpoint."""
+        has_grown = self._near_scene.reach(self._drawn_camera, viewpoint)
+        return self._make_renderer() if has_grown or self._renderer is None else self._renderer
 
     def _from_origin(self, state: TrafficState, pose: CameraPose) -> tuple[TrafficState, CameraPose]:
         """Vehicles and camera in the coordinates of the scene."""
@@ -275,6 +296,5 @@ class ViewRenderer:
 
     def close(self) -> None:
         """Free the renderer; closing twice is allowed."""
-        if self._renderer is not None:
-            self._renderer.close()
-        self._renderer = None
+        self._free_renderer()
+        self._is_closed = True

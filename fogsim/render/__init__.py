@@ -5,11 +5,13 @@ from collections.abc import Callable
 from fogsim.errors import InputError
 from fogsim.registry import Registry
 from fogsim.render.best import best_renderer
-from fogsim.render.protocol import Renderer, RenderError
+from fogsim.render.protocol import FARTHEST, Renderer, RenderError
 from fogsim.render.pyrender_scene import to_pyrender
 from fogsim.values.scene import Scene
 
 __all__ = [
+    "FARTHEST",
+    "LIMITED",
     "RENDERERS",
     "ROLES",
     "RenderError",
@@ -52,6 +54,10 @@ RENDERERS: Registry[Callable[[Scene, float], Renderer]] = Registry(
 
 ROLES = ("auto", "reference")
 """Names that stand for a renderer: for the best one here, and for the independent reference, which is pyrender."""
+
+
+LIMITED = ("auto", "cpu", "opengl")
+"""Names of those that draw nothing of what stands still beyond a depth of `FARTHEST`."""
 
 
 def make_renderer(name: str, scene: Scene, illuminance: float) -> Renderer:

@@ -8,10 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
+from fogsim.render.protocol import FARTHEST
 from fogsim.render.vectors import Vector, dot, row
-
-FARTHEST = 1600.0
-"""Distance beyond which no copy is drawn, nearer in small pictures [m]."""
 
 _LARGEST = 8.0  # about the radius of what is largest, but for the ground and woods [m]
 _SMALLEST, _SMALLEST_PLAIN = 1.0, 3.0  # radius in the picture below which a copy is left out [px]

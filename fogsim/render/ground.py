@@ -6,9 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.values.scene import Mesh, Surface
-
-_SIDE = 160.0  # side of the squares of the ground that pieces lie in [m]
+from fogsim.values.scene import GROUND_SQUARE, Mesh, Surface
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +58,7 @@ def _groups(ground: Mesh, faces: NDArray[np.uint32]) -> list[NDArray[np.uint32]]
         return []
     middle = ground.positions[faces, :2].mean(axis=1)
     paved = ground.surface[faces[:, 0]] == int(Surface.ROAD)
-    key = np.column_stack((np.floor(middle / _SIDE).astype(np.int64), paved))
+    key = np.column_stack((np.floor(middle / GROUND_SQUARE).astype(np.int64), paved))
     _, group = np.unique(key, axis=0, return_inverse=True)
     order = np.argsort(group.ravel(), kind="stable")
     return np.split(faces[order], np.cumsum(np.bincount(group.ravel()))[:-1])

@@ -8,6 +8,9 @@ from fogsim.values.camera import Camera, CameraPose
 from fogsim.values.image import View
 from fogsim.values.scene import Batch
 
+FARTHEST = 1600.0
+"""Depth beyond which FogSim's own renderers draw no copy and no ground but the plain, nearer in small pictures [m]."""
+
 
 class RenderError(FogSimError, RuntimeError):
     """A renderer cannot be used here or any more; the message says why and what to do."""

@@ -1,8 +1,10 @@
 """Road, markings, signs, vehicles and roadside as plain geometry and materials."""
 
-from fogsim.scene.build import build_scene
+from fogsim.scene.build import ScenePlan, build_scene
+from fogsim.scene.ground import Squares
 from fogsim.scene.light_sources import light_sources, street_lighting
 from fogsim.scene.signs import SIGN_KINDS
+from fogsim.scene.solids import merge
 from fogsim.scene.street_lamps import street_lamp_heads
 from fogsim.scene.surroundings import Corridor, Nearness, surroundings
 from fogsim.scene.vehicles import vehicle_batches
@@ -11,8 +13,11 @@ __all__ = [
     "SIGN_KINDS",
     "Corridor",
     "Nearness",
+    "ScenePlan",
+    "Squares",
     "build_scene",
     "light_sources",
+    "merge",
     "street_lamp_heads",
     "street_lighting",
     "surroundings",

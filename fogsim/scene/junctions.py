@@ -55,6 +55,8 @@ def walkable(areas: Sequence[PavedArea], lanes: Sequence[Lane]) -> list[PavedAre
     lanes : sequence of Lane
         The lanes of vehicles.
     """
+    if not any(area.kind is LaneKind.FOOTWAY for area in areas):
+        return list(areas)
     places = np.concatenate([refined(cleaned(lane.centreline), _PIECE)[:, :2] for lane in lanes])
     places = places[np.argsort(places[:, 0], kind="stable")]
     return [area for area in areas if area.kind is not LaneKind.FOOTWAY or not _any_within(places, area)]
@@ -186,26 +188,65 @@ class Areas:
     """
 
     def __init__(self, areas: Sequence[PavedArea]) -> None:
-        self._outlines = [_counterclockwise(area)[:, :2] for area in areas]
-        self._low = np.array([outline.min(axis=0) for outline in self._outlines]).reshape(-1, 2)
-        self._high = np.array([outline.max(axis=0) for outline in self._outlines]).reshape(-1, 2)
+        outlines = [_counterclockwise(area)[:, :2] for area in areas]
+        self._corners = np.concatenate([np.zeros((0, 2)), *outlines])
+        self._first = np.cumsum([0, *map(len, outlines)])
 
-    def cover(self, points: Points) -> bool:
-        """Whether one area has all of some points inside or on its border.
+    def cover_all(self, lines: Sequence[Points]) -> list[bool]:
+        """Whether one area has all points of a line inside or on its border, for each of some lines.
 
         Parameters
         ----------
-        points : (n, 3) float64
-            The points [m].
+        lines : sequence of (n, 3) float64
+            The lines [m].
         """
-        low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
-        candidates = np.flatnonzero(np.all((self._low < low + 0.1) & (high - 0.1 < self._high), axis=1))
-        return any(_inside(points[:, :2], self._outlines[candidate]) for candidate in candidates)
+        points = np.concatenate([np.zeros((0, 2)), *(line[:, :2] for line in lines)])
+        covered: list[bool] = _covered(points, np.cumsum([0, *map(len, lines)]), self._corners, self._first).tolist()
+        return covered
 
 
-def _inside(points: NDArray[np.float64], outline: NDArray[np.float64]) -> bool:
-    # Points on the border, where lanes begin, count: they are moved a little towards the middle of all.
-    return bool(np.all(_within(points + 0.02 * (points.mean(axis=0) - points), outline)))
+@kernel
+def _covered(
+    points: NDArray[np.float64], first: NDArray[np.int64], corners: NDArray[np.float64], begin: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """Which lines (points from `first` on) lie within one of some outlines (corners from `begin` on)."""
+    result = np.zeros(len(first) - 1, np.bool_)
+    low, high = np.empty((len(begin) - 1, 2)), np.empty((len(begin) - 1, 2))
+    for area in range(len(begin) - 1):
+        low[area], high[area] = _extremes(corners[begin[area] : begin[area + 1]])
+    for line in range(len(first) - 1):
+        own = points[first[line] : first[line + 1]]
+        west_south, east_north = _extremes(own)
+        middle_x, middle_y = 0.0, 0.0
+        for i in range(len(own)):
+            middle_x, middle_y = middle_x + own[i, 0], middle_y + own[i, 1]
+        middle_x, middle_y = middle_x / len(own), middle_y / len(own)
+        # Points on the border, where lanes begin, count: they are moved a little towards the middle of all.
+        drawn_in = np.empty((len(own), 2))
+        for i in range(len(own)):
+            drawn_in[i, 0] = own[i, 0] + 0.02 * (middle_x - own[i, 0])
+            drawn_in[i, 1] = own[i, 1] + 0.02 * (middle_y - own[i, 1])
+        for area in range(len(low)):
+            if (
+                low[area, 0] < west_south[0] + 0.1
+                and low[area, 1] < west_south[1] + 0.1
+                and east_north[0] - 0.1 < high[area, 0]
+                and east_north[1] - 0.1 < high[area, 1]
+                and _lie_within(drawn_in, corners[begin[area] : begin[area + 1]]).all()
+            ):
+                result[line] = True
+                break
+    return result
+
+
+@kernel
+def _extremes(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Least and greatest coordinates of points (n, 2)."""
+    low, high = points[0].copy(), points[0].copy()
+    for i in range(1, len(points)):
+        for axis in range(2):
+            low[axis], high[axis] = min(low[axis], points[i, axis]), max(high[axis], points[i, axis])
+    return low, high
 
 
 def _within(points: NDArray[np.float64], outline: NDArray[np.float64]) -> NDArray[np.bool_]:

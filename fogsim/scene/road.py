@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fogsim.scene.chainage import Chainage
 from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.polyline import Points, arc_length, at_distance, cleaned, left_normals, parallel, refined, true_spans
-from fogsim.scene.solids import Material, grid, merge
+from fogsim.scene.solids import Material, folds, grid, merge
 from fogsim.values.road import Lane, LaneEnd, LaneKind, LaneMarking
 from fogsim.values.scene import Instance, Mesh, Surface
 
@@ -122,16 +122,10 @@ def footway_mesh(line: Points, left: tuple[float, float | NDArray[np.float64]]) 
     stone = np.minimum(0.13, (high - low) / 2)
     # A kerbstone on each side, and how far above the line each fold of the profile lies.
     profile = [(low, -0.05), (low, KERB), (low + stone, KERB), (high - stone, KERB), (high, KERB), (high, -0.05)]
-    rows = [parallel(line, offset, lift) for offset, lift in profile]
-    faces = zip(rows[:-1], rows[1:], (KERBSTONE, KERBSTONE, FLAGSTONES, KERBSTONE, KERBSTONE), strict=True)
+    rows = np.stack([parallel(line, offset, lift) for offset, lift in profile])
     side = parallel(line, 1.0)[0, :2] - line[0, :2]
-    toward = [np.array([*(s * side), u]) for s, u in ((-1, 0), (0, 1), (0, 1), (0, 1), (1, 0))]
-    return merge(
-        [
-            grid(np.stack((a, b), axis=1), material, facing)
-            for (a, b, material), facing in zip(faces, toward, strict=True)
-        ]
-    )
+    toward = np.array([[*(s * side), u] for s, u in ((-1, 0), (0, 1), (0, 1), (0, 1), (1, 0))])
+    return folds(rows, (KERBSTONE, KERBSTONE, FLAGSTONES, KERBSTONE, KERBSTONE), toward)
 
 
 def free_edges(lane: Lane, index: LaneIndex) -> Iterator[tuple[int, NDArray[np.float64]]]:

@@ -61,20 +61,42 @@ def mesh(
     instance : int
         Instance id.
     """
-    points = _snapped(np.asarray(positions, np.float64)).reshape(-1, 3)
+    points, directions = _rows(positions), _rows(normals)
+    colour = np.array(material.reflectance if reflectance is None else reflectance, np.float32, ndmin=2)
+    snapped, facing, colours = _vertices(points, directions, colour)
     count = len(points)
-    directions = np.asarray(normals, np.float64).reshape(-1, 3)
-    length = np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-12)
-    colour = material.reflectance if reflectance is None else reflectance
     return Mesh(
-        positions=points,
-        normals=(directions / length).astype(np.float32),
-        reflectance=np.array(np.broadcast_to(np.asarray(colour, np.float32), (count, 3))),
+        positions=snapped,
+        normals=facing,
+        reflectance=colours,
         surface=np.full(count, int(material.surface), np.int32),
         road=np.zeros((count, 4), np.float32) if road is None else np.asarray(road, np.float32).reshape(-1, 4),
         instance=np.full(count, instance, np.int32),
         faces=np.asarray(faces, np.uint32).reshape(-1, 3),
     )
+
+
+def _rows(vectors: ArrayLike) -> NDArray[np.float64]:
+    """Vectors (n, 3) of any shape, which no one writes to."""
+    return np.ascontiguousarray(vectors, np.float64).reshape(-1, 3)
+
+
+@kernel
+def _vertices(
+    points: NDArray[np.float64], directions: NDArray[np.float64], colour: NDArray[np.float32]
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+    """Positions (n, 3) to the nanometre (see `_snapped`), unit normals, and reflectances, of which one may do for all."""
+    count = len(points)
+    snapped, facing = np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
+    colours = np.empty((count, 3), np.float32)
+    for i in range(count):
+        x, y, z = directions[i, 0], directions[i, 1], directions[i, 2]
+        length = max(np.sqrt(x * x + y * y + z * z), 1e-12)
+        for axis in range(3):
+            snapped[i, axis] = np.rint(points[i, axis] * 1e9) / 1e9 + 0.0
+            facing[i, axis] = directions[i, axis] / length
+            colours[i, axis] = colour[i if len(colour) == count else 0, axis]
+    return snapped, facing, colours
 
 
 def _snapped(positions: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -175,6 +197,26 @@ def grid(
         road=road,
         instance=instance,
     )
+
+
+def folds(rows: NDArray[np.float64], materials: Sequence[Material], toward: NDArray[np.float64]) -> Mesh:
+    """Strips between neighbouring lines, with an edge where two of them meet.
+
+    Parameters
+    ----------
+    rows : (k + 1, n, 3) float64
+        The lines [m].
+    materials : sequence of k Material
+        Material of each strip, all of one surface.
+    toward : (k, 3) float64
+        Direction to whose side each strip's normals are turned.
+    """
+    strips, count = len(materials), 2 * rows.shape[1]
+    points = np.stack((rows[:-1], rows[1:]), axis=2)
+    normals = np.stack([grid_normals(strip, facing) for strip, facing in zip(points, toward, strict=True)])
+    colours = np.repeat(np.array([material.reflectance for material in materials], np.float32), count, axis=0)
+    faces = grid_faces(rows.shape[1], 2) + count * np.arange(strips)[:, None, None]
+    return mesh(points, faces, normals, materials[0], reflectance=colours)
 
 
 def quad(corners: ArrayLike, material: Material, toward: ArrayLike) -> Mesh:

@@ -11,6 +11,10 @@ MIDDLE, FAR, TINY, SPECK = LEVELS_OF_DETAIL = (":middle", ":far", ":tiny", ":spe
 """Endings of the names of a shape's levels of detail for when it is small in the picture, the finest first."""
 
 
+GROUND_SQUARE = 160.0
+"""Side of the squares of the ground that are built and drawn as pieces [m]."""
+
+
 class Instance(IntEnum):
     """Instance ids that renderers draw (see `View.instance`): the vehicle in row i has FIRST_VEHICLE + i."""
 

@@ -104,10 +104,10 @@ def test_a_sliver_of_a_junction_is_left_out() -> None:
 
 
 def test_areas_tell_what_they_cover() -> None:
-    areas = Areas([PavedArea("j", L_SHAPE)])
-    assert areas.cover(np.array([[0.0, 2, 0], [9, 2, 0]]))
-    assert not areas.cover(np.array([[2.0, 2, 0], [8, 8, 0]]))
-    assert not Areas([]).cover(np.array([[0.0, 2, 0], [9, 2, 0]]))
+    lines = np.array([[0.0, 2, 0], [9, 2, 0]]), np.array([[2.0, 2, 0], [8, 8, 0]])
+    assert Areas([PavedArea("j", L_SHAPE)]).cover_all(lines) == [True, False]
+    assert Areas([]).cover_all(lines) == [False, False]
+    assert Areas([PavedArea("j", L_SHAPE)]).cover_all([]) == []
 
 
 def test_a_town_is_paved_wherever_vehicles_drive(town: RoadNetwork) -> None:

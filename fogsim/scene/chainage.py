@@ -1,12 +1,11 @@
 """Distances along lanes that neighbours share, so that a line painted half in each of two lanes meets itself."""
 
-import math
 from collections.abc import Mapping, Sequence
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.jit import kernel
 from fogsim.scene.polyline import arc_length, cleaned, project
 from fogsim.values.road import Lane
 
@@ -64,33 +63,52 @@ class Chainage:
         return lane.edge_id in self._other
 
 
-def _key(point: NDArray[np.float64]) -> tuple[int, int, int]:
-    column, row, level = np.round(np.asarray(point) / (0.5, 0.5, 2.0)).astype(int).tolist()
-    return column, row, level
+def _keys(points: Sequence[NDArray[np.float64]]) -> list[tuple[int, int, int]]:
+    """Where points are, alike for those that are at the same place but for rounding."""
+    rounded = np.round(np.array(points).reshape(-1, 3) / (0.5, 0.5, 2.0)).astype(int)
+    return [(column, row, level) for column, row, level in rounded.tolist()]
 
 
 def _predecessors(lanes: Sequence[Lane], reference: Mapping[str, NDArray[np.float64]]) -> dict[str, str]:
-    ends = {_key(lane.centreline[-1]): lane.edge_id for lane in lanes}
-    found = {edge: ends.get(_key(line[0])) for edge, line in reference.items()}
+    ends = dict(zip(_keys([lane.centreline[-1] for lane in lanes]), (lane.edge_id for lane in lanes), strict=True))
+    starts = _keys([line[0] for line in reference.values()])
+    found = {edge: ends.get(start) for edge, start in zip(reference, starts, strict=True)}
     return {edge: before for edge, before in found.items() if before is not None and before != edge}
 
 
 def _opposites(reference: Mapping[str, NDArray[np.float64]]) -> dict[str, str]:
     """Edges that run the other way beside an edge: its end near the edge's start, and its start near the edge's end."""
-    ends: dict[tuple[int, int], list[str]] = {}
-    ends_of = {edge: line[[0, -1]].tolist() for edge, line in reference.items()}
-    for edge, (_, last) in ends_of.items():
-        column, row = (math.floor(x / _BESIDE) for x in last[:2])
-        for cell in product((column - 1, column, column + 1), (row - 1, row, row + 1)):
-            ends.setdefault(cell, []).append(edge)
-    found = {}
-    for edge, mine in ends_of.items():
-        column, row = (math.floor(x / _BESIDE) for x in mine[0][:2])
-        for other in ends.get((column, row), ()):
-            theirs = ends_of[other]
-            if other != edge and max(math.dist(theirs[1], mine[0]), math.dist(theirs[0], mine[1])) < _BESIDE:
-                found[edge] = other
-    return found
+    edges = list(reference)
+    ends = np.array([line[[0, -1]] for line in reference.values()]).reshape(-1, 2, 3)
+    order = np.argsort(ends[:, 1, 0], kind="stable")
+    found = _opposite_places(ends, order, ends[order, 1, 0])
+    return {edges[place]: edges[other] for place, other in enumerate(found.tolist()) if other >= 0}
+
+
+@kernel
+def _opposite_places(
+    ends: NDArray[np.float64], order: NDArray[np.int64], east: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """For each line with ends (n, 2, 3) the last of those that run the other way beside it, −1 if there is none.
+
+    `order` sorts the lines by the x of their last points, which are `east`.
+    """
+    result = np.full(len(ends), -1)
+    for mine in range(len(ends)):
+        x = ends[mine, 0, 0]
+        first, end = np.searchsorted(east, x - _BESIDE), np.searchsorted(east, x + _BESIDE, "right")
+        for place in range(first, end):
+            other = order[place]
+            apart = max(_apart(ends[other, 1], ends[mine, 0]), _apart(ends[other, 0], ends[mine, 1]))
+            if other > result[mine] and other != mine and apart < _BESIDE:
+                result[mine] = other
+    return result
+
+
+@kernel
+def _apart(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+    x, y, z = one[0] - other[0], one[1] - other[1], one[2] - other[2]
+    return float(np.sqrt(x * x + y * y + z * z))
 
 
 def _offsets(

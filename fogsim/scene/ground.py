@@ -1,6 +1,7 @@
 """The ground of a scene: all that is near it and drawn once, whole or in squares."""
 
 import functools
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
@@ -29,6 +30,7 @@ _ASTRAY = 0.3  # how far footways may reach onto a road [m]
 _STICKING_OUT = 0.4  # how far lanes may stick out of their junction [m]
 _BESIDE = 60.0  # what belongs to a line lies nearer to it than this on level ground [m]
 _SLOPES = 5.0  # and so much farther for each metre of the network's heights
+_BLOCK = 256  # parts that are put together at once, for many small arrays take more room than a few large ones
 _LONG = 45.0  # no triangle is longer than this [m] (see `LONGEST`), but for those of larger junctions
 
 
@@ -231,16 +233,21 @@ class GroundPlan:
         squares : Squares, optional
             Where; there it is complete but for the plain, triangle for triangle as in the whole.
         """
-        parts = [*self._pavement(squares), *self._beside_roads(squares)]
-        parts += [gantry_mesh(gantry, self._terrain) for gantry in self._bridges]
-        parts += [] if self._land is None else [self._land]
-        return merge([self.plain, *parts]) if squares is None else squares.part_of(merge(parts))
+        parts = itertools.chain(
+            [self.plain] if squares is None else [],
+            self._pavement(squares),
+            self._beside_roads(squares),
+            (gantry_mesh(gantry, self._terrain) for gantry in self._bridges),
+            [] if self._land is None else [self._land],
+        )
+        blocks = iter(lambda: list(itertools.islice(parts, _BLOCK)), [])
+        return merge([merge(block) if squares is None else squares.part_of(merge(block)) for block in blocks])
 
     @functools.cached_property
     def _driven_index(self) -> LaneIndex:
         return LaneIndex(self._driven)
 
-    def _pavement(self, squares: Squares | None) -> list[Mesh]:
+    def _pavement(self, squares: Squares | None) -> Iterator[Mesh]:
         """Lanes, junctions, footways and what is painted across them."""
         across = self._across.near(squares, self.beside)
         # Some stick out of their junction in bends.
@@ -249,13 +256,11 @@ class GroundPlan:
         lanes = [*self._open_lanes.near(squares, self.beside), *bulging]
         seen = [lane for lane in lanes if lane.kind in {LaneKind.CARRIAGEWAY, LaneKind.JUNCTION}]
         footways = [lane for lane in lanes if lane.kind is LaneKind.FOOTWAY]
-        paved = [area_mesh(area) for area in walkable(self._areas.near(squares, self.beside), self._driven)]
-        return [
-            *(lane_mesh(lane, self._chainage) for lane in seen),
-            *(footway_mesh(line, (-half, half)) for lane in footways for line, half in self._kept_off(lane)),
-            *(area for area in paved if area is not None),
-            *transverse_markings(lanes),
-        ]
+        paved = map(area_mesh, walkable(self._areas.near(squares, self.beside), self._driven))
+        yield from (lane_mesh(lane, self._chainage) for lane in seen)
+        yield from (footway_mesh(line, (-half, half)) for lane in footways for line, half in self._kept_off(lane))
+        yield from (area for area in paved if area is not None)
+        yield from transverse_markings(lanes)
 
     def _junctions(self, squares: Squares | None) -> Areas:
         return Areas(self._areas.near(squares, self.beside + 2.0 * self._widest))
@@ -270,18 +275,16 @@ class GroundPlan:
         for start, end in true_spans(driven.clearance(line, same_level=2.5) >= least, least=2):
             yield line[start:end], half
 
-    def _beside_roads(self, squares: Squares | None) -> list[Mesh]:
+    def _beside_roads(self, squares: Squares | None) -> Iterator[Mesh]:
         """What lies along free sides of lanes and of junctions."""
-        parts = list[Mesh]()
         for border in self._borders.near(squares, self.beside):
-            parts += edge_meshes(border.edge, self._terrain, self._index)
-            parts += [guard_rail(rail.line, rail.side, rail.distance) for rail in border.rails]
+            yield from edge_meshes(border.edge, self._terrain, self._index)
+            yield from (guard_rail(rail.line, rail.side, rail.distance) for rail in border.rails)
         areas = [area for area in self._areas.near(squares, self.beside) if area.kind is LaneKind.JUNCTION]
         leading = self._leading.near(squares, 2.0 * (self.beside + self._widest))
         if areas and leading:
             for edge in free_borders(areas, leading, self._index):
-                parts += edge_meshes(edge, self._terrain, self._index)
-        return parts
+                yield from edge_meshes(edge, self._terrain, self._index)
 
 
 def _spread(lanes: Sequence[Lane]) -> Spread[Lane]:

@@ -1,6 +1,7 @@
 """How far a point is from any lane."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,30 @@ _CELL = 20.0  # side of the square cells in which pieces of lanes are looked up 
 _LONGEST = 20.0  # piece of a lane [m]
 _STEP = 0.1  # shortest step in the search for room [m]
 _AROUND = 2  # cells on each side that a piece as near as `FARTHEST` may lie in: (30 + 20 / 2) / 20
+
+
+class _Pieces(NamedTuple):
+    """Straight pieces of lanes by the cells that their middles lie in.
+
+    Attributes
+    ----------
+    corner : (2,) int64
+        Column and row of the first cell.
+    rows : int
+        Number of rows.
+    key : (n,) int64
+        Cell of each piece, in order: its column times the number of rows, and its row.
+    columns : (m + 1,) int64
+        Where the pieces of each column begin, and their number.
+    pieces : (n, 7) float64
+        Start (x, y, z), step to the end (x, y, z) and half the width [m] of each.
+    """
+
+    corner: NDArray[np.int64]
+    rows: int
+    key: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    pieces: NDArray[np.float64]
 
 
 class LaneIndex:
@@ -34,14 +59,15 @@ class LaneIndex:
         step = np.concatenate([np.diff(line, axis=0) for line in lines])
         half = np.repeat([0.5 * lane.width for lane in lanes], counts)
         cells = np.floor((start[:, :2] + 0.5 * step[:, :2]) / _CELL).astype(np.int64)
-        self._corner = cells.min(axis=0)
-        cells -= self._corner
+        corner = cells.min(axis=0)
+        cells -= corner
         # Cells of a column follow one another, so that neighbours in it are one stretch of pieces.
-        self._rows = int(cells[:, 1].max()) + 1
-        key = cells[:, 0] * self._rows + cells[:, 1]
+        rows = int(cells[:, 1].max()) + 1
+        key = cells[:, 0] * rows + cells[:, 1]
         order = np.argsort(key, kind="stable")
-        self._key = key[order]
-        self._pieces = np.column_stack((start, step, half))[order]
+        key = key[order]
+        columns = np.searchsorted(key, np.arange(int(cells[:, 0].max()) + 2) * rows)
+        self._pieces = _Pieces(corner, rows, key, columns, np.column_stack((start, step, half))[order])
 
     def clearance(self, points: Points, same_level: float | None = None) -> NDArray[np.float64]:
         """Distance from points (n, 3) to the nearest lane's edge [m], negative on a lane, at most `FARTHEST`.
@@ -55,7 +81,7 @@ class LaneIndex:
         """
         places = np.ascontiguousarray(points, np.float64)
         level = np.inf if same_level is None else same_level
-        return _clearances(places, level, self._corner, self._key, self._rows, self._pieces)
+        return _clearances(places, level, self._pieces)
 
     def room(self, points: Points, normal: NDArray[np.float64], most: float, same_level: float) -> NDArray[np.float64]:
         """How far one gets from points (n, 3) along their normals (n, 2) before a lane begins [m].
@@ -72,7 +98,7 @@ class LaneIndex:
             Lanes higher or lower than the point by more than this [m] are left out.
         """
         places, directions = np.ascontiguousarray(points, np.float64), np.ascontiguousarray(normal, np.float64)
-        return _rooms(places, directions, most, same_level, self._corner, self._key, self._rows, self._pieces)
+        return _rooms(places, directions, most, same_level, self._pieces)
 
 
 @kernel
@@ -81,17 +107,14 @@ def _rooms(
     normal: NDArray[np.float64],
     most: float,
     same_level: float,
-    corner: NDArray[np.int64],
-    key: NDArray[np.int64],
-    rows: int,
-    pieces: NDArray[np.float64],
+    lanes: _Pieces,
 ) -> NDArray[np.float64]:
     result = np.full(len(points), most)
     for i in range(len(points)):
         away = _STEP
         while away < most:
             x, y = points[i, 0] + away * normal[i, 0], points[i, 1] + away * normal[i, 1]
-            clear = _clearance(x, y, points[i, 2], same_level, corner, key, rows, pieces)
+            clear = _clearance(x, y, points[i, 2], same_level, lanes)
             if clear <= 0.0:
                 result[i] = max(away + clear, 0.0)
                 break
@@ -103,14 +126,11 @@ def _rooms(
 def _clearances(
     points: NDArray[np.float64],
     same_level: float,
-    corner: NDArray[np.int64],
-    key: NDArray[np.int64],
-    rows: int,
-    pieces: NDArray[np.float64],
+    lanes: _Pieces,
 ) -> NDArray[np.float64]:
     result = np.empty(len(points))
     for i in range(len(points)):
-        result[i] = _clearance(points[i, 0], points[i, 1], points[i, 2], same_level, corner, key, rows, pieces)
+        result[i] = _clearance(points[i, 0], points[i, 1], points[i, 2], same_level, lanes)
     return result
 
 
@@ -120,23 +140,22 @@ def _clearance(
     y: float,
     z: float,
     same_level: float,
-    corner: NDArray[np.int64],
-    key: NDArray[np.int64],
-    rows: int,
-    pieces: NDArray[np.float64],
+    lanes: _Pieces,
 ) -> float:
-    nearest = FARTHEST
-    middle, row = np.int64(np.floor(x / _CELL)) - corner[0], np.int64(np.floor(y / _CELL)) - corner[1]
+    nearest, pieces, key, columns, rows = FARTHEST, lanes.pieces, lanes.key, lanes.columns, lanes.rows
+    middle, row = np.int64(np.floor(x / _CELL)) - lanes.corner[0], np.int64(np.floor(y / _CELL)) - lanes.corner[1]
     low, high = max(row - _AROUND, 0), min(row + _AROUND, rows - 1)
     if low > high:
         return nearest
-    for column in range(middle - _AROUND, middle + _AROUND + 1):
-        first, end = np.searchsorted(key, column * rows + low), np.searchsorted(key, column * rows + high + 1)
-        for k in range(first, end):
+    for column in range(max(middle - _AROUND, 0), min(middle + _AROUND + 1, len(columns) - 1)):
+        k, end, last = columns[column], columns[column + 1], column * rows + high
+        k += np.searchsorted(key[k:end], column * rows + low)
+        while k < end and key[k] <= last:
             dx, dy = pieces[k, 3], pieces[k, 4]
             u, v = x - pieces[k, 0], y - pieces[k, 1]
             share = min(max((u * dx + v * dy) / max(dx * dx + dy * dy, 1e-12), 0.0), 1.0)
             if abs(z - pieces[k, 2] - share * pieces[k, 5]) <= same_level:
                 u, v = u - share * dx, v - share * dy
                 nearest = min(nearest, np.sqrt(u * u + v * v) - pieces[k, 6])
+            k += 1
     return nearest

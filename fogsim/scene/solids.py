@@ -85,7 +85,7 @@ def _rows(vectors: ArrayLike) -> NDArray[np.float64]:
 def _vertices(
     points: NDArray[np.float64], directions: NDArray[np.float64], colour: NDArray[np.float32]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-    """Positions (n, 3) to the nanometre (see `_snapped`), unit normals, and reflectances, of which one may do for all."""
+    """Positions (n, 3) to the nanometre (see `_snapped`), unit normals, and reflectances: one may do for all."""
     count = len(points)
     snapped, facing = np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
     colours = np.empty((count, 3), np.float32)

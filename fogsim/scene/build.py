@@ -13,7 +13,7 @@ from fogsim.scene.ground import Border, GroundPlan, Rail
 from fogsim.scene.houses import house_places, house_shapes, houses, shapes_in_use
 from fogsim.scene.junctions import Areas
 from fogsim.scene.lane_index import LaneIndex
-from fogsim.scene.polyline import cleaned, parallel, true_spans
+from fogsim.scene.polyline import SHORTEST, parallel, true_spans
 from fogsim.scene.road import FAST, free_edges
 from fogsim.scene.roadside import placed, post_shapes, stations, trees
 from fogsim.scene.signs import gantries, sign_batches, sign_shapes
@@ -81,7 +81,7 @@ class ScenePlan:
     def __init__(
         self, network: RoadNetwork, signs: SignMap, rng: np.random.Generator, *, street_lamps: bool = False
     ) -> None:
-        lanes = [lane for lane in network.lanes if len(lane.centreline) > 1 and len(cleaned(lane.centreline)) > 1]
+        lanes = _with_length([lane for lane in network.lanes if len(lane.centreline) > 1])
         driven = [lane for lane in lanes if lane.kind in {LaneKind.CARRIAGEWAY, LaneKind.JUNCTION}]
         if not driven:
             raise InputError(f"a scene needs at least one lane with a length, got {len(network.lanes)} lanes without")
@@ -113,6 +113,16 @@ class ScenePlan:
         return Scene(ground=self.ground.mesh(), shapes=self.shapes, scenery=self.scenery)
 
 
+def _with_length(lanes: Sequence[Lane]) -> list[Lane]:
+    """Lanes that are more than one place (see `cleaned`)."""
+    lines = [lane.centreline[:, :2] for lane in lanes]
+    first = np.cumsum([0, *map(len, lines[:-1])])
+    places = np.concatenate([np.zeros((0, 2)), *lines])
+    off = places - np.repeat(places[first[: len(lines)]], [len(line) for line in lines], axis=0)
+    farthest = np.maximum.reduceat(np.hypot(off[:, 0], off[:, 1]), first) if lines else np.zeros(0)
+    return [lane for lane, length in zip(lanes, farthest.tolist(), strict=True) if length >= SHORTEST]
+
+
 def _free_sides(lanes: Sequence[Lane], index: LaneIndex) -> list[Edge]:
     """Free sides of lanes, as of `free_edges`."""
     limits = {_place(lane.centreline[-1]): lane.speed_limit for lane in lanes if lane.kind is LaneKind.CARRIAGEWAY}
@@ -139,7 +149,7 @@ def _furniture(edges: Sequence[Edge], index: LaneIndex) -> tuple[list[tuple[Rail
         along = list[Rail]()
         if edge.speed_limit >= FAST:
             side, distance = edge.side, edge.inner + edge.shoulder + _RAIL_BEHIND_SHOULDER
-            free = index.clearance(parallel(edge.line, side * (distance + 0.2)), same_level=2.5) >= 0.4
+            free = index.clearance(parallel(edge.line, side * (distance + 0.2)), same_level=2.5, within=1.0) >= 0.4
             for start, end in true_spans(free, least=2):
                 line = edge.line[start:end]
                 posts, heading = stations(line, _POST_SPACING, side * (distance + 0.15))

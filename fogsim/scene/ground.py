@@ -270,9 +270,9 @@ class GroundPlan:
         driven = self._driven_index
         line, half = refined(cleaned(lane.centreline), LONGEST), lane.width / 2
         least = min(half, 0.8) - _ASTRAY
-        if np.any(driven.clearance(refined(line, _LOOK), same_level=2.5) < least):
+        if np.any(driven.clearance(refined(line, _LOOK), same_level=2.5, within=1.0) < least):
             line = refined(line, _LOOK)
-        for start, end in true_spans(driven.clearance(line, same_level=2.5) >= least, least=2):
+        for start, end in true_spans(driven.clearance(line, same_level=2.5, within=1.0) >= least, least=2):
             yield line[start:end], half
 
     def _beside_roads(self, squares: Squares | None) -> Iterator[Mesh]:

@@ -161,7 +161,8 @@ def _free_parts(corners: Points, index: LaneIndex, everything: LaneIndex) -> Ite
     outward = np.column_stack((step[:, 1], -step[:, 0])) / np.hypot(step[:, 0], step[:, 1])[:, None]
     beside = 0.5 * (outline + following)
     beside[:, :2] += 0.4 * outward
-    free = (index.clearance(beside, same_level=2.5) > 0.1) & (everything.clearance(beside, same_level=2.5) > -0.1)
+    free = index.clearance(beside, same_level=2.5, within=1.0) > 0.1
+    free &= everything.clearance(beside, same_level=2.5, within=1.0) > -0.1
     for span in _spans_around(free):
         line = np.concatenate((outline[span], following[span[-1:]]))
         if np.sum(np.hypot(*np.diff(line[:, :2], axis=0).T)) > 0.1:

@@ -1,5 +1,6 @@
 """How far a point is from any lane."""
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -67,10 +68,13 @@ class LaneIndex:
         order = np.argsort(key, kind="stable")
         key = key[order]
         columns = np.searchsorted(key, np.arange(int(cells[:, 0].max()) + 2) * rows)
+        self._widest = float(half.max())
         self._pieces = _Pieces(corner, rows, key, columns, np.column_stack((start, step, half))[order])
 
-    def clearance(self, points: Points, same_level: float | None = None) -> NDArray[np.float64]:
-        """Distance from points (n, 3) to the nearest lane's edge [m], negative on a lane, at most `FARTHEST`.
+    def clearance(
+        self, points: Points, same_level: float | None = None, within: float = FARTHEST
+    ) -> NDArray[np.float64]:
+        """Distance from points (n, 3) to the nearest lane's edge [m], negative on a lane, at most `within`.
 
         Parameters
         ----------
@@ -78,10 +82,12 @@ class LaneIndex:
             Points [m].
         same_level : float, optional
             Lanes higher or lower than the point by more than this [m] are left out.
+        within : float
+            Distances beyond this, at most `FARTHEST`, need not be told apart [m]: short ones are soon found.
         """
         places = np.ascontiguousarray(points, np.float64)
         level = np.inf if same_level is None else same_level
-        return _clearances(places, level, self._pieces)
+        return _clearances(places, level, within, self._around(within), self._pieces)
 
     def room(self, points: Points, normal: NDArray[np.float64], most: float, same_level: float) -> NDArray[np.float64]:
         """How far one gets from points (n, 3) along their normals (n, 2) before a lane begins [m].
@@ -98,7 +104,11 @@ class LaneIndex:
             Lanes higher or lower than the point by more than this [m] are left out.
         """
         places, directions = np.ascontiguousarray(points, np.float64), np.ascontiguousarray(normal, np.float64)
-        return _rooms(places, directions, most, same_level, self._pieces)
+        return _rooms(places, directions, most, same_level, self._around(most), self._pieces)
+
+    def _around(self, within: float) -> int:
+        """Cells on each side that the pieces of lanes whose edges are so near [m] may lie in."""
+        return min(math.ceil((within + self._widest + 0.5 * _LONGEST) / _CELL), _AROUND)
 
 
 @kernel
@@ -107,6 +117,7 @@ def _rooms(
     normal: NDArray[np.float64],
     most: float,
     same_level: float,
+    around: int,
     lanes: _Pieces,
 ) -> NDArray[np.float64]:
     result = np.full(len(points), most)
@@ -114,7 +125,7 @@ def _rooms(
         away = _STEP
         while away < most:
             x, y = points[i, 0] + away * normal[i, 0], points[i, 1] + away * normal[i, 1]
-            clear = _clearance(x, y, points[i, 2], same_level, lanes)
+            clear = _clearance((x, y, points[i, 2]), same_level, most, around, lanes)
             if clear <= 0.0:
                 result[i] = max(away + clear, 0.0)
                 break
@@ -126,28 +137,28 @@ def _rooms(
 def _clearances(
     points: NDArray[np.float64],
     same_level: float,
+    within: float,
+    around: int,
     lanes: _Pieces,
 ) -> NDArray[np.float64]:
     result = np.empty(len(points))
     for i in range(len(points)):
-        result[i] = _clearance(points[i, 0], points[i, 1], points[i, 2], same_level, lanes)
+        place = (points[i, 0], points[i, 1], points[i, 2])
+        result[i] = _clearance(place, same_level, within, around, lanes)
     return result
 
 
 @kernel
 def _clearance(
-    x: float,
-    y: float,
-    z: float,
-    same_level: float,
-    lanes: _Pieces,
+    place: tuple[float, float, float], same_level: float, within: float, around: int, lanes: _Pieces
 ) -> float:
-    nearest, pieces, key, columns, rows = FARTHEST, lanes.pieces, lanes.key, lanes.columns, lanes.rows
+    x, y, z = place
+    nearest, pieces, key, columns, rows = within, lanes.pieces, lanes.key, lanes.columns, lanes.rows
     middle, row = np.int64(np.floor(x / _CELL)) - lanes.corner[0], np.int64(np.floor(y / _CELL)) - lanes.corner[1]
-    low, high = max(row - _AROUND, 0), min(row + _AROUND, rows - 1)
+    low, high = max(row - around, 0), min(row + around, rows - 1)
     if low > high:
         return nearest
-    for column in range(max(middle - _AROUND, 0), min(middle + _AROUND + 1, len(columns) - 1)):
+    for column in range(max(middle - around, 0), min(middle + around + 1, len(columns) - 1)):
         k, end, last = columns[column], columns[column + 1], column * rows + high
         k += np.searchsorted(key[k:end], column * rows + low)
         while k < end and key[k] <= last:

@@ -13,7 +13,11 @@ Points = NDArray[np.float64]
 _TIGHT = 1e-9  # pieces whose length times that of the line's piece is less than this have no direction [m²]
 
 
-def cleaned(points: Points, shortest: float = 0.05) -> Points:
+SHORTEST = 0.05
+"""Length below which a segment is joined to the next [m]."""
+
+
+def cleaned(points: Points, shortest: float = SHORTEST) -> Points:
     """Polyline without its shortest segments.
 
     Parameters

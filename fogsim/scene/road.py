@@ -155,14 +155,14 @@ def free_edges(lane: Lane, index: LaneIndex) -> Iterator[tuple[int, NDArray[np.f
 
 def _looked_at(line: Points, left: float, index: LaneIndex) -> tuple[Points, NDArray[np.bool_]]:
     """Which points of a line have no lane at a distance to their left [m], with more points where that changes."""
-    free = index.clearance(parallel(line, left), same_level=2.5) > 0.2
+    free = index.clearance(parallel(line, left), same_level=2.5, within=1.0) > 0.2
     before = np.flatnonzero(free[1:] != free[:-1])
     if not len(before):
         return line, free
     share = np.arange(1, _CLOSER)[:, None] / _CLOSER
     between = line[before, None] + share * (line[before + 1] - line[before])[:, None]
     closer = np.insert(line, np.repeat(before + 1, _CLOSER - 1), between.reshape(-1, 3), axis=0)
-    return closer, index.clearance(parallel(closer, left), same_level=2.5) > 0.2
+    return closer, index.clearance(parallel(closer, left), same_level=2.5, within=1.0) > 0.2
 
 
 def transverse_markings(lanes: Sequence[Lane]) -> Iterator[Mesh]:

@@ -264,28 +264,48 @@ def concave_faces(outline: NDArray[np.float64]) -> NDArray[np.int64]:
     outline : (n, 2) float64
         Corners, counterclockwise.
     """
-    left, faces = list(range(len(outline))), []
-    while len(left) > 3:
-        ear = next((k for k in range(len(left)) if _is_ear(outline, left, k)), None)
+    return _triangles(np.ascontiguousarray(outline, np.float64))
+
+
+@kernel
+def _triangles(outline: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Triangles (m, 3) of a polygon (see `concave_faces`)."""
+    left, count = np.arange(len(outline)), len(outline)
+    faces = np.empty((count - 2, 3), np.int64)
+    for number in range(count - 3):
         # An outline that crosses itself has no ear left; what remains is closed as if it were convex.
-        ear = 1 if ear is None else ear
-        faces.append((left[ear - 1], left[ear], left[(ear + 1) % len(left)]))
-        del left[ear]
-    return np.array([*faces, left], np.int64)
+        ear = 1
+        for place in range(count):
+            if _is_ear(outline, left[:count], place):
+                ear = place
+                break
+        faces[number, 0], faces[number, 1] = left[(ear - 1) % count], left[ear]
+        faces[number, 2] = left[(ear + 1) % count]
+        for place in range(ear, count - 1):
+            left[place] = left[place + 1]
+        count -= 1
+    faces[-1] = left[:3]
+    return faces
 
 
-def _is_ear(outline: NDArray[np.float64], left: list[int], place: int) -> bool:
-    a, b, c = outline[left[place - 1]], outline[left[place]], outline[left[(place + 1) % len(left)]]
+@kernel
+def _is_ear(outline: NDArray[np.float64], left: NDArray[np.int64], place: int) -> bool:
+    before, here, after = left[place - 1], left[place], left[(place + 1) % len(left)]
+    a, b, c = outline[before], outline[here], outline[after]
     if _turn(a, b, c) <= 1e-12:
         return False
-    others = outline[[k for k in left if k not in {left[place - 1], left[place], left[(place + 1) % len(left)]}]]
-    within = [(_turn(u, v, others.T) >= 0) for u, v in ((a, b), (b, c), (c, a))]
-    return not np.any(within[0] & within[1] & within[2])
+    for k in left:
+        if k not in (before, here, after):
+            other = outline[k]
+            if _turn(a, b, other) >= 0 and _turn(b, c, other) >= 0 and _turn(c, a, other) >= 0:
+                return False
+    return True
 
 
-def _turn(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]) -> NDArray[np.float64]:
+@kernel
+def _turn(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]) -> float:
     """Twice the area of the triangle a, b, c, positive if it turns left."""
-    return np.asarray((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
 
 
 def facetted(triangles: NDArray[np.float64], material: Material) -> Mesh:

@@ -56,7 +56,7 @@ def lamp_posts(edges: Sequence[Edge], index: LaneIndex) -> list[Batch]:
         if edge.side != side:
             continue
         along, heading = stations(edge.line, _SPACING, side * (edge.inner + edge.shoulder + _BESIDE))
-        free = index.clearance(along, same_level=2.5) > 0.3
+        free = index.clearance(along, same_level=2.5, within=1.0) > 0.3
         # Their arms reach to the left of where they look.
         facing = heading if side < 0 else heading + np.pi
         for place, turn in zip(along[free], facing[free].tolist(), strict=True):

@@ -37,7 +37,9 @@ class Terrain:
     """
 
     def __init__(self, lanes: Sequence[Lane]) -> None:
-        places = np.concatenate([refined(cleaned(lane.centreline), 0.5 * _CELL) for lane in lanes])
+        places = np.concatenate([lane.centreline for lane in lanes])
+        if np.ptp(places[:, 2]) > 0.0:
+            places = np.concatenate([refined(cleaned(lane.centreline), 0.5 * _CELL) for lane in lanes])
         self._heights: NDArray[np.float64] | None = None
         hilly = np.ptp(places[:, 2]) > _LEVEL
         self.plain = float(places[:, 2].min()) - (_BELOW if hilly else 0.1)

@@ -165,29 +165,26 @@ def _looked_at(line: Points, left: float, index: LaneIndex) -> tuple[Points, NDA
     return closer, index.clearance(parallel(closer, left), same_level=2.5, within=1.0) > 0.2
 
 
-def transverse_markings(lanes: Sequence[Lane]) -> Iterator[Mesh]:
+def transverse_markings(lanes: Sequence[Lane]) -> list[Mesh]:
     """Stop lines, lines to give way at, and zebra crossings of all lanes.
 
     Parameters
     ----------
     lanes : sequence of Lane
         The lanes.
-
-    Yields
-    ------
-    Mesh
-        All that is painted across one of them.
     """
+    parts = []
     for lane in lanes:
         line = cleaned(lane.centreline)
         if lane.kind is LaneKind.CROSSING:
-            yield _zebra(line, lane.width)
+            parts.append(_zebra(line, lane.width))
         elif lane.end is LaneEnd.STOP:
-            yield _bars(line, lane.width, _STOP_WIDTH, [(-0.5, 0.5)])
+            parts.append(_bars(line, lane.width, _STOP_WIDTH, [(-0.5, 0.5)]))
         elif lane.end is LaneEnd.YIELD:
             count = max(round(lane.width / 0.75), 2)
             edges = [(i / count - 0.5 + 0.17 / count, i / count - 0.5 + 0.83 / count) for i in range(count)]
-            yield _bars(line, lane.width, _YIELD_WIDTH, edges)
+            parts.append(_bars(line, lane.width, _YIELD_WIDTH, edges))
+    return parts
 
 
 def _bars(line: Points, width: float, thick: float, pieces: Sequence[tuple[float, float]]) -> Mesh:

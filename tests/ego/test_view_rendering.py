@@ -5,6 +5,7 @@ import pytest
 
 import fogsim
 from fogsim.camera import mounted_pose
+from fogsim.ego import view_rendering
 from fogsim.ego.view_rendering import ViewRenderer
 from fogsim.scenario import build
 from fogsim.values import Lane, LaneMarking, RoadNetwork, SignMap, TrafficState
@@ -66,6 +67,22 @@ def test_where_the_ego_leaves_its_route_there_is_a_road_too(scenario: fogsim.Sce
     assert shares[0] > 0.2
     assert shares[1:] == pytest.approx([shares[0]] * 2, abs=0.02)
     view_renderer.close()
+
+
+def test_a_large_network_looks_as_if_it_were_built_whole(
+    scenario: fogsim.Scenario, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lanes = [road((900.0 * number, 0.0), 900.0, str(number)) for number in range(5)]
+    network = RoadNetwork(tuple(lanes), np.concatenate([lane.centreline for lane in lanes]))
+    pictures = []
+    for few in (0, 2000):
+        monkeypatch.setattr(view_rendering, "FEW_LANES", few)
+        view_renderer = ViewRenderer(scenario, network, SignMap())
+        pictures.append([seen(view_renderer, scenario, two_cars(x, 0.1)) for x in (100.0, 2100.0)])
+        view_renderer.close()
+    for there, here in zip(*pictures, strict=True):
+        np.testing.assert_array_equal(there[0], here[0])
+        np.testing.assert_array_equal(there[1], here[1])
 
 
 def test_a_closed_view_renderer_says_so(scenario: fogsim.Scenario) -> None:

@@ -42,7 +42,7 @@ def camera(width: int, height: int, roll: float = 0.0) -> Camera:
 def motorway(at: float = 250.0, vehicles: int = 30, signs: int = 10, nearest: float = 18.0) -> Place:
     """Motorway with vehicles and signs ahead of an eye `at` metres along the route."""
     net = read_net(NET)
-    network = road_network(net, [edge.getID() for edge in net.getEdges() if edge.getFunction() != "internal"][:1])
+    network = road_network(net, [edge for edge in net.edges if not edge.startswith(":")][:1])
     lanes = [lane for lane in network.lanes if np.linalg.norm(np.diff(lane.centreline, axis=0), axis=1).sum() > 600]
     own = [lane for lane in lanes if lane.edge_id == lanes[0].edge_id]
     eye, heading = along(own[len(own) // 2].centreline, at)

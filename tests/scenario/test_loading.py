@@ -275,7 +275,7 @@ def test_a_resolved_scenario_loads_again(folder: Path) -> None:
             "start_m must be less than end",
         ),
         (["drivers.advised=stretch", "drivers.advised_stretch.display=sign"], "display: .*message_sign.*; got 'sign'"),
-        (["drivers.advised=somebody"], "advised: .*'ego', 'all' or 'stretch'"),
+        (["drivers.advised=somebody"], "advised: .*'ego', 'all', 'stretch', 'signs', 'equipped' or 'law'"),
     ],
 )
 def test_advised_stretches_that_do_not_fit(settings: list[str], message: str) -> None:

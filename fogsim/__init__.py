@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from fogsim.scenario import Scenario as Scenario
     from fogsim.scenario import catalogue as catalogue
     from fogsim.scenario import load_scenario as load_scenario
+    from fogsim.traffic_run import run_traffic as run_traffic
     from fogsim.values import Belief as Belief
     from fogsim.values import Camera as Camera
     from fogsim.values import Command as Command
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from fogsim.values import Step as Step
     from fogsim.values import Stretch as Stretch
     from fogsim.values import StretchAdvice as StretchAdvice
+    from fogsim.values import TrafficStep as TrafficStep
 
     __version__: str
 
@@ -51,6 +53,7 @@ _VALUES = (
     "Step",
     "Stretch",
     "StretchAdvice",
+    "TrafficStep",
 )
 _LAZY = {
     **dict.fromkeys(_ERRORS, "fogsim.errors"),
@@ -62,6 +65,7 @@ _LAZY = {
     "catalogue": "fogsim.scenario",
     "load_scenario": "fogsim.scenario",
     "run": "fogsim.loop",
+    "run_traffic": "fogsim.traffic_run",
     "semantic_mask": "fogsim.dataset",
     "transmission": "fogsim.dataset",
     "write_dataset": "fogsim.dataset",
@@ -89,12 +93,14 @@ __all__ = [
     "Step",
     "Stretch",
     "StretchAdvice",
+    "TrafficStep",
     "attach",
     "catalogue",
     "connect",
     "estimators",
     "load_scenario",
     "run",
+    "run_traffic",
     "semantic_mask",
     "transmission",
     "write_dataset",

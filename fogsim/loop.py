@@ -17,8 +17,8 @@ from fogsim.road_advice import RoadAdvice, stretch_advices
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.road_sections import DISPLAYS
 from fogsim.scenario.schema import InformedMethod
-from fogsim.traffic import FogAccess, Traffic, libsumo_traffic
-from fogsim.values import Belief, Command, Ending, FogField, RoadSection, Step, TrafficSnapshot
+from fogsim.traffic import AnyTraffic, FogAccess, Traffic, libsumo_traffic
+from fogsim.values import Belief, Command, Ending, FogField, RoadSection, Step, TrafficSnapshot, TrafficStep
 from fogsim.values.belief import certain_belief
 from fogsim.values.result_checks import checked_advice, checked_command, checked_lamps
 
@@ -68,22 +68,23 @@ def run(
     warn_of_unplayed(scenario, step)
 
 
-def warn_of_unplayed(scenario: Scenario, last: Step) -> None:
+def warn_of_unplayed(scenario: Scenario, last: TrafficStep) -> None:
     """Warn of what was not played in a run that is over, if a longer one would not have played it either.
 
     Parameters
     ----------
     scenario : Scenario
         What was run.
-    last : Step
+    last : TrafficStep
         The last step.
 
     Warns
     -----
     UnplayedWarning
-        If the ego came to the end of its way, or an event's vehicle had left before, or a lane was not there.
+        If the ego came to the end of its way, or nobody was left, or an event's vehicle had left before, or a lane was
+        not there.
     """
-    came_to_end = last.ending in (Ending.ARRIVED, Ending.LEFT_NETWORK)
+    came_to_end = last.ending in (Ending.ARRIVED, Ending.LEFT_NETWORK, Ending.NOBODY_LEFT)
     if last.unplayed and (came_to_end or last.unplayed.is_final):
         warnings.warn(f"{scenario.name}: not played: {last.unplayed}", UnplayedWarning, stacklevel=3)
 
@@ -223,6 +224,27 @@ class DriversFog:
             self._fog.set_time(time)
 
 
+def advance_traffic(traffic: AnyTraffic, fog: DriversFog, periods: build.Periods, index: int, command: Command) -> None:
+    """Move a traffic simulation by one camera period, the fog with it.
+
+    Parameters
+    ----------
+    traffic : AnyTraffic
+        The simulation.
+    fog : DriversFog
+        The fog about its drivers.
+    periods : Periods
+        The clocks.
+    index : int
+        Number of the camera period that begins.
+    command : Command
+        What is in force.
+    """
+    for number in range(periods.traffic_steps):
+        fog.set_time((index + number / periods.traffic_steps) * periods.camera_period)
+        traffic.advance(command)
+
+
 class ClosedLoop:
     """One ego vehicle in one simulation, from command to finished step.
 
@@ -234,9 +256,15 @@ class ClosedLoop:
         The traffic simulation; None for SUMO in this process, as the scenario describes it.
     sumo_outputs : Path or None
         As of `run`.
+
+    Raises
+    ------
+    InputError
+        If the scenario has no ego; see `run_traffic`.
     """
 
     def __init__(self, scenario: Scenario, traffic: Traffic | None = None, sumo_outputs: Path | None = None) -> None:
+        build.check_ego(scenario, "the closed loop")
         self._scenario = scenario
         self._periods = build.periods(scenario)
         self._traffic = traffic or libsumo_traffic(build.traffic_setup(scenario), sumo_outputs)
@@ -319,10 +347,7 @@ class ClosedLoop:
         if not self._drivers_fog.is_entered and self._fog is not None and command.is_for_others:
             # In clear air nobody else has chosen a speed so far.
             self._drivers_fog.enter(self._fog, self._traffic)
-        for number in range(self._periods.traffic_steps):
-            part = number / self._periods.traffic_steps
-            self._drivers_fog.set_time((self._step.index + part) * self._periods.camera_period)
-            self._traffic.advance(command)
+        advance_traffic(self._traffic, self._drivers_fog, self._periods, self._step.index, command)
         snapshot, index = self._traffic.observe(), self._step.index + 1
         if snapshot is None:
             time = self._periods.time(index)

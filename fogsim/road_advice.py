@@ -9,7 +9,7 @@ from fogsim.advice.harmonisation import harmonised_speeds
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.road_sections import DISPLAYS
 from fogsim.units import KMH_PER_MPS
-from fogsim.values import Belief, Display, SpeedAdvice, Step, Stretch, StretchAdvice
+from fogsim.values import Belief, Display, SpeedAdvice, Step, Stretch, StretchAdvice, TrafficStep
 from fogsim.values.belief import certain_belief
 from fogsim.values.result_checks import checked_advice
 
@@ -49,20 +49,39 @@ class RoadAdvice:
         sections = tuple(section.stretch for section in step.truth.sections)
         here = next((s for s in sections if s.start <= step.route_position < s.end), None)
         if self._advice.informed_by == "belief":
-            self._egos = self._ask(step, step.belief, self._egos)
+            self._egos = self._ask(step, step.speed_limit, step.belief, self._egos)
             if here is not None:
                 self._told[here] = self._egos
         else:
-            for section in step.truth.sections:
-                previous = self._told.get(section.stretch, SpeedAdvice())
-                self._told[section.stretch] = self._ask(step, certain_belief(section.extinction), previous)
+            self._ask_meters(step, step.speed_limit)
         shown = self._shown(sections, step.speed_limit)
         if self._advice.informed_by == "truth":
             self._egos = SpeedAdvice(self._heard(here, dict(zip(sections, shown, strict=True))))
         return self._egos, stretch_advices(sections, shown, self._display)
 
-    def _ask(self, step: Step, known: Belief, previous: SpeedAdvice) -> SpeedAdvice:
-        return checked_advice(self._advice.method, self._adviser.advise(known, step.speed_limit, step.time, previous))
+    def advise_traffic(self, step: TrafficStep, limit: float) -> tuple[StretchAdvice, ...]:
+        """Advice to all on the sections that have any, by the meters, where there is no ego.
+
+        Parameters
+        ----------
+        step : TrafficStep
+            What was finished last.
+        limit : float
+            Speed limit that the adviser goes by [m/s].
+        """
+        if step.index == 0:
+            self._told = {}
+        self._ask_meters(step, limit)
+        sections = tuple(section.stretch for section in step.truth.sections)
+        return stretch_advices(sections, self._shown(sections, limit), self._display)
+
+    def _ask_meters(self, step: TrafficStep, limit: float) -> None:
+        for section in step.truth.sections:
+            previous = self._told.get(section.stretch, SpeedAdvice())
+            self._told[section.stretch] = self._ask(step, limit, certain_belief(section.extinction), previous)
+
+    def _ask(self, step: TrafficStep, limit: float, known: Belief, previous: SpeedAdvice) -> SpeedAdvice:
+        return checked_advice(self._advice.method, self._adviser.advise(known, limit, step.time, previous))
 
     def _shown(self, sections: Sequence[Stretch], limit: float) -> tuple[float, ...]:
         speeds = tuple(self._told.get(section, SpeedAdvice()).speed for section in sections)

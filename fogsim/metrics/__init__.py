@@ -2,7 +2,7 @@
 
 from fogsim.kinematics import stopping_sight_distance
 from fogsim.metrics.metric import JsonValue, Metric, Sample
-from fogsim.metrics.run_metrics import METRICS, MetricFactory, RunMetrics, RunSummary
+from fogsim.metrics.run_metrics import METRICS, MetricFactory, RunMetrics, RunSummary, TrafficRunMetrics
 from fogsim.metrics.step_metrics import DEFAULT_STANDARD, step_metrics
 from fogsim.metrics.surrogate import (
     SafetyStandard,
@@ -25,6 +25,7 @@ __all__ = [
     "RunSummary",
     "SafetyStandard",
     "Sample",
+    "TrafficRunMetrics",
     "deceleration_rate_to_avoid_crash",
     "modified_deceleration_rate_to_avoid_crash",
     "potential_collision_speed",

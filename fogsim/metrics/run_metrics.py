@@ -17,10 +17,10 @@ from fogsim.metrics.traffic_emissions import TrafficEmissions
 from fogsim.metrics.traffic_flow import TrafficFlow
 from fogsim.metrics.traffic_headways import TrafficHeadways
 from fogsim.metrics.traffic_sight import TrafficSight
-from fogsim.metrics.traffic_span import TrafficGathering, TrafficMetric
+from fogsim.metrics.traffic_span import GatheredMetrics, TrafficMetric
 from fogsim.registry import Registry
 from fogsim.units import clock_time
-from fogsim.values import Step
+from fogsim.values import Step, TrafficStep
 from fogsim.values.result_checks import checked_values
 
 MetricFactory = Callable[[SafetyStandard], Metric | TrafficMetric]
@@ -104,8 +104,7 @@ class RunMetrics:
         self.standard = standard
         self._metrics = {name: METRICS[name](standard) for name in names}
         self._of_ego = [metric for metric in self._metrics.values() if not isinstance(metric, TrafficMetric)]
-        self._of_traffic = [metric for metric in self._metrics.values() if isinstance(metric, TrafficMetric)]
-        self._gathering = TrafficGathering()
+        self._of_traffic = GatheredMetrics(_of_everybody(self._metrics.values()))
         self._last: Step | None = None
 
     def update(self, step: Step) -> None:
@@ -124,32 +123,92 @@ class RunMetrics:
             If the step is not later than the one before.
         """
         last, self._last = self._last, step
-        if last is not None and last.index == step.index:
+        elapsed = _elapsed(last, step)
+        if elapsed is None:
             return
-        elapsed = 0.0 if last is None else clock_time(step.time - last.time)
-        if last is not None and not elapsed > 0:
-            raise SimulationError(f"steps must follow in time, got {step.time!r} s after {last.time!r} s")
         sample = Sample(step, elapsed, step_metrics(step, self.standard))
         for metric in self._of_ego:
             metric.update(sample)
-        if self._of_traffic:
-            self._gathering.add(step, elapsed)
-            if self._gathering.is_full:
-                self._take_in_traffic()
-
-    def _take_in_traffic(self) -> None:
-        span = self._gathering.take()
-        if span is not None:
-            for metric in self._of_traffic:
-                metric.add(span)
+        self._of_traffic.add(step, elapsed)
 
     def summary(self) -> RunSummary:
         """Say what the steps so far amount to."""
-        self._take_in_traffic()
-        ending = None if self._last is None else self._last.ending
-        values: dict[str, JsonValue] = {"ending": None if ending is None else ending.value}
-        meanings = {"ending": "why the run was over; none if it was cut short"}
-        for name, metric in self._metrics.items():
-            values.update(checked_values(name, metric.result()))
-            meanings.update(metric.meanings)
-        return RunSummary(values, meanings)
+        self._of_traffic.hand_over()
+        return _summary(self._last, self._metrics)
+
+
+class TrafficRunMetrics:
+    """Watches the steps of one run without an ego: the metrics of everybody.
+
+    Parameters
+    ----------
+    standard : SafetyStandard
+        What the measures are judged by.
+    names : iterable of str
+        Metrics from `METRICS`; those of an ego among them are left out.
+
+    Raises
+    ------
+    UnknownNameError
+        If a name is not in `METRICS`.
+    """
+
+    def __init__(self, standard: SafetyStandard = DEFAULT_STANDARD, names: Iterable[str] = METRICS) -> None:
+        made = {name: METRICS[name](standard) for name in names}
+        self._metrics = {name: metric for name, metric in made.items() if isinstance(metric, TrafficMetric)}
+        self._of_traffic = GatheredMetrics(_of_everybody(self._metrics.values()))
+        self._last: TrafficStep | None = None
+        self._duration, self._steps = 0.0, 0
+
+    def update(self, step: TrafficStep) -> None:
+        """Take in one finished step; the time since the one before is read from their times.
+
+        Parameters
+        ----------
+        step : TrafficStep
+            The step.
+
+        Raises
+        ------
+        SimulationError
+            If the step is not later than the one before.
+        """
+        last, self._last = self._last, step
+        elapsed = _elapsed(last, step)
+        if elapsed is not None:
+            self._duration, self._steps = self._duration + elapsed, self._steps + 1
+            self._of_traffic.add(step, elapsed)
+
+    def summary(self) -> RunSummary:
+        """Say what the steps so far amount to."""
+        self._of_traffic.hand_over()
+        found = _summary(self._last, self._metrics)
+        about: dict[str, JsonValue] = {"duration_s": clock_time(self._duration), "steps": self._steps}
+        meanings = {key: Motion.meanings[key] for key in about}
+        return RunSummary({**found.values, **about}, {**found.meanings, **meanings})
+
+
+def _of_everybody(metrics: Iterable[Metric | TrafficMetric]) -> list[TrafficMetric]:
+    return [metric for metric in metrics if isinstance(metric, TrafficMetric)]
+
+
+def _elapsed(last: TrafficStep | None, step: TrafficStep) -> float | None:
+    """Time since the step before [s]; None if it is the same."""
+    if last is None:
+        return 0.0
+    if last.index == step.index:
+        return None
+    elapsed = clock_time(step.time - last.time)
+    if not elapsed > 0:
+        raise SimulationError(f"steps must follow in time, got {step.time!r} s after {last.time!r} s")
+    return elapsed
+
+
+def _summary(last: TrafficStep | None, metrics: Mapping[str, Metric | TrafficMetric]) -> RunSummary:
+    ending = None if last is None else last.ending
+    values: dict[str, JsonValue] = {"ending": None if ending is None else ending.value}
+    meanings = {"ending": "why the run was over; none if it was cut short"}
+    for name, metric in metrics.items():
+        values.update(checked_values(name, metric.result()))
+        meanings.update(metric.meanings)
+    return RunSummary(values, meanings)

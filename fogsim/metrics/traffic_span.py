@@ -1,7 +1,7 @@
 """All vehicles near the ego over several steps, as arrays: together they cost a fraction of one by one."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fogsim.metrics.following import Following, pair_in_lanes
 from fogsim.metrics.metric import JsonValue, share
-from fogsim.values import Collision, Step, TrafficState
+from fogsim.values import Collision, TrafficState, TrafficStep
 
 MOST_ROWS = 4096
 """Rows that are gathered before the metrics get them."""
@@ -173,12 +173,12 @@ class TrafficGathering:
         """True if a span is worth making."""
         return self._rows >= MOST_ROWS
 
-    def add(self, step: Step, elapsed: float) -> None:
+    def add(self, step: TrafficStep, elapsed: float) -> None:
         """Take in a step.
 
         Parameters
         ----------
-        step : Step
+        step : TrafficStep
             The next step.
         elapsed : float
             Time since the one before [s].
@@ -229,6 +229,42 @@ class TrafficGathering:
         self._moments += len(states)
         self._rows, self._states, self._numbers, self._collisions = 0, [], [], []
         return span
+
+
+class GatheredMetrics:
+    """Hands metrics of everybody the steps of a run, some at a time.
+
+    Parameters
+    ----------
+    metrics : sequence of TrafficMetric
+        The metrics.
+    """
+
+    def __init__(self, metrics: Sequence[TrafficMetric]) -> None:
+        self._metrics = metrics
+        self._gathering = TrafficGathering()
+
+    def add(self, step: TrafficStep, elapsed: float) -> None:
+        """Take in a step.
+
+        Parameters
+        ----------
+        step : TrafficStep
+            The next step.
+        elapsed : float
+            Time since the one before [s].
+        """
+        if self._metrics:
+            self._gathering.add(step, elapsed)
+            if self._gathering.is_full:
+                self.hand_over()
+
+    def hand_over(self) -> None:
+        """Hand over what has been gathered."""
+        span = self._gathering.take()
+        if span is not None:
+            for metric in self._metrics:
+                metric.add(span)
 
 
 def _numbers(known: dict[str, int], names: tuple[str, ...]) -> NDArray[np.intp]:

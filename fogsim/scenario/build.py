@@ -118,10 +118,11 @@ def traffic_setup(scenario: Scenario) -> TrafficSetup:
         net=None if traffic.net is None else folder / traffic.net,
         routes=tuple(folder / path for path in traffic.routes),
         additional=tuple(folder / path for path in traffic.additional),
-        ego=traffic.ego,
+        ego=traffic.ego if traffic.has_ego else None,
         step_length=scenario.clocks.traffic_step_s,
         keep_lane=traffic.keep_lane,
         warm_up_limit=traffic.warm_up_limit_s,
+        warm_up=traffic.warm_up_s,
         advice_deceleration=traffic.advice_deceleration_mps2,
         reading_radius=traffic.reading_radius_m,
         events=tuple(event for place, written in enumerate(traffic.events) for event in _events(written, place)),
@@ -213,7 +214,7 @@ def stretch_advice(scenario: Scenario, speed: float) -> StretchAdvice:
         Advised speed [m/s].
     """
     stretch = scenario.drivers.advised_stretch
-    return StretchAdvice(speed, Stretch(stretch.start_m, stretch.end_m), stretch.display)
+    return StretchAdvice(speed, Stretch(stretch.start_m, stretch.end_m, scenario.traffic.along), stretch.display)
 
 
 def camera_mount(scenario: Scenario, body: str = CAR) -> CameraMount:
@@ -368,6 +369,28 @@ def fog_field(scenario: Scenario, route: NDArray[np.float64]) -> FogField:
     return fog_along(scenario.fog, airlight_from_illuminance(scenario.light.illuminance_lx), route)
 
 
+def check_ego(scenario: Scenario, who: str) -> None:
+    """Refuse a scenario without an ego.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    who : str
+        Who needs it, for the message.
+
+    Raises
+    ------
+    InputError
+        If its ego is none.
+    """
+    if not scenario.traffic.has_ego:
+        raise InputError(
+            f"{who} needs an ego vehicle, and traffic.ego is none; name one, or run traffic alone with fogsim study or "
+            "fogsim.run_traffic"
+        )
+
+
 def check_frames(scenario: Scenario, who: str) -> None:
     """Refuse a scenario that draws no frames.
 
@@ -381,8 +404,9 @@ def check_frames(scenario: Scenario, who: str) -> None:
     Raises
     ------
     InputError
-        If its renderer is "none".
+        If its renderer is "none", or its ego is.
     """
+    check_ego(scenario, who)
     if scenario.renderer == NO_RENDERER:
         raise InputError(f"{who} needs frames, and renderer: none draws none; choose auto, opengl, cpu or reference")
 

@@ -43,7 +43,9 @@ def road_sections(scenario: Scenario, length: float) -> tuple[Stretch, ...]:
     starts = [start for start in starts if start < end and start <= length - SHORTEST]
     # What ends with the route has no end of its own: whoever is there has not left it.
     last = math.inf if end >= length else end
-    return tuple(Stretch(start, stop) for start, stop in zip(starts, [*starts[1:], last], strict=True))
+    return tuple(
+        Stretch(start, stop, scenario.traffic.along) for start, stop in zip(starts, [*starts[1:], last], strict=True)
+    )
 
 
 def meter_places(scenario: Scenario, sections: tuple[Stretch, ...], route: NDArray[np.float64]) -> NDArray[np.float64]:

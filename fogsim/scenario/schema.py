@@ -19,6 +19,7 @@ from fogsim.render import RENDERERS, ROLES
 from fogsim.scenario.camera_schema import CameraSection
 from fogsim.scenario.fog import Fog
 from fogsim.scenario.section import Distance, Flag, Length, Method, Number, Period, Section, Seed, Text, method_of
+from fogsim.scenario.traffic_alone import without_ego
 from fogsim.scenario.traffic_schema import DriversSection, Traffic
 
 NO_RENDERER = "none"
@@ -146,6 +147,11 @@ class Scenario(Section):
     """How the belief becomes lamps; with `informed_by: truth`, how the true visibility does."""
 
     directory: Path = Field(default=Path(), exclude=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_ego(cls, written: object) -> object:
+        return without_ego(written)
 
     @field_validator("directory", mode="before")
     @classmethod

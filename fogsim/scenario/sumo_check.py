@@ -104,13 +104,14 @@ def demand_mistakes(document: Document, scenario: Scenario) -> list[str]:
         unfit = {places[v]: _unfit_way(v, demand.routes[v], edges) for v in named.values() if v in demand.routes}
         told |= {at: text for at, text in unfit.items() if text}
         told |= _wide_changes(scenario, demand, edges)
-        told |= _places_aside(scenario, demand.routes.get(scenario.traffic.ego), edges)
+        told |= _unknown_edges(scenario, edges) or _places_aside(scenario, _way(scenario, demand), edges)
     return [f"{document.where(at)}: {dotted(at)}: {text}" for at, text in told.items()]
 
 
 def _named_vehicles(scenario: Scenario) -> Iterator[tuple[KeyPath, str]]:
     traffic = scenario.traffic
-    yield ("traffic", "ego"), traffic.ego
+    if traffic.has_ego:
+        yield ("traffic", "ego"), traffic.ego
     yield from ((("traffic", "keep_lane", i), vehicle) for i, vehicle in enumerate(traffic.keep_lane))
     yield from ((("traffic", "events", i, "vehicle"), event.vehicle) for i, event in enumerate(traffic.events))
 
@@ -125,11 +126,26 @@ def _demand(scenario: Scenario, wanted: frozenset[str]) -> Demand:
 def _edges(scenario: Scenario, demand: Demand) -> NetEdges | None:
     """Edges of the network, if anything is to be said about them."""
     traffic, folder = scenario.traffic, scenario.directory
-    if not demand.routes and not any(isinstance(event, ChangeLane) for event in traffic.events):
+    changes = any(isinstance(event, ChangeLane) for event in traffic.events)
+    if not (demand.routes or changes or traffic.along):
         return None
     net = configured_files(folder / traffic.config)[0] if traffic.config else folder / (traffic.net or Path())
-    way = demand.routes.get(traffic.ego)
-    return read_net_edges(net, () if way is None else way.edges)
+    return read_net_edges(net, _way(scenario, demand))
+
+
+def _way(scenario: Scenario, demand: Demand) -> tuple[str, ...]:
+    """Edges along which places count; none where they are not known."""
+    way = demand.routes.get(scenario.traffic.ego)
+    return scenario.traffic.along if way is None else tuple(way.edges)
+
+
+def _unknown_edges(scenario: Scenario, edges: NetEdges) -> dict[KeyPath, str]:
+    """Edges along which places are to count, and which the network does not have."""
+    return {
+        ("traffic", "along", i): f"the net has no edge {shown(edge)}; {_suggested(edge, edges.lanes)}"
+        for i, edge in enumerate(scenario.traffic.along)
+        if edge not in edges.lanes
+    }
 
 
 def _unknown_vehicle(vehicle: str, demand: Demand) -> str:
@@ -166,11 +182,11 @@ def _wide_changes(scenario: Scenario, demand: Demand, edges: NetEdges) -> dict[K
     return told
 
 
-def _places_aside(scenario: Scenario, way: VehicleRoute | None, edges: NetEdges) -> Mapping[KeyPath, str]:
+def _places_aside(scenario: Scenario, way: tuple[str, ...], edges: NetEdges) -> Mapping[KeyPath, str]:
     """Places along the ego's route that lie beyond its end, or before its beginning."""
-    if way is None or not all(edges.axes.get(edge) for edge in way.edges):
+    if not way or not all(edges.axes.get(edge) for edge in way):
         return {}
-    length, drivers = edges.route_length(way.edges), scenario.drivers
+    length, drivers = edges.route_length(way), scenario.drivers
     stretch, signs = drivers.advised_stretch, drivers.signs
     told = {} if scenario.fog.wind is not None else _banks_aside(scenario, length)
     if stretch.start_m >= length:

@@ -26,6 +26,7 @@ from fogsim.scenario.section import (
     Time,
     Whole,
 )
+from fogsim.scenario.traffic_alone import NO_EGO
 from fogsim.traffic import COMPLIANCES, FOLLOWING_MODELS, SPEED_CHOICES, AfterCollision, Compliance
 from fogsim.values import Display
 
@@ -45,7 +46,7 @@ class Event(Section):
     """It begins when the vehicle has driven this far."""
 
     at_time_s: Time | None = None
-    """It begins at this time after the ego's appearance."""
+    """It begins at this time after the ego's appearance, or after the run's beginning without an ego."""
 
     at_gap_to_ego_m: Annotated[Number, Field(ge=-10_000, le=10_000)] | None = None
     """It begins when the gap to the ego, bumper to bumper, comes to this: positive ahead, negative behind."""
@@ -130,7 +131,7 @@ SumoOptions = Annotated[
 
 
 class Traffic(Section):
-    """A SUMO simulation and its ego."""
+    """A SUMO simulation and its ego, if it has one."""
 
     config: Path | None = None
     """SUMO configuration (.sumocfg), relative to the scenario's folder; in place of the three below."""
@@ -145,7 +146,10 @@ class Traffic(Section):
     """SUMO additional files; POIs of type `fogsim.sign.KIND` in them are signs."""
 
     ego: Id = "ego"
-    """Id of the ego vehicle in the route files."""
+    """Id of the ego vehicle in the route files; `none` for traffic alone, without camera and estimators."""
+
+    along: tuple[Id, ...] = ()
+    """With `ego: none`: edges, as they are driven one after the other, along which places count, not its route."""
 
     keep_lane: tuple[Id, ...] = ()
     """Vehicles that never change lane."""
@@ -153,11 +157,14 @@ class Traffic(Section):
     warm_up_limit_s: Period = 600.0
     """Simulated time within which the ego must appear; the run begins when it does."""
 
+    warm_up_s: Time = 0.0
+    """With `ego: none`: simulated time before the run begins."""
+
     advice_deceleration_mps2: Deceleration = 2.0
     """How hard an advised vehicle slows down to the advice."""
 
     reading_radius_m: Annotated[Length, Field(ge=1)] = 1000.0
-    """Vehicles farther from the ego than this are not read and not drawn."""
+    """Vehicles farther from the ego than this are not read and not drawn; with `ego: none` all are read."""
 
     events: tuple[AnyEvent, ...] = ()
     """What is scripted."""
@@ -171,6 +178,18 @@ class Traffic(Section):
     sumo_options: SumoOptions = Field(default_factory=dict)
     """Further options of SUMO by name: `{tripinfo-output: trips.xml, device.ssm.probability: 1}`. Outputs go into the
     run's directory; files that are read are named relative to the scenario's folder."""
+
+    @property
+    def has_ego(self) -> bool:
+        """Whether there is an ego."""
+        return self.ego != NO_EGO
+
+    @model_validator(mode="after")
+    def _keys_without_ego(self) -> Self:
+        for key in ("along", "warm_up_s"):
+            if self.has_ego and getattr(self, key):
+                raise ValueError(f"{key}: goes with ego: none, and the ego is {self.ego!r}")
+        return self
 
     @model_validator(mode="after")
     def _no_gap_to_itself(self) -> Self:
@@ -356,7 +375,8 @@ class DriversSection(Section):
 
     advised: Literal["ego", "all", "stretch", "signs", "equipped", "law"] = "ego"
     """Who hears the advice: the ego alone; all vehicles near it as well; all on a `stretch` of its route; all who pass
-    message `signs` along it; all `equipped` vehicles on it; all on it, as a `law` that they know."""
+    message `signs` along it; all `equipped` vehicles on it; all on it, as a `law` that they know. With
+    `ego: none`, `all` is everybody and the default, and `traffic.along` is the route."""
 
     signs: Signs = Signs()
     """Those signs."""

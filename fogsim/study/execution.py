@@ -1,16 +1,18 @@
 """One run of a study: its metrics in a row of plain values, and its profiles."""
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 from fogsim.errors import FogSimError, UnplayedWarning
 from fogsim.files.atomic import write_json
 from fogsim.loop import run
-from fogsim.metrics import RunMetrics
+from fogsim.metrics import RunMetrics, RunSummary, TrafficRunMetrics
 from fogsim.scenario import Scenario, build
 from fogsim.study.profiles import RunProfiles
+from fogsim.traffic_run import run_traffic
+from fogsim.values import TrafficStep
 
 Value = str | float | int | None
 """What a cell of the table holds."""
@@ -34,13 +36,33 @@ def measure_run(scenario: Scenario, seed: int, sumo_outputs: Path | None = None)
         ``metrics``, flat: those of a method have its name before theirs, with a point between; and ``profiles``, of
         `RunProfiles.to_json`.
     """
-    metrics, profiles = RunMetrics(build.safety_standard(scenario)), RunProfiles()
+    standard, profiles = build.safety_standard(scenario), RunProfiles()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnplayedWarning)
-        for step in run(scenario, seed, sumo_outputs=sumo_outputs):
-            metrics.update(step)
-            profiles.update(step)
-    return {"metrics": dict(_flat(metrics.summary().to_json())), "profiles": profiles.to_json()}
+        if scenario.traffic.has_ego:
+            summary = _watched(run(scenario, seed, sumo_outputs=sumo_outputs), RunMetrics(standard), profiles)
+        else:
+            summary = _watched(run_traffic(scenario, seed, sumo_outputs), TrafficRunMetrics(standard), profiles)
+    return {"metrics": dict(_flat(summary.to_json())), "profiles": profiles.to_json()}
+
+
+_AnyStep = TypeVar("_AnyStep", bound=TrafficStep)
+_TakenStep_contra = TypeVar("_TakenStep_contra", bound=TrafficStep, contravariant=True)
+
+
+class _Watching(Protocol[_TakenStep_contra]):
+    """Metrics of a run."""
+
+    def update(self, step: _TakenStep_contra) -> None: ...
+
+    def summary(self) -> RunSummary: ...
+
+
+def _watched(steps: Iterable[_AnyStep], metrics: _Watching[_AnyStep], profiles: RunProfiles) -> RunSummary:
+    for step in steps:
+        metrics.update(step)
+        profiles.update(step)
+    return metrics.summary()
 
 
 def _flat(values: Mapping[str, object], prefix: str = "") -> list[tuple[str, Value]]:

@@ -18,6 +18,7 @@ from fogsim.scenario.document import Document, read_document
 from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.schema import NO_RENDERER
 from fogsim.scenario.section import Id, Section, Seed, Share, Text
+from fogsim.scenario.traffic_alone import NO_EGO
 from fogsim.study.main_metrics import unknown_metrics
 from fogsim.traffic.road.configuration import configured_demand, configured_files
 
@@ -41,7 +42,7 @@ class StudyFile(Section):
     """In its place: a SUMO configuration, relative to the study's folder."""
 
     ego: Id | None = None
-    """With `sumocfg`: id of the ego vehicle."""
+    """With `sumocfg`: id of the ego vehicle; none, the default, for traffic alone."""
 
     settings: tuple[Text, ...] = ()
     """`key.path=value` each, put in place of the scenario's in every run."""
@@ -79,9 +80,11 @@ class StudyFile(Section):
     @model_validator(mode="after")
     def _one_source(self) -> Self:
         if (self.scenario is None) == (self.sumocfg is None):
-            raise ValueError("give either scenario, or sumocfg with ego")
-        if self.sumocfg is not None and self.ego is None:
-            raise ValueError("ego is missing: which vehicle of the SUMO configuration is the ego?")
+            raise ValueError("give either scenario, or sumocfg, perhaps with ego")
+        if self.scenario is not None and self.ego is not None:
+            raise ValueError(
+                "ego: goes with sumocfg; a scenario names its own, which settings: [traffic.ego=ID] changes"
+            )
         return self
 
     @model_validator(mode="after")
@@ -259,7 +262,7 @@ def _scenario(document: Document, written: StudyFile, levels: Mapping[str, str])
     folder = document.path.parent
     try:
         if written.sumocfg is not None:
-            scenario = scenario_from_config(folder / written.sumocfg, str(written.ego), settings)
+            scenario = scenario_from_config(folder / written.sumocfg, written.ego or NO_EGO, settings)
         else:
             name = str(written.scenario)
             beside = folder / name

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from fogsim.metrics.following import find_following
 from fogsim.metrics.surrogate import QUEUE_SPEED, time_to_collision
 from fogsim.units import clock_time
-from fogsim.values import Step, TrafficState
+from fogsim.values import Step, TrafficState, TrafficStep
 
 CLASS_WIDTH = 0.25
 """Width of a class of time to collision [s]."""
@@ -41,7 +41,7 @@ class RunProfiles:
     """Watches the steps of one run."""
 
     def __init__(self) -> None:
-        self._last: Step | None = None
+        self._last: TrafficStep | None = None
         self._duration = 0.0
         self._vehicle_time = 0.0
         self._by_class = np.zeros((2, CLASSES))
@@ -49,13 +49,13 @@ class RunProfiles:
         self._collisions: list[tuple[float, float, float, float, str, str]] = []
         self._collision_count = 0
 
-    def update(self, step: Step) -> None:
+    def update(self, step: TrafficStep) -> None:
         """Take in one finished step; what was found at it is held to be true for the time since the one before.
 
         Parameters
         ----------
-        step : Step
-            The step.
+        step : TrafficStep
+            The step; speeds over the road are of the ego's road, if there is one.
         """
         last, self._last = self._last, step
         if last is not None and last.index == step.index:
@@ -63,7 +63,8 @@ class RunProfiles:
         elapsed = 0.0 if last is None else clock_time(step.time - last.time)
         self._vehicle_time += elapsed * len(step.traffic.ids)
         self._add_times_to_collision(step.traffic, elapsed)
-        self._road.update(step, elapsed)
+        if isinstance(step, Step):
+            self._road.update(step, elapsed)
         for hit in step.collisions:
             places = [_place(s.traffic, name) for name in (hit.collider, hit.victim) for s in (step, last) if s]
             x, y = next((place for place in places if place is not None), (math.nan, math.nan))

@@ -8,7 +8,7 @@ from fogsim.traffic.drivers.events import BrakeEvent, Event, LampFailureEvent, L
 from fogsim.traffic.drivers.following import FOLLOWING_MODELS
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.drivers.speed_choice import SPEED_CHOICES, DriverSetup
-from fogsim.traffic.protocol import Traffic
+from fogsim.traffic.protocol import AnyTraffic, NetworkTraffic, Traffic
 from fogsim.traffic.road.configuration import configured_files, ignored_options
 from fogsim.traffic.road.demand import Demand, VehicleRoute, read_configured_demand, read_demand
 from fogsim.traffic.road.net_edges import NetEdges, read_net_edges
@@ -38,8 +38,30 @@ def libsumo_traffic(setup: TrafficSetup, outputs: Path | None = None) -> Traffic
         If its configuration has options that cannot hold here and are left out; later, if SUMO writes files that are
         not kept.
     """
+    return _libsumo(setup, outputs)
+
+
+def libsumo_network_traffic(setup: TrafficSetup, outputs: Path | None = None) -> NetworkTraffic:
+    """SUMO inside this process, without an ego; one at a time.
+
+    Parameters
+    ----------
+    setup : TrafficSetup
+        The simulation; its ego is None.
+    outputs : Path or None
+        As of `libsumo_traffic`.
+
+    Warns
+    -----
+    UserWarning
+        As of `libsumo_traffic`.
+    """
+    return _libsumo(setup, outputs)
+
+
+def _libsumo(setup: TrafficSetup, outputs: Path | None) -> SumoTraffic:
     for option in ignored_options(setup.config) if setup.config else ():
-        warnings.warn(f"{setup.config}: {option}", stacklevel=2)
+        warnings.warn(f"{setup.config}: {option}", stacklevel=3)
     return SumoTraffic(setup, LibsumoLink(OutputFolder(outputs, output_prefix(setup))))
 
 
@@ -61,6 +83,7 @@ __all__ = [
     "FOLLOWING_MODELS",
     "SPEED_CHOICES",
     "AfterCollision",
+    "AnyTraffic",
     "AttachedTraffic",
     "BrakeEvent",
     "Compliance",
@@ -72,12 +95,14 @@ __all__ = [
     "LampFailureEvent",
     "LaneChangeEvent",
     "NetEdges",
+    "NetworkTraffic",
     "TraciLink",
     "Traffic",
     "TrafficSetup",
     "Trigger",
     "VehicleRoute",
     "configured_files",
+    "libsumo_network_traffic",
     "libsumo_traffic",
     "read_configured_demand",
     "read_demand",

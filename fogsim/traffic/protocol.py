@@ -3,10 +3,38 @@
 from typing import Protocol
 
 from fogsim.traffic.drivers.sight import FogAccess
-from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot, Unplayed
+from fogsim.values import Command, NetworkSnapshot, RoadNetwork, SignMap, TrafficSnapshot, Unplayed
 
 
-class Traffic(Protocol):
+class AnyTraffic(Protocol):
+    """A running traffic simulation."""
+
+    def enter_fog(self, fog: FogAccess) -> None:
+        """Let drivers see only what this fog lets them see, from now on and in every later run.
+
+        Parameters
+        ----------
+        fog : FogAccess
+            The fog.
+        """
+
+    def advance(self, command: Command) -> None:
+        """Move by one traffic step with a command in force.
+
+        Parameters
+        ----------
+        command : Command
+            Advised speeds and lamps.
+        """
+
+    def unplayed(self) -> Unplayed:
+        """Tell what of the script has not been played since the start; before `close`."""
+
+    def close(self) -> None:
+        """End the simulation; closing twice is allowed."""
+
+
+class Traffic(AnyTraffic, Protocol):
     """A running traffic simulation with one ego vehicle."""
 
     def start(self, seed: int) -> None:
@@ -23,35 +51,32 @@ class Traffic(Protocol):
             If the simulation cannot start or the ego does not appear in time.
         """
 
-    def enter_fog(self, fog: FogAccess) -> None:
-        """Let drivers see only what this fog lets them see, from now on and in every later run.
-
-        Parameters
-        ----------
-        fog : FogAccess
-            The fog.
-        """
-
     def planned_network(self) -> tuple[RoadNetwork, SignMap] | None:
         """Roads and signs along the ego's way before `start`; None where no file has it written out."""
 
     def network(self) -> tuple[RoadNetwork, SignMap]:
         """Roads and signs; after `start`."""
 
-    def advance(self, command: Command) -> None:
-        """Move by one traffic step with a command in force.
-
-        Parameters
-        ----------
-        command : Command
-            Advised speeds and lamps.
-        """
-
     def observe(self) -> TrafficSnapshot | None:
         """Tell where everybody is and what has happened since the last call; None once the ego has left."""
 
-    def unplayed(self) -> Unplayed:
-        """Tell what of the script has not been played since the start; before `close`."""
 
-    def close(self) -> None:
-        """End the simulation; closing twice is allowed."""
+class NetworkTraffic(AnyTraffic, Protocol):
+    """A running traffic simulation without an ego vehicle."""
+
+    def start(self, seed: int) -> None:
+        """Begin, or begin anew.
+
+        Parameters
+        ----------
+        seed : int
+            Seed of the simulation's own random numbers; the same seed replays exactly.
+
+        Raises
+        ------
+        SimulationError
+            If the simulation cannot start.
+        """
+
+    def observe_network(self) -> NetworkSnapshot:
+        """Tell where everybody is and what has happened since the last call."""

@@ -21,7 +21,7 @@ class AfterCollision(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class TrafficSetup:
-    """A SUMO simulation and who the ego is.
+    """A SUMO simulation, and who the ego is if there is one.
 
     Attributes
     ----------
@@ -29,8 +29,8 @@ class TrafficSetup:
         SUMO network; None for the one that the simulation says it has loaded.
     routes, additional : tuple of Path
         SUMO route and additional files.
-    ego : str
-        Id of the ego vehicle.
+    ego : str or None
+        Id of the ego vehicle; None for traffic alone.
     step_length : float
         SUMO's step [s].
     keep_lane : tuple of str
@@ -49,6 +49,8 @@ class TrafficSetup:
         How drivers choose their speed in fog and follow advice.
     after_collision : AfterCollision
         What becomes of vehicles that have collided.
+    warm_up : float
+        Without an ego, simulated time before the run begins [s].
     config : Path or None
         SUMO configuration, in place of net, routes and additional files.
     sumo_options : tuple of (str, str)
@@ -58,7 +60,7 @@ class TrafficSetup:
     net: Path | None
     routes: tuple[Path, ...]
     additional: tuple[Path, ...]
-    ego: str
+    ego: str | None
     step_length: float
     keep_lane: tuple[str, ...]
     warm_up_limit: float
@@ -70,3 +72,4 @@ class TrafficSetup:
     after_collision: AfterCollision = AfterCollision.STOP
     config: Path | None = None
     sumo_options: tuple[tuple[str, str], ...] = ()
+    warm_up: float = 0.0

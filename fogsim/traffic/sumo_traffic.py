@@ -1,6 +1,7 @@
 """Traffic by SUMO, wherever it runs."""
 
 import functools
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Concatenate, ParamSpec, TypeVar
@@ -26,7 +27,7 @@ from fogsim.traffic.sumo.route_position import GapToEgo, RoutePosition
 from fogsim.traffic.sumo.vehicle_reader import SubscribedReader, VehicleReader
 from fogsim.traffic.sumo_behaviour.speed_control import SpeedControl, SumoDesiredSpeeds
 from fogsim.traffic.sumo_drivers.drivers_perception import DriversPerception, drivers_perception
-from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot, TrafficState, Unplayed
+from fogsim.values import Command, NetworkSnapshot, RoadNetwork, SignMap, TrafficSnapshot, TrafficState, Unplayed
 
 _NO_ADVICE = Command()
 _P = ParamSpec("_P")
@@ -68,12 +69,12 @@ def _translates_errors(
 
 
 class SumoTraffic:
-    """A SUMO simulation with one ego vehicle.
+    """A SUMO simulation with one ego vehicle, or without: see `Traffic` and `NetworkTraffic`.
 
     Parameters
     ----------
     setup : TrafficSetup
-        The simulation and its ego.
+        The simulation and its ego, if it has one.
     link : SumoLink
         How it is reached.
     """
@@ -85,7 +86,7 @@ class SumoTraffic:
         self._fog: FogAccess | None = None
         self._seed = 0
         self._ego_lamps = Command().lamps
-        self._ego_since = 0.0
+        self._begun = 0.0
         self._route: RoutePosition | None = None
         self._mark = 0
         self._teleported = False
@@ -99,7 +100,7 @@ class SumoTraffic:
 
     @_translates_errors
     def start(self, seed: int) -> None:
-        """Begin, or begin anew, and run until the ego is on the road; see `Traffic.start`.
+        """Begin, or begin anew, and run until the ego is on the road or, without one, through the warm-up.
 
         Parameters
         ----------
@@ -136,7 +137,9 @@ class SumoTraffic:
     def _warm_up(self, run: _Run) -> None:
         simulation, vehicle, ego = run.api.simulation, run.api.vehicle, self._setup.ego
         begun, seen = simulation.getTime(), set(vehicle.getIDList())
-        while ego not in vehicle.getIDList():
+        while ego is None and simulation.getTime() - begun < self._setup.warm_up - 0.5 * self._setup.step_length:
+            self._step(run)
+        while ego is not None and ego not in vehicle.getIDList():
             waited = simulation.getTime() - begun
             if waited > self._setup.warm_up_limit or simulation.getMinExpectedNumber() == 0:
                 raise SimulationError(
@@ -145,7 +148,7 @@ class SumoTraffic:
                 )
             self._step(run)
             seen.update(simulation.getDepartedIDList())
-        self._ego_since = simulation.getTime()
+        self._begun = simulation.getTime()
         run.collisions.take()
 
     def enter_fog(self, fog: FogAccess) -> None:
@@ -225,7 +228,9 @@ class SumoTraffic:
     def _play_script(self, run: _Run, command: Command) -> dict[str, Order]:
         run.roster.update()
         present, ego = run.roster.present, self._setup.ego
-        orders = {ego: (command.advice.speed, self._setup.advice_deceleration)} if ego in present else {}
+        orders: dict[str, Order] = {}
+        if ego is not None and ego in present:
+            orders[ego] = command.advice.speed, self._setup.advice_deceleration
         if run.script.is_idle:
             return orders
         actions = run.script.play(self._situation(run, present))
@@ -238,14 +243,14 @@ class SumoTraffic:
         vehicle, ego = run.api.vehicle, self._setup.ego
 
         def gap_to_ego(other: str) -> float | None:
-            return GapToEgo(run.api, ego).measure(other) if ego in present else None
+            return GapToEgo(run.api, ego).measure(other) if ego is not None and ego in present else None
 
         def has_lane(other: str, lanes: int) -> bool:
             edge, lane = str(vehicle.getRoadID(other)), int(vehicle.getLaneIndex(other)) + lanes
             # Lanes of a junction tell nothing of those behind it, where SUMO makes the change.
             return lane >= 0 and (edge.startswith(":") or lane < int(run.api.edge.getLaneNumber(edge)))
 
-        time = run.api.simulation.getTime() - self._ego_since
+        time = run.api.simulation.getTime() - self._begun
         return Situation(time, present, vehicle.getDistance, gap_to_ego, has_lane)
 
     def _step(self, run: _Run) -> None:
@@ -274,7 +279,7 @@ class SumoTraffic:
         run, ego = self._running, self._setup.ego
         teleported, self._teleported = self._teleported, False
         run.roster.update()
-        if teleported or ego not in run.roster.present:
+        if teleported or ego is None or ego not in run.roster.present:
             # Where it comes back, if it does, has nothing to do with where it was.
             self._route = None
             return None
@@ -293,6 +298,21 @@ class SumoTraffic:
             speed_limit=run.api.lane.getMaxSpeed(state.lane[row]),
             leader=run.reader.leader(),
             collisions=run.collisions.take(),
+        )
+
+    @_translates_errors
+    def observe_network(self) -> NetworkSnapshot:
+        """Tell where everybody is; see `NetworkTraffic.observe_network`."""
+        run = self._running
+        run.roster.update()
+        state = run.reader.state(self._ego_lamps)
+        # Who is between lanes is on none.
+        limits = [float(run.api.lane.getMaxSpeed(lane)) for lane in {*state.lane} if lane]
+        return NetworkSnapshot(
+            state=_with_failed_lamps(run.lane_changes.smoothed(state), run.script.dark),
+            speed_limit=max(limits, default=math.inf),
+            collisions=run.collisions.take(),
+            is_over=run.api.simulation.getMinExpectedNumber() == 0,
         )
 
     def unplayed(self) -> Unplayed:

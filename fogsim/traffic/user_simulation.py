@@ -83,9 +83,13 @@ class AttachedTraffic(SumoTraffic):
     ------
     SimulationError
         If no simulation runs there.
+    InputError
+        If no ego is named.
     """
 
     def __init__(self, setup: TrafficSetup, api: Api) -> None:
+        if setup.ego is None:
+            raise InputError("attaching to a simulation needs an ego vehicle in it, and traffic.ego is none")
         self._attached = AttachedLink(api)
         self._api = api
         self.ego = setup.ego

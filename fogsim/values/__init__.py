@@ -10,8 +10,8 @@ from fogsim.values.light import Beam, HeadLamp, Lamp, Lights, LightSources, Stre
 from fogsim.values.observation import LeadMeasurement, Observation, SignSighting
 from fogsim.values.road import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea, RoadNetwork, Sign, SignMap
 from fogsim.values.scene import Batch, Mesh, Scene, Surface
-from fogsim.values.step import Ending, RoadSection, Step, Truth
-from fogsim.values.traffic import Collision, Leader, TrafficSnapshot, TrafficState
+from fogsim.values.step import Ending, RoadSection, Step, TrafficStep, Truth
+from fogsim.values.traffic import Collision, Leader, NetworkSnapshot, TrafficSnapshot, TrafficState
 from fogsim.values.unplayed import NOTHING_UNPLAYED, Reason, Unplayed, UnplayedEvent
 
 __all__ = [
@@ -43,6 +43,7 @@ __all__ = [
     "LightSources",
     "Lights",
     "Mesh",
+    "NetworkSnapshot",
     "Observation",
     "PavedArea",
     "Reason",
@@ -61,6 +62,7 @@ __all__ = [
     "Surface",
     "TrafficSnapshot",
     "TrafficState",
+    "TrafficStep",
     "Truth",
     "Unplayed",
     "UnplayedEvent",

@@ -1,4 +1,4 @@
-"""One finished instant of the closed loop: what metrics and recorders get."""
+"""One finished instant of a run: what metrics and recorders get."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -26,6 +26,8 @@ class Ending(StrEnum):
     COLLISION = "collision"
     TIME = "time"
     LEFT_NETWORK = "left the network"
+    NOBODY_LEFT = "nobody left"
+    """Without an ego: all vehicles have gone, and no more will come."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +53,7 @@ class Truth:
     Attributes
     ----------
     extinction : float
-        Extinction coefficient at the ego's camera [1/m].
+        Extinction coefficient at the ego's camera, or at the visibility meters where there is no ego [1/m].
     extinction_ahead : float
         Mean extinction coefficient from the camera to one visibility length ahead along the heading [1/m]: what a
         camera that looks ahead can at best report where the fog varies.
@@ -66,7 +68,8 @@ class Truth:
     vehicle_extinctions : (n,) float64 or None
         Extinction coefficient at the eyes of each driver of `Step.traffic` [1/m]; None where nobody asked.
     sections : tuple of RoadSection
-        Visibility meters beside the ego's route, in the direction of travel, where sections of it are advised.
+        Visibility meters beside the ego's route, or beside ``traffic.along``, in the direction of travel, where
+        sections of it are advised.
     """
 
     extinction: float
@@ -89,38 +92,22 @@ class Truth:
         return visibility_from_extinction(self.extinction_ahead)
 
 
-@dataclass(frozen=True, slots=True)
-class Step:
-    """One finished instant.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrafficStep:
+    """One finished instant of the traffic, whether an ego is in it or not.
 
     Attributes
     ----------
     index : int
         Number of the camera period, from 0.
     time : float
-        Simulated time [s].
+        Simulated time since the run began [s].
     traffic : TrafficState
-        Every vehicle.
-    ego : int
-        Row of the ego vehicle in `traffic`.
-    route_position : float
-        How far the ego has driven along its route [m].
-    speed_limit : float
-        Speed limit where the ego is [m/s].
-    leader : Leader or None
-        The vehicle ahead.
+        Every vehicle that is read.
     collisions : tuple of Collision
         Collisions that were new in this period.
     truth : Truth
         The fog as it is.
-    view : View
-        The drawn scene before fog and camera.
-    observation : Observation
-        What the ego knows: camera frame and sensors.
-    estimates : tuple of Estimate
-        What the estimators make of it.
-    belief : Belief
-        What is believed after this step.
     command : Command
         What was in force while the traffic moved to this instant.
     ending : Ending or None
@@ -132,16 +119,44 @@ class Step:
     index: int
     time: float
     traffic: TrafficState
+    collisions: tuple[Collision, ...]
+    truth: Truth
+    command: Command
+    ending: Ending | None
+    unplayed: Unplayed = NOTHING_UNPLAYED
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Step(TrafficStep):
+    """One finished instant of the closed loop about an ego.
+
+    Attributes
+    ----------
+    index, time, traffic, collisions, truth, command, ending, unplayed
+        As of `TrafficStep`.
+    ego : int
+        Row of the ego vehicle in `traffic`.
+    route_position : float
+        How far the ego has driven along its route [m].
+    speed_limit : float
+        Speed limit where the ego is [m/s].
+    leader : Leader or None
+        The vehicle ahead.
+    view : View
+        The drawn scene before fog and camera.
+    observation : Observation
+        What the ego knows: camera frame and sensors.
+    estimates : tuple of Estimate
+        What the estimators make of it.
+    belief : Belief
+        What is believed after this step.
+    """
+
     ego: int
     route_position: float
     speed_limit: float
     leader: Leader | None
-    collisions: tuple[Collision, ...]
-    truth: Truth
     view: View
     observation: Observation
     estimates: tuple[Estimate, ...]
     belief: Belief
-    command: Command
-    ending: Ending | None
-    unplayed: Unplayed = NOTHING_UNPLAYED

@@ -145,3 +145,25 @@ class TrafficSnapshot:
     speed_limit: float
     leader: Leader | None
     collisions: tuple[Collision, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class NetworkSnapshot:
+    """The traffic of a whole network at one instant, without an ego.
+
+    Attributes
+    ----------
+    state : TrafficState
+        Every vehicle.
+    speed_limit : float
+        Highest speed limit of the lanes that they are on [m/s]; ``inf`` where nobody is.
+    collisions : tuple of Collision
+        Collisions since the last snapshot, each pair once.
+    is_over : bool
+        True if nobody is there, and nobody will come.
+    """
+
+    state: TrafficState
+    speed_limit: float
+    collisions: tuple[Collision, ...]
+    is_over: bool

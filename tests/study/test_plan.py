@@ -68,7 +68,8 @@ def test_a_scenario_beside_the_study_is_found(tmp_path: Path) -> None:
         (("  visibility:", "  seed:"), r"factors\.seed: the table has a column of that name"),
         (("scenario: motorway_fog_bank", "scenario: motorway"), r"unknown scenario 'motorway'"),
         (("scenario: motorway_fog_bank", "ego: x"), r"give either scenario, or sumocfg"),
-        (("scenario: motorway_fog_bank", "sumocfg: a.sumocfg"), r"ego is missing"),
+        (("scenario: motorway_fog_bank", "sumocfg: a.sumocfg"), r"there is no file .a.sumocfg"),
+        (("scenario: motorway_fog_bank", "scenario: motorway_fog_bank\nego: x"), r"ego: goes with sumocfg"),
         (("fog.visibility_m=60", "fog.visibility_m=sixty"), r"visibility=v60: .*fog\.visibility_m"),
     ],
 )

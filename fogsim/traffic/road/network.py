@@ -95,7 +95,7 @@ def road_network(roads: RoadMap, route: Sequence[str]) -> RoadNetwork:
     lanes = tuple(lane for lane, is_drawn in zip(roads.lanes, roads.drawn.tolist(), strict=True) if is_drawn)
     for lane in lanes:
         _check_shape(lane)
-    return RoadNetwork(lanes=lanes, route=_route_axis(roads, route), areas=roads.areas)
+    return RoadNetwork(lanes=lanes, route=route_axis(roads, route), areas=roads.areas)
 
 
 def _check_shape(lane: Lane) -> None:
@@ -107,8 +107,21 @@ def _check_shape(lane: Lane) -> None:
         )
 
 
-def _route_axis(roads: RoadMap, route: Sequence[str]) -> NDArray[np.float64]:
-    """Middle lanes of a route's edges, end to end, without repeated points."""
+def route_axis(roads: RoadMap, route: Sequence[str]) -> NDArray[np.float64]:
+    """Middle lanes of a route's edges, end to end, without repeated points: a polyline (n, 3) [m].
+
+    Parameters
+    ----------
+    roads : RoadMap
+        The network.
+    route : sequence of str
+        Edge ids.
+
+    Raises
+    ------
+    InputError
+        If a lane has no shape to draw.
+    """
     middle = [roads.middle_lane(edge) for edge in route]
     for lane in middle:
         _check_shape(lane)

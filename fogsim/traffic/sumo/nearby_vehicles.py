@@ -1,8 +1,8 @@
-"""Which vehicles are near the ego, without asking all of them where they are in every step."""
+"""Which vehicles are read: those near the ego, without asking all where they are in every step, or everybody."""
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,34 @@ TOP_SPEED = 100.0
 
 MAX_WAIT = 1.0
 """Time after which a vehicle's distance is computed again in any case [s], should somebody have moved it by hand."""
+
+
+class AllVehicles:
+    """Finds everybody on the road.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    roster : Roster
+        Who is on the road.
+    """
+
+    def __init__(self, api: Api, roster: Roster) -> None:
+        self._position = vehicle_getter(api, "getPosition3D")
+        self._roster = roster
+        self._ids: tuple[str, ...] = ()
+        self._mark = self._removals = 0
+
+    def find(self) -> tuple[tuple[str, ...], NDArray[np.float64]]:
+        """Ids in SUMO's order and positions (n, 3) [m]; the ids are the same object while nobody comes or goes."""
+        roster = self._roster
+        roster.update()
+        new, self._mark = roster.entered_since(self._mark)
+        if new or self._removals != roster.removals:
+            self._removals = roster.removals
+            self._ids = tuple(sorted(roster.present))
+        return self._ids, _positions(self._position, self._ids)
 
 
 class NearbyVehicles:
@@ -131,5 +159,9 @@ class NearbyVehicles:
         return np.asarray(np.hypot(position[:, 0] - here[0], position[:, 1] - here[1]))
 
     def _positions(self, vehicles: Sequence[str]) -> NDArray[np.float64]:
-        flat = itertools.chain.from_iterable(map(self._position, vehicles))
-        return np.fromiter(flat, np.float64, 3 * len(vehicles)).reshape(-1, 3)
+        return _positions(self._position, vehicles)
+
+
+def _positions(position: Callable[[str], Sequence[float]], vehicles: Sequence[str]) -> NDArray[np.float64]:
+    flat = itertools.chain.from_iterable(map(position, vehicles))
+    return np.fromiter(flat, np.float64, 3 * len(vehicles)).reshape(-1, 3)

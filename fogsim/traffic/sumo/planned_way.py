@@ -35,6 +35,8 @@ def planned_way(setup: TrafficSetup) -> PlannedWay | None:
     setup : TrafficSetup
         The simulation and its ego.
     """
+    if setup.ego is None:
+        return None
     if setup.config is None:
         if setup.net is None:
             return None

@@ -28,13 +28,13 @@ class SumoVehiclePlaces:
     ----------
     api : Api
         The simulation.
-    ego : str
-        Id of the ego.
+    ego : str or None
+        Id of the ego; without one, everybody is near what would be it.
     roster : Roster
         Which vehicles are on the road.
     """
 
-    def __init__(self, api: Api, ego: str, roster: Roster) -> None:
+    def __init__(self, api: Api, ego: str | None, roster: Roster) -> None:
         self._api = api
         self._ego = ego
         self._roster = roster
@@ -77,7 +77,7 @@ class SumoVehiclePlaces:
 
     def _ego_route(self) -> tuple[str, ...]:
         """Edges of the ego's route; of its last one when it has left the road."""
-        if self._ego in self._roster.present or not self._route[1]:
+        if self._ego is not None and (self._ego in self._roster.present or not self._route[1]):
             route = self._api.vehicle.getRouteID(self._ego)
             if route != self._route[0]:
                 self._route = (route, tuple(self._api.vehicle.getRoute(self._ego)))
@@ -123,9 +123,11 @@ class SumoVehiclePlaces:
         among : collection of str or None
             Vehicles that are asked about; None for all.
         """
+        asked = self._roster.present if among is None else among
+        if self._ego is None:
+            return asked
         if self._ego not in self._roster.present:
             return ()
-        asked = self._roster.present if among is None else among
         if distance == math.inf:
             return asked
         here = self._position(self._ego)[:2]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fogsim.traffic.appearance import OTHERS_LAMPS, body_kind, cross_section, lamps_from_many_signals, paint
 from fogsim.traffic.sumo.claims import SPEED_FACTOR, TOP_SPEED, Claims
 from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
-from fogsim.traffic.sumo.nearby_vehicles import NearbyVehicles
+from fogsim.traffic.sumo.nearby_vehicles import AllVehicles, NearbyVehicles
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.values import Collision, Lamp, Leader, TrafficState
 
@@ -73,7 +73,7 @@ class _Constants(NamedTuple):
     """What never changes about those near, and which row is the ego's."""
 
     ids: Sequence[str]
-    ego: int
+    ego: int | None
     kinds: tuple[str, ...]
     length: NDArray[np.float64]
     width: NDArray[np.float64]
@@ -151,21 +151,22 @@ class VehicleReader:
     ----------
     api : Api
         The simulation.
-    ego : str
-        Id of the ego, which is always read.
+    ego : str or None
+        Id of the ego, which is always read; None to read everybody, wherever they are.
     radius : float
         Vehicles farther from the ego than this are left out [m].
     roster : Roster or None
         Who is on the road; None for one of its own.
     """
 
-    def __init__(self, api: Api, ego: str, radius: float, roster: Roster | None = None) -> None:
+    def __init__(self, api: Api, ego: str | None, radius: float, roster: Roster | None = None) -> None:
         self._api = api
         self._ego = ego
         self._radius = radius
         self._bodies = VehicleBodies(api)
         self._roster = Roster(api) if roster is None else roster
-        self._nearby_vehicles = NearbyVehicles(api, ego, radius, self._roster)
+        near = AllVehicles(api, self._roster) if ego is None else NearbyVehicles(api, ego, radius, self._roster)
+        self._nearby_vehicles: AllVehicles | NearbyVehicles = near
         self._getters = tuple(vehicle_getter(api, name) for name in _CHANGING)
         self._slope = vehicle_getter(api, "getSlope")
         self._level = math.nan
@@ -195,7 +196,8 @@ class VehicleReader:
         constants = self._constants_of(now.ids)
         ego = constants.ego
         lamps = self._lamps(now.signals)
-        lamps[ego] = int(ego_lamps) | (int(lamps[ego]) & int(Lamp.STOP))
+        if ego is not None:
+            lamps[ego] = int(ego_lamps) | (int(lamps[ego]) & int(Lamp.STOP))
         return TrafficState(
             time=self._roster.time,
             ids=now.ids,
@@ -233,7 +235,9 @@ class VehicleReader:
             kinds, numbers = self._bodies.look_up(ids)
             length, width, height = numbers[:, :3].T
             body = (kinds, length, width, height, numbers[:, 3:6])
-            self._constants = _Constants(ids, ids.index(self._ego), *body, *numbers[:, 6:].T)
+            self._constants = _Constants(
+                ids, None if self._ego is None else ids.index(self._ego), *body, *numbers[:, 6:].T
+            )
         return self._constants
 
     def _dynamic_state(self) -> DynamicState:
@@ -260,7 +264,7 @@ class VehicleReader:
 
     def leader(self) -> Leader | None:
         """The vehicle ahead of the ego in its lane."""
-        found = self._leader(self._ego, LEADER_RANGE)
+        found = None if self._ego is None else self._leader(self._ego, LEADER_RANGE)
         if found is None or not found[0]:
             return None
         # SUMO's gap leaves out the follower's minimum gap.
@@ -283,7 +287,7 @@ class VehicleReader:
 
 
 class SubscribedReader(VehicleReader):
-    """Reads vehicles by subscribing to the surroundings of the ego, which SUMO sends at once.
+    """Reads vehicles by subscribing to the surroundings of an ego, which SUMO sends at once.
 
     The subscription is for this instant alone: SUMO ends itself if one outlives its vehicle, and other
     clients may take the ego away before the next step. The interface and the result are those of
@@ -291,6 +295,8 @@ class SubscribedReader(VehicleReader):
     """
 
     def _dynamic_state(self) -> DynamicState:
+        if self._ego is None:
+            return super()._dynamic_state()
         rows = self._surroundings()
         # Rows of a subscription of the user's own may be among them, with other variables.
         listed = sorted(vehicle for vehicle, row in rows.items() if all(v in row for v in _MOVING))

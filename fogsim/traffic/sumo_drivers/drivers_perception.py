@@ -46,19 +46,20 @@ class DriversPerception:
     def __init__(self, parts: Sequence[PerceivedPart]) -> None:
         self._parts = tuple(parts)
 
-    def update(self, ego: str, ego_lamps: Lamp, dark: frozenset[str]) -> None:
+    def update(self, ego: str | None, ego_lamps: Lamp, dark: frozenset[str]) -> None:
         """Tell SUMO's drivers, before a step, what they do not see.
 
         Parameters
         ----------
-        ego : str
-            Id of the ego, whose lamps are not SUMO's.
+        ego : str or None
+            Id of the ego, whose lamps are not SUMO's, if there is one.
         ego_lamps : Lamp
             Its lit lamps.
         dark : frozenset of str
             Vehicles whose lamps have failed.
         """
-        own_lamps: OwnLamps = {**dict.fromkeys(dark, None), ego: None if ego in dark else int(ego_lamps)}
+        own_lamps: OwnLamps = {} if ego is None else {ego: int(ego_lamps)}
+        own_lamps.update(dict.fromkeys(dark, None))
         for part in self._parts:
             part.update(own_lamps)
 

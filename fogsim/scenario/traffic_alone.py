@@ -1,0 +1,108 @@
+"""Scenarios without an ego (``traffic.ego: none``): what they leave out, and what they have in place of its camera."""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from pydantic import ValidationError
+from pydantic_core import InitErrorDetails, PydanticCustomError
+
+from fogsim.scenario.plain_yaml import KeyPath
+from fogsim.scenario.section import MISTAKE
+
+NO_EGO = "none"
+"""What stands for an ego's id where there is none."""
+
+_NEEDS = "needs an ego, and traffic.ego is none"
+
+
+def without_ego(written: object) -> object:
+    """Fill in what follows from there being no ego, and refuse what needs one; other scenarios stay as they are.
+
+    Parameters
+    ----------
+    written : object
+        What stands in a scenario file.
+
+    Raises
+    ------
+    ValidationError
+        One mistake for each key that needs an ego.
+    """
+    traffic = written.get("traffic") if isinstance(written, dict) else None
+    if not isinstance(written, dict) or not isinstance(traffic, dict) or traffic.get("ego") != NO_EGO:
+        return written
+    mistakes = [
+        InitErrorDetails(type=PydanticCustomError(MISTAKE, "{told}", {"told": told}), loc=place, input=0)
+        for place, told in (*_of_camera(written), *_of_place(written), *_of_events(traffic))
+    ]
+    if mistakes:
+        raise ValidationError.from_exception_data("scenario", mistakes)
+    fog, drivers = written.get("fog"), written.get("drivers", {})
+    filled = {"renderer": "none", "estimators": [], "lighting": "low_beam", **written, "advice": _advice(written)}
+    if isinstance(drivers, dict):
+        filled["drivers"] = {"advised": "all", **drivers}
+    if isinstance(fog, dict) and not traffic.get("along"):
+        filled["fog"] = {"top_m": "inf", **fog}
+    return filled
+
+
+def _method(value: object) -> dict[str, Any]:
+    return {"method": value} if isinstance(value, str) else value if isinstance(value, dict) else {}
+
+
+def _advice(written: dict[str, Any]) -> object:
+    advice = written.get("advice", "stopping_sight_distance")
+    return {"informed_by": "truth", **_method(advice)} if isinstance(advice, str | dict) else advice
+
+
+def _of_camera(written: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
+    """What goes by an ego's camera, or lights its lamps."""
+    if written.get("renderer", NO_EGO) != NO_EGO:
+        yield ("renderer",), f"drawing frames {_NEEDS}; leave it out, or write none"
+    if written.get("estimators"):
+        yield ("estimators",), f"reading frames {_NEEDS}; leave it out, or write []"
+    if _method(written.get("advice")).get("informed_by") == "belief":
+        yield (
+            ("advice", "informed_by"),
+            f"belief {_NEEDS}; leave it out, or write truth: a visibility meter at the road",
+        )
+    if _method(written.get("lighting")).get("method", "low_beam") != "low_beam":
+        yield ("lighting",), f"choosing lamps {_NEEDS}; leave it out, or write low_beam"
+
+
+def _of_place(written: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
+    """What lies along an ego's route, or is told by it."""
+    drivers, fog = written.get("drivers"), written.get("fog")
+    advised = drivers.get("advised") if isinstance(drivers, dict) else None
+    if advised == "ego":
+        yield ("drivers", "advised"), f"ego {_NEEDS}; leave it out, or write all"
+    if written["traffic"].get("along"):
+        return
+    what = "counts along the ego's route, and traffic.ego is none: name the road's edges in traffic.along"
+    if advised in ("stretch", "signs", "equipped", "law"):
+        yield ("drivers", "advised"), f"{advised} {what}"
+    if isinstance(fog, dict):
+        yield from ((place, f"this {what}") for place in _along_the_route(fog))
+
+
+def _along_the_route(fog: dict[str, Any]) -> Iterator[KeyPath]:
+    if fog.get("banks"):
+        yield "fog", "banks"
+    if fog.get("top_m", "inf") not in ("inf", ".inf", "infinity", math.inf):
+        yield "fog", "top_m"
+    for key in ("base_m", "scale_height_m"):
+        if fog.get(key) is not None:
+            yield "fog", key
+    changes = fog.get("changes")
+    for number, change in enumerate(changes if isinstance(changes, list | tuple) else ()):
+        for key in ("base_m", "top_m"):
+            if isinstance(change, dict) and change.get(key) is not None:
+                yield "fog", "changes", number, key
+
+
+def _of_events(traffic: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
+    events = traffic.get("events")
+    for number, event in enumerate(events if isinstance(events, list | tuple) else ()):
+        if isinstance(event, dict) and event.get("at_gap_to_ego_m") is not None:
+            yield ("traffic", "events", number, "at_gap_to_ego_m"), f"a gap to the ego {_NEEDS}"

@@ -1,0 +1,256 @@
+"""Traffic alone in fog: no ego, no camera, advice by visibility meters at the road; traffic → advice → traffic."""
+
+import dataclasses
+import math
+from collections.abc import Generator, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.atmosphere import extinction, field_at
+from fogsim.ego.road_meters import RoadMeters
+from fogsim.errors import InputError, SimulationError, shown, suggest
+from fogsim.loop import DriversFog, advance_traffic, spread_advice, warn_of_unplayed
+from fogsim.randomness import spawn_streams
+from fogsim.road_advice import RoadAdvice
+from fogsim.scenario import Scenario, build
+from fogsim.scenario.road_sections import DISPLAYS, EYES, stations
+from fogsim.traffic import NetworkTraffic, libsumo_network_traffic
+from fogsim.traffic.road.configuration import configured_files
+from fogsim.traffic.road.network import read_net, route_axis
+from fogsim.values import Command, Ending, NetworkSnapshot, TrafficStep, Truth
+from fogsim.values.belief import certain_belief
+from fogsim.values.result_checks import checked_advice, checked_command
+
+METER_SPACING = 100.0
+"""Distance between visibility meters along a road [m]."""
+
+
+def run_traffic(
+    scenario: Scenario, seed: int = 0, sumo_outputs: Path | None = None
+) -> Generator[TrafficStep, None, None]:
+    """Run a scenario without an ego (``traffic.ego: none``) with its own advice.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        From `load_scenario`.
+    seed : int
+        The same seed gives the same run, bit for bit.
+    sumo_outputs : Path or None
+        As of `fogsim.run`.
+
+    Yields
+    ------
+    TrafficStep
+        One a camera period, with all vehicles of the network; the last has its `ending` set: the duration is over, or
+        all vehicles have gone and no more will come.
+
+    Raises
+    ------
+    FogSimError
+        If the scenario has an ego, or SUMO cannot start.
+
+    Warns
+    -----
+    UnplayedWarning
+        As of `fogsim.run`.
+    """
+    policy = MeteredAdvice(scenario)
+    with TrafficRun(scenario, sumo_outputs=sumo_outputs) as traffic:
+        step, limit = traffic.start(seed)
+        yield step
+        while step.ending is None:
+            step, limit = traffic.advance(policy.decide(step, limit))
+            yield step
+    warn_of_unplayed(scenario, step)
+
+
+class MeteredAdvice:
+    """The scenario's adviser, who goes by the visibility meters; asked once a decision period.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._scenario = scenario
+        self._adviser = build.adviser(scenario)
+        self._frames = build.periods(scenario).decision_frames
+        self._road = RoadAdvice(scenario) if scenario.drivers.advised in DISPLAYS else None
+
+    def decide(self, step: TrafficStep, speed_limit: float) -> Command:
+        """Command for the next camera period; the one in force between decisions.
+
+        Parameters
+        ----------
+        step : TrafficStep
+            What was finished last.
+        speed_limit : float
+            Highest speed limit where somebody drives [m/s].
+        """
+        if step.index % self._frames:
+            return step.command
+        if self._road is not None:
+            return Command(stretches=self._road.advise_traffic(step, speed_limit))
+        measured = certain_belief(step.truth.extinction)
+        advised = self._adviser.advise(measured, speed_limit, step.time, step.command.advice)
+        advice = checked_advice(self._scenario.advice.method, advised)
+        command = spread_advice(Command(advice=advice), self._scenario)
+        # Without an ego there is no place to be near to.
+        return dataclasses.replace(command, advice_reach=math.inf) if command.advice_reach else command
+
+
+class TrafficRun:
+    """The traffic of one simulation in fog, from command to finished step.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario; its ego is none.
+    traffic : NetworkTraffic or None
+        The traffic simulation; None for SUMO in this process, as the scenario describes it.
+    sumo_outputs : Path or None
+        As of `fogsim.run`.
+
+    Raises
+    ------
+    InputError
+        If the scenario has an ego, or the network lacks an edge of ``traffic.along``.
+    """
+
+    def __init__(
+        self, scenario: Scenario, traffic: NetworkTraffic | None = None, sumo_outputs: Path | None = None
+    ) -> None:
+        if scenario.traffic.has_ego:
+            raise InputError(
+                f"traffic alone has no ego, and traffic.ego is {scenario.traffic.ego!r}; write none, or call fogsim.run"
+            )
+        setup = build.traffic_setup(scenario)
+        self._periods = build.periods(scenario)
+        self._traffic = traffic or libsumo_network_traffic(setup, sumo_outputs)
+        along, net = scenario.traffic.along, setup.net if setup.config is None else configured_files(setup.config)[0]
+        # Fog without a road along which it lies has no heights either, so that its ground may be anywhere.
+        axis = _axis_along(along, net) if along and net is not None else np.zeros((1, 3))
+        self._fog = build.fog_field(scenario, axis)
+        # A meter that stands for a whole network does not see single patches.
+        self._metered = self._fog if along else dataclasses.replace(self._fog, patches=None)
+        self._meters = _places_along(axis) + EYES
+        self._section_meters = RoadMeters(scenario, axis)
+        self._drivers_fog = DriversFog()
+        self._step: TrafficStep | None = None
+
+    def start(self, seed: int) -> tuple[TrafficStep, float]:
+        """Begin a run, or begin anew.
+
+        Parameters
+        ----------
+        seed : int
+            Seed of every random number of the run.
+
+        Returns
+        -------
+        tuple of TrafficStep and float
+            The first instant, and the highest speed limit where somebody drives [m/s].
+
+        Raises
+        ------
+        SimulationError
+            If SUMO cannot start, or runs already in this process.
+        """
+        self._step = None
+        self._drivers_fog.set_time(0.0)
+        if not self._drivers_fog.is_about(self._fog):
+            self._drivers_fog.enter(self._fog, self._traffic)
+        self._traffic.start(spawn_streams(seed).traffic_seed)
+        return self._complete_step(0, Command())
+
+    def advance(self, command: Command) -> tuple[TrafficStep, float]:
+        """Move by one camera period with a command in force.
+
+        Parameters
+        ----------
+        command : Command
+            Advice to drivers.
+
+        Returns
+        -------
+        tuple of TrafficStep and float
+            As of `start`.
+
+        Raises
+        ------
+        InputError
+            If the command is none, or a speed in it is nan or negative.
+        SimulationError
+            If the run has not been started or is over.
+        """
+        if self._step is None or self._step.ending is not None:
+            raise SimulationError("the run has not been started or is over: call start() before advance()")
+        checked_command(command)
+        if not self._drivers_fog.is_entered and command.is_for_others:
+            # In clear air nobody has chosen a speed so far.
+            self._drivers_fog.enter(self._fog, self._traffic)
+        advance_traffic(self._traffic, self._drivers_fog, self._periods, self._step.index, command)
+        return self._complete_step(self._step.index + 1, command)
+
+    def _complete_step(self, index: int, command: Command) -> tuple[TrafficStep, float]:
+        snapshot, time = self._traffic.observe_network(), self._periods.time(index)
+        step = TrafficStep(
+            index=index,
+            time=time,
+            traffic=snapshot.state,
+            collisions=snapshot.collisions,
+            truth=self._truth(snapshot, time),
+            command=command,
+            ending=self._ending(index, snapshot),
+        )
+        if step.ending is not None:
+            step = dataclasses.replace(step, unplayed=self._traffic.unplayed())
+        self._step = step
+        return step, snapshot.speed_limit
+
+    def _truth(self, snapshot: NetworkSnapshot, time: float) -> Truth:
+        fog = field_at(self._fog, time)
+        measured = float(extinction(field_at(self._metered, time), self._meters).max())
+        seen = extinction(fog, snapshot.state.position + EYES)
+        sections = self._section_meters.measure(fog)
+        return Truth(measured, measured, fog=fog, vehicle_extinctions=seen, sections=sections)
+
+    def _ending(self, index: int, snapshot: NetworkSnapshot) -> Ending | None:
+        if index >= self._periods.frames:
+            return Ending.TIME
+        return Ending.NOBODY_LEFT if snapshot.is_over else None
+
+    def close(self) -> None:
+        """End the simulation; closing twice is allowed."""
+        self._traffic.close()
+        self._step = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _axis_along(edges: Sequence[str], net: Path) -> NDArray[np.float64]:
+    roads = read_net(net)
+    for edge in edges:
+        if edge not in roads.edges:
+            raise InputError(f"traffic.along: {net} has no edge {shown(edge)}; {suggest(edge, roads.edges)}")
+    return route_axis(roads, edges)
+
+
+def _places_along(axis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Places of visibility meters on the ground along a polyline (n, 3) [m], its beginning and end among them."""
+    station = stations(axis)
+    at = np.linspace(0.0, station[-1], 1 + math.ceil(station[-1] / METER_SPACING))
+    return np.stack([np.interp(at, station, axis[:, i]) for i in range(3)], axis=1)

@@ -25,6 +25,7 @@ _STYLE = """
 body { max-width: 76rem; }
 h3 { font-size: 1rem; margin: 1.2rem 0 .3rem; }
 .scrolls { overflow-x: auto; }
+.scrolls td:first-child { min-width: 11rem; }
 .scrolls small { color: #5d6975; } .scrolls small b { color: #1c2733; }
 figure { max-width: 52rem; }
 details { margin: .8rem 0; } summary { cursor: pointer; font-weight: 600; color: #44505c; }
@@ -139,7 +140,11 @@ def _page(study: Study, rows: Sequence[Row], found: _Findings, folder: Path) -> 
             '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">',
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
             f"<title>{title} – FogSim</title>\n<style>{PAGE_STYLE}{_STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>",
-            *([f'<div class="partial">PARTIAL: {len(failed)} runs are missing or failed</div>'] if failed else []),
+            *(
+                [f'<div class="partial">PARTIAL: {len(failed)} of {len(rows)} runs missing or failed</div>']
+                if failed
+                else []
+            ),
             summary(study, rows, found.of_main(), found.remarks),
             *_failures(study, failed),
             main_tables(study, done, found.main, found.of_main(), found.remarks),

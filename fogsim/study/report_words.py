@@ -46,38 +46,45 @@ def _compared(study: Study, rows: Sequence[Row]) -> str:
 
 
 def _findings(study: Study, differences: Sequence[Difference]) -> list[str]:
-    """What is shown of each policy, in a list for each cell of the other factors."""
+    """What is shown of each metric, in a list for each cell of the other factors."""
     grid = Grid(study)
     lines = []
     for panel, title in grid.panels.items():
-        items = []
-        for policy in grid.policies:
-            cell = grid.cell(policy, panel)
-            of_policy = [one for one in differences if tuple(one.levels.values()) == cell]
-            if of_policy:
-                items.append(f"<li><b>{escape(policy)}</b>: {escape(_finding(study, of_policy))}</li>")
+        cells = {grid.cell(policy, panel) for policy in grid.policies}
+        here = [one for one in differences if tuple(one.levels.values()) in cells]
+        by_metric = {one.metric: [each for each in here if each.metric == one.metric] for one in here}
+        shown = {m for m, found in by_metric.items() if any(one.is_shown(study.confidence) for one in found)}
+        items = [_finding(grid, metric, by_metric[metric]) for metric in by_metric if metric in shown]
+        nothing = [metric_words(metric).label for metric in by_metric if metric not in shown]
+        if nothing:
+            items.append(f"No difference of any could be shown in: {', '.join(nothing)}.")
         heading = f"<h3>{escape(title)}</h3>" if title else ""
-        lines += [heading, f"<ul>{''.join(items)}</ul>"] if items else []
+        lines += [heading, "<ul>", *(f"<li>{escape(item)}</li>" for item in items), "</ul>"] if items else []
     return lines
 
 
-def _finding(study: Study, differences: Sequence[Difference]) -> str:
-    shown = [one for one in differences if one.is_shown(study.confidence)]
-    if not shown:
-        return "no difference could be shown in any of the main metrics."
-    others = [metric_words(one.metric).label for one in differences if one not in shown]
-    said = "; ".join(_said(one, metric_words(one.metric)) for one in shown) + "."
-    return said + (f" No difference could be shown in: {', '.join(others)}." if others else "")
+def _finding(grid: Grid, metric: str, differences: Sequence[Difference]) -> str:
+    """Who differs from the baseline in one metric, by how much, and of whom that could not be shown."""
+    words = metric_words(metric)
+    groups: dict[str, list[str]] = {}
+    for one in sorted(differences, key=lambda each: each.difference):
+        policy = one.levels[grid.policy_factor]
+        if one.is_shown(grid.study.confidence):
+            told = f"{policy} ({signed(words.scale * one.difference)})"
+            groups.setdefault(_verdict(one, words), []).append(told)
+    unshown = [one.levels[grid.policy_factor] for one in differences if not one.is_shown(grid.study.confidence)]
+    said = [f"{verdict} with {', '.join(policies)}" for verdict, policies in groups.items()]
+    said += [f"no difference could be shown for {', '.join(unshown)}"] if unshown else []
+    unit = "percentage points" if words.unit == "%" else words.unit
+    return f"{words.label}{f' [{unit}]' if unit else ''}: {'; '.join(said)}."
 
 
-def _said(one: Difference, words: MetricWords) -> str:
-    """One difference that is shown, with its interval, and whether it is for the better."""
-    judged = {"less": one.difference < 0, "more": one.difference > 0}.get(words.better)
-    verdict = "" if judged is None else ", better" if judged else ", worse"
-    low, high = (words.scale * (end or 0.0) for end in (one.low, one.high))
-    unit = "%-points" if words.unit == "%" else words.unit
-    size = f"{words.label} {signed(words.scale * one.difference)} {unit}".rstrip()
-    return f"{size} ({signed(low)} … {signed(high)}){verdict}"
+def _verdict(one: Difference, words: MetricWords) -> str:
+    """Whether a difference is for the better, where the metric says what is."""
+    lower = one.difference < 0
+    if words.better == "neither":
+        return "lower" if lower else "higher"
+    return "better" if lower == (words.better == "less") else "worse"
 
 
 def _doubts(study: Study, differences: Sequence[Difference]) -> list[str]:

@@ -125,11 +125,11 @@ def test_the_report_says_what_is_shown_and_no_more(study: Study, folder: Path) -
     summary = page[page.index("<h2>Summary") : page.index("<h2>Main metrics")]
     assert "2 policy × 2 fog × 8 seeds = 32 runs, of which all are complete" in summary
     assert "slow &lt;1&gt;" in summary
-    assert len(re.findall(r"Time at TTC &lt; 3 s −(0\.9|1\.0)\d* %-points \(−[\d.]+ … −[\d.]+\), better", summary)) == 2
-    assert summary.count(", better") == 2
+    better = r"Time at TTC &lt; 3 s \[percentage points\]: better with slow &lt;1&gt; \(−(0\.9|1\.0|1)\d*\)"
+    assert len(re.findall(better, summary)) == 2
     # Speed is neither better nor worse by itself, and collisions differ by chance alone.
-    assert summary.count("Mean speed of all −") == 2
-    assert summary.count("No difference could be shown in: Collisions of all.") == 2
+    assert len(re.findall(r"Mean speed of all \[km/h\]: lower with slow &lt;1&gt; \(−1[78][.\d]*\)", summary)) == 2
+    assert summary.count("No difference of any could be shown in: Collisions of all.") == 2
     assert "4 of 6 comparisons that vary" in summary
     assert "Run without a camera, which nothing in them goes by: all." in page
     assert "advice=&lt;slow&gt;" in page
@@ -172,7 +172,7 @@ def test_chosen_metrics_and_failed_runs(study: Study, tmp_path: Path) -> None:
     rows = rows_of(study)
     rows[3] = {**{k: rows[3][k] for k in ("run", "policy", "fog", "seed")}, "status": "failed", "message": "a < b"}
     page = written(chosen, rows, tmp_path)
-    assert "PARTIAL: 1 runs are missing or failed" in page
+    assert "PARTIAL: 1 of 32 runs missing or failed" in page
     assert "a &lt; b" in page
     assert "<td>max_drac_mps2</td><td>no run has a value</td>" in page
     comparison = table(tmp_path / "comparison.csv")
@@ -188,7 +188,7 @@ def test_without_any_finished_run_there_is_a_report_too(study: Study, tmp_path: 
     write_report(study, rows, {}, tmp_path)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "of which 0 are complete" in page
-    assert "PARTIAL: 32 runs" in page
+    assert "PARTIAL: 32 of 32 runs" in page
     assert list((tmp_path / "figures").iterdir()) == []
 
 

@@ -48,7 +48,7 @@ def test_a_study_is_run_continued_and_reported(tmp_path: Path) -> None:
     figures = {path.name for path in (out / "figures").iterdir()}
     assert {"mean_speed_mps.svg", "ttc_survival.csv", "speed_over_road.svg"} <= figures
     page = (out / "report.html").read_text(encoding="utf-8")
-    assert "PARTIAL: 2 runs are missing or failed" in page
+    assert "PARTIAL: 2 of 6 runs missing or failed" in page
     assert "did not appear within" in page
 
     # As if the command had been killed: what is done is not run again, what failed is, and the table is the same.

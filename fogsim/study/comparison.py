@@ -63,17 +63,17 @@ class Difference:
     def is_shown(self, confidence: float) -> bool:
         """Whether the data show that there is a difference: the interval excludes 0, and the test agrees.
 
-        Of few seeds, the bootstrap alone would claim too much: three differences of one sign exclude 0, and happen by
-        chance in one case of four.
+        A difference that is the same in every run has no interval, and goes by the test. Of few seeds, the bootstrap
+        alone would claim too much: three differences of one sign exclude 0, and happen by chance in one case of four.
 
         Parameters
         ----------
         confidence : float
             Confidence of the interval.
         """
-        if self.low is None or self.high is None or self.p_value is None:
+        if self.p_value is None or self.p_value > 1.0 - confidence:
             return False
-        return (self.low > 0.0 or self.high < 0.0) and self.p_value <= 1.0 - confidence
+        return self.low is None or self.high is None or self.low > 0.0 or self.high < 0.0
 
 
 def numeric_metrics(rows: Sequence[Row], factors: Iterable[str]) -> list[str]:

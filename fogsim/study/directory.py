@@ -95,6 +95,9 @@ class StudyDirectory:
     def _row(self, run: StudyRun) -> Row:
         found = self._result(run)
         metrics: dict[str, Value] = found.get("metrics", {})
+        if not run.scenario.estimators:
+            # Without a camera what is believed is but where beliefs begin: no error to compare.
+            metrics = {key: None if key.startswith("belief_") else value for key, value in metrics.items()}
         about = {"seed": run.seed, "status": found.get("status", "missing"), "message": found.get("message")}
         outputs = result_file(self.results, run).with_suffix("")
         kept: dict[str, Value] = {"sumo_outputs": f"{self.results.name}/{outputs.name}"} if outputs.is_dir() else {}

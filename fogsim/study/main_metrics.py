@@ -116,4 +116,5 @@ def signed(value: float, digits: int = 3) -> str:
     digits : int
         Digits that count.
     """
-    return f"{value:+.{digits}g}".replace("-", "−")
+    text = f"{value:+.{digits}g}" if abs(value) < 10**digits else f"{value:+.0f}"
+    return text.replace("-", "−")

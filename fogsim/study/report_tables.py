@@ -44,7 +44,7 @@ def main_tables(
         for metric in metrics:
             cells = [grid.cell(policy, panel) for policy in grid.policies]
             values = [_mean_cell(study, metric, of_cell.get(cell, []), found.get((metric, cell))) for cell in cells]
-            remark = f"<br><small>{escape(remarks[metric])}</small>" if metric in remarks else ""
+            remark = f"<br><small>{escape(remarks[metric].partition(':')[0])}</small>" if metric in remarks else ""
             label = f'<span title="{escape(metric)}">{escape(metric_words(metric).axis)}</span>{remark}'
             body.append([label, *values])
         parts += [f"<h3>{escape(title)}</h3>" if title else "", _table(head, body, texts=1)]
@@ -63,7 +63,7 @@ def _mean_cell(study: Study, metric: str, rows: Sequence[Row], one: Difference |
         return text
     said = signed(scale * one.difference)
     if one.low is not None and one.high is not None:
-        said += f" ({signed(scale * one.low, 2)} … {signed(scale * one.high, 2)})"
+        said += f"<br>({signed(scale * one.low, 2)} … {signed(scale * one.high, 2)})"
     return f"{text}<br><small>{f'<b>{said}</b>' if one.is_shown(study.confidence) else said}</small>"
 
 

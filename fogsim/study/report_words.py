@@ -94,7 +94,7 @@ def _doubts(study: Study, differences: Sequence[Difference]) -> list[str]:
         return ['<p class="note">Nothing was compared.</p>']
     level = 1.0 - study.confidence
     shown = sum(one.is_shown(study.confidence) for one in tested)
-    kept = sum((one.adjusted_p_value or 1.0) <= level for one in tested)
+    kept = sum(one.is_shown(study.confidence) and (one.adjusted_p_value or 1.0) <= level for one in tested)
     said = [
         f"A difference counts as shown where its {study.confidence:.0%} interval excludes 0 and the paired permutation "
         f"test has p ≤ {level:.2g}: {shown} of {len(tested)} comparisons that vary. If no policy did anything, about "

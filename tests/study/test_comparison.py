@@ -81,6 +81,12 @@ def test_few_seeds_show_nothing_and_one_pair_has_no_test() -> None:
     (one, _) = compare_to_baseline(STUDY, table(-2.0, seeds=1), ["speed_mps"])
     assert (one.pairs, one.low, one.p_value, one.seeds_for_half_width) == (1, None, None, None)
     assert not one.is_shown(0.95)
+    # The same difference in every run has no interval; the test tells six seeds of it from none, and five not.
+    rows = [{**row, "steps": 10 if row["policy"] == "slow" else 7} for row in table(0.0, seeds=6)]
+    (same, _) = compare_to_baseline(STUDY, rows, ["steps"])
+    assert (same.difference, same.low, same.is_shown(0.95)) == (3.0, None, True)
+    (same, _) = compare_to_baseline(STUDY, [row for row in rows if row["seed"] != 5], ["steps"])
+    assert not same.is_shown(0.95)
 
 
 def test_p_values_are_adjusted_to_the_number_of_comparisons() -> None:

@@ -107,3 +107,14 @@ def test_a_result_that_is_broken_is_run_again(tmp_path: Path) -> None:
         assert len(directory.missing()) == 4
     file.write_text(json.dumps({"status": "complete", "metrics": {}}), encoding="utf-8")
     assert len(directory.missing()) == 3
+
+
+def test_what_is_believed_without_a_camera_is_no_metric(tmp_path: Path) -> None:
+    study = load_study(study_file(tmp_path, STUDY.replace("duration_s=1", "duration_s=1, lighting=low_beam")))
+    assert not study.runs[0].scenario.estimators
+    directory = StudyDirectory(tmp_path / "out", study)
+    metrics = {"belief_median_error_percent": 691.0, "mean_speed_mps": 20.0}
+    result = {"status": "complete", "metrics": metrics}
+    (tmp_path / "out" / "runs" / f"{study.runs[0].key}.json").write_text(json.dumps(result), encoding="utf-8")
+    row = directory.rows()[0]
+    assert (row["belief_median_error_percent"], row["mean_speed_mps"]) == (None, 20.0)

@@ -199,8 +199,11 @@ class Bands:
 
 
 def processors() -> int:
-    """Number of processors that this process may use: one where it is a worker, beside others that draw too."""
-    if multiprocessing.parent_process() is not None:
+    """Number of processors that this process may use: one where it is a worker, beside others that draw too.
+
+    Ray tells its workers by ``OMP_NUM_THREADS``, as does whoever else shares a machine out.
+    """
+    if multiprocessing.parent_process() is not None or os.environ.get("OMP_NUM_THREADS") == "1":
         return 1
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))

@@ -1,6 +1,6 @@
 """``fogsim study``: policies compared over seeds."""
 
-import os
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -8,6 +8,14 @@ import typer
 
 from fogsim.cli.printing import INTERRUPTED, escape, stderr, stdout
 from fogsim.cli.progress import STARTING, progress_bar
+from fogsim.errors import InputError
+
+
+class EngineName(StrEnum):
+    """What `--engine` names."""
+
+    POOL = "pool"
+    RAY = "ray"
 
 
 def study_command(
@@ -18,13 +26,24 @@ def study_command(
     processes: Annotated[
         int | None, typer.Option("-j", "--processes", min=1, help="Runs at once. [one a core]")
     ] = None,
+    engine: Annotated[
+        EngineName, typer.Option(help="What runs the runs: processes of this machine, or a Ray cluster.")
+    ] = EngineName.POOL,
+    address: Annotated[
+        str | None,
+        typer.Option(help="With --engine ray: HOST:PORT of the head, auto or local. [$RAY_ADDRESS, or local]"),
+    ] = None,
     check: Annotated[
         bool, typer.Option("--check", help="Check the file and say how many runs it has; run none.")
     ] = False,
 ) -> None:
     """Run a grid of policies, fogs, drivers and seeds, and write a table, differences with intervals, and a report."""
-    from fogsim.study import load_study, run_study
+    from fogsim.study import RayCluster, load_study, run_study
 
+    if address is not None and engine is EngineName.POOL:
+        raise InputError("--address is a Ray cluster's: give --engine ray with it")
+    on_ray = engine is EngineName.RAY
+    runner = {"engine": RayCluster(address, processes)} if on_ray else {"processes": processes}
     loaded = load_study(study)
     shape = " × ".join(f"{len(levels)} {name}" for name, levels in loaded.factors.items())
     cells = len({tuple(run.levels.values()) for run in loaded.runs})
@@ -42,7 +61,7 @@ def study_command(
                 said = f", {len(failed)} failed" if failed else ""
                 progress.update(task, completed=done, description=f"{done} of {len(loaded.runs)} runs{said}")
 
-            rows = run_study(loaded, directory, processes=processes or os.cpu_count(), watch=show)
+            rows = run_study(loaded, directory, **runner, watch=show)
     except KeyboardInterrupt:
         stdout.print("Interrupted; finished runs are kept, and the same command goes on.")
         raise typer.Exit(INTERRUPTED) from None

@@ -4,16 +4,29 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+from fogsim.errors import InputError
 from fogsim.files.writer_lock import WriterLock
 from fogsim.study.comparison import Difference
 from fogsim.study.directory import StudyDirectory
+from fogsim.study.engine import Engine
 from fogsim.study.plan import Study, StudyRun, load_study
-from fogsim.study.pool import run_in_pool
+from fogsim.study.pool import ProcessPool
 from fogsim.study.pooled_profiles import pool_profiles
+from fogsim.study.ray_cluster import RayCluster
 from fogsim.study.report import write_report
 from fogsim.study.table import Row, write_table
 
-__all__ = ["Difference", "Row", "Study", "StudyRun", "Watch", "load_study", "run_study"]
+__all__ = [
+    "Difference",
+    "Engine",
+    "RayCluster",
+    "Row",
+    "Study",
+    "StudyRun",
+    "Watch",
+    "load_study",
+    "run_study",
+]
 
 
 Watch = Callable[[int, str | None], None]
@@ -24,7 +37,14 @@ def _unwatched(_: int, __: str | None) -> None:
     """Show nothing."""
 
 
-def run_study(study: Study, out: Path, *, processes: int | None = None, watch: Watch = _unwatched) -> list[Row]:
+def run_study(
+    study: Study,
+    out: Path,
+    *,
+    processes: int | None = None,
+    engine: Engine | None = None,
+    watch: Watch = _unwatched,
+) -> list[Row]:
     """Run what a directory has no result of yet, and write its table, comparison and report.
 
     Parameters
@@ -35,7 +55,9 @@ def run_study(study: Study, out: Path, *, processes: int | None = None, watch: W
         Directory: ``study.parquet`` and ``study.csv`` (a row for each run: factors, seed, metrics), ``comparison.csv``,
         ``report.html``, ``figures/`` (SVG and CSV); ``runs/`` holds a file for each run, by which a study is continued.
     processes : int or None
-        Runs at once; None for one a core.
+        Runs at once in processes of this machine; None for one a core.
+    engine : Engine or None
+        What runs in their place: `RayCluster`.
     watch : callable
         Called at the beginning and after each run, with the number of runs that are done, and with what went wrong with
         the last one or None.
@@ -48,10 +70,18 @@ def run_study(study: Study, out: Path, *, processes: int | None = None, watch: W
     Raises
     ------
     InputError
-        If the directory holds something else, another study, or is written by another process.
+        If the directory holds something else, another study, or is written by another process; if both processes and
+        an engine are given; or if a Ray cluster does not answer or cannot run the study.
+    MissingDependencyError
+        If Ray is asked for and not installed.
+    OSError
+        If something cannot be written, as on a full disk: runs that were done are kept, and the same call goes on.
     KeyboardInterrupt
         On Ctrl-C: all runs that were done are kept, and the same call goes on.
     """
+    if engine is not None and processes is not None:
+        raise InputError("processes are this machine's: give either processes or an engine")
+    engine = engine or ProcessPool(processes or os.cpu_count() or 1)
     directory = StudyDirectory(out, study)
     with WriterLock(out):
         missing = directory.missing()
@@ -63,7 +93,7 @@ def run_study(study: Study, out: Path, *, processes: int | None = None, watch: W
             done += 1
             watch(done, message)
 
-        run_in_pool(missing, directory.results, processes or os.cpu_count() or 1, count)
+        engine.run(missing, directory.results, count)
         rows = directory.rows()
         write_table(rows, out)
         write_report(study, rows, pool_profiles(directory.profiles()), out)

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from fogsim.errors import InputError, shown
-from fogsim.files.atomic import write_json
+from fogsim.files.atomic import partial_path, write_json
 from fogsim.recorders.manifest import versions
+from fogsim.study.engine import result_file
 from fogsim.study.execution import Value
 from fogsim.study.plan import Study, StudyRun
-from fogsim.study.pool import result_file
 from fogsim.study.profiles import Profiles
 from fogsim.study.table import Row
 
@@ -47,11 +47,14 @@ class StudyDirectory:
         manifest = path / "study.json"
         if manifest.exists():
             self._check_same(manifest, described)
-        elif path.exists() and any(path.iterdir()):
-            raise InputError(f"--out {path} holds something else than a study; choose another directory")
-        self.results.mkdir(parents=True, exist_ok=True)
-        if not manifest.exists():
+        else:
+            # A process that was killed there, or a full disk, may have left as much.
+            begun = {partial_path(manifest)}
+            if path.exists() and set(path.iterdir()) - begun:
+                raise InputError(f"--out {path} holds something else than a study; choose another directory")
+            path.mkdir(parents=True, exist_ok=True)
             write_json(manifest, {**described, "versions": versions()})
+        self.results.mkdir(exist_ok=True)
 
     def _check_same(self, manifest: Path, described: dict[str, Any]) -> None:
         try:

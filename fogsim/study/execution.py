@@ -75,8 +75,44 @@ def _flat(values: Mapping[str, object], prefix: str = "") -> list[tuple[str, Val
     return rows
 
 
+def run_outcome(scenario: Scenario, seed: int, sumo_outputs: Path) -> dict[str, Any]:
+    """Run, and give what the file of a run holds; what goes wrong with the run is told there too.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What is run.
+    seed : int
+        Its seed.
+    sumo_outputs : Path
+        Folder of what SUMO writes, as of `run`.
+
+    Returns
+    -------
+    dict
+        ``status``, and what `measure_run` gives or a ``message``.
+    """
+    try:
+        return {"status": "complete", **measure_run(scenario, seed, sumo_outputs)}
+    except FogSimError as error:
+        return failure(str(error))
+    except Exception as error:  # noqa: BLE001 - a broken run, of a user's own method perhaps, must not stop the others
+        return failure(f"{type(error).__name__}: {error}")
+
+
+def failure(message: str) -> dict[str, Any]:
+    """Outcome of a run that failed.
+
+    Parameters
+    ----------
+    message : str
+        What went wrong.
+    """
+    return {"status": "failed", "message": message}
+
+
 def run_to_file(scenario: Scenario, seed: int, result: Path) -> str | None:
-    """Run, and write the metrics into a file; what goes wrong with the run is written there too.
+    """Run, and write the outcome into a file.
 
     Parameters
     ----------
@@ -97,11 +133,6 @@ def run_to_file(scenario: Scenario, seed: int, result: Path) -> str | None:
     OSError
         If the file cannot be written, as on a full disk.
     """
-    try:
-        found = {"status": "complete", **measure_run(scenario, seed, result.with_suffix(""))}
-    except FogSimError as error:
-        found = {"status": "failed", "message": str(error)}
-    except Exception as error:  # noqa: BLE001 - a broken run, of a user's own method perhaps, must not stop the others
-        found = {"status": "failed", "message": f"{type(error).__name__}: {error}"}
-    write_json(result, found)
-    return str(found["message"]) if "message" in found else None
+    outcome = run_outcome(scenario, seed, result.with_suffix(""))
+    write_json(result, outcome)
+    return outcome.get("message")

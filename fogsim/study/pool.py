@@ -5,64 +5,63 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
 from pathlib import Path
 
 from fogsim.files.atomic import write_json
 from fogsim.scenario import Scenario
-from fogsim.study.execution import run_to_file
+from fogsim.study.engine import PROCESS_DIED, RunWatch, result_file
+from fogsim.study.execution import failure, run_to_file
 from fogsim.study.plan import StudyRun
-
-RunWatch = Callable[[StudyRun, str | None], None]
-"""Called with each run that is done, and what went wrong with it."""
 
 Work = Callable[[Scenario, int, Path], str | None]
 """Runs a scenario with a seed, writes the result into a file, and tells what went wrong, if anything did."""
 
 
-def run_in_pool(
-    runs: Iterable[StudyRun], folder: Path, processes: int, watch: RunWatch, work: Work = run_to_file
-) -> None:
-    """Run what is given, each run's result in a file of its key.
+@dataclass(frozen=True, slots=True)
+class ProcessPool:
+    """Parallel processes of this machine.
 
     A process that dies takes its run with it and no other: those that were under way are run again, each alone, and
     the one that dies again is noted as failed.
 
-    Parameters
+    Attributes
     ----------
-    runs : iterable of StudyRun
-        What is to be run.
-    folder : Path
-        Where the results go, ``KEY.json`` each.
     processes : int
         How many run at once.
-    watch : RunWatch
-        Who is told of each run that is done, in this process.
     work : Work
-        What is done with each, in another process; a function of a module.
+        What is done with each run, in another process; a function of a module.
     """
-    waiting = list(reversed(list(runs)))
-    while waiting:
-        for suspect in _run_until_broken(waiting, folder, processes, watch, work):
-            if _run_until_broken([suspect], folder, 1, watch, work):
-                message = "the process that ran it died"
-                write_json(result_file(folder, suspect), {"status": "failed", "message": message})
-                watch(suspect, message)
 
+    processes: int
+    work: Work = run_to_file
 
-def result_file(folder: Path, run: StudyRun) -> Path:
-    """Where the result of a run is.
+    def run(self, runs: Sequence[StudyRun], folder: Path, watch: RunWatch) -> None:
+        """Run what is given, each run's outcome in its `result_file`.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder of the results.
-    run : StudyRun
-        The run.
-    """
-    return folder / f"{run.key}.json"
+        Parameters
+        ----------
+        runs : sequence of StudyRun
+            What is to be run.
+        folder : Path
+            Where the results go, ``KEY.json`` each.
+        watch : RunWatch
+            Who is told of each run that is done, in this process.
+
+        Raises
+        ------
+        OSError
+            If a result cannot be written, as on a full disk.
+        """
+        waiting = list(reversed(runs))
+        while waiting:
+            for suspect in _run_until_broken(waiting, folder, self.processes, watch, self.work):
+                if _run_until_broken([suspect], folder, 1, watch, self.work):
+                    write_json(result_file(folder, suspect), failure(PROCESS_DIED))
+                    watch(suspect, PROCESS_DIED)
 
 
 def _run_until_broken(

@@ -8,7 +8,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from fogsim.files.atomic import partial_path, publish, write_text
+from fogsim.files.atomic import write_bytes, write_text
 from fogsim.study.execution import Value
 
 Row = Mapping[str, Value]
@@ -38,9 +38,9 @@ def write_table(rows: Sequence[Row], folder: Path) -> None:
     """
     names = columns(rows)
     table = pa.table({name: _column([row.get(name) for row in rows]) for name in names})
-    path = folder / "study.parquet"
-    pq.write_table(table, partial_path(path))
-    publish(path)
+    content = io.BytesIO()
+    pq.write_table(table, content)
+    write_bytes(folder / "study.parquet", content.getvalue())
     write_csv(folder / "study.csv", names, [[row.get(name) for name in names] for row in rows])
 
 

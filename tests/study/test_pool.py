@@ -6,7 +6,8 @@ import pytest
 
 from fogsim.scenario import load_scenario
 from fogsim.study import StudyRun
-from fogsim.study.pool import result_file, run_in_pool
+from fogsim.study.engine import result_file
+from fogsim.study.pool import ProcessPool
 
 SCENARIO = load_scenario("motorway_fog_bank")
 WORK = """
@@ -32,7 +33,7 @@ def test_a_process_that_dies_costs_no_other_run(
     work = __import__(name).work
     runs = [StudyRun(seed, {"policy": "none"}, seed, SCENARIO, f"k{seed}") for seed in range(6)]
     told: dict[int, str | None] = {}
-    run_in_pool(runs, tmp_path, processes, lambda run, message: told.update({run.seed: message}), work)
+    ProcessPool(processes, work).run(runs, tmp_path, lambda run, message: told.update({run.seed: message}))
     assert told == {0: None, 1: None, 2: "odd", 3: "the process that ran it died", 4: None, 5: None}
     for run in runs:
         status = json.loads(result_file(tmp_path, run).read_text(encoding="utf-8"))["status"]
@@ -54,6 +55,6 @@ def test_ctrl_c_ends_all_processes_and_keeps_what_is_done(tmp_path: Path, monkey
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run_in_pool(runs, tmp_path, 2, interrupt, __import__("slow_work").work)
+        ProcessPool(2, __import__("slow_work").work).run(runs, tmp_path, interrupt)
     assert result_file(tmp_path, runs[0]).exists()
     assert not result_file(tmp_path, runs[1]).exists()

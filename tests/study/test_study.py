@@ -1,5 +1,7 @@
+import errno
 import json
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -7,8 +9,10 @@ import pytest
 from early_motorway import EARLY
 
 from fogsim.errors import InputError
-from fogsim.study import load_study, run_study
+from fogsim.files.atomic import write_json
+from fogsim.study import StudyRun, load_study, run_study
 from fogsim.study.directory import StudyDirectory
+from fogsim.study.engine import RunWatch, result_file
 
 STUDY = f"""
 scenario: motorway_fog_bank
@@ -96,6 +100,49 @@ def test_directories_of_something_else_are_left_alone(tmp_path: Path) -> None:
         StudyDirectory(tmp_path, study)
     with pytest.raises(InputError, match="is a file"):
         StudyDirectory(study_file(tmp_path), study)
+
+
+def full_disk(monkeypatch: pytest.MonkeyPatch, ending: str) -> None:
+    """No room for files of this ending."""
+    write = Path.write_bytes
+
+    def refuse(path: Path, data: bytes) -> int:
+        if path.name.endswith(f"{ending}.part"):
+            path.touch()
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return write(path, data)
+
+    monkeypatch.setattr(Path, "write_bytes", refuse)
+
+
+@pytest.mark.parametrize("ending", ["study.json", "0.json", "parquet", "study.csv", "comparison.csv", "svg", "html"])
+def test_a_full_disk_costs_no_run_and_the_same_command_goes_on(tmp_path: Path, ending: str) -> None:
+    study, out = load_study(study_file(tmp_path)), tmp_path / "out"
+    engine = PlayedRuns()
+    with pytest.MonkeyPatch.context() as patch:
+        full_disk(patch, study.runs[2].key + ".json" if ending == "0.json" else ending)
+        with pytest.raises(OSError, match=r"No space left on device: '.*\.part'"):
+            run_study(study, out, engine=engine)
+    assert not list(out.rglob("*.part"))
+    run_study(study, out, engine=engine)
+    # What was done before is not run again.
+    assert len(engine.run_numbers) == len(set(engine.run_numbers)) + (ending == "0.json")
+    assert pq.read_table(out / "study.parquet").column("status").to_pylist() == ["complete"] * 4
+
+
+class PlayedRuns:
+    """An engine that computes nothing."""
+
+    def __init__(self) -> None:
+        self.run_numbers: list[int] = []
+
+    def run(self, runs: Sequence[StudyRun], folder: Path, watch: RunWatch) -> None:
+        """Write a number for each run."""
+        for run in runs:
+            self.run_numbers.append(run.number)
+            metrics = {"mean_speed_mps": float(run.number), "collisions": run.number % 2}
+            write_json(result_file(folder, run), {"status": "complete", "metrics": metrics})
+            watch(run, None)
 
 
 def test_a_result_that_is_broken_is_run_again(tmp_path: Path) -> None:

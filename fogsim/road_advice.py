@@ -118,5 +118,12 @@ def stretch_advices(
     display : Display
         How drivers hear it.
     """
-    told = zip(sections, speeds, strict=True)
-    return tuple(StretchAdvice(speed, section, display) for section, speed in told if speed < math.inf)
+    told: list[StretchAdvice] = []
+    for section, speed in zip(sections, speeds, strict=True):
+        last = told[-1] if told else None
+        if last and display != Display.MESSAGE_SIGN and (last.speed, last.stretch.end) == (speed, section.start):
+            # What is heard anywhere needs no end where the next section is told the same.
+            told[-1] = StretchAdvice(speed, Stretch(last.stretch.start, section.end), display)
+        elif speed < math.inf:
+            told.append(StretchAdvice(speed, section, display))
+    return tuple(told)

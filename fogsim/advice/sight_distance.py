@@ -1,10 +1,9 @@
 """Stopping within the distance that can be seen."""
 
-import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
-from fogsim.advice.raising import hold_rises
+from fogsim.advice.presentation import PresentedAdviser
 from fogsim.kinematics import DECELERATION, REACTION_TIME, safe_speed
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import GRAVITY, KMH_PER_MPS
@@ -13,10 +12,8 @@ from fogsim.values import Belief, SpeedAdvice
 
 @checked_parameters
 @dataclass(frozen=True, slots=True)
-class StoppingSightDistance:
+class StoppingSightDistance(PresentedAdviser):
     """Advise the speed from which a driver can stop within what is visible.
-
-    A lower speed is advised at once; a higher one only after it has been justified for `hold` seconds without a break.
 
     Attributes
     ----------
@@ -29,20 +26,11 @@ class StoppingSightDistance:
         speed (AASHTO 1990), down to 0.1 on ice.
     grade : float
         Slope of the road [-], positive uphill.
-    quantile : float
-        Which quantile of the believed visibility counts as sight distance, 0 … 1; 0.5 is the median, less is careful.
     sight_share : float
         Share of the visibility that may be needed to stop [-]; 1 for an obstacle ahead, 0.5 for narrow roads
         where others come the other way (German StVO § 3).
-    rounding : float
-        The advice is rounded down to a multiple of this [m/s].
-    minimum : float
-        Lowest speed that is ever advised [m/s].
-    hold : float
-        Time before the advice rises [s].
-    widest_belief : float
-        Standard deviation of ln k above which a belief says too little to change the advice [-]: at the start, or
-        while nothing but the rear of a truck is to be seen.
+    quantile, widest_belief, smoothing, hysteresis, rounding, rounded, minimum, hold
+        See `PresentedAdviser`.
 
     Raises
     ------
@@ -54,33 +42,24 @@ class StoppingSightDistance:
     deceleration: Annotated[float, Range(0.1, 15.0, "m/s²")] = DECELERATION
     friction: Annotated[float, Range(0.05, 1.5)] = 1.0
     grade: Annotated[float, Range(-0.2, 0.2)] = 0.0
-    quantile: Annotated[float, Range(0.0, 1.0)] = 0.25
+    quantile: Annotated[float, Range(0.0, 1.0)] = field(default=0.25, kw_only=True)
     sight_share: Annotated[float, Range(0.01, 1.0)] = 1.0
-    rounding: Annotated[float, Range(0.01, 50.0, "m/s")] = 10.0 / KMH_PER_MPS
-    minimum: Annotated[float, Range(0.0, 100.0, "m/s")] = 20.0 / KMH_PER_MPS
-    hold: Annotated[float, Range(0.0, 3600.0, "s")] = 3.0
-    widest_belief: Annotated[float, Range(0.01, 10.0)] = 0.7
+    rounding: Annotated[float, Range(0.01, 50.0, "m/s")] = field(default=10.0 / KMH_PER_MPS, kw_only=True)
+    minimum: Annotated[float, Range(0.0, 100.0, "m/s")] = field(default=20.0 / KMH_PER_MPS, kw_only=True)
+    hold: Annotated[float, Range(0.0, 3600.0, "s")] = field(default=3.0, kw_only=True)
 
-    def advise(self, belief: Belief, speed_limit: float, time: float, previous: SpeedAdvice) -> SpeedAdvice:
-        """Advise a speed; see `Adviser.advise`. No advice (``inf``) where the limit itself is safe.
+    def speed_at(self, visibility: float) -> float:
+        """Speed from which one stops in sight; see `PresentedAdviser.speed_at`.
 
         Parameters
         ----------
-        belief, speed_limit, time, previous
-            As of `Adviser.advise`.
+        visibility : float
+            Meteorological visibility [m].
         """
-        if belief.log_standard_deviation > self.widest_belief:
-            return SpeedAdvice(previous.speed)
-        sight = self.sight_share * belief.visibility_quantile(self.quantile)
         braking = min(self.deceleration, self.friction * GRAVITY)
-        stoppable = braking + GRAVITY * self.grade > 0.0
-        safe = safe_speed(sight, self.reaction_time, braking, self.grade) if stoppable else 0.0
-        target = math.inf if safe >= speed_limit else self._rounded(safe)
-        return hold_rises(target, time, previous, self.hold)
-
-    def _rounded(self, speed: float) -> float:
-        # A hair of tolerance keeps exact multiples from being rounded down a whole step.
-        return max(self.minimum, math.floor(speed / self.rounding + 1e-9) * self.rounding)
+        if braking + GRAVITY * self.grade <= 0.0:
+            return 0.0
+        return safe_speed(self.sight_share * visibility, self.reaction_time, braking, self.grade)
 
 
 @dataclass(frozen=True, slots=True)

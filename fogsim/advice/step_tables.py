@@ -3,16 +3,15 @@
 import math
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Annotated
 
-from fogsim.advice.raising import hold_rises
-from fogsim.advice.sight_distance import StoppingSightDistance
+from fogsim.advice.presentation import PresentedAdviser
 from fogsim.errors import InputError
+from fogsim.kinematics import DECELERATION, REACTION_TIME, safe_speed
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import KMH_PER_MPS, METRES_PER_MILE
-from fogsim.values import Belief, SpeedAdvice
 
 _MPH = METRES_PER_MILE / 3600.0
 _KMH = 1.0 / KMH_PER_MPS
@@ -25,10 +24,8 @@ Speeds = Sequence[Annotated[float, Range(0.1, 140.0, "m/s")]]
 
 @checked_parameters
 @dataclass(frozen=True, slots=True)
-class StepTable:
+class StepTable(PresentedAdviser):
     """Advise the speed of the step in which the visibility lies; none at the last step's end and above.
-
-    A lower speed is advised at once; a higher one only after it has been justified for `hold` seconds without a break.
 
     Attributes
     ----------
@@ -36,12 +33,8 @@ class StepTable:
         Ends of the steps, ascending [m]: a speed holds below its end; by default those of the A16.
     speeds : sequence of float
         Advised speed of each step, ascending too [m/s].
-    quantile : float
-        Which quantile of the believed visibility is looked up, 0 … 1; 0.5 is the median, less is careful.
-    hold : float
-        Time before the advice rises [s].
-    widest_belief : float
-        Standard deviation of ln k above which a belief says too little to change the advice [-].
+    quantile, widest_belief, smoothing, hysteresis, rounding, rounded, minimum, hold
+        See `PresentedAdviser`.
 
     Raises
     ------
@@ -51,9 +44,6 @@ class StepTable:
 
     visibilities: Visibilities = (70.0, 140.0)
     speeds: Speeds = (60.0 * _KMH, 80.0 * _KMH)
-    quantile: Annotated[float, Range(0.0, 1.0)] = 0.5
-    hold: Annotated[float, Range(0.0, 3600.0, "s")] = 60.0
-    widest_belief: Annotated[float, Range(0.01, 10.0)] = 0.7
 
     def __post_init__(self) -> None:
         for name, values in (("visibilities", self.visibilities), ("speeds", self.speeds)):
@@ -65,19 +55,15 @@ class StepTable:
                 f"visibilities and {len(self.speeds)} speeds"
             )
 
-    def advise(self, belief: Belief, speed_limit: float, time: float, previous: SpeedAdvice) -> SpeedAdvice:
-        """Advise a speed; see `Adviser.advise`. No advice (``inf``) where the limit is no higher.
+    def speed_at(self, visibility: float) -> float:
+        """Speed of a visibility's step; see `PresentedAdviser.speed_at`.
 
         Parameters
         ----------
-        belief, speed_limit, time, previous
-            As of `Adviser.advise`.
+        visibility : float
+            Meteorological visibility [m].
         """
-        if belief.log_standard_deviation > self.widest_belief:
-            return SpeedAdvice(previous.speed)
-        step = bisect_right(self.visibilities, belief.visibility_quantile(self.quantile))
-        speed = (*self.speeds, math.inf)[step]
-        return hold_rises(speed if speed < speed_limit else math.inf, time, previous, self.hold)
+        return (*self.speeds, math.inf)[bisect_right(self.visibilities, visibility)]
 
 
 @checked_parameters
@@ -132,17 +118,13 @@ class FiftyBelowFifty(StepTable):
 
 @checked_parameters
 @dataclass(frozen=True, slots=True)
-class VirginiaI77:
+class VirginiaI77(PresentedAdviser):
     """Advise as I-77 at Fancy Gap: below 198 m the speed from which one stops in sight, 30 … 65 mph (VTRC 19-R6, 2018).
 
     Attributes
     ----------
-    quantile : float
-        Which quantile of the believed visibility counts as sight distance, 0 … 1; 0.5 is the median, less is careful.
-    hold : float
-        Time before the advice rises [s].
-    widest_belief : float
-        Standard deviation of ln k above which a belief says too little to change the advice [-].
+    quantile, widest_belief, smoothing, hysteresis, rounding, rounded, minimum, hold
+        See `PresentedAdviser`.
 
     Raises
     ------
@@ -150,25 +132,18 @@ class VirginiaI77:
         If a parameter is out of the range in its annotation.
     """
 
-    quantile: Annotated[float, Range(0.0, 1.0)] = 0.5
-    hold: Annotated[float, Range(0.0, 3600.0, "s")] = 60.0
-    widest_belief: Annotated[float, Range(0.01, 10.0)] = 0.7
+    rounding: Annotated[float, Range(0.0, 50.0, "m/s")] = field(default=5.0 * _MPH, kw_only=True)
+    minimum: Annotated[float, Range(0.0, 100.0, "m/s")] = field(default=30.0 * _MPH, kw_only=True)
 
-    def advise(self, belief: Belief, speed_limit: float, time: float, previous: SpeedAdvice) -> SpeedAdvice:
-        """Advise a speed; see `Adviser.advise`.
+    def speed_at(self, visibility: float) -> float:
+        """Speed from which one stops in sight; see `PresentedAdviser.speed_at`.
 
         Parameters
         ----------
-        belief, speed_limit, time, previous
-            As of `Adviser.advise`.
+        visibility : float
+            Meteorological visibility [m].
         """
-        in_sight = StoppingSightDistance(
-            quantile=self.quantile,
-            rounding=5.0 * _MPH,
-            minimum=30.0 * _MPH,
-            hold=self.hold,
-            widest_belief=self.widest_belief,
-        )
-        if belief.visibility_quantile(self.quantile) < _I77_VISIBILITY:
-            return in_sight.advise(belief, min(speed_limit, 70.0 * _MPH), time, previous)
-        return hold_rises(math.inf, time, previous, self.hold)
+        if visibility >= _I77_VISIBILITY:
+            return math.inf
+        in_sight = safe_speed(visibility, REACTION_TIME, DECELERATION)
+        return math.inf if in_sight >= 70.0 * _MPH else in_sight

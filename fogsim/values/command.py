@@ -17,10 +17,13 @@ class SpeedAdvice:
         Advised speed [m/s]; ``inf`` for no advice.
     raise_since : float or None
         Instant [s] since which a higher speed has been justified without a break, None if it is not.
+    smoothed : tuple of float or None
+        Instant [s] and logarithm of the visibility as smoothed till then [ln m]; None where nothing is smoothed.
     """
 
     speed: float = float("inf")
     raise_since: float | None = None
+    smoothed: tuple[float, float] | None = None
 
 
 class Display(StrEnum):

@@ -1,8 +1,11 @@
 import errno
 import json
+import math
+import re
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
+from types import SimpleNamespace
 
 import pyarrow.parquet as pq
 import pytest
@@ -10,9 +13,12 @@ from early_motorway import EARLY
 
 from fogsim.errors import InputError
 from fogsim.files.atomic import write_json
+from fogsim.scenario import build
 from fogsim.study import StudyRun, load_study, run_study
 from fogsim.study.directory import StudyDirectory
 from fogsim.study.engine import RunWatch, result_file
+from fogsim.study.execution import run_to_file
+from fogsim.values import SpeedAdvice
 
 STUDY = f"""
 scenario: motorway_fog_bank
@@ -165,3 +171,15 @@ def test_what_is_believed_without_a_camera_is_no_metric(tmp_path: Path) -> None:
     (tmp_path / "out" / "runs" / f"{study.runs[0].key}.json").write_text(json.dumps(result), encoding="utf-8")
     row = directory.rows()[0]
     assert (row["belief_median_error_percent"], row["mean_speed_mps"]) == (None, 20.0)
+
+
+def test_a_policy_that_returns_no_speed_is_reported_with_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    signs = "duration_s=1, lighting=low_beam, drivers.advised=signs"
+    study = load_study(study_file(tmp_path, STUDY.replace("duration_s=1", signs)))
+    broken = SimpleNamespace(advise=lambda *_: SpeedAdvice(math.nan))
+    monkeypatch.setattr(build, "adviser", lambda _: broken)
+    told = run_to_file(study.runs[-1].scenario, 1, tmp_path / "run.json")
+    assert told == json.loads((tmp_path / "run.json").read_text(encoding="utf-8"))["message"]
+    assert re.fullmatch(r"adviser 'fixed_speed': advise\(\): speed must be .* got nan", str(told))

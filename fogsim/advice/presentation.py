@@ -1,0 +1,118 @@
+"""How advice that follows the visibility is presented: careful, smoothed, rounded, and without flicker."""
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+from typing import Annotated, Literal
+
+from fogsim.parameters import Range
+from fogsim.values import Belief, SpeedAdvice
+
+_EXACT = 1e-9
+"""A hair of tolerance keeps exact multiples from being rounded a whole step [-]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PresentedAdviser(ABC):
+    """An adviser that says a speed for a visibility, as all present it: a base class.
+
+    A lower speed is advised at once; a higher one only after it has been justified for `hold` seconds without a break.
+
+    Attributes
+    ----------
+    quantile : float
+        Which quantile of the believed visibility counts, 0 … 1; 0.5 is the median, less is careful.
+    widest_belief : float
+        Standard deviation of ln k above which a belief says too little to change the advice [-]: at the start, or
+        while nothing but the rear of a truck is to be seen.
+    smoothing : float
+        Time constant with which the logarithm of the visibility is smoothed exponentially [s]; 0 for none.
+    hysteresis : float
+        By which share the visibility must exceed what a higher speed asks for before the advice rises [-].
+    rounding : float
+        The advice is a multiple of this [m/s]; 0 for speeds as they come.
+    rounded : str
+        `down`, `nearest` or `up`.
+    minimum : float
+        Lowest speed that is ever advised [m/s].
+    hold : float
+        Time before the advice rises [s].
+    """
+
+    quantile: Annotated[float, Range(0.0, 1.0)] = 0.5
+    widest_belief: Annotated[float, Range(0.01, 10.0)] = 0.7
+    smoothing: Annotated[float, Range(0.0, 3600.0, "s")] = 0.0
+    hysteresis: Annotated[float, Range(0.0, 10.0)] = 0.0
+    rounding: Annotated[float, Range(0.0, 50.0, "m/s")] = 0.0
+    rounded: Literal["down", "nearest", "up"] = "down"
+    minimum: Annotated[float, Range(0.0, 100.0, "m/s")] = 0.0
+    hold: Annotated[float, Range(0.0, 3600.0, "s")] = 60.0
+
+    @abstractmethod
+    def speed_at(self, visibility: float) -> float:
+        """Speed that is right in a visibility [m/s]; ``inf`` for no advice.
+
+        Parameters
+        ----------
+        visibility : float
+            Meteorological visibility [m].
+        """
+
+    def advise(self, belief: Belief, speed_limit: float, time: float, previous: SpeedAdvice) -> SpeedAdvice:
+        """Advise a speed; see `Adviser.advise`. No advice (``inf``) where the limit is no higher.
+
+        Parameters
+        ----------
+        belief, speed_limit, time, previous
+            As of `Adviser.advise`.
+        """
+        if belief.log_standard_deviation > self.widest_belief:
+            return SpeedAdvice(previous.speed)
+        smoothed = self._smoothed(belief.visibility_quantile(self.quantile), time, previous)
+        visibility = math.exp(smoothed)
+        target = self._presented(visibility, speed_limit)
+        if target > previous.speed and self.hysteresis > 0.0:
+            target = max(previous.speed, self._presented(visibility / (1.0 + self.hysteresis), speed_limit))
+        advice = hold_rises(target, time, previous, self.hold)
+        return replace(advice, smoothed=(time, smoothed)) if self.smoothing > 0.0 else advice
+
+    def _smoothed(self, visibility: float, time: float, previous: SpeedAdvice) -> float:
+        """Logarithm of the smoothed visibility [ln m]."""
+        now = math.log(visibility)
+        if self.smoothing == 0.0 or previous.smoothed is None:
+            return now
+        since, before = previous.smoothed
+        return before + (now - before) * -math.expm1(-max(time - since, 0.0) / self.smoothing)
+
+    def _presented(self, visibility: float, limit: float) -> float:
+        speed = self.speed_at(visibility)
+        if speed >= limit:
+            return math.inf
+        return max(self.minimum, self._on_grid(speed) if self.rounding > 0.0 else speed)
+
+    def _on_grid(self, speed: float) -> float:
+        multiple = speed / self.rounding
+        if self.rounded == "nearest":
+            return round(multiple) * self.rounding
+        whole = math.floor(multiple + _EXACT) if self.rounded == "down" else math.ceil(multiple - _EXACT)
+        return whole * self.rounding
+
+
+def hold_rises(target: float, time: float, previous: SpeedAdvice, hold: float) -> SpeedAdvice:
+    """Advice that goes to a target speed, upwards only after a hold time.
+
+    Parameters
+    ----------
+    target : float
+        Speed that is justified now [m/s]; ``inf`` for no advice.
+    time : float
+        Instant [s].
+    previous : SpeedAdvice
+        The advice in force.
+    hold : float
+        Time for which a higher speed must have been justified without a break [s].
+    """
+    if target <= previous.speed:
+        return SpeedAdvice(target)
+    since = time if previous.raise_since is None else previous.raise_since
+    return SpeedAdvice(target) if time - since >= hold else SpeedAdvice(previous.speed, raise_since=since)

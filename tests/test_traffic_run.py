@@ -10,6 +10,7 @@ import fogsim
 from fogsim.errors import FogSimError, InputError
 from fogsim.metrics import TrafficRunMetrics
 from fogsim.scenario import Scenario, load_scenario
+from fogsim.scenario.build import check_frames
 from fogsim.scenario.loading import scenario_from_config
 from fogsim.study.execution import measure_run
 from fogsim.study.plan import load_study, needs_camera
@@ -137,6 +138,11 @@ def test_what_needs_an_ego_is_refused_in_one_line(overrides: tuple[str, ...], sa
     with pytest.raises(InputError, match=said) as refused:
         alone(EVEN, *overrides)
     assert "\n" not in str(refused.value)
+
+
+def test_frames_need_an_ego() -> None:
+    with pytest.raises(InputError, match=r"a dataset needs an ego vehicle, and traffic\.ego is none"):
+        check_frames(alone(EVEN), "a dataset")
 
 
 def test_runs_with_and_without_an_ego_name_one_another() -> None:

@@ -53,8 +53,10 @@ def run_command(
 ) -> None:
     """Run a scenario and write manifest.json, steps.parquet, metrics.json, video.mp4 and report.html."""
     from fogsim.recording import record_run
+    from fogsim.scenario.build import check_ego
 
     loaded = chosen_scenario(scenario, sumocfg, ego, visibility, settings)
+    check_ego(loaded, "fogsim run")
     recorders = ["table", *(["video"] if video else []), *(["report"] if report else [])]
     recorders += ["trajectories"] if trajectories else []
     directory = out or Path("runs", f"{loaded.name}-seed{seed}")

@@ -54,7 +54,9 @@ def chosen_scenario(
     fog = [] if visibility is None else [f"fog.visibility_m={visibility!r}"]
     if sumocfg is not None and name is None:
         if ego is None:
-            raise InputError(f"--sumocfg {sumocfg}: --ego is missing: which vehicle is the ego?")
+            raise InputError(
+                f"--sumocfg {sumocfg}: --ego is missing: which vehicle is the ego? Traffic alone is for fogsim study"
+            )
         if not fog and not any(setting.startswith("fog.") for setting in settings):
             raise InputError(f"--sumocfg {sumocfg}: --visibility is missing, or a fog by --set fog.…")
         return scenario_from_config(sumocfg, ego, [*fog, *settings])

@@ -67,7 +67,9 @@ def view_command(
 def _surrounding(scenario: "Scenario", at: float, seed: int) -> "Surrounding":
     """Run a scenario with its own policy to an instant [s]."""
     from fogsim.loop import AdvisedDriving, ClosedLoop
+    from fogsim.scenario.build import check_ego
 
+    check_ego(scenario, "fogsim view")
     # The viewer needs an OpenGL context of its own kind, so frames are drawn without.
     drawn = scenario.model_copy(update={"renderer": "cpu"})
     policy = AdvisedDriving(drawn)

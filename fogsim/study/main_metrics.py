@@ -116,5 +116,5 @@ def signed(value: float, digits: int = 3) -> str:
     digits : int
         Digits that count.
     """
-    text = f"{value:+.{digits}g}" if abs(value) < 10**digits else f"{value:+.0f}"
-    return text.replace("-", "−")
+    text = f"{value:+.{digits}g}"
+    return (f"{value:+.0f}" if "e+" in text else text).replace("-", "−")

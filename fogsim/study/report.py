@@ -25,7 +25,7 @@ _STYLE = """
 body { max-width: 76rem; }
 h3 { font-size: 1rem; margin: 1.2rem 0 .3rem; }
 .scrolls { overflow-x: auto; }
-.scrolls td:first-child { min-width: 11rem; }
+.scrolls td:first-child { min-width: 11rem; } .scrolls td, .scrolls th { padding-right: .5rem; }
 .scrolls small { color: #5d6975; } .scrolls small b { color: #1c2733; }
 figure { max-width: 52rem; }
 details { margin: .8rem 0; } summary { cursor: pointer; font-weight: 600; color: #44505c; }

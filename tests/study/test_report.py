@@ -12,7 +12,7 @@ import pytest
 from fogsim.metrics import DEFAULT_STANDARD, METRICS
 from fogsim.scenario import load_scenario
 from fogsim.study.figures import trade_off_figure
-from fogsim.study.main_metrics import DELAY_METRICS, MAIN_METRICS, SAFETY_METRICS
+from fogsim.study.main_metrics import DELAY_METRICS, MAIN_METRICS, SAFETY_METRICS, signed
 from fogsim.study.plan import Study, StudyRun
 from fogsim.study.pooled_profiles import PooledProfiles, pool_profiles
 from fogsim.study.profile_figures import collisions_figure, speed_figure
@@ -214,6 +214,13 @@ def test_profiles_of_runs_add_up() -> None:
     assert [hit.seed for hit in pooled.collisions] == [0, 0, 1, 1]
     assert np.isnan(PooledProfiles().survival()).all()
     assert PooledProfiles().speeds().shape == (0, 3)
+
+
+@pytest.mark.parametrize(
+    ("value", "said"), [(-0.0123456, "−0.012"), (99.9, "+100"), (1234.5, "+1234"), (-2e-7, "−2e−07"), (0.0, "+0")]
+)
+def test_differences_are_signed_and_short(value: float, said: str) -> None:
+    assert signed(value, 2) == said
 
 
 def test_metrics_that_the_report_shows_first_are_there() -> None:

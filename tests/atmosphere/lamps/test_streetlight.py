@@ -60,12 +60,12 @@ def test_fog_on_a_part_of_the_road_dims_the_lamps_in_it():
 
 
 def test_the_same_light_from_wherever_the_camera_looks_and_as_it_drives_on():
-    painter = StreetLight()
+    painter, still = StreetLight(), added()
     for x in (0.0, 10.0, 200.0, 260.0, 1000.0):
         lamps = dataclasses.replace(EVEN, position=LAMP + np.array((x, 0.0, 0.0)))
         pose = dataclasses.replace(POSE, position=(x, 0.0, 1.5))
         out = painter.on(road(), CAMERA, pose, fog(math.inf), lamps).radiance - road().radiance
-        assert out == pytest.approx(added(), rel=0.05, abs=1e-3)
+        assert (np.abs(out - still) <= np.maximum(0.05 * still, 1e-3)).all()
 
 
 def test_map_stays_as_the_camera_drives_and_moves_on_with_it():

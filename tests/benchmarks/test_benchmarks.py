@@ -69,7 +69,7 @@ def records(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
         ),
         (
             "renderers.py",
-            ("--renderers", "4", "--frames", "8"),
+            ("--renderers", "4", "--frames", "8", "--renderer", "cpu"),
             {"growth_kib_per_renderer", "growth_kib_per_1000_frames"},
         ),
         ("air.py", ("--repeat", "2"), {"fog", "lamps", "changing", "width", "height", "ms_median", "ms_min", "ms_max"}),

@@ -1,0 +1,83 @@
+"""Write the tables of docs/policies.md: ``python docs/make_study_tables.py [--check] STUDY_FOLDER …``.
+
+A folder is what ``fogsim study scenarios/studies/NAME.yaml`` has written, ``runs/NAME`` by default; its ``comparison.csv``
+and ``study.csv`` are read. Each cell of a table has a mean and, in brackets, the interval of its difference to the
+baseline; a star says that 0 is not in it.
+"""
+
+import argparse
+import csv
+import statistics
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from make_tables import END, HERE, filled
+
+PAGE = HERE / "policies.md"
+Cells = tuple[str, ...]
+
+SPEED = ("traffic_mean_speed_mps", "mean speed of all [km/h]", 3.6, 1)
+SPREAD = ("traffic_speed_standard_deviation_mps", "its sd [km/h]", 3.6, 1)
+
+COLUMNS: Mapping[str, Sequence[tuple[str, str, float, int]]] = {}
+"""Of each study: metrics, what the column is called, the factor to its unit, and digits after the point."""
+
+
+def read(path: Path) -> list[dict[str, str]]:
+    """Rows of a CSV file."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def table(folder: Path, columns: Sequence[tuple[str, str, float, int]]) -> list[Cells]:
+    """Heading and rows of a study's table: a row a cell of its grid."""
+    runs, compared = read(folder / "study.csv"), read(folder / "comparison.csv")
+    factors = list(runs[0])[1 : list(runs[0]).index("seed")]
+    cells = dict.fromkeys(tuple(run[name] for name in factors) for run in runs)
+    differences = {(*(row[name] for name in factors), row["metric"]): row for row in compared}
+    rows = []
+    for cell in cells:
+        inside = [run for run in runs if tuple(run[name] for name in factors) == cell and run["status"] == "complete"]
+        rows.append((*cell, *(_cell(inside, differences.get((*cell, c[0])), c) for c in columns)))
+    return [(*factors, *(name for _, name, _, _ in columns)), *rows]
+
+
+def _cell(
+    runs: Sequence[Mapping[str, str]], difference: Mapping[str, str] | None, column: tuple[str, str, float, int]
+) -> str:
+    metric, _, factor, digits = column
+    values = [factor * float(run[metric]) for run in runs if run.get(metric)]
+    if not values:
+        return "–"
+    told = f"{statistics.fmean(values):.{digits}f}"
+    if difference is None or not difference["low"]:
+        return told
+    low, high = (factor * float(difference[end]) for end in ("low", "high"))
+    star = "*" if low > 0 or high < 0 else ""
+    return f"{told} [{low:+.{digits}f}, {high:+.{digits}f}]{star}"
+
+
+def main() -> int:
+    """Write the tables, or say which are not up to date."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folders", nargs="+", type=Path, metavar="STUDY_FOLDER", help=", ".join(COLUMNS))
+    parser.add_argument("--check", action="store_true", help="write nothing, say which are not up to date")
+    arguments = parser.parse_args()
+    stale = False
+    for folder in arguments.folders:
+        if folder.name not in COLUMNS:
+            parser.error(f"no study of the docs is called {folder.name!r}; there are {', '.join(COLUMNS)}")
+        heading, *rows = table(folder, COLUMNS[folder.name])
+        text = PAGE.read_text(encoding="utf-8")
+        new = filled(text, folder.name, heading, rows)
+        if new != text and arguments.check:
+            stale = True
+            print(f"{PAGE.name}: {folder.name} is not up to date")  # noqa: T201 - the line is the result
+        elif new != text:
+            PAGE.write_text(new, encoding="utf-8")
+    return int(stale)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,7 +1,7 @@
 """Write the tables of docs/policies.md: ``python docs/make_study_tables.py [--check] STUDY_FOLDER …``.
 
-A folder is what ``fogsim study scenarios/studies/NAME.yaml`` has written, ``runs/NAME`` by default; its ``comparison.csv``
-and ``study.csv`` are read. Each cell of a table has a mean and, in brackets, the interval of its difference to the
+A folder is what ``fogsim study scenarios/studies/NAME.yaml`` has written, ``runs/NAME`` by default; its ``study.csv``
+and ``comparison.csv`` are read. Each cell of a table has a mean and, in brackets, the interval of its difference to the
 baseline; a star says that 0 is not in it.
 """
 
@@ -12,7 +12,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from make_tables import END, HERE, filled
+from make_tables import HERE, filled
 
 PAGE = HERE / "policies.md"
 Cells = tuple[str, ...]

@@ -17,10 +17,30 @@ from make_tables import HERE, filled
 PAGE = HERE / "policies.md"
 Cells = tuple[str, ...]
 
-SPEED = ("traffic_mean_speed_mps", "mean speed of all [km/h]", 3.6, 1)
-SPREAD = ("traffic_speed_standard_deviation_mps", "its sd [km/h]", 3.6, 1)
+Column = tuple[str, str, float, int]
 
-COLUMNS: Mapping[str, Sequence[tuple[str, str, float, int]]] = {}
+SPEED: Column = ("traffic_mean_speed_mps", "mean speed [km/h]", 3.6, 1)
+SPREAD: Column = ("traffic_speed_standard_deviation_mps", "its sd [km/h]", 3.6, 1)
+DELAY: Column = ("traffic_delay_s_per_vehicle_km", "delay [s/km]", 1.0, 1)
+OVERDRIVING: Column = ("traffic_overdriving_time_share", "overdriving [% of time in fog]", 100.0, 0)
+CONFLICTS: Column = ("traffic_conflicts_per_vehicle_h", "conflicts [1/h]", 1.0, 2)
+BRAKING: Column = ("traffic_hard_braking_time_share", "hard braking [% of time]", 100.0, 2)
+COLLISIONS: Column = ("collisions", "collisions a run", 1.0, 2)
+EGO: Column = ("negative_margin_time_share", "ego too fast for its sight [% of time]", 100.0, 0)
+
+COLUMNS: Mapping[str, Sequence[Column]] = {
+    "motorway_policies": (SPEED, DELAY, OVERDRIVING, CONFLICTS, BRAKING, COLLISIONS, EGO),
+    "motorway_compliance": (SPEED, DELAY, OVERDRIVING, CONFLICTS, BRAKING, COLLISIONS),
+    "estimators_in_the_loop": (
+        ("belief_median_error_percent", "error of the belief [%]", 1.0, 1),
+        ("mean_advised_speed_mps", "speed advised [km/h]", 3.6, 1),
+        ("advised_time_share", "advised [% of time]", 100.0, 0),
+        EGO,
+        OVERDRIVING,
+        COLLISIONS,
+    ),
+    "field_sizes": (SPEED, SPREAD, OVERDRIVING, CONFLICTS, ("traffic_collisions", "collisions a run", 1.0, 2)),
+}
 """Of each study: metrics, what the column is called, the factor to its unit, and digits after the point."""
 
 
@@ -30,7 +50,7 @@ def read(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def table(folder: Path, columns: Sequence[tuple[str, str, float, int]]) -> list[Cells]:
+def table(folder: Path, columns: Sequence[Column]) -> list[Cells]:
     """Heading and rows of a study's table: a row a cell of its grid."""
     runs, compared = read(folder / "study.csv"), read(folder / "comparison.csv")
     factors = list(runs[0])[1 : list(runs[0]).index("seed")]
@@ -44,7 +64,7 @@ def table(folder: Path, columns: Sequence[tuple[str, str, float, int]]) -> list[
 
 
 def _cell(
-    runs: Sequence[Mapping[str, str]], difference: Mapping[str, str] | None, column: tuple[str, str, float, int]
+    runs: Sequence[Mapping[str, str]], difference: Mapping[str, str] | None, column: Column
 ) -> str:
     metric, _, factor, digits = column
     values = [factor * float(run[metric]) for run in runs if run.get(metric)]

@@ -76,7 +76,8 @@ def passed(
     """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        traffic = libsumo_traffic(replace(_setup(folder, overrides, lanes, demand), events=events))
+        setup = replace(_setup(folder, overrides, lanes, demand), events=events)
+        traffic = libsumo_traffic(setup, folder / "outputs")
         extinction = extinction_from_visibility(visibility) if math.isfinite(visibility) else 0.0
         traffic.enter_fog(FieldAccess(FogField(extinction, (0.0, 0.0, 0.0))))
         command = command or Command()
@@ -87,7 +88,7 @@ def passed(
         finally:
             # SUMO writes the loops' file to its end only now.
             traffic.close()
-        return list(_events(folder / "loops.xml"))
+        return list(_events(folder / "outputs" / "loops.xml"))
 
 
 def _setup(folder: Path, overrides: tuple[str, ...], lanes: int, demand: str) -> TrafficSetup:

@@ -84,14 +84,15 @@ class SpeedControl:
         self._vehicles.setSpeed(vehicle, decelerated_speed(speed, allowed, deceleration, self._step_length))
 
     def _brakes_hard(self, vehicle: str) -> bool:
-        """Whether the driver brakes as hard by himself as SUMO lets a vehicle whose speed is set.
+        """Whether the driver brakes harder by himself, or would, than SUMO lets a vehicle whose speed is set.
 
         That is the type's ``decel``, and in an emergency a driver needs ``emergencyDecel``.
         """
         get = self._vehicles
-        if get.getAcceleration(vehicle) > -get.getDecel(vehicle) + _SAME:
-            return False
-        return bool(get.getSpeedWithoutTraCI(vehicle) <= get.getSpeed(vehicle) + _SAME)
+        excess = -get.getAcceleration(vehicle) - get.getDecel(vehicle)
+        if abs(excess) > _SAME:
+            return bool(excess > 0.0)
+        return bool(get.getSpeedWithoutTraCI(vehicle) < get.getSpeed(vehicle) - _SAME)
 
 
 class SumoDesiredSpeeds:

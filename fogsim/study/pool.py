@@ -59,29 +59,45 @@ class ProcessPool:
         waiting = list(reversed(runs))
         while waiting:
             for suspect in _run_until_broken(waiting, folder, self.processes, watch, self.work):
-                if _run_until_broken([suspect], folder, 1, watch, self.work):
-                    write_json(result_file(folder, suspect), failure(PROCESS_DIED))
-                    watch(suspect, PROCESS_DIED)
+                alone = [suspect]
+                while alone:
+                    if _run_until_broken(alone, folder, 1, watch, self.work):
+                        write_json(result_file(folder, suspect), failure(PROCESS_DIED))
+                        watch(suspect, PROCESS_DIED)
 
 
 def _run_until_broken(
     waiting: list[StudyRun], folder: Path, processes: int, watch: RunWatch, work: Work
 ) -> list[StudyRun]:
     """Run from the end of a list, which becomes shorter; gives back what was under way when a process died."""
-    with _pool(processes) as pool:
-        under_way: dict[Future[str | None], StudyRun] = {}
-        try:
+    under_way: dict[Future[str | None], StudyRun] = {}
+    try:
+        with _pool(processes) as pool:
             while waiting or under_way:
                 while waiting and len(under_way) < processes:
                     run = waiting[-1]
-                    future = pool.submit(work, run.scenario, run.seed, result_file(folder, run))
+                    future = _submitted(pool, work, run, result_file(folder, run))
                     under_way[future] = waiting.pop()
                 for done in wait(under_way, return_when=FIRST_COMPLETED).done:
                     message = done.result()
                     watch(under_way.pop(done), message)
-        except BrokenProcessPool:
-            return list(under_way.values())
+    except BrokenProcessPool:
+        return list(under_way.values())
     return []
+
+
+def _submitted(pool: ProcessPoolExecutor, work: Work, run: StudyRun, result: Path) -> Future[str | None]:
+    """A run on its way to a process.
+
+    Raises
+    ------
+    BrokenProcessPool
+        Also if what has died is the server from which processes are forked; the next pool has a new one.
+    """
+    try:
+        return pool.submit(work, run.scenario, run.seed, result)
+    except (EOFError, ConnectionError) as error:
+        raise BrokenProcessPool(str(error)) from error
 
 
 @contextlib.contextmanager

@@ -1,6 +1,8 @@
 import json
 import sys
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -58,3 +60,21 @@ def test_ctrl_c_ends_all_processes_and_keeps_what_is_done(tmp_path: Path, monkey
         ProcessPool(2, __import__("slow_work").work).run(runs, tmp_path, interrupt)
     assert result_file(tmp_path, runs[0]).exists()
     assert not result_file(tmp_path, runs[1]).exists()
+
+
+def test_the_death_of_the_server_of_processes_costs_no_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    submit, dead = ProcessPoolExecutor.submit, [EOFError(), ConnectionRefusedError()]
+
+    def submitted(pool: ProcessPoolExecutor, *call: Any) -> Any:
+        if dead:
+            raise dead.pop()
+        return submit(pool, *call)
+
+    monkeypatch.setattr(ProcessPoolExecutor, "submit", submitted)
+    (tmp_path / "plain_work.py").write_text("def work(scenario, seed, result):\n    result.touch()\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    runs = [StudyRun(seed, {}, seed, SCENARIO, f"k{seed}") for seed in range(2)]
+    told: list[int] = []
+    work = __import__("plain_work").work
+    ProcessPool(1, work).run(runs, tmp_path, lambda run, _: told.append(run.seed))
+    assert told == [0, 1]

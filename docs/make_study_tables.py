@@ -63,9 +63,7 @@ def table(folder: Path, columns: Sequence[Column]) -> list[Cells]:
     return [(*factors, *(name for _, name, _, _ in columns)), *rows]
 
 
-def _cell(
-    runs: Sequence[Mapping[str, str]], difference: Mapping[str, str] | None, column: Column
-) -> str:
+def _cell(runs: Sequence[Mapping[str, str]], difference: Mapping[str, str] | None, column: Column) -> str:
     metric, _, factor, digits = column
     values = [factor * float(run[metric]) for run in runs if run.get(metric)]
     if not values:

@@ -17,9 +17,10 @@ from fogsim.values.result_checks import checked_advice
 class RoadAdvice:
     """What the sections of the ego's route are advised in one run; it remembers what each was advised last.
 
-    Informed by the truth, each section goes by the visibility meter on it, and the ego hears what others hear there.
-    Informed by the ego's belief, the ego goes by its own advice, and tells it to the section on which it is; a section
-    that it has left keeps what it told last, and one that it has not reached knows nothing.
+    Informed by the truth, each section goes by the visibility meter on it and the speed limit of its own road, and the
+    ego hears what others hear there. Informed by the ego's belief, the ego goes by its own advice, and tells it to the
+    section on which it is; a section that it has left keeps what it told last, and one that it has not reached knows
+    nothing.
 
     Parameters
     ----------
@@ -53,44 +54,44 @@ class RoadAdvice:
             if here is not None:
                 self._told[here] = self._egos
         else:
-            self._ask_meters(step, step.speed_limit)
-        shown = self._shown(sections, step.speed_limit)
+            self._ask_meters(step)
+        shown = self._shown(step)
         if self._advice.informed_by == "truth":
             self._egos = SpeedAdvice(self._heard(here, dict(zip(sections, shown, strict=True))))
         return self._egos, stretch_advices(sections, shown, self._display)
 
-    def advise_traffic(self, step: TrafficStep, limit: float) -> tuple[StretchAdvice, ...]:
+    def advise_traffic(self, step: TrafficStep) -> tuple[StretchAdvice, ...]:
         """Advice to all on the sections that have any, by the meters, where there is no ego.
 
         Parameters
         ----------
         step : TrafficStep
             What was finished last.
-        limit : float
-            Speed limit that the adviser goes by [m/s].
         """
         if step.index == 0:
             self._told = {}
-        self._ask_meters(step, limit)
+        self._ask_meters(step)
         sections = tuple(section.stretch for section in step.truth.sections)
-        return stretch_advices(sections, self._shown(sections, limit), self._display)
+        return stretch_advices(sections, self._shown(step), self._display)
 
-    def _ask_meters(self, step: TrafficStep, limit: float) -> None:
+    def _ask_meters(self, step: TrafficStep) -> None:
         for section in step.truth.sections:
             previous = self._told.get(section.stretch, SpeedAdvice())
-            self._told[section.stretch] = self._ask(step, limit, certain_belief(section.extinction), previous)
+            known = certain_belief(section.extinction)
+            self._told[section.stretch] = self._ask(step, section.speed_limit, known, previous)
 
     def _ask(self, step: TrafficStep, limit: float, known: Belief, previous: SpeedAdvice) -> SpeedAdvice:
         return checked_advice(self._advice.method, self._adviser.advise(known, limit, step.time, previous))
 
-    def _shown(self, sections: Sequence[Stretch], limit: float) -> tuple[float, ...]:
-        speeds = tuple(self._told.get(section, SpeedAdvice()).speed for section in sections)
-        steps = self._harmonisation
+    def _shown(self, step: TrafficStep) -> tuple[float, ...]:
+        sections, steps = step.truth.sections, self._harmonisation
+        speeds = tuple(self._told.get(section.stretch, SpeedAdvice()).speed for section in sections)
         if steps is None:
             return speeds
-        lengths = [following.start - section.start for section, following in itertools.pairwise(sections)]
+        starts, limits = [s.stretch.start for s in sections], [s.speed_limit for s in sections]
+        lengths = [*(following - start for start, following in itertools.pairwise(starts)), math.inf]
         largest = steps.largest_step_kmh / KMH_PER_MPS
-        return harmonised_speeds(speeds, [*lengths, math.inf], limit, largest, steps.deceleration_mps2)
+        return harmonised_speeds(speeds, lengths, limits, largest, steps.deceleration_mps2)
 
     def _heard(self, here: Stretch | None, shown: dict[Stretch, float]) -> float:
         """What the ego has heard where it is [m/s]; a sign says in passing what holds to the end of its section."""

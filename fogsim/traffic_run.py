@@ -92,12 +92,12 @@ class MeteredAdvice:
         step : TrafficStep
             What was finished last.
         speed_limit : float
-            Highest speed limit where somebody drives [m/s].
+            Highest speed limit where somebody drives [m/s]; sections of road have their own.
         """
         if step.index % self._frames:
             return step.command
         if self._road is not None:
-            return Command(stretches=self._road.advise_traffic(step, speed_limit))
+            return Command(stretches=self._road.advise_traffic(step))
         measured = certain_belief(step.truth.extinction)
         advised = self._adviser.advise(measured, speed_limit, step.time, step.command.advice)
         advice = checked_advice(self._scenario.advice.method, advised)
@@ -136,12 +136,12 @@ class TrafficRun:
         self._traffic = traffic or libsumo_network_traffic(setup, sumo_outputs)
         along, net = scenario.traffic.along, setup.net if setup.config is None else configured_files(setup.config)[0]
         # Fog without a road along which it lies has no heights either, so that its ground may be anywhere.
-        axis = _axis_along(along, net) if along and net is not None else np.zeros((1, 3))
+        axis, limits = _axis_along(along, net) if along and net is not None else (np.zeros((1, 3)), np.zeros(0))
         self._fog = build.fog_field(scenario, axis)
         # A meter that stands for a whole network does not see single patches.
         self._metered = self._fog if along else dataclasses.replace(self._fog, patches=None)
         self._meters = _places_along(axis) + EYES
-        self._section_meters = RoadMeters(scenario, axis)
+        self._section_meters = RoadMeters(scenario, axis, limits)
         self._drivers_fog = DriversFog()
         self._step: TrafficStep | None = None
 
@@ -241,7 +241,8 @@ class TrafficRun:
         self.close()
 
 
-def _axis_along(edges: Sequence[str], net: Path) -> NDArray[np.float64]:
+def _axis_along(edges: Sequence[str], net: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Points along a road [m], and the speed limits on the way to them [m/s]."""
     roads = read_net(net)
     for edge in edges:
         if edge not in roads.edges:

@@ -1,6 +1,7 @@
 """Advice to sections of road, on plain values: no simulation runs."""
 
 import math
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import cast
 
@@ -13,7 +14,7 @@ from fogsim.ego.road_meters import RoadMeters
 from fogsim.errors import InputError
 from fogsim.road_advice import RoadAdvice
 from fogsim.scenario import Scenario, build
-from fogsim.scenario.road_sections import road_sections
+from fogsim.scenario.road_sections import road_sections, section_limits
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Display, FogField, RoadSection, SpeedAdvice, Step, Stretch
 from fogsim.values.belief import certain_belief
@@ -28,11 +29,17 @@ def scenario(*settings: str) -> Scenario:
     return fogsim.load_scenario("motorway_fog_bank", settings)
 
 
-def step(visibilities: list[float], position: float = 0.0, index: int = 0, believed: float = 1000.0) -> Step:
-    """An ego on a road with a meter each 500 m."""
+def step(
+    visibilities: list[float],
+    position: float = 0.0,
+    index: int = 0,
+    believed: float = 1000.0,
+    limits: Sequence[float] = (),
+) -> Step:
+    """An ego on a road with a meter each 500 m; it is where the limit is 130 km/h, as it is elsewhere if not given."""
     meters = [
-        RoadSection(Stretch(500.0 * i, 500.0 * (i + 1)), extinction_from_visibility(v))
-        for i, v in enumerate(visibilities)
+        RoadSection(Stretch(500.0 * i, 500.0 * (i + 1)), extinction_from_visibility(v), limit)
+        for i, (v, limit) in enumerate(zip(visibilities, limits or [LIMIT] * len(visibilities), strict=True))
     ]
     truth = SimpleNamespace(sections=tuple(meters))
     belief = certain_belief(extinction_from_visibility(believed))
@@ -68,6 +75,25 @@ def test_signs_step_down_towards_fog_where_they_are_harmonised() -> None:
     assert told == {0.0: round(3.6 * math.hypot(60.0 / 3.6, math.sqrt(2 * 0.1 * 500.0))), 500.0: 60}
 
 
+def test_each_section_goes_by_the_limit_of_its_own_road() -> None:
+    signs, town = scenario("drivers.advised=signs", A16), 50.0 / 3.6
+    road = step([100.0, 100.0, 60.0, 60.0], limits=[LIMIT, town, town, LIMIT])
+    assert kmh(RoadAdvice(signs), road)[1] == {0.0: 80, 1500.0: 60}
+    assert {a.stretch.start for a in RoadAdvice(signs).advise_traffic(road)} == {0.0, 1500.0}
+    # A step down towards fog is not needed where the limit is lower already.
+    harmonised = scenario("drivers.advised=signs", "drivers.harmonisation={}", A16)
+    road = step([1000.0, 1000.0, 1000.0, 60.0], limits=[LIMIT, LIMIT, town, LIMIT])
+    assert kmh(RoadAdvice(harmonised), road)[1] == {0.0: 120, 500.0: 100, 1500.0: 60}
+
+
+def test_the_limit_of_a_section_is_that_where_it_begins() -> None:
+    route = np.array([[0.0, 0.0, 0.0], [500.0, 0.0, 0.0], [800.0, 0.0, 0.0], [3000.0, 0.0, 0.0]])
+    sections = tuple(Stretch(start, start + 400.0) for start in (0.0, 400.0, 500.0, 799.0, 3000.0))
+    limits = section_limits(sections, route, np.array([30.0, 30.0, 20.0, 10.0]))
+    assert limits == (30.0, 30.0, 20.0, 20.0, 10.0)
+    assert section_limits(sections[:2], route, np.zeros(0)) == (math.inf, math.inf)
+
+
 def test_in_cars_and_by_law_advice_holds_as_long_as_it_is_in_force() -> None:
     for advised, display in (("equipped", Display.IN_CAR), ("law", Display.LAW)):
         advice = RoadAdvice(scenario(f"drivers.advised={advised}", A16))
@@ -101,7 +127,7 @@ def test_meters_measure_at_the_signs_and_in_the_middle_of_other_sections() -> No
     for advised, expected in (("signs", [2000.0, 2000.0, 2000.0, 60.0, 60.0, EDGE]), ("law", [2000.0])):
         bank = scenario(f"drivers.advised={advised}")
         fog = build.fog_field(bank, ROUTE)
-        measured = RoadMeters(bank, ROUTE).measure(fog)
+        measured = RoadMeters(bank, ROUTE, np.full(2, LIMIT)).measure(fog)
         visibilities = [math.log(20.0) / section.extinction for section in measured]
         assert visibilities[: len(expected)] == pytest.approx(expected, rel=0.001)
     # The last one was that of drivers who apply a law.

@@ -5,7 +5,11 @@ from collections.abc import Sequence
 
 
 def harmonised_speeds(
-    speeds: Sequence[float], lengths: Sequence[float], limit: float, largest_step: float, deceleration: float
+    speeds: Sequence[float],
+    lengths: Sequence[float],
+    limits: Sequence[float],
+    largest_step: float,
+    deceleration: float,
 ) -> tuple[float, ...]:
     """Advised speeds, lowered where the next section downstream is advised much less.
 
@@ -19,17 +23,18 @@ def harmonised_speeds(
         What each section is advised for itself, in the direction of travel [m/s]; ``inf`` for nothing.
     lengths : (n,) sequence of float
         Distance from each section's beginning to that of the next [m]; the last does not matter.
-    limit : float
-        Speed limit, from which on nothing needs to be advised [m/s].
+    limits : (n,) sequence of float
+        Speed limit of each section, from which on nothing needs to be advised [m/s].
     largest_step : float
         Largest difference between two sections on the way down [m/s].
     deceleration : float
         Deceleration a [m/s²].
     """
-    shown = list(speeds)
+    shown, down = list(speeds), speeds[-1] if speeds else math.inf
     for place in reversed(range(len(shown) - 1)):
-        down = shown[place + 1]
         reached = min(down + largest_step, math.sqrt(down**2 + 2.0 * deceleration * lengths[place]))
-        if reached < limit:
+        if reached < limits[place]:
             shown[place] = min(shown[place], reached)
+        # A section whose limit says more than the step hides the step, and hides none of those upstream of it.
+        down = min(speeds[place], reached)
     return tuple(shown)

@@ -100,7 +100,7 @@ class EgoEquipment:
             kind = NoView if self._scenario.renderer == NO_RENDERER else ViewRenderer
             road, signs = network()
             self._view_renderer = kind(self._scenario, road, signs, body)
-            self._meters = RoadMeters(self._scenario, road.route)
+            self._meters = RoadMeters(self._scenario, road.route, road.route_limits)
         for estimator in self._estimators:
             estimator.reset()
         self._fusion.reset()

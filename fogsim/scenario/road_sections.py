@@ -73,6 +73,26 @@ def meter_places(scenario: Scenario, sections: tuple[Stretch, ...], route: NDArr
     return np.stack([np.interp(at, station, route[:, axis]) for axis in range(3)], axis=-1) + EYES
 
 
+def section_limits(
+    sections: tuple[Stretch, ...], route: NDArray[np.float64], limits: NDArray[np.float64]
+) -> tuple[float, ...]:
+    """Speed limit where each section begins [m/s]; ``inf`` where no limits are known.
+
+    Parameters
+    ----------
+    sections : tuple of Stretch
+        From `road_sections`.
+    route : (n, 3) float64
+        Polyline along the route [m].
+    limits : (n,) float64
+        Speed limit of the road that leads to each of its points [m/s], as of `RoadNetwork.route_limits`; or empty.
+    """
+    if not len(limits):
+        return (math.inf,) * len(sections)
+    behind = np.searchsorted(stations(route), [section.start for section in sections], side="right")
+    return tuple(limits[np.minimum(behind, len(limits) - 1)].tolist())
+
+
 def stations(route: NDArray[np.float64]) -> NDArray[np.float64]:
     """Positions of a route's points along it (n,) [m].
 

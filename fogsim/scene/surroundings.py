@@ -63,7 +63,7 @@ def surroundings(network: RoadNetwork, signs: SignMap, line: Points) -> Surround
         lanes = [replace(lane, centreline=lane.centreline - origin) for lane in lanes]
         areas = [replace(area, outline=area.outline - origin) for area in areas]
     return Surroundings(
-        RoadNetwork(tuple(lanes), network.route - origin, tuple(areas)),
+        replace(network, lanes=tuple(lanes), route=network.route - origin, areas=tuple(areas)),
         SignMap(tuple(replace(sign, position=_moved(sign.position, origin)) for sign in posts)),
         origin,
         whole=len(lanes) == len(network.lanes) and len(areas) == len(network.areas) and len(posts) == len(signs.signs),

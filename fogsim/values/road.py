@@ -1,6 +1,6 @@
 """The road network and its signs as plain geometry."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
@@ -138,8 +138,11 @@ class RoadNetwork:
         Polyline along the route that the ego drives [m].
     areas : tuple of PavedArea
         Where roads and footways meet.
+    route_limits : (n,) float64
+        Highest speed limit of the road that leads to each point of the route [m/s]. Empty where it is not known.
     """
 
     lanes: tuple[Lane, ...]
     route: NDArray[np.float64]
     areas: tuple[PavedArea, ...] = ()
+    route_limits: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))

@@ -40,10 +40,13 @@ class RoadSection:
         The section.
     extinction : float
         Extinction coefficient at the meter [1/m].
+    speed_limit : float
+        Speed limit where the section begins [m/s], as the map has it; ``inf`` where that is not known.
     """
 
     stretch: Stretch
     extinction: float
+    speed_limit: float
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ KMH = 3.6
 def steps(speeds: list[float], lengths: list[float], deceleration: float = 1.0, largest: float = 20.0) -> list[float]:
     """Harmonised speeds on a road of 130 km/h, all in km/h."""
     given = [speed / KMH for speed in speeds]
-    shown = harmonised_speeds(given, lengths, 130.0 / KMH, largest / KMH, deceleration)
+    shown = harmonised_speeds(given, lengths, [130.0 / KMH] * len(given), largest / KMH, deceleration)
     return [speed * KMH for speed in shown]
 
 

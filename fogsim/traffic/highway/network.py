@@ -56,7 +56,8 @@ def road_network(road: Any, ego: Any) -> RoadNetwork:
         for end, parallel in ends.items()
         for lane in _carriageway(edge_id(start, end), parallel)
     ]
-    return RoadNetwork(tuple(lanes), _route(road.network, ego))
+    route, limits = _route(road.network, ego)
+    return RoadNetwork(tuple(lanes), route, route_limits=limits)
 
 
 def _carriageway(edge_id: str, parallel: Sequence[Any]) -> Iterator[Lane]:
@@ -133,10 +134,13 @@ def _centreline(lane: Any) -> NDArray[np.float64]:
     return upright([lane.position(s, 0.0) for s in stations])
 
 
-def _route(network: Any, ego: Any) -> NDArray[np.float64]:
-    points = np.concatenate([_centreline(network.get_lane(index)) for index in lanes_ahead(network, ego)])
-    apart = np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-6
-    return points[np.concatenate(([True], apart))]
+def _route(network: Any, ego: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Points of the ego's route [m], and the speed limits on the way to them [m/s]."""
+    lanes = [network.get_lane(index) for index in lanes_ahead(network, ego)]
+    lines = [_centreline(lane) for lane in lanes]
+    points, limits = np.concatenate(lines), np.repeat([speed_limit(lane) for lane in lanes], list(map(len, lines)))
+    apart = np.concatenate(([True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-6))
+    return points[apart], limits[apart]
 
 
 def lanes_ahead(network: Any, ego: Any) -> Iterator[tuple[str, str, int]]:

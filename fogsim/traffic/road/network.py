@@ -95,7 +95,8 @@ def road_network(roads: RoadMap, route: Sequence[str]) -> RoadNetwork:
     lanes = tuple(lane for lane, is_drawn in zip(roads.lanes, roads.drawn.tolist(), strict=True) if is_drawn)
     for lane in lanes:
         _check_shape(lane)
-    return RoadNetwork(lanes=lanes, route=route_axis(roads, route), areas=roads.areas)
+    axis, limits = route_axis(roads, route)
+    return RoadNetwork(lanes=lanes, route=axis, areas=roads.areas, route_limits=limits)
 
 
 def _check_shape(lane: Lane) -> None:
@@ -107,8 +108,8 @@ def _check_shape(lane: Lane) -> None:
         )
 
 
-def route_axis(roads: RoadMap, route: Sequence[str]) -> NDArray[np.float64]:
-    """Middle lanes of a route's edges, end to end, without repeated points: a polyline (n, 3) [m].
+def route_axis(roads: RoadMap, route: Sequence[str]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Middle lanes of a route's edges, end to end, without repeated points, and the speed limits along them.
 
     Parameters
     ----------
@@ -116,6 +117,11 @@ def route_axis(roads: RoadMap, route: Sequence[str]) -> NDArray[np.float64]:
         The network.
     route : sequence of str
         Edge ids.
+
+    Returns
+    -------
+    tuple of (n, 3) float64 and (n,) float64
+        A polyline [m], and the highest speed limit of the edge that leads to each of its points [m/s].
 
     Raises
     ------
@@ -126,5 +132,6 @@ def route_axis(roads: RoadMap, route: Sequence[str]) -> NDArray[np.float64]:
     for lane in middle:
         _check_shape(lane)
     points = np.concatenate([lane.centreline for lane in middle])
-    moved = np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-3
-    return points[np.concatenate(([True], moved))]
+    limits = np.repeat([roads.speed_limit(edge) for edge in route], [len(lane.centreline) for lane in middle])
+    kept = np.concatenate(([True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-3))
+    return points[kept], limits[kept]

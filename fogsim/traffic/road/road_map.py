@@ -56,6 +56,21 @@ class RoadMap:
         places = self.edges[edge]
         return self.lanes[places[len(places) // 2]]
 
+    def speed_limit(self, edge: str) -> float:
+        """Highest speed limit of an edge's lanes [m/s].
+
+        Parameters
+        ----------
+        edge : str
+            Its id.
+
+        Raises
+        ------
+        KeyError
+            If there is no such edge.
+        """
+        return max(self.lanes[place].speed_limit for place in self.edges[edge])
+
 
 def edge_ranges(edges: Sequence[str], counts: Iterable[int]) -> dict[str, range]:
     """Places of each edge's lanes among those of all edges, one edge after another.

@@ -68,6 +68,7 @@ def test_a_straight_road_with_y_up() -> None:
     ]  # fmt: skip
     assert [lane.outermost for lane in network.lanes] == [False, False, False, True]
     assert network.route == pytest.approx(network.lanes[2].centreline)
+    assert network.route_limits.tolist() == [30.0, 30.0]
     assert environment.vehicle.lane_index == ("0", "1", 2)
 
 

@@ -29,11 +29,16 @@ def test_lanes_of_the_motorway() -> None:
 
 
 def test_the_route_runs_along_the_middle_lanes_without_jumps() -> None:
-    route = road_network(read_net(NET), ["approach", "bank", "exit"]).route
+    network = road_network(read_net(NET), ["approach", "bank", "exit"])
+    route = network.route
     steps = np.linalg.norm(np.diff(route, axis=0), axis=1)
     assert steps.sum() == pytest.approx(5500.0, rel=0.005)
     assert steps.min() > 0
     assert steps.max() < 25.0
+    changes = np.flatnonzero(np.diff(network.route_limits))
+    places = np.cumsum(np.concatenate(([0.0], steps)))[changes]
+    assert network.route_limits[[0, changes[1], -1]] * 3.6 == pytest.approx([130.0, 110.0, 130.0], abs=0.02)
+    assert places == pytest.approx([900.0, 900.0 + 2504.0], abs=0.5)
 
 
 def test_what_is_no_network(tmp_path: Path) -> None:

@@ -2,14 +2,16 @@
 
 A straight road with three lanes carries a number of vehicles on 10 km (that of ``benchmarks/traffic.py``), all of which
 are read, in fog of 100 m by day. The loop goes round as `fogsim.run` does; after each step `RunMetrics.update` takes it
-in. Both are timed in the same run, in blocks of 80 steps: ``share`` is the median of the blocks' ratios of metrics to
-everything else, a quarter of them lie below ``share_low``, a quarter above ``share_high``.
+in, and with ``--profiles`` `RunProfiles.update` before it, as in a study. Both are timed in the same run, in blocks of
+80 steps: ``share`` is the median of the blocks' ratios of metrics to everything else, a quarter of them lie below
+``share_low``, a quarter above ``share_high``.
 
 ``frames`` says what is run: ``none`` is without frames at 2 Hz (the cheapest run that a study can have),
 ``small`` draws 160 × 120 pixels at 2 Hz by the processor, with an estimator; ``none_10_hz`` is without frames at SUMO's
 own step, where nothing is left out between two steps that are measured. Times are the processor's [ms].
 
-    python benchmarks/metrics.py [--json] [--vehicles 100 …] [--seconds 200] [--block 80] [--profile]
+    python benchmarks/metrics.py [--json] [--vehicles 100 …] [--seconds 200] [--block 80] [--profiles]
+        [--profile]
 
 ``--profile`` tells where the metrics' time goes, by metric.
 """
@@ -28,6 +30,7 @@ from fogsim.loop import run
 from fogsim.metrics import METRICS, RunMetrics
 from fogsim.scenario import build
 from fogsim.scenario.loading import clock_settings, scenario_from_config
+from fogsim.study.profiles import RunProfiles
 from fogsim.values import Step
 
 FRAMELESS = (
@@ -51,7 +54,7 @@ def timed(call: Callable[[], object]) -> float:
     return 1e-6 * (time.thread_time_ns() - started)
 
 
-def measure(frames: str, vehicles: int, seconds: float, size: int) -> dict[str, float | str]:
+def measure(frames: str, vehicles: int, seconds: float, size: int, *, profiled: bool) -> dict[str, float | str]:
     """One record of so many seconds of simulated time, in blocks of so many steps."""
     period, settings = RUNS[frames]
     blocks: list[tuple[float, float]] = []
@@ -59,20 +62,26 @@ def measure(frames: str, vehicles: int, seconds: float, size: int) -> dict[str, 
         config = configuration(Path(folder), vehicles)
         told = ["fog.visibility_m=100", "traffic.reading_radius_m=6000", f"duration_s={seconds}", *settings]
         scenario = scenario_from_config(config, "ego", [*clock_settings(0.1, period, period), *told])
-        metrics = RunMetrics(build.safety_standard(scenario))
+        profiles = [RunProfiles()] if profiled else []
+        metrics = RunMetrics(build.safety_standard(scenario), watchers=profiles)
         steps = run(scenario, 1)
         last = [next(steps)]
-        metrics.update(last[0])
 
         def go_on() -> None:
             last[0] = next(steps)
+
+        def watch() -> None:
+            for watcher in (*profiles, metrics):
+                watcher.update(last[0])
+
+        watch()
 
         while last[0].ending is None:
             others = own = 0.0
             for _ in range(size):
                 if last[0].ending is None:
                     others += timed(go_on)
-                    own += timed(lambda: metrics.update(last[0]))
+                    own += timed(watch)
             blocks.append((others / size, own / size))
         steps.close()
     # The first block has what is made once.
@@ -112,6 +121,7 @@ def main() -> None:
     parser.add_argument("--frames", action="append", choices=[*RUNS], help="which runs (default all)")
     parser.add_argument("--seconds", type=float, default=200.0, help="simulated time of each run")
     parser.add_argument("--block", type=int, default=BLOCK, help="steps in a block")
+    parser.add_argument("--profiles", action="store_true", help="with the profiles that a study keeps")
     parser.add_argument("--profile", action="store_true", help="tell the cost of each metric alone")
     arguments = parser.parse_args()
     counts = arguments.vehicles or [100]
@@ -119,7 +129,8 @@ def main() -> None:
         records: list[dict[str, float | str]] = [{"vehicles": n, **by_metric(n)} for n in counts]
     else:
         kinds, size = arguments.frames or [*RUNS], arguments.block
-        records = [measure(kind, n, arguments.seconds, size) for n in counts for kind in kinds]
+        profiled = arguments.profiles
+        records = [measure(kind, n, arguments.seconds, size, profiled=profiled) for n in counts for kind in kinds]
     if arguments.json:
         print(json.dumps(records, indent=2))
         return

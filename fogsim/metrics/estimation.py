@@ -9,6 +9,7 @@ import numpy as np
 
 from fogsim.metrics.metric import JsonValue, Sample, share
 from fogsim.units import finite_or_none
+from fogsim.values import Belief
 
 FOG_LIMIT = 1000.0
 """Visibility below which the air is called fog [m] (WMO); errors are counted only there."""
@@ -27,6 +28,9 @@ def relative_error(visibility: float, truth: float) -> float:
 
 LONGEST_LAG = 30.0
 """Latencies are looked for up to this [s]."""
+
+_MOST_WAITING = 64
+"""Beliefs that are gathered before they are judged: one after another they cost half of one in each step."""
 
 LEAST_CHANGE = 0.1
 """Standard deviation of ln V over a run from which a latency can be told; a tenth is a change of 10 %."""
@@ -180,6 +184,7 @@ class BeliefError:
         "belief_coverage_share": "share of those steps in which the 90 % interval held the truth",
     }
     _errors: Errors = field(default_factory=Errors)
+    _waiting: list[tuple[float, float, Belief]] = field(default_factory=list)
 
     def update(self, sample: Sample) -> None:
         """Take in one step.
@@ -189,16 +194,22 @@ class BeliefError:
         sample : Sample
             The step, and what is derived from it.
         """
-        truth, belief = sample.step.truth.visibility_ahead, sample.step.belief
-        said = belief.visibility
-        self._errors.follow(sample.step.time, truth, said)
-        if truth >= FOG_LIMIT:
-            return
-        self._errors.asked += 1
-        self._errors.judge(truth, said, belief.visibility_quantile(0.05), belief.visibility_quantile(0.95))
+        self._waiting.append((sample.step.time, sample.step.truth.visibility_ahead, sample.step.belief))
+        if len(self._waiting) >= _MOST_WAITING:
+            self._judge_waiting()
+
+    def _judge_waiting(self) -> None:
+        for time, truth, belief in self._waiting:
+            low, said, high = belief.visibility_quantiles((0.05, 0.5, 0.95))
+            self._errors.follow(time, truth, said)
+            if truth < FOG_LIMIT:
+                self._errors.asked += 1
+                self._errors.judge(truth, said, low, high)
+        self._waiting.clear()
 
     def result(self) -> dict[str, JsonValue]:
         """Say the error and the coverage."""
+        self._judge_waiting()
         errors = self._errors.result()
         return {
             "belief_count": errors["count"],

@@ -17,7 +17,7 @@ from fogsim.metrics.traffic_emissions import TrafficEmissions
 from fogsim.metrics.traffic_flow import TrafficFlow
 from fogsim.metrics.traffic_headways import TrafficHeadways
 from fogsim.metrics.traffic_sight import TrafficSight
-from fogsim.metrics.traffic_span import GatheredMetrics, TrafficMetric
+from fogsim.metrics.traffic_span import GatheredMetrics, SpanWatcher, TrafficMetric
 from fogsim.registry import Registry
 from fogsim.units import clock_time
 from fogsim.values import Step, TrafficStep
@@ -88,6 +88,8 @@ class RunMetrics:
         What the measures are judged by.
     names : iterable of str
         Metrics from `METRICS`; all of them by default.
+    watchers : iterable of SpanWatcher
+        Who gets what the metrics of everybody get; `summary` hands over the last of it.
 
     Attributes
     ----------
@@ -100,11 +102,16 @@ class RunMetrics:
         If a name is not in `METRICS`.
     """
 
-    def __init__(self, standard: SafetyStandard = DEFAULT_STANDARD, names: Iterable[str] = METRICS) -> None:
+    def __init__(
+        self,
+        standard: SafetyStandard = DEFAULT_STANDARD,
+        names: Iterable[str] = METRICS,
+        watchers: Iterable[SpanWatcher] = (),
+    ) -> None:
         self.standard = standard
         self._metrics = {name: METRICS[name](standard) for name in names}
         self._of_ego = [metric for metric in self._metrics.values() if not isinstance(metric, TrafficMetric)]
-        self._of_traffic = GatheredMetrics(_of_everybody(self._metrics.values()))
+        self._of_traffic = GatheredMetrics([*_of_everybody(self._metrics.values()), *watchers])
         self._last: Step | None = None
 
     def update(self, step: Step) -> None:
@@ -146,6 +153,8 @@ class TrafficRunMetrics:
         What the measures are judged by.
     names : iterable of str
         Metrics from `METRICS`; those of an ego among them are left out.
+    watchers : iterable of SpanWatcher
+        Who gets what the metrics of everybody get; `summary` hands over the last of it.
 
     Raises
     ------
@@ -153,10 +162,15 @@ class TrafficRunMetrics:
         If a name is not in `METRICS`.
     """
 
-    def __init__(self, standard: SafetyStandard = DEFAULT_STANDARD, names: Iterable[str] = METRICS) -> None:
+    def __init__(
+        self,
+        standard: SafetyStandard = DEFAULT_STANDARD,
+        names: Iterable[str] = METRICS,
+        watchers: Iterable[SpanWatcher] = (),
+    ) -> None:
         made = {name: METRICS[name](standard) for name in names}
         self._metrics = {name: metric for name, metric in made.items() if isinstance(metric, TrafficMetric)}
-        self._of_traffic = GatheredMetrics(_of_everybody(self._metrics.values()))
+        self._of_traffic = GatheredMetrics([*_of_everybody(self._metrics.values()), *watchers])
         self._last: TrafficStep | None = None
         self._duration, self._steps = 0.0, 0
 

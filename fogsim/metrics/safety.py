@@ -5,12 +5,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from fogsim.metrics.metric import JsonValue, Sample, share
-from fogsim.metrics.surrogate import (
-    QUEUE_SPEED,
-    time_exposed_time_to_collision,
-    time_headway,
-    time_integrated_time_to_collision,
-)
+from fogsim.metrics.surrogate import QUEUE_SPEED
 from fogsim.units import clock_time, finite_or_none
 from fogsim.values import Collision, Leader
 
@@ -29,12 +24,13 @@ class _Approach:
     def add(self, sample: Sample, leader: Leader, threshold: float) -> None:
         speed, remaining = float(sample.step.traffic.speed[sample.step.ego]), sample.derived["time_to_collision_s"]
         self.least_gap = _least(self.least_gap, leader.gap)
-        self.least_headway = _least(self.least_headway, finite_or_none(float(time_headway(leader.gap, speed))))
+        if speed > 0.0:
+            self.least_headway = _least(self.least_headway, max(leader.gap, 0.0) / speed)
         self.max_drac = _most(self.max_drac, sample.derived["drac_mps2"])
         self.least_time_to_collision = _least(self.least_time_to_collision, remaining)
-        if remaining is not None:
-            self.exposed += time_exposed_time_to_collision(remaining, sample.elapsed, threshold)
-            self.integrated += time_integrated_time_to_collision(remaining, sample.elapsed, threshold)
+        if remaining is not None and remaining <= threshold:
+            self.exposed += sample.elapsed
+            self.integrated += (threshold - remaining) * sample.elapsed
 
 
 @dataclass(slots=True)
@@ -176,6 +172,8 @@ class Collisions:
         sample : Sample
             The step, and what is derived from it.
         """
+        if not sample.step.collisions:
+            return
         ego = sample.step.traffic.ids[sample.step.ego]
         self._all.extend(sample.step.collisions)
         self._ego.extend(hit for hit in sample.step.collisions if ego in {hit.collider, hit.victim})
@@ -191,8 +189,8 @@ class Collisions:
 
 
 def _least(one: float | None, other: float | None) -> float | None:
-    return min((value for value in (one, other) if value is not None), default=None)
+    return one if other is None or (one is not None and one <= other) else other
 
 
 def _most(one: float | None, other: float | None) -> float | None:
-    return max((value for value in (one, other) if value is not None), default=None)
+    return one if other is None or (one is not None and one >= other) else other

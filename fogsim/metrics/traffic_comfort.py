@@ -45,7 +45,8 @@ class TrafficComfort(TrafficMetric):
             np.concatenate(parts)
             for parts in zip(self._last, (span.moment, span.vehicle, span.elapsed, span.acceleration), strict=True)
         )
-        order = np.lexsort((moment, vehicle))
+        # Moments ascend, and stay so within a vehicle.
+        order = np.argsort(vehicle, kind="stable")
         before, after = order[:-1], order[1:]
         follows = (vehicle[before] == vehicle[after]) & (moment[before] + 1 == moment[after]) & (elapsed[after] > 0.0)
         change = np.diff(acceleration[order])[follows]

@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.linear_algebra import matrix_product
 from fogsim.metrics.metric import JsonValue
 from fogsim.metrics.traffic_span import Exposure, TrafficMetric, TrafficSpan
 
@@ -75,12 +76,14 @@ class TrafficEmissions(TrafficMetric):
         self._exposure.add(span)
         names = np.array([_KINDS.index(name) if name in _KINDS else 0 for name in span.kind_names], dtype=np.intp)
         kind, speed, acceleration = names[span.kind], span.speed, span.acceleration
-        powers = (np.ones(len(speed)), speed, speed**2, speed**3)
-        terms = np.stack((*powers, acceleration, acceleration * speed, acceleration * powers[2]))
-        rates = np.maximum((_RATES[:, kind] * terms.T).sum(axis=-1), 0.0)
-        coasting = _COASTING[kind, 0] + _COASTING[kind, 1] * powers[2]
-        burning = (-acceleration < coasting) | (speed <= _CREEPING)
-        self._milligrams += (rates * (span.elapsed * burning)).sum(axis=-1)
+        square = speed**2
+        burning = (-acceleration < _COASTING[kind, 0] + _COASTING[kind, 1] * square) | (speed <= _CREEPING)
+        powers = np.ones(len(speed)), speed, square, square * speed
+        terms = np.stack((*powers, acceleration, acceleration * speed, acceleration * square))
+        for number in np.unique(names):
+            of_kind = np.flatnonzero(burning & (kind == number))
+            rates = np.maximum(matrix_product(_RATES[:, number], terms[:, of_kind]), 0.0)
+            self._milligrams += (rates * span.elapsed[of_kind]).sum(axis=-1)
 
     def result(self) -> dict[str, JsonValue]:
         """Say what was emitted for what was driven."""

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,6 +83,19 @@ class TrafficSpan:
     def vehicle_distance(self) -> float:
         """Way of all vehicles together [m]."""
         return float((self.elapsed * self.speed).sum())
+
+
+class SpanWatcher(Protocol):
+    """Whoever watches everybody near the ego."""
+
+    def add(self, span: TrafficSpan) -> None:
+        """Take in some steps.
+
+        Parameters
+        ----------
+        span : TrafficSpan
+            The next steps.
+        """
 
 
 class TrafficMetric(ABC):
@@ -232,16 +245,16 @@ class TrafficGathering:
 
 
 class GatheredMetrics:
-    """Hands metrics of everybody the steps of a run, some at a time.
+    """Hands whoever watches everybody the steps of a run, some at a time.
 
     Parameters
     ----------
-    metrics : sequence of TrafficMetric
-        The metrics.
+    watchers : sequence of SpanWatcher
+        Metrics of everybody, and others who watch.
     """
 
-    def __init__(self, metrics: Sequence[TrafficMetric]) -> None:
-        self._metrics = metrics
+    def __init__(self, watchers: Sequence[SpanWatcher]) -> None:
+        self._watchers = watchers
         self._gathering = TrafficGathering()
 
     def add(self, step: TrafficStep, elapsed: float) -> None:
@@ -254,7 +267,7 @@ class GatheredMetrics:
         elapsed : float
             Time since the one before [s].
         """
-        if self._metrics:
+        if self._watchers:
             self._gathering.add(step, elapsed)
             if self._gathering.is_full:
                 self.hand_over()
@@ -263,8 +276,8 @@ class GatheredMetrics:
         """Hand over what has been gathered."""
         span = self._gathering.take()
         if span is not None:
-            for metric in self._metrics:
-                metric.add(span)
+            for watcher in self._watchers:
+                watcher.add(span)
 
 
 def _numbers(known: dict[str, int], names: tuple[str, ...]) -> NDArray[np.intp]:

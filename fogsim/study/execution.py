@@ -40,9 +40,11 @@ def measure_run(scenario: Scenario, seed: int, sumo_outputs: Path | None = None)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnplayedWarning)
         if scenario.traffic.has_ego:
-            summary = _watched(run(scenario, seed, sumo_outputs=sumo_outputs), RunMetrics(standard), profiles)
+            metrics = RunMetrics(standard, watchers=[profiles])
+            summary = _watched(run(scenario, seed, sumo_outputs=sumo_outputs), metrics, profiles)
         else:
-            summary = _watched(run_traffic(scenario, seed, sumo_outputs), TrafficRunMetrics(standard), profiles)
+            of_traffic = TrafficRunMetrics(standard, watchers=[profiles])
+            summary = _watched(run_traffic(scenario, seed, sumo_outputs), of_traffic, profiles)
     return {"metrics": dict(_flat(summary.to_json())), "profiles": profiles.to_json()}
 
 
@@ -60,8 +62,8 @@ class _Watching(Protocol[_TakenStep_contra]):
 
 def _watched(steps: Iterable[_AnyStep], metrics: _Watching[_AnyStep], profiles: RunProfiles) -> RunSummary:
     for step in steps:
-        metrics.update(step)
         profiles.update(step)
+        metrics.update(step)
     return metrics.summary()
 
 

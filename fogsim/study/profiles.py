@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from fogsim.metrics.following import find_following
 from fogsim.metrics.surrogate import QUEUE_SPEED, time_to_collision
+from fogsim.metrics.traffic_span import TrafficSpan
 from fogsim.units import clock_time
 from fogsim.values import Step, TrafficState, TrafficStep
 
@@ -38,11 +38,10 @@ _MOST_PENDING = 200_000
 
 
 class RunProfiles:
-    """Watches the steps of one run."""
+    """Watches the steps of one run, and everybody in them as one of the watchers of its metrics."""
 
     def __init__(self) -> None:
         self._last: TrafficStep | None = None
-        self._duration = 0.0
         self._vehicle_time = 0.0
         self._by_class = np.zeros((2, CLASSES))
         self._road = _Road()
@@ -55,14 +54,12 @@ class RunProfiles:
         Parameters
         ----------
         step : TrafficStep
-            The step; speeds over the road are of the ego's road, if there is one.
+            The step, before the metrics get it; speeds over the road are of the ego's road, if there is one.
         """
         last, self._last = self._last, step
         if last is not None and last.index == step.index:
             return
         elapsed = 0.0 if last is None else clock_time(step.time - last.time)
-        self._vehicle_time += elapsed * len(step.traffic.ids)
-        self._add_times_to_collision(step.traffic, elapsed)
         if isinstance(step, Step):
             self._road.update(step, elapsed)
         for hit in step.collisions:
@@ -72,16 +69,25 @@ class RunProfiles:
             if len(self._collisions) < MOST_COLLISIONS:
                 self._collisions.append((hit.time, x, y, hit.impact_speed, hit.collider, hit.victim))
 
-    def _add_times_to_collision(self, traffic: TrafficState, elapsed: float) -> None:
-        found = find_following(traffic)
+    def add(self, span: TrafficSpan) -> None:
+        """Take in everybody in some steps.
+
+        Parameters
+        ----------
+        span : TrafficSpan
+            The steps, which `update` has had.
+        """
+        self._vehicle_time += span.vehicle_time
+        found = span.following
         remaining = time_to_collision(found.gap, found.speed, found.leader_speed)
-        queue = found.leader_speed < QUEUE_SPEED
-        short = remaining < CLASS_WIDTH * CLASSES
-        place = (remaining[short] / CLASS_WIDTH).astype(np.intp)
-        np.add.at(self._by_class, (queue[short].astype(np.intp), place), elapsed)
+        short = np.flatnonzero(remaining < CLASS_WIDTH * CLASSES)
+        place = (remaining[short] / CLASS_WIDTH).astype(np.intp) + CLASSES * (found.leader_speed[short] < QUEUE_SPEED)
+        times = np.bincount(place, span.elapsed[found.follower[short]], minlength=2 * CLASSES)
+        self._by_class += times.reshape(2, CLASSES)
+        self._road.add(span)
 
     def to_json(self) -> dict[str, Any]:
-        """Give the profiles as JSON can hold them.
+        """Give the profiles as JSON can hold them, once the metrics have handed over all that they gathered.
 
         Returns
         -------
@@ -127,33 +133,39 @@ class _Road:
 
     def __init__(self) -> None:
         self._path: list[tuple[float, float, float]] = []
-        self._ego: dict[int, NDArray[np.float64]] = {}
+        self._ego: dict[int, list[float]] = {}
         self._pending: list[_Squares] = []
         self._pending_rows = 0
 
     def update(self, step: Step, elapsed: float) -> None:
         traffic, place = step.traffic, step.route_position
-        x, y, _ = traffic.position[step.ego]
         if not self._path or place >= self._path[-1][0] + _PLACE:
+            x, y, _ = traffic.position[step.ego]
             self._path.append((place, float(x), float(y)))
-        sums = self._ego.setdefault(int(place // CELL_LENGTH), np.zeros(3))
-        sums += elapsed * np.array([1.0, traffic.speed[step.ego], step.truth.extinction])
-        self._pending.append(_squares(traffic, elapsed))
-        self._pending_rows += len(traffic.ids)
+        sums = self._ego.setdefault(int(place // CELL_LENGTH), [0.0, 0.0, 0.0])
+        sums[0] += elapsed
+        sums[1] += elapsed * float(traffic.speed[step.ego])
+        sums[2] += elapsed * step.truth.extinction
+
+    def add(self, span: TrafficSpan) -> None:
+        if not self._path:
+            return
+        self._pending.append(_squares(span))
+        self._pending_rows += len(span.elapsed)
         if self._pending_rows > _MOST_PENDING:
             self._merge()
 
     def _merge(self) -> _Squares:
         key, row = np.unique(np.concatenate([part.key for part in self._pending]), return_inverse=True)
-        sums = np.zeros((len(key), 6))
-        np.add.at(sums, row, np.concatenate([part.sums for part in self._pending]))
+        columns = np.concatenate([part.sums for part in self._pending]).T
+        sums = np.array([np.bincount(row, column) for column in columns], dtype=np.float64).T
         self._pending, self._pending_rows = [_Squares(key, sums)], 0
         return self._pending[0]
 
     def to_json(self) -> dict[str, Any]:
         everybody = self._everybody()
         cells = sorted(self._ego.keys() | everybody.keys())
-        ego = np.array([self._ego.get(cell, np.zeros(3)) for cell in cells]).reshape(-1, 3)
+        ego = np.array([self._ego.get(cell, [0.0] * 3) for cell in cells]).reshape(-1, 3)
         others = np.array([everybody.get(cell, np.zeros(2)) for cell in cells]).reshape(-1, 2)
         path = np.array(self._path[:: round(CELL_LENGTH / _PLACE)]).reshape(-1, 3)
         return {
@@ -170,7 +182,7 @@ class _Road:
 
     def _everybody(self) -> dict[int, NDArray[np.float64]]:
         """Time and way of all vehicles that drove on the ego's road in its direction, by cell."""
-        if len(self._path) < 2:
+        if len(self._path) < 2 or not self._pending:
             return {}
         _, sums = self._merge()
         sums = sums[sums[:, 0] > 0]
@@ -191,12 +203,12 @@ class _Road:
         return found
 
 
-def _squares(traffic: TrafficState, elapsed: float) -> _Squares:
-    x, y = np.floor(traffic.position[:, :2].T / _PLACE).astype(np.int64) + 2**20
-    eighth = np.round(traffic.heading / (math.pi / 4)).astype(np.int64) % 8
-    columns = [np.ones(len(x)), traffic.speed, *traffic.position[:, :2].T]
-    columns += [np.cos(traffic.heading), np.sin(traffic.heading)]
-    return _Squares((x * 2**21 + y) * 8 + eighth, elapsed * np.stack(columns, axis=1))
+def _squares(span: TrafficSpan) -> _Squares:
+    x, y = np.floor(span.position[:, :2].T / _PLACE).astype(np.int64) + 2**20
+    eighth = np.round(span.heading / (math.pi / 4)).astype(np.int64) % 8
+    columns = np.stack((span.speed, *span.position[:, :2].T, np.cos(span.heading), np.sin(span.heading)), axis=1)
+    sums = np.concatenate((span.elapsed[:, None], span.elapsed[:, None] * columns), axis=1)
+    return _Squares((x * 2**21 + y) * 8 + eighth, sums)
 
 
 def _place(traffic: TrafficState, vehicle: str) -> tuple[float, float] | None:

@@ -1,5 +1,6 @@
 """What is believed about the fog after many estimates."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,9 +33,19 @@ class Belief:
         share : float
             Probability in 0 … 1; 0.05 is a cautious visibility, 0.5 the median.
         """
+        return self.visibility_quantiles((share,))[0]
+
+    def visibility_quantiles(self, shares: Sequence[float]) -> tuple[float, ...]:
+        """Several of these together, which cost hardly more than one [m].
+
+        Parameters
+        ----------
+        shares : (n,) sequence of float
+            Probabilities in 0 … 1.
+        """
         cumulative = np.cumsum(self.probability) - 0.5 * self.probability
-        log_extinction = np.interp(1.0 - share, cumulative, self.log_extinction)
-        return float(OPTICAL_DEPTH_AT_VISIBILITY / np.exp(log_extinction))
+        log_extinctions = np.interp([1.0 - share for share in shares], cumulative, self.log_extinction)
+        return tuple((OPTICAL_DEPTH_AT_VISIBILITY / np.exp(log_extinctions)).tolist())
 
     @property
     def visibility(self) -> float:

@@ -2,8 +2,9 @@ import math
 
 import pytest
 
-from fogsim.metrics import SafetyStandard, step_metrics
+from fogsim.metrics import SafetyStandard, deceleration_rate_to_avoid_crash, step_metrics, time_to_collision
 from fogsim.recorders import DERIVED_QUANTITIES
+from fogsim.units import finite_or_none
 from fogsim.values import Leader
 from tests.recorders.synthetic import make_step
 
@@ -24,6 +25,14 @@ def test_no_leader_and_contact_leave_the_measures_undefined() -> None:
     touching = step_metrics(make_step(speed=25.0, leader=Leader("other", 0.0, 20.0)))
     assert touching["time_to_collision_s"] == 0.0
     assert touching["drac_mps2"] is None
+
+
+@pytest.mark.parametrize("gap", [-1.0, 0.0, 7.0])
+@pytest.mark.parametrize("ahead", [0.0, 20.0, 25.0, 30.0])
+def test_the_leader_is_measured_as_everybody_is(gap: float, ahead: float) -> None:
+    derived = step_metrics(make_step(speed=25.0, leader=Leader("other", gap, ahead)))
+    assert derived["time_to_collision_s"] == finite_or_none(float(time_to_collision(gap, 25.0, ahead)))
+    assert derived["drac_mps2"] == finite_or_none(float(deceleration_rate_to_avoid_crash(gap, 25.0, ahead)))
 
 
 def test_margin_is_visibility_ahead_minus_the_aashto_stopping_sight_distance_of_100_kmh() -> None:

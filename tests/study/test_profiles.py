@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 
+from fogsim.metrics import RunMetrics
 from fogsim.study import profiles
 from fogsim.study.profiles import RunProfiles
 from fogsim.units import extinction_from_visibility
@@ -36,8 +37,11 @@ def drive() -> list[Step]:
 
 def profiles_of(steps: list[Step]) -> dict[str, object]:
     watched = RunProfiles()
+    metrics = RunMetrics(names=[], watchers=[watched])
     for one in steps:
         watched.update(one)
+        metrics.update(one)
+    metrics.summary()
     return json.loads(json.dumps(watched.to_json(), allow_nan=False))
 
 

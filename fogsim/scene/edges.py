@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.jit import kernel
 from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.polyline import Points, arc_length, left_normals, parallel, refined, true_spans
 from fogsim.scene.road import FAST, KERB, LINE_CODE, LONGEST, TOWN, footway_mesh, strip
@@ -113,13 +114,24 @@ def _room_beside(line: Points, inner: float, most: float, index: LaneIndex, shar
 
 def _thinned(line: Points, room: NDArray[np.float64]) -> tuple[Points, NDArray[np.float64]]:
     """A line and the room beside it, without the points between which it is straight and widens evenly."""
-    step = np.diff(line, axis=0)
-    step /= np.linalg.norm(step, axis=1, keepdims=True)
-    kept = np.ones(len(line), np.bool_)
-    kept[1:-1] = np.linalg.norm(np.diff(step, axis=0), axis=1) > 1e-6
-    kept[1:-1] |= np.abs(np.diff(room, n=2)) > 0.03
-    corners = refined(line[kept], LONGEST)
+    corners = refined(line[_corners(np.ascontiguousarray(line), room)], LONGEST)
     return corners, np.interp(arc_length(corners), arc_length(line), room)
+
+
+@kernel
+def _corners(line: Points, room: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which points of a line are its ends, or where it bends or its room changes unevenly."""
+    kept = np.ones(len(line), np.bool_)
+    before = line[1] - line[0]
+    before /= np.sqrt((before * before).sum())
+    for i in range(1, len(line) - 1):
+        step = line[i + 1] - line[i]
+        step /= np.sqrt((step * step).sum())
+        turned = step - before
+        uneven = abs((room[i + 1] - room[i]) - (room[i] - room[i - 1]))
+        kept[i] = np.sqrt((turned * turned).sum()) > 1e-6 or uneven > 0.03
+        before = step
+    return kept
 
 
 def _shoulder_width(speed_limit: float, side: int) -> float:

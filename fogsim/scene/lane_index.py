@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
-from fogsim.scene.polyline import Points, cleaned, refined
+from fogsim.scene.polyline import Points, refined_lines
 from fogsim.values.road import Lane
 
 FARTHEST = 30.0
@@ -54,11 +54,12 @@ class LaneIndex:
     """
 
     def __init__(self, lanes: Sequence[Lane]) -> None:
-        lines = [refined(cleaned(lane.centreline), _LONGEST) for lane in lanes]
-        counts = [len(line) - 1 for line in lines]
-        start = np.concatenate([line[:-1] for line in lines])
-        step = np.concatenate([np.diff(line, axis=0) for line in lines])
-        half = np.repeat([0.5 * lane.width for lane in lanes], counts)
+        points, counts = refined_lines([lane.centreline for lane in lanes], _LONGEST)
+        # From the last point of a line to the first of the next there is no piece.
+        within = np.ones(len(points) - 1, np.bool_)
+        within[np.cumsum(counts)[:-1] - 1] = False
+        start, step = points[:-1][within], np.diff(points, axis=0)[within]
+        half = np.repeat([0.5 * lane.width for lane in lanes], counts - 1)
         cells = np.floor((start[:, :2] + 0.5 * step[:, :2]) / _CELL).astype(np.int64)
         corner = cells.min(axis=0)
         cells -= corner

@@ -3,6 +3,8 @@
 The work is compiled: networks have a hundred thousand of them, each too short for numpy to be fast.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -70,6 +72,22 @@ def refined(points: Points, longest: float) -> Points:
     return _refined(np.ascontiguousarray(points, np.float64), longest)
 
 
+def refined_lines(lines: Sequence[Points], longest: float) -> tuple[Points, NDArray[np.int64]]:
+    """Points of many polylines, one after another, each `cleaned` and then `refined`, and how many each has.
+
+    Parameters
+    ----------
+    lines : sequence of (n, 3) float64
+        The polylines [m].
+    longest : float
+        Length above which a segment is divided evenly [m].
+    """
+    ends = np.cumsum([0, *map(len, lines)])
+    points = np.concatenate(lines)
+    counts = _refined_counts(points, ends, longest)
+    return _refined_lines(points, ends, longest, int(counts.sum())), counts
+
+
 def left_normals(points: Points) -> NDArray[np.float64]:
     """Vectors (n, 2) to the left at the vertices, mitred so that parallels keep their distance.
 
@@ -113,14 +131,7 @@ def project(points: NDArray[np.float64], line: Points) -> NDArray[np.float64]:
     line : (n, 2 or 3) float64
         The polyline [m].
     """
-    start, step = line[:-1, :2], np.diff(line[:, :2], axis=0)
-    length = np.hypot(*step.T)
-    offset = points[:, None, :2] - start
-    share = np.clip(np.einsum("ijk,jk->ij", offset, step) / length**2, 0.0, 1.0)
-    gap = np.linalg.norm(offset - share[..., None] * step, axis=2)
-    nearest = np.argmin(gap, axis=1)
-    along = share[np.arange(len(points)), nearest] * length[nearest]
-    return np.asarray(arc_length(line)[nearest] + along, np.float64)
+    return _project(np.ascontiguousarray(points, np.float64), np.ascontiguousarray(line, np.float64))
 
 
 def true_spans(chosen: NDArray[np.bool_], *, least: int = 1) -> list[tuple[int, int]]:
@@ -161,6 +172,23 @@ def _arc_length(points: Points) -> NDArray[np.float64]:
 
 
 @kernel
+def _project(points: Points, line: Points) -> NDArray[np.float64]:
+    """Distance along a line of its place nearest to each point (see `project`): on the first piece of several."""
+    length, result = _arc_length(line), np.zeros(len(points))
+    for k in range(len(points)):
+        nearest = np.inf
+        for i in range(len(line) - 1):
+            dx, dy = line[i + 1, 0] - line[i, 0], line[i + 1, 1] - line[i, 1]
+            u, v, piece = points[k, 0] - line[i, 0], points[k, 1] - line[i, 1], np.hypot(dx, dy)
+            share = min(max((u * dx + v * dy) / (piece * piece), 0.0), 1.0)
+            u, v = u - share * dx, v - share * dy
+            gap = np.sqrt(u * u + v * v)
+            if gap < nearest:
+                nearest, result[k] = gap, length[i] + share * piece
+    return result
+
+
+@kernel
 def _refined(points: Points, longest: float) -> Points:
     """Polyline with as many vertices more that no segment is longer than `longest` [m]."""
     count = 1
@@ -178,6 +206,28 @@ def _refined(points: Points, longest: float) -> Points:
                 result[k, axis] = points[i, axis] + share * (points[i + 1, axis] - points[i, axis])
             k += 1
     result[k] = points[-1]
+    return result
+
+
+@kernel
+def _refined_counts(points: Points, ends: NDArray[np.int64], longest: float) -> NDArray[np.int64]:
+    """How many points each line has when it is cleaned and refined; lines lie between `ends`."""
+    counts = np.empty(len(ends) - 1, np.int64)
+    for i in range(len(counts)):
+        line = points[ends[i] : ends[i + 1]]
+        counts[i] = len(_refined(line[_kept_vertices(line, SHORTEST)], longest))
+    return counts
+
+
+@kernel
+def _refined_lines(points: Points, ends: NDArray[np.int64], longest: float, count: int) -> Points:
+    result = np.empty((count, points.shape[1]))
+    k = 0
+    for i in range(len(ends) - 1):
+        line = points[ends[i] : ends[i + 1]]
+        fine = _refined(line[_kept_vertices(line, SHORTEST)], longest)
+        result[k : k + len(fine)] = fine
+        k += len(fine)
     return result
 
 

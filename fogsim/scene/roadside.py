@@ -8,6 +8,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.jit import kernel
 from fogsim.linear_algebra import matrix_product
 from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.polyline import arc_length, at_distance, left_normals
@@ -187,13 +188,22 @@ def trees(
 
 def _apart(places: Points, taken: Points, distance: float) -> NDArray[np.bool_]:
     """Which places lie farther than a distance [m] from every place that is taken."""
-    apart = np.ones(len(places), np.bool_)
     order = np.argsort(places[:, 0], kind="stable")
-    east = places[order, 0]
-    for x, y in taken[:, :2].tolist():
+    apart = np.empty(len(places), np.bool_)
+    apart[order] = _sorted_apart(places[order], taken, distance)
+    return apart
+
+
+@kernel
+def _sorted_apart(places: Points, taken: Points, distance: float) -> NDArray[np.bool_]:
+    """Which places (n, 3), from west to east, lie apart from every one that is taken (see `_apart`)."""
+    apart, east = np.ones(len(places), np.bool_), np.ascontiguousarray(places[:, 0])
+    for k in range(len(taken)):
+        x, y = taken[k, 0], taken[k, 1]
         # Only those in the same strip from south to north may be near.
-        near = order[np.searchsorted(east, x - distance) : np.searchsorted(east, x + distance, "right")]
-        apart[near] &= (np.abs(places[near, 1] - y) > distance) | (np.abs(places[near, 0] - x) > distance)
+        for i in range(np.searchsorted(east, x - distance), np.searchsorted(east, x + distance, "right")):
+            if abs(places[i, 1] - y) <= distance and abs(places[i, 0] - x) <= distance:
+                apart[i] = False
     return apart
 
 

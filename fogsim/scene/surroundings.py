@@ -129,7 +129,7 @@ class Corridor:
         """
         if not lines:
             return []
-        dense = [_dense(line) for line in lines]
+        dense = _dense_lines(lines)
         near = self.contains(np.concatenate([points[:, :2] for points in dense]))
         first = np.cumsum([0, *map(len, dense[:-1])])
         found: list[bool] = np.logical_or.reduceat(near, first).tolist()
@@ -138,6 +138,17 @@ class Corridor:
 
 Nearness = Corridor
 """The old name."""
+
+
+def _dense_lines(lines: Sequence[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
+    """Lines as of `_dense`: few are so long that they need it."""
+    places = np.concatenate([line[:, :2] for line in lines])
+    owner = np.repeat(np.arange(len(lines)), [len(line) for line in lines])
+    far = (np.abs(np.diff(places, axis=0)) > _SQUARE).any(axis=1) & (owner[1:] == owner[:-1])
+    dense = list(lines)
+    for number in np.unique(owner[1:][far]).tolist():
+        dense[number] = _dense(dense[number])
+    return dense
 
 
 def _dense(line: NDArray[np.float64]) -> NDArray[np.float64]:

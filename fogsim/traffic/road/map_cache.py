@@ -61,6 +61,17 @@ def cached_map(net: Path) -> RoadMap | None:
         return None
 
 
+def compacted(roads: RoadMap) -> RoadMap:
+    """The same map in a few large arrays: small ones, made between what a parser drops, keep its memory from the system.
+
+    Parameters
+    ----------
+    roads : RoadMap
+        The map.
+    """
+    return _map_of(_arrays_of(roads))
+
+
 def keep_map(net: Path, roads: RoadMap) -> None:
     """Keep a map, if the user's cache directory can be written.
 

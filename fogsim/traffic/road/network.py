@@ -11,7 +11,7 @@ import sumolib
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
-from fogsim.traffic.road.map_cache import cached_map, is_worth_caching, keep_map
+from fogsim.traffic.road.map_cache import cached_map, compacted, is_worth_caching, keep_map
 from fogsim.traffic.road.net_lanes import map_of
 from fogsim.traffic.road.road_map import RoadMap
 from fogsim.traffic.road.xml_stream import open_unpacked
@@ -39,7 +39,7 @@ def read_net(path: Path) -> RoadMap:
         return _parsed(path)
     known = cached_map(path)
     if known is None:
-        known = _parsed(path)
+        known = compacted(_parsed(path))
         keep_map(path, known)
     return known
 

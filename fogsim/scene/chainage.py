@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
-from fogsim.scene.polyline import arc_length, cleaned, project
+from fogsim.scene.polyline import all_cleaned, arc_length, project
 from fogsim.values.road import Lane
 
 _BESIDE = 9.0  # ends of the two directions of a road lie nearer to each other than this [m]
@@ -27,10 +27,11 @@ class Chainage:
     """
 
     def __init__(self, lanes: Sequence[Lane]) -> None:
-        self._reference: dict[str, NDArray[np.float64]] = {}
+        along: dict[str, NDArray[np.float64]] = {}
         for lane in lanes:
-            if lane.outermost or lane.edge_id not in self._reference:
-                self._reference[lane.edge_id] = cleaned(lane.centreline)
+            if lane.outermost or lane.edge_id not in along:
+                along[lane.edge_id] = lane.centreline
+        self._reference = dict(zip(along, all_cleaned(list(along.values())), strict=True))
         opposites = _opposites(self._reference)
         self._offset = _offsets(self._reference, _predecessors(lanes, self._reference), opposites)
         # Of the two directions of a road, one is measured along the other.

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fogsim.scene.edges import Edge
 from fogsim.scene.lane_index import LaneIndex
@@ -106,17 +107,21 @@ def houses(edges: Sequence[Edge], index: LaneIndex, terrain: Terrain, rng: np.ra
     """
     found: dict[str, list[tuple[Points, float, float]]] = {}
     taken = Spacing(1.8 * HOUSE_RADIUS)
-    for edge in edges:
-        if edge.speed_limit > TOWN:
-            continue
-        places, along = stations(edge.line, _PLOT, edge.side * (edge.inner + edge.shoulder + _GARDEN))
-        room = index.clearance(places) > HOUSE_RADIUS
-        for place, turn, free in zip(places, along.tolist(), room.tolist(), strict=True):
-            built, kind, size = rng.random() < 0.8, int(rng.integers(len(_KINDS))), rng.uniform(0.9, 1.12)
-            if built and free and taken.takes(place):
-                facing = turn if edge.side > 0 else turn + np.pi
-                found.setdefault(f"house_{kind}", []).append((place, facing, size))
+    plots = [_plots(edge) for edge in edges if edge.speed_limit <= TOWN]
+    places = np.concatenate([np.zeros((0, 3)), *(own for own, _ in plots)])
+    facing = np.concatenate([np.zeros(0), *(turn for _, turn in plots)])
+    room = index.clearance(places) > HOUSE_RADIUS
+    for place, turn, free in zip(places, facing.tolist(), room.tolist(), strict=True):
+        built, kind, size = rng.random() < 0.8, int(rng.integers(len(_KINDS))), rng.uniform(0.9, 1.12)
+        if built and free and taken.takes(place):
+            found.setdefault(f"house_{kind}", []).append((place, turn, size))
     return [_built(name, members, terrain) for name, members in found.items()]
+
+
+def _plots(edge: Edge) -> tuple[Points, NDArray[np.float64]]:
+    """Where houses may stand along a street (n, 3) [m], and their headings [rad]."""
+    places, along = stations(edge.line, _PLOT, edge.side * (edge.inner + edge.shoulder + _GARDEN))
+    return places, along if edge.side > 0 else along + np.pi
 
 
 def _built(name: str, members: Sequence[tuple[Points, float, float]], terrain: Terrain) -> Batch:

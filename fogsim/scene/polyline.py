@@ -88,6 +88,21 @@ def refined_lines(lines: Sequence[Points], longest: float) -> tuple[Points, NDAr
     return _refined_lines(points, ends, longest, int(counts.sum())), counts
 
 
+def all_cleaned(lines: Sequence[Points]) -> list[Points]:
+    """Each of many polylines `cleaned`, as parts of one array.
+
+    Parameters
+    ----------
+    lines : sequence of (n, 3) float64
+        The polylines [m].
+    """
+    if not lines:
+        return []
+    points, counts = refined_lines(lines, np.inf)
+    ends = np.cumsum(counts).tolist()
+    return [points[end - count : end] for end, count in zip(ends, counts.tolist(), strict=True)]
+
+
 def left_normals(points: Points) -> NDArray[np.float64]:
     """Vectors (n, 2) to the left at the vertices, mitred so that parallels keep their distance.
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fogsim.scene.chainage import Chainage
 from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.polyline import Points, arc_length, at_distance, cleaned, left_normals, parallel, refined, true_spans
-from fogsim.scene.solids import Material, folds, grid, merge
+from fogsim.scene.solids import Material, folds, grid, grid_faces, grid_normals, mesh
 from fogsim.values.road import Lane, LaneEnd, LaneKind, LaneMarking
 from fogsim.values.scene import Instance, Mesh, Surface
 
@@ -192,35 +192,30 @@ def _bars(line: Points, width: float, thick: float, pieces: Sequence[tuple[float
     length = float(arc_length(line)[-1])
     near, far = (at_distance(line, np.array([max(length - _SETBACK - d, 0.0)]))[0] for d in (thick, 0.0))
     left = np.append(left_normals(line)[-1], 0.0)
-    parts = []
-    for low, high in pieces:
-        ends = [0.98 * width * low * left, 0.98 * width * high * left]
-        parts.append(_painted(np.array([[near + end, far + end] for end in ends])))
-    return merge(parts)
+    ends = (0.98 * width * np.array(pieces))[:, :, None] * left
+    return _painted(np.stack((near + ends, far + ends), axis=2))
 
 
 def _zebra(line: Points, width: float) -> Mesh:
     """Stripes along the carriageway, across the way of the pedestrians."""
     length = float(arc_length(line)[-1])
     left = np.append(left_normals(line)[0], 0.0)
-    parts = []
-    for start in np.arange(0.25, max(length - 0.5, 0.3), 1.0).tolist():
-        a, b = at_distance(line, np.array([start, start + 0.5]))
-        parts.append(_painted(np.array([[a + end, b + end] for end in (-width / 2 * left, width / 2 * left)])))
-    return merge(parts)
+    starts = np.arange(0.25, max(length - 0.5, 0.3), 1.0)
+    ends = np.stack((at_distance(line, starts), at_distance(line, starts + 0.5)), axis=1)
+    return _painted(np.stack((ends + -width / 2 * left, ends + width / 2 * left), axis=1))
 
 
 def _painted(corners: Points) -> Mesh:
-    """Patch of paint: corners (2, 2, 3), whose second index runs across the line that the road attributes stand for.
+    """Patches of paint: corners (k, 2, 2, 3), whose third index runs across the line that road attributes stand for.
 
     Only part of the attributes' line is as wide as its patch, so that its edges are smoothed like those of any line.
     """
-    along = math.dist(corners[0, 0], corners[1, 0])
-    middle = corners.mean(axis=1, keepdims=True)
-    widened = middle + 1.5 * (corners - middle)
-    road = np.zeros((2, 2, 4))
-    road[..., 0] = np.array([[0.0], [along]])
+    middle = corners.mean(axis=2, keepdims=True)
+    lifted = middle + 1.5 * (corners - middle) + np.array([0.0, 0.0, _LIFT])
+    road = np.zeros((*corners.shape[:3], 4))
+    road[:, 1, :, 0] = np.array([math.dist(near[0], far[0]) for near, far in corners.tolist()])[:, None]
     road[..., 1] = 1.0 + 0.75 * LINE_WIDTH * np.array([-1.0, 1.0])
     road[..., 2], road[..., 3] = 1.0, 3.0
-    lifted = widened + np.array([0.0, 0.0, _LIFT])
-    return grid(lifted, ASPHALT, (0, 0, 1), road=road.reshape(-1, 4), instance=Instance.ROAD)
+    normals = np.stack([grid_normals(patch, (0, 0, 1)) for patch in lifted])
+    faces = grid_faces(2, 2) + 4 * np.arange(len(corners))[:, None, None]
+    return mesh(lifted, faces, normals, ASPHALT, road=road, instance=Instance.ROAD)

@@ -62,7 +62,7 @@ def cached_map(net: Path) -> RoadMap | None:
 
 
 def compacted(roads: RoadMap) -> RoadMap:
-    """The same map in a few large arrays: small ones, made between what a parser drops, keep its memory from the system.
+    """The same map in a few large arrays: small ones, made among what a parser drops, hold its memory back.
 
     Parameters
     ----------

@@ -1,6 +1,5 @@
 """How far a point is from any lane."""
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -14,10 +13,9 @@ from fogsim.values.road import Lane
 FARTHEST = 30.0
 """Distances beyond this are not told apart [m]."""
 
-_CELL = 20.0  # side of the square cells in which pieces of lanes are looked up [m]
+_CELL = 10.0  # side of the square cells in which pieces of lanes are looked up [m]
 _LONGEST = 20.0  # piece of a lane [m]
 _STEP = 0.1  # shortest step in the search for room [m]
-_AROUND = 2  # cells on each side that a piece as near as `FARTHEST` may lie in: (30 + 20 / 2) / 20
 
 
 class _Pieces(NamedTuple):
@@ -88,7 +86,7 @@ class LaneIndex:
         """
         places = np.ascontiguousarray(points, np.float64)
         level = np.inf if same_level is None else same_level
-        return _clearances(places, level, within, self._around(within), self._pieces)
+        return _clearances(places, level, within, self._reach(within), self._pieces)
 
     def room(self, points: Points, normal: NDArray[np.float64], most: float, same_level: float) -> NDArray[np.float64]:
         """How far one gets from points (n, 3) along their normals (n, 2) before a lane begins [m].
@@ -105,11 +103,11 @@ class LaneIndex:
             Lanes higher or lower than the point by more than this [m] are left out.
         """
         places, directions = np.ascontiguousarray(points, np.float64), np.ascontiguousarray(normal, np.float64)
-        return _rooms(places, directions, most, same_level, self._around(most), self._pieces)
+        return _rooms(places, directions, most, same_level, self._reach(most), self._pieces)
 
-    def _around(self, within: float) -> int:
-        """Cells on each side that the pieces of lanes whose edges are so near [m] may lie in."""
-        return min(math.ceil((within + self._widest + 0.5 * _LONGEST) / _CELL), _AROUND)
+    def _reach(self, within: float) -> float:
+        """How far off the middles of pieces of lanes may be whose edges are so near [m]."""
+        return within + self._widest + 0.5 * _LONGEST
 
 
 @kernel
@@ -118,7 +116,7 @@ def _rooms(
     normal: NDArray[np.float64],
     most: float,
     same_level: float,
-    around: int,
+    reach: float,
     lanes: _Pieces,
 ) -> NDArray[np.float64]:
     result = np.full(len(points), most)
@@ -126,7 +124,7 @@ def _rooms(
         away = _STEP
         while away < most:
             x, y = points[i, 0] + away * normal[i, 0], points[i, 1] + away * normal[i, 1]
-            clear = _clearance((x, y, points[i, 2]), same_level, most, around, lanes)
+            clear = _clearance((x, y, points[i, 2]), same_level, most, reach, lanes)
             if clear <= 0.0:
                 result[i] = max(away + clear, 0.0)
                 break
@@ -139,27 +137,27 @@ def _clearances(
     points: NDArray[np.float64],
     same_level: float,
     within: float,
-    around: int,
+    reach: float,
     lanes: _Pieces,
 ) -> NDArray[np.float64]:
     result = np.empty(len(points))
     for i in range(len(points)):
         place = (points[i, 0], points[i, 1], points[i, 2])
-        result[i] = _clearance(place, same_level, within, around, lanes)
+        result[i] = _clearance(place, same_level, within, reach, lanes)
     return result
 
 
 @kernel
 def _clearance(
-    place: tuple[float, float, float], same_level: float, within: float, around: int, lanes: _Pieces
+    place: tuple[float, float, float], same_level: float, within: float, reach: float, lanes: _Pieces
 ) -> float:
     x, y, z = place
     nearest, pieces, key, columns, rows = within, lanes.pieces, lanes.key, lanes.columns, lanes.rows
-    middle, row = np.int64(np.floor(x / _CELL)) - lanes.corner[0], np.int64(np.floor(y / _CELL)) - lanes.corner[1]
-    low, high = max(row - around, 0), min(row + around, rows - 1)
+    low, high = max(_cell(y - reach) - lanes.corner[1], 0), min(_cell(y + reach) - lanes.corner[1], rows - 1)
     if low > high:
         return nearest
-    for column in range(max(middle - around, 0), min(middle + around + 1, len(columns) - 1)):
+    first, last_column = _cell(x - reach) - lanes.corner[0], _cell(x + reach) - lanes.corner[0]
+    for column in range(max(first, 0), min(last_column + 1, len(columns) - 1)):
         k, end, last = columns[column], columns[column + 1], column * rows + high
         k += np.searchsorted(key[k:end], column * rows + low)
         while k < end and key[k] <= last:
@@ -171,3 +169,9 @@ def _clearance(
                 nearest = min(nearest, np.sqrt(u * u + v * v) - pieces[k, 6])
             k += 1
     return nearest
+
+
+@kernel
+def _cell(place: float) -> int:
+    """Column or row of a place."""
+    return np.int64(np.floor(place / _CELL))

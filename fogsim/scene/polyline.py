@@ -55,8 +55,7 @@ def at_distance(points: Points, distance: NDArray[np.float64]) -> Points:
     distance : (k,) float64
         Distances from its first vertex [m].
     """
-    length = arc_length(points)
-    return np.stack([np.interp(distance, length, points[:, axis]) for axis in range(3)], axis=1)
+    return _at_distance(np.ascontiguousarray(points, np.float64), np.ascontiguousarray(distance, np.float64))
 
 
 def refined(points: Points, longest: float) -> Points:
@@ -159,8 +158,21 @@ def true_spans(chosen: NDArray[np.bool_], *, least: int = 1) -> list[tuple[int, 
     least : int
         Shorter spans are left out.
     """
-    changes = np.flatnonzero(np.diff(np.concatenate(([0], chosen.astype(int), [0]))))
-    return [(first, end) for first, end in changes.reshape(-1, 2).tolist() if end - first >= least]
+    return [(first, end) for first, end in _true_spans(np.ascontiguousarray(chosen), least).tolist()]
+
+
+@kernel
+def _true_spans(chosen: NDArray[np.bool_], least: int) -> NDArray[np.int64]:
+    """First indices of spans that are all true, and those after their last (k, 2)."""
+    spans = np.empty(((len(chosen) + 1) // 2, 2), np.int64)
+    count, first = 0, 0
+    for i in range(len(chosen) + 1):
+        if i == len(chosen) or not chosen[i]:
+            if i > first and i - first >= least:
+                spans[count, 0], spans[count, 1] = first, i
+                count += 1
+            first = i + 1
+    return spans[:count]
 
 
 @kernel
@@ -200,6 +212,21 @@ def _project(points: Points, line: Points) -> NDArray[np.float64]:
             gap = np.sqrt(u * u + v * v)
             if gap < nearest:
                 nearest, result[k] = gap, length[i] + share * piece
+    return result
+
+
+@kernel
+def _at_distance(points: Points, distance: NDArray[np.float64]) -> Points:
+    """Points (k, 3) along a line (see `at_distance`)."""
+    length, result = _arc_length(points), np.empty((len(distance), 3))
+    for k in range(len(distance)):
+        i = np.searchsorted(length, distance[k], "right") - 1
+        if i < 0 or i >= len(length) - 1 or length[i] == distance[k]:
+            result[k] = points[max(i, 0)]
+            continue
+        for axis in range(3):
+            slope = (points[i + 1, axis] - points[i, axis]) / (length[i + 1] - length[i])
+            result[k, axis] = slope * (distance[k] - length[i]) + points[i, axis]
     return result
 
 

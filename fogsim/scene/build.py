@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
+from fogsim.garbage import no_garbage_collection
 from fogsim.scene.bodies import body_shapes
 from fogsim.scene.edges import Edge, lane_edge
 from fogsim.scene.ground import Border, GroundPlan, Rail
@@ -78,6 +79,7 @@ class ScenePlan:
         If no lane has a length.
     """
 
+    @no_garbage_collection()
     def __init__(
         self, network: RoadNetwork, signs: SignMap, rng: np.random.Generator, *, street_lamps: bool = False
     ) -> None:

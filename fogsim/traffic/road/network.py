@@ -1,9 +1,7 @@
 """Roads of a SUMO network as plain geometry."""
 
-import contextlib
-import gc
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +9,7 @@ import sumolib
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
+from fogsim.garbage import no_garbage_collection
 from fogsim.traffic.road.map_cache import cached_map, compacted, is_worth_caching, keep_map
 from fogsim.traffic.road.net_lanes import map_of
 from fogsim.traffic.road.road_map import RoadMap
@@ -20,6 +19,7 @@ from fogsim.values import Lane, RoadNetwork
 _ROOT, _HEAD = re.compile(rb"<net\s[^>]*>"), 1 << 20  # tag of the root, and in how many first bytes of a file it stands
 
 
+@no_garbage_collection()
 def read_net(path: Path) -> RoadMap:
     """Read a SUMO network file.
 
@@ -46,26 +46,13 @@ def read_net(path: Path) -> RoadMap:
 
 def _parsed(path: Path) -> RoadMap:
     try:
-        with _no_garbage_collection():
-            net = sumolib.net.readNet(str(path), withInternal=True, withFoes=False)
-            found = map_of(net, _is_lefthand(path))
+        net = sumolib.net.readNet(str(path), withInternal=True, withFoes=False)
+        found = map_of(net, _is_lefthand(path))
     except Exception as error:
         raise InputError(f"{path}: not a SUMO network: {error}") from error
     if not found.edges:
         raise InputError(f"{path}: the SUMO network has no edges")
     return found
-
-
-@contextlib.contextmanager
-def _no_garbage_collection() -> Iterator[None]:
-    """Pause garbage collection, which takes two thirds of the time where nothing made becomes garbage."""
-    was_enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_enabled:
-            gc.enable()
 
 
 def _is_lefthand(path: Path) -> bool:

@@ -174,4 +174,4 @@ def _clearance(
 @kernel
 def _cell(place: float) -> int:
     """Column or row of a place."""
-    return np.int64(np.floor(place / _CELL))
+    return int(np.floor(place / _CELL))

@@ -12,6 +12,7 @@ from fogsim.metrics.step_metrics import DEFAULT_STANDARD, step_metrics
 from fogsim.metrics.surrogate import SafetyStandard
 from fogsim.metrics.traffic_collisions import TrafficCollisions
 from fogsim.metrics.traffic_comfort import TrafficComfort
+from fogsim.metrics.traffic_compliance import TrafficCompliance
 from fogsim.metrics.traffic_conflicts import TrafficConflicts
 from fogsim.metrics.traffic_emissions import TrafficEmissions
 from fogsim.metrics.traffic_flow import TrafficFlow
@@ -43,6 +44,7 @@ METRICS: Registry[MetricFactory] = Registry(
         "traffic_sight": lambda standard: TrafficSight(standard.reaction_time, standard.deceleration),
         "traffic_flow": lambda _: TrafficFlow(),
         "traffic_comfort": lambda _: TrafficComfort(),
+        "traffic_compliance": lambda standard: TrafficCompliance(standard.advice_tolerance),
         "traffic_emissions": lambda _: TrafficEmissions(),
     },
 )

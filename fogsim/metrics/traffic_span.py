@@ -41,6 +41,8 @@ class TrafficSpan:
         As of `TrafficState`.
     free_speed : (n,) float64
         As of `TrafficState`; nan where it is not known.
+    advised_speed : (n,) float64
+        As of `TrafficState`; ``inf`` where a driver has heard none.
     extinction : (n,) float64
         Extinction coefficient at the driver's eyes [1/m]; nan where it is not known.
     duration : float
@@ -62,6 +64,7 @@ class TrafficSpan:
     acceleration: NDArray[np.float64]
     length: NDArray[np.float64]
     free_speed: NDArray[np.float64]
+    advised_speed: NDArray[np.float64]
     extinction: NDArray[np.float64]
     duration: float
     collisions: tuple[Collision, ...]
@@ -219,7 +222,8 @@ class TrafficGathering:
         states, times, extinctions = zip(*self._states, strict=True)
         vehicles, lanes, kinds = zip(*self._numbers, strict=True)
         counts = [len(state.ids) for state in states]
-        free = [state.free_speed if len(state.free_speed) else np.full(len(state.ids), np.nan) for state in states]
+        free = [_known(state.free_speed, n, np.nan) for state, n in zip(states, counts, strict=True)]
+        advised = [_known(state.advised_speed, n, np.inf) for state, n in zip(states, counts, strict=True)]
         fog = [np.full(n, np.nan) if k is None else k for k, n in zip(extinctions, counts, strict=True)]
         span = TrafficSpan(
             moment=np.repeat(np.arange(self._moments, self._moments + len(states)), counts),
@@ -233,6 +237,7 @@ class TrafficGathering:
             acceleration=np.concatenate([state.acceleration for state in states]),
             length=np.concatenate([state.length for state in states]),
             free_speed=np.concatenate(free),
+            advised_speed=np.concatenate(advised),
             extinction=np.concatenate(fog),
             duration=float(sum(times)),
             collisions=tuple(self._collisions),
@@ -242,6 +247,11 @@ class TrafficGathering:
         self._moments += len(states)
         self._rows, self._states, self._numbers, self._collisions = 0, [], [], []
         return span
+
+
+def _known(values: NDArray[np.float64], count: int, unknown: float) -> NDArray[np.float64]:
+    """Values of each vehicle; the same for all where a state has none."""
+    return values if len(values) else np.full(count, unknown)
 
 
 class GatheredMetrics:

@@ -2,7 +2,7 @@
 
 import functools
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Concatenate, ParamSpec, TypeVar
 
@@ -85,7 +85,7 @@ class SumoTraffic:
         self._run: _Run | None = None
         self._fog: FogAccess | None = None
         self._seed = 0
-        self._ego_lamps = Command().lamps
+        self._command = _NO_ADVICE
         self._begun = 0.0
         self._route: RoutePosition | None = None
         self._mark = 0
@@ -125,7 +125,7 @@ class SumoTraffic:
         self._seed = seed
         if self._fog is not None:
             self.enter_fog(self._fog)
-        self._ego_lamps = Command().lamps
+        self._command = _NO_ADVICE
         self._route, self._mark, self._teleported = None, 0, False
         try:
             check_step_length(api, setup.step_length)
@@ -216,7 +216,7 @@ class SumoTraffic:
             Advised speeds and lamps.
         """
         run = self._running
-        self._ego_lamps = command.lamps
+        self._command = command
         run.speeds.apply(self._play_script(run, command))
         self._update_drivers(run, command)
 
@@ -260,7 +260,7 @@ class SumoTraffic:
 
     def _update_drivers(self, run: _Run, command: Command) -> None:
         if run.perception is not None:
-            run.perception.update(self._setup.ego, self._ego_lamps, run.script.dark)
+            run.perception.update(self._setup.ego, self._command.lamps, run.script.dark)
         if run.drivers is not None:
             run.drivers.update(command)
 
@@ -286,7 +286,7 @@ class SumoTraffic:
         new, self._mark = run.roster.entered_since(self._mark)
         # Another vehicle may have come under the ego's name.
         self._route = RoutePosition(run.api, ego) if self._route is None or ego in new else self._route
-        state = run.reader.state(self._ego_lamps)
+        state = run.reader.state(self._command.lamps, self._heard(run))
         row = state.ids.index(ego)
         route_position, route_length = self._route.update(state.position[row])
         state = _with_failed_lamps(run.lane_changes.smoothed(state), run.script.dark)
@@ -305,7 +305,7 @@ class SumoTraffic:
         """Tell where everybody is; see `NetworkTraffic.observe_network`."""
         run = self._running
         run.roster.update()
-        state = run.reader.state(self._ego_lamps)
+        state = run.reader.state(self._command.lamps, self._heard(run))
         # Who is between lanes is on none.
         limits = [float(run.api.lane.getMaxSpeed(lane)) for lane in {*state.lane} if lane]
         return NetworkSnapshot(
@@ -314,6 +314,12 @@ class SumoTraffic:
             collisions=run.collisions.take(),
             is_over=run.api.simulation.getMinExpectedNumber() == 0,
         )
+
+    def _heard(self, run: _Run) -> Mapping[str, float]:
+        """What everybody has heard advised, the ego its own [m/s]."""
+        heard = {} if run.drivers is None else run.drivers.heard
+        ego, own = self._setup.ego, self._command.advice.speed
+        return heard if ego is None or math.isinf(own) else {**heard, ego: own}
 
     def unplayed(self) -> Unplayed:
         """What of the script has not been played; see `Traffic.unplayed`."""

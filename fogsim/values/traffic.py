@@ -1,5 +1,6 @@
 """Where every vehicle is at one instant."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -40,6 +41,9 @@ class TrafficState:
     free_speed : (n,) float64
         Speed at which a driver would travel alone in clear air [m/s]: the lane's limit times the driver's own factor,
         and no more than the vehicle can. Empty where it is not known.
+    advised_speed : (n,) float64
+        Lowest speed in force that a driver has heard advised, whether they follow it or not, the ego its own [m/s];
+        ``inf`` where they have heard none. Empty where nobody has.
     """
 
     time: float
@@ -57,6 +61,7 @@ class TrafficState:
     paint: NDArray[np.float64]
     grade: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     free_speed: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    advised_speed: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         """Put everybody on the level where no grade is given."""
@@ -75,6 +80,19 @@ class TrafficState:
             return self.ids.index(vehicle_id)
         except ValueError:
             return None
+
+
+def advised_speeds(ids: Sequence[str], heard: Mapping[str, float]) -> NDArray[np.float64]:
+    """Advice to vehicles as `TrafficState.advised_speed` has it (n,) [m/s]; empty where nobody has heard any.
+
+    Parameters
+    ----------
+    ids : (n,) sequence of str
+        The vehicles.
+    heard : mapping from vehicle id to float
+        What those who have heard any were advised [m/s].
+    """
+    return np.array([heard.get(vehicle, np.inf) for vehicle in ids]) if heard else np.zeros(0)
 
 
 @dataclass(frozen=True, slots=True)

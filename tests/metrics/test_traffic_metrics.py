@@ -9,6 +9,7 @@ import pytest
 from fogsim.metrics.histogram import Histogram
 from fogsim.metrics.traffic_collisions import TrafficCollisions
 from fogsim.metrics.traffic_comfort import TrafficComfort
+from fogsim.metrics.traffic_compliance import TrafficCompliance
 from fogsim.metrics.traffic_conflicts import TrafficConflicts
 from fogsim.metrics.traffic_emissions import TrafficEmissions
 from fogsim.metrics.traffic_flow import TrafficFlow
@@ -128,6 +129,16 @@ def test_jerk_and_hard_braking_of_those_who_stay() -> None:
     assert found["traffic_hard_braking_time_share"] == pytest.approx(1 / 6)
 
 
+def test_compliance_of_those_who_have_heard_advice() -> None:
+    road = lanes(("a", 0, 20), ("a", 50, 20.9), ("a", 90, 21.1), ("a", 130, 30))
+    advised = dataclasses.replace(road, advised_speed=np.array([25.0, 20.0, 20.0, np.inf]))
+    found = watched(TrafficCompliance(tolerance=1.0), [(0.0, road), (2.0, road), (2.0, advised), (1.0, advised)])
+    assert found["traffic_advised_time_share"] == pytest.approx(9.0 / 20.0)
+    assert found["traffic_advice_compliance_share"] == pytest.approx(2.0 / 3.0)
+    unadvised = watched(TrafficCompliance(tolerance=1.0), [(0.0, road), (2.0, road)])
+    assert unadvised == {"traffic_advised_time_share": 0.0, "traffic_advice_compliance_share": None}
+
+
 def test_emissions_of_a_car_that_keeps_its_speed_coasts_and_stands() -> None:
     """SUMO's HBEFA 4 petrol Euro 4 car at 20 m/s: 1521 + 15.59 · 20 + 0.1199 · 20³ mg of CO2 a second."""
     road = lanes(("a", 0, 20), ("b", 0, 20), ("c", 0, 0))
@@ -152,7 +163,7 @@ def test_collisions_by_what_was_driven() -> None:
     "metric",
     [
         *(TrafficConflicts(3.0), TrafficHeadways(), TrafficFlow(), TrafficSight(2.5, 3.4), TrafficComfort()),
-        *(TrafficCollisions(), TrafficEmissions()),
+        *(TrafficCollisions(), TrafficEmissions(), TrafficCompliance(1.0)),
     ],
     ids=lambda metric: type(metric).__name__,
 )

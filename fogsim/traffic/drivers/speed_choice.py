@@ -253,7 +253,17 @@ class DriverTraits:
         compliance : Compliance
             How drivers follow it.
         """
-        return self.reached_from < compliance.reached_share and self.moved_from < compliance.rate
+        return self.hears(compliance) and self.moved_from < compliance.rate
+
+    def hears(self, compliance: Compliance) -> bool:
+        """Whether advice reaches them.
+
+        Parameters
+        ----------
+        compliance : Compliance
+            Whom it reaches.
+        """
+        return self.reached_from < compliance.reached_share
 
 
 class HeardAdvice(NamedTuple):

@@ -4,7 +4,8 @@ Its environments let their road decide for everybody (``act``) in each simulatio
 drivers have chosen their speeds, and before the script has its way. IDM and MOBIL stay as they are.
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 
 from fogsim.traffic.drivers.events import Event
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
@@ -66,6 +67,11 @@ class DriverControl:
         self._desired_speeds.fog = fog
         if self._sight is not None:
             limit_sight(fog, self._fleet, self._sight)
+
+    def heard(self) -> Mapping[str, float]:
+        """What everybody has heard advised, the ego its own [m/s]."""
+        own, ego = self.command.advice.speed, self._fleet.name(self._fleet.ego)
+        return self._desired_speeds.heard if math.isinf(own) else {**self._desired_speeds.heard, ego: own}
 
     def unplayed(self, keep_lane: Sequence[str]) -> Unplayed:
         """Tell what has not been played so far; see `Manoeuvres.unplayed`.

@@ -1,6 +1,7 @@
 """How fast highway-env's drivers desire to drive: by their own choice in fog, and when they are advised."""
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -60,6 +61,12 @@ class HighwayDesiredSpeeds:
         self._own_speed: dict[Any, float] = {}
         self._own_headway: dict[Any, float] = {}
         self._next = 0.0
+        self._heard: dict[str, float] = {}
+
+    @property
+    def heard(self) -> Mapping[str, float]:
+        """Lowest advice in force of those whom any has reached, followed or not, when they listened last [m/s]."""
+        return self._heard
 
     def update(self, command: Command) -> None:
         """Set the target speeds of this step, and restore those of drivers whom nothing slows down any more.
@@ -87,11 +94,18 @@ class HighwayDesiredSpeeds:
         """Let every driver choose a speed."""
         time, name = self._fleet.time, self._fleet.name
         self._advised_since = heard_since(advised, self._advised_since, time)
-        self._desired = {}
+        self._desired, self._heard = {}, {}
         for vehicle, visibility in zip(vehicles, self._visibilities(vehicles), strict=True):
             vehicle_id = name(vehicle)
             driver = self._traits_of(vehicle_id)
             room, kept = self._follow(vehicle, driver, visibility)
+            reached = {
+                display: speeds[vehicle_id]
+                for display, speeds in advised.items()
+                if vehicle_id in speeds and driver.hears(self._setup.compliance_with(display))
+            }
+            if reached:
+                self._heard[vehicle_id] = min(reached.values())
             own = min(self._own_speed.get(vehicle, vehicle.target_speed), speed_limit(vehicle.lane))
             desired = desired_speed(
                 self._setup,
@@ -99,9 +113,8 @@ class HighwayDesiredSpeeds:
                 own,
                 drivers_visibility(self._sight, visibility),
                 [
-                    HeardAdvice(display, speeds[vehicle_id], time - self._advised_since[display][vehicle_id])
-                    for display, speeds in advised.items()
-                    if vehicle_id in speeds
+                    HeardAdvice(display, speed, time - self._advised_since[display][vehicle_id])
+                    for display, speed in reached.items()
                 ],
                 room,
                 kept,

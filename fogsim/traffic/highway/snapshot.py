@@ -1,6 +1,7 @@
 """From highway-env's vehicles to a snapshot: its positions are centres, its y axis and headings point down."""
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from fogsim.traffic.highway.fleet import Fleet, acceleration, ahead
 from fogsim.traffic.highway.network import lane_id, speed_limit, station_along, upright
 from fogsim.values import Collision, Leader, TrafficSnapshot, TrafficState
+from fogsim.values.traffic import advised_speeds
 
 HEIGHT = 1.5
 """Height of every vehicle [m], as of SUMO's passenger cars; highway-env's have none."""
@@ -41,7 +43,11 @@ def rear_bumper(vehicle: Any) -> NDArray[np.float64]:
 
 
 def read_snapshot(
-    fleet: Fleet, route: NDArray[np.float64], collisions: tuple[Collision, ...], reach: float
+    fleet: Fleet,
+    route: NDArray[np.float64],
+    collisions: tuple[Collision, ...],
+    reach: float,
+    heard: Mapping[str, float] | None = None,
 ) -> TrafficSnapshot | None:
     """Snapshot of the traffic.
 
@@ -55,6 +61,8 @@ def read_snapshot(
         What has happened.
     reach : float
         Vehicles farther from the ego than this are left out [m].
+    heard : mapping from vehicle id to float or None
+        What drivers have heard advised [m/s]; None if nobody has heard anything.
 
     Returns
     -------
@@ -67,7 +75,7 @@ def read_snapshot(
     near = [v for v in vehicles if math.dist(v.position, ego.position) <= reach]
     position, length = station_along(route, front_bumper(ego))
     return TrafficSnapshot(
-        state=_state(fleet, near),
+        state=_state(fleet, near, heard or {}),
         ego=near.index(ego),
         route_position=position,
         route_length=length,
@@ -77,10 +85,11 @@ def read_snapshot(
     )
 
 
-def _state(fleet: Fleet, vehicles: list[Any]) -> TrafficState:
+def _state(fleet: Fleet, vehicles: list[Any], heard: Mapping[str, float]) -> TrafficState:
+    ids = tuple(fleet.name(v) for v in vehicles)
     return TrafficState(
         time=fleet.time,
-        ids=tuple(fleet.name(v) for v in vehicles),
+        ids=ids,
         types=("car",) * len(vehicles),
         position=np.array([front_bumper(v) for v in vehicles]),
         heading=np.array([math.remainder(-v.heading, math.tau) for v in vehicles]),
@@ -92,6 +101,7 @@ def _state(fleet: Fleet, vehicles: list[Any]) -> TrafficState:
         lane=tuple(lane_id(v.lane_index) for v in vehicles),
         lamps=np.array([int(fleet.lamps(v)) for v in vehicles], dtype=np.int32),
         paint=np.array([fleet.paint(v) for v in vehicles]),
+        advised_speed=advised_speeds(ids, heard),
     )
 
 

@@ -182,8 +182,9 @@ class HighwayTraffic:
 
         The impact speed of a collision is the length of the difference of both velocities.
         """
-        fleet, _ = self._running()
-        return read_snapshot(fleet, self.network()[0].route, self._collisions.take(), self._reading_radius)
+        fleet, control = self._running()
+        route, collisions = self.network()[0].route, self._collisions.take()
+        return read_snapshot(fleet, route, collisions, self._reading_radius, control.heard())
 
     def unplayed(self) -> Unplayed:
         """What of the script has not been played; see `Traffic.unplayed`."""

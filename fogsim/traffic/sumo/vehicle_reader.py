@@ -14,6 +14,7 @@ from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
 from fogsim.traffic.sumo.nearby_vehicles import AllVehicles, NearbyVehicles
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.values import Collision, Lamp, Leader, TrafficState
+from fogsim.values.traffic import advised_speeds
 
 LEADER_RANGE = 500.0
 """How far ahead a leader is looked for [m]."""
@@ -181,13 +182,15 @@ class VehicleReader:
         self._constants: _Constants | None = None
         self._signals: tuple[Sequence[int], NDArray[np.int32]] = ([], np.zeros(0, dtype=np.int32))
 
-    def state(self, ego_lamps: Lamp) -> TrafficState:
+    def state(self, ego_lamps: Lamp, heard: Mapping[str, float] | None = None) -> TrafficState:
         """Vehicles near the ego.
 
         Parameters
         ----------
         ego_lamps : Lamp
             Lamps of the command; the ego lights its stop lamps itself.
+        heard : mapping from vehicle id to float or None
+            What drivers have heard advised [m/s]; None if nobody has heard anything.
         """
         self._roster.update()
         new, self._mark = self._roster.entered_since(self._mark)
@@ -214,6 +217,7 @@ class VehicleReader:
             paint=constants.paint,
             grade=np.radians(now.slope),
             free_speed=np.minimum(self._limits(now.lane) * constants.speed_factor, constants.top_speed),
+            advised_speed=advised_speeds(now.ids, heard or {}),
         )
 
     def _limits(self, lanes: Sequence[str]) -> NDArray[np.float64]:

@@ -143,9 +143,15 @@ class SumoDesiredSpeeds:
         self._shares = SpeedShareControl(api, table, setup.advice_deceleration, roster.time)
         self._hearing = AdviceHearing(SumoVehiclePlaces(api, setup.ego, roster))
         self._advised_since: Heard = {}
+        self._heard: dict[str, float] = {}
         self._next, self._chosen = 0.0, self._roster.time
         self._mark = 0
         self._trains: set[str] = set()
+
+    @property
+    def heard(self) -> Mapping[str, float]:
+        """Lowest advice in force of those whom any has reached, followed or not, when they listened last [m/s]."""
+        return self._heard
 
     def update(self, command: Command) -> None:
         """Let new drivers choose a speed, and all drivers if it is time to choose again.
@@ -167,7 +173,7 @@ class SumoDesiredSpeeds:
         if time >= self._next:
             elapsed, self._chosen = time - self._chosen, time
             self._next = time + CHOICE_PERIOD
-            advised = self._hearing.listen(command, elapsed)
+            advised, self._heard = self._hearing.listen(command, elapsed), {}
             # In even fog and without advice, choices stay as they are, but for those who go by their leader.
             settled = self._extinction is not None and not advised and not self._advised_since
             self._advised_since = heard_since(advised, self._advised_since, time)
@@ -227,14 +233,28 @@ class SumoDesiredSpeeds:
         followed: set[int] = set()
         for display, speeds in advised.items():
             compliance = self._compliance[display]
-            reached = values[:, Column.REACHED_FROM] < compliance.reached_share
-            for i in np.flatnonzero(reached & (values[:, Column.MOVED_FROM] < compliance.rate)).tolist():
-                if ids[i] in speeds and self._has_answered(ids[i], display):
+            moved = values[:, Column.MOVED_FROM] < compliance.rate
+            for i in self._reached(ids, values, compliance, speeds):
+                if moved[i] and self._has_answered(ids[i], display):
                     wanted = self._advised(ids[i], int(rows[i]), float(own[i]), compliance, speeds[ids[i]])
                     # Of several, what makes the driver slowest counts.
                     desired[i] = min(float(desired[i]), wanted) if i in followed else wanted
                     followed.add(i)
         return rows, desired, shares
+
+    def _reached(
+        self,
+        ids: Sequence[str],
+        values: NDArray[np.float64],
+        compliance: Compliance,
+        speeds: Mapping[str, float],
+    ) -> list[int]:
+        """Which of some vehicles an advice reaches, which is remembered: who is there, and gets what is said there."""
+        gets = np.flatnonzero(values[:, Column.REACHED_FROM] < compliance.reached_share).tolist()
+        reached = [i for i in gets if ids[i] in speeds]
+        for vehicle in (ids[i] for i in reached):
+            self._heard[vehicle] = min(speeds[vehicle], self._heard.get(vehicle, math.inf))
+        return reached
 
     def _extinctions(self, ids: Sequence[str]) -> NDArray[np.float64]:
         """Extinction coefficients where vehicles are (n,) [1/m]."""

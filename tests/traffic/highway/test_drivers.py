@@ -54,6 +54,13 @@ class Road:
         assert snapshot is not None
         return [v for v in snapshot.state.ids if v != "ego"]
 
+    def heard(self) -> dict[str, float]:
+        """What those have heard who have heard anything."""
+        snapshot = self.traffic.observe()
+        assert snapshot is not None
+        state = snapshot.state
+        return {v: s for v, s in zip(state.ids, state.advised_speed.tolist(), strict=False) if s < math.inf}
+
     def drive(self, seconds: float, command: Command | None = None) -> "Road":
         for _ in range(round(seconds / self.traffic.step_length)):
             self.traffic.advance(command or Command())
@@ -122,6 +129,7 @@ def advised(road: Road, speed: float = 15.0) -> Command:
 def test_advice_that_nobody_follows_changes_no_target_speed(nobody: dict[str, float]) -> None:
     road = Road(exact(**nobody))
     assert road.drive(10.0, advised(road)).targets() == [FAST] * len(road.others)
+    assert road.heard() == ({} if "reached_share" in nobody else dict.fromkeys(road.ids, 15.0))
 
 
 def test_advice_that_all_follow_sets_every_target_speed() -> None:
@@ -187,6 +195,9 @@ def test_the_egos_advice_reaches_those_near_it() -> None:
     reach = sorted(apart)[5] + 1.0
     heard = road.drive(0.1, Command(SpeedAdvice(15.0), advice_reach=reach)).targets()
     assert [target < FAST for target in heard] == [distance <= reach for distance in apart]
+    assert road.heard() == dict.fromkeys(
+        ["ego", *(v for v, d in zip(road.ids, apart, strict=True) if d <= reach)], 15.0
+    )
 
 
 @pytest.mark.parametrize(

@@ -100,17 +100,40 @@ def test_drivers_hear_advice_on_the_stretch_and_drive_by_themselves_behind_it(st
     assert [told[v][-1] for v in ("on", "coming", "late")] == pytest.approx([FAST] * 3, abs=0.5)
 
 
+def heard(traffic: Traffic) -> dict[str, float]:
+    """What those have heard who have heard anything."""
+    snapshot = traffic.observe()
+    assert snapshot is not None
+    state = snapshot.state
+    return {v: s for v, s in zip(state.ids, state.advised_speed.tolist(), strict=False) if s < math.inf}
+
+
+@pytest.mark.parametrize(
+    ("compliance", "others"), [({"rate": 0.0}, {"on": ADVISED, "coming": ADVISED}), ({"reached_share": 0.0}, {})]
+)
+def test_who_has_heard_advice_is_told_whether_they_follow_it(start: Any, compliance: Any, others: Any) -> None:
+    traffic = start(drivers=DriverSetup("unaffected", spread=0.0, compliance=Compliance(**compliance)))
+    assert heard(traffic) == {}
+    advice = StretchAdvice(ADVISED, Stretch(), Display.LAW), StretchAdvice(20.0, Stretch(), Display.IN_CAR)
+    drive(traffic, 2.0, Command(SpeedAdvice(25.0), stretches=advice))
+    assert heard(traffic) == {**others, "ego": 25.0}
+    drive(traffic, 2.0, Command())
+    assert heard(traffic) == {}
+
+
 def test_a_sign_tells_those_who_pass_it(start: Any) -> None:
     traffic = start()
     drive(traffic, 1.0, Command())
     told = drive(traffic, 12.0, to_all(Display.MESSAGE_SIGN))
     assert min(told["on"]) > 29.0
+    assert heard(traffic) == {"coming": ADVISED, "late": ADVISED}
     # It comes to the sign 10 s after it has entered, and brakes within a second.
     assert told["coming"][85] > 29.0
     assert told["coming"][-1] < 27.0
     # What was read is kept when the sign goes dark, to the end of the stretch.
     assert drive(traffic, 12.0, Command())["coming"][-1] == pytest.approx(ADVISED, abs=0.3)
     assert drive(traffic, 30.0, Command())["coming"][-1] == pytest.approx(FAST, abs=0.5)
+    assert heard(traffic) == {}
 
 
 def test_a_stretch_goes_on_across_junctions(start: Any) -> None:

@@ -1,0 +1,54 @@
+"""Whether everybody near the ego keeps to the advice that they have heard."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+
+from fogsim.metrics.metric import JsonValue, share
+from fogsim.metrics.traffic_span import Exposure, TrafficMetric, TrafficSpan
+
+
+@dataclass(slots=True)
+class TrafficCompliance(TrafficMetric):
+    """Speeds against the advice in force that drivers have heard, whether they follow it, and whether they have yet.
+
+    Attributes
+    ----------
+    tolerance : float
+        Speed above the advice that still counts as following it [m/s].
+    """
+
+    tolerance: float
+    meanings: ClassVar[Mapping[str, str]] = {
+        "traffic_advised_time_share": "share of the time of all vehicles near the ego in which their drivers have "
+        "heard an advice in force; the ego hears its own",
+        "traffic_advice_compliance_share": "share of that time in which they drive at it, or slower; 1 km/h above it "
+        "counts",
+    }
+    _exposure: Exposure = field(default_factory=Exposure)
+    _advised_time: float = 0.0
+    _compliant_time: float = 0.0
+
+    def add(self, span: TrafficSpan) -> None:
+        """Take in some steps.
+
+        Parameters
+        ----------
+        span : TrafficSpan
+            The next steps.
+        """
+        self._exposure.add(span)
+        advised = np.isfinite(span.advised_speed)
+        if advised.any():
+            elapsed, above = span.elapsed[advised], span.speed[advised] - span.advised_speed[advised]
+            self._advised_time += float(elapsed.sum())
+            self._compliant_time += float(elapsed[above <= self.tolerance].sum())
+
+    def result(self) -> dict[str, JsonValue]:
+        """Say how everybody followed the advice."""
+        return {
+            "traffic_advised_time_share": share(self._advised_time, self._exposure.time),
+            "traffic_advice_compliance_share": share(self._compliant_time, self._advised_time),
+        }

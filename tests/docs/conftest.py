@@ -83,7 +83,9 @@ def readers_folder(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Ca
         if "camera.yaml" in page:
             (calibration,) = re.findall(r"```yaml\n(width: .*?)```", page, re.DOTALL) or (CAMERA,)
             put_pictures(made, calibration)
-        if "policies.yaml" in page:
+        if "scenarios/studies/" in page:
+            shutil.copytree(CHECKOUT / "scenarios", made / "scenarios")
+        if "# policies.yaml\n" in page:
             (text,) = re.findall(r"```yaml\n(# policies\.yaml\n.*?)```", page, re.DOTALL)
             (made / "policies.yaml").write_text(text, encoding="utf-8")
         if "my/scenario.yaml" in page:

@@ -1,12 +1,13 @@
 """Write the tables of docs/policies.md: ``python docs/make_study_tables.py [--check] STUDY_FOLDER …``.
 
 A folder is what ``fogsim study scenarios/studies/NAME.yaml`` has written, ``runs/NAME`` by default; its ``study.csv``
-and ``comparison.csv`` are read. Each cell of a table has a mean and, in brackets, the interval of its difference to the
-baseline; a star says that 0 is not in it.
+and ``comparison.csv`` are read. Each cell of a table has a mean and, in brackets, the interval of its difference to
+the baseline; a star says that 0 is not in it and that the paired test has p ≤ 0.05.
 """
 
 import argparse
 import csv
+import shutil
 import statistics
 import sys
 from collections.abc import Mapping, Sequence
@@ -16,6 +17,9 @@ from make_tables import HERE, filled
 
 PAGE = HERE / "policies.md"
 Cells = tuple[str, ...]
+
+P_SHOWN = 0.05
+"""Largest p of the paired permutation test with which a difference counts as shown, as in the report."""
 
 Column = tuple[str, str, float, int]
 
@@ -42,6 +46,11 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
     "field_sizes": (SPEED, SPREAD, OVERDRIVING, CONFLICTS, ("traffic_collisions", "collisions a run", 1.0, 2)),
 }
 """Of each study: metrics, what the column is called, the factor to its unit, and digits after the point."""
+
+FIGURES: Mapping[str, Sequence[str]] = {
+    "motorway_policies": ("trade_off_traffic_conflicts_per_vehicle_km", "speed_over_road"),
+}
+"""Figures of a study's report that the page shows."""
 
 
 def read(path: Path) -> list[dict[str, str]]:
@@ -72,12 +81,12 @@ def _cell(runs: Sequence[Mapping[str, str]], difference: Mapping[str, str] | Non
     if difference is None or not difference["low"]:
         return told
     low, high = (factor * float(difference[end]) for end in ("low", "high"))
-    star = "*" if low > 0 or high < 0 else ""
+    star = "*" if (low > 0 or high < 0) and float(difference["p_value"] or 1.0) <= P_SHOWN else ""
     return f"{told} [{low:+.{digits}f}, {high:+.{digits}f}]{star}"
 
 
 def main() -> int:
-    """Write the tables, or say which are not up to date."""
+    """Write the tables and copy the figures, or say which tables are not up to date."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", nargs="+", type=Path, metavar="STUDY_FOLDER", help=", ".join(COLUMNS))
     parser.add_argument("--check", action="store_true", help="write nothing, say which are not up to date")
@@ -92,8 +101,10 @@ def main() -> int:
         if new != text and arguments.check:
             stale = True
             print(f"{PAGE.name}: {folder.name} is not up to date")  # noqa: T201 - the line is the result
-        elif new != text:
+        elif not arguments.check:
             PAGE.write_text(new, encoding="utf-8")
+            for name in FIGURES.get(folder.name, ()):
+                shutil.copy(folder / "figures" / f"{name}.svg", HERE / "pictures" / f"{folder.name}_{name}.svg")
     return int(stale)
 
 

@@ -17,7 +17,7 @@ class TrafficCollisions(TrafficMetric):
     """
 
     meanings: ClassVar[Mapping[str, str]] = {
-        "traffic_collisions": "number of collisions of vehicles near the ego, the ego among them, each pair once",
+        "traffic_collisions": "number of collisions of vehicles read, the ego among them, each pair once",
         "traffic_collisions_per_million_vehicle_km": "the same per million kilometres of all vehicles",
         "traffic_mean_impact_speed_mps": "mean difference of speed in them",
         "traffic_max_impact_speed_mps": "highest difference of speed in them",

@@ -18,7 +18,7 @@ class TrafficComfort(TrafficMetric):
     """Jerk, the change of acceleration between two steps, and hard braking of everybody near the ego."""
 
     meanings: ClassVar[Mapping[str, str]] = {
-        "traffic_rms_jerk_mps3": "root mean square over the time of all vehicles near the ego of the change of "
+        "traffic_rms_jerk_mps3": "root mean square over the time of all vehicles read of the change of "
         "acceleration from step to step, over the time between them",
         "traffic_hard_braking_time_share": "share of that time in which they brake harder than 3.4 m/s²",
     }

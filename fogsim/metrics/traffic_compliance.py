@@ -22,7 +22,7 @@ class TrafficCompliance(TrafficMetric):
 
     tolerance: float
     meanings: ClassVar[Mapping[str, str]] = {
-        "traffic_advised_time_share": "share of the time of all vehicles near the ego in which their drivers have "
+        "traffic_advised_time_share": "share of the time of all vehicles read in which their drivers have "
         "heard an advice in force; the ego hears its own",
         "traffic_advice_compliance_share": "share of that time in which they drive at it, or slower; 1 km/h above it "
         "counts",

@@ -57,7 +57,7 @@ class TrafficEmissions(TrafficMetric):
     """
 
     meanings: ClassVar[Mapping[str, str]] = {
-        "traffic_co2_g_per_vehicle_km": "carbon dioxide of all vehicles near the ego, per kilometre of all, by HBEFA 4 "
+        "traffic_co2_g_per_vehicle_km": "carbon dioxide of all vehicles read, per kilometre of all, by HBEFA 4 "
         "with SUMO's usual classes; on the level",
         "traffic_nox_mg_per_vehicle_km": "nitrogen oxides, likewise",
         "traffic_fuel_g_per_vehicle_km": "fuel, likewise",

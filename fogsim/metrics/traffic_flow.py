@@ -60,7 +60,7 @@ class TrafficFlow(TrafficMetric):
     """
 
     meanings: ClassVar[Mapping[str, str]] = {
-        "traffic_vehicle_time_s": "time of all vehicles near the ego (traffic.reading_radius_m) together",
+        "traffic_vehicle_time_s": "time of all vehicles read together (traffic.reading_radius_m; all without an ego)",
         "traffic_vehicle_distance_m": "way of all of them in it",
         "traffic_mean_vehicles": "mean number of them",
         "traffic_vehicle_km_per_h": "throughput: their way per hour of simulated time (within that radius)",

@@ -31,7 +31,7 @@ class TrafficSight(TrafficMetric):
     reaction_time: float
     deceleration: float
     meanings: ClassVar[Mapping[str, str]] = {
-        "traffic_fog_time_share": "share of the time of all vehicles near the ego in fog (below 1000 m where they are)",
+        "traffic_fog_time_share": "share of the time of all vehicles read in fog (below 1000 m where they are)",
         "traffic_overdriving_time_share": "share of the same time with a stopping sight distance above the visibility "
         "at the vehicle's place; on the level, with stopping_reaction_time_s and stopping_deceleration_mps2",
         "traffic_mean_sight_margin_m": "mean over the time in fog of visibility minus stopping sight distance",

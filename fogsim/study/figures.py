@@ -101,6 +101,9 @@ def trade_off_figure(study: Study, rows: Sequence[Row], across: str, upwards: st
                 alpha=0.9,
                 label=policy,
             )
+        if not any(axes.dataLim.intervaly):
+            # Around nothing but zeros matplotlib would show negative numbers, which there are none of.
+            axes.set_ylim(-0.05, 1.0)
     label_figure(figure, metric_words(across).axis, metric_words(upwards).axis)
     name = f"trade_off_{upwards}"
     caption = (

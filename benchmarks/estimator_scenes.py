@@ -132,7 +132,7 @@ def _rows(state: TrafficState, rows: NDArray[np.int64]) -> TrafficState:
         value = getattr(state, field.name)
         if isinstance(value, tuple):
             kept[field.name] = tuple(value[row] for row in rows)
-        elif isinstance(value, np.ndarray):
+        elif isinstance(value, np.ndarray) and len(value):  # what is not known of anybody is empty
             kept[field.name] = value[rows]
     return dataclasses.replace(state, **kept)
 

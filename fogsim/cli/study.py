@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from fogsim.cli.printing import INTERRUPTED, escape, stderr, stdout
+from fogsim.cli.printing import BAD_INPUT, INTERRUPTED, escape, stderr, stdout
 from fogsim.cli.progress import STARTING, progress_bar
 from fogsim.errors import InputError
 
@@ -71,3 +71,6 @@ def study_command(
     stdout.print("Results:")
     for name in ("study.parquet", "study.csv", "comparison.csv", "report.html"):
         stdout.print(f"  {escape(directory / name)}", soft_wrap=True)
+    if len(missing) == len(rows):
+        stdout.print("[yellow]No run is complete.[/]")
+        raise typer.Exit(BAD_INPUT)

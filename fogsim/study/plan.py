@@ -186,6 +186,11 @@ def file_digests(scenario: Scenario) -> dict[str, str]:
     ----------
     scenario : Scenario
         The scenario.
+
+    Raises
+    ------
+    InputError
+        If one of them is not there.
     """
     traffic, folder = scenario.traffic, scenario.directory
     named = [path for path in (traffic.config, traffic.net, *traffic.routes, *traffic.additional) if path is not None]
@@ -194,8 +199,11 @@ def file_digests(scenario: Scenario) -> dict[str, str]:
         config = folder / traffic.config
         net, additional = configured_files(config)
         files += [net, *additional, *configured_demand(config).files]
-    there = [path for path in dict.fromkeys(files) if path.is_file()]
-    return {os.path.relpath(path, folder): _digest(path, path.stat().st_mtime_ns) for path in there}
+    for path in files:
+        if not path.is_file():
+            source = folder / traffic.config if traffic.config is not None else scenario.name
+            raise InputError(f"{source} names {path}, which is not there")
+    return {os.path.relpath(path, folder): _digest(path, path.stat().st_mtime_ns) for path in dict.fromkeys(files)}
 
 
 @functools.lru_cache

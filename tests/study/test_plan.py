@@ -3,6 +3,7 @@ from pathlib import Path
 import pytest
 
 from fogsim.errors import InputError
+from fogsim.scenario.loading import catalogue
 from fogsim.study import load_study
 
 STUDY = """
@@ -85,6 +86,19 @@ def test_an_empty_study_says_what_is_missing(tmp_path: Path) -> None:
         load_study(written(tmp_path, "scenario: motorway_fog_bank"))
     with pytest.raises(InputError, match="factors"):
         load_study(written(tmp_path, "scenario: motorway_fog_bank\nfactors: {}"))
+
+
+def test_a_file_that_the_configuration_names_is_missed_before_anything_is_run(tmp_path: Path) -> None:
+    net = catalogue()["motorway_fog_bank"].parent / "motorway.net.xml"
+    (tmp_path / "a.sumocfg").write_text(
+        f'<configuration><net-file value="{net}"/><additional-files value="loops.add.xml"/></configuration>',
+        encoding="utf-8",
+    )
+    text = STUDY.replace("scenario: motorway_fog_bank", "sumocfg: a.sumocfg").replace(
+        "[advice=stopping_sight_distance]", "[]"
+    )
+    with pytest.raises(InputError, match=r"a\.sumocfg names .*loops\.add\.xml, which is not there"):
+        load_study(written(tmp_path, text))
 
 
 def test_runs_that_nothing_sees_draw_no_frames(tmp_path: Path) -> None:

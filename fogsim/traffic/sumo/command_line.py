@@ -35,7 +35,10 @@ def command_line(setup: TrafficSetup, seed: int) -> list[str]:
 
 def _usual(setup: TrafficSetup) -> dict[str, str]:
     """Options as they are where nobody has chosen."""
-    quiet = {"no-step-log": "true", "duration-log.disable": "true", "no-warnings": "true"}
+    quiet = {
+        **dict.fromkeys(("no-step-log", "duration-log.disable", "no-warnings"), "true"),
+        **dict.fromkeys(("verbose", "duration-log.statistics"), "false"),
+    }
     # Vehicles are not teleported: collisions stay where they happen and are counted. How jams dissolve in a simulation
     # of the user's own is left to its configuration.
     # Nor is it changed whether it looks for collisions at junctions.

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fogsim.errors import InputError, shown
+from fogsim.quantities import UNIT_OF_SUFFIX
 from fogsim.scenario.plain_yaml import DEEPEST, MOST_BYTES, KeyPath, PlainYamlError, parse_yaml
 
 TAKES_THE_PLACE_OF = {
@@ -98,9 +99,24 @@ def _set(data: dict[str, Any], path: tuple[str, ...], value: object, text: str) 
             block[key] = {}
         block = block[place]
     if isinstance(block, dict):
+        for other in [key for key in block if key != path[-1] and same_quantity(str(key), path[-1])]:
+            del block[other]
         block[path[-1]] = value
     else:
         block[_place(block, path[-1], path, text)] = value
+
+
+def same_quantity(key: str, other: str) -> bool:
+    """Tell whether two keys differ by a unit at the end alone, which one of them has: ``speed`` and ``speed_kmh``.
+
+    Parameters
+    ----------
+    key, other : str
+        The keys.
+    """
+    shorter, longer = sorted((key, other), key=len)
+    stem, _, suffix = longer.rpartition("_")
+    return stem == shorter and suffix in UNIT_OF_SUFFIX
 
 
 def _place(block: object, key: str, path: tuple[str, ...], text: str) -> int:

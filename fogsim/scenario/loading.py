@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.schema import Scenario
 from fogsim.scenario.sumo_check import demand_mistakes, option_lines, step_mistake
 from fogsim.scenario.traffic_schema import Traffic
+from fogsim.scenario.written_units import with_units_in_keys
 from fogsim.traffic.road.configuration import configured_files
 
 SCENARIO_FILE = "scenario.yaml"
@@ -227,7 +229,11 @@ def _checked(
         raise InputError(f"overrides must be a list of key.path=value each, got the text {shown(overrides)}")
     overrides = tuple(overrides)
     data = apply_overrides(document.data, overrides)
-    document = document.overridden(overrides)
+    document = replace(document.overridden(overrides), data=data)
+    document, unfit = with_units_in_keys(document, Scenario)
+    if unfit:
+        raise InputError("\n".join(unfit))
+    data = document.data
     mistakes = _unnamed_files(document, data) if named_files else []
     try:
         scenario = Scenario.model_validate(data).model_copy(update={"directory": folder})

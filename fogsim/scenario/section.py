@@ -14,6 +14,7 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from fogsim.errors import UnknownNameError
 from fogsim.parameters import parameter_mistakes
+from fogsim.quantities import is_quantity, parse_quantity
 from fogsim.registry import Registry
 
 FARTHEST = 1e6
@@ -31,8 +32,15 @@ Seed = Annotated[Whole, Field(ge=0, le=2**63 - 1)]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 """A finite number."""
 
-Share = Annotated[Number, Field(ge=0, le=1)]
-"""A share [-]."""
+
+def _percent(value: object) -> object:
+    """Let a share be written in per cent."""
+    is_percent = isinstance(value, str) and is_quantity(value) and value.rstrip().endswith("%")
+    return parse_quantity(str(value), "") if is_percent else value
+
+
+Share = Annotated[Number, Field(ge=0, le=1), BeforeValidator(_percent)]
+"""A share [-], perhaps written in per cent: 0.6, or ``60 %``."""
 
 Time = Annotated[Number, Field(ge=0, le=FARTHEST)]
 """A time from zero [s]."""

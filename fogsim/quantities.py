@@ -1,0 +1,110 @@
+"""Quantities as people write them, a number and a unit: pint reads them, in the unit that is asked for."""
+
+import functools
+import math
+import re
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pint
+
+UNIT_OF_SUFFIX = {
+    "m": "m",
+    "km": "km",
+    "s": "s",
+    "kmh": "km/h",
+    "mps": "m/s",
+    "mps2": "m/s^2",
+    "deg": "deg",
+    "percent": "%",
+    "lx": "lx",
+    "cd": "cd",
+    "cdpm2": "cd/m^2",
+    "vph": "veh/h",
+}
+"""Units of keys of files by the end of their name: ``speed_kmh`` is in km/h."""
+
+_WRITTEN = re.compile(r"\s*([-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?|[-+]?inf)\s*([^\d\s].*?)?\s*\Z")
+
+_UNIT = re.compile(r"[^\W\d_][^\W_]*(?:\s?[/*·^]?\s?-?[^\W_]+)*\Z|%\Z|°\Z")
+
+
+def is_quantity(text: object) -> bool:
+    """Tell whether something is text that begins like a number.
+
+    Parameters
+    ----------
+    text : object
+        What a file has.
+    """
+    return isinstance(text, str) and _WRITTEN.match(text) is not None
+
+
+def parse_quantity(text: str, unit: str) -> float:
+    """Number of a quantity in a unit: ``parse_quantity("90 km/h", "m/s")`` is 25.
+
+    Parameters
+    ----------
+    text : str
+        A number and a unit of the same dimension; without a unit it counts in the one asked for only where it is
+        dimensionless, infinite or zero.
+    unit : str
+        The unit that is asked for, as pint names it; "" for a pure number.
+
+    Raises
+    ------
+    ValueError
+        If it is no quantity, its unit is not known, or is of another dimension.
+    """
+    match = _WRITTEN.match(text)
+    if match is None:
+        raise ValueError(f"expected a number and a unit such as {example_of(unit)!r}, got {text!r}")
+    number, written = float(match[1]), match[2] or ""
+    if not written:
+        if unit and number != 0.0 and math.isfinite(number):
+            raise ValueError(f"{text!r} has no unit; expected one such as in {example_of(unit)!r}")
+        return number
+    larger, smaller = _factors(written, unit)
+    # Divided by a whole number or a short fraction, 95 % is 0.95 and 90 km/h is 25 m/s, and not a neighbour of it.
+    return number * larger if larger >= 1.0 else number / smaller
+
+
+def example_of(unit: str) -> str:
+    """A quantity of a unit, for messages.
+
+    Parameters
+    ----------
+    unit : str
+        The unit; "" for a pure number.
+    """
+    return f"10 {unit}" if unit else "10"
+
+
+@functools.cache
+def _factors(written: str, unit: str) -> tuple[float, float]:
+    """How many of a unit are in one that is written, and the other way round."""
+    import pint  # noqa: PLC0415 - takes 0.3 s, and most files have plain numbers
+
+    units = _units()
+    try:
+        # pint's parser stumbles over what is no unit at all in many ways.
+        source = units.parse_units(written) if _UNIT.match(written) else None
+    except (pint.PintError, ValueError, TypeError, AttributeError):
+        source = None
+    if source is None:
+        raise ValueError(f"unknown unit {written!r}; expected one such as in {example_of(unit)!r}")
+    try:
+        target = units.parse_units(unit)
+        there, back = units.Quantity(1.0, source).to(target), units.Quantity(1.0, target).to(source)
+        return float(there.magnitude), float(back.magnitude)
+    except pint.PintError:
+        raise ValueError(f"the unit {written!r} does not fit; expected one such as in {example_of(unit)!r}") from None
+
+
+@functools.cache
+def _units() -> "pint.UnitRegistry[float]":
+    import pint  # noqa: PLC0415 - as above
+
+    units: pint.UnitRegistry[float] = pint.UnitRegistry()
+    units.define("vehicle = [] = veh = vehicles")
+    return units

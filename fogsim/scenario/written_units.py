@@ -1,0 +1,123 @@
+"""Keys whose values bring their unit: ``speed: 90 km/h`` stands for ``speed_kmh: 90``."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any, get_args
+
+from pydantic import BaseModel
+
+from fogsim.quantities import UNIT_OF_SUFFIX, is_quantity, parse_quantity
+from fogsim.scenario.document import Document
+from fogsim.scenario.plain_yaml import KeyPath, dotted
+
+
+def with_units_in_keys(document: Document, model: type[BaseModel]) -> tuple[Document, list[str]]:
+    """Copy of a document in which values that are written with their units are numbers, under the keys of the schema.
+
+    Parameters
+    ----------
+    document : Document
+        What was read.
+    model : type
+        Its schema, whose keys end in their units.
+
+    Returns
+    -------
+    Document
+        The copy; what could not be read is as it was.
+    list of str
+        A line for each mistake: a unit that is not known or does not fit, or a key that stands there twice.
+    """
+    conversion = _Conversion(document)
+    data = conversion.block(document.data, (model,), ())
+    return replace(document, data=data, origins=conversion.origins), conversion.mistakes
+
+
+Models = tuple[type[BaseModel], ...]
+
+
+class _Conversion:
+    """Goes down through a document beside its schema."""
+
+    def __init__(self, document: Document) -> None:
+        self._document = document
+        self.origins = dict(document.origins)
+        self.mistakes: list[str] = []
+
+    def block(self, written: dict[str, Any], models: Models, at: KeyPath) -> dict[str, Any]:
+        """A block of keys that some of the models have."""
+        result: dict[str, Any] = {}
+        for key, value in written.items():
+            suffixed = [] if _known(key, models) else list(_with_suffix(key, models))
+            if suffixed and is_quantity(value):
+                name, number = self._quantity(suffixed, written, (*at, key))
+                result[name] = number
+            else:
+                result[key] = self._value(value, _models_of(key, models), (*at, key))
+        return result
+
+    def _value(self, value: object, models: Models, at: KeyPath) -> object:
+        if not models:
+            return value
+        if isinstance(value, list):
+            return [self._value(one, models, (*at, place)) for place, one in enumerate(value)]
+        if not isinstance(value, dict):
+            return value
+        # A mapping by name has blocks of its own, which have other keys.
+        if not any(_known(key, models) or list(_with_suffix(key, models)) for key in value):
+            return {key: self._value(one, models, (*at, key)) for key, one in value.items()}
+        of_kind = tuple(model for model in models if value.get("kind") in get_args(_annotation(model, "kind")))
+        return self.block(value, of_kind or models, at)
+
+    def _quantity(self, suffixed: list[tuple[str, str]], written: dict[str, Any], at: KeyPath) -> tuple[str, float]:
+        key = str(at[-1])
+        name, number = _converted(suffixed, written[key])
+        if name in written:
+            self._tell(at, f"the key {name} stands beside it; one of them must go")
+        elif isinstance(number, ValueError):
+            self._tell(at, number)
+        if at in self.origins:
+            self.origins[*at[:-1], name] = self.origins[at]
+        return name, 0.0 if isinstance(number, ValueError) else number
+
+    def _tell(self, at: KeyPath, what: object) -> None:
+        self.mistakes.append(f"{self._document.where(at)}: {dotted(at)}: {what}")
+
+
+def _converted(suffixed: list[tuple[str, str]], value: str) -> tuple[str, float | ValueError]:
+    """Key and number of a quantity, by the first unit that fits."""
+    outcomes: list[tuple[str, float | ValueError]] = []
+    for name, unit in suffixed:
+        try:
+            return name, parse_quantity(value, unit)
+        except ValueError as error:
+            outcomes.append((name, error))
+    return outcomes[0]
+
+
+def _known(key: object, models: Models) -> bool:
+    return any(key in model.model_fields for model in models)
+
+
+def _with_suffix(key: object, models: Models) -> Iterator[tuple[str, str]]:
+    """Keys of models that are a key and a unit, and that unit."""
+    for suffix, unit in UNIT_OF_SUFFIX.items():
+        if _known(f"{key}_{suffix}", models):
+            yield f"{key}_{suffix}", unit
+
+
+def _annotation(model: type[BaseModel], key: str) -> object:
+    field = model.model_fields.get(key)
+    return None if field is None else field.annotation
+
+
+def _models_of(key: str, models: Models) -> Models:
+    return tuple(dict.fromkeys(found for model in models for found in _models_in(_annotation(model, key))))
+
+
+def _models_in(annotation: object) -> Iterator[type[BaseModel]]:
+    """All models inside an annotation such as ``tuple[Bank, ...]``."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for part in get_args(annotation):
+        yield from _models_in(part)

@@ -15,6 +15,7 @@ from fogsim.errors import SimulationError, UnplayedWarning
 from fogsim.randomness import spawn_streams
 from fogsim.road_advice import RoadAdvice, stretch_advices
 from fogsim.scenario import Scenario, build
+from fogsim.scenario.drivers import stretch_advice
 from fogsim.scenario.road_sections import DISPLAYS
 from fogsim.scenario.schema import InformedMethod
 from fogsim.traffic import AnyTraffic, FogAccess, Traffic, libsumo_traffic
@@ -160,7 +161,7 @@ def spread_advice(command: Command, scenario: Scenario, sections: Sequence[RoadS
         stretches, speeds = [section.stretch for section in sections], [command.advice.speed] * len(sections)
         told = stretch_advices(stretches, speeds, DISPLAYS[scenario.drivers.advised])
         return dataclasses.replace(command, stretches=told)
-    return dataclasses.replace(command, stretches=(build.stretch_advice(scenario, command.advice.speed),))
+    return dataclasses.replace(command, stretches=(stretch_advice(scenario, command.advice.speed),))
 
 
 class EntersFog(Protocol):

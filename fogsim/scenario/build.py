@@ -24,15 +24,13 @@ from fogsim.estimators import ESTIMATORS, Estimator
 from fogsim.fusion import FUSIONS, Fusion
 from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy
 from fogsim.metrics import SafetyStandard
+from fogsim.scenario.drivers import driver_setup, driver_sight
 from fogsim.scenario.fog import fog_along
 from fogsim.scenario.schema import NO_RENDERER, Scenario
-from fogsim.scenario.traffic_schema import AnyEvent, Brake, BreakDown, ChangeLane, ComplianceSection, LampsFail
+from fogsim.scenario.traffic_schema import AnyEvent, Brake, BreakDown, ChangeLane, LampsFail
 from fogsim.sensors import LeadSensor
 from fogsim.traffic import (
     BrakeEvent,
-    Compliance,
-    DriverSetup,
-    DriverSight,
     Event,
     LampFailureEvent,
     LaneChangeEvent,
@@ -41,7 +39,7 @@ from fogsim.traffic import (
 )
 from fogsim.traffic.sumo.options import OptionValue
 from fogsim.units import KMH_PER_MPS, clock_time
-from fogsim.values import Camera, Display, FogField, Stretch, StretchAdvice
+from fogsim.values import Camera, FogField
 
 AIRLIGHT_EXPOSURE = 0.6
 """Share of saturation at which the fixed exposure puts the airlight: bright fog, yet room for lamps above it."""
@@ -126,8 +124,8 @@ def traffic_setup(scenario: Scenario) -> TrafficSetup:
         advice_deceleration=traffic.advice_deceleration_mps2,
         reading_radius=traffic.reading_radius_m,
         events=tuple(event for place, written in enumerate(traffic.events) for event in _events(written, place)),
-        sight=_driver_sight(scenario),
-        drivers=_driver_setup(scenario),
+        sight=driver_sight(scenario),
+        drivers=driver_setup(scenario),
         after_collision=traffic.after_collision,
         config=None if traffic.config is None else folder / traffic.config,
         sumo_options=tuple((name, _option_text(value, folder)) for name, value in traffic.sumo_options.items()),
@@ -161,60 +159,6 @@ def _events(written: AnyEvent, place: int) -> tuple[Event, ...]:
             return (LaneChangeEvent(vehicle, trigger, written.lanes, written.stay_s),)
         case LampsFail():
             return (LampFailureEvent(vehicle, trigger),)
-
-
-def _driver_sight(scenario: Scenario) -> DriverSight | None:
-    """Eyes of the drivers; None if they see through the fog."""
-    drivers = scenario.drivers
-    if drivers.see_through_fog:
-        return None
-    return DriverSight(scenario.light.illuminance_lx, drivers.headlamp_reach_m, drivers.reaction_time_s)
-
-
-def _driver_setup(scenario: Scenario) -> DriverSetup:
-    """How drivers choose their speed and follow advice."""
-    drivers = scenario.drivers
-    compliance, given = _compliance(drivers.compliance), drivers.compliance_by_display
-    by_display = {
-        display: _compliance(own) for display in Display if (own := getattr(given, display.value)) is not None
-    }
-    if drivers.advised == "equipped":
-        in_car = by_display.get(Display.IN_CAR, compliance)
-        reached = drivers.equipped_share * in_car.reached_share
-        by_display[Display.IN_CAR] = dataclasses.replace(in_car, reached_share=reached)
-    return DriverSetup(
-        speed_choice=drivers.speed_choice,
-        spread=drivers.speed_spread,
-        compliance=compliance,
-        misjudgement=drivers.distance_misjudgement,
-        following=drivers.following,
-        compliance_by_display=by_display,
-    )
-
-
-def _compliance(written: ComplianceSection) -> Compliance:
-    return Compliance(
-        written.reached_share,
-        written.rate,
-        written.strength,
-        written.delay_s,
-        written.trust,
-        written.foreseen,
-    )
-
-
-def stretch_advice(scenario: Scenario, speed: float) -> StretchAdvice:
-    """Advice to all on the scenario's advised stretch.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    speed : float
-        Advised speed [m/s].
-    """
-    stretch = scenario.drivers.advised_stretch
-    return StretchAdvice(speed, Stretch(stretch.start_m, stretch.end_m, scenario.traffic.along), stretch.display)
 
 
 def camera_mount(scenario: Scenario, body: str = CAR) -> CameraMount:

@@ -1,0 +1,74 @@
+"""From a scenario to its drivers: how they see, choose their speed and follow advice, and where it reaches them."""
+
+import dataclasses
+
+from fogsim.scenario.schema import Scenario
+from fogsim.scenario.traffic_schema import ComplianceSection
+from fogsim.traffic import Compliance, DriverSetup, DriverSight
+from fogsim.values import Display, Stretch, StretchAdvice
+
+
+def driver_sight(scenario: Scenario) -> DriverSight | None:
+    """Eyes of the drivers; None if they see through the fog.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+    drivers = scenario.drivers
+    if drivers.see_through_fog:
+        return None
+    return DriverSight(scenario.light.illuminance_lx, drivers.headlamp_reach_m, drivers.reaction_time_s)
+
+
+def driver_setup(scenario: Scenario) -> DriverSetup:
+    """How drivers choose their speed and follow advice.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+    drivers = scenario.drivers
+    compliance, given = _compliance(drivers.compliance), drivers.compliance_by_display
+    by_display = {
+        display: _compliance(own) for display in Display if (own := getattr(given, display.value)) is not None
+    }
+    if drivers.advised == "equipped":
+        in_car = by_display.get(Display.IN_CAR, compliance)
+        reached = drivers.equipped_share * in_car.reached_share
+        by_display[Display.IN_CAR] = dataclasses.replace(in_car, reached_share=reached)
+    return DriverSetup(
+        speed_choice=drivers.speed_choice,
+        spread=drivers.speed_spread,
+        compliance=compliance,
+        misjudgement=drivers.distance_misjudgement,
+        following=drivers.following,
+        compliance_by_display=by_display,
+    )
+
+
+def _compliance(written: ComplianceSection) -> Compliance:
+    return Compliance(
+        written.reached_share,
+        written.rate,
+        written.strength,
+        written.delay_s,
+        written.trust,
+        written.foreseen,
+    )
+
+
+def stretch_advice(scenario: Scenario, speed: float) -> StretchAdvice:
+    """Advice to all on the scenario's advised stretch.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    speed : float
+        Advised speed [m/s].
+    """
+    stretch = scenario.drivers.advised_stretch
+    return StretchAdvice(speed, Stretch(stretch.start_m, stretch.end_m, scenario.traffic.along), stretch.display)

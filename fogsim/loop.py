@@ -8,6 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Protocol, Self
 
+from fogsim.advice import VehicleAdviser
 from fogsim.atmosphere import FogNow
 from fogsim.ego.equipment import EgoEquipment
 from fogsim.ego.view_rendering import Surrounding
@@ -19,7 +20,17 @@ from fogsim.scenario.drivers import stretch_advice
 from fogsim.scenario.road_sections import DISPLAYS
 from fogsim.scenario.schema import InformedMethod
 from fogsim.traffic import AnyTraffic, FogAccess, Traffic, libsumo_traffic
-from fogsim.values import Belief, Command, Ending, FogField, RoadSection, Step, TrafficSnapshot, TrafficStep
+from fogsim.values import (
+    Belief,
+    Command,
+    Ending,
+    FogField,
+    RoadSection,
+    SpeedAdvice,
+    Step,
+    TrafficSnapshot,
+    TrafficStep,
+)
 from fogsim.values.belief import certain_belief
 from fogsim.values.result_checks import checked_advice, checked_command, checked_lamps
 
@@ -122,10 +133,14 @@ class AdvisedDriving:
         if self._road is not None:
             advice, stretches = self._road.advise(step)
             return Command(advice=advice, lamps=lamps, stretches=stretches)
-        informed = known_fog(step, self._scenario.advice)
-        advised = self._adviser.advise(informed, step.speed_limit, step.time, previous.advice)
-        advice = checked_advice(self._scenario.advice.method, advised)
+        advice = checked_advice(self._scenario.advice.method, self._ask_adviser(step))
         return spread_advice(Command(advice=advice, lamps=lamps), self._scenario)
+
+    def _ask_adviser(self, step: Step) -> SpeedAdvice:
+        known, adviser, previous = known_fog(step, self._scenario.advice), self._adviser, step.command.advice
+        if isinstance(adviser, VehicleAdviser):
+            return adviser.advise_vehicle(known, step.observation, step.speed_limit, step.time, previous)
+        return adviser.advise(known, step.speed_limit, step.time, previous)
 
 
 def known_fog(step: Step, method: InformedMethod) -> Belief:

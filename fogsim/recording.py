@@ -133,7 +133,14 @@ def record_run(
     status "failed" with the error's message.
     """
     with Interruption() as interruption, RunDirectory(out, overwrite) as directory:
-        manifest = Manifest(Status.RUNNING, seed, resolved(scenario), datetime.now(UTC), command_line=command_line)
+        manifest = Manifest(
+            Status.RUNNING,
+            seed,
+            resolved(scenario),
+            datetime.now(UTC),
+            command_line=command_line,
+            own_methods=build.own_methods(scenario),
+        )
         metrics = RunMetrics(build.safety_standard(scenario))
         recording = Recording(
             directory, manifest, _open_recorders(recorders, scenario, seed, directory, metrics), metrics

@@ -1,11 +1,13 @@
 """A registry: one mapping from names to factories per kind; docs, command line and schema read it."""
 
 import inspect
-from collections.abc import Callable, Iterator, Mapping
-from typing import TypeVar
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
 
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.parameters import parameter_mistakes
+from fogsim.user_code import announced, import_object, is_object_name, load_announced, version_of
 
 T = TypeVar("T")
 
@@ -13,17 +15,26 @@ T = TypeVar("T")
 class Registry(Mapping[str, T]):
     """Named factories of one kind; a duplicate is refused and an unknown name answers with the known ones.
 
+    Beside its own entries it finds what users bring: ``module:Object`` in a module of theirs, and what installed
+    packages announce as entry points.
+
     Parameters
     ----------
     kind : str
         What the names stand for, as it is to appear in messages ("estimator").
     entries : mapping
         The factories by name.
+    group : str
+        Group of entry points by which packages announce further ones; "" if users can bring none.
+    methods : sequence of str
+        Methods that a class of a user's own must have; one of those that are parted by "|".
     """
 
-    def __init__(self, kind: str, entries: Mapping[str, T]) -> None:
+    def __init__(self, kind: str, entries: Mapping[str, T], group: str = "", methods: Sequence[str] = ()) -> None:
         self.kind = kind
         self._entries = dict(entries)
+        self._group = group
+        self._methods = tuple(methods)
 
     def register(self, name: str, factory: T) -> None:
         """Add a factory under a new name.
@@ -44,11 +55,72 @@ class Registry(Mapping[str, T]):
             raise ValueError(f"{self.kind} {name!r} is registered already")
         self._entries[name] = factory
 
-    def __getitem__(self, name: str) -> T:
+    def registered(self, name: str) -> Callable[[T], T]:
+        """Class decorator that adds a factory under a new name: ``@ADVISERS.registered("cautious")``.
+
+        Parameters
+        ----------
+        name : str
+            A name that is free.
+        """
+
+        def add(factory: T) -> T:
+            self.register(name, factory)
+            return factory
+
+        return add
+
+    def find(self, name: str, folder: Path | None = None) -> T:
+        """A factory by its name.
+
+        Parameters
+        ----------
+        name : str
+            Of an entry, of one that an installed package announces, or ``module:Object``.
+        folder : Path or None
+            Where the module is looked for first; None for the working directory.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is none of this name.
+        InputError
+            If it cannot be imported, or is not of this kind.
+        """
         try:
             return self._entries[name]
         except (KeyError, TypeError):
-            raise UnknownNameError(self.kind, name, self._entries) from None
+            pass
+        if self._group and is_object_name(name):
+            return self._checked(name, import_object(name, folder))
+        further = announced(self._group) if self._group else {}
+        if name not in further:
+            raise UnknownNameError(self.kind, name, [*self._entries, *further]) from None
+        return self._checked(name, load_announced(further[name]))
+
+    def version(self, name: str, folder: Path | None = None) -> str | None:
+        """Version of a method of a user's own; None of FogSim's, and of those that a program has registered itself.
+
+        Parameters
+        ----------
+        name, folder
+            As of `find`.
+        """
+        return None if name in self._entries else version_of(name, self._group, folder)
+
+    def _checked(self, name: str, factory: Any) -> T:
+        if not callable(factory):
+            raise InputError(f"{self.kind} {name!r} must be a class or a function that makes one, got {factory!r}")
+        # What a function makes is known when it is called.
+        lacking = [wanted for wanted in self._methods if not any(hasattr(factory, one) for one in wanted.split("|"))]
+        if inspect.isclass(factory) and lacking:
+            needed = " and ".join(f"{wanted.replace('|', '() or ')}()" for wanted in lacking)
+            raise InputError(f"{self.kind} {name!r} must have a method {needed}")
+        checked: T = factory
+        return checked
+
+    def __getitem__(self, name: str) -> T:
+        return self.find(name)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._entries)
@@ -57,7 +129,7 @@ class Registry(Mapping[str, T]):
         return len(self._entries)
 
     def __contains__(self, name: object) -> bool:
-        return name in self._entries
+        return name in self._entries or (bool(self._group) and (is_object_name(name) or name in announced(self._group)))
 
 
 def parameters(factory: Callable[..., object]) -> dict[str, object]:

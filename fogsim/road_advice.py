@@ -4,7 +4,6 @@ import itertools
 import math
 from collections.abc import Sequence
 
-from fogsim.advice import Adviser
 from fogsim.advice.harmonisation import harmonised_speeds
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.road_sections import DISPLAYS
@@ -29,7 +28,7 @@ class RoadAdvice:
     """
 
     def __init__(self, scenario: Scenario) -> None:
-        self._adviser: Adviser = build.adviser(scenario)
+        self._adviser = build.road_adviser(scenario)
         self._advice = scenario.advice
         self._display = DISPLAYS[scenario.drivers.advised]
         self._harmonisation = scenario.drivers.harmonisation

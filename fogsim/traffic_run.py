@@ -80,7 +80,7 @@ class MeteredAdvice:
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
-        self._adviser = build.adviser(scenario)
+        self._adviser = build.road_adviser(scenario)
         self._frames = build.periods(scenario).decision_frames
         self._road = RoadAdvice(scenario) if scenario.drivers.advised in DISPLAYS else None
 

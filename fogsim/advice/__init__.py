@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from fogsim.advice.protocol import Adviser
+from fogsim.advice.protocol import Adviser, VehicleAdviser
 from fogsim.advice.sight_distance import FixedSpeed, NoAdvice, StoppingSightDistance
 from fogsim.advice.step_tables import (
     AlabamaI10,
@@ -15,7 +15,7 @@ from fogsim.advice.step_tables import (
 )
 from fogsim.registry import Registry
 
-ADVISERS: Registry[Callable[..., Adviser]] = Registry(
+ADVISERS: Registry[Callable[..., Adviser | VehicleAdviser]] = Registry(
     "adviser",
     {
         "stopping_sight_distance": StoppingSightDistance,
@@ -30,6 +30,8 @@ ADVISERS: Registry[Callable[..., Adviser]] = Registry(
         "fixed_speed": FixedSpeed,
         "none": NoAdvice,
     },
+    group="fogsim.advice",
+    methods=("advise|advise_vehicle",),
 )
 
-__all__ = ["ADVISERS", "Adviser", "FixedSpeed", "NoAdvice", "StepTable", "StoppingSightDistance"]
+__all__ = ["ADVISERS", "Adviser", "FixedSpeed", "NoAdvice", "StepTable", "StoppingSightDistance", "VehicleAdviser"]

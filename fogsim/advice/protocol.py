@@ -1,8 +1,8 @@
 """What a speed adviser is asked."""
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
-from fogsim.values import Belief, SpeedAdvice
+from fogsim.values import Belief, Observation, SpeedAdvice
 
 
 class Adviser(Protocol):
@@ -15,6 +15,30 @@ class Adviser(Protocol):
         ----------
         belief : Belief
             What is believed about the fog.
+        speed_limit : float
+            Speed limit [m/s].
+        time : float
+            Instant [s].
+        previous : SpeedAdvice
+            The advice in force.
+        """
+
+
+@runtime_checkable
+class VehicleAdviser(Protocol):
+    """A rule that goes by the vehicle's own speed and its lead vehicle too, in the ego alone; it keeps nothing."""
+
+    def advise_vehicle(
+        self, belief: Belief, observation: Observation, speed_limit: float, time: float, previous: SpeedAdvice
+    ) -> SpeedAdvice:
+        """Advise a speed.
+
+        Parameters
+        ----------
+        belief : Belief
+            What is believed about the fog.
+        observation : Observation
+            What the vehicle's sensors tell: its speed, the lead vehicle, the frame, the signs ahead.
         speed_limit : float
             Speed limit [m/s].
         time : float

@@ -25,6 +25,8 @@ ESTIMATORS: Registry[Callable[..., Estimator]] = Registry(
         "joint_road": JointRoad,
         "lead_contrast": LeadContrast,
     },
+    group="fogsim.estimators",
+    methods=("update", "reset"),
 )
 """Every estimator by name: called with a camera and keyword parameters it gives an `Estimator`."""
 

@@ -7,7 +7,9 @@ from fogsim.fusion.grid_filter import GridFilter
 from fogsim.fusion.protocol import Fusion
 from fogsim.registry import Registry
 
-FUSIONS: Registry[Callable[..., Fusion]] = Registry("fusion", {"grid_filter": GridFilter})
+FUSIONS: Registry[Callable[..., Fusion]] = Registry(
+    "fusion", {"grid_filter": GridFilter}, group="fogsim.fusion", methods=("update", "reset")
+)
 """Every fusion by name: called with keyword parameters it gives a `Fusion`."""
 
 

@@ -8,7 +8,10 @@ from fogsim.lighting.rules import FogLampRules, LowBeamOnly
 from fogsim.registry import Registry
 
 LIGHTING_POLICIES: Registry[Callable[..., LightingPolicy]] = Registry(
-    "lighting policy", {"fog_lamp_rules": FogLampRules, "low_beam": LowBeamOnly}
+    "lighting policy",
+    {"fog_lamp_rules": FogLampRules, "low_beam": LowBeamOnly},
+    group="fogsim.lighting",
+    methods=("lamps",),
 )
 
 __all__ = ["LIGHTING_POLICIES", "FogLampRules", "LampMount", "LightingPolicy", "LowBeamOnly", "own_head_lamps"]

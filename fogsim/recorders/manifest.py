@@ -51,6 +51,8 @@ class Manifest:
         What went wrong, if anything.
     failed_recorders : mapping from str to str
         Recorders that failed, and why.
+    own_methods : mapping from str to str
+        Methods of the user's own, and their versions.
     """
 
     status: Status
@@ -64,6 +66,7 @@ class Manifest:
     process: WritingProcess = field(default_factory=WritingProcess.this)
     message: str = ""
     failed_recorders: Mapping[str, str] = field(default_factory=dict)
+    own_methods: Mapping[str, str] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, object]:
         """What ``manifest.json`` says, without the names of files."""
@@ -79,7 +82,7 @@ class Manifest:
             "ended": None if self.ended is None else _utc(self.ended),
             "process": self.process.to_json(),
             "command_line": list(self.command_line),
-            "versions": versions(),
+            "versions": {**versions(), **self.own_methods},
             "scenario": self.scenario,
         }
 

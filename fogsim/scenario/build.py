@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.advice import ADVISERS, Adviser
+from fogsim.advice import ADVISERS, Adviser, VehicleAdviser
 from fogsim.atmosphere import airlight_from_illuminance
 from fogsim.camera import (
     USUAL_MOUNTS,
@@ -365,7 +365,7 @@ def estimators(scenario: Scenario, assumed: Camera) -> tuple[Estimator, ...]:
     assumed : Camera
         The assumed calibration.
     """
-    return tuple(ESTIMATORS[e.method](assumed, **e.parameters) for e in scenario.estimators)
+    return tuple(ESTIMATORS.find(e.method, scenario.directory)(assumed, **e.parameters) for e in scenario.estimators)
 
 
 def fusion(scenario: Scenario) -> Fusion:
@@ -376,10 +376,10 @@ def fusion(scenario: Scenario) -> Fusion:
     scenario : Scenario
         The scenario.
     """
-    return FUSIONS[scenario.fusion.method](**scenario.fusion.parameters)
+    return FUSIONS.find(scenario.fusion.method, scenario.directory)(**scenario.fusion.parameters)
 
 
-def adviser(scenario: Scenario) -> Adviser:
+def adviser(scenario: Scenario) -> Adviser | VehicleAdviser:
     """Speed adviser of a scenario.
 
     Parameters
@@ -387,7 +387,47 @@ def adviser(scenario: Scenario) -> Adviser:
     scenario : Scenario
         The scenario.
     """
-    return ADVISERS[scenario.advice.method](**scenario.advice.parameters)
+    return ADVISERS.find(scenario.advice.method, scenario.directory)(**scenario.advice.parameters)
+
+
+def road_adviser(scenario: Scenario) -> Adviser:
+    """Speed adviser of a scenario, who advises roads.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+
+    Raises
+    ------
+    InputError
+        If it needs the sensors of a vehicle.
+    """
+    advising = adviser(scenario)
+    if isinstance(advising, VehicleAdviser):
+        raise InputError(
+            f"advice: {scenario.advice.method!r} goes by a vehicle's own sensors (advise_vehicle), which roads do not "
+            f"have; with drivers.advised: {scenario.drivers.advised} take an adviser with advise()"
+        )
+    return advising
+
+
+def own_methods(scenario: Scenario) -> dict[str, str]:
+    """Versions of the methods of a scenario that are not FogSim's, by their names.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+    folder = scenario.directory
+    found = {
+        **{one.method: ESTIMATORS.version(one.method, folder) for one in scenario.estimators},
+        scenario.fusion.method: FUSIONS.version(scenario.fusion.method, folder),
+        scenario.advice.method: ADVISERS.version(scenario.advice.method, folder),
+        scenario.lighting.method: LIGHTING_POLICIES.version(scenario.lighting.method, folder),
+    }
+    return {name: version for name, version in found.items() if version is not None}
 
 
 def safety_standard(scenario: Scenario) -> SafetyStandard:
@@ -414,4 +454,5 @@ def lighting_policy(scenario: Scenario) -> LightingPolicy:
     scenario : Scenario
         The scenario.
     """
-    return LIGHTING_POLICIES[scenario.lighting.method](**scenario.lighting.parameters)
+    policy = LIGHTING_POLICIES.find(scenario.lighting.method, scenario.directory)
+    return policy(**scenario.lighting.parameters)

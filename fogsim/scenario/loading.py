@@ -15,6 +15,7 @@ from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.schema import Scenario
 from fogsim.scenario.sumo_check import demand_mistakes, option_lines, step_mistake
+from fogsim.scenario.system_under_test import without_sut, without_sut_in_path
 from fogsim.scenario.traffic_schema import Traffic
 from fogsim.scenario.written_units import with_units_in_keys
 from fogsim.traffic.road.configuration import configured_files
@@ -227,7 +228,7 @@ def _checked(
 ) -> Scenario:
     if isinstance(overrides, str):
         raise InputError(f"overrides must be a list of key.path=value each, got the text {shown(overrides)}")
-    overrides = tuple(overrides)
+    document, overrides = without_sut(document), tuple(without_sut_in_path(text) for text in overrides)
     data = apply_overrides(document.data, overrides)
     document = replace(document.overridden(overrides), data=data)
     document, unfit = with_units_in_keys(document, Scenario)
@@ -236,7 +237,7 @@ def _checked(
     data = document.data
     mistakes = _unnamed_files(document, data) if named_files else []
     try:
-        scenario = Scenario.model_validate(data).model_copy(update={"directory": folder})
+        scenario = Scenario.model_validate(data, context={"folder": folder}).model_copy(update={"directory": folder})
     except ValidationError as error:
         raise InputError(mistake_lines(document, Scenario, error, mistakes)) from error
     # A simulation that runs already, or is none of SUMO's, keeps its own time.

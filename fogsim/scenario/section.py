@@ -9,10 +9,10 @@ import math
 from collections.abc import Callable
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, ValidationInfo
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from fogsim.errors import UnknownNameError
+from fogsim.errors import InputError
 from fogsim.parameters import parameter_mistakes
 from fogsim.quantities import is_quantity, parse_quantity
 from fogsim.registry import Registry
@@ -143,12 +143,12 @@ def method_of(registry: Registry[Callable[..., Any]]) -> BeforeValidator:
         The methods of one kind.
     """
 
-    def check(value: object) -> object:
+    def check(value: object, info: ValidationInfo) -> object:
         written = {"method": value} if isinstance(value, str) else value
         if isinstance(written, dict) and isinstance(written.get("method"), str):
             try:
-                factory = registry[written["method"]]
-            except UnknownNameError as error:
+                factory = registry.find(written["method"], (info.context or {}).get("folder"))
+            except InputError as error:
                 # Only a plain ValueError is a message to pydantic's user.
                 raise ValueError(str(error)) from None
             _check_parameters(factory, written.get("parameters"))

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 
 from fogsim.errors import InputError, suggest
-from fogsim.scenario import Scenario, load_scenario, override, resolved, scenario_from_config
+from fogsim.scenario import Scenario, build, load_scenario, override, resolved, scenario_from_config
 from fogsim.scenario.document import Document, read_document
 from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.schema import NO_RENDERER
@@ -172,7 +172,9 @@ class Study:
         seeds = list(dict.fromkeys(run.seed for run in self.runs))
         factors = {name: list(levels) for name, levels in self.factors.items()}
         files = dict(item for run in self.runs for item in file_digests(run.scenario).items())
-        return {"factors": factors, "baseline": dict(self.baseline), "seeds": seeds, "files": files, "cells": cells}
+        told = {"factors": factors, "baseline": dict(self.baseline), "seeds": seeds, "files": files, "cells": cells}
+        methods = dict(item for run in self.runs for item in build.own_methods(run.scenario).items())
+        return {**told, "own_methods": methods} if methods else told
 
 
 def _label(levels: Mapping[str, str]) -> str:

@@ -1,0 +1,54 @@
+"""The block ``sut``: another way to write what is under test, which are keys of their own."""
+
+from dataclasses import replace
+
+from fogsim.errors import InputError, shown, suggest
+from fogsim.scenario.document import Document
+
+BLOCK = "sut"
+"""Name of the block."""
+
+KEYS = ("estimators", "fusion", "advice", "lighting")
+"""Keys that may stand in it."""
+
+
+def without_sut(document: Document) -> Document:
+    """Copy of a document in which the keys of ``sut`` stand by themselves.
+
+    Parameters
+    ----------
+    document : Document
+        What was read.
+
+    Raises
+    ------
+    InputError
+        If the block is none, has other keys, or one that stands outside it too.
+    """
+    if BLOCK not in document.data:
+        return document
+    block = document.data[BLOCK]
+    if not isinstance(block, dict):
+        raise InputError(f"{document.where((BLOCK,))}: {BLOCK}: must be a block of keys; got {shown(block)}")
+    mistakes = [
+        f"{document.where((BLOCK, key))}: {BLOCK}.{key}: "
+        + (f"unknown key; {suggest(str(key), KEYS)}" if key not in KEYS else f"{key} stands outside {BLOCK} too")
+        for key in block
+        if key not in KEYS or key in document.data
+    ]
+    if mistakes:
+        raise InputError("\n".join(mistakes))
+    data = {key: value for key, value in document.data.items() if key != BLOCK}
+    origins = {at[1:] if at[:1] == (BLOCK,) and len(at) > 1 else at: told for at, told in document.origins.items()}
+    return replace(document, data={**data, **block}, origins=origins)
+
+
+def without_sut_in_path(override: str) -> str:
+    """An override of a key in ``sut`` as one of the key itself.
+
+    Parameters
+    ----------
+    override : str
+        ``key.path=value``.
+    """
+    return override.strip().removeprefix(f"{BLOCK}.")

@@ -1,0 +1,29 @@
+"""A plug-in as a user would write one: an adviser that goes by its own speed and the gap to its lead vehicle."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from fogsim import Belief, Observation, SpeedAdvice
+from fogsim.parameters import Range, checked_parameters
+
+
+@checked_parameters
+@dataclass(frozen=True)
+class Cautious:
+    """Advise what covers the visibility, or the gap if that is shorter, in a given time."""
+
+    headway: Annotated[float, Range(0.5, 10.0, "s")] = 3.0
+
+    def advise_vehicle(
+        self,
+        belief: Belief,
+        observation: Observation,
+        speed_limit: float,
+        time: float,  # noqa: ARG002 - the protocol's parameters
+        previous: SpeedAdvice,  # noqa: ARG002 - the protocol's parameters
+    ) -> SpeedAdvice:
+        """Advise a speed [m/s]."""
+        reach = belief.visibility_quantile(0.25)
+        if observation.lead is not None:
+            reach = min(reach, observation.lead.distance)
+        return SpeedAdvice(min(speed_limit, reach / self.headway))

@@ -3,6 +3,7 @@
 import inspect
 import re
 import sys
+from collections.abc import Sequence
 from dataclasses import astuple, fields
 from pathlib import Path
 from typing import Any, get_args
@@ -17,7 +18,7 @@ from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.metrics import RunMetrics
 from fogsim.parameters import accepted_parameters, mismatch
-from fogsim.recorders.table import table_columns
+from fogsim.recorders.table_columns import Column, table_columns, traffic_table_columns
 from fogsim.recorders.trajectories import TRAJECTORY_COLUMNS
 from fogsim.scenario.schema import Scenario
 from fogsim.scenario.section import GIVEN_BY_THE_LOOP, Method
@@ -92,7 +93,16 @@ def _models_in(annotation: Any) -> list[type[BaseModel]]:
 
 def columns() -> list[tuple[str, ...]]:
     """Columns of steps.parquet, with those of one estimator."""
-    return [(f"`{c.name}`", str(c.kind), c.meaning) for c in table_columns(["METHOD"])]
+    return _column_rows(table_columns(["METHOD"]))
+
+
+def traffic_columns() -> list[tuple[str, ...]]:
+    """Columns of steps.parquet of traffic alone."""
+    return _column_rows(traffic_table_columns())
+
+
+def _column_rows(found: Sequence[Column[Any]]) -> list[tuple[str, ...]]:
+    return [(f"`{column.name}`", str(column.kind), column.meaning) for column in found]
 
 
 def trajectory_columns() -> list[tuple[str, ...]]:
@@ -197,6 +207,7 @@ TABLES = {
     },
     "results.md": {
         "columns": (("column", "type", "meaning"), columns),
+        "traffic_columns": (("column", "type", "meaning"), traffic_columns),
         "trajectories": (("column", "type", "meaning"), trajectory_columns),
         "metrics": (("key", "meaning"), metrics),
     },

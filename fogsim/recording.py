@@ -2,30 +2,36 @@
 
 import contextlib
 import dataclasses
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Generic, TypeVar
 
 from fogsim.errors import InputError, RecorderError
 from fogsim.files.atomic import refuse_existing
 from fogsim.interruption import Interruption
 from fogsim.loop import run, warn_of_unplayed
-from fogsim.metrics import RunMetrics, RunSummary, step_metrics
+from fogsim.metrics import MetricsOfRun, RunMetrics, RunSummary, TrafficRunMetrics
 from fogsim.recorders import (
     RECORDERS,
+    TRAFFIC_RECORDERS,
     USUAL_RECORDERS,
+    USUAL_TRAFFIC_RECORDERS,
     Manifest,
-    Recorder,
     RunDirectory,
     RunInformation,
     Status,
+    StepRecorder,
     write_sign_map,
 )
+from fogsim.recording_steps import Recording
+from fogsim.registry import Registry
 from fogsim.scenario import Scenario, build, resolved
 from fogsim.traffic.road.configuration import configured_files
 from fogsim.traffic.road.network import read_net
 from fogsim.traffic.road.signs import geographic_position, sign_map
-from fogsim.values import NOTHING_UNPLAYED, Ending, SignMap, Step, Unplayed
+from fogsim.traffic_run import run_traffic
+from fogsim.values import NOTHING_UNPLAYED, Ending, SignMap, Step, TrafficStep, Unplayed
 from fogsim.values.result_checks import checked_recorder
 
 
@@ -132,6 +138,106 @@ def record_run(
     made for them, and earlier results as they were; one after it leaves what was recorded until then, and a manifest of
     status "failed" with the error's message.
     """
+    of_ego = _Recorded(
+        lambda folder: run(scenario, seed, sumo_outputs=folder),
+        RunMetrics(build.safety_standard(scenario)),
+        RECORDERS,
+        watch,
+    )
+    return _record(of_ego, scenario, seed, out, overwrite, recorders, command_line)
+
+
+def record_traffic(
+    scenario: Scenario,
+    seed: int,
+    out: Path,
+    *,
+    overwrite: bool = False,
+    recorders: Iterable[str] = USUAL_TRAFFIC_RECORDERS,
+    command_line: Sequence[str] = (),
+    watch: Callable[[TrafficStep], None] = lambda _: None,
+) -> RecordedRun:
+    """Run a scenario without an ego and write its results into a directory, as `record_run` does.
+
+    There is no video, and table and report are of everybody.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        From `load_scenario`; its ``traffic.ego`` is none.
+    seed : int
+        As of `record_run`.
+    out : Path
+        As of `record_run`.
+    overwrite : bool
+        As of `record_run`.
+    recorders : iterable of str
+        Which of `TRAFFIC_RECORDERS` write, each at most once; by default all but ``trajectories``.
+    command_line : sequence of str
+        As of `record_run`.
+    watch : callable
+        As of `record_run`; it gets each `TrafficStep`.
+
+    Returns
+    -------
+    RecordedRun
+        As of `record_run`.
+
+    Raises
+    ------
+    FogSimError
+        As of `record_run`, or if the scenario has an ego.
+    ValueError, TypeError
+        If the seed is negative or no integer.
+
+    Warns
+    -----
+    UnplayedWarning
+        As of `record_run`.
+    """
+    alone = _Recorded(
+        lambda folder: run_traffic(scenario, seed, folder),
+        TrafficRunMetrics(build.safety_standard(scenario)),
+        TRAFFIC_RECORDERS,
+        watch,
+    )
+    return _record(alone, scenario, seed, out, overwrite, recorders, command_line)
+
+
+AnyStep = TypeVar("AnyStep", bound=TrafficStep)
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class _Recorded(Generic[AnyStep]):
+    """A run that is recorded.
+
+    Attributes
+    ----------
+    steps : callable
+        Begins it, given the folder of what SUMO writes.
+    metrics : MetricsOfRun
+        Its metrics.
+    recorders : Registry
+        Who can write it.
+    watch : callable
+        Called with each finished step.
+    """
+
+    steps: Callable[[Path], Generator[AnyStep, None, None]]
+    metrics: MetricsOfRun[AnyStep]
+    recorders: Registry[Callable[[RunInformation], StepRecorder[AnyStep]]]
+    watch: Callable[[AnyStep], None]
+
+
+def _record(
+    what: _Recorded[AnyStep],
+    scenario: Scenario,
+    seed: int,
+    out: Path,
+    overwrite: bool,
+    recorders: Iterable[str],
+    command_line: Sequence[str],
+) -> RecordedRun:
     with Interruption() as interruption, RunDirectory(out, overwrite) as directory:
         manifest = Manifest(
             Status.RUNNING,
@@ -141,18 +247,16 @@ def record_run(
             command_line=command_line,
             own_methods=build.own_methods(scenario),
         )
-        metrics = RunMetrics(build.safety_standard(scenario))
-        recording = Recording(
-            directory, manifest, _open_recorders(recorders, scenario, seed, directory, metrics), metrics
-        )
+        information = _information(scenario, seed, directory, what.metrics)
+        opened = {name: checked_recorder(name, what.recorders[name](information)) for name in recorders}
+        recording = Recording(directory, manifest, opened, what.metrics)
         status, last, message = Status.FAILED, None, ""
         try:
             directory.clear_sumo_outputs()
-            steps_of_run = run(scenario, seed, sumo_outputs=directory.sumo_outputs)
-            with contextlib.closing(steps_of_run) as steps, interruption.allowed():
+            with contextlib.closing(what.steps(directory.sumo_outputs)) as steps, interruption.allowed():
                 for step in steps:
                     recording.record(step)
-                    watch(step)
+                    what.watch(step)
                     last = step
                     if step.ending is not None:
                         # Whoever takes warnings for errors is not to lose a run that is over by one of the loop's.
@@ -174,134 +278,13 @@ def record_run(
         raise RecorderError(recording.failures, directory.path)
     if last is not None and status is Status.COMPLETE:
         warn_of_unplayed(scenario, last)
-    return RecordedRun(status, ending, metrics.summary(), directory.path, tuple(recording.files), unplayed)
+    return RecordedRun(status, ending, what.metrics.summary(), directory.path, tuple(recording.files), unplayed)
 
 
-class Recording:
-    """Recorders of one run, from its first step to the time when their files take their places.
-
-    Parameters
-    ----------
-    directory : RunDirectory
-        Where the files go.
-    manifest : Manifest
-        What is known before the first step.
-    recorders : mapping from str to Recorder
-        Recorders by name.
-    metrics : RunMetrics
-        Metrics of the steps.
-
-    Attributes
-    ----------
-    failures : dict from str to str
-        Recorders that failed, and why.
-    files : list of str
-        Names of the files of the closed recording.
-    """
-
-    def __init__(
-        self, directory: RunDirectory, manifest: Manifest, recorders: Mapping[str, Recorder], metrics: RunMetrics
-    ) -> None:
-        self._directory = directory
-        self._manifest = manifest
-        self._recorders = recorders
-        self._metrics = metrics
-        self._begun = False
-        self.failures: dict[str, str] = {}
-        self.files: list[str] = []
-
-    def record(self, step: Step) -> None:
-        """Hand a step to metrics and recorders.
-
-        Parameters
-        ----------
-        step : Step
-            The finished step.
-
-        Raises
-        ------
-        RecorderError
-            If one fails.
-        """
-        if not self._begun:
-            self._begin()
-        self._metrics.update(step)
-        derived = step_metrics(step, self._metrics.standard)
-        for name, recorder in self._recorders.items():
-            try:
-                recorder.record(step, derived)
-            except Exception as error:
-                self.failures[name] = f"{type(error).__name__}: {error}"
-                raise RecorderError(self.failures, self._directory.path) from error
-
-    def _begin(self) -> None:
-        self._directory.begin(self._manifest.to_json())
-        self._begun = True
-
-    def begin_if_nothing_is_lost(self) -> None:
-        """Begin without a step, unless earlier results are there."""
-        if not (self._begun or self._directory.earlier or self._directory.unfinished.exists()):
-            self._begin()
-
-    def close(self, manifest: Manifest, interruption: Interruption) -> Status:
-        """Close all recorders, also when some fail, and write metrics and manifest; nothing if it was never begun.
-
-        Parameters
-        ----------
-        manifest : Manifest
-            How the run ended.
-        interruption : Interruption
-            What holds signals back; they are let through while a whole run's recorders are closed.
-
-        Returns
-        -------
-        Status
-            How it ended now.
-        """
-        if not self._begun:
-            self._directory.clear_sumo_outputs()
-            return manifest.status
-        status = manifest.status
-        for name, recorder in reversed(list(self._recorders.items())):
-            status = self._close(name, recorder, status, interruption)
-        complete = status is Status.COMPLETE
-        with self._noting_failure("metrics"):
-            self._directory.write_metrics({"complete": complete, **self._metrics.summary().to_json()})
-        if self.failures and complete:
-            status = Status.FAILED
-        message = manifest.message or "; ".join(f"{name}: {reason}" for name, reason in self.failures.items())
-        ended = dataclasses.replace(
-            manifest, status=status, message=message, failed_recorders=self.failures, ended=datetime.now(UTC)
-        )
-        self._directory.finish(ended.to_json())
-        self.files = self._directory.files()
-        return status
-
-    def _close(self, name: str, recorder: Recorder, status: Status, interruption: Interruption) -> Status:
-        with self._noting_failure(name):
-            if status is Status.COMPLETE:
-                try:
-                    with interruption.allowed():
-                        recorder.close(complete=True)
-                        return status
-                except KeyboardInterrupt:
-                    status = Status.INTERRUPTED
-            recorder.close(complete=False)
-        return status
-
-    @contextlib.contextmanager
-    def _noting_failure(self, name: str) -> Iterator[None]:
-        """Note why a recorder failed, where the reason is not known already."""
-        try:
-            yield
-        except Exception as error:  # noqa: BLE001 - a recorder may be anybody's, and must not cost the others their files
-            self.failures.setdefault(name, f"{type(error).__name__}: {error}")
-
-
-def _open_recorders(
-    recorders: Iterable[str], scenario: Scenario, seed: int, directory: RunDirectory, metrics: RunMetrics
-) -> dict[str, Recorder]:
-    information = RunInformation(
+def _information(
+    scenario: Scenario, seed: int, directory: RunDirectory, metrics: MetricsOfRun[AnyStep]
+) -> RunInformation:
+    return RunInformation(
         directory=directory,
         title=scenario.name,
         description=scenario.description,
@@ -311,7 +294,6 @@ def _open_recorders(
         summary=lambda: metrics.summary().values,
         meanings=metrics.summary().meanings,
     )
-    return {name: checked_recorder(name, RECORDERS[name](information)) for name in recorders}
 
 
 def record_signs(scenario: Scenario, out: Path, *, overwrite: bool = False) -> SignMap:

@@ -11,7 +11,7 @@ from pyarrow import parquet
 import fogsim
 from fogsim.errors import FogSimError, RecorderError, SimulationError, UnknownNameError
 from fogsim.recorders import ReportRecorder
-from fogsim.recording import record_run
+from fogsim.recording import record_run, record_traffic
 from fogsim.scenario import Scenario
 from fogsim.values import Step
 
@@ -108,3 +108,36 @@ def test_odd_names_of_directories_work(tmp_path: Path, monkeypatch: pytest.Monke
     assert status(out)["command_line"] == ["fogsim", "run", "--out", str(out)]
     with (out / "steps.parquet").open("rb") as table:
         assert parquet.read_table(table).num_rows == 3
+
+
+def without_ego(*settings: str) -> Scenario:
+    nobody = ["traffic.ego=none", "estimators=[]", "lighting=low_beam", "traffic.events=[]", "fog={visibility_m: 60}"]
+    clocks = ["clocks.traffic_step_s=0.5", "clocks.camera_period_s=0.5", "duration_s=2"]
+    return fogsim.load_scenario("motorway_fog_bank", [EARLY, *nobody, *clocks, *settings])
+
+
+def test_traffic_alone_is_recorded_the_same_again(tmp_path: Path) -> None:
+    texts, tables = [], []
+    for out in (tmp_path / "one", tmp_path / "again"):
+        done = record_traffic(without_ego("traffic.warm_up_s=10"), 1, out, recorders=("table", "trajectories"))
+        assert done.files == ("manifest.json", "metrics.json", "steps.parquet", "trajectories.parquet")
+        texts.append((out / "metrics.json").read_text(encoding="utf-8"))
+        tables.append((out / "steps.parquet").read_bytes())
+        assert json.loads(texts[-1]) == {"complete": True, **done.summary.to_json()}
+    assert texts[0] == texts[1]
+    assert tables[0] == tables[1]
+    rows = parquet.read_table(tmp_path / "one" / "steps.parquet").to_pylist()
+    assert [row["time_s"] for row in rows] == [0.0, 0.5, 1.0, 1.5, 2.0]
+    trajectories = parquet.read_table(tmp_path / "one" / "trajectories.parquet").to_pydict()
+    assert [trajectories["index"].count(row["index"]) for row in rows] == [row["n_vehicles"] for row in rows]
+    assert rows[-1]["n_vehicles"] > 3
+
+
+def test_traffic_alone_has_no_video_and_a_run_with_an_ego_is_not_alone(tmp_path: Path) -> None:
+    with pytest.raises(UnknownNameError, match=r"recorder of traffic alone.*'video'"):
+        record_traffic(without_ego(), 1, tmp_path / "out", recorders=("video",))
+    with pytest.raises(FogSimError, match=r"traffic\.ego is 'ego'; write none"):
+        record_traffic(short(), 1, tmp_path / "out")
+    with pytest.raises(FogSimError, match=r"needs an ego vehicle, and traffic\.ego is none; name one, or .*fogsim run"):
+        record_run(without_ego(), 1, tmp_path / "out")
+    assert list(tmp_path.iterdir()) == []

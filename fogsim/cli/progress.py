@@ -7,7 +7,7 @@ from typing import Self
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from fogsim.values import Step
+from fogsim.values import Step, TrafficStep
 
 STARTING = "starting; a first run compiles for some seconds"
 """Description of a bar before the first step."""
@@ -38,7 +38,7 @@ def progress_bar(console: Console, *, stays: bool = False) -> Progress:
 
 
 class SimulationProgress:
-    """A bar over simulated time, with how fast it passes and what is believed.
+    """A bar over simulated time, with how fast it passes, and what the ego believes or how many drive.
 
     Parameters
     ----------
@@ -53,18 +53,18 @@ class SimulationProgress:
         self._progress = progress_bar(console, stays=True)
         self._task = self._progress.add_task(STARTING, total=duration)
 
-    def show(self, step: Step) -> None:
+    def show(self, step: TrafficStep) -> None:
         """Move the bar.
 
         Parameters
         ----------
-        step : Step
+        step : TrafficStep
             The step that is finished.
         """
         task = self._progress.tasks[self._task]
         rate = step.time / task.elapsed if task.elapsed else 0.0
-        believed = f"V ≈ {step.belief.visibility:.0f} m"
-        description = f"{step.time:.0f} of {self._duration:.0f} s, {rate:.1f}× real time, {believed}"
+        found = f"V ≈ {step.belief.visibility:.0f} m" if isinstance(step, Step) else f"{len(step.traffic.ids)} vehicles"
+        description = f"{step.time:.0f} of {self._duration:.0f} s, {rate:.1f}× real time, {found}"
         # A run that is over is done, however much of its longest duration is left.
         done = step.time if step.ending is None else self._duration
         self._progress.update(self._task, completed=done, description=description)

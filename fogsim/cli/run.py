@@ -4,7 +4,7 @@ import sys
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.table import Table
@@ -20,6 +20,9 @@ from fogsim.cli.scenario_options import (
     chosen_scenario,
 )
 from fogsim.errors import UnplayedWarning
+
+if TYPE_CHECKING:
+    from fogsim.scenario import Scenario
 
 SHOWN = {
     "distance_m": ("distance driven", "m"),
@@ -37,6 +40,21 @@ SHOWN = {
 }
 """Metrics that the summary shows, with their wording and unit; metrics.json and the report have all of them."""
 
+SHOWN_OF_TRAFFIC = {
+    "duration_s": ("simulated time", "s"),
+    "traffic_vehicle_time_s": ("time of all vehicles together", "s"),
+    "traffic_mean_speed_mps": ("mean speed", "m/s"),
+    "traffic_speed_standard_deviation_mps": ("standard deviation of speed", "m/s"),
+    "traffic_delay_s_per_vehicle_km": ("delay", "s per vehicle-km"),
+    "traffic_collisions": ("collisions", ""),
+    "traffic_minimum_time_to_collision_s": ("least time to collision", "s"),
+    "traffic_exposed_time_share": ("time below the time-to-collision threshold", "%"),
+    "traffic_overdriving_time_share": ("time in which vehicles could not have stopped in sight", "%"),
+    "traffic_advised_time_share": ("time in which drivers had heard an advice", "%"),
+    "traffic_advice_compliance_share": ("of it at the advice or slower", "%"),
+}
+"""What it shows of traffic alone; shares are of the time of all vehicles."""
+
 
 def run_command(
     scenario: ScenarioName = None,
@@ -47,32 +65,37 @@ def run_command(
     out: Annotated[Path | None, typer.Option(help="Directory for the results. [runs/SCENARIO-seedN]")] = None,
     settings: Settings = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace results that are there already.")] = False,
-    video: Annotated[bool, typer.Option(help="Write video.mp4.")] = True,
+    video: Annotated[
+        bool | None, typer.Option("--video/--no-video", help="Write video.mp4; as a rule where there is an ego.")
+    ] = None,
     report: Annotated[bool, typer.Option(help="Write report.html.")] = True,
     trajectories: Annotated[bool, typer.Option(help="Write trajectories.parquet, all vehicles.")] = False,
 ) -> None:
     """Run a scenario and write manifest.json, steps.parquet, metrics.json, video.mp4 and report.html."""
-    from fogsim.recording import record_run
-    from fogsim.scenario.build import check_ego
+    from fogsim.recording import record_run, record_traffic
 
     loaded = chosen_scenario(scenario, sumocfg, ego, visibility, settings)
-    check_ego(loaded, "fogsim run")
-    recorders = ["table", *(["video"] if video else []), *(["report"] if report else [])]
-    recorders += ["trajectories"] if trajectories else []
+    chosen = {
+        "table": True,
+        "video": _filmed(loaded, video),
+        "report": report,
+        "trajectories": trajectories,
+    }
+    record = record_run if loaded.traffic.has_ego else record_traffic
     directory = out or Path("runs", f"{loaded.name}-seed{seed}")
     with warnings.catch_warnings(), SimulationProgress(stderr, loaded.duration_s) as progress:
         # The summary names all of it.
         warnings.simplefilter("ignore", UnplayedWarning)
-        result = record_run(
+        result = record(
             loaded,
             seed,
             directory,
             overwrite=overwrite,
-            recorders=recorders,
+            recorders=[name for name, wanted in chosen.items() if wanted],
             command_line=["fogsim", *sys.argv[1:]],
             watch=progress.show,
         )
-    _print_summary(result.summary.values)
+    _print_summary(result.summary.values, SHOWN if loaded.traffic.has_ego else SHOWN_OF_TRAFFIC)
     partial = "the results are partial and say so" if result.files else "before its first step; nothing was written"
     ended = result.ending.value if result.ending else f"{result.status.value}; {partial}"
     stdout.print(f"\nThe run ended: [bold]{ended}[/].")
@@ -85,9 +108,18 @@ def run_command(
         raise typer.Exit(INTERRUPTED)
 
 
-def _print_summary(values: Mapping[str, object]) -> None:
+def _filmed(scenario: "Scenario", wanted: bool | None) -> bool:
+    """Whether there is a video: where nobody says, if there is a camera for it."""
+    if wanted:
+        from fogsim.scenario.build import check_ego
+
+        check_ego(scenario, "--video")
+    return scenario.traffic.has_ego if wanted is None else wanted
+
+
+def _print_summary(values: Mapping[str, object], shown: Mapping[str, tuple[str, str]]) -> None:
     table = Table(title="Summary", title_justify="left", box=None, show_header=False, pad_edge=False)
-    for key, (wording, unit) in SHOWN.items():
+    for key, (wording, unit) in shown.items():
         value = values.get(key)
         if isinstance(value, int | float):
             scale = 100.0 if key.endswith("_share") else 1.0

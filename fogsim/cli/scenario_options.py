@@ -16,7 +16,7 @@ SCENARIO_HELP = "A scenario of the catalogue (fogsim list), a file or a folder."
 
 ScenarioName = Annotated[str | None, typer.Argument(help=SCENARIO_HELP)]
 SumoConfiguration = Annotated[Path | None, typer.Option(help="A SUMO configuration, in place of a scenario.")]
-EgoId = Annotated[str | None, typer.Option(help="Id of the vehicle that is the ego.")]
+EgoId = Annotated[str | None, typer.Option(help="Id of the vehicle that is the ego; none for traffic alone.")]
 HomogeneousVisibility = Annotated[
     float | None, typer.Option(help="Meteorological visibility of homogeneous fog in metres.", min=1.0)
 ]
@@ -37,7 +37,7 @@ def chosen_scenario(
     sumocfg : Path or None
         The SUMO configuration.
     ego : str or None
-        Id of the ego; the SUMO configuration needs one.
+        Id of the ego, or ``none`` for traffic alone; the SUMO configuration needs one of them.
     visibility : float or None
         Meteorological visibility of homogeneous fog [m]; the SUMO configuration needs it, or a fog in the settings.
     settings : sequence of str or None
@@ -55,7 +55,7 @@ def chosen_scenario(
     if sumocfg is not None and name is None:
         if ego is None:
             raise InputError(
-                f"--sumocfg {sumocfg}: --ego is missing: which vehicle is the ego? Traffic alone is for fogsim study"
+                f"--sumocfg {sumocfg}: --ego is missing: which vehicle is the ego? For traffic alone write --ego none"
             )
         if not fog and not any(setting.startswith("fog.") for setting in settings):
             raise InputError(f"--sumocfg {sumocfg}: --visibility is missing, or a fog by --set fog.…")

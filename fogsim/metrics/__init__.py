@@ -2,7 +2,7 @@
 
 from fogsim.kinematics import stopping_sight_distance
 from fogsim.metrics.metric import JsonValue, Metric, Sample
-from fogsim.metrics.run_metrics import METRICS, MetricFactory, RunMetrics, RunSummary, TrafficRunMetrics
+from fogsim.metrics.run_metrics import METRICS, MetricFactory, MetricsOfRun, RunMetrics, RunSummary, TrafficRunMetrics
 from fogsim.metrics.step_metrics import DEFAULT_STANDARD, step_metrics
 from fogsim.metrics.surrogate import (
     SafetyStandard,
@@ -21,6 +21,7 @@ __all__ = [
     "JsonValue",
     "Metric",
     "MetricFactory",
+    "MetricsOfRun",
     "RunMetrics",
     "RunSummary",
     "SafetyStandard",

@@ -1,7 +1,9 @@
 """All metrics of one run, from its steps one at a time."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 from fogsim.errors import SimulationError
 from fogsim.metrics.estimation import BeliefError, EstimatorErrors
@@ -81,8 +83,88 @@ def _written(value: JsonValue) -> JsonValue:
     return round(float(f"{value:.9g}"), 9) + 0.0 if isinstance(value, float) else value
 
 
-class RunMetrics:
-    """Watches the steps of one run.
+AnyStep = TypeVar("AnyStep", bound=TrafficStep)
+
+
+class MetricsOfRun(ABC, Generic[AnyStep]):
+    """Watches the steps of one run; what runs with and without an ego have in common.
+
+    Parameters
+    ----------
+    standard : SafetyStandard
+        What the measures are judged by.
+    metrics : mapping from str to Metric or TrafficMetric
+        Metrics by name, in the order of the summary.
+    watchers : iterable of SpanWatcher
+        Who gets what the metrics of everybody get; `summary` hands over the last of it.
+
+    Attributes
+    ----------
+    standard : SafetyStandard
+        The same.
+    """
+
+    def __init__(
+        self,
+        standard: SafetyStandard,
+        metrics: Mapping[str, Metric | TrafficMetric],
+        watchers: Iterable[SpanWatcher],
+    ) -> None:
+        self.standard = standard
+        self._metrics = metrics
+        of_everybody = [metric for metric in metrics.values() if isinstance(metric, TrafficMetric)]
+        self._of_traffic = GatheredMetrics([*of_everybody, *watchers])
+        self._last: AnyStep | None = None
+
+    def update(self, step: AnyStep) -> None:
+        """Take in one finished step; the time since the one before is read from their times.
+
+        A step that comes once more, as the last one of an ego that has left the network, adds its ending only.
+
+        Parameters
+        ----------
+        step : TrafficStep
+            The step; a `Step` where the run has an ego.
+
+        Raises
+        ------
+        SimulationError
+            If the step is not later than the one before.
+        """
+        last, self._last = self._last, step
+        elapsed = _elapsed(last, step)
+        if elapsed is not None:
+            self._take(step, elapsed)
+            self._of_traffic.add(step, elapsed)
+
+    @abstractmethod
+    def _take(self, step: AnyStep, elapsed: float) -> None:
+        """Take from a step what is not of everybody, a time [s] after the one before."""
+
+    @abstractmethod
+    def derive(self, step: AnyStep) -> dict[str, float | None]:
+        """Derive from one step alone what recorders write beside it.
+
+        Parameters
+        ----------
+        step : TrafficStep
+            The step, as of `update`.
+        """
+
+    def summary(self) -> RunSummary:
+        """Say what the steps so far amount to."""
+        self._of_traffic.hand_over()
+        ending = None if self._last is None else self._last.ending
+        values: dict[str, JsonValue] = {"ending": None if ending is None else ending.value}
+        meanings = {"ending": "why the run was over; none if it was cut short"}
+        for name, metric in self._metrics.items():
+            values.update(checked_values(name, metric.result()))
+            meanings.update(metric.meanings)
+        return RunSummary(values, meanings)
+
+
+class RunMetrics(MetricsOfRun[Step]):
+    """Watches the steps of one run about an ego.
 
     Parameters
     ----------
@@ -92,11 +174,6 @@ class RunMetrics:
         Metrics from `METRICS`; all of them by default.
     watchers : iterable of SpanWatcher
         Who gets what the metrics of everybody get; `summary` hands over the last of it.
-
-    Attributes
-    ----------
-    standard : SafetyStandard
-        The same.
 
     Raises
     ------
@@ -110,43 +187,27 @@ class RunMetrics:
         names: Iterable[str] = METRICS,
         watchers: Iterable[SpanWatcher] = (),
     ) -> None:
-        self.standard = standard
-        self._metrics = {name: METRICS[name](standard) for name in names}
-        self._of_ego = [metric for metric in self._metrics.values() if not isinstance(metric, TrafficMetric)]
-        self._of_traffic = GatheredMetrics([*_of_everybody(self._metrics.values()), *watchers])
-        self._last: Step | None = None
+        metrics = {name: METRICS[name](standard) for name in names}
+        super().__init__(standard, metrics, watchers)
+        self._of_ego = [metric for metric in metrics.values() if not isinstance(metric, TrafficMetric)]
 
-    def update(self, step: Step) -> None:
-        """Take in one finished step; the time since the one before is read from their times.
+    def _take(self, step: Step, elapsed: float) -> None:
+        sample = Sample(step, elapsed, self.derive(step))
+        for metric in self._of_ego:
+            metric.update(sample)
 
-        When the ego leaves the network, the last step comes once more with its ending; only that is taken from it.
+    def derive(self, step: Step) -> dict[str, float | None]:
+        """Derive the safety of one instant, as `step_metrics` does.
 
         Parameters
         ----------
         step : Step
             The step.
-
-        Raises
-        ------
-        SimulationError
-            If the step is not later than the one before.
         """
-        last, self._last = self._last, step
-        elapsed = _elapsed(last, step)
-        if elapsed is None:
-            return
-        sample = Sample(step, elapsed, step_metrics(step, self.standard))
-        for metric in self._of_ego:
-            metric.update(sample)
-        self._of_traffic.add(step, elapsed)
-
-    def summary(self) -> RunSummary:
-        """Say what the steps so far amount to."""
-        self._of_traffic.hand_over()
-        return _summary(self._last, self._metrics)
+        return step_metrics(step, self.standard)
 
 
-class TrafficRunMetrics:
+class TrafficRunMetrics(MetricsOfRun[TrafficStep]):
     """Watches the steps of one run without an ego: the metrics of everybody.
 
     Parameters
@@ -171,41 +232,31 @@ class TrafficRunMetrics:
         watchers: Iterable[SpanWatcher] = (),
     ) -> None:
         made = {name: METRICS[name](standard) for name in names}
-        self._metrics = {name: metric for name, metric in made.items() if isinstance(metric, TrafficMetric)}
-        self._of_traffic = GatheredMetrics([*_of_everybody(self._metrics.values()), *watchers])
-        self._last: TrafficStep | None = None
+        of_everybody = {name: metric for name, metric in made.items() if isinstance(metric, TrafficMetric)}
+        super().__init__(standard, of_everybody, watchers)
         self._duration, self._steps = 0.0, 0
 
-    def update(self, step: TrafficStep) -> None:
-        """Take in one finished step; the time since the one before is read from their times.
+    def _take(self, step: TrafficStep, elapsed: float) -> None:  # noqa: ARG002 - counted whatever is in it
+        self._duration, self._steps = self._duration + elapsed, self._steps + 1
+
+    def derive(self, step: TrafficStep) -> dict[str, float | None]:  # noqa: ARG002 - as of `MetricsOfRun`
+        """Derive nothing: all that is derived from a step alone is of an ego.
 
         Parameters
         ----------
         step : TrafficStep
             The step.
-
-        Raises
-        ------
-        SimulationError
-            If the step is not later than the one before.
         """
-        last, self._last = self._last, step
-        elapsed = _elapsed(last, step)
-        if elapsed is not None:
-            self._duration, self._steps = self._duration + elapsed, self._steps + 1
-            self._of_traffic.add(step, elapsed)
+        return {}
 
     def summary(self) -> RunSummary:
         """Say what the steps so far amount to."""
-        self._of_traffic.hand_over()
-        found = _summary(self._last, self._metrics)
+        found = super().summary()
         about: dict[str, JsonValue] = {"duration_s": clock_time(self._duration), "steps": self._steps}
         meanings = {key: Motion.meanings[key] for key in about}
-        return RunSummary({**found.values, **about}, {**found.meanings, **meanings})
-
-
-def _of_everybody(metrics: Iterable[Metric | TrafficMetric]) -> list[TrafficMetric]:
-    return [metric for metric in metrics if isinstance(metric, TrafficMetric)]
+        # The way of the run comes first, as in that of an ego.
+        first = {"ending": found.values["ending"], **about}
+        return RunSummary({**first, **found.values}, {**found.meanings, **meanings})
 
 
 def _elapsed(last: TrafficStep | None, step: TrafficStep) -> float | None:
@@ -218,13 +269,3 @@ def _elapsed(last: TrafficStep | None, step: TrafficStep) -> float | None:
     if not elapsed > 0:
         raise SimulationError(f"steps must follow in time, got {step.time!r} s after {last.time!r} s")
     return elapsed
-
-
-def _summary(last: TrafficStep | None, metrics: Mapping[str, Metric | TrafficMetric]) -> RunSummary:
-    ending = None if last is None else last.ending
-    values: dict[str, JsonValue] = {"ending": None if ending is None else ending.value}
-    meanings = {"ending": "why the run was over; none if it was cut short"}
-    for name, metric in metrics.items():
-        values.update(checked_values(name, metric.result()))
-        meanings.update(metric.meanings)
-    return RunSummary(values, meanings)

@@ -5,18 +5,31 @@ from collections.abc import Callable
 from fogsim.files.atomic import write_json
 from fogsim.recorders.frame_panel import FramePanel
 from fogsim.recorders.manifest import Manifest, Status, versions
-from fogsim.recorders.protocol import DERIVED_QUANTITIES, Derived, Recorder, RunInformation
+from fogsim.recorders.protocol import (
+    DERIVED_QUANTITIES,
+    AnyStep_contra,
+    Derived,
+    Recorder,
+    RunInformation,
+    StepRecorder,
+    TrafficRecorder,
+)
 from fogsim.recorders.recovery import recover_run
 from fogsim.recorders.report import ReportRecorder
 from fogsim.recorders.run_directory import RunDirectory
 from fogsim.recorders.sign_map import write_sign_map
-from fogsim.recorders.table import TableRecorder
+from fogsim.recorders.table import StepTable, TableRecorder
+from fogsim.recorders.table_columns import traffic_table_columns
+from fogsim.recorders.traffic_report import TrafficReportRecorder
 from fogsim.recorders.trajectories import TrajectoryRecorder, with_trajectories
 from fogsim.recorders.video import VideoRecorder, encoder_report
 from fogsim.registry import Registry
 
 RecorderFactory = Callable[[RunInformation], Recorder]
-"""Makes a recorder for one run."""
+"""Makes a recorder for one run about an ego."""
+
+TrafficRecorderFactory = Callable[[RunInformation], TrafficRecorder]
+"""Makes a recorder for one run of traffic alone."""
 
 RECORDERS: Registry[RecorderFactory] = Registry(
     "recorder",
@@ -27,15 +40,31 @@ RECORDERS: Registry[RecorderFactory] = Registry(
         "trajectories": lambda run: TrajectoryRecorder(run.directory.trajectories),
     },
 )
-"""Every recorder by name."""
+"""Every recorder of runs about an ego, by name."""
+
+TRAFFIC_RECORDERS: Registry[TrafficRecorderFactory] = Registry(
+    "recorder of traffic alone",
+    {
+        "table": lambda run: StepTable(run.directory.table, traffic_table_columns()),
+        "report": TrafficReportRecorder,
+        "trajectories": lambda run: TrajectoryRecorder(run.directory.trajectories),
+    },
+)
+"""Every recorder of runs without an ego, by name."""
 
 USUAL_RECORDERS = ("table", "video", "report")
-"""Those that write where nobody has chosen."""
+"""Those that write of a run about an ego where nobody has chosen."""
+
+USUAL_TRAFFIC_RECORDERS = ("table", "report")
+"""Those that write of traffic alone where nobody has chosen."""
 
 __all__ = [
     "DERIVED_QUANTITIES",
     "RECORDERS",
+    "TRAFFIC_RECORDERS",
     "USUAL_RECORDERS",
+    "USUAL_TRAFFIC_RECORDERS",
+    "AnyStep_contra",
     "Derived",
     "FramePanel",
     "Manifest",
@@ -45,7 +74,12 @@ __all__ = [
     "RunDirectory",
     "RunInformation",
     "Status",
+    "StepRecorder",
+    "StepTable",
     "TableRecorder",
+    "TrafficRecorder",
+    "TrafficRecorderFactory",
+    "TrafficReportRecorder",
     "TrajectoryRecorder",
     "VideoRecorder",
     "encoder_report",

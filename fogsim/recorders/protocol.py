@@ -2,13 +2,16 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 from fogsim.recorders.run_directory import RunDirectory
-from fogsim.values import Step
+from fogsim.values import Step, TrafficStep
 
 Derived = Mapping[str, float | None]
-"""What was derived from a step; the keys are `DERIVED_QUANTITIES`, None where a quantity is undefined."""
+"""What was derived from a step; the keys are `DERIVED_QUANTITIES`, None where a quantity is undefined.
+
+Without an ego there are none of them.
+"""
 
 DERIVED_QUANTITIES: Mapping[str, str] = {
     "time_to_collision_s": "time to collision with the leader; none if it is not approached",
@@ -16,19 +19,21 @@ DERIVED_QUANTITIES: Mapping[str, str] = {
     "stopping_sight_distance_m": "distance in which the ego could stop after a reaction time",
     "visibility_margin_m": "true visibility ahead minus stopping sight distance; none in clear air",
 }
-"""Quantities that every recorder is handed with each step, and what they mean."""
+"""Quantities that every recorder of an ego's run is handed with each step, and what they mean."""
+
+AnyStep_contra = TypeVar("AnyStep_contra", bound=TrafficStep, contravariant=True)
 
 
-class Recorder(Protocol):
+class StepRecorder(Protocol[AnyStep_contra]):
     """Writes what happens to a file; under its final name a file is always whole."""
 
-    def record(self, step: Step, derived: Derived) -> None:
+    def record(self, step: AnyStep_contra, derived: Derived) -> None:
         """Take in one finished step.
 
         Parameters
         ----------
-        step : Step
-            The step.
+        step : TrafficStep
+            The step; a `Step` where the run has an ego.
         derived : mapping from str to float or None
             `DERIVED_QUANTITIES` of the step.
         """
@@ -43,6 +48,13 @@ class Recorder(Protocol):
         complete : bool
             False if the run was cut short: the file then says so, and is finished within a second.
         """
+
+
+Recorder = StepRecorder[Step]
+"""A recorder of runs about an ego."""
+
+TrafficRecorder = StepRecorder[TrafficStep]
+"""A recorder of traffic alone, which can record runs about an ego, too."""
 
 
 def _no_summary() -> Mapping[str, object]:

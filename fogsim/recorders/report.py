@@ -2,14 +2,16 @@
 
 import base64
 import io
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
+from typing import Generic
 
 from fogsim.files.atomic import write_text
 from fogsim.recorders.camera_picture import scale_image
 from fogsim.recorders.manifest import versions
-from fogsim.recorders.protocol import Derived, RunInformation
+from fogsim.recorders.protocol import AnyStep_contra, Derived, RunInformation
 from fogsim.recorders.report_data import Album, Curves, ReportPicture
 from fogsim.recorders.report_figures import draw_figures
 from fogsim.units import KMH_PER_MPS
@@ -62,6 +64,8 @@ class ReportContent:
         Name and description of the scenario.
     interrupted_at : float or None
         Instant at which the run was cut short [s], None if it was complete.
+    recorded : bool
+        Whether there was a step.
     not_played : sequence of str
         What of the script was not played, a line each.
     metrics : mapping from str to object
@@ -79,6 +83,7 @@ class ReportContent:
     title: str
     description: str
     interrupted_at: float | None
+    recorded: bool
     not_played: Sequence[str]
     metrics: Mapping[str, object]
     meanings: Mapping[str, str]
@@ -106,7 +111,7 @@ def render_report(content: ReportContent) -> str:
             *(f'<p class="note">Not played: {escape(line)}</p>' for line in content.not_played),
             _summary_table(content.metrics, content.meanings),
             _methods_table(content.metrics, content.meanings),
-            _figures(content.figures, recorded=bool(content.pictures)),
+            _figures(content.figures, recorded=content.recorded),
             _pictures(content.pictures),
             _footer(content.footer),
             "</body>\n</html>\n",
@@ -218,7 +223,7 @@ def _value(key: str, value: object) -> str:
     return f"{number} {_UNITS.get(suffix, '')}".strip() + in_kmh
 
 
-class ReportRecorder:
+class StepReport(ABC, Generic[AnyStep_contra]):
     """Writes ``report.html``: metrics, figures and pictures in one file that opens without a network.
 
     Parameters
@@ -229,24 +234,35 @@ class ReportRecorder:
 
     def __init__(self, information: RunInformation) -> None:
         self._information = information
-        self._curves = Curves(estimates={method: [] for method in information.methods})
-        self._album = Album()
+        self._last: float | None = None
         self._not_played: list[str] = []
         self._open = True
 
-    def record(self, step: Step, derived: Derived) -> None:
+    def record(self, step: AnyStep_contra, derived: Derived) -> None:
         """Remember a step.
 
         Parameters
         ----------
-        step : Step
+        step : TrafficStep
             The finished step.
         derived : mapping from str to float or None
             `DERIVED_QUANTITIES` of the step.
         """
-        self._curves.add(step, derived)
-        self._album.add(step)
+        self._remember(step, derived)
+        self._last = step.time
         self._not_played = step.unplayed.lines
+
+    @abstractmethod
+    def _remember(self, step: AnyStep_contra, derived: Derived) -> None:
+        """Remember what figures and pictures need of a step."""
+
+    @abstractmethod
+    def _figures(self) -> Sequence[tuple[str, bytes]]:
+        """Caption and PNG of each figure, once there was a step."""
+
+    def _pictures(self) -> Sequence[ReportPicture]:
+        """Camera images; none where there is no camera."""
+        return ()
 
     def close(self, complete: bool) -> None:
         """Write the report; it says so if the run was cut short.
@@ -258,21 +274,46 @@ class ReportRecorder:
         """
         if not self._open:
             return
-        last = self._curves.time[-1] if self._curves.time else 0.0
         content = ReportContent(
             title=self._information.title,
             description=self._information.description,
-            interrupted_at=None if complete else last,
+            interrupted_at=None if complete else self._last or 0.0,
+            recorded=self._last is not None,
             not_played=self._not_played,
             metrics=self._information.summary(),
             meanings=self._information.meanings,
             # Figures take longer than somebody waits who has pressed Ctrl-C.
-            figures=draw_figures(self._curves) if self._curves.time and complete else [],
-            pictures=self._album.chosen(),
+            figures=self._figures() if self._last is not None and complete else [],
+            pictures=self._pictures(),
             footer=_footnotes(self._information.seed),
         )
         write_text(self._information.directory.report, render_report(content))
         self._open = False
+
+
+class ReportRecorder(StepReport[Step]):
+    """Writes the report of a run about an ego.
+
+    Parameters
+    ----------
+    information : RunInformation
+        The run.
+    """
+
+    def __init__(self, information: RunInformation) -> None:
+        super().__init__(information)
+        self._curves = Curves(estimates={method: [] for method in information.methods})
+        self._album = Album()
+
+    def _remember(self, step: Step, derived: Derived) -> None:
+        self._curves.add(step, derived)
+        self._album.add(step)
+
+    def _figures(self) -> Sequence[tuple[str, bytes]]:
+        return draw_figures(self._curves)
+
+    def _pictures(self) -> Sequence[ReportPicture]:
+        return self._album.chosen()
 
 
 def _footnotes(seed: int) -> Mapping[str, str]:

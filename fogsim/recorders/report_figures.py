@@ -14,8 +14,10 @@ from fogsim.recorders.report_data import Curves
 from fogsim.recorders.style import ON_LIGHT, method_colours
 from fogsim.units import KMH_PER_MPS
 
-_TRUTH, _BELIEF, _ADVICE, _ALARM, _SPEED = "#c28a00", "#1f6fd0", "#1f9d61", "#cf3a34", "#1c2733"
-_MUTED = "#7b8794"
+TRUTH, BELIEF, ADVICE, ALARM, SPEED = "#c28a00", "#1f6fd0", "#1f9d61", "#cf3a34", "#1c2733"
+MUTED = "#7b8794"
+"""Colours of what is drawn; `ALARM` is of collisions and dangers."""
+
 _VISIBILITY_TICKS = (20, 50, 100, 200, 500, 1000, 2000)
 _MOST_MARGIN = 300.0
 """Safety margins beyond this are drawn at it, so that the dangerous part can be read [m]."""
@@ -37,54 +39,92 @@ def draw_figures(curves: Curves, time_to_collision_threshold: float = 3.0) -> li
         Caption and PNG of each figure.
     """
 
-    def conflict(axes: Sequence[Axes], curves: Curves) -> None:
-        _draw_conflict(axes, curves, time_to_collision_threshold)
+    def figure(heights: Sequence[float], draw: Callable[[Sequence[Axes]], None]) -> bytes:
+        return figure_over_time(curves.time, curves.collisions, heights, draw)
 
     return [
         (
             "Meteorological visibility: what was true ahead of the camera, what each method said frame by frame, "
             "and what was believed with its 90 % interval.",
-            _figure(curves, (3.4,), lambda axes, curves: _draw_visibility(axes[0], curves)),
+            figure((3.4,), lambda axes: _draw_visibility(axes[0], curves)),
         ),
         (
             "Speed of the ego, the advice in force and the speed limit.",
-            _figure(curves, (2.5,), lambda axes, curves: _draw_speed(axes[0], curves)),
+            figure((2.5,), lambda axes: _draw_speed(axes[0], curves)),
         ),
         (
             "Gap to the vehicle ahead, and time to collision while it is approached.",
-            _figure(curves, (1.9, 1.7), conflict),
+            figure((1.9, 1.7), lambda axes: _draw_conflict(axes, curves, time_to_collision_threshold)),
         ),
         (
             "Safety margin: true visibility ahead minus the distance in which the ego could stop. "
             "Where it is negative, something standing on the road could not have been avoided.",
-            _figure(curves, (2.5,), lambda axes, curves: _draw_margin(axes[0], curves)),
+            figure((2.5,), lambda axes: _draw_margin(axes[0], curves)),
         ),
     ]
 
 
-def _figure(curves: Curves, heights: Sequence[float], draw: Callable[[Sequence[Axes], Curves], None]) -> bytes:
+def figure_over_time(
+    time: Sequence[float],
+    collisions: Sequence[float],
+    heights: Sequence[float],
+    draw: Callable[[Sequence[Axes]], None],
+) -> bytes:
+    """Draw quantities over time, collisions marked, as PNG.
+
+    Parameters
+    ----------
+    time : sequence of float
+        Instants of the steps, at least one [s].
+    collisions : sequence of float
+        Instants of collisions [s].
+    heights : sequence of float
+        Height of each axis, from above [inch].
+    draw : callable
+        Draws into the axes.
+    """
+
+    def draw_marked(axes: Sequence[Axes]) -> None:
+        draw(axes)
+        for axis in axes:
+            for number, instant in enumerate(collisions):
+                label = "collision" if number == 0 else None
+                axis.axvline(instant, color=ALARM, linewidth=1.2, linestyle=(0, (4, 2)), zorder=5, label=label)
+            axis.set_xlim(time[0], max(time[-1], time[0] + 1e-3))
+
+    return drawn_figure(heights, draw_marked, "time [s]")
+
+
+def drawn_figure(heights: Sequence[float], draw: Callable[[Sequence[Axes]], None], across: str) -> bytes:
+    """Draw a figure in the look of the report, as PNG.
+
+    Parameters
+    ----------
+    heights : sequence of float
+        Height of each axis, from above [inch].
+    draw : callable
+        Draws into the axes.
+    across : str
+        What the common horizontal axis is of.
+    """
     figure = Figure(figsize=(9.2, sum(heights)), dpi=144)
     # The same margins in every figure, in inches, so that all time axes stand under one another.
     height = sum(heights)
     figure.subplots_adjust(left=0.08, right=0.985, bottom=0.45 / height, top=1 - 0.3 / height, hspace=0.12)
     grid = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=list(heights))
     axes = [row[0] for row in grid]
-    draw(axes, curves)
+    draw(axes)
     for axis in axes:
-        _dress(axis, curves, legend=axis is axes[0])
-    axes[-1].set_xlabel("time [s]", fontsize=9)
+        _dress(axis, legend=axis is axes[0])
+    axes[-1].set_xlabel(across, fontsize=9)
     buffer = io.BytesIO()
     FigureCanvasAgg(figure)
     figure.savefig(buffer, format="png")
     return buffer.getvalue()
 
 
-def _dress(axis: Axes, curves: Curves, *, legend: bool) -> None:
-    """Give an axis the look of the report, and mark the collisions."""
-    for number, instant in enumerate(curves.collisions):
-        label = "collision" if number == 0 else None
-        axis.axvline(instant, color=_ALARM, linewidth=1.2, linestyle=(0, (4, 2)), zorder=5, label=label)
-    axis.set_xlim(curves.time[0], max(curves.time[-1], curves.time[0] + 1e-3))
+def _dress(axis: Axes, *, legend: bool) -> None:
+    """Give an axis the look of the report."""
     axis.yaxis.set_label_coords(-0.052, 0.5)
     axis.grid(visible=True, color="#e3e8ed", linewidth=0.7)
     axis.set_axisbelow(True)
@@ -107,16 +147,29 @@ def _dress(axis: Axes, curves: Curves, *, legend: bool) -> None:
 
 
 def _draw_visibility(axis: Axes, curves: Curves) -> None:
-    low, high = (np.clip(_array(values), *_ends()) for values in (curves.low, curves.high))
-    axis.fill_between(curves.time, low, high, color=_BELIEF, alpha=0.18, linewidth=0, label="90 % interval")
-    axis.plot(curves.time, curves.belief, color=_BELIEF, linewidth=1.6, label="belief")
+    low, high = (np.clip(plottable(values), *_ends()) for values in (curves.low, curves.high))
+    axis.fill_between(curves.time, low, high, color=BELIEF, alpha=0.18, linewidth=0, label="90 % interval")
+    axis.plot(curves.time, curves.belief, color=BELIEF, linewidth=1.6, label="belief")
     colours = method_colours(list(curves.estimates), ON_LIGHT)
     for method, points in curves.estimates.items():
         times, values = np.array(points, dtype=np.float64).reshape(-1, 2).T
         colour = [part / 255.0 for part in colours[method]]
         axis.scatter(times, values, s=5, color=colour, linewidths=0, alpha=0.7, label=method)
-    truth = np.where(np.isfinite(_array(curves.truth)), _array(curves.truth), _ends()[1])
-    axis.plot(curves.time, truth, color=_TRUTH, linewidth=1.8, linestyle=(0, (5, 1.5)), label="truth ahead")
+    dashes = (0, (5, 1.5))
+    axis.plot(
+        curves.time, shown_visibility(curves.truth), color=TRUTH, linewidth=1.8, linestyle=dashes, label="truth ahead"
+    )
+    scale_visibility(axis)
+
+
+def scale_visibility(axis: Axes) -> None:
+    """Let an axis be of visibility [m].
+
+    Parameters
+    ----------
+    axis : Axes
+        The axis.
+    """
     axis.set_yscale("log")
     axis.set_ylim(*_ends())
     axis.yaxis.set_major_locator(FixedLocator(_VISIBILITY_TICKS))
@@ -125,30 +178,41 @@ def _draw_visibility(axis: Axes, curves: Curves) -> None:
     axis.set_ylabel("visibility [m]", fontsize=9)
 
 
+def shown_visibility(values: Sequence[float | None]) -> NDArray[np.float64]:
+    """Visibilities to plot [m]; clear air is at the upper end of the axis.
+
+    Parameters
+    ----------
+    values : sequence of float or None
+        Visibilities [m]; None for clear air.
+    """
+    return np.clip(np.nan_to_num(plottable(values), nan=_ends()[1]), *_ends())
+
+
 def _draw_speed(axis: Axes, curves: Curves) -> None:
-    axis.plot(curves.time, _array(curves.limit) * KMH_PER_MPS, color=_MUTED, linewidth=1.0, label="speed limit")
-    advice = _array(curves.advice) * KMH_PER_MPS
-    axis.plot(curves.time, advice, color=_ADVICE, linewidth=1.6, drawstyle="steps-post", label="advice")
-    axis.plot(curves.time, _array(curves.speed) * KMH_PER_MPS, color=_SPEED, linewidth=1.6, label="speed")
+    axis.plot(curves.time, plottable(curves.limit) * KMH_PER_MPS, color=MUTED, linewidth=1.0, label="speed limit")
+    advice = plottable(curves.advice) * KMH_PER_MPS
+    axis.plot(curves.time, advice, color=ADVICE, linewidth=1.6, drawstyle="steps-post", label="advice")
+    axis.plot(curves.time, plottable(curves.speed) * KMH_PER_MPS, color=SPEED, linewidth=1.6, label="speed")
     axis.set_ylim(bottom=0)
     axis.set_ylabel("speed [km/h]", fontsize=9)
 
 
 def _draw_conflict(axes: Sequence[Axes], curves: Curves, threshold: float) -> None:
-    axes[0].plot(curves.time, _array(curves.gap), color=_SPEED, linewidth=1.6)
+    axes[0].plot(curves.time, plottable(curves.gap), color=SPEED, linewidth=1.6)
     axes[0].set_ylim(bottom=min(0.0, *(gap for gap in curves.gap if gap is not None), 0.0))
     axes[0].set_ylabel("gap [m]", fontsize=9)
-    axes[1].axhspan(0, threshold, color=_ALARM, alpha=0.10, linewidth=0)
-    axes[1].plot(curves.time, _array(curves.time_to_collision), color=_SPEED, linewidth=1.6)
+    axes[1].axhspan(0, threshold, color=ALARM, alpha=0.10, linewidth=0)
+    axes[1].plot(curves.time, plottable(curves.time_to_collision), color=SPEED, linewidth=1.6)
     axes[1].set_ylim(0, 20)
     axes[1].set_ylabel("time to\ncollision [s]", fontsize=9)
 
 
 def _draw_margin(axis: Axes, curves: Curves) -> None:
-    margin = np.minimum(np.nan_to_num(_array(curves.margin), nan=_MOST_MARGIN), _MOST_MARGIN)
-    axis.fill_between(curves.time, margin, 0, where=margin < 0, color=_ALARM, alpha=0.25, linewidth=0, interpolate=True)
-    axis.axhline(0, color=_MUTED, linewidth=1.0)
-    axis.plot(curves.time, margin, color=_SPEED, linewidth=1.6)
+    margin = np.minimum(np.nan_to_num(plottable(curves.margin), nan=_MOST_MARGIN), _MOST_MARGIN)
+    axis.fill_between(curves.time, margin, 0, where=margin < 0, color=ALARM, alpha=0.25, linewidth=0, interpolate=True)
+    axis.axhline(0, color=MUTED, linewidth=1.0)
+    axis.plot(curves.time, margin, color=SPEED, linewidth=1.6)
     axis.set_ylabel("margin [m]", fontsize=9)
 
 
@@ -156,6 +220,12 @@ def _ends() -> tuple[float, float]:
     return float(_VISIBILITY_TICKS[0]), float(_VISIBILITY_TICKS[-1])
 
 
-def _array(values: Sequence[float | None]) -> NDArray[np.float64]:
-    """Make an array to plot; matplotlib leaves a gap where a value is missing."""
+def plottable(values: Sequence[float | None]) -> NDArray[np.float64]:
+    """Make an array to plot; matplotlib leaves a gap where a value is missing.
+
+    Parameters
+    ----------
+    values : sequence of float or None
+        The values.
+    """
     return np.array(values, dtype=np.float64)

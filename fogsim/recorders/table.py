@@ -5,19 +5,18 @@ import json
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from fogsim.files.atomic import write_bytes
 from fogsim.files.row_log import RowLog, read_rows
-from fogsim.recorders.protocol import DERIVED_QUANTITIES, Derived
+from fogsim.recorders.protocol import AnyStep_contra, Derived
 from fogsim.recorders.run_directory import ROW_LOG
-from fogsim.units import finite_or_none
-from fogsim.values import Estimate, Leader, LeadMeasurement, Step
+from fogsim.recorders.table_columns import Column, table_columns
+from fogsim.values import Step
 
 ROWS_PER_GROUP = 1024
 """Rows of one row group."""
@@ -26,29 +25,7 @@ LOG_PERIOD = 0.5
 """Time between two writings of rows [s]: what a process that is killed loses at most, and what a full disk loses."""
 
 
-@dataclass(frozen=True, slots=True)
-class Column:
-    """One column of the table.
-
-    Attributes
-    ----------
-    name : str
-        Its name, which ends in its unit.
-    kind : pyarrow.DataType
-        Its type.
-    meaning : str
-        One line on it, stored in the file.
-    value : callable
-        Takes it from a step and what was derived from it; None is stored as null.
-    """
-
-    name: str
-    kind: Any
-    meaning: str
-    value: Callable[[Step, Derived], object]
-
-
-class TableRecorder:
+class StepTable(Generic[AnyStep_contra]):
     """Writes ``steps.parquet``: one row a step, columns with units in their names.
 
     The metadata of its schema says ``fogsim.complete`` (``true`` or ``false``), ``fogsim.methods`` (comma-separated)
@@ -59,15 +36,23 @@ class TableRecorder:
     ----------
     path : Path
         The file; nothing is written before the first row.
+    columns : sequence of Column
+        What is taken from each step.
     methods : sequence of str
-        Estimators that get columns of their own.
+        Estimators that have columns of their own.
     clock : callable
         Gives the time that passes [s].
     """
 
-    def __init__(self, path: Path, methods: Sequence[str], clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        path: Path,
+        columns: Sequence[Column[AnyStep_contra]],
+        methods: Sequence[str] = (),
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         self._path = path
-        self._columns = table_columns(methods)
+        self._columns = columns
         self._schema = pa.schema(
             [(column.name, column.kind) for column in self._columns],
             metadata={
@@ -81,12 +66,12 @@ class TableRecorder:
         self._rows: list[list[object]] = []
         self._open = True
 
-    def record(self, step: Step, derived: Derived) -> None:
+    def record(self, step: AnyStep_contra, derived: Derived) -> None:
         """Add a row; a step that comes once more, with its ending, takes the place of the one before.
 
         Parameters
         ----------
-        step : Step
+        step : TrafficStep
             The finished step.
         derived : mapping from str to float or None
             `DERIVED_QUANTITIES` of the step.
@@ -127,6 +112,23 @@ class TableRecorder:
         self._open = False
 
 
+class TableRecorder(StepTable[Step]):
+    """Writes the table of a run about an ego.
+
+    Parameters
+    ----------
+    path : Path
+        As of `StepTable`.
+    methods : sequence of str
+        Estimators that get columns of their own.
+    clock : callable
+        Gives the time that passes [s].
+    """
+
+    def __init__(self, path: Path, methods: Sequence[str], clock: Callable[[], float] = time.monotonic) -> None:
+        super().__init__(path, table_columns(methods), methods, clock)
+
+
 def write_table(path: Path, rows: Any, complete: bool) -> None:
     """Write the rows of a log as a table, whole or not at all.
 
@@ -151,140 +153,3 @@ def write_table(path: Path, rows: Any, complete: bool) -> None:
         writer.write_table(table, row_group_size=ROWS_PER_GROUP)
         writer.add_key_value_metadata({"fogsim.complete": "true" if complete else "false", **rows.schema.metadata})
     write_bytes(path, file.getvalue())
-
-
-def table_columns(methods: Sequence[str]) -> list[Column]:
-    """List the columns of the table for given estimators, in their order.
-
-    Parameters
-    ----------
-    methods : sequence of str
-        Names of the estimators.
-    """
-    columns = [*_EGO_COLUMNS, *_TRAFFIC_COLUMNS, *map(_derived_column, DERIVED_QUANTITIES), *_FOG_COLUMNS]
-    for method in methods:
-        columns += _estimator_columns(method)
-    return columns
-
-
-def _ego(name: str) -> Callable[[Step, Derived], object]:
-    return lambda step, _: float(getattr(step.traffic, name)[step.ego])
-
-
-def _position(axis: int) -> Callable[[Step, Derived], object]:
-    return lambda step, _: float(step.traffic.position[step.ego, axis])
-
-
-def _of_leader(value: Callable[[Leader], object]) -> Callable[[Step, Derived], object]:
-    return lambda step, _: None if step.leader is None else value(step.leader)
-
-
-def _of_lead(value: Callable[[LeadMeasurement], float]) -> Callable[[Step, Derived], object]:
-    return lambda step, _: None if step.observation.lead is None else value(step.observation.lead)
-
-
-def _believed(share: float) -> Callable[[Step, Derived], object]:
-    return lambda step, _: step.belief.visibility_quantile(share)
-
-
-def _derived_column(name: str) -> Column:
-    return Column(name, pa.float64(), DERIVED_QUANTITIES[name], lambda _, derived: derived[name])
-
-
-def _estimator_columns(method: str) -> list[Column]:
-    def of_estimate(value: Callable[[Estimate], object]) -> Callable[[Step, Derived], object]:
-        return lambda step, _: next((value(e) for e in step.estimates if e.method == method), None)
-
-    def if_valid(value: Callable[[Estimate], float]) -> Callable[[Step, Derived], object]:
-        return of_estimate(lambda estimate: finite_or_none(value(estimate)) if estimate.valid else None)
-
-    number = pa.float64()
-    return [
-        Column(f"{method}_valid", pa.bool_(), "the method could tell", of_estimate(lambda e: e.valid)),
-        Column(
-            f"{method}_extinction_per_m",
-            number,
-            "estimated extinction coefficient",
-            if_valid(lambda e: e.extinction),
-        ),
-        Column(
-            f"{method}_standard_deviation_per_m",
-            number,
-            "its standard deviation as the method gives it",
-            if_valid(lambda e: e.standard_deviation),
-        ),
-        Column(
-            f"{method}_visibility_m",
-            number,
-            "estimated meteorological visibility; null for clear air",
-            if_valid(lambda e: e.visibility),
-        ),
-    ]
-
-
-_EGO_COLUMNS = (
-    Column("index", pa.int64(), "number of the camera period, from 0", lambda step, _: step.index),
-    Column("time_s", pa.float64(), "simulated time", lambda step, _: step.time),
-    Column("route_position_m", pa.float64(), "distance along the route", lambda step, _: step.route_position),
-    Column("x_m", pa.float64(), "east, middle of the front bumper", _position(0)),
-    Column("y_m", pa.float64(), "north, middle of the front bumper", _position(1)),
-    Column("heading_rad", pa.float64(), "counterclockwise from east", _ego("heading")),
-    Column("speed_mps", pa.float64(), "speed of the ego", _ego("speed")),
-    Column("acceleration_mps2", pa.float64(), "acceleration of the ego", _ego("acceleration")),
-    Column("speed_limit_mps", pa.float64(), "speed limit", lambda step, _: step.speed_limit),
-    Column(
-        "advised_speed_mps",
-        pa.float64(),
-        "advice in force; null for none",
-        lambda step, _: finite_or_none(step.command.advice.speed),
-    ),
-    Column(
-        "lamps",
-        pa.int32(),
-        "lit lamps of the ego, bits of Lamp",
-        lambda step, _: int(step.traffic.lamps[step.ego]),
-    ),
-)
-_TRAFFIC_COLUMNS = (
-    Column("n_vehicles", pa.int32(), "vehicles near the ego, itself included", lambda step, _: len(step.traffic.ids)),
-    Column("leader_id", pa.string(), "vehicle ahead", _of_leader(lambda leader: leader.vehicle_id)),
-    Column("leader_gap_m", pa.float64(), "true gap to it", _of_leader(lambda leader: leader.gap)),
-    Column("leader_speed_mps", pa.float64(), "its true speed", _of_leader(lambda leader: leader.speed)),
-    Column("collisions", pa.int32(), "collisions new in this period", lambda step, _: len(step.collisions)),
-    Column(
-        "ending",
-        pa.string(),
-        "why the run is over",
-        lambda step, _: None if step.ending is None else step.ending.value,
-    ),
-)
-_FOG_COLUMNS = (
-    Column("true_extinction_per_m", pa.float64(), "at the camera", lambda step, _: step.truth.extinction),
-    Column(
-        "true_visibility_m",
-        pa.float64(),
-        "at the camera; null for clear air",
-        lambda step, _: finite_or_none(step.truth.visibility),
-    ),
-    Column(
-        "true_visibility_ahead_m",
-        pa.float64(),
-        "of the fog ahead; null for clear air",
-        lambda step, _: finite_or_none(step.truth.visibility_ahead),
-    ),
-    Column("believed_visibility_m", pa.float64(), "median of the belief", _believed(0.5)),
-    Column("believed_visibility_low_m", pa.float64(), "5 % quantile of the belief", _believed(0.05)),
-    Column("believed_visibility_high_m", pa.float64(), "95 % quantile of the belief", _believed(0.95)),
-    Column(
-        "measured_lead_distance_m",
-        pa.float64(),
-        "gap by the range sensor",
-        _of_lead(lambda lead: lead.distance),
-    ),
-    Column(
-        "measured_lead_relative_speed_mps",
-        pa.float64(),
-        "lead's speed minus own by the range sensor",
-        _of_lead(lambda lead: lead.relative_speed),
-    ),
-)

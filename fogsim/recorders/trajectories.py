@@ -5,7 +5,7 @@ import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
 import pyarrow as pa
@@ -17,7 +17,7 @@ from fogsim.recorders.protocol import Derived
 from fogsim.recorders.run_directory import LOG_SUFFIX
 from fogsim.recorders.table import LOG_PERIOD
 from fogsim.units import visibility_from_extinction
-from fogsim.values import Step
+from fogsim.values import TrafficStep
 
 MOST_ROWS_HELD = 50_000
 """Rows of one batch at most: some megabytes."""
@@ -41,6 +41,9 @@ TRAJECTORY_COLUMNS: Mapping[str, tuple[Any, str]] = {
     "visibility": (pa.float64(), "true meteorological visibility at the driver's eyes [m]; null for clear air"),
 }
 """Columns of ``trajectories.parquet``: their types and meanings, named as in SUMO's fcd-output."""
+
+
+_AnyStep = TypeVar("_AnyStep", bound=TrafficStep)
 
 
 class TrajectoryRecorder:
@@ -68,16 +71,16 @@ class TrajectoryRecorder:
         self._log: RowLog | None = None
         self._logged = -math.inf
         self._last = -math.inf
-        self._held: list[Step] = []
+        self._held: list[TrafficStep] = []
         self._rows_held = 0
         self._open = True
 
-    def record(self, step: Step, _derived: Derived | None = None) -> None:
+    def record(self, step: TrafficStep, _derived: Derived | None = None) -> None:
         """Add the vehicles of a step; one in which no time has passed adds nothing.
 
         Parameters
         ----------
-        step : Step
+        step : TrafficStep
             The finished step.
         _derived : mapping from str to float or None
             Not needed.
@@ -132,20 +135,20 @@ class TrajectoryRecorder:
         self.close(complete=kind is None)
 
 
-def with_trajectories(steps: Iterable[Step], path: Path) -> Iterator[Step]:
+def with_trajectories(steps: Iterable[_AnyStep], path: Path) -> Iterator[_AnyStep]:
     """Pass steps on, and write the trajectories of all vehicles in them into a parquet file.
 
     Parameters
     ----------
-    steps : iterable of Step
-        Steps of one run, as `fogsim.run` yields them.
+    steps : iterable of TrafficStep
+        Steps of one run, as `fogsim.run` or `fogsim.run_traffic` yields them.
     path : Path
         The file, ``….parquet``, in a folder that is there. It is whole when the last step was taken, and also, marked
         as partial, when whoever takes them leaves off or something fails.
 
     Yields
     ------
-    Step
+    TrafficStep
         The steps.
 
     Raises
@@ -159,7 +162,7 @@ def with_trajectories(steps: Iterable[Step], path: Path) -> Iterator[Step]:
             yield step
 
 
-def _batch(steps: list[Step], schema: Any) -> Any:
+def _batch(steps: list[TrafficStep], schema: Any) -> Any:
     """Rows of some instants (pyarrow.RecordBatch)."""
     states = [step.traffic for step in steps]
     counts = [len(state.ids) for state in states]
@@ -190,7 +193,7 @@ def _batch(steps: list[Step], schema: Any) -> Any:
     return pa.RecordBatch.from_arrays(arrays, schema=schema)
 
 
-def _visibilities(step: Step) -> list[float | None]:
+def _visibilities(step: TrafficStep) -> list[float | None]:
     """Visibility at each vehicle [m]; None in clear air, and where it is not known."""
     extinctions = step.truth.vehicle_extinctions
     if extinctions is None:

@@ -330,8 +330,8 @@ def check_ego(scenario: Scenario, who: str) -> None:
     """
     if not scenario.traffic.has_ego:
         raise InputError(
-            f"{who} needs an ego vehicle, and traffic.ego is none; name one, or run traffic alone with fogsim study or "
-            "fogsim.run_traffic"
+            f"{who} needs an ego vehicle, and traffic.ego is none; name one, or run traffic alone with fogsim "
+            "run, fogsim study or fogsim.run_traffic"
         )
 
 

@@ -3,12 +3,12 @@
 import warnings
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from fogsim.errors import FogSimError, UnplayedWarning
 from fogsim.files.atomic import write_json
 from fogsim.loop import run
-from fogsim.metrics import RunMetrics, RunSummary, TrafficRunMetrics
+from fogsim.metrics import MetricsOfRun, RunMetrics, RunSummary, TrafficRunMetrics
 from fogsim.scenario import Scenario, build
 from fogsim.study.profiles import RunProfiles
 from fogsim.traffic_run import run_traffic
@@ -49,18 +49,9 @@ def measure_run(scenario: Scenario, seed: int, sumo_outputs: Path | None = None)
 
 
 _AnyStep = TypeVar("_AnyStep", bound=TrafficStep)
-_TakenStep_contra = TypeVar("_TakenStep_contra", bound=TrafficStep, contravariant=True)
 
 
-class _Watching(Protocol[_TakenStep_contra]):
-    """Metrics of a run."""
-
-    def update(self, step: _TakenStep_contra) -> None: ...
-
-    def summary(self) -> RunSummary: ...
-
-
-def _watched(steps: Iterable[_AnyStep], metrics: _Watching[_AnyStep], profiles: RunProfiles) -> RunSummary:
+def _watched(steps: Iterable[_AnyStep], metrics: MetricsOfRun[_AnyStep], profiles: RunProfiles) -> RunSummary:
     for step in steps:
         profiles.update(step)
         metrics.update(step)

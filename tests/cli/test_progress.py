@@ -10,7 +10,7 @@ from fogsim.cli.printing import stderr
 from fogsim.cli.progress import SimulationProgress
 from fogsim.errors import InputError
 from fogsim.values import Ending
-from tests.recorders.synthetic import make_step
+from tests.recorders.synthetic import make_step, make_traffic_step
 
 TOWN = str(Path(__file__).resolve().parents[1] / "data" / "grid" / "grid.sumocfg")
 
@@ -22,6 +22,24 @@ def test_the_bar_of_a_run_that_is_over_is_full(ending: Ending | None, share: flo
     (task,) = progress._progress.tasks
     assert task.percentage == pytest.approx(share)
     assert "50 of 200 s" in task.description
+
+
+def test_the_bar_of_traffic_alone_says_how_many_drive() -> None:
+    progress = SimulationProgress(stderr, 200.0)
+    progress.show(make_traffic_step(time=50.0))
+    (task,) = progress._progress.tasks
+    assert task.description.endswith("2 vehicles")
+
+
+def test_a_run_of_traffic_alone_has_a_summary_and_no_video(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    alone = ["--sumocfg", TOWN, "--ego", "none", "--visibility", "120", "--set", "duration_s=1", "--out", str(out)]
+    done = CliRunner().invoke(app.app, ["run", *alone, "--set", "traffic.warm_up_s=20"], catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    assert {path.name for path in out.iterdir()} == {"manifest.json", "metrics.json", "report.html", "steps.parquet"}
+    assert "time of all vehicles together" in done.output
+    assert "distance driven" not in done.output
+    assert "The run ended: time." in done.output
 
 
 def test_a_data_set_of_a_sumo_configuration(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """Synthetic steps: a car that drives into a fog bank behind another, with a drawn image for a camera."""
 
+import dataclasses
 import math
 from collections.abc import Iterator
 
@@ -22,6 +23,7 @@ from fogsim.values import (
     SpeedAdvice,
     Step,
     TrafficState,
+    TrafficStep,
     Truth,
     View,
 )
@@ -120,6 +122,32 @@ def make_step(
         estimates=estimates,
         belief=belief(min(visibility, 5000.0)) if believed is None else believed,
         command=Command(SpeedAdvice(advised), lamps),
+        ending=ending,
+    )
+
+
+def make_traffic_step(
+    index: int = 0,
+    *,
+    time: float = 0.0,
+    speed: float = 25.0,
+    collisions: tuple[Collision, ...] = (),
+    visibility: float = 100.0,
+    visibilities: tuple[float, float] | None = None,
+    command: Command | None = None,
+    heard: tuple[float, float] = (math.inf, math.inf),
+    ending: Ending | None = None,
+) -> TrafficStep:
+    """One step of traffic alone: two cars, of which the second has the speed, with what they see and have heard."""
+    seen = [extinction_from_visibility(v) for v in visibilities or (visibility, visibility)]
+    extinction = extinction_from_visibility(visibility)
+    return TrafficStep(
+        index=index,
+        time=time,
+        traffic=dataclasses.replace(traffic(time, speed, x=speed * time), advised_speed=np.array(heard)),
+        collisions=collisions,
+        truth=Truth(extinction, extinction, vehicle_extinctions=np.array(seen)),
+        command=Command() if command is None else command,
         ending=ending,
     )
 

@@ -19,7 +19,7 @@ SIGHTS = {
     "deuteranopia": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.01182, 0.04294, 0.968881]],
     "tritanopia": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.3039]],
 }
-REPORT = [tuple(round(255 * part) for part in to_rgb(name)) for name in (report_figures._BELIEF, report_figures._TRUTH)]
+REPORT = [tuple(round(255 * part) for part in to_rgb(name)) for name in (report_figures.BELIEF, report_figures.TRUTH)]
 GROUNDS = {"dark": (ON_DARK, GROUND, (BELIEF, TRUTH)), "light": (ON_LIGHT, (255, 255, 255), REPORT)}
 
 

@@ -1,0 +1,154 @@
+"""The report of traffic alone: everybody over time and over the road, and no camera."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from fogsim.recorders.protocol import Derived, RunInformation
+from fogsim.recorders.report import StepReport
+from fogsim.recorders.report_figures import (
+    ADVICE,
+    BELIEF,
+    SPEED,
+    TRUTH,
+    figure_over_time,
+    plottable,
+    scale_visibility,
+    shown_visibility,
+)
+from fogsim.recorders.table_columns import least_visibility, lowest_advice
+from fogsim.units import KMH_PER_MPS, finite_or_none
+from fogsim.values import TrafficStep
+
+_SPREAD = (15.0, 85.0)
+"""Percentiles of the speeds of all vehicles between which a band is drawn [%]; the 85th is traffic engineers' usual."""
+
+
+@dataclass(slots=True)
+class TrafficCurves:
+    """Quantities of everybody over time, one entry a step; None where a quantity is undefined or without limit.
+
+    Attributes
+    ----------
+    time, mean_speed, slow, fast, advice : list
+        In s and m/s; `slow` and `fast` are the 15th and 85th percentile of speed, `advice` is the lowest anywhere.
+    vehicles, advised : list of int
+        Vehicles in the network, and those of them whose drivers have heard an advice in force.
+    metered, least : list of float or None
+        Visibility at the meter that sees least, and least at the eyes of any driver [m].
+    collisions : list of float
+        Instants of collisions [s].
+    """
+
+    time: list[float] = field(default_factory=list)
+    mean_speed: list[float | None] = field(default_factory=list)
+    slow: list[float | None] = field(default_factory=list)
+    fast: list[float | None] = field(default_factory=list)
+    advice: list[float | None] = field(default_factory=list)
+    vehicles: list[int] = field(default_factory=list)
+    advised: list[int] = field(default_factory=list)
+    metered: list[float | None] = field(default_factory=list)
+    least: list[float | None] = field(default_factory=list)
+    collisions: list[float] = field(default_factory=list)
+
+    def add(self, step: TrafficStep) -> None:
+        """Take in one step.
+
+        Parameters
+        ----------
+        step : TrafficStep
+            The finished step.
+        """
+        speed = step.traffic.speed
+        slow, fast = np.percentile(speed, _SPREAD).tolist() if len(speed) else (None, None)
+        self.time.append(step.time)
+        self.mean_speed.append(float(speed.mean()) if len(speed) else None)
+        self.slow.append(slow)
+        self.fast.append(fast)
+        self.advice.append(finite_or_none(lowest_advice(step)))
+        self.vehicles.append(len(speed))
+        self.advised.append(int(np.isfinite(step.traffic.advised_speed).sum()))
+        self.metered.append(finite_or_none(step.truth.visibility))
+        self.least.append(least_visibility(step))
+        self.collisions.extend(hit.time for hit in step.collisions)
+
+
+class TrafficReportRecorder(StepReport[TrafficStep]):
+    """Writes the report of traffic alone.
+
+    Parameters
+    ----------
+    information : RunInformation
+        The run.
+    """
+
+    def __init__(self, information: RunInformation) -> None:
+        super().__init__(information)
+        self._curves = TrafficCurves()
+
+    def _remember(self, step: TrafficStep, derived: Derived) -> None:  # noqa: ARG002 - all of it is of an ego
+        self._curves.add(step)
+
+    def _figures(self) -> Sequence[tuple[str, bytes]]:
+        return draw_traffic_figures(self._curves)
+
+
+def draw_traffic_figures(curves: TrafficCurves) -> list[tuple[str, bytes]]:
+    """Draw every figure of the report of traffic alone.
+
+    Parameters
+    ----------
+    curves : TrafficCurves
+        The run, of at least one step.
+
+    Returns
+    -------
+    list of (str, bytes)
+        Caption and PNG of each figure.
+    """
+    time, collisions = curves.time, curves.collisions
+    return [
+        (
+            "Speed of all vehicles in the network: mean, and 15th to 85th percentile; lowest advice in force anywhere.",
+            figure_over_time(time, collisions, (3.0,), lambda axes: _draw_speed(axes[0], curves)),
+        ),
+        (
+            "Vehicles in the network, and those whose drivers have heard an advice in force.",
+            figure_over_time(time, collisions, (2.2,), lambda axes: _draw_vehicles(axes[0], curves)),
+        ),
+        (
+            "Meteorological visibility: at the visibility meter at the road that sees least, and least at the eyes of "
+            "any driver; 2000 m stands for all that is more.",
+            figure_over_time(time, collisions, (2.5,), lambda axes: _draw_visibility(axes[0], curves)),
+        ),
+    ]
+
+
+def _draw_speed(axis: Axes, curves: TrafficCurves) -> None:
+    slow, fast, mean, advice = (_kmh(v) for v in (curves.slow, curves.fast, curves.mean_speed, curves.advice))
+    axis.fill_between(curves.time, slow, fast, color=SPEED, alpha=0.15, linewidth=0, label="15th to 85th percentile")
+    axis.plot(curves.time, advice, color=ADVICE, linewidth=1.6, drawstyle="steps-post", label="lowest advice")
+    axis.plot(curves.time, mean, color=SPEED, linewidth=1.6, label="mean speed")
+    axis.set_ylim(bottom=0)
+    axis.set_ylabel("speed [km/h]", fontsize=9)
+
+
+def _draw_vehicles(axis: Axes, curves: TrafficCurves) -> None:
+    axis.plot(curves.time, curves.vehicles, color=SPEED, linewidth=1.6, label="vehicles")
+    axis.plot(curves.time, curves.advised, color=ADVICE, linewidth=1.6, label="have heard advice")
+    axis.set_ylim(bottom=0)
+    axis.set_ylabel("vehicles", fontsize=9)
+
+
+def _draw_visibility(axis: Axes, curves: TrafficCurves) -> None:
+    axis.plot(curves.time, shown_visibility(curves.least), color=BELIEF, linewidth=1.6, label="least of any driver")
+    metered = shown_visibility(curves.metered)
+    axis.plot(curves.time, metered, color=TRUTH, linewidth=1.8, linestyle=(0, (5, 1.5)), label="at the meter")
+    scale_visibility(axis)
+
+
+def _kmh(values: Sequence[float | None]) -> NDArray[np.float64]:
+    return plottable(values) * KMH_PER_MPS

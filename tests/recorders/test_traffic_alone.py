@@ -1,0 +1,102 @@
+"""Table and report of traffic alone: figures by hand, and nothing in them that needs an ego."""
+
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pyarrow import parquet
+
+from fogsim.metrics import TrafficRunMetrics
+from fogsim.recorders import TRAFFIC_RECORDERS, RunDirectory, RunInformation
+from fogsim.recorders.traffic_report import TrafficCurves
+from fogsim.values import Collision, Command, Ending, SpeedAdvice, Stretch, StretchAdvice, TrafficStep
+from tests.recorders.synthetic import make_traffic_step
+from tests.recorders.test_report import Page
+
+SIGN = StretchAdvice(15.0, Stretch(0.0, 500.0))
+
+
+def some_steps() -> list[TrafficStep]:
+    told = Command(SpeedAdvice(20.0), stretches=(SIGN,))
+    return [
+        make_traffic_step(0, speed=30.0, visibility=80.0, visibilities=(200.0, 50.0)),
+        make_traffic_step(1, time=0.5, speed=10.0, visibility=math.inf, command=told, heard=(15.0, math.inf)),
+        make_traffic_step(2, time=1.0, collisions=(Collision(0.9, "a", "b", 3.0),), ending=Ending.TIME),
+    ]
+
+
+def nobody(step: TrafficStep) -> TrafficStep:
+    """The same without any vehicle."""
+    state = step.traffic
+    empty = {f.name: getattr(state, f.name)[:0] for f in dataclasses.fields(state) if f.name != "time"}
+    truth = dataclasses.replace(step.truth, vehicle_extinctions=np.zeros(0))
+    return dataclasses.replace(step, traffic=dataclasses.replace(state, **empty), truth=truth)
+
+
+def recorded(folder: Path, steps: list[TrafficStep], complete: bool = True) -> Path:
+    metrics = TrafficRunMetrics()
+    with RunDirectory(folder) as directory:
+        directory.begin({})
+        meanings = metrics.summary().meanings
+        information = RunInformation(
+            directory, "Everybody", "", 5, (), 0.5, lambda: metrics.summary().to_json(), meanings
+        )
+        recorders = [make(information) for make in TRAFFIC_RECORDERS.values()]
+        for step in steps:
+            metrics.update(step)
+            for recorder in recorders:
+                recorder.record(step, metrics.derive(step))
+        for recorder in recorders:
+            recorder.close(complete)
+        directory.finish({})
+    return folder
+
+
+def test_a_row_of_the_table_is_of_everybody(tmp_path: Path) -> None:
+    table = parquet.read_table(recorded(tmp_path, some_steps()) / "steps.parquet")
+    columns = table.to_pydict()
+    assert columns["time_s"] == [0.0, 0.5, 1.0]
+    assert columns["n_vehicles"] == [2, 2, 2]
+    assert columns["mean_speed_mps"] == [25.0, 15.0, 22.5]
+    assert columns["advised_speed_mps"] == [None, 15.0, None]
+    assert columns["n_advised"] == [0, 1, 0]
+    assert columns["collisions"] == [0, 0, 1]
+    assert columns["ending"] == [None, None, "time"]
+    assert columns["true_visibility_m"] == pytest.approx([80.0, None, 100.0])
+    assert columns["least_visibility_m"] == pytest.approx([50.0, None, 100.0])
+    assert not {"route_position_m", "believed_visibility_m", "leader_gap_m", "lamps"} & set(columns)
+    assert table.schema.metadata[b"fogsim.complete"] == b"true"
+
+
+def test_a_network_without_vehicles_has_rows_and_figures_too(tmp_path: Path) -> None:
+    steps = [nobody(step) for step in some_steps()]
+    row = parquet.read_table(recorded(tmp_path, steps) / "steps.parquet").to_pylist()[0]
+    assert (row["n_vehicles"], row["mean_speed_mps"], row["least_visibility_m"]) == (0, None, None)
+
+
+def test_the_report_is_of_everybody(tmp_path: Path) -> None:
+    page = Page((recorded(tmp_path, some_steps()) / "report.html").read_text(encoding="utf-8"))
+    assert len(page.images) == 3
+    assert "traffic mean speed" in page.text
+    for word in ("of the ego", "camera", "Gap"):
+        assert word not in page.text.split("Over time")[1]
+
+
+def test_an_interrupted_report_says_so_and_that_there_were_steps(tmp_path: Path) -> None:
+    page = Page((recorded(tmp_path, some_steps(), complete=False) / "report.html").read_text(encoding="utf-8"))
+    assert "PARTIAL: interrupted at t = 1.0 s" in page.text
+    assert "Figures are of whole runs" in page.text
+
+
+def test_curves_are_percentiles_of_speed_and_the_lowest_advice() -> None:
+    curves = TrafficCurves()
+    for step in some_steps():
+        curves.add(step)
+    # Speeds are 20 and 30, 20 and 10, 20 and 25 m/s.
+    assert curves.slow == pytest.approx([21.5, 11.5, 20.75])
+    assert curves.fast == pytest.approx([28.5, 18.5, 24.25])
+    assert curves.advice == [None, 15.0, None]
+    assert curves.advised == [0, 1, 0]
+    assert curves.collisions == [0.9]

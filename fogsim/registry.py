@@ -70,6 +70,11 @@ class Registry(Mapping[str, T]):
 
         return add
 
+    @property
+    def known(self) -> list[str]:
+        """Names of all entries, and of what installed packages announce; sorted."""
+        return sorted({*self._entries, *(announced(self._group) if self._group else ())})
+
     def find(self, name: str, folder: Path | None = None) -> T:
         """A factory by its name.
 
@@ -95,7 +100,7 @@ class Registry(Mapping[str, T]):
             return self._checked(name, import_object(name, folder))
         further = announced(self._group) if self._group else {}
         if name not in further:
-            raise UnknownNameError(self.kind, name, [*self._entries, *further]) from None
+            raise UnknownNameError(self.kind, name, self.known) from None
         return self._checked(name, load_announced(further[name]))
 
     def version(self, name: str, folder: Path | None = None) -> str | None:

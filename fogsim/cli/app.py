@@ -19,6 +19,7 @@ from fogsim.cli.reproduce import reproduce_command
 from fogsim.cli.run import run_command
 from fogsim.cli.scenarios import list_command, validate_command
 from fogsim.cli.signs import signs_command
+from fogsim.cli.starting import new_command, schema_command
 from fogsim.cli.study import study_command
 from fogsim.cli.view import view_command
 from fogsim.errors import FogSimError
@@ -56,6 +57,8 @@ app.command("view")(view_command)
 app.command("recover")(recover_command)
 app.command("list")(list_command)
 app.command("validate")(validate_command)
+app.command("new")(new_command)
+app.command("schema")(schema_command)
 app.command("signs")(signs_command)
 app.command("dataset")(dataset_command)
 app.command("fog")(fog_command)

@@ -1,0 +1,67 @@
+"""A scenario of one's own, begun from one that is there."""
+
+import re
+import shutil
+from pathlib import Path
+
+from fogsim.errors import InputError, shown
+from fogsim.files.atomic import write_json
+from fogsim.scenario.json_schema import scenario_json_schema
+from fogsim.scenario.loading import SCENARIO_FILE, load_scenario, scenario_file
+
+_NAME_KEY = re.compile(r"^name:.*$", re.MULTILINE)
+
+_HEAD = """\
+# yaml-language-server: $schema=fogsim.schema.json
+# Begun from {source} by `fogsim new`. Editors that know YAML complete the keys by {schema} (`fogsim schema` makes it);
+# `fogsim validate {folder}` checks them, `fogsim run {folder}` runs them.
+"""
+
+SCHEMA_FILE = "fogsim.schema.json"
+"""File by which editors complete and check a scenario's keys."""
+
+
+def begin_scenario(name: str, source: str, parent: Path) -> tuple[Path, ...]:
+    """Copy a scenario with its SUMO files and comments into a folder of its own.
+
+    Parameters
+    ----------
+    name : str
+        Name of the new scenario, and of its folder.
+    source : str
+        A scenario of the catalogue, a file, or a folder.
+    parent : Path
+        Where the folder is made.
+
+    Returns
+    -------
+    tuple of Path
+        The files, the scenario's own first.
+
+    Raises
+    ------
+    InputError
+        If the name is none for a scenario, or stands for something that is there already, or the source is wrong.
+    """
+    if not re.fullmatch(r"[A-Za-z0-9_.-]{1,100}", name) or set(name) == {"."}:
+        raise InputError(f"a scenario's name has letters, digits, '_', '.' and '-', up to 100; got {shown(name)}")
+    old, text = load_scenario(source), scenario_file(source).read_text(encoding="utf-8")
+    folder = parent / name
+    if folder.exists():
+        raise InputError(f"{folder} is there already; give another name")
+    traffic = old.traffic
+    beside = [path for path in (traffic.config, traffic.net, *traffic.routes, *traffic.additional) if path is not None]
+    outside = [path for path in beside if path.is_absolute() or ".." in path.parts]
+    folder.mkdir(parents=True)
+    made = [folder / SCENARIO_FILE]
+    for path in beside:
+        if path not in outside:
+            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(old.directory / path, folder / path)
+            made.append(folder / path)
+    for path in outside:
+        text = text.replace(str(path), str((old.directory / path).resolve()))
+    head = _HEAD.format(source=source, folder=folder, schema=SCHEMA_FILE)
+    made[0].write_text(head + _NAME_KEY.sub(f"name: {name}", text, count=1), encoding="utf-8")
+    write_json(folder / SCHEMA_FILE, scenario_json_schema())
+    return (*made, folder / SCHEMA_FILE)

@@ -1,0 +1,91 @@
+import json
+from pathlib import Path
+
+import pytest
+import yaml
+from jsonschema import Draft202012Validator
+
+from fogsim import InputError, catalogue, load_scenario
+from fogsim.scenario.json_schema import json_schema, scenario_json_schema
+from fogsim.scenario.starting import begin_scenario
+from fogsim.study.plan import StudyFile
+
+STUDIES = sorted((Path(__file__).parents[2] / "scenarios" / "studies").glob("*.yaml"))
+
+
+@pytest.fixture(scope="module")
+def scenarios():
+    schema = scenario_json_schema()
+    json.dumps(schema, allow_nan=False)
+    Draft202012Validator.check_schema(schema)
+    return Draft202012Validator(schema)
+
+
+def places(validator, text):
+    return [error.json_path for error in validator.iter_errors(yaml.safe_load(text))]
+
+
+@pytest.mark.parametrize("name", catalogue())
+def test_editors_find_nothing_wrong_with_shipped_scenarios(scenarios, name):
+    assert places(scenarios, catalogue()[name].read_text()) == []
+
+
+@pytest.mark.parametrize("study", STUDIES, ids=lambda path: path.stem)
+def test_editors_find_nothing_wrong_with_shipped_studies(study):
+    assert places(Draft202012Validator(json_schema(StudyFile)), study.read_text()) == []
+
+
+@pytest.mark.parametrize(
+    ("written", "place"),
+    [
+        ("fog: {visibility: 150 m}", None),
+        ("fog: {visibility_m: inf}", None),
+        ("fog: {visibility: $fog}", None),
+        ("fog: {banks: [{start: 1 km, end_m: 1200, visibility: 50 m}], outside_visibility_m: 500}", None),
+        ("fog: {visibility_m: 80}\nsut: {advice: 'mine:Cautious', estimators: [joint_road]}", None),
+        ("fog: {visibility_m: 80}\ndrivers: {compliance: {rate: 60 %}, following: careful}", None),
+        ("fog: {visibilty: 150 m}", "$.fog"),
+        ("fog: {visibility: 150}", "$.fog.visibility"),
+        ("fog: {visibility_m: 0.5}", "$.fog.visibility_m"),
+        ("fog: {banks: [{start: 1 km, visibility: 50 m}]}", "$.fog.banks[0]"),
+        ("fog: {visibility_m: 80}\nadvice: stopping_sigt_distance", "$.advice"),
+        ("fog: {visibility_m: 80}\nsut: {advise: none}", "$.sut"),
+    ],
+)
+def test_editors_find_what_is_wrong(scenarios, written, place):
+    found = places(scenarios, f"name: a\ntraffic: {{net: a, routes: [b]}}\n{written}")
+    assert found == ([] if place is None else [place])
+
+
+def test_a_scenario_of_ones_own_begins_as_the_one_it_is_begun_from(tmp_path):
+    files = begin_scenario("mine", "motorway_fog_bank", tmp_path)
+    mine, source = load_scenario(tmp_path / "mine"), load_scenario("motorway_fog_bank")
+    assert mine.model_copy(update={"name": source.name, "directory": source.directory}) == source
+    assert mine.name == "mine"
+    assert "# the lead stops inside the bank" in files[0].read_text()
+    assert {file.name for file in files} >= {"scenario.yaml", "motorway.net.xml", "fogsim.schema.json"}
+    with pytest.raises(InputError, match="is there already"):
+        begin_scenario("mine", "motorway_fog_bank", tmp_path)
+
+
+@pytest.mark.parametrize("name", ["", "..", "a/b", "a b", "x" * 101])
+def test_a_name_that_no_scenario_can_have_makes_nothing(tmp_path, name):
+    with pytest.raises(InputError, match="a scenario's name has letters"):
+        begin_scenario(name, "motorway_fog_bank", tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_files_that_lie_elsewhere_are_named_by_their_place(tmp_path):
+    begin_scenario("first", "motorway_fog_bank", tmp_path)
+    here = tmp_path / "first" / "scenario.yaml"
+    other = tmp_path / "other.yaml"
+    other.write_text(
+        here.read_text()
+        .replace("motorway.net.xml", "first/motorway.net.xml")
+        .replace("[motorway.rou.xml]", f"[{tmp_path}/first/motorway.rou.xml]")
+        .replace("signs.add.xml", "first/signs.add.xml")
+    )
+    begin_scenario("second", str(other), tmp_path)
+    second = load_scenario(tmp_path / "second")
+    assert second.traffic.routes == (tmp_path / "first" / "motorway.rou.xml",)
+    assert (tmp_path / "second" / "first" / "motorway.net.xml").is_file()

@@ -137,6 +137,7 @@ class TrafficRun:
         along, net = scenario.traffic.along, setup.net if setup.config is None else configured_files(setup.config)[0]
         # Fog without a road along which it lies has no heights either, so that its ground may be anywhere.
         axis, limits = _axis_along(along, net) if along and net is not None else (np.zeros((1, 3)), np.zeros(0))
+        self._route = axis if along else None
         self._fog = build.fog_field(scenario, axis)
         # A meter that stands for a whole network does not see single patches.
         self._metered = self._fog if along else dataclasses.replace(self._fog, patches=None)
@@ -220,7 +221,7 @@ class TrafficRun:
         measured = float(extinction(field_at(self._metered, time), self._meters).max())
         seen = extinction(fog, snapshot.state.position + EYES)
         sections = self._section_meters.measure(fog)
-        return Truth(measured, measured, fog=fog, vehicle_extinctions=seen, sections=sections)
+        return Truth(measured, measured, fog=fog, vehicle_extinctions=seen, sections=sections, route=self._route)
 
     def _ending(self, index: int, snapshot: NetworkSnapshot) -> Ending | None:
         if index >= self._periods.frames:

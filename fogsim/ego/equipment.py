@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fogsim.atmosphere import extinction, field_at, optical_depth_along
 from fogsim.camera import mounted_pose
@@ -58,6 +59,7 @@ class EgoEquipment:
         self._view_renderer: EgoView | None = None
         self._streams: Streams | None = None
         self._meters: RoadMeters | None = None
+        self._route: NDArray[np.float64] | None = None
         self._mount_camera(build.CAR)
 
     def _mount_camera(self, body: str) -> None:
@@ -101,6 +103,7 @@ class EgoEquipment:
             road, signs = network()
             self._view_renderer = kind(self._scenario, road, signs, body)
             self._meters = RoadMeters(self._scenario, road.route, road.route_limits)
+            self._route = road.route
         for estimator in self._estimators:
             estimator.reset()
         self._fusion.reset()
@@ -136,7 +139,8 @@ class EgoEquipment:
             raise SimulationError("the run has not been started, or is closed")
         renderer, state, ego = self._view_renderer, snapshot.state, snapshot.ego
         pose, fog = self._pose(state, ego), field_at(self._view_renderer.fog, time)
-        truth = fog_truth(fog, pose, self._camera, renderer.signs, state, self._meters.measure(fog))
+        sections = self._meters.measure(fog)
+        truth = fog_truth(fog, pose, self._camera, renderer.signs, state, sections, self._route)
         view, radiance = renderer.render(state, ego, pose, time)
         image = self._camera_sensor.take(radiance, self._streams.camera)
         frame = Frame(time, image, self._assumed_camera)
@@ -213,6 +217,7 @@ def fog_truth(
     signs: SignMap,
     traffic: TrafficState | None = None,
     sections: tuple[RoadSection, ...] = (),
+    route: NDArray[np.float64] | None = None,
 ) -> Truth:
     """The fog at a camera, and as far as it sees along its heading, parallel to the road under it.
 
@@ -230,6 +235,8 @@ def fog_truth(
         Vehicles whose drivers have fog about them, too.
     sections : tuple of RoadSection
         What meters beside the road measure.
+    route : (n, 3) float64 or None
+        Polyline along the ego's route [m].
     """
     eye, level = np.array(pose.position), math.cos(pose.road_grade)
     direction = np.array([math.cos(pose.heading) * level, math.sin(pose.heading) * level, math.sin(pose.road_grade)])
@@ -245,5 +252,6 @@ def fog_truth(
         fog=fog,
         signs=signs,
         sections=sections,
+        route=route,
         vehicle_extinctions=None if traffic is None else extinction(fog, traffic.position + _EYES),
     )

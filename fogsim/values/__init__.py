@@ -10,6 +10,7 @@ from fogsim.values.light import Beam, HeadLamp, Lamp, Lights, LightSources, Stre
 from fogsim.values.observation import LeadMeasurement, Observation, SignSighting
 from fogsim.values.road import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea, RoadNetwork, Sign, SignMap
 from fogsim.values.scene import Batch, Mesh, Scene, Surface
+from fogsim.values.script import Begun
 from fogsim.values.step import Ending, RoadSection, Step, TrafficStep, Truth
 from fogsim.values.traffic import Collision, Leader, NetworkSnapshot, TrafficSnapshot, TrafficState
 from fogsim.values.unplayed import NOTHING_UNPLAYED, Reason, Unplayed, UnplayedEvent
@@ -18,6 +19,7 @@ __all__ = [
     "NOTHING_UNPLAYED",
     "Batch",
     "Beam",
+    "Begun",
     "Belief",
     "Camera",
     "CameraPose",

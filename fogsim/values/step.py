@@ -15,6 +15,7 @@ from fogsim.values.fog import FogField
 from fogsim.values.image import View
 from fogsim.values.observation import Observation
 from fogsim.values.road import SignMap
+from fogsim.values.script import Begun
 from fogsim.values.traffic import Collision, Leader, TrafficState
 from fogsim.values.unplayed import NOTHING_UNPLAYED, Unplayed
 
@@ -73,6 +74,8 @@ class Truth:
     sections : tuple of RoadSection
         Visibility meters beside the ego's route, or beside ``traffic.along``, in the direction of travel, where
         sections of it are advised.
+    route : (n, 3) float64 or None
+        Polyline along the ego's route, or along ``traffic.along`` [m]; None where there is neither.
     """
 
     extinction: float
@@ -83,6 +86,7 @@ class Truth:
     signs: SignMap | None = None
     vehicle_extinctions: NDArray[np.float64] | None = None
     sections: tuple[RoadSection, ...] = ()
+    route: NDArray[np.float64] | None = None
 
     @property
     def visibility(self) -> float:
@@ -117,6 +121,8 @@ class TrafficStep:
         Why the run is over, None while it goes on.
     unplayed : Unplayed
         What of the script has not been played, on the step that ends a run; empty on all others.
+    begun : tuple of Begun
+        What of the script began in this period.
     """
 
     index: int
@@ -127,6 +133,7 @@ class TrafficStep:
     command: Command
     ending: Ending | None
     unplayed: Unplayed = NOTHING_UNPLAYED
+    begun: tuple[Begun, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,7 +142,7 @@ class Step(TrafficStep):
 
     Attributes
     ----------
-    index, time, traffic, collisions, truth, command, ending, unplayed
+    index, time, traffic, collisions, truth, command, ending, unplayed, begun
         As of `TrafficStep`.
     ego : int
         Row of the ego vehicle in `traffic`.

@@ -1,17 +1,17 @@
 """Cost of a run's metrics, as a share of the run itself.
 
-A straight road with three lanes carries a number of vehicles on 10 km (that of ``benchmarks/traffic.py``), all of which
-are read, in fog of 100 m by day. The loop goes round as `fogsim.run` does; after each step `RunMetrics.update` takes it
-in, and with ``--profiles`` `RunProfiles.update` before it, as in a study. Both are timed in the same run, in blocks of
-80 steps: ``share`` is the median of the blocks' ratios of metrics to everything else, a quarter of them lie below
-``share_low``, a quarter above ``share_high``.
+A straight road with three lanes carries a number of vehicles on 10 km, or they wander through a town (both of
+``benchmarks/traffic.py``); all of them are read, in fog of 100 m by day. The loop goes round as `fogsim.run` does;
+after each step `RunMetrics.update` takes it in, and with ``--profiles`` `RunProfiles.update` before it, as in a study.
+Both are timed in the same run, in blocks of 80 steps: ``share`` is the median of the blocks' ratios of metrics to
+everything else, a quarter of them lie below ``share_low``, a quarter above ``share_high``.
 
 ``frames`` says what is run: ``none`` is without frames at 2 Hz (the cheapest run that a study can have),
 ``small`` draws 160 × 120 pixels at 2 Hz by the processor, with an estimator; ``none_10_hz`` is without frames at SUMO's
 own step, where nothing is left out between two steps that are measured. Times are the processor's [ms].
 
-    python benchmarks/metrics.py [--json] [--vehicles 100 …] [--seconds 200] [--block 80] [--profiles]
-        [--profile]
+    python benchmarks/metrics.py [--json] [--network town] [--vehicles 100 …] [--seconds 200] [--block 80]
+        [--profiles] [--profile]
 
 ``--profile`` tells where the metrics' time goes, by metric.
 """
@@ -24,7 +24,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from traffic import configuration
+from traffic import CONFIGURATIONS
 
 from fogsim.loop import run
 from fogsim.metrics import METRICS, RunMetrics
@@ -54,12 +54,14 @@ def timed(call: Callable[[], object]) -> float:
     return 1e-6 * (time.thread_time_ns() - started)
 
 
-def measure(frames: str, vehicles: int, seconds: float, size: int, *, profiled: bool) -> dict[str, float | str]:
+def measure(
+    network: str, frames: str, vehicles: int, seconds: float, size: int, *, profiled: bool
+) -> dict[str, float | str]:
     """One record of so many seconds of simulated time, in blocks of so many steps."""
     period, settings = RUNS[frames]
     blocks: list[tuple[float, float]] = []
     with tempfile.TemporaryDirectory() as folder:
-        config = configuration(Path(folder), vehicles)
+        config = CONFIGURATIONS[network](Path(folder), vehicles)
         told = ["fog.visibility_m=100", "traffic.reading_radius_m=6000", f"duration_s={seconds}", *settings]
         scenario = scenario_from_config(config, "ego", [*clock_settings(0.1, period, period), *told])
         profiles = [RunProfiles()] if profiled else []
@@ -88,6 +90,7 @@ def measure(frames: str, vehicles: int, seconds: float, size: int, *, profiled: 
     others, own = zip(*blocks[1:], strict=True)
     low, middle, high = statistics.quantiles([b / a for a, b in zip(others, own, strict=True)], n=4)
     return {
+        "network": network,
         "frames": frames,
         "vehicles": vehicles,
         "vehicles_read": len(last[0].traffic.ids),
@@ -100,11 +103,11 @@ def measure(frames: str, vehicles: int, seconds: float, size: int, *, profiled: 
     }
 
 
-def by_metric(vehicles: int) -> dict[str, float]:
+def by_metric(network: str, vehicles: int) -> dict[str, float]:
     """Milliseconds that each metric alone takes for a step, the following of vehicles included."""
     with tempfile.TemporaryDirectory() as folder:
         told = ["fog.visibility_m=100", "traffic.reading_radius_m=6000", "duration_s=20", *RUNS["none"][1]]
-        config = configuration(Path(folder), vehicles)
+        config = CONFIGURATIONS[network](Path(folder), vehicles)
         steps: list[Step] = list(run(scenario_from_config(config, "ego", [*clock_settings(0.1, 0.1, 0.1), *told]), 1))
     costs = {}
     for name in METRICS:
@@ -117,6 +120,7 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
+    parser.add_argument("--network", choices=[*CONFIGURATIONS], default="motorway", help="where they drive")
     parser.add_argument("--vehicles", action="append", type=int, help="vehicles (default 100)")
     parser.add_argument("--frames", action="append", choices=[*RUNS], help="which runs (default all)")
     parser.add_argument("--seconds", type=float, default=200.0, help="simulated time of each run")
@@ -126,11 +130,14 @@ def main() -> None:
     arguments = parser.parse_args()
     counts = arguments.vehicles or [100]
     if arguments.profile:
-        records: list[dict[str, float | str]] = [{"vehicles": n, **by_metric(n)} for n in counts]
+        records: list[dict[str, float | str]] = [{"vehicles": n, **by_metric(arguments.network, n)} for n in counts]
     else:
         kinds, size = arguments.frames or [*RUNS], arguments.block
-        profiled = arguments.profiles
-        records = [measure(kind, n, arguments.seconds, size, profiled=profiled) for n in counts for kind in kinds]
+        records = [
+            measure(arguments.network, kind, n, arguments.seconds, size, profiled=arguments.profiles)
+            for n in counts
+            for kind in kinds
+        ]
     if arguments.json:
         print(json.dumps(records, indent=2))
         return

@@ -17,6 +17,7 @@ from fogsim.metrics.traffic_comfort import TrafficComfort
 from fogsim.metrics.traffic_compliance import TrafficCompliance
 from fogsim.metrics.traffic_conflicts import TrafficConflicts
 from fogsim.metrics.traffic_emissions import TrafficEmissions
+from fogsim.metrics.traffic_encroachment import TrafficEncroachment
 from fogsim.metrics.traffic_flow import TrafficFlow
 from fogsim.metrics.traffic_headways import TrafficHeadways
 from fogsim.metrics.traffic_sight import TrafficSight
@@ -43,6 +44,7 @@ METRICS: Registry[MetricFactory] = Registry(
         "traffic_collisions": lambda _: TrafficCollisions(),
         "traffic_conflicts": lambda standard: TrafficConflicts(standard.time_to_collision),
         "traffic_headways": lambda _: TrafficHeadways(),
+        "traffic_encroachment": lambda _: TrafficEncroachment(),
         "traffic_sight": lambda standard: TrafficSight(standard.reaction_time, standard.deceleration),
         "traffic_flow": lambda _: TrafficFlow(),
         "traffic_comfort": lambda _: TrafficComfort(),

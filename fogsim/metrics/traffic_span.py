@@ -35,9 +35,11 @@ class TrafficSpan:
         Numbers of vehicle, lane and body kind, the same throughout a run.
     elapsed : (n,) float64
         Time since the step before [s]: what was found at the step is held to be true for it.
+    time : (n,) float64
+        Time of the step since the first one of the run [s].
     position : (n, 3) float64
-        As of `TrafficState`, and so are the next six.
-    heading, speed, acceleration, length : (n,) float64
+        As of `TrafficState`, and so are the next seven.
+    heading, speed, acceleration, length, width : (n,) float64
         As of `TrafficState`.
     free_speed : (n,) float64
         As of `TrafficState`; nan where it is not known.
@@ -58,11 +60,13 @@ class TrafficSpan:
     lane: NDArray[np.intp]
     kind: NDArray[np.intp]
     elapsed: NDArray[np.float64]
+    time: NDArray[np.float64]
     position: NDArray[np.float64]
     heading: NDArray[np.float64]
     speed: NDArray[np.float64]
     acceleration: NDArray[np.float64]
     length: NDArray[np.float64]
+    width: NDArray[np.float64]
     free_speed: NDArray[np.float64]
     advised_speed: NDArray[np.float64]
     extinction: NDArray[np.float64]
@@ -183,6 +187,7 @@ class TrafficGathering:
         self._last_lanes: tuple[str, ...] = ()
         self._last = np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros(0, np.intp)
         self._rows = self._moments = 0
+        self._time = 0.0
 
     @property
     def is_full(self) -> bool:
@@ -222,6 +227,7 @@ class TrafficGathering:
         states, times, extinctions = zip(*self._states, strict=True)
         vehicles, lanes, kinds = zip(*self._numbers, strict=True)
         counts = [len(state.ids) for state in states]
+        clock = self._time + np.cumsum(times)
         free = [_known(state.free_speed, n, np.nan) for state, n in zip(states, counts, strict=True)]
         advised = [_known(state.advised_speed, n, np.inf) for state, n in zip(states, counts, strict=True)]
         fog = [np.full(n, np.nan) if k is None else k for k, n in zip(extinctions, counts, strict=True)]
@@ -231,11 +237,13 @@ class TrafficGathering:
             lane=np.concatenate(lanes),
             kind=np.concatenate(kinds),
             elapsed=np.repeat(np.array(times), counts),
+            time=np.repeat(clock, counts),
             position=np.concatenate([state.position.reshape(-1, 3) for state in states]),
             heading=np.concatenate([state.heading for state in states]),
             speed=np.concatenate([state.speed for state in states]),
             acceleration=np.concatenate([state.acceleration for state in states]),
             length=np.concatenate([state.length for state in states]),
+            width=np.concatenate([state.width for state in states]),
             free_speed=np.concatenate(free),
             advised_speed=np.concatenate(advised),
             extinction=np.concatenate(fog),
@@ -245,6 +253,7 @@ class TrafficGathering:
             kind_names=tuple(self._kinds),
         )
         self._moments += len(states)
+        self._time = float(clock[-1])
         self._rows, self._states, self._numbers, self._collisions = 0, [], [], []
         return span
 

@@ -12,6 +12,7 @@ from fogsim.metrics.traffic_comfort import TrafficComfort
 from fogsim.metrics.traffic_compliance import TrafficCompliance
 from fogsim.metrics.traffic_conflicts import TrafficConflicts
 from fogsim.metrics.traffic_emissions import TrafficEmissions
+from fogsim.metrics.traffic_encroachment import TrafficEncroachment
 from fogsim.metrics.traffic_flow import TrafficFlow
 from fogsim.metrics.traffic_headways import TrafficHeadways
 from fogsim.metrics.traffic_sight import TrafficSight
@@ -163,7 +164,7 @@ def test_collisions_by_what_was_driven() -> None:
     "metric",
     [
         *(TrafficConflicts(3.0), TrafficHeadways(), TrafficFlow(), TrafficSight(2.5, 3.4), TrafficComfort()),
-        *(TrafficCollisions(), TrafficEmissions(), TrafficCompliance(1.0)),
+        *(TrafficCollisions(), TrafficEmissions(), TrafficCompliance(1.0), TrafficEncroachment()),
     ],
     ids=lambda metric: type(metric).__name__,
 )

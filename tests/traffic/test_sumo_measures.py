@@ -3,7 +3,7 @@
 import dataclasses
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
@@ -17,6 +17,7 @@ from fogsim.metrics.surrogate import CRITICAL_DECELERATION, QUEUE_SPEED
 from fogsim.metrics.traffic_collisions import TrafficCollisions
 from fogsim.metrics.traffic_conflicts import TrafficConflicts
 from fogsim.metrics.traffic_emissions import TrafficEmissions
+from fogsim.metrics.traffic_encroachment import TrafficEncroachment
 from fogsim.metrics.traffic_flow import TrafficFlow
 from fogsim.metrics.traffic_span import TrafficGathering, TrafficMetric
 from fogsim.traffic import DriverSetup, TrafficSetup
@@ -31,6 +32,8 @@ STEPS = 400
 LENGTH = 3000.0
 BRAKES_AT = 250
 """Step in which the first vehicle begins to brake."""
+CROSSING = Path(__file__).resolve().parents[1] / "data" / "crossing" / "priority.net.xml"
+CROSSING_STEPS = 260
 NET = (
     f'<net version="1.20"><edge id="road" from="a" to="b" priority="1"><lane id="road_0" index="0" speed="30" '
     f'length="{LENGTH}" shape="0,0 {LENGTH},0"/></edge>'
@@ -111,8 +114,23 @@ def drive(folder: Path, wakes_at: int) -> Run:
     types = "".join(f'<vType id="{kind}" vClass="{kind}" {alike}/>' for kind in sorted({*CLASSES}))
     demand = f'<routes>{types}<route id="r" edges="road"/>{vehicles}</routes>'
     (folder / "road.rou.xml").write_text(demand, encoding="utf-8")
+
+    def disturb(api: Api, number: int) -> None:
+        if number == BRAKES_AT:
+            api.vehicle.slowDown("g", 6.0, 3.0)
+            api.vehicle.setSpeedMode("f", 0)
+            api.vehicle.setSpeed("f", api.vehicle.getSpeed("f"))
+        if number == wakes_at:
+            api.vehicle.setSpeedMode("f", 31)
+            api.vehicle.setSpeed("f", -1.0)
+
+    return play(folder, folder / "road.net.xml", STEPS, disturb)
+
+
+def play(folder: Path, net: Path, steps: int, disturb: Callable[[Api, int], None]) -> Run:
+    """The vehicles of ``road.rou.xml`` on a network, for so many steps before each of which something may happen."""
     setup = TrafficSetup(
-        net=folder / "road.net.xml",
+        net=net,
         routes=(folder / "road.rou.xml",),
         additional=(),
         ego="ego",
@@ -130,14 +148,8 @@ def drive(folder: Path, wakes_at: int) -> Run:
     states, collisions, emitted = [], [], []
     try:
         traffic.start(1)
-        for number in range(STEPS):
-            if number == BRAKES_AT:
-                link.api.vehicle.slowDown("g", 6.0, 3.0)
-                link.api.vehicle.setSpeedMode("f", 0)
-                link.api.vehicle.setSpeed("f", link.api.vehicle.getSpeed("f"))
-            if number == wakes_at:
-                link.api.vehicle.setSpeedMode("f", 31)
-                link.api.vehicle.setSpeed("f", -1.0)
+        for number in range(steps):
+            disturb(link.api, number)
             if number:
                 traffic.advance(Command())
             snapshot = traffic.observe()
@@ -235,3 +247,27 @@ def test_emissions_are_those_of_sumo(run: Run) -> None:
     assert found["traffic_nox_mg_per_vehicle_km"] == pytest.approx(nitrogen, rel=0.005)
     assert found["traffic_fuel_g_per_vehicle_km"] == pytest.approx(1e-3 * fuel, rel=0.005)
     assert {kind for state in run.states for kind in state.types} == {"car", "van", "truck", "bus", "motorcycle"}
+
+
+def test_post_encroachment_times_are_those_of_the_ssm_device(tmp_path: Path) -> None:
+    """Of both pairs of three who cross squarely; the metric interpolates over 0.3 s: 3 cm at 3 m/s², 6 ms at 5 m/s."""
+    starts = (("ego", "NC CS", 190.0), ("b", "SC CN", 150.0), ("c", "WC CE", 100.0))
+    vehicles = "".join(
+        f'<vehicle id="{name}" type="t" depart="0" departPos="{place}" departSpeed="9"><route edges="{edges}"/>'
+        "</vehicle>"
+        for name, edges, place in starts
+    )
+    (tmp_path / "road.rou.xml").write_text(
+        f'<routes><vType id="t" sigma="0" speedDev="0" length="5" width="1.8"/>{vehicles}</routes>', encoding="utf-8"
+    )
+    run = play(tmp_path, CROSSING, CROSSING_STEPS, lambda *_: None)
+    root = ET.parse(tmp_path / "ssm.xml").getroot()  # noqa: S314 - the test's own run
+    told = [float(pet.get("value", "")) for pet in root.iter("PET") if pet.get("value") != "NA"]
+    assert len(told) == 2
+    found = run.watched(TrafficEncroachment())
+    assert found["traffic_minimum_post_encroachment_time_s"] == pytest.approx(min(told), abs=0.01)
+    kilometres = sum(state.speed.sum() * STEP for state in run.states[1:]) / 1000.0
+    for limit in (5, 1):
+        short = sum(time <= limit for time in told) / kilometres
+        assert found[f"traffic_post_encroachments_below_{limit}_s_per_vehicle_km"] == pytest.approx(short)
+    assert max(told) < 5.0

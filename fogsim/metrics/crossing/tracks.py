@@ -1,0 +1,239 @@
+"""Tracks of vehicles through junctions, from their rows in steps."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.metrics.traffic_span import TrafficSpan
+
+Floats = NDArray[np.float64]
+Numbers = NDArray[np.intp]
+
+CLEARANCE = 6.0
+"""Way beyond its length after which a vehicle has left the junction's last crossing with others [m]."""
+
+UNKNOWN = -1
+"""Number of a lane that was not seen, and of the junction of a lane outside of all."""
+
+INTERVAL = 0.3
+"""Time between two rows that is short enough [s]: at 3 m/s² the way between them is straight in time to 3 cm."""
+
+_JUMP = 5.0
+"""Way in one step beyond one and a half times that of the speed, from which a vehicle has been put elsewhere [m]."""
+
+
+class Fronts(NamedTuple):
+    """Where fronts of vehicles were; row i is one vehicle at one step.
+
+    Attributes
+    ----------
+    vehicle, lane : (n,) intp
+        Numbers of vehicle and lane.
+    time, elapsed : (n,) float64
+        Time, and that since the step before [s].
+    x, y : (n,) float64
+        Middle of the front bumper [m].
+    speed, length, width : (n,) float64
+        Speed [m/s]; size of the body [m].
+    """
+
+    vehicle: Numbers
+    lane: Numbers
+    time: Floats
+    elapsed: Floats
+    x: Floats
+    y: Floats
+    speed: Floats
+    length: Floats
+    width: Floats
+
+    @classmethod
+    def of(cls, span: TrafficSpan) -> "Fronts":
+        """Those of some steps, of short ones but one in each `INTERVAL`.
+
+        Parameters
+        ----------
+        span : TrafficSpan
+            The steps.
+        """
+        time, elapsed = span.time, span.elapsed
+        x, y = span.position[:, 0], span.position[:, 1]
+        fronts = cls(span.vehicle, span.lane, time, elapsed, x, y, span.speed, span.length, span.width)
+        ticks = time / INTERVAL + 1e-6
+        return fronts.chosen(np.floor(ticks) > np.floor(ticks - elapsed / INTERVAL))
+
+    @classmethod
+    def joined(cls, parts: Sequence["Fronts"]) -> "Fronts":
+        """All rows of several, one after the other.
+
+        Parameters
+        ----------
+        parts : sequence of Fronts
+            At least one.
+        """
+        return parts[0]._replace(
+            **{name: np.concatenate([getattr(part, name) for part in parts]) for name in cls._fields}
+        )
+
+    def chosen(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> "Fronts":
+        """Some of the rows.
+
+        Parameters
+        ----------
+        rows : (m,) intp, or (n,) bool
+            Which.
+        """
+        return self._replace(**{name: getattr(self, name)[rows] for name in self._fields})
+
+
+class Junctions:
+    """Which lanes lie in which junctions: SUMO names those of a junction J ``:J_edge_lane``.
+
+    Attributes
+    ----------
+    of_lane : (n,) intp
+        Number of the junction of each lane so far, `UNKNOWN` for one outside of all.
+    """
+
+    def __init__(self) -> None:
+        self.of_lane: Numbers = np.zeros(0, np.intp)
+        self._known: dict[str, int] = {}
+
+    def learn(self, lane_names: Sequence[str]) -> bool:
+        """Take in the lanes so far; True if any of them lies in a junction.
+
+        Parameters
+        ----------
+        lane_names : sequence of str
+            As of `TrafficSpan`.
+        """
+        new = lane_names[len(self.of_lane) :]
+        if new:
+            found = [self._number(name) for name in new]
+            self.of_lane = np.concatenate((self.of_lane, np.array(found, dtype=np.intp)))
+        return bool(self._known)
+
+    def _number(self, lane: str) -> int:
+        if not lane.startswith(":"):
+            return UNKNOWN
+        return self._known.setdefault(lane.rsplit("_", 2)[0], len(self._known))
+
+
+class Tracks(NamedTuple):
+    """Ways through junctions, one vehicle's after another's.
+
+    Attributes
+    ----------
+    fronts : Fronts
+        Rows in the order of vehicle and time; of each way from the row before the junction on, until the rear has left.
+    source : (n,) intp
+        Rows that these were.
+    track : (n,) intp
+        Number of the way that a row belongs to.
+    start, end : (m,) intp
+        First and last row of each way.
+    travelled : (n,) float64
+        Way of the front along all of them [m].
+    junction : (n,) intp
+        Junction in which the way from the row before to this one lies; `UNKNOWN` where there is none, or no way.
+    origin, target : (n,) intp
+        Lanes from which and to which the vehicle goes through it, `UNKNOWN` where that was not seen.
+    """
+
+    fronts: Fronts
+    source: Numbers
+    track: Numbers
+    start: Numbers
+    end: Numbers
+    travelled: Floats
+    junction: Numbers
+    origin: Numbers
+    target: Numbers
+
+    def time_at(self, row: Numbers, travelled: Floats) -> Floats:
+        """Time at which a front is at a place of its way (k,) [s]; that of the way's nearer end beyond it.
+
+        Parameters
+        ----------
+        row : (k,) intp
+            Any row of the way.
+        travelled : (k,) float64
+            The place [m]; where a vehicle stands there, the time at which it drives on.
+        """
+        if not row.size:
+            return travelled
+        track = self.track[row]
+        ends = self.travelled[self.start[track]], self.travelled[self.end[track]]
+        return np.interp(np.clip(travelled, *ends), self.travelled, self.fronts.time)
+
+
+def tracks_through(fronts: Fronts, junctions: Junctions) -> Tracks:
+    """Ways of vehicles through junctions.
+
+    Parameters
+    ----------
+    fronts : Fronts
+        Rows of which each vehicle's are in the order of time.
+    junctions : Junctions
+        Which lanes are in which.
+    """
+    source = _rows_at_junctions(fronts, junctions.of_lane[fronts.lane] >= 0)
+    fronts = fronts.chosen(source)
+    way = np.hypot(*_steps(fronts.x, fronts.y))
+    elapsed = np.diff(fronts.time, prepend=fronts.time[:1])
+    # A vehicle that is put elsewhere, or comes back, begins another way.
+    begins = _changes(fronts.vehicle) | (elapsed > fronts.elapsed + INTERVAL)
+    begins |= way > 1.5 * elapsed * np.maximum(fronts.speed, np.roll(fronts.speed, 1)) + _JUMP
+    track = np.cumsum(begins) - 1
+    start = np.flatnonzero(begins)
+    end = np.append(start[1:], len(begins))[: len(start)] - 1
+    inside = junctions.of_lane[fronts.lane]
+    junction = np.where(inside >= 0, inside, np.roll(inside, 1))
+    number = np.arange(len(begins))
+    before = np.maximum.accumulate(np.where(inside < 0, number, -1))
+    after = np.minimum.accumulate(np.where(inside < 0, number, len(begins))[::-1])[::-1]
+    before[1:] = before[:-1].copy()
+    known = (before >= start[track]) & ~begins, after <= end[track]
+    origin, target = (
+        np.where(seen, fronts.lane[np.where(seen, row, 0)], UNKNOWN)
+        for seen, row in zip(known, (before, after), strict=True)
+    )
+    moves = ~begins & (way > 0.0)
+    return Tracks(
+        fronts=fronts,
+        source=source,
+        track=track,
+        start=start,
+        end=end,
+        travelled=np.cumsum(np.where(begins, 1.0, way)),
+        junction=np.where(moves, junction, UNKNOWN),
+        origin=origin,
+        target=target,
+    )
+
+
+def _rows_at_junctions(fronts: Fronts, inside: NDArray[np.bool_]) -> Numbers:
+    """Rows in junctions, those before, and those after until the rear is clear of it; by vehicle and time."""
+    # numpy sorts numbers of 16 bits and less by counting.
+    short = fronts.vehicle.astype(np.min_scalar_type(int(fronts.vehicle.max(initial=0))))
+    order = np.argsort(short, kind="stable")
+    first, inner, number = _changes(fronts.vehicle[order]), inside[order], np.arange(len(order))
+    travelled = np.cumsum(np.hypot(*_steps(fronts.x[order], fronts.y[order])))
+    last_inner = np.maximum.accumulate(np.where(inner, number, -1))
+    been = last_inner >= np.maximum.accumulate(np.where(first, number, 0))
+    wanted = been & (travelled - travelled[last_inner] <= fronts.length[order] + CLEARANCE)
+    wanted[1:] |= wanted[:-1] & ~first[1:]
+    wanted[:-1] |= inner[1:] & ~first[1:]
+    rows: Numbers = order[wanted]
+    return rows
+
+
+def _steps(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    return np.diff(x, prepend=x[:1]), np.diff(y, prepend=y[:1])
+
+
+def _changes(vehicle: Numbers) -> NDArray[np.bool_]:
+    changes: NDArray[np.bool_] = np.diff(vehicle, prepend=-1) != 0
+    return changes

@@ -1,0 +1,94 @@
+"""How closely in time vehicles whose ways cross drive over the same place."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+
+from fogsim.metrics.crossing import Fronts, Junctions, find_encroachments, tracks_through
+from fogsim.metrics.metric import JsonValue
+from fogsim.metrics.traffic_span import Exposure, TrafficMetric, TrafficSpan
+
+MEMORY = 10.0
+"""Time after which a vehicle that has left is no more compared with those who come [s]."""
+
+CONFLICT = 5.0
+"""Post-encroachment time up to which SSAM by default calls an encounter a conflict [s] (FHWA-HRT-08-051)."""
+
+SERIOUS = 1.0
+"""Time below which it is critical [s] (Várhelyi, Accident Analysis and Prevention 30 (1998), 731-742)."""
+
+
+@dataclass(slots=True)
+class TrafficEncroachment(TrafficMetric):
+    """Post-encroachment time (PET) of vehicles whose ways cross in a junction, the least of each pair.
+
+    A junction is where SUMO's lanes have names that begin with a colon; the formula is `find_encroachments`'.
+    """
+
+    meanings: ClassVar[Mapping[str, str]] = {
+        "traffic_minimum_post_encroachment_time_s": "least time from when a vehicle has left a place where its way "
+        "and another one's cross in a junction until that one comes there (PET); 0 if both were there at once, none "
+        "above 10 s",
+        "traffic_post_encroachments_below_5_s_per_vehicle_km": "pairs of vehicles with such a time of 5 s or less, per "
+        "kilometre of all vehicles",
+        "traffic_post_encroachments_below_1_s_per_vehicle_km": "the same with 1 s or less",
+    }
+    _exposure: Exposure = field(default_factory=Exposure)
+    _junctions: Junctions = field(default_factory=Junctions)
+    _pending: list[Fronts] = field(default_factory=list)
+    _since: float = 0.0
+    _least: dict[tuple[int, int, int], float] = field(default_factory=dict)
+
+    def add(self, span: TrafficSpan) -> None:
+        """Take in some steps.
+
+        Parameters
+        ----------
+        span : TrafficSpan
+            The next steps.
+        """
+        self._exposure.add(span)
+        fronts = Fronts.of(span)
+        if not len(fronts.time):
+            return
+        now = float(fronts.time[-1])
+        if not self._junctions.learn(span.lane_names):
+            # Its last rows may be those before the first junction.
+            self._pending, self._since = [fronts], now
+            return
+        self._pending.append(fronts)
+        if now - self._since >= MEMORY:
+            self._compare()
+            self._since = now
+
+    def _compare(self) -> None:
+        """Compare all who are pending, and keep those whom others may still encounter."""
+        rows = Fronts.joined(self._pending)
+        tracks = tracks_through(rows, self._junctions)
+        columns = (column.tolist() for column in find_encroachments(tracks))
+        for first, second, junction, time in zip(*columns, strict=True):
+            pair = min(first, second), max(first, second), junction
+            self._least[pair] = min(time, self._least.get(pair, MEMORY))
+        now = rows.time.max()
+        kept = rows.time == now
+        inside = np.flatnonzero(tracks.junction >= 0)
+        left = tracks.time_at(inside, tracks.travelled[inside] + tracks.fronts.length[inside])
+        late = inside[left > now - MEMORY]
+        since = np.full(len(tracks.start), len(tracks.track))
+        np.minimum.at(since, tracks.track[late], late - 1)
+        kept[tracks.source[np.arange(len(tracks.track)) >= since[tracks.track]]] = True
+        self._pending = [rows.chosen(kept)]
+
+    def result(self) -> dict[str, JsonValue]:
+        """Say how closely they followed one another."""
+        if self._junctions.learn(()):
+            self._compare()
+        times = np.array([time for time in self._least.values() if time < MEMORY])
+        rate = self._exposure.per_kilometre
+        return {
+            "traffic_minimum_post_encroachment_time_s": float(times.min()) if len(times) else None,
+            "traffic_post_encroachments_below_5_s_per_vehicle_km": rate(int((times <= CONFLICT).sum())),
+            "traffic_post_encroachments_below_1_s_per_vehicle_km": rate(int((times <= SERIOUS).sum())),
+        }

@@ -7,11 +7,15 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Generic, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fogsim.errors import InputError, RecorderError
 from fogsim.files.atomic import refuse_existing
 from fogsim.interruption import Interruption
 from fogsim.loop import run, warn_of_unplayed
 from fogsim.metrics import MetricsOfRun, RunMetrics, RunSummary, TrafficRunMetrics
+from fogsim.metrics.road_speeds import RoadSpeeds
 from fogsim.recorders import (
     RECORDERS,
     TRAFFIC_RECORDERS,
@@ -30,7 +34,7 @@ from fogsim.scenario import Scenario, build, resolved
 from fogsim.traffic.road.configuration import configured_files
 from fogsim.traffic.road.network import read_net
 from fogsim.traffic.road.signs import geographic_position, sign_map
-from fogsim.traffic_run import run_traffic
+from fogsim.traffic_run import road_along, run_traffic
 from fogsim.values import NOTHING_UNPLAYED, Ending, SignMap, Step, TrafficStep, Unplayed
 from fogsim.values.result_checks import checked_recorder
 
@@ -195,11 +199,14 @@ def record_traffic(
     UnplayedWarning
         As of `record_run`.
     """
+    along = road_along(scenario)
+    road = None if along is None else RoadSpeeds(along[0])
     alone = _Recorded(
         lambda folder: run_traffic(scenario, seed, folder),
-        TrafficRunMetrics(build.safety_standard(scenario)),
+        TrafficRunMetrics(build.safety_standard(scenario), watchers=[] if road is None else [road]),
         TRAFFIC_RECORDERS,
         watch,
+        road,
     )
     return _record(alone, scenario, seed, out, overwrite, recorders, command_line)
 
@@ -221,12 +228,21 @@ class _Recorded(Generic[AnyStep]):
         Who can write it.
     watch : callable
         Called with each finished step.
+    road : RoadSpeeds or None
+        The road whose speeds are asked for.
     """
 
     steps: Callable[[Path], Generator[AnyStep, None, None]]
     metrics: MetricsOfRun[AnyStep]
     recorders: Registry[Callable[[RunInformation], StepRecorder[AnyStep]]]
     watch: Callable[[AnyStep], None]
+    road: RoadSpeeds | None = None
+
+    def along_road(self) -> NDArray[np.float64]:
+        """Means along the road, as of `RunInformation`."""
+        # The summary has the metrics hand over the last steps.
+        self.metrics.summary()
+        return np.zeros((0, 4)) if self.road is None else self.road.means()
 
 
 def _record(
@@ -247,7 +263,7 @@ def _record(
             command_line=command_line,
             own_methods=build.own_methods(scenario),
         )
-        information = _information(scenario, seed, directory, what.metrics)
+        information = _information(what, scenario, seed, directory)
         opened = {name: checked_recorder(name, what.recorders[name](information)) for name in recorders}
         recording = Recording(directory, manifest, opened, what.metrics)
         status, last, message = Status.FAILED, None, ""
@@ -281,9 +297,7 @@ def _record(
     return RecordedRun(status, ending, what.metrics.summary(), directory.path, tuple(recording.files), unplayed)
 
 
-def _information(
-    scenario: Scenario, seed: int, directory: RunDirectory, metrics: MetricsOfRun[AnyStep]
-) -> RunInformation:
+def _information(what: _Recorded[AnyStep], scenario: Scenario, seed: int, directory: RunDirectory) -> RunInformation:
     return RunInformation(
         directory=directory,
         title=scenario.name,
@@ -291,8 +305,9 @@ def _information(
         seed=seed,
         methods=tuple(e.method for e in scenario.estimators),
         frame_period=scenario.clocks.camera_period_s,
-        summary=lambda: metrics.summary().values,
-        meanings=metrics.summary().meanings,
+        summary=lambda: what.metrics.summary().values,
+        meanings=what.metrics.summary().meanings,
+        along_road=what.along_road,
     )
 
 

@@ -133,6 +133,12 @@ def test_traffic_alone_is_recorded_the_same_again(tmp_path: Path) -> None:
     assert rows[-1]["n_vehicles"] > 3
 
 
+def test_the_report_of_traffic_alone_has_speed_over_the_named_road(tmp_path: Path) -> None:
+    scenario = without_ego("traffic.warm_up_s=10", 'traffic.along=["approach","bank"]', "duration_s=0.5")
+    record_traffic(scenario, 1, tmp_path, recorders=("report",))
+    assert "Over the road of traffic.along" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
 def test_traffic_alone_has_no_video_and_a_run_with_an_ego_is_not_alone(tmp_path: Path) -> None:
     with pytest.raises(UnknownNameError, match=r"recorder of traffic alone.*'video'"):
         record_traffic(without_ego(), 1, tmp_path / "out", recorders=("video",))

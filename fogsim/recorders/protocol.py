@@ -4,6 +4,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fogsim.recorders.run_directory import RunDirectory
 from fogsim.values import Step, TrafficStep
 
@@ -61,6 +64,10 @@ def _no_summary() -> Mapping[str, object]:
     return {}
 
 
+def _no_road() -> NDArray[np.float64]:
+    return np.zeros((0, 4))
+
+
 @dataclass(frozen=True, slots=True)
 class RunInformation:
     """What a recorder may want to know before the first step.
@@ -81,6 +88,9 @@ class RunInformation:
         Gives the metrics of the run by key when the run is over; a key ends in its unit.
     meanings : mapping from str to str
         One line on each of those keys.
+    along_road : callable
+        Gives means over everybody on the road of traffic alone when the run is over (n, 4): middle of a stretch [m],
+        speed [m/s], extinction [1/m], and time of the vehicles [s]; empty where no road was named.
     """
 
     directory: RunDirectory
@@ -91,3 +101,4 @@ class RunInformation:
     frame_period: float
     summary: Callable[[], Mapping[str, object]] = _no_summary
     meanings: Mapping[str, str] = field(default_factory=dict)
+    along_road: Callable[[], NDArray[np.float64]] = _no_road

@@ -164,7 +164,7 @@ def _method_rows(name: str, methods: Mapping[str, Mapping[str, object]], meaning
 def _figures(figures: Sequence[tuple[str, bytes]], *, recorded: bool) -> str:
     if not figures:
         return f"<p>{'Figures are of whole runs; the rows are a table.' if recorded else 'No step was recorded.'}</p>"
-    return "<h2>Over time</h2>\n" + "\n".join(_figure(png, caption, caption) for caption, png in figures)
+    return "<h2>Figures</h2>\n" + "\n".join(_figure(png, caption, caption) for caption, png in figures)
 
 
 def _pictures(pictures: Sequence[ReportPicture]) -> str:

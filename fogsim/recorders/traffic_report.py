@@ -1,5 +1,6 @@
 """The report of traffic alone: everybody over time and over the road, and no camera."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -14,13 +15,14 @@ from fogsim.recorders.report_figures import (
     BELIEF,
     SPEED,
     TRUTH,
+    drawn_figure,
     figure_over_time,
     plottable,
     scale_visibility,
     shown_visibility,
 )
 from fogsim.recorders.table_columns import least_visibility, lowest_advice
-from fogsim.units import KMH_PER_MPS, finite_or_none
+from fogsim.units import KMH_PER_MPS, finite_or_none, visibility_from_extinction
 from fogsim.values import TrafficStep
 
 _SPREAD = (15.0, 85.0)
@@ -93,7 +95,8 @@ class TrafficReportRecorder(StepReport[TrafficStep]):
         self._curves.add(step)
 
     def _figures(self) -> Sequence[tuple[str, bytes]]:
-        return draw_traffic_figures(self._curves)
+        along_road = self._information.along_road()
+        return [*draw_traffic_figures(self._curves), *([road_figure(along_road)] if len(along_road) else [])]
 
 
 def draw_traffic_figures(curves: TrafficCurves) -> list[tuple[str, bytes]]:
@@ -125,6 +128,43 @@ def draw_traffic_figures(curves: TrafficCurves) -> list[tuple[str, bytes]]:
             figure_over_time(time, collisions, (2.5,), lambda axes: _draw_visibility(axes[0], curves)),
         ),
     ]
+
+
+def road_figure(along_road: NDArray[np.float64]) -> tuple[str, bytes]:
+    """Draw speed over the road, and the visibility there.
+
+    Parameters
+    ----------
+    along_road : (n, 4) float64
+        As of `RunInformation`; at least one row.
+
+    Returns
+    -------
+    tuple of str and bytes
+        Caption and PNG.
+    """
+    # Nobody's mean is a line across a stretch that nobody was on.
+    place, speed, extinction, _ = np.insert(along_road, _breaks(along_road[:, 0]), np.nan, axis=0).T
+
+    def draw(axes: Sequence[Axes]) -> None:
+        axes[0].plot(place / 1000.0, speed * KMH_PER_MPS, color=SPEED, linewidth=1.6)
+        axes[0].set_ylim(bottom=0)
+        axes[0].set_ylabel("mean speed [km/h]", fontsize=9)
+        visibilities = [None if math.isnan(k) else finite_or_none(visibility_from_extinction(k)) for k in extinction]
+        axes[1].plot(place / 1000.0, shown_visibility(visibilities), color=TRUTH, linewidth=1.6)
+        scale_visibility(axes[1])
+
+    caption = (
+        "Over the road of traffic.along: mean speed of all vehicles on it and in its direction, way over time, and the "
+        "visibility that they met."
+    )
+    return caption, drawn_figure((2.4, 1.8), draw, "place along the road [km]")
+
+
+def _breaks(place: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Rows before which stretches of a road are missing."""
+    ways = np.diff(place)
+    return 1 + np.flatnonzero(ways > 1.5 * ways.min()) if len(ways) else np.zeros(0, np.intp)
 
 
 def _draw_speed(axis: Axes, curves: TrafficCurves) -> None:

@@ -7,12 +7,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.metrics.road_speeds import ROAD_COLUMNS
 from fogsim.study.profiles import CLASSES, Profiles
 
 Cell = tuple[str, ...]
 """Levels of all factors, in their order."""
 
-_SUMS = ("ego_time_s", "ego_way_m", "ego_extinction_time_s_per_m", "vehicle_time_s", "vehicle_way_m")
+_SUMS = ROAD_COLUMNS[1:]
 
 
 class CollisionPlace(NamedTuple):
@@ -47,10 +48,10 @@ class PooledProfiles:
         Time of all vehicles [s].
     moving, queue : (n,) float64
         That in each class of time to collision, with a leader that moves and with one that is slower than 5 m/s [s].
-    road : mapping from float to (5,) float64
-        By place along the ego's route [m]: time, way and extinction over time of the ego, time and way of everybody.
+    road : mapping from float to (6,) float64
+        By place along the road [m]: time, way and extinction over time of the ego, and of everybody.
     path : (n, 2) float64
-        The longest way of the ego in plan [m].
+        The road, or the longest way of an ego, in plan [m].
     collisions : list of CollisionPlace
         Those that were kept.
     """
@@ -76,7 +77,9 @@ class PooledProfiles:
         classes, road, hits = profiles["time_to_collision"], profiles["road"], profiles["collisions"]
         self.moving += np.array(classes["moving_s"])
         self.queue += np.array(classes["queue_s"])
-        for place, *sums in zip(road["place_m"], *(road[name] for name in _SUMS), strict=True):
+        places = road["place_m"]
+        # Runs of earlier versions have no extinctions of everybody.
+        for place, *sums in zip(places, *(road.get(name, [0.0] * len(places)) for name in _SUMS), strict=True):
             self.road[place] = self.road.get(place, np.zeros(len(_SUMS))) + np.array(sums)
         path = np.array([profiles["path"]["x_m"], profiles["path"]["y_m"]]).T
         self.path = path if len(path) > len(self.path) else self.path
@@ -93,7 +96,7 @@ class PooledProfiles:
         return np.asarray(1.0 - np.cumsum(self.moving) / self.vehicle_time)
 
     def speeds(self, *, ego_only: bool = False) -> NDArray[np.float64]:
-        """Place along the ego's route [m], mean speed there [m/s] and time on which it is based [s], as columns.
+        """Place along the road [m], mean speed there [m/s] and time on which it is based [s], as columns.
 
         Parameters
         ----------
@@ -105,8 +108,9 @@ class PooledProfiles:
         return np.array(found).reshape(-1, 3)
 
     def extinctions(self) -> NDArray[np.float64]:
-        """Place along the ego's route [m] and mean extinction at the ego there [1/m], as columns."""
-        found = [(place, sums[2] / sums[0]) for place, sums in self._road() if sums[0] > 0.0]
+        """Place along the road [m] and mean extinction there [1/m], as columns: at egos, else at everybody."""
+        time, fog = (0, 2) if any(sums[0] > 0.0 for sums in self.road.values()) else (3, 5)
+        found = [(place, sums[fog] / sums[time]) for place, sums in self._road() if sums[time] > 0.0]
         return np.array(found).reshape(-1, 2)
 
     def _road(self) -> Iterator[tuple[float, NDArray[np.float64]]]:

@@ -7,10 +7,11 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 
+from fogsim.metrics.road_speeds import CELL_LENGTH
 from fogsim.study.drawing import MUTED, Grid, StudyFigure, label_figure, padded, svg_of
 from fogsim.study.plan import Study
 from fogsim.study.pooled_profiles import Cell, PooledProfiles
-from fogsim.study.profiles import CELL_LENGTH, CLASS_WIDTH, CLASSES
+from fogsim.study.profiles import CLASS_WIDTH, CLASSES
 from fogsim.units import KMH_PER_MPS, visibility_from_extinction
 
 _EVEN = 1.15
@@ -71,7 +72,9 @@ def _scale_near_hundred(axes: Axes, values: NDArray[np.float64]) -> None:
 
 
 def speed_figure(study: Study, cells: Mapping[Cell, PooledProfiles]) -> StudyFigure | None:
-    """Mean speed of everybody along the ego's route, over the fog that is there; None where no ego drove.
+    """Mean speed of everybody along the road, over the fog that is there; None where no road is known.
+
+    It is the ego's route, or that of ``traffic.along`` without an ego.
 
     Parameters
     ----------
@@ -97,13 +100,18 @@ def speed_figure(study: Study, cells: Mapping[Cell, PooledProfiles]) -> StudyFig
             place, speed, time = _with_gaps(speeds).T
             shown = np.where(time >= _LEAST_TIME, KMH_PER_MPS * speed, np.nan)
             axes.plot(place / 1000, shown, color=look.colour, linestyle=look.dashes, linewidth=1.4, label=policy)
-    label_figure(figure, "Place along the ego's route [km]", "Mean speed of all [km/h]")
+    label_figure(figure, "Place along the road [km]", "Mean speed of all [km/h]")
+    road = "the ego's road" if _have_ego(cells) else "the road of traffic.along"
     caption = (
-        "Mean speed of all vehicles on the ego's road and in its direction, way over time, in stretches of "
+        f"Mean speed of all vehicles on {road} and in its direction, way over time, in stretches of "
         f"{CELL_LENGTH:.0f} m with at least {_LEAST_TIME:.0f} s of vehicles' time; shaded: extinction of the fog."
     )
     columns = [*study.factors, "place_m", "mean_speed_mps", "vehicle_time_s"]
     return StudyFigure("speed_over_road", caption, svg_of(figure, "speed_over_road"), columns, rows)
+
+
+def _have_ego(cells: Mapping[Cell, PooledProfiles]) -> bool:
+    return any(sums[0] > 0.0 for pooled in cells.values() for sums in pooled.road.values())
 
 
 def _with_gaps(table: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -115,7 +123,7 @@ def _with_gaps(table: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _shade_fog(axes: Axes, pooled: list[PooledProfiles]) -> None:
-    """Shade the places of a road by the mean extinction that egos found there, and say the least visibility."""
+    """Shade the places of a road by the mean extinction that was found there, and say the least visibility."""
     sums: dict[float, NDArray[np.float64]] = {}
     for one in pooled:
         for place, extinction in one.extinctions():
@@ -171,6 +179,7 @@ def collisions_figure(study: Study, cells: Mapping[Cell, PooledProfiles]) -> Stu
         axes.set_ylim(*y)
         axes.set_aspect("equal")
     label_figure(figure, "East [m]", "North [m]")
-    caption = "Where collisions of any vehicles near the ego were, all seeds together; grey: the ego's way."
+    where, way = ("near the ego ", "the ego's way") if _have_ego(cells) else ("", "the road of traffic.along, if any")
+    caption = f"Where collisions of any vehicles {where}were, all seeds together; grey: {way}."
     columns = [*study.factors, "seed", "time_s", "x_m", "y_m", "impact_speed_mps"]
     return StudyFigure("collisions_map", caption, svg_of(figure, "collisions_map"), columns, rows)

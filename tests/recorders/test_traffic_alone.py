@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from pyarrow import parquet
 
 from fogsim.metrics import TrafficRunMetrics
@@ -35,13 +36,19 @@ def nobody(step: TrafficStep) -> TrafficStep:
     return dataclasses.replace(step, traffic=dataclasses.replace(state, **empty), truth=truth)
 
 
-def recorded(folder: Path, steps: list[TrafficStep], complete: bool = True) -> Path:
+NO_ROAD = np.zeros((0, 4))
+
+
+def recorded(
+    folder: Path, steps: list[TrafficStep], complete: bool = True, road: NDArray[np.float64] = NO_ROAD
+) -> Path:
     metrics = TrafficRunMetrics()
     with RunDirectory(folder) as directory:
         directory.begin({})
         meanings = metrics.summary().meanings
+        summary = metrics.summary
         information = RunInformation(
-            directory, "Everybody", "", 5, (), 0.5, lambda: metrics.summary().to_json(), meanings
+            directory, "Everybody", "", 5, (), 0.5, lambda: summary().to_json(), meanings, lambda: road
         )
         recorders = [make(information) for make in TRAFFIC_RECORDERS.values()]
         for step in steps:
@@ -81,7 +88,14 @@ def test_the_report_is_of_everybody(tmp_path: Path) -> None:
     assert len(page.images) == 3
     assert "traffic mean speed" in page.text
     for word in ("of the ego", "camera", "Gap"):
-        assert word not in page.text.split("Over time")[1]
+        assert word not in page.text.split("Figures")[1]
+
+
+def test_the_report_has_speed_over_a_road_that_is_named(tmp_path: Path) -> None:
+    road = np.array([[25.0, 30.0, 0.0, 5.0], [75.0, 28.0, 0.05, 4.0], [175.0, 20.0, 0.04, 4.0]])
+    page = Page((recorded(tmp_path, some_steps(), road=road) / "report.html").read_text(encoding="utf-8"))
+    assert len(page.images) == 4
+    assert "Over the road of traffic.along" in page.text
 
 
 def test_an_interrupted_report_says_so_and_that_there_were_steps(tmp_path: Path) -> None:

@@ -6,11 +6,11 @@ import json
 import numpy as np
 import pytest
 
-from fogsim.metrics import RunMetrics
-from fogsim.study import profiles
+from fogsim.metrics import RunMetrics, TrafficRunMetrics, road_speeds
+from fogsim.study.pooled_profiles import PooledProfiles
 from fogsim.study.profiles import RunProfiles
 from fogsim.units import extinction_from_visibility
-from fogsim.values import Collision, Step, TrafficState
+from fogsim.values import Collision, Step, TrafficState, TrafficStep
 from tests.metrics.roads import lanes as traffic
 from tests.recorders.synthetic import make_step
 
@@ -47,7 +47,7 @@ def profiles_of(steps: list[Step]) -> dict[str, object]:
 
 @pytest.mark.parametrize("most_pending", [1, 200_000])
 def test_speeds_along_the_road_are_of_those_who_drive_on_it(most_pending: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(profiles, "_MOST_PENDING", most_pending)
+    monkeypatch.setattr(road_speeds, "_MOST_PENDING", most_pending)
     found = profiles_of(drive())
     road = found["road"]
     # The ego is at 20, 40 | 60, 80 | 100 … 140 | 160, 180 | 200 m; the other at 30 | 60, 90 | 120 | 150, 180 | 210.
@@ -60,6 +60,42 @@ def test_speeds_along_the_road_are_of_those_who_drive_on_it(most_pending: int, m
     assert road["vehicle_way_m"] == [70, 100, 90, 100, 50]
     assert found["path"]["place_m"] == [0, 100, 200]
     assert found["path"]["x_m"] == pytest.approx([0, 100 * np.cos(1.0), 200 * np.cos(1.0)], rel=1e-5)
+
+
+def test_speeds_along_a_named_road_need_no_ego() -> None:
+    """The road is the way of `drive`'s ego; those who drive beside it or against it are not on it."""
+    along = 10.0 * np.arange(21)[:, None] * np.array([np.cos(1.0), np.sin(1.0), 0.0])
+    watched = RunProfiles(along)
+    metrics = TrafficRunMetrics(names=[], watchers=[watched])
+    for one in drive():
+        known = dataclasses.replace(one.truth, vehicle_extinctions=np.array([0.01, 0.03, 9.0, 9.0]))
+        kept = {f.name: getattr(one, f.name) for f in dataclasses.fields(TrafficStep)}
+        alone = TrafficStep(**{**kept, "truth": known})
+        watched.update(alone)
+        metrics.update(alone)
+    metrics.summary()
+    found = watched.to_json()
+    road = found["road"]
+    assert road["place_m"] == [25.0, 75.0, 125.0, 175.0, 225.0]
+    assert road["vehicle_time_s"] == [3, 4, 4, 4, 2]
+    assert road["vehicle_way_m"] == [70, 100, 90, 100, 50]
+    # Of the ego's time above, and that of the other: 1, 2, 1, 2 and 1 s.
+    expected = [0.01 * slow + 0.03 * fast for slow, fast in ((2, 1), (2, 2), (3, 1), (2, 2), (1, 1))]
+    assert road["vehicle_extinction_time_s_per_m"] == pytest.approx(expected, rel=1e-5)
+    assert road["ego_time_s"] == [0.0] * 5
+    assert found["path"]["place_m"] == [0, 50, 100, 150, 200]
+    pooled = PooledProfiles()
+    pooled.add(0, found)
+    assert pooled.speeds()[:, 1] == pytest.approx([70 / 3, 25, 22.5, 25, 25])
+    assert pooled.extinctions()[:, 1] == pytest.approx([k / t for k, t in zip(expected, (3, 4, 4, 4, 2), strict=True)])
+
+
+def test_profiles_of_earlier_versions_are_read() -> None:
+    found = profiles_of(drive())
+    del found["road"]["vehicle_extinction_time_s_per_m"]
+    pooled = PooledProfiles()
+    pooled.add(0, found)
+    assert pooled.extinctions()[:, 1] == pytest.approx([extinction_from_visibility(100.0)] * 5, rel=1e-5)
 
 
 def test_time_of_all_by_time_to_collision_apart_from_queues() -> None:

@@ -34,7 +34,7 @@ from fogsim.scenario import Scenario, build, resolved
 from fogsim.traffic.road.configuration import configured_files
 from fogsim.traffic.road.network import read_net
 from fogsim.traffic.road.signs import geographic_position, sign_map
-from fogsim.traffic_run import road_along, run_traffic
+from fogsim.traffic_run import run_traffic
 from fogsim.values import NOTHING_UNPLAYED, Ending, SignMap, Step, TrafficStep, Unplayed
 from fogsim.values.result_checks import checked_recorder
 
@@ -199,11 +199,10 @@ def record_traffic(
     UnplayedWarning
         As of `record_run`.
     """
-    along = road_along(scenario)
-    road = None if along is None else RoadSpeeds(along[0])
+    road = RoadSpeeds()
     alone = _Recorded(
         lambda folder: run_traffic(scenario, seed, folder),
-        TrafficRunMetrics(build.safety_standard(scenario), watchers=[] if road is None else [road]),
+        TrafficRunMetrics(build.safety_standard(scenario), watchers=[road]),
         TRAFFIC_RECORDERS,
         watch,
         road,

@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -134,17 +134,13 @@ class TrafficRun:
         setup = build.traffic_setup(scenario)
         self._periods = build.periods(scenario)
         self._traffic = traffic or libsumo_network_traffic(setup, sumo_outputs)
-        road = road_along(scenario)
+        along, net = scenario.traffic.along, setup.net if setup.config is None else configured_files(setup.config)[0]
         # Fog without a road along which it lies has no heights either, so that its ground may be anywhere.
-<<<<<<< HEAD
         axis, limits = _axis_along(along, net) if along and net is not None else (np.zeros((1, 3)), np.zeros(0))
         self._route = axis if along else None
-=======
-        axis, limits = (np.zeros((1, 3)), np.zeros(0)) if road is None else road
->>>>>>> 5ae5975 (Speed over the road of traffic alone: in reports of runs and of studies)
         self._fog = build.fog_field(scenario, axis)
         # A meter that stands for a whole network does not see single patches.
-        self._metered = self._fog if road is not None else dataclasses.replace(self._fog, patches=None)
+        self._metered = self._fog if along else dataclasses.replace(self._fog, patches=None)
         self._meters = _places_along(axis) + EYES
         self._section_meters = RoadMeters(scenario, axis, limits)
         self._drivers_fog = DriversFog()
@@ -246,28 +242,8 @@ class TrafficRun:
         self.close()
 
 
-def road_along(scenario: Scenario) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-    """Road along which fog lies and meters stand, as ``traffic.along`` names its edges; None where it names none.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        A scenario without an ego.
-
-    Returns
-    -------
-    tuple of (n, 3) float64 and (n,) float64, or None
-        Points along it [m], and the speed limits on the way to them [m/s].
-
-    Raises
-    ------
-    InputError
-        If the network cannot be read, or lacks one of the edges.
-    """
-    setup, edges = build.traffic_setup(scenario), scenario.traffic.along
-    net = setup.net if setup.config is None else configured_files(setup.config)[0]
-    if not edges or net is None:
-        return None
+def _axis_along(edges: Sequence[str], net: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Points along a road [m], and the speed limits on the way to them [m/s]."""
     roads = read_net(net)
     for edge in edges:
         if edge not in roads.edges:

@@ -49,18 +49,13 @@ class _Squares(NamedTuple):
 
 
 class RoadSpeeds:
-    """Speeds along a road: a polyline, or the route of an ego.
+    """Speeds along a road: the way of an ego, of which `update` is told, or else the route that spans name.
 
-    Where a route leads is known only when the ego has driven it: until then others' speeds wait in small squares.
-
-    Parameters
-    ----------
-    axis : (n, 3) float64 or None
-        Polyline along the road [m]; None for the way of the ego.
+    What is on an ego's way is known only when it has driven it: until then others' speeds wait in small squares.
     """
 
-    def __init__(self, axis: NDArray[np.float64] | None = None) -> None:
-        self._path = [] if axis is None else _points_along(axis)
+    def __init__(self) -> None:
+        self._path: list[tuple[float, float, float]] = []
         self._ego: dict[int, NDArray[np.float64]] = {}
         self._pending: list[_Squares] = []
         self._pending_rows = 0
@@ -95,6 +90,8 @@ class RoadSpeeds:
         span : TrafficSpan
             The steps.
         """
+        if not self._path and span.route is not None:
+            self._path = _points_along(span.route)
         if not self._path:
             return
         self._pending.append(_squares(span))

@@ -53,6 +53,8 @@ class TrafficSpan:
         What happened in it, between vehicles of which one was near the ego.
     lane_names, kind_names : tuple of str
         Lanes and body kinds so far, by their numbers.
+    route : (m, 3) float64 or None
+        As of `Truth`.
     """
 
     moment: NDArray[np.intp]
@@ -74,6 +76,7 @@ class TrafficSpan:
     collisions: tuple[Collision, ...]
     lane_names: tuple[str, ...]
     kind_names: tuple[str, ...]
+    route: NDArray[np.float64] | None = None
 
     @cached_property
     def following(self) -> Following:
@@ -183,6 +186,7 @@ class TrafficGathering:
         self._states: list[tuple[TrafficState, float, NDArray[np.float64] | None]] = []
         self._numbers: list[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]] = []
         self._collisions: list[Collision] = []
+        self._route: NDArray[np.float64] | None = None
         self._last_ids: tuple[str, ...] = ()
         self._last_lanes: tuple[str, ...] = ()
         self._last = np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros(0, np.intp)
@@ -204,7 +208,7 @@ class TrafficGathering:
         elapsed : float
             Time since the one before [s].
         """
-        traffic = step.traffic
+        traffic, self._route = step.traffic, step.truth.route
         if step.collisions:
             # The simulation may have removed both; then they were near at the step before.
             near = {*self._last_ids, *traffic.ids}
@@ -251,6 +255,7 @@ class TrafficGathering:
             collisions=tuple(self._collisions),
             lane_names=tuple(self._lanes),
             kind_names=tuple(self._kinds),
+            route=self._route,
         )
         self._moments += len(states)
         self._time = float(clock[-1])

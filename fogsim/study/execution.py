@@ -11,7 +11,7 @@ from fogsim.loop import run
 from fogsim.metrics import MetricsOfRun, RunMetrics, RunSummary, TrafficRunMetrics
 from fogsim.scenario import Scenario, build
 from fogsim.study.profiles import RunProfiles
-from fogsim.traffic_run import road_along, run_traffic
+from fogsim.traffic_run import run_traffic
 from fogsim.values import TrafficStep
 
 Value = str | float | int | None
@@ -36,8 +36,7 @@ def measure_run(scenario: Scenario, seed: int, sumo_outputs: Path | None = None)
         ``metrics``, flat: those of a method have its name before theirs, with a point between; and ``profiles``, of
         `RunProfiles.to_json`.
     """
-    standard, road = build.safety_standard(scenario), None if scenario.traffic.has_ego else road_along(scenario)
-    profiles = RunProfiles(None if road is None else road[0])
+    standard, profiles = build.safety_standard(scenario), RunProfiles()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnplayedWarning)
         if scenario.traffic.has_ego:

@@ -27,19 +27,13 @@ MOST_COLLISIONS = 100
 
 
 class RunProfiles:
-    """Watches the steps of one run, and everybody in them as one of the watchers of its metrics.
+    """Watches the steps of one run, and everybody in them as one of the watchers of its metrics."""
 
-    Parameters
-    ----------
-    axis : (n, 3) float64 or None
-        Polyline along the road whose speeds are asked for [m]; None for the ego's way.
-    """
-
-    def __init__(self, axis: NDArray[np.float64] | None = None) -> None:
+    def __init__(self) -> None:
         self._last: TrafficStep | None = None
         self._vehicle_time = 0.0
         self._by_class = np.zeros((2, CLASSES))
-        self._road = RoadSpeeds(axis)
+        self._road = RoadSpeeds()
         self._collisions: list[tuple[float, float, float, float, str, str]] = []
         self._collision_count = 0
 

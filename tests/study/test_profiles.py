@@ -65,10 +65,10 @@ def test_speeds_along_the_road_are_of_those_who_drive_on_it(most_pending: int, m
 def test_speeds_along_a_named_road_need_no_ego() -> None:
     """The road is the way of `drive`'s ego; those who drive beside it or against it are not on it."""
     along = 10.0 * np.arange(21)[:, None] * np.array([np.cos(1.0), np.sin(1.0), 0.0])
-    watched = RunProfiles(along)
+    watched = RunProfiles()
     metrics = TrafficRunMetrics(names=[], watchers=[watched])
     for one in drive():
-        known = dataclasses.replace(one.truth, vehicle_extinctions=np.array([0.01, 0.03, 9.0, 9.0]))
+        known = dataclasses.replace(one.truth, vehicle_extinctions=np.array([0.01, 0.03, 9.0, 9.0]), route=along)
         kept = {f.name: getattr(one, f.name) for f in dataclasses.fields(TrafficStep)}
         alone = TrafficStep(**{**kept, "truth": known})
         watched.update(alone)

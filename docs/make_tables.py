@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import astuple, fields
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -31,7 +31,7 @@ END = "<!-- end of table -->"
 
 
 def scenario_keys(model: type[BaseModel] = Scenario, prefix: str = "") -> list[tuple[str, ...]]:
-    """Key, default, what is allowed, and meaning of every key of a scenario file; N stands for a place in a list."""
+    """Key, default, what is allowed, and meaning of every key of a scenario file; N stands for a place in a list, NAME for a name."""
     rows: list[tuple[str, ...]] = []
     schema = model.model_json_schema()
     for name, field in model.model_fields.items():
@@ -42,7 +42,8 @@ def scenario_keys(model: type[BaseModel] = Scenario, prefix: str = "") -> list[t
             allowed = _allowed(schema["properties"][name], schema.get("$defs", {}))
             told = " ".join((field.description or "").split())
             rows.append((f"`{prefix}{name}`", _default(field), allowed, told))
-        place = ".N" if "tuple" in str(field.annotation) else ""
+        by_name = get_origin(field.annotation) is dict
+        place = ".NAME" if by_name else ".N" if "tuple" in str(field.annotation) else ""
         for model_inside in inner:
             more = scenario_keys(model_inside, f"{prefix}{name}{place}.")
             # Kinds of one list share keys: each is told once.

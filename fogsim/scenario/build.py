@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,7 @@ from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy
 from fogsim.metrics import SafetyStandard
 from fogsim.scenario.drivers import driver_setup, driver_sight
 from fogsim.scenario.fog import fog_along
+from fogsim.scenario.generated_files import traffic_files
 from fogsim.scenario.schema import NO_RENDERER, Scenario
 from fogsim.scenario.traffic_schema import AnyEvent, Brake, BreakDown, ChangeLane, LampsFail
 from fogsim.sensors import LeadSensor
@@ -111,19 +113,22 @@ def traffic_setup(scenario: Scenario) -> TrafficSetup:
     scenario : Scenario
         The scenario.
     """
-    traffic, folder = scenario.traffic, scenario.directory
+    traffic, folder, files = scenario.traffic, scenario.directory, traffic_files(scenario)
     return TrafficSetup(
-        net=None if traffic.net is None else folder / traffic.net,
-        routes=tuple(folder / path for path in traffic.routes),
-        additional=tuple(folder / path for path in traffic.additional),
+        net=files.net,
+        routes=files.routes,
+        additional=files.additional,
         ego=traffic.ego if traffic.has_ego else None,
         step_length=scenario.clocks.traffic_step_s,
-        keep_lane=traffic.keep_lane,
+        keep_lane=(*traffic.keep_lane, *(name for name, actor in scenario.actors.items() if actor.keeps_lane)),
         warm_up_limit=traffic.warm_up_limit_s,
         warm_up=traffic.warm_up_s,
         advice_deceleration=traffic.advice_deceleration_mps2,
         reading_radius=traffic.reading_radius_m,
-        events=tuple(event for place, written in enumerate(traffic.events) for event in _events(written, place)),
+        events=(
+            *(e for place, one in enumerate(traffic.events) for e in _events(one, place)),
+            *_failed_lamps(scenario),
+        ),
         sight=driver_sight(scenario),
         drivers=driver_setup(scenario),
         after_collision=traffic.after_collision,
@@ -139,6 +144,13 @@ def _option_text(value: OptionValue, folder: Path) -> str:
     if not isinstance(value, str):
         return str(value)
     return ",".join(str(folder / name) if name and (folder / name).is_file() else name for name in value.split(","))
+
+
+def _failed_lamps(scenario: Scenario) -> Iterator[Event]:
+    """Actors whose lamps have failed before the run begins."""
+    for name, actor in scenario.actors.items():
+        if actor.lamps == "failed":
+            yield LampFailureEvent(name, Trigger(None, 0.0, None, f"actors.{name}.lamps"))
 
 
 def _events(written: AnyEvent, place: int) -> tuple[Event, ...]:

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from fogsim.errors import InputError, UnknownNameError, nearest, shown, suggest
 from fogsim.scenario.document import Document, apply_overrides, read_document
+from fogsim.scenario.generated_files import road_layout
 from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.schema import Scenario
@@ -19,6 +20,7 @@ from fogsim.scenario.system_under_test import without_sut, without_sut_in_path
 from fogsim.scenario.traffic_schema import Traffic
 from fogsim.scenario.written_units import with_units_in_keys
 from fogsim.traffic.road.configuration import configured_files
+from fogsim.traffic.templates import PlacementError
 
 SCENARIO_FILE = "scenario.yaml"
 _PACKAGE = Path(__file__).resolve().parent.parent
@@ -251,15 +253,23 @@ def _checked(
     if refused:
         raise InputError("\n".join(refused))
     _check_files(document, scenario)
+    _check_placement(document, scenario)
     unknown = demand_mistakes(document, scenario) if named_files and closed_demand else []
     if unknown:
         raise InputError("\n".join(unknown))
     return scenario
 
 
+_TRAFFIC = "it is required, or road (a road by template) in its place"
+
+
 def _unnamed_files(document: Document, data: dict[str, Any]) -> list[str]:
     """Say which files a scenario does not name, and must; the schema knows no keys of which either one or others do."""
     traffic = data.get("traffic")
+    if data.get("road") is not None:
+        return []
+    if "traffic" not in data:
+        return [f"{document.where(('traffic',))}: traffic: this key is missing; {_TRAFFIC}"]
     if not isinstance(traffic, dict):
         return []
     # A key whose name is misspelt is told as such, and not as missing.
@@ -283,6 +293,16 @@ def _check_files(document: Document, scenario: Scenario) -> None:
         raise InputError("\n".join(_no_file(document, scenario.directory, *one) for one in missing))
     if traffic.config is not None:
         configured_files(scenario.directory / traffic.config)
+
+
+def _check_placement(document: Document, scenario: Scenario) -> None:
+    if scenario.road is None:
+        return
+    try:
+        road_layout(scenario)
+    except PlacementError as error:
+        at = ("actors", error.actor)
+        raise InputError(f"{document.where(at)}: {dotted(at)}: {error.told}") from error
 
 
 def _no_file(document: Document, directory: Path, key_path: KeyPath, path: Path) -> str:

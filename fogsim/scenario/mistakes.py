@@ -1,7 +1,7 @@
 """What the check of a file has found, in lines that name file, line, key, value and what is allowed."""
 
 from collections.abc import Sequence
-from typing import Any, get_args
+from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
@@ -102,13 +102,17 @@ def _kinds() -> dict[str, type[BaseModel]]:
 def _known_keys(root: type[BaseModel], location: Sequence[str | int]) -> list[str]:
     """Keys that a schema allows at a location."""
     model: Any = root
+    is_name = False
     for before, key in zip((None, *location), location, strict=False):
-        if isinstance(key, int):
+        if isinstance(key, int) or is_name:
+            # A place in a list, or a name in a block of entries by name.
+            is_name = False
             continue
         if isinstance(before, int) and key in _kinds():
             model = _kinds()[str(key)]
         else:
-            model = _model_in(model.model_fields[key].annotation)
+            annotation = model.model_fields[key].annotation
+            model, is_name = _model_in(annotation), get_origin(annotation) is dict
     return [name for name, field in model.model_fields.items() if not field.exclude]
 
 

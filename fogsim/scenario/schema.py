@@ -18,6 +18,7 @@ from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.render import RENDERERS, ROLES
 from fogsim.scenario.camera_schema import CameraSection
 from fogsim.scenario.fog import Fog
+from fogsim.scenario.road_schema import Actors, DemandSection, Road, check_roads
 from fogsim.scenario.section import Distance, Flag, Length, Method, Number, Period, Section, Seed, Text, method_of
 from fogsim.scenario.traffic_alone import without_ego
 from fogsim.scenario.traffic_schema import DriversSection, Traffic
@@ -105,7 +106,16 @@ class Scenario(Section):
     clocks: Clocks = Clocks()
     """The clocks."""
 
-    traffic: Traffic
+    road: Road | None = None
+    """A road by template, in place of `traffic.net` and `traffic.routes`."""
+
+    demand: DemandSection | None = None
+    """Traffic on that road."""
+
+    actors: Actors = Field(default_factory=dict)
+    """Vehicles on it by their ids, the ego among them."""
+
+    traffic: Traffic = Traffic()
     """The traffic."""
 
     drivers: DriversSection = DriversSection()
@@ -158,6 +168,11 @@ class Scenario(Section):
     def _no_key(cls, _: object) -> None:
         # Where the file lies is known when it is read; nobody writes it.
         raise PydanticCustomError("extra_forbidden", "unknown key")
+
+    @model_validator(mode="after")
+    def _road_or_network(self) -> Self:
+        check_roads(self)
+        return self
 
     @field_validator("renderer")
     @classmethod

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from fogsim.errors import nearest, shown, suggest
 from fogsim.scenario.document import Document
+from fogsim.scenario.generated_files import traffic_files
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.schema import Clocks, Scenario
 from fogsim.scenario.traffic_schema import ChangeLane
@@ -120,7 +121,8 @@ def _demand(scenario: Scenario, wanted: frozenset[str]) -> Demand:
     traffic, folder = scenario.traffic, scenario.directory
     if traffic.config is not None:
         return read_configured_demand(folder / traffic.config, wanted)
-    return read_demand((folder / path for path in (*traffic.additional, *traffic.routes)), wanted)
+    files = traffic_files(scenario)
+    return read_demand((*files.additional, *files.routes), wanted)
 
 
 def _edges(scenario: Scenario, demand: Demand) -> NetEdges | None:
@@ -129,7 +131,7 @@ def _edges(scenario: Scenario, demand: Demand) -> NetEdges | None:
     changes = any(isinstance(event, ChangeLane) for event in traffic.events)
     if not (demand.routes or changes or traffic.along):
         return None
-    net = configured_files(folder / traffic.config)[0] if traffic.config else folder / (traffic.net or Path())
+    net = configured_files(folder / traffic.config)[0] if traffic.config else traffic_files(scenario).net or Path()
     return read_net_edges(net, _way(scenario, demand))
 
 

@@ -1,0 +1,184 @@
+"""SUMO's files of a scenario: those that it names, and those that FogSim writes of its road, demand and actors.
+
+What is written lies in the user's cache directory, in a folder named after its content, so that the same scenario has
+the same files, and one that is changed has others.
+"""
+
+import contextlib
+import hashlib
+import os
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from fogsim.errors import InputError
+from fogsim.files.user_cache import VARIABLE, cache_directory
+from fogsim.scenario.road_schema import ActorSection, Road, measure_of
+from fogsim.scenario.schema import Scenario
+from fogsim.traffic.templates import (
+    ROAD_TEMPLATES,
+    Actor,
+    Demand,
+    Layout,
+    Placed,
+    Relation,
+    RoadTemplate,
+    check_placement,
+    cuts_around,
+    net_text,
+    place_actors,
+    routes_text,
+)
+
+_NET, _ROUTES = "road.net.xml", "road.rou.xml"
+_MOST_FOLDERS = 200  # of generated files; the oldest go
+_SECONDS_PER_HOUR = 3600.0
+
+
+@dataclass(frozen=True, slots=True)
+class TrafficFiles:
+    """SUMO's files of a scenario.
+
+    Attributes
+    ----------
+    net : Path or None
+        Its network; None where a configuration names it.
+    routes, additional : tuple of Path
+        Its route and additional files, but those that a configuration names.
+    """
+
+    net: Path | None
+    routes: tuple[Path, ...]
+    additional: tuple[Path, ...]
+
+
+def traffic_files(scenario: Scenario) -> TrafficFiles:
+    """Files of a scenario; those of a road by template are written where they are not there yet.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+
+    Raises
+    ------
+    PlacementError
+        If an actor cannot be where it is to be.
+    InputError
+        If nothing can be written into the cache directory.
+    """
+    traffic, folder = scenario.traffic, scenario.directory
+    net = None if traffic.net is None else folder / traffic.net
+    routes = tuple(folder / path for path in traffic.routes)
+    additional = tuple(folder / path for path in traffic.additional)
+    if scenario.road is None:
+        return TrafficFiles(net, routes, additional)
+    layout, placed = road_layout(scenario)
+    texts = {_NET: net_text(layout.net), _ROUTES: routes_text(layout, _demand(scenario), placed)}
+    made = _written(texts)
+    return TrafficFiles(made / _NET, (made / _ROUTES, *routes), additional)
+
+
+def road_layout(scenario: Scenario) -> tuple[Layout, tuple[Placed, ...]]:
+    """Road of a scenario and where its actors are.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        A scenario that has a road by template.
+
+    Raises
+    ------
+    PlacementError
+        If an actor cannot be where it is to be.
+    """
+    if scenario.road is None:
+        raise ValueError("expected a scenario with a road by template, got one without")
+    template = _template(scenario.road)
+    sections = dict(scenario.actors)
+    if scenario.traffic.has_ego:
+        sections = {scenario.traffic.ego: ActorSection(), **sections}
+    placed = place_actors([_actor(name, section) for name, section in sections.items()])
+    on_the_way = [one for one in placed if one.actor.way == "same_way"]
+    layout = template.layout(cuts_around(on_the_way, template.free_length))
+    check_placement(placed, layout)
+    return layout, placed
+
+
+def _template(road: Road) -> RoadTemplate:
+    given = {key: getattr(road, key) for key in road.model_fields_set - {"template"}}
+    named = {measure_of(key): value for key, value in given.items() if value is not None}
+    return ROAD_TEMPLATES[road.template](
+        **{name: value * worth if worth != 1.0 else value for (name, worth), value in named.items()}
+    )
+
+
+def _actor(name: str, section: ActorSection) -> Actor:
+    lanes = {"right": 0, "left": -1}
+    return Actor(
+        name,
+        section.type,
+        section.on,
+        lanes[section.lane] if isinstance(section.lane, str) else section.lane,
+        _place(section),
+        None if section.speed_kmh is None else section.speed_kmh / 3.6,
+        section.depart_s,
+        section.stands,
+    )
+
+
+def _place(section: ActorSection) -> float | Relation:
+    gap = section.gap_m or 0.0
+    if section.ahead_of is not None:
+        return Relation(section.ahead_of, gap)
+    if section.behind is not None:
+        return Relation(section.behind, -gap)
+    if section.beside is not None:
+        return Relation(section.beside, 0.0, is_beside=True)
+    return 200.0 if section.position_m is None else section.position_m
+
+
+def _demand(scenario: Scenario) -> Demand:
+    section = scenario.demand
+    if section is None:
+        return Demand()
+    flows = {
+        key.removesuffix("_vph"): getattr(section, key) / _SECONDS_PER_HOUR
+        for key in type(section).model_fields
+        if key.endswith("_vph")
+    }
+    return Demand(tuple(flows.items()), tuple(section.mix.items()))
+
+
+def _written(texts: dict[str, str]) -> Path:
+    digest = hashlib.sha256("\0".join(texts.values()).encode()).hexdigest()[:24]
+    folder = cache_directory() / "roads" / digest
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, text in texts.items():
+            place = folder / name
+            if place.is_file():
+                os.utime(folder)
+                continue
+            # Several processes may do so at once.
+            part = place.with_name(f"{name}.{os.getpid()}.part")
+            part.write_text(text, encoding="utf-8")
+            part.replace(place)
+    except OSError as error:
+        raise InputError(
+            f"the files of a road by template cannot be written into {folder}: {error.strerror}; name another folder "
+            f"in the environment variable {VARIABLE}"
+        ) from error
+    _leave_out_old(folder.parent)
+    return folder
+
+
+def _leave_out_old(parent: Path) -> None:
+    with contextlib.suppress(OSError):
+        for old in sorted(_folders(parent), key=lambda path: path.stat().st_mtime)[:-_MOST_FOLDERS]:
+            shutil.rmtree(old, ignore_errors=True)
+
+
+def _folders(parent: Path) -> Iterator[Path]:
+    return (path for path in parent.iterdir() if path.is_dir())

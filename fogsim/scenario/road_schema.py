@@ -1,0 +1,195 @@
+"""The schema of the blocks ``road``, ``demand`` and ``actors``: roads by template, and who drives on them."""
+
+import math
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BeforeValidator, Field, field_validator, model_validator
+
+from fogsim.errors import UnknownNameError, suggest
+from fogsim.quantities import is_quantity, parse_quantity
+from fogsim.scenario.section import Distance, Flag, Id, Length, Number, Section, Share, SpeedKmh, Time, Whole
+from fogsim.traffic.templates import ROAD_TEMPLATES, USUAL_MIX, VEHICLE_KINDS, measures
+
+_ROUNDING = 1e-6
+
+
+def _signed_percent(value: object) -> object:
+    is_percent = isinstance(value, str) and is_quantity(value) and value.rstrip().endswith("%")
+    return parse_quantity(str(value), "") if is_percent else value
+
+
+Grade = Annotated[Number, Field(ge=-0.15, le=0.15), BeforeValidator(_signed_percent)]
+"""A grade [-], perhaps written in per cent; positive climbs."""
+
+Flow = Annotated[Number, Field(ge=0, le=20_000)]
+"""A flow of traffic [veh/h]."""
+
+
+class Road(Section):
+    """A road by template, in place of a network; what is not written is as usual for the template."""
+
+    template: str
+    """Kind of road."""
+
+    length_m: Annotated[Length, Field(ge=50, le=50_000)] | None = None
+    """Length of the ego's way."""
+
+    lanes: Annotated[Whole, Field(ge=1, le=6)] | None = None
+    """Lanes in the ego's direction."""
+
+    oncoming_lanes: Annotated[Whole, Field(ge=0, le=6)] | None = None
+    """Lanes in the other direction; 0 for none."""
+
+    lane_width_m: Annotated[Length, Field(ge=2.2, le=6)] | None = None
+    """Width of each lane."""
+
+    median_m: Annotated[Distance, Field(le=100)] | None = None
+    """Distance between the inner borders of the two directions; 0 for a road whose directions share a line."""
+
+    limit_kmh: Annotated[SpeedKmh, Field(ge=5)] | None = None
+    """Speed limit."""
+
+    @field_validator("template")
+    @classmethod
+    def _known_template(cls, value: str) -> str:
+        if value not in ROAD_TEMPLATES:
+            raise ValueError(str(UnknownNameError("road template", value, ROAD_TEMPLATES)))
+        return value
+
+    @model_validator(mode="after")
+    def _measures_of_the_template(self) -> Self:
+        has = [key for key in type(self).model_fields if measure_of(key)[0] in measures(self.template)]
+        for key in self.model_fields_set - {"template"}:
+            if key not in has and getattr(self, key) is not None:
+                raise ValueError(f"a {self.template} has no {key}; {suggest(key, has)}")
+        return self
+
+
+_SI = {"m": 1.0, "kmh": 1.0 / 3.6, "deg": math.pi / 180.0}
+
+
+def measure_of(key: str) -> tuple[str, float]:
+    """Name of a template's measure by its key in a file, and its SI unit's worth in the file's.
+
+    Parameters
+    ----------
+    key : str
+        The key, perhaps with a unit at the end.
+    """
+    stem, _, suffix = key.rpartition("_")
+    return (stem, _SI[suffix]) if suffix in _SI else (key, 1.0)
+
+
+class DemandSection(Section):
+    """Traffic beside the actors, on a road by template: it is there from the beginning, and differs with the seed."""
+
+    same_way_vph: Flow = 0.0
+    """Vehicles that drive as the ego does."""
+
+    oncoming_vph: Flow = 0.0
+    """Vehicles that come towards it."""
+
+    mix: dict[str, Share] = Field(default_factory=lambda: dict(USUAL_MIX))
+    """Shares of types of vehicles; what they leave is cars."""
+
+    @field_validator("mix")
+    @classmethod
+    def _known_types(cls, value: dict[str, float]) -> dict[str, float]:
+        for name in value:
+            _check_type(name)
+        rest = 1.0 - math.fsum(share for name, share in value.items() if name != "car")
+        if rest < -_ROUNDING or ("car" in value and abs(rest - value["car"]) > _ROUNDING):
+            raise ValueError(f"shares of types must together be 1, and are {math.fsum(value.values()):g}")
+        return {**value, "car": max(rest, 0.0)}
+
+
+def _check_type(name: str) -> str:
+    if name not in VEHICLE_KINDS:
+        raise ValueError(str(UnknownNameError("vehicle type", name, VEHICLE_KINDS)))
+    return name
+
+
+class ActorSection(Section):
+    """A vehicle and where it is when the run begins."""
+
+    type: str = "car"
+    """Type of the vehicle."""
+
+    on: Id = "same_way"
+    """Way that it takes."""
+
+    lane: Literal["right", "left"] | Annotated[Whole, Field(ge=0, le=9)] = "right"
+    """Lane: `right`, `left`, or its number from the right, from 0."""
+
+    position_m: Distance | None = None
+    """Position of its front bumper along its way; 200 where nothing else places it."""
+
+    ahead_of: Id | None = None
+    """It is ahead of this actor, by `gap_m`, bumper to bumper."""
+
+    behind: Id | None = None
+    """It is behind this actor, by `gap_m`."""
+
+    beside: Id | None = None
+    """It is beside this actor, front by front, in another lane."""
+
+    gap_m: Length | None = None
+    """That gap."""
+
+    speed_kmh: SpeedKmh | None = None
+    """Speed with which it begins, and which it keeps where nothing slows it; by default that of the road and type."""
+
+    depart_s: Time = 0.0
+    """When it appears; the ego's appearance begins the run."""
+
+    stands: Flag = False
+    """Whether it stands still for good."""
+
+    lamps: Literal["on", "failed"] = "on"
+    """Whether its lamps shine, or have failed."""
+
+    keeps_lane: Flag = True
+    """Whether it stays in its lane, where nothing scripted makes it change."""
+
+    @field_validator("type")
+    @classmethod
+    def _known_type(cls, value: str) -> str:
+        return _check_type(value)
+
+    @model_validator(mode="after")
+    def _placed_once(self) -> Self:
+        given = [key for key in ("position_m", "ahead_of", "behind", "beside") if getattr(self, key) is not None]
+        if len(given) > 1:
+            raise ValueError(f"give one of position_m, ahead_of, behind and beside, got {' and '.join(given)}")
+        if (self.gap_m is not None) != (given in (["ahead_of"], ["behind"])):
+            raise ValueError("gap_m goes with ahead_of or behind, which need it")
+        return self
+
+
+Actors = dict[Id, ActorSection]
+
+
+def check_roads(written: Any) -> None:
+    """Refuse blocks of a scenario that do not go together.
+
+    Parameters
+    ----------
+    written : Scenario
+        The scenario.
+
+    Raises
+    ------
+    ValueError
+        If there is a road and a network, or demand or actors without a road.
+    """
+    traffic = written.traffic
+    if written.road is not None:
+        for key in ("net", "config"):
+            if getattr(traffic, key) is not None:
+                raise ValueError(
+                    f"give road or traffic.{key}, not both: traffic.{key} is {str(getattr(traffic, key))!r}"
+                )
+        return
+    for key in ("demand", "actors"):
+        if getattr(written, key):
+            raise ValueError(f"{key}: goes with a road by template (road: {{template: …}}), which is missing")

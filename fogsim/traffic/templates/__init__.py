@@ -1,0 +1,27 @@
+"""Roads by template, and who drives on them, written to SUMO's files: no netconvert is needed."""
+
+from fogsim.traffic.templates.catalogue import ROAD_TEMPLATES, RoadTemplate, measures
+from fogsim.traffic.templates.demand import Demand, cuts_around, routes_text
+from fogsim.traffic.templates.net_plan import Layout
+from fogsim.traffic.templates.net_writer import net_text
+from fogsim.traffic.templates.placement import Actor, Placed, PlacementError, Relation, check_placement, place_actors
+from fogsim.traffic.templates.vehicle_types import USUAL_MIX, VEHICLE_KINDS
+
+__all__ = [
+    "ROAD_TEMPLATES",
+    "USUAL_MIX",
+    "VEHICLE_KINDS",
+    "Actor",
+    "Demand",
+    "Layout",
+    "Placed",
+    "PlacementError",
+    "Relation",
+    "RoadTemplate",
+    "check_placement",
+    "cuts_around",
+    "measures",
+    "net_text",
+    "place_actors",
+    "routes_text",
+]

@@ -1,0 +1,173 @@
+"""Who drives on a road: route files with actors, a road that is full when a run begins, and who comes after."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from fogsim.traffic.templates.net_plan import Layout
+from fogsim.traffic.templates.placement import Placed, edge_at
+from fogsim.traffic.templates.vehicle_types import SLOW, USUAL_MIX, VEHICLE_KINDS, VehicleKind
+from fogsim.traffic.templates.xml_text import element, opening
+
+_END = 1_000_000  # of flows [s]
+_MEAN_SHARE_OF_LIMIT = 0.9
+_ROOM = 30.0  # around actors, kept free in their lanes [m]
+_SHORTEST = 25.0  # edge that is filled [m]
+
+
+@dataclass(frozen=True, slots=True)
+class Demand:
+    """Traffic beside the actors.
+
+    Attributes
+    ----------
+    flows : tuple of (str, float)
+        Vehicles per second [1/s] by way.
+    mix : tuple of (str, float)
+        Shares of types, together 1.
+    """
+
+    flows: tuple[tuple[str, float], ...] = ()
+    mix: tuple[tuple[str, float], ...] = USUAL_MIX
+
+
+def cuts_around(placed: Sequence[Placed], length: float) -> tuple[float, ...]:
+    """Where the ego's way is cut so that the lanes of actors stay free around and between them, and the rest fills.
+
+    Parameters
+    ----------
+    placed : sequence of Placed
+        Actors on that way.
+    length : float
+        Length of what may be cut [m].
+    """
+    if not placed:
+        return ()
+    first = min(one.position - one.actor.length for one in placed) - _ROOM
+    last = max(one.position for one in placed) + _ROOM
+    return tuple(cut for cut in (first, last) if _SHORTEST < cut < length - _SHORTEST)
+
+
+def routes_text(layout: Layout, demand: Demand, placed: Sequence[Placed]) -> str:
+    """Text of a route file.
+
+    Parameters
+    ----------
+    layout : Layout
+        The road.
+    demand : Demand
+        Traffic beside the actors.
+    placed : sequence of Placed
+        The actors.
+    """
+    lines = list(_types(demand.mix, max(edge.lanes for edge in layout.net.edges)))
+    for one in sorted(placed, key=lambda one: one.actor.depart):
+        lines += _actor(one, layout)
+    taken = {_taken_lane(one, layout) for one in placed}
+    for way, rate in demand.flows:
+        if rate > 0.0:
+            lines += _filling(layout, way, rate, taken)
+            lines += _flows(layout, way, rate)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n<routes>\n' + "\n".join(lines) + "\n</routes>\n"
+
+
+def _taken_lane(one: Placed, layout: Layout) -> tuple[str, int]:
+    name, _ = edge_at(layout, one.actor.way, one.position)
+    return name, one.actor.lane % layout.edge(name).lanes
+
+
+def _types(mix: Sequence[tuple[str, float]], lanes: int) -> Iterator[str]:
+    """Types of the traffic: those of the right lane, and those of the others, where the slow ones do not drive."""
+    slow = math.fsum(share for name, share in mix if name in SLOW)
+    right = min(1.0, slow * lanes)
+    quick = 1.0 - slow
+    in_lane: dict[str, dict[str, float]] = {"right": {}, "left": {}}
+    for name, share in mix:
+        in_lane["right"][name] = share * right / slow if name in SLOW else share * (1 - right) / quick
+        in_lane["left"][name] = 0.0 if name in SLOW and quick > 0 else share / (quick or 1.0)
+    for place, shares in in_lane.items():
+        yield opening("vTypeDistribution", id=f"mix.{place}")
+        for name, share in shares.items():
+            if share > 0.0:
+                yield "    " + _type(f"{name}.{place}", VEHICLE_KINDS[name], probability=f"{share:.4f}")
+        yield "</vTypeDistribution>"
+
+
+def _type(name: str, kind: VehicleKind, **further: object) -> str:
+    written = {
+        "vClass": kind.vehicle_class,
+        "length": kind.length,
+        "width": kind.width,
+        "height": kind.height,
+        "maxSpeed": kind.top_speed,
+        "speedFactor": kind.speed_factor,
+        "tau": kind.headway,
+        "accel": kind.acceleration,
+        "decel": kind.deceleration,
+        "sigma": kind.imperfection,
+    }
+    return element("vType", id=name, **(written | further))
+
+
+def _actor(one: Placed, layout: Layout) -> Iterator[str]:
+    actor = one.actor
+    edge, position = edge_at(layout, actor.way, one.position)
+    way = layout.way(actor.way)
+    kind = VEHICLE_KINDS[actor.kind]
+    speed = min(layout.edge(edge).limit, kind.top_speed) if actor.speed is None else actor.speed
+    steady = {"speedFactor": "1.0", "speedDev": "0", "sigma": "0"}
+    if actor.speed:
+        # What it is to keep it also keeps where the limit is lower.
+        steady |= {"maxSpeed": f"{speed:.3f}", "speedFactor": f"{max(1.0, speed / layout.edge(edge).limit):.3f}"}
+    lane = actor.lane % layout.edge(edge).lanes
+    yield _type(f"type.{actor.name}", kind, **steady)
+    yield element("route", id=f"route.{actor.name}", edges=" ".join(way[way.index(edge) :]))
+    yield opening(
+        "vehicle",
+        id=actor.name,
+        type=f"type.{actor.name}",
+        route=f"route.{actor.name}",
+        depart=f"{actor.depart:g}",
+        departLane=lane,
+        departPos=f"{position:.2f}",
+        departSpeed="0" if actor.stands else f"{speed:.3f}",
+        insertionChecks="none",
+    )
+    if actor.stands:
+        yield "    " + element("stop", lane=f"{edge}_{lane}", endPos=f"{position:.2f}", duration=_END)
+    yield "</vehicle>"
+
+
+def _filling(layout: Layout, way: str, rate: float, taken: set[tuple[str, int]]) -> Iterator[str]:
+    """Vehicles that are there from the beginning, anywhere on the edges of a way."""
+    names = layout.way(way)
+    due = 0.0
+    for place, name in enumerate(names):
+        edge = layout.edge(name)
+        if edge.length < _SHORTEST:
+            continue
+        route = f"route.{way}.{place}"
+        yield element("route", id=route, edges=" ".join(names[place:]))
+        for lane in range(edge.lanes):
+            due += edge.length * rate / edge.lanes / (_MEAN_SHARE_OF_LIMIT * edge.limit)
+            if (name, lane) in taken:
+                due = 0.0
+            count, due = math.floor(due), due % 1.0
+            if count:
+                there = {"begin": "0", "end": "0.001", "number": count, "departPos": "random_free"}
+                yield _flow(f"{way}.there.{place}.{lane}", route, lane, there)
+
+
+def _flows(layout: Layout, way: str, rate: float) -> Iterator[str]:
+    """Vehicles that come at the beginning of a way, at times between which nothing is remembered."""
+    first = layout.edge(layout.way(way)[0])
+    if first.length < _SHORTEST:
+        yield element("route", id=f"route.{way}.0", edges=" ".join(layout.way(way)))
+    for lane in range(first.lanes):
+        coming = {"begin": "0", "end": _END, "period": f"exp({rate / first.lanes:.6f})", "departPos": "base"}
+        yield _flow(f"{way}.{lane}", f"route.{way}.0", lane, coming)
+
+
+def _flow(name: str, route: str, lane: int, times: Mapping[str, object]) -> str:
+    mix = "mix.right" if lane == 0 else "mix.left"
+    return element("flow", id=name, type=mix, route=route, departLane=lane, departSpeed="desired", **times)

@@ -1,0 +1,206 @@
+"""Where actors are when a run begins: along their ways, by themselves or beside one another."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from fogsim.errors import InputError, suggest
+from fogsim.traffic.templates.net_plan import Layout
+from fogsim.traffic.templates.vehicle_types import VEHICLE_KINDS
+
+_LEAST_GAP = 0.5  # between two vehicles of a lane [m]
+
+
+@dataclass(frozen=True, slots=True)
+class Relation:
+    """Where an actor is as seen from another.
+
+    Attributes
+    ----------
+    other : str
+        The other's id.
+    gap : float
+        Gap between bumpers [m]; negative behind the other; where `is_beside`, of the front bumpers.
+    is_beside : bool
+        Whether the front bumpers count.
+    """
+
+    other: str
+    gap: float
+    is_beside: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Actor:
+    """A vehicle that a scenario places.
+
+    Attributes
+    ----------
+    name : str
+        Its id.
+    kind : str
+        One of `VEHICLE_KINDS`.
+    way : str
+        Way that it takes.
+    lane : int
+        Number of its lane from the right; negative ones count from the left.
+    place : float or Relation
+        Position of its front bumper along its way [m], or where it is as seen from another.
+    speed : float or None
+        Speed with which it begins and which it keeps where it can [m/s]; None for what its road and type allow.
+    depart : float
+        When it appears [s].
+    stands : bool
+        Whether it stands still for good.
+    """
+
+    name: str
+    kind: str = "car"
+    way: str = "same_way"
+    lane: int = 0
+    place: float | Relation = 200.0
+    speed: float | None = None
+    depart: float = 0.0
+    stands: bool = False
+
+    @property
+    def length(self) -> float:
+        """Length of the vehicle [m]."""
+        return VEHICLE_KINDS[self.kind].length
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """An actor where it begins.
+
+    Attributes
+    ----------
+    actor : Actor
+        The actor.
+    position : float
+        Position of its front bumper along its way [m].
+    """
+
+    actor: Actor
+    position: float
+
+
+class PlacementError(InputError):
+    """An actor that cannot be where it is to be.
+
+    Parameters
+    ----------
+    actor : str
+        Its id.
+    told : str
+        What is wrong.
+    """
+
+    def __init__(self, actor: str, told: str) -> None:
+        super().__init__(f"{actor}: {told}")
+        self.actor = actor
+        self.told = told
+
+
+def place_actors(actors: Sequence[Actor]) -> tuple[Placed, ...]:
+    """Positions of actors along their ways.
+
+    Parameters
+    ----------
+    actors : sequence of Actor
+        They.
+
+    Raises
+    ------
+    PlacementError
+        If one is placed beside an actor that is not there, has another way, or is placed beside itself in the end.
+    """
+    by_name = {actor.name: actor for actor in actors}
+    return tuple(Placed(actor, _position(actor, by_name, ())) for actor in actors)
+
+
+def _position(actor: Actor, by_name: Mapping[str, Actor], asked: tuple[str, ...]) -> float:
+    relation = actor.place
+    if not isinstance(relation, Relation):
+        return relation
+    if actor.name in asked:
+        raise PlacementError(actor.name, f"is placed by itself, through {', '.join(asked)}")
+    other = by_name.get(relation.other)
+    if other is None:
+        raise PlacementError(actor.name, f"there is no actor {relation.other!r}; {suggest(relation.other, by_name)}")
+    if other.way != actor.way:
+        told = f"is on the way {actor.way!r}, and {other.name!r} on {other.way!r}; give a position in its place"
+        raise PlacementError(actor.name, told)
+    place = _position(other, by_name, (*asked, actor.name))
+    if relation.is_beside:
+        return place + relation.gap
+    return place + relation.gap + (actor.length if relation.gap >= 0 else -other.length)
+
+
+def check_placement(placed: Sequence[Placed], layout: Layout) -> None:
+    """Refuse actors that lie off their way or in one another.
+
+    Parameters
+    ----------
+    placed : sequence of Placed
+        The actors.
+    layout : Layout
+        The road.
+
+    Raises
+    ------
+    PlacementError
+        If one does.
+    """
+    ways = dict(layout.ways)
+    for one in placed:
+        actor = one.actor
+        if actor.way not in ways:
+            raise PlacementError(actor.name, f"the road has no way {actor.way!r}; {suggest(actor.way, ways)}")
+        length = layout.length(actor.way)
+        if not actor.length <= one.position <= length:
+            room = f"{actor.length:g} … {length:.0f} m"
+            raise PlacementError(actor.name, f"must begin within {room} of its way, got {one.position:.0f} m")
+        lanes = layout.edge(edge_at(layout, actor.way, one.position)[0]).lanes
+        if not -lanes <= actor.lane < lanes:
+            raise PlacementError(actor.name, f"there are lanes 0 to {lanes - 1}, got {actor.lane}")
+    _check_apart(placed, layout)
+
+
+def _check_apart(placed: Sequence[Placed], layout: Layout) -> None:
+    for number, one in enumerate(placed):
+        for other in placed[:number]:
+            if one.actor.depart != other.actor.depart or _lane(one, layout) != _lane(other, layout):
+                continue
+            ahead, behind = (one, other) if one.position > other.position else (other, one)
+            gap = ahead.position - ahead.actor.length - behind.position
+            if gap < _LEAST_GAP:
+                told = (
+                    f"must begin at least {_LEAST_GAP:g} m from {other.actor.name!r} in the same lane, got {gap:.1f} m"
+                )
+                raise PlacementError(one.actor.name, told)
+
+
+def _lane(one: Placed, layout: Layout) -> tuple[str, int]:
+    lanes = layout.edge(edge_at(layout, one.actor.way, one.position)[0]).lanes
+    return one.actor.way, one.actor.lane % lanes
+
+
+def edge_at(layout: Layout, way: str, position: float) -> tuple[str, float]:
+    """Edge of a way at a position, and the position along that edge [m].
+
+    Parameters
+    ----------
+    layout : Layout
+        The road.
+    way : str
+        The way.
+    position : float
+        Position along it [m].
+    """
+    names = layout.way(way)
+    for name in names[:-1]:
+        length = layout.edge(name).length
+        if position <= length:
+            return name, position
+        position -= length
+    return names[-1], min(position, layout.edge(names[-1]).length)

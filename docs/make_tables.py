@@ -31,7 +31,7 @@ END = "<!-- end of table -->"
 
 
 def scenario_keys(model: type[BaseModel] = Scenario, prefix: str = "") -> list[tuple[str, ...]]:
-    """Key, default, what is allowed, and meaning of every key of a scenario file; N stands for a place in a list, NAME for a name."""
+    """Key, default, what is allowed, and meaning of every key; N stands for a place in a list, NAME for a name."""
     rows: list[tuple[str, ...]] = []
     schema = model.model_json_schema()
     for name, field in model.model_fields.items():

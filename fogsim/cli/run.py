@@ -19,7 +19,7 @@ from fogsim.cli.scenario_options import (
     SumoConfiguration,
     chosen_scenario,
 )
-from fogsim.errors import UnplayedWarning
+from fogsim.errors import InputError, UnplayedWarning
 
 if TYPE_CHECKING:
     from fogsim.scenario import Scenario
@@ -66,7 +66,7 @@ def run_command(
     settings: Settings = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace results that are there already.")] = False,
     video: Annotated[
-        bool | None, typer.Option("--video/--no-video", help="Write video.mp4; as a rule where there is an ego.")
+        bool | None, typer.Option("--video/--no-video", help="Write video.mp4 (as a rule where there is an ego).")
     ] = None,
     report: Annotated[bool, typer.Option(help="Write report.html.")] = True,
     trajectories: Annotated[bool, typer.Option(help="Write trajectories.parquet, all vehicles.")] = False,
@@ -110,10 +110,10 @@ def run_command(
 
 def _filmed(scenario: "Scenario", wanted: bool | None) -> bool:
     """Whether there is a video: where nobody says, if there is a camera for it."""
-    if wanted:
-        from fogsim.scenario.build import check_ego
-
-        check_ego(scenario, "--video")
+    if wanted and not scenario.traffic.has_ego:
+        raise InputError(
+            "--video shows what an ego's camera sees, and traffic.ego is none; leave it out, or name an ego"
+        )
     return scenario.traffic.has_ego if wanted is None else wanted
 
 

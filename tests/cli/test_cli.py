@@ -122,7 +122,7 @@ def test_an_interrupted_run_leaves_readable_results_that_say_they_are_partial(tm
         (["run"], "expected either a scenario or --sumocfg FILE, got neither"),
         (["run", "motorway_fog_bank", "--sumocfg", TOWN], "got both"),
         (["run", "--sumocfg", TOWN, "--visibility", "120"], "--ego is missing"),
-        (["run", "--sumocfg", TOWN, "--ego", "none", "--visibility", "120", "--video"], "--video needs an ego vehicle"),
+        (["run", "--sumocfg", TOWN, "--ego", "none", "--visibility", "120", "--video"], "--video shows what an ego's"),
         (["run", "--sumocfg", TOWN, "--ego", "veh18"], "--visibility is missing"),
         (["run", "--sumocfg", "no.sumocfg", "--ego", "a", "--visibility", "80"], "there is no file 'no.sumocfg'"),
     ],

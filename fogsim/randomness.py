@@ -13,8 +13,8 @@ class Streams:
     ----------
     traffic_seed : int
         Seed handed to the traffic simulation, in 0 … 2³¹ − 1.
-    fog, camera, sensors, driver : numpy.random.Generator
-        Generators for fog fields, camera noise, the vehicle's other sensors and drivers.
+    fog, camera, sensors, driver, faults : numpy.random.Generator
+        Generators for fog fields, camera noise, the vehicle's other sensors, drivers and faults of sensors.
     """
 
     traffic_seed: int
@@ -22,6 +22,7 @@ class Streams:
     camera: np.random.Generator
     sensors: np.random.Generator
     driver: np.random.Generator
+    faults: np.random.Generator
 
 
 def spawn_streams(seed: int) -> Streams:
@@ -37,11 +38,12 @@ def spawn_streams(seed: int) -> Streams:
     ValueError
         If the seed is negative.
     """
-    traffic, fog, camera, sensors, driver = np.random.SeedSequence(seed).spawn(5)
+    traffic, fog, camera, sensors, driver, faults = np.random.SeedSequence(seed).spawn(6)
     return Streams(
         traffic_seed=int(traffic.generate_state(1, np.uint32)[0] >> 1),
         fog=np.random.default_rng(fog),
         camera=np.random.default_rng(camera),
         sensors=np.random.default_rng(sensors),
         driver=np.random.default_rng(driver),
+        faults=np.random.default_rng(faults),
     )

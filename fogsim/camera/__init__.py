@@ -1,5 +1,6 @@
 """Where the camera is, its samples, glare, exposure, noise, response and quantisation."""
 
+from fogsim.camera.delivery import Delivered, FrameDelivery
 from fogsim.camera.exposure import AutoExposure, Metering, Pixels, Sensor, expose
 from fogsim.camera.glare import LensGlare
 from fogsim.camera.mount import USUAL_MOUNTS, BodyPitch, CameraMount, Suspension, mounted_pose
@@ -15,6 +16,8 @@ __all__ = [
     "BodyPitch",
     "CameraMount",
     "CameraSensor",
+    "Delivered",
+    "FrameDelivery",
     "LensGlare",
     "Metering",
     "Photographer",

@@ -1,19 +1,23 @@
 """What rides in the ego: from a snapshot of the traffic to a finished step."""
 
+import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere import extinction, field_at, optical_depth_along
-from fogsim.camera import mounted_pose
+from fogsim.camera import Delivered, FrameDelivery, mounted_pose
+from fogsim.ego.frame_watch import FrameWatch
 from fogsim.ego.road_meters import RoadMeters
+from fogsim.ego.sensor_faults import FaultSchedule
 from fogsim.ego.view_rendering import EgoView, NoView, Surrounding, ViewRenderer
 from fogsim.errors import SimulationError
 from fogsim.randomness import Streams
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.schema import NO_RENDERER
+from fogsim.scenario.sensor_schema import fault_of
 from fogsim.sensors import measure_lead, signs_ahead
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import (
@@ -21,6 +25,8 @@ from fogsim.values import (
     CameraPose,
     Command,
     Ending,
+    Estimate,
+    Fault,
     FogField,
     Frame,
     Observation,
@@ -55,6 +61,9 @@ class EgoEquipment:
         self._camera_sensor = build.camera_sensor(scenario)
         self._body_pitch = build.body_pitch(scenario)
         self._lead_sensor = build.lead_sensor(scenario)
+        self._faults = tuple(fault_of(written) for written in scenario.sensors.faults)
+        self._schedule: FaultSchedule | None = None
+        self._delivery, self._watch = FrameDelivery(), FrameWatch()
         self._fusion = build.fusion(scenario)
         self._view_renderer: EgoView | None = None
         self._streams: Streams | None = None
@@ -109,8 +118,31 @@ class EgoEquipment:
         self._fusion.reset()
         self._camera_sensor.reset()
         self._body_pitch.reset()
+        self._delivery.reset()
+        self._watch.reset()
         self._streams = streams
+        self._schedule = FaultSchedule(streams.faults)
+        self._schedule.begin(self._faults, 0.0)
         return self._view_renderer.fog
+
+    def begin_faults(self, faults: Iterable[Fault], time: float) -> None:
+        """Let faults of the sensors begin, beside those of the scenario.
+
+        Parameters
+        ----------
+        faults : iterable of Fault
+            The faults.
+        time : float
+            When they are in force for the first time, after their delays [s]: the time of a step to come.
+
+        Raises
+        ------
+        SimulationError
+            If `start_run` has not been called, or it is closed.
+        """
+        if self._schedule is None:
+            raise SimulationError("the run has not been started, or is closed")
+        self._schedule.begin(faults, time)
 
     def complete_step(
         self, index: int, time: float, snapshot: TrafficSnapshot, command: Command, ending: Ending | None
@@ -135,20 +167,18 @@ class EgoEquipment:
         SimulationError
             If `start_run` has not been called, or it is closed.
         """
-        if self._view_renderer is None or self._streams is None or self._meters is None:
+        if self._view_renderer is None or self._streams is None or self._meters is None or self._schedule is None:
             raise SimulationError("the run has not been started, or is closed")
         renderer, state, ego = self._view_renderer, snapshot.state, snapshot.ego
+        faults = self._schedule.at(time)
         pose, fog = self._pose(state, ego), field_at(self._view_renderer.fog, time)
         sections = self._meters.measure(fog)
         truth = fog_truth(fog, pose, self._camera, renderer.signs, state, sections, self._route)
         view, radiance = renderer.render(state, ego, pose, time)
         image = self._camera_sensor.take(radiance, self._streams.camera)
-        frame = Frame(time, image, self._assumed_camera)
+        frame = Frame(*self._delivery.deliver(Delivered(time, image), faults), self._assumed_camera)
         observation = self._observe(frame, snapshot, renderer.signs, self._streams)
-        estimates = tuple(
-            checked_estimate(section.method, estimator.update(observation))
-            for section, estimator in zip(self._scenario.estimators, self._estimators, strict=True)
-        )
+        estimates = self._estimate(frame, observation)
         return Step(
             index=index,
             time=time,
@@ -158,7 +188,7 @@ class EgoEquipment:
             speed_limit=snapshot.speed_limit,
             leader=snapshot.leader,
             collisions=snapshot.collisions,
-            truth=truth,
+            truth=dataclasses.replace(truth, faults=tuple(one.fault for one in faults)),
             view=view,
             observation=observation,
             estimates=estimates,
@@ -203,11 +233,20 @@ class EgoEquipment:
             signs=signs_ahead(signs, state.position[ego], float(state.heading[ego]), reach),
         )
 
+    def _estimate(self, frame: Frame, observation: Observation) -> tuple[Estimate, ...]:
+        """What each estimator says; none is asked about a frame that tells nothing new."""
+        if why := self._watch.why_no_news(frame, observation.speed):
+            return tuple(Estimate.invalid(estimator.method, why) for estimator in self._estimators)
+        return tuple(
+            checked_estimate(section.method, estimator.update(observation))
+            for section, estimator in zip(self._scenario.estimators, self._estimators, strict=True)
+        )
+
     def close(self) -> None:
         """Free the renderer; closing twice is allowed."""
         if self._view_renderer is not None:
             self._view_renderer.close()
-        self._view_renderer, self._streams = None, None
+        self._view_renderer, self._streams, self._schedule = None, None, None
 
 
 def fog_truth(

@@ -43,7 +43,7 @@ def table_columns(methods: Sequence[str]) -> list[Column[Step]]:
         Names of the estimators.
     """
     columns: list[Column[Step]] = [*_CLOCK_COLUMNS, *_EGO_COLUMNS, *_NEAR_COLUMNS, *_EVENT_COLUMNS]
-    columns += [*map(_derived_column, DERIVED_QUANTITIES), *_FOG_COLUMNS]
+    columns += [*map(_derived_column, DERIVED_QUANTITIES), *_FOG_COLUMNS, *_FAULT_COLUMNS]
     for method in methods:
         columns += _estimator_columns(method)
     return columns
@@ -208,6 +208,14 @@ _FOG_COLUMNS: tuple[Column[Step], ...] = (
         pa.float64(),
         "lead's speed minus own by the range sensor",
         _of_lead(lambda lead: lead.relative_speed),
+    ),
+)
+_FAULT_COLUMNS: tuple[Column[Step], ...] = (
+    Column(
+        "sensor_faults",
+        pa.string(),
+        "faults of sensors in force, with commas between; null for none",
+        lambda step, _: ", ".join(fault.name for fault in step.truth.faults) or None,
     ),
 )
 _NETWORK_COLUMNS: tuple[Column[TrafficStep], ...] = (

@@ -19,7 +19,8 @@ from fogsim.render import RENDERERS, ROLES
 from fogsim.scenario.camera_schema import CameraSection
 from fogsim.scenario.fog import Fog
 from fogsim.scenario.road_schema import Actors, DemandSection, Road, check_roads
-from fogsim.scenario.section import Distance, Flag, Length, Method, Number, Period, Section, Seed, Text, method_of
+from fogsim.scenario.section import Flag, Method, Number, Period, Section, Seed, Text, method_of
+from fogsim.scenario.sensor_schema import Sensors
 from fogsim.scenario.traffic_alone import without_ego
 from fogsim.scenario.traffic_schema import DriversSection, Traffic
 
@@ -63,29 +64,6 @@ class Light(Section):
     illuminance_lx: Annotated[Number, Field(ge=0, le=200_000)] = 10_000.0
     """Horizontal illuminance of the overcast sky: 10 000 by day, 1 … 100 in twilight, 0.01 … 0.1 at night. Below 1000
     lamps light the road and the fog."""
-
-
-class Lead(Section):
-    """The radar that tracks the vehicle ahead."""
-
-    reach_m: Length = 200.0
-    """Distance up to which it tracks a vehicle."""
-
-    distance_deviation_m: Annotated[Distance, Field(le=1000)] = 0.25
-    """Standard deviation of its distance."""
-
-    speed_deviation_mps: Annotated[Number, Field(ge=0, le=140)] = 0.1
-    """Standard deviation of its relative speed."""
-
-
-class Sensors(Section):
-    """Sensors beside the camera."""
-
-    lead: Lead = Lead()
-    """The radar."""
-
-    sign_reach_m: Length = 250.0
-    """Distance up to which the map tells of signs ahead."""
 
 
 class Scenario(Section):
@@ -140,7 +118,7 @@ class Scenario(Section):
     """Seed of trees and posts, which are the same for every seed of the run."""
 
     sensors: Sensors = Sensors()
-    """The other sensors."""
+    """The other sensors, and the faults of all."""
 
     estimators: tuple[Annotated[Method, method_of(ESTIMATORS)], ...] = Field(
         default=(Method(method="negru2013"),), validate_default=True
@@ -199,6 +177,15 @@ class Scenario(Section):
             raise ValueError("renderer: none draws no frames that estimators could read; write estimators: [] with it")
         if draws and not value:
             raise PydanticCustomError("too_short", "must have at least one entry")
+        return value
+
+    @field_validator("sensors")
+    @classmethod
+    def _frames_for_faults(cls, value: Sensors, info: ValidationInfo) -> Sensors:
+        if info.data.get("renderer") == NO_RENDERER:
+            for place, fault in enumerate(value.faults):
+                if fault.sensor == "camera":
+                    raise ValueError(f"faults.{place} is of the camera, and renderer: none draws no frames")
         return value
 
     @model_validator(mode="after")

@@ -11,6 +11,7 @@ from fogsim.values.belief import Belief
 from fogsim.values.camera import Camera, CameraPose
 from fogsim.values.command import Command, Stretch
 from fogsim.values.estimate import Estimate
+from fogsim.values.fault import Fault
 from fogsim.values.fog import FogField
 from fogsim.values.image import View
 from fogsim.values.observation import Observation
@@ -76,6 +77,8 @@ class Truth:
         sections of it are advised.
     route : (n, 3) float64 or None
         Polyline along the ego's route, or along ``traffic.along`` [m]; None where there is neither.
+    faults : tuple of Fault
+        Faults of the ego's sensors in force now.
     """
 
     extinction: float
@@ -87,6 +90,7 @@ class Truth:
     vehicle_extinctions: NDArray[np.float64] | None = None
     sections: tuple[RoadSection, ...] = ()
     route: NDArray[np.float64] | None = None
+    faults: tuple[Fault, ...] = ()
 
     @property
     def visibility(self) -> float:

@@ -78,6 +78,7 @@ def test_a_step_becomes_a_row(tmp_path: Path) -> None:
         "measured_lead_relative_speed_mps": -5.1,
         "collisions": 1,
         "ending": "time",
+        "sensor_faults": None,
         "joint_road_valid": True,
         "joint_road_visibility_m": pytest.approx(110.0),
         "joint_road_extinction_per_m": pytest.approx(math.log(20) / 110),

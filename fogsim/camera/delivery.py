@@ -1,0 +1,96 @@
+"""From the pictures that a camera takes to the frames that come out of it, which faults hold up, lose or blacken."""
+
+from collections import deque
+from collections.abc import Iterable
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from fogsim.camera.exposure import Pixels
+from fogsim.values import Blackout, DroppedFrames, FaultKind, FrozenFrame, Latency, TimeStamp
+
+_ROUNDING = 1e-9
+"""Times that differ by no more than this are the same [s]."""
+
+
+class Faulty(Protocol):
+    """A fault in force, as far as frames go through it."""
+
+    @property
+    def kind(self) -> FaultKind:
+        """What is wrong."""
+
+    @property
+    def rng(self) -> np.random.Generator:
+        """Random numbers of this fault alone."""
+
+
+class Delivered(NamedTuple):
+    """What comes out of a camera.
+
+    Attributes
+    ----------
+    time : float
+        The time that it bears [s].
+    pixels : (rows, cols, 3) uint8 or uint16
+        The picture.
+    """
+
+    time: float
+    pixels: Pixels
+
+
+class FrameDelivery:
+    """The way of the pictures out of a camera.
+
+    Where no new frame arrives, the last one is still there, with the time that it bears. Before the first it is black.
+    """
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin a run: no picture is on its way."""
+        self._under_way: deque[Delivered] = deque()
+        self._last: Delivered | None = None
+
+    def deliver(self, taken: Delivered, faults: Iterable[Faulty]) -> Delivered:
+        """Take in a picture and hand out what there is now.
+
+        Parameters
+        ----------
+        taken : Delivered
+            The picture and the time of its exposure, which is now.
+        faults : iterable of Faulty
+            What is wrong now; faults that are none of the camera's signal change nothing.
+        """
+        self._under_way.append(taken)
+        late, lost, stamp = 0.0, False, TimeStamp.EXPOSURE
+        frozen: FrozenFrame | None = None
+        black = False
+        for fault in faults:
+            match fault.kind:
+                case Latency(delay, time_stamp):
+                    late, stamp = late + delay, time_stamp
+                case DroppedFrames(share):
+                    lost |= bool(fault.rng.random() < share)
+                case FrozenFrame() as kind:
+                    frozen = kind
+                case Blackout():
+                    black = True
+        arrived = self._arrived(taken.time, late)
+        if self._last is None:
+            self._last = Delivered(taken.time, np.zeros_like(taken.pixels))
+        if frozen is not None:
+            if frozen.time_stamp is TimeStamp.DELIVERY:
+                self._last = Delivered(taken.time, self._last.pixels)
+        elif arrived is not None and not lost:
+            self._last = arrived if stamp is TimeStamp.EXPOSURE else Delivered(taken.time, arrived.pixels)
+        return Delivered(taken.time, np.zeros_like(taken.pixels)) if black else self._last
+
+    def _arrived(self, now: float, late: float) -> Delivered | None:
+        """The newest picture that has arrived; older ones are overtaken."""
+        arrived = None
+        while self._under_way and self._under_way[0].time + late <= now + _ROUNDING:
+            arrived = self._under_way.popleft()
+        return arrived

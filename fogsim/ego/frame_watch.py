@@ -1,0 +1,51 @@
+"""Whether a camera's frame tells anything new: what a vehicle can find out by itself."""
+
+import math
+
+from fogsim.camera import Pixels
+from fogsim.values import Frame
+
+MOVING = 1.0
+"""Speed from which on the picture of the road must change from frame to frame [m/s]."""
+
+_APART = 16
+"""Rows and columns between the pixels that are compared first."""
+
+
+class FrameWatch:
+    """Watches the frames of one camera; estimators are asked only about those that are news.
+
+    A frame is none if it bears the time of the one before. Nor is it if it has the very same pixels while the vehicle
+    moves: noise and the road never repeat to the last bit.
+    """
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all frames."""
+        self._time = -math.inf
+        self._pixels: Pixels | None = None
+
+    def why_no_news(self, frame: Frame, speed: float) -> str:
+        """Say why a frame is no news; empty if it is.
+
+        Parameters
+        ----------
+        frame : Frame
+            What the camera hands out.
+        speed : float
+            Own speed by the odometer [m/s].
+        """
+        before, earlier = self._pixels, self._time
+        self._time, self._pixels = max(frame.time, earlier), frame.image
+        if frame.time <= earlier:
+            return f"no new frame: the last one is of {earlier:.2f} s"
+        if speed > MOVING and before is not None and _are_same(before, frame.image):
+            return "the picture stands still while the vehicle moves"
+        return ""
+
+
+def _are_same(one: Pixels, other: Pixels) -> bool:
+    some = (slice(None, None, _APART), slice(None, None, _APART))
+    return bool((one[some] == other[some]).all() and (one == other).all())

@@ -1,0 +1,78 @@
+"""Faults of the ego's sensors in whole runs: what comes out of the sensors, and what is made of it."""
+
+import numpy as np
+import pytest
+from early_motorway import EARLY
+
+import fogsim
+from fogsim.values import Blackout, Fault, Frame, Step
+
+SMALL = (EARLY, "camera.width=320", "camera.height=240", "duration_s=1", "fog.visibility_m=100", "estimators=[zhu2015]")
+
+
+def steps(*faults: str) -> list[Step]:
+    written = [*SMALL, f"sensors.faults=[{', '.join(faults)}]"]
+    return list(fogsim.run(fogsim.load_scenario("motorway_fog_bank", written), seed=2))
+
+
+def frame(step: Step) -> Frame:
+    assert isinstance(step.observation.frame, Frame)
+    return step.observation.frame
+
+
+@pytest.fixture(scope="module")
+def plain() -> list[Step]:
+    return steps()
+
+
+def test_a_camera_that_goes_black_leaves_all_else_as_it_was_and_no_estimate(plain: list[Step]) -> None:
+    black = steps("{sensor: camera, fault: blackout, at: 0.3 s, for: 0.4 s}")
+    for index, (one, other) in enumerate(zip(black, plain, strict=True)):
+        assert one.observation.lead == other.observation.lead
+        assert frame(one).time == one.time
+        if 3 <= index < 7:
+            assert not frame(one).image.any()
+            assert not any(estimate.valid for estimate in one.estimates)
+            assert [fault.name for fault in one.truth.faults] == ["camera blackout"]
+        else:
+            np.testing.assert_array_equal(frame(one).image, frame(other).image)
+            assert one.truth.faults == ()
+    widths = [step.belief.log_standard_deviation for step in black[2:7]]
+    assert widths == sorted(widths)
+    assert widths[-1] > widths[0]
+
+
+def test_a_fault_that_never_comes_changes_no_byte(plain: list[Step]) -> None:
+    for one, other in zip(steps("{fault: blackout, at: 50 s}"), plain, strict=True):
+        np.testing.assert_array_equal(frame(one).image, frame(other).image)
+        np.testing.assert_array_equal(one.belief.probability, other.belief.probability)
+
+
+@pytest.mark.parametrize("time_stamp", ["exposure", "delivery"])
+def test_a_frozen_frame_is_no_news_whatever_time_it_bears(plain: list[Step], time_stamp: str) -> None:
+    frozen = steps(f"{{fault: frozen, at: 0.5 s, for: 0.3 s, time_stamp: {time_stamp}}}")
+    for step in frozen[5:8]:
+        np.testing.assert_array_equal(frame(step).image, frame(plain[4]).image)
+        assert frame(step).time == (plain[4].time if time_stamp == "exposure" else step.time)
+        assert not any(estimate.valid for estimate in step.estimates)
+    assert [estimate.valid for estimate in frozen[8].estimates] == [estimate.valid for estimate in plain[8].estimates]
+
+
+def test_faults_begin_in_the_run_too_and_each_has_its_own_chance() -> None:
+    with fogsim.ClosedLoop(fogsim.load_scenario("motorway_fog_bank", [*SMALL])) as loop:
+        first = loop.start(2)
+        loop._equipment.begin_faults([Fault(Blackout(), duration=0.1)], 0.1)
+        seen = [frame(loop.advance(first.command)).image.any() for _ in range(2)]
+    assert seen == [False, True]
+
+
+def test_a_run_without_frames_takes_no_fault_of_the_camera() -> None:
+    with pytest.raises(fogsim.InputError, match=r"faults\.0 is of the camera, and renderer: none"):
+        fogsim.load_scenario(
+            "motorway_fog_bank", ["renderer=none", "estimators=[]", "sensors.faults=[{fault: blackout}]"]
+        )
+
+
+def test_faults_are_named_after_one_sensor() -> None:
+    with pytest.raises(fogsim.InputError, match=r"sensor.*camera.*lead"):
+        fogsim.load_scenario("motorway_fog_bank", ["sensors.faults=[{sensor: lead, fault: blackout}]"])

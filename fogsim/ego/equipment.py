@@ -1,6 +1,5 @@
 """What rides in the ego: from a snapshot of the traffic to a finished step."""
 
-import dataclasses
 import math
 from collections.abc import Callable, Iterable
 
@@ -173,7 +172,8 @@ class EgoEquipment:
         faults = self._schedule.at(time)
         pose, fog = self._pose(state, ego), field_at(self._view_renderer.fog, time)
         sections = self._meters.measure(fog)
-        truth = fog_truth(fog, pose, self._camera, renderer.signs, state, sections, self._route)
+        known = tuple(one.fault for one in faults)
+        truth = fog_truth(fog, pose, self._camera, renderer.signs, state, sections, self._route, known)
         view, radiance = renderer.render(state, ego, pose, time)
         image = self._camera_sensor.take(radiance, self._streams.camera)
         frame = Frame(*self._delivery.deliver(Delivered(time, image), faults), self._assumed_camera)
@@ -188,7 +188,7 @@ class EgoEquipment:
             speed_limit=snapshot.speed_limit,
             leader=snapshot.leader,
             collisions=snapshot.collisions,
-            truth=dataclasses.replace(truth, faults=tuple(one.fault for one in faults)),
+            truth=truth,
             view=view,
             observation=observation,
             estimates=estimates,
@@ -257,6 +257,7 @@ def fog_truth(
     traffic: TrafficState | None = None,
     sections: tuple[RoadSection, ...] = (),
     route: NDArray[np.float64] | None = None,
+    faults: tuple[Fault, ...] = (),
 ) -> Truth:
     """The fog at a camera, and as far as it sees along its heading, parallel to the road under it.
 
@@ -276,6 +277,8 @@ def fog_truth(
         What meters beside the road measure.
     route : (n, 3) float64 or None
         Polyline along the ego's route [m].
+    faults : tuple of Fault
+        Faults of its sensors in force.
     """
     eye, level = np.array(pose.position), math.cos(pose.road_grade)
     direction = np.array([math.cos(pose.heading) * level, math.sin(pose.heading) * level, math.sin(pose.road_grade)])
@@ -292,5 +295,6 @@ def fog_truth(
         signs=signs,
         sections=sections,
         route=route,
+        faults=faults,
         vehicle_extinctions=None if traffic is None else extinction(fog, traffic.position + _EYES),
     )

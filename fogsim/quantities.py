@@ -40,6 +40,20 @@ def is_quantity(text: object) -> bool:
     return isinstance(text, str) and _WRITTEN.match(text) is not None
 
 
+def split_quantity(text: str) -> tuple[float, str] | None:
+    """Number and unit of text as it is written: 10 and ``m`` of ``10 m``; None if it is no finite quantity.
+
+    Parameters
+    ----------
+    text : str
+        What a file has.
+    """
+    match = _WRITTEN.match(text)
+    if match is None or not math.isfinite(float(match[1])) or not (match[2] is None or _UNIT.match(match[2])):
+        return None
+    return float(match[1]), match[2] or ""
+
+
 def parse_quantity(text: str, unit: str) -> float:
     """Number of a quantity in a unit: ``parse_quantity("90 km/h", "m/s")`` is 25.
 

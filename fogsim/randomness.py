@@ -47,3 +47,16 @@ def spawn_streams(seed: int) -> Streams:
         driver=np.random.default_rng(driver),
         faults=np.random.default_rng(faults),
     )
+
+
+def named_generator(seed: int, name: str) -> np.random.Generator:
+    """Generator for what is drawn under a name before a run, apart from all streams of the run.
+
+    Parameters
+    ----------
+    seed : int
+        Seed of the run.
+    name : str
+        The name.
+    """
+    return np.random.default_rng([seed, *name.encode()])

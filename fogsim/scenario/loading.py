@@ -1,9 +1,10 @@
 """From a scenario file to a checked `Scenario`; a mistake is told with file, line, key, value and what is allowed."""
 
+import json
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from fogsim.scenario.schema import Scenario
 from fogsim.scenario.sumo_check import demand_mistakes, option_lines, step_mistake
 from fogsim.scenario.system_under_test import without_sut, without_sut_in_path
 from fogsim.scenario.traffic_schema import Traffic
+from fogsim.scenario.variation import Case, Variation, chosen_cases, read_variation, with_case
 from fogsim.scenario.written_units import with_units_in_keys
 from fogsim.traffic.road.configuration import configured_files
 from fogsim.traffic.templates import PlacementError
@@ -90,7 +92,7 @@ DAY = 86_400.0
 def load_scenario(
     name_or_path: str | Path, overrides: Iterable[str] = (), *, others_add_vehicles: bool = False
 ) -> Scenario:
-    """Load and check a scenario.
+    """Load and check a scenario; of a file that varies something, its first case.
 
     Parameters
     ----------
@@ -113,6 +115,57 @@ def load_scenario(
     """
     path = scenario_file(name_or_path)
     return _checked(read_document(path), overrides, path.parent, closed_demand=not others_add_vehicles)
+
+
+@dataclass(frozen=True, slots=True)
+class ScenarioCases:
+    """Cases of a scenario file.
+
+    Attributes
+    ----------
+    document : Document
+        What was read.
+    variation : Variation
+        What the file varies.
+    cases : tuple of (Case, Scenario)
+        Those that were asked for.
+    """
+
+    document: Document
+    variation: Variation
+    cases: tuple[tuple[Case, Scenario], ...]
+
+
+def load_cases(name_or_path: str | Path, overrides: Iterable[str] = (), wanted: str = "") -> ScenarioCases:
+    """Load and check the cases of a scenario file; one that varies nothing has one.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        As of `load_scenario`.
+    overrides : iterable of str
+        As of `load_scenario`.
+    wanted : str
+        Which cases, ``name=value`` with commas between; empty for all.
+
+    Raises
+    ------
+    InputError
+        As of `load_scenario`, with the first case in which something does not fit; or if there is no such case.
+    """
+    path = scenario_file(name_or_path)
+    document = _overridden(read_document(path), overrides)
+    variation = read_variation(document)
+    checked: dict[str, Scenario] = {}
+    cases = []
+    for case in chosen_cases(variation, wanted, path):
+        put = with_case(document, case)
+        # What differs in its seed alone is the same scenario.
+        key = json.dumps(put.data)
+        if key not in checked:
+            checked[key] = _checked_case(put, case, path.parent)
+        cases.append((case, checked[key]))
+    return ScenarioCases(document, variation, tuple(cases))
 
 
 def scenario_from_config(
@@ -228,11 +281,33 @@ def _checked(
     named_files: bool = True,
     closed_demand: bool = True,
 ) -> Scenario:
+    document = _overridden(document, overrides)
+    case = read_variation(document).cases[0]
+    return _checked_case(with_case(document, case), case, folder, named_files, closed_demand)
+
+
+def _overridden(document: Document, overrides: Iterable[str]) -> Document:
+    """Copy of a document with overrides, in which the keys of ``sut`` stand by themselves."""
     if isinstance(overrides, str):
         raise InputError(f"overrides must be a list of key.path=value each, got the text {shown(overrides)}")
     document, overrides = without_sut(document), tuple(without_sut_in_path(text) for text in overrides)
     data = apply_overrides(document.data, overrides)
-    document = replace(document.overridden(overrides), data=data)
+    return replace(document.overridden(overrides), data=data)
+
+
+def _checked_case(
+    document: Document, case: Case, folder: Path, named_files: bool = True, closed_demand: bool = True
+) -> Scenario:
+    """A scenario; a mistake in it is told with the case in which it is one."""
+    try:
+        return _checked_scenario(document, folder, named_files, closed_demand)
+    except InputError as error:
+        if not case.label:
+            raise
+        raise InputError(f"{error}\nin the case {case.label}") from error
+
+
+def _checked_scenario(document: Document, folder: Path, named_files: bool, closed_demand: bool) -> Scenario:
     document, unfit = with_units_in_keys(document, Scenario)
     if unfit:
         raise InputError("\n".join(unfit))

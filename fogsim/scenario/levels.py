@@ -1,0 +1,292 @@
+"""Values that a name stands for in the cases of a file: a list, a range, seeds, or draws of a distribution."""
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from fogsim.errors import shown, suggest
+from fogsim.quantities import split_quantity
+from fogsim.randomness import named_generator
+
+MOST_VALUES = 100_000
+"""Most values of one name."""
+
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
+_SEEDS = re.compile(r"\s*([0-9]{1,9})\s+seeds?\s*\Z")
+_RANGE = ("from", "to", "step")
+_DISTRIBUTIONS = {
+    "uniform": "its lower and upper end",
+    "normal": "mean and standard deviation",
+    "lognormal": "median and standard deviation of the logarithm",
+}
+_LIMITS = ("at_least", "at_most")
+_EXPECTED = "expected a list, {from, to, step}, 20 seeds, or {uniform: [low, high]}"
+_MOST_DRAWS = 10_000
+
+Value = str | float | int | bool
+"""What a name stands for in one case."""
+
+
+class VaryMistake(ValueError):
+    """What is wrong with the values of a name.
+
+    Parameters
+    ----------
+    told : str
+        What is wrong.
+    below : str or int
+        At which key or place below the name.
+    """
+
+    def __init__(self, told: str, *below: str | int) -> None:
+        super().__init__(told)
+        self.below = below
+
+
+@dataclass(frozen=True, slots=True)
+class Levels:
+    """Values that are all taken, one after another.
+
+    Attributes
+    ----------
+    values : tuple of value
+        The values.
+    """
+
+    values: tuple[Value, ...]
+    is_drawn = False
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __iter__(self) -> Iterator[Value]:
+        return iter(self.values)
+
+    @property
+    def is_numeric(self) -> bool:
+        """Whether all are numbers, perhaps with a unit."""
+        return all(not isinstance(one, bool) and _number_and_unit(one) is not None for one in self.values)
+
+    def value(self, _: int) -> Value:
+        """First of the values, whatever the seed.
+
+        Parameters
+        ----------
+        _ : int
+            The seed.
+        """
+        return self.values[0]
+
+
+@dataclass(frozen=True, slots=True)
+class SeedLevels(Levels):
+    """Seeds, which also seed the runs."""
+
+
+@dataclass(frozen=True, slots=True)
+class Draws:
+    """A value for each seed, drawn of a distribution.
+
+    Attributes
+    ----------
+    name : str
+        Name that stands for it, from which its random numbers come.
+    distribution : str
+        Kind of the distribution.
+    parameters : (float, float)
+        Its parameters.
+    limits : (float, float)
+        What the values are between; beyond it, one is drawn again.
+    unit : str
+        Unit of the parameters; empty for none.
+    """
+
+    name: str
+    distribution: str
+    parameters: tuple[float, float]
+    limits: tuple[float, float]
+    unit: str
+    is_drawn = True
+    is_numeric = False
+
+    def __len__(self) -> int:
+        return 1
+
+    def __iter__(self) -> Iterator[Value]:
+        yield self.value(0)
+
+    def value(self, seed: int) -> Value:
+        """Value of a seed.
+
+        Parameters
+        ----------
+        seed : int
+            The seed.
+
+        Raises
+        ------
+        VaryMistake
+            If none of ten thousand draws lies between the limits.
+        """
+        generator = named_generator(seed, self.name)
+        low, high = self.limits
+        for _ in range(_MOST_DRAWS):
+            drawn = self._shaped(float(generator.random()), float(generator.standard_normal()))
+            if low <= drawn <= high:
+                return _written(drawn, self.unit)
+        raise VaryMistake(f"none of {_MOST_DRAWS} draws lies between its limits, {low:g} and {high:g}")
+
+    def _shaped(self, uniform: float, normal: float) -> float:
+        first, second = self.parameters
+        if self.distribution == "uniform":
+            return first + (second - first) * uniform
+        return first + second * normal if self.distribution == "normal" else first * math.exp(second * normal)
+
+
+Values = Levels | Draws
+"""What a name stands for."""
+
+
+def parse_levels(name: str, written: object) -> Values:
+    """Values of a name as a file has them.
+
+    Parameters
+    ----------
+    name : str
+        The name.
+    written : object
+        A list; ``{from, to, step}``; ``20 seeds`` or ``{seeds: [3, 5]}``; ``{uniform: [low, high]}``, ``{normal: [mean,
+        deviation]}`` or ``{lognormal: [median, deviation]}``, perhaps with ``at_least`` and ``at_most``.
+
+    Raises
+    ------
+    VaryMistake
+        If it is none of them.
+    """
+    if not _NAME.match(name):
+        raise VaryMistake("a name consists of letters, digits and _, and begins with no digit")
+    if isinstance(written, str) and (found := _SEEDS.match(written)):
+        return _seeds(int(found[1]))
+    if isinstance(written, list):
+        return _listed(written)
+    if not isinstance(written, dict) or not written:
+        raise VaryMistake(f"{_EXPECTED}; got {shown(written)}")
+    known = ("seeds", *_RANGE, *_DISTRIBUTIONS, *_LIMITS)
+    for key in written:
+        if key not in known:
+            raise VaryMistake(f"unknown key; {suggest(str(key), known)}", key)
+    if "seeds" in written:
+        _refuse_others(written, ("seeds",))
+        return _seeds(written["seeds"])
+    kind = next((key for key in _DISTRIBUTIONS if key in written), None)
+    if kind is None:
+        _refuse_others(written, _RANGE)
+        return _range(written)
+    _refuse_others(written, (kind, *_LIMITS))
+    return _draws(name, kind, written)
+
+
+def _refuse_others(written: dict[str, object], allowed: tuple[str, ...]) -> None:
+    for key in written:
+        if key not in allowed:
+            raise VaryMistake(f"does not go with {next(one for one in written if one in allowed)}", key)
+
+
+def _seeds(written: object) -> SeedLevels:
+    if isinstance(written, int) and not isinstance(written, bool):
+        if not 1 <= written <= MOST_VALUES:
+            raise VaryMistake(f"expected 1 … {MOST_VALUES} seeds, got {written}")
+        return SeedLevels(tuple(range(written)))
+    listed = written if isinstance(written, list) else []
+    if not listed or any(isinstance(one, bool) or not isinstance(one, int) or one < 0 for one in listed):
+        raise VaryMistake(f"expected how many, or a list of whole numbers from 0 on; got {shown(written)}", "seeds")
+    _refuse_repeated(listed, "seeds")
+    return SeedLevels(tuple(listed))
+
+
+def _listed(written: list[object]) -> Levels:
+    if not written:
+        raise VaryMistake("needs at least one value")
+    for place, one in enumerate(written):
+        if not isinstance(one, str | int | float | bool):
+            raise VaryMistake(f"a value is a number, text, true or false; got {shown(one)}", place)
+    _refuse_repeated(written)
+    return Levels(tuple(one for one in written if isinstance(one, str | int | float | bool)))
+
+
+def _refuse_repeated(written: list[object], *below: str) -> None:
+    told = [(type(one), one) for one in written]
+    for place, one in enumerate(told):
+        if one in told[:place]:
+            raise VaryMistake(f"{shown(one[1])} stands twice", *below, place)
+
+
+def _range(written: dict[str, object]) -> Levels:
+    for key in _RANGE:
+        if key not in written:
+            raise VaryMistake(f"{key} is missing; a range has from, to and step")
+    (first, last, step), unit = _numbers({key: written[key] for key in _RANGE})
+    if step == 0 or (last - first) / step < 0:
+        raise VaryMistake(f"a step of {shown(written['step'])} does not lead there", "step")
+    number = math.floor((last - first) / step + 1e-9) + 1
+    if number > MOST_VALUES:
+        raise VaryMistake(f"{number} values are more than {MOST_VALUES}", "step")
+    return Levels(tuple(_written(first + i * step, unit) for i in range(number)))
+
+
+def _draws(name: str, kind: str, written: dict[str, object]) -> Draws:
+    pair = written[kind]
+    if not isinstance(pair, list) or len(pair) != 2:
+        raise VaryMistake(f"expected two values, {_DISTRIBUTIONS[kind]}; got {shown(pair)}", kind)
+    parameters = {"0": pair[0], "1": pair[1]}
+    if kind == "lognormal":
+        # The deviation of a logarithm has no unit.
+        (deviation,), _ = _numbers({kind: pair[1]})
+        limits = {key: written[key] for key in _LIMITS if key in written}
+        (median, *ends), unit = _numbers({kind: pair[0], **limits})
+        numbers, found = [median, deviation], dict(zip(limits, ends, strict=True))
+    else:
+        limits = {key: written[key] for key in _LIMITS if key in written}
+        numbers, unit = _numbers({**parameters, **limits})
+        found = dict(zip(limits, numbers[2:], strict=True))
+    first, second = numbers[:2]
+    wrong = second <= first if kind == "uniform" else second <= 0 or (kind == "lognormal" and first <= 0)
+    if wrong:
+        raise VaryMistake(f"expected {_DISTRIBUTIONS[kind]}, got {shown(pair)}", kind)
+    draws = Draws(name, kind, (first, second), (found.get("at_least", -math.inf), found.get("at_most", math.inf)), unit)
+    draws.value(0)
+    return draws
+
+
+def _numbers(written: dict[str, object]) -> tuple[list[float], str]:
+    """Numbers of values that have one unit together, and that unit."""
+    found: dict[str, tuple[float, str]] = {}
+    for key, value in written.items():
+        one = _number_and_unit(value)
+        if one is None:
+            raise VaryMistake(f"expected a number, perhaps with a unit; got {shown(value)}", *_below(key))
+        found[key] = one
+    units = list(dict.fromkeys(unit for _, unit in found.values()))
+    if len(units) > 1:
+        raise VaryMistake(f"all of it must have the same unit, got {' and '.join(one or 'none' for one in units)}")
+    return [number for number, _ in found.values()], units[0]
+
+
+def _below(key: str) -> tuple[str, ...]:
+    return () if key.isdecimal() else (key,)
+
+
+def _number_and_unit(value: object) -> tuple[float, str] | None:
+    if isinstance(value, bool):
+        return None
+    if isinstance(value, int | float):
+        return (float(value), "") if math.isfinite(value) else None
+    return split_quantity(value) if isinstance(value, str) else None
+
+
+def _written(number: float, unit: str) -> Value:
+    """A number as a file would have it: six digits of it, by which a case can be named."""
+    rounded = float(f"{number:.6g}")
+    plain: float | int = int(rounded) if rounded.is_integer() and abs(rounded) < 1e6 else rounded
+    return f"{plain:g} {unit}" if unit else plain

@@ -1,0 +1,314 @@
+"""The blocks ``vary`` and ``verdict``: what differs between the cases of a file, and when all of them together pass."""
+
+import itertools
+import json
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, Self
+
+from pydantic import Field, ValidationError, model_validator
+
+from fogsim.errors import InputError, shown, suggest
+from fogsim.scenario.document import Document
+from fogsim.scenario.levels import SeedLevels, Value, Values, VaryMistake, parse_levels
+from fogsim.scenario.mistakes import mistake_lines
+from fogsim.scenario.plain_yaml import KeyPath, dotted
+from fogsim.scenario.section import Section, Share
+
+MOST_CASES = 100_000
+"""Most cases of a file."""
+
+_PLACE = re.compile(r"\$(?:\$|\{([^{}]*)\}|([A-Za-z_][A-Za-z0-9_]*))")
+"""Where a name stands: ``$name``, ``${name}``; ``$$`` is a plain ``$``."""
+
+
+class Verdict(Section):
+    """When all cases of a file together pass."""
+
+    pass_rate: Annotated[Share, Field(gt=0)] = 1.0
+    """Share of the cases that must pass."""
+
+    confidence: Annotated[Share, Field(ge=0.5, lt=1)] = 0.9
+    """Confidence with which the rate must be at least that, one-sided (Clopper & Pearson 1934)."""
+
+    conclusive: Share = 0.5
+    """Share of the cases in which what was to be tested must have happened."""
+
+    @property
+    def least_cases(self) -> int:
+        """Number of cases from which on this verdict can be a pass, if all of them pass."""
+        if self.pass_rate == 1.0:
+            return 1
+        return math.ceil(math.log(1.0 - self.confidence) / math.log(self.pass_rate) - 1e-9)
+
+
+class VariationKeys(Section):
+    """Keys that stand in a file beside those of a scenario."""
+
+    vary: dict[str, Any] = Field(default_factory=dict)
+    """What differs between the cases of the file: a name and its values; ``$name`` stands for them elsewhere."""
+
+    verdict: Verdict = Verdict()
+    """When all cases together pass; without it, when none fails."""
+
+    @model_validator(mode="after")
+    def _something_varies(self) -> Self:
+        if "verdict" in self.model_fields_set and not self.vary:
+            raise ValueError("verdict: goes with vary, since it is about several cases")
+        return self
+
+
+KEYS = tuple(VariationKeys.model_fields)
+"""Names of these blocks."""
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One case of a file.
+
+    Attributes
+    ----------
+    values : mapping from str to value
+        What each name stands for.
+    seed : int
+        Seed of its run.
+    """
+
+    values: Mapping[str, Value]
+    seed: int = 0
+
+    @property
+    def label(self) -> str:
+        """The case as ``--case`` names it; empty for the one of a file that varies nothing."""
+        return ",".join(f"{name}={value_text(value)}" for name, value in self.values.items())
+
+
+def value_text(value: Value) -> str:
+    """A value as labels and text in a file have it.
+
+    Parameters
+    ----------
+    value : value
+        The value.
+    """
+    return str(value).lower() if isinstance(value, bool) else f"{value:g}" if isinstance(value, float) else str(value)
+
+
+@dataclass(frozen=True, slots=True)
+class Variation:
+    """What a file varies.
+
+    Attributes
+    ----------
+    cases : tuple of Case
+        The grid, the last name fastest.
+    numeric : frozenset of str
+        Names that stand for numbers of the grid, perhaps with a unit.
+    seeds : str or None
+        Name that stands for seeds.
+    verdict : Verdict
+        When all of them together pass.
+    """
+
+    cases: tuple[Case, ...]
+    numeric: frozenset[str] = frozenset()
+    seeds: str | None = None
+    verdict: Verdict = Verdict()
+
+
+def read_variation(document: Document) -> Variation:
+    """Read ``vary`` and ``verdict``, and check that each name stands somewhere.
+
+    Parameters
+    ----------
+    document : Document
+        What was read, with overrides in place.
+
+    Raises
+    ------
+    InputError
+        A line for each mistake, with file, line, key and what is allowed.
+    """
+    written = {key: document.data[key] for key in KEYS if key in document.data}
+    try:
+        keys = VariationKeys.model_validate(written)
+    except ValidationError as error:
+        raise InputError(mistake_lines(document, VariationKeys, error)) from error
+    if not keys.vary:
+        return Variation((Case({}),))
+    varied, mistakes = _parsed(document, keys.vary)
+    mistakes += _misplaced(document, varied)
+    if mistakes:
+        raise InputError("\n".join(mistakes))
+    cases = _grid(document, varied)
+    _check_reachable(document, keys.verdict, len(cases))
+    seeds = next((name for name, values in varied.items() if isinstance(values, SeedLevels)), None)
+    numeric = frozenset(name for name, values in varied.items() if values.is_numeric)
+    return Variation(cases, numeric, seeds, keys.verdict)
+
+
+def _parsed(document: Document, written: Mapping[str, Any]) -> tuple[dict[str, Values], list[str]]:
+    varied: dict[str, Values] = {}
+    mistakes = []
+    for name, value in written.items():
+        try:
+            varied[name] = parse_levels(name, value)
+        except VaryMistake as mistake:
+            at: KeyPath = ("vary", name, *mistake.below)
+            mistakes.append(f"{document.where(at)}: {dotted(at)}: {mistake}")
+    seeds = [name for name, values in varied.items() if isinstance(values, SeedLevels)]
+    for name in seeds[1:]:
+        mistakes.append(f"{document.where(('vary', name))}: vary.{name}: {seeds[0]} has the seeds already")
+    if not seeds and not mistakes:
+        drawn = [name for name, values in varied.items() if values.is_drawn]
+        mistakes += [
+            f"{document.where(('vary', name))}: vary.{name}: a value is drawn for each seed, and there are none; "
+            "add for example run: 20 seeds"
+            for name in drawn
+        ]
+    return varied, mistakes
+
+
+def _misplaced(document: Document, varied: Mapping[str, Values]) -> list[str]:
+    """Names that stand nowhere, and places of names that are none."""
+    used: set[str] = set()
+    mistakes = []
+    for at, text in _texts({key: value for key, value in document.data.items() if key not in KEYS}, ()):
+        for name in _names(text):
+            used.add(name)
+            if name not in varied:
+                told = f"unknown name ${name}; {suggest(name, varied)}"
+                mistakes.append(f"{document.where(at)}: {dotted(at)}: {told}")
+    for name, values in varied.items():
+        if name not in used and not isinstance(values, SeedLevels):
+            told = f"${name} stands nowhere in the file, so that its cases would not differ"
+            mistakes.append(f"{document.where(('vary', name))}: vary.{name}: {told}")
+    return mistakes
+
+
+def _texts(value: object, at: KeyPath) -> Iterator[tuple[KeyPath, str]]:
+    if isinstance(value, str):
+        yield at, value
+    elif isinstance(value, dict):
+        for key, one in value.items():
+            yield from _texts(one, (*at, key))
+    elif isinstance(value, list):
+        for place, one in enumerate(value):
+            yield from _texts(one, (*at, place))
+
+
+def _names(text: str) -> list[str]:
+    return [match[1] if match[1] is not None else match[2] for match in _PLACE.finditer(text) if match[0] != "$$"]
+
+
+def _grid(document: Document, varied: Mapping[str, Values]) -> tuple[Case, ...]:
+    gridded = {name: values for name, values in varied.items() if not values.is_drawn}
+    number = math.prod(len(values) for values in gridded.values())
+    if number > MOST_CASES:
+        raise InputError(f"{document.where(('vary',))}: vary: {number} cases are more than {MOST_CASES}")
+    cases = []
+    for cell in itertools.product(*gridded.values()):
+        chosen = dict(zip(gridded, cell, strict=True))
+        seed = next((int(chosen[name]) for name, values in gridded.items() if isinstance(values, SeedLevels)), 0)
+        cases.append(Case({name: chosen.get(name, values.value(seed)) for name, values in varied.items()}, seed))
+    return tuple(cases)
+
+
+def _check_reachable(document: Document, verdict: Verdict, number: int) -> None:
+    if verdict.least_cases > number:
+        raise InputError(
+            f"{document.where(('verdict',))}: verdict: {number} cases that all pass do not show a pass rate of "
+            f"{verdict.pass_rate:.4g} with a confidence of {verdict.confidence:.4g}; at least {verdict.least_cases} "
+            "would, so this verdict could not be a pass"
+        )
+
+
+def with_case(document: Document, case: Case) -> Document:
+    """Copy of a document with a case's values in place of their names, and without `KEYS`.
+
+    Parameters
+    ----------
+    document : Document
+        What `read_variation` has checked.
+    case : Case
+        The case.
+    """
+    data = {key: value for key, value in document.data.items() if key not in KEYS}
+    return replace(document, data=_put(data, case.values) if case.values else data)
+
+
+def _put(value: Any, values: Mapping[str, Value]) -> Any:
+    if isinstance(value, dict):
+        return {key: _put(one, values) for key, one in value.items()}
+    if isinstance(value, list):
+        return [_put(one, values) for one in value]
+    if not isinstance(value, str) or "$" not in value:
+        return value
+    whole = _PLACE.fullmatch(value)
+    if whole is not None and whole[0] != "$$":
+        return values[_names(value)[0]]
+    return _PLACE.sub(lambda found: "$" if found[0] == "$$" else value_text(values[_names(found[0])[0]]), value)
+
+
+def chosen_cases(variation: Variation, wanted: str, where: object) -> tuple[Case, ...]:
+    """Cases that have some values.
+
+    Parameters
+    ----------
+    variation : Variation
+        What the file varies.
+    wanted : str
+        ``name=value`` pairs with commas between, as in `Case.label`; empty for all cases. A name that stands for numbers
+        may have one beside the grid, if it is given together with all others of the grid.
+    where : object
+        What messages name: the file.
+
+    Raises
+    ------
+    InputError
+        If it is not of that form, or there is no such name, value or case.
+    """
+    pairs = _pairs(wanted, variation, where)
+    cases = list(variation.cases)
+    for name, text in pairs.items():
+        fitting = [case for case in cases if value_text(case.values[name]) == text]
+        if not fitting and name in variation.numeric:
+            level = parse_levels(name, [_plain(text)])
+            fitting = [replace(case, values={**case.values, name: level.value(0)}) for case in _distinct(cases, name)]
+        if not fitting:
+            known = dict.fromkeys(value_text(case.values[name]) for case in cases)
+            raise InputError(f"--case {wanted}: {where} has no {name}={text}; {suggest(text, known)}")
+        cases = fitting
+    return tuple(cases)
+
+
+def _pairs(wanted: str, variation: Variation, where: object) -> dict[str, str]:
+    known = variation.cases[0].values
+    pairs: dict[str, str] = {}
+    for part in re.split(r",\s*(?=[A-Za-z_]\w*=)", wanted) if wanted.strip() else ():
+        name, equals, text = (one.strip() for one in part.partition("="))
+        if not equals or not name:
+            raise InputError(f"--case {shown(wanted)}: expected name=value, with commas between, got {shown(part)}")
+        if name not in known:
+            raise InputError(f"--case {wanted}: {where} varies no {name}; {suggest(name, known)}")
+        pairs[name] = text
+    return pairs
+
+
+def _plain(text: str) -> Value:
+    """Number of a text, or the text, which is then a quantity."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def _distinct(cases: Iterable[Case], name: str) -> list[Case]:
+    """Cases that differ in more than one name."""
+    kept: dict[str, Case] = {}
+    for case in cases:
+        rest = {key: value for key, value in case.values.items() if key != name}
+        kept.setdefault(json.dumps([rest, case.seed]), case)
+    return list(kept.values())

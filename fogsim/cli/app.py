@@ -21,6 +21,7 @@ from fogsim.cli.scenarios import list_command, validate_command
 from fogsim.cli.signs import signs_command
 from fogsim.cli.starting import new_command, schema_command
 from fogsim.cli.study import study_command
+from fogsim.cli.test import check_command
 from fogsim.cli.view import view_command
 from fogsim.errors import FogSimError
 from fogsim.interruption import ProgramSignals, leave, leave_on_signals
@@ -52,6 +53,7 @@ def _take_common_options(
 
 # In the order of --help.
 app.command("run")(run_command)
+app.command("test")(check_command)
 app.command("study")(study_command)
 app.command("view")(view_command)
 app.command("recover")(recover_command)

@@ -28,7 +28,7 @@ Value = str | float | int | bool
 """What a name stands for in one case."""
 
 
-class VaryMistake(ValueError):
+class LevelsError(ValueError):
     """What is wrong with the values of a name.
 
     Parameters
@@ -126,7 +126,7 @@ class Draws:
 
         Raises
         ------
-        VaryMistake
+        LevelsError
             If none of ten thousand draws lies between the limits.
         """
         generator = named_generator(seed, self.name)
@@ -135,7 +135,7 @@ class Draws:
             drawn = self._shaped(float(generator.random()), float(generator.standard_normal()))
             if low <= drawn <= high:
                 return _written(drawn, self.unit)
-        raise VaryMistake(f"none of {_MOST_DRAWS} draws lies between its limits, {low:g} and {high:g}")
+        raise LevelsError(f"none of {_MOST_DRAWS} draws of {self.name} lies between its limits, {low:g} and {high:g}")
 
     def _shaped(self, uniform: float, normal: float) -> float:
         first, second = self.parameters
@@ -161,21 +161,21 @@ def parse_levels(name: str, written: object) -> Values:
 
     Raises
     ------
-    VaryMistake
+    LevelsError
         If it is none of them.
     """
     if not _NAME.match(name):
-        raise VaryMistake("a name consists of letters, digits and _, and begins with no digit")
+        raise LevelsError("a name consists of letters, digits and _, and begins with no digit")
     if isinstance(written, str) and (found := _SEEDS.match(written)):
         return _seeds(int(found[1]))
     if isinstance(written, list):
         return _listed(written)
     if not isinstance(written, dict) or not written:
-        raise VaryMistake(f"{_EXPECTED}; got {shown(written)}")
+        raise LevelsError(f"{_EXPECTED}; got {shown(written)}")
     known = ("seeds", *_RANGE, *_DISTRIBUTIONS, *_LIMITS)
     for key in written:
         if key not in known:
-            raise VaryMistake(f"unknown key; {suggest(str(key), known)}", key)
+            raise LevelsError(f"unknown key; {suggest(str(key), known)}", key)
     if "seeds" in written:
         _refuse_others(written, ("seeds",))
         return _seeds(written["seeds"])
@@ -190,27 +190,27 @@ def parse_levels(name: str, written: object) -> Values:
 def _refuse_others(written: dict[str, object], allowed: tuple[str, ...]) -> None:
     for key in written:
         if key not in allowed:
-            raise VaryMistake(f"does not go with {next(one for one in written if one in allowed)}", key)
+            raise LevelsError(f"does not go with {next(one for one in written if one in allowed)}", key)
 
 
 def _seeds(written: object) -> SeedLevels:
     if isinstance(written, int) and not isinstance(written, bool):
         if not 1 <= written <= MOST_VALUES:
-            raise VaryMistake(f"expected 1 … {MOST_VALUES} seeds, got {written}")
+            raise LevelsError(f"expected 1 … {MOST_VALUES} seeds, got {written}")
         return SeedLevels(tuple(range(written)))
     listed = written if isinstance(written, list) else []
     if not listed or any(isinstance(one, bool) or not isinstance(one, int) or one < 0 for one in listed):
-        raise VaryMistake(f"expected how many, or a list of whole numbers from 0 on; got {shown(written)}", "seeds")
+        raise LevelsError(f"expected how many, or a list of whole numbers from 0 on; got {shown(written)}", "seeds")
     _refuse_repeated(listed, "seeds")
     return SeedLevels(tuple(listed))
 
 
 def _listed(written: list[object]) -> Levels:
     if not written:
-        raise VaryMistake("needs at least one value")
+        raise LevelsError("needs at least one value")
     for place, one in enumerate(written):
         if not isinstance(one, str | int | float | bool):
-            raise VaryMistake(f"a value is a number, text, true or false; got {shown(one)}", place)
+            raise LevelsError(f"a value is a number, text, true or false; got {shown(one)}", place)
     _refuse_repeated(written)
     return Levels(tuple(one for one in written if isinstance(one, str | int | float | bool)))
 
@@ -219,26 +219,26 @@ def _refuse_repeated(written: list[object], *below: str) -> None:
     told = [(type(one), one) for one in written]
     for place, one in enumerate(told):
         if one in told[:place]:
-            raise VaryMistake(f"{shown(one[1])} stands twice", *below, place)
+            raise LevelsError(f"{shown(one[1])} stands twice", *below, place)
 
 
 def _range(written: dict[str, object]) -> Levels:
     for key in _RANGE:
         if key not in written:
-            raise VaryMistake(f"{key} is missing; a range has from, to and step")
+            raise LevelsError(f"{key} is missing; a range has from, to and step")
     (first, last, step), unit = _numbers({key: written[key] for key in _RANGE})
     if step == 0 or (last - first) / step < 0:
-        raise VaryMistake(f"a step of {shown(written['step'])} does not lead there", "step")
+        raise LevelsError(f"a step of {shown(written['step'])} does not lead there", "step")
     number = math.floor((last - first) / step + 1e-9) + 1
     if number > MOST_VALUES:
-        raise VaryMistake(f"{number} values are more than {MOST_VALUES}", "step")
+        raise LevelsError(f"{number} values are more than {MOST_VALUES}", "step")
     return Levels(tuple(_written(first + i * step, unit) for i in range(number)))
 
 
 def _draws(name: str, kind: str, written: dict[str, object]) -> Draws:
     pair = written[kind]
     if not isinstance(pair, list) or len(pair) != 2:
-        raise VaryMistake(f"expected two values, {_DISTRIBUTIONS[kind]}; got {shown(pair)}", kind)
+        raise LevelsError(f"expected two values, {_DISTRIBUTIONS[kind]}; got {shown(pair)}", kind)
     parameters = {"0": pair[0], "1": pair[1]}
     if kind == "lognormal":
         # The deviation of a logarithm has no unit.
@@ -253,7 +253,7 @@ def _draws(name: str, kind: str, written: dict[str, object]) -> Draws:
     first, second = numbers[:2]
     wrong = second <= first if kind == "uniform" else second <= 0 or (kind == "lognormal" and first <= 0)
     if wrong:
-        raise VaryMistake(f"expected {_DISTRIBUTIONS[kind]}, got {shown(pair)}", kind)
+        raise LevelsError(f"expected {_DISTRIBUTIONS[kind]}, got {shown(pair)}", kind)
     draws = Draws(name, kind, (first, second), (found.get("at_least", -math.inf), found.get("at_most", math.inf)), unit)
     draws.value(0)
     return draws
@@ -265,11 +265,11 @@ def _numbers(written: dict[str, object]) -> tuple[list[float], str]:
     for key, value in written.items():
         one = _number_and_unit(value)
         if one is None:
-            raise VaryMistake(f"expected a number, perhaps with a unit; got {shown(value)}", *_below(key))
+            raise LevelsError(f"expected a number, perhaps with a unit; got {shown(value)}", *_below(key))
         found[key] = one
     units = list(dict.fromkeys(unit for _, unit in found.values()))
     if len(units) > 1:
-        raise VaryMistake(f"all of it must have the same unit, got {' and '.join(one or 'none' for one in units)}")
+        raise LevelsError(f"all of it must have the same unit, got {' and '.join(one or 'none' for one in units)}")
     return [number for number, _ in found.values()], units[0]
 
 

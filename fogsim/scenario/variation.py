@@ -1,18 +1,20 @@
 """The blocks ``vary`` and ``verdict``: what differs between the cases of a file, and when all of them together pass."""
 
+import contextlib
 import itertools
 import json
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, Self
 
 from pydantic import Field, ValidationError, model_validator
 
 from fogsim.errors import InputError, shown, suggest
+from fogsim.quantities import split_quantity
 from fogsim.scenario.document import Document
-from fogsim.scenario.levels import SeedLevels, Value, Values, VaryMistake, parse_levels
+from fogsim.scenario.levels import LevelsError, SeedLevels, Value, Values, parse_levels
 from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.section import Section, Share
@@ -44,13 +46,17 @@ class Verdict(Section):
         return math.ceil(math.log(1.0 - self.confidence) / math.log(self.pass_rate) - 1e-9)
 
 
+NONE_FAILS = Verdict()
+"""All pass together when none fails."""
+
+
 class VariationKeys(Section):
     """Keys that stand in a file beside those of a scenario."""
 
     vary: dict[str, Any] = Field(default_factory=dict)
     """What differs between the cases of the file: a name and its values; ``$name`` stands for them elsewhere."""
 
-    verdict: Verdict = Verdict()
+    verdict: Verdict = NONE_FAILS
     """When all cases together pass; without it, when none fails."""
 
     @model_validator(mode="after")
@@ -104,18 +110,15 @@ class Variation:
     ----------
     cases : tuple of Case
         The grid, the last name fastest.
-    numeric : frozenset of str
-        Names that stand for numbers of the grid, perhaps with a unit.
-    seeds : str or None
-        Name that stands for seeds.
+    varied : mapping from str to Values
+        What each name stands for.
     verdict : Verdict
         When all of them together pass.
     """
 
     cases: tuple[Case, ...]
-    numeric: frozenset[str] = frozenset()
-    seeds: str | None = None
-    verdict: Verdict = Verdict()
+    varied: Mapping[str, Values] = field(default_factory=dict)
+    verdict: Verdict = NONE_FAILS
 
 
 def read_variation(document: Document) -> Variation:
@@ -139,14 +142,15 @@ def read_variation(document: Document) -> Variation:
     if not keys.vary:
         return Variation((Case({}),))
     varied, mistakes = _parsed(document, keys.vary)
-    mistakes += _misplaced(document, varied)
+    mistakes += _misplaced(document, keys.vary, varied)
     if mistakes:
         raise InputError("\n".join(mistakes))
-    cases = _grid(document, varied)
+    try:
+        cases = _grid(document, varied)
+    except LevelsError as error:
+        raise InputError(f"{document.where(('vary',))}: vary: {error}") from error
     _check_reachable(document, keys.verdict, len(cases))
-    seeds = next((name for name, values in varied.items() if isinstance(values, SeedLevels)), None)
-    numeric = frozenset(name for name, values in varied.items() if values.is_numeric)
-    return Variation(cases, numeric, seeds, keys.verdict)
+    return Variation(cases, varied, keys.verdict)
 
 
 def _parsed(document: Document, written: Mapping[str, Any]) -> tuple[dict[str, Values], list[str]]:
@@ -155,12 +159,13 @@ def _parsed(document: Document, written: Mapping[str, Any]) -> tuple[dict[str, V
     for name, value in written.items():
         try:
             varied[name] = parse_levels(name, value)
-        except VaryMistake as mistake:
+        except LevelsError as mistake:
             at: KeyPath = ("vary", name, *mistake.below)
             mistakes.append(f"{document.where(at)}: {dotted(at)}: {mistake}")
     seeds = [name for name, values in varied.items() if isinstance(values, SeedLevels)]
-    for name in seeds[1:]:
-        mistakes.append(f"{document.where(('vary', name))}: vary.{name}: {seeds[0]} has the seeds already")
+    mistakes += [
+        f"{document.where(('vary', name))}: vary.{name}: {seeds[0]} has the seeds already" for name in seeds[1:]
+    ]
     if not seeds and not mistakes:
         drawn = [name for name, values in varied.items() if values.is_drawn]
         mistakes += [
@@ -171,15 +176,15 @@ def _parsed(document: Document, written: Mapping[str, Any]) -> tuple[dict[str, V
     return varied, mistakes
 
 
-def _misplaced(document: Document, varied: Mapping[str, Values]) -> list[str]:
+def _misplaced(document: Document, named: Mapping[str, object], varied: Mapping[str, Values]) -> list[str]:
     """Names that stand nowhere, and places of names that are none."""
     used: set[str] = set()
     mistakes = []
     for at, text in _texts({key: value for key, value in document.data.items() if key not in KEYS}, ()):
         for name in _names(text):
             used.add(name)
-            if name not in varied:
-                told = f"unknown name ${name}; {suggest(name, varied)}"
+            if name not in named:
+                told = f"unknown name ${name}; {suggest(name, named)}"
                 mistakes.append(f"{document.where(at)}: {dotted(at)}: {told}")
     for name, values in varied.items():
         if name not in used and not isinstance(values, SeedLevels):
@@ -208,12 +213,16 @@ def _grid(document: Document, varied: Mapping[str, Values]) -> tuple[Case, ...]:
     number = math.prod(len(values) for values in gridded.values())
     if number > MOST_CASES:
         raise InputError(f"{document.where(('vary',))}: vary: {number} cases are more than {MOST_CASES}")
-    cases = []
-    for cell in itertools.product(*gridded.values()):
-        chosen = dict(zip(gridded, cell, strict=True))
-        seed = next((int(chosen[name]) for name, values in gridded.items() if isinstance(values, SeedLevels)), 0)
-        cases.append(Case({name: chosen.get(name, values.value(seed)) for name, values in varied.items()}, seed))
-    return tuple(cases)
+    cells = itertools.product(*gridded.values())
+    return tuple(_case(varied, dict(zip(gridded, cell, strict=True))) for cell in cells)
+
+
+def _case(varied: Mapping[str, Values], chosen: Mapping[str, Value]) -> Case:
+    """The case of a cell of the grid, with what is drawn for its seed."""
+    seed = next((int(chosen[name]) for name, values in varied.items() if isinstance(values, SeedLevels)), 0)
+    return Case(
+        {name: values.value(seed) if values.is_drawn else chosen[name] for name, values in varied.items()}, seed
+    )
 
 
 def _check_reachable(document: Document, verdict: Verdict, number: int) -> None:
@@ -260,8 +269,8 @@ def chosen_cases(variation: Variation, wanted: str, where: object) -> tuple[Case
     variation : Variation
         What the file varies.
     wanted : str
-        ``name=value`` pairs with commas between, as in `Case.label`; empty for all cases. A name that stands for numbers
-        may have one beside the grid, if it is given together with all others of the grid.
+        ``name=value`` pairs with commas between, as in `Case.label`; empty for all cases. A name that stands for
+        numbers may have one that is not in the grid.
     where : object
         What messages name: the file.
 
@@ -274,9 +283,9 @@ def chosen_cases(variation: Variation, wanted: str, where: object) -> tuple[Case
     cases = list(variation.cases)
     for name, text in pairs.items():
         fitting = [case for case in cases if value_text(case.values[name]) == text]
-        if not fitting and name in variation.numeric:
-            level = parse_levels(name, [_plain(text)])
-            fitting = [replace(case, values={**case.values, name: level.value(0)}) for case in _distinct(cases, name)]
+        if not fitting and (value := _beside_grid(variation.varied[name], text)) is not None:
+            others = _distinct(cases, name, variation.varied)
+            fitting = [_case(variation.varied, {**case.values, name: value}) for case in others]
         if not fitting:
             known = dict.fromkeys(value_text(case.values[name]) for case in cases)
             raise InputError(f"--case {wanted}: {where} has no {name}={text}; {suggest(text, known)}")
@@ -297,18 +306,21 @@ def _pairs(wanted: str, variation: Variation, where: object) -> dict[str, str]:
     return pairs
 
 
-def _plain(text: str) -> Value:
-    """Number of a text, or the text, which is then a quantity."""
-    try:
+def _beside_grid(values: Values, text: str) -> Value | None:
+    """Value of a text for a name whose values are numbers; None if it cannot be one."""
+    if isinstance(values, SeedLevels):
+        return int(text) if text.isdecimal() else None
+    if not values.is_numeric:
+        return None
+    with contextlib.suppress(ValueError):
         return float(text)
-    except ValueError:
-        return text
+    return text if split_quantity(text) else None
 
 
-def _distinct(cases: Iterable[Case], name: str) -> list[Case]:
-    """Cases that differ in more than one name."""
+def _distinct(cases: Iterable[Case], name: str, varied: Mapping[str, Values]) -> list[Case]:
+    """Cases that differ in more than one name, and what is drawn for it."""
     kept: dict[str, Case] = {}
     for case in cases:
-        rest = {key: value for key, value in case.values.items() if key != name}
-        kept.setdefault(json.dumps([rest, case.seed]), case)
+        rest = {key: value for key, value in case.values.items() if key != name and not varied[key].is_drawn}
+        kept.setdefault(json.dumps(rest), case)
     return list(kept.values())

@@ -45,7 +45,7 @@ def measure_run(scenario: Scenario, seed: int, sumo_outputs: Path | None = None)
         else:
             of_traffic = TrafficRunMetrics(standard, watchers=[profiles])
             summary = _watched(run_traffic(scenario, seed, sumo_outputs), of_traffic, profiles)
-    return {"metrics": dict(_flat(summary.to_json())), "profiles": profiles.to_json()}
+    return {"metrics": flat_metrics(summary.to_json()), "profiles": profiles.to_json()}
 
 
 _AnyStep = TypeVar("_AnyStep", bound=TrafficStep)
@@ -56,6 +56,17 @@ def _watched(steps: Iterable[_AnyStep], metrics: MetricsOfRun[_AnyStep], profile
         profiles.update(step)
         metrics.update(step)
     return metrics.summary()
+
+
+def flat_metrics(values: Mapping[str, object]) -> dict[str, Value]:
+    """Metrics without levels: those of a method have its name before theirs, with a point between.
+
+    Parameters
+    ----------
+    values : mapping
+        Of ``RunSummary.to_json``.
+    """
+    return dict(_flat(values))
 
 
 def _flat(values: Mapping[str, object], prefix: str = "") -> list[tuple[str, Value]]:

@@ -1,0 +1,21 @@
+"""Tests of driving in fog: scenario files with what they expect, run case by case and judged."""
+
+from fogsim.testing.collection import FogTest, collect, find_files, only_cases
+from fogsim.testing.judgement import Judgement, Outcome
+from fogsim.testing.keywords import parse_keywords
+from fogsim.testing.results import CaseResult
+from fogsim.testing.session import FileOutcome, last_failed, run_tests
+
+__all__ = [
+    "CaseResult",
+    "FileOutcome",
+    "FogTest",
+    "Judgement",
+    "Outcome",
+    "collect",
+    "find_files",
+    "last_failed",
+    "only_cases",
+    "parse_keywords",
+    "run_tests",
+]

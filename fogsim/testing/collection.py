@@ -1,0 +1,168 @@
+"""Which tests there are: scenario files that expect something, and the runs of their cases."""
+
+import hashlib
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from fogsim.errors import InputError
+from fogsim.scenario import build, resolved
+from fogsim.scenario.document import read_document
+from fogsim.scenario.loading import SCENARIO_FILE, ScenarioCases, load_cases, scenario_file
+from fogsim.scenario.variation import NONE_FAILS, Verdict, value_text
+from fogsim.study.plan import StudyRun, file_digests
+from fogsim.testing.keywords import Keywords
+
+PATTERN = "*.fog.yaml"
+"""Names of files of tests; a folder's scenario.yaml is one too, if it expects something."""
+
+EXPECT = "expect"
+"""The block of a file that makes a test of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class FogTest:
+    """A scenario file with what it expects.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    name : str
+        Name of the scenario.
+    lines : mapping from str to str
+        Expectations that are asked for, and where each stands: ``file:line``.
+    runs : tuple of StudyRun
+        Cases that are asked for.
+    verdict : Verdict
+        When all of them together pass.
+    """
+
+    path: Path
+    name: str
+    lines: Mapping[str, str]
+    runs: tuple[StudyRun, ...]
+    verdict: Verdict
+
+
+def find_files(names: Iterable[str | Path]) -> list[Path]:
+    """Files of tests, in their order, each once.
+
+    Parameters
+    ----------
+    names : iterable of str or Path
+        Files; folders, in which ``*.fog.yaml`` and each ``scenario.yaml`` with ``expect`` are found at any depth; or
+        names of the catalogue.
+
+    Raises
+    ------
+    InputError
+        If there is nothing of a name, or a file cannot be read.
+    """
+    found: dict[Path, Path] = {}
+    for name in names:
+        path = Path(name)
+        for file in _in_folder(path) if path.is_dir() else [scenario_file(name)]:
+            found.setdefault(file.resolve(), file)
+    return list(found.values())
+
+
+def _in_folder(folder: Path) -> Iterator[Path]:
+    files = {*folder.rglob(PATTERN), *folder.rglob(SCENARIO_FILE)}
+    for file in sorted(one for one in files if one.is_file() and not _is_hidden(one.relative_to(folder))):
+        if file.name != SCENARIO_FILE or EXPECT in read_document(file).data:
+            yield file
+
+
+def _is_hidden(path: Path) -> bool:
+    return any(part.startswith(".") for part in path.parts)
+
+
+def collect(
+    files: Sequence[Path], settings: Sequence[str] = (), case: str = "", keywords: Keywords | None = None
+) -> list[FogTest]:
+    """Tests of files; those of which nothing is asked for are left out.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        From `find_files`.
+    settings : sequence of str
+        ``key.path=value`` each, put in place of every file's.
+    case : str
+        Which cases, as ``--case`` has them; empty for all.
+    keywords : Keywords or None
+        Which expectations.
+
+    Raises
+    ------
+    InputError
+        A line for each mistake of all files.
+    """
+    tests, mistakes = [], []
+    for file in files:
+        try:
+            loaded = load_cases(file, settings, case)
+        except InputError as error:
+            mistakes.append(str(error))
+            continue
+        name = loaded.cases[0][1].name
+        lines = {
+            one: loaded.document.where((EXPECT, one))
+            for one in loaded.document.data.get(EXPECT) or {}
+            if keywords is None or keywords.match(f"{file} {name} {one}")
+        }
+        if lines:
+            whole = len(loaded.cases) == len(loaded.variation.cases)
+            # A part of the cases shows no rate; none of it may fail.
+            verdict = loaded.variation.verdict if whole else NONE_FAILS
+            tests.append(FogTest(file, name, lines, tuple(_runs(file, loaded)), verdict))
+    if mistakes:
+        raise InputError("\n".join(mistakes))
+    return tests
+
+
+def _runs(file: Path, loaded: ScenarioCases) -> Iterator[StudyRun]:
+    described: dict[int, str] = {}
+    for number, (case, scenario) in enumerate(loaded.cases):
+        # Cases that differ in their seed share one scenario.
+        if id(scenario) not in described:
+            told = [resolved(scenario), file_digests(scenario), build.own_methods(scenario)]
+            described[id(scenario)] = json.dumps(told, sort_keys=True)
+        text = f"{file.resolve()} {described[id(scenario)]} {case.label} {case.seed}"
+        key = hashlib.sha256(text.encode()).hexdigest()[:20]
+        levels = {name: value_text(value) for name, value in case.values.items()}
+        yield StudyRun(number, levels, case.seed, scenario, key)
+
+
+def only_cases(tests: Iterable[FogTest], wanted: Mapping[Path, Sequence[str]]) -> list[FogTest]:
+    """Tests with some of their cases alone; those without any are left out.
+
+    Parameters
+    ----------
+    tests : iterable of FogTest
+        The tests.
+    wanted : mapping from Path to sequence of str
+        Labels of the cases of each file.
+    """
+    kept = []
+    for test in tests:
+        labels = wanted.get(test.path.resolve(), ())
+        runs = tuple(run for run in test.runs if label_of(run) in labels)
+        if runs:
+            # A part of the cases shows no rate.
+            verdict = test.verdict if len(runs) == len(test.runs) else NONE_FAILS
+            kept.append(replace(test, runs=runs, verdict=verdict))
+    return kept
+
+
+def label_of(run: StudyRun) -> str:
+    """A case as ``--case`` names it.
+
+    Parameters
+    ----------
+    run : StudyRun
+        Its run.
+    """
+    return ",".join(f"{name}={level}" for name, level in run.levels.items())

@@ -1,0 +1,90 @@
+"""One case: a run that is watched by what is expected of it."""
+
+import time
+import warnings
+from pathlib import Path
+from typing import Any
+
+from fogsim.errors import FogSimError, UnplayedWarning
+from fogsim.files.atomic import write_json
+from fogsim.loop import run
+from fogsim.metrics import RunMetrics, TrafficRunMetrics
+from fogsim.scenario import Scenario, build
+from fogsim.study.execution import failure, flat_metrics
+from fogsim.testing.expecting import watch_of
+from fogsim.testing.results import finding_to_json
+from fogsim.traffic_run import run_traffic
+
+
+def check_case(scenario: Scenario, seed: int, sumo_outputs: Path | None = None) -> dict[str, Any]:
+    """Run a case, and tell what came of each of its expectations.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        With what it expects.
+    seed : int
+        Seed of the run.
+    sumo_outputs : Path or None
+        Folder of what SUMO writes, as of `run`.
+
+    Returns
+    -------
+    dict
+        ``findings``, ``metrics`` and ``ending``, as JSON has them.
+    """
+    standard, watch = build.safety_standard(scenario), watch_of(scenario)
+    ending = None
+    with warnings.catch_warnings():
+        # What was not played is for the expectations to say.
+        warnings.simplefilter("ignore", UnplayedWarning)
+        if scenario.traffic.has_ego:
+            of_ego = RunMetrics(standard)
+            for step in run(scenario, seed, sumo_outputs=sumo_outputs):
+                of_ego.update(step)
+                watch.update(step)
+                ending = step.ending
+            summary = of_ego.summary()
+        else:
+            of_traffic = TrafficRunMetrics(standard)
+            for instant in run_traffic(scenario, seed, sumo_outputs):
+                of_traffic.update(instant)
+                watch.update(instant)
+                ending = instant.ending
+            summary = of_traffic.summary()
+    metrics = flat_metrics(summary.to_json())
+    findings = [finding_to_json(one) for one in watch.findings(metrics)]
+    return {"findings": findings, "metrics": metrics, "ending": ending}
+
+
+def check_to_file(scenario: Scenario, seed: int, result: Path) -> str | None:
+    """Check a case, and write what came of it into a file; what goes wrong with the run is told there too.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        With what it expects.
+    seed : int
+        Seed of the run.
+    result : Path
+        The file.
+
+    Returns
+    -------
+    str or None
+        What went wrong with the run, if anything did.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    begun = time.monotonic()
+    try:
+        outcome = {"status": "complete", **check_case(scenario, seed, result.with_suffix(""))}
+    except FogSimError as error:
+        outcome = failure(str(error))
+    except Exception as error:  # noqa: BLE001 - a broken run, of a user's own method perhaps, must not stop the others
+        outcome = failure(f"{type(error).__name__}: {error}")
+    write_json(result, {**outcome, "duration_s": round(time.monotonic() - begun, 3)})
+    return outcome.get("message")

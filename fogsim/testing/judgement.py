@@ -1,0 +1,128 @@
+"""Whether all cases of a file together pass: each clause of each expectation by itself."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from scipy.special import betaincinv
+
+from fogsim.scenario.variation import Verdict
+from fogsim.study.plan import StudyRun
+from fogsim.testing.collection import FogTest
+from fogsim.testing.expecting import Finding, FindingVerdict
+from fogsim.testing.results import CaseResult
+
+
+class Outcome(StrEnum):
+    """What a line of the report says."""
+
+    PASSED = "passed"
+    FAILED = "failed"
+    INCONCLUSIVE = "inconclusive"
+    ERROR = "error"
+
+
+def rate_bounds(passed: int, tried: int, confidence: float) -> tuple[float, float]:
+    """Bounds of a pass rate, each one-sided: Clopper & Pearson (1934), Biometrika 26, 404.
+
+    Parameters
+    ----------
+    passed : int
+        Cases that passed.
+    tried : int
+        Cases that passed or failed, at least one.
+    confidence : float
+        Confidence of each bound, 0 … 1.
+
+    Returns
+    -------
+    (float, float)
+        The rate is at least the first, and at most the second, with this confidence.
+    """
+    failed = tried - passed
+    low = 0.0 if passed == 0 else float(betaincinv(passed, failed + 1, 1.0 - confidence))
+    high = 1.0 if failed == 0 else float(betaincinv(passed + 1, failed, confidence))
+    return low, high
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """What came of a clause in all cases.
+
+    Attributes
+    ----------
+    name, clause : str
+        The expectation and its clause.
+    outcome : Outcome
+        What came of it.
+    numbers : (int, int, int)
+        Cases that passed, failed, and were inconclusive.
+    telling : Finding
+        A finding that shows why: the first one that failed, else the first of those that the outcome is about.
+    run : StudyRun
+        Its case.
+    why : str
+        What the outcome goes by, where there are several cases.
+    """
+
+    name: str
+    clause: str
+    outcome: Outcome
+    numbers: tuple[int, int, int]
+    telling: Finding
+    run: StudyRun
+    why: str = ""
+
+    @property
+    def title(self) -> str:
+        """Name of the expectation and its clause."""
+        return f"{self.name}.{self.clause}" if self.clause else self.name
+
+
+def judge(test: FogTest, results: Sequence[CaseResult]) -> Iterator[Judgement]:
+    """Judge each clause of a test, by the cases whose runs did not go wrong.
+
+    Parameters
+    ----------
+    test : FogTest
+        The test.
+    results : sequence of CaseResult
+        Its cases.
+    """
+    clauses: dict[tuple[str, str], list[tuple[StudyRun, Finding]]] = {}
+    for result in results:
+        for finding in result.findings:
+            clauses.setdefault((finding.name, finding.clause), []).append((result.run, finding))
+    for (name, clause), findings in clauses.items():
+        numbers = _counted(findings)
+        outcome, why = _outcome(numbers, test.verdict)
+        shown = FindingVerdict.FAILED if numbers[1] else FindingVerdict(str(outcome))
+        of_it = (one for one in findings if one[1].verdict is shown)
+        run, telling = next(of_it, findings[0])
+        yield Judgement(name, clause, outcome, numbers, telling, run, why if len(findings) > 1 else "")
+
+
+def _counted(findings: Sequence[tuple[StudyRun, Finding]]) -> tuple[int, int, int]:
+    verdicts = [finding.verdict for _, finding in findings]
+    passed, failed = verdicts.count(FindingVerdict.PASSED), verdicts.count(FindingVerdict.FAILED)
+    return passed, failed, len(verdicts) - passed - failed
+
+
+def _outcome(numbers: tuple[int, int, int], verdict: Verdict) -> tuple[Outcome, str]:
+    passed, failed, inconclusive = numbers
+    tried, of_all = passed + failed, sum(numbers)
+    if tried == 0:
+        return Outcome.INCONCLUSIVE, f"{inconclusive} of {of_all} cases inconclusive"
+    told = f"{passed} of {tried} cases passed" + (f", {inconclusive} inconclusive" if inconclusive else "")
+    low, high = float(not failed), float(not failed)
+    if verdict.pass_rate < 1.0:
+        low, high = rate_bounds(passed, tried, verdict.confidence)
+        told += (
+            f": a rate of {100 * low:.1f} … {100 * high:.1f} % with {100 * verdict.confidence:.4g} % confidence each; "
+            f"wanted {100 * verdict.pass_rate:.4g} %"
+        )
+    if high < verdict.pass_rate:
+        return Outcome.FAILED, told
+    if tried < verdict.conclusive * of_all:
+        return Outcome.INCONCLUSIVE, f"{told}; {100 * verdict.conclusive:.4g} % of them must show something"
+    return (Outcome.PASSED if low >= verdict.pass_rate else Outcome.INCONCLUSIVE), told

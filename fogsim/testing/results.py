@@ -1,0 +1,87 @@
+"""What came of the cases, read back from their files."""
+
+import dataclasses
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from fogsim.study.engine import result_file
+from fogsim.study.plan import StudyRun
+from fogsim.testing.expecting import Finding, FindingVerdict
+
+
+def finding_to_json(finding: Finding) -> dict[str, Any]:
+    """A finding as files have it.
+
+    Parameters
+    ----------
+    finding : Finding
+        The finding.
+    """
+    return dataclasses.asdict(finding)
+
+
+def finding_from_json(values: Mapping[str, Any]) -> Finding:
+    """A finding of a file.
+
+    Parameters
+    ----------
+    values : mapping
+        As of `finding_to_json`.
+    """
+    return Finding(**{**values, "verdict": FindingVerdict(values["verdict"])})
+
+
+@dataclass(frozen=True, slots=True)
+class CaseResult:
+    """What came of a case.
+
+    Attributes
+    ----------
+    run : StudyRun
+        The case.
+    message : str or None
+        What went wrong with its run, if anything did.
+    findings : tuple of Finding
+        What came of each clause of the expectations that were asked for.
+    metrics : mapping
+        Metrics of the run.
+    duration : float
+        How long it took [s].
+    """
+
+    run: StudyRun
+    message: str | None
+    findings: tuple[Finding, ...] = ()
+    metrics: Mapping[str, Any] = field(default_factory=dict)
+    duration: float = 0.0
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether the run went wrong, or not as expected."""
+        return self.message is not None or any(one.verdict is FindingVerdict.FAILED for one in self.findings)
+
+
+def read_result(folder: Path, run: StudyRun, expectations: Sequence[str]) -> CaseResult | None:
+    """What came of a case; None if it has no whole result.
+
+    Parameters
+    ----------
+    folder : Path
+        Where the results are.
+    run : StudyRun
+        The case.
+    expectations : sequence of str
+        Names of those that are asked for.
+    """
+    try:
+        found = json.loads(result_file(folder, run).read_text(encoding="utf-8"))
+        took = float(found.get("duration_s", 0.0))
+        if found["status"] != "complete":
+            return CaseResult(run, str(found["message"]), duration=took)
+        findings = tuple(finding_from_json(one) for one in found["findings"] if one["name"] in expectations)
+        return CaseResult(run, None, findings, found["metrics"], took)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return None

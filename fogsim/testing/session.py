@@ -1,0 +1,192 @@
+"""Running tests: cases in parallel, results in files, what is left of an earlier call."""
+
+import json
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from fogsim.errors import InputError
+from fogsim.files.atomic import partial_path, write_json
+from fogsim.files.writer_lock import WriterLock
+from fogsim.recorders.manifest import versions
+from fogsim.study.engine import Engine
+from fogsim.study.plan import StudyRun
+from fogsim.testing.collection import FogTest, label_of
+from fogsim.testing.expecting import FindingVerdict
+from fogsim.testing.judgement import Judgement, Outcome, judge
+from fogsim.testing.results import CaseResult, read_result
+
+Watch = Callable[[int, int], None]
+"""Called at the beginning and after each case, with the numbers of cases that are done and of those that failed."""
+
+_SESSION = "session.json"
+_RESULTS = "results"
+
+
+@dataclass(frozen=True, slots=True)
+class FileOutcome:
+    """What came of a test.
+
+    Attributes
+    ----------
+    test : FogTest
+        The test.
+    results : tuple of CaseResult
+        Its cases that were run.
+    judgements : tuple of Judgement
+        What came of each clause of its expectations.
+    """
+
+    test: FogTest
+    results: tuple[CaseResult, ...]
+    judgements: tuple[Judgement, ...]
+
+    @property
+    def broken(self) -> list[CaseResult]:
+        """Cases whose runs went wrong."""
+        return [one for one in self.results if one.message is not None]
+
+    @property
+    def is_passed(self) -> bool:
+        """Whether all of it passed."""
+        return not self.broken and all(one.outcome is Outcome.PASSED for one in self.judgements)
+
+    @property
+    def duration(self) -> float:
+        """How long its runs took together [s]."""
+        return sum(one.duration for one in self.results)
+
+
+class _FirstFailure(Exception):  # noqa: N818 - no error: what ends a session with -x
+    """A case has failed."""
+
+
+def _unwatched(_: int, __: int) -> None:
+    """Show nothing."""
+
+
+def run_tests(
+    tests: Sequence[FogTest],
+    out: Path,
+    engine: Engine,
+    *,
+    resume: bool = False,
+    first_failure_ends: bool = False,
+    watch: Watch = _unwatched,
+) -> list[FileOutcome]:
+    """Run all cases of tests, and judge them.
+
+    Parameters
+    ----------
+    tests : sequence of FogTest
+        From `collect`.
+    out : Path
+        Directory of what came of them.
+    engine : Engine
+        What runs the cases, with `check_to_file` as its work.
+    resume : bool
+        Whether results of an earlier call count that was cut off; those of other scenarios, seeds or versions do not.
+    first_failure_ends : bool
+        Whether the first case that fails ends it.
+    watch : callable
+        Called at the beginning and after each case.
+
+    Returns
+    -------
+    list of FileOutcome
+        In the order of the tests; after a first failure only cases that were done.
+
+    Raises
+    ------
+    InputError
+        If the directory holds something else, or is written by another process.
+    OSError
+        If a result cannot be written.
+    KeyboardInterrupt
+        On Ctrl-C: cases that are done are kept, for `resume`.
+    """
+    results = _begin(out, resume)
+    with WriterLock(out):
+        names = {run.key: (*test.lines,) for test in tests for run in test.runs}
+        found = {run.key: read_result(results, run, names[run.key]) for test in tests for run in test.runs}
+        waiting = [run for test in tests for run in test.runs if found[run.key] is None]
+        done = failed = 0
+        for one in found.values():
+            done, failed = done + (one is not None), failed + (one is not None and one.has_failed)
+        watch(done, failed)
+
+        def count(run: StudyRun, _: str | None) -> None:
+            nonlocal done, failed
+            found[run.key] = one = read_result(results, run, names[run.key])
+            done, failed = done + 1, failed + (one is None or one.has_failed)
+            watch(done, failed)
+            if failed and first_failure_ends:
+                raise _FirstFailure
+
+        try:
+            if not (failed and first_failure_ends):
+                engine.run(waiting, results, count)
+        except _FirstFailure:
+            pass
+        outcomes = [_outcome(test, found) for test in tests]
+        _end(out, outcomes)
+    return outcomes
+
+
+def _begin(out: Path, resume: bool) -> Path:
+    """Make the directory, and leave in it what counts."""
+    if out.exists() and not out.is_dir():
+        raise InputError(f"--out {out} is a file; give the name of a directory")
+    session = out / _SESSION
+    if out.is_dir() and not session.exists() and set(out.iterdir()) - {partial_path(session)}:
+        raise InputError(f"--out {out} holds something else than tests; choose another directory")
+    out.mkdir(parents=True, exist_ok=True)
+    last = _read_session(out)
+    if not (resume and last.get("versions") == versions()):
+        shutil.rmtree(out / _RESULTS, ignore_errors=True)
+    write_json(session, {"versions": versions(), "not_passed": last.get("not_passed", {})})
+    (out / _RESULTS).mkdir(exist_ok=True)
+    return out / _RESULTS
+
+
+def _read_session(out: Path) -> Mapping[str, object]:
+    try:
+        found = json.loads((out / _SESSION).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _outcome(test: FogTest, found: Mapping[str, CaseResult | None]) -> FileOutcome:
+    results = tuple(one for run in test.runs if (one := found[run.key]) is not None)
+    return FileOutcome(test, results, tuple(judge(test, [one for one in results if one.message is None])))
+
+
+def _end(out: Path, outcomes: Sequence[FileOutcome]) -> None:
+    """Note what did not pass, for `last_failed`."""
+    noted: dict[str, list[str]] = {}
+    for outcome in outcomes:
+        if not outcome.is_passed:
+            wrong = {(one.name, one.clause) for one in outcome.judgements if one.outcome is not Outcome.PASSED}
+            noted[str(outcome.test.path.resolve())] = [
+                label_of(one.run) for one in outcome.results if _counts_against(one, wrong)
+            ]
+    write_json(out / _SESSION, {"versions": versions(), "not_passed": noted})
+
+
+def _counts_against(result: CaseResult, wrong: set[tuple[str, str]]) -> bool:
+    of_wrong = [one for one in result.findings if (one.name, one.clause) in wrong]
+    return result.message is not None or any(one.verdict is not FindingVerdict.PASSED for one in of_wrong)
+
+
+def last_failed(out: Path) -> dict[Path, list[str]]:
+    """Files that did not pass in the last call, and the labels of their cases that did not.
+
+    Parameters
+    ----------
+    out : Path
+        The directory.
+    """
+    noted = _read_session(out).get("not_passed")
+    return {Path(file): list(cases) for file, cases in noted.items()} if isinstance(noted, dict) else {}

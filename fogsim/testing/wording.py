@@ -1,0 +1,96 @@
+"""What came of tests, in words that terminal, reports and annotations share."""
+
+import shlex
+from collections.abc import Sequence
+
+from fogsim.study.plan import StudyRun
+from fogsim.testing.collection import FogTest, label_of
+from fogsim.testing.expecting import Finding
+from fogsim.testing.judgement import Judgement, Outcome
+from fogsim.testing.results import CaseResult
+from fogsim.testing.session import FileOutcome
+
+
+def finding_text(finding: Finding) -> str:
+    """What was expected, what came, when and where.
+
+    Parameters
+    ----------
+    finding : Finding
+        The finding.
+    """
+    came = f", came {finding.came}" if finding.came else ""
+    when = "" if finding.time is None else f" at {finding.time:.1f} s"
+    where = "" if finding.position is None else f", {finding.position:.0f} m"
+    why = f" ({finding.reason})" if finding.reason else ""
+    return f"expected {finding.expected}{came}{when}{where}{why}"
+
+
+def judgement_text(judgement: Judgement) -> str:
+    """What came of a clause in all cases.
+
+    Parameters
+    ----------
+    judgement : Judgement
+        The judgement.
+    """
+    if not judgement.why:
+        return finding_text(judgement.telling)
+    if judgement.outcome is Outcome.PASSED:
+        return f"expected {judgement.telling.expected}; {judgement.why}"
+    return f"{judgement.why}; {label_of(judgement.run)}: {finding_text(judgement.telling)}"
+
+
+def broken_text(broken: Sequence[CaseResult]) -> str:
+    """What went wrong with runs.
+
+    Parameters
+    ----------
+    broken : sequence of CaseResult
+        Those that went wrong, at least one.
+    """
+    first, number = broken[0], len(broken)
+    runs = "the run went wrong" if number == 1 else f"{number} runs went wrong"
+    label = label_of(first.run)
+    return f"{runs}: {label + ': ' if label else ''}{first.message}"
+
+
+def command_text(test: FogTest, run: StudyRun, settings: Sequence[str] = (), program: str = "test") -> str:
+    """Command that runs a case again.
+
+    Parameters
+    ----------
+    test : FogTest
+        The test.
+    run : StudyRun
+        The case.
+    settings : sequence of str
+        ``key.path=value`` each, put in place of the file's.
+    program : str
+        ``test``, or ``run`` for all files of a run.
+    """
+    label = label_of(run)
+    chosen = ["--case", label] if label else []
+    return shlex.join(
+        ["fogsim", program, str(test.path), *chosen, *(part for one in settings for part in ("--set", one))]
+    )
+
+
+def totals_text(outcomes: Sequence[FileOutcome], seconds: float) -> str:
+    """How many expectations passed.
+
+    Parameters
+    ----------
+    outcomes : sequence of FileOutcome
+        What came of the tests.
+    seconds : float
+        How long it took [s].
+    """
+    numbers = dict.fromkeys(Outcome, 0)
+    for one in outcomes:
+        numbers[Outcome.ERROR] += bool(one.broken)
+        for judgement in one.judgements:
+            numbers[judgement.outcome] += 1
+    counted = ", ".join(f"{number} {outcome}" for outcome, number in numbers.items() if number)
+    cases = sum(len(one.results) for one in outcomes)
+    return f"{counted or 'nothing was checked'}; {cases} runs of {len(outcomes)} files in {seconds:.1f} s"

@@ -1,0 +1,71 @@
+"""Whether all cases of a file together pass."""
+
+from pathlib import Path
+
+import pytest
+from scipy.stats import binomtest
+
+from fogsim.scenario.variation import NONE_FAILS, Verdict
+from fogsim.study.plan import StudyRun
+from fogsim.testing.collection import FogTest
+from fogsim.testing.expecting import Finding, FindingVerdict
+from fogsim.testing.judgement import Judgement, Outcome, judge, rate_bounds
+from fogsim.testing.results import CaseResult
+
+
+@pytest.mark.parametrize(("passed", "tried"), [(0, 5), (3, 5), (58, 60), (60, 60)])
+def test_bounds_are_clopper_and_pearsons(passed: int, tried: int) -> None:
+    # The two-sided interval of twice the rest has the one-sided bounds as its ends.
+    interval = binomtest(passed, tried).proportion_ci(0.8, method="exact")
+    assert rate_bounds(passed, tried, 0.9) == pytest.approx((interval.low, interval.high))
+
+
+def test_the_least_number_of_cases_is_the_one_at_which_the_bound_is_reached() -> None:
+    wanted = Verdict(pass_rate=0.95, confidence=0.9)
+    assert wanted.least_cases == 45
+    assert rate_bounds(45, 45, 0.9)[0] >= 0.95 > rate_bounds(44, 44, 0.9)[0]
+
+
+def judged(verdicts: str, wanted: Verdict = NONE_FAILS) -> Judgement:
+    kinds = {"p": FindingVerdict.PASSED, "f": FindingVerdict.FAILED, "i": FindingVerdict.INCONCLUSIVE}
+    results = []
+    for number, one in enumerate(verdicts):
+        run = StudyRun(number, {"run": str(number)}, number, None, str(number))  # type: ignore[arg-type]  # unused
+        finding = Finding("safe", "never", kinds[one], "no collision", "", None, None, "")
+        results.append(CaseResult(run, None, (finding,)))
+    test = FogTest(Path("a"), "a", {"safe": "a:1"}, tuple(one.run for one in results), wanted)
+    (judgement,) = judge(test, results)
+    return judgement
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "outcome"),
+    [
+        ("p", Outcome.PASSED),
+        ("f", Outcome.FAILED),
+        ("i", Outcome.INCONCLUSIVE),
+        ("ppp", Outcome.PASSED),
+        ("ppf", Outcome.FAILED),
+        ("ppi", Outcome.PASSED),
+        ("pii", Outcome.INCONCLUSIVE),
+        ("fii", Outcome.FAILED),
+        ("iii", Outcome.INCONCLUSIVE),
+    ],
+)
+def test_without_a_rate_none_may_fail_and_half_must_show_something(verdicts: str, outcome: Outcome) -> None:
+    assert judged(verdicts).outcome is outcome
+
+
+def test_a_rate_is_shown_or_refuted_or_neither() -> None:
+    wanted = Verdict(pass_rate=0.9, confidence=0.9)
+    assert judged("p" * 22, wanted).outcome is Outcome.PASSED
+    assert judged("p" * 39 + "f" * 1, wanted).outcome is Outcome.PASSED
+    assert judged("p" * 21 + "f", wanted).outcome is Outcome.INCONCLUSIVE
+    assert judged("p" * 12 + "f" * 8, wanted).outcome is Outcome.FAILED
+    assert "12 of 20 cases passed: a rate of 43.3 … 75.1 %" in judged("p" * 12 + "f" * 8, wanted).why
+
+
+def test_what_is_told_is_of_the_first_case_that_failed() -> None:
+    assert judged("ppff").run.number == 2
+    assert judged("pii").run.number == 1
+    assert judged("ppp").run.number == 0

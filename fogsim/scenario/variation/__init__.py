@@ -1,0 +1,27 @@
+"""What differs between the cases of a scenario file, and when all of them together pass."""
+
+from fogsim.scenario.variation.cases import (
+    KEYS,
+    NONE_FAILS,
+    Case,
+    Variation,
+    VariationKeys,
+    Verdict,
+    chosen_cases,
+    read_variation,
+    value_text,
+    with_case,
+)
+
+__all__ = [
+    "KEYS",
+    "NONE_FAILS",
+    "Case",
+    "Variation",
+    "VariationKeys",
+    "Verdict",
+    "chosen_cases",
+    "read_variation",
+    "value_text",
+    "with_case",
+]

@@ -1,7 +1,12 @@
 """What rides in the ego: from a snapshot of the traffic to a finished step."""
 
 import math
+<<<<<<< HEAD
 from collections.abc import Callable, Iterable
+=======
+from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
+>>>>>>> 04f228d (Conditions on a run: a language over finished steps, its signals, and watches)
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +33,8 @@ from fogsim.values import (
     Fault,
     FogField,
     Frame,
+    Lane,
+    LaneKind,
     Observation,
     RoadNetwork,
     RoadSection,
@@ -68,6 +75,7 @@ class EgoEquipment:
         self._streams: Streams | None = None
         self._meters: RoadMeters | None = None
         self._route: NDArray[np.float64] | None = None
+        self._carriageways: Mapping[str, tuple[str, ...]] = {}
         self._mount_camera(build.CAR)
 
     def _mount_camera(self, body: str) -> None:
@@ -111,7 +119,7 @@ class EgoEquipment:
             road, signs = network()
             self._view_renderer = kind(self._scenario, road, signs, body)
             self._meters = RoadMeters(self._scenario, road.route, road.route_limits)
-            self._route = road.route
+            self._route, self._carriageways = road.route, carriageways(road.lanes)
         for estimator in self._estimators:
             estimator.reset()
         self._fusion.reset()
@@ -172,8 +180,12 @@ class EgoEquipment:
         faults = self._schedule.at(time)
         pose, fog = self._pose(state, ego), field_at(self._view_renderer.fog, time)
         sections = self._meters.measure(fog)
+<<<<<<< HEAD
         known = tuple(one.fault for one in faults)
         truth = fog_truth(fog, pose, self._camera, renderer.signs, state, sections, self._route, known)
+=======
+        truth = fog_truth(fog, pose, self._camera, renderer.signs, state, sections, self._route, self._carriageways)
+>>>>>>> 04f228d (Conditions on a run: a language over finished steps, its signals, and watches)
         view, radiance = renderer.render(state, ego, pose, time)
         image = self._camera_sensor.take(radiance, self._streams.camera)
         frame = Frame(*self._delivery.deliver(Delivered(time, image), faults), self._assumed_camera)
@@ -257,7 +269,11 @@ def fog_truth(
     traffic: TrafficState | None = None,
     sections: tuple[RoadSection, ...] = (),
     route: NDArray[np.float64] | None = None,
+<<<<<<< HEAD
     faults: tuple[Fault, ...] = (),
+=======
+    lanes: Mapping[str, tuple[str, ...]] = MappingProxyType({}),
+>>>>>>> 04f228d (Conditions on a run: a language over finished steps, its signals, and watches)
 ) -> Truth:
     """The fog at a camera, and as far as it sees along its heading, parallel to the road under it.
 
@@ -277,8 +293,13 @@ def fog_truth(
         What meters beside the road measure.
     route : (n, 3) float64 or None
         Polyline along the ego's route [m].
+<<<<<<< HEAD
     faults : tuple of Fault
         Faults of its sensors in force.
+=======
+    lanes : mapping from str to tuple of str
+        Lanes for vehicles of each edge, from `carriageways`.
+>>>>>>> 04f228d (Conditions on a run: a language over finished steps, its signals, and watches)
     """
     eye, level = np.array(pose.position), math.cos(pose.road_grade)
     direction = np.array([math.cos(pose.heading) * level, math.sin(pose.heading) * level, math.sin(pose.road_grade)])
@@ -295,6 +316,30 @@ def fog_truth(
         signs=signs,
         sections=sections,
         route=route,
+<<<<<<< HEAD
         faults=faults,
+=======
+        carriageways=lanes,
+>>>>>>> 04f228d (Conditions on a run: a language over finished steps, its signals, and watches)
         vehicle_extinctions=None if traffic is None else extinction(fog, traffic.position + _EYES),
     )
+
+
+def carriageways(lanes: Iterable[Lane]) -> dict[str, tuple[str, ...]]:
+    """Ids of the lanes for vehicles of each edge, from the right.
+
+    Parameters
+    ----------
+    lanes : iterable of Lane
+        Every lane, named by its edge and its number from the right as SUMO does.
+    """
+    found: dict[str, list[str]] = {}
+    for lane in lanes:
+        if lane.kind is LaneKind.CARRIAGEWAY:
+            found.setdefault(lane.edge_id, []).append(lane.lane_id)
+    return {edge: tuple(sorted(ids, key=_number_from_right)) for edge, ids in found.items()}
+
+
+def _number_from_right(lane_id: str) -> int:
+    number = lane_id.rpartition("_")[2]
+    return int(number) if number.isdecimal() else 0

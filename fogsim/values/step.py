@@ -1,6 +1,7 @@
 """One finished instant of a run: what metrics and recorders get."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
@@ -77,8 +78,13 @@ class Truth:
         sections of it are advised.
     route : (n, 3) float64 or None
         Polyline along the ego's route, or along ``traffic.along`` [m]; None where there is neither.
+<<<<<<< HEAD
     faults : tuple of Fault
         Faults of the ego's sensors in force now.
+=======
+    carriageways : mapping from str to tuple of str
+        Ids of the lanes for vehicles of each edge, from the right; empty where no network is known.
+>>>>>>> 04f228d (Conditions on a run: a language over finished steps, its signals, and watches)
     """
 
     extinction: float
@@ -90,7 +96,11 @@ class Truth:
     vehicle_extinctions: NDArray[np.float64] | None = None
     sections: tuple[RoadSection, ...] = ()
     route: NDArray[np.float64] | None = None
+<<<<<<< HEAD
     faults: tuple[Fault, ...] = ()
+=======
+    carriageways: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+>>>>>>> 04f228d (Conditions on a run: a language over finished steps, its signals, and watches)
 
     @property
     def visibility(self) -> float:

@@ -1,0 +1,30 @@
+"""Conditions on a run: a small language over finished steps, for triggers and expectations."""
+
+from fogsim.conditions.moment import History, Moment
+from fogsim.conditions.parsing import mended, parse_condition
+from fogsim.conditions.signal import Kind, Need, Place, Signal
+from fogsim.conditions.signals import SIGNALS
+from fogsim.conditions.syntax import Comparison, Condition, Edge, Flag, Held, Quantity, Reference, signals_of
+from fogsim.conditions.watching import Watch, shown_value
+
+__all__ = [
+    "SIGNALS",
+    "Comparison",
+    "Condition",
+    "Edge",
+    "Flag",
+    "Held",
+    "History",
+    "Kind",
+    "Moment",
+    "Need",
+    "Place",
+    "Quantity",
+    "Reference",
+    "Signal",
+    "Watch",
+    "mended",
+    "parse_condition",
+    "shown_value",
+    "signals_of",
+]

@@ -1,0 +1,122 @@
+"""A finished step as conditions look at it: with what has happened before, and with places along the route."""
+
+from fogsim.conditions.route_places import Extent, Route, RoutePlace, extent_of
+from fogsim.values import Step, TrafficStep
+
+EGO = "ego"
+"""What the ego is called in conditions, whatever its id."""
+
+
+class Moment:
+    """One step of a run, and what is known of the ones before.
+
+    Parameters
+    ----------
+    step : TrafficStep
+        The step.
+    collisions : set of tuple of str
+        Pairs that have hit each other so far.
+    begun : set of str
+        What of the script has begun so far.
+    route : Route or None
+        The way along which places count.
+    """
+
+    def __init__(
+        self, step: TrafficStep, collisions: set[tuple[str, str]], begun: set[str], route: Route | None
+    ) -> None:
+        self.step, self.collisions, self.begun = step, collisions, begun
+        self._route = route
+        self._places: dict[str, RoutePlace | None] = {}
+
+    @property
+    def ego_step(self) -> Step | None:
+        """The step if there is an ego; None otherwise."""
+        return self.step if isinstance(self.step, Step) else None
+
+    def vehicle_id(self, vehicle: str) -> str:
+        """Id of a vehicle: the ego's own for ``ego``.
+
+        Parameters
+        ----------
+        vehicle : str
+            As a condition has it.
+        """
+        step = self.ego_step
+        return step.traffic.ids[step.ego] if step is not None and vehicle == EGO else vehicle
+
+    def row(self, vehicle: str) -> int | None:
+        """Row of a vehicle in the traffic; None if it is not on the road now.
+
+        Parameters
+        ----------
+        vehicle : str
+            As a condition has it.
+        """
+        return self.step.traffic.row(self.vehicle_id(vehicle))
+
+    def position(self, vehicle: str) -> float | None:
+        """How far along the route a vehicle's front bumper is [m], in the ego's own count; None if it is not there.
+
+        Parameters
+        ----------
+        vehicle : str
+            As a condition has it.
+        """
+        step, place = self.ego_step, self._place(vehicle)
+        if step is not None and self.row(vehicle) == step.ego:
+            return step.route_position
+        return None if place is None else place.front
+
+    def extent(self, vehicle: str) -> Extent | None:
+        """What a vehicle covers of the route; None if it is not there.
+
+        Parameters
+        ----------
+        vehicle : str
+            As a condition has it.
+        """
+        row, place = self.row(vehicle), self._place(vehicle)
+        return None if row is None or place is None else extent_of(place, self.step.traffic, row)
+
+    def _place(self, vehicle: str) -> RoutePlace | None:
+        if vehicle not in self._places:
+            self._places[vehicle] = self._located(vehicle)
+        return self._places[vehicle]
+
+    def _located(self, vehicle: str) -> RoutePlace | None:
+        row, traffic, step = self.row(vehicle), self.step.traffic, self.ego_step
+        if row is None or self._route is None:
+            return None
+        if step is None:
+            return self._route.locate(traffic.position[row], float(traffic.heading[row]))
+        # SUMO counts the ego's way along its lanes, and the polyline is one of them: others are put into its count.
+        ego = self._route.locate(traffic.position[step.ego], float(traffic.heading[step.ego]), step.route_position)
+        place = self._route.locate(traffic.position[row], float(traffic.heading[row]), step.route_position)
+        if ego is None or place is None:
+            return None
+        return RoutePlace(place.front - ego.front + step.route_position, place.along)
+
+
+class History:
+    """What conditions remember of a run, whichever they are; hands out moments, one a step."""
+
+    def __init__(self) -> None:
+        self._collisions: set[tuple[str, str]] = set()
+        self._begun: set[str] = set()
+        self._route: Route | None = None
+
+    def moment(self, step: TrafficStep) -> Moment:
+        """Take in the next step.
+
+        Parameters
+        ----------
+        step : TrafficStep
+            The step.
+        """
+        self._collisions |= {(hit.collider, hit.victim) for hit in step.collisions}
+        self._begun |= {begun.name for begun in step.begun}
+        points = step.truth.route
+        if points is not None and len(points) > 1 and (self._route is None or self._route.points is not points):
+            self._route = Route(points)
+        return Moment(step, self._collisions, self._begun, self._route)

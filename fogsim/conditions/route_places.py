@@ -1,0 +1,150 @@
+"""Where vehicles are along a route: places, extents, gaps and times between them."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.values import TrafficState
+
+FARTHEST_ASIDE = 30.0
+"""Distance from the route up to which a vehicle has a place along it [m]: that of the other carriageway."""
+
+_AS_NEAR = 1.0
+"""Where a route passes a place twice, its ways there lie this near to one another [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class RoutePlace:
+    """Where a vehicle is along a route.
+
+    Attributes
+    ----------
+    front : float
+        Position of its front bumper [m].
+    along : float
+        Cosine of its heading to the route: 1 with it, −1 against it.
+    """
+
+    front: float
+    along: float
+
+
+class Route:
+    """A polyline along which places count.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+        Its points [m], at least two.
+    """
+
+    def __init__(self, points: NDArray[np.float64]) -> None:
+        self.points = points
+        steps = np.diff(points, axis=0)
+        self._length = np.linalg.norm(steps, axis=1)
+        self._start = np.concatenate(([0.0], np.cumsum(self._length)[:-1]))
+        self._direction = steps / np.maximum(self._length, 1e-9)[:, None]
+
+    def locate(self, position: NDArray[np.float64], heading: float, near: float | None = None) -> RoutePlace | None:
+        """Nearest place on the route; None if it is farther than `FARTHEST_ASIDE`.
+
+        Parameters
+        ----------
+        position : (3,) float64
+            Where it is [m].
+        heading : float
+            Direction of travel [rad].
+        near : float or None
+            A position along the route: of several places that are as near, the one nearest to it [m].
+        """
+        way = position - self.points[:-1]
+        at = np.clip(np.einsum("ij,ij->i", way, self._direction), 0.0, self._length)
+        aside = np.linalg.norm(way - at[:, None] * self._direction, axis=1)
+        nearest = int(np.argmin(aside))
+        if aside[nearest] > FARTHEST_ASIDE:
+            return None
+        if near is not None:
+            candidates = np.flatnonzero(aside <= aside[nearest] + _AS_NEAR)
+            nearest = int(candidates[np.argmin(np.abs(self._start[candidates] + at[candidates] - near))])
+            # Points of one piece of the way are all as near: the nearest of those about this one is meant.
+            about = candidates[np.abs(self._start[candidates] - self._start[nearest]) <= 2.0 * FARTHEST_ASIDE]
+            nearest = int(about[np.argmin(aside[about])])
+        x, y, _ = self._direction[nearest]
+        along = float(x) * math.cos(heading) + float(y) * math.sin(heading)
+        return RoutePlace(float(self._start[nearest] + at[nearest]), along)
+
+
+@dataclass(frozen=True, slots=True)
+class Extent:
+    """The piece of a route that a vehicle covers, and how it moves along it.
+
+    Attributes
+    ----------
+    begin, end : float
+        Positions of its two bumpers, in the direction of the route [m].
+    velocity : float
+        Along the route [m/s]; negative for oncoming vehicles.
+    """
+
+    begin: float
+    end: float
+    velocity: float
+
+
+def extent_of(place: RoutePlace, traffic: TrafficState, row: int) -> Extent:
+    """What a vehicle covers of a route.
+
+    Parameters
+    ----------
+    place : RoutePlace
+        Where its front bumper is.
+    traffic : TrafficState
+        The traffic.
+    row : int
+        Its row.
+    """
+    rear = place.front - float(traffic.length[row]) * place.along
+    return Extent(min(rear, place.front), max(rear, place.front), float(traffic.speed[row]) * place.along)
+
+
+def gap_between(one: Extent, other: Extent) -> float:
+    """Gap from one vehicle to another along the route, bumper to bumper [m].
+
+    Positive for another that is ahead in the direction of the route, negative for one behind, 0 for one beside.
+
+    Parameters
+    ----------
+    one, other : Extent
+        The two.
+    """
+    return max(other.begin - one.end, 0.0) or min(other.end - one.begin, 0.0)
+
+
+def time_to_meet(one: Extent, other: Extent) -> float:
+    """Time until one vehicle and another are beside one another at constant speeds [s].
+
+    ``inf`` if they do not approach; 0 while they are beside one another.
+
+    Parameters
+    ----------
+    one, other : Extent
+        The two.
+    """
+    gap = gap_between(one, other)
+    approach = math.copysign(1.0, gap) * (one.velocity - other.velocity)
+    return 0.0 if gap == 0.0 else abs(gap) / approach if approach > 0.0 else math.inf
+
+
+def headway_between(one: Extent, other: Extent) -> float:
+    """Time that the one that is behind takes for the gap at its speed [s]; ``inf`` if it stands or drives away.
+
+    Parameters
+    ----------
+    one, other : Extent
+        The two.
+    """
+    gap = gap_between(one, other)
+    speed = one.velocity if gap >= 0.0 else other.velocity
+    return abs(gap) / speed if speed > 0.0 else math.inf

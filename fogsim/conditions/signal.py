@@ -1,0 +1,121 @@
+"""What a signal of a run is: its unit, its range, what it needs, and how it is read from a moment."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum, StrEnum
+
+from fogsim.conditions.moment import Moment
+
+
+class Kind(Enum):
+    """What a signal is."""
+
+    NUMBER = "number"
+    FLAG = "true or false"
+    WORD = "word"
+    WORDS = "words"
+    LANE = "lane"
+
+
+class Need(StrEnum):
+    """What a run must have for a signal to have a value."""
+
+    EGO = "an ego"
+    FRAMES = "frames"
+    """A camera and estimators, which need an ego, too."""
+    ROUTE = "a route"
+    """Of the ego, or ``traffic.along``."""
+
+
+@dataclass(frozen=True, slots=True)
+class LanePlace:
+    """A lane by its number from the right, and how many there are.
+
+    Attributes
+    ----------
+    number : int
+        From 0.
+    count : int or None
+        None where it is not known.
+    """
+
+    number: int
+    count: int | None
+
+    @property
+    def names(self) -> frozenset[str] | None:
+        """Which of "right" and "left" it is; None where the left one is not known."""
+        if self.count is None:
+            return frozenset({"right"}) if self.number == 0 else None
+        return frozenset(name for name, at in (("right", 0), ("left", self.count - 1)) if self.number == at)
+
+
+Value = float | bool | str | frozenset[str] | LanePlace | None
+"""What a signal is now; None where it has no value."""
+
+
+class Place(Enum):
+    """What stands in the place holders of a signal's name."""
+
+    VEHICLE = "vehicle"
+    BANK = "fog bank"
+    METHOD = "estimator"
+    SIGNAL = "traffic light"
+    EVENT = "event"
+
+
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """A quantity of a run that conditions may ask for.
+
+    Attributes
+    ----------
+    meaning : str
+        One line on it.
+    value : callable
+        Takes it from a moment and what stands in the place holders.
+    kind : Kind
+        What it is.
+    unit : str
+        SI unit of a number; "" for a pure one.
+    shown_unit : str
+        Unit in which it is shown; "" for the SI one.
+    least, most : float
+        Range of a number; what lies outside cannot come.
+    words : tuple of str
+        What a word may be; empty where any may come.
+    places : tuple of Place
+        What stands in the place holders.
+    needs : frozenset of Need
+        What the run must have.
+    """
+
+    meaning: str
+    value: Callable[..., Value]
+    kind: Kind = Kind.NUMBER
+    unit: str = ""
+    shown_unit: str = ""
+    least: float = -math.inf
+    most: float = math.inf
+    words: tuple[str, ...] = ()
+    places: tuple[Place, ...] = ()
+    needs: frozenset[Need] = frozenset()
+
+    @property
+    def told_in(self) -> str:
+        """Unit in which it is shown."""
+        return self.shown_unit or self.unit
+
+    def read(self, moment: Moment, arguments: tuple[str, ...]) -> Value:
+        """Value at a moment; None where there is none.
+
+        Parameters
+        ----------
+        moment : Moment
+            The moment.
+        arguments : tuple of str
+            What stands in the place holders.
+        """
+        value: Value = self.value(moment, *arguments)
+        return None if isinstance(value, float) and math.isnan(value) else value

@@ -1,0 +1,204 @@
+"""What a condition is once it has been read: plain values, which say as text what was written."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """A signal of a run, such as ``ego.speed`` or ``gap(ego, slow)``.
+
+    Attributes
+    ----------
+    signal : str
+        Key in `SIGNALS`: ``X.speed``, ``gap(X, Y)``.
+    arguments : tuple of str
+        Vehicles, methods, numbers that stand in its place holders.
+    """
+
+    signal: str
+    arguments: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        head, bracket, tail = self.signal.partition("(")
+        if bracket:
+            return f"{head}({', '.join(map(_quoted, self.arguments))}){tail.partition(')')[2]}"
+        subject, dot, attribute = self.signal.rpartition(".")
+        if not (subject and self.arguments):
+            return self.signal
+        vehicle = self.arguments[0]
+        return f"{_quoted(vehicle) if vehicle[0].isalpha() else _always_quoted(vehicle)}{dot}{attribute}"
+
+
+_PLAIN = re.compile(r"[\w:#@.\-]+")
+
+
+def _quoted(name: str) -> str:
+    """A name as a condition may have it, in quotation marks where it must."""
+    return name if _PLAIN.fullmatch(name) else _always_quoted(name)
+
+
+def _always_quoted(name: str) -> str:
+    return f"'{name}'" if '"' in name else f'"{name}"'
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A number to compare with.
+
+    Attributes
+    ----------
+    value : float
+        In SI units.
+    number, unit : str
+        As written: "70" and "km/h".
+    """
+
+    value: float
+    number: str
+    unit: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.number} {self.unit}".strip()
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """A word to compare with, such as ``red``."""
+
+    word: str
+
+    def __str__(self) -> str:
+        return _quoted(self.word)
+
+
+Operand = Quantity | Word | Reference
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """A signal against a number, a word or another signal; `operator` is one of ``< <= > >= == != include``."""
+
+    left: Reference
+    operator: str
+    right: Operand
+
+    def __str__(self) -> str:
+        return f"{self.left} {self.operator} {self.right}"
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """A signal that passes a value now: ``falls below``, ``rises above``, ``becomes`` or, of any value, ``changes``."""
+
+    left: Reference
+    how: str
+    right: Operand | None = None
+
+    def __str__(self) -> str:
+        return f"{self.left} {self.how}" + ("" if self.right is None else f" {self.right}")
+
+
+@dataclass(frozen=True, slots=True)
+class Flag:
+    """A signal that is true or false by itself, such as ``ego.collision``."""
+
+    left: Reference
+
+    def __str__(self) -> str:
+        return str(self.left)
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """A condition that has been true without a break for some time [s]."""
+
+    part: "Condition"
+    duration: Quantity
+
+    def __str__(self) -> str:
+        return f"{_bracketed(self.part)} for {self.duration}"
+
+
+@dataclass(frozen=True, slots=True)
+class Not:
+    """A condition that is not true."""
+
+    part: "Condition"
+
+    def __str__(self) -> str:
+        return f"not {_bracketed(self.part)}"
+
+
+@dataclass(frozen=True, slots=True)
+class AllOf:
+    """Conditions that are all true."""
+
+    parts: tuple["Condition", ...]
+
+    def __str__(self) -> str:
+        return " and ".join(map(_bracketed, self.parts))
+
+
+@dataclass(frozen=True, slots=True)
+class AnyOf:
+    """Conditions of which one is true at least."""
+
+    parts: tuple["Condition", ...]
+
+    def __str__(self) -> str:
+        return " or ".join(map(_bracketed, self.parts))
+
+
+Condition = Comparison | Edge | Flag | Held | Not | AllOf | AnyOf
+"""A condition on a run."""
+
+
+def _bracketed(part: Condition) -> str:
+    return f"({part})" if isinstance(part, AllOf | AnyOf | Held) else str(part)
+
+
+def parts_of(condition: Condition) -> Iterator[Condition]:
+    """A condition and everything inside it, the innermost first.
+
+    Parameters
+    ----------
+    condition : Condition
+        The condition.
+    """
+    match condition:
+        case AllOf(parts) | AnyOf(parts):
+            for part in parts:
+                yield from parts_of(part)
+        case Not(part) | Held(part):
+            yield from parts_of(part)
+    yield condition
+
+
+def comparisons_of(condition: Condition) -> tuple[Comparison | Edge | Flag, ...]:
+    """What a condition asks of single signals, each once, in the order in which it is written.
+
+    Parameters
+    ----------
+    condition : Condition
+        The condition.
+    """
+    asked = (part for part in parts_of(condition) if isinstance(part, Comparison | Edge | Flag))
+    return tuple(dict.fromkeys(asked))
+
+
+def signals_of(condition: Condition) -> tuple[Reference, ...]:
+    """Signals that a condition asks for, each once, in the order in which they are written.
+
+    Parameters
+    ----------
+    condition : Condition
+        The condition.
+    """
+    found: dict[Reference, None] = {}
+    for asked in comparisons_of(condition):
+        found[asked.left] = None
+        if isinstance(asked, Comparison | Edge) and isinstance(asked.right, Reference):
+            found[asked.right] = None
+    return tuple(found)

@@ -1,0 +1,210 @@
+"""Watches a condition over the steps of a run: true, false, or not known."""
+
+import operator
+from collections.abc import Callable, Mapping
+
+from fogsim.conditions.moment import History, Moment
+from fogsim.conditions.signal import LanePlace, Value
+from fogsim.conditions.signals import SIGNALS
+from fogsim.conditions.syntax import (
+    AllOf,
+    AnyOf,
+    Comparison,
+    Condition,
+    Edge,
+    Flag,
+    Held,
+    Not,
+    Operand,
+    Quantity,
+    Reference,
+    Word,
+    parts_of,
+    signals_of,
+)
+from fogsim.quantities import parse_quantity
+from fogsim.values import TrafficStep
+
+_TICK = 1e-6
+"""Rounding of times [s]."""
+
+_COMPARE: Mapping[str, Callable[[float, float], bool]] = {
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+    "==": operator.eq,
+    "!=": operator.ne,
+}
+
+
+class Watch:
+    """Watches one condition, and remembers what it needs of earlier steps.
+
+    A comparison with a value that is not there now (the vehicle is not on the road, the estimator cannot tell) is not
+    known; what follows from the other parts all the same is: ``false and unknown`` is false.
+
+    Parameters
+    ----------
+    condition : Condition
+        From `parse_condition`.
+    """
+
+    def __init__(self, condition: Condition) -> None:
+        self.condition = condition
+        self._parts = tuple(dict.fromkeys(parts_of(condition)))
+        self._signals = signals_of(condition)
+        self._before: dict[Edge, Value] = {}
+        self._since: dict[Held, float] = {}
+        self._history = History()
+        self._units = _shown_units(self._parts)
+        self.values: Mapping[Reference, Value] = {}
+
+    def update(self, step: TrafficStep) -> bool | None:
+        """Take in the next step, and say whether the condition holds at it; None if that is not known.
+
+        Parameters
+        ----------
+        step : TrafficStep
+            The step; each of a run, in their order.
+        """
+        return self.look(self._history.moment(step))
+
+    def look(self, moment: Moment) -> bool | None:
+        """Do the same for a moment from a `History` that is shared with other watches.
+
+        Parameters
+        ----------
+        moment : Moment
+            The moment.
+        """
+        self.values = {signal: SIGNALS[signal.signal].read(moment, signal.arguments) for signal in self._signals}
+        results: dict[Condition, bool | None] = {}
+        for part in self._parts:
+            results[part] = self._evaluate(part, results, moment.step.time)
+        return results[self.condition]
+
+    def told(self) -> str:
+        """Say what the signals of the condition were at the last step: ``gap(ego, slow) = 83.2 m``."""
+        return ", ".join(
+            f"{signal} = {shown_value(signal, v, self._units[signal])}" for signal, v in self.values.items()
+        )
+
+    def _evaluate(self, part: Condition, results: Mapping[Condition, bool | None], time: float) -> bool | None:
+        result: bool | None
+        match part:
+            case Comparison(left, relation, right):
+                result = _compared(self.values[left], relation, self._operand(right))
+            case Flag(left):
+                result = _compared(self.values[left], "==", "true")
+            case Edge():
+                result = self._passed(part)
+            case Held(inner, duration):
+                result = self._held(part, results[inner], time, duration.value)
+            case Not(inner):
+                result = _not(results[inner])
+            case AllOf(parts):
+                result = _all([results[one] for one in parts])
+            case AnyOf(parts):
+                result = _not(_all([_not(results[one]) for one in parts]))
+        return result
+
+    def _operand(self, right: Operand) -> Value:
+        match right:
+            case Quantity():
+                return right.value
+            case Word():
+                return right.word
+            case Reference():
+                return self.values[right]
+
+    def _passed(self, edge: Edge) -> bool | None:
+        now = self.values[edge.left]
+        if now is None:
+            return None
+        before = self._before.get(edge)
+        self._before[edge] = now
+        if before is None:
+            return False
+        if edge.right is None:
+            return _without_count(before) != _without_count(now)
+        relation = {"falls below": "<", "rises above": ">", "becomes": "=="}[edge.how]
+        operand = self._operand(edge.right)
+        earlier, later = _compared(before, relation, operand), _compared(now, relation, operand)
+        return None if earlier is None or later is None else later and not earlier
+
+    def _held(self, part: Held, inside: bool | None, time: float, duration: float) -> bool | None:
+        if not inside:
+            self._since.pop(part, None)
+            return inside
+        return time - self._since.setdefault(part, time) >= duration - _TICK
+
+
+def _not(part: bool | None) -> bool | None:
+    return None if part is None else not part
+
+
+def _all(parts: list[bool | None]) -> bool | None:
+    """Whether all are true, in Kleene's logic of three values."""
+    return False if False in parts else None if None in parts else True
+
+
+def _without_count(value: Value) -> Value:
+    """A lane's number: on a road with more lanes it is the same lane."""
+    return value.number if isinstance(value, LanePlace) else value
+
+
+def _compared(value: Value, relation: str, operand: Value) -> bool | None:
+    if value is None or operand is None:
+        return None
+    if isinstance(value, LanePlace):
+        if isinstance(operand, str):
+            names = value.names
+            return None if names is None else (operand in names) == (relation == "==")
+        value = float(value.number)
+    if isinstance(value, frozenset):
+        return operand in value
+    if isinstance(value, bool | str):
+        same = operand == (str(value).lower() if isinstance(value, bool) else value)
+        return same == (relation == "==")
+    assert isinstance(operand, int | float)  # noqa: S101 - the parser has seen to it
+    return _COMPARE[relation](value, operand)
+
+
+def _shown_units(parts: tuple[Condition, ...]) -> dict[Reference, str]:
+    """Units in which signals are told: those in which the condition compares them, else their own."""
+    units: dict[Reference, str] = {}
+    for part in parts:
+        if isinstance(part, Comparison | Edge | Flag):
+            right = None if isinstance(part, Flag) else part.right
+            written = right.unit if isinstance(right, Quantity) else ""
+            units[part.left] = written or units.get(part.left, "") or SIGNALS[part.left.signal].told_in
+            if isinstance(right, Reference):
+                units.setdefault(right, units[part.left])
+    return units
+
+
+def shown_value(signal: Reference, value: Value, unit: str = "") -> str:
+    """A signal's value as messages tell it.
+
+    Parameters
+    ----------
+    signal : Reference
+        The signal.
+    value : float, bool, str, frozenset, LanePlace or None
+        Its value, in SI units.
+    unit : str
+        The unit to tell it in; "" for the signal's own.
+    """
+    if value is None:
+        return "unknown"
+    if isinstance(value, LanePlace):
+        return str(value.number)
+    if isinstance(value, frozenset):
+        return " ".join(sorted(value)) or "none"
+    if isinstance(value, bool | str):
+        return str(value).lower() if isinstance(value, bool) else value
+    kind = SIGNALS[signal.signal]
+    unit = unit or kind.told_in
+    number = value if unit == kind.unit else value / parse_quantity(f"1 {unit}", kind.unit)
+    return f"{number:.4g} {unit}".strip()

@@ -1,0 +1,1 @@
+"""Expectations of a run: what must hold in it, and what came."""

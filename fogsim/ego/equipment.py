@@ -1,12 +1,9 @@
 """What rides in the ego: from a snapshot of the traffic to a finished step."""
 
 import math
-<<<<<<< HEAD
-from collections.abc import Callable, Iterable
-=======
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
->>>>>>> 04f228d (Conditions on a run: a language over finished steps, its signals, and watches)
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,8 +71,7 @@ class EgoEquipment:
         self._view_renderer: EgoView | None = None
         self._streams: Streams | None = None
         self._meters: RoadMeters | None = None
-        self._route: NDArray[np.float64] | None = None
-        self._carriageways: Mapping[str, tuple[str, ...]] = {}
+        self._way = KnownWay()
         self._mount_camera(build.CAR)
 
     def _mount_camera(self, body: str) -> None:
@@ -119,7 +115,7 @@ class EgoEquipment:
             road, signs = network()
             self._view_renderer = kind(self._scenario, road, signs, body)
             self._meters = RoadMeters(self._scenario, road.route, road.route_limits)
-            self._route, self._carriageways = road.route, carriageways(road.lanes)
+            self._way = KnownWay(road.route, carriageways(road.lanes))
         for estimator in self._estimators:
             estimator.reset()
         self._fusion.reset()
@@ -180,12 +176,8 @@ class EgoEquipment:
         faults = self._schedule.at(time)
         pose, fog = self._pose(state, ego), field_at(self._view_renderer.fog, time)
         sections = self._meters.measure(fog)
-<<<<<<< HEAD
         known = tuple(one.fault for one in faults)
-        truth = fog_truth(fog, pose, self._camera, renderer.signs, state, sections, self._route, known)
-=======
-        truth = fog_truth(fog, pose, self._camera, renderer.signs, state, sections, self._route, self._carriageways)
->>>>>>> 04f228d (Conditions on a run: a language over finished steps, its signals, and watches)
+        truth = fog_truth(fog, pose, self._camera, renderer.signs, state, sections, self._way, known)
         view, radiance = renderer.render(state, ego, pose, time)
         image = self._camera_sensor.take(radiance, self._streams.camera)
         frame = Frame(*self._delivery.deliver(Delivered(time, image), faults), self._assumed_camera)
@@ -261,6 +253,21 @@ class EgoEquipment:
         self._view_renderer, self._streams, self._schedule = None, None, None
 
 
+class KnownWay(NamedTuple):
+    """What of the road does not change in a run.
+
+    Attributes
+    ----------
+    route : (n, 3) float64 or None
+        Polyline along the ego's route [m].
+    carriageways : mapping from str to tuple of str
+        Lanes for vehicles of each edge, from `carriageways`.
+    """
+
+    route: NDArray[np.float64] | None = None
+    carriageways: Mapping[str, tuple[str, ...]] = MappingProxyType({})
+
+
 def fog_truth(
     fog: FogField,
     pose: CameraPose,
@@ -268,12 +275,8 @@ def fog_truth(
     signs: SignMap,
     traffic: TrafficState | None = None,
     sections: tuple[RoadSection, ...] = (),
-    route: NDArray[np.float64] | None = None,
-<<<<<<< HEAD
+    way: KnownWay | None = None,
     faults: tuple[Fault, ...] = (),
-=======
-    lanes: Mapping[str, tuple[str, ...]] = MappingProxyType({}),
->>>>>>> 04f228d (Conditions on a run: a language over finished steps, its signals, and watches)
 ) -> Truth:
     """The fog at a camera, and as far as it sees along its heading, parallel to the road under it.
 
@@ -291,15 +294,10 @@ def fog_truth(
         Vehicles whose drivers have fog about them, too.
     sections : tuple of RoadSection
         What meters beside the road measure.
-    route : (n, 3) float64 or None
-        Polyline along the ego's route [m].
-<<<<<<< HEAD
+    way : KnownWay or None
+        The ego's route, and the lanes.
     faults : tuple of Fault
         Faults of its sensors in force.
-=======
-    lanes : mapping from str to tuple of str
-        Lanes for vehicles of each edge, from `carriageways`.
->>>>>>> 04f228d (Conditions on a run: a language over finished steps, its signals, and watches)
     """
     eye, level = np.array(pose.position), math.cos(pose.road_grade)
     direction = np.array([math.cos(pose.heading) * level, math.sin(pose.heading) * level, math.sin(pose.road_grade)])
@@ -315,12 +313,9 @@ def fog_truth(
         fog=fog,
         signs=signs,
         sections=sections,
-        route=route,
-<<<<<<< HEAD
+        route=None if way is None else way.route,
+        carriageways={} if way is None else way.carriageways,
         faults=faults,
-=======
-        carriageways=lanes,
->>>>>>> 04f228d (Conditions on a run: a language over finished steps, its signals, and watches)
         vehicle_extinctions=None if traffic is None else extinction(fog, traffic.position + _EYES),
     )
 

@@ -78,13 +78,10 @@ class Truth:
         sections of it are advised.
     route : (n, 3) float64 or None
         Polyline along the ego's route, or along ``traffic.along`` [m]; None where there is neither.
-<<<<<<< HEAD
     faults : tuple of Fault
         Faults of the ego's sensors in force now.
-=======
     carriageways : mapping from str to tuple of str
         Ids of the lanes for vehicles of each edge, from the right; empty where no network is known.
->>>>>>> 04f228d (Conditions on a run: a language over finished steps, its signals, and watches)
     """
 
     extinction: float
@@ -96,11 +93,8 @@ class Truth:
     vehicle_extinctions: NDArray[np.float64] | None = None
     sections: tuple[RoadSection, ...] = ()
     route: NDArray[np.float64] | None = None
-<<<<<<< HEAD
     faults: tuple[Fault, ...] = ()
-=======
     carriageways: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
->>>>>>> 04f228d (Conditions on a run: a language over finished steps, its signals, and watches)
 
     @property
     def visibility(self) -> float:

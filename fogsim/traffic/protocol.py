@@ -1,9 +1,11 @@
 """What the loop asks of a traffic simulation, whatever runs it."""
 
+from collections.abc import Sequence
 from typing import Protocol
 
 from fogsim.traffic.drivers.sight import FogAccess
 from fogsim.values import Command, NetworkSnapshot, RoadNetwork, SignMap, TrafficSnapshot, Unplayed
+from fogsim.values.script import TrafficAction
 
 
 class AnyTraffic(Protocol):
@@ -16,6 +18,25 @@ class AnyTraffic(Protocol):
         ----------
         fog : FogAccess
             The fog.
+        """
+
+    def begin(self, actions: Sequence[TrafficAction]) -> tuple[TrafficAction, ...]:
+        """Begin what a script asks for, with the next step.
+
+        Parameters
+        ----------
+        actions : sequence of TrafficAction
+            What begins.
+
+        Returns
+        -------
+        tuple of TrafficAction
+            Those that could not begin: the vehicle has left, or there is no such lane.
+
+        Raises
+        ------
+        InputError
+            If this simulation cannot do it at all.
         """
 
     def advance(self, command: Command) -> None:

@@ -2,11 +2,9 @@
 
 import functools
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Concatenate, ParamSpec, TypeVar
-
-import numpy as np
 
 from fogsim.errors import SimulationError
 from fogsim.traffic.collision_log import CollisionLog
@@ -25,9 +23,11 @@ from fogsim.traffic.sumo.planned_way import planned_way
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.route_position import GapToEgo, RoutePosition
 from fogsim.traffic.sumo.vehicle_reader import SubscribedReader, VehicleReader
+from fogsim.traffic.sumo_behaviour.scripted_actions import ScriptedActions, has_lane
 from fogsim.traffic.sumo_behaviour.speed_control import SpeedControl, SumoDesiredSpeeds
 from fogsim.traffic.sumo_drivers.drivers_perception import DriversPerception, drivers_perception
-from fogsim.values import Command, NetworkSnapshot, RoadNetwork, SignMap, TrafficSnapshot, TrafficState, Unplayed
+from fogsim.values import Command, NetworkSnapshot, RoadNetwork, SignMap, TrafficSnapshot, Unplayed
+from fogsim.values.script import TrafficAction
 
 _NO_ADVICE = Command()
 _P = ParamSpec("_P")
@@ -46,6 +46,7 @@ class _Run:
     lanes: LaneKeeping
     collisions: CollisionLog
     script: Script
+    actions: ScriptedActions
     session: str
     perception: DriversPerception | None = None
     drivers: SumoDesiredSpeeds | None = None
@@ -111,15 +112,17 @@ class SumoTraffic:
         api = self._link.begin(command_line(setup, seed))
         roster, session = Roster(api, self._link.remote), new_session(api)
         reader = SubscribedReader if self._link.remote else VehicleReader
+        script, speeds, changes = Script(setup.events), SpeedControl(api, setup.step_length), LaneChangeSmoothing()
         self._run = _Run(
             api=api,
             roster=roster,
             reader=reader(api, setup.ego, setup.reading_radius, roster),
-            lane_changes=LaneChangeSmoothing(),
-            speeds=SpeedControl(api, setup.step_length),
+            lane_changes=changes,
+            speeds=speeds,
             lanes=LaneKeeping(api, setup.keep_lane, roster, session),
             collisions=CollisionLog(),
-            script=Script(setup.events),
+            script=script,
+            actions=ScriptedActions(api, speeds, script.lamps, changes, session),
             session=session,
         )
         self._seed = seed
@@ -194,6 +197,23 @@ class SumoTraffic:
         return road_network(net, route), sign_map(net, self._setup.additional or loaded_additional(api))
 
     @_translates_errors
+    def begin(self, actions: Sequence[TrafficAction]) -> tuple[TrafficAction, ...]:
+        """Begin actions with the next step; see `Traffic.begin`.
+
+        Parameters
+        ----------
+        actions : sequence of TrafficAction
+            What begins.
+        """
+        run = self._running
+        run.roster.update()
+        return run.actions.begin(actions, self._elapsed(run), run.roster.present)
+
+    def _elapsed(self, run: _Run) -> float:
+        """Time since the ego appeared [s]."""
+        return float(run.api.simulation.getTime()) - self._begun
+
+    @_translates_errors
     def advance(self, command: Command) -> None:
         """Move by one traffic step; see `Traffic.advance`.
 
@@ -218,6 +238,7 @@ class SumoTraffic:
         run = self._running
         self._command = command
         run.speeds.apply(self._play_script(run, command))
+        run.actions.play(self._elapsed(run), run.roster.present)
         self._update_drivers(run, command)
 
     @_translates_errors
@@ -245,13 +266,8 @@ class SumoTraffic:
         def gap_to_ego(other: str) -> float | None:
             return GapToEgo(run.api, ego).measure(other) if ego is not None and ego in present else None
 
-        def has_lane(other: str, lanes: int) -> bool:
-            edge, lane = str(vehicle.getRoadID(other)), int(vehicle.getLaneIndex(other)) + lanes
-            # Lanes of a junction tell nothing of those behind it, where SUMO makes the change.
-            return lane >= 0 and (edge.startswith(":") or lane < int(run.api.edge.getLaneNumber(edge)))
-
-        time = run.api.simulation.getTime() - self._begun
-        return Situation(time, present, vehicle.getDistance, gap_to_ego, has_lane)
+        may_change = functools.partial(has_lane, run.api)
+        return Situation(self._elapsed(run), present, vehicle.getDistance, gap_to_ego, may_change)
 
     def _step(self, run: _Run) -> None:
         self._update_drivers(run, _NO_ADVICE)
@@ -289,7 +305,7 @@ class SumoTraffic:
         state = run.reader.state(self._command.lamps, self._heard(run))
         row = state.ids.index(ego)
         route_position, route_length = self._route.update(state.position[row])
-        state = _with_failed_lamps(run.lane_changes.smoothed(state), run.script.dark)
+        state = run.script.lamps.shown(run.lane_changes.smoothed(state), self._elapsed(run))
         return TrafficSnapshot(
             state=state,
             ego=row,
@@ -309,7 +325,7 @@ class SumoTraffic:
         # Who is between lanes is on none.
         limits = [float(run.api.lane.getMaxSpeed(lane)) for lane in {*state.lane} if lane]
         return NetworkSnapshot(
-            state=_with_failed_lamps(run.lane_changes.smoothed(state), run.script.dark),
+            state=run.script.lamps.shown(run.lane_changes.smoothed(state), self._elapsed(run)),
             speed_limit=max(limits, default=math.inf),
             collisions=run.collisions.take(),
             is_over=run.api.simulation.getMinExpectedNumber() == 0,
@@ -336,6 +352,7 @@ class SumoTraffic:
         run.roster.reload()
         run.speeds.release(run.roster.present)
         run.lanes.release(run.roster.present)
+        run.actions.release(run.roster.present)
         if run.perception is not None:
             run.perception.release()
         if run.drivers is not None:
@@ -345,10 +362,3 @@ class SumoTraffic:
         """End the simulation; see `Traffic.close`."""
         self._link.end()
         self._run = None
-
-
-def _with_failed_lamps(state: TrafficState, dark: frozenset[str]) -> TrafficState:
-    """A state in which some vehicles' lamps have failed."""
-    if not dark:
-        return state
-    return replace(state, lamps=np.where([v in dark for v in state.ids], 0, state.lamps).astype(np.int32))

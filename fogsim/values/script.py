@@ -1,6 +1,10 @@
 """What a scenario's script does in a run."""
 
+import math
 from dataclasses import dataclass
+from enum import StrEnum
+
+from fogsim.values.light import Lamp
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,3 +24,203 @@ class Begun:
     name: str
     time: float
     what: str = ""
+
+
+class Shape(StrEnum):
+    """How a speed goes over into another: evenly, along half a wave of a cosine, or at once."""
+
+    LINEAR = "linear"
+    SINUSOIDAL = "sinusoidal"
+    STEP = "step"
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeSpeed:
+    """A vehicle comes to a speed, whatever limits and advice say, and holds it; it hits nobody for that.
+
+    Attributes
+    ----------
+    vehicle : str
+        Its id.
+    speed : float
+        Speed to come to [m/s].
+    duration : float
+        Time that it takes [s]; 0 for at once. A vehicle that cannot speed up as fast takes longer.
+    shape : Shape
+        How.
+    hold : float
+        Time from the beginning until the driver drives by himself again [s].
+    """
+
+    vehicle: str
+    speed: float
+    duration: float = 0.0
+    shape: Shape = Shape.LINEAR
+    hold: float = math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Follow:
+    """A vehicle keeps a time headway to another one ahead of it, in its own lane or in another.
+
+    Attributes
+    ----------
+    vehicle, leader : str
+        Their ids.
+    headway : float
+        Gap, bumper to bumper, over the vehicle's own speed [s].
+    hold : float
+        Time until the driver drives by himself again [s].
+    """
+
+    vehicle: str
+    leader: str
+    headway: float
+    hold: float = math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """A vehicle stops at a place ahead, stands there, and drives on.
+
+    Attributes
+    ----------
+    vehicle : str
+        Its id.
+    distance : float
+        Way to the place [m].
+    deceleration : float
+        How hard it brakes for that, as late as it can [m/s²].
+    stand : float
+        Time for which it stands [s].
+    """
+
+    vehicle: str
+    distance: float
+    deceleration: float = 3.0
+    stand: float = math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeLane:
+    """A vehicle changes lane, whoever is there: it cuts in.
+
+    Attributes
+    ----------
+    vehicle : str
+        Its id.
+    lanes : int
+        How many lanes to the left; negative to the right.
+    stay : float
+        Time for which it stays there [s].
+    duration : float or None
+        Time that the way over takes [s]; None for the usual one.
+    indicator : float
+        Time for which it indicates before [s]; the lamp goes out when it is over. 0 for no indicating.
+    """
+
+    vehicle: str
+    lanes: int
+    stay: float = 60.0
+    duration: float | None = None
+    indicator: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class SetLamps:
+    """Lamps of a vehicle are switched by hand, or fail.
+
+    Attributes
+    ----------
+    vehicle : str
+        Its id.
+    lit, dark : Lamp
+        Lamps that are lit, or dark, from now on, whatever the vehicle does.
+    failed : Lamp
+        Lamps that are dark for ever.
+    automatic : Lamp
+        Lamps that are the vehicle's own again.
+    """
+
+    vehicle: str
+    lit: Lamp = Lamp.NONE
+    dark: Lamp = Lamp.NONE
+    failed: Lamp = Lamp.NONE
+    automatic: Lamp = Lamp.NONE
+
+
+@dataclass(frozen=True, slots=True)
+class SetSignal:
+    """Traffic lights show something else than their program.
+
+    Attributes
+    ----------
+    signal : str
+        Id of the traffic lights.
+    phase : int or None
+        Phase of their program to go to, from which it goes on; None for `state`.
+    state : str
+        SUMO's letter for each link, such as ``rrGG``, or one letter for all.
+    hold : float
+        Time after which the program goes on where it was left [s].
+    """
+
+    signal: str
+    phase: int | None = None
+    state: str = "r"
+    hold: float = math.inf
+
+
+TrafficAction = ChangeSpeed | Follow | Stop | ChangeLane | SetLamps | SetSignal
+"""What a traffic simulation can be told to do at once."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeFog:
+    """The fog becomes thicker or thinner everywhere.
+
+    Attributes
+    ----------
+    density : float
+        Factor of the extinction coefficient of the scenario to come to [-].
+    duration : float
+        Time that it takes [s].
+    """
+
+    density: float
+    duration: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeLight:
+    """Daylight becomes brighter or darker, and stays daylight.
+
+    Attributes
+    ----------
+    factor : float
+        Horizontal illuminance to come to, over that of the scenario [-].
+    duration : float
+        Time that it takes [s].
+    """
+
+    factor: float
+    duration: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Actions:
+    """What of a script begins now, and is in force in the next camera period.
+
+    Attributes
+    ----------
+    traffic : tuple of TrafficAction
+        For the traffic.
+    fog : tuple of ChangeFog
+        For the fog.
+    light : tuple of ChangeLight
+        For the daylight.
+    """
+
+    traffic: tuple[TrafficAction, ...] = ()
+    fog: tuple[ChangeFog, ...] = ()
+    light: tuple[ChangeLight, ...] = ()

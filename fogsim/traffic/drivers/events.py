@@ -4,7 +4,9 @@ import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 
+from fogsim.traffic.drivers.playing import ALL_LAMPS, Lamps
 from fogsim.values import Reason, Unplayed, UnplayedEvent
+from fogsim.values.script import ChangeLane, SetLamps
 
 Order = tuple[float, float]
 """Target speed [m/s], ``inf`` to free the vehicle, and the deceleration to reach it with [m/s²]."""
@@ -183,12 +185,12 @@ class ScriptedActions:
     ----------
     orders : mapping from vehicle id to Order
         Speeds to bring vehicles to.
-    lane_changes : tuple of LaneChangeEvent
+    lane_changes : tuple of ChangeLane
         Lane changes that begin now.
     """
 
     orders: Mapping[str, Order]
-    lane_changes: tuple[LaneChangeEvent, ...]
+    lane_changes: tuple[ChangeLane, ...]
 
 
 class Script:
@@ -198,20 +200,25 @@ class Script:
     ----------
     events : iterable of Event
         What is scripted.
+
+    Attributes
+    ----------
+    lamps : Lamps
+        Lamps that are not the vehicles' own.
     """
 
     def __init__(self, events: Iterable[Event]) -> None:
+        self.lamps = Lamps()
         self._events = tuple(events)
         self._waiting: list[Event] = list(self._events)
         self._without_lane: set[LaneChangeEvent] = set()
         self._braking: dict[BrakeEvent, float] = {}
-        self._dark: set[str] = set()
         self._gaps: dict[str, float | None] = {}
 
     @property
     def dark(self) -> frozenset[str]:
         """Vehicles whose lamps have failed."""
-        return frozenset(self._dark)
+        return self.lamps.dark
 
     @property
     def is_idle(self) -> bool:
@@ -270,15 +277,15 @@ class Script:
             if isinstance(event, BrakeEvent):
                 self._braking[event] = situation.time
             elif isinstance(event, LampFailureEvent):
-                self._dark.add(event.vehicle)
+                self.lamps.switch(SetLamps(event.vehicle, failed=ALL_LAMPS))
         return begun
 
-    def _lane_changes(self, begun: Iterable[Event], situation: Situation) -> tuple[LaneChangeEvent, ...]:
+    def _lane_changes(self, begun: Iterable[Event], situation: Situation) -> tuple[ChangeLane, ...]:
         """Lane changes among events that begin, without those for which there is no lane."""
         changes = [event for event in begun if isinstance(event, LaneChangeEvent)]
         possible = tuple(event for event in changes if situation.has_lane(event.vehicle, event.lanes))
         self._without_lane.update(set(changes).difference(possible))
-        return possible
+        return tuple(ChangeLane(event.vehicle, event.lanes, event.stay) for event in possible)
 
     def _is_due(self, event: Event, situation: Situation, gap: float | None) -> bool:
         vehicle = event.vehicle

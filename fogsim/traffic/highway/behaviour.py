@@ -15,6 +15,7 @@ from fogsim.traffic.highway.fleet import Fleet
 from fogsim.traffic.highway.manoeuvres import Manoeuvres
 from fogsim.traffic.highway.perception import limit_sight
 from fogsim.values import Command, Unplayed
+from fogsim.values.script import TrafficAction
 
 
 class DriverControl:
@@ -72,6 +73,16 @@ class DriverControl:
         """What everybody has heard advised, the ego its own [m/s]."""
         own, ego = self.command.advice.speed, self._fleet.name(self._fleet.ego)
         return self._desired_speeds.heard if math.isinf(own) else {**self._desired_speeds.heard, ego: own}
+
+    def begin(self, actions: Sequence[TrafficAction]) -> tuple[TrafficAction, ...]:
+        """Begin what a script asks for; see `Manoeuvres.begin`.
+
+        Parameters
+        ----------
+        actions : sequence of TrafficAction
+            What begins.
+        """
+        return self._manoeuvres.begin(actions)
 
     def unplayed(self, keep_lane: Sequence[str]) -> Unplayed:
         """Tell what has not been played so far; see `Manoeuvres.unplayed`.

@@ -2,16 +2,18 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, TypeGuard
 
 from highway_env.vehicle.controller import ControlledVehicle
 
 from fogsim.errors import InputError, suggest
 from fogsim.kinematics import decelerated_speed
 from fogsim.linear_algebra import matrix_product
-from fogsim.traffic.drivers.events import Event, LaneChangeEvent, Order, Script, Situation, signed_gap
+from fogsim.traffic.drivers.events import Event, Order, Script, Situation, signed_gap
+from fogsim.traffic.drivers.playing import ALL_LAMPS
 from fogsim.traffic.highway.fleet import LEAD, Fleet, acceleration
 from fogsim.values import Unplayed
+from fogsim.values.script import ChangeLane, SetLamps, TrafficAction
 
 
 class Manoeuvres:
@@ -42,6 +44,42 @@ class Manoeuvres:
         self._script = Script(events)
         self._driven: dict[str, float] = {}
         self._keeping_lane: dict[str, tuple[float, bool]] = {}
+
+    def begin(self, actions: Sequence[TrafficAction]) -> tuple[TrafficAction, ...]:
+        """Begin what a script asks for: changes of lane as they are here, and lamps that fail all at once.
+
+        Parameters
+        ----------
+        actions : sequence of TrafficAction
+            What begins.
+
+        Returns
+        -------
+        tuple of TrafficAction
+            Those that could not begin: the vehicle has left, or there is no such lane.
+
+        Raises
+        ------
+        InputError
+            If highway-env's vehicles cannot do it.
+        """
+        vehicles, refused = self._fleet.present(), list[TrafficAction]()
+        situation = self._situation(vehicles)
+        for action in actions:
+            if not _is_playable(action):
+                raise InputError(
+                    f"timeline: highway-env's vehicles cannot play {type(action).__name__}: only changes of lane "
+                    "without duration and indicator, and the failure of all lamps"
+                )
+            if action.vehicle not in vehicles:
+                refused.append(action)
+            elif isinstance(action, SetLamps):
+                self._script.lamps.switch(action)
+            elif situation.has_lane(action.vehicle, action.lanes):
+                self._change_lane(vehicles[action.vehicle], action)
+            else:
+                refused.append(action)
+        return tuple(refused)
 
     def plan(self) -> Mapping[str, Order]:
         """Begin what is due, before the drivers decide.
@@ -100,7 +138,7 @@ class Manoeuvres:
         driven = self._driven
         return Situation(self._fleet.time, set(vehicles), lambda name: driven.get(name, 0.0), gap_to_ego, has_lane)
 
-    def _change_lane(self, vehicle: Any, event: LaneChangeEvent) -> None:
+    def _change_lane(self, vehicle: Any, event: ChangeLane) -> None:
         """Aim for another lane, as far over as there are lanes, and stay there: MOBIL would call it off."""
         if not isinstance(vehicle, ControlledVehicle):
             raise InputError(
@@ -118,6 +156,12 @@ class Manoeuvres:
                 del self._keeping_lane[name]
                 if name in vehicles:
                     vehicles[name].enable_lane_change = own
+
+
+def _is_playable(action: TrafficAction) -> TypeGuard[ChangeLane | SetLamps]:
+    if isinstance(action, ChangeLane):
+        return action.duration is None and action.indicator == 0.0
+    return isinstance(action, SetLamps) and action.failed == ALL_LAMPS
 
 
 def _lane_over(vehicle: Any, lanes: int) -> tuple[str, str, int]:

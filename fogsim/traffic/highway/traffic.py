@@ -18,6 +18,7 @@ from fogsim.traffic.highway.network import planned_route, road_network, same_roa
 from fogsim.traffic.highway.snapshot import read_snapshot
 from fogsim.traffic.setup import UNTOUCHED, AfterCollision
 from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot, Unplayed
+from fogsim.values.script import TrafficAction
 
 
 def is_highway_environment(environment: object) -> bool:
@@ -156,6 +157,22 @@ class HighwayTraffic:
         if self._network is None:
             raise SimulationError("the traffic has not been started, or is closed")
         return self._network, SignMap()
+
+    def begin(self, actions: Sequence[TrafficAction]) -> tuple[TrafficAction, ...]:
+        """Begin what a script asks for; see `Traffic.begin`.
+
+        Parameters
+        ----------
+        actions : sequence of TrafficAction
+            What begins.
+
+        Raises
+        ------
+        InputError
+            If highway-env's vehicles cannot do it.
+        """
+        _, control = self._running()
+        return control.begin(actions)
 
     def advance(self, command: Command) -> None:
         """Move by one simulation step with a command in force.

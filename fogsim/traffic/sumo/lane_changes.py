@@ -17,6 +17,9 @@ from fogsim.values import TrafficState
 DURATION = 3.0
 """Time that a change by one lane takes [s]."""
 
+LEAST_DURATION = 0.001
+"""Time that a change at once takes [s]."""
+
 LANE_WIDTH = 3.75
 """Whoever moves farther to the side than this takes longer, at the same sideways speed [m]."""
 
@@ -68,6 +71,19 @@ class LaneChangeSmoothing:
     def __init__(self) -> None:
         self._last: TrafficState | None = None
         self._glides: dict[str, _Glide] = {}
+        self._wanted: dict[str, float] = {}
+
+    def take_time(self, vehicle: str, duration: float) -> None:
+        """Let the next change of a vehicle take a time.
+
+        Parameters
+        ----------
+        vehicle : str
+            Its id.
+        duration : float
+            The time [s]; 0 for a change at once.
+        """
+        self._wanted[vehicle] = duration
 
     def smoothed(self, state: TrafficState) -> TrafficState:
         """The state as it is to be seen; the states of one run are to be given in their order.
@@ -91,7 +107,8 @@ class LaneChangeSmoothing:
                 earlier = self._glides.get(vehicle)
                 left, rate = (0.0, 0.0) if earlier is None else earlier.left(state.time)
                 offset = left + jump
-                duration = DURATION * max(1.0, abs(offset) / LANE_WIDTH)
+                usual = DURATION * max(1.0, abs(offset) / LANE_WIDTH)
+                duration = max(self._wanted.pop(vehicle, usual), LEAST_DURATION)
                 self._glides[vehicle] = _Glide(state.time, duration, offset, rate)
 
     def _glided(self, state: TrafficState) -> TrafficState:

@@ -27,6 +27,17 @@ from fogsim.traffic.sumo_behaviour.top_speeds import TopSpeedControl
 from fogsim.values import Command, Display
 
 _SUMO_DRIVES = -1.0
+_IMPOSED = 1 + 8 + 16 + 64
+"""Speed mode of a vehicle whose speed is imposed: it hits nobody, gives way and stops at red lights.
+
+It regards neither the road's limit nor how hard its type may speed up and brake, which is seen to here.
+"""
+_IMPOSED_CLOSE = _IMPOSED - 1
+"""That of one who follows as closely as the script says, and whose leader is watched here."""
+
+_LEADER_RANGE = 200.0
+"""Distance up to which somebody ahead is looked for [m]."""
+
 _SAME = 1e-6  # [m/s], [m/s²]
 
 
@@ -45,6 +56,7 @@ class SpeedControl:
         self._vehicles = api.vehicle
         self._step_length = step_length
         self._held: set[str] = set()
+        self._modes: dict[str, int] = {}
 
     def apply(self, orders: Mapping[str, Order]) -> None:
         """Apply the orders of this step.
@@ -61,6 +73,56 @@ class SpeedControl:
                 self._vehicles.setSpeed(vehicle, _SUMO_DRIVES)
                 self._held.discard(vehicle)
 
+    def impose(self, speeds: Mapping[str, float], close: Collection[str] = ()) -> None:
+        """Give vehicles exact speeds after this step, as far as others on the road leave room for them.
+
+        They speed up no faster than their type can, and brake as hard as it can in an emergency.
+
+        Parameters
+        ----------
+        speeds : mapping from vehicle id to float
+            Speeds of vehicles on the road [m/s]; ``inf`` frees one.
+        close : collection of str
+            Those who may come nearer to the one ahead than SUMO's car following holds safe.
+        """
+        get = self._vehicles
+        for vehicle, wanted in speeds.items():
+            if math.isinf(wanted):
+                self._free(vehicle)
+                continue
+            mode = _IMPOSED_CLOSE if vehicle in close else _IMPOSED
+            self._modes.setdefault(vehicle, get.getSpeedMode(vehicle))
+            if get.getSpeedMode(vehicle) != mode:
+                get.setSpeedMode(vehicle, mode)
+            now, step = get.getSpeed(vehicle), self._step_length
+            if self._is_in_danger(vehicle) if vehicle in close else self._brakes_harder(vehicle):
+                get.setSpeed(vehicle, _SUMO_DRIVES)
+                continue
+            lowest, highest = now - get.getEmergencyDecel(vehicle) * step, now + get.getAccel(vehicle) * step
+            get.setSpeed(vehicle, max(min(wanted, highest), lowest, 0.0))
+
+    def _brakes_harder(self, vehicle: str) -> bool:
+        """Whether the driver would by himself brake harder than his type does but in an emergency."""
+        get = self._vehicles
+        hardest = get.getDecel(vehicle) * self._step_length
+        return bool(get.getSpeedWithoutTraCI(vehicle) < get.getSpeed(vehicle) - hardest - _SAME)
+
+    def _is_in_danger(self, vehicle: str) -> bool:
+        """Whether somebody ahead is so near, or so slow, that the type's deceleration hardly does to hit nobody."""
+        get = self._vehicles
+        found = get.getLeader(vehicle, _LEADER_RANGE)
+        if not found or not found[0]:
+            return False
+        # SUMO's gap leaves out the follower's minimum gap.
+        gap = max(found[1] + get.getMinGap(vehicle), _SAME)
+        approach = max(get.getSpeed(vehicle) - get.getSpeed(found[0]), 0.0)
+        return bool(gap < 1.0 or approach**2 / (2.0 * gap) > get.getDecel(vehicle))
+
+    def _free(self, vehicle: str) -> None:
+        if vehicle in self._modes:
+            self._vehicles.setSpeed(vehicle, _SUMO_DRIVES)
+            self._vehicles.setSpeedMode(vehicle, self._modes.pop(vehicle))
+
     def release(self, present: Collection[str]) -> None:
         """Free all vehicles that are held.
 
@@ -72,6 +134,10 @@ class SpeedControl:
         for vehicle in self._held.intersection(present):
             self._vehicles.setSpeed(vehicle, _SUMO_DRIVES)
         self._held.clear()
+        for vehicle in list(self._modes):
+            if vehicle in present:
+                self._free(vehicle)
+        self._modes.clear()
 
     def _hold(self, vehicle: str, target: float, deceleration: float) -> None:
         self._held.add(vehicle)

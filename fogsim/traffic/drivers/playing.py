@@ -1,0 +1,303 @@
+"""Actions of a script that have begun: speeds, lanes and lamps of vehicles, whatever simulates them."""
+
+import math
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+import numpy as np
+
+from fogsim.values import Lamp, TrafficState
+from fogsim.values.script import ChangeLane, ChangeSpeed, Follow, SetLamps, Shape, Stop, TrafficAction
+
+ALL_LAMPS = Lamp(sum(Lamp))
+"""Every lamp of a vehicle."""
+
+BESIDE_STANDSTILL = 2.0
+"""Gap that a following vehicle leaves when it stands [m]."""
+
+GAP_GAIN, SPEED_GAIN = 0.25, 0.8
+"""Of the law by which a scripted vehicle follows: acceleration for a gap [1/s²] and for a difference of speeds [1/s].
+
+They damp it at any headway above 0.25 s (Rajamani, Vehicle Dynamics and Control, 2nd ed., ch. 6: constant time gap).
+"""
+
+LEAST_ACCELERATION, MOST_ACCELERATION = -6.0, 2.5
+"""Limits of that acceleration [m/s²]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """What actions look at.
+
+    Attributes
+    ----------
+    time : float
+        Time since the ego appeared [s].
+    step : float
+        Time to the next step [s].
+    present : collection of str
+        Vehicles on the road.
+    driven, speed : callable
+        Distance that a vehicle has driven [m], and its speed [m/s].
+    gap : callable
+        Gap from a vehicle to another that is ahead of it, bumper to bumper [m]; None if there is none.
+    """
+
+    time: float
+    step: float
+    present: Collection[str]
+    driven: Callable[[str], float]
+    speed: Callable[[str], float]
+    gap: Callable[[str, str], float | None]
+
+
+class _Course(Protocol):
+    """Speeds of one vehicle while an action lasts."""
+
+    def speed(self, motion: Motion) -> float | None:
+        """Speed to have after the next step [m/s]; ``inf`` for the driver's own, None when the action is over."""
+
+
+@dataclass(slots=True)
+class _SpeedCourse:
+    action: ChangeSpeed
+    begun: float
+    first: float
+
+    def speed(self, motion: Motion) -> float | None:
+        passed = motion.time + motion.step - self.begun
+        if motion.time - self.begun >= self.action.hold - 1e-9:
+            return None
+        return speed_on_the_way(self.action, self.first, passed)
+
+
+def speed_on_the_way(action: ChangeSpeed, first: float, passed: float) -> float:
+    """Speed at a time on the way from one speed to another [m/s].
+
+    Parameters
+    ----------
+    action : ChangeSpeed
+        The change.
+    first : float
+        Speed at its beginning [m/s].
+    passed : float
+        Time since then [s].
+    """
+    at_once = action.shape is Shape.STEP or action.duration <= 0.0
+    share = 1.0 if at_once else min(max(passed / action.duration, 0.0), 1.0)
+    if action.shape is Shape.SINUSOIDAL:
+        share = 0.5 - 0.5 * math.cos(math.pi * share)
+    return first + share * (action.speed - first)
+
+
+@dataclass(slots=True)
+class _FollowCourse:
+    action: Follow
+    begun: float
+
+    def speed(self, motion: Motion) -> float | None:
+        follow = self.action
+        if motion.time - self.begun >= follow.hold - 1e-9 or follow.leader not in motion.present:
+            return None
+        gap, own = motion.gap(follow.vehicle, follow.leader), motion.speed(follow.vehicle)
+        if gap is None:
+            return math.inf
+        excess = gap - BESIDE_STANDSTILL - follow.headway * own
+        wanted = GAP_GAIN * excess + SPEED_GAIN * (motion.speed(follow.leader) - own)
+        return max(own + min(max(wanted, LEAST_ACCELERATION), MOST_ACCELERATION) * motion.step, 0.0)
+
+
+@dataclass(slots=True)
+class _StopCourse:
+    action: Stop
+    place: float
+    stood_since: float | None = None
+
+    def speed(self, motion: Motion) -> float | None:
+        left = max(self.place - motion.driven(self.action.vehicle), 0.0)
+        own, lost = motion.speed(self.action.vehicle), self.action.deceleration * motion.step
+        if self.stood_since is None and own < 0.1 and left < 1.0:
+            self.stood_since = motion.time
+        if self.stood_since is not None:
+            return None if motion.time - self.stood_since >= self.action.stand - 1e-9 else 0.0
+        # From this speed after the step one comes to a standstill at the place.
+        allowed = math.sqrt(lost**2 + 2.0 * self.action.deceleration * left) - lost
+        return allowed if allowed < own else math.inf
+
+
+@dataclass(slots=True)
+class _Switches:
+    """Lamps that are not the vehicle's own."""
+
+    lit: Lamp = Lamp.NONE
+    dark: Lamp = Lamp.NONE
+    failed: Lamp = Lamp.NONE
+
+
+@dataclass(frozen=True, slots=True)
+class _Indicating:
+    change: ChangeLane
+    begins: float
+    ends: float
+
+
+@dataclass(slots=True)
+class Lamps:
+    """Lamps that are switched by hand, have failed, or indicate a change of lane."""
+
+    _switches: dict[str, _Switches] = field(default_factory=dict)
+    _indicating: dict[str, _Indicating] = field(default_factory=dict)
+
+    @property
+    def dark(self) -> frozenset[str]:
+        """Vehicles of which nothing can be seen but the body: no lamp that would shine by itself is lit."""
+        seen = Lamp.POSITION | Lamp.LOW_BEAM
+        return frozenset(v for v, s in self._switches.items() if (s.dark | s.failed) & seen == seen and not s.lit)
+
+    def switch(self, action: SetLamps) -> None:
+        """Switch lamps.
+
+        Parameters
+        ----------
+        action : SetLamps
+            Which.
+        """
+        now = self._switches.setdefault(action.vehicle, _Switches())
+        now.failed |= action.failed
+        now.lit = (now.lit & ~(action.dark | action.automatic) | action.lit) & ~now.failed
+        now.dark = now.dark & ~(action.lit | action.automatic) | action.dark
+
+    def indicate(self, indicating: _Indicating) -> None:
+        """Let a vehicle indicate.
+
+        Parameters
+        ----------
+        indicating : _Indicating
+            Which, and until when.
+        """
+        self._indicating[indicating.change.vehicle] = indicating
+
+    def shown(self, state: TrafficState, time: float) -> TrafficState:
+        """A state with the lamps as they are.
+
+        Parameters
+        ----------
+        state : TrafficState
+            With the lamps that the vehicles would have lit by themselves.
+        time : float
+            Time since the ego appeared [s].
+        """
+        self._indicating = {v: one for v, one in self._indicating.items() if time < one.ends}
+        touched = {v for v in (*self._switches, *self._indicating) if v in state.ids}
+        if not touched:
+            return state
+        lamps = state.lamps.copy()
+        for vehicle in touched:
+            row, switches = state.ids.index(vehicle), self._switches.get(vehicle, _Switches())
+            lit = Lamp(int(lamps[row]))
+            if vehicle in self._indicating:
+                left = self._indicating[vehicle].change.lanes > 0
+                lit |= Lamp.INDICATOR_LEFT if left else Lamp.INDICATOR_RIGHT
+            lamps[row] = int((lit | switches.lit) & ~(switches.dark | switches.failed))
+        return replace(state, lamps=lamps.astype(np.int32))
+
+
+USUAL_DURATION = 3.0
+"""Time that a change of lane takes which says nothing of it [s]."""
+
+
+class Playing:
+    """Plays what has begun.
+
+    Parameters
+    ----------
+    lamps : Lamps
+        Lamps that are not the vehicles' own.
+    """
+
+    def __init__(self, lamps: Lamps) -> None:
+        self._lamps = lamps
+        self._courses: dict[str, _Course] = {}
+        self._due_changes: list[_Indicating] = []
+
+    @property
+    def is_idle(self) -> bool:
+        """True if nothing is under way, so that `speeds` and `changes` would give nothing."""
+        return not (self._courses or self._due_changes)
+
+    @property
+    def following(self) -> frozenset[str]:
+        """Vehicles that keep a headway to another one."""
+        return frozenset(v for v, course in self._courses.items() if isinstance(course, _FollowCourse))
+
+    def begin(self, action: TrafficAction, motion: Motion) -> None:
+        """Begin an action of a vehicle on the road; of several on a speed the last one counts.
+
+        Parameters
+        ----------
+        action : TrafficAction
+            What; traffic lights are not drivers' business, and left alone.
+        motion : Motion
+            How everybody moves.
+        """
+        match action:
+            case ChangeSpeed():
+                self._courses[action.vehicle] = _SpeedCourse(action, motion.time, motion.speed(action.vehicle))
+            case Follow():
+                self._courses[action.vehicle] = _FollowCourse(action, motion.time)
+            case Stop():
+                place = motion.driven(action.vehicle) + action.distance
+                self._courses[action.vehicle] = _StopCourse(action, place)
+            case ChangeLane():
+                begins = motion.time + action.indicator
+                lasting = USUAL_DURATION if action.duration is None else action.duration
+                indicating = _Indicating(action, begins, begins + lasting)
+                self._due_changes.append(indicating)
+                if action.indicator > 0.0:
+                    self._lamps.indicate(indicating)
+            case SetLamps():
+                self._lamps.switch(action)
+
+    def speeds(self, motion: Motion) -> dict[str, float]:
+        """Speeds that vehicles are to have after the next step [m/s]; ``inf`` for a driver who is free.
+
+        Parameters
+        ----------
+        motion : Motion
+            How everybody moves.
+        """
+        speeds: dict[str, float] = {}
+        for vehicle, course in list(self._courses.items()):
+            speed = course.speed(motion) if vehicle in motion.present else None
+            if speed is None:
+                del self._courses[vehicle]
+            if vehicle in motion.present:
+                speeds[vehicle] = math.inf if speed is None else speed
+        return speeds
+
+    def changes(self, motion: Motion) -> tuple[ChangeLane, ...]:
+        """Changes of lane that are to be made now.
+
+        Parameters
+        ----------
+        motion : Motion
+            How everybody moves.
+        """
+        due = [one for one in self._due_changes if one.begins <= motion.time + 1e-9]
+        self._due_changes = [one for one in self._due_changes if one not in due]
+        return tuple(one.change for one in due if one.change.vehicle in motion.present)
+
+
+def vehicles_of(actions: Iterable[TrafficAction]) -> tuple[str, ...]:
+    """Vehicles that actions are about, each once.
+
+    Parameters
+    ----------
+    actions : iterable of TrafficAction
+        The actions.
+    """
+    named: Sequence[str] = [
+        one for action in actions for one in (getattr(action, "vehicle", ""), getattr(action, "leader", "")) if one
+    ]
+    return tuple(dict.fromkeys(named))

@@ -1,0 +1,158 @@
+"""Actions of a script in SUMO: imposed speeds, changes of lane, lamps and traffic lights."""
+
+from collections.abc import Collection, Sequence
+
+from fogsim.traffic.drivers.playing import Lamps, Motion, Playing
+from fogsim.traffic.sumo.claims import LANE_CHANGE_MODE, Claims
+from fogsim.traffic.sumo.lane_changes import LaneChangeSmoothing
+from fogsim.traffic.sumo.link import Api
+from fogsim.traffic.sumo.route_position import GapToEgo
+from fogsim.traffic.sumo_behaviour.signal_control import SignalControl
+from fogsim.traffic.sumo_behaviour.speed_control import SpeedControl
+from fogsim.values.script import ChangeLane, SetSignal, TrafficAction
+
+_REGARD_OF_OTHERS, _NO_COLLISION = 3 << 8, 1 << 8
+"""Bits of SUMO's lane-change mode on what of others a change that is asked for regards, and those for as much as does
+not hit anybody."""
+
+LONGEST_CHANGE = 10.0
+"""Time after which a change of lane that nobody could make is given up [s]."""
+
+
+class ScriptedActions:
+    """Plays in SUMO what the script has begun.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    speeds : SpeedControl
+        Sets the speeds.
+    lamps : Lamps
+        Lamps that are not the vehicles' own.
+    lane_changes : LaneChangeSmoothing
+        Shows changes of lane.
+    session : str
+        Name of the session.
+    """
+
+    def __init__(
+        self, api: Api, speeds: SpeedControl, lamps: Lamps, lane_changes: LaneChangeSmoothing, session: str
+    ) -> None:
+        self._api = api
+        self._step = float(api.simulation.getDeltaT())
+        self._speeds = speeds
+        self._playing = Playing(lamps)
+        self._lane_changes = lane_changes
+        self._signals = SignalControl(api)
+        self._modes = Claims(api, LANE_CHANGE_MODE, f"{session}.script")
+        self._changing: dict[str, float] = {}
+
+    def begin(
+        self, actions: Sequence[TrafficAction], time: float, present: Collection[str]
+    ) -> tuple[TrafficAction, ...]:
+        """Begin actions.
+
+        Parameters
+        ----------
+        actions : sequence of TrafficAction
+            What begins.
+        time : float
+            Time since the ego appeared [s].
+        present : collection of str
+            Vehicles on the road.
+
+        Returns
+        -------
+        tuple of TrafficAction
+            Those that could not begin: the vehicle has left, or has no such lane.
+
+        Raises
+        ------
+        InputError
+            If there are no such traffic lights, or not in such a state.
+        """
+        refused, motion = [], self._motion(time, present)
+        for action in actions:
+            if isinstance(action, SetSignal):
+                self._signals.begin(action, time)
+            elif action.vehicle not in present or not self._has_lane(action):
+                refused.append(action)
+            else:
+                self._playing.begin(action, motion)
+        return tuple(refused)
+
+    def _has_lane(self, action: TrafficAction) -> bool:
+        return not isinstance(action, ChangeLane) or has_lane(self._api, action.vehicle, action.lanes)
+
+    def _motion(self, time: float, present: Collection[str]) -> Motion:
+        vehicle = self._api.vehicle
+
+        def gap(follower: str, leader: str) -> float | None:
+            signed = GapToEgo(self._api, leader).measure(follower)
+            return None if signed is None or signed > 0.0 else -signed
+
+        return Motion(time, self._step, present, vehicle.getDistance, vehicle.getSpeed, gap)
+
+    def play(self, time: float, present: Collection[str]) -> None:
+        """Go on with what has begun, for the next step.
+
+        Parameters
+        ----------
+        time : float
+            Time since the ego appeared [s].
+        present : collection of str
+            Vehicles on the road.
+        """
+        self._signals.update(time)
+        self._end_changes(time, present)
+        if self._playing.is_idle:
+            return
+        motion = self._motion(time, present)
+        self._speeds.impose(self._playing.speeds(motion), self._playing.following)
+        for change in self._playing.changes(motion):
+            self._change_lane(change, time)
+
+    def _change_lane(self, change: ChangeLane, time: float) -> None:
+        vehicle, mode = change.vehicle, int(self._modes.own_value(change.vehicle))
+        self._modes.claim(vehicle, mode & ~_REGARD_OF_OTHERS | _NO_COLLISION)
+        self._changing[vehicle] = time + min(change.stay, LONGEST_CHANGE)
+        if change.duration is not None:
+            self._lane_changes.take_time(vehicle, change.duration)
+        self._api.vehicle.changeLaneRelative(vehicle, change.lanes, change.stay)
+
+    def _end_changes(self, time: float, present: Collection[str]) -> None:
+        for vehicle in [one for one, end in self._changing.items() if time >= end]:
+            del self._changing[vehicle]
+            if vehicle in present:
+                self._modes.withdraw(vehicle)
+
+    def release(self, present: Collection[str]) -> None:
+        """Give traffic lights and lane changing back; speeds are `SpeedControl`'s.
+
+        Parameters
+        ----------
+        present : collection of str
+            Vehicles on the road.
+        """
+        self._signals.release()
+        for vehicle in self._changing.keys() & set(present):
+            self._modes.withdraw(vehicle)
+        self._changing.clear()
+
+
+def has_lane(api: Api, vehicle: str, lanes: int) -> bool:
+    """Tell whether a vehicle could go so many lanes to the left, negative to the right, where it is.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    vehicle : str
+        Its id.
+    lanes : int
+        How many.
+    """
+    edge, lane = str(api.vehicle.getRoadID(vehicle)), int(api.vehicle.getLaneIndex(vehicle)) + lanes
+    # Lanes of a junction tell nothing of those behind it, where SUMO makes the change.
+    return lane >= 0 and (edge.startswith(":") or lane < int(api.edge.getLaneNumber(edge)))

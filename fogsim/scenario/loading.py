@@ -378,6 +378,8 @@ def _check_placement(document: Document, scenario: Scenario) -> None:
     except PlacementError as error:
         at = ("actors", error.actor)
         raise InputError(f"{document.where(at)}: {dotted(at)}: {error.told}") from error
+    except InputError as error:
+        raise InputError(f"{document.where(('road',))}: road: {error}") from error
 
 
 def _no_file(document: Document, directory: Path, key_path: KeyPath, path: Path) -> str:

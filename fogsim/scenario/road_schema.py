@@ -49,6 +49,24 @@ class Road(Section):
     limit_kmh: Annotated[SpeedKmh, Field(ge=5)] | None = None
     """Speed limit."""
 
+    curve_at_m: Distance | None = None
+    """Where a curve begins; on a country road, how long the straights before its curves are."""
+
+    curve_radius_m: Annotated[Length, Field(ge=30, le=100_000)] | None = None
+    """Radius of the curve."""
+
+    curve_turn_deg: Annotated[Number, Field(ge=-180, le=180)] | None = None
+    """By how much it turns to the left; negative to the right, 0 for none."""
+
+    grade: Grade | None = None
+    """Grade; positive climbs."""
+
+    grade_at_m: Distance | None = None
+    """Where the grade begins."""
+
+    grade_length_m: Length | None = None
+    """How long it is, with its vertical curves; the road is level after it, and on a country road goes down again."""
+
     @field_validator("template")
     @classmethod
     def _known_template(cls, value: str) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from fogsim.registry import Registry
-from fogsim.traffic.templates.motorway import Motorway
+from fogsim.traffic.templates.along_roads import Curve, Grade, Motorway, Rural, Straight
 from fogsim.traffic.templates.net_plan import Layout
 
 
@@ -28,7 +28,10 @@ class RoadTemplate(Protocol):
         ...
 
 
-ROAD_TEMPLATES: Registry[type[RoadTemplate]] = Registry("road template", {"motorway": Motorway})
+ROAD_TEMPLATES: Registry[type[RoadTemplate]] = Registry(
+    "road template",
+    {"motorway": Motorway, "straight": Straight, "curve": Curve, "grade": Grade, "rural": Rural},
+)
 """Templates by name."""
 
 

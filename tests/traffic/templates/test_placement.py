@@ -3,7 +3,7 @@
 import pytest
 
 from fogsim.traffic.templates import Actor, PlacementError, Relation, check_placement, place_actors
-from fogsim.traffic.templates.motorway import Motorway
+from fogsim.traffic.templates.along_roads import Motorway
 
 EGO = Actor("ego", place=200.0)
 

@@ -1,0 +1,262 @@
+"""Roads without junctions: a motorway, a straight road, a curve, a grade, a country road."""
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fogsim.errors import InputError
+from fogsim.traffic.templates.alignment import Axis, Bend, axis_of
+from fogsim.traffic.templates.net_plan import Edge, Layout, Link, NetPlan
+
+SAME_WAY, ONCOMING = "same_way", "oncoming"
+"""Names of the ego's way and of that of the oncoming traffic, and of the edges on them."""
+
+START = (0.0, 0.0, math.radians(20.0))
+"""Where a road begins, and in which direction: no axis of the image or of the map is any road's."""
+
+_CREST_RADIUS = 3000.0  # of vertical curves [m]
+_SPIRAL_SHARE = 1.0 / 6.0  # length of a spiral by the radius that it leads to
+_PRIORITY = 10
+
+
+def chain(name: str, axes: Sequence[Axis], nodes: Sequence[str], road: "AlongRoad", lanes: int) -> tuple[Edge, ...]:
+    """Edges of one direction, end to end: ``name``, ``name.1`` and so on.
+
+    Parameters
+    ----------
+    name : str
+        Id of the first.
+    axes : sequence of Axis
+        Their left borders.
+    nodes : sequence of str
+        Ids of the nodes between which they lie: one more than there are edges.
+    road : AlongRoad
+        Whose lane width and limit they have.
+    lanes : int
+        How many lanes they have.
+    """
+    names = [name, *(f"{name}.{number}" for number in range(1, len(nodes) - 1))]
+    return tuple(
+        Edge(own, *between, part, lanes, road.lane_width, road.limit, _PRIORITY)
+        for own, between, part in zip(names, itertools.pairwise(nodes), axes, strict=True)
+    )
+
+
+def straight_links(edges: Sequence[Edge]) -> list[Link]:
+    """Connections of edges that follow one another, lane to lane.
+
+    Parameters
+    ----------
+    edges : sequence of Edge
+        The edges, with as many lanes each.
+    """
+    return [
+        Link(one.name, other.name, lane, lane) for one, other in itertools.pairwise(edges) for lane in range(one.lanes)
+    ]
+
+
+@dataclass(frozen=True, slots=True)
+class AlongRoad:
+    """A road with one curve and one grade at most; what a template leaves open is a straight, level country road.
+
+    Attributes
+    ----------
+    length : float
+        Length [m].
+    lanes, oncoming_lanes : int
+        Lanes of either direction; 0 oncoming ones for a road of one direction.
+    lane_width, median : float
+        Width of each, and distance between the two directions' inner borders [m].
+    limit : float
+        Speed limit [m/s].
+    curve_at, curve_radius, curve_turn : float
+        Where a curve begins and its radius [m], and by how much it turns to the left, or, negative, right [rad].
+    grade : float
+        Grade [-]; positive climbs.
+    grade_at, grade_length : float
+        Where it begins and how long it is, with its vertical curves [m].
+    """
+
+    length: float = 2000.0
+    lanes: int = 1
+    oncoming_lanes: int = 1
+    lane_width: float = 3.5
+    median: float = 0.0
+    limit: float = 100.0 / 3.6
+    curve_at: float = 400.0
+    curve_radius: float = 400.0
+    curve_turn: float = 0.0
+    grade: float = 0.0
+    grade_at: float = 300.0
+    grade_length: float = 1000.0
+
+    @property
+    def free_length(self) -> float:
+        """How far from its beginning the ego's way may be cut [m]."""
+        return self.length
+
+    def layout(self, cuts: Sequence[float] = ()) -> Layout:
+        """The road.
+
+        Parameters
+        ----------
+        cuts : sequence of float
+            Stations at which the ego's way is cut into edges [m].
+
+        Raises
+        ------
+        InputError
+            If its curve or its grade is longer than the road.
+        """
+        axis = self.axis()
+        ends = [0.0, *sorted(cuts), self.length]
+        parts = [axis.part(*span) for span in itertools.pairwise(ends)]
+        nodes = ["begin", *(f"cut{number}" for number in range(1, len(parts))), "end"]
+        edges = list(chain(SAME_WAY, [part.moved(-0.5 * self.median) for part in parts], nodes, self, self.lanes))
+        ways = [(SAME_WAY, tuple(edge.name for edge in edges))]
+        links = straight_links(edges)
+        if self.oncoming_lanes:
+            back = self._oncoming(axis, parts, nodes)
+            edges, links = [*edges, *back], [*links, *straight_links(back)]
+            ways.append((ONCOMING, tuple(edge.name for edge in back)))
+        return Layout(NetPlan(tuple(edges), tuple(links)), tuple(ways))
+
+    def _oncoming(self, axis: Axis, parts: Sequence[Axis], nodes: Sequence[str]) -> tuple[Edge, ...]:
+        """The other direction: where both share a line they share their nodes, by which that is known."""
+        if self.median:
+            parts, nodes = [axis], [f"{ONCOMING}.end", f"{ONCOMING}.begin"]
+        axes = [part.moved(0.5 * self.median).reversed() for part in reversed(parts)]
+        return chain(ONCOMING, axes, nodes[::-1], self, self.oncoming_lanes)
+
+    def axis(self) -> Axis:
+        """Its middle.
+
+        Raises
+        ------
+        InputError
+            If its curve or its grade is longer than the road.
+        """
+        return axis_of(self.bends(), self.grades(), START)
+
+    def bends(self) -> list[Bend]:
+        """Its plan.
+
+        Raises
+        ------
+        InputError
+            If its curve does not end on it.
+        """
+        if not self.curve_turn:
+            return [Bend(self.length)]
+        curve = spirals_and_arc(self.curve_radius, self.curve_turn)
+        rest = self.length - self.curve_at - sum(bend.length for bend in curve)
+        if rest <= 0.0:
+            raise InputError(f"the curve ends {-rest:.0f} m beyond the road, which is {self.length:g} m long")
+        before = [Bend(self.curve_at)] if self.curve_at else []
+        return [*before, *curve, Bend(rest)]
+
+    def grades(self) -> list[tuple[float, float]]:
+        """Its profile: stations [m] and grades [-].
+
+        Raises
+        ------
+        InputError
+            If its grade does not end on it, or is too short for its vertical curves.
+        """
+        if not self.grade:
+            return []
+        eased, end = abs(self.grade) * _CREST_RADIUS, self.grade_at + self.grade_length
+        if end > self.length:
+            raise InputError(
+                f"the grade ends {end - self.length:.0f} m beyond the road, which is {self.length:g} m long"
+            )
+        if 2.0 * eased > self.grade_length:
+            raise InputError(f"the grade must be at least {2.0 * eased:g} m long, got {self.grade_length:g} m")
+        at = self.grade_at
+        return [(at, 0.0), (at + eased, self.grade), (end - eased, self.grade), (end, 0.0)]
+
+
+def spirals_and_arc(radius: float, turn: float) -> list[Bend]:
+    """A curve: a spiral into it, an arc, and a spiral out of it.
+
+    Parameters
+    ----------
+    radius : float
+        Radius of the arc [m].
+    turn : float
+        By how much the whole turns to the left [rad].
+    """
+    curvature = math.copysign(1.0 / radius, turn)
+    spiral = min(_SPIRAL_SHARE * radius, 0.5 * radius * abs(turn))
+    arc = radius * abs(turn) - spiral
+    return [Bend(spiral, 0.0, curvature), Bend(arc, curvature, curvature), Bend(spiral, curvature, 0.0)]
+
+
+@dataclass(frozen=True, slots=True)
+class Motorway(AlongRoad):
+    """A motorway with two carriageways."""
+
+    length: float = 3000.0
+    lanes: int = 2
+    oncoming_lanes: int = 2
+    lane_width: float = 3.75
+    median: float = 4.0
+    limit: float = 130.0 / 3.6
+
+
+@dataclass(frozen=True, slots=True)
+class Straight(AlongRoad):
+    """A straight, level road of two lanes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Curve(AlongRoad):
+    """A road of two lanes with a curve to the left."""
+
+    curve_radius: float = 250.0
+    curve_turn: float = math.radians(70.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Grade(AlongRoad):
+    """A road of two lanes that climbs."""
+
+    grade: float = 0.04
+
+
+@dataclass(frozen=True, slots=True)
+class Rural(AlongRoad):
+    """A country road that winds, to the right and to the left in turn, and goes up and down.
+
+    Its curves and grades follow one another along the whole road, and have the measures of one curve and one grade.
+    """
+
+    length: float = 3000.0
+    lane_width: float = 3.25
+    curve_at: float = 250.0
+    curve_radius: float = 320.0
+    curve_turn: float = math.radians(40.0)
+    grade: float = 0.025
+    grade_at: float = 150.0
+    grade_length: float = 300.0
+
+    def bends(self) -> list[Bend]:
+        """Its plan: a straight before each curve, as far as whole curves fit."""
+        bends, left, side = list[Bend](), self.length, -1.0
+        while self.curve_turn:
+            curve = spirals_and_arc(self.curve_radius, side * self.curve_turn)
+            needed = self.curve_at + sum(bend.length for bend in curve)
+            if needed >= left:
+                break
+            bends += [*([Bend(self.curve_at)] if self.curve_at else []), *curve]
+            left, side = left - needed, -side
+        return [*bends, Bend(left)]
+
+    def grades(self) -> list[tuple[float, float]]:
+        """Its profile: up and down in turn."""
+        if not self.grade:
+            return []
+        half = 0.5 * self.grade_length
+        count = max(1, math.floor((self.length - self.grade_at) / half))
+        return [(self.grade_at + half * n, self.grade * math.sin(0.5 * math.pi * n)) for n in range(count)]

@@ -27,7 +27,7 @@ from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy
 from fogsim.metrics import SafetyStandard
 from fogsim.scenario.drivers import driver_setup, driver_sight
 from fogsim.scenario.fog import fog_along
-from fogsim.scenario.generated_files import traffic_files
+from fogsim.scenario.roads.files import traffic_files
 from fogsim.scenario.schema import NO_RENDERER, Scenario
 from fogsim.scenario.traffic_schema import AnyEvent, Brake, BreakDown, ChangeLane, LampsFail
 from fogsim.sensors import LeadSensor

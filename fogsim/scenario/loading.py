@@ -12,9 +12,9 @@ from pydantic import ValidationError
 
 from fogsim.errors import InputError, UnknownNameError, nearest, shown, suggest
 from fogsim.scenario.document import Document, apply_overrides, read_document
-from fogsim.scenario.generated_files import road_layout
 from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.plain_yaml import KeyPath, dotted
+from fogsim.scenario.roads.files import road_layout
 from fogsim.scenario.schema import Scenario
 from fogsim.scenario.sumo_check import demand_mistakes, option_lines, step_mistake
 from fogsim.scenario.system_under_test import without_sut, without_sut_in_path

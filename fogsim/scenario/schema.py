@@ -18,7 +18,7 @@ from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.render import RENDERERS, ROLES
 from fogsim.scenario.camera_schema import CameraSection
 from fogsim.scenario.fog import Fog
-from fogsim.scenario.road_schema import Actors, DemandSection, Road, check_roads
+from fogsim.scenario.roads.schema import Actors, DemandSection, Road, check_roads
 from fogsim.scenario.section import Flag, Method, Number, Period, Section, Seed, Text, method_of
 from fogsim.scenario.sensor_schema import Sensors
 from fogsim.scenario.traffic_alone import without_ego

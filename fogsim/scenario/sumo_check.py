@@ -6,8 +6,8 @@ from pathlib import Path
 
 from fogsim.errors import nearest, shown, suggest
 from fogsim.scenario.document import Document
-from fogsim.scenario.generated_files import traffic_files
 from fogsim.scenario.plain_yaml import KeyPath, dotted
+from fogsim.scenario.roads.files import traffic_files
 from fogsim.scenario.schema import Clocks, Scenario
 from fogsim.scenario.traffic_schema import ChangeLane
 from fogsim.traffic import (

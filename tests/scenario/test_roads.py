@@ -6,7 +6,7 @@ import pytest
 
 from fogsim.errors import InputError
 from fogsim.scenario import Scenario, build, load_scenario, override, resolved
-from fogsim.scenario.generated_files import traffic_files
+from fogsim.scenario.roads.files import traffic_files
 
 TEXT = """
 name: template_motorway

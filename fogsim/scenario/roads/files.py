@@ -14,7 +14,7 @@ from pathlib import Path
 
 from fogsim.errors import InputError
 from fogsim.files.user_cache import VARIABLE, cache_directory
-from fogsim.scenario.road_schema import ActorSection, Road, measure_of
+from fogsim.scenario.roads.schema import ActorSection, Road, measure_of
 from fogsim.scenario.schema import Scenario
 from fogsim.traffic.templates import (
     ROAD_TEMPLATES,

@@ -13,8 +13,9 @@ class Streams:
     ----------
     traffic_seed : int
         Seed handed to the traffic simulation, in 0 … 2³¹ − 1.
-    fog, camera, sensors, driver, faults : numpy.random.Generator
-        Generators for fog fields, camera noise, the vehicle's other sensors, drivers and faults of sensors.
+    fog, camera, sensors, driver, faults, gps : numpy.random.Generator
+        Generators for fog fields, camera noise, the vehicle's other sensors, drivers, faults of sensors
+        and satellite positioning.
     """
 
     traffic_seed: int
@@ -23,6 +24,7 @@ class Streams:
     sensors: np.random.Generator
     driver: np.random.Generator
     faults: np.random.Generator
+    gps: np.random.Generator
 
 
 def spawn_streams(seed: int) -> Streams:
@@ -38,7 +40,7 @@ def spawn_streams(seed: int) -> Streams:
     ValueError
         If the seed is negative.
     """
-    traffic, fog, camera, sensors, driver, faults = np.random.SeedSequence(seed).spawn(6)
+    traffic, fog, camera, sensors, driver, faults, gps = np.random.SeedSequence(seed).spawn(7)
     return Streams(
         traffic_seed=int(traffic.generate_state(1, np.uint32)[0] >> 1),
         fog=np.random.default_rng(fog),
@@ -46,6 +48,7 @@ def spawn_streams(seed: int) -> Streams:
         sensors=np.random.default_rng(sensors),
         driver=np.random.default_rng(driver),
         faults=np.random.default_rng(faults),
+        gps=np.random.default_rng(gps),
     )
 
 

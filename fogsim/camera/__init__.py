@@ -3,7 +3,7 @@
 from fogsim.camera.delivery import Delivered, FrameDelivery
 from fogsim.camera.exposure import AutoExposure, Metering, Pixels, Sensor, expose
 from fogsim.camera.glare import LensGlare
-from fogsim.camera.mount import USUAL_MOUNTS, BodyPitch, CameraMount, Suspension, mounted_pose
+from fogsim.camera.mount import USUAL_MOUNTS, BodyPitch, CameraMount, Suspension, knocked, mounted_pose
 from fogsim.camera.sampling import averaged, middle_samples, supersampled
 from fogsim.camera.sensor import CameraSensor
 
@@ -26,6 +26,7 @@ __all__ = [
     "Suspension",
     "averaged",
     "expose",
+    "knocked",
     "middle_samples",
     "mounted_pose",
     "supersampled",

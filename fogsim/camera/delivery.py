@@ -2,27 +2,15 @@
 
 from collections import deque
 from collections.abc import Iterable
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from fogsim.camera.exposure import Pixels
-from fogsim.values import Blackout, DroppedFrames, FaultKind, FrozenFrame, Latency, TimeStamp
+from fogsim.values.fault import Blackout, DroppedFrames, FrozenFrame, Latency, RunningFault, TimeStamp
 
 _ROUNDING = 1e-9
 """Times that differ by no more than this are the same [s]."""
-
-
-class Faulty(Protocol):
-    """A fault in force, as far as frames go through it."""
-
-    @property
-    def kind(self) -> FaultKind:
-        """What is wrong."""
-
-    @property
-    def rng(self) -> np.random.Generator:
-        """Random numbers of this fault alone."""
 
 
 class Delivered(NamedTuple):
@@ -54,14 +42,14 @@ class FrameDelivery:
         self._under_way: deque[Delivered] = deque()
         self._last: Delivered | None = None
 
-    def deliver(self, taken: Delivered, faults: Iterable[Faulty]) -> Delivered:
+    def deliver(self, taken: Delivered, faults: Iterable[RunningFault]) -> Delivered:
         """Take in a picture and hand out what there is now.
 
         Parameters
         ----------
         taken : Delivered
             The picture and the time of its exposure, which is now.
-        faults : iterable of Faulty
+        faults : iterable of RunningFault
             What is wrong now; faults that are none of the camera's signal change nothing.
         """
         self._under_way.append(taken)

@@ -1,13 +1,15 @@
 """Where a camera is mounted, and how the body that it is mounted on pitches."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.values import Camera, CameraPose
+from fogsim.values.fault import FaultKind, Miscalibration
 
 
 class CameraMount(NamedTuple):
@@ -67,6 +69,27 @@ def mounted_pose(
     y = float(front_bumper[1]) - along * math.sin(heading)
     z = float(front_bumper[2]) - setback * up + camera.mount_height * forward
     return CameraPose(position=(x, y, z), heading=heading, grade=grade + body_pitch, road_grade=grade)
+
+
+def knocked(camera: Camera, kinds: Iterable[FaultKind]) -> Camera:
+    """The true calibration of a camera that has been knocked, or whose lens has slipped.
+
+    Parameters
+    ----------
+    camera : Camera
+        Its true calibration before.
+    kinds : iterable of FaultKind
+        What is wrong now, with whatever sensor.
+    """
+    for kind in kinds:
+        if isinstance(kind, Miscalibration):
+            camera = replace(
+                camera,
+                pitch=camera.pitch + kind.pitch,
+                roll=camera.roll + kind.roll,
+                focal_length=camera.focal_length * kind.focal_length_ratio,
+            )
+    return camera
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,13 +4,15 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere import extinction, field_at, optical_depth_along
-from fogsim.camera import Delivered, FrameDelivery, mounted_pose
+from fogsim.camera import Delivered, FrameDelivery, knocked, mounted_pose
 from fogsim.ego.frame_watch import FrameWatch
+from fogsim.ego.measurements import EgoSensors
 from fogsim.ego.road_meters import RoadMeters
 from fogsim.ego.sensor_faults import FaultSchedule
 from fogsim.ego.view_rendering import EgoView, NoView, Surrounding, ViewRenderer
@@ -19,7 +21,7 @@ from fogsim.randomness import Streams
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.schema import NO_RENDERER
 from fogsim.scenario.sensor_schema import fault_of
-from fogsim.sensors import measure_lead, signs_ahead
+from fogsim.sensors import check_sign_ids, faulty_signs
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import (
     Camera,
@@ -35,12 +37,14 @@ from fogsim.values import (
     Observation,
     RoadNetwork,
     RoadSection,
+    RunningFault,
     SignMap,
     Step,
     TrafficSnapshot,
     TrafficState,
     Truth,
 )
+from fogsim.values.fault import FaultKind, Where
 from fogsim.values.result_checks import checked_belief, checked_estimate
 
 _SIGHT_LINE = np.geomspace(1.0, 20_000.0, 400)
@@ -63,7 +67,7 @@ class EgoEquipment:
         self._scenario = scenario
         self._camera_sensor = build.camera_sensor(scenario)
         self._body_pitch = build.body_pitch(scenario)
-        self._lead_sensor = build.lead_sensor(scenario)
+        self._sensors = EgoSensors(scenario)
         self._faults = tuple(fault_of(written) for written in scenario.sensors.faults)
         self._schedule: FaultSchedule | None = None
         self._delivery, self._watch = FrameDelivery(), FrameWatch()
@@ -72,6 +76,8 @@ class EgoEquipment:
         self._streams: Streams | None = None
         self._meters: RoadMeters | None = None
         self._way = KnownWay()
+        self._network: tuple[RoadNetwork, SignMap] | None = None
+        self._sign_faults: tuple[FaultKind, ...] = ()
         self._mount_camera(build.CAR)
 
     def _mount_camera(self, body: str) -> None:
@@ -111,11 +117,12 @@ class EgoEquipment:
             self.close()
             self._mount_camera(body)
         if self._view_renderer is None:
-            kind = NoView if self._scenario.renderer == NO_RENDERER else ViewRenderer
-            road, signs = network()
-            self._view_renderer = kind(self._scenario, road, signs, body)
+            self._network = road, _ = network()
             self._meters = RoadMeters(self._scenario, road.route, road.route_limits)
             self._way = KnownWay(road.route, carriageways(road.lanes))
+        self._schedule = FaultSchedule(streams.faults)
+        self.begin_faults(self._faults, 0.0)
+        view = self._view_of_world(())
         for estimator in self._estimators:
             estimator.reset()
         self._fusion.reset()
@@ -124,9 +131,22 @@ class EgoEquipment:
         self._delivery.reset()
         self._watch.reset()
         self._streams = streams
-        self._schedule = FaultSchedule(streams.faults)
-        self._schedule.begin(self._faults, 0.0)
-        return self._view_renderer.fog
+        return view.fog
+
+    def _view_of_world(self, faults: Sequence[RunningFault]) -> EgoView:
+        """What draws the world, built anew where signs have gone or come back since the last time."""
+        if self._network is None:
+            raise SimulationError("the run has not been started, or is closed")
+        road, signs = self._network
+        of_signs = tuple(one.kind for one in faults if one.kind.sensor == "signs")
+        if self._view_renderer is None or of_signs != self._sign_faults:
+            if self._view_renderer is not None:
+                self._view_renderer.close()
+            kind = NoView if self._scenario.renderer == NO_RENDERER else ViewRenderer
+            standing = faulty_signs(signs, of_signs, Where.WORLD) if of_signs else signs
+            self._view_renderer = kind(self._scenario, road, standing, self._body)
+            self._sign_faults = of_signs
+        return self._view_renderer
 
     def begin_faults(self, faults: Iterable[Fault], time: float) -> None:
         """Let faults of the sensors begin, beside those of the scenario.
@@ -142,10 +162,14 @@ class EgoEquipment:
         ------
         SimulationError
             If `start_run` has not been called, or it is closed.
+        InputError
+            If a sign is named that there is none of.
         """
-        if self._schedule is None:
+        if self._schedule is None or self._network is None:
             raise SimulationError("the run has not been started, or is closed")
-        self._schedule.begin(faults, time)
+        ordered = tuple(faults)
+        check_sign_ids((fault.kind for fault in ordered), self._network[1])
+        self._schedule.begin(ordered, time)
 
     def complete_step(
         self, index: int, time: float, snapshot: TrafficSnapshot, command: Command, ending: Ending | None
@@ -170,7 +194,8 @@ class EgoEquipment:
         SimulationError
             If `start_run` has not been called, or it is closed.
         """
-        if self._view_renderer is None or self._streams is None or self._meters is None or self._schedule is None:
+        streams, meters, schedule, network = self._streams, self._meters, self._schedule, self._network
+        if streams is None or meters is None or schedule is None or network is None:
             raise SimulationError("the run has not been started, or is closed")
         renderer, state, ego = self._view_renderer, snapshot.state, snapshot.ego
         faults = self._schedule.at(time)
@@ -180,8 +205,21 @@ class EgoEquipment:
         truth = fog_truth(fog, pose, self._camera, renderer.signs, state, sections, self._way, known)
         view, radiance = renderer.render(state, ego, pose, time)
         image = self._camera_sensor.take(radiance, self._streams.camera)
+        faults = schedule.at(time)
+        renderer, state, ego = self._view_of_world(faults), snapshot.state, snapshot.ego
+        camera = knocked(self._camera, [one.kind for one in faults])
+        pose, fog = self._pose(state, ego), field_at(renderer.fog, time)
+        sections, known = meters.measure(fog), tuple(one.fault for one in faults)
+        truth = fog_truth(fog, pose, camera, renderer.signs, state, sections, network[0].route, known)
+        view, radiance = renderer.render(state, ego, pose, time, camera)
+        image = self._camera_sensor.take(radiance, streams.camera)
         frame = Frame(*self._delivery.deliver(Delivered(time, image), faults), self._assumed_camera)
-        observation = self._observe(frame, snapshot, renderer.signs, self._streams)
+        observation = Observation(
+            frame=frame,
+            speed=float(state.speed[ego]),
+            lead=self._sensors.lead(snapshot, faults, streams),
+            signs=self._sensors.signs(snapshot, network[1], faults, streams),
+        )
         estimates = self._estimate(frame, observation)
         return Step(
             index=index,
@@ -226,16 +264,6 @@ class EgoEquipment:
         body_pitch = self._body_pitch.update(float(state.acceleration[ego]))
         heading, grade = float(state.heading[ego]), float(state.grade[ego])
         return mounted_pose(self._camera, state.position[ego], heading, self._setback, grade, body_pitch)
-
-    def _observe(self, frame: Frame, snapshot: TrafficSnapshot, signs: SignMap, streams: Streams) -> Observation:
-        state, ego = snapshot.state, snapshot.ego
-        speed, reach = float(state.speed[ego]), self._scenario.sensors.sign_reach_m
-        return Observation(
-            frame=frame,
-            speed=speed,
-            lead=measure_lead(snapshot.leader, speed, self._lead_sensor, streams.sensors),
-            signs=signs_ahead(signs, state.position[ego], float(state.heading[ego]), reach),
-        )
 
     def _estimate(self, frame: Frame, observation: Observation) -> tuple[Estimate, ...]:
         """What each estimator says; none is asked about a frame that tells nothing new."""

@@ -1,38 +1,13 @@
 """Which faults of the ego's sensors are in force, and when they begin and end."""
 
 from collections.abc import Iterable
-from typing import NamedTuple
 
 import numpy as np
 
-from fogsim.values import Fault, FaultKind
+from fogsim.values.fault import Fault, RunningFault
 
 _ROUNDING = 1e-9
 """Times that differ by no more than this are the same [s]."""
-
-
-class RunningFault(NamedTuple):
-    """A fault with its time and its own chance.
-
-    Attributes
-    ----------
-    fault : Fault
-        The fault.
-    begin, end : float
-        It is in force from `begin` until just before `end` [s].
-    rng : numpy.random.Generator
-        Random numbers of this fault alone.
-    """
-
-    fault: Fault
-    begin: float
-    end: float
-    rng: np.random.Generator
-
-    @property
-    def kind(self) -> FaultKind:
-        """What is wrong."""
-        return self.fault.kind
 
 
 class FaultSchedule:

@@ -94,7 +94,9 @@ class EgoView(Protocol):
     signs: SignMap
     fog: FogField
 
-    def render(self, state: TrafficState, ego: int, pose: CameraPose, time: float) -> tuple[View, NDArray[np.float32]]:
+    def render(
+        self, state: TrafficState, ego: int, pose: CameraPose, time: float, camera: Camera | None = None
+    ) -> tuple[View, NDArray[np.float32]]:
         """Draw; see `ViewRenderer.render`."""
 
     def surrounding(self, state: TrafficState, ego: int, pose: CameraPose) -> Surrounding:
@@ -216,7 +218,9 @@ class ViewRenderer:
             self._renderer.close()
         self._renderer = None
 
-    def render(self, state: TrafficState, ego: int, pose: CameraPose, time: float) -> tuple[View, NDArray[np.float32]]:
+    def render(
+        self, state: TrafficState, ego: int, pose: CameraPose, time: float, camera: Camera | None = None
+    ) -> tuple[View, NDArray[np.float32]]:
         """Draw what is there, and what of it reaches the camera through the air.
 
         Parameters
@@ -229,6 +233,8 @@ class ViewRenderer:
             Where the camera is.
         time : float
             Time since the run began [s].
+        camera : Camera or None
+            Its true calibration now, if it is another than at the beginning.
 
         Returns
         -------
@@ -238,11 +244,12 @@ class ViewRenderer:
             Linear radiance at the camera [cd/m²], the mean of a pixel's samples.
         """
         self._go_to(state.position[ego])
-        camera, lights = self._drawn_camera, self._lights(state, ego, pose)
+        drawn = self._drawn_camera if camera is None else supersampled(camera, self._samples)
+        lights = self._lights(state, ego, pose)
         near, viewpoint = self._from_origin(state, pose)
         renderer = self._renderer_for(viewpoint)
-        view = renderer.render(vehicle_batches(near, ego), camera, viewpoint, lamplight=bool(lights.own))
-        radiance = self._air.radiance(view, camera, pose, lights, time)
+        view = renderer.render(vehicle_batches(near, ego), drawn, viewpoint, lamplight=bool(lights.own))
+        radiance = self._air.radiance(view, drawn, pose, lights, time)
         return middle_samples(view, self._samples), averaged(radiance, self._samples)
 
     def surrounding(self, state: TrafficState, ego: int, pose: CameraPose) -> Surrounding:

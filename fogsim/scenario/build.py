@@ -30,7 +30,7 @@ from fogsim.scenario.fog import fog_along
 from fogsim.scenario.roads.files import traffic_files
 from fogsim.scenario.schema import NO_RENDERER, Scenario
 from fogsim.scenario.traffic_schema import AnyEvent, Brake, BreakDown, ChangeLane, LampsFail
-from fogsim.sensors import LeadSensor
+from fogsim.sensors import Gps, LeadSensor
 from fogsim.traffic import (
     BrakeEvent,
     Event,
@@ -309,7 +309,20 @@ def lead_sensor(scenario: Scenario) -> LeadSensor:
         The scenario.
     """
     lead = scenario.sensors.lead
-    return LeadSensor(lead.reach_m, lead.distance_deviation_m, lead.speed_deviation_mps)
+    view = math.radians(lead.field_of_view_deg)
+    return LeadSensor(lead.reach_m, lead.distance_deviation_m, lead.speed_deviation_mps, view)
+
+
+def gps(scenario: Scenario) -> Gps:
+    """Satellite positioning of the ego.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+    section = scenario.sensors.gps
+    return Gps(section.position_deviation_m, math.radians(section.heading_deviation_deg))
 
 
 def fog_field(scenario: Scenario, route: NDArray[np.float64]) -> FogField:

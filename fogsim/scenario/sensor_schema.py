@@ -5,8 +5,36 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from fogsim.scenario.section import Distance, Length, Number, Period, Section, Share, Time
-from fogsim.values import Blackout, DroppedFrames, Fault, FaultKind, FrozenFrame, Latency, TimeStamp
+from fogsim.scenario.section import Distance, Id, Length, Number, Period, Place, Section, Share, Time
+from fogsim.values.fault import (
+    Blackout,
+    DroppedFrames,
+    Fault,
+    FaultKind,
+    FrozenFrame,
+    HeadingBias,
+    Latency,
+    LeadBias,
+    LeadDropout,
+    LeadNarrowView,
+    LeadNoise,
+    Miscalibration,
+    Outage,
+    PositionBias,
+    SignsMissing,
+    SignsMoved,
+    TimeStamp,
+    Where,
+)
+
+Angle = Annotated[Number, Field(ge=-180, le=180)]
+"""An angle [°]."""
+
+SmallAngle = Annotated[Number, Field(ge=-10, le=10)]
+"""An angle by which a camera may be knocked [°]."""
+
+Speed = Annotated[Number, Field(ge=-140, le=140)]
+"""A speed, or a difference of speeds [m/s]."""
 
 
 class Lead(Section):
@@ -21,6 +49,19 @@ class Lead(Section):
     speed_deviation_mps: Annotated[Number, Field(ge=0, le=140)] = 0.1
     """Standard deviation of its relative speed."""
 
+    field_of_view_deg: Annotated[Number, Field(ge=0.1, le=360)] = 360.0
+    """Full horizontal angle within which it tracks a vehicle; long-range radars have about 10 to 20."""
+
+
+class GpsSection(Section):
+    """Satellite positioning, by which the map tells of signs ahead."""
+
+    position_deviation_m: Annotated[Distance, Field(le=1000)] = 0.0
+    """Standard deviation of the position, east and north."""
+
+    heading_deviation_deg: Annotated[Number, Field(ge=0, le=180)] = 0.0
+    """Standard deviation of the heading."""
+
 
 class FaultSection(Section):
     """A fault of a sensor."""
@@ -31,22 +72,31 @@ class FaultSection(Section):
     for_s: Period | None = None
     """How long it lasts; if not given, to the end of the run."""
 
+    def in_si(self) -> FaultKind:
+        """What is wrong, in SI units."""
+        raise NotImplementedError
 
-class CameraBlackout(FaultSection):
-    """Black frames."""
+
+class CameraFaultSection(FaultSection):
+    """A fault of the camera."""
 
     sensor: Literal["camera"] = "camera"
     """Sensor that the fault is of."""
+
+
+class CameraBlackout(CameraFaultSection):
+    """Black frames."""
 
     fault: Literal["blackout"]
     """`blackout`: black frames, each with its own time."""
 
+    def in_si(self) -> FaultKind:
+        """What is wrong, in SI units."""
+        return Blackout()
 
-class CameraFrozen(FaultSection):
+
+class CameraFrozen(CameraFaultSection):
     """One frame again and again."""
-
-    sensor: Literal["camera"] = "camera"
-    """Sensor that the fault is of."""
 
     fault: Literal["frozen"]
     """`frozen`: the last frame before the fault, again and again."""
@@ -54,25 +104,27 @@ class CameraFrozen(FaultSection):
     time_stamp: TimeStamp = TimeStamp.DELIVERY
     """Time that the frame bears: that of its `exposure`, or of each `delivery`, as if it were new."""
 
+    def in_si(self) -> FaultKind:
+        """What is wrong, in SI units."""
+        return FrozenFrame(self.time_stamp)
 
-class CameraDroppedFrames(FaultSection):
+
+class CameraDroppedFrames(CameraFaultSection):
     """Frames that get lost."""
 
-    sensor: Literal["camera"] = "camera"
-    """Sensor that the fault is of."""
-
     fault: Literal["dropped_frames"]
-    """`dropped_frames`: frames get lost, each by chance."""
+    """`dropped_frames`: frames get lost, each by chance; the last one stays."""
 
     share: Share = 1.0
-    """Share of them that do."""
+    """Share that gets lost."""
+
+    def in_si(self) -> FaultKind:
+        """What is wrong, in SI units."""
+        return DroppedFrames(self.share)
 
 
-class CameraLatency(FaultSection):
+class CameraLatency(CameraFaultSection):
     """Frames that come late."""
-
-    sensor: Literal["camera"] = "camera"
-    """Sensor that the fault is of."""
 
     fault: Literal["latency"]
     """`latency`: frames come late."""
@@ -83,9 +135,212 @@ class CameraLatency(FaultSection):
     time_stamp: TimeStamp = TimeStamp.EXPOSURE
     """Which of both times they bear: `exposure` or `delivery`."""
 
+    def in_si(self) -> FaultKind:
+        """What is wrong, in SI units."""
+        return Latency(self.delay_s, self.time_stamp)
+
+
+class CameraCalibration(CameraFaultSection):
+    """A camera that is knocked, or whose lens slips."""
+
+    fault: Literal["calibration"]
+    """`calibration`: the camera is knocked, or its lens slips; the estimators still assume what was."""
+
+    pitch_deg: SmallAngle = 0.0
+    """What is added to its true pitch."""
+
+    roll_deg: SmallAngle = 0.0
+    """What is added to its true roll."""
+
+    focal_length_percent: Annotated[Number, Field(ge=-50, le=50)] = 0.0
+    """What is added to its true focal length."""
+
+    def in_si(self) -> FaultKind:
+        """What is wrong, in SI units."""
+        ratio = 1.0 + self.focal_length_percent / 100.0
+        return Miscalibration(math.radians(self.pitch_deg), math.radians(self.roll_deg), ratio)
+
+
+class LeadFaultSection(FaultSection):
+    """A fault of the radar."""
+
+    sensor: Literal["lead"] = "lead"
+    """Sensor that the fault is of."""
+
+
+class LeadDropoutSection(LeadFaultSection):
+    """A radar that loses the vehicle ahead."""
+
+    fault: Literal["dropout"]
+    """`dropout`: the vehicle ahead is lost, in each measurement by chance."""
+
+    share: Share = 1.0
+    """Share that gets lost."""
+
+    def in_si(self) -> FaultKind:
+        """What is wrong, in SI units."""
+        return LeadDropout(self.share)
+
+
+class LeadBiasSection(LeadFaultSection):
+    """A radar that measures wrong."""
+
+    fault: Literal["bias"]
+    """`bias`: distance and relative speed are wrong."""
+
+    distance_m: Annotated[Place, Field(ge=-1000, le=1000)] = 0.0
+    """What is added to the distance."""
+
+    relative_speed_mps: Speed = 0.0
+    """What is added to the relative speed."""
+
+    def in_si(self) -> FaultKind:
+        """What is wrong, in SI units."""
+        return LeadBias(self.distance_m, self.relative_speed_mps)
+
+
+class LeadNoiseSection(LeadFaultSection):
+    """A radar that is noisier."""
+
+    fault: Literal["noise"]
+    """`noise`: its standard deviations are larger."""
+
+    factor: Annotated[Number, Field(ge=0, le=1000)] = 10.0
+    """How many times as large."""
+
+    def in_si(self) -> FaultKind:
+        """What is wrong, in SI units."""
+        return LeadNoise(self.factor)
+
+
+class LeadNarrowViewSection(LeadFaultSection):
+    """A radar that sees less to the sides."""
+
+    fault: Literal["narrow_view"]
+    """`narrow_view`: its field of view is narrowed, as by snow on its cover."""
+
+    field_of_view_deg: Annotated[Number, Field(ge=0.1, le=360)] = 2.0
+    """Full angle that is left."""
+
+    def in_si(self) -> FaultKind:
+        """What is wrong, in SI units."""
+        return LeadNarrowView(math.radians(self.field_of_view_deg))
+
+
+class GpsFaultSection(FaultSection):
+    """A fault of satellite positioning."""
+
+    sensor: Literal["gps"] = "gps"
+    """Sensor that the fault is of."""
+
+
+class GpsPositionBias(GpsFaultSection):
+    """A position beside the true one."""
+
+    fault: Literal["position_bias"]
+    """`position_bias`: the position is beside the true one, as reflections from walls make it."""
+
+    east_m: Place = 0.0
+    """How far east."""
+
+    north_m: Place = 0.0
+    """How far north."""
+
+    along_m: Place = 0.0
+    """How far ahead in the direction of travel."""
+
+    left_m: Place = 0.0
+    """How far to its left."""
+
+    def in_si(self) -> FaultKind:
+        """What is wrong, in SI units."""
+        return PositionBias(self.east_m, self.north_m, self.along_m, self.left_m)
+
+
+class GpsHeadingBias(GpsFaultSection):
+    """A wrong heading."""
+
+    fault: Literal["heading_bias"]
+    """`heading_bias`: the heading is wrong."""
+
+    angle_deg: Angle = 0.0
+    """What is added, counterclockwise."""
+
+    def in_si(self) -> FaultKind:
+        """What is wrong, in SI units."""
+        return HeadingBias(math.radians(self.angle_deg))
+
+
+class GpsOutage(GpsFaultSection):
+    """No position."""
+
+    fault: Literal["outage"]
+    """`outage`: no position, as in a tunnel, and so no signs ahead."""
+
+    def in_si(self) -> FaultKind:
+        """What is wrong, in SI units."""
+        return Outage()
+
+
+class SignFaultSection(FaultSection):
+    """A fault of signs or of the map that has them."""
+
+    sensor: Literal["signs"] = "signs"
+    """Sensor that the fault is of."""
+
+    where: Where = Where.WORLD
+    """Whether it is the signs that are not where they were (`world`), or their entries in the vehicle's `map`."""
+
+    ids: tuple[Id, ...] = ()
+    """Which signs; all if not given."""
+
+
+class SignsMissingSection(SignFaultSection):
+    """Signs that have gone."""
+
+    fault: Literal["missing"]
+    """`missing`: signs have gone."""
+
+    def in_si(self) -> FaultKind:
+        """What is wrong, in SI units."""
+        return SignsMissing(self.where, self.ids)
+
+
+class SignsMovedSection(SignFaultSection):
+    """Signs that are elsewhere."""
+
+    fault: Literal["moved"]
+    """`moved`: signs are elsewhere."""
+
+    along_m: Place = 0.0
+    """How far ahead, seen by those they speak to."""
+
+    left_m: Place = 0.0
+    """How far to the left."""
+
+    up_m: Place = 0.0
+    """How far up."""
+
+    def in_si(self) -> FaultKind:
+        """What is wrong, in SI units."""
+        return SignsMoved(self.where, self.ids, self.along_m, self.left_m, self.up_m)
+
 
 AnyFault = Annotated[
-    CameraBlackout | CameraFrozen | CameraDroppedFrames | CameraLatency,
+    CameraBlackout
+    | CameraFrozen
+    | CameraDroppedFrames
+    | CameraLatency
+    | CameraCalibration
+    | LeadDropoutSection
+    | LeadBiasSection
+    | LeadNoiseSection
+    | LeadNarrowViewSection
+    | GpsPositionBias
+    | GpsHeadingBias
+    | GpsOutage
+    | SignsMissingSection
+    | SignsMovedSection,
     Field(discriminator="fault"),
 ]
 """Any fault of any sensor, known by its name."""
@@ -96,6 +351,9 @@ class Sensors(Section):
 
     lead: Lead = Lead()
     """The radar."""
+
+    gps: GpsSection = GpsSection()
+    """Satellite positioning."""
 
     sign_reach_m: Length = 250.0
     """Distance up to which the map tells of signs ahead."""
@@ -112,16 +370,4 @@ def fault_of(written: AnyFault) -> Fault:
     written : AnyFault
         What the file has.
     """
-    return Fault(_kind_of(written), written.at_s, math.inf if written.for_s is None else written.for_s)
-
-
-def _kind_of(written: AnyFault) -> FaultKind:
-    match written:
-        case CameraBlackout():
-            return Blackout()
-        case CameraFrozen():
-            return FrozenFrame(written.time_stamp)
-        case CameraDroppedFrames():
-            return DroppedFrames(written.share)
-        case CameraLatency():
-            return Latency(written.delay_s, written.time_stamp)
+    return Fault(written.in_si(), written.at_s, math.inf if written.for_s is None else written.for_s)

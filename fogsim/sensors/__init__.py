@@ -1,6 +1,20 @@
 """What a vehicle measures beside its camera."""
 
+from fogsim.sensors.faults import check_sign_ids, faulty_fix, faulty_lead, faulty_lead_sensor, faulty_signs
+from fogsim.sensors.gps import Fix, Gps, measure_fix
 from fogsim.sensors.lead import LeadSensor, measure_lead
 from fogsim.sensors.signs import signs_ahead
 
-__all__ = ["LeadSensor", "measure_lead", "signs_ahead"]
+__all__ = [
+    "Fix",
+    "Gps",
+    "LeadSensor",
+    "check_sign_ids",
+    "faulty_fix",
+    "faulty_lead",
+    "faulty_lead_sensor",
+    "faulty_signs",
+    "measure_fix",
+    "measure_lead",
+    "signs_ahead",
+]

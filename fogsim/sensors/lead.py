@@ -1,5 +1,6 @@
 """A radar-like sensor that tracks the vehicle ahead; radar waves pass through fog."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,15 +20,18 @@ class LeadSensor:
         Standard deviation of the distance [m].
     speed_deviation : float
         Standard deviation of the relative speed [m/s].
+    field_of_view : float
+        Full horizontal angle within which it measures [rad].
     """
 
     reach: float = 200.0
     distance_deviation: float = 0.25
     speed_deviation: float = 0.1
+    field_of_view: float = math.inf
 
 
 def measure_lead(
-    leader: Leader | None, own_speed: float, sensor: LeadSensor, rng: np.random.Generator
+    leader: Leader | None, own_speed: float, sensor: LeadSensor, rng: np.random.Generator, bearing: float = 0.0
 ) -> LeadMeasurement | None:
     """Measure the vehicle ahead.
 
@@ -43,14 +47,16 @@ def measure_lead(
         Reach and noise.
     rng : numpy.random.Generator
         Source of the noise.
+    bearing : float
+        Angle from the own axis to the middle of its rear [rad].
 
     Returns
     -------
     LeadMeasurement or None
-        None if nothing is within reach.
+        None if nothing is within reach and field of view.
     """
     distance_noise, speed_noise = rng.normal(size=2)
-    if leader is None or leader.gap > sensor.reach:
+    if leader is None or leader.gap > sensor.reach or 2.0 * abs(bearing) > sensor.field_of_view:
         return None
     return LeadMeasurement(
         distance=max(leader.gap + sensor.distance_deviation * float(distance_noise), 0.0),

@@ -4,7 +4,7 @@ from fogsim.values.belief import Belief
 from fogsim.values.camera import Camera, CameraPose, Response
 from fogsim.values.command import Command, Display, SpeedAdvice, Stretch, StretchAdvice
 from fogsim.values.estimate import Estimate, FogCategory, fog_category
-from fogsim.values.fault import Blackout, DroppedFrames, Fault, FaultKind, FrozenFrame, Latency, TimeStamp
+from fogsim.values.fault import Fault, RunningFault
 from fogsim.values.fog import FogBank, FogChange, FogField, FogPatches
 from fogsim.values.image import Frame, View
 from fogsim.values.light import Beam, HeadLamp, Lamp, Lights, LightSources, StreetLighting
@@ -22,31 +22,26 @@ __all__ = [
     "Beam",
     "Begun",
     "Belief",
-    "Blackout",
     "Camera",
     "CameraPose",
     "Collision",
     "Command",
     "Display",
-    "DroppedFrames",
     "Ending",
     "Estimate",
     "Fault",
-    "FaultKind",
     "FogBank",
     "FogCategory",
     "FogChange",
     "FogField",
     "FogPatches",
     "Frame",
-    "FrozenFrame",
     "HeadLamp",
     "Lamp",
     "Lane",
     "LaneEnd",
     "LaneKind",
     "LaneMarking",
-    "Latency",
     "LeadMeasurement",
     "Leader",
     "LightSources",
@@ -59,6 +54,7 @@ __all__ = [
     "Response",
     "RoadNetwork",
     "RoadSection",
+    "RunningFault",
     "Scene",
     "Sign",
     "SignMap",
@@ -69,7 +65,6 @@ __all__ = [
     "Stretch",
     "StretchAdvice",
     "Surface",
-    "TimeStamp",
     "TrafficSnapshot",
     "TrafficState",
     "TrafficStep",

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import ClassVar
 
+import numpy as np
+
 
 class TimeStamp(StrEnum):
     """The time that a camera says its frame is of: that of its exposure, or that at which it is handed on."""
@@ -69,7 +71,184 @@ class Latency:
     time_stamp: TimeStamp = TimeStamp.EXPOSURE
 
 
-FaultKind = Blackout | FrozenFrame | DroppedFrames | Latency
+@dataclass(frozen=True, slots=True)
+class Miscalibration:
+    """A camera that is knocked out of place, or whose lens slips, of which the estimators are told nothing.
+
+    Attributes
+    ----------
+    pitch, roll : float
+        What is added to the true angles [rad].
+    focal_length_ratio : float
+        True focal length over that before [-].
+    """
+
+    sensor: ClassVar[str] = "camera"
+    name: ClassVar[str] = "calibration"
+    pitch: float = 0.0
+    roll: float = 0.0
+    focal_length_ratio: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class LeadDropout:
+    """A radar that loses the vehicle ahead, in each measurement by chance.
+
+    Attributes
+    ----------
+    share : float
+        Share of measurements that get lost, 0 … 1.
+    """
+
+    sensor: ClassVar[str] = "lead"
+    name: ClassVar[str] = "dropout"
+    share: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class LeadBias:
+    """A radar that measures wrong.
+
+    Attributes
+    ----------
+    distance : float
+        What is added to the distance [m].
+    relative_speed : float
+        What is added to the relative speed [m/s].
+    """
+
+    sensor: ClassVar[str] = "lead"
+    name: ClassVar[str] = "bias"
+    distance: float = 0.0
+    relative_speed: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class LeadNoise:
+    """A radar that is noisier than it should be.
+
+    Attributes
+    ----------
+    factor : float
+        Its standard deviations over those that it should have [-].
+    """
+
+    sensor: ClassVar[str] = "lead"
+    name: ClassVar[str] = "noise"
+    factor: float = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class LeadNarrowView:
+    """A radar whose field of view is narrowed, as by snow on its cover.
+
+    Attributes
+    ----------
+    field_of_view : float
+        Full angle within which it measures [rad].
+    """
+
+    sensor: ClassVar[str] = "lead"
+    name: ClassVar[str] = "narrow_view"
+    field_of_view: float = math.radians(2.0)
+
+
+@dataclass(frozen=True, slots=True)
+class PositionBias:
+    """A satellite position beside the true one, as reflections from walls make it.
+
+    Attributes
+    ----------
+    east, north : float
+        What is added in the world [m].
+    along, left : float
+        What is added in the direction of travel, and to its left [m].
+    """
+
+    sensor: ClassVar[str] = "gps"
+    name: ClassVar[str] = "position_bias"
+    east: float = 0.0
+    north: float = 0.0
+    along: float = 0.0
+    left: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class HeadingBias:
+    """A wrong heading.
+
+    Attributes
+    ----------
+    angle : float
+        What is added, counterclockwise [rad].
+    """
+
+    sensor: ClassVar[str] = "gps"
+    name: ClassVar[str] = "heading_bias"
+    angle: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Outage:
+    """No position at all, as in a tunnel."""
+
+    sensor: ClassVar[str] = "gps"
+    name: ClassVar[str] = "outage"
+
+
+class Where(StrEnum):
+    """Whether it is the sign that is not where it was, or its entry in the vehicle's map."""
+
+    WORLD = "world"
+    MAP = "map"
+
+
+@dataclass(frozen=True, slots=True)
+class SignsMissing:
+    """Signs that have gone.
+
+    Attributes
+    ----------
+    where : Where
+        From the world, or from the vehicle's map.
+    ids : tuple of str
+        Which; all if empty.
+    """
+
+    sensor: ClassVar[str] = "signs"
+    name: ClassVar[str] = "missing"
+    where: Where = Where.WORLD
+    ids: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class SignsMoved:
+    """Signs that are elsewhere.
+
+    Attributes
+    ----------
+    where : Where
+        In the world, or on the vehicle's map.
+    ids : tuple of str
+        Which; all if empty.
+    along, left, up : float
+        How far, seen by those they speak to [m].
+    """
+
+    sensor: ClassVar[str] = "signs"
+    name: ClassVar[str] = "moved"
+    where: Where = Where.WORLD
+    ids: tuple[str, ...] = ()
+    along: float = 0.0
+    left: float = 0.0
+    up: float = 0.0
+
+
+CameraFault = Blackout | FrozenFrame | DroppedFrames | Latency | Miscalibration
+LeadFault = LeadDropout | LeadBias | LeadNoise | LeadNarrowView
+GpsFault = PositionBias | HeadingBias | Outage
+SignFault = SignsMissing | SignsMoved
+FaultKind = CameraFault | LeadFault | GpsFault | SignFault
 """What can be wrong with a sensor."""
 
 
@@ -95,3 +274,28 @@ class Fault:
     def name(self) -> str:
         """Sensor and kind, as ``camera blackout``."""
         return f"{self.kind.sensor} {self.kind.name}"
+
+
+@dataclass(frozen=True, slots=True)
+class RunningFault:
+    """A fault with its time and its own chance.
+
+    Attributes
+    ----------
+    fault : Fault
+        The fault.
+    begin, end : float
+        It is in force from `begin` until just before `end` [s].
+    rng : numpy.random.Generator
+        Random numbers of this fault alone.
+    """
+
+    fault: Fault
+    begin: float
+    end: float
+    rng: np.random.Generator
+
+    @property
+    def kind(self) -> FaultKind:
+        """What is wrong."""
+        return self.fault.kind

@@ -1,17 +1,19 @@
 """Which picture comes out of a camera when, and with what time."""
 
-from typing import NamedTuple
-
 import numpy as np
 import pytest
 
 from fogsim.camera import Delivered, FrameDelivery
-from fogsim.values import Blackout, DroppedFrames, FaultKind, FrozenFrame, Latency, TimeStamp
-
-
-class Running(NamedTuple):
-    kind: FaultKind
-    rng: np.random.Generator
+from fogsim.values.fault import (
+    Blackout,
+    DroppedFrames,
+    Fault,
+    FaultKind,
+    FrozenFrame,
+    Latency,
+    RunningFault,
+    TimeStamp,
+)
 
 
 def handed_out(*kinds: FaultKind, begin: int = 3, end: int = 8, count: int = 12) -> list[tuple[float, int]]:
@@ -20,7 +22,7 @@ def handed_out(*kinds: FaultKind, begin: int = 3, end: int = 8, count: int = 12)
     seen = []
     for second in range(count):
         taken = Delivered(float(second), np.full((2, 2, 3), second + 1, np.uint8))
-        faults = [Running(kind, rng) for kind in kinds] if begin <= second < end else []
+        faults = [RunningFault(Fault(kind), begin, end, rng) for kind in kinds] if begin <= second < end else []
         frame = delivery.deliver(taken, faults)
         seen.append((frame.time, int(frame.pixels[0, 0, 0])))
     return seen

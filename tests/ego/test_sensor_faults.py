@@ -5,7 +5,8 @@ import pytest
 from early_motorway import EARLY
 
 import fogsim
-from fogsim.values import Blackout, Fault, Frame, Step
+from fogsim.values import Frame, Step
+from fogsim.values.fault import Blackout, Fault
 
 SMALL = (EARLY, "camera.width=320", "camera.height=240", "duration_s=1", "fog.visibility_m=100", "estimators=[zhu2015]")
 
@@ -76,3 +77,24 @@ def test_a_run_without_frames_takes_no_fault_of_the_camera() -> None:
 def test_faults_are_named_after_one_sensor() -> None:
     with pytest.raises(fogsim.InputError, match=r"sensor.*camera.*lead"):
         fogsim.load_scenario("motorway_fog_bank", ["sensors.faults=[{sensor: lead, fault: blackout}]"])
+
+
+def test_a_knocked_camera_sees_what_one_sees_that_was_mounted_so(plain: list[Step]) -> None:
+    knocked = steps("{fault: calibration, pitch: 0.5 deg, roll: 1 deg, focal_length: 2 %}")
+    view = np.degrees(2.0 * np.arctan(np.tan(np.radians(29.0)) / 1.02))
+    mounted = ["camera.pitch_deg=2.5", "camera.roll_deg=1", f"camera.field_of_view_deg={view}"]
+    other = next(fogsim.run(fogsim.load_scenario("motorway_fog_bank", [*SMALL, *mounted]), seed=2))
+    difference = frame(knocked[0]).image.astype(int) - frame(other).image
+    assert (difference != 0).mean() < 0.01
+    assert frame(knocked[0]).camera == frame(plain[0]).camera
+    camera = knocked[0].truth.camera
+    assert camera is not None
+    assert camera.pitch == pytest.approx(np.radians(2.5))
+
+
+def test_signs_that_have_gone_are_not_drawn_but_stay_on_the_map(plain: list[Step]) -> None:
+    gone = steps("{sensor: signs, fault: missing, at: 0.5 s, for: 0.2 s}")
+    assert [len(step.truth.signs.signs) > 0 for step in gone] == [True] * 5 + [False] * 2 + [True] * 4
+    assert [step.observation.signs for step in gone] == [step.observation.signs for step in plain]
+    forgotten = steps("{sensor: signs, fault: missing, where: map}", "{sensor: gps, fault: outage, at: 5 s}")
+    assert all(step.observation.signs == () and step.truth.signs.signs for step in forgotten)

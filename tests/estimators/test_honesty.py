@@ -115,7 +115,7 @@ def test_a_false_truth_changes_nothing(as_it_is: list[Step], monkeypatch: pytest
         return measure_lead(leader and dataclasses.replace(leader, vehicle_id=f"v{rng.integers(99)}"), *arguments)
 
     monkeypatch.setattr("fogsim.ego.equipment.fog_truth", false_truth)
-    monkeypatch.setattr("fogsim.ego.equipment.measure_lead", measure_another)
+    monkeypatch.setattr("fogsim.ego.measurements.measure_lead", measure_another)
     monkeypatch.setattr(ViewRenderer, "render", render_falsely)
     misled = drive()
     assert misled[3].truth.visibility != as_it_is[3].truth.visibility

@@ -1,0 +1,87 @@
+"""What the ego's sensors beside its camera measure, faults included."""
+
+import math
+from collections.abc import Sequence
+
+from fogsim.randomness import Streams
+from fogsim.scenario import Scenario, build
+from fogsim.sensors import (
+    Fix,
+    faulty_fix,
+    faulty_lead,
+    faulty_lead_sensor,
+    faulty_signs,
+    measure_fix,
+    measure_lead,
+    signs_ahead,
+)
+from fogsim.values import LeadMeasurement, RunningFault, SignMap, SignSighting, TrafficSnapshot
+from fogsim.values.fault import Where
+
+Faults = Sequence[RunningFault]
+
+
+class EgoSensors:
+    """Radar, satellite positioning and sign map of an ego.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._radar, self._gps = build.lead_sensor(scenario), build.gps(scenario)
+        self._sign_reach = scenario.sensors.sign_reach_m
+
+    def lead(self, snapshot: TrafficSnapshot, faults: Faults, streams: Streams) -> LeadMeasurement | None:
+        """The vehicle ahead by radar.
+
+        Parameters
+        ----------
+        snapshot : TrafficSnapshot
+            The traffic now.
+        faults : sequence of RunningFault
+            What is wrong now.
+        streams : Streams
+            Random numbers of the run.
+        """
+        speed, radar = float(snapshot.state.speed[snapshot.ego]), faulty_lead_sensor(self._radar, faults)
+        measured = measure_lead(snapshot.leader, speed, radar, streams.sensors, _bearing(snapshot))
+        return faulty_lead(measured, faults)
+
+    def signs(
+        self, snapshot: TrafficSnapshot, known: SignMap, faults: Faults, streams: Streams
+    ) -> tuple[SignSighting, ...]:
+        """Signs ahead by the map, from where the vehicle takes itself to be.
+
+        Parameters
+        ----------
+        snapshot : TrafficSnapshot
+            The traffic now.
+        known : SignMap
+            The map without faults.
+        faults : sequence of RunningFault
+            What is wrong now.
+        streams : Streams
+            Random numbers of the run.
+        """
+        state, ego = snapshot.state, snapshot.ego
+        fix = measure_fix(state.position[ego], float(state.heading[ego]), self._gps, streams.gps)
+        measured: Fix | None = faulty_fix(fix, faults)
+        if measured is None:
+            return ()
+        known = faulty_signs(known, (fault.kind for fault in faults), Where.MAP)
+        return signs_ahead(known, measured.position, measured.heading, self._sign_reach)
+
+
+def _bearing(snapshot: TrafficSnapshot) -> float:
+    """Angle from the ego's axis to the middle of the leader's rear [rad]; 0 if that is not read."""
+    state, ego, leader = snapshot.state, snapshot.ego, snapshot.leader
+    if leader is None or leader.vehicle_id not in state.ids:
+        return 0.0
+    row, own = state.ids.index(leader.vehicle_id), float(state.heading[ego])
+    x, y = (state.position[row] - state.position[ego])[:2].tolist()
+    x -= float(state.length[row]) * math.cos(float(state.heading[row]))
+    y -= float(state.length[row]) * math.sin(float(state.heading[row]))
+    return math.atan2(y * math.cos(own) - x * math.sin(own), max(x * math.cos(own) + y * math.sin(own), 0.0))

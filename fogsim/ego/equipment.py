@@ -1,10 +1,9 @@
 """What rides in the ego: from a snapshot of the traffic to a finished step."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
-from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -197,20 +196,12 @@ class EgoEquipment:
         streams, meters, schedule, network = self._streams, self._meters, self._schedule, self._network
         if streams is None or meters is None or schedule is None or network is None:
             raise SimulationError("the run has not been started, or is closed")
-        renderer, state, ego = self._view_renderer, snapshot.state, snapshot.ego
-        faults = self._schedule.at(time)
-        pose, fog = self._pose(state, ego), field_at(self._view_renderer.fog, time)
-        sections = self._meters.measure(fog)
-        known = tuple(one.fault for one in faults)
-        truth = fog_truth(fog, pose, self._camera, renderer.signs, state, sections, self._way, known)
-        view, radiance = renderer.render(state, ego, pose, time)
-        image = self._camera_sensor.take(radiance, self._streams.camera)
         faults = schedule.at(time)
         renderer, state, ego = self._view_of_world(faults), snapshot.state, snapshot.ego
         camera = knocked(self._camera, [one.kind for one in faults])
         pose, fog = self._pose(state, ego), field_at(renderer.fog, time)
         sections, known = meters.measure(fog), tuple(one.fault for one in faults)
-        truth = fog_truth(fog, pose, camera, renderer.signs, state, sections, network[0].route, known)
+        truth = fog_truth(fog, pose, camera, renderer.signs, state, sections, self._way, known)
         view, radiance = renderer.render(state, ego, pose, time, camera)
         image = self._camera_sensor.take(radiance, streams.camera)
         frame = Frame(*self._delivery.deliver(Delivered(time, image), faults), self._assumed_camera)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from fogsim.errors import InputError
 from fogsim.files.user_cache import VARIABLE, cache_directory
-from fogsim.scenario.roads.schema import ActorSection, Road, measure_of
+from fogsim.scenario.roads.schema import ActorSection, DemandSection, Road, measure_of
 from fogsim.scenario.schema import Scenario
 from fogsim.traffic.templates import (
     ROAD_TEMPLATES,
@@ -29,6 +29,7 @@ from fogsim.traffic.templates import (
     net_text,
     place_actors,
     routes_text,
+    usual_mix,
 )
 
 _NET, _ROUTES = "road.net.xml", "road.rou.xml"
@@ -75,7 +76,8 @@ def traffic_files(scenario: Scenario) -> TrafficFiles:
     if scenario.road is None:
         return TrafficFiles(net, routes, additional)
     layout, placed = road_layout(scenario)
-    texts = {_NET: net_text(layout.net), _ROUTES: routes_text(layout, _demand(scenario), placed)}
+    demand = _demand(scenario.demand or DemandSection(), usual_mix(scenario.road.template))
+    texts = {_NET: net_text(layout.net), _ROUTES: routes_text(layout, demand, placed)}
     made = _written(texts)
     return TrafficFiles(made / _NET, (made / _ROUTES, *routes), additional)
 
@@ -139,16 +141,13 @@ def _place(section: ActorSection) -> float | Relation:
     return 200.0 if section.position_m is None else section.position_m
 
 
-def _demand(scenario: Scenario) -> Demand:
-    section = scenario.demand
-    if section is None:
-        return Demand()
+def _demand(section: DemandSection, mix: tuple[tuple[str, float], ...]) -> Demand:
     flows = {
         key.removesuffix("_vph"): getattr(section, key) / _SECONDS_PER_HOUR
         for key in type(section).model_fields
         if key.endswith("_vph")
     }
-    return Demand(tuple(flows.items()), tuple(section.mix.items()))
+    return Demand(tuple(flows.items()), mix if section.mix is None else tuple(section.mix.items()), section.turning)
 
 
 def _written(texts: dict[str, str]) -> Path:

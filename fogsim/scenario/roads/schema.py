@@ -8,7 +8,7 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 from fogsim.errors import UnknownNameError, suggest
 from fogsim.quantities import is_quantity, parse_quantity
 from fogsim.scenario.section import Distance, Flag, Id, Length, Number, Section, Share, SpeedKmh, Time, Whole
-from fogsim.traffic.templates import ROAD_TEMPLATES, USUAL_MIX, VEHICLE_KINDS, measures
+from fogsim.traffic.templates import ROAD_TEMPLATES, VEHICLE_KINDS, measures
 
 _ROUNDING = 1e-6
 
@@ -67,6 +67,24 @@ class Road(Section):
     grade_length_m: Length | None = None
     """How long it is, with its vertical curves; the road is level after it, and on a country road goes down again."""
 
+    lights: Flag | None = None
+    """Whether a crossing has traffic lights; without, the road that crosses the ego's gives way."""
+
+    side_limit_kmh: Annotated[SpeedKmh, Field(ge=5)] | None = None
+    """Speed limit of the road that meets the ego's."""
+
+    radius_m: Annotated[Length, Field(ge=12, le=100)] | None = None
+    """Radius of a roundabout, to the middle of its lane."""
+
+    ramp_at_m: Annotated[Distance, Field(ge=100)] | None = None
+    """Where the lane begins on which those who come from a ramp speed up."""
+
+    ramp_length_m: Annotated[Length, Field(ge=150)] | None = None
+    """Length of the ramp."""
+
+    merge_length_m: Annotated[Length, Field(ge=50)] | None = None
+    """Length of the lane to speed up on."""
+
     @field_validator("template")
     @classmethod
     def _known_template(cls, value: str) -> str:
@@ -107,12 +125,26 @@ class DemandSection(Section):
     oncoming_vph: Flow = 0.0
     """Vehicles that come towards it."""
 
-    mix: dict[str, Share] = Field(default_factory=lambda: dict(USUAL_MIX))
-    """Shares of types of vehicles; what they leave is cars."""
+    ramp_vph: Flow = 0.0
+    """Vehicles that come from a ramp."""
+
+    north_vph: Flow = 0.0
+    """Vehicles that come from the left, where a road meets the ego's, which comes from the west."""
+
+    south_vph: Flow = 0.0
+    """Vehicles that come from the right there."""
+
+    turning: Share = 0.2
+    """Share of vehicles that turn where roads meet, half of them to either side."""
+
+    mix: dict[str, Share] | None = None
+    """Shares of types of vehicles; what they leave is cars. By default as usual for the template."""
 
     @field_validator("mix")
     @classmethod
-    def _known_types(cls, value: dict[str, float]) -> dict[str, float]:
+    def _known_types(cls, value: dict[str, float] | None) -> dict[str, float] | None:
+        if value is None:
+            return None
         for name in value:
             _check_type(name)
         rest = 1.0 - math.fsum(share for name, share in value.items() if name != "car")

@@ -1,15 +1,14 @@
 """Roads by template, and who drives on them, written to SUMO's files: no netconvert is needed."""
 
-from fogsim.traffic.templates.catalogue import ROAD_TEMPLATES, RoadTemplate, measures
+from fogsim.traffic.templates.catalogue import ROAD_TEMPLATES, RoadTemplate, measures, usual_mix
 from fogsim.traffic.templates.demand import Demand, cuts_around, routes_text
 from fogsim.traffic.templates.net_plan import Layout
 from fogsim.traffic.templates.net_writer import net_text
 from fogsim.traffic.templates.placement import Actor, Placed, PlacementError, Relation, check_placement, place_actors
-from fogsim.traffic.templates.vehicle_types import USUAL_MIX, VEHICLE_KINDS
+from fogsim.traffic.templates.vehicle_types import VEHICLE_KINDS
 
 __all__ = [
     "ROAD_TEMPLATES",
-    "USUAL_MIX",
     "VEHICLE_KINDS",
     "Actor",
     "Demand",
@@ -24,4 +23,5 @@ __all__ = [
     "net_text",
     "place_actors",
     "routes_text",
+    "usual_mix",
 ]

@@ -7,6 +7,9 @@ from typing import Protocol
 from fogsim.registry import Registry
 from fogsim.traffic.templates.along_roads import Curve, Grade, Motorway, Rural, Straight
 from fogsim.traffic.templates.net_plan import Layout
+from fogsim.traffic.templates.ramp import Ramp
+from fogsim.traffic.templates.town_roads import Crossing, Roundabout, Streets
+from fogsim.traffic.templates.vehicle_types import TOWN_MIX, USUAL_MIX
 
 
 class RoadTemplate(Protocol):
@@ -30,9 +33,29 @@ class RoadTemplate(Protocol):
 
 ROAD_TEMPLATES: Registry[type[RoadTemplate]] = Registry(
     "road template",
-    {"motorway": Motorway, "straight": Straight, "curve": Curve, "grade": Grade, "rural": Rural},
+    {
+        "motorway": Motorway,
+        "ramp": Ramp,
+        "straight": Straight,
+        "curve": Curve,
+        "grade": Grade,
+        "rural": Rural,
+        "crossing": Crossing,
+        "roundabout": Roundabout,
+    },
 )
 """Templates by name."""
+
+
+def usual_mix(template: str) -> tuple[tuple[str, float], ...]:
+    """Shares of types of vehicles on a template's roads, where nothing else is said.
+
+    Parameters
+    ----------
+    template : str
+        Its name.
+    """
+    return TOWN_MIX if issubclass(ROAD_TEMPLATES[template], Streets) else USUAL_MIX
 
 
 def measures(template: str) -> tuple[str, ...]:

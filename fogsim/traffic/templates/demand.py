@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 from fogsim.traffic.templates.net_plan import Layout
 from fogsim.traffic.templates.placement import Placed, edge_at
-from fogsim.traffic.templates.vehicle_types import SLOW, USUAL_MIX, VEHICLE_KINDS, VehicleKind
+from fogsim.traffic.templates.vehicle_types import SLOW, VEHICLE_KINDS, VehicleKind
 from fogsim.traffic.templates.xml_text import element, opening
 
 _END = 1_000_000  # of flows [s]
 _MEAN_SHARE_OF_LIMIT = 0.9
+_GAP = 2.0  # time gap to others that who gives way wants beside SUMO's, with which some collide [s]
 _ROOM = 30.0  # around actors, kept free in their lanes [m]
 _SHORTEST = 25.0  # edge that is filled [m]
 
@@ -25,10 +26,13 @@ class Demand:
         Vehicles per second [1/s] by way.
     mix : tuple of (str, float)
         Shares of types, together 1.
+    turning : float
+        Share that turns where roads meet, half to either side [-].
     """
 
-    flows: tuple[tuple[str, float], ...] = ()
-    mix: tuple[tuple[str, float], ...] = USUAL_MIX
+    flows: tuple[tuple[str, float], ...]
+    mix: tuple[tuple[str, float], ...]
+    turning: float = 0.2
 
 
 def cuts_around(placed: Sequence[Placed], length: float) -> tuple[float, ...]:
@@ -64,11 +68,18 @@ def routes_text(layout: Layout, demand: Demand, placed: Sequence[Placed]) -> str
     for one in sorted(placed, key=lambda one: one.actor.depart):
         lines += _actor(one, layout)
     taken = {_taken_lane(one, layout) for one in placed}
-    for way, rate in demand.flows:
-        if rate > 0.0:
-            lines += _filling(layout, way, rate, taken)
-            lines += _flows(layout, way, rate)
+    for way, rate in _rates(layout, demand):
+        lines += _filling(layout, way, rate, taken)
+        lines += _flows(layout, way, rate)
     return '<?xml version="1.0" encoding="UTF-8"?>\n<routes>\n' + "\n".join(lines) + "\n</routes>\n"
+
+
+def _rates(layout: Layout, demand: Demand) -> Iterator[tuple[str, float]]:
+    """Flows of ways [1/s], those that turn apart."""
+    for way, rate in demand.flows:
+        turning = [f"{way}.{side}" for side in ("left", "right") if layout.way(f"{way}.{side}")]
+        shares = {way: 1.0 - demand.turning if turning else 1.0, **dict.fromkeys(turning, 0.5 * demand.turning)}
+        yield from ((name, share * rate) for name, share in shares.items() if share * rate > 0.0)
 
 
 def _taken_lane(one: Placed, layout: Layout) -> tuple[str, int]:
@@ -105,6 +116,7 @@ def _type(name: str, kind: VehicleKind, **further: object) -> str:
         "accel": kind.acceleration,
         "decel": kind.deceleration,
         "sigma": kind.imperfection,
+        "jmTimegapMinor": _GAP,
     }
     return element("vType", id=name, **(written | further))
 

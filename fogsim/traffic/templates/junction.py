@@ -150,12 +150,17 @@ def _junction(
     name: str, around: tuple[tuple[Edge, ...], tuple[Edge, ...]], ways: tuple[CrossingWay, ...], has_signals: bool
 ) -> Junction:
     meets = tuple(tuple(way is not other and way.meets(other) for other in ways) for way in ways)
-    yields = tuple(
-        tuple(met and way.yields_to(other) for met, other in zip(row, ways, strict=True))
+    yields = [
+        [met and way.yields_to(other) for met, other in zip(row, ways, strict=True)]
         for row, way in zip(meets, ways, strict=True)
-    )
+    ]
     waits = tuple(_waits_at(number, ways, (meets[number], yields[number]), has_signals) for number in range(len(ways)))
-    return Junction(name, *around, ways, meets, yields, waits, has_signals)
+    if has_signals:
+        # Who waited within the junction leaves it when the lights have changed: those who have green then let him.
+        for row, met, way in zip(yields, meets, ways, strict=True):
+            for place, (other, share) in enumerate(zip(ways, waits, strict=True)):
+                row[place] |= share is not None and met[place] and way.source.priority != other.source.priority
+    return Junction(name, *around, ways, meets, tuple(map(tuple, yields)), waits, has_signals)
 
 
 def _waits_at(

@@ -46,6 +46,7 @@ VEHICLE_KINDS: Registry[VehicleKind] = Registry(
     {
         "car": CAR,
         "van": VehicleKind("delivery", 5.9, 2.05, 2.4, 36.1, "normc(0.90,0.08,0.70,1.10)", 1.5),
+        "lorry": VehicleKind("truck", 9.2, 2.5, 3.4, 25.0, "normc(0.95,0.05,0.80,1.05)", 1.6, 1.2, 4.0, 0.3),
         "truck": VehicleKind("truck", 15.5, 2.5, 3.8, 24.7, "normc(0.98,0.03,0.90,1.05)", 1.8, 0.8, 4.0, 0.3),
         "coach": VehicleKind("coach", 12.5, 2.55, 3.55, 27.8, "normc(1.00,0.02,0.95,1.05)", 1.7, 1.2, 4.0, 0.3),
         "motorcycle": VehicleKind("motorcycle", 2.2, 0.9, 1.5, 55.0, "normc(1.00,0.10,0.80,1.25)", 1.3, 4.0, 6.0),
@@ -56,6 +57,9 @@ VEHICLE_KINDS: Registry[VehicleKind] = Registry(
 
 USUAL_MIX = (("car", 0.68), ("van", 0.14), ("truck", 0.15), ("coach", 0.03))
 """Shares of types in traffic, where nothing else is said."""
+
+TOWN_MIX = (("car", 0.84), ("van", 0.10), ("lorry", 0.06))
+"""Shares of types in the traffic of streets."""
 
 SLOW = ("truck", "coach", "bicycle")
 """Types that keep to the right lane."""

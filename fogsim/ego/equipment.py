@@ -228,6 +228,7 @@ class EgoEquipment:
             belief=checked_belief(self._scenario.fusion.method, self._fusion.update(estimates, time)),
             command=command,
             ending=ending,
+            reading_radius=self._scenario.traffic.reading_radius_m,
         )
 
     def surrounding(self, state: TrafficState, ego: int, pose: CameraPose) -> Surrounding:

@@ -27,7 +27,7 @@ ROAD_COLUMNS = (
 )
 """Columns of `RoadSpeeds.sums`."""
 
-_ROAD_HALF_WIDTH = 20.0
+ROAD_HALF_WIDTH = 20.0
 """How far beside the path others still drive on its road [m]."""
 
 _MOST_PENDING = 200_000
@@ -147,7 +147,7 @@ class RoadSpeeds:
         ahead = (way * along).sum(axis=1)
         beside = np.abs(way[:, 0] * along[:, 1] - way[:, 1] * along[:, 0])
         same = (heading * along).sum(axis=1) > math.cos(math.pi / 4) * np.hypot(*heading.T)
-        on_road = same & (beside < _ROAD_HALF_WIDTH) & (np.abs(ahead) < 2 * PATH_SPACING)
+        on_road = same & (beside < ROAD_HALF_WIDTH) & (np.abs(ahead) < 2 * PATH_SPACING)
         cell = ((path[nearest, 0] + ahead)[on_road] // CELL_LENGTH).astype(int)
         found: dict[int, NDArray[np.float64]] = {}
         for number, part in zip(cell, sums[on_road, :3], strict=True):

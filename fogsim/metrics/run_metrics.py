@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from fogsim.errors import SimulationError
+from fogsim.metrics.cross_sections import TrafficThroughput
+from fogsim.metrics.crossing import TrafficEncroachment
 from fogsim.metrics.estimation import BeliefError, EstimatorErrors
 from fogsim.metrics.metric import JsonValue, Metric, Sample
 from fogsim.metrics.motion import Comfort, Compliance, Motion
@@ -17,7 +19,6 @@ from fogsim.metrics.traffic_comfort import TrafficComfort
 from fogsim.metrics.traffic_compliance import TrafficCompliance
 from fogsim.metrics.traffic_conflicts import TrafficConflicts
 from fogsim.metrics.traffic_emissions import TrafficEmissions
-from fogsim.metrics.traffic_encroachment import TrafficEncroachment
 from fogsim.metrics.traffic_flow import TrafficFlow
 from fogsim.metrics.traffic_headways import TrafficHeadways
 from fogsim.metrics.traffic_sight import TrafficSight
@@ -47,6 +48,7 @@ METRICS: Registry[MetricFactory] = Registry(
         "traffic_encroachment": lambda _: TrafficEncroachment(),
         "traffic_sight": lambda standard: TrafficSight(standard.reaction_time, standard.deceleration),
         "traffic_flow": lambda _: TrafficFlow(),
+        "traffic_throughput": lambda _: TrafficThroughput(),
         "traffic_comfort": lambda _: TrafficComfort(),
         "traffic_compliance": lambda standard: TrafficCompliance(standard.advice_tolerance),
         "traffic_emissions": lambda _: TrafficEmissions(),

@@ -1,5 +1,6 @@
 """All vehicles near the ego over several steps, as arrays: together they cost a fraction of one by one."""
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from fogsim.metrics.following import Following, pair_in_lanes
 from fogsim.metrics.metric import JsonValue, share
-from fogsim.values import Collision, TrafficState, TrafficStep
+from fogsim.values import Collision, Step, TrafficState, TrafficStep
 
 MOST_ROWS = 4096
 """Rows that are gathered before the metrics get them."""
@@ -55,6 +56,10 @@ class TrafficSpan:
         Lanes and body kinds so far, by their numbers.
     route : (m, 3) float64 or None
         As of `Truth`.
+    ego : (k,) intp or None
+        Rows of the ego, one in each step; None without one.
+    reading_radius : float
+        As of `Step` [m]; ``inf`` without an ego.
     """
 
     moment: NDArray[np.intp]
@@ -77,6 +82,8 @@ class TrafficSpan:
     lane_names: tuple[str, ...]
     kind_names: tuple[str, ...]
     route: NDArray[np.float64] | None = None
+    ego: NDArray[np.intp] | None = None
+    reading_radius: float = math.inf
 
     @cached_property
     def following(self) -> Following:
@@ -187,6 +194,8 @@ class TrafficGathering:
         self._numbers: list[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]] = []
         self._collisions: list[Collision] = []
         self._route: NDArray[np.float64] | None = None
+        self._egos: list[int] = []
+        self._reading_radius = math.inf
         self._last_ids: tuple[str, ...] = ()
         self._last_lanes: tuple[str, ...] = ()
         self._last = np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros(0, np.intp)
@@ -221,6 +230,9 @@ class TrafficGathering:
             lanes, self._last_lanes = _numbers(self._lanes, traffic.lane), traffic.lane
         self._last = vehicles, lanes, kinds
         self._numbers.append(self._last)
+        if isinstance(step, Step):
+            self._egos.append(self._rows - len(self._states) + step.ego)
+            self._reading_radius = step.reading_radius
         self._states.append((traffic, elapsed, step.truth.vehicle_extinctions))
         self._rows += len(vehicles) + 1
 
@@ -256,10 +268,12 @@ class TrafficGathering:
             lane_names=tuple(self._lanes),
             kind_names=tuple(self._kinds),
             route=self._route,
+            ego=np.array(self._egos, dtype=np.intp) if self._egos else None,
+            reading_radius=self._reading_radius,
         )
         self._moments += len(states)
         self._time = float(clock[-1])
-        self._rows, self._states, self._numbers, self._collisions = 0, [], [], []
+        self._rows, self._states, self._numbers, self._collisions, self._egos = 0, [], [], [], []
         return span
 
 

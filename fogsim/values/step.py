@@ -1,5 +1,6 @@
 """One finished instant of a run: what metrics and recorders get."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -168,6 +169,8 @@ class Step(TrafficStep):
         What the estimators make of it.
     belief : Belief
         What is believed after this step.
+    reading_radius : float
+        Distance from the ego up to which vehicles are in `traffic` [m].
     """
 
     ego: int
@@ -178,3 +181,4 @@ class Step(TrafficStep):
     observation: Observation
     estimates: tuple[Estimate, ...]
     belief: Belief
+    reading_radius: float = math.inf

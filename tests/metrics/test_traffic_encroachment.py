@@ -8,9 +8,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from fogsim.metrics.crossing import TrafficEncroachment
 from fogsim.metrics.crossing.way_kernels import crossing_pieces
 from fogsim.metrics.metric import JsonValue
-from fogsim.metrics.traffic_encroachment import TrafficEncroachment
 from fogsim.values import TrafficState
 from tests.metrics.roads import lanes, watched
 
@@ -178,6 +178,16 @@ def test_who_is_put_elsewhere_crosses_nothing() -> None:
 
     found = measured(a=Driver(evenly(3.0)), b=Driver(put, math.pi / 2, ways=NORTHWARDS))
     assert found[MINIMUM] is None
+
+
+def test_what_is_said_does_not_change_by_being_asked_again() -> None:
+    metric = TrafficEncroachment()
+    watched(metric, [(0.0, road(3.0, {"a": Driver(evenly(3.0))}))])
+    assert metric.result() == {MINIMUM: None, BELOW_5: None, BELOW_1: None}
+    drivers = {"a": Driver(evenly(3.0)), "b": Driver(evenly(5.0), math.pi / 2, ways=NORTHWARDS)}
+    first = watched(metric, [(0.5, road(0.5 * i, drivers)) for i in range(24)])
+    assert metric.result() == first
+    assert first[MINIMUM] == pytest.approx(1.32)
 
 
 def test_all_of_many_pieces_that_cross_are_found() -> None:

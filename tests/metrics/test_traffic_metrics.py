@@ -6,13 +6,14 @@ import math
 import numpy as np
 import pytest
 
+from fogsim.metrics.cross_sections import TrafficThroughput
+from fogsim.metrics.crossing import TrafficEncroachment
 from fogsim.metrics.histogram import Histogram
 from fogsim.metrics.traffic_collisions import TrafficCollisions
 from fogsim.metrics.traffic_comfort import TrafficComfort
 from fogsim.metrics.traffic_compliance import TrafficCompliance
 from fogsim.metrics.traffic_conflicts import TrafficConflicts
 from fogsim.metrics.traffic_emissions import TrafficEmissions
-from fogsim.metrics.traffic_encroachment import TrafficEncroachment
 from fogsim.metrics.traffic_flow import TrafficFlow
 from fogsim.metrics.traffic_headways import TrafficHeadways
 from fogsim.metrics.traffic_sight import TrafficSight
@@ -165,6 +166,7 @@ def test_collisions_by_what_was_driven() -> None:
     [
         *(TrafficConflicts(3.0), TrafficHeadways(), TrafficFlow(), TrafficSight(2.5, 3.4), TrafficComfort()),
         *(TrafficCollisions(), TrafficEmissions(), TrafficCompliance(1.0), TrafficEncroachment()),
+        TrafficThroughput(),
     ],
     ids=lambda metric: type(metric).__name__,
 )

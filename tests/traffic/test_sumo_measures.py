@@ -12,12 +12,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from fogsim.metrics.cross_sections import TrafficThroughput
+from fogsim.metrics.cross_sections.traffic_throughput import SPACING
+from fogsim.metrics.crossing import TrafficEncroachment
 from fogsim.metrics.metric import JsonValue
 from fogsim.metrics.surrogate import CRITICAL_DECELERATION, QUEUE_SPEED
 from fogsim.metrics.traffic_collisions import TrafficCollisions
 from fogsim.metrics.traffic_conflicts import TrafficConflicts
 from fogsim.metrics.traffic_emissions import TrafficEmissions
-from fogsim.metrics.traffic_encroachment import TrafficEncroachment
 from fogsim.metrics.traffic_flow import TrafficFlow
 from fogsim.metrics.traffic_span import TrafficGathering, TrafficMetric
 from fogsim.traffic import DriverSetup, TrafficSetup
@@ -25,7 +27,7 @@ from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo_traffic import SumoTraffic
 from fogsim.values import Collision, Command, TrafficState
-from tests.recorders.synthetic import make_step
+from tests.recorders.synthetic import make_step, make_traffic_step
 
 STEP = 0.1
 STEPS = 400
@@ -124,15 +126,22 @@ def drive(folder: Path, wakes_at: int) -> Run:
             api.vehicle.setSpeedMode("f", 31)
             api.vehicle.setSpeed("f", -1.0)
 
-    return play(folder, folder / "road.net.xml", STEPS, disturb)
+    loops = "".join(
+        f'<inductionLoop id="{place:g}" lane="road_0" pos="{place}" period="1000" file="loops.xml"/>'
+        for place in np.arange(0.5 * SPACING, LENGTH, SPACING)
+    )
+    (folder / "loops.add.xml").write_text(f"<additional>{loops}</additional>", encoding="utf-8")
+    return play(folder, folder / "road.net.xml", STEPS, disturb, (folder / "loops.add.xml",))
 
 
-def play(folder: Path, net: Path, steps: int, disturb: Callable[[Api, int], None]) -> Run:
+def play(
+    folder: Path, net: Path, steps: int, disturb: Callable[[Api, int], None], additional: tuple[Path, ...] = ()
+) -> Run:
     """The vehicles of ``road.rou.xml`` on a network, for so many steps before each of which something may happen."""
     setup = TrafficSetup(
         net=net,
         routes=(folder / "road.rou.xml",),
-        additional=(),
+        additional=additional,
         ego="ego",
         step_length=STEP,
         keep_lane=(),
@@ -223,6 +232,24 @@ def test_way_and_delay_are_those_of_the_trips(run: Run) -> None:
     delay = found["traffic_delay_s_per_vehicle_km"]
     assert isinstance(delay, float)
     assert delay * way / 1000.0 == pytest.approx(lost, abs=0.5e-3 * len(SPEEDS))
+
+
+def test_flow_is_that_of_induction_loops(run: Run) -> None:
+    """Of all vehicles, as without an ego."""
+    road = np.array([[0.0, 0.0, 0.0], [LENGTH, 0.0, 0.0]])
+    gathering, metric = TrafficGathering(), TrafficThroughput()
+    for number, state in enumerate(run.states):
+        step = make_traffic_step(number)
+        truth = dataclasses.replace(step.truth, route=road)
+        gathering.add(dataclasses.replace(step, traffic=state, truth=truth), STEP if number else 0.0)
+    span = gathering.take()
+    assert span is not None
+    metric.add(span)
+    loops = [loop.attrib for loop in ET.parse(run.folder / "loops.xml").getroot()]  # noqa: S314 - the test's own run
+    passed = sum(int(loop["nVehEntered"]) for loop in loops)
+    assert passed > len(SPEEDS)
+    hours = len(loops) * (STEPS - 1) * STEP / 3600.0
+    assert metric.result()["traffic_flow_vehicles_per_h"] == pytest.approx(passed / hours)
 
 
 def test_collisions_are_those_of_sumos_output(tmp_path: Path) -> None:

@@ -6,7 +6,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from fogsim.metrics.crossing import Fronts, Junctions, find_encroachments, tracks_through
+from fogsim.metrics.crossing.encroachment import find_encroachments
+from fogsim.metrics.crossing.tracks import Fronts, Junctions, tracks_through
 from fogsim.metrics.metric import JsonValue
 from fogsim.metrics.traffic_span import Exposure, TrafficMetric, TrafficSpan
 
@@ -37,7 +38,8 @@ class TrafficEncroachment(TrafficMetric):
     }
     _exposure: Exposure = field(default_factory=Exposure)
     _junctions: Junctions = field(default_factory=Junctions)
-    _pending: list[Fronts] = field(default_factory=list)
+    _spans: list[TrafficSpan] = field(default_factory=list)
+    _kept: list[Fronts] = field(default_factory=list)
     _since: float = 0.0
     _least: dict[tuple[int, int, int], float] = field(default_factory=dict)
 
@@ -50,22 +52,24 @@ class TrafficEncroachment(TrafficMetric):
             The next steps.
         """
         self._exposure.add(span)
-        fronts = Fronts.of(span)
-        if not len(fronts.time):
+        if not len(span.time):
             return
-        now = float(fronts.time[-1])
+        now = float(span.time[-1])
         if not self._junctions.learn(span.lane_names):
             # Its last rows may be those before the first junction.
-            self._pending, self._since = [fronts], now
+            self._spans, self._since = [span], now
             return
-        self._pending.append(fronts)
+        self._spans.append(span)
         if now - self._since >= MEMORY:
             self._compare()
             self._since = now
 
     def _compare(self) -> None:
-        """Compare all who are pending, and keep those whom others may still encounter."""
-        rows = Fronts.joined(self._pending)
+        """Compare all who are new, and keep those whom others may still encounter."""
+        rows = Fronts.joined([*self._kept, *(Fronts.of(span) for span in self._spans)])
+        self._spans = []
+        if not len(rows.time):
+            return
         tracks = tracks_through(rows, self._junctions)
         columns = (column.tolist() for column in find_encroachments(tracks))
         for first, second, junction, time in zip(*columns, strict=True):
@@ -79,11 +83,11 @@ class TrafficEncroachment(TrafficMetric):
         since = np.full(len(tracks.start), len(tracks.track))
         np.minimum.at(since, tracks.track[late], late - 1)
         kept[tracks.source[np.arange(len(tracks.track)) >= since[tracks.track]]] = True
-        self._pending = [rows.chosen(kept)]
+        self._kept = [rows.chosen(kept)]
 
     def result(self) -> dict[str, JsonValue]:
         """Say how closely they followed one another."""
-        if self._junctions.learn(()):
+        if self._junctions.learn(()) and self._spans:
             self._compare()
         times = np.array([time for time in self._least.values() if time < MEMORY])
         rate = self._exposure.per_kilometre

@@ -1,0 +1,99 @@
+"""How many vehicles pass the cross sections of a road."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.metrics.cross_sections.passage_kernels import NOT_YET, count_passages
+from fogsim.metrics.metric import JsonValue, share
+from fogsim.metrics.road_speeds import ROAD_HALF_WIDTH
+from fogsim.metrics.traffic_span import HOUR, TrafficMetric, TrafficSpan
+
+SPACING = 250.0
+"""Way from one cross section to the next [m]; the first lies half of it from where the road begins."""
+
+_FASTEST = 80.0
+"""Speed at which nobody departs from the ego [m/s]."""
+
+_AHEAD = 5.0
+"""How far to either side along the road its direction is taken [m]."""
+
+
+@dataclass(slots=True)
+class TrafficThroughput(TrafficMetric):
+    """Flow: vehicles that pass cross sections of the ego's route, or of ``traffic.along``, over the time of counting.
+
+    A section is counted at while it is read: always without an ego, else while it is within the reading radius. Who
+    passes is found from two steps that follow one another, in the direction of the road and within 20 m of its line.
+    The ego, whose coming decides when is counted, is not counted itself.
+    """
+
+    meanings: ClassVar[Mapping[str, str]] = {
+        "traffic_flow_vehicles_per_h": "vehicles that pass cross sections of the ego's route, or of traffic.along, "
+        "every 250 m, over the time in which these are read: mean over sections by that time; the ego is not counted",
+    }
+    _sections: NDArray[np.float64] | None = None
+    _last: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 4)))
+    _passed: int = 0
+    _time: float = 0.0
+
+    def add(self, span: TrafficSpan) -> None:
+        """Take in some steps.
+
+        Parameters
+        ----------
+        span : TrafficSpan
+            The next steps.
+        """
+        if span.route is None:
+            return
+        if self._sections is None:
+            self._sections = sections_along(span.route)
+        read, time = _when_read(span, self._sections)
+        self._time += time
+        missing = int(span.vehicle.max(initial=-1)) + 1 - len(self._last)
+        self._last = np.concatenate((self._last, np.full((max(missing, 0), 4), NOT_YET)))
+        others = np.ones(len(span.vehicle), np.bool_)
+        if span.ego is not None:
+            others[span.ego] = False
+        rows = span.position[others, :2], span.moment[others], span.vehicle[others]
+        first = int(span.moment[0]) if len(span.moment) else 0
+        self._passed += count_passages(*rows, self._last, self._sections, read, first, ROAD_HALF_WIDTH)
+
+    def result(self) -> dict[str, JsonValue]:
+        """Say how many passed."""
+        return {"traffic_flow_vehicles_per_h": share(HOUR * self._passed, self._time)}
+
+
+def sections_along(road: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Middles of cross sections [m], and the unit vector along the road there (s, 4).
+
+    Parameters
+    ----------
+    road : (m, 3) float64
+        Polyline along it [m].
+    """
+    x, y = road[:, 0], road[:, 1]
+    place = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))))
+    middle = np.arange(0.5 * SPACING, place[-1], SPACING)
+    begin, end = (
+        np.stack((np.interp(middle + ahead, place, x), np.interp(middle + ahead, place, y)), axis=1)
+        for ahead in (-_AHEAD, _AHEAD)
+    )
+    way = end - begin
+    return np.concatenate((0.5 * (begin + end), way / np.hypot(way[:, :1], way[:, 1:])), axis=1)
+
+
+def _when_read(span: TrafficSpan, sections: NDArray[np.float64]) -> tuple[NDArray[np.bool_], float]:
+    """Which sections are read at each step that has rows, from the first one on, and for how long all of them [s]."""
+    if span.ego is None:
+        steps = int(np.ptp(span.moment)) + 1 if len(span.moment) else 0
+        return np.ones((steps, len(sections)), np.bool_), span.duration * len(sections)
+    ego, elapsed = span.position[span.ego, None, :2], span.elapsed[span.ego, None]
+    away = np.hypot(*np.moveaxis(ego - sections[:, :2], -1, 0))
+    # Who passes was read at the step before, too.
+    read = away <= span.reading_radius - _FASTEST * elapsed
+    return read, float((read * elapsed).sum())

@@ -51,7 +51,7 @@ class Fronts(NamedTuple):
 
     @classmethod
     def of(cls, span: TrafficSpan) -> "Fronts":
-        """Those of some steps, of short ones but one in each `INTERVAL`.
+        """Those of some steps, of short ones but the first and one in each `INTERVAL`.
 
         Parameters
         ----------
@@ -62,7 +62,7 @@ class Fronts(NamedTuple):
         x, y = span.position[:, 0], span.position[:, 1]
         fronts = cls(span.vehicle, span.lane, time, elapsed, x, y, span.speed, span.length, span.width)
         ticks = time / INTERVAL + 1e-6
-        return fronts.chosen(np.floor(ticks) > np.floor(ticks - elapsed / INTERVAL))
+        return fronts.chosen((np.floor(ticks) > np.floor(ticks - elapsed / INTERVAL)) | (elapsed == 0.0))
 
     @classmethod
     def joined(cls, parts: Sequence["Fronts"]) -> "Fronts":

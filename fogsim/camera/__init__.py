@@ -2,6 +2,7 @@
 
 from fogsim.camera.delivery import Delivered, FrameDelivery
 from fogsim.camera.exposure import AutoExposure, Metering, Pixels, Sensor, expose
+from fogsim.camera.faulty_lens import FaultyLens
 from fogsim.camera.glare import LensGlare
 from fogsim.camera.mount import USUAL_MOUNTS, BodyPitch, CameraMount, Suspension, knocked, mounted_pose
 from fogsim.camera.sampling import averaged, middle_samples, supersampled
@@ -17,6 +18,7 @@ __all__ = [
     "CameraMount",
     "CameraSensor",
     "Delivered",
+    "FaultyLens",
     "FrameDelivery",
     "LensGlare",
     "Metering",

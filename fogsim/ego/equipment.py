@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere import extinction, field_at, optical_depth_along
-from fogsim.camera import Delivered, FrameDelivery, knocked, mounted_pose
+from fogsim.camera import Delivered, FaultyLens, FrameDelivery, knocked, mounted_pose
 from fogsim.ego.frame_watch import FrameWatch
 from fogsim.ego.measurements import EgoSensors
 from fogsim.ego.road_meters import RoadMeters
@@ -69,7 +69,7 @@ class EgoEquipment:
         self._sensors = EgoSensors(scenario)
         self._faults = tuple(fault_of(written) for written in scenario.sensors.faults)
         self._schedule: FaultSchedule | None = None
-        self._delivery, self._watch = FrameDelivery(), FrameWatch()
+        self._glass, self._delivery, self._watch = FaultyLens(), FrameDelivery(), FrameWatch()
         self._fusion = build.fusion(scenario)
         self._view_renderer: EgoView | None = None
         self._streams: Streams | None = None
@@ -127,6 +127,7 @@ class EgoEquipment:
         self._fusion.reset()
         self._camera_sensor.reset()
         self._body_pitch.reset()
+        self._glass.reset()
         self._delivery.reset()
         self._watch.reset()
         self._streams = streams
@@ -203,7 +204,7 @@ class EgoEquipment:
         sections, known = meters.measure(fog), tuple(one.fault for one in faults)
         truth = fog_truth(fog, pose, camera, renderer.signs, state, sections, self._way, known)
         view, radiance = renderer.render(state, ego, pose, time, camera)
-        image = self._camera_sensor.take(radiance, streams.camera)
+        image = self._camera_sensor.take(self._glass.look_through(radiance, camera, faults), streams.camera)
         frame = Frame(*self._delivery.deliver(Delivered(time, image), faults), self._assumed_camera)
         observation = Observation(
             frame=frame,

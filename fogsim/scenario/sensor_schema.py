@@ -8,10 +8,12 @@ from pydantic import Field
 from fogsim.scenario.section import Distance, Id, Length, Number, Period, Place, Section, Share, Time
 from fogsim.values.fault import (
     Blackout,
+    DirtyLens,
     DroppedFrames,
     Fault,
     FaultKind,
     FrozenFrame,
+    Glare,
     HeadingBias,
     Latency,
     LeadBias,
@@ -24,6 +26,7 @@ from fogsim.values.fault import (
     SignsMissing,
     SignsMoved,
     TimeStamp,
+    WetLens,
     Where,
 )
 
@@ -159,6 +162,70 @@ class CameraCalibration(CameraFaultSection):
         """What is wrong, in SI units."""
         ratio = 1.0 + self.focal_length_percent / 100.0
         return Miscalibration(math.radians(self.pitch_deg), math.radians(self.roll_deg), ratio)
+
+
+class CameraDirtyLens(CameraFaultSection):
+    """Dirt on the glass."""
+
+    fault: Literal["dirty_lens"]
+    """`dirty_lens`: dirt on the glass before the camera, out of focus."""
+
+    coverage: Share = 0.1
+    """Sum of the areas of all blots over that of the glass."""
+
+    diameter_m: Annotated[Number, Field(ge=1e-4, le=0.1)] = 0.002
+    """Median of their diameters."""
+
+    albedo: Share = 0.3
+    """Luminance of a blot over the mean of the picture."""
+
+    def in_si(self) -> FaultKind:
+        """What is wrong, in SI units."""
+        return DirtyLens(self.coverage, self.diameter_m, self.albedo)
+
+
+class CameraWetLens(CameraFaultSection):
+    """Water on the glass."""
+
+    fault: Literal["wet_lens"]
+    """`wet_lens`: drops and a film of water on the glass before the camera."""
+
+    coverage: Share = 0.15
+    """Sum of the areas of all drops over that of the glass."""
+
+    diameter_m: Annotated[Number, Field(ge=1e-4, le=0.1)] = 0.003
+    """Median of their diameters."""
+
+    blur_deg: Annotated[Number, Field(ge=0, le=5)] = 0.1
+    """Standard deviation of the blur by the film between them."""
+
+    def in_si(self) -> FaultKind:
+        """What is wrong, in SI units."""
+        return WetLens(self.coverage, self.diameter_m, math.radians(self.blur_deg))
+
+
+class CameraGlare(CameraFaultSection):
+    """A low sun, or another small source, that shines into the camera."""
+
+    fault: Literal["glare"]
+    """`glare`: a small source, such as a low sun, shines into the camera; nothing hides it."""
+
+    azimuth_deg: Angle = 0.0
+    """Its direction, counterclockwise from the vehicle's axis."""
+
+    elevation_deg: Annotated[Number, Field(ge=-90, le=90)] = 8.0
+    """Its height over the road's plane."""
+
+    illuminance_lx: Annotated[Number, Field(ge=0, le=200_000)] = 10_000.0
+    """What it makes on a surface that faces it, at the camera."""
+
+    haze: Annotated[Number, Field(ge=0, le=1000)] = 1.0
+    """What the windscreen scatters over what a clean one does; a dirty one has 10 and more."""
+
+    def in_si(self) -> FaultKind:
+        """What is wrong, in SI units."""
+        azimuth, elevation = math.radians(self.azimuth_deg), math.radians(self.elevation_deg)
+        return Glare(azimuth, elevation, self.illuminance_lx, self.haze)
 
 
 class LeadFaultSection(FaultSection):
@@ -332,6 +399,9 @@ AnyFault = Annotated[
     | CameraDroppedFrames
     | CameraLatency
     | CameraCalibration
+    | CameraDirtyLens
+    | CameraWetLens
+    | CameraGlare
     | LeadDropoutSection
     | LeadBiasSection
     | LeadNoiseSection

@@ -91,6 +91,72 @@ class Miscalibration:
 
 
 @dataclass(frozen=True, slots=True)
+class DirtyLens:
+    """Dirt on the glass before the camera.
+
+    Attributes
+    ----------
+    coverage : float
+        Sum of the areas of all blots over that of the glass [-].
+    diameter : float
+        Median of their diameters [m].
+    albedo : float
+        Luminance of a blot over the mean of the picture [-].
+    """
+
+    sensor: ClassVar[str] = "camera"
+    name: ClassVar[str] = "dirty_lens"
+    coverage: float = 0.1
+    diameter: float = 0.002
+    albedo: float = 0.3
+
+
+@dataclass(frozen=True, slots=True)
+class WetLens:
+    """Water on the glass before the camera.
+
+    Attributes
+    ----------
+    coverage : float
+        Sum of the areas of all drops over that of the glass [-].
+    diameter : float
+        Median of their diameters [m].
+    blur : float
+        Standard deviation of the blur by the film between them [rad].
+    """
+
+    sensor: ClassVar[str] = "camera"
+    name: ClassVar[str] = "wet_lens"
+    coverage: float = 0.15
+    diameter: float = 0.003
+    blur: float = math.radians(0.1)
+
+
+@dataclass(frozen=True, slots=True)
+class Glare:
+    """A small source, such as a low sun, that shines into the camera.
+
+    Attributes
+    ----------
+    azimuth : float
+        Its direction, counterclockwise from the vehicle's axis [rad].
+    elevation : float
+        Its height over the road's plane [rad].
+    illuminance : float
+        What it makes on a surface that faces it, at the camera [lx].
+    haze : float
+        What the windscreen scatters over what a clean one does [-].
+    """
+
+    sensor: ClassVar[str] = "camera"
+    name: ClassVar[str] = "glare"
+    azimuth: float = 0.0
+    elevation: float = math.radians(8.0)
+    illuminance: float = 10_000.0
+    haze: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
 class LeadDropout:
     """A radar that loses the vehicle ahead, in each measurement by chance.
 
@@ -244,7 +310,7 @@ class SignsMoved:
     up: float = 0.0
 
 
-CameraFault = Blackout | FrozenFrame | DroppedFrames | Latency | Miscalibration
+CameraFault = Blackout | FrozenFrame | DroppedFrames | Latency | Miscalibration | DirtyLens | WetLens | Glare
 LeadFault = LeadDropout | LeadBias | LeadNoise | LeadNarrowView
 GpsFault = PositionBias | HeadingBias | Outage
 SignFault = SignsMissing | SignsMoved

@@ -1,7 +1,9 @@
 """Conditions on a run: a small language over finished steps, for triggers and expectations."""
 
+from fogsim.conditions.fitness import RunContent, condition_mistakes, vehicles_of
 from fogsim.conditions.moment import History, Moment
 from fogsim.conditions.parsing import mended, parse_condition
+from fogsim.conditions.possibility import outcomes
 from fogsim.conditions.signal import Kind, Need, Place, Signal
 from fogsim.conditions.signals import SIGNALS
 from fogsim.conditions.syntax import Comparison, Condition, Edge, Flag, Held, Quantity, Reference, signals_of
@@ -21,10 +23,14 @@ __all__ = [
     "Place",
     "Quantity",
     "Reference",
+    "RunContent",
     "Signal",
     "Watch",
+    "condition_mistakes",
     "mended",
+    "outcomes",
     "parse_condition",
     "shown_value",
     "signals_of",
+    "vehicles_of",
 ]

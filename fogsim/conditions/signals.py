@@ -11,7 +11,14 @@ from fogsim.conditions.route_places import Extent, gap_between, headway_between,
 from fogsim.conditions.signal import Kind, LanePlace, Need, Place, Signal
 from fogsim.kinematics import DECELERATION, REACTION_TIME, stopping_sight_distance
 from fogsim.registry import Registry
+from fogsim.units import KMH_PER_MPS
 from fogsim.values import Ending, Estimate, FogBank, Lamp, Leader, Step
+
+FASTEST = 500.0 / KMH_PER_MPS
+"""No vehicle drives faster [m/s]."""
+
+HARDEST = 100.0
+"""No vehicle brakes or speeds up harder, in a collision neither [m/s²]."""
 
 LAMP_WORDS = tuple(str(lamp.name).lower() for lamp in Lamp if lamp)
 """Lamps by their words."""
@@ -187,11 +194,13 @@ _OF_VEHICLES = {
         Kind.FLAG,
         places=_VEHICLE,
     ),
-    "X.speed": _speed("speed", _of_vehicle(lambda m, i: float(m.step.traffic.speed[i])), places=_VEHICLE),
+    "X.speed": _speed("speed", _of_vehicle(lambda m, i: float(m.step.traffic.speed[i])), most=FASTEST, places=_VEHICLE),
     "X.acceleration": Signal(
         "acceleration along the heading",
         _of_vehicle(lambda m, i: float(m.step.traffic.acceleration[i])),
         unit="m/s^2",
+        least=-HARDEST,
+        most=HARDEST,
         places=_VEHICLE,
     ),
     "X.position": Signal(

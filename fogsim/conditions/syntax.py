@@ -78,14 +78,14 @@ Operand = Quantity | Word | Reference
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """A signal against a number, a word or another signal; `operator` is one of ``< <= > >= == != include``."""
+    """A signal against a number, a word or another signal; `relation` is one of ``< <= > >= == != include``."""
 
     left: Reference
-    operator: str
+    relation: str
     right: Operand
 
     def __str__(self) -> str:
-        return f"{self.left} {self.operator} {self.right}"
+        return f"{self.left} {self.relation} {self.right}"
 
 
 @dataclass(frozen=True, slots=True)

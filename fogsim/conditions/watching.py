@@ -1,20 +1,17 @@
 """Watches a condition over the steps of a run: true, false, or not known."""
 
-import operator
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
+from fogsim.conditions.logic import combined, compared, passed
 from fogsim.conditions.moment import History, Moment
 from fogsim.conditions.signal import LanePlace, Value
 from fogsim.conditions.signals import SIGNALS
 from fogsim.conditions.syntax import (
-    AllOf,
-    AnyOf,
     Comparison,
     Condition,
     Edge,
     Flag,
     Held,
-    Not,
     Operand,
     Quantity,
     Reference,
@@ -27,15 +24,6 @@ from fogsim.values import TrafficStep
 
 _TICK = 1e-6
 """Rounding of times [s]."""
-
-_COMPARE: Mapping[str, Callable[[float, float], bool]] = {
-    "<": operator.lt,
-    "<=": operator.le,
-    ">": operator.gt,
-    ">=": operator.ge,
-    "==": operator.eq,
-    "!=": operator.ne,
-}
 
 
 class Watch:
@@ -84,6 +72,16 @@ class Watch:
             results[part] = self._evaluate(part, results, moment.step.time)
         return results[self.condition]
 
+    def operands(self, comparison: Comparison) -> tuple[Value, Value]:
+        """What a comparison of the condition compared at the last step; None for what was not known.
+
+        Parameters
+        ----------
+        comparison : Comparison
+            The comparison.
+        """
+        return self.values[comparison.left], self._operand(comparison.right)
+
     def told(self) -> str:
         """Say what the signals of the condition were at the last step: ``gap(ego, slow) = 83.2 m``."""
         return ", ".join(
@@ -91,23 +89,17 @@ class Watch:
         )
 
     def _evaluate(self, part: Condition, results: Mapping[Condition, bool | None], time: float) -> bool | None:
-        result: bool | None
         match part:
             case Comparison(left, relation, right):
-                result = _compared(self.values[left], relation, self._operand(right))
+                return compared(self.values[left], relation, self._operand(right))
             case Flag(left):
-                result = _compared(self.values[left], "==", "true")
+                return compared(self.values[left], "==", "true")
             case Edge():
-                result = self._passed(part)
+                return self._passed(part)
             case Held(inner, duration):
-                result = self._held(part, results[inner], time, duration.value)
-            case Not(inner):
-                result = _not(results[inner])
-            case AllOf(parts):
-                result = _all([results[one] for one in parts])
-            case AnyOf(parts):
-                result = _not(_all([_not(results[one]) for one in parts]))
-        return result
+                return self._held(part, results[inner], time, duration.value)
+            case _:
+                return combined(part, results.__getitem__)
 
     def _operand(self, right: Operand) -> Value:
         match right:
@@ -126,49 +118,13 @@ class Watch:
         self._before[edge] = now
         if before is None:
             return False
-        if edge.right is None:
-            return _without_count(before) != _without_count(now)
-        relation = {"falls below": "<", "rises above": ">", "becomes": "=="}[edge.how]
-        operand = self._operand(edge.right)
-        earlier, later = _compared(before, relation, operand), _compared(now, relation, operand)
-        return None if earlier is None or later is None else later and not earlier
+        return passed(before, now, edge.how, None if edge.right is None else self._operand(edge.right))
 
     def _held(self, part: Held, inside: bool | None, time: float, duration: float) -> bool | None:
         if not inside:
             self._since.pop(part, None)
             return inside
         return time - self._since.setdefault(part, time) >= duration - _TICK
-
-
-def _not(part: bool | None) -> bool | None:
-    return None if part is None else not part
-
-
-def _all(parts: list[bool | None]) -> bool | None:
-    """Whether all are true, in Kleene's logic of three values."""
-    return False if False in parts else None if None in parts else True
-
-
-def _without_count(value: Value) -> Value:
-    """A lane's number: on a road with more lanes it is the same lane."""
-    return value.number if isinstance(value, LanePlace) else value
-
-
-def _compared(value: Value, relation: str, operand: Value) -> bool | None:
-    if value is None or operand is None:
-        return None
-    if isinstance(value, LanePlace):
-        if isinstance(operand, str):
-            names = value.names
-            return None if names is None else (operand in names) == (relation == "==")
-        value = float(value.number)
-    if isinstance(value, frozenset):
-        return operand in value
-    if isinstance(value, bool | str):
-        same = operand == (str(value).lower() if isinstance(value, bool) else value)
-        return same == (relation == "==")
-    assert isinstance(operand, int | float)  # noqa: S101 - the parser has seen to it
-    return _COMPARE[relation](value, operand)
 
 
 def _shown_units(parts: tuple[Condition, ...]) -> dict[Reference, str]:

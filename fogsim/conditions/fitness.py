@@ -1,0 +1,70 @@
+"""Whether a run can tell what a condition asks: what it needs, and the names that stand in it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from fogsim.conditions.moment import EGO
+from fogsim.conditions.signal import Need, Place
+from fogsim.conditions.signals import SIGNALS
+from fogsim.conditions.syntax import Condition, Reference, signals_of
+from fogsim.errors import shown, suggest
+
+
+@dataclass(frozen=True, slots=True)
+class RunContent:
+    """What a run has that conditions may ask for.
+
+    Attributes
+    ----------
+    needs : frozenset of Need
+        What it has.
+    methods : tuple of str
+        Its estimators.
+    banks : int
+        Number of its fog banks.
+    events : tuple of str
+        What of its script can begin.
+    """
+
+    needs: frozenset[Need]
+    methods: tuple[str, ...] = ()
+    banks: int = 0
+    events: tuple[str, ...] = ()
+
+
+def condition_mistakes(condition: Condition, content: RunContent) -> Iterator[str]:
+    """Say what of a condition a run cannot tell.
+
+    Parameters
+    ----------
+    condition : Condition
+        The condition.
+    content : RunContent
+        What the run has.
+    """
+    for reference in signals_of(condition):
+        signal = SIGNALS[reference.signal]
+        lacking = signal.needs - content.needs
+        if EGO in vehicles_of(reference) and Need.EGO not in content.needs:
+            lacking |= {Need.EGO}
+        if lacking:
+            yield f"{reference} needs {' and '.join(sorted(lacking))}, and this run has none"
+            continue
+        for place, argument in zip(signal.places, reference.arguments, strict=True):
+            if place is Place.BANK and int(argument) >= content.banks:
+                yield f"{reference}: there is no fog.banks.{argument}; the fog has {content.banks or 'no'} banks"
+            known = {Place.METHOD: content.methods, Place.EVENT: content.events}.get(place)
+            if known is not None and argument not in known:
+                yield f"{reference}: unknown {place.value} {shown(argument)}; {suggest(argument, known)}"
+
+
+def vehicles_of(reference: Reference) -> tuple[str, ...]:
+    """Vehicles that a signal is about.
+
+    Parameters
+    ----------
+    reference : Reference
+        The signal.
+    """
+    places = SIGNALS[reference.signal].places
+    return tuple(name for place, name in zip(places, reference.arguments, strict=True) if place is Place.VEHICLE)

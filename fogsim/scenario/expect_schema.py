@@ -1,0 +1,274 @@
+"""The schema of the block ``expect``: what must hold in a run, and what of that the run could not tell is refused."""
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Annotated, Any, Self
+
+from pydantic import BeforeValidator, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic_core import InitErrorDetails, PydanticCustomError
+
+from fogsim.conditions import Condition, RunContent, condition_mistakes, mended, outcomes, signals_of, vehicles_of
+from fogsim.conditions.parsing import OPERATORS
+from fogsim.errors import shown, suggest
+from fogsim.expectations import Always, Clause, Eventually, Happened, MetricCheck, Whenever
+from fogsim.metrics.estimation import ErrorStatistics
+from fogsim.metrics.run_metrics import RunMetrics, TrafficRunMetrics
+from fogsim.quantities import UNIT_OF_SUFFIX, is_quantity, parse_quantity
+from fogsim.scenario.plain_yaml import KeyPath
+from fogsim.scenario.section import MISTAKE, Flag, Id, Period, Section, Time, Whole
+from fogsim.scenario.written_conditions import WrittenCondition
+
+_CLAUSES = ("always", "never", "eventually", "whenever", "happened", "metric")
+
+_GOES_WITH = {
+    "while": ("always", "never", "eventually"),
+    "for_at_least_s": ("always", "never"),
+    "within_s": ("whenever", "eventually", "happened"),
+    "require": ("whenever",),
+    "throughout": ("whenever",),
+    "at_least": ("whenever",),
+}
+
+_TIMES = re.compile(r"\s*(\d+)\s*times?\s*\Z")
+
+_METRIC = re.compile(r"\s*([A-Za-z_][\w.]*)\s*(<=|>=|==|!=|<|>)\s*(\S.*?)\s*\Z")
+
+
+def _number_of_times(value: object) -> object:
+    """Let a number of times be written as ``3 times`` or ``once``."""
+    match = _TIMES.match(value) if isinstance(value, str) else None
+    return int(match[1]) if match else 1 if value == "once" else value
+
+
+class Expectation(Section):
+    """What is expected of a run: one clause or several."""
+
+    model_config = ConfigDict(serialize_by_alias=True)
+
+    always: WrittenCondition | None = None
+    """Holds at every step at which it is known."""
+
+    never: WrittenCondition | None = None
+    """Holds at no step."""
+
+    eventually: WrittenCondition | None = None
+    """Holds at some step, before the run or the time `within` is over."""
+
+    during: WrittenCondition | None = Field(default=None, alias="while")
+    """Only steps at which this holds count for `always`, `never` and `eventually`."""
+
+    for_at_least_s: Time = 0.0
+    """Time that must count for `always` and `never`; with less the result is inconclusive."""
+
+    whenever: WrittenCondition | None = None
+    """Each time this becomes true, `require` must hold."""
+
+    require: WrittenCondition | None = None
+    """What must hold then: at once, once `within` a time, or all that time with `throughout`."""
+
+    within_s: Time | None = None
+    """Time after `whenever` became true; for `eventually` and `happened` since the run began."""
+
+    throughout: Flag = False
+    """Whether `require` must hold all the time `within`."""
+
+    at_least: Annotated[Whole, Field(ge=1, le=1_000_000), BeforeValidator(_number_of_times)] = 1
+    """How often `whenever` must have been tried; with fewer times the result is inconclusive."""
+
+    happened: Id | None = None
+    """Name of an entry of the timeline that must begin; if it never does, the result is inconclusive."""
+
+    metric: Annotated[str, Field(max_length=200)] | None = None
+    """A key of metrics.json with what it must be: `minimum_gap_m >= 5`."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _mended(cls, written: object) -> object:
+        return mended(written) if isinstance(written, Mapping) else written
+
+    @field_validator("metric")
+    @classmethod
+    def _readable_metric(cls, value: str | None) -> str | None:
+        if value is not None:
+            _metric_check("", value)
+        return value
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        refuse(self._mistakes())
+        return self
+
+    def _mistakes(self) -> Iterator[tuple[KeyPath, str]]:
+        given = {self._key(name) for name in self.model_fields_set if getattr(self, name) is not None}
+        if not given & set(_CLAUSES):
+            yield (), f"expects nothing; it needs one of {', '.join(_CLAUSES)}"
+        for key, goes_with in _GOES_WITH.items():
+            if key in given and not given & set(goes_with):
+                yield (key,), f"goes with {' or '.join(goes_with)}, which is missing"
+        if "whenever" in given and "require" not in given:
+            yield ("whenever",), "needs require: what must hold then"
+        if self.throughout and not self.within_s:
+            yield ("throughout",), "needs within: the time for which it must hold"
+        yield from self._without_outcome()
+
+    def _without_outcome(self) -> Iterator[tuple[KeyPath, str]]:
+        """Conditions that cannot be true, or cannot be false."""
+        for key, good in (("always", True), ("never", False), ("eventually", True), ("require", True)):
+            condition: Condition | None = getattr(self, key)
+            possible = frozenset({True, False}) if condition is None else outcomes(condition)
+            if possible == {good}:
+                yield (key,), f"this cannot fail: {condition} is {str(good).lower()} whatever comes"
+            elif possible == {not good}:
+                yield (key,), f"this cannot pass: {condition} is {str(not good).lower()} whatever comes"
+        for key, condition in (("whenever", self.whenever), ("while", self.during)):
+            if condition is not None and outcomes(condition) == {False}:
+                yield (key,), f"nothing would be tested: {condition} is never true"
+
+    def conditions(self) -> Iterator[tuple[str, Condition]]:
+        """Its conditions, by their keys."""
+        for name in ("always", "never", "eventually", "during", "whenever", "require"):
+            condition = getattr(self, name)
+            if condition is not None:
+                yield self._key(name), condition
+
+    @classmethod
+    def _key(cls, name: str) -> str:
+        return cls.model_fields[name].alias or name
+
+    def clauses(self, name: str) -> Iterator[Clause]:
+        """Its clauses as plain values.
+
+        Parameters
+        ----------
+        name : str
+            Name of the expectation.
+        """
+        within = math.inf if self.within_s is None else self.within_s
+        for condition, is_never in ((self.always, False), (self.never, True)):
+            if condition is not None:
+                yield Always(name, condition, is_never, self.during, self.for_at_least_s)
+        if self.eventually is not None:
+            yield Eventually(name, self.eventually, self.during, within)
+        if self.whenever is not None and self.require is not None:
+            yield Whenever(name, self.whenever, self.require, self.within_s or 0.0, self.throughout, self.at_least)
+        if self.happened is not None:
+            yield Happened(name, self.happened, within)
+        if self.metric is not None:
+            yield _metric_check(name, self.metric)
+
+
+Expectations = dict[Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+$", max_length=100)], Expectation]
+"""Expectations by their names."""
+
+
+def _metric_check(name: str, written: str) -> MetricCheck:
+    match = _METRIC.match(written)
+    if match is None:
+        raise ValueError(f"expected a key of metrics.json, one of {' '.join(OPERATORS)} and a value")
+    key, relation, value = match.groups()
+    if not is_quantity(value):
+        if relation not in ("==", "!="):
+            raise ValueError(f"expected a number after {relation}, got {shown(value)}")
+        return MetricCheck(name, key, relation, value)
+    unit = UNIT_OF_SUFFIX.get(key.rpartition("_")[2], "")
+    has_unit = re.search(r"[^\W\d_]\s*\Z|[%°]\s*\Z", value) is not None and not value.endswith("inf")
+    # A bare number counts in the unit at the end of the key.
+    return MetricCheck(name, key, relation, parse_quantity(value, unit if has_unit else ""))
+
+
+def refuse(mistakes: Iterable[tuple[KeyPath, str]]) -> None:
+    """Refuse what has mistakes.
+
+    Parameters
+    ----------
+    mistakes : iterable of tuple
+        Key path and what is wrong there.
+
+    Raises
+    ------
+    ValidationError
+        If there are any.
+    """
+    told = [
+        InitErrorDetails(type=PydanticCustomError(MISTAKE, "{told}", {"told": text}), loc=place, input=0)
+        for place, text in mistakes
+    ]
+    if told:
+        raise ValidationError.from_exception_data("expect", told)
+
+
+def expectation_mistakes(
+    expect: Mapping[str, Expectation], content: RunContent, duration: float
+) -> Iterator[tuple[KeyPath, str]]:
+    """Say what of some expectations a run could not tell.
+
+    Parameters
+    ----------
+    expect : mapping from str to Expectation
+        The expectations.
+    content : RunContent
+        What the run has.
+    duration : float
+        Its longest time [s].
+    """
+    for name, expectation in expect.items():
+        for key, condition in expectation.conditions():
+            yield from (((name, key), told) for told in condition_mistakes(condition, content))
+        for key, time in (("within_s", expectation.within_s), ("for_at_least_s", expectation.for_at_least_s)):
+            if time is not None and time > duration:
+                yield (name, key), f"this cannot be decided: the run lasts {duration:g} s; got {time:g} s"
+        if expectation.happened is not None and expectation.happened not in content.events:
+            yield (name, "happened"), f"unknown event {shown(expectation.happened)}; " + suggest(
+                expectation.happened, content.events
+            )
+        if expectation.metric is not None:
+            key = _metric_check(name, expectation.metric).metric
+            known = list(_metrics(content))
+            if key not in known:
+                yield (name, "metric"), f"unknown metric {shown(key)}; {suggest(key, known)}"
+
+
+def _metrics(content: RunContent) -> Iterator[str]:
+    """Keys of the metrics of a run."""
+    has_ego = "an ego" in content.needs
+    yield from (RunMetrics() if has_ego else TrafficRunMetrics()).summary().meanings
+    yield from (f"estimators.{method}.{key}" for method in content.methods for key in ErrorStatistics().result())
+
+
+def named_vehicles(expect: Mapping[str, Expectation]) -> Iterator[tuple[KeyPath, str]]:
+    """Vehicles that expectations name, the ego aside, and where.
+
+    Parameters
+    ----------
+    expect : mapping from str to Expectation
+        The expectations.
+    """
+    for name, expectation in expect.items():
+        for key, condition in expectation.conditions():
+            for reference in signals_of(condition):
+                yield from ((("expect", name, key), vehicle) for vehicle in vehicles_of(reference))
+
+
+def clauses_of(expect: Mapping[str, Expectation]) -> tuple[Clause, ...]:
+    """Clauses of some expectations, in their order.
+
+    Parameters
+    ----------
+    expect : mapping from str to Expectation
+        The expectations.
+    """
+    return tuple(clause for name, expectation in expect.items() for clause in expectation.clauses(name))
+
+
+def known_events(scenario: Any) -> tuple[str, ...]:
+    """Names of what can begin in a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+    timeline = getattr(scenario, "timeline", ())
+    named = [getattr(entry, "name", None) for entry in timeline]
+    return (*(f"timeline.{place}" for place in range(len(timeline))), *(name for name in named if name))

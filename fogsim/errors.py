@@ -86,6 +86,21 @@ def nearest(name: str, known: Iterable[str]) -> str | None:
     return next(iter(difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)), None)
 
 
+def nearest_of(name: str, known: Iterable[str], most: int) -> list[str]:
+    """The nearest of many known names, the nearest first; however far they are.
+
+    Parameters
+    ----------
+    name : str
+        What was given.
+    known : iterable of str
+        What is allowed.
+    most : int
+        How many to give at most.
+    """
+    return difflib.get_close_matches(name, list(known), n=most, cutoff=0.0)
+
+
 def shown(value: object) -> str:
     """A user's value as messages repeat it: `repr`, cut short in the middle if it is long.
 

@@ -1,7 +1,7 @@
 """Conditions on a run: a small language over finished steps, for triggers and expectations."""
 
 from fogsim.conditions.fitness import RunContent, condition_mistakes, vehicles_of
-from fogsim.conditions.moment import History, Moment
+from fogsim.conditions.moment import EGO, History, Moment
 from fogsim.conditions.parsing import mended, parse_condition
 from fogsim.conditions.possibility import outcomes
 from fogsim.conditions.signal import Kind, Need, Place, Signal
@@ -10,6 +10,7 @@ from fogsim.conditions.syntax import Comparison, Condition, Edge, Flag, Held, Qu
 from fogsim.conditions.watching import Watch, shown_value
 
 __all__ = [
+    "EGO",
     "SIGNALS",
     "Comparison",
     "Condition",

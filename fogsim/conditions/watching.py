@@ -1,5 +1,6 @@
 """Watches a condition over the steps of a run: true, false, or not known."""
 
+import math
 from collections.abc import Mapping
 
 from fogsim.conditions.logic import combined, compared, passed
@@ -163,4 +164,4 @@ def shown_value(signal: Reference, value: Value, unit: str = "") -> str:
     kind = SIGNALS[signal.signal]
     unit = unit or kind.told_in
     number = value if unit == kind.unit else value / parse_quantity(f"1 {unit}", kind.unit)
-    return f"{number:.4g} {unit}".strip()
+    return "inf" if math.isinf(number) else f"{number:.4g} {unit}".strip()

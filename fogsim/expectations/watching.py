@@ -199,7 +199,7 @@ class _EventuallyWatch:
     def result(self, _: Mapping[str, object]) -> Result:
         within, end = self._clause.within, self._scope.end
         if self._held is not None:
-            time, _, told = self._held
+            time, told = self._held[0], self._held[2]
             return _passed(self._held) if time <= within + _TICK else _failed(self._held, told, f"only at {time:g} s")
         if not self._scope.was_entered:
             return _open(f"{self._clause.during} never held")
@@ -263,9 +263,7 @@ class _WheneverWatch:
         tried = self._passed + self._failed
         if self._broken is not None:
             sight, since = self._broken
-            return _failed(
-                sight, f"{sight[2]} at {sight[0]:g} s", f"{self._failed} of {tried} times; whenever: {since:g} s"
-            )
+            return _failed(sight, sight[2], f"not so {self._failed} of {tried} times; the first began at {since:g} s")
         came = f"{self._passed} of {tried} times"
         if tried < self._clause.at_least:
             undecided = f", {self._fired - tried} of them not decided" if self._fired > tried else ""
@@ -315,8 +313,9 @@ class _MetricWatch:
         return _passed(None, came) if holds else _failed(None, came)
 
 
-def _found(metrics: object, key: str) -> object:
+def _found(metrics: Mapping[str, object], key: str) -> object:
     """A metric by its key; None if there is none."""
+    found: object = metrics
     for part in key.split("."):
-        metrics = metrics.get(part) if isinstance(metrics, Mapping) else None
-    return metrics
+        found = found.get(part) if isinstance(found, Mapping) else None
+    return found

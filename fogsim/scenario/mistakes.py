@@ -113,7 +113,7 @@ def _known_keys(root: type[BaseModel], location: Sequence[str | int]) -> list[st
         else:
             annotation = model.model_fields[key].annotation
             model, is_name = _model_in(annotation), get_origin(annotation) is dict
-    return [name for name, field in model.model_fields.items() if not field.exclude]
+    return [field.alias or name for name, field in model.model_fields.items() if not field.exclude]
 
 
 def _model_in(annotation: object) -> Any:

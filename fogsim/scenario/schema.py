@@ -17,6 +17,8 @@ from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.render import RENDERERS, ROLES
 from fogsim.scenario.camera_schema import CameraSection
+from fogsim.scenario.expect.checks import check_expectations
+from fogsim.scenario.expect.schema import Expectations
 from fogsim.scenario.fog import Fog
 from fogsim.scenario.roads.schema import Actors, DemandSection, Road, check_roads
 from fogsim.scenario.section import Flag, Method, Number, Period, Section, Seed, Text, method_of
@@ -134,6 +136,9 @@ class Scenario(Section):
     lighting: Annotated[InformedMethod, method_of(LIGHTING_POLICIES)] = InformedMethod(method="fog_lamp_rules")
     """How the belief becomes lamps; with `informed_by: truth`, how the true visibility does."""
 
+    expect: Expectations = Field(default_factory=dict)
+    """What must hold in the run, by name; `fogsim test` tells whether it does."""
+
     directory: Path = Field(default=Path(), exclude=True)
 
     @model_validator(mode="before")
@@ -150,6 +155,11 @@ class Scenario(Section):
     @model_validator(mode="after")
     def _road_or_network(self) -> Self:
         check_roads(self)
+        return self
+
+    @model_validator(mode="after")
+    def _can_be_told(self) -> Self:
+        check_expectations(self)
         return self
 
     @field_validator("renderer")

@@ -4,8 +4,10 @@ import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from fogsim.conditions import EGO
 from fogsim.errors import nearest, shown, suggest
 from fogsim.scenario.document import Document
+from fogsim.scenario.expect.checks import named_vehicles
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.roads.files import traffic_files
 from fogsim.scenario.schema import Clocks, Scenario
@@ -97,8 +99,10 @@ def demand_mistakes(document: Document, scenario: Scenario) -> list[str]:
         If ``traffic.config`` is no SUMO configuration.
     """
     named = dict(_named_vehicles(scenario))
-    demand = _demand(scenario, frozenset(named.values()))
-    told = {at: _unknown_vehicle(vehicle, demand) for at, vehicle in named.items() if demand.lacks(vehicle)}
+    watched = [(at, vehicle) for at, vehicle in named_vehicles(scenario.expect) if vehicle != EGO]
+    demand = _demand(scenario, frozenset((*named.values(), *(vehicle for _, vehicle in watched))))
+    asked = (*named.items(), *watched)
+    told = {at: _unknown_vehicle(vehicle, demand) for at, vehicle in asked if demand.lacks(vehicle)}
     edges = _edges(scenario, demand)
     if edges is not None:
         places = {vehicle: at for at, vehicle in reversed(named.items())}

@@ -1,23 +1,20 @@
-"""The schema of the block ``expect``: what must hold in a run, and what of that the run could not tell is refused."""
+"""The schema of the block ``expect``: what must hold in a run."""
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Annotated, Any, Self
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Self
 
-from pydantic import BeforeValidator, ConfigDict, Field, ValidationError, field_validator, model_validator
-from pydantic_core import InitErrorDetails, PydanticCustomError
+from pydantic import BeforeValidator, ConfigDict, Field, field_validator, model_validator
 
-from fogsim.conditions import Condition, RunContent, condition_mistakes, mended, outcomes, signals_of, vehicles_of
+from fogsim.conditions import Condition, mended, outcomes
 from fogsim.conditions.parsing import OPERATORS
-from fogsim.errors import shown, suggest
+from fogsim.errors import shown
 from fogsim.expectations import Always, Clause, Eventually, Happened, MetricCheck, Whenever
-from fogsim.metrics.estimation import ErrorStatistics
-from fogsim.metrics.run_metrics import RunMetrics, TrafficRunMetrics
 from fogsim.quantities import UNIT_OF_SUFFIX, is_quantity, parse_quantity
+from fogsim.scenario.expect.conditions import WrittenCondition, refuse
 from fogsim.scenario.plain_yaml import KeyPath
-from fogsim.scenario.section import MISTAKE, Flag, Id, Period, Section, Time, Whole
-from fogsim.scenario.written_conditions import WrittenCondition
+from fogsim.scenario.section import Flag, Id, Section, Time, Whole
 
 _CLAUSES = ("always", "never", "eventually", "whenever", "happened", "metric")
 
@@ -91,7 +88,7 @@ class Expectation(Section):
     @classmethod
     def _readable_metric(cls, value: str | None) -> str | None:
         if value is not None:
-            _metric_check("", value)
+            metric_check("", value)
         return value
 
     @model_validator(mode="after")
@@ -100,7 +97,9 @@ class Expectation(Section):
         return self
 
     def _mistakes(self) -> Iterator[tuple[KeyPath, str]]:
-        given = {self._key(name) for name in self.model_fields_set if getattr(self, name) is not None}
+        # A resolved scenario has every default written out.
+        fields = type(self).model_fields.items()
+        given = {self._key(name) for name, field in fields if getattr(self, name) != field.default}
         if not given & set(_CLAUSES):
             yield (), f"expects nothing; it needs one of {', '.join(_CLAUSES)}"
         for key, goes_with in _GOES_WITH.items():
@@ -155,14 +154,28 @@ class Expectation(Section):
         if self.happened is not None:
             yield Happened(name, self.happened, within)
         if self.metric is not None:
-            yield _metric_check(name, self.metric)
+            yield metric_check(name, self.metric)
 
 
 Expectations = dict[Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+$", max_length=100)], Expectation]
 """Expectations by their names."""
 
 
-def _metric_check(name: str, written: str) -> MetricCheck:
+def metric_check(name: str, written: str) -> MetricCheck:
+    """Read what a metric must be.
+
+    Parameters
+    ----------
+    name : str
+        Name of the expectation.
+    written : str
+        ``minimum_gap_m >= 5``; a number may have a unit that fits that of the key.
+
+    Raises
+    ------
+    ValueError
+        If it is something else.
+    """
     match = _METRIC.match(written)
     if match is None:
         raise ValueError(f"expected a key of metrics.json, one of {' '.join(OPERATORS)} and a value")
@@ -177,79 +190,6 @@ def _metric_check(name: str, written: str) -> MetricCheck:
     return MetricCheck(name, key, relation, parse_quantity(value, unit if has_unit else ""))
 
 
-def refuse(mistakes: Iterable[tuple[KeyPath, str]]) -> None:
-    """Refuse what has mistakes.
-
-    Parameters
-    ----------
-    mistakes : iterable of tuple
-        Key path and what is wrong there.
-
-    Raises
-    ------
-    ValidationError
-        If there are any.
-    """
-    told = [
-        InitErrorDetails(type=PydanticCustomError(MISTAKE, "{told}", {"told": text}), loc=place, input=0)
-        for place, text in mistakes
-    ]
-    if told:
-        raise ValidationError.from_exception_data("expect", told)
-
-
-def expectation_mistakes(
-    expect: Mapping[str, Expectation], content: RunContent, duration: float
-) -> Iterator[tuple[KeyPath, str]]:
-    """Say what of some expectations a run could not tell.
-
-    Parameters
-    ----------
-    expect : mapping from str to Expectation
-        The expectations.
-    content : RunContent
-        What the run has.
-    duration : float
-        Its longest time [s].
-    """
-    for name, expectation in expect.items():
-        for key, condition in expectation.conditions():
-            yield from (((name, key), told) for told in condition_mistakes(condition, content))
-        for key, time in (("within_s", expectation.within_s), ("for_at_least_s", expectation.for_at_least_s)):
-            if time is not None and time > duration:
-                yield (name, key), f"this cannot be decided: the run lasts {duration:g} s; got {time:g} s"
-        if expectation.happened is not None and expectation.happened not in content.events:
-            yield (name, "happened"), f"unknown event {shown(expectation.happened)}; " + suggest(
-                expectation.happened, content.events
-            )
-        if expectation.metric is not None:
-            key = _metric_check(name, expectation.metric).metric
-            known = list(_metrics(content))
-            if key not in known:
-                yield (name, "metric"), f"unknown metric {shown(key)}; {suggest(key, known)}"
-
-
-def _metrics(content: RunContent) -> Iterator[str]:
-    """Keys of the metrics of a run."""
-    has_ego = "an ego" in content.needs
-    yield from (RunMetrics() if has_ego else TrafficRunMetrics()).summary().meanings
-    yield from (f"estimators.{method}.{key}" for method in content.methods for key in ErrorStatistics().result())
-
-
-def named_vehicles(expect: Mapping[str, Expectation]) -> Iterator[tuple[KeyPath, str]]:
-    """Vehicles that expectations name, the ego aside, and where.
-
-    Parameters
-    ----------
-    expect : mapping from str to Expectation
-        The expectations.
-    """
-    for name, expectation in expect.items():
-        for key, condition in expectation.conditions():
-            for reference in signals_of(condition):
-                yield from ((("expect", name, key), vehicle) for vehicle in vehicles_of(reference))
-
-
 def clauses_of(expect: Mapping[str, Expectation]) -> tuple[Clause, ...]:
     """Clauses of some expectations, in their order.
 
@@ -259,16 +199,3 @@ def clauses_of(expect: Mapping[str, Expectation]) -> tuple[Clause, ...]:
         The expectations.
     """
     return tuple(clause for name, expectation in expect.items() for clause in expectation.clauses(name))
-
-
-def known_events(scenario: Any) -> tuple[str, ...]:
-    """Names of what can begin in a scenario.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
-    timeline = getattr(scenario, "timeline", ())
-    named = [getattr(entry, "name", None) for entry in timeline]
-    return (*(f"timeline.{place}" for place in range(len(timeline))), *(name for name in named if name))

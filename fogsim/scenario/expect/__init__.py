@@ -1,0 +1,1 @@
+"""The block ``expect`` of scenario files, and conditions in them."""

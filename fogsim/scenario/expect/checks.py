@@ -1,0 +1,121 @@
+"""What of a scenario's expectations its run could not tell, and the names that stand in them."""
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+from fogsim.conditions import Need, RunContent, condition_mistakes, signals_of, vehicles_of
+from fogsim.errors import nearest_of, shown, suggest
+from fogsim.metrics.estimation import Errors
+from fogsim.metrics.run_metrics import RunMetrics, TrafficRunMetrics
+from fogsim.scenario.expect.conditions import refuse
+from fogsim.scenario.expect.schema import Expectation, metric_check
+from fogsim.scenario.plain_yaml import KeyPath
+
+if TYPE_CHECKING:
+    from fogsim.scenario.schema import Scenario
+
+MOST_SHOWN = 5
+"""Most metrics that a message lists."""
+
+
+def check_expectations(scenario: "Scenario") -> None:
+    """Refuse expectations that a run of a scenario could not tell.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+
+    Raises
+    ------
+    ValidationError
+        If there are any.
+    """
+    mistakes = expectation_mistakes(scenario.expect, run_content(scenario), scenario.duration_s)
+    refuse((("expect", *place), told) for place, told in mistakes)
+
+
+def run_content(scenario: "Scenario") -> RunContent:
+    """What conditions of a scenario may ask for.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+    has_ego = scenario.traffic.has_ego
+    methods = tuple(one.method for one in scenario.estimators)
+    has = {Need.EGO: has_ego, Need.ROUTE: has_ego or bool(scenario.traffic.along), Need.FRAMES: bool(methods)}
+    return RunContent(
+        frozenset(need for need, is_there in has.items() if is_there),
+        methods,
+        len(scenario.fog.banks),
+        known_events(scenario),
+    )
+
+
+def known_events(scenario: "Scenario") -> tuple[str, ...]:
+    """Names of what can begin in a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+    timeline = getattr(scenario, "timeline", ())
+    named = [getattr(entry, "name", None) for entry in timeline]
+    return (*(f"timeline.{place}" for place in range(len(timeline))), *(name for name in named if name))
+
+
+def expectation_mistakes(
+    expect: Mapping[str, Expectation], content: RunContent, duration: float
+) -> Iterator[tuple[KeyPath, str]]:
+    """Say what of some expectations a run could not tell.
+
+    Parameters
+    ----------
+    expect : mapping from str to Expectation
+        The expectations.
+    content : RunContent
+        What the run has.
+    duration : float
+        Its longest time [s].
+    """
+    for name, expectation in expect.items():
+        for key, condition in expectation.conditions():
+            yield from (((name, key), told) for told in condition_mistakes(condition, content))
+        for key, time in (("within_s", expectation.within_s), ("for_at_least_s", expectation.for_at_least_s)):
+            if time is not None and time > duration:
+                yield (name, key), f"this cannot be decided: the run lasts {duration:g} s; got {time:g} s"
+        if expectation.happened is not None and expectation.happened not in content.events:
+            yield (
+                (name, "happened"),
+                f"unknown event {shown(expectation.happened)}; " + suggest(expectation.happened, content.events),
+            )
+        if expectation.metric is not None:
+            key = metric_check(name, expectation.metric).metric
+            known = list(_metrics(content))
+            if key not in known:
+                near = nearest_of(key, known, MOST_SHOWN)
+                yield (name, "metric"), f"unknown metric {shown(key)}; {suggest(key, near)}, … ({len(known)} in all)"
+
+
+def _metrics(content: RunContent) -> Iterator[str]:
+    """Keys of the metrics of a run."""
+    has_ego = Need.EGO in content.needs
+    yield from (RunMetrics() if has_ego else TrafficRunMetrics()).summary().meanings
+    yield from (f"estimators.{method}.{key}" for method in content.methods for key in Errors().result())
+
+
+def named_vehicles(expect: Mapping[str, Expectation]) -> Iterator[tuple[KeyPath, str]]:
+    """Vehicles that expectations name, the ego aside, and where.
+
+    Parameters
+    ----------
+    expect : mapping from str to Expectation
+        The expectations.
+    """
+    for name, expectation in expect.items():
+        for key, condition in expectation.conditions():
+            for reference in signals_of(condition):
+                yield from ((("expect", name, key), vehicle) for vehicle in vehicles_of(reference))

@@ -1,0 +1,39 @@
+"""Conditions in scenario files: read when the file is, written back as text."""
+
+from collections.abc import Iterable
+from typing import Annotated
+
+from pydantic import PlainSerializer, PlainValidator, ValidationError, WithJsonSchema
+from pydantic_core import InitErrorDetails, PydanticCustomError
+
+from fogsim.conditions import Condition, parse_condition
+from fogsim.scenario.plain_yaml import KeyPath
+from fogsim.scenario.section import MISTAKE
+
+_SCHEMA = {"format": "condition", "anyOf": [{"type": "string"}, {"type": "object"}, {"type": "array"}]}
+
+WrittenCondition = Annotated[
+    Condition, PlainValidator(parse_condition), PlainSerializer(str, return_type=str), WithJsonSchema(_SCHEMA)
+]
+"""A condition on the run: text, or a mapping from signals to the rest of it."""
+
+
+def refuse(mistakes: Iterable[tuple[KeyPath, str]]) -> None:
+    """Refuse what has mistakes.
+
+    Parameters
+    ----------
+    mistakes : iterable of tuple
+        Key path and what is wrong there.
+
+    Raises
+    ------
+    ValidationError
+        If there are any.
+    """
+    told = [
+        InitErrorDetails(type=PydanticCustomError(MISTAKE, "{told}", {"told": text}), loc=place, input=0)
+        for place, text in mistakes
+    ]
+    if told:
+        raise ValidationError.from_exception_data("expect", told)

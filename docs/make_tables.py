@@ -13,6 +13,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from fogsim.advice import ADVISERS
+from fogsim.conditions import SIGNALS
 from fogsim.estimators import ESTIMATORS
 from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
@@ -39,9 +40,10 @@ def scenario_keys(model: type[BaseModel] = Scenario, prefix: str = "") -> list[t
             continue
         inner = [model for model in _models_in(field.annotation) if model is not Method]
         if not inner:
-            allowed = _allowed(schema["properties"][name], schema.get("$defs", {}))
+            key = field.alias or name
+            allowed = _allowed(schema["properties"][key], schema.get("$defs", {}))
             told = " ".join((field.description or "").split())
-            rows.append((f"`{prefix}{name}`", _default(field), allowed, told))
+            rows.append((f"`{prefix}{key}`", _default(field), allowed, told))
         by_name = get_origin(field.annotation) is dict
         place = ".NAME" if by_name else ".N" if "tuple" in str(field.annotation) else ""
         for model_inside in inner:
@@ -66,6 +68,8 @@ def _allowed(schema: dict[str, Any], definitions: dict[str, Any]) -> str:
     """What a value may be by its JSON schema, in words."""
     if "$ref" in schema:
         schema = definitions[schema["$ref"].rpartition("/")[2]]
+    if schema.get("format") == "condition":
+        return "condition"
     if "anyOf" in schema:
         parts = [part for part in schema["anyOf"] if part.get("type") != "null"]
         return " or ".join(_allowed(part, definitions) for part in parts)
@@ -114,6 +118,14 @@ def trajectory_columns() -> list[tuple[str, ...]]:
 def metrics() -> list[tuple[str, ...]]:
     """Keys of metrics.json."""
     return [(f"`{key}`", meaning) for key, meaning in RunMetrics().summary().meanings.items()]
+
+
+def signals() -> list[tuple[str, ...]]:
+    """Signals of conditions."""
+    return [
+        (f"`{name}`", signal.told_in or signal.kind.value, signal.meaning, ", ".join(sorted(signal.needs)))
+        for name, signal in SIGNALS.items()
+    ]
 
 
 def signs() -> list[tuple[str, ...]]:
@@ -205,6 +217,9 @@ TABLES = {
         "signs": (("kind", "code", "meaning"), signs),
         "keys": (("key", "default", "allowed", "meaning"), scenario_keys),
         "parameters": (("method", "parameter", "default", "allowed", "meaning"), parameters),
+    },
+    "tests.md": {
+        "signals": (("signal", "unit or kind", "meaning", "needs"), signals),
     },
     "results.md": {
         "columns": (("column", "type", "meaning"), columns),

@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Self
 
-from pydantic import BeforeValidator, ConfigDict, Field, field_validator, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema, field_validator, model_validator
 
 from fogsim.conditions import Condition, mended, outcomes
 from fogsim.conditions.parsing import OPERATORS
@@ -36,6 +36,12 @@ def _number_of_times(value: object) -> object:
     """Let a number of times be written as ``3 times`` or ``once``."""
     match = _TIMES.match(value) if isinstance(value, str) else None
     return int(match[1]) if match else 1 if value == "once" else value
+
+
+_TIMES_SCHEMA = {"anyOf": [{"type": "integer", "minimum": 1, "maximum": 1_000_000}, {"type": "string"}]}
+
+Times = Annotated[Whole, Field(ge=1, le=1_000_000), BeforeValidator(_number_of_times), WithJsonSchema(_TIMES_SCHEMA)]
+"""A number of times, perhaps written ``3 times``."""
 
 
 class Expectation(Section):
@@ -70,7 +76,7 @@ class Expectation(Section):
     throughout: Flag = False
     """Whether `require` must hold all the time `within`."""
 
-    at_least: Annotated[Whole, Field(ge=1, le=1_000_000), BeforeValidator(_number_of_times)] = 1
+    at_least: Times = 1
     """How often `whenever` must have been tried; with fewer times the result is inconclusive."""
 
     happened: Id | None = None

@@ -68,11 +68,9 @@ def _allowed(schema: dict[str, Any], definitions: dict[str, Any]) -> str:
     """What a value may be by its JSON schema, in words."""
     if "$ref" in schema:
         schema = definitions[schema["$ref"].rpartition("/")[2]]
-    if schema.get("format") == "condition":
-        return "condition"
     if "anyOf" in schema:
         parts = [part for part in schema["anyOf"] if part.get("type") != "null"]
-        return " or ".join(_allowed(part, definitions) for part in parts)
+        return schema.get("format") or " or ".join(_allowed(part, definitions) for part in parts)
     if "enum" in schema:
         return ", ".join(f"`{value}`" for value in schema["enum"])
     if "const" in schema:

@@ -13,7 +13,7 @@ import shutil
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple, get_args
+from typing import Any, NamedTuple, get_args, get_origin
 
 import pytest
 import yaml
@@ -96,8 +96,9 @@ def keys(model: type[BaseModel] = Scenario, at: Path_ = ()) -> Iterator[Key]:
     for name, field in model.model_fields.items():
         if field.exclude:
             continue
-        path = (*at, name)
-        yield Key(path, ends_of(schema["properties"][name], schema.get("$defs", {})))
+        key = field.alias or name
+        path = (*at, key)
+        yield Key(path, ends_of(schema["properties"][key], schema.get("$defs", {})))
         inner = models_in(field.annotation)
         if Method in inner:
             for method, factory in METHODS[name].items():
@@ -110,8 +111,9 @@ def keys(model: type[BaseModel] = Scenario, at: Path_ = ()) -> Iterator[Key]:
             for number, one in enumerate(inner):
                 yield from keys(one, (*path, number))
         else:
+            by_name = ("one",) if get_origin(field.annotation) is dict else ()
             for one in inner:
-                yield from keys(one, path)
+                yield from keys(one, (*path, *by_name))
 
 
 KEYS = list(keys())
@@ -209,8 +211,8 @@ def test_every_block_of_the_schema_is_tried() -> None:
         return {model}.union(*map(blocks, inner))
 
     tried = {key.path for key in KEYS}
-    assert all(any(path[-1] == name for path in tried) for block in blocks(Scenario) - {Method} for name in
-               block.model_fields if not block.model_fields[name].exclude)  # fmt: skip
+    assert all(any(path[-1] == (field.alias or name) for path in tried) for block in blocks(Scenario) - {Method} for
+               name, field in block.model_fields.items() if not field.exclude)  # fmt: skip
 
 
 @pytest.mark.parametrize("block", [None, *EXAMPLES])

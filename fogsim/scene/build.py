@@ -19,6 +19,7 @@ from fogsim.scene.road import FAST, free_edges
 from fogsim.scene.roadside import placed, post_shapes, stations, trees
 from fogsim.scene.signs import gantries, sign_batches, sign_shapes
 from fogsim.scene.street_lamps import lamp_posts, street_lamp_shapes
+from fogsim.scene.structures import structure_batches, structure_shapes
 from fogsim.scene.terrain import Terrain
 from fogsim.scene.trees import tree_shapes
 from fogsim.values.road import Lane, LaneKind, RoadNetwork, SignMap
@@ -98,15 +99,17 @@ class ScenePlan:
         bridges = gantries(signs.signs, driven)
         hanging = [sign for gantry in bridges for sign in gantry.signs]
         shapes = {**body_shapes(), **post_shapes(), **tree_shapes(rng), **sign_shapes(signs.signs)}
+        shapes |= structure_shapes(network.structures)
         if street_lamps:
             shapes |= street_lamp_shapes()
             posts += lamp_posts(edges, index)
         built = houses(edges, index, terrain, rng)
         shapes |= shapes_in_use(house_shapes(), built)
         growing = trees([(edge.side, edge.line) for edge in edges], index, house_places(built), shapes, terrain, rng)
+        beside = structure_batches(network.structures)
         self.lanes = len(lanes)
         self.shapes: Mapping[str, Mesh] = shapes
-        self.scenery = _joined([*posts, *sign_batches(signs.signs, hanging, terrain), *built, *growing])
+        self.scenery = _joined([*posts, *sign_batches(signs.signs, hanging, terrain), *built, *growing, *beside])
         borders = [Border(edge, along) for edge, along in zip(edges, rails, strict=True)]
         self.ground = GroundPlan(network.areas, lanes, across, borders, bridges, index, terrain)
 

@@ -59,14 +59,23 @@ def surroundings(network: RoadNetwork, signs: SignMap, line: Points) -> Surround
     lanes = _chosen(network.lanes, near.reaches([lane.centreline for lane in network.lanes]))
     areas = _chosen(network.areas, near.reaches([area.outline for area in network.areas]))
     posts = _chosen(signs.signs, near.reaches([np.array([sign.position]) for sign in signs.signs]))
+    beside = _chosen(network.structures, near.reaches([one.line for one in network.structures]))
     if origin.any():
         lanes = [replace(lane, centreline=lane.centreline - origin) for lane in lanes]
         areas = [replace(area, outline=area.outline - origin) for area in areas]
+        beside = [replace(one, line=one.line - origin) for one in beside]
     return Surroundings(
-        replace(network, lanes=tuple(lanes), route=network.route - origin, areas=tuple(areas)),
+        replace(
+            network,
+            lanes=tuple(lanes),
+            route=network.route - origin,
+            areas=tuple(areas),
+            structures=tuple(beside),
+        ),
         SignMap(tuple(replace(sign, position=_moved(sign.position, origin)) for sign in posts)),
         origin,
-        whole=len(lanes) == len(network.lanes) and len(areas) == len(network.areas) and len(posts) == len(signs.signs),
+        whole=(len(lanes), len(areas), len(beside), len(posts))
+        == (len(network.lanes), len(network.areas), len(network.structures), len(signs.signs)),
     )
 
 

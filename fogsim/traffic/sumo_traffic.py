@@ -4,6 +4,7 @@ import functools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Concatenate, ParamSpec, TypeVar
 
 from fogsim.errors import SimulationError
@@ -11,7 +12,9 @@ from fogsim.traffic.collision_log import CollisionLog
 from fogsim.traffic.drivers.events import Order, Script, Situation
 from fogsim.traffic.drivers.sight import FogAccess
 from fogsim.traffic.road.network import read_net, road_network
+from fogsim.traffic.road.road_map import RoadMap
 from fogsim.traffic.road.signs import sign_map
+from fogsim.traffic.road.structures import structures
 from fogsim.traffic.setup import TrafficSetup
 from fogsim.traffic.sumo.claims import new_session
 from fogsim.traffic.sumo.command_line import command_line
@@ -182,7 +185,7 @@ class SumoTraffic:
         net = read_net(planned.net)
         if not net.edges.keys() >= set(planned.edges):
             return None
-        roads = road_network(net, planned.edges), sign_map(net, planned.additional)
+        roads = _roads(net, planned.edges, planned.additional)
         self._planned = planned.edges, roads
         return roads
 
@@ -194,7 +197,7 @@ class SumoTraffic:
         if self._planned is not None and self._planned[0] == route:
             return self._planned[1]
         net = read_net(self._setup.net or loaded_net(api))
-        return road_network(net, route), sign_map(net, self._setup.additional or loaded_additional(api))
+        return _roads(net, route, self._setup.additional or loaded_additional(api))
 
     @_translates_errors
     def begin(self, actions: Sequence[TrafficAction]) -> tuple[TrafficAction, ...]:
@@ -362,3 +365,8 @@ class SumoTraffic:
         """End the simulation; see `Traffic.close`."""
         self._link.end()
         self._run = None
+
+
+def _roads(net: RoadMap, route: Sequence[str], additional: Sequence[Path]) -> tuple[RoadNetwork, SignMap]:
+    """Roads with what stands beside them, and signs."""
+    return road_network(net, route, structures(additional)), sign_map(net, additional)

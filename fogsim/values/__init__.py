@@ -9,7 +9,18 @@ from fogsim.values.fog import FogBank, FogChange, FogField, FogPatches
 from fogsim.values.image import Frame, View
 from fogsim.values.light import Beam, HeadLamp, Lamp, Lights, LightSources, StreetLighting
 from fogsim.values.observation import LeadMeasurement, Observation, SignSighting
-from fogsim.values.road import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea, RoadNetwork, Sign, SignMap
+from fogsim.values.road import (
+    Lane,
+    LaneEnd,
+    LaneKind,
+    LaneMarking,
+    PavedArea,
+    RoadNetwork,
+    Sign,
+    SignMap,
+    Structure,
+    StructureKind,
+)
 from fogsim.values.scene import Batch, Mesh, Scene, Surface
 from fogsim.values.script import Begun
 from fogsim.values.step import Ending, RoadSection, Step, TrafficStep, Truth
@@ -64,6 +75,8 @@ __all__ = [
     "StreetLighting",
     "Stretch",
     "StretchAdvice",
+    "Structure",
+    "StructureKind",
     "Surface",
     "TrafficSnapshot",
     "TrafficState",

@@ -126,6 +126,42 @@ class SignMap:
     signs: tuple[Sign, ...] = ()
 
 
+class StructureKind(StrEnum):
+    """What a structure is made like."""
+
+    WALL = "wall"
+    HEDGE = "hedge"
+    BUILDING = "building"
+    TRUCK = "truck"
+    TUNNEL = "tunnel"
+
+
+@dataclass(frozen=True, slots=True)
+class Structure:
+    """What stands beside a road or over it and hides what is behind: a box, swept along a line.
+
+    Attributes
+    ----------
+    structure_id : str
+        Its id.
+    kind : StructureKind
+        What it is made like.
+    line : (n, 3) float64
+        Its middle, at the height of the road [m].
+    width : float
+        Its width across that line [m].
+    bottom, top : float
+        Heights above the line between which it is [m].
+    """
+
+    structure_id: str
+    kind: StructureKind
+    line: NDArray[np.float64]
+    width: float
+    bottom: float
+    top: float
+
+
 @dataclass(frozen=True, slots=True)
 class RoadNetwork:
     """Every lane that is drawn, and the axis of the ego's route.
@@ -140,9 +176,12 @@ class RoadNetwork:
         Where roads and footways meet.
     route_limits : (n,) float64
         Highest speed limit of the road that leads to each point of the route [m/s]. Empty where it is not known.
+    structures : tuple of Structure
+        What stands beside the roads and over them.
     """
 
     lanes: tuple[Lane, ...]
     route: NDArray[np.float64]
     areas: tuple[PavedArea, ...] = ()
     route_limits: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    structures: tuple[Structure, ...] = ()

@@ -2,11 +2,13 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fogsim.errors import InputError
 from fogsim.scenario import Scenario, build, load_scenario, override, resolved
 from fogsim.scenario.roads.files import traffic_files
+from fogsim.traffic.road.structures import structures
 
 TEXT = """
 name: template_motorway
@@ -69,3 +71,45 @@ def test_demand_and_actors_need_a_road(tmp_path: Path) -> None:
     text = TEXT.replace("road:", "traffic: {net: a.net.xml, routes: [a.rou.xml]} #", 1)
     with pytest.raises(InputError, match="demand: goes with a road by template"):
         loaded(tmp_path, text)
+
+
+BESIDE = """
+name: beside
+road:
+  template: tunnel
+  tunnel_at: 200 m
+  obstructions: [{kind: hedge, at: 20 m, side: left, distance: 2 m}, {kind: wall, at: 20 m, length: 50 m}]
+fog: {visibility: 150 m}
+"""
+
+
+def test_what_stands_beside_a_road_is_drawn_where_it_is_said_to_be(tmp_path: Path) -> None:
+    setup = build.traffic_setup(loaded(tmp_path, BESIDE))
+    found = {one.structure_id: one for one in structures(setup.additional)}
+    assert {name: one.kind for name, one in found.items()} == {
+        "obstruction.0": "hedge",
+        "obstruction.1": "wall",
+        **dict.fromkeys(("tunnel.right", "tunnel.left", "tunnel.roof"), "tunnel"),
+    }
+    along = np.array([np.cos(np.radians(20.0)), np.sin(np.radians(20.0))])
+    left = np.array([-along[1], along[0]])
+    hedge, wall, roof = (found[name] for name in ("obstruction.0", "obstruction.1", "tunnel.roof"))
+    # The two lanes have 3.5 m each; the middle of the road begins where the map does.
+    np.testing.assert_allclose(hedge.line[0, :2], 20.0 * along + (3.5 + 2.0 + 0.6) * left, atol=0.02)
+    np.testing.assert_allclose(wall.line[-1, :2], 70.0 * along - (3.5 + 3.0 + 0.15) * left, atol=0.02)
+    np.testing.assert_allclose(roof.line[[0, -1], :2], [200.0 * along, 600.0 * along], atol=0.02)
+    assert roof.bottom == 5.2
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("at: 20 m, side", "at: 1990 m, side", "scenario.yaml:3: road: obstructions.0: ends beyond its way"),
+        ("kind: hedge", "kind: hedge, along: ramp", "obstructions.0: the road has no way 'ramp'"),
+        ("tunnel_at: 200 m", "tunnel_at: 1700 m", "road: the tunnel ends 100 m beyond the road"),
+        ("kind: wall", "kind: wal", "scenario.yaml:6: road.obstructions.1.kind"),
+    ],
+)
+def test_what_does_not_fit_beside_a_road_is_told(tmp_path: Path, old: str, new: str, told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        loaded(tmp_path, BESIDE.replace(old, new, 1))

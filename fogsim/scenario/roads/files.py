@@ -14,16 +14,18 @@ from pathlib import Path
 
 from fogsim.errors import InputError
 from fogsim.files.user_cache import VARIABLE, cache_directory
-from fogsim.scenario.roads.schema import ActorSection, DemandSection, Road, measure_of
+from fogsim.scenario.roads.schema import NO_MEASURES, ActorSection, DemandSection, ObstructionSection, Road, measure_of
 from fogsim.scenario.schema import Scenario
 from fogsim.traffic.templates import (
     ROAD_TEMPLATES,
     Actor,
     Demand,
     Layout,
+    Obstruction,
     Placed,
     Relation,
     RoadTemplate,
+    additional_text,
     check_placement,
     cuts_around,
     net_text,
@@ -32,7 +34,7 @@ from fogsim.traffic.templates import (
     usual_mix,
 )
 
-_NET, _ROUTES = "road.net.xml", "road.rou.xml"
+_NET, _ROUTES, _BESIDE = "road.net.xml", "road.rou.xml", "road.add.xml"
 _MOST_FOLDERS = 200  # of generated files; the oldest go
 _SECONDS_PER_HOUR = 3600.0
 
@@ -78,8 +80,9 @@ def traffic_files(scenario: Scenario) -> TrafficFiles:
     layout, placed = road_layout(scenario)
     demand = _demand(scenario.demand or DemandSection(), usual_mix(scenario.road.template))
     texts = {_NET: net_text(layout.net), _ROUTES: routes_text(layout, demand, placed)}
-    made = _written(texts)
-    return TrafficFiles(made / _NET, (made / _ROUTES, *routes), additional)
+    beside = additional_text(layout, [_obstruction(one) for one in scenario.road.obstructions])
+    made = _written({**texts, **({_BESIDE: beside} if beside else {})})
+    return TrafficFiles(made / _NET, (made / _ROUTES, *routes), (*([made / _BESIDE] if beside else []), *additional))
 
 
 def road_layout(scenario: Scenario) -> tuple[Layout, tuple[Placed, ...]]:
@@ -109,7 +112,7 @@ def road_layout(scenario: Scenario) -> tuple[Layout, tuple[Placed, ...]]:
 
 
 def _template(road: Road) -> RoadTemplate:
-    given = {key: getattr(road, key) for key in road.model_fields_set - {"template"}}
+    given = {key: getattr(road, key) for key in road.model_fields_set - NO_MEASURES}
     named = {measure_of(key): value for key, value in given.items() if value is not None}
     return ROAD_TEMPLATES[road.template](
         **{name: value * worth if worth != 1.0 else value for (name, worth), value in named.items()}
@@ -128,6 +131,12 @@ def _actor(name: str, section: ActorSection) -> Actor:
         section.depart_s,
         section.stands,
     )
+
+
+def _obstruction(section: ObstructionSection) -> Obstruction:
+    width, height, length = section.sizes()
+    at = (section.along, section.at_m, length, section.side == "left", section.distance_m)
+    return Obstruction(section.kind, *at, width, height)
 
 
 def _place(section: ActorSection) -> float | Relation:

@@ -25,6 +25,49 @@ Flow = Annotated[Number, Field(ge=0, le=20_000)]
 """A flow of traffic [veh/h]."""
 
 
+NO_MEASURES = frozenset({"template", "obstructions"})
+"""Keys of a road that every template has, and that are none of its measures."""
+
+_SIZES = {"wall": (0.3, 3.0, 60.0), "hedge": (1.2, 2.2, 60.0), "building": (9.0, 7.0, 20.0), "truck": (2.5, 3.8, 12.0)}
+"""Width, height and length of each kind of obstruction, where nothing else is said [m]."""
+
+
+class ObstructionSection(Section):
+    """Something beside the road that hides what is behind it from the camera."""
+
+    kind: Literal["wall", "hedge", "building", "truck"]
+    """What it is."""
+
+    along: Id = "same_way"
+    """Way beside which it is."""
+
+    at_m: Distance
+    """Where along that way it begins."""
+
+    side: Literal["left", "right"] = "right"
+    """On which side of the road, beyond the oncoming lanes on the left."""
+
+    distance_m: Distance = 3.0
+    """From the border of the carriageway to its near side."""
+
+    length_m: Annotated[Length, Field(ge=0.1)] | None = None
+    """Its length along the road; by default 60 of walls and hedges, 20 of buildings, 12 of trucks."""
+
+    width_m: Annotated[Length, Field(ge=0.1)] | None = None
+    """Its size across the road; by default 0.3, 1.2, 9 and 2.5."""
+
+    height_m: Annotated[Length, Field(ge=0.1)] | None = None
+    """Its height; by default 3, 2.2, 7 and 3.8."""
+
+    def sizes(self) -> tuple[float, float, float]:
+        """Width, height and length [m]."""
+        given = (self.width_m, self.height_m, self.length_m)
+        width, height, length = (
+            one if one is not None else usual for one, usual in zip(given, _SIZES[self.kind], strict=True)
+        )
+        return width, height, length
+
+
 class Road(Section):
     """A road by template, in place of a network; what is not written is as usual for the template."""
 
@@ -85,6 +128,18 @@ class Road(Section):
     merge_length_m: Annotated[Length, Field(ge=50)] | None = None
     """Length of the lane to speed up on."""
 
+    tunnel_at_m: Distance | None = None
+    """Where a tunnel begins."""
+
+    tunnel_length_m: Length | None = None
+    """Its length."""
+
+    tunnel_height_m: Annotated[Length, Field(ge=4)] | None = None
+    """Its height."""
+
+    obstructions: tuple[ObstructionSection, ...] = ()
+    """What stands beside the road and hides what is behind it from the camera; drivers see through it."""
+
     @field_validator("template")
     @classmethod
     def _known_template(cls, value: str) -> str:
@@ -95,7 +150,7 @@ class Road(Section):
     @model_validator(mode="after")
     def _measures_of_the_template(self) -> Self:
         has = [key for key in type(self).model_fields if measure_of(key)[0] in measures(self.template)]
-        for key in self.model_fields_set - {"template"}:
+        for key in self.model_fields_set - NO_MEASURES:
             if key not in has and getattr(self, key) is not None:
                 raise ValueError(f"a {self.template} has no {key}; {suggest(key, has)}")
         return self

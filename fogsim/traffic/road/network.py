@@ -14,7 +14,7 @@ from fogsim.traffic.road.map_cache import cached_map, compacted, is_worth_cachin
 from fogsim.traffic.road.net_lanes import map_of
 from fogsim.traffic.road.road_map import RoadMap
 from fogsim.traffic.road.xml_stream import open_unpacked
-from fogsim.values import Lane, RoadNetwork
+from fogsim.values import Lane, RoadNetwork, Structure
 
 _ROOT, _HEAD = re.compile(rb"<net\s[^>]*>"), 1 << 20  # tag of the root, and in how many first bytes of a file it stands
 
@@ -62,7 +62,7 @@ def _is_lefthand(path: Path) -> bool:
     return root is not None and b'lefthand="' in root[0] and b'lefthand="false"' not in root[0]
 
 
-def road_network(roads: RoadMap, route: Sequence[str]) -> RoadNetwork:
+def road_network(roads: RoadMap, route: Sequence[str], structures: tuple[Structure, ...] = ()) -> RoadNetwork:
     """Every lane of a network that is a road or a footway, its junctions, and the axis of a route.
 
     In a network without any, the tracks or waterways are drawn in their place, as lanes without lines.
@@ -73,6 +73,8 @@ def road_network(roads: RoadMap, route: Sequence[str]) -> RoadNetwork:
         The network.
     route : sequence of str
         Edge ids of the ego's route.
+    structures : tuple of Structure
+        What stands beside the roads.
 
     Raises
     ------
@@ -83,7 +85,7 @@ def road_network(roads: RoadMap, route: Sequence[str]) -> RoadNetwork:
     for lane in lanes:
         _check_shape(lane)
     axis, limits = route_axis(roads, route)
-    return RoadNetwork(lanes=lanes, route=axis, areas=roads.areas, route_limits=limits)
+    return RoadNetwork(lanes, axis, roads.areas, limits, structures)
 
 
 def _check_shape(lane: Lane) -> None:

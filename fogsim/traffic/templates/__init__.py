@@ -1,5 +1,6 @@
 """Roads by template, and who drives on them, written to SUMO's files: no netconvert is needed."""
 
+from fogsim.traffic.templates.beside import Obstruction, additional_text
 from fogsim.traffic.templates.catalogue import ROAD_TEMPLATES, RoadTemplate, measures, usual_mix
 from fogsim.traffic.templates.demand import Demand, cuts_around, routes_text
 from fogsim.traffic.templates.net_plan import Layout
@@ -13,10 +14,12 @@ __all__ = [
     "Actor",
     "Demand",
     "Layout",
+    "Obstruction",
     "Placed",
     "PlacementError",
     "Relation",
     "RoadTemplate",
+    "additional_text",
     "check_placement",
     "cuts_around",
     "measures",

@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fogsim.errors import InputError
 from fogsim.traffic.templates.alignment import Axis, Bend, axis_of
@@ -120,7 +120,7 @@ class AlongRoad:
             back = self._oncoming(axis, parts, nodes)
             edges, links = [*edges, *back], [*links, *straight_links(back)]
             ways.append((ONCOMING, tuple(edge.name for edge in back)))
-        return Layout(NetPlan(tuple(edges), tuple(links)), tuple(ways))
+        return Layout(NetPlan(tuple(edges), tuple(links)), tuple(ways), self.beyond)
 
     def _oncoming(self, axis: Axis, parts: Sequence[Axis], nodes: Sequence[str]) -> tuple[Edge, ...]:
         """The other direction: where both share a line they share their nodes, by which that is known."""
@@ -128,6 +128,11 @@ class AlongRoad:
             parts, nodes = [axis], [f"{ONCOMING}.end", f"{ONCOMING}.begin"]
         axes = [part.moved(0.5 * self.median).reversed() for part in reversed(parts)]
         return chain(ONCOMING, axes, nodes[::-1], self, self.oncoming_lanes)
+
+    @property
+    def beyond(self) -> float:
+        """How far the road goes on to the left of the ego's left border [m]."""
+        return self.median + self.oncoming_lanes * self.lane_width
 
     def axis(self) -> Axis:
         """Its middle.
@@ -260,3 +265,41 @@ class Rural(AlongRoad):
         half = 0.5 * self.grade_length
         count = max(1, math.floor((self.length - self.grade_at) / half))
         return [(self.grade_at + half * n, self.grade * math.sin(0.5 * math.pi * n)) for n in range(count)]
+
+
+@dataclass(frozen=True, slots=True)
+class Tunnel(AlongRoad):
+    """A road of two lanes with a tunnel.
+
+    Attributes
+    ----------
+    tunnel_at, tunnel_length, tunnel_height : float
+        Where the tunnel begins, how long and how high it is [m].
+    """
+
+    limit: float = 80.0 / 3.6
+    tunnel_at: float = 500.0
+    tunnel_length: float = 400.0
+    tunnel_height: float = 5.2
+
+    def layout(self, cuts: Sequence[float] = ()) -> Layout:
+        """The road; see `AlongRoad.layout`.
+
+        Parameters
+        ----------
+        cuts : sequence of float
+            Stations at which the ego's way is cut into edges [m].
+
+        Raises
+        ------
+        InputError
+            If the tunnel, the curve or the grade is longer than the road.
+        """
+        end = self.tunnel_at + self.tunnel_length
+        if end > self.length:
+            raise InputError(
+                f"the tunnel ends {end - self.length:.0f} m beyond the road, which is {self.length:g} m long"
+            )
+        plain = AlongRoad.layout(self, cuts)
+        inside = self.axis().moved(-0.5 * self.median).part(self.tunnel_at, end)
+        return replace(plain, tunnel=(inside, self.tunnel_height))

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from fogsim.registry import Registry
-from fogsim.traffic.templates.along_roads import Curve, Grade, Motorway, Rural, Straight
+from fogsim.traffic.templates.along_roads import Curve, Grade, Motorway, Rural, Straight, Tunnel
 from fogsim.traffic.templates.net_plan import Layout
 from fogsim.traffic.templates.ramp import Ramp
 from fogsim.traffic.templates.town_roads import Crossing, Roundabout, Streets
@@ -40,6 +40,7 @@ ROAD_TEMPLATES: Registry[type[RoadTemplate]] = Registry(
         "curve": Curve,
         "grade": Grade,
         "rural": Rural,
+        "tunnel": Tunnel,
         "crossing": Crossing,
         "roundabout": Roundabout,
     },

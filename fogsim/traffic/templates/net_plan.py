@@ -127,10 +127,16 @@ class Layout:
         The network.
     ways : mapping from name to edge ids, as pairs
         Ways by name: ``same_way``, which is the ego's, ``oncoming``, and others that the template has.
+    beyond : float
+        How far the road goes on to the left of a way's left border: median and oncoming lanes [m].
+    tunnel : tuple of (Axis, float) or None
+        Left border of the ego's way in a tunnel, and the tunnel's height [m].
     """
 
     net: NetPlan
     ways: tuple[tuple[str, tuple[str, ...]], ...]
+    beyond: float = 0.0
+    tunnel: tuple[Axis, float] | None = None
 
     def way(self, name: str) -> tuple[str, ...]:
         """Edges of a way; none where there is no such way.

@@ -83,7 +83,7 @@ class Ramp(Motorway):
             back = axis.moved(0.5 * self.median).reversed()
             edges.append(Edge(ONCOMING, f"{ONCOMING}.begin", f"{ONCOMING}.end", back, self.oncoming_lanes, *usual))
             ways.append((ONCOMING, (ONCOMING,)))
-        return Layout(NetPlan(tuple(edges), tuple(links)), tuple(ways))
+        return Layout(NetPlan(tuple(edges), tuple(links)), tuple(ways), self.beyond)
 
     def _ramp(self, inner: Axis) -> Axis:
         """Left border of the ramp, made from its end: it leaves the motorway's right border backwards."""

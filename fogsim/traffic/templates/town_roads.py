@@ -119,7 +119,7 @@ class Crossing(Streets):
             links.append(Link(name, target, direction=turn[0]))
             ways.append((name if turn == "straight" else f"{name}.{turn}", (name, target)))
         signals = ((node, two_phases()),) if self.lights else ()
-        return Layout(NetPlan(tuple(edges), tuple(links), signals), tuple(ways))
+        return Layout(NetPlan(tuple(edges), tuple(links), signals), tuple(ways), self.lane_width)
 
 
 def two_phases() -> tuple[Phase, ...]:
@@ -142,9 +142,6 @@ class Roundabout(Streets):
         Speed limit on it [m/s].
     """
 
-    length: float = 800.0
-    limit: float = 70.0 / 3.6
-    side_limit: float = 70.0 / 3.6
     radius: float = 18.0
     ring_limit: float = 35.0 / 3.6
 
@@ -168,7 +165,7 @@ class Roundabout(Streets):
             for number, name in enumerate(ARMS)
             for turn, steps in _TURNS.items()
         ]
-        return Layout(NetPlan(tuple(edges), tuple(links)), tuple(ways))
+        return Layout(NetPlan(tuple(edges), tuple(links)), tuple(ways), self.lane_width)
 
     def _way(self, number: int, steps: int) -> tuple[str, ...]:
         """Edges from an arm to one so many arms on."""

@@ -1,0 +1,125 @@
+"""What stands beside a road by template, and tunnels over it: lines of structures, and the file that tells of them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fogsim.errors import InputError
+from fogsim.traffic.road.structures import STRUCTURE_TYPE
+from fogsim.traffic.templates.alignment import Axis, Points
+from fogsim.traffic.templates.net_plan import Layout
+from fogsim.traffic.templates.xml_text import element, opening
+
+_WALL, _ROOF = 0.6, 0.8  # thickness of a tunnel's walls and roof [m]
+_KERB = 1.0  # between a tunnel's carriageway and its walls [m]
+
+
+@dataclass(frozen=True, slots=True)
+class Obstruction:
+    """Something beside a way that hides what is behind it.
+
+    Attributes
+    ----------
+    kind : str
+        ``wall``, ``hedge``, ``building`` or ``truck``.
+    way : str
+        Way beside which it is.
+    at, length : float
+        Where along it it begins, and how long it is [m].
+    is_left : bool
+        Whether it stands to the left of the road, beyond the oncoming lanes.
+    distance : float
+        From the border of the carriageway to its near side [m].
+    width, height : float
+        Its size across the road, and its height [m].
+    """
+
+    kind: str
+    way: str
+    at: float
+    length: float
+    is_left: bool
+    distance: float
+    width: float
+    height: float
+
+
+def additional_text(layout: Layout, obstructions: Sequence[Obstruction]) -> str:
+    """Text of an additional file with all that stands beside a road; "" if nothing does.
+
+    Parameters
+    ----------
+    layout : Layout
+        The road.
+    obstructions : sequence of Obstruction
+        What a scenario puts beside it.
+
+    Raises
+    ------
+    InputError
+        If an obstruction is beside no way of the road, or beyond its end.
+    """
+    lines = list[str]()
+    for number, one in enumerate(obstructions):
+        name = f"obstruction.{number}"
+        if not layout.way(one.way):
+            raise InputError(
+                f"obstructions.{number}: the road has no way {one.way!r}; it has {', '.join(dict(layout.ways))}"
+            )
+        if one.at + one.length > layout.length(one.way):
+            raise InputError(
+                f"obstructions.{number}: ends beyond its way, which is {layout.length(one.way):.0f} m long"
+            )
+        lines += _structure(name, one.kind, _line(layout, one), (one.width, 0.0, one.height))
+    if layout.tunnel is not None:
+        lines += _tunnel(layout, *layout.tunnel)
+    if not lines:
+        return ""
+    return '<?xml version="1.0" encoding="UTF-8"?>\n<additional>\n' + "\n".join(lines) + "\n</additional>\n"
+
+
+def _line(layout: Layout, one: Obstruction) -> Points:
+    """Middle line of an obstruction (n, 3) [m]."""
+    aside = one.distance + 0.5 * one.width
+    if one.is_left:
+        return _along(layout, one.way, one.at, one.length, layout.beyond + aside)
+    width = layout.edge(layout.way(one.way)[0]).width
+    return _along(layout, one.way, one.at, one.length, -width - aside)
+
+
+def _along(layout: Layout, way: str, start: float, length: float, left: float) -> Points:
+    """Points at a distance to the left of a way's left border, between two places along it."""
+    parts, passed = list[Points](), 0.0
+    for name in layout.way(way):
+        axis = layout.edge(name).axis
+        first, last = max(start - passed, 0.0), min(start + length - passed, axis.length)
+        if last - first > 0.01:
+            offset = float(axis.stations[0])
+            parts.append(axis.part(offset + first, offset + last).beside(left))
+        passed += axis.length
+    points = np.concatenate(parts)
+    kept = np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 0.01])
+    line: Points = points[kept]
+    return line
+
+
+def _tunnel(layout: Layout, axis: Axis, height: float) -> list[str]:
+    """Two walls and a roof over both directions."""
+    right = layout.edge(layout.way("same_way")[0]).width + _KERB
+    left, middle = layout.beyond + _KERB, 0.5 * (layout.beyond + _KERB - right)
+    lines = list[str]()
+    for name, aside in (("right", -right - 0.5 * _WALL), ("left", left + 0.5 * _WALL)):
+        lines += _structure(f"tunnel.{name}", "tunnel", axis.beside(aside), (_WALL, 0.0, height))
+    roof = (left + right + 2 * _WALL, height, height + _ROOF)
+    return lines + _structure("tunnel.roof", "tunnel", axis.beside(middle), roof)
+
+
+def _structure(name: str, kind: str, line: Points, sizes: tuple[float, float, float]) -> list[str]:
+    shape = " ".join(f"{x:.2f},{y:.2f},{z:.2f}" for x, y, z in line.tolist())
+    measures = zip(("width", "bottom", "top"), sizes, strict=True)
+    return [
+        opening("poly", id=name, type=f"{STRUCTURE_TYPE}{kind}", color="gray", fill="0", layer="1", shape=shape),
+        *(f"    {element('param', key=key, value=f'{size:g}')}" for key, size in measures),
+        "</poly>",
+    ]

@@ -42,8 +42,9 @@ def _marked(path: Path) -> list[Structure]:
 
 def _structure(path: Path, shape: Any) -> Structure:
     where, kind = f"{path}: poly {shape.id!r}", str(shape.type).removeprefix(STRUCTURE_TYPE)
-    if kind not in set(StructureKind):
-        raise InputError(f"{where}: unknown kind of structure {kind!r}; {suggest(kind, [str(one) for one in StructureKind])}")
+    kinds = [str(one) for one in StructureKind]
+    if kind not in kinds:
+        raise InputError(f"{where}: unknown kind of structure {kind!r}; {suggest(kind, kinds)}")
     given = {parameter.key: parameter.value for parameter in (shape.param or [])}
     try:
         points = [[float(number) for number in corner.split(",")] for corner in str(shape.shape).split()]

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, ImageDraw, ImageFont
 
 import fogsim
 from fogsim.metrics import step_metrics
@@ -18,9 +18,20 @@ SHEET = (("inf", 30), ("400", 120), ("200", 120), ("100", 330), ("50", 100), ("3
 """Visibilities [m] of the contact sheet, and the frame of the run that is shown for each."""
 
 
-def frame(visibility: str, index: int) -> NDArray[np.uint8]:
+FAULTS = (
+    ("clean glass", ()),
+    ("dirty_lens", ("{fault: dirty_lens}",)),
+    ("wet_lens", ("{fault: wet_lens}",)),
+    ("glare", ("{fault: glare, azimuth: 6 deg, elevation: 7 deg}",)),
+    ("glare on dirty glass", ("{fault: glare, azimuth: 6 deg, elevation: 7 deg, haze: 10}", "{fault: dirty_lens}")),
+    ("calibration", ("{fault: calibration, roll: 4 deg, pitch: 2 deg}",)),
+)
+"""Faults of the sheet of faults, in fog of 150 m."""
+
+
+def frame(visibility: str, index: int, *settings: str) -> NDArray[np.uint8]:
     """One camera frame of the motorway in homogeneous fog."""
-    scenario = fogsim.load_scenario("motorway_fog_bank", [f"fog.visibility_m={visibility}"])
+    scenario = fogsim.load_scenario("motorway_fog_bank", [f"fog.visibility_m={visibility}", *settings])
     for step in fogsim.run(scenario, seed=1):
         if step.index == index:
             return step.observation.image
@@ -32,6 +43,17 @@ def contact_sheet() -> Image.Image:
     sheet = Image.new("RGB", (3 * 480, 2 * 360))
     for place, (visibility, index) in enumerate(SHEET):
         picture = Image.fromarray(frame(visibility, index)).resize((480, 360), Image.Resampling.LANCZOS)
+        sheet.paste(picture, (place % 3 * 480, place // 3 * 360))
+    return sheet
+
+
+def fault_sheet() -> Image.Image:
+    """What faults of the camera look like, 480×360 each, with their names."""
+    sheet = Image.new("RGB", (3 * 480, 2 * 360))
+    for place, (name, faults) in enumerate(FAULTS):
+        taken = frame("150", 90, f"sensors.faults=[{', '.join(faults)}]")
+        picture = Image.fromarray(taken).resize((480, 360), Image.Resampling.LANCZOS)
+        ImageDraw.Draw(picture).text((10, 6), name, fill=(20, 20, 20), font=ImageFont.load_default(18))
         sheet.paste(picture, (place % 3 * 480, place // 3 * 360))
     return sheet
 
@@ -64,6 +86,7 @@ def main() -> None:
     OUT.mkdir(exist_ok=True)
     contact_sheet().save(OUT / "visibilities.jpg", quality=88)
     overlay("120", 6).save(OUT / "estimate.jpg", quality=88)
+    fault_sheet().save(OUT / "sensor_faults.jpg", quality=88)
     demo_frame(91.0).save(OUT / "demo.jpg", quality=88)
 
 

@@ -23,3 +23,10 @@ def test_sumo_takes_the_traffic_seed() -> None:
 def test_a_negative_seed_is_refused() -> None:
     with pytest.raises(ValueError, match="non-negative"):
         spawn_streams(-1)
+
+
+def test_streams_that_came_later_leave_the_earlier_ones_as_they_were() -> None:
+    """Faults and satellite positioning came last: noise of camera and radar is as it was without them."""
+    streams, earlier = spawn_streams(7), np.random.SeedSequence(7).spawn(5)
+    for name, seed in zip(("fog", "camera", "sensors", "driver"), earlier[1:], strict=True):
+        assert getattr(streams, name).random() == np.random.default_rng(seed).random()

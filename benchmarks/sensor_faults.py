@@ -1,0 +1,155 @@
+"""What each estimator says while a sensor is faulty, and what is believed after some seconds of it.
+
+The ego drives on the motorway in even fog, behind another car; after some seconds of good frames one fault is in force
+for five. `valid` is the share of frames in which the method says something, `error` the median of (V_est − V) / V of
+these, `outside` their share whose 90 % interval of k does not hold the truth. `low` … `high` is the 90 % interval of
+the belief at the fault's end by this method alone, over all seeds from the lowest to the highest; a method is `fooled`
+if the belief of any seed leaves the truth out.
+
+    python benchmarks/sensor_faults.py [--json] [--docs] [--faults …] [--methods …] [--seeds 3] [--visibility 150]
+"""
+
+import argparse
+import json
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import fogsim
+from fogsim.fusion import make
+from fogsim.values import Belief, Step
+from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate
+
+FAULTS = {
+    "none": "",
+    "blackout": "fault: blackout",
+    "frozen, new times": "fault: frozen",
+    "frozen, old time": "fault: frozen, time_stamp: exposure",
+    "half of frames dropped": "fault: dropped_frames, share: 50 %",
+    "latency 0.6 s": "fault: latency, delay: 0.6 s",
+    "dirt on 10 % of the glass": "fault: dirty_lens",
+    "dirt on 30 %, 4 mm": "fault: dirty_lens, coverage: 30 %, diameter: 4 mm",
+    "drops on 15 %": "fault: wet_lens",
+    "drops on 30 %, 5 mm": "fault: wet_lens, coverage: 30 %, diameter: 5 mm",
+    "sun 8° up": "fault: glare",
+    "sun 15° aside, dirty glass": "fault: glare, azimuth: 15 deg, haze: 10",
+    "pitch + 0.5°": "fault: calibration, pitch: 0.5 deg",
+    "pitch + 2°": "fault: calibration, pitch: 2 deg",
+    "roll + 2°": "fault: calibration, roll: 2 deg",
+    "focal length + 5 %": "fault: calibration, focal_length: 5 %",
+    "radar lost": "fault: dropout",
+    "radar + 5 m": "fault: bias, distance: 5 m",
+    "radar noise × 10": "fault: noise",
+}
+METHODS = ("joint_road", "negru2013", "zhu2015", "huang2015_rough", "huang2015_lead", "lead_contrast")
+BEGIN, LASTS, SETTLED = 5.0, 5.0, 1.0
+"""When the fault begins, how long it lasts, and how much of it is not counted yet [s]."""
+
+DOCS = Path(__file__).resolve().parent.parent / "docs" / "sensors.md"
+MARK, END = "<!-- table: sensor faults -->", "<!-- end of sensor faults -->"
+
+
+def steps(fault: str, seed: int, visibility: float, methods: tuple[str, ...]) -> Iterator[Step]:
+    """Steps of a drive with a fault."""
+    faults = f"[{{{fault}, at: {BEGIN} s, for: {LASTS} s}}]" if fault else "[]"
+    scenario = fogsim.load_scenario(
+        "motorway_fog_bank",
+        [
+            f"fog={{visibility_m: {visibility}}}",
+            f"sensors.faults={faults}",
+            f"estimators=[{', '.join(methods)}]",
+            "clocks={camera_period_s: 0.2, decision_period_s: 1.0}",
+            f"duration_s={BEGIN + LASTS}",
+        ],
+    )
+    return fogsim.run(scenario, seed)
+
+
+def holds_truth(estimate: Estimate, extinction: float) -> bool:
+    """Whether the 90 % interval of an estimate holds the true extinction coefficient."""
+    return abs(estimate.extinction - extinction) <= NORMAL_90_PERCENT * estimate.standard_deviation
+
+
+def measure(name: str, seeds: int, visibility: float, methods: tuple[str, ...]) -> list[dict[str, Any]]:
+    """Records of a fault, one for each method."""
+    said: dict[str, list[Estimate]] = {method: [] for method in methods}
+    beliefs: dict[str, list[Belief]] = {method: [] for method in methods}
+    extinction = math.log(20.0) / visibility
+    for seed in range(1, seeds + 1):
+        fusions = {method: make("grid_filter") for method in methods}
+        last: dict[str, Belief] = {}
+        for step in steps(FAULTS[name], seed, visibility, methods):
+            if step.time >= BEGIN + LASTS:
+                break
+            for method, estimate in zip(methods, step.estimates, strict=True):
+                last[method] = fusions[method].update([estimate], step.time)
+                if step.time >= BEGIN + SETTLED:
+                    said[method].append(estimate)
+        for method in methods:
+            beliefs[method].append(last[method])
+    return [record(name, method, said[method], beliefs[method], extinction) for method in methods]
+
+
+def record(
+    fault: str, method: str, estimates: list[Estimate], beliefs: list[Belief], extinction: float
+) -> dict[str, Any]:
+    """What a method said during a fault, in figures."""
+    valid = [one for one in estimates if one.valid]
+    truth = math.log(20.0) / extinction
+    intervals = [belief.visibility_quantiles((0.05, 0.95)) for belief in beliefs]
+    return {
+        "fault": fault,
+        "method": method,
+        "frames": len(estimates),
+        "valid_pct": 100.0 * len(valid) / len(estimates),
+        "error_pct": float(np.median([100.0 * (one.visibility / truth - 1.0) for one in valid])) if valid else None,
+        "outside_pct": 100.0 * float(np.mean([not holds_truth(one, extinction) for one in valid])) if valid else None,
+        "low_m": min(low for low, _ in intervals),
+        "high_m": max(high for _, high in intervals),
+        "fooled": any(not low <= truth <= high for low, high in intervals),
+    }
+
+
+def cell(one: dict[str, Any]) -> str:
+    """A record in a cell of the table: how often valid and how far off, then the belief."""
+    error = one["error_pct"]
+    said = "silent" if error is None else f"{one['valid_pct']:.0f} %, {'clear' if error > 900 else f'{error:+.0f} %'}"
+    belief = f"{one['low_m']:.0f}–{one['high_m']:.0f}" if one["high_m"] < 3000 else f"over {one['low_m']:.0f}"
+    return f"{said}; {'**' + belief + '**' if one['fooled'] else belief}"
+
+
+def table(records: list[dict[str, Any]]) -> str:
+    """Faults by methods."""
+    methods = list(dict.fromkeys(one["method"] for one in records))
+    lines = ["| fault | " + " | ".join(f"`{method}`" for method in methods) + " |", "|---" * (len(methods) + 1) + "|"]
+    for fault in dict.fromkeys(one["fault"] for one in records):
+        row = {one["method"]: cell(one) for one in records if one["fault"] == fault}
+        lines.append(f"| {fault} | " + " | ".join(row[method] for method in methods) + " |")
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", action="store_true", help="print a list of flat records")
+    parser.add_argument("--docs", action="store_true", help="write the table of docs/sensors.md")
+    parser.add_argument("--faults", nargs="+", choices=FAULTS, default=list(FAULTS), help="only these")
+    parser.add_argument("--methods", nargs="+", default=METHODS, help="estimators")
+    parser.add_argument("--seeds", type=int, default=3, help="drives for each fault")
+    parser.add_argument("--visibility", type=float, default=150.0, help="visibility [m]")
+    asked = parser.parse_args()
+    records = [
+        one for name in asked.faults for one in measure(name, asked.seeds, asked.visibility, tuple(asked.methods))
+    ]
+    if asked.docs:
+        before, rest = DOCS.read_text(encoding="utf-8").split(MARK, 1)
+        text = f"{before}{MARK}\n\n{table(records)}\n\n{END}{rest.split(END, 1)[1]}"
+        DOCS.write_text(text, encoding="utf-8")
+    print(json.dumps(records, indent=2) if asked.json else table(records))
+
+
+if __name__ == "__main__":
+    main()

@@ -19,8 +19,10 @@ from fogsim.scenario import Scenario, build
 from fogsim.scenario.drivers import stretch_advice
 from fogsim.scenario.road_sections import DISPLAYS
 from fogsim.scenario.schema import InformedMethod
+from fogsim.timeline import Timeline
 from fogsim.traffic import AnyTraffic, FogAccess, Traffic, libsumo_traffic
 from fogsim.values import (
+    Begun,
     Belief,
     Command,
     Ending,
@@ -228,6 +230,23 @@ class DriversFog:
         self._fog, self._field = FogNow(fog), fog
         traffic.enter_fog(self._fog)
 
+    def restart(self) -> None:
+        """Let it be the beginning of a run, in the fog that was entered."""
+        if self._fog is not None and self._field is not None:
+            self._fog.change(self._field)
+            self._fog.set_time(0.0)
+
+    def change(self, fog: FogField) -> None:
+        """Let the fog do something else from now on, within its bounds.
+
+        Parameters
+        ----------
+        fog : FogField
+            The fog over time.
+        """
+        if self._fog is not None:
+            self._fog.change(fog)
+
     def set_time(self, time: float) -> None:
         """Let it be a time from here on.
 
@@ -287,6 +306,7 @@ class ClosedLoop:
         self._replays = traffic is None
         self._equipment = EgoEquipment(scenario)
         self._drivers_fog = DriversFog()
+        self._timeline = Timeline(scenario)
         self._fog: FogField | None = None
         self._step: Step | None = None
 
@@ -307,7 +327,8 @@ class ClosedLoop:
         """
         streams = spawn_streams(seed)
         self._step = None
-        self._drivers_fog.set_time(0.0)
+        self._drivers_fog.restart()
+        self._timeline = Timeline(self._scenario)
         if self._replays and not self._drivers_fog.is_entered:
             self._enter_planned_fog()
         self._traffic.start(streams.traffic_seed)
@@ -363,6 +384,7 @@ class ClosedLoop:
         if not self._drivers_fog.is_entered and self._fog is not None and command.is_for_others:
             # In clear air nobody else has chosen a speed so far.
             self._drivers_fog.enter(self._fog, self._traffic)
+        begun = self._begin_what_is_due(self._step)
         advance_traffic(self._traffic, self._drivers_fog, self._periods, self._step.index, command)
         snapshot, index = self._traffic.observe(), self._step.index + 1
         if snapshot is None:
@@ -370,8 +392,19 @@ class ClosedLoop:
             step = dataclasses.replace(self._step, index=index, time=time, ending=Ending.LEFT_NETWORK)
         else:
             step = self._complete_step(index, snapshot, command)
-        self._step = self._with_unplayed(step)
+        self._step = self._with_unplayed(dataclasses.replace(step, begun=begun))
         return self._step
+
+    def _begin_what_is_due(self, step: Step) -> tuple[Begun, ...]:
+        """Let begin what the timeline asks for after a step."""
+        due = self._timeline.due(step)
+        if not due.parts:
+            return due.over
+        refused = self._traffic.begin(due.actions.traffic) if due.actions.traffic else ()
+        fog = self._equipment.begin(due.actions, step.time, self._periods.time(step.index + 1))
+        if due.actions.fog:
+            self._drivers_fog.change(fog)
+        return self._timeline.begun(due, refused)
 
     def surrounding(self) -> Surrounding:
         """Tell what is around the ego's camera now: scene, vehicles, camera and lamps.
@@ -388,7 +421,9 @@ class ClosedLoop:
 
     def _with_unplayed(self, step: Step) -> Step:
         """A step; one that ends a run with what was not played."""
-        return step if step.ending is None else dataclasses.replace(step, unplayed=self._traffic.unplayed())
+        if step.ending is None:
+            return step
+        return dataclasses.replace(step, unplayed=self._traffic.unplayed() + self._timeline.unplayed(step))
 
     def _complete_step(self, index: int, snapshot: TrafficSnapshot, command: Command) -> Step:
         time = self._periods.time(index)

@@ -14,9 +14,10 @@ from fogsim.loop import AdvisedDriving, DriversFog
 from fogsim.randomness import spawn_streams
 from fogsim.scenario import Scenario, attached_scenario, build, override
 from fogsim.scenario.loading import clock_settings
+from fogsim.timeline import Timeline
 from fogsim.traffic import AttachedTraffic, TraciLink, Traffic, step_length, traci_traffic
 from fogsim.units import clock_time
-from fogsim.values import Command, Step
+from fogsim.values import NOTHING_UNPLAYED, Begun, Command, Step
 from fogsim.values.result_checks import checked_command
 
 DECISION_PERIOD = 0.5
@@ -158,6 +159,9 @@ class AttachedSession:
         self._seed = seed
         self._equipment = EgoEquipment(scenario)
         self._policy = AdvisedDriving(scenario)
+        self._timeline = Timeline(scenario)
+        self._begun: tuple[Begun, ...] = ()
+        self._last: Step | None = None
         self._command = Command()
         self._times: tuple[float, float] | None = None
         self._index = 0
@@ -205,6 +209,7 @@ class AttachedSession:
         time = self._elapsed(snapshot.state.time)
         self._drivers_fog.set_time(time)
         step = self._equipment.complete_step(self._index, time, snapshot, self._command, None)
+        step, self._begun = dataclasses.replace(step, begun=self._begun), ()
         self._index += 1
         return step
 
@@ -235,8 +240,21 @@ class AttachedSession:
             What is in force.
         """
         self._command = self._policy.decide(step) if command is None else checked_command(command)
+        if step is not self._last:
+            self._begin_what_is_due(step)
+            self._last = step
         self._traffic.obey(self._command)
         return self._command
+
+    def _begin_what_is_due(self, step: Step) -> None:
+        """Let begin what the timeline asks for after a step, which is looked at once."""
+        due = self._timeline.due(step)
+        if due.parts:
+            fog = self._equipment.begin(due.actions, step.time, step.time)
+            if due.actions.fog:
+                self._drivers_fog.change(fog)
+        refused = self._traffic.begin(due.actions.traffic) if due.actions.traffic else ()
+        self._begun += self._timeline.begun(due, refused)
 
     def close(self) -> None:
         """Let drivers drive and see by themselves again and free the renderer; the simulation goes on.
@@ -254,7 +272,10 @@ class AttachedSession:
         """
         tells = self._tells_unplayed and self._started and not self._closed
         self._end()
-        if tells and (unplayed := self._traffic.unplayed()):
+        unplayed = self._traffic.unplayed() if tells else NOTHING_UNPLAYED
+        if tells and self._last is not None:
+            unplayed += self._timeline.unplayed(self._last)
+        if unplayed:
             warnings.warn(f"{self._name}: not played: {unplayed}", UnplayedWarning, stacklevel=2)
 
     def _end(self) -> None:

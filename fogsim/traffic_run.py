@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere import extinction, field_at
+from fogsim.atmosphere import extinction, field_at, with_change
 from fogsim.ego.road_meters import RoadMeters
 from fogsim.errors import InputError, SimulationError, shown, suggest
 from fogsim.loop import DriversFog, advance_traffic, spread_advice, warn_of_unplayed
@@ -18,10 +18,11 @@ from fogsim.randomness import spawn_streams
 from fogsim.road_advice import RoadAdvice
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.road_sections import DISPLAYS, EYES, stations
+from fogsim.timeline import Timeline
 from fogsim.traffic import NetworkTraffic, libsumo_network_traffic
 from fogsim.traffic.road.configuration import configured_files
 from fogsim.traffic.road.network import read_net, route_axis
-from fogsim.values import Command, Ending, NetworkSnapshot, TrafficStep, Truth
+from fogsim.values import Begun, Command, Ending, NetworkSnapshot, TrafficStep, Truth
 from fogsim.values.belief import certain_belief
 from fogsim.values.result_checks import checked_advice, checked_command
 
@@ -139,8 +140,9 @@ class TrafficRun:
         axis, limits = _axis_along(along, net) if along and net is not None else (np.zeros((1, 3)), np.zeros(0))
         self._route = axis if along else None
         self._fog = build.fog_field(scenario, axis)
+        self._fog_now, self._scenario, self._timeline = self._fog, scenario, Timeline(scenario)
         # A meter that stands for a whole network does not see single patches.
-        self._metered = self._fog if along else dataclasses.replace(self._fog, patches=None)
+        self._sees_patches = bool(along)
         self._meters = _places_along(axis) + EYES
         self._section_meters = RoadMeters(scenario, axis, limits)
         self._drivers_fog = DriversFog()
@@ -165,7 +167,8 @@ class TrafficRun:
             If SUMO cannot start, or runs already in this process.
         """
         self._step = None
-        self._drivers_fog.set_time(0.0)
+        self._timeline, self._fog_now = Timeline(self._scenario), self._fog
+        self._drivers_fog.restart()
         if not self._drivers_fog.is_about(self._fog):
             self._drivers_fog.enter(self._fog, self._traffic)
         self._traffic.start(spawn_streams(seed).traffic_seed)
@@ -197,10 +200,20 @@ class TrafficRun:
         if not self._drivers_fog.is_entered and command.is_for_others:
             # In clear air nobody has chosen a speed so far.
             self._drivers_fog.enter(self._fog, self._traffic)
+        begun = self._begin_what_is_due(self._step)
         advance_traffic(self._traffic, self._drivers_fog, self._periods, self._step.index, command)
-        return self._complete_step(self._step.index + 1, command)
+        return self._complete_step(self._step.index + 1, command, begun)
 
-    def _complete_step(self, index: int, command: Command) -> tuple[TrafficStep, float]:
+    def _begin_what_is_due(self, step: TrafficStep) -> tuple[Begun, ...]:
+        """Let begin what the timeline asks for after a step."""
+        due = self._timeline.due(step)
+        for change in due.actions.fog:
+            self._fog_now = with_change(self._fog_now, step.time, change.density, change.duration)
+            self._drivers_fog.change(self._fog_now)
+        refused = self._traffic.begin(due.actions.traffic) if due.actions.traffic else ()
+        return self._timeline.begun(due, refused)
+
+    def _complete_step(self, index: int, command: Command, begun: tuple[Begun, ...] = ()) -> tuple[TrafficStep, float]:
         snapshot, time = self._traffic.observe_network(), self._periods.time(index)
         step = TrafficStep(
             index=index,
@@ -210,15 +223,18 @@ class TrafficRun:
             truth=self._truth(snapshot, time),
             command=command,
             ending=self._ending(index, snapshot),
+            begun=begun,
         )
         if step.ending is not None:
-            step = dataclasses.replace(step, unplayed=self._traffic.unplayed())
+            unplayed = self._traffic.unplayed() + self._timeline.unplayed(step)
+            step = dataclasses.replace(step, unplayed=unplayed)
         self._step = step
         return step, snapshot.speed_limit
 
     def _truth(self, snapshot: NetworkSnapshot, time: float) -> Truth:
-        fog = field_at(self._fog, time)
-        measured = float(extinction(field_at(self._metered, time), self._meters).max())
+        fog = field_at(self._fog_now, time)
+        metered = fog if self._sees_patches else dataclasses.replace(fog, patches=None)
+        measured = float(extinction(metered, self._meters).max())
         seen = extinction(fog, snapshot.state.position + EYES)
         sections = self._section_meters.measure(fog)
         return Truth(measured, measured, fog=fog, vehicle_extinctions=seen, sections=sections, route=self._route)

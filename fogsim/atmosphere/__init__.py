@@ -4,7 +4,7 @@ from fogsim.atmosphere.air import Air
 from fogsim.atmosphere.fog.airlight import airlight_from_illuminance
 from fogsim.atmosphere.fog.frustum import FrustumGrid, frustum_grid, radiance_through_grid
 from fogsim.atmosphere.fog.koschmieder import fogged_radiance
-from fogsim.atmosphere.fog.medium import field_at
+from fogsim.atmosphere.fog.medium import field_at, with_change
 from fogsim.atmosphere.fog.optical_depth import FieldAccess, FogNow, extinction, optical_depth, optical_depth_along
 from fogsim.atmosphere.lamps.phase_function import Droplets
 from fogsim.atmosphere.visibility.night_visibility import FogKind, Observer, Pavement, visibility_distance
@@ -31,4 +31,5 @@ __all__ = [
     "veiling_luminance",
     "visibility_distance",
     "visibility_level",
+    "with_change",
 ]

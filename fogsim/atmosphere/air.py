@@ -30,10 +30,15 @@ class Air:
         The fog.
     droplets : Droplets
         Sizes of its droplets, which set how lamplight is scattered.
+
+    Attributes
+    ----------
+    field : FogField
+        The fog; another one from when it is set.
     """
 
     def __init__(self, field: FogField, droplets: Droplets = Droplets.MODERATE_RADIATION) -> None:
-        self._field = field
+        self.field = field
         self._own, self._halos, self._streets = OwnLamplight(droplets), Halos(droplets), StreetLight()
 
     def prepare(self, camera: Camera, lamps: Sequence[tuple[HeadLamp, ...]]) -> None:
@@ -83,7 +88,7 @@ class Air:
         InputError
             If the beam of a lit lamp has holes.
         """
-        field = field_at(self._field, time)
+        field = field_at(self.field, time)
         lit = view if lights.streets is None else self._streets.on(view, camera, pose, field, lights.streets)
         radiance = daytime_luminance(lit, field, camera, pose)
         if lights.own:
@@ -105,7 +110,7 @@ class Air:
         (rows, cols) float32
             0 … 1; for the sky, that of the whole path to the fog's end.
         """
-        return transmittance(view, field_at(self._field, time), camera, pose)
+        return transmittance(view, field_at(self.field, time), camera, pose)
 
     transmission = transmittance
     """The name that `transmittance` had up to version 0.1."""

@@ -2,14 +2,16 @@
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere import extinction, field_at, optical_depth_along
+from fogsim.atmosphere import extinction, field_at, optical_depth_along, with_change
 from fogsim.camera import Delivered, FaultyLens, FrameDelivery, knocked, mounted_pose
+from fogsim.ego.daylight import Ramp, brightened
 from fogsim.ego.frame_watch import FrameWatch
 from fogsim.ego.measurements import EgoSensors
 from fogsim.ego.road_meters import RoadMeters
@@ -45,6 +47,7 @@ from fogsim.values import (
 )
 from fogsim.values.fault import FaultKind, Where
 from fogsim.values.result_checks import checked_belief, checked_estimate
+from fogsim.values.script import Actions
 
 _SIGHT_LINE = np.geomspace(1.0, 20_000.0, 400)
 """Distances ahead at which the optical depth is looked up to find how far one sees [m]."""
@@ -69,6 +72,9 @@ class EgoEquipment:
         self._sensors = EgoSensors(scenario)
         self._faults = tuple(fault_of(written) for written in scenario.sensors.faults)
         self._schedule: FaultSchedule | None = None
+        self._light = Ramp(1.0)
+        self._fog: FogField | None = None
+        self._fog_now: FogField | None = None
         self._glass, self._delivery, self._watch = FaultyLens(), FrameDelivery(), FrameWatch()
         self._fusion = build.fusion(scenario)
         self._view_renderer: EgoView | None = None
@@ -114,6 +120,7 @@ class EgoEquipment:
         """
         if body != self._body:
             self.close()
+            self._fog = self._fog_now = None
             self._mount_camera(body)
         if self._view_renderer is None:
             self._network = road, _ = network()
@@ -131,7 +138,11 @@ class EgoEquipment:
         self._delivery.reset()
         self._watch.reset()
         self._streams = streams
-        return view.fog
+        self._light = Ramp(1.0)
+        if self._fog is None:
+            self._fog = view.fog
+        self._enter_fog(self._fog)
+        return self._fog
 
     def _view_of_world(self, faults: Sequence[RunningFault]) -> EgoView:
         """What draws the world, built anew where signs have gone or come back since the last time."""
@@ -146,7 +157,49 @@ class EgoEquipment:
             standing = faulty_signs(signs, of_signs, Where.WORLD) if of_signs else signs
             self._view_renderer = kind(self._scenario, road, standing, self._body)
             self._sign_faults = of_signs
+            if self._fog_now is not None:
+                self._view_renderer.enter_fog(self._fog_now)
         return self._view_renderer
+
+    def begin(self, actions: Actions, time: float, first_time: float) -> FogField:
+        """Let what a script asks of fog, light and sensors begin.
+
+        Parameters
+        ----------
+        actions : Actions
+            What begins.
+        time : float
+            When it does [s].
+        first_time : float
+            Time of the first step in which it is in force [s].
+
+        Returns
+        -------
+        FogField
+            The fog from now on, over time; the same object if it does as before.
+
+        Raises
+        ------
+        SimulationError
+            If `start_run` has not been called, or it is closed.
+        """
+        if self._fog_now is None:
+            raise SimulationError("the run has not been started, or is closed")
+        fog = self._fog_now
+        for change in actions.fog:
+            fog = with_change(fog, time, change.density, change.duration)
+        if actions.fog:
+            self._enter_fog(fog)
+        for light in actions.light:
+            self._light = self._light.turned(time, light.factor, light.duration)
+        if actions.faults:
+            self.begin_faults(actions.faults, first_time)
+        return fog
+
+    def _enter_fog(self, fog: FogField) -> None:
+        self._fog_now = fog
+        if self._view_renderer is not None:
+            self._view_renderer.enter_fog(fog)
 
     def begin_faults(self, faults: Iterable[Fault], time: float) -> None:
         """Let faults of the sensors begin, beside those of the scenario.
@@ -199,11 +252,13 @@ class EgoEquipment:
             raise SimulationError("the run has not been started, or is closed")
         faults = schedule.at(time)
         renderer, state, ego = self._view_of_world(faults), snapshot.state, snapshot.ego
-        camera = knocked(self._camera, [one.kind for one in faults])
-        pose, fog = self._pose(state, ego), field_at(renderer.fog, time)
+        camera, brightness = knocked(self._camera, [one.kind for one in faults]), np.float32(self._light.at(time))
+        pose, fog = self._pose(state, ego), brightened(field_at(renderer.fog, time), float(brightness))
         sections, known = meters.measure(fog), tuple(one.fault for one in faults)
         truth = fog_truth(fog, pose, camera, renderer.signs, state, sections, self._way, known)
         view, radiance = renderer.render(state, ego, pose, time, camera)
+        if brightness != 1.0:
+            view, radiance = replace(view, radiance=view.radiance * brightness), radiance * brightness
         image = self._camera_sensor.take(self._glass.look_through(radiance, camera, faults), streams.camera)
         frame = Frame(*self._delivery.deliver(Delivered(time, image), faults), self._assumed_camera)
         observation = Observation(

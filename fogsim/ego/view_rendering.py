@@ -94,6 +94,9 @@ class EgoView(Protocol):
     signs: SignMap
     fog: FogField
 
+    def enter_fog(self, fog: FogField) -> None:
+        """Look through another fog; see `ViewRenderer.enter_fog`."""
+
     def render(
         self, state: TrafficState, ego: int, pose: CameraPose, time: float, camera: Camera | None = None
     ) -> tuple[View, NDArray[np.float32]]:
@@ -128,6 +131,16 @@ class NoView:
         empty = np.full(size, np.inf, np.float32), np.zeros(size, np.int32)
         self._black = np.zeros((*size, 3), np.float32)
         self._view = View(self._black, *empty)
+
+    def enter_fog(self, fog: FogField) -> None:
+        """Look through another fog; see `ViewRenderer.enter_fog`.
+
+        Parameters
+        ----------
+        fog : FogField
+            The fog over time.
+        """
+        self.fog = fog
 
     def render(self, *_: object) -> tuple[View, NDArray[np.float32]]:
         """Draw nothing; see `ViewRenderer.render`."""
@@ -217,6 +230,16 @@ class ViewRenderer:
         if self._renderer is not None:
             self._renderer.close()
         self._renderer = None
+
+    def enter_fog(self, fog: FogField) -> None:
+        """Look through another fog from now on.
+
+        Parameters
+        ----------
+        fog : FogField
+            The fog over time.
+        """
+        self.fog = self._air.field = fog
 
     def render(
         self, state: TrafficState, ego: int, pose: CameraPose, time: float, camera: Camera | None = None

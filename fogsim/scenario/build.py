@@ -29,6 +29,7 @@ from fogsim.scenario.drivers import driver_setup, driver_sight
 from fogsim.scenario.fog import fog_along
 from fogsim.scenario.roads.files import traffic_files
 from fogsim.scenario.schema import NO_RENDERER, Scenario
+from fogsim.scenario.timeline import scripted_fog
 from fogsim.scenario.traffic_schema import AnyEvent, Brake, BreakDown, ChangeLane, LampsFail
 from fogsim.sensors import Gps, LeadSensor
 from fogsim.traffic import (
@@ -335,7 +336,8 @@ def fog_field(scenario: Scenario, route: NDArray[np.float64]) -> FogField:
     route : (n, 3) float64
         Polyline along the route [m].
     """
-    return fog_along(scenario.fog, airlight_from_illuminance(scenario.light.illuminance_lx), route)
+    fog = fog_along(scenario.fog, airlight_from_illuminance(scenario.light.illuminance_lx), route)
+    return scripted_fog(scenario.timeline, fog)
 
 
 def check_ego(scenario: Scenario, who: str) -> None:

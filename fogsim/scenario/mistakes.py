@@ -47,7 +47,7 @@ def mistake_lines(
     blocks = {detail["loc"][:length] for detail in details for length in range(len(detail["loc"]))}
     own = [detail for detail in details if detail["loc"] not in blocks]
     unknown = [detail["loc"] for detail in own[:MOST_TOLD] if detail["type"] == "extra_forbidden"]
-    meant = {(*place[:-1], nearest(str(place[-1]), _known_keys(model, place[:-1]))) for place in unknown}
+    meant = {(*place[:-1], nearest(str(place[-1]), known_keys(model, place[:-1]))) for place in unknown}
     told = [
         _mistake_line(document, model, d) for d in own[:MOST_TOLD] if d["type"] != "missing" or d["loc"] not in meant
     ]
@@ -62,7 +62,7 @@ def _mistake_line(document: Document, model: type[BaseModel], detail: ErrorDetai
     key_path = _without_kinds(location)
     where = f"{document.where(key_path)}: {dotted(key_path) or 'scenario'}"
     if detail["type"] == "extra_forbidden":
-        return f"{where}: unknown key; {suggest(str(key_path[-1]), _known_keys(model, location[:-1]))}"
+        return f"{where}: unknown key; {suggest(str(key_path[-1]), known_keys(model, location[:-1]))}"
     if detail["type"] == "union_tag_invalid":
         context = detail["ctx"]
         allowed = [kind.strip(" '") for kind in str(context["expected_tags"]).split(",")]
@@ -99,8 +99,16 @@ def _kinds() -> dict[str, type[BaseModel]]:
     return {str(get_args(model.model_fields["kind"].annotation)[0]): model for model in models}
 
 
-def _known_keys(root: type[BaseModel], location: Sequence[str | int]) -> list[str]:
-    """Keys that a schema allows at a location."""
+def known_keys(root: type[BaseModel], location: Sequence[str | int]) -> list[str]:
+    """Keys that a schema allows at a location.
+
+    Parameters
+    ----------
+    root : type
+        The schema.
+    location : sequence of str or int
+        The location in it, as pydantic has it.
+    """
     model: Any = root
     is_name = False
     for before, key in zip((None, *location), location, strict=False):

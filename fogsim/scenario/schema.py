@@ -3,6 +3,7 @@
 Everything inside FogSim is SI and radians; `fogsim.scenario.build` converts, once.
 """
 
+import math
 import warnings
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -23,6 +24,7 @@ from fogsim.scenario.fog import Fog
 from fogsim.scenario.roads.schema import Actors, DemandSection, Road, check_roads
 from fogsim.scenario.section import Flag, Method, Number, Period, Section, Seed, Text, method_of
 from fogsim.scenario.sensor_schema import Sensors
+from fogsim.scenario.timeline import Timeline, timeline_mistakes
 from fogsim.scenario.traffic_alone import without_ego
 from fogsim.scenario.traffic_schema import DriversSection, Traffic
 
@@ -106,6 +108,9 @@ class Scenario(Section):
 
     light: Light = Light()
     """The light."""
+
+    timeline: Timeline = ()
+    """What happens in the run, and when."""
 
     camera: CameraSection = CameraSection()
     """The camera."""
@@ -197,6 +202,21 @@ class Scenario(Section):
                 if fault.sensor == "camera":
                     raise ValueError(f"faults.{place} is of the camera, and renderer: none draws no frames")
         return value
+
+    @model_validator(mode="after")
+    def _timeline_fits(self) -> Self:
+        visibility = self.fog.visibility_m or self.fog.outside_visibility_m or math.inf
+        mistakes = timeline_mistakes(
+            self.timeline,
+            has_ego=self.traffic.has_ego,
+            illuminance=self.light.illuminance_lx,
+            visibility=visibility,
+            has_banks=bool(self.fog.banks),
+        )
+        told = "; ".join(mistakes)
+        if told:
+            raise ValueError(told)
+        return self
 
     @model_validator(mode="after")
     def _distinct_estimators(self) -> Self:

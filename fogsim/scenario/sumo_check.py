@@ -11,6 +11,7 @@ from fogsim.scenario.expect.checks import named_vehicles
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.roads.files import traffic_files
 from fogsim.scenario.schema import Clocks, Scenario
+from fogsim.scenario.timeline import vehicles_of
 from fogsim.scenario.traffic_schema import ChangeLane
 from fogsim.traffic import (
     Demand,
@@ -119,6 +120,9 @@ def _named_vehicles(scenario: Scenario) -> Iterator[tuple[KeyPath, str]]:
         yield ("traffic", "ego"), traffic.ego
     yield from ((("traffic", "keep_lane", i), vehicle) for i, vehicle in enumerate(traffic.keep_lane))
     yield from ((("traffic", "events", i, "vehicle"), event.vehicle) for i, event in enumerate(traffic.events))
+    for i, entry in enumerate(scenario.timeline):
+        named = {vehicle for vehicle in vehicles_of(entry) if vehicle != EGO}
+        yield from ((("timeline", i, "do", vehicle), vehicle) for vehicle in sorted(named))
 
 
 def _demand(scenario: Scenario, wanted: frozenset[str]) -> Demand:

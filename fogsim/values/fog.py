@@ -144,6 +144,8 @@ class FogField:
         Velocity (x, y) with which banks and patches drift [m/s].
     changes : tuple of FogChange
         The fog over time, in order of time; empty for fog that does not change.
+    reachable_densities : tuple of float
+        Factors of the extinction coefficient that a script may bring beside those of `changes` [-].
     airlight_shading : float
         How much the airlight dims with each unit of optical depth overhead [-]; 0 for airlight that is the same
         everywhere. Two-stream theory of a conservative layer gives ¾ (1 − g), about 0.1 in fog.
@@ -168,6 +170,7 @@ class FogField:
     airlight_shading: float = 0.0
     forward_scatter: float = 0.0
     forward_scatter_width: float = math.radians(1.0)
+    reachable_densities: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse a field that cannot be.

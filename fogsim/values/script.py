@@ -4,12 +4,13 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
+from fogsim.values.fault import Fault
 from fogsim.values.light import Lamp
 
 
 @dataclass(frozen=True, slots=True)
 class Begun:
-    """Something of the script that has begun.
+    """Something of the script that has begun, or is over.
 
     Attributes
     ----------
@@ -19,11 +20,20 @@ class Begun:
         When it began [s].
     what : str
         What it does, in a few words.
+    why : str
+        What held then.
+    who : tuple of str
+        Vehicles that it is about.
+    is_over : bool
+        True if this is its end.
     """
 
     name: str
     time: float
     what: str = ""
+    why: str = ""
+    who: tuple[str, ...] = ()
+    is_over: bool = False
 
 
 class Shape(StrEnum):
@@ -219,8 +229,11 @@ class Actions:
         For the fog.
     light : tuple of ChangeLight
         For the daylight.
+    faults : tuple of Fault
+        For the ego's sensors.
     """
 
     traffic: tuple[TrafficAction, ...] = ()
     fog: tuple[ChangeFog, ...] = ()
     light: tuple[ChangeLight, ...] = ()
+    faults: tuple[Fault, ...] = ()

@@ -10,6 +10,7 @@ class Reason(StrEnum):
     NOT_REACHED = "its time, position or gap was not reached"
     NEVER_SEEN = "the vehicle was never on the road"
     LEFT = "the vehicle left the road before"
+    NEVER_HELD = "its condition never held"
     NO_LANE = "there was no such lane"
 
 
@@ -49,6 +50,10 @@ class Unplayed:
 
     def __bool__(self) -> bool:
         return bool(self.events or self.vehicles)
+
+    def __add__(self, other: "Unplayed") -> "Unplayed":
+        """What two parts of a script have not played, together."""
+        return Unplayed(self.events + other.events, tuple(sorted({*self.vehicles, *other.vehicles})))
 
     def __str__(self) -> str:
         return "; ".join(self.lines)

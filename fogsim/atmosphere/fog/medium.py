@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.values import FogBank, FogField
+from fogsim.values import FogBank, FogChange, FogField
 
 EXTINCTION, BASE, BASE_EDGE, TOP, TOP_EDGE, GROUND, DECAY = range(7)
 """Places of the numbers in `Medium.layer`."""
@@ -79,6 +79,30 @@ def field_at(field: FogField, time: float) -> FogField:
         wind=(0.0, 0.0),
         changes=(),
     )
+
+
+SHORTEST_CHANGE = 1e-3
+"""Time that a change of the fog at once takes [s]."""
+
+
+def with_change(field: FogField, time: float, density: float, duration: float) -> FogField:
+    """A fog that from a time on changes to another density, evenly, and stays there; its heights stay as they are then.
+
+    Parameters
+    ----------
+    field : FogField
+        The fog over time.
+    time : float
+        When the change begins [s]; what was to come later does not.
+    density : float
+        Factor of the extinction coefficient to come to [-].
+    duration : float
+        Time that it takes [s].
+    """
+    now, base, top = _layer_at(field, time)
+    begun, done = FogChange(time, now, base, top), FogChange(time + max(duration, SHORTEST_CHANGE), density, base, top)
+    earlier = tuple(change for change in field.changes if change.time < time)
+    return dataclasses.replace(field, changes=(*earlier, begun, done))
 
 
 def _layer_at(field: FogField, time: float) -> tuple[float, float, float]:

@@ -143,7 +143,7 @@ class FieldAccess:
         """Extinction coefficient that is exceeded nowhere and never [1/m]; banks do not overlap."""
         field = self.field
         densest = field.extinction + max((0.0, *(bank.extra_extinction for bank in field.banks)))
-        return densest * max((c.density for c in field.changes), default=1.0) * float(self._factors.max())
+        return densest * max(self._densities) * float(self._factors.max())
 
     @property
     def minimum_extinction(self) -> float:
@@ -159,7 +159,13 @@ class FieldAccess:
         if math.isfinite(field.scale_height) or max(bases) > -math.inf or is_shallow:
             return 0.0
         thinnest = field.extinction + min((0.0, *(bank.extra_extinction for bank in field.banks)))
-        return thinnest * min((c.density for c in field.changes), default=1.0) * float(self._factors.min())
+        return thinnest * min(self._densities) * float(self._factors.min())
+
+    @property
+    def _densities(self) -> tuple[float, ...]:
+        """Factors of the extinction coefficient that the fog comes to, or may."""
+        written = tuple(change.density for change in self.field.changes) or (1.0,)
+        return written + self.field.reachable_densities
 
     @property
     def _factors(self) -> NDArray[np.float32]:
@@ -202,6 +208,16 @@ class FogNow:
     def __init__(self, field: FogField) -> None:
         self._always = FieldAccess(field)
         self._now = field_at(field, 0.0)
+
+    def change(self, field: FogField) -> None:
+        """Let the fog be another one over time, of the same bounds.
+
+        Parameters
+        ----------
+        field : FogField
+            The fog over time.
+        """
+        self._always = FieldAccess(field)
 
     def set_time(self, time: float) -> None:
         """Let it be a time from here on.

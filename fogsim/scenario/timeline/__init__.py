@@ -1,0 +1,30 @@
+"""What a scenario makes happen while it runs: the block ``timeline``, and the actions that its entries stand for."""
+
+from fogsim.scenario.timeline.actions import (
+    Situation,
+    actions_of,
+    doings_of,
+    entry_name,
+    fog_reference,
+    scripted_fog,
+    told,
+    vehicles_of,
+)
+from fogsim.scenario.timeline.checks import timeline_mistakes
+from fogsim.scenario.timeline.schema import FogActions, LightActions, Timeline, TimelineEntry
+
+__all__ = [
+    "FogActions",
+    "LightActions",
+    "Situation",
+    "Timeline",
+    "TimelineEntry",
+    "actions_of",
+    "doings_of",
+    "entry_name",
+    "fog_reference",
+    "scripted_fog",
+    "timeline_mistakes",
+    "told",
+    "vehicles_of",
+]

@@ -1,0 +1,285 @@
+"""From the entries of a timeline to actions in SI units, where everybody is when they begin."""
+
+import dataclasses
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Protocol
+
+from fogsim.scenario.sensor_schema import fault_of
+from fogsim.scenario.timeline.schema import (
+    Doing,
+    FogActions,
+    LampName,
+    LaneAction,
+    LightActions,
+    SignalActions,
+    SpeedAction,
+    StopAction,
+    Switch,
+    TimelineEntry,
+    VehicleActions,
+)
+from fogsim.units import KMH_PER_MPS, extinction_from_visibility
+from fogsim.values import Fault, FogChange, FogField, Lamp
+from fogsim.values.script import (
+    Actions,
+    ChangeFog,
+    ChangeLane,
+    ChangeLight,
+    ChangeSpeed,
+    Follow,
+    SetLamps,
+    SetSignal,
+    Shape,
+    Stop,
+    TrafficAction,
+)
+
+_ALL = Lamp(sum(Lamp))
+_HAZARD = Lamp.INDICATOR_LEFT | Lamp.INDICATOR_RIGHT
+_STATES = {"red": "r", "yellow": "y", "green": "G", "off": "O"}
+
+
+class Situation(Protocol):
+    """Where vehicles are when an entry begins; None for what is not known of them now."""
+
+    def vehicle_id(self, vehicle: str) -> str:
+        """Id of a vehicle: the ego's own for ``ego``."""
+
+    def speed(self, vehicle: str) -> float | None:
+        """Speed of a vehicle [m/s]."""
+
+    def position(self, vehicle: str) -> float | None:
+        """How far along the route its front bumper is [m]."""
+
+    def lane(self, vehicle: str) -> int | None:
+        """Number of its lane from the right."""
+
+
+def actions_of(entry: TimelineEntry, now: Situation, reference: float, light: float) -> Actions | None:
+    """What an entry begins.
+
+    Parameters
+    ----------
+    entry : TimelineEntry
+        The entry.
+    now : Situation
+        Where everybody is.
+    reference : float
+        Extinction coefficient to which densities refer, from `fog_reference` [1/m].
+    light : float
+        Illuminance of the scenario [lx].
+
+    Returns
+    -------
+    Actions or None
+        None while somebody of whom it tells is not on the road, or not at a place that it needs.
+    """
+    traffic: list[TrafficAction] = []
+    fog: list[ChangeFog] = []
+    lights: list[ChangeLight] = []
+    faults: list[Fault] = []
+    for subject, doing in doings_of(entry):
+        match doing:
+            case VehicleActions():
+                moves = _of_vehicle(subject, doing, now)
+                if moves is None:
+                    return None
+                traffic += moves
+            case SignalActions():
+                state = "r" if doing.state is None else _STATES.get(doing.state, doing.state)
+                signal = subject.removeprefix("signal.")
+                traffic.append(SetSignal(signal, doing.phase, state, _endless(doing.for_s)))
+            case FogActions():
+                fog.append(ChangeFog(_density(doing, reference), doing.over_s))
+            case LightActions():
+                lights.append(ChangeLight(doing.illuminance_lx / light, doing.over_s))
+            case _:
+                faults.append(fault_of(doing))
+    return Actions(tuple(traffic), tuple(fog), tuple(lights), tuple(faults))
+
+
+def doings_of(entry: TimelineEntry) -> Iterator[tuple[str, Doing]]:
+    """Subjects of an entry, each with one thing that it does; those of several several times.
+
+    Parameters
+    ----------
+    entry : TimelineEntry
+        The entry.
+    """
+    for subject, written in entry.do.items():
+        yield from ((subject, doing) for doing in (written if isinstance(written, tuple) else (written,)))
+
+
+def entry_name(entry: TimelineEntry, number: int) -> str:
+    """What an entry is called in conditions and messages.
+
+    Parameters
+    ----------
+    entry : TimelineEntry
+        The entry.
+    number : int
+        Its place in the timeline, from 0.
+    """
+    return entry.name or f"timeline.{number}"
+
+
+def told(entry: TimelineEntry) -> str:
+    """What an entry does in a few words: ``slow: brake; fog: visibility_m``.
+
+    Parameters
+    ----------
+    entry : TimelineEntry
+        The entry.
+    """
+    words = []
+    for subject, doing in doings_of(entry):
+        given = [key for key in type(doing).model_fields if key in doing.model_fields_set]
+        fault = getattr(doing, "fault", "")
+        words.append(f"{subject}: {fault or ' and '.join(key for key in given if key not in ('over_s', 'for_s'))}")
+    return "; ".join(words)
+
+
+def vehicles_of(entry: TimelineEntry) -> tuple[str, ...]:
+    """Vehicles that an entry makes do something, or follow, as it names them; each once.
+
+    Parameters
+    ----------
+    entry : TimelineEntry
+        The entry.
+    """
+    named = []
+    for subject, doing in doings_of(entry):
+        if isinstance(doing, VehicleActions):
+            named += [subject, *([doing.follow.vehicle] if doing.follow else [])]
+    return tuple(dict.fromkeys(named))
+
+
+def _endless(duration: float | None) -> float:
+    return math.inf if duration is None else duration
+
+
+def _of_vehicle(subject: str, doing: VehicleActions, now: Situation) -> list[TrafficAction] | None:
+    vehicle, speed = now.vehicle_id(subject), now.speed(subject)
+    if speed is None:
+        return None
+    moves: list[TrafficAction | None] = []
+    if doing.speed:
+        moves.append(_speed_change(vehicle, doing.speed, speed))
+    if doing.brake:
+        brake = doing.brake
+        moves.append(_braking(vehicle, speed, brake.to_kmh / KMH_PER_MPS, brake.deceleration_mps2, brake.hold_s))
+    if doing.break_down:
+        moves += [_braking(vehicle, speed, 0.0, doing.break_down.deceleration_mps2, None), *_wreck(vehicle, doing)]
+    if doing.follow:
+        follow, leader = doing.follow, now.vehicle_id(doing.follow.vehicle)
+        is_there = now.speed(follow.vehicle) is not None
+        moves.append(Follow(vehicle, leader, follow.headway_s, _endless(follow.for_s)) if is_there else None)
+    if doing.stop:
+        moves.append(_stopping(vehicle, doing.stop, now.position(subject)))
+    if doing.change_lane:
+        moves.append(_lane_change(vehicle, doing.change_lane, now.lane(subject)))
+    if doing.lamps is not None:
+        moves.append(_lamps(vehicle, doing.lamps))
+    if doing.hazard_lights is not None:
+        lit, own = (_HAZARD, Lamp.NONE) if doing.hazard_lights else (Lamp.NONE, _HAZARD)
+        moves.append(SetLamps(vehicle, lit=lit, automatic=own))
+    whole = [move for move in moves if move is not None]
+    return whole if len(whole) == len(moves) else None
+
+
+def _speed_change(vehicle: str, action: SpeedAction, now: float) -> ChangeSpeed:
+    speed = action.to_kmh / KMH_PER_MPS
+    duration = abs(speed - now) / action.rate_mps2 if action.rate_mps2 else action.over_s or 0.0
+    return ChangeSpeed(vehicle, speed, duration, action.shape, _endless(action.for_s))
+
+
+def _braking(vehicle: str, now: float, speed: float, deceleration: float, hold: float | None) -> ChangeSpeed:
+    to = min(speed, now)
+    return ChangeSpeed(vehicle, to, (now - to) / deceleration, Shape.LINEAR, _endless(hold))
+
+
+def _wreck(vehicle: str, doing: VehicleActions) -> Iterator[SetLamps]:
+    if doing.break_down and not doing.break_down.lamps:
+        yield SetLamps(vehicle, failed=_ALL)
+    if doing.break_down and doing.break_down.hazard_lights:
+        yield SetLamps(vehicle, lit=_HAZARD)
+
+
+def _stopping(vehicle: str, action: StopAction, now: float | None) -> Stop | None:
+    stand = _endless(action.for_s)
+    if action.after_m is not None:
+        return Stop(vehicle, action.after_m, action.deceleration_mps2, stand)
+    if action.position_m is None or now is None:
+        return None
+    return Stop(vehicle, max(action.position_m - now, 0.0), action.deceleration_mps2, stand)
+
+
+def _lane_change(vehicle: str, action: LaneAction, now: int | None) -> ChangeLane | None:
+    if action.lanes is None and (action.to is None or now is None):
+        return None
+    lanes = action.lanes if action.lanes is not None else (action.to or 0) - (now or 0)
+    return ChangeLane(vehicle, lanes, action.stay_s, action.duration_s, action.indicator_s)
+
+
+def _lamps(vehicle: str, written: Mapping[LampName, Switch] | str) -> SetLamps:
+    """Switches of lamps, which files name as `Lamp` does in small letters."""
+    if isinstance(written, str):
+        return SetLamps(vehicle, failed=_ALL) if written == "failed" else SetLamps(vehicle, automatic=_ALL)
+
+    def those(state: str) -> Lamp:
+        return Lamp(sum(Lamp[name.upper()] for name, value in written.items() if value == state))
+
+    return SetLamps(vehicle, those("on"), those("off"), those("failed"), those("automatic"))
+
+
+def _density(action: FogActions, reference: float) -> float:
+    if action.density is not None:
+        return action.density
+    visibility = math.inf if action.visibility_m is None else action.visibility_m
+    return extinction_from_visibility(visibility) / reference if reference > 0.0 else 0.0
+
+
+def fog_reference(entries: Sequence[TimelineEntry], extinction: float) -> float:
+    """Extinction coefficient to which densities refer: the scenario's own, or the densest of the timeline's [1/m].
+
+    Parameters
+    ----------
+    entries : sequence of TimelineEntry
+        The timeline.
+    extinction : float
+        Extinction coefficient of the scenario, outside banks [1/m]; 0 in clear air, where fog may come to be.
+    """
+    wanted = [
+        extinction_from_visibility(doing.visibility_m)
+        for entry in entries
+        for _, doing in doings_of(entry)
+        if isinstance(doing, FogActions) and doing.visibility_m is not None
+    ]
+    return extinction if extinction > 0.0 else max(wanted, default=0.0)
+
+
+def scripted_fog(entries: Sequence[TimelineEntry], fog: FogField) -> FogField:
+    """A fog that can become what a timeline makes of it.
+
+    Parameters
+    ----------
+    entries : sequence of TimelineEntry
+        The timeline.
+    fog : FogField
+        The fog without it.
+
+    Returns
+    -------
+    FogField
+        With the densities that it may come to; where the air is clear, fog of density 0 in its place.
+    """
+    reference = fog_reference(entries, fog.extinction)
+    changes = [doing for entry in entries for _, doing in doings_of(entry) if isinstance(doing, FogActions)]
+    if not changes:
+        return fog
+    densities = tuple(_density(change, reference) for change in changes)
+    if fog.extinction > 0.0 or reference == 0.0 or fog.banks:
+        return dataclasses.replace(fog, reachable_densities=densities)
+    clear = FogChange(0.0, 0.0, fog.base, fog.top)
+    return dataclasses.replace(fog, extinction=reference, changes=(clear,), reachable_densities=densities)

@@ -1,0 +1,357 @@
+"""The schema of the block ``timeline``: what is to happen when; ``do`` has one block for each of its subjects."""
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    TypeAdapter,
+    ValidationError,
+    model_validator,
+)
+from pydantic_core import InitErrorDetails, PydanticCustomError
+
+from fogsim.conditions import mended, parse_condition
+from fogsim.errors import suggest
+from fogsim.scenario.mistakes import known_keys
+from fogsim.scenario.plain_yaml import KeyPath
+from fogsim.scenario.section import (
+    MISTAKE,
+    Deceleration,
+    Distance,
+    Flag,
+    Id,
+    Number,
+    Period,
+    Place,
+    Section,
+    SpeedKmh,
+    Time,
+    Visibility,
+    Whole,
+)
+from fogsim.scenario.sensor_schema import AnyFault
+from fogsim.values.script import Shape
+
+Switch = Literal["on", "off", "failed", "automatic"]
+"""State of a lamp: lit or dark by hand, dark for ever, or the vehicle's own."""
+
+LampName = Literal[
+    "position",
+    "low_beam",
+    "high_beam",
+    "front_fog",
+    "rear_fog",
+    "stop",
+    "indicator_left",
+    "indicator_right",
+    "daytime",
+]
+"""Lamps of a vehicle."""
+
+
+def _word(value: object) -> object:
+    """Words that YAML takes for truth values."""
+    return {True: "on", False: "off"}[value] if isinstance(value, bool) else value
+
+
+class SpeedAction(Section):
+    """A vehicle comes to a speed and holds it, whatever the limit and advice say; it hits nobody for that."""
+
+    to_kmh: SpeedKmh
+    """Speed that a vehicle comes to, no higher than its type's `maxSpeed`."""
+
+    over_s: Time | None = None
+    """Time that this takes, as far as its type can speed up; without it and the next, as fast as it can."""
+
+    rate_mps2: Deceleration | None = None
+    """Acceleration or deceleration, in place of the time."""
+
+    shape: Shape = Shape.LINEAR
+    """How the speed goes over: `linear`, `sinusoidal` (smooth at both ends), or `step`: as fast as the vehicle can."""
+
+    for_s: Period | None = None
+    """Time from the beginning until the driver drives by himself again; without it, to the end of the run."""
+
+    @model_validator(mode="after")
+    def _one_pace(self) -> Self:
+        given = [key for key in ("over_s", "rate_mps2") if getattr(self, key) is not None]
+        if len(given) > 1 or (given and self.shape is Shape.STEP):
+            raise ValueError("give over_s, rate_mps2 or shape: step, not two of them")
+        return self
+
+
+class BrakeAction(Section):
+    """A vehicle brakes, holds the lower speed, and drives on."""
+
+    to_kmh: SpeedKmh = 0.0
+    """Speed that it brakes to; 0 is a standstill."""
+
+    deceleration_mps2: Deceleration = 4.0
+    """How hard it brakes, up to its type's `emergencyDecel`."""
+
+    hold_s: Period | None = 30.0
+    """How long it keeps that speed, from the beginning of the braking; null for the rest of the run."""
+
+
+class BreakDownAction(Section):
+    """A vehicle comes to a standstill and stays there."""
+
+    deceleration_mps2: Deceleration = 3.0
+    """How hard it brakes."""
+
+    lamps: Flag = True
+    """Whether its lamps stay lit."""
+
+    hazard_lights: Flag = False
+    """Whether it switches its hazard lights on."""
+
+
+class FollowAction(Section):
+    """A vehicle keeps a time headway to another one ahead of it."""
+
+    vehicle: Id
+    """The other one: its id, or `ego`."""
+
+    headway_s: Annotated[Period, Field(le=60)]
+    """Gap, bumper to bumper, over its own speed; 2 m at standstill."""
+
+    for_s: Period | None = None
+    """How long; without it, to the end of the run."""
+
+
+class StopAction(Section):
+    """A vehicle stops at a place, stands there, and drives on."""
+
+    position_m: Place | None = None
+    """Place along the ego's route, or `traffic.along`, where its front bumper comes to stand."""
+
+    after_m: Distance | None = None
+    """Or way to the place from where the vehicle is."""
+
+    deceleration_mps2: Deceleration = 3.0
+    """How hard it brakes, as late as it can."""
+
+    for_s: Period | None = None
+    """How long it stands; without it, to the end of the run."""
+
+    @model_validator(mode="after")
+    def _one_place(self) -> Self:
+        if (self.position_m is None) == (self.after_m is None):
+            raise ValueError("say where: position_m or after_m, and not both")
+        return self
+
+
+class LaneAction(Section):
+    """A vehicle changes lane, whoever is there, as far as it does not hit anybody."""
+
+    lanes: Annotated[Whole, Field(ge=-4, le=4)] | None = None
+    """How many lanes to the left; negative to the right."""
+
+    to: Annotated[Whole, Field(ge=0, le=20)] | None = None
+    """Or the lane to go to: its number from the right, from 0."""
+
+    duration_s: Annotated[Time, Field(le=60)] | None = None
+    """Time that the way over takes in pictures and positions; 3 s a lane if not given. For SUMO it changes at once."""
+
+    indicator_s: Annotated[Time, Field(le=60)] = 0.0
+    """Time for which it indicates before; it does until it is over. 0 for not at all."""
+
+    stay_s: Period = 60.0
+    """How long it stays there."""
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if (self.lanes is None) == (self.to is None):
+            raise ValueError("say where: lanes (to the left, negative to the right) or to (number of the lane)")
+        return self
+
+
+class VehicleActions(Section):
+    """What a vehicle does; what is given begins together."""
+
+    speed: SpeedAction | None = None
+    """Come to a speed and hold it."""
+
+    brake: BrakeAction | None = None
+    """Brake, hold the lower speed, and drive on."""
+
+    follow: FollowAction | None = None
+    """Keep a headway to another vehicle."""
+
+    stop: StopAction | None = None
+    """Stop at a place."""
+
+    change_lane: LaneAction | None = None
+    """Change lane."""
+
+    break_down: BreakDownAction | None = None
+    """Come to a standstill for good."""
+
+    lamps: dict[LampName, Annotated[Switch, BeforeValidator(_word)]] | Literal["failed", "automatic"] | None = None
+    """Lamps by name (`position`, `low_beam`, `high_beam`, `front_fog`, `rear_fog`, `stop`, `indicator_left`,
+    `indicator_right`, `daytime`), each `on`, `off`, `failed` (for ever) or `automatic`; or one of these two for all."""
+
+    hazard_lights: Flag | None = None
+    """Whether both indicators are lit."""
+
+    @model_validator(mode="after")
+    def _one_motion(self) -> Self:
+        motions = ("speed", "brake", "follow", "stop", "break_down")
+        given = [key for key in motions if getattr(self, key) is not None]
+        if len(given) > 1:
+            raise ValueError(f"{' and '.join(given)} cannot begin together: each sets the speed; take two entries")
+        return self
+
+
+class SignalActions(Section):
+    """What traffic lights show."""
+
+    phase: Annotated[Whole, Field(ge=0, le=200)] | None = None
+    """Phase of the program to go to, which goes on from there."""
+
+    state: Annotated[str, Field(pattern="^(red|yellow|green|off|[rygGsuoO]{1,200})$")] | None = None
+    """`red`, `yellow`, `green` or `off` for all links, or SUMO's letter for each link (`rrGGrr`), held in place of the
+    program."""
+
+    for_s: Period | None = None
+    """Time after which the program goes on; without it, to the end of the run."""
+
+    @model_validator(mode="after")
+    def _one_state(self) -> Self:
+        if (self.phase is None) == (self.state is None):
+            raise ValueError("say what they show: phase or state, and not both")
+        return self
+
+
+class FogActions(Section):
+    """How the fog changes, everywhere."""
+
+    visibility_m: Visibility | None = None
+    """Meteorological visibility to come to, where it is even or outside the banks."""
+
+    density: Annotated[Number, Field(ge=0, le=1000)] | None = None
+    """Or factor of the extinction coefficient that the scenario begins with."""
+
+    over_s: Time = 0.0
+    """Time that this takes."""
+
+    @model_validator(mode="after")
+    def _one_measure(self) -> Self:
+        if (self.visibility_m is None) == (self.density is None):
+            raise ValueError("say how thick: visibility_m or density, and not both")
+        return self
+
+
+class LightActions(Section):
+    """How daylight changes."""
+
+    illuminance_lx: Annotated[Number, Field(ge=1000, le=200_000)]
+    """Horizontal illuminance to come to; by day alone, where no lamps light the road."""
+
+    over_s: Time = 0.0
+    """Time that this takes."""
+
+
+Doing = VehicleActions | SignalActions | FogActions | LightActions | AnyFault
+"""What an entry does to one of its subjects."""
+
+_KINDS: Mapping[str, type[Section]] = {"fog": FogActions, "light": LightActions}
+_SIGNAL, _SENSOR = "signal.", "sensors."
+_FAULTS: TypeAdapter[AnyFault] = TypeAdapter(AnyFault)
+
+
+def _by_subject(written: object) -> object:
+    """Read each block by what its subject is: fog, light, a sensor, traffic lights, or else a vehicle."""
+    if not isinstance(written, dict):
+        return written
+    done: dict[str, tuple[object, ...]] = {}
+    mistakes: list[InitErrorDetails] = []
+    for subject, blocks in _flat(written):
+        listed = blocks if isinstance(blocks, list | tuple) else [blocks]
+        done[subject] = ()
+        for place, block in enumerate(listed):
+            at = (subject, place) if isinstance(blocks, list | tuple) else (subject,)
+            try:
+                done[subject] += (_read(subject, block),)
+            except ValidationError as error:
+                mistakes += [_placed(detail, at, subject) for detail in error.errors()]
+    if mistakes:
+        raise ValidationError.from_exception_data("do", mistakes)
+    return done
+
+
+def _flat(written: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Subjects and their blocks; ``--set`` makes blocks in blocks of a name with a dot."""
+    for subject, block in written.items():
+        if subject in ("signal", "sensors") and isinstance(block, dict):
+            yield from ((f"{subject}.{name}", inner) for name, inner in block.items())
+        else:
+            yield str(subject), block
+
+
+def _read(subject: str, block: object) -> object:
+    if isinstance(block, Section):
+        return block
+    if subject.startswith(_SENSOR):
+        sensor = subject.removeprefix(_SENSOR)
+        return _FAULTS.validate_python({"sensor": sensor, **block} if isinstance(block, dict) else block)
+    kind = _kind_of(subject)
+    read = kind.model_validate(block)
+    if not read.model_fields_set:
+        told = f"says nothing to do; allowed: {', '.join(kind.model_fields)}"
+        mistake = InitErrorDetails(type=PydanticCustomError(MISTAKE, "{told}", {"told": told}), loc=(), input=0)
+        raise ValidationError.from_exception_data("do", [mistake])
+    return read
+
+
+def _placed(detail: Any, at: KeyPath, subject: str) -> InitErrorDetails:
+    """A mistake inside a block at its place in the whole; it says all itself."""
+    inner: KeyPath = detail["loc"]
+    if subject.startswith(_SENSOR):
+        # What a fault is called stands in pydantic's place, and not in the file.
+        inner = inner[1:]
+    told, shown = detail["msg"].removeprefix("Value error, "), detail["input"]
+    if detail["type"] == "extra_forbidden":
+        kind = None if subject.startswith(_SENSOR) else _kind_of(subject)
+        told = "unknown key" + (f"; {suggest(str(inner[-1]), known_keys(kind, inner[:-1]))}" if kind else "")
+    elif detail["type"] not in ("missing", MISTAKE) and not isinstance(shown, dict | Section):
+        told = f"{told}; got {shown!r}"
+    custom = PydanticCustomError(MISTAKE, "{told}", {"told": f"{told[0].lower()}{told[1:]}"})
+    return InitErrorDetails(type=custom, loc=(*at, *inner), input=0)
+
+
+def _kind_of(subject: str) -> type[Section]:
+    return SignalActions if subject.startswith(_SIGNAL) else _KINDS.get(subject, VehicleActions)
+
+
+def _readable(written: Any) -> Any:
+    """Refuse what is no condition; what was written stays, but for what YAML has torn apart."""
+    parse_condition(written)
+    return mended(written) if isinstance(written, dict) else written
+
+
+class TimelineEntry(Section):
+    """Something that happens when a condition holds."""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]{0,99}$")] | None = None
+    """Name in conditions, expectations and messages; `timeline.N` without one."""
+
+    when: Annotated[Any, AfterValidator(_readable)]
+    """Condition: text such as `gap(ego, slow) < 80 m and ego.speed > 50 km/h`, or a mapping; see docs/tests.md."""
+
+    delay_s: Time = 0.0
+    """Time from then until it begins."""
+
+    repeat: Literal["once", "each"] = "once"
+    """`once`: when the condition holds for the first time; `each`: each time that it comes to hold."""
+
+    do: Annotated[dict[Id, Doing | tuple[Doing, ...]], BeforeValidator(_by_subject), Field(min_length=1)]
+    """What, by its subjects: the id of a vehicle (or `ego`), `signal.ID`, `fog`, `light`, `sensors.camera` and other
+    sensors, each with a block or a list of blocks."""
+
+
+Timeline = tuple[TimelineEntry, ...]
+"""The block."""

@@ -1,0 +1,227 @@
+"""The timeline of a scenario while it runs: finished steps go in, what begins in the next camera period comes out."""
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass, field
+
+from fogsim.conditions import History, Moment, Watch, parse_condition
+from fogsim.scenario import Scenario
+from fogsim.scenario.timeline import TimelineEntry, actions_of, entry_name, fog_reference, told, vehicles_of
+from fogsim.units import extinction_from_visibility
+from fogsim.values import Reason, TrafficStep, Unplayed, UnplayedEvent
+from fogsim.values.script import (
+    Actions,
+    Begun,
+    ChangeFog,
+    ChangeLane,
+    ChangeLight,
+    ChangeSpeed,
+    Follow,
+    SetSignal,
+    TrafficAction,
+)
+
+_TICK = 1e-6
+"""Rounding of times [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Due:
+    """What of a timeline begins in a camera period.
+
+    Attributes
+    ----------
+    actions : Actions
+        What is to be done.
+    parts : tuple of (Begun, tuple of TrafficAction)
+        Entries that begin, and what each asks of the traffic.
+    over : tuple of Begun
+        Entries that are over.
+    """
+
+    actions: Actions = field(default_factory=Actions)
+    parts: tuple[tuple[Begun, tuple[TrafficAction, ...]], ...] = ()
+    over: tuple[Begun, ...] = ()
+
+
+NOTHING_DUE = Due()
+
+
+class Timeline:
+    """Watches the conditions of a scenario's timeline, and says what begins.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._entries = tuple(
+            _Entry(written, entry_name(written, number)) for number, written in enumerate(scenario.timeline)
+        )
+        fog = scenario.fog.visibility_m or scenario.fog.outside_visibility_m or math.inf
+        self._reference = fog_reference(scenario.timeline, extinction_from_visibility(fog))
+        self._light = scenario.light.illuminance_lx
+        self._history = History()
+        self._seen: set[str] = set()
+        self._ends: list[Begun] = []
+
+    def due(self, step: TrafficStep) -> Due:
+        """Take in a finished step, and say what begins after it.
+
+        An entry begins when its condition holds (and its delay is over) and all its vehicles are on the road.
+
+        Parameters
+        ----------
+        step : TrafficStep
+            The step; each of a run, in their order.
+        """
+        if not self._entries:
+            return NOTHING_DUE
+        moment = self._history.moment(step)
+        now = _Now(moment)
+        self._seen.update(step.traffic.ids)
+        parts: list[tuple[Begun, Actions]] = []
+        for entry in self._entries:
+            entry.look(moment)
+            actions = actions_of(entry.written, now, self._reference, self._light) if entry.is_due(step.time) else None
+            if actions is not None:
+                parts.append((entry.begin(step.time, moment), actions))
+        self._ends += [end for begun, actions in parts if (end := _end(begun, actions)) is not None]
+        over = tuple(end for end in self._ends if end.time <= step.time + _TICK)
+        self._ends = [end for end in self._ends if end not in over]
+        return Due(_together([actions for _, actions in parts]), tuple((b, a.traffic) for b, a in parts), over)
+
+    def begun(self, due: Due, refused: Collection[TrafficAction]) -> tuple[Begun, ...]:
+        """What has begun, or is over, of what was due.
+
+        Parameters
+        ----------
+        due : Due
+            From `due`.
+        refused : collection of TrafficAction
+            What the traffic could not begin: its entries have not begun.
+        """
+        failed = {begun.name for begun, actions in due.parts if any(action in refused for action in actions)}
+        for entry in self._entries:
+            entry.was_refused |= entry.name in failed
+        self._ends = [end for end in self._ends if end.name not in failed]
+        return (*due.over, *(begun for begun, _ in due.parts if begun.name not in failed))
+
+    def unplayed(self, step: TrafficStep) -> Unplayed:
+        """What has not begun when a run is over.
+
+        Parameters
+        ----------
+        step : TrafficStep
+            Its last step.
+        """
+        reasons = [(entry, entry.why_not(self._seen, step)) for entry in self._entries]
+        names = {vehicle for entry in self._entries for vehicle in entry.vehicles(step)}
+        return Unplayed(
+            tuple(UnplayedEvent(f"{e.name} ({told(e.written)})", why) for e, why in reasons if why is not None),
+            tuple(sorted(names.difference(self._seen))),
+        )
+
+
+class _Entry:
+    """An entry, and what has become of it."""
+
+    def __init__(self, written: TimelineEntry, name: str) -> None:
+        self.written, self.name = written, name
+        self.was_refused = False
+        self._watch = Watch(parse_condition(written.when))
+        self._held = False
+        self._has_held = self._has_begun = False
+        self._waiting: list[tuple[float, str]] = []
+
+    def look(self, moment: Moment) -> None:
+        """See whether the condition holds now."""
+        holds = bool(self._watch.look(moment))
+        comes = holds and not self._held and not (self._has_held and self.written.repeat == "once")
+        self._held = holds
+        self._has_held |= holds
+        if comes:
+            self._waiting.append((moment.step.time + self.written.delay_s, self._watch.told()))
+
+    def is_due(self, time: float) -> bool:
+        """Tell whether it is time to begin."""
+        return bool(self._waiting) and self._waiting[0][0] <= time + _TICK
+
+    def begin(self, time: float, moment: Moment) -> Begun:
+        """Begin."""
+        _, why = self._waiting.pop(0)
+        self._has_begun = True
+        who = tuple(moment.vehicle_id(vehicle) for vehicle in vehicles_of(self.written))
+        return Begun(self.name, time, told(self.written), why, who)
+
+    def vehicles(self, step: TrafficStep) -> tuple[str, ...]:
+        """Ids of its vehicles."""
+        moment = History().moment(step)
+        return tuple(moment.vehicle_id(vehicle) for vehicle in vehicles_of(self.written))
+
+    def why_not(self, seen: Collection[str], step: TrafficStep) -> Reason | None:
+        """Why it has not begun; None if it has."""
+        if self.was_refused:
+            return Reason.NO_LANE
+        if self._has_begun:
+            return None
+        if not self._has_held or not self.is_due(step.time):
+            return Reason.NEVER_HELD
+        absent = [vehicle for vehicle in self.vehicles(step) if step.traffic.row(vehicle) is None]
+        return Reason.NEVER_SEEN if any(vehicle not in seen for vehicle in absent) else Reason.LEFT
+
+
+class _Now:
+    """Where vehicles are at one moment; see `fogsim.scenario.timeline.Situation`."""
+
+    def __init__(self, moment: Moment) -> None:
+        self._moment = moment
+
+    def vehicle_id(self, vehicle: str) -> str:
+        return self._moment.vehicle_id(vehicle)
+
+    def speed(self, vehicle: str) -> float | None:
+        row = self._moment.row(vehicle)
+        return None if row is None else float(self._moment.step.traffic.speed[row])
+
+    def position(self, vehicle: str) -> float | None:
+        return self._moment.position(vehicle)
+
+    def lane(self, vehicle: str) -> int | None:
+        row = self._moment.row(vehicle)
+        number = "" if row is None else self._moment.step.traffic.lane[row].rpartition("_")[2]
+        return int(number) if number.isdecimal() else None
+
+
+def _together(parts: list[Actions]) -> Actions:
+    return Actions(
+        tuple(one for part in parts for one in part.traffic),
+        tuple(one for part in parts for one in part.fog),
+        tuple(one for part in parts for one in part.light),
+        tuple(one for part in parts for one in part.faults),
+    )
+
+
+def _end(begun: Begun, actions: Actions) -> Begun | None:
+    """When what an entry does is over, where that is known beforehand."""
+    lasting = [_duration(action) for action in (*actions.traffic, *actions.fog, *actions.light)]
+    lasting += [fault.delay + fault.duration for fault in actions.faults]
+    longest = max(lasting, default=0.0)
+    if not 0.0 < longest < math.inf:
+        return None
+    return Begun(begun.name, begun.time + longest, begun.what, begun.why, begun.who, is_over=True)
+
+
+def _duration(action: TrafficAction | ChangeFog | ChangeLight) -> float:
+    """How long an action lasts [s]; 0 for what is done at once, or over when nobody can tell beforehand."""
+    match action:
+        case ChangeSpeed() | Follow() | SetSignal():
+            return action.hold
+        case ChangeLane():
+            return action.indicator + (action.duration or 0.0)
+        case ChangeFog() | ChangeLight():
+            return action.duration
+        case _:
+            return 0.0

@@ -23,6 +23,8 @@ from fogsim.recorders.table_columns import Column, table_columns, traffic_table_
 from fogsim.recorders.trajectories import TRAJECTORY_COLUMNS
 from fogsim.scenario.schema import Scenario
 from fogsim.scenario.section import GIVEN_BY_THE_LOOP, Method
+from fogsim.scenario.sensor_schema import FaultSection
+from fogsim.scenario.timeline import TimelineEntry
 from fogsim.scene import SIGN_KINDS
 from fogsim.traffic import COMPLIANCES, FOLLOWING_MODELS, SPEED_CHOICES
 from fogsim.traffic.drivers.following import OBSERVED_MIXTURE
@@ -39,6 +41,9 @@ def scenario_keys(model: type[BaseModel] = Scenario, prefix: str = "") -> list[t
         if field.exclude:
             continue
         inner = [model for model in _models_in(field.annotation) if model is not Method]
+        if model is TimelineEntry:
+            # What is wrong with sensors is told where it stands for the whole run.
+            inner = [one for one in inner if not issubclass(one, FaultSection)]
         if not inner:
             key = field.alias or name
             allowed = _allowed(schema["properties"][key], schema.get("$defs", {}))
@@ -71,16 +76,20 @@ def _allowed(schema: dict[str, Any], definitions: dict[str, Any]) -> str:
     if "anyOf" in schema:
         parts = [part for part in schema["anyOf"] if part.get("type") != "null"]
         return schema.get("format") or " or ".join(_allowed(part, definitions) for part in parts)
-    if "enum" in schema:
-        return ", ".join(f"`{value}`" for value in schema["enum"])
-    if "const" in schema:
-        return f"`{schema['const']}`"
+    if "enum" in schema or "const" in schema:
+        return ", ".join(f"`{value}`" for value in schema.get("enum") or [schema["const"]])
+    return _allowed_of_type(schema, definitions)
+
+
+def _allowed_of_type(schema: dict[str, Any], definitions: dict[str, Any]) -> str:
     if schema["type"] == "array":
         inner = schema["items"] if "items" in schema else schema["prefixItems"][0]
         return f"list of {_allowed(inner, definitions)}"
     shares = next(iter(schema.get("patternProperties", {}).values()), schema.get("additionalProperties"))
     if isinstance(shares, dict) and "minimum" in shares:
         schema = shares
+    if isinstance(shares, dict) and "enum" in shares:
+        return f"by name, each {_allowed(shares, definitions)}"
     if "minimum" not in schema:
         words = {"boolean": "true, false", "string": schema.get("format", "text")}
         return words.get(schema["type"], "by name, each a truth value, number or text" if shares else "method")

@@ -4,7 +4,7 @@ import math
 from collections.abc import Collection
 from dataclasses import dataclass, field
 
-from fogsim.conditions import History, Moment, Watch, parse_condition
+from fogsim.conditions import History, Moment, Watch
 from fogsim.scenario import Scenario
 from fogsim.scenario.timeline import TimelineEntry, actions_of, entry_name, fog_reference, told, vehicles_of
 from fogsim.units import extinction_from_visibility
@@ -57,9 +57,7 @@ class Timeline:
     """
 
     def __init__(self, scenario: Scenario) -> None:
-        self._entries = tuple(
-            _Entry(written, entry_name(written, number)) for number, written in enumerate(scenario.timeline)
-        )
+        self._entries = tuple(_Entry(written, number) for number, written in enumerate(scenario.timeline))
         fog = scenario.fog.visibility_m or scenario.fog.outside_visibility_m or math.inf
         self._reference = fog_reference(scenario.timeline, extinction_from_visibility(fog))
         self._light = scenario.light.illuminance_lx
@@ -128,10 +126,10 @@ class Timeline:
 class _Entry:
     """An entry, and what has become of it."""
 
-    def __init__(self, written: TimelineEntry, name: str) -> None:
-        self.written, self.name = written, name
+    def __init__(self, written: TimelineEntry, number: int) -> None:
+        self.written, self.name, self.key = written, entry_name(written, number), f"timeline.{number}"
         self.was_refused = False
-        self._watch = Watch(parse_condition(written.when))
+        self._watch = Watch(written.when)
         self._held = False
         self._has_held = self._has_begun = False
         self._waiting: list[tuple[float, str]] = []
@@ -154,7 +152,7 @@ class _Entry:
         _, why = self._waiting.pop(0)
         self._has_begun = True
         who = tuple(moment.vehicle_id(vehicle) for vehicle in vehicles_of(self.written))
-        return Begun(self.name, time, told(self.written), why, who)
+        return Begun(self.name, time, told(self.written), why, who, self.key)
 
     def vehicles(self, step: TrafficStep) -> tuple[str, ...]:
         """Ids of its vehicles."""
@@ -211,7 +209,7 @@ def _end(begun: Begun, actions: Actions) -> Begun | None:
     longest = max(lasting, default=0.0)
     if not 0.0 < longest < math.inf:
         return None
-    return Begun(begun.name, begun.time + longest, begun.what, begun.why, begun.who, is_over=True)
+    return Begun(begun.name, begun.time + longest, begun.what, begun.why, begun.who, begun.key, is_over=True)
 
 
 def _duration(action: TrafficAction | ChangeFog | ChangeLight) -> float:

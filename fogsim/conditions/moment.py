@@ -115,7 +115,7 @@ class History:
             The step.
         """
         self._collisions |= {(hit.collider, hit.victim) for hit in step.collisions}
-        self._begun |= {begun.name for begun in step.begun}
+        self._begun |= {name for begun in step.begun for name in (begun.name, begun.key)}
         points = step.truth.route
         if points is not None and len(points) > 1 and (self._route is None or self._route.points is not points):
             self._route = Route(points)

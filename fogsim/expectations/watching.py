@@ -279,7 +279,7 @@ class _HappenedWatch:
 
     def look(self, moment: Moment) -> None:
         if self._begun is None and self._clause.event in moment.begun:
-            begun = next((b.time for b in moment.step.begun if b.name == self._clause.event), moment.step.time)
+            begun = next((b.time for b in moment.step.begun if self._clause.event in (b.name, b.key)), moment.step.time)
             self._begun = (begun, _sight(moment, "")[1], f"{self._clause.event} began at {begun:g} s")
 
     def result(self, _: Mapping[str, object]) -> Result:

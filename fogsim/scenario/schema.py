@@ -3,7 +3,6 @@
 Everything inside FogSim is SI and radians; `fogsim.scenario.build` converts, once.
 """
 
-import math
 import warnings
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -24,7 +23,7 @@ from fogsim.scenario.fog import Fog
 from fogsim.scenario.roads.schema import Actors, DemandSection, Road, check_roads
 from fogsim.scenario.section import Flag, Method, Number, Period, Section, Seed, Text, method_of
 from fogsim.scenario.sensor_schema import Sensors
-from fogsim.scenario.timeline import Timeline, timeline_mistakes
+from fogsim.scenario.timeline import Timeline, check_timeline
 from fogsim.scenario.traffic_alone import without_ego
 from fogsim.scenario.traffic_schema import DriversSection, Traffic
 
@@ -165,6 +164,7 @@ class Scenario(Section):
     @model_validator(mode="after")
     def _can_be_told(self) -> Self:
         check_expectations(self)
+        check_timeline(self)
         return self
 
     @field_validator("renderer")
@@ -202,21 +202,6 @@ class Scenario(Section):
                 if fault.sensor == "camera":
                     raise ValueError(f"faults.{place} is of the camera, and renderer: none draws no frames")
         return value
-
-    @model_validator(mode="after")
-    def _timeline_fits(self) -> Self:
-        visibility = self.fog.visibility_m or self.fog.outside_visibility_m or math.inf
-        mistakes = timeline_mistakes(
-            self.timeline,
-            has_ego=self.traffic.has_ego,
-            illuminance=self.light.illuminance_lx,
-            visibility=visibility,
-            has_banks=bool(self.fog.banks),
-        )
-        told = "; ".join(mistakes)
-        if told:
-            raise ValueError(told)
-        return self
 
     @model_validator(mode="after")
     def _distinct_estimators(self) -> Self:

@@ -11,7 +11,6 @@ from fogsim.scenario.expect.checks import named_vehicles
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.roads.files import traffic_files
 from fogsim.scenario.schema import Clocks, Scenario
-from fogsim.scenario.timeline import vehicles_of
 from fogsim.scenario.traffic_schema import ChangeLane
 from fogsim.traffic import (
     Demand,
@@ -101,6 +100,7 @@ def demand_mistakes(document: Document, scenario: Scenario) -> list[str]:
     """
     named = dict(_named_vehicles(scenario))
     watched = [(at, vehicle) for at, vehicle in named_vehicles(scenario.expect) if vehicle != EGO]
+    watched += scripted_vehicles(scenario.timeline)
     demand = _demand(scenario, frozenset((*named.values(), *(vehicle for _, vehicle in watched))))
     asked = (*named.items(), *watched)
     told = {at: _unknown_vehicle(vehicle, demand) for at, vehicle in asked if demand.lacks(vehicle)}
@@ -120,9 +120,6 @@ def _named_vehicles(scenario: Scenario) -> Iterator[tuple[KeyPath, str]]:
         yield ("traffic", "ego"), traffic.ego
     yield from ((("traffic", "keep_lane", i), vehicle) for i, vehicle in enumerate(traffic.keep_lane))
     yield from ((("traffic", "events", i, "vehicle"), event.vehicle) for i, event in enumerate(traffic.events))
-    for i, entry in enumerate(scenario.timeline):
-        named = {vehicle for vehicle in vehicles_of(entry) if vehicle != EGO}
-        yield from ((("timeline", i, "do", vehicle), vehicle) for vehicle in sorted(named))
 
 
 def _demand(scenario: Scenario, wanted: frozenset[str]) -> Demand:

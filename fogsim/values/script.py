@@ -24,6 +24,8 @@ class Begun:
         What held then.
     who : tuple of str
         Vehicles that it is about.
+    key : str
+        Its place in the scenario, such as ``timeline.0``, whatever its name.
     is_over : bool
         True if this is its end.
     """
@@ -33,6 +35,7 @@ class Begun:
     what: str = ""
     why: str = ""
     who: tuple[str, ...] = ()
+    key: str = ""
     is_over: bool = False
 
 

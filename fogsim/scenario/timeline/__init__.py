@@ -10,7 +10,7 @@ from fogsim.scenario.timeline.actions import (
     told,
     vehicles_of,
 )
-from fogsim.scenario.timeline.checks import timeline_mistakes
+from fogsim.scenario.timeline.checks import check_timeline, named_vehicles
 from fogsim.scenario.timeline.schema import FogActions, LightActions, Timeline, TimelineEntry
 
 __all__ = [
@@ -20,11 +20,12 @@ __all__ = [
     "Timeline",
     "TimelineEntry",
     "actions_of",
+    "check_timeline",
     "doings_of",
     "entry_name",
     "fog_reference",
+    "named_vehicles",
     "scripted_fog",
-    "timeline_mistakes",
     "told",
     "vehicles_of",
 ]

@@ -2,20 +2,19 @@
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Protocol
 
 from fogsim.scenario.sensor_schema import fault_of
 from fogsim.scenario.timeline.schema import (
     Doing,
     FogActions,
-    LampName,
+    LampActions,
     LaneAction,
     LightActions,
     SignalActions,
     SpeedAction,
     StopAction,
-    Switch,
     TimelineEntry,
     VehicleActions,
 )
@@ -222,13 +221,12 @@ def _lane_change(vehicle: str, action: LaneAction, now: int | None) -> ChangeLan
     return ChangeLane(vehicle, lanes, action.stay_s, action.duration_s, action.indicator_s)
 
 
-def _lamps(vehicle: str, written: Mapping[LampName, Switch] | str) -> SetLamps:
+def _lamps(vehicle: str, written: LampActions) -> SetLamps:
     """Switches of lamps, which files name as `Lamp` does in small letters."""
-    if isinstance(written, str):
-        return SetLamps(vehicle, failed=_ALL) if written == "failed" else SetLamps(vehicle, automatic=_ALL)
+    states = {lamp: getattr(written, (lamp.name or "").lower()) or written.all for lamp in Lamp}
 
     def those(state: str) -> Lamp:
-        return Lamp(sum(Lamp[name.upper()] for name, value in written.items() if value == state))
+        return Lamp(sum(lamp for lamp, value in states.items() if value == state))
 
     return SetLamps(vehicle, those("on"), those("off"), those("failed"), those("automatic"))
 

@@ -1,59 +1,69 @@
-"""What of a timeline does not fit the rest of its scenario."""
+"""What of a timeline does not fit the rest of its scenario, and the names that stand in it."""
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
-from fogsim.conditions.moment import EGO
-from fogsim.scenario.sensor_schema import AnyFault
+from fogsim.conditions import EGO, condition_mistakes, signals_of
+from fogsim.conditions import vehicles_of as vehicles_of_signal
+from fogsim.scenario.expect.checks import run_content
+from fogsim.scenario.expect.conditions import refuse
+from fogsim.scenario.plain_yaml import KeyPath
 from fogsim.scenario.timeline.actions import doings_of, entry_name, vehicles_of
-from fogsim.scenario.timeline.schema import FogActions, LightActions, SignalActions, TimelineEntry, VehicleActions
+from fogsim.scenario.timeline.schema import (
+    Doing,
+    FogActions,
+    LightActions,
+    SignalActions,
+    TimelineEntry,
+    VehicleActions,
+)
 from fogsim.units import DAY_ILLUMINANCE
 
+if TYPE_CHECKING:
+    from fogsim.scenario.schema import Scenario
 
-def timeline_mistakes(
-    entries: Sequence[TimelineEntry], *, has_ego: bool, illuminance: float, visibility: float, has_banks: bool
-) -> Iterator[str]:
-    """Say what does not fit, one line each with its key path.
+
+def check_timeline(scenario: "Scenario") -> None:
+    """Refuse a timeline that a run of its scenario could not play.
 
     Parameters
     ----------
-    entries : sequence of TimelineEntry
-        The timeline.
-    has_ego : bool
-        Whether there is an ego.
-    illuminance : float
-        Illuminance of the scenario [lx].
-    visibility : float
-        Its meteorological visibility, outside banks [m].
-    has_banks : bool
-        Whether it has fog banks.
+    scenario : Scenario
+        The scenario.
+
+    Raises
+    ------
+    ValidationError
+        If there is anything that it could not.
     """
-    names = [entry_name(entry, number) for number, entry in enumerate(entries)]
-    for number, entry in enumerate(entries):
-        at = f"timeline.{number}"
+    refuse((("timeline", *place), told) for place, told in _mistakes(scenario))
+
+
+def _mistakes(scenario: "Scenario") -> Iterator[tuple[KeyPath, str]]:
+    names = [entry_name(entry, number) for number, entry in enumerate(scenario.timeline)]
+    content = run_content(scenario) if scenario.timeline else None
+    for number, entry in enumerate(scenario.timeline):
         if names[number] in names[:number]:
-            yield f"{at}.name: names of entries must differ, and {names[number]!r} stands there twice"
-        if not has_ego and EGO in vehicles_of(entry):
-            yield f"{at}.do: it tells of the ego, and traffic.ego is none"
+            yield (number, "name"), f"names of entries must differ, and {names[number]!r} stands there twice"
+        if content is not None:
+            yield from (((number, "when"), told) for told in condition_mistakes(entry.when, content))
+        if not scenario.traffic.has_ego and EGO in vehicles_of(entry):
+            yield (number, "do"), "it tells of the ego, and traffic.ego is none"
         for subject, doing in doings_of(entry):
-            told = _mistake(doing, has_ego, illuminance, math.isfinite(visibility), has_banks)
+            told = _mistake(doing, scenario)
             if told:
-                yield f"{at}.do.{subject}: {told}"
+                yield (number, "do", subject), told
 
 
-def _mistake(
-    doing: VehicleActions | SignalActions | FogActions | LightActions | AnyFault,
-    has_ego: bool,
-    illuminance: float,
-    is_foggy: bool,
-    has_banks: bool,
-) -> str | None:
+def _mistake(doing: Doing, scenario: "Scenario") -> str | None:
     if isinstance(doing, VehicleActions | SignalActions):
         return None
     if isinstance(doing, FogActions):
-        return _fog_mistake(doing, is_foggy, has_banks)
-    if not has_ego:
+        return _fog_mistake(doing, scenario)
+    if not scenario.traffic.has_ego:
         return "daylight and sensors concern an ego's camera, and traffic.ego is none"
+    illuminance = scenario.light.illuminance_lx
     if isinstance(doing, LightActions) and illuminance < DAY_ILLUMINANCE:
         return (
             f"daylight changes by day alone, and light.illuminance_lx is {illuminance:g}, less than "
@@ -62,9 +72,29 @@ def _mistake(
     return None
 
 
-def _fog_mistake(doing: FogActions, is_foggy: bool, has_banks: bool) -> str | None:
-    if doing.density is not None and not is_foggy and not has_banks:
+def _fog_mistake(doing: FogActions, scenario: "Scenario") -> str | None:
+    visibility = scenario.fog.visibility_m or scenario.fog.outside_visibility_m or math.inf
+    is_clear, has_banks = math.isinf(visibility), bool(scenario.fog.banks)
+    if doing.density is not None and is_clear and not has_banks:
         return "there is no fog of which this could be a multiple; write visibility_m, or give the scenario fog"
-    if doing.visibility_m is not None and not is_foggy and has_banks:
+    if doing.visibility_m is not None and is_clear and has_banks:
         return "outside the banks the air is clear; write density, which is that of the banks"
     return None
+
+
+def named_vehicles(timeline: Sequence[TimelineEntry]) -> Iterator[tuple[KeyPath, str]]:
+    """Vehicles that a timeline names, the ego aside, and where.
+
+    Parameters
+    ----------
+    timeline : sequence of TimelineEntry
+        The timeline.
+    """
+    for number, entry in enumerate(timeline):
+        for vehicle in vehicles_of(entry):
+            if vehicle != EGO:
+                yield ("timeline", number, "do", vehicle), vehicle
+        for reference in signals_of(entry.when):
+            for vehicle in vehicles_of_signal(reference):
+                if vehicle != EGO:
+                    yield ("timeline", number, "when"), vehicle

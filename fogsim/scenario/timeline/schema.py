@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
-    AfterValidator,
     BeforeValidator,
     Field,
     TypeAdapter,
@@ -13,8 +12,8 @@ from pydantic import (
 )
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from fogsim.conditions import mended, parse_condition
 from fogsim.errors import suggest
+from fogsim.scenario.expect.conditions import WrittenCondition
 from fogsim.scenario.mistakes import known_keys
 from fogsim.scenario.plain_yaml import KeyPath
 from fogsim.scenario.section import (
@@ -38,23 +37,52 @@ from fogsim.values.script import Shape
 Switch = Literal["on", "off", "failed", "automatic"]
 """State of a lamp: lit or dark by hand, dark for ever, or the vehicle's own."""
 
-LampName = Literal[
-    "position",
-    "low_beam",
-    "high_beam",
-    "front_fog",
-    "rear_fog",
-    "stop",
-    "indicator_left",
-    "indicator_right",
-    "daytime",
-]
-"""Lamps of a vehicle."""
-
 
 def _word(value: object) -> object:
     """Words that YAML takes for truth values."""
     return {True: "on", False: "off"}[value] if isinstance(value, bool) else value
+
+
+Lit = Annotated[Switch, BeforeValidator(_word)] | None
+
+
+class LampActions(Section):
+    """Lamps switched by hand: `on`, `off`, `failed` (dark for ever), or `automatic`, the vehicle's own again."""
+
+    position: Lit = None
+    """Position lamps."""
+
+    low_beam: Lit = None
+    """Low beam."""
+
+    high_beam: Lit = None
+    """High beam."""
+
+    front_fog: Lit = None
+    """Front fog lamps."""
+
+    rear_fog: Lit = None
+    """Rear fog lamps."""
+
+    stop: Lit = None
+    """Stop lamps."""
+
+    indicator_left: Lit = None
+    """Left indicators."""
+
+    indicator_right: Lit = None
+    """Right indicators."""
+
+    daytime: Lit = None
+    """Daytime running lamps."""
+
+    all: Lit = None
+    """Every lamp, before what is said of single ones; `lamps: failed` stands for `lamps: {all: failed}`."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _all_at_once(cls, written: object) -> object:
+        return {"all": written} if isinstance(written, str | bool) else written
 
 
 class SpeedAction(Section):
@@ -190,9 +218,8 @@ class VehicleActions(Section):
     break_down: BreakDownAction | None = None
     """Come to a standstill for good."""
 
-    lamps: dict[LampName, Annotated[Switch, BeforeValidator(_word)]] | Literal["failed", "automatic"] | None = None
-    """Lamps by name (`position`, `low_beam`, `high_beam`, `front_fog`, `rear_fog`, `stop`, `indicator_left`,
-    `indicator_right`, `daytime`), each `on`, `off`, `failed` (for ever) or `automatic`; or one of these two for all."""
+    lamps: LampActions | None = None
+    """Switch lamps by hand, or let them fail."""
 
     hazard_lights: Flag | None = None
     """Whether both indicators are lit."""
@@ -327,19 +354,13 @@ def _kind_of(subject: str) -> type[Section]:
     return SignalActions if subject.startswith(_SIGNAL) else _KINDS.get(subject, VehicleActions)
 
 
-def _readable(written: Any) -> Any:
-    """Refuse what is no condition; what was written stays, but for what YAML has torn apart."""
-    parse_condition(written)
-    return mended(written) if isinstance(written, dict) else written
-
-
 class TimelineEntry(Section):
     """Something that happens when a condition holds."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]{0,99}$")] | None = None
     """Name in conditions, expectations and messages; `timeline.N` without one."""
 
-    when: Annotated[Any, AfterValidator(_readable)]
+    when: WrittenCondition
     """Condition: text such as `gap(ego, slow) < 80 m and ego.speed > 50 km/h`, or a mapping; see docs/tests.md."""
 
     delay_s: Time = 0.0

@@ -1,0 +1,100 @@
+"""The block ``timeline``: what is written, and every mistake at its place."""
+
+from pathlib import Path
+
+import pytest
+
+from fogsim.errors import InputError
+from fogsim.scenario import load_scenario, resolved
+from fogsim.scenario.timeline import vehicles_of
+
+BLIND = ("renderer=none", "estimators=[]", "traffic.events=[]", "fog={visibility_m: 100}")
+
+
+def mistake(entry: str, *settings: str) -> str:
+    with pytest.raises(InputError) as error:
+        load_scenario("motorway_fog_bank", [*BLIND, *settings, f"timeline=[{entry}]"])
+    return str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("do", "told"),
+    [
+        ("{lead: {brake: {decelaration: 6 m/s²}}}", "do.lead.brake.decelaration: unknown key; did you mean 'dec"),
+        ("{lead: {brakes: {}}}", "do.lead.brakes: unknown key; did you mean 'brake'"),
+        ("{lead: {brake: {to: 80 m}}}", "do.lead.brake.to: "),
+        ("{lead: {brake: {to_kmh: -3}}}", "do.lead.brake.to_kmh: input should be greater than or equal to 0; got -3"),
+        ("{lead: {}}", "do.lead: says nothing to do; allowed: speed, brake, follow"),
+        ("{lead: {brake: {}, speed: {to: 3 m/s}}}", "do.lead: speed and brake cannot begin together"),
+        ("{lead: {change_lane: {}}}", "do.lead.change_lane: say where: lanes"),
+        ("{lead: {speed: {to_kmh: 3, over_s: 1, rate_mps2: 2}}}", "do.lead.speed: give over_s, rate_mps2 or shape"),
+        ("{lead: {stop: {}}}", "do.lead.stop: say where: position_m or after_m"),
+        ("{lead: {lamps: {stopp: off}}}", "do.lead.lamps.stopp: unknown key; did you mean 'stop'"),
+        ("{lead: {follow: {headway: 1 s}}}", "do.lead.follow.vehicle: field required"),
+        ("{fog: {over: 3 s}}", "do.fog: say how thick: visibility_m or density"),
+        ("{light: {illuminance: 100 lx}}", "do.light.illuminance_lx: input should be greater than or equal to 1000"),
+        ("{signal.C: {state: purple}}", "do.signal.C.state"),
+        ("{sensors.camera: {fault: blackoud}}", "do.sensors.camera"),
+        ("{leed: {brake: {}}}", "do.leed: there is no vehicle 'leed' in "),
+        ("{lead: {follow: {vehicle: nobody, headway: 1 s}}}", "there is no vehicle 'nobody' in "),
+        ("{}", "do: "),
+    ],
+)
+def test_mistakes_are_told_with_their_key(do: str, told: str) -> None:
+    text = mistake(f"{{when: time > 1 s, do: {do}}}")
+    assert f"timeline.0.{told}" in text or (told in text and "timeline.0.do" in text)
+    assert len(text.splitlines()) == 1
+
+
+def test_mistakes_of_conditions_and_names() -> None:
+    brake = "do: {lead: {brake: {}}}"
+    assert "timeline.0.when: " in mistake(f"{{when: lead.sped > 3 m/s, {brake}}}")
+    assert "timeline.0.when: this key is missing" in mistake(f"{{{brake}}}")
+    two = f"{{name: a, when: time > 1 s, {brake}}}, {{name: a, when: time > 1 s, {brake}}}"
+    assert "timeline.1.name: names of entries must differ, and 'a' stands there twice" in mistake(two)
+
+
+@pytest.mark.parametrize(
+    ("do", "setting", "told"),
+    [
+        ("fog: {density: 2}", "fog={visibility_m: inf}", "there is no fog of which this could be a multiple"),
+        (
+            "fog: {visibility: 30 m}",
+            "fog={outside_visibility_m: inf, banks: [{start_m: 100, end_m: 900, visibility_m: 40}]}",
+            "outside the banks the air is clear; write density",
+        ),
+        ("light: {illuminance: 2000 lx}", "light.illuminance_lx=10", "daylight changes by day alone"),
+    ],
+)
+def test_what_does_not_fit_the_scenario_is_told(do: str, setting: str, told: str) -> None:
+    text = mistake(f"{{when: time > 1 s, do: {{{do}}}}}", setting)
+    assert told in text
+    assert "timeline.0.do." in text
+
+
+def test_a_line_of_a_file_is_named(tmp_path: Path) -> None:
+    base = Path(load_scenario("motorway_fog_bank").directory).resolve()
+    file = tmp_path / "scenario.yaml"
+    file.write_text(
+        "name: mine\nrenderer: none\nestimators: []\nfog: {visibility: 100 m}\n"
+        f"traffic: {{net: {base}/motorway.net.xml, routes: [{base}/motorway.rou.xml]}}\n"
+        "timeline:\n  - when: time > 1 s\n    do:\n      lead:\n        brake:\n          to: 3 s\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(InputError, match=r"scenario\.yaml:11: timeline\.0\.do\.lead\.brake\.to: "):
+        load_scenario(file)
+
+
+def test_what_is_written_comes_back_as_plain_data_that_loads_again() -> None:
+    written = (
+        "{name: one, when: {gap(ego, lead): '< 80 m'}, delay: 0.5 s, repeat: each, do: {lead: [{lamps: {stop: off}}, "
+        "{lamps: failed}], sensors.camera: {fault: latency, delay: 0.4 s}, signal.C: {state: red, for: 3 s}, "
+        "light: {illuminance: 5000 lx}, ego: {follow: {vehicle: lead, headway: 1 s}}}}"
+    )
+    scenario = load_scenario("motorway_fog_bank", [*BLIND, f"timeline=[{written}]"])
+    assert vehicles_of(scenario.timeline[0]) == ("lead", "ego")
+    plain = resolved(scenario)["timeline"]
+    assert plain[0]["when"] == {"gap(ego, lead)": "< 80 m"}
+    assert plain[0]["do"]["lead"] == [{"lamps": {"stop": "off"}}, {"lamps": {"all": "failed"}}]
+    again = load_scenario("motorway_fog_bank", [*BLIND, f"timeline={plain!r}".replace("None", "null")])
+    assert again.timeline == scenario.timeline

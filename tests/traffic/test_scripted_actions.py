@@ -1,0 +1,200 @@
+"""Actions of a script in SUMO: what is asked for is driven, shown and given back."""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fogsim.errors import InputError
+from fogsim.traffic import TrafficSetup, libsumo_traffic
+from fogsim.traffic.sumo.libsumo_link import load_libsumo
+from fogsim.traffic.sumo_traffic import SumoTraffic
+from fogsim.values import Command, Lamp
+from fogsim.values.script import (
+    ChangeLane,
+    ChangeSpeed,
+    Follow,
+    SetLamps,
+    SetSignal,
+    Shape,
+    Stop,
+    TrafficAction,
+)
+
+DATA = Path(__file__).resolve().parents[1] / "data" / "crossing"
+STEP = 0.1
+TYPE = '<vType id="car" sigma="0" decel="4.5" emergencyDecel="9" accel="2.6" maxSpeed="40" tau="1.0"/>'
+
+
+def setup_in(folder: Path, net: str, *vehicles: str) -> TrafficSetup:
+    routes = folder / "cars.rou.xml"
+    routes.write_text(f"<routes>{TYPE}{''.join(vehicles)}</routes>", encoding="utf-8")
+    return TrafficSetup(
+        net=Path(net) if Path(net).is_absolute() else DATA / net,
+        routes=(routes,),
+        additional=(),
+        ego="ego",
+        step_length=STEP,
+        keep_lane=("ego", "lead"),
+        warm_up_limit=60.0,
+        advice_deceleration=2.0,
+        reading_radius=3000.0,
+    )
+
+
+def car(name: str, edges: str, position: float, speed: float, lane: int = 0) -> str:
+    place = f'departPos="{position}" departSpeed="{speed}" departLane="{lane}"'
+    return f'<vehicle id="{name}" type="car" depart="0" {place}><route edges="{edges}"/></vehicle>'
+
+
+MOTORWAY = Path(__file__).resolve().parents[2] / "scenarios" / "motorway_fog_bank" / "motorway.net.xml"
+
+
+@pytest.fixture
+def motorway(tmp_path: Path) -> Iterator[SumoTraffic]:
+    setup = setup_in(
+        tmp_path, str(MOTORWAY), car("ego", "approach bank", 100, 25), car("lead", "approach bank", 180, 25)
+    )
+    traffic = libsumo_traffic(setup)
+    assert isinstance(traffic, SumoTraffic)
+    traffic.start(1)
+    yield traffic
+    traffic.close()
+
+
+def drive(traffic: SumoTraffic, steps: int, vehicle: str = "lead") -> list[dict[str, Any]]:
+    """What is seen of a vehicle after each step."""
+    seen = []
+    for _ in range(steps):
+        traffic.advance(Command())
+        snapshot = traffic.observe()
+        assert snapshot is not None
+        state = snapshot.state
+        row = state.ids.index(vehicle)
+        seen.append(
+            {
+                "speed": float(state.speed[row]),
+                "lane": state.lane[row],
+                "place": state.position[row],
+                "lamps": Lamp(int(state.lamps[row])),
+                "leader": snapshot.leader,
+            }
+        )
+    return seen
+
+
+@pytest.mark.parametrize(
+    ("action", "due", "speed"),
+    [
+        (ChangeSpeed("lead", 10.0, 2.0), 2.0, 10.0),  # 7.5 m/s², harder than the type's decel, within an emergency's
+        (ChangeSpeed("lead", 10.0, 6.0, Shape.SINUSOIDAL), 6.0, 10.0),
+        (ChangeSpeed("lead", 35.0, 5.0), 5.0, 35.0),  # the limit is 33.3 m/s
+        (ChangeSpeed("lead", 0.0, 0.0, Shape.STEP), 2.8, 0.0),  # as hard as in an emergency: 25 m/s over 9 m/s²
+    ],
+)
+def test_a_speed_is_reached_in_its_time_to_the_step(
+    motorway: SumoTraffic, action: ChangeSpeed, due: float, speed: float
+) -> None:
+    motorway.begin([action])
+    speeds = [one["speed"] for one in drive(motorway, round(due / STEP) + 20)]
+    there = next(i for i, one in enumerate(speeds, 1) if abs(one - speed) < 0.01)
+    assert there * STEP == pytest.approx(due, abs=STEP + 1e-9)
+    assert speeds[there:] == pytest.approx([speed] * len(speeds[there:]))
+
+
+def test_who_was_held_is_free_again_and_nothing_is_left(motorway: SumoTraffic) -> None:
+    get = load_libsumo().vehicle
+    mode = get.getSpeedMode("lead")
+    motorway.begin([ChangeSpeed("lead", 10.0, 1.0, hold=2.0), SetLamps("lead", failed=Lamp.STOP)])
+    seen = drive(motorway, 60)
+    assert seen[19]["speed"] == pytest.approx(10.0)
+    assert seen[-1]["speed"] == pytest.approx(10.0 + 4.0 * 2.6, abs=0.3)
+    assert get.getSpeedMode("lead") == mode
+    assert not any(Lamp.STOP & one["lamps"] for one in seen)  # it braked
+
+
+def test_scripted_vehicles_brake_for_others(motorway: SumoTraffic) -> None:
+    motorway.begin([ChangeSpeed("ego", 35.0), ChangeSpeed("lead", 5.0, 3.0)])
+    gaps = [one["leader"].gap for one in drive(motorway, 250) if one["leader"]]
+    assert len(gaps) > 200
+    assert min(gaps) > 0.5
+
+
+def test_a_follower_keeps_a_headway_shorter_than_its_own(motorway: SumoTraffic) -> None:
+    motorway.begin([ChangeSpeed("lead", 25.0), Follow("ego", "lead", 0.6)])
+    last = drive(motorway, 400)[-1]
+    assert last["leader"].gap == pytest.approx(0.6 * 25.0 + 2.0, abs=0.3)
+
+
+def test_a_vehicle_stops_at_a_place(motorway: SumoTraffic) -> None:
+    odometer = load_libsumo().vehicle.getDistance
+    begun = odometer("lead")
+    motorway.begin([Stop("lead", 180.0, 3.0, stand=2.0)])
+    speeds = [one["speed"] for one in drive(motorway, 115)]
+    assert speeds[-1] < 0.1
+    assert odometer("lead") - begun == pytest.approx(180.0, abs=1.0)
+    assert drive(motorway, 40)[-1]["speed"] > 2.0
+
+
+def test_a_change_of_lane_takes_its_time_and_is_indicated_before(motorway: SumoTraffic) -> None:
+    assert motorway.begin([ChangeLane("lead", -1), ChangeLane("nobody", 1)]) != ()  # lane 0 is the rightmost
+    change = ChangeLane("lead", 1, stay=20.0, duration=5.0, indicator=1.0)
+    before = drive(motorway, 1)[0]["place"]
+    assert motorway.begin([change]) == ()
+    seen = drive(motorway, 75)
+    heading = seen[1]["place"][:2] - before[:2]
+    left = np.array([-heading[1], heading[0]]) / math.hypot(*heading)
+    across = [float((one["place"][:2] - before[:2]) @ left) for one in seen]
+    width = across[-1]
+    assert width == pytest.approx(3.75, abs=0.3)
+    moving = [i for i, way in enumerate(across) if 0.01 * width < way < 0.99 * width]
+    assert (len(moving) - 1) * STEP == pytest.approx(5.0, rel=0.15)
+    assert moving[0] * STEP == pytest.approx(1.0, abs=0.5)
+    indicated = [bool(one["lamps"] & Lamp.INDICATOR_LEFT) for one in seen]
+    assert all(indicated[:55])
+    assert not any(indicated[62:])
+
+
+def lights(tmp_path: Path) -> SumoTraffic:
+    traffic = libsumo_traffic(setup_in(tmp_path, "lights.net.xml", car("ego", "WC CE", 100, 10, lane=1)))
+    assert isinstance(traffic, SumoTraffic)
+    return traffic
+
+
+def test_traffic_lights_are_held_and_given_back(tmp_path: Path) -> None:
+    traffic = lights(tmp_path)
+    try:
+        traffic.start(1)
+        get = load_libsumo().trafficlight
+        program, state = get.getProgram("C"), get.getRedYellowGreenState("C")
+        traffic.begin([SetSignal("C", state="r", hold=2.0)])
+        drive(traffic, 15, "ego")
+        assert get.getRedYellowGreenState("C") == "r" * len(state)
+        drive(traffic, 10, "ego")
+        assert get.getProgram("C") == program
+        assert set(get.getRedYellowGreenState("C")) != {"r"}
+        traffic.begin([SetSignal("C", phase=2, hold=3.0)])
+        drive(traffic, 25, "ego")
+        assert get.getPhase("C") == 2
+        drive(traffic, 10, "ego")
+        assert get.getPhase("C") == 3
+        for wrong, told in [
+            (SetSignal("D"), "no traffic lights 'D' in the net; known: C"),
+            (SetSignal("C", state="rG"), f"expected {len(state)} letters, or one for all, got 'rG'"),
+            (SetSignal("C", phase=99), "has phases 0 to"),
+        ]:
+            action: TrafficAction = wrong
+            with pytest.raises(InputError, match=told):
+                traffic.begin([action])
+    finally:
+        traffic.close()
+
+
+def test_without_actions_a_run_is_as_before(motorway: SumoTraffic) -> None:
+    assert motorway.begin([]) == ()
+    seen = drive(motorway, 20)
+    motorway.start(1)
+    assert [one["speed"] for one in drive(motorway, 20)] == [one["speed"] for one in seen]

@@ -11,6 +11,7 @@ from fogsim.scenario.expect.checks import named_vehicles
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.roads.files import traffic_files
 from fogsim.scenario.schema import Clocks, Scenario
+from fogsim.scenario.timeline import named_vehicles as scripted_vehicles
 from fogsim.scenario.traffic_schema import ChangeLane
 from fogsim.traffic import (
     Demand,

@@ -49,6 +49,8 @@ def test_mistakes_are_told_with_their_key(do: str, told: str) -> None:
 def test_mistakes_of_conditions_and_names() -> None:
     brake = "do: {lead: {brake: {}}}"
     assert "timeline.0.when: " in mistake(f"{{when: lead.sped > 3 m/s, {brake}}}")
+    assert "timeline.0.when: there is no vehicle 'leed' in " in mistake(f"{{when: leed.speed > 3 m/s, {brake}}}")
+    assert "timeline.0.when: unknown event 'timeline.7'" in mistake(f"{{when: happened(timeline.7), {brake}}}")
     assert "timeline.0.when: this key is missing" in mistake(f"{{{brake}}}")
     two = f"{{name: a, when: time > 1 s, {brake}}}, {{name: a, when: time > 1 s, {brake}}}"
     assert "timeline.1.name: names of entries must differ, and 'a' stands there twice" in mistake(two)
@@ -94,7 +96,7 @@ def test_what_is_written_comes_back_as_plain_data_that_loads_again() -> None:
     scenario = load_scenario("motorway_fog_bank", [*BLIND, f"timeline=[{written}]"])
     assert vehicles_of(scenario.timeline[0]) == ("lead", "ego")
     plain = resolved(scenario)["timeline"]
-    assert plain[0]["when"] == {"gap(ego, lead)": "< 80 m"}
+    assert plain[0]["when"] == "gap(ego, lead) < 80 m"
     assert plain[0]["do"]["lead"] == [{"lamps": {"stop": "off"}}, {"lamps": {"all": "failed"}}]
     again = load_scenario("motorway_fog_bank", [*BLIND, f"timeline={plain!r}".replace("None", "null")])
     assert again.timeline == scenario.timeline

@@ -50,7 +50,8 @@ def test_mistakes_of_conditions_and_names() -> None:
     brake = "do: {lead: {brake: {}}}"
     assert "timeline.0.when: " in mistake(f"{{when: lead.sped > 3 m/s, {brake}}}")
     assert "timeline.0.when: there is no vehicle 'leed' in " in mistake(f"{{when: leed.speed > 3 m/s, {brake}}}")
-    assert "timeline.0.when: unknown event 'timeline.7'" in mistake(f"{{when: happened(timeline.7), {brake}}}")
+    unknown = mistake(f"{{when: happened(timeline.7), {brake}}}")
+    assert "timeline.0.when: happened(timeline.7): unknown event 'timeline.7'" in unknown
     assert "timeline.0.when: this key is missing" in mistake(f"{{{brake}}}")
     two = f"{{name: a, when: time > 1 s, {brake}}}, {{name: a, when: time > 1 s, {brake}}}"
     assert "timeline.1.name: names of entries must differ, and 'a' stands there twice" in mistake(two)

@@ -27,7 +27,7 @@ from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy
 from fogsim.metrics import SafetyStandard
 from fogsim.scenario.drivers import driver_setup, driver_sight
 from fogsim.scenario.fog import fog_along
-from fogsim.scenario.roads.files import traffic_files
+from fogsim.scenario.roads.files import actors_of, traffic_files
 from fogsim.scenario.schema import NO_RENDERER, Scenario
 from fogsim.scenario.timeline import scripted_fog
 from fogsim.scenario.traffic_schema import AnyEvent, Brake, BreakDown, ChangeLane, LampsFail
@@ -121,7 +121,7 @@ def traffic_setup(scenario: Scenario) -> TrafficSetup:
         additional=files.additional,
         ego=traffic.ego if traffic.has_ego else None,
         step_length=scenario.clocks.traffic_step_s,
-        keep_lane=(*traffic.keep_lane, *(name for name, actor in scenario.actors.items() if actor.keeps_lane)),
+        keep_lane=(*traffic.keep_lane, *(name for name, actor in actors_of(scenario).items() if actor.stays_in_lane)),
         warm_up_limit=traffic.warm_up_limit_s,
         warm_up=traffic.warm_up_s,
         advice_deceleration=traffic.advice_deceleration_mps2,

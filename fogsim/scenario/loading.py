@@ -14,7 +14,7 @@ from fogsim.errors import InputError, UnknownNameError, nearest, shown, suggest
 from fogsim.scenario.document import Document, apply_overrides, read_document
 from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.plain_yaml import KeyPath, dotted
-from fogsim.scenario.roads.files import traffic_files
+from fogsim.scenario.roads.files import DemandError, traffic_files
 from fogsim.scenario.schema import Scenario
 from fogsim.scenario.sumo_check import demand_mistakes, option_lines, step_mistake
 from fogsim.scenario.system_under_test import without_sut, without_sut_in_path
@@ -375,8 +375,8 @@ def _check_placement(document: Document, scenario: Scenario) -> None:
         return
     try:
         traffic_files(scenario)
-    except PlacementError as error:
-        at = ("actors", error.actor)
+    except (PlacementError, DemandError) as error:
+        at = ("actors", error.actor) if isinstance(error, PlacementError) else ("demand", error.key)
         raise InputError(f"{document.where(at)}: {dotted(at)}: {error.told}") from error
     except InputError as error:
         raise InputError(f"{document.where(('road',))}: road: {error}") from error

@@ -51,6 +51,7 @@ def test_a_road_by_template_is_written_for_sumo(tmp_path: Path) -> None:
     [
         ("template: motorway", "template: motorwy", "unknown road template 'motorwy'"),
         ("540 veh/h", "540 km/h", "scenario.yaml:4: demand.same_way: "),
+        ("oncoming: 540", "ramp: 540", "scenario.yaml:4: demand.ramp_vph: the road has no way 'ramp'"),
         ("lanes: 2", "lane: 2", "road.lane: unknown key; did you mean 'lanes'"),
         ("lane: right", "lan: right", "actors.ego.lan: unknown key; did you mean 'lane'"),
         ("truck: 15 %", "tram: 15 %", "unknown vehicle type 'tram'"),

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from fogsim.errors import InputError
+from fogsim.errors import InputError, suggest
 from fogsim.files.user_cache import VARIABLE, cache_directory
 from fogsim.scenario.roads.schema import NO_MEASURES, ActorSection, DemandSection, ObstructionSection, Road, measure_of
 from fogsim.scenario.schema import Scenario
@@ -68,6 +68,8 @@ def traffic_files(scenario: Scenario) -> TrafficFiles:
     ------
     PlacementError
         If an actor cannot be where it is to be.
+    DemandError
+        If there is traffic on a way that the road does not have.
     InputError
         If nothing can be written into the cache directory.
     """
@@ -78,6 +80,7 @@ def traffic_files(scenario: Scenario) -> TrafficFiles:
     if scenario.road is None:
         return TrafficFiles(net, routes, additional)
     layout, placed = road_layout(scenario)
+    _check_ways(layout, scenario.demand or DemandSection())
     demand = _demand(scenario.demand or DemandSection(), usual_mix(scenario.road.template))
     texts = {_NET: net_text(layout.net), _ROUTES: routes_text(layout, demand, placed)}
     beside = additional_text(layout, [_obstruction(one) for one in scenario.road.obstructions])
@@ -101,14 +104,48 @@ def road_layout(scenario: Scenario) -> tuple[Layout, tuple[Placed, ...]]:
     if scenario.road is None:
         raise ValueError("expected a scenario with a road by template, got one without")
     template = _template(scenario.road)
-    sections = dict(scenario.actors)
-    if scenario.traffic.has_ego:
-        sections = {scenario.traffic.ego: ActorSection(), **sections}
-    placed = place_actors([_actor(name, section) for name, section in sections.items()])
+    placed = place_actors([_actor(name, section) for name, section in actors_of(scenario).items()])
     on_the_way = [one for one in placed if one.actor.way == "same_way"]
     layout = template.layout(cuts_around(on_the_way, template.free_length))
     check_placement(placed, layout)
     return layout, placed
+
+
+class DemandError(InputError):
+    """Traffic on a way that a road does not have.
+
+    Parameters
+    ----------
+    key : str
+        Key of the demand.
+    told : str
+        What is wrong.
+    """
+
+    def __init__(self, key: str, told: str) -> None:
+        super().__init__(f"demand.{key}: {told}")
+        self.key = key
+        self.told = told
+
+
+def _check_ways(layout: Layout, section: DemandSection) -> None:
+    for key in section.model_fields_set:
+        way = key.removesuffix("_vph")
+        if key != way and getattr(section, key) and not layout.way(way):
+            raise DemandError(key, f"the road has no way {way!r}; {suggest(way, dict(layout.ways))}")
+
+
+def actors_of(scenario: Scenario) -> dict[str, ActorSection]:
+    """Actors of a scenario by their ids; on a road by template the ego is one of them, also where it is not written.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+    if scenario.road is None or not scenario.traffic.has_ego:
+        return dict(scenario.actors)
+    return {scenario.traffic.ego: ActorSection(), **scenario.actors}
 
 
 def _template(road: Road) -> RoadTemplate:

@@ -8,7 +8,7 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 from fogsim.errors import UnknownNameError, suggest
 from fogsim.quantities import is_quantity, parse_quantity
 from fogsim.scenario.section import Distance, Flag, Id, Length, Number, Section, Share, SpeedKmh, Time, Whole
-from fogsim.traffic.templates import ROAD_TEMPLATES, VEHICLE_KINDS, measures
+from fogsim.traffic.templates import RAMP, ROAD_TEMPLATES, VEHICLE_KINDS, measures
 
 _ROUNDING = 1e-6
 
@@ -253,8 +253,8 @@ class ActorSection(Section):
     lamps: Literal["on", "failed"] = "on"
     """Whether its lamps shine, or have failed."""
 
-    keeps_lane: Flag = True
-    """Whether it stays in its lane, where nothing scripted makes it change."""
+    keeps_lane: Flag | None = None
+    """Whether it stays in its lane where nothing scripted makes it change; by default all do but those on a ramp."""
 
     @field_validator("type")
     @classmethod
@@ -269,6 +269,11 @@ class ActorSection(Section):
         if (self.gap_m is not None) != (given in (["ahead_of"], ["behind"])):
             raise ValueError("gap_m goes with ahead_of or behind, which need it")
         return self
+
+    @property
+    def stays_in_lane(self) -> bool:
+        """Whether it stays in its lane."""
+        return self.on != RAMP if self.keeps_lane is None else self.keeps_lane
 
 
 Actors = dict[Id, ActorSection]

@@ -6,9 +6,11 @@ from fogsim.traffic.templates.demand import Demand, cuts_around, routes_text
 from fogsim.traffic.templates.net_plan import Layout
 from fogsim.traffic.templates.net_writer import net_text
 from fogsim.traffic.templates.placement import Actor, Placed, PlacementError, Relation, check_placement, place_actors
+from fogsim.traffic.templates.ramp import RAMP
 from fogsim.traffic.templates.vehicle_types import VEHICLE_KINDS
 
 __all__ = [
+    "RAMP",
     "ROAD_TEMPLATES",
     "VEHICLE_KINDS",
     "Actor",

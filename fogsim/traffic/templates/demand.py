@@ -143,7 +143,8 @@ def _actor(one: Placed, layout: Layout) -> Iterator[str]:
         departLane=lane,
         departPos=f"{position:.2f}",
         departSpeed="0" if actor.stands else f"{speed:.3f}",
-        insertionChecks="none",
+        # Where actors are at first has been checked; who comes later comes when there is room.
+        insertionChecks="all" if actor.depart else "none",
     )
     if actor.stands:
         yield "    " + element("stop", lane=f"{edge}_{lane}", endPos=f"{position:.2f}", duration=_END)

@@ -25,7 +25,9 @@ FLOWS = tuple((way, 0.1) for way in ("same_way", "oncoming", "ramp", "north", "s
 def test_sumo_plays_it_without_a_warning(name: str, tmp_path: Path) -> None:
     template = ROAD_TEMPLATES[name]()
     slow = Actor("slow", "truck", place=Relation("ego", 40.0), speed=8.0)
-    placed = place_actors((Actor("ego", place=120.0, speed=10.0), slow))
+    broken_down = Actor("broken_down", "van", place=60.0, stands=True, lane=-1)
+    standing = [broken_down] if name in ("motorway", "ramp") else []
+    placed = place_actors((Actor("ego", place=120.0, speed=10.0), slow, *standing))
     layout = template.layout(cuts_around(placed, template.free_length))
     demand = Demand(tuple(flow for flow in FLOWS if layout.way(flow[0])), usual_mix(name))
     (tmp_path / "net.xml").write_text(net_text(layout.net), encoding="utf-8")

@@ -12,7 +12,7 @@ from fogsim.conditions.signal import Kind, LanePlace, Need, Place, Signal
 from fogsim.kinematics import DECELERATION, REACTION_TIME, stopping_sight_distance
 from fogsim.registry import Registry
 from fogsim.units import KMH_PER_MPS
-from fogsim.values import Ending, Estimate, FogBank, Lamp, Leader, Step
+from fogsim.values import Ending, Estimate, FogBank, Lamp, Leader, SignalAhead, SignalColour, Step
 
 FASTEST = 500.0 / KMH_PER_MPS
 """No vehicle drives faster [m/s]."""
@@ -154,6 +154,16 @@ def _estimate(read: Callable[[Moment, Estimate], float | bool | None]) -> Callab
     return value
 
 
+def _light(read: Callable[[SignalAhead], _Read]) -> Callable[[Moment, str], _Read | None]:
+    """Signal of the next traffic light, if it is the one that is asked for."""
+
+    def value(moment: Moment, name: str) -> _Read | None:
+        ahead = None if moment.ego_step is None else moment.ego_step.signal_ahead
+        return read(ahead) if ahead is not None and ahead.signal_id == name else None
+
+    return value
+
+
 def _relative_error(visibility: float, truth: float) -> float | None:
     """How far a visibility is from the true one, as a share of it; None in clear air, where there is no share."""
     return None if math.isinf(truth) else abs(visibility / truth - 1.0)
@@ -290,6 +300,23 @@ _OF_EGO = {
     ),
 }
 
+_OF_LIGHTS = {
+    "signal(ID).state": Signal(
+        "what a traffic light shows to the ego, as long as it is the next on its way",
+        _light(lambda light: light.colour.value),
+        Kind.WORD,
+        words=tuple(colour.value for colour in SignalColour),
+        places=(Place.SIGNAL,),
+        needs=_EGO,
+    ),
+    "signal(ID).distance": _metres(
+        "way to its stop line, as long as it is the next on the ego's way",
+        _light(lambda light: light.distance),
+        places=(Place.SIGNAL,),
+        needs=_EGO,
+    ),
+}
+
 _OF_FOG = {
     "fog.visibility_at_camera": _metres(
         "true visibility at the camera; without an ego, at the densest visibility meter",
@@ -349,6 +376,6 @@ _OF_FOG = {
     ),
 }
 
-SIGNALS: Registry[Signal] = Registry("signal", {**_OF_RUN, **_OF_VEHICLES, **_OF_EGO, **_OF_FOG})
+SIGNALS: Registry[Signal] = Registry("signal", {**_OF_RUN, **_OF_VEHICLES, **_OF_EGO, **_OF_LIGHTS, **_OF_FOG})
 """Every signal by name. In a name, X and Y stand for vehicles (``ego`` for the ego), METHOD for an estimator of the
-scenario, N for the number of a fog bank, EVENT for an entry of the timeline."""
+scenario, ID for a traffic light, N for the number of a fog bank, EVENT for an entry of the timeline."""

@@ -118,7 +118,8 @@ class Held:
     duration: Quantity
 
     def __str__(self) -> str:
-        return f"{_bracketed(self.part)} for {self.duration}"
+        inside = f"({self.part})" if isinstance(self.part, Not) else _bracketed(self.part)
+        return f"{inside} for {self.duration}"
 
 
 @dataclass(frozen=True, slots=True)

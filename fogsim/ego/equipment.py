@@ -276,6 +276,7 @@ class EgoEquipment:
             route_position=snapshot.route_position,
             speed_limit=snapshot.speed_limit,
             leader=snapshot.leader,
+            signal_ahead=snapshot.signal_ahead,
             collisions=snapshot.collisions,
             truth=truth,
             view=view,

@@ -317,6 +317,7 @@ class SumoTraffic:
             speed_limit=run.api.lane.getMaxSpeed(state.lane[row]),
             leader=run.reader.leader(),
             collisions=run.collisions.take(),
+            signal_ahead=run.reader.signal_ahead(),
         )
 
     @_translates_errors

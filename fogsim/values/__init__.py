@@ -24,7 +24,15 @@ from fogsim.values.road import (
 from fogsim.values.scene import Batch, Mesh, Scene, Surface
 from fogsim.values.script import Begun
 from fogsim.values.step import Ending, RoadSection, Step, TrafficStep, Truth
-from fogsim.values.traffic import Collision, Leader, NetworkSnapshot, TrafficSnapshot, TrafficState
+from fogsim.values.traffic import (
+    Collision,
+    Leader,
+    NetworkSnapshot,
+    SignalAhead,
+    SignalColour,
+    TrafficSnapshot,
+    TrafficState,
+)
 from fogsim.values.unplayed import NOTHING_UNPLAYED, Reason, Unplayed, UnplayedEvent
 
 __all__ = [
@@ -70,6 +78,8 @@ __all__ = [
     "Sign",
     "SignMap",
     "SignSighting",
+    "SignalAhead",
+    "SignalColour",
     "SpeedAdvice",
     "Step",
     "StreetLighting",

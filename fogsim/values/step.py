@@ -19,7 +19,7 @@ from fogsim.values.image import View
 from fogsim.values.observation import Observation
 from fogsim.values.road import SignMap
 from fogsim.values.script import Begun
-from fogsim.values.traffic import Collision, Leader, TrafficState
+from fogsim.values.traffic import Collision, Leader, SignalAhead, TrafficState
 from fogsim.values.unplayed import NOTHING_UNPLAYED, Unplayed
 
 
@@ -161,6 +161,8 @@ class Step(TrafficStep):
         Speed limit where the ego is [m/s].
     leader : Leader or None
         The vehicle ahead.
+    signal_ahead : SignalAhead or None
+        The next traffic light on the ego's way.
     view : View
         The drawn scene before fog and camera.
     observation : Observation
@@ -182,3 +184,4 @@ class Step(TrafficStep):
     estimates: tuple[Estimate, ...]
     belief: Belief
     reading_radius: float = math.inf
+    signal_ahead: SignalAhead | None = None

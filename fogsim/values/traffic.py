@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,6 +115,38 @@ class Leader:
     speed: float
 
 
+class SignalColour(StrEnum):
+    """What a traffic light shows."""
+
+    RED = "red"
+    RED_YELLOW = "red_yellow"
+    YELLOW = "yellow"
+    GREEN = "green"
+    GREEN_ARROW = "green_arrow"
+    """To the right after a stop."""
+    BLINKING = "blinking"
+    OFF = "off"
+
+
+@dataclass(frozen=True, slots=True)
+class SignalAhead:
+    """The next traffic light on the ego's way.
+
+    Attributes
+    ----------
+    signal_id : str
+        Its id.
+    colour : SignalColour
+        What it shows to the ego.
+    distance : float
+        Way from the ego's front bumper to its stop line [m].
+    """
+
+    signal_id: str
+    colour: SignalColour
+    distance: float
+
+
 @dataclass(frozen=True, slots=True)
 class Collision:
     """Two vehicles that have hit each other.
@@ -154,6 +187,8 @@ class TrafficSnapshot:
         The vehicle ahead in its lane.
     collisions : tuple of Collision
         Collisions of any vehicles since the last snapshot, each pair once.
+    signal_ahead : SignalAhead or None
+        The next traffic light on its way.
     """
 
     state: TrafficState
@@ -163,6 +198,7 @@ class TrafficSnapshot:
     speed_limit: float
     leader: Leader | None
     collisions: tuple[Collision, ...]
+    signal_ahead: SignalAhead | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from fogsim.traffic.sumo.claims import SPEED_FACTOR, TOP_SPEED, Claims
 from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
 from fogsim.traffic.sumo.nearby_vehicles import AllVehicles, NearbyVehicles
 from fogsim.traffic.sumo.roster import Roster
-from fogsim.values import Collision, Lamp, Leader, TrafficState
+from fogsim.values import Collision, Lamp, Leader, SignalAhead, SignalColour, TrafficState
 from fogsim.values.traffic import advised_speeds
 
 LEADER_RANGE = 500.0
@@ -145,6 +145,20 @@ class VehicleBodies:
         return row
 
 
+_COLOURS = {
+    "r": SignalColour.RED,
+    "u": SignalColour.RED_YELLOW,
+    "y": SignalColour.YELLOW,
+    "Y": SignalColour.YELLOW,
+    "g": SignalColour.GREEN,
+    "G": SignalColour.GREEN,
+    "s": SignalColour.GREEN_ARROW,
+    "o": SignalColour.BLINKING,
+    "O": SignalColour.OFF,
+}
+"""What SUMO's letters mean."""
+
+
 class VehicleReader:
     """Reads vehicles by SUMO's plain getters, which inside the process beat subscriptions.
 
@@ -174,6 +188,8 @@ class VehicleReader:
         self._leader = vehicle_getter(api, "getLeader")
         self._speed = vehicle_getter(api, "getSpeed")
         self._minimum_gap = vehicle_getter(api, "getMinGap")
+        self._lights = vehicle_getter(api, "getNextTLS")
+        self._has_signals: bool | None = None
         self._hits = getter(api, "simulation", "getCollisions")
         self._lane_limit = getter(api, "lane", "getMaxSpeed")
         # Who is between lanes is limited by nothing but the vehicle.
@@ -273,6 +289,13 @@ class VehicleReader:
             return None
         # SUMO's gap leaves out the follower's minimum gap.
         return Leader(found[0], found[1] + self._minimum_gap(self._ego), self._speed(found[0]))
+
+    def signal_ahead(self) -> SignalAhead | None:
+        """The next traffic light on the ego's way."""
+        if self._has_signals is None:
+            self._has_signals = int(self._api.trafficlight.getIDCount()) > 0
+        lights = self._lights(self._ego) if self._has_signals and self._ego is not None else ()
+        return next((SignalAhead(light, _COLOURS[state], way) for light, _, way, state in lights), None)
 
     def collisions(self) -> list[Collision]:
         """Collisions of the last step; SUMO tells one in every step while the vehicles overlap."""

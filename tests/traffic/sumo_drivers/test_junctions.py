@@ -1,5 +1,6 @@
 """Drivers at junctions in a real SUMO: they yield to whom they see, and obey the lights that they see."""
 
+import contextlib
 import itertools
 import math
 from collections.abc import Callable, Iterator
@@ -24,7 +25,7 @@ from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo_traffic import command_line
 from fogsim.units import extinction_from_visibility
-from fogsim.values import Collision, Command, FogField
+from fogsim.values import Collision, Command, FogField, SignalAhead, SignalColour
 
 DATA = Path(__file__).resolve().parents[2] / "data" / "crossing"
 DAY = DriverSight(illuminance=10_000.0)
@@ -168,6 +169,19 @@ def test_a_red_light_is_overrun_in_dense_fog_as_physics_says_and_obeyed_in_thin(
         seen = max(d for d in (0.1 * n for n in range(1, 1000)) if 200.0 * math.exp(-k * d) / d**2 >= 1e-3)
         left = math.sqrt(13.89**2 - 2 * EMERGENCY_DECELERATION * max(seen - 13.89 * DAY.reaction_time, 0.0))
         assert entered["ego"][1] == pytest.approx(left, abs=1.2)
+
+
+def test_the_light_ahead_of_the_ego_is_told(setup_of: Callable[..., TrafficSetup]) -> None:
+    with contextlib.closing(libsumo_traffic(at_red(setup_of))) as traffic:
+        traffic.start(1)
+        show_red(0)
+        first = traffic.observe()
+        assert first is not None
+        assert first.signal_ahead == SignalAhead("C", SignalColour.RED, first.signal_ahead.distance)
+        traffic.advance(Command())
+        second = traffic.observe()
+        way = second.route_position - first.route_position
+        assert 0.0 < way == pytest.approx(first.signal_ahead.distance - second.signal_ahead.distance)
 
 
 def test_nobody_stops_at_a_line_in_one_step(setup_of: Callable[..., TrafficSetup]) -> None:

@@ -1,0 +1,239 @@
+"""Signals read from steps made by hand."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fogsim.conditions import SIGNALS, Watch, parse_condition
+from fogsim.conditions.signal import Kind, LanePlace
+from fogsim.values import (
+    Begun,
+    Collision,
+    Command,
+    Estimate,
+    FogBank,
+    FogField,
+    Lamp,
+    Leader,
+    SignalAhead,
+    SignalColour,
+    SpeedAdvice,
+    Step,
+    StretchAdvice,
+    TrafficStep,
+)
+from tests.recorders.synthetic import estimate, make_step, traffic
+
+ROUTE = np.array([[0.0, 0.0, 0.0], [500.0, 0.0, 0.0], [500.0, 1000.0, 0.0]])
+CARRIAGEWAYS = {"motorway": ("motorway_1", "motorway_2"), "wide": ("wide_0", "wide_1", "wide_2")}
+
+
+def read(signal: str, step: TrafficStep) -> object:
+    """Value of a signal, by a condition that asks for it."""
+    watch = Watch(parse_condition(f"{signal} changes"))
+    watch.update(step)
+    (value,) = watch.values.values()
+    return value
+
+
+def placed(step: Step, *places: tuple[float, float], heading: tuple[float, ...] = (), **further: Any) -> Step:
+    """A step on `ROUTE`: the other vehicle, then the ego."""
+    state = replace(step.traffic, position=np.array([[*place, 0.0] for place in places]), **further)
+    state = replace(state, heading=np.array(heading)) if heading else state
+    truth = replace(step.truth, route=ROUTE, carriageways=CARRIAGEWAYS)
+    return replace(step, traffic=state, truth=truth)
+
+
+def test_the_ego_is_known_by_its_name_and_by_its_id() -> None:
+    step = make_step(speed=25.0, acceleration=-1.5, route_position=100.0)
+    renamed = replace(step, traffic=replace(step.traffic, ids=("other", "car 7")))
+    for ego in ("ego", '"car 7"'):
+        assert read(f"{ego}.speed", renamed) == 25.0
+        assert read(f"{ego}.acceleration", renamed) == -1.5
+        assert read(f"{ego}.position", renamed) == 100.0
+    assert read("other.speed", renamed) == 20.0
+
+
+def test_who_is_not_on_the_road_has_no_value() -> None:
+    step = make_step()
+    for signal, found in SIGNALS.items():
+        name = signal.replace("X", "ghost").replace("Y", "ghost").replace("METHOD", "ghost").replace("ID", "ghost")
+        if "ghost" in name and name not in {"ghost.present", "ghost.collision"}:
+            assert read(name.replace("N", "0"), step) is None
+        elif found.kind is Kind.NUMBER:
+            assert isinstance(read(name, step), float | None), signal
+    assert read("ghost.present", step) is False
+    assert read("other.present", step) is True
+
+
+@pytest.mark.parametrize(
+    ("other", "heading", "gap", "ttc", "headway"),
+    [
+        # The ego is at 200 m with 25 m/s, vehicles are 4.6 m long, and the other drives 20 m/s.
+        ((260.0, -3.5), 0.0, 55.4, 55.4 / 5.0, 55.4 / 25.0),
+        ((150.0, 0.0), 0.0, -45.4, math.inf, 45.4 / 20.0),
+        ((202.0, -3.5), 0.0, 0.0, 0.0, 0.0),
+        # An oncoming one, whose front is nearer than its rear.
+        ((260.0, 7.0), math.pi, 60.0, 60.0 / 45.0, 60.0 / 25.0),
+        # Round the corner.
+        ((500.0, 300.0), math.pi / 2, 595.4, 595.4 / 5.0, 595.4 / 25.0),
+        ((260.0, 40.0), 0.0, None, None, None),
+    ],
+)
+def test_gaps_and_times_along_the_route(
+    other: tuple[float, float], heading: float, gap: float | None, ttc: float | None, headway: float | None
+) -> None:
+    step = placed(make_step(speed=25.0, route_position=200.0), other, (200.0, 0.0), heading=(heading, 0.0))
+    for signal, expected in (("gap", gap), ("ttc", ttc), ("headway", headway)):
+        found = read(f"{signal}(ego, other)", step)
+        assert found == (None if expected is None else pytest.approx(expected)), signal
+
+
+def test_the_gap_the_other_way_has_the_other_sign() -> None:
+    step = placed(make_step(speed=25.0, route_position=200.0), (260.0, 0.0), (200.0, 0.0))
+    assert read("gap(other, ego)", step) == pytest.approx(-55.4)
+    assert read("ttc(other, ego)", step) == pytest.approx(55.4 / 5.0)
+    assert read("distance(other, ego)", step) == pytest.approx(60.0)
+
+
+def test_places_count_as_the_egos_own_does() -> None:
+    """SUMO's way of the ego and the polyline may differ; the ego's own place is where SUMO has it."""
+    step = placed(make_step(route_position=230.0), (260.0, 0.0), (200.0, 0.0))
+    assert (read("ego.position", step), read("other.position", step)) == (230.0, pytest.approx(290.0))
+
+
+def test_on_a_lap_a_place_is_near_to_the_ego() -> None:
+    lap = np.array([[0.0, 0.0, 0.0], [400.0, 0.0, 0.0], [400.0, 10.0, 0.0], [0.0, 10.0, 0.0], [0.0, 0.0, 0.0]])
+    twice = np.concatenate((lap, lap[1:]))
+    step = placed(make_step(route_position=1020.0), (260.0, 0.0), (200.0, 0.0))
+    step = replace(step, truth=replace(step.truth, route=twice))
+    assert read("other.position", step) == pytest.approx(1080.0)
+
+
+@pytest.mark.parametrize(
+    ("lane", "value", "right", "left"),
+    [
+        ("motorway_1", LanePlace(0, 2), True, False),
+        ("wide_2", LanePlace(2, 3), False, True),
+        (":junction_0_1", LanePlace(1, None), None, None),
+        (":junction_0_0", LanePlace(0, None), True, False),
+        ("", None, None, None),
+    ],
+)
+def test_lanes(lane: str, value: LanePlace | None, right: bool | None, left: bool | None) -> None:
+    step = placed(make_step(), (60.0, 0.0), (0.0, 0.0), lane=(lane, "motorway_2"))
+    assert read("other.lane", step) == value
+    assert Watch(parse_condition("other.lane == right")).update(step) is right
+    assert Watch(parse_condition("other.lane == left")).update(step) is left
+    assert Watch(parse_condition("other.lane != left")).update(step) is (None if left is None else not left)
+    if value is not None:
+        assert Watch(parse_condition(f"other.lane == {value.number}")).update(step) is True
+
+
+def test_a_wider_road_is_no_change_of_lane() -> None:
+    watch = Watch(parse_condition("other.lane changes"))
+    lanes = ("motorway_1", "wide_0", "wide_1", "wide_1")
+    steps = [placed(make_step(i), (60.0, 0.0), (0.0, 0.0), lane=(lane, "motorway_1")) for i, lane in enumerate(lanes)]
+    assert [watch.update(step) for step in steps] == [False, False, True, False]
+
+
+def test_lamps() -> None:
+    step = make_step(lamps=Lamp.LOW_BEAM | Lamp.REAR_FOG)
+    assert read("ego.lamps", step) == read("lamps", step) == {"low_beam", "rear_fog"}
+    watch = Watch(parse_condition("lamps include rear_fog and not lamps include stop"))
+    assert watch.update(step) is True
+    assert watch.told() == "lamps = low_beam rear_fog"
+
+
+def test_advice() -> None:
+    step = make_step(advised=20.0)
+    heard = replace(step.traffic, advised_speed=np.array([math.inf, 20.0]))
+    assert read("advice", step) == 20.0
+    assert read("ego.advice", step) == math.inf
+    assert read("ego.advice", replace(step, traffic=heard)) == 20.0
+    alone = TrafficStep(
+        index=0, time=0.0, traffic=step.traffic, collisions=(), truth=step.truth, ending=None,
+        command=Command(SpeedAdvice(30.0), advised_speeds={"a": 25.0}, stretches=(StretchAdvice(22.0),)),
+    )  # fmt: skip
+    assert read("advice", alone) == 22.0
+    assert read("limit", alone) is None
+
+
+def test_the_leader() -> None:
+    near = make_step(speed=25.0, leader=Leader("other", 50.0, 20.0))
+    assert (read("ego.gap", near), read("ego.ttc", near), read("ego.headway", near)) == (50.0, 10.0, 2.0)
+    assert read("ego.leader", near) == "other"
+    alone = make_step()
+    assert (read("ego.gap", alone), read("ego.ttc", alone), read("ego.headway", alone)) == (math.inf,) * 3
+    assert Watch(parse_condition("ego.leader == none")).update(alone) is True
+    opening = make_step(speed=15.0, leader=Leader("other", 50.0, 20.0))
+    assert read("ego.ttc", opening) == math.inf
+
+
+def test_sight_and_stopping() -> None:
+    step = make_step(speed=20.0, visibility=150.0, visibility_ahead=90.0)
+    assert read("fog.visibility_at_camera", step) == pytest.approx(150.0)
+    assert read("fog.visibility_ahead", step) == pytest.approx(90.0)
+    assert read("ego.stopping_sight_distance", step) == pytest.approx(20.0 * 2.5 + 20.0**2 / 6.8)
+    assert Watch(parse_condition("ego.stopping_sight_distance <= fog.visibility_ahead")).update(step) is False
+    assert read("other.visibility", step) is None
+    eyes = replace(step.truth, vehicle_extinctions=np.array([0.03, 0.0]))
+    assert read("other.visibility", replace(step, truth=eyes)) == pytest.approx(math.log(20.0) / 0.03)
+    assert read("ego.visibility", replace(step, truth=eyes)) == math.inf
+
+
+def test_banks() -> None:
+    banks = tuple(FogBank((at, 0.0), (1.0, 0.0), 0.0, 100.0, 10.0, 0.02) for at in (0.0, 300.0))
+    fog = FogField(0.001, (1.0, 1.0, 1.0), banks)
+    step = placed(make_step(), (350.0, 0.0), (150.0, 0.0))
+    step = replace(step, truth=replace(step.truth, fog=fog))
+    assert [read(f"fog.bank({n})", step) for n in (0, 1, 2)] == [False, False, None]
+    assert [read(f"fog.bank({n}, other)", step) for n in (0, 1)] == [False, True]
+
+
+def test_estimates_and_belief() -> None:
+    estimates = (estimate("joint_road", 80.0), Estimate.invalid("negru2013", "no band"))
+    step = make_step(visibility=100.0, estimates=estimates)
+    assert read("estimate(joint_road).visibility", step) == pytest.approx(80.0)
+    assert read("estimate(mine.py:joint_road).error", step) == pytest.approx(0.2)
+    assert read("estimate(negru2013).visibility", step) is None
+    assert read("estimate(negru2013).valid", step) is False
+    low, middle, high = (read(f"belief.{name}", step) for name in ("low", "visibility", "high"))
+    assert isinstance(middle, float)
+    assert low < middle < high  # type: ignore[operator]  # numbers, as the one between them is
+    assert read("belief.error", step) == pytest.approx(abs(middle / 100.0 - 1.0))
+    assert read("belief.error", make_step(visibility=math.inf, estimates=estimates)) is None
+    assert read("belief.visibility", make_step()) is None
+
+
+def test_what_has_happened_stays_so() -> None:
+    watch = Watch(parse_condition("other.collision and collisions == 1 and happened(timeline.0)"))
+    hit = {"collisions": (Collision(0.0, "ego", "other", 2.0),)}
+    first: Mapping[str, Any] = {"begun": (Begun("timeline.0", 0.0),)}
+    steps = [make_step(0), replace(make_step(1), **first), make_step(2, **hit), make_step(3, **hit)]
+    assert [watch.update(step) for step in steps] == [False, False, True, True]
+
+
+def test_the_light_ahead() -> None:
+    ahead = SignalAhead("C", SignalColour.RED, 40.0)
+    step = replace(make_step(), signal_ahead=ahead)
+    assert Watch(parse_condition("signal(C).state == red")).update(step) is True
+    assert Watch(parse_condition("signal(D).state == red")).update(step) is None
+    assert read("signal(C).distance", step) == 40.0
+
+
+def test_signals_of_a_run() -> None:
+    step = make_step(time=3.0)
+    assert read("time", step) == 3.0
+    assert read("ending", step) is None
+    assert read("limit", step) == pytest.approx(130 / 3.6)
+
+
+def test_traffic_is_of_the_synthetic_kind() -> None:
+    """The lane ids and sizes that the tests above go by."""
+    assert traffic(0.0, 1.0).lane[0] == "motorway_1"
+    assert traffic(0.0, 1.0).length[0] == 4.6

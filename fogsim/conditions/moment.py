@@ -17,7 +17,7 @@ class Moment:
     collisions : set of tuple of str
         Pairs that have hit each other so far.
     begun : set of str
-        What of the script has begun so far.
+        What of the script has begun so far, by its names and by its places in the scenario.
     route : Route or None
         The way along which places count.
     """
@@ -115,7 +115,8 @@ class History:
             The step.
         """
         self._collisions |= {(hit.collider, hit.victim) for hit in step.collisions}
-        self._begun |= {name for begun in step.begun for name in (begun.name, begun.key)}
+        begun = [one for one in step.begun if not one.is_over]
+        self._begun |= {name for one in begun for name in (one.name, one.key)}
         points = step.truth.route
         if points is not None and len(points) > 1 and (self._route is None or self._route.points is not points):
             self._route = Route(points)

@@ -202,7 +202,7 @@ class _Text:
             arguments = self._arguments()
             attribute = self._take(re.compile(r"\.[A-Za-z_]\w*"))
             return self._call(name, arguments, attribute)
-        if name in SIGNALS:
+        if name in SIGNALS and not SIGNALS[name].places:
             return Reference(name)
         vehicle, _, attribute = name.rpartition(".")
         return self._found(f"X.{attribute}", (vehicle,), name) if vehicle else self._unknown(name)

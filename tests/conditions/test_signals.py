@@ -211,11 +211,13 @@ def test_estimates_and_belief() -> None:
 
 
 def test_what_has_happened_stays_so() -> None:
-    watch = Watch(parse_condition("other.collision and collisions == 1 and happened(timeline.0)"))
+    watch = Watch(parse_condition("other.collision and collisions == 1 and happened(timeline.0) and happened(cut)"))
     hit = {"collisions": (Collision(0.0, "ego", "other", 2.0),)}
-    first: Mapping[str, Any] = {"begun": (Begun("timeline.0", 0.0),)}
+    first: Mapping[str, Any] = {"begun": (Begun("cut", 0.0, key="timeline.0"), Begun("end", 0.0, is_over=True))}
     steps = [make_step(0), replace(make_step(1), **first), make_step(2, **hit), make_step(3, **hit)]
     assert [watch.update(step) for step in steps] == [False, False, True, True]
+    over = Watch(parse_condition("happened(end)"))
+    assert [over.update(step) for step in steps] == [False] * 4
 
 
 def test_the_light_ahead() -> None:

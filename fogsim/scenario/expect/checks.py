@@ -50,21 +50,11 @@ def run_content(scenario: "Scenario") -> RunContent:
         frozenset(need for need, is_there in has.items() if is_there),
         methods,
         len(scenario.fog.banks),
-        known_events(scenario),
+        (
+            *(f"timeline.{number}" for number in range(len(scenario.timeline))),
+            *(entry.name for entry in scenario.timeline if entry.name),
+        ),
     )
-
-
-def known_events(scenario: "Scenario") -> tuple[str, ...]:
-    """Names of what can begin in a scenario.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
-    timeline = getattr(scenario, "timeline", ())
-    named = [getattr(entry, "name", None) for entry in timeline]
-    return (*(f"timeline.{place}" for place in range(len(timeline))), *(name for name in named if name))
 
 
 def expectation_mistakes(

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from fogsim.study.plan import StudyRun
 from fogsim.testing.collection import FogTest, label_of
-from fogsim.testing.expecting import Finding
+from fogsim.testing.expecting import Finding, FindingVerdict
 from fogsim.testing.judgement import Judgement, Outcome
 from fogsim.testing.results import CaseResult
 from fogsim.testing.session import FileOutcome
@@ -39,6 +39,27 @@ def judgement_text(judgement: Judgement) -> str:
     if judgement.outcome is Outcome.PASSED:
         return f"expected {judgement.telling.expected}; {judgement.why}"
     return f"{judgement.why}; {label_of(judgement.run)}: {finding_text(judgement.telling)}"
+
+
+def case_lines(outcome: FileOutcome, judgement: Judgement) -> list[str]:
+    """A line for each case that did not pass a clause; none for a file of one case.
+
+    Parameters
+    ----------
+    outcome : FileOutcome
+        What came of a test.
+    judgement : Judgement
+        One of its clauses.
+    """
+    if len(outcome.results) == 1:
+        return []
+    return [
+        f"{label_of(result.run)}: {finding.verdict}: {finding_text(finding)}"
+        for result in outcome.results
+        for finding in result.findings
+        if (finding.name, finding.clause) == (judgement.name, judgement.clause)
+        and finding.verdict is not FindingVerdict.PASSED
+    ]
 
 
 def broken_text(broken: Sequence[CaseResult]) -> str:

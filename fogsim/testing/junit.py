@@ -1,0 +1,100 @@
+"""What came of tests as JUnit's XML, as CI servers read it: a suite for each file, a case for each clause.
+
+By the schema of Jenkins' xUnit plugin (junit-10.xsd), which GitLab and GitHub's actions read too. What is inconclusive
+is a failure there, since those servers take what is skipped for fine.
+"""
+
+import platform
+import re
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+from fogsim.files.atomic import write_text
+from fogsim.testing.judgement import Judgement, Outcome
+from fogsim.testing.results import CaseResult
+from fogsim.testing.session import FileOutcome
+from fogsim.testing.wording import broken_text, case_lines, command_text, judgement_text
+
+_NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""Characters that XML 1.0 cannot hold."""
+
+
+def write_junit(path: Path, outcomes: Sequence[FileOutcome], settings: Sequence[str] = ()) -> None:
+    """Write what came of tests.
+
+    Parameters
+    ----------
+    path : Path
+        The file; its folder is made where it is not there.
+    outcomes : sequence of FileOutcome
+        What came of the tests.
+    settings : sequence of str
+        What ``--set`` put in place of the files' values, for the commands that run a case again.
+    """
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    suites = [_suite(one, settings, now) for one in outcomes]
+    counted = {key: str(sum(int(one.attrib[key]) for one in suites)) for key in ("tests", "failures", "errors")}
+    seconds = _seconds(sum(one.duration for one in outcomes))
+    root = ET.Element("testsuites", {"name": "fogsim", "time": seconds, **counted})
+    root.extend(suites)
+    ET.indent(root)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_text(path, f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n')
+
+
+def _suite(outcome: FileOutcome, settings: Sequence[str], now: str) -> ET.Element:
+    outcomes = [one.outcome for one in outcome.judgements]
+    suite = ET.Element(
+        "testsuite",
+        name=_text(outcome.test.name),
+        tests=str(len(outcomes) + bool(outcome.broken)),
+        failures=str(sum(one is not Outcome.PASSED for one in outcomes)),
+        errors=str(int(bool(outcome.broken))),
+        skipped="0",
+        time=_seconds(outcome.duration),
+        timestamp=now,
+        hostname=platform.node(),
+        file=_text(str(outcome.test.path)),
+    )
+    suite.extend(_clause(outcome, one, settings) for one in outcome.judgements)
+    if outcome.broken:
+        suite.append(_broken(outcome, outcome.broken, settings))
+    return suite
+
+
+def _clause(outcome: FileOutcome, judgement: Judgement, settings: Sequence[str]) -> ET.Element:
+    # The runs are those of all clauses: each has its share of their time.
+    share = outcome.duration / (len(outcome.judgements) + bool(outcome.broken))
+    case = _case(outcome, judgement.title, share)
+    told = judgement_text(judgement)
+    if judgement.outcome is not Outcome.PASSED:
+        failure = ET.SubElement(case, "failure", type=str(judgement.outcome), message=_text(told))
+        where = outcome.test.lines[judgement.name]
+        failure.text = _text(f"{where}\n{told}\n{command_text(outcome.test, judgement.run, settings)}\n")
+    lines = case_lines(outcome, judgement)
+    if lines:
+        ET.SubElement(case, "system-out").text = _text("\n".join(lines) + "\n")
+    return case
+
+
+def _broken(outcome: FileOutcome, broken: Sequence[CaseResult], settings: Sequence[str]) -> ET.Element:
+    case = _case(outcome, "run", outcome.duration / (len(outcome.judgements) + 1))
+    told = broken_text(broken)
+    error = ET.SubElement(case, "error", type="error", message=_text(told))
+    error.text = _text(f"{outcome.test.path}\n{told}\n{command_text(outcome.test, broken[0].run, settings)}\n")
+    return case
+
+
+def _case(outcome: FileOutcome, name: str, seconds: float) -> ET.Element:
+    attributes = {"classname": _text(str(outcome.test.path)), "name": _text(name), "time": _seconds(seconds)}
+    return ET.Element("testcase", attributes)
+
+
+def _text(text: str) -> str:
+    return _NO_XML.sub(lambda found: f"\\x{ord(found[0]):02x}", text)
+
+
+def _seconds(seconds: float) -> str:
+    return f"{seconds:.3f}"

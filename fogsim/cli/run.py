@@ -12,12 +12,13 @@ from rich.table import Table
 from fogsim.cli.printing import INTERRUPTED, escape, stderr, stdout
 from fogsim.cli.progress import SimulationProgress
 from fogsim.cli.scenario_options import (
+    CaseValues,
     EgoId,
     HomogeneousVisibility,
     ScenarioName,
     Settings,
     SumoConfiguration,
-    chosen_scenario,
+    chosen_case,
 )
 from fogsim.errors import InputError, UnplayedWarning
 
@@ -61,8 +62,13 @@ def run_command(
     sumocfg: SumoConfiguration = None,
     ego: EgoId = None,
     visibility: HomogeneousVisibility = None,
-    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same run, bit for bit.")] = 0,
-    out: Annotated[Path | None, typer.Option(help="Directory for the results. [runs/SCENARIO-seedN]")] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="The same seed gives the same run, bit for bit. [0, or the case's]")
+    ] = None,
+    case: CaseValues = "",
+    out: Annotated[
+        Path | None, typer.Option(help="Directory for the results. [runs/SCENARIO-seedN, runs/SCENARIO-CASE]")
+    ] = None,
     settings: Settings = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace results that are there already.")] = False,
     video: Annotated[
@@ -74,7 +80,7 @@ def run_command(
     """Run a scenario and write manifest.json, steps.parquet, metrics.json, video.mp4 and report.html."""
     from fogsim.recording import record_run, record_traffic
 
-    loaded = chosen_scenario(scenario, sumocfg, ego, visibility, settings)
+    loaded, of_file = chosen_case(scenario, sumocfg, ego, visibility, settings, case, seed)
     chosen = {
         "table": True,
         "video": _filmed(loaded, video),
@@ -82,13 +88,13 @@ def run_command(
         "trajectories": trajectories,
     }
     record = record_run if loaded.traffic.has_ego else record_traffic
-    directory = out or Path("runs", f"{loaded.name}-seed{seed}")
+    directory = out or Path("runs", f"{loaded.name}-{of_file.folder_name}")
     with warnings.catch_warnings(), SimulationProgress(stderr, loaded.duration_s) as progress:
         # The summary names all of it.
         warnings.simplefilter("ignore", UnplayedWarning)
         result = record(
             loaded,
-            seed,
+            of_file.seed,
             directory,
             overwrite=overwrite,
             recorders=[name for name, wanted in chosen.items() if wanted],

@@ -11,6 +11,7 @@ from fogsim.errors import InputError
 
 if TYPE_CHECKING:
     from fogsim.scenario import Scenario
+    from fogsim.scenario.variation import Case
 
 SCENARIO_HELP = "A scenario of the catalogue (fogsim list), a file or a folder."
 
@@ -22,6 +23,10 @@ HomogeneousVisibility = Annotated[
 ]
 Settings = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY.PATH=VALUE", help="Put a value in place of the file's.")
+]
+
+CaseValues = Annotated[
+    str, typer.Option("--case", metavar="NAME=VALUE,…", help="Only cases of a file that varies with these values.")
 ]
 
 
@@ -48,21 +53,55 @@ def chosen_scenario(
     InputError
         If neither or both are given, something is missing, or the scenario cannot be loaded.
     """
-    from fogsim.scenario import load_scenario, scenario_from_config
+    return chosen_case(name, sumocfg, ego, visibility, settings, "", None)[0]
+
+
+def chosen_case(
+    name: str | None,
+    sumocfg: Path | None,
+    ego: str | None,
+    visibility: float | None,
+    settings: Sequence[str] | None,
+    case: str,
+    seed: int | None,
+) -> "tuple[Scenario, Case]":
+    """Scenario of a name or of a SUMO configuration, and the case of it that is to be run.
+
+    Parameters
+    ----------
+    name, sumocfg, ego, visibility, settings
+        As of `chosen_scenario`.
+    case : str
+        Which case of a file that varies something, ``name=value`` with commas between; empty for the first.
+    seed : int or None
+        Seed of the run; None for the case's, which is 0 where a file varies no seeds.
+
+    Raises
+    ------
+    InputError
+        As of `chosen_scenario`, or if there is no such case, or it has another seed.
+    """
+    from fogsim.scenario import scenario_from_config
+    from fogsim.scenario.loading import load_cases
+    from fogsim.scenario.variation import Case
 
     settings = settings or ()
     fog = [] if visibility is None else [f"fog.visibility_m={visibility!r}"]
     if sumocfg is not None and name is None:
         if ego is None:
             raise InputError(
-                f"--sumocfg {sumocfg}: --ego is missing: which vehicle is the ego? For traffic alone write --ego none"
+                f"--sumocfg {sumocfg}: --ego is missing: which vehicle is the ego? Traffic alone is for fogsim study"
             )
         if not fog and not any(setting.startswith("fog.") for setting in settings):
             raise InputError(f"--sumocfg {sumocfg}: --visibility is missing, or a fog by --set fog.…")
-        return scenario_from_config(sumocfg, ego, [*fog, *settings])
+        if case:
+            raise InputError(f"--case {case}: a SUMO configuration has no cases; a scenario file that varies has")
+        return scenario_from_config(sumocfg, ego, [*fog, *settings]), Case({}, seed or 0)
     if name is not None and sumocfg is None:
         if name.endswith(".sumocfg"):
             raise InputError(f"{name} is a SUMO configuration, not a scenario: run it with --sumocfg {name} --ego ID")
-        return load_scenario(name, [*fog, *([] if ego is None else [f"traffic.ego={json.dumps(ego)}"]), *settings])
+        changed = [*fog, *([] if ego is None else [f"traffic.ego={json.dumps(ego)}"]), *settings]
+        chosen, scenario = load_cases(name, changed, case, seed).cases[0]
+        return scenario, chosen
     given = "neither" if name is None else f"both: {name} and --sumocfg {sumocfg}"
     raise InputError(f"expected either a scenario or --sumocfg FILE, got {given}")

@@ -10,10 +10,10 @@ import typer
 
 from fogsim.cli.printing import INTERRUPTED, escape, stderr, stdout
 from fogsim.cli.progress import STARTING, progress_bar
-from fogsim.cli.scenario_options import Settings
+from fogsim.cli.scenario_options import CaseValues, Settings
 
 if TYPE_CHECKING:
-    from fogsim.testing import FileOutcome
+    from fogsim.testing import FileOutcome, FogTest
 
 NOT_PASSED = 1
 """Exit code if something failed, was inconclusive, or a run went wrong."""
@@ -22,6 +22,7 @@ NOTHING_COLLECTED = 5
 """Exit code if there was no test, as of pytest."""
 
 _COLOURS = {"passed": "green", "failed": "red", "inconclusive": "yellow", "error": "red"}
+_INDENT = " " * 15
 
 
 def check_command(
@@ -30,66 +31,123 @@ def check_command(
     processes: Annotated[
         int | None, typer.Option("-j", "--processes", min=1, help="Runs at once. [one a core]")
     ] = None,
+    junit: Annotated[Path | None, typer.Option(help="Write JUnit's XML, for CI servers, to this file.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a page with plots and videos to this file.")] = None,
     keywords: Annotated[
         str | None, typer.Option("-k", help="Only expectations whose names fit: fog and not (night or truck).")
     ] = None,
-    case: Annotated[str, typer.Option(help="Only cases with these values: strength=0.7,run=3.")] = "",
+    case: CaseValues = "",
     exit_first: Annotated[bool, typer.Option("-x", help="End with the first case that fails.")] = False,
-    of_last: Annotated[bool, typer.Option("--lf", help="Only what did not pass in the last call.")] = False,
+    of_last: Annotated[bool, typer.Option("--lf", help="Only cases that did not pass in the last call.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on where a call was cut off.")] = False,
+    shrink: Annotated[bool, typer.Option("--shrink", help="Look for the smallest case of what failed.")] = False,
+    evidence: Annotated[bool, typer.Option(help="Keep a video and plots of what did not pass.")] = True,
     settings: Settings = None,
 ) -> None:
-    """Run scenario files with `expect:` and tell whether they pass: exit code 0, 1, 2 (bad input) or 5 (no tests)."""
-    from fogsim.study.pool import ProcessPool
-    from fogsim.testing import collect, find_files, last_failed, only_cases, parse_keywords, run_tests
-    from fogsim.testing.execution import check_to_file
+    """Run scenario files with `expect:`, and exit with 0 (passed), 1 (not), 2 (bad input) or 5 (no tests)."""
+    from fogsim.testing.artefacts import keep_artefacts
+    from fogsim.testing.junit import write_junit
+    from fogsim.testing.page import PageContent, write_page
+    from fogsim.testing.wording import totals_text
+
+    begun, chosen = time.monotonic(), settings or []
+    tests = _asked_for(files or ["."], keywords, case, chosen, out if of_last else None)
+    number = processes or os.cpu_count() or 1
+    try:
+        outcomes = _run(tests, out, number, resume=resume, exit_first=exit_first)
+        kept = keep_artefacts(outcomes, out, number) if evidence else {}
+        for outcome in outcomes:
+            _print_outcome(outcome, chosen)
+            if shrink:
+                _print_smallest(outcome, chosen, out)
+    except KeyboardInterrupt:
+        stdout.print("Interrupted; cases that are done are kept, and the same command with --resume goes on.")
+        raise typer.Exit(INTERRUPTED) from None
+    seconds = time.monotonic() - begun
+    stdout.print(f"\n{totals_text(outcomes, seconds)}")
+    if junit is not None:
+        write_junit(junit, outcomes, chosen)
+    if html is not None:
+        write_page(html, PageContent(outcomes, kept, seconds, chosen))
+    for path in [*(one for found in kept.values() for one in found.files), junit, html]:
+        if path is not None:
+            stdout.print(f"  {escape(path)}", soft_wrap=True)
+    _annotate(outcomes, chosen)
+    if not all(one.is_passed for one in outcomes):
+        raise typer.Exit(NOT_PASSED)
+
+
+def _asked_for(
+    files: Sequence[str], keywords: str | None, case: str, settings: Sequence[str], failed_in: Path | None
+) -> "list[FogTest]":
+    from fogsim.testing import collect, find_files, last_failed, only_cases, parse_keywords
 
     asked = None if keywords is None else parse_keywords(keywords)
-    found = find_files(files or ["."])
-    tests = collect(found, settings or (), case, asked)
-    noted = last_failed(out) if of_last else {}
+    found = find_files(files)
+    tests = collect(found, settings, case, asked)
+    noted = {} if failed_in is None else last_failed(failed_in)
     # As of pytest: where nothing has failed, all is run.
     tests = only_cases(tests, noted) if noted else tests
     if not tests:
         stdout.print(f"No tests: none of {len(found)} files expects anything that was asked for.")
         raise typer.Exit(NOTHING_COLLECTED)
-    total, begun = sum(len(test.runs) for test in tests), time.monotonic()
-    try:
-        with progress_bar(stderr, stays=True) as progress:
-            task = progress.add_task(STARTING, total=total)
-
-            def show(done: int, failed: int) -> None:
-                said = f", {failed} failed" if failed else ""
-                progress.update(task, completed=done, description=f"{done} of {total} runs{said}")
-
-            engine = ProcessPool(processes or os.cpu_count() or 1, check_to_file)
-            outcomes = run_tests(tests, out, engine, resume=resume, first_failure_ends=exit_first, watch=show)
-    except KeyboardInterrupt:
-        stdout.print("Interrupted; cases that are done are kept, and the same command with --resume goes on.")
-        raise typer.Exit(INTERRUPTED) from None
-    _print_outcomes(outcomes, settings or ())
-    from fogsim.testing.wording import totals_text
-
-    stdout.print(f"\n{totals_text(outcomes, time.monotonic() - begun)}")
-    if not all(one.is_passed for one in outcomes):
-        raise typer.Exit(NOT_PASSED)
+    return tests
 
 
-def _print_outcomes(outcomes: Sequence["FileOutcome"], settings: Sequence[str]) -> None:
+def _run(
+    tests: "Sequence[FogTest]", out: Path, processes: int, *, resume: bool, exit_first: bool
+) -> "list[FileOutcome]":
+    from fogsim.study.pool import ProcessPool
+    from fogsim.testing import run_tests
+    from fogsim.testing.execution import check_to_file
+
+    total = sum(len(test.runs) for test in tests)
+    with progress_bar(stderr, stays=True) as progress:
+        task = progress.add_task(STARTING, total=total)
+
+        def show(done: int, failed: int) -> None:
+            said = f", {failed} failed" if failed else ""
+            progress.update(task, completed=done, description=f"{done} of {total} runs{said}")
+
+        engine = ProcessPool(processes, check_to_file)
+        return run_tests(tests, out, engine, resume=resume, first_failure_ends=exit_first, watch=show)
+
+
+def _print_outcome(outcome: "FileOutcome", settings: Sequence[str]) -> None:
     from fogsim.testing.wording import broken_text, command_text, judgement_text
 
-    for one in outcomes:
-        number = len(one.results)
-        cases = "1 case" if number == 1 else f"{number} cases"
-        stdout.print(f"[bold]{escape(one.test.path)}[/] ({escape(one.test.name)}, {cases})", soft_wrap=True)
-        for judgement in one.judgements:
-            _print_line(judgement.outcome, f"{judgement.title}: {judgement_text(judgement)}")
-            if judgement.outcome != "passed":
-                stdout.print(f"{'':15}{escape(command_text(one.test, judgement.run, settings))}", soft_wrap=True)
-        if one.broken:
-            _print_line("error", broken_text(one.broken))
-            stdout.print(f"{'':15}{escape(command_text(one.test, one.broken[0].run, settings))}", soft_wrap=True)
+    number, test = len(outcome.results), outcome.test
+    cases = "1 case" if number == 1 else f"{number} cases"
+    stdout.print(f"[bold]{escape(test.path)}[/] ({escape(test.name)}, {cases})", soft_wrap=True)
+    for judgement in outcome.judgements:
+        _print_line(judgement.outcome, f"{judgement.title}: {judgement_text(judgement)}")
+        if judgement.outcome != "passed":
+            stdout.print(f"{_INDENT}{escape(command_text(test, judgement.run, settings))}", soft_wrap=True)
+    if outcome.broken:
+        _print_line("error", broken_text(outcome.broken))
+        stdout.print(f"{_INDENT}{escape(command_text(test, outcome.broken[0].run, settings))}", soft_wrap=True)
 
 
 def _print_line(outcome: str, told: str) -> None:
     stdout.print(f"  [{_COLOURS[outcome]}]{outcome.upper():13}[/]{escape(told)}", soft_wrap=True)
+
+
+def _print_smallest(outcome: "FileOutcome", settings: Sequence[str], out: Path) -> None:
+    from fogsim.study.pool import ProcessPool
+    from fogsim.testing.execution import check_to_file
+    from fogsim.testing.shrinking import shrink, smallest_text
+
+    for judgement in outcome.judgements:
+        if len(outcome.results) > 1 and judgement.numbers[1]:
+            found = shrink(outcome, judgement, settings, ProcessPool(1, check_to_file), out / "results")
+            told = smallest_text(outcome.test, found, settings)
+            stdout.print(f"{_INDENT}{escape(f'{judgement.title}: {told}')}", soft_wrap=True)
+
+
+def _annotate(outcomes: "Sequence[FileOutcome]", settings: Sequence[str]) -> None:
+    """Tell GitHub, where it runs this, on which lines what did not pass stands."""
+    from fogsim.testing.annotations import annotations
+
+    if os.environ.get("GITHUB_ACTIONS") == "true":
+        for line in annotations(outcomes, settings):
+            typer.echo(line)

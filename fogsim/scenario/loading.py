@@ -136,7 +136,9 @@ class ScenarioCases:
     cases: tuple[tuple[Case, Scenario], ...]
 
 
-def load_cases(name_or_path: str | Path, overrides: Iterable[str] = (), wanted: str = "") -> ScenarioCases:
+def load_cases(
+    name_or_path: str | Path, overrides: Iterable[str] = (), wanted: str = "", seed: int | None = None
+) -> ScenarioCases:
     """Load and check the cases of a scenario file; one that varies nothing has one.
 
     Parameters
@@ -147,6 +149,8 @@ def load_cases(name_or_path: str | Path, overrides: Iterable[str] = (), wanted: 
         As of `load_scenario`.
     wanted : str
         Which cases, ``name=value`` with commas between; empty for all.
+    seed : int or None
+        Seed of the runs; None for those of the cases.
 
     Raises
     ------
@@ -158,7 +162,7 @@ def load_cases(name_or_path: str | Path, overrides: Iterable[str] = (), wanted: 
     variation = read_variation(document)
     checked: dict[str, Scenario] = {}
     cases = []
-    for case in chosen_cases(variation, wanted, path):
+    for case in chosen_cases(variation, wanted, path, seed):
         put = with_case(document, case)
         # What differs in its seed alone is the same scenario.
         key = json.dumps(put.data)

@@ -1,7 +1,38 @@
 """What is kept of a case that failed: a video around the failure, and a plot of what was looked at."""
 
-from dataclasses import dataclass
+import hashlib
+import re
+import shutil
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+from fogsim.conditions import Condition
+from fogsim.expectations import Always, Eventually, Finding, Whenever
+from fogsim.files.atomic import write_json, write_text
+from fogsim.loop import run
+from fogsim.metrics import step_metrics
+from fogsim.recorders import VideoRecorder
+from fogsim.scenario import Scenario, build
+from fogsim.scenario.expect.schema import clauses_of
+from fogsim.scenario.schema import NO_RENDERER
+from fogsim.study.plan import StudyRun
+from fogsim.study.pool import ProcessPool
+from fogsim.testing.collection import FogTest, label_of
+from fogsim.testing.judgement import Outcome
+from fogsim.testing.session import FileOutcome
+from fogsim.testing.signal_plot import SignalLog, plot_signals
+from fogsim.traffic_run import run_traffic
+from fogsim.values import Step, TrafficStep
+
+BEFORE, AFTER = 6.0, 2.0
+"""How long before a failure its video begins, and how long after it it ends [s]."""
+
+_VIDEO = "video.mp4"
+
+FOLDER = "failures"
+"""Folder in the directory of the tests."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,3 +49,150 @@ class Artefacts:
 
     plot: Path | None = None
     video: Path | None = None
+
+    @property
+    def files(self) -> list[Path]:
+        """Those that are there."""
+        return [one for one in (self.plot, self.video) if one is not None]
+
+
+Kept = Mapping[tuple[str, str, str], Artefacts]
+"""What was kept, by key of the run, name and clause."""
+
+
+def keep_artefacts(outcomes: Sequence[FileOutcome], out: Path, processes: int) -> Kept:
+    """Run the telling case of each clause again that did not pass, and keep what it looked like.
+
+    The same seed gives the same run; one that was inconclusive shows what did not come.
+
+    Parameters
+    ----------
+    outcomes : sequence of FileOutcome
+        What came of the tests.
+    out : Path
+        Directory of the tests.
+    processes : int
+        Runs at once.
+    """
+    told: dict[str, tuple[StudyRun, list[Finding]]] = {}
+    for one in outcomes:
+        for judgement in one.judgements:
+            if judgement.outcome is not Outcome.PASSED:
+                name = _folder_name(one.test, judgement.run)
+                told.setdefault(name, (judgement.run, []))[1].append(judgement.telling)
+    folder = out / FOLDER
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    work = KeepFailures({name: tuple(findings) for name, (_, findings) in told.items()})
+    ProcessPool(processes, work).run(
+        [replace(run, key=name) for name, (run, _) in told.items()], folder, lambda *_: None
+    )
+    return {
+        (run.key, finding.name, finding.clause): Artefacts(
+            _if_there(folder / name / f"{title_of(finding)}.svg"), _if_there(folder / name / _VIDEO)
+        )
+        for name, (run, findings) in told.items()
+        for finding in findings
+    }
+
+
+def _folder_name(test: FogTest, run: StudyRun) -> str:
+    digest = hashlib.sha256(str(test.path.resolve()).encode()).hexdigest()[:6]
+    return re.sub(r"[^A-Za-z0-9_.,=-]", "_", f"{test.name}-{digest}-{label_of(run)}".rstrip("-"))[:150]
+
+
+def title_of(finding: Finding) -> str:
+    """Name of an expectation and its clause, as files are named.
+
+    Parameters
+    ----------
+    finding : Finding
+        The finding.
+    """
+    return re.sub(r"[^A-Za-z0-9_.-]", "_", f"{finding.name}.{finding.clause}")
+
+
+def _if_there(path: Path) -> Path | None:
+    return path if path.is_file() else None
+
+
+@dataclass(frozen=True, slots=True)
+class KeepFailures:
+    """Runs cases again up to shortly after their failures, and keeps videos and plots.
+
+    Attributes
+    ----------
+    findings : mapping from str to tuple of Finding
+        What failed, by the name of the folder.
+    """
+
+    findings: Mapping[str, tuple[Finding, ...]]
+
+    def __call__(self, scenario: Scenario, seed: int, result: Path) -> str | None:
+        """Run a case again.
+
+        Parameters
+        ----------
+        scenario : Scenario
+            With what it expects.
+        seed : int
+            Seed of its run.
+        result : Path
+            File that says when it is done; the folder of its name beside it has the rest.
+
+        Returns
+        -------
+        str or None
+            What went wrong with it.
+        """
+        folder = result.with_suffix("")
+        folder.mkdir(exist_ok=True)
+        message = None
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)
+                _keep(scenario, seed, self.findings[folder.name], folder)
+        except Exception as error:  # noqa: BLE001 - the test has failed for its own reasons, and this is but a picture
+            message = f"{type(error).__name__}: {error}"
+        write_json(result, {"message": message})
+        return message
+
+
+def conditions_of(scenario: Scenario, finding: Finding) -> Iterator[Condition]:
+    """Conditions of the clause that a finding is about.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        With what it expects.
+    finding : Finding
+        The finding.
+    """
+    for clause in clauses_of(scenario.expect):
+        if (clause.name, clause.clause) == (finding.name, finding.clause):
+            if isinstance(clause, Whenever):
+                yield from (clause.trigger, clause.require)
+            elif isinstance(clause, Always | Eventually):
+                yield clause.condition
+                yield from () if clause.during is None else (clause.during,)
+
+
+def _keep(scenario: Scenario, seed: int, findings: Sequence[Finding], folder: Path) -> None:
+    instants = [one.time for one in findings if one.time is not None]
+    logs = {title_of(one): SignalLog(conditions_of(scenario, one)) for one in findings}
+    has_frames = scenario.traffic.has_ego and scenario.renderer != NO_RENDERER
+    steps: Iterable[TrafficStep] = run(scenario, seed) if scenario.traffic.has_ego else run_traffic(scenario, seed)
+    video = VideoRecorder(folder / _VIDEO, scenario.clocks.camera_period_s) if has_frames and instants else None
+    standard = build.safety_standard(scenario)
+    for step in steps:
+        for log in logs.values():
+            log.update(step)
+        if video is not None and isinstance(step, Step) and -BEFORE <= step.time - min(instants) <= AFTER:
+            video.record(step, step_metrics(step, standard))
+        if instants and step.time >= max(instants) + AFTER:
+            break
+    if video is not None:
+        video.close(complete=True)
+    for title, log in logs.items():
+        if log.values:
+            write_text(folder / f"{title}.svg", plot_signals(log, title, instants))

@@ -10,7 +10,7 @@ from fogsim.errors import InputError
 from fogsim.scenario import build, resolved
 from fogsim.scenario.document import read_document
 from fogsim.scenario.loading import SCENARIO_FILE, ScenarioCases, load_cases, scenario_file
-from fogsim.scenario.variation import NONE_FAILS, Verdict, value_text
+from fogsim.scenario.variation import NONE_FAILS, Verdict
 from fogsim.study.plan import StudyRun, file_digests
 from fogsim.testing.keywords import Keywords
 
@@ -132,8 +132,7 @@ def _runs(file: Path, loaded: ScenarioCases) -> Iterator[StudyRun]:
             described[id(scenario)] = json.dumps(told, sort_keys=True)
         text = f"{file.resolve()} {described[id(scenario)]} {case.label} {case.seed}"
         key = hashlib.sha256(text.encode()).hexdigest()[:20]
-        levels = {name: value_text(value) for name, value in case.values.items()}
-        yield StudyRun(number, levels, case.seed, scenario, key)
+        yield StudyRun(number, case.levels, case.seed, scenario, key)
 
 
 def only_cases(tests: Iterable[FogTest], wanted: Mapping[Path, Sequence[str]]) -> list[FogTest]:

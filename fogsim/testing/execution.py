@@ -6,12 +6,13 @@ from pathlib import Path
 from typing import Any
 
 from fogsim.errors import FogSimError, UnplayedWarning
+from fogsim.expectations import ExpectationWatch
 from fogsim.files.atomic import write_json
 from fogsim.loop import run
 from fogsim.metrics import RunMetrics, TrafficRunMetrics
 from fogsim.scenario import Scenario, build
+from fogsim.scenario.expect.schema import clauses_of
 from fogsim.study.execution import failure, flat_metrics
-from fogsim.testing.expecting import watch_of
 from fogsim.testing.results import finding_to_json
 from fogsim.traffic_run import run_traffic
 
@@ -33,7 +34,7 @@ def check_case(scenario: Scenario, seed: int, sumo_outputs: Path | None = None) 
     dict
         ``findings``, ``metrics`` and ``ending``, as JSON has them.
     """
-    standard, watch = build.safety_standard(scenario), watch_of(scenario)
+    standard, watch = build.safety_standard(scenario), ExpectationWatch(clauses_of(scenario.expect))
     ending = None
     with warnings.catch_warnings():
         # What was not played is for the expectations to say.
@@ -52,9 +53,9 @@ def check_case(scenario: Scenario, seed: int, sumo_outputs: Path | None = None) 
                 watch.update(instant)
                 ending = instant.ending
             summary = of_traffic.summary()
-    metrics = flat_metrics(summary.to_json())
+    metrics = summary.to_json()
     findings = [finding_to_json(one) for one in watch.findings(metrics)]
-    return {"findings": findings, "metrics": metrics, "ending": ending}
+    return {"findings": findings, "metrics": flat_metrics(metrics), "ending": ending}
 
 
 def check_to_file(scenario: Scenario, seed: int, result: Path) -> str | None:

@@ -6,10 +6,10 @@ from enum import StrEnum
 
 from scipy.special import betaincinv
 
+from fogsim.expectations import Finding, FindingVerdict
 from fogsim.scenario.variation import Verdict
 from fogsim.study.plan import StudyRun
 from fogsim.testing.collection import FogTest
-from fogsim.testing.expecting import Finding, FindingVerdict
 from fogsim.testing.results import CaseResult
 
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from fogsim.expectations import Finding, FindingVerdict
 from fogsim.study.engine import result_file
 from fogsim.study.plan import StudyRun
-from fogsim.testing.expecting import Finding, FindingVerdict
 
 
 def finding_to_json(finding: Finding) -> dict[str, Any]:
@@ -57,6 +57,12 @@ class CaseResult:
     findings: tuple[Finding, ...] = ()
     metrics: Mapping[str, Any] = field(default_factory=dict)
     duration: float = 0.0
+
+    @property
+    def is_passed(self) -> bool:
+        """Whether something was expected, and all of it came."""
+        verdicts = [one.verdict for one in self.findings]
+        return bool(verdicts) and all(one is FindingVerdict.PASSED for one in verdicts)
 
     @property
     def has_failed(self) -> bool:

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fogsim.errors import InputError
+from fogsim.expectations import FindingVerdict
 from fogsim.files.atomic import partial_path, write_json
 from fogsim.files.writer_lock import WriterLock
 from fogsim.recorders.manifest import versions
 from fogsim.study.engine import Engine
 from fogsim.study.plan import StudyRun
 from fogsim.testing.collection import FogTest, label_of
-from fogsim.testing.expecting import FindingVerdict
 from fogsim.testing.judgement import Judgement, Outcome, judge
 from fogsim.testing.results import CaseResult, read_result
 

@@ -3,9 +3,9 @@
 import shlex
 from collections.abc import Sequence
 
+from fogsim.expectations import Finding, FindingVerdict
 from fogsim.study.plan import StudyRun
 from fogsim.testing.collection import FogTest, label_of
-from fogsim.testing.expecting import Finding, FindingVerdict
 from fogsim.testing.judgement import Judgement, Outcome
 from fogsim.testing.results import CaseResult
 from fogsim.testing.session import FileOutcome
@@ -20,7 +20,7 @@ def finding_text(finding: Finding) -> str:
         The finding.
     """
     came = f", came {finding.came}" if finding.came else ""
-    when = "" if finding.time is None else f" at {finding.time:.1f} s"
+    when = "" if finding.time is None or f"{finding.time:g} s" in finding.came else f" at {finding.time:.4g} s"
     where = "" if finding.position is None else f", {finding.position:.0f} m"
     why = f" ({finding.reason})" if finding.reason else ""
     return f"expected {finding.expected}{came}{when}{where}{why}"
@@ -95,6 +95,25 @@ def command_text(test: FogTest, run: StudyRun, settings: Sequence[str] = (), pro
     return shlex.join(
         ["fogsim", program, str(test.path), *chosen, *(part for one in settings for part in ("--set", one))]
     )
+
+
+def expectation_lines(outcome: FileOutcome, name: str) -> list[str]:
+    """What keeps an expectation from being passed, and how to see it again; nothing if it is passed.
+
+    Parameters
+    ----------
+    outcome : FileOutcome
+        What came of its test.
+    name : str
+        The expectation.
+    """
+    lines = []
+    for one in outcome.judgements:
+        if one.name == name and one.outcome is not Outcome.PASSED:
+            lines += [f"{one.outcome}: {one.title}: {judgement_text(one)}", command_text(outcome.test, one.run)]
+    if outcome.broken:
+        lines += [broken_text(outcome.broken), command_text(outcome.test, outcome.broken[0].run)]
+    return lines
 
 
 def totals_text(outcomes: Sequence[FileOutcome], seconds: float) -> str:

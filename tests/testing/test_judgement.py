@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 from scipy.stats import binomtest
 
+from fogsim.expectations import Finding, FindingVerdict
 from fogsim.scenario.variation import NONE_FAILS, Verdict
 from fogsim.study.plan import StudyRun
 from fogsim.testing.collection import FogTest
-from fogsim.testing.expecting import Finding, FindingVerdict
 from fogsim.testing.judgement import Judgement, Outcome, judge, rate_bounds
 from fogsim.testing.results import CaseResult
 

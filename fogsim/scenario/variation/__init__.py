@@ -12,6 +12,7 @@ from fogsim.scenario.variation.cases import (
     value_text,
     with_case,
 )
+from fogsim.scenario.variation.levels import number_with_unit
 
 __all__ = [
     "KEYS",
@@ -21,6 +22,7 @@ __all__ = [
     "VariationKeys",
     "Verdict",
     "chosen_cases",
+    "number_with_unit",
     "read_variation",
     "value_text",
     "with_case",

@@ -86,9 +86,19 @@ class Case:
     seed: int = 0
 
     @property
+    def levels(self) -> dict[str, str]:
+        """What each name stands for, as text."""
+        return {name: value_text(value) for name, value in self.values.items()}
+
+    @property
     def label(self) -> str:
         """The case as ``--case`` names it; empty for the one of a file that varies nothing."""
-        return ",".join(f"{name}={value_text(value)}" for name, value in self.values.items())
+        return ",".join(f"{name}={level}" for name, level in self.levels.items())
+
+    @property
+    def folder_name(self) -> str:
+        """The case as a folder may be named; ``seedN`` for a file that varies nothing."""
+        return re.sub(r"[^\w.,=-]", "_", self.label)[:100] or f"seed{self.seed}"
 
 
 def value_text(value: Value) -> str:
@@ -261,7 +271,7 @@ def _put(value: Any, values: Mapping[str, Value]) -> Any:
     return _PLACE.sub(lambda found: "$" if found[0] == "$$" else value_text(values[_names(found[0])[0]]), value)
 
 
-def chosen_cases(variation: Variation, wanted: str, where: object) -> tuple[Case, ...]:
+def chosen_cases(variation: Variation, wanted: str, where: object, seed: int | None = None) -> tuple[Case, ...]:
     """Cases that have some values.
 
     Parameters
@@ -273,6 +283,8 @@ def chosen_cases(variation: Variation, wanted: str, where: object) -> tuple[Case
         numbers may have one that is not in the grid.
     where : object
         What messages name: the file.
+    seed : int or None
+        Seed of the runs; None for those of the cases.
 
     Raises
     ------
@@ -280,6 +292,9 @@ def chosen_cases(variation: Variation, wanted: str, where: object) -> tuple[Case
         If it is not of that form, or there is no such name, value or case.
     """
     pairs = _pairs(wanted, variation, where)
+    of_seeds = next((name for name, values in variation.varied.items() if isinstance(values, SeedLevels)), None)
+    if seed is not None and of_seeds is not None and pairs.setdefault(of_seeds, str(seed)) != str(seed):
+        raise InputError(f"--seed {seed}: --case {wanted} has another; {of_seeds} is the seed in {where}")
     cases = list(variation.cases)
     for name, text in pairs.items():
         fitting = [case for case in cases if value_text(case.values[name]) == text]
@@ -290,7 +305,7 @@ def chosen_cases(variation: Variation, wanted: str, where: object) -> tuple[Case
             known = dict.fromkeys(value_text(case.values[name]) for case in cases)
             raise InputError(f"--case {wanted}: {where} has no {name}={text}; {suggest(text, known)}")
         cases = fitting
-    return tuple(cases)
+    return tuple(cases if seed is None else (replace(case, seed=seed) for case in cases))
 
 
 def _pairs(wanted: str, variation: Variation, where: object) -> dict[str, str]:

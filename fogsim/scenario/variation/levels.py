@@ -56,6 +56,7 @@ class Levels:
 
     values: tuple[Value, ...]
     is_drawn = False
+    is_divisible = True
 
     def __len__(self) -> int:
         return len(self.values)
@@ -83,6 +84,8 @@ class Levels:
 class SeedLevels(Levels):
     """Seeds, which also seed the runs."""
 
+    is_divisible = False
+
 
 @dataclass(frozen=True, slots=True)
 class Draws:
@@ -108,7 +111,7 @@ class Draws:
     limits: tuple[float, float]
     unit: str
     is_drawn = True
-    is_numeric = False
+    is_numeric = is_divisible = False
 
     def __len__(self) -> int:
         return 1
@@ -134,7 +137,7 @@ class Draws:
         for _ in range(_MOST_DRAWS):
             drawn = self._shaped(float(generator.random()), float(generator.standard_normal()))
             if low <= drawn <= high:
-                return _written(drawn, self.unit)
+                return number_with_unit(drawn, self.unit)
         raise LevelsError(f"none of {_MOST_DRAWS} draws of {self.name} lies between its limits, {low:g} and {high:g}")
 
     def _shaped(self, uniform: float, normal: float) -> float:
@@ -232,7 +235,7 @@ def _range(written: dict[str, object]) -> Levels:
     number = math.floor((last - first) / step + 1e-9) + 1
     if number > MOST_VALUES:
         raise LevelsError(f"{number} values are more than {MOST_VALUES}", "step")
-    return Levels(tuple(_written(first + i * step, unit) for i in range(number)))
+    return Levels(tuple(number_with_unit(first + i * step, unit) for i in range(number)))
 
 
 def _draws(name: str, kind: str, written: dict[str, object]) -> Draws:
@@ -285,8 +288,16 @@ def _number_and_unit(value: object) -> tuple[float, str] | None:
     return split_quantity(value) if isinstance(value, str) else None
 
 
-def _written(number: float, unit: str) -> Value:
-    """A number as a file would have it: six digits of it, by which a case can be named."""
+def number_with_unit(number: float, unit: str) -> Value:
+    """A number as a file would have it: six digits of it, by which a case can be named.
+
+    Parameters
+    ----------
+    number : float
+        The number.
+    unit : str
+        Its unit; empty for none.
+    """
     rounded = float(f"{number:.6g}")
     plain: float | int = int(rounded) if rounded.is_integer() and abs(rounded) < 1e6 else rounded
     return f"{plain:g} {unit}" if unit else plain

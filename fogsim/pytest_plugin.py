@@ -1,0 +1,155 @@
+"""For pytest: files ``*.fog.yaml`` are tests, an item for each expectation, and ``fogsim_run`` runs one case.
+
+Nothing of FogSim is imported before there is such a file or a test that asks for the fixture.
+"""
+
+from __future__ import annotations
+
+import functools
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from fogsim.testing import CaseResult, FileOutcome, FogTest
+
+_SUFFIX = ".fog.yaml"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the options.
+
+    Parameters
+    ----------
+    parser : Parser
+        pytest's.
+    """
+    group = parser.getgroup("fogsim")
+    group.addoption(
+        "--fogsim-processes", type=int, default=None, metavar="N", help="Runs of *.fog.yaml at once. [one a core]"
+    )
+
+
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> FogFile | None:
+    """Collect files of tests.
+
+    Parameters
+    ----------
+    file_path : Path
+        A file.
+    parent : Collector
+        What it is in.
+    """
+    return FogFile.from_parent(parent, path=file_path) if file_path.name.endswith(_SUFFIX) else None
+
+
+class FogFile(pytest.File):
+    """A scenario file with what it expects; its cases are run once, when the first of its items is."""
+
+    _tests: list[FogTest]
+
+    def collect(self) -> Iterator[FogItem]:
+        """Give an item for each expectation.
+
+        Raises
+        ------
+        CollectError
+            If the file has mistakes.
+        """
+        from fogsim.errors import FogSimError  # noqa: PLC0415 - nothing is imported unasked
+        from fogsim.testing import collect  # noqa: PLC0415 - as above
+
+        try:
+            self._tests = collect([self.path])
+        except FogSimError as error:
+            raise self.CollectError(str(error)) from error
+        for test in self._tests:
+            for name in test.lines:
+                yield FogItem.from_parent(self, name=name, test=test)
+
+    @functools.cached_property
+    def outcome(self) -> FileOutcome:
+        """What came of all cases."""
+        from fogsim.testing import check_test  # noqa: PLC0415 - as above
+
+        (test,) = self._tests
+        with tempfile.TemporaryDirectory() as folder:
+            return check_test(test, Path(folder), self.config.getoption("--fogsim-processes"))
+
+
+class FogItem(pytest.Item):
+    """An expectation, over all cases of its file.
+
+    Parameters
+    ----------
+    test : FogTest
+        Its test.
+    **about
+        What pytest gives.
+    """
+
+    def __init__(self, *, test: FogTest, **about: Any) -> None:
+        super().__init__(**about)
+        self._test = test
+
+    def runtest(self) -> None:
+        """Fail if not every clause of it passed.
+
+        Raises
+        ------
+        NotPassedError
+            With what came.
+        """
+        from fogsim.testing.wording import expectation_lines  # noqa: PLC0415 - as above
+
+        assert isinstance(self.parent, FogFile)  # noqa: S101 - nothing else makes items
+        lines = expectation_lines(self.parent.outcome, self.name)
+        if lines:
+            raise NotPassedError("\n".join(lines))
+
+    def repr_failure(
+        self,
+        excinfo: pytest.ExceptionInfo[BaseException],
+        style: Any = None,
+    ) -> Any:
+        """What came, in place of a traceback.
+
+        Parameters
+        ----------
+        excinfo : ExceptionInfo
+            What was raised.
+        style : str or None
+            As of pytest.
+        """
+        return str(excinfo.value) if isinstance(excinfo.value, NotPassedError) else super().repr_failure(excinfo, style)
+
+    def reportinfo(self) -> tuple[Path, int, str]:
+        """Where it stands."""
+        line = self._test.lines[self.name].rpartition(":")[2]
+        return self.path, int(line) - 1 if line.isdecimal() else 0, f"{self.path.name}::{self.name}"
+
+
+class NotPassedError(Exception):
+    """An expectation has failed, was inconclusive, or its run went wrong."""
+
+
+@pytest.fixture
+def fogsim_run(request: pytest.FixtureRequest) -> Callable[..., CaseResult]:
+    """Run one case of a scenario in this process, and tell what came of it: ``fogsim_run("a.fog.yaml", case="run=3")``.
+
+    Parameters
+    ----------
+    request : FixtureRequest
+        The test; files are relative to its own.
+    """
+    from fogsim.testing import check_one_case  # noqa: PLC0415 - as above
+
+    def run(scenario: str | Path, *settings: str, case: str = "", seed: int | None = None) -> CaseResult:
+        beside = request.path.parent / scenario
+        return check_one_case(beside if beside.exists() else scenario, settings, case, seed)
+
+    return run

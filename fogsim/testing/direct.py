@@ -1,0 +1,67 @@
+"""Tests for other programs: a whole file, or one case in this process."""
+
+import os
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from fogsim.errors import InputError
+from fogsim.scenario.loading import load_cases
+from fogsim.study.plan import StudyRun
+from fogsim.study.pool import ProcessPool
+from fogsim.testing.collection import FogTest
+from fogsim.testing.execution import check_case, check_to_file
+from fogsim.testing.results import CaseResult, finding_from_json
+from fogsim.testing.session import FileOutcome, run_tests
+
+
+def check_test(test: FogTest, out: Path, processes: int | None = None) -> FileOutcome:
+    """Run all cases of a test, in processes of this machine, and judge them.
+
+    Parameters
+    ----------
+    test : FogTest
+        From `collect`.
+    out : Path
+        Directory of what came of them.
+    processes : int or None
+        Runs at once; None for one a core.
+
+    Raises
+    ------
+    InputError, OSError, KeyboardInterrupt
+        As of `run_tests`.
+    """
+    (outcome,) = run_tests([test], out, ProcessPool(processes or os.cpu_count() or 1, check_to_file))
+    return outcome
+
+
+def check_one_case(
+    scenario: str | Path, settings: Sequence[str] = (), case: str = "", seed: int | None = None
+) -> CaseResult:
+    """Run one case in this process.
+
+    Parameters
+    ----------
+    scenario : str or Path
+        As of `load_scenario`; it may expect something or nothing.
+    settings : sequence of str
+        ``key.path=value`` each, put in place of the file's.
+    case : str
+        Which case, ``name=value`` with commas between; empty for the file's first.
+    seed : int or None
+        Seed of the run; None for the case's.
+
+    Raises
+    ------
+    FogSimError
+        If the scenario does not fit, or the run goes wrong.
+    """
+    if isinstance(settings, str):
+        raise InputError(f"settings must be a list of key.path=value each, got the text {settings!r}")
+    begun = time.monotonic()
+    chosen, loaded = load_cases(scenario, settings, case, seed).cases[0]
+    run = StudyRun(0, chosen.levels, chosen.seed, loaded, "")
+    found = check_case(loaded, run.seed)
+    findings = tuple(finding_from_json(one) for one in found["findings"])
+    return CaseResult(run, None, findings, found["metrics"], time.monotonic() - begun)

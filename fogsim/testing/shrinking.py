@@ -1,0 +1,171 @@
+"""The smallest case that fails: as many names as can be at their first values, numbers as near to them as can be."""
+
+import contextlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from fogsim.errors import InputError
+from fogsim.expectations import FindingVerdict
+from fogsim.quantities import split_quantity
+from fogsim.scenario.loading import load_cases
+from fogsim.scenario.variation import Variation, number_with_unit, value_text
+from fogsim.study.engine import Engine
+from fogsim.testing.collection import FogTest, collect
+from fogsim.testing.judgement import Judgement
+from fogsim.testing.results import CaseResult, read_result
+from fogsim.testing.session import FileOutcome
+from fogsim.testing.wording import command_text
+
+HALVINGS = 5
+"""How often the way of a number to its first value is halved."""
+
+Values = Mapping[str, str]
+"""Names and their values, as text; those that are drawn for the seed are left out."""
+
+Fails = Callable[[Values], bool | None]
+"""Whether a case fails; None if it cannot be one."""
+
+
+@dataclass(frozen=True, slots=True)
+class SmallestCase:
+    """The smallest case that fails.
+
+    Attributes
+    ----------
+    values : mapping from str to str
+        Its values.
+    passes_at : mapping from str to str
+        For each number that is not at its first value: the nearest one towards it with which the case did not fail.
+    tried : int
+        How many cases were run for it.
+    """
+
+    values: Values
+    passes_at: Values
+    tried: int
+
+
+def smallest_text(test: FogTest, found: SmallestCase, settings: Sequence[str] = ()) -> str:
+    """The smallest case in words, with the command that runs it.
+
+    Parameters
+    ----------
+    test : FogTest
+        The test.
+    found : SmallestCase
+        What `shrink` found.
+    settings : sequence of str
+        What ``--set`` put in place of the file's values.
+    """
+    passes = ", ".join(f"{name}={value}" for name, value in found.passes_at.items())
+    told = f"; it does not with {passes}" if passes else ""
+    run = replace(test.runs[0], levels=found.values)
+    return f"the smallest case that fails ({found.tried} more runs){told}: {command_text(test, run, settings)}"
+
+
+def shrink(
+    outcome: FileOutcome, judgement: Judgement, settings: Sequence[str], engine: Engine, out: Path
+) -> SmallestCase:
+    """Look for the smallest case of a sweep in which a clause fails.
+
+    Parameters
+    ----------
+    outcome : FileOutcome
+        What came of the test, several cases.
+    judgement : Judgement
+        The clause; it has failed in a case at least.
+    settings : sequence of str
+        What ``--set`` put in place of the file's values.
+    engine : Engine
+        What runs further cases.
+    out : Path
+        Where their results go.
+
+    Raises
+    ------
+    OSError
+        If a result cannot be written.
+    """
+    path = outcome.test.path
+    variation = load_cases(path, settings).variation
+    gridded = [name for name, values in variation.varied.items() if not values.is_drawn]
+    first = {name: value_text(variation.varied[name].value(0)) for name in gridded}
+    known: dict[str, bool | None] = {
+        _key(_values(result, gridded)): _fails(result, judgement) for result in outcome.results
+    }
+    tried = 0
+
+    def fails(values: Values) -> bool | None:
+        nonlocal tried
+        if _key(values) not in known:
+            tried += 1
+            known[_key(values)] = _run(path, settings, values, judgement, engine, out)
+        return known[_key(values)]
+
+    failing = [_values(result, gridded) for result in outcome.results if _fails(result, judgement)]
+    start = min(failing, key=lambda values: sum(values[name] != first[name] for name in gridded))
+    values = _at_first_values(start, first, fails)
+    passes_at = {}
+    for name in gridded:
+        nearer = _nearer(values, name, first[name], variation, fails)
+        if nearer is not None:
+            values, passes_at[name] = nearer
+    return SmallestCase(values, passes_at, tried)
+
+
+def _values(result: CaseResult, gridded: Sequence[str]) -> Values:
+    return {name: result.run.levels[name] for name in gridded}
+
+
+def _key(values: Values) -> str:
+    return repr(sorted(values.items()))
+
+
+def _fails(result: CaseResult, judgement: Judgement) -> bool:
+    return any(
+        (one.name, one.clause) == (judgement.name, judgement.clause) and one.verdict is FindingVerdict.FAILED
+        for one in result.findings
+    )
+
+
+def _run(
+    path: Path, settings: Sequence[str], values: Values, judgement: Judgement, engine: Engine, out: Path
+) -> bool | None:
+    label = ",".join(f"{name}={value}" for name, value in values.items())
+    with contextlib.suppress(InputError):
+        (test,) = collect([path], settings, label)
+        engine.run(test.runs, out, lambda *_: None)
+        result = read_result(out, test.runs[0], [judgement.name])
+        return result is not None and _fails(result, judgement)
+    return None
+
+
+def _at_first_values(values: Values, first: Values, fails: Fails) -> Values:
+    """A failing case none of whose names can be put to its first value alone."""
+    changed = True
+    while changed:
+        changed = False
+        for name in first:
+            simpler = {**values, name: first[name]}
+            if values[name] != first[name] and fails(simpler):
+                values, changed = simpler, True
+    return values
+
+
+def _nearer(values: Values, name: str, first: str, variation: Variation, fails: Fails) -> tuple[Values, str] | None:
+    """A failing case with a number nearer to its first value, and the nearest with which it did not fail."""
+    if values[name] == first or not variation.varied[name].is_divisible:
+        return None
+    bad, good = split_quantity(values[name]), split_quantity(first)
+    if bad is None or good is None or bad[1] != good[1]:
+        return None
+    failing, passing = bad[0], good[0]
+    for _ in range(HALVINGS):
+        middle = value_text(number_with_unit((failing + passing) / 2, bad[1]))
+        found = fails({**values, name: middle})
+        if found is None:
+            break
+        failing, passing = ((failing + passing) / 2, passing) if found else (failing, (failing + passing) / 2)
+    told = [value_text(number_with_unit(one, bad[1])) for one in (failing, passing)]
+    return {**values, name: told[0]}, told[1]

@@ -1,0 +1,80 @@
+"""The smallest case of a sweep that fails; whether a case fails is made up."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+from early_motorway import ROUTES
+from made_up_cases import complete
+
+from fogsim.files.atomic import write_json
+from fogsim.study.engine import RunWatch, result_file
+from fogsim.study.plan import StudyRun
+from fogsim.testing import collect, run_tests
+from fogsim.testing.shrinking import shrink, smallest_text
+
+SCENARIO = f"""
+name: swept
+traffic: {{net: {ROUTES.parents[2]}/scenarios/motorway_fog_bank/motorway.net.xml, routes: [{ROUTES}], ego: ego}}
+fog: {{visibility: $visibility}}
+light: {{illuminance_lx: $light}}
+duration_s: $duration
+expect:
+  e0: {{always: ego.ttc > 1 s}}
+vary:
+  visibility: {{from: 200 m, to: 50 m, step: -50 m}}
+  light: [10000, 5, 0]
+  duration: [10, 20]
+  run: 2 seeds
+"""
+
+
+@dataclass
+class Pretending:
+    """Says of each case what a rule says."""
+
+    fails: Callable[[float, float, float, int], bool]
+    ran: list[str] = field(default_factory=list)
+
+    def run(self, runs: Sequence[StudyRun], folder: Path, watch: RunWatch) -> None:
+        for run in runs:
+            visibility, light, duration = (float(run.levels[n].split()[0]) for n in ("visibility", "light", "duration"))
+            self.ran.append(",".join(run.levels.values()))
+            verdict = "failed" if self.fails(visibility, light, duration, run.seed) else "passed"
+            write_json(result_file(folder, run), {**complete(verdict), "metrics": {}})
+            watch(run, None)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    (tmp_path / "swept.fog.yaml").write_text(SCENARIO)
+    return tmp_path / "swept.fog.yaml"
+
+
+def test_names_that_do_not_matter_are_at_their_first_values_and_numbers_near_them(file: Path, tmp_path: Path) -> None:
+    engine = Pretending(lambda visibility, light, _, __: visibility < 130.0 and light < 10.0)
+    tests = collect([file])
+    (outcome,) = run_tests(tests, tmp_path / "out", engine)
+    assert len(engine.ran) == 4 * 3 * 2 * 2
+    (judgement,) = outcome.judgements
+    found = shrink(outcome, judgement, [], engine, tmp_path / "out" / "results")
+    assert found.values["duration"] == "10"
+    assert found.values["run"] == "0"
+    nearest, passing = (float(one["visibility"].split()[0]) for one in (found.values, found.passes_at))
+    assert 120.0 < nearest < 130.0 <= passing < 135.0
+    assert 5.0 <= float(found.values["light"]) < 10.0 <= float(found.passes_at["light"])
+    assert found.tried == len(engine.ran) - 48
+    told = smallest_text(tests[0], found)
+    assert f"it does not with visibility={found.passes_at['visibility']}, light=" in told
+    again = told.partition(" --case ")[2].strip("'")
+    (only,) = collect([file], case=again)[0].runs
+    assert only.levels == found.values
+
+
+def test_a_seed_stays_the_one_that_fails(file: Path, tmp_path: Path) -> None:
+    engine = Pretending(lambda _, __, ___, seed: seed == 1)
+    (outcome,) = run_tests(collect([file]), tmp_path / "out", engine)
+    found = shrink(outcome, outcome.judgements[0], [], engine, tmp_path / "out" / "results")
+    assert found.values == {"visibility": "200 m", "light": "10000", "duration": "10", "run": "1"}
+    assert (found.passes_at, found.tried) == ({}, 0)

@@ -38,7 +38,7 @@ def check_command(
     ] = None,
     case: CaseValues = "",
     exit_first: Annotated[bool, typer.Option("-x", help="End with the first case that fails.")] = False,
-    of_last: Annotated[bool, typer.Option("--lf", help="Only cases that did not pass in the last call.")] = False,
+    of_last: Annotated[bool, typer.Option("--lf", help="Only cases that did not pass when last run.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on where a call was cut off.")] = False,
     shrink: Annotated[bool, typer.Option("--shrink", help="Look for the smallest case of what failed.")] = False,
     evidence: Annotated[bool, typer.Option(help="Keep a video and plots of what did not pass.")] = True,
@@ -69,7 +69,7 @@ def check_command(
         write_junit(junit, outcomes, chosen)
     if html is not None:
         write_page(html, PageContent(outcomes, kept, seconds, chosen))
-    for path in [*(one for found in kept.values() for one in found.files), junit, html]:
+    for path in dict.fromkeys([*(one for found in kept.values() for one in found.files), junit, html]):
         if path is not None:
             stdout.print(f"  {escape(path)}", soft_wrap=True)
     _annotate(outcomes, chosen)

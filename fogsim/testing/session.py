@@ -164,14 +164,16 @@ def _outcome(test: FogTest, found: Mapping[str, CaseResult | None]) -> FileOutco
 
 
 def _end(out: Path, outcomes: Sequence[FileOutcome]) -> None:
-    """Note what did not pass, for `last_failed`."""
-    noted: dict[str, list[str]] = {}
+    """Note what did not pass, for `last_failed`; what was not run again stays noted."""
+    noted = {str(file): cases for file, cases in last_failed(out).items() if file.is_file()}
     for outcome in outcomes:
-        if not outcome.is_passed:
-            wrong = {(one.name, one.clause) for one in outcome.judgements if one.outcome is not Outcome.PASSED}
-            noted[str(outcome.test.path.resolve())] = [
-                label_of(one.run) for one in outcome.results if _counts_against(one, wrong)
-            ]
+        file = str(outcome.test.path.resolve())
+        wrong = {(one.name, one.clause) for one in outcome.judgements if one.outcome is not Outcome.PASSED}
+        were_run = {label_of(one.run): _counts_against(one, wrong) for one in outcome.results}
+        still = [label for label in noted.pop(file, []) if label not in were_run]
+        cases = [*still, *(label for label, counts in were_run.items() if counts)]
+        if cases:
+            noted[file] = cases
     write_json(out / _SESSION, {"versions": versions(), "not_passed": noted})
 
 
@@ -181,7 +183,7 @@ def _counts_against(result: CaseResult, wrong: set[tuple[str, str]]) -> bool:
 
 
 def last_failed(out: Path) -> dict[Path, list[str]]:
-    """Files that did not pass in the last call, and the labels of their cases that did not.
+    """Files that did not pass when they were run last, and the labels of their cases that did not.
 
     Parameters
     ----------

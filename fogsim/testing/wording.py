@@ -133,4 +133,9 @@ def totals_text(outcomes: Sequence[FileOutcome], seconds: float) -> str:
             numbers[judgement.outcome] += 1
     counted = ", ".join(f"{number} {outcome}" for outcome, number in numbers.items() if number)
     cases = sum(len(one.results) for one in outcomes)
-    return f"{counted or 'nothing was checked'}; {cases} runs of {len(outcomes)} files in {seconds:.1f} s"
+    of_files = f"{_number(cases, 'run')} of {_number(len(outcomes), 'file')}"
+    return f"{counted or 'nothing was checked'}; {of_files} in {seconds:.1f} s"
+
+
+def _number(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"

@@ -1,6 +1,7 @@
 """Running tests: what counts of earlier calls, and when one ends."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,18 +13,29 @@ from fogsim.testing import last_failed, only_cases, run_tests
 
 def test_all_cases_are_run_and_judged(tmp_path: Path) -> None:
     told = {"a0": complete("passed"), "a1": complete("failed"), "b0": complete("passed"), "c0": BROKEN}
-    tests = [made_up_test(keys, Path(f"{keys[0]}.fog.yaml")) for keys in (["a0", "a1"], ["b0"], ["c0"])]
+    tests = [made_up_test(keys, tmp_path / f"{keys[0]}.fog.yaml") for keys in (["a0", "a1"], ["b0"], ["c0"])]
     seen: list[tuple[int, int]] = []
     outcomes = run_tests(tests, tmp_path / "out", MadeUpEngine(told), watch=lambda *both: seen.append(both))
     assert [one.is_passed for one in outcomes] == [False, True, False]
     assert outcomes[2].broken[0].message == BROKEN["message"]
     assert seen == [(0, 0), (1, 0), (2, 1), (3, 1), (4, 2)]
     assert last_failed(tmp_path / "out") == {
-        Path("a0.fog.yaml").resolve(): ["run=1"],
-        Path("c0.fog.yaml").resolve(): [""],
+        tmp_path / "a0.fog.yaml": ["run=1"],
+        tmp_path / "c0.fog.yaml": [""],
     }
     again = only_cases(tests, last_failed(tmp_path / "out"))
     assert [run.key for test in again for run in test.runs] == ["a1", "c0"]
+
+
+def test_what_was_not_run_again_stays_noted(tmp_path: Path) -> None:
+    tests = [made_up_test(keys, tmp_path / f"{keys[0]}.fog.yaml") for keys in (["a0", "a1", "a2"], ["b0"])]
+    for test in tests:
+        test.path.touch()
+    run_tests(tests, tmp_path / "out", MadeUpEngine(dict.fromkeys(("a0", "a1", "a2", "b0"), complete("failed"))))
+    mended = {"a1": complete("passed"), "a2": complete("failed")}
+    only = replace(tests[0], runs=tests[0].runs[1:])
+    run_tests([only], tmp_path / "out", MadeUpEngine(mended))
+    assert last_failed(tmp_path / "out") == {tests[0].path: ["run=0", "run=2"], tests[1].path: [""]}
 
 
 def test_expectations_that_are_not_asked_for_do_not_count(tmp_path: Path) -> None:

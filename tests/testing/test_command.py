@@ -1,0 +1,109 @@
+"""``fogsim test`` from file to exit code, and the plug-in for pytest."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from subprocess import CompletedProcess
+
+import pytest
+from early_motorway import ROUTES
+
+from fogsim.testing import check_one_case
+
+ROOT = Path(__file__).parents[2]
+Command = Callable[..., "CompletedProcess[str]"]
+
+SCENARIO = f"""
+name: short
+traffic: {{net: {ROOT}/scenarios/motorway_fog_bank/motorway.net.xml, routes: [{ROUTES}], ego: ego}}
+duration_s: 1.5
+renderer: none
+estimators: []
+fog: {{visibility: $visibility}}
+advice: {{method: stopping_sight_distance, informed_by: truth}}
+expect:
+  slower: {{eventually: ego.speed < 92 km/h}}
+  safe: {{never: ego.collision}}
+  stops: {{whenever: ego.speed falls below 5 km/h, require: advice < 50 km/h}}
+vary: {{visibility: [60 m, 5 km]}}
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    (tmp_path / "short.fog.yaml").write_text(SCENARIO)
+    return tmp_path / "short.fog.yaml"
+
+
+def test_a_sweep_from_file_to_exit_code(file: Path, command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("GITHUB_ACTIONS", "true")
+    done = command("test", str(file), "-j", "1", "--junit", "ci/j.xml", "--html", "ci/page.html", cwd=file.parent)
+    assert done.returncode == 1, done.stderr
+    lines = [line.strip() for line in done.stdout.splitlines()]
+    told = "slower.eventually: 1 of 2 cases passed; visibility=5 km: expected eventually ego.speed < 92 km/h"
+    assert any(line.startswith("FAILED") and told in line for line in lines)
+    assert f"fogsim test {file} --case 'visibility=5 km'" in lines
+    assert any(line.startswith("PASSED       safe.never: ") and "2 of 2 cases passed" in line for line in lines)
+    assert any(line.startswith("INCONCLUSIVE stops.whenever: 2 of 2 cases inconclusive") for line in lines)
+    assert any(line.startswith("1 passed, 1 failed, 1 inconclusive; 2 runs of 1 file in") for line in lines)
+    assert sum(line.startswith("::error file=") for line in lines) == 2
+    assert "data:image/svg+xml" in (file.parent / "ci" / "page.html").read_text(encoding="utf-8")
+    assert (file.parent / "ci" / "j.xml").is_file()
+    session = json.loads((file.parent / "runs" / "tests" / "session.json").read_text())
+    assert session["not_passed"] == {str(file): ["visibility=60 m", "visibility=5 km"]}
+
+
+def test_bad_input_and_no_tests_have_their_codes(file: Path, command: Command) -> None:
+    folder = file.parent
+    for arguments, code, told in (
+        ([str(file), "--case", "visiblity=60 m"], 2, "varies no visiblity; did you mean 'visibility'?"),
+        ([str(file), "-k", "safe and"], 2, "expected a word, got the end"),
+        ([str(file), "-k", "night"], 5, "No tests: none of 1 files expects anything that was asked for."),
+        ([str(folder / "none.fog.yaml")], 2, "there is no such scenario file"),
+        ([str(folder / "empty")], 5, "No tests: none of 0 files"),
+    ):
+        (folder / "empty").mkdir(exist_ok=True)
+        done = command("test", *arguments, cwd=folder)
+        assert done.returncode == code
+        assert told in done.stdout + done.stderr
+
+
+def test_one_case_in_this_process(file: Path) -> None:
+    result = check_one_case(file, ["duration_s=0.3"], "visibility=60 m", seed=3)
+    assert [(one.name, str(one.verdict)) for one in result.findings] == [
+        ("slower", "failed"),
+        ("safe", "passed"),
+        ("stops", "inconclusive"),
+    ]
+    assert (result.run.seed, result.is_passed, result.has_failed) == (3, False, True)
+    assert result.metrics["ego_collisions"] == 0
+
+
+PYTHON_TEST = """
+def test_it(fogsim_run):
+    result = fogsim_run("short.fog.yaml", "duration_s=0.3", case="visibility=60 m")
+    assert [one.name for one in result.findings if str(one.verdict) == "passed"] == ["safe"]
+"""
+
+
+def test_pytest_collects_files_and_has_a_fixture(file: Path) -> None:
+    (file.parent / "bad.fog.yaml").write_text(SCENARIO.replace("never", "nevr"))
+    (file.parent / "test_it.py").write_text(PYTHON_TEST)
+    options = ["-p", "fogsim.pytest_plugin", "-p", "no:cacheprovider", "-q", "--fogsim-processes", "1"]
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", *options, "--continue-on-collection-errors", "-c", os.devnull, "."],
+        cwd=file.parent,
+        env={**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert "2 failed, 2 passed, 1 error" in done.stdout
+    assert "expect.safe.nevr: unknown key; did you mean 'never'?" in done.stdout
+    assert "failed: slower.eventually: 1 of 2 cases passed; visibility=5 km: expected" in done.stdout
+    assert "short.fog.yaml --case 'visibility=5 km'" in done.stdout
+    assert "inconclusive: stops.whenever" in done.stdout

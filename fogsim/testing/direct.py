@@ -1,22 +1,52 @@
-"""Tests for other programs: a whole file, or one case in this process."""
+"""Tests for other programs: a whole file, or one case; in this process where that is quicker."""
 
 import os
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from fogsim.errors import InputError
 from fogsim.scenario.loading import load_cases
+from fogsim.study.engine import Engine, RunWatch, result_file
 from fogsim.study.plan import StudyRun
-from fogsim.study.pool import ProcessPool
+from fogsim.study.pool import ProcessPool, Work
 from fogsim.testing.collection import FogTest
 from fogsim.testing.execution import check_case, check_to_file
 from fogsim.testing.results import CaseResult, finding_from_json
 from fogsim.testing.session import FileOutcome, run_tests
 
 
+@dataclass(frozen=True, slots=True)
+class ThisProcess:
+    """An engine that runs one case after another where it is called: quick to begin, and a debugger can follow.
+
+    Attributes
+    ----------
+    work : Work
+        What is done with each run.
+    """
+
+    work: Work = check_to_file
+
+    def run(self, runs: Sequence[StudyRun], folder: Path, watch: RunWatch) -> None:
+        """Run what is given, as of `Engine`.
+
+        Parameters
+        ----------
+        runs : sequence of StudyRun
+            What is to be run.
+        folder : Path
+            Where the results go, ``KEY.json`` each.
+        watch : RunWatch
+            Who is told of each run that is done.
+        """
+        for run in runs:
+            watch(run, self.work(run.scenario, run.seed, result_file(folder, run)))
+
+
 def check_test(test: FogTest, out: Path, processes: int | None = None) -> FileOutcome:
-    """Run all cases of a test, in processes of this machine, and judge them.
+    """Run all cases of a test and judge them: a single case in this process, several in others.
 
     Parameters
     ----------
@@ -25,14 +55,16 @@ def check_test(test: FogTest, out: Path, processes: int | None = None) -> FileOu
     out : Path
         Directory of what came of them.
     processes : int or None
-        Runs at once; None for one a core.
+        Runs at once, in this process for one; None for one a core.
 
     Raises
     ------
     InputError, OSError, KeyboardInterrupt
         As of `run_tests`.
     """
-    (outcome,) = run_tests([test], out, ProcessPool(processes or os.cpu_count() or 1, check_to_file))
+    number = min(processes or os.cpu_count() or 1, len(test.runs))
+    engine: Engine = ThisProcess() if number == 1 else ProcessPool(number, check_to_file)
+    (outcome,) = run_tests([test], out, engine)
     return outcome
 
 

@@ -49,7 +49,7 @@ def test_a_failure_has_a_plot_and_a_video_around_it(
     failures = [finding("failed", time=8.0), finding("failed", "told", "whenever", time=8.5)]
     work = KeepFailures({"a": tuple(finding_from_json(one) for one in failures)})
     assert work(scenario, 5, tmp_path / "a.json") is None
-    assert steps[-1].time == pytest.approx(8.5 + AFTER)
+    assert 8.5 + AFTER <= steps[-1].time < 8.5 + AFTER + 1.5 * period
     video = cv2.VideoCapture(str(tmp_path / "a" / "video.mp4"))
     shown = sum(8.0 - BEFORE <= step.time <= 8.0 + AFTER for step in steps)
     assert video.get(cv2.CAP_PROP_FRAME_COUNT) == shown

@@ -2,8 +2,6 @@
 
 import json
 import os
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from subprocess import CompletedProcess
@@ -12,6 +10,9 @@ import pytest
 from early_motorway import ROUTES
 
 from fogsim.testing import check_one_case
+from fogsim.testing.direct import ThisProcess
+
+pytest_plugins = ["pytester"]
 
 ROOT = Path(__file__).parents[2]
 Command = Callable[..., "CompletedProcess[str]"]
@@ -40,6 +41,9 @@ def file(tmp_path: Path) -> Path:
 
 def test_a_sweep_from_file_to_exit_code(file: Path, command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("GITHUB_ACTIONS", "true")
+    # The command lines in the docs are run in processes of their own.
+    monkeypatch.setattr("fogsim.study.pool.ProcessPool", lambda _, work: ThisProcess(work))
+    monkeypatch.setattr("fogsim.testing.artefacts.ProcessPool", lambda _, work: ThisProcess(work))
     done = command("test", str(file), "-j", "1", "--junit", "ci/j.xml", "--html", "ci/page.html", cwd=file.parent)
     assert done.returncode == 1, done.stderr
     lines = [line.strip() for line in done.stdout.splitlines()]
@@ -72,7 +76,7 @@ def test_bad_input_and_no_tests_have_their_codes(file: Path, command: Command) -
 
 
 def test_one_case_in_this_process(file: Path) -> None:
-    result = check_one_case(file, ["duration_s=0.3"], "visibility=60 m", seed=3)
+    result = check_one_case(file, ["duration_s=0.3"], "visibility=5 km", seed=3)
     assert [(one.name, str(one.verdict)) for one in result.findings] == [
         ("slower", "failed"),
         ("safe", "passed"),
@@ -84,26 +88,25 @@ def test_one_case_in_this_process(file: Path) -> None:
 
 PYTHON_TEST = """
 def test_it(fogsim_run):
-    result = fogsim_run("short.fog.yaml", "duration_s=0.3", case="visibility=60 m")
+    result = fogsim_run("short.fog.yaml", "duration_s=0.3", case="visibility=5 km")
     assert [one.name for one in result.findings if str(one.verdict) == "passed"] == ["safe"]
 """
 
 
-def test_pytest_collects_files_and_has_a_fixture(file: Path) -> None:
+def test_pytest_collects_files_and_has_a_fixture(
+    file: Path, pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # What is imported within is forgotten afterwards, so that SUMO must have been there before.
+    check_one_case(file, ["duration_s=0.3"])
     (file.parent / "bad.fog.yaml").write_text(SCENARIO.replace("never", "nevr"))
     (file.parent / "test_it.py").write_text(PYTHON_TEST)
-    options = ["-p", "fogsim.pytest_plugin", "-p", "no:cacheprovider", "-q", "--fogsim-processes", "1"]
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", *options, "--continue-on-collection-errors", "-c", os.devnull, "."],
-        cwd=file.parent,
-        env={**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 1, done.stdout + done.stderr
-    assert "2 failed, 2 passed, 1 error" in done.stdout
-    assert "expect.safe.nevr: unknown key; did you mean 'never'?" in done.stdout
-    assert "failed: slower.eventually: 1 of 2 cases passed; visibility=5 km: expected" in done.stdout
-    assert "short.fog.yaml --case 'visibility=5 km'" in done.stdout
-    assert "inconclusive: stops.whenever" in done.stdout
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+    monkeypatch.chdir(file.parent)
+    options = ["-p", "fogsim.pytest_plugin", "-p", "no:cacheprovider", "--fogsim-processes", "1", "-c", os.devnull]
+    done = pytester.runpytest_inprocess(*options, "--continue-on-collection-errors", ".")
+    done.assert_outcomes(passed=2, failed=2, errors=1)
+    told = done.stdout.str()
+    assert "expect.safe.nevr: unknown key; did you mean 'never'?" in told
+    assert "failed: slower.eventually: 1 of 2 cases passed; visibility=5 km: expected" in told
+    assert "short.fog.yaml --case 'visibility=5 km'" in told
+    assert "inconclusive: stops.whenever" in told

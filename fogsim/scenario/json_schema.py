@@ -14,6 +14,7 @@ from fogsim.quantities import UNIT_OF_SUFFIX
 from fogsim.registry import Registry
 from fogsim.scenario.schema import Scenario
 from fogsim.scenario.system_under_test import BLOCK, KEYS
+from fogsim.scenario.variation import VariationKeys
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 """Which JSON Schema it is."""
@@ -34,8 +35,10 @@ _SCALARS = {"number", "integer", "string", "boolean"}
 
 def scenario_json_schema() -> dict[str, Any]:
     """JSON Schema of a scenario file."""
-    schema = json_schema(Scenario)
+    schema, beside = json_schema(Scenario), json_schema(VariationKeys)
     written = schema["properties"]
+    written.update(beside["properties"])
+    schema["$defs"].update(beside["$defs"])
     for key, registry in _METHODS.items():
         written[key] = _methods(written[key], registry)
     written[BLOCK] = {

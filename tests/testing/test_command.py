@@ -102,7 +102,7 @@ def test_pytest_collects_files_and_has_a_fixture(
     (file.parent / "test_it.py").write_text(PYTHON_TEST)
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
     monkeypatch.chdir(file.parent)
-    options = ["-p", "fogsim.pytest_plugin", "-p", "no:cacheprovider", "--fogsim-processes", "1", "-c", os.devnull]
+    options = ["-p", "fogsim.cli.pytest_plugin", "-p", "no:cacheprovider", "--fogsim-processes", "1", "-c", os.devnull]
     done = pytester.runpytest_inprocess(*options, "--continue-on-collection-errors", ".")
     done.assert_outcomes(passed=2, failed=2, errors=1)
     told = done.stdout.str()

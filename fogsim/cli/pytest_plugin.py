@@ -60,8 +60,8 @@ class FogFile(pytest.File):
         CollectError
             If the file has mistakes.
         """
-        from fogsim.errors import FogSimError  # noqa: PLC0415 - nothing is imported unasked
-        from fogsim.testing import collect  # noqa: PLC0415 - as above
+        from fogsim.errors import FogSimError
+        from fogsim.testing import collect
 
         try:
             self._tests = collect([self.path])
@@ -74,7 +74,7 @@ class FogFile(pytest.File):
     @functools.cached_property
     def outcome(self) -> FileOutcome:
         """What came of all cases."""
-        from fogsim.testing import check_test  # noqa: PLC0415 - as above
+        from fogsim.testing import check_test
 
         (test,) = self._tests
         with tempfile.TemporaryDirectory() as folder:
@@ -104,7 +104,7 @@ class FogItem(pytest.Item):
         NotPassedError
             With what came.
         """
-        from fogsim.testing.wording import expectation_lines  # noqa: PLC0415 - as above
+        from fogsim.testing.wording import expectation_lines
 
         assert isinstance(self.parent, FogFile)  # noqa: S101 - nothing else makes items
         lines = expectation_lines(self.parent.outcome, self.name)
@@ -146,7 +146,7 @@ def fogsim_run(request: pytest.FixtureRequest) -> Callable[..., CaseResult]:
     request : FixtureRequest
         The test; files are relative to its own.
     """
-    from fogsim.testing import check_one_case  # noqa: PLC0415 - as above
+    from fogsim.testing import check_one_case
 
     def run(scenario: str | Path, *settings: str, case: str = "", seed: int | None = None) -> CaseResult:
         beside = request.path.parent / scenario

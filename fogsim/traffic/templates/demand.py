@@ -133,13 +133,15 @@ def _actor(one: Placed, layout: Layout) -> Iterator[str]:
         steady |= {"maxSpeed": f"{speed:.3f}", "speedFactor": f"{max(1.0, speed / layout.edge(edge).limit):.3f}"}
     lane = actor.lane % layout.edge(edge).lanes
     yield _type(f"type.{actor.name}", kind, **steady)
-    yield element("route", id=f"route.{actor.name}", edges=" ".join(way[way.index(edge) :]))
+    yield element("route", id=f"route.{actor.name}", edges=" ".join(way))
     yield opening(
         "vehicle",
         id=actor.name,
         type=f"type.{actor.name}",
         route=f"route.{actor.name}",
         depart=f"{actor.depart:g}",
+        # The whole way is its route, along which places count.
+        departEdge=way.index(edge),
         departLane=lane,
         departPos=f"{position:.2f}",
         departSpeed="0" if actor.stands else f"{speed:.3f}",

@@ -270,6 +270,18 @@ def resolved(scenario: Scenario) -> dict[str, Any]:
     return data
 
 
+def as_written(scenario: Scenario) -> dict[str, Any]:
+    """A scenario as plain data, without what is as it is by default.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+    data: dict[str, Any] = _without_infinities(scenario.model_dump(mode="json", exclude_none=True, exclude_unset=True))
+    return data
+
+
 def _without_infinities(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _without_infinities(v) for key, v in value.items()}

@@ -12,8 +12,14 @@ from fogsim.scenario.section import MISTAKE
 
 _SCHEMA = {"format": "condition", "anyOf": [{"type": "string"}, {"type": "object"}, {"type": "array"}]}
 
+
+def _condition(written: object) -> Condition:
+    """A condition that is written, or that a program has made."""
+    return written if isinstance(written, Condition) else parse_condition(written)
+
+
 WrittenCondition = Annotated[
-    Condition, PlainValidator(parse_condition), PlainSerializer(str, return_type=str), WithJsonSchema(_SCHEMA)
+    Condition, PlainValidator(_condition), PlainSerializer(str, return_type=str), WithJsonSchema(_SCHEMA)
 ]
 """A condition on the run: text, or a mapping from signals to the rest of it."""
 

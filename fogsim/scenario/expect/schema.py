@@ -47,7 +47,7 @@ Times = Annotated[Whole, Field(ge=1, le=1_000_000), BeforeValidator(_number_of_t
 class Expectation(Section):
     """What is expected of a run: one clause or several."""
 
-    model_config = ConfigDict(serialize_by_alias=True)
+    model_config = ConfigDict(serialize_by_alias=True, validate_by_name=True, validate_by_alias=True)
 
     always: WrittenCondition | None = None
     """Holds at every step at which it is known."""

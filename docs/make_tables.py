@@ -19,6 +19,7 @@ from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.metrics import RunMetrics
 from fogsim.parameters import accepted_parameters, mismatch
+from fogsim.recorders.events import EVENT_COLUMNS
 from fogsim.recorders.table_columns import Column, table_columns, traffic_table_columns
 from fogsim.recorders.trajectories import TRAJECTORY_COLUMNS
 from fogsim.scenario.schema import Scenario
@@ -120,6 +121,11 @@ def _column_rows(found: Sequence[Column[Any]]) -> list[tuple[str, ...]]:
 def trajectory_columns() -> list[tuple[str, ...]]:
     """Columns of ``trajectories.parquet``."""
     return [(f"`{name}`", str(kind), told) for name, (kind, told) in TRAJECTORY_COLUMNS.items()]
+
+
+def event_columns() -> list[tuple[str, ...]]:
+    """Columns of ``events.parquet``."""
+    return [(f"`{name}`", str(kind), told) for name, (kind, told) in EVENT_COLUMNS.items()]
 
 
 def metrics() -> list[tuple[str, ...]]:
@@ -232,6 +238,7 @@ TABLES = {
         "columns": (("column", "type", "meaning"), columns),
         "traffic_columns": (("column", "type", "meaning"), traffic_columns),
         "trajectories": (("column", "type", "meaning"), trajectory_columns),
+        "events": (("column", "type", "meaning"), event_columns),
         "metrics": (("key", "meaning"), metrics),
     },
 }

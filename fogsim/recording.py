@@ -87,6 +87,7 @@ def record_run(
     - ``metrics.json``, always, at the end: `RunSummary`'s keys, which end in their units, and ``complete``.
     - ``steps.parquet``, by the recorder ``table``: a row for each step, columns in SI units and radians.
     - ``trajectories.parquet``, by ``trajectories``: a row for each vehicle and step, in SUMO's FCD columns.
+    - ``events.parquet``, by ``events``: a row for each event: of the timeline, collisions, faults of sensors, the end.
     - ``video.mp4``, by ``video``: a frame of 1024×480 px (H.264) for each step, at real speed.
     - ``report.html``, by ``report``: metrics, figures and pictures in one file.
     - ``sumo_outputs``, a folder: what SUMO writes, where its files or options ask for outputs.
@@ -102,7 +103,7 @@ def record_run(
     overwrite : bool
         True to replace the results that are there, once the run is over; files that are not FogSim's stay.
     recorders : iterable of str
-        Which of `RECORDERS` write, each at most once; by default all but ``trajectories``.
+        Which of `RECORDERS` write, each at most once; by default all but ``trajectories`` and ``events``.
     command_line : sequence of str
         Program and arguments of the command that started it, for the manifest; empty if none did.
     watch : callable
@@ -176,7 +177,8 @@ def record_traffic(
     overwrite : bool
         As of `record_run`.
     recorders : iterable of str
-        Which of `TRAFFIC_RECORDERS` write, each at most once; by default all but ``trajectories``.
+        Which of `TRAFFIC_RECORDERS` write, each at most once; by default all but ``trajectories`` and
+        ``events``.
     command_line : sequence of str
         As of `record_run`.
     watch : callable

@@ -76,6 +76,9 @@ def run_command(
     ] = None,
     report: Annotated[bool, typer.Option(help="Write report.html.")] = True,
     trajectories: Annotated[bool, typer.Option(help="Write trajectories.parquet, all vehicles.")] = False,
+    events: Annotated[
+        bool | None, typer.Option("--events/--no-events", help="Write events.parquet (as a rule with a timeline).")
+    ] = None,
 ) -> None:
     """Run a scenario and write manifest.json, steps.parquet, metrics.json, video.mp4 and report.html."""
     from fogsim.recording import record_run, record_traffic
@@ -86,6 +89,7 @@ def run_command(
         "video": _filmed(loaded, video),
         "report": report,
         "trajectories": trajectories,
+        "events": bool(loaded.timeline) if events is None else events,
     }
     record = record_run if loaded.traffic.has_ego else record_traffic
     directory = out or Path("runs", f"{loaded.name}-{of_file.folder_name}")

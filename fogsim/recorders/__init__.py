@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from fogsim.files.atomic import write_json
+from fogsim.recorders.events import EventRecorder
 from fogsim.recorders.frame_panel import FramePanel
 from fogsim.recorders.manifest import Manifest, Status, versions
 from fogsim.recorders.protocol import (
@@ -38,6 +39,7 @@ RECORDERS: Registry[RecorderFactory] = Registry(
         "video": lambda run: VideoRecorder(run.directory.video, run.frame_period),
         "report": ReportRecorder,
         "trajectories": lambda run: TrajectoryRecorder(run.directory.trajectories),
+        "events": lambda run: EventRecorder(run.directory.events),
     },
 )
 """Every recorder of runs about an ego, by name."""
@@ -48,6 +50,7 @@ TRAFFIC_RECORDERS: Registry[TrafficRecorderFactory] = Registry(
         "table": lambda run: StepTable(run.directory.table, traffic_table_columns()),
         "report": TrafficReportRecorder,
         "trajectories": lambda run: TrajectoryRecorder(run.directory.trajectories),
+        "events": lambda run: EventRecorder(run.directory.events),
     },
 )
 """Every recorder of runs without an ego, by name."""
@@ -66,6 +69,7 @@ __all__ = [
     "USUAL_TRAFFIC_RECORDERS",
     "AnyStep_contra",
     "Derived",
+    "EventRecorder",
     "FramePanel",
     "Manifest",
     "Recorder",

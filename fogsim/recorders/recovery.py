@@ -7,8 +7,10 @@ from pathlib import Path
 from fogsim.errors import InputError
 from fogsim.files.row_log import read_rows
 from fogsim.files.writer_lock import WriterLock
+from fogsim.recorders.events import write_event_table
 from fogsim.recorders.manifest import Status
 from fogsim.recorders.run_directory import (
+    EVENT_LOG,
     ROW_LOG,
     TRAJECTORY_LOG,
     UNFINISHED,
@@ -24,8 +26,8 @@ from fogsim.recorders.trajectories import write_trajectory_table
 def recover_run(path: Path, overwrite: bool = False) -> list[str]:
     """Make readable what a run has left that was killed, or could not close its table.
 
-    Its rows become ``steps.parquet`` and ``trajectories.parquet``, marked as partial, and its manifest says "dead";
-    video and report are lost.
+    Its rows become ``steps.parquet``, ``events.parquet`` and ``trajectories.parquet``, marked as partial, and its
+    manifest says "dead"; video and report are lost.
 
     Parameters
     ----------
@@ -69,13 +71,14 @@ def recover_run(path: Path, overwrite: bool = False) -> list[str]:
 
 def _make_readable(folder: Path) -> None:
     """Make tables of the rows in a folder."""
-    rows, trajectories = folder / ROW_LOG, folder / TRAJECTORY_LOG
+    rows, trajectories, events = folder / ROW_LOG, folder / TRAJECTORY_LOG, folder / EVENT_LOG
     # A log without a head is of a process that was killed as it began.
     if rows.exists():
         with contextlib.suppress(InputError):
             write_table(folder / "steps.parquet", read_rows(rows), complete=False)
         rows.unlink()
-    if trajectories.exists():
-        with contextlib.suppress(InputError):
-            write_trajectory_table(folder / "trajectories.parquet", trajectories, complete=False)
-        trajectories.unlink()
+    for log, write in ((trajectories, write_trajectory_table), (events, write_event_table)):
+        if log.exists():
+            with contextlib.suppress(InputError):
+                write(log.with_suffix(".parquet"), log, complete=False)
+            log.unlink()

@@ -23,6 +23,9 @@ ROW_LOG = "steps" + LOG_SUFFIX
 TRAJECTORY_LOG = "trajectories" + LOG_SUFFIX
 """Rows of ``trajectories.parquet``."""
 
+EVENT_LOG = "events" + LOG_SUFFIX
+"""Rows of ``events.parquet``."""
+
 SUMO_OUTPUTS = "sumo_outputs"
 """Folder of the files that SUMO itself has written; ``sumo_outputs.part`` until the end of the run."""
 
@@ -31,6 +34,7 @@ _NAMES = {
     "metrics": "metrics.json",
     "table": "steps.parquet",
     "trajectories": "trajectories.parquet",
+    "events": "events.parquet",
     "video": "video.mp4",
     "report": "report.html",
 }
@@ -219,6 +223,11 @@ class RunDirectory:
     def trajectories(self) -> Path:
         """One row a vehicle and step."""
         return self.unfinished / _NAMES["trajectories"]
+
+    @property
+    def events(self) -> Path:
+        """One row an event."""
+        return self.unfinished / _NAMES["events"]
 
     @property
     def video(self) -> Path:

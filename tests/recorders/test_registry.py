@@ -17,6 +17,7 @@ def test_every_registered_recorder_writes_its_file(tmp_path: Path) -> None:
             recorder.close(complete=True)
         directory.finish({})
         assert directory.files() == [
+            "events.parquet",
             "manifest.json",
             "report.html",
             "steps.parquet",

@@ -1,0 +1,139 @@
+"""What happens in a run, one row each: the script's doings, collisions, faults of sensors, the end."""
+
+import json
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pyarrow as pa
+
+from fogsim.files.row_log import RowLog, row_batches, row_schema
+from fogsim.recorders.protocol import Derived
+from fogsim.recorders.run_directory import EVENT_LOG
+from fogsim.recorders.table import write_table
+from fogsim.values import Step, TrafficStep
+
+EVENT_COLUMNS: Mapping[str, tuple[Any, str]] = {
+    "index": (pa.int64(), "number of the camera period, as in steps.parquet"),
+    "time_s": (pa.float64(), "time since the run began"),
+    "event": (pa.string(), "script_begins, script_ends, collision, fault_begins, fault_ends or run_ends"),
+    "name": (pa.string(), "entry of the timeline, sensor and fault, or why the run ended"),
+    "what": (pa.string(), "what is done; of a collision the speed of the impact [m/s]"),
+    "who": (pa.string(), "vehicles, with commas between"),
+    "x_m": (pa.float64(), "where the first of them is, or else the ego: east; null if neither is there"),
+    "y_m": (pa.float64(), "likewise, north"),
+    "z_m": (pa.float64(), "likewise, height"),
+    "why": (pa.string(), "what held of the condition when it came to hold"),
+}
+"""Columns of ``events.parquet``: their types and meanings."""
+
+
+class _Event(NamedTuple):
+    """A row but for what every event of a step has."""
+
+    time: float
+    event: str
+    name: str
+    what: str = ""
+    who: tuple[str, ...] = ()
+    why: str = ""
+
+
+class EventRecorder:
+    """Writes ``events.parquet``: a row for each event, in the order of time; equal steps give equal bytes.
+
+    Until it is closed, rows are in ``events.arrows`` beside it, from the step on in which they happened.
+
+    Parameters
+    ----------
+    path : Path
+        The file; nothing is written before the first step.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._schema = pa.schema(
+            [(name, kind) for name, (kind, _) in EVENT_COLUMNS.items()],
+            metadata={"fogsim.columns": json.dumps({name: told for name, (_, told) in EVENT_COLUMNS.items()})},
+        )
+        self._log: RowLog | None = None
+        self._faults: frozenset[str] = frozenset()
+        self._last = -math.inf
+        self._open = True
+
+    def record(self, step: TrafficStep, _derived: Derived | None = None) -> None:
+        """Add the events of a step.
+
+        Parameters
+        ----------
+        step : TrafficStep
+            The finished step.
+        _derived : mapping from str to float or None
+            Not needed.
+        """
+        rows = [self._row(step, event) for event in self._events(step)]
+        self._faults, self._last = frozenset(fault.name for fault in step.truth.faults), step.traffic.time
+        if self._log is None:
+            self._log = RowLog(self._path.with_name(EVENT_LOG), self._schema)
+        if rows:
+            columns = dict(zip(self._schema.names, zip(*rows, strict=True), strict=True))
+            self._log.append(pa.RecordBatch.from_pydict(columns, schema=self._schema))
+
+    def _events(self, step: TrafficStep) -> Iterator[_Event]:
+        for begun in step.begun:
+            how = "script_ends" if begun.is_over else "script_begins"
+            yield _Event(begun.time, how, begun.name, begun.what, begun.who, begun.why)
+        # The step that ends a run may show once more what was last seen.
+        for hit in step.collisions if step.traffic.time > self._last else ():
+            who = (hit.collider, hit.victim)
+            yield _Event(step.time, "collision", f"{hit.collider} hit {hit.victim}", f"{hit.impact_speed:.3f}", who)
+        now = frozenset(fault.name for fault in step.truth.faults)
+        for how, faults in (("fault_begins", now - self._faults), ("fault_ends", self._faults - now)):
+            yield from (_Event(step.time, how, fault) for fault in sorted(faults))
+        if step.ending is not None:
+            yield _Event(step.time, "run_ends", step.ending.value)
+
+    def _row(self, step: TrafficStep, event: _Event) -> tuple[object, ...]:
+        row = step.traffic.row(event.who[0]) if event.who else step.ego if isinstance(step, Step) else None
+        place = (None, None, None) if row is None else step.traffic.position[row].tolist()
+        told = event.name, event.what, ",".join(event.who)
+        return (step.index, event.time, event.event, *told, *place, event.why)
+
+    def close(self, complete: bool) -> None:
+        """Make the parquet file of the rows, and say in it whether the run was complete.
+
+        Parameters
+        ----------
+        complete : bool
+            False if the run was cut short.
+        """
+        if not self._open:
+            return
+        log = self._log or RowLog(self._path.with_name(EVENT_LOG), self._schema)
+        log.release_reserve()
+        write_event_table(self._path, log.path, complete)
+        log.remove()
+        self._open = False
+
+
+def write_event_table(path: Path, log: Path, complete: bool) -> None:
+    """Make a parquet file of a log of events, whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+        The parquet file.
+    log : Path
+        The log, which may have been cut off.
+    complete : bool
+        Whether it is of a whole run.
+
+    Raises
+    ------
+    InputError
+        If it is no log.
+    OSError
+        If the file cannot be written; the message names it.
+    """
+    write_table(path, pa.Table.from_batches(row_batches(log), schema=row_schema(log)), complete)

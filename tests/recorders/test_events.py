@@ -1,0 +1,78 @@
+"""events.parquet: what happens in a run, a row each."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from fogsim.recorders.events import EVENT_COLUMNS, EventRecorder
+from fogsim.recorders.recovery import _make_readable
+from fogsim.values import Collision, Command, Ending, Fault, TrafficState, TrafficStep, Truth
+from fogsim.values.fault import Blackout
+from fogsim.values.script import Begun
+
+
+def step(index: int, **further: object) -> TrafficStep:
+    one, two = np.zeros(1), np.ones(1)
+    state = TrafficState(
+        0.1 * index, ("slow",), ("car",), np.array([[5.0, 6.0, 7.0]]), one, one, one, two, two, two, ("e_0",),
+        np.zeros(1, np.int32), np.zeros((1, 3)),
+    )  # fmt: skip
+    truth = Truth(0.0, 0.0, faults=(Fault(Blackout()),) if index == 1 else ())
+    plain = TrafficStep(
+        index=index, time=0.1 * index, traffic=state, collisions=(), truth=truth, command=Command(), ending=None
+    )
+    return replace(plain, **further)  # type: ignore[arg-type]  # any field
+
+
+BEGUN = Begun("cut_in", 0.0, "slow: brake", "slow.speed = 3 m/s", ("slow", "ego"), "timeline.0")
+STEPS = [
+    step(0),
+    step(1, begun=(BEGUN,)),
+    step(2, collisions=(Collision(0.2, "slow", "other", 4.5),), begun=(replace(BEGUN, time=0.2, is_over=True),)),
+    step(3, ending=Ending.TIME),
+]
+EXPECTED = [
+    (1, 0.0, "script_begins", "cut_in", "slow: brake", "slow,ego", 5.0, 6.0, 7.0, "slow.speed = 3 m/s"),
+    (1, 0.1, "fault_begins", "camera blackout", "", "", None, None, None, ""),
+    (2, 0.2, "script_ends", "cut_in", "slow: brake", "slow,ego", 5.0, 6.0, 7.0, "slow.speed = 3 m/s"),
+    (2, 0.2, "collision", "slow hit other", "4.500", "slow,other", 5.0, 6.0, 7.0, ""),
+    (2, 0.2, "fault_ends", "camera blackout", "", "", None, None, None, ""),
+    (3, pytest.approx(0.3), "run_ends", "time", "", "", None, None, None, ""),
+]
+
+
+def rows(file: Path) -> list[tuple[object, ...]]:
+    table = pq.read_table(file)
+    assert table.schema.names == list(EVENT_COLUMNS)
+    return [tuple(row.values()) for row in table.to_pylist()]
+
+
+@pytest.mark.parametrize("complete", [True, False])
+def test_every_event_is_a_row(tmp_path: Path, complete: bool) -> None:
+    file = tmp_path / "events.parquet"
+    recorder = EventRecorder(file)
+    for one in STEPS:
+        recorder.record(one)
+    recorder.close(complete)
+    recorder.close(complete)
+    assert rows(file) == EXPECTED
+    assert pq.read_schema(file).metadata[b"fogsim.complete"] == str(complete).lower().encode()
+    assert [one.name for one in tmp_path.iterdir()] == ["events.parquet"]
+
+
+def test_a_run_without_events_has_an_empty_table(tmp_path: Path) -> None:
+    recorder = EventRecorder(tmp_path / "events.parquet")
+    recorder.record(STEPS[0])
+    recorder.close(complete=True)
+    assert rows(tmp_path / "events.parquet") == []
+
+
+def test_events_of_a_process_that_died_are_there(tmp_path: Path) -> None:
+    recorder = EventRecorder(tmp_path / "events.parquet")
+    for one in STEPS[:2]:
+        recorder.record(one)
+    _make_readable(tmp_path)
+    assert rows(tmp_path / "events.parquet") == EXPECTED[:2]

@@ -1,4 +1,4 @@
-"""The timeline of a scenario while it runs: finished steps go in, what begins in the next camera period comes out."""
+"""Entries of a timeline whose conditions are watched, and what of them begins, is over, or has never begun."""
 
 import math
 from collections.abc import Collection

@@ -30,6 +30,7 @@ FAULTS = {
     "frozen, old time": "fault: frozen, time_stamp: exposure",
     "half of frames dropped": "fault: dropped_frames, share: 50 %",
     "latency 0.6 s": "fault: latency, delay: 0.6 s",
+    "the same, new times": "fault: latency, delay: 0.6 s, time_stamp: delivery",
     "dirt on 10 % of the glass": "fault: dirty_lens",
     "dirt on 30 %, 4 mm": "fault: dirty_lens, coverage: 30 %, diameter: 4 mm",
     "drops on 15 %": "fault: wet_lens",

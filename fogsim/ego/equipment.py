@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fogsim.atmosphere import extinction, field_at, optical_depth_along, with_change
 from fogsim.camera import Delivered, FaultyLens, FrameDelivery, knocked, mounted_pose
 from fogsim.ego.daylight import Ramp, brightened
-from fogsim.ego.frame_watch import FrameWatch
+from fogsim.ego.frame_watch import FrameWatch, LeadHistory
 from fogsim.ego.measurements import EgoSensors
 from fogsim.ego.road_meters import RoadMeters
 from fogsim.ego.sensor_faults import FaultSchedule
@@ -75,7 +75,8 @@ class EgoEquipment:
         self._light = Ramp(1.0)
         self._fog: FogField | None = None
         self._fog_now: FogField | None = None
-        self._glass, self._delivery, self._watch = FaultyLens(), FrameDelivery(), FrameWatch()
+        self._glass, self._delivery = FaultyLens(), FrameDelivery()
+        self._watch, self._leads = FrameWatch(), LeadHistory()
         self._fusion = build.fusion(scenario)
         self._view_renderer: EgoView | None = None
         self._streams: Streams | None = None
@@ -137,6 +138,7 @@ class EgoEquipment:
         self._glass.reset()
         self._delivery.reset()
         self._watch.reset()
+        self._leads.reset()
         self._streams = streams
         self._light = Ramp(1.0)
         if self._fog is None:
@@ -267,7 +269,7 @@ class EgoEquipment:
             lead=self._sensors.lead(snapshot, faults, streams),
             signs=self._sensors.signs(snapshot, network[1], faults, streams),
         )
-        estimates = self._estimate(frame, observation)
+        estimates = self._estimate(frame, observation, time)
         return Step(
             index=index,
             time=time,
@@ -314,10 +316,13 @@ class EgoEquipment:
         heading, grade = float(state.heading[ego]), float(state.grade[ego])
         return mounted_pose(self._camera, state.position[ego], heading, self._setback, grade, body_pitch)
 
-    def _estimate(self, frame: Frame, observation: Observation) -> tuple[Estimate, ...]:
+    def _estimate(self, frame: Frame, observation: Observation, time: float) -> tuple[Estimate, ...]:
         """What each estimator says; none is asked about a frame that tells nothing new."""
+        self._leads.add(time, observation.lead)
         if why := self._watch.why_no_news(frame, observation.speed):
             return tuple(Estimate.invalid(estimator.method, why) for estimator in self._estimators)
+        # A late frame belongs with what the radar measured when it was taken.
+        observation = replace(observation, lead=self._leads.at(frame.time))
         return tuple(
             checked_estimate(section.method, estimator.update(observation))
             for section, estimator in zip(self._scenario.estimators, self._estimators, strict=True)

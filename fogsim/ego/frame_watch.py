@@ -1,9 +1,10 @@
-"""Whether a camera's frame tells anything new: what a vehicle can find out by itself."""
+"""Whether a camera's frame tells anything new, and what was measured when it was taken: what a vehicle can find out."""
 
 import math
+from collections import deque
 
 from fogsim.camera import Pixels
-from fogsim.values import Frame
+from fogsim.values import Frame, LeadMeasurement
 
 MOVING = 1.0
 """Speed from which on the picture of the road must change from frame to frame [m/s]."""
@@ -44,6 +45,41 @@ class FrameWatch:
         if speed > MOVING and before is not None and _are_same(before, frame.image):
             return "the picture stands still while the vehicle moves"
         return ""
+
+
+class LeadHistory:
+    """What the radar measured, until the frame of that time has arrived."""
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all measurements."""
+        self._measured: deque[tuple[float, LeadMeasurement | None]] = deque()
+
+    def add(self, time: float, measured: LeadMeasurement | None) -> None:
+        """Keep a measurement.
+
+        Parameters
+        ----------
+        time : float
+            When it was made [s].
+        measured : LeadMeasurement or None
+            The measurement.
+        """
+        self._measured.append((time, measured))
+
+    def at(self, time: float) -> LeadMeasurement | None:
+        """The last measurement until the time of a frame; earlier ones are forgotten.
+
+        Parameters
+        ----------
+        time : float
+            The time that the frame bears [s], not before that of the last call.
+        """
+        while len(self._measured) > 1 and self._measured[1][0] <= time:
+            self._measured.popleft()
+        return self._measured[0][1] if self._measured else None
 
 
 def _are_same(one: Pixels, other: Pixels) -> bool:

@@ -10,6 +10,7 @@ from fogsim.errors import nearest, shown, suggest
 from fogsim.scenario.document import Document
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.section import MISTAKE
+from fogsim.scenario.sensor_schema import AnyFault
 from fogsim.scenario.traffic_schema import AnyEvent
 
 MOST_TOLD = 50
@@ -66,9 +67,10 @@ def _mistake_line(document: Document, model: type[BaseModel], detail: ErrorDetai
     if detail["type"] == "union_tag_invalid":
         context = detail["ctx"]
         allowed = [kind.strip(" '") for kind in str(context["expected_tags"]).split(",")]
-        return f"{where}.kind: unknown kind {shown(context['tag'])}; {suggest(str(context['tag']), allowed)}"
+        key = _discriminator(context)
+        return f"{where}.{key}: unknown {key} {shown(context['tag'])}; {suggest(str(context['tag']), allowed)}"
     if detail["type"] == "union_tag_not_found":
-        return f"{where}.kind: this key is missing; it is required"
+        return f"{where}.{_discriminator(detail['ctx'])}: this key is missing; it is required"
     if detail["type"] == "missing":
         return f"{where}: this key is missing; it is required"
     if detail["type"] == MISTAKE:
@@ -83,6 +85,11 @@ def _mistake_line(document: Document, model: type[BaseModel], detail: ErrorDetai
     return f"{where}: {message[0].lower()}{message[1:]}{got}"
 
 
+def _discriminator(context: dict[str, Any]) -> str:
+    """Key by which blocks of a list are told apart, as pydantic names it."""
+    return str(context["discriminator"]).strip("'")
+
+
 def _without_kinds(location: KeyPath) -> KeyPath:
     """Key path of a mistake: pydantic puts the kind of a list's entry behind its place, where files have no key."""
     kinds = _kinds()
@@ -95,8 +102,11 @@ def _without_kinds(location: KeyPath) -> KeyPath:
 
 def _kinds() -> dict[str, type[BaseModel]]:
     """Models of list entries by their kind."""
-    models = (*get_args(get_args(AnyEvent)[0]),)
-    return {str(get_args(model.model_fields["kind"].annotation)[0]): model for model in models}
+    return {
+        str(get_args(model.model_fields[key].annotation)[0]): model
+        for key, union in (("kind", AnyEvent), ("fault", AnyFault))
+        for model in get_args(get_args(union)[0])
+    }
 
 
 def known_keys(root: type[BaseModel], location: Sequence[str | int]) -> list[str]:

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from fogsim.ego.frame_watch import FrameWatch
-from fogsim.values import Camera, Frame
+from fogsim.ego.frame_watch import FrameWatch, LeadHistory
+from fogsim.values import Camera, Frame, LeadMeasurement
 
 CAMERA = Camera(40, 30, 50.0, (20.0, 15.0), 1.4)
 
@@ -34,3 +34,16 @@ def test_a_picture_that_stands_still_is_no_news_only_while_the_vehicle_moves() -
     one_pixel = still.image.copy()
     one_pixel[7, 9, 1] ^= 1
     assert watch.why_no_news(Frame(0.4, one_pixel, CAMERA), 20.0) == ""
+
+
+def test_a_late_frame_belongs_with_what_was_measured_when_it_was_taken() -> None:
+    history = LeadHistory()
+    assert history.at(0.0) is None
+    for number in range(6):
+        history.add(0.1 * number, LeadMeasurement(float(number), 0.0) if number != 2 else None)
+    assert [history.at(time) for time in (0.1, 0.2, 0.35, 0.5)] == [
+        LeadMeasurement(1.0, 0.0),
+        None,
+        LeadMeasurement(3.0, 0.0),
+        LeadMeasurement(5.0, 0.0),
+    ]

@@ -74,11 +74,6 @@ def test_a_run_without_frames_takes_no_fault_of_the_camera() -> None:
         )
 
 
-def test_faults_are_named_after_one_sensor() -> None:
-    with pytest.raises(fogsim.InputError, match=r"sensor.*camera.*lead"):
-        fogsim.load_scenario("motorway_fog_bank", ["sensors.faults=[{sensor: lead, fault: blackout}]"])
-
-
 def test_a_knocked_camera_sees_what_one_sees_that_was_mounted_so(plain: list[Step]) -> None:
     knocked = steps("{fault: calibration, pitch: 0.5 deg, roll: 1 deg, focal_length: 2 %}")
     view = np.degrees(2.0 * np.arctan(np.tan(np.radians(29.0)) / 1.02))
@@ -98,3 +93,23 @@ def test_signs_that_have_gone_are_not_drawn_but_stay_on_the_map(plain: list[Step
     assert [step.observation.signs for step in gone] == [step.observation.signs for step in plain]
     forgotten = steps("{sensor: signs, fault: missing, where: map}", "{sensor: gps, fault: outage, at: 5 s}")
     assert all(step.observation.signs == () and step.truth.signs.signs for step in forgotten)
+
+
+@pytest.mark.parametrize(
+    ("fault", "told"),
+    [
+        ("{fault: wetlens}", r"sensors\.faults\.0\.fault: unknown fault 'wetlens'; did you mean 'wet_lens'\?"),
+        ("{sensor: lead}", r"sensors\.faults\.0\.fault: this key is missing"),
+        ("{sensor: lead, fault: wet_lens}", r"sensors\.faults\.0\.sensor: input should be 'camera'; got 'lead'"),
+        ("{fault: wet_lens, covrage: 0.1}", r"sensors\.faults\.0\.covrage: unknown key; did you mean 'coverage'\?"),
+        ("{fault: wet_lens, at: 3 km}", r"sensors\.faults\.0\.at: the unit 'km' does not fit"),
+    ],
+)
+def test_mistakes_in_faults_are_told_by_key_and_value(fault: str, told: str) -> None:
+    with pytest.raises(fogsim.InputError, match=told):
+        fogsim.load_scenario("motorway_fog_bank", [f"sensors.faults=[{fault}]"])
+
+
+def test_a_sign_that_is_not_there_stops_the_run_at_its_beginning() -> None:
+    with pytest.raises(fogsim.InputError, match=r"there is no sign 'limit'; did you mean 'limit\.exit'"):
+        steps("{fault: moved, ids: [limit], left: 3 m}")

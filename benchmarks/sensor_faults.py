@@ -117,7 +117,8 @@ def record(
 def cell(one: dict[str, Any]) -> str:
     """A record in a cell of the table: how often valid and how far off, then the belief."""
     error = one["error_pct"]
-    said = "silent" if error is None else f"{one['valid_pct']:.0f} %, {'clear' if error > 900 else f'{error:+.0f} %'}"
+    off = "" if error is None else "clear" if error > 900 else f"{round(error):+d} %".replace("+0", "0")
+    said = f"{one['valid_pct']:.0f} %, {off}" if off else "silent"
     belief = f"{one['low_m']:.0f}–{one['high_m']:.0f}" if one["high_m"] < 3000 else f"over {one['low_m']:.0f}"
     return f"{said}; {'**' + belief + '**' if one['fooled'] else belief}"
 

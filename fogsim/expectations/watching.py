@@ -149,16 +149,14 @@ class _AlwaysWatch:
         at_worst = "" if worst is None else f"at worst {worst[2]} at {worst[0]:g} s"
         if self._broken is not None:
             is_worst = worst is None or worst[0] == self._broken[0]
-            return _failed(self._broken, self._broken[2] + ("" if is_worst else f"; {at_worst}"))
+            return _failed(self._broken, self._broken[2], "" if is_worst else at_worst)
         if not self._scope.was_entered:
             return _open(f"{self._clause.during} never held")
         if not self._known_once:
             return _open(_NEVER_KNOWN, self._watch.told())
         if self._counted < self._clause.for_at_least - _TICK:
-            return _open(
-                f"it counted for {self._counted:g} s, and {self._clause.for_at_least:g} s were wanted", at_worst
-            )
-        return _passed(worst, at_worst or self._watch.told())
+            return _open(f"it counted for {self._counted:g} s, and {self._clause.for_at_least:g} s were wanted")
+        return _passed(worst, self._watch.told() if worst is None else f"at worst {worst[2]}")
 
 
 class _Worst:
@@ -264,7 +262,7 @@ class _WheneverWatch:
         if self._broken is not None:
             sight, since = self._broken
             return _failed(sight, sight[2], f"not so {self._failed} of {tried} times; the first began at {since:g} s")
-        came = f"{self._passed} of {tried} times"
+        came = f"{self._passed} of {tried} times" if tried else ""
         if tried < self._clause.at_least:
             undecided = f", {self._fired - tried} of them not decided" if self._fired > tried else ""
             wanted = f"{self._clause.at_least} wanted"

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, get_args
+from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel
 
@@ -53,8 +53,14 @@ class _Conversion:
                 name, number = self._quantity(suffixed, written, (*at, key))
                 result[name] = number
             else:
-                result[key] = self._value(value, _models_of(key, models), (*at, key))
+                inner = _models_of(key, models)
+                is_by_name = isinstance(value, dict) and any(_is_by_name(model, key) for model in models)
+                result[key] = (self._by_name if is_by_name else self._value)(value, inner, (*at, key))
         return result
+
+    def _by_name(self, value: dict[str, Any], models: Models, at: KeyPath) -> dict[str, Any]:
+        """A mapping from names, which may be those of keys, to blocks."""
+        return {name: self._value(one, models, (*at, name)) for name, one in value.items()}
 
     def _value(self, value: object, models: Models, at: KeyPath) -> object:
         if not models:
@@ -63,9 +69,9 @@ class _Conversion:
             return [self._value(one, models, (*at, place)) for place, one in enumerate(value)]
         if not isinstance(value, dict):
             return value
-        # A mapping by name has blocks of its own, which have other keys.
+        # A mapping by name inside a list or another has blocks of its own, which have other keys.
         if not any(_known(key, models) or list(_with_suffix(key, models)) for key in value):
-            return {key: self._value(one, models, (*at, key)) for key, one in value.items()}
+            return self._by_name(value, models, at)
         of_kind = tuple(model for model in models if value.get("kind") in get_args(_annotation(model, "kind")))
         return self.block(value, of_kind or models, at)
 
@@ -109,6 +115,10 @@ def _with_suffix(key: object, models: Models) -> Iterator[tuple[str, str]]:
 def _annotation(model: type[BaseModel], key: str) -> object:
     field = model.model_fields.get(key)
     return None if field is None else field.annotation
+
+
+def _is_by_name(model: type[BaseModel], key: str) -> bool:
+    return get_origin(_annotation(model, key)) is dict
 
 
 def _models_of(key: str, models: Models) -> Models:

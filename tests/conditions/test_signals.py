@@ -106,6 +106,17 @@ def test_places_count_as_the_egos_own_does() -> None:
     assert (read("ego.position", step), read("other.position", step)) == (230.0, pytest.approx(290.0))
 
 
+def test_without_an_ego_places_are_along_the_named_road() -> None:
+    step = placed(make_step(), (260.0, 0.0), (500.0, 300.0), heading=(0.0, math.pi / 2))
+    alone = TrafficStep(
+        index=0, time=0.0, traffic=step.traffic, collisions=(), truth=step.truth, command=step.command, ending=None
+    )
+    assert read("other.position", alone) == pytest.approx(260.0)
+    assert read("gap(other, ego)", alone) == pytest.approx(800.0 - 4.6 - 260.0)
+    assert read("fog.bank(0)", alone) is None
+    assert read("ego.ttc", alone) is None
+
+
 def test_on_a_lap_a_place_is_near_to_the_ego() -> None:
     lap = np.array([[0.0, 0.0, 0.0], [400.0, 0.0, 0.0], [400.0, 10.0, 0.0], [0.0, 10.0, 0.0], [0.0, 0.0, 0.0]])
     twice = np.concatenate((lap, lap[1:]))

@@ -48,6 +48,11 @@ def test_what_a_test_engineer_writes(tmp_path: Path) -> None:
     assert metric == MetricCheck("flows", "minimum_gap_m", ">=", 10.0)
 
 
+def test_an_expectation_may_have_the_name_of_a_key(tmp_path: Path) -> None:
+    scenario = load(tmp_path, "  always: {never: ego.collision, while: time > 3 s, for_at_least: 2 s}\n")
+    assert scenario.expect["always"].for_at_least_s == 2.0
+
+
 def test_a_resolved_scenario_is_read_as_what_it_was(tmp_path: Path) -> None:
     scenario = load(tmp_path, "  safe: {never: ego.collision, while: time > 3 s}\n")
     written = resolved(scenario)["expect"]["safe"]

@@ -16,7 +16,7 @@ from fogsim.randomness import spawn_streams
 from fogsim.scenario import build
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.traffic.sumo_traffic import command_line
-from fogsim.values import Command, SpeedAdvice, Step
+from fogsim.values import Command, Lamp, SpeedAdvice, Step
 
 GRID = Path(__file__).resolve().parent / "data" / "grid"
 ARGUMENTS = ["-c", str(GRID / "grid.sumocfg"), "--step-length", "0.5", "--no-step-log", "--seed", "1"]
@@ -288,3 +288,30 @@ def test_a_session_tells_at_its_end_what_was_not_played(libsumo: Any) -> None:
         attached()
     with pytest.raises(KeyError):
         attached(failing=True)
+
+
+def test_a_timeline_is_played_in_the_users_loop_and_all_is_given_back(libsumo: Any) -> None:
+    do = f"{{{EGO}: {{speed: {{to: 18 km/h, rate: 2 m/s²}}, hazard_lights: on}}, fog: {{visibility: 60 m}}}}"
+    settings = (*SMALL, f"timeline=[{{name: slow, when: time >= 1 s, do: {do}}}, {{when: time > 99 s, do: {do}}}]")
+    libsumo.simulationStep(40.0)
+    mode = libsumo.vehicle.getSpeedMode(EGO)
+    begun, last = [], None
+    session = fogsim.attach(libsumo, ego=EGO, visibility=120.0, settings=settings)
+    for _ in range(24):
+        libsumo.simulationStep()
+        last = session.observe()
+        assert last is not None
+        session.advise(last)
+        session.advise(last)  # the same step begins nothing twice
+        begun += [(one.name, one.time) for one in last.begun]
+    assert libsumo.vehicle.getSpeedMode(EGO) != mode
+    with pytest.warns(UnplayedWarning, match=r"timeline\.1 .*its condition never held"):
+        session.close()
+    assert begun == [("slow", 1.0)]
+    assert last is not None
+    assert last.traffic.speed[last.ego] == pytest.approx(5.0)
+    assert last.truth.visibility == pytest.approx(60.0)
+    assert last.traffic.lamps[last.ego] & (Lamp.INDICATOR_LEFT | Lamp.INDICATOR_RIGHT)
+    assert libsumo.vehicle.getSpeedMode(EGO) == mode
+    libsumo.simulationStep(libsumo.simulation.getTime() + 4.0)
+    assert libsumo.vehicle.getSpeed(EGO) > 6.0

@@ -111,6 +111,7 @@ def demand_mistakes(document: Document, scenario: Scenario) -> list[str]:
         unfit = {places[v]: _unfit_way(v, demand.routes[v], edges) for v in named.values() if v in demand.routes}
         told |= {at: text for at, text in unfit.items() if text}
         told |= _wide_changes(scenario, demand, edges)
+        told |= _unknown_signals(scenario, edges)
         told |= _unknown_edges(scenario, edges) or _places_aside(scenario, _way(scenario, demand), edges)
     return [f"{document.where(at)}: {dotted(at)}: {text}" for at, text in told.items()]
 
@@ -135,7 +136,7 @@ def _edges(scenario: Scenario, demand: Demand) -> NetEdges | None:
     """Edges of the network, if anything is to be said about them."""
     traffic, folder = scenario.traffic, scenario.directory
     changes = any(isinstance(event, ChangeLane) for event in traffic.events)
-    if not (demand.routes or changes or traffic.along):
+    if not (demand.routes or changes or traffic.along or scenario.timeline):
         return None
     net = configured_files(folder / traffic.config)[0] if traffic.config else traffic_files(scenario).net or Path()
     return read_net_edges(net, _way(scenario, demand))
@@ -153,6 +154,20 @@ def _unknown_edges(scenario: Scenario, edges: NetEdges) -> dict[KeyPath, str]:
         ("traffic", "along", i): f"the net has no edge {shown(edge)}; {_suggested(edge, edges.lanes)}"
         for i, edge in enumerate(scenario.traffic.along)
         if edge not in edges.lanes
+    }
+
+
+def _unknown_signals(scenario: Scenario, edges: NetEdges) -> dict[KeyPath, str]:
+    """Traffic lights that the timeline sets, and the net does not have."""
+    known, prefix = edges.signals, "signal."
+    subjects = ((i, subject) for i, entry in enumerate(scenario.timeline) for subject in entry.do)
+    named = [(i, subject.removeprefix(prefix)) for i, subject in subjects if subject.startswith(prefix)]
+    return {
+        ("timeline", i, "do", prefix + signal): (
+            f"the net has no traffic lights {shown(signal)}; {suggest(signal, known) if known else 'it has none'}"
+        )
+        for i, signal in named
+        if signal not in known
     }
 
 

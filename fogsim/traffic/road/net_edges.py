@@ -24,10 +24,13 @@ class NetEdges:
         How many lanes each has.
     axes : mapping from edge id to sequence of points
         Middle lane [m] of each edge that was asked for.
+    signals : tuple of str
+        Ids of traffic lights.
     """
 
     lanes: Mapping[str, int]
     axes: Mapping[str, Sequence[Point]]
+    signals: tuple[str, ...] = ()
 
     def route_length(self, route: Sequence[str]) -> float:
         """Length of the axis that fog is laid along [m]: middle lanes of a route's edges, end to end.
@@ -71,7 +74,7 @@ def read_net_edges(net: Path, wanted: Collection[str], most_bytes: int = MOST_BY
     if not reader.lanes or (size == most_bytes and not reader.is_done):
         return None
     axes = {edge: shapes[len(shapes) // 2] for edge, shapes in reader.shapes.items() if shapes}
-    return NetEdges(reader.lanes, axes)
+    return NetEdges(reader.lanes, axes, tuple(reader.signals))
 
 
 class _EdgeReader:
@@ -81,6 +84,7 @@ class _EdgeReader:
         self.is_done = False
         self.lanes: dict[str, int] = {}
         self.shapes: dict[str, list[list[Point]]] = {edge: [] for edge in wanted}
+        self.signals: dict[str, None] = {}
         self._edge = ""
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
@@ -91,8 +95,10 @@ class _EdgeReader:
             self.lanes[self._edge] = self.lanes.get(self._edge, 0) + 1
             if self._edge in self.shapes:
                 self.shapes[self._edge].append(_points(attributes.get("shape", "")))
+        elif tag == "tlLogic":
+            self.signals[attributes.get("id", "")] = None
         elif tag == "connection":
-            # All edges stand before the connections between them.
+            # All edges and programs of traffic lights stand before the connections.
             self.is_done = True
 
     def end(self, tag: str) -> None:

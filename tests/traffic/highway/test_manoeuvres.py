@@ -1,5 +1,6 @@
 """Scripted events, acted out by highway-env's vehicles."""
 
+import contextlib
 import copy
 import math
 from collections.abc import Sequence
@@ -13,9 +14,11 @@ import pytest
 from fogsim.atmosphere import FieldAccess, airlight_from_illuminance
 from fogsim.errors import InputError
 from fogsim.traffic import AfterCollision, BrakeEvent, DriverSight, Event, LampFailureEvent, LaneChangeEvent, Trigger
+from fogsim.traffic.drivers.playing import ALL_LAMPS
 from fogsim.traffic.highway import HighwayTraffic
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Command, FogField, TrafficSnapshot
+from fogsim.values.script import ChangeLane, ChangeSpeed, SetLamps, SetSignal
 
 ONE_LANE = {"vehicles_count": 1, "lanes_count": 1}
 THREE_LANES = {"vehicles_count": 1, "lanes_count": 3, "initial_lane_id": 1}
@@ -51,6 +54,21 @@ def course(snapshots: Sequence[TrafficSnapshot], vehicle: str = "lead") -> tuple
     """Times, speeds and accelerations of a vehicle."""
     rows = [(s.state.time, s.state.speed[of(s, vehicle)], s.state.acceleration[of(s, vehicle)]) for s in snapshots]
     return tuple(np.array(rows).T)
+
+
+def test_of_a_timeline_changes_of_lane_and_failing_lamps_are_played_and_all_else_is_refused() -> None:
+    traffic, environment = traffic_of([], THREE_LANES)
+    with contextlib.closing(environment):
+        traffic.start(0)
+        lane = environment.vehicle.lane_index[2]
+        asked = ChangeLane("ego", 1), ChangeLane("ego", 5), ChangeLane("nobody", 1), SetLamps("ego", failed=ALL_LAMPS)
+        assert traffic.begin(asked) == (ChangeLane("nobody", 1),)
+        last = drive(traffic, 6.0)[-1]
+        assert environment.vehicle.lane_index[2] == max(lane - 5, 0)
+        assert last.state.lamps[of(last, "ego")] == 0
+        for action in (ChangeSpeed("lead", 5.0), ChangeLane("ego", 1, duration=2.0), SetSignal("C")):
+            with pytest.raises(InputError, match=f"vehicles cannot play {type(action).__name__}: only changes of lane"):
+                traffic.begin([action])
 
 
 def test_a_lead_vehicle_brakes_as_hard_as_scripted_and_drives_on() -> None:

@@ -15,7 +15,6 @@ import yaml
 from fogsim.conditions import Condition, parse_condition
 from fogsim.errors import InputError, suggest
 from fogsim.files.atomic import refuse_existing, refuse_missing_folder, write_text
-from fogsim.quantities import UNIT_OF_SUFFIX
 from fogsim.scenario import Scenario, load_scenario
 from fogsim.scenario.camera_schema import CalibrationErrors, CameraSection, Exposure
 from fogsim.scenario.expect.schema import Expectation
@@ -63,6 +62,7 @@ from fogsim.scenario.timeline.schema import (
 from fogsim.scenario.traffic_schema import DriversSection as Drivers
 from fogsim.scenario.traffic_schema import Traffic
 from fogsim.scenario.variation.cases import Verdict
+from fogsim.units.quantities import UNIT_OF_SUFFIX
 
 _TRAFFIC_FILES = ("config", "net")
 

@@ -22,7 +22,7 @@ from fogsim.conditions.syntax import (
     Word,
 )
 from fogsim.errors import shown, suggest
-from fogsim.quantities import example_of, parse_quantity
+from fogsim.units.quantities import example_of, parse_quantity
 
 _NUMBER = re.compile(r"[-+]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?|inf\b)")
 _UNIT_PART = r"(?!(?:and|or|not|for)\b)[^\W\d_]+(?:\^?-?\d+)?"

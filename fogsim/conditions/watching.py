@@ -20,7 +20,7 @@ from fogsim.conditions.syntax import (
     parts_of,
     signals_of,
 )
-from fogsim.quantities import parse_quantity
+from fogsim.units.quantities import parse_quantity
 from fogsim.values import TrafficStep
 
 _TICK = 1e-6

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from fogsim.errors import InputError, shown
-from fogsim.quantities import UNIT_OF_SUFFIX
 from fogsim.scenario.plain_yaml import DEEPEST, MOST_BYTES, KeyPath, PlainYamlError, parse_yaml
+from fogsim.units.quantities import UNIT_OF_SUFFIX
 
 TAKES_THE_PLACE_OF = {
     ("fog", "visibility_m"): ("outside_visibility_m", "banks"),

@@ -10,11 +10,11 @@ from fogsim.advice import ADVISERS
 from fogsim.estimators import ESTIMATORS
 from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
-from fogsim.quantities import UNIT_OF_SUFFIX
 from fogsim.registry import Registry
 from fogsim.scenario.schema import Scenario
 from fogsim.scenario.system_under_test import BLOCK, KEYS
 from fogsim.scenario.variation import VariationKeys
+from fogsim.units.quantities import UNIT_OF_SUFFIX
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 """Which JSON Schema it is."""

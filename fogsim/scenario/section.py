@@ -14,8 +14,8 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from fogsim.errors import InputError
 from fogsim.parameters import parameter_mistakes
-from fogsim.quantities import is_quantity, parse_quantity
 from fogsim.registry import Registry
+from fogsim.units.quantities import is_quantity, parse_quantity
 
 FARTHEST = 1e6
 """Longest length, and longest time, that a scenario may name [m, s]."""

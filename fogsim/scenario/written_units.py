@@ -6,9 +6,9 @@ from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel
 
-from fogsim.quantities import UNIT_OF_SUFFIX, is_quantity, parse_quantity
 from fogsim.scenario.document import Document
 from fogsim.scenario.plain_yaml import KeyPath, dotted
+from fogsim.units.quantities import UNIT_OF_SUFFIX, is_quantity, parse_quantity
 
 
 def with_units_in_keys(document: Document, model: type[BaseModel]) -> tuple[Document, list[str]]:

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from fogsim.errors import InputError
 from fogsim.expectations import FindingVerdict
-from fogsim.quantities import split_quantity
 from fogsim.scenario.loading import load_cases
 from fogsim.scenario.variation import Variation, number_with_unit, value_text
 from fogsim.study.engine import Engine
@@ -16,6 +15,7 @@ from fogsim.testing.judgement import Judgement
 from fogsim.testing.results import CaseResult, read_result
 from fogsim.testing.session import FileOutcome
 from fogsim.testing.wording import command_text
+from fogsim.units.quantities import split_quantity
 
 HALVINGS = 5
 """How often the way of a number to its first value is halved."""

@@ -11,10 +11,10 @@ from fogsim.conditions import Condition, mended, outcomes
 from fogsim.conditions.parsing import OPERATORS
 from fogsim.errors import shown
 from fogsim.expectations import Always, Clause, Eventually, Happened, MetricCheck, Whenever
-from fogsim.quantities import UNIT_OF_SUFFIX, is_quantity, parse_quantity
 from fogsim.scenario.expect.conditions import WrittenCondition, refuse
 from fogsim.scenario.plain_yaml import KeyPath
 from fogsim.scenario.section import Flag, Id, Section, Time, Whole
+from fogsim.units.quantities import UNIT_OF_SUFFIX, is_quantity, parse_quantity
 
 _CLAUSES = ("always", "never", "eventually", "whenever", "happened", "metric")
 

@@ -6,9 +6,9 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from fogsim.errors import UnknownNameError, suggest
-from fogsim.quantities import is_quantity, parse_quantity
 from fogsim.scenario.section import Distance, Flag, Id, Length, Number, Section, Share, SpeedKmh, Time, Whole
 from fogsim.traffic.templates import RAMP, ROAD_TEMPLATES, VEHICLE_KINDS, measures
+from fogsim.units.quantities import is_quantity, parse_quantity
 
 _ROUNDING = 1e-6
 

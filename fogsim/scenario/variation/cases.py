@@ -12,12 +12,12 @@ from typing import Annotated, Any, Self
 from pydantic import Field, ValidationError, model_validator
 
 from fogsim.errors import InputError, shown, suggest
-from fogsim.quantities import split_quantity
 from fogsim.scenario.document import Document
 from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.section import Section, Share
 from fogsim.scenario.variation.levels import LevelsError, SeedLevels, Value, Values, parse_levels
+from fogsim.units.quantities import split_quantity
 
 MOST_CASES = 100_000
 """Most cases of a file."""

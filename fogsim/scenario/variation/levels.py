@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from fogsim.errors import shown, suggest
-from fogsim.quantities import split_quantity
 from fogsim.randomness import named_generator
+from fogsim.units.quantities import split_quantity
 
 MOST_VALUES = 100_000
 """Most values of one name."""

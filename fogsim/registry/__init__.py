@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.parameters import parameter_mistakes
-from fogsim.user_code import announced, import_object, is_object_name, load_announced, version_of
+from fogsim.registry.user_code import announced, import_object, is_object_name, load_announced, version_of
 
 T = TypeVar("T")
 

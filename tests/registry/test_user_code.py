@@ -10,11 +10,11 @@ from fogsim import Belief, InputError, LeadMeasurement, Observation, SpeedAdvice
 from fogsim.advice import ADVISERS, VehicleAdviser
 from fogsim.errors import UnknownNameError
 from fogsim.recorders import Manifest, Status
+from fogsim.registry.user_code import import_object
 from fogsim.scenario import build
-from fogsim.user_code import import_object
 from fogsim.values.belief import certain_belief
 
-PLUGIN = Path(__file__).parent / "data" / "adas_fog_plugin"
+PLUGIN = Path(__file__).parents[1] / "data" / "adas_fog_plugin"
 
 
 def test_an_object_of_a_module_beside_the_scenario_is_found_from_anywhere(tmp_path, monkeypatch):

@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from fogsim.quantities import UNIT_OF_SUFFIX, is_quantity, parse_quantity
+from fogsim.units.quantities import UNIT_OF_SUFFIX, is_quantity, parse_quantity
 
 
 @pytest.mark.parametrize(

@@ -368,7 +368,8 @@ def _unnamed_files(document: Document, data: dict[str, Any]) -> list[str]:
     if meant.get("config") is not None:
         return []
     what = "net with routes is required, or config (a SUMO configuration) in their place"
-    places = [("traffic", key) for key in ("net", "routes") if meant.get(key) in (None, "", [])]
+    needed = ("net",) if data.get("actors") else ("net", "routes")
+    places = [("traffic", key) for key in needed if meant.get(key) in (None, "", [])]
     return [f"{document.where(place)}: {dotted(place)}: this key is missing; {what}" for place in places]
 
 
@@ -387,7 +388,7 @@ def _check_files(document: Document, scenario: Scenario) -> None:
 
 
 def _check_placement(document: Document, scenario: Scenario) -> None:
-    if scenario.road is None:
+    if scenario.road is None and not scenario.actors:
         return
     try:
         traffic_files(scenario)

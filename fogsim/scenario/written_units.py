@@ -52,6 +52,10 @@ class _Conversion:
             if suffixed and is_quantity(value):
                 name, number = self._quantity(suffixed, written, (*at, key))
                 result[name] = number
+            elif isinstance(value, dict) and any(get_origin(_annotation(model, key)) is dict for model in models):
+                # Names that people choose, which may be those of keys.
+                inside, there = _models_of(key, models), (*at, key)
+                result[key] = {name: self._value(one, inside, (*there, name)) for name, one in value.items()}
             else:
                 inner = _models_of(key, models)
                 is_by_name = isinstance(value, dict) and any(_is_by_name(model, key) for model in models)

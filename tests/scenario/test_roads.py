@@ -1,6 +1,7 @@
 """Scenarios whose road is a template."""
 
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from fogsim.errors import InputError
 from fogsim.scenario import Scenario, build, load_scenario, override, resolved
 from fogsim.scenario.roads.files import traffic_files
 from fogsim.traffic.road.structures import structures
+from fogsim.traffic.templates import ROAD_TEMPLATES, net_text
 
 TEXT = """
 name: template_motorway
@@ -114,3 +116,33 @@ def test_what_stands_beside_a_road_is_drawn_where_it_is_said_to_be(tmp_path: Pat
 def test_what_does_not_fit_beside_a_road_is_told(tmp_path: Path, old: str, new: str, told: str) -> None:
     with pytest.raises(InputError, match=told):
         loaded(tmp_path, BESIDE.replace(old, new, 1))
+
+
+OWN_NET = """
+name: own_net
+traffic: {net: road.net.xml, warm_up_limit: 10 s}
+actors:
+  ego: {edges: [EDGES], position: 60 m, depart: 5 s}
+  behind: {behind: ego, gap: 20 m, speed: 50 km/h}
+fog: {visibility: 150 m}
+"""
+
+
+def test_actors_drive_on_a_network_of_ones_own(tmp_path: Path) -> None:
+    layout = ROAD_TEMPLATES["motorway"]().layout((500.0,))
+    (tmp_path / "road.net.xml").write_text(net_text(layout.net), encoding="utf-8")
+    scenario = loaded(tmp_path, OWN_NET.replace("EDGES", "same_way, same_way.1"))
+    (routes,) = build.traffic_setup(scenario).routes
+    root = ET.fromstring(routes.read_text(encoding="utf-8"))  # noqa: S314 - our own file
+    found = {one.get("id"): (one.get("depart"), float(one.get("departPos") or "")) for one in root.iter("vehicle")}
+    assert found == {"ego": ("5", 60.0), "behind": ("5", pytest.approx(60.0 - 4.6 - 20.0))}
+    assert {one.get("edges") for one in root.iter("route")} == {"same_way same_way.1"}
+    with pytest.raises(InputError, match=r"scenario.yaml:5: actors.ego: the net has no edge 'same'"):
+        loaded(tmp_path, OWN_NET.replace("EDGES", "same"))
+    with pytest.raises(InputError, match=r"actors.ego: needs edges"):
+        loaded(tmp_path, OWN_NET.replace("edges: [EDGES], ", ""))
+
+
+def test_actors_need_a_road(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"actors: go with a road by template .* or with traffic.net"):
+        loaded(tmp_path, OWN_NET.replace("net: road.net.xml", "config: a.sumocfg"))

@@ -8,8 +8,8 @@ import contextlib
 import hashlib
 import os
 import shutil
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fogsim.errors import InputError, suggest
@@ -23,13 +23,16 @@ from fogsim.traffic.templates import (
     Layout,
     Obstruction,
     Placed,
+    PlacementError,
     Relation,
     RoadTemplate,
+    actors_text,
     additional_text,
     check_placement,
     cuts_around,
     net_text,
     place_actors,
+    read_ways,
     routes_text,
     usual_mix,
 )
@@ -78,7 +81,8 @@ def traffic_files(scenario: Scenario) -> TrafficFiles:
     routes = tuple(folder / path for path in traffic.routes)
     additional = tuple(folder / path for path in traffic.additional)
     if scenario.road is None:
-        return TrafficFiles(net, routes, additional)
+        own = () if net is None or not scenario.actors else (_written({_ROUTES: _actors_on(net, scenario)}) / _ROUTES,)
+        return TrafficFiles(net, (*own, *routes), additional)
     layout, placed = road_layout(scenario)
     _check_ways(layout, scenario.demand or DemandSection())
     demand = _demand(scenario.demand or DemandSection(), usual_mix(scenario.road.template))
@@ -104,11 +108,48 @@ def road_layout(scenario: Scenario) -> tuple[Layout, tuple[Placed, ...]]:
     if scenario.road is None:
         raise ValueError("expected a scenario with a road by template, got one without")
     template = _template(scenario.road)
-    placed = place_actors([_actor(name, section) for name, section in actors_of(scenario).items()])
+    sections = actors_of(scenario)
+    placed = place_actors([_actor(name, sections) for name in sections])
     on_the_way = [one for one in placed if one.actor.way == "same_way"]
     layout = template.layout(cuts_around(on_the_way, template.free_length))
     check_placement(placed, layout)
     return layout, placed
+
+
+def _actors_on(net: Path, scenario: Scenario) -> str:
+    """Text of a route file with the actors of a scenario that has a network of its own."""
+    sections = scenario.actors
+    edges = {name: _declared(name, sections).edges for name in sections}
+    for name, way in edges.items():
+        if not way:
+            raise PlacementError(
+                name, "needs edges, its way on the network, or an actor that it is placed by and follows"
+            )
+    placed = place_actors([replace(_actor(name, sections), way=" ".join(way)) for name, way in edges.items()])
+    ways = read_ways(net, {" ".join(way): way for way in edges.values()})
+    for name, way in edges.items():
+        for edge in way:
+            if edge not in ways.edges:
+                raise PlacementError(name, f"the net has no edge {edge!r}")
+    check_placement(placed, ways)
+    return actors_text(ways, placed)
+
+
+def _declared(name: str, sections: Mapping[str, ActorSection]) -> ActorSection:
+    """The actor that says which way an actor takes."""
+    return _first(name, sections, lambda section: bool(section.edges or section.on))
+
+
+def _first(name: str, sections: Mapping[str, ActorSection], says_so: Callable[[ActorSection], bool]) -> ActorSection:
+    """The first that says something: an actor itself, the one that it is placed by, and so on; else the last."""
+    asked, section = {name}, sections[name]
+    while not says_so(section):
+        other = section.placed_by
+        if other is None or other not in sections or other in asked:
+            break
+        asked.add(other)
+        section = sections[other]
+    return section
 
 
 class DemandError(InputError):
@@ -156,16 +197,17 @@ def _template(road: Road) -> RoadTemplate:
     )
 
 
-def _actor(name: str, section: ActorSection) -> Actor:
+def _actor(name: str, sections: Mapping[str, ActorSection]) -> Actor:
+    section = sections[name]
     lanes = {"right": 0, "left": -1}
     return Actor(
         name,
         section.type,
-        section.on,
+        _declared(name, sections).on or "same_way",
         lanes[section.lane] if isinstance(section.lane, str) else section.lane,
         _place(section),
         None if section.speed_kmh is None else section.speed_kmh / 3.6,
-        section.depart_s,
+        _first(name, sections, lambda one: one.depart_s is not None).depart_s or 0.0,
         section.stands,
     )
 

@@ -220,8 +220,11 @@ class ActorSection(Section):
     type: str = "car"
     """Type of the vehicle."""
 
-    on: Id = "same_way"
-    """Way that it takes."""
+    on: Id | None = None
+    """Way that it takes on a road by template; by default `same_way`, or that of the actor that it is placed by."""
+
+    edges: tuple[Id, ...] = ()
+    """Way that it takes on a network of one's own: edges, one after the other; by default as `on`."""
 
     lane: Literal["right", "left"] | Annotated[Whole, Field(ge=0, le=9)] = "right"
     """Lane: `right`, `left`, or its number from the right, from 0."""
@@ -244,8 +247,8 @@ class ActorSection(Section):
     speed_kmh: SpeedKmh | None = None
     """Speed with which it begins, and which it keeps where nothing slows it; by default that of the road and type."""
 
-    depart_s: Time = 0.0
-    """When it appears; the ego's appearance begins the run."""
+    depart_s: Time | None = None
+    """When it appears; the ego's appearance begins the run. By default 0, or as the actor that it is placed by."""
 
     stands: Flag = False
     """Whether it stands still for good."""
@@ -269,6 +272,11 @@ class ActorSection(Section):
         if (self.gap_m is not None) != (given in (["ahead_of"], ["behind"])):
             raise ValueError("gap_m goes with ahead_of or behind, which need it")
         return self
+
+    @property
+    def placed_by(self) -> str | None:
+        """Id of the actor that it is placed by."""
+        return self.ahead_of or self.behind or self.beside
 
     @property
     def stays_in_lane(self) -> bool:
@@ -300,6 +308,9 @@ def check_roads(written: Any) -> None:
                     f"give road or traffic.{key}, not both: traffic.{key} is {str(getattr(traffic, key))!r}"
                 )
         return
-    for key in ("demand", "actors"):
-        if getattr(written, key):
-            raise ValueError(f"{key}: goes with a road by template (road: {{template: …}}), which is missing")
+    if written.demand is not None:
+        raise ValueError("demand: goes with a road by template (road: {template: …}), which is missing")
+    if written.actors and traffic.net is None:
+        raise ValueError(
+            "actors: go with a road by template (road: {template: …}) or with traffic.net; both are missing"
+        )

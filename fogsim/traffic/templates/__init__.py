@@ -2,9 +2,10 @@
 
 from fogsim.traffic.templates.beside import Obstruction, additional_text
 from fogsim.traffic.templates.catalogue import ROAD_TEMPLATES, RoadTemplate, measures, usual_mix
-from fogsim.traffic.templates.demand import Demand, cuts_around, routes_text
+from fogsim.traffic.templates.demand import Demand, actors_text, cuts_around, routes_text
 from fogsim.traffic.templates.net_plan import Layout
 from fogsim.traffic.templates.net_writer import net_text
+from fogsim.traffic.templates.own_net import KnownWays, read_ways
 from fogsim.traffic.templates.placement import Actor, Placed, PlacementError, Relation, check_placement, place_actors
 from fogsim.traffic.templates.ramp import RAMP
 from fogsim.traffic.templates.vehicle_types import VEHICLE_KINDS
@@ -15,18 +16,21 @@ __all__ = [
     "VEHICLE_KINDS",
     "Actor",
     "Demand",
+    "KnownWays",
     "Layout",
     "Obstruction",
     "Placed",
     "PlacementError",
     "Relation",
     "RoadTemplate",
+    "actors_text",
     "additional_text",
     "check_placement",
     "cuts_around",
     "measures",
     "net_text",
     "place_actors",
+    "read_ways",
     "routes_text",
     "usual_mix",
 ]

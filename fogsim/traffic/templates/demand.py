@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from fogsim.traffic.templates.net_plan import Layout
-from fogsim.traffic.templates.placement import Placed, edge_at
+from fogsim.traffic.templates.placement import Placed, Ways, edge_at
 from fogsim.traffic.templates.vehicle_types import SLOW, VEHICLE_KINDS, VehicleKind
 from fogsim.traffic.templates.xml_text import element, opening
 
@@ -64,14 +64,34 @@ def routes_text(layout: Layout, demand: Demand, placed: Sequence[Placed]) -> str
     placed : sequence of Placed
         The actors.
     """
-    lines = list(_types(demand.mix, max(edge.lanes for edge in layout.net.edges)))
-    for one in sorted(placed, key=lambda one: one.actor.depart):
-        lines += _actor(one, layout)
+    lines = [*_types(demand.mix, max(edge.lanes for edge in layout.net.edges)), *_actors(placed, layout)]
     taken = {_taken_lane(one, layout) for one in placed}
     for way, rate in _rates(layout, demand):
         lines += _filling(layout, way, rate, taken)
         lines += _flows(layout, way, rate)
+    return _routes(lines)
+
+
+def actors_text(ways: Ways, placed: Sequence[Placed]) -> str:
+    """Text of a route file with actors alone.
+
+    Parameters
+    ----------
+    ways : Ways
+        The road.
+    placed : sequence of Placed
+        The actors.
+    """
+    return _routes(list(_actors(placed, ways)))
+
+
+def _routes(lines: Sequence[str]) -> str:
     return '<?xml version="1.0" encoding="UTF-8"?>\n<routes>\n' + "\n".join(lines) + "\n</routes>\n"
+
+
+def _actors(placed: Sequence[Placed], ways: Ways) -> Iterator[str]:
+    for one in sorted(placed, key=lambda one: one.actor.depart):
+        yield from _actor(one, ways)
 
 
 def _rates(layout: Layout, demand: Demand) -> Iterator[tuple[str, float]]:
@@ -121,7 +141,7 @@ def _type(name: str, kind: VehicleKind, **further: object) -> str:
     return element("vType", id=name, **(written | further))
 
 
-def _actor(one: Placed, layout: Layout) -> Iterator[str]:
+def _actor(one: Placed, layout: Ways) -> Iterator[str]:
     actor = one.actor
     edge, position = edge_at(layout, actor.way, one.position)
     way = layout.way(actor.way)

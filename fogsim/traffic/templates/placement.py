@@ -2,12 +2,44 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 from fogsim.errors import InputError, suggest
-from fogsim.traffic.templates.net_plan import Layout
 from fogsim.traffic.templates.vehicle_types import VEHICLE_KINDS
 
 _LEAST_GAP = 0.5  # between two vehicles of a lane [m]
+
+
+class EdgeMeasures(Protocol):
+    """What actors need to know of an edge: how many lanes it has, its length [m] and its limit [m/s]."""
+
+    @property
+    def lanes(self) -> int: ...  # noqa: D102 - told above
+    @property
+    def length(self) -> float: ...  # noqa: D102
+    @property
+    def limit(self) -> float: ...  # noqa: D102
+
+
+class Ways(Protocol):
+    """Ways on which actors are placed: of a `Layout`, or on a network of a user's own."""
+
+    @property
+    def ways(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
+        """Ways by name."""
+        ...
+
+    def way(self, name: str) -> tuple[str, ...]:
+        """Edges of a way."""
+        ...
+
+    def edge(self, name: str) -> EdgeMeasures:
+        """An edge by its id."""
+        ...
+
+    def length(self, way: str) -> float:
+        """Length of a way [m]."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,14 +168,14 @@ def _position(actor: Actor, by_name: Mapping[str, Actor], asked: tuple[str, ...]
     return place + relation.gap + (actor.length if relation.gap >= 0 else -other.length)
 
 
-def check_placement(placed: Sequence[Placed], layout: Layout) -> None:
+def check_placement(placed: Sequence[Placed], layout: Ways) -> None:
     """Refuse actors that lie off their way or in one another.
 
     Parameters
     ----------
     placed : sequence of Placed
         The actors.
-    layout : Layout
+    layout : Ways
         The road.
 
     Raises
@@ -166,7 +198,7 @@ def check_placement(placed: Sequence[Placed], layout: Layout) -> None:
     _check_apart(placed, layout)
 
 
-def _check_apart(placed: Sequence[Placed], layout: Layout) -> None:
+def _check_apart(placed: Sequence[Placed], layout: Ways) -> None:
     for number, one in enumerate(placed):
         for other in placed[:number]:
             if one.actor.depart != other.actor.depart or _lane(one, layout) != _lane(other, layout):
@@ -180,17 +212,17 @@ def _check_apart(placed: Sequence[Placed], layout: Layout) -> None:
                 raise PlacementError(one.actor.name, told)
 
 
-def _lane(one: Placed, layout: Layout) -> tuple[str, int]:
+def _lane(one: Placed, layout: Ways) -> tuple[str, int]:
     lanes = layout.edge(edge_at(layout, one.actor.way, one.position)[0]).lanes
     return one.actor.way, one.actor.lane % lanes
 
 
-def edge_at(layout: Layout, way: str, position: float) -> tuple[str, float]:
+def edge_at(layout: Ways, way: str, position: float) -> tuple[str, float]:
     """Edge of a way at a position, and the position along that edge [m].
 
     Parameters
     ----------
-    layout : Layout
+    layout : Ways
         The road.
     way : str
         The way.

@@ -1,0 +1,117 @@
+"""Ways on a network of a user's own, as far as actors need to know them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from fogsim.traffic.road.xml_stream import UNREADABLE, read_elements
+
+_MOST_BYTES = 2_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class KnownEdge:
+    """What is known of an edge.
+
+    Attributes
+    ----------
+    lanes : int
+        How many lanes it has.
+    length : float
+        Its length [m].
+    limit : float
+        Its speed limit [m/s].
+    """
+
+    lanes: int
+    length: float
+    limit: float
+
+
+@dataclass(frozen=True, slots=True)
+class KnownWays:
+    """Ways on a network.
+
+    Attributes
+    ----------
+    ways : mapping from name to edge ids, as pairs
+        The ways by name.
+    edges : mapping from edge id to KnownEdge
+        What is known of their edges; those that the network does not have are missing.
+    """
+
+    ways: tuple[tuple[str, tuple[str, ...]], ...]
+    edges: Mapping[str, KnownEdge]
+
+    def way(self, name: str) -> tuple[str, ...]:
+        """Edges of a way; none where there is no such way.
+
+        Parameters
+        ----------
+        name : str
+            Its name.
+        """
+        return dict(self.ways).get(name, ())
+
+    def edge(self, name: str) -> KnownEdge:
+        """An edge by its id.
+
+        Parameters
+        ----------
+        name : str
+            The id.
+        """
+        return self.edges[name]
+
+    def length(self, way: str) -> float:
+        """Length of a way's edges, without what lies within junctions [m].
+
+        Parameters
+        ----------
+        way : str
+            Its name.
+        """
+        return sum(self.edge(name).length for name in self.way(way))
+
+
+def read_ways(net: Path, ways: Mapping[str, tuple[str, ...]]) -> KnownWays:
+    """Read what a network says of the edges of ways.
+
+    Parameters
+    ----------
+    net : Path
+        SUMO network file.
+    ways : mapping from name to tuple of str
+        Edges of each way.
+    """
+    reader = _Reader(frozenset(edge for edges in ways.values() for edge in edges))
+    try:
+        read_elements(net, reader, _MOST_BYTES)
+    except UNREADABLE:
+        # SUMO tells what is wrong with it.
+        return KnownWays(tuple(ways.items()), {})
+    return KnownWays(tuple(ways.items()), reader.edges)
+
+
+class _Reader:
+    """Reads edges as they come."""
+
+    def __init__(self, wanted: frozenset[str]) -> None:
+        self.is_done = False
+        self.edges: dict[str, KnownEdge] = {}
+        self._wanted = wanted
+        self._edge = ""
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        if tag == "edge":
+            self._edge = attributes.get("id", "")
+        elif tag == "lane" and self._edge in self._wanted:
+            before = self.edges.get(self._edge)
+            lanes = 1 if before is None else before.lanes + 1
+            self.edges[self._edge] = KnownEdge(lanes, float(attributes["length"]), float(attributes["speed"]))
+        elif tag == "connection":
+            # All edges stand before the connections between them.
+            self.is_done = True
+
+    def end(self, tag: str) -> None:
+        pass

@@ -10,6 +10,7 @@ if the belief of any seed leaves the truth out.
 """
 
 import argparse
+import inspect
 import json
 import math
 from collections.abc import Iterator
@@ -19,6 +20,7 @@ from typing import Any
 import numpy as np
 
 import fogsim
+from fogsim.estimators import ESTIMATORS
 from fogsim.fusion import make
 from fogsim.values import Belief, Step
 from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate
@@ -30,7 +32,7 @@ FAULTS = {
     "frozen, old time": "fault: frozen, time_stamp: exposure",
     "half of frames dropped": "fault: dropped_frames, share: 50 %",
     "latency 0.6 s": "fault: latency, delay: 0.6 s",
-    "the same, new times": "fault: latency, delay: 0.6 s, time_stamp: delivery",
+    "latency 0.6 s, new times": "fault: latency, delay: 0.6 s, time_stamp: delivery",
     "dirt on 10 % of the glass": "fault: dirty_lens",
     "dirt on 30 %, 4 mm": "fault: dirty_lens, coverage: 30 %, diameter: 4 mm",
     "drops on 15 %": "fault: wet_lens",
@@ -39,13 +41,20 @@ FAULTS = {
     "sun 15° aside, dirty glass": "fault: glare, azimuth: 15 deg, haze: 10",
     "pitch + 0.5°": "fault: calibration, pitch: 0.5 deg",
     "pitch + 2°": "fault: calibration, pitch: 2 deg",
+    "pitch + 2°, told as unsure": "fault: calibration, pitch: 2 deg",
     "roll + 2°": "fault: calibration, roll: 2 deg",
     "focal length + 5 %": "fault: calibration, focal_length: 5 %",
     "radar lost": "fault: dropout",
     "radar + 5 m": "fault: bias, distance: 5 m",
     "radar noise × 10": "fault: noise",
 }
+UNSURE = {"pitch + 2°, told as unsure"}
+"""Where methods are told that the pitch is not known well, by `pitch_deviation` [rad], as far as they have that."""
+
+UNSURE_PITCH = 0.01
 METHODS = ("joint_road", "negru2013", "zhu2015", "huang2015_rough", "huang2015_lead", "lead_contrast")
+PARAMETERS = {method: inspect.signature(ESTIMATORS[method]).parameters for method in METHODS}
+
 BEGIN, LASTS, SETTLED = 5.0, 5.0, 1.0
 """When the fault begins, how long it lasts, and how much of it is not counted yet [s]."""
 
@@ -53,15 +62,20 @@ DOCS = Path(__file__).resolve().parent.parent / "docs" / "sensors.md"
 MARK, END = "<!-- table: sensor faults -->", "<!-- end of sensor faults -->"
 
 
-def steps(fault: str, seed: int, visibility: float, methods: tuple[str, ...]) -> Iterator[Step]:
+def steps(name: str, seed: int, visibility: float, methods: tuple[str, ...]) -> Iterator[Step]:
     """Steps of a drive with a fault."""
-    faults = f"[{{{fault}, at: {BEGIN} s, for: {LASTS} s}}]" if fault else "[]"
+    faults = f"[{{{FAULTS[name]}, at: {BEGIN} s, for: {LASTS} s}}]" if FAULTS[name] else "[]"
+    parameters = f"{{pitch_deviation: {UNSURE_PITCH}}}" if name in UNSURE else "{}"
+    written = [
+        f"{{method: {method}, parameters: {parameters if 'pitch_deviation' in PARAMETERS[method] else '{}'}}}"
+        for method in methods
+    ]
     scenario = fogsim.load_scenario(
         "motorway_fog_bank",
         [
             f"fog={{visibility_m: {visibility}}}",
             f"sensors.faults={faults}",
-            f"estimators=[{', '.join(methods)}]",
+            f"estimators=[{', '.join(written)}]",
             "clocks={camera_period_s: 0.2, decision_period_s: 1.0}",
             f"duration_s={BEGIN + LASTS}",
         ],
@@ -82,7 +96,7 @@ def measure(name: str, seeds: int, visibility: float, methods: tuple[str, ...]) 
     for seed in range(1, seeds + 1):
         fusions = {method: make("grid_filter") for method in methods}
         last: dict[str, Belief] = {}
-        for step in steps(FAULTS[name], seed, visibility, methods):
+        for step in steps(name, seed, visibility, methods):
             if step.time >= BEGIN + LASTS:
                 break
             for method, estimate in zip(methods, step.estimates, strict=True):
@@ -139,7 +153,7 @@ def main() -> None:
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
     parser.add_argument("--docs", action="store_true", help="write the table of docs/sensors.md")
     parser.add_argument("--faults", nargs="+", choices=FAULTS, default=list(FAULTS), help="only these")
-    parser.add_argument("--methods", nargs="+", default=METHODS, help="estimators")
+    parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS, help="estimators")
     parser.add_argument("--seeds", type=int, default=3, help="drives for each fault")
     parser.add_argument("--visibility", type=float, default=150.0, help="visibility [m]")
     asked = parser.parse_args()

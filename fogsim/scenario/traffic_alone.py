@@ -67,6 +67,9 @@ def _of_camera(written: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
             ("advice", "informed_by"),
             f"belief {_NEEDS}; leave it out, or write truth: a visibility meter at the road",
         )
+    sensors = written.get("sensors")
+    if isinstance(sensors, dict) and sensors.get("faults"):
+        yield ("sensors", "faults"), f"a fault of a sensor {_NEEDS}; leave it out"
     if _method(written.get("lighting")).get("method", "low_beam") != "low_beam":
         yield ("lighting",), f"choosing lamps {_NEEDS}; leave it out, or write low_beam"
 

@@ -28,6 +28,7 @@ class Moment:
         self.step, self.collisions, self.begun = step, collisions, begun
         self._route = route
         self._places: dict[str, RoutePlace | None] = {}
+        self._by_row: dict[int, RoutePlace | None] = {}
 
     @property
     def ego_step(self) -> Step | None:
@@ -85,17 +86,23 @@ class Moment:
         return self._places[vehicle]
 
     def _located(self, vehicle: str) -> RoutePlace | None:
-        row, traffic, step = self.row(vehicle), self.step.traffic, self.ego_step
+        row, step = self.row(vehicle), self.ego_step
         if row is None or self._route is None:
             return None
-        if step is None:
-            return self._route.locate(traffic.position[row], float(traffic.heading[row]))
+        place = self._on_route(self._route, row)
+        if step is None or place is None:
+            return place
         # SUMO counts the ego's way along its lanes, and the polyline is one of them: others are put into its count.
-        ego = self._route.locate(traffic.position[step.ego], float(traffic.heading[step.ego]), step.route_position)
-        place = self._route.locate(traffic.position[row], float(traffic.heading[row]), step.route_position)
-        if ego is None or place is None:
-            return None
-        return RoutePlace(place.front - ego.front + step.route_position, place.along)
+        ego = self._on_route(self._route, step.ego)
+        return None if ego is None else RoutePlace(place.front - ego.front + step.route_position, place.along)
+
+    def _on_route(self, route: Route, row: int) -> RoutePlace | None:
+        """Place of a vehicle by the polyline alone."""
+        if row not in self._by_row:
+            traffic, step = self.step.traffic, self.ego_step
+            near = None if step is None else step.route_position
+            self._by_row[row] = route.locate(traffic.position[row], float(traffic.heading[row]), near)
+        return self._by_row[row]
 
 
 class History:

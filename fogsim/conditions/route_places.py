@@ -46,6 +46,8 @@ class Route:
         self._length = np.linalg.norm(steps, axis=1)
         self._start = np.concatenate(([0.0], np.cumsum(self._length)[:-1]))
         self._direction = steps / np.maximum(self._length, 1e-9)[:, None]
+        # Columns apart are three times as fast as rows.
+        self._columns = tuple((points[:-1, i].copy(), self._direction[:, i].copy()) for i in range(3))
 
     def locate(self, position: NDArray[np.float64], heading: float, near: float | None = None) -> RoutePlace | None:
         """Nearest place on the route; None if it is farther than `FARTHEST_ASIDE`.
@@ -59,9 +61,11 @@ class Route:
         near : float or None
             A position along the route: of several places that are as near, the one nearest to it [m].
         """
-        way = position - self.points[:-1]
-        at = np.clip(np.einsum("ij,ij->i", way, self._direction), 0.0, self._length)
-        aside = np.linalg.norm(way - at[:, None] * self._direction, axis=1)
+        ways = [float(place) - start for place, (start, _) in zip(position, self._columns, strict=True)]
+        at = sum(way * part for way, (_, part) in zip(ways, self._columns, strict=True))
+        at = np.minimum(np.maximum(at, 0.0), self._length)
+        away = [way - at * part for way, (_, part) in zip(ways, self._columns, strict=True)]
+        aside = np.sqrt(sum(part * part for part in away))
         nearest = int(np.argmin(aside))
         if aside[nearest] > FARTHEST_ASIDE:
             return None

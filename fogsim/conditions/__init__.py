@@ -1,6 +1,6 @@
 """Conditions on a run: a small language over finished steps, for triggers and expectations."""
 
-from fogsim.conditions.fitness import RunContent, condition_mistakes, vehicles_of
+from fogsim.conditions.fitness import RunContent, condition_mistakes, lights_of, vehicles_of
 from fogsim.conditions.moment import EGO, History, Moment
 from fogsim.conditions.parsing import mended, parse_condition
 from fogsim.conditions.possibility import outcomes
@@ -28,6 +28,7 @@ __all__ = [
     "Signal",
     "Watch",
     "condition_mistakes",
+    "lights_of",
     "mended",
     "outcomes",
     "parse_condition",

@@ -66,5 +66,20 @@ def vehicles_of(reference: Reference) -> tuple[str, ...]:
     reference : Reference
         The signal.
     """
+    return _names(reference, Place.VEHICLE)
+
+
+def lights_of(condition: Condition) -> tuple[str, ...]:
+    """Traffic lights that a condition asks for.
+
+    Parameters
+    ----------
+    condition : Condition
+        The condition.
+    """
+    return tuple(name for reference in signals_of(condition) for name in _names(reference, Place.SIGNAL))
+
+
+def _names(reference: Reference, kind: Place) -> tuple[str, ...]:
     places = SIGNALS[reference.signal].places
-    return tuple(name for place, name in zip(places, reference.arguments, strict=True) if place is Place.VEHICLE)
+    return tuple(name for place, name in zip(places, reference.arguments, strict=True) if place is kind)

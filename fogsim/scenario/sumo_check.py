@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from fogsim.conditions import EGO
+from fogsim.conditions import EGO, lights_of
 from fogsim.errors import nearest, shown, suggest
 from fogsim.scenario.document import Document
 from fogsim.scenario.expect.checks import named_vehicles
@@ -158,17 +158,25 @@ def _unknown_edges(scenario: Scenario, edges: NetEdges) -> dict[KeyPath, str]:
 
 
 def _unknown_signals(scenario: Scenario, edges: NetEdges) -> dict[KeyPath, str]:
-    """Traffic lights that the timeline sets, and the net does not have."""
-    known, prefix = edges.signals, "signal."
-    subjects = ((i, subject) for i, entry in enumerate(scenario.timeline) for subject in entry.do)
-    named = [(i, subject.removeprefix(prefix)) for i, subject in subjects if subject.startswith(prefix)]
+    """Traffic lights that the timeline sets or conditions ask for, and the net does not have."""
+    known = edges.signals
     return {
-        ("timeline", i, "do", prefix + signal): (
-            f"the net has no traffic lights {shown(signal)}; {suggest(signal, known) if known else 'it has none'}"
-        )
-        for i, signal in named
+        at: f"the net has no traffic lights {shown(signal)}; {suggest(signal, known) if known else 'it has none'}"
+        for at, signal in _named_signals(scenario)
         if signal not in known
     }
+
+
+def _named_signals(scenario: Scenario) -> Iterator[tuple[KeyPath, str]]:
+    prefix = "signal."
+    for number, entry in enumerate(scenario.timeline):
+        for subject in entry.do:
+            if subject.startswith(prefix):
+                yield ("timeline", number, "do", subject), subject.removeprefix(prefix)
+        yield from ((("timeline", number, "when"), light) for light in lights_of(entry.when))
+    for name, expectation in scenario.expect.items():
+        for key, condition in expectation.conditions():
+            yield from ((("expect", name, key), light) for light in lights_of(condition))
 
 
 def _unknown_vehicle(vehicle: str, demand: Demand) -> str:

@@ -84,6 +84,7 @@ def test_a_resolved_scenario_is_read_as_what_it_was(tmp_path: Path) -> None:
         ("a: {never: ego.collision, whil: time > 3 s}", "expect.a.whil: unknown key; did you mean 'while'?"),
         ("a: {never: slow.speed > 3 kg}", "the unit 'kg' does not fit"),
         ("a: {never: gap(ego, slwo) < 3 m}", "there is no vehicle 'slwo' in"),
+        ("a: {never: signal(C).state == red}", "the net has no traffic lights 'C'; it has none"),
         ("a: {never: estimate(joint_road).valid}", "unknown estimator 'joint_road'; known: negru2013"),
         ("a: {never: fog.bank(0)}", "there is no fog.banks.0; the fog has no banks"),
         ("a: {happened: timeline.0}", "unknown event 'timeline.0'"),

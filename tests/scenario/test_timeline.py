@@ -92,7 +92,7 @@ def test_a_line_of_a_file_is_named(tmp_path: Path) -> None:
 def test_what_is_written_comes_back_as_plain_data_that_loads_again() -> None:
     written = (
         "{name: one, when: {gap(ego, lead): '< 80 m'}, delay: 0.5 s, repeat: each, do: {lead: [{lamps: {stop: off}}, "
-        "{lamps: failed}], sensors.camera: {fault: latency, delay: 0.4 s}, "
+        "{lamps: {all: failed}}], sensors.camera: {fault: latency, delay: 0.4 s}, "
         "light: {illuminance: 5000 lx}, ego: {follow: {vehicle: lead, headway: 1 s}}}}"
     )
     scenario = load_scenario("motorway_fog_bank", [*BLIND, f"timeline=[{written}]"])

@@ -77,12 +77,7 @@ class LampActions(Section):
     """Daytime running lamps."""
 
     all: Lit = None
-    """Every lamp, before what is said of single ones; `lamps: failed` stands for `lamps: {all: failed}`."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _all_at_once(cls, written: object) -> object:
-        return {"all": written} if isinstance(written, str | bool) else written
+    """Every lamp but those of which something else is said."""
 
 
 class SpeedAction(Section):

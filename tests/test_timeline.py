@@ -14,7 +14,7 @@ from fogsim.loop import ClosedLoop
 from fogsim.scenario import Scenario, load_scenario
 from fogsim.timeline import Timeline
 from fogsim.values import Command, Lamp, Reason, Step, TrafficState, TrafficStep, Truth
-from fogsim.values.script import Begun, ChangeFog, ChangeLane, ChangeSpeed, Stop
+from fogsim.values.script import Begun, ChangeFog, ChangeLane, ChangeSpeed, Depart, Stop
 
 BLIND = (EARLY, "renderer=none", "estimators=[]", "traffic.events=[]")
 
@@ -85,6 +85,17 @@ def test_actions_are_in_si_units_and_where_everybody_is() -> None:
         Stop("ego", pytest.approx(300.0), 3.0, 3.0),
     )
     assert due.actions.fog == (ChangeFog(2.5, 4.0),)
+
+
+def test_a_vehicle_that_the_timeline_brings_is_known_to_the_rest_of_it() -> None:
+    timeline = Timeline(
+        scenario(
+            "{when: time >= 0 s, do: {new: {depart: {like: ego, gap: 15 m, speed: 72 km/h}}}}",
+            "{when: new.speed > 10 m/s, do: {new: {hazard_lights: on}}}",
+        )
+    )
+    assert timeline.due(step(0.0, ego=100.0)).actions.traffic == (Depart("new", "ego", 15.0, None, 20.0),)
+    assert names(timeline, step(0.1, ego=100.0), step(0.2, ego=100.0, new=120.0)) == [[], ["timeline.1"]]
 
 
 def test_an_entry_is_told_when_it_begins_and_when_it_is_over() -> None:

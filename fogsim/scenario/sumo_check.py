@@ -11,6 +11,7 @@ from fogsim.scenario.expect.checks import named_vehicles
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.roads.files import traffic_files
 from fogsim.scenario.schema import Clocks, Scenario
+from fogsim.scenario.timeline import departing_vehicles
 from fogsim.scenario.timeline import named_vehicles as scripted_vehicles
 from fogsim.scenario.traffic_schema import ChangeLane
 from fogsim.traffic import (
@@ -100,7 +101,8 @@ def demand_mistakes(document: Document, scenario: Scenario) -> list[str]:
         If ``traffic.config`` is no SUMO configuration.
     """
     named = dict(_named_vehicles(scenario))
-    watched = [(at, vehicle) for at, vehicle in named_vehicles(scenario.expect) if vehicle != EGO]
+    others = departing_vehicles(scenario.timeline) | {EGO}
+    watched = [(at, vehicle) for at, vehicle in named_vehicles(scenario.expect) if vehicle not in others]
     watched += scripted_vehicles(scenario.timeline)
     demand = _demand(scenario, frozenset((*named.values(), *(vehicle for _, vehicle in watched))))
     asked = (*named.items(), *watched)

@@ -184,7 +184,32 @@ class SetSignal:
     hold: float = math.inf
 
 
-TrafficAction = ChangeSpeed | Follow | Stop | ChangeLane | SetLamps | SetSignal
+@dataclass(frozen=True, slots=True)
+class Depart:
+    """A vehicle comes onto the road near another one, of the same type and with the rest of its way.
+
+    Attributes
+    ----------
+    vehicle : str
+        Its id, which nobody on the road has.
+    like : str
+        The other one.
+    gap : float
+        Gap to the other one along the road, bumper to bumper [m]; negative behind it.
+    lane : int or None
+        Lane from the right; None for the other one's.
+    speed : float or None
+        Its speed [m/s]; None for the other one's.
+    """
+
+    vehicle: str
+    like: str
+    gap: float
+    lane: int | None = None
+    speed: float | None = None
+
+
+TrafficAction = ChangeSpeed | Follow | Stop | ChangeLane | SetLamps | SetSignal | Depart
 """What a traffic simulation can be told to do at once."""
 
 

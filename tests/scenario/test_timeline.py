@@ -38,6 +38,8 @@ def mistake(entry: str, *settings: str) -> str:
         ("{leed: {brake: {}}}", "do.leed: there is no vehicle 'leed' in "),
         ("{lead: {follow: {vehicle: nobody, headway: 1 s}}}", "there is no vehicle 'nobody' in "),
         ("{signal.C: {state: red}}", "do.signal.C: the net has no traffic lights 'C'; it has none"),
+        ("{new: {depart: {like: leed, gap: 9 m}}}", "do.leed: there is no vehicle 'leed' in "),
+        ("{new: {depart: {like: ego, gap: 9 m}, brake: {}}}", "do.new: depart stands by itself"),
         ("{}", "do: "),
     ],
 )

@@ -16,6 +16,7 @@ from fogsim.values import Command, Lamp
 from fogsim.values.script import (
     ChangeLane,
     ChangeSpeed,
+    Depart,
     Follow,
     SetLamps,
     SetSignal,
@@ -156,6 +157,22 @@ def test_a_change_of_lane_takes_its_time_and_is_indicated_before(motorway: SumoT
     indicated = [bool(one["lamps"] & Lamp.INDICATOR_LEFT) for one in seen]
     assert all(indicated[:55])
     assert not any(indicated[62:])
+
+
+@pytest.mark.parametrize("gap", [15.0, -20.0])
+def test_a_vehicle_comes_onto_the_road_near_another(motorway: SumoTraffic, gap: float) -> None:
+    get = load_libsumo().vehicle
+    refused = Depart("ego", "lead", 10.0), Depart("new", "nobody", 10.0), Depart("new", "lead", -9e5)
+    assert motorway.begin(refused) == refused
+    before = get.getDistance("lead") + 180.0
+    assert motorway.begin([Depart("new", "lead", gap, lane=1, speed=20.0)]) == ()
+    seen = drive(motorway, 1, "new")[0]
+    assert seen["lane"] == "approach_1"
+    assert seen["speed"] == pytest.approx(20.0, abs=0.3)
+    length = get.getLength("lead")
+    front = before + gap + math.copysign(length, gap)
+    assert get.getLanePosition("new") == pytest.approx(front, abs=0.5)
+    assert get.getRoute("new") == get.getRoute("lead")
 
 
 def lights(tmp_path: Path) -> SumoTraffic:

@@ -3,6 +3,7 @@
 from fogsim.scenario.timeline.actions import (
     Situation,
     actions_of,
+    departing_vehicles,
     doings_of,
     entry_name,
     fog_reference,
@@ -21,6 +22,7 @@ __all__ = [
     "TimelineEntry",
     "actions_of",
     "check_timeline",
+    "departing_vehicles",
     "doings_of",
     "entry_name",
     "fog_reference",

@@ -7,6 +7,7 @@ from typing import Protocol
 
 from fogsim.scenario.sensor_schema import fault_of
 from fogsim.scenario.timeline.schema import (
+    DepartAction,
     Doing,
     FogActions,
     LampActions,
@@ -26,6 +27,7 @@ from fogsim.values.script import (
     ChangeLane,
     ChangeLight,
     ChangeSpeed,
+    Depart,
     Follow,
     SetLamps,
     SetSignal,
@@ -151,6 +153,7 @@ def vehicles_of(entry: TimelineEntry) -> tuple[str, ...]:
     for subject, doing in doings_of(entry):
         if isinstance(doing, VehicleActions):
             named += [subject, *([doing.follow.vehicle] if doing.follow else [])]
+            named += [doing.depart.like] if doing.depart else []
     return tuple(dict.fromkeys(named))
 
 
@@ -160,6 +163,8 @@ def _endless(duration: float | None) -> float:
 
 def _of_vehicle(subject: str, doing: VehicleActions, now: Situation) -> list[TrafficAction] | None:
     vehicle, speed = now.vehicle_id(subject), now.speed(subject)
+    if doing.depart:
+        return _departure(vehicle, doing.depart, now) if speed is None else None
     if speed is None:
         return None
     moves: list[TrafficAction | None] = []
@@ -169,7 +174,7 @@ def _of_vehicle(subject: str, doing: VehicleActions, now: Situation) -> list[Tra
         brake = doing.brake
         moves.append(_braking(vehicle, speed, brake.to_kmh / KMH_PER_MPS, brake.deceleration_mps2, brake.hold_s))
     if doing.break_down:
-        moves += [_braking(vehicle, speed, 0.0, doing.break_down.deceleration_mps2, None), *_wreck(vehicle, doing)]
+        moves.append(_braking(vehicle, speed, 0.0, doing.break_down.deceleration_mps2, None))
     if doing.follow:
         follow, leader = doing.follow, now.vehicle_id(doing.follow.vehicle)
         is_there = now.speed(follow.vehicle) is not None
@@ -178,13 +183,27 @@ def _of_vehicle(subject: str, doing: VehicleActions, now: Situation) -> list[Tra
         moves.append(_stopping(vehicle, doing.stop, now.position(subject)))
     if doing.change_lane:
         moves.append(_lane_change(vehicle, doing.change_lane, now.lane(subject)))
-    if doing.lamps is not None:
-        moves.append(_lamps(vehicle, doing.lamps))
-    if doing.hazard_lights is not None:
-        lit, own = (_HAZARD, Lamp.NONE) if doing.hazard_lights else (Lamp.NONE, _HAZARD)
-        moves.append(SetLamps(vehicle, lit=lit, automatic=own))
+    moves += _switches(vehicle, doing)
     whole = [move for move in moves if move is not None]
     return whole if len(whole) == len(moves) else None
+
+
+def _departure(vehicle: str, action: DepartAction, now: Situation) -> list[TrafficAction] | None:
+    speed = None if action.speed_kmh is None else action.speed_kmh / KMH_PER_MPS
+    departing = Depart(vehicle, now.vehicle_id(action.like), action.gap_m, action.lane, speed)
+    return None if now.speed(action.like) is None else [departing]
+
+
+def departing_vehicles(entries: Sequence[TimelineEntry]) -> frozenset[str]:
+    """Vehicles that a timeline brings onto the road.
+
+    Parameters
+    ----------
+    entries : sequence of TimelineEntry
+        The timeline.
+    """
+    doings = [pair for entry in entries for pair in doings_of(entry)]
+    return frozenset(subject for subject, doing in doings if isinstance(doing, VehicleActions) and doing.depart)
 
 
 def _speed_change(vehicle: str, action: SpeedAction, now: float) -> ChangeSpeed:
@@ -198,11 +217,16 @@ def _braking(vehicle: str, now: float, speed: float, deceleration: float, hold: 
     return ChangeSpeed(vehicle, to, (now - to) / deceleration, Shape.LINEAR, _endless(hold))
 
 
-def _wreck(vehicle: str, doing: VehicleActions) -> Iterator[SetLamps]:
+def _switches(vehicle: str, doing: VehicleActions) -> Iterator[SetLamps]:
     if doing.break_down and not doing.break_down.lamps:
         yield SetLamps(vehicle, failed=_ALL)
     if doing.break_down and doing.break_down.hazard_lights:
         yield SetLamps(vehicle, lit=_HAZARD)
+    if doing.lamps is not None:
+        yield _lamps(vehicle, doing.lamps)
+    if doing.hazard_lights is not None:
+        lit, own = (_HAZARD, Lamp.NONE) if doing.hazard_lights else (Lamp.NONE, _HAZARD)
+        yield SetLamps(vehicle, lit=lit, automatic=own)
 
 
 def _stopping(vehicle: str, action: StopAction, now: float | None) -> Stop | None:

@@ -9,7 +9,7 @@ from fogsim.conditions import vehicles_of as vehicles_of_signal
 from fogsim.scenario.expect.checks import run_content
 from fogsim.scenario.expect.conditions import refuse
 from fogsim.scenario.plain_yaml import KeyPath
-from fogsim.scenario.timeline.actions import doings_of, entry_name, vehicles_of
+from fogsim.scenario.timeline.actions import departing_vehicles, doings_of, entry_name, vehicles_of
 from fogsim.scenario.timeline.schema import (
     Doing,
     FogActions,
@@ -83,18 +83,19 @@ def _fog_mistake(doing: FogActions, scenario: "Scenario") -> str | None:
 
 
 def named_vehicles(timeline: Sequence[TimelineEntry]) -> Iterator[tuple[KeyPath, str]]:
-    """Vehicles that a timeline names, the ego aside, and where.
+    """Vehicles that a timeline names, and where; the ego aside, and those that it brings itself.
 
     Parameters
     ----------
     timeline : sequence of TimelineEntry
         The timeline.
     """
+    others = departing_vehicles(timeline) | {EGO}
     for number, entry in enumerate(timeline):
         for vehicle in vehicles_of(entry):
-            if vehicle != EGO:
+            if vehicle not in others:
                 yield ("timeline", number, "do", vehicle), vehicle
         for reference in signals_of(entry.when):
             for vehicle in vehicles_of_signal(reference):
-                if vehicle != EGO:
+                if vehicle not in others:
                     yield ("timeline", number, "when"), vehicle

@@ -192,6 +192,22 @@ class LaneAction(Section):
         return self
 
 
+class DepartAction(Section):
+    """A vehicle that is not there yet comes onto the road near another one, and drives on as that one would."""
+
+    like: Id
+    """The other one, or `ego`: its type and the rest of its way are the new one's."""
+
+    gap_m: Place
+    """Gap to it along the road, bumper to bumper: positive ahead, negative behind."""
+
+    lane: Annotated[Whole, Field(ge=0, le=20)] | None = None
+    """Number of the lane from the right, from 0; that of the other one if not given."""
+
+    speed_kmh: SpeedKmh | None = None
+    """Its speed; that of the other one if not given."""
+
+
 class VehicleActions(Section):
     """What a vehicle does; what is given begins together."""
 
@@ -219,12 +235,17 @@ class VehicleActions(Section):
     hazard_lights: Flag | None = None
     """Whether both indicators are lit."""
 
+    depart: DepartAction | None = None
+    """Come onto the road, for an id that is in no file."""
+
     @model_validator(mode="after")
     def _one_motion(self) -> Self:
         motions = ("speed", "brake", "follow", "stop", "break_down")
         given = [key for key in motions if getattr(self, key) is not None]
         if len(given) > 1:
             raise ValueError(f"{' and '.join(given)} cannot begin together: each sets the speed; take two entries")
+        if self.depart and len(self.model_fields_set) > 1:
+            raise ValueError("depart stands by itself: what the vehicle does then is another entry")
         return self
 
 

@@ -1,7 +1,7 @@
 """Actions of a script that have begun: speeds, lanes and lamps of vehicles, whatever simulates them."""
 
 import math
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
@@ -287,17 +287,3 @@ class Playing:
         due = [one for one in self._due_changes if one.begins <= motion.time + 1e-9]
         self._due_changes = [one for one in self._due_changes if one not in due]
         return tuple(one.change for one in due if one.change.vehicle in motion.present)
-
-
-def vehicles_of(actions: Iterable[TrafficAction]) -> tuple[str, ...]:
-    """Vehicles that actions are about, each once.
-
-    Parameters
-    ----------
-    actions : iterable of TrafficAction
-        The actions.
-    """
-    named: Sequence[str] = [
-        one for action in actions for one in (getattr(action, "vehicle", ""), getattr(action, "leader", "")) if one
-    ]
-    return tuple(dict.fromkeys(named))

@@ -7,9 +7,10 @@ from fogsim.traffic.sumo.claims import LANE_CHANGE_MODE, Claims
 from fogsim.traffic.sumo.lane_changes import LaneChangeSmoothing
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.route_position import GapToEgo
+from fogsim.traffic.sumo_behaviour.departures import depart
 from fogsim.traffic.sumo_behaviour.signal_control import SignalControl
 from fogsim.traffic.sumo_behaviour.speed_control import SpeedControl
-from fogsim.values.script import ChangeLane, SetSignal, TrafficAction
+from fogsim.values.script import ChangeLane, Depart, SetSignal, TrafficAction
 
 _REGARD_OF_OTHERS, _NO_COLLISION = 3 << 8, 1 << 8
 """Bits of SUMO's lane-change mode on what of others a change that is asked for regards, and those for as much as does
@@ -72,10 +73,12 @@ class ScriptedActions:
         InputError
             If there are no such traffic lights, or not in such a state.
         """
-        refused, motion = [], self._motion(time, present)
+        refused, motion = list[TrafficAction](), self._motion(time, present)
         for action in actions:
             if isinstance(action, SetSignal):
                 self._signals.begin(action, time)
+            elif isinstance(action, Depart):
+                refused += [] if depart(self._api, action, present) else [action]
             elif action.vehicle not in present or not self._has_lane(action):
                 refused.append(action)
             else:

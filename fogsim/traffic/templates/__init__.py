@@ -3,7 +3,7 @@
 from fogsim.traffic.templates.beside import Obstruction, additional_text
 from fogsim.traffic.templates.catalogue import ROAD_TEMPLATES, RoadTemplate, measures, usual_mix
 from fogsim.traffic.templates.demand import Demand, actors_text, cuts_around, routes_text
-from fogsim.traffic.templates.net_plan import Layout
+from fogsim.traffic.templates.layout import Layout
 from fogsim.traffic.templates.net_writer import net_text
 from fogsim.traffic.templates.own_net import KnownWays, read_ways
 from fogsim.traffic.templates.placement import Actor, Placed, PlacementError, Relation, check_placement, place_actors

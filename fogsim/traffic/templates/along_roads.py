@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 from fogsim.errors import InputError
 from fogsim.traffic.templates.alignment import Axis, Bend, axis_of
-from fogsim.traffic.templates.net_plan import Edge, Layout, Link, NetPlan
+from fogsim.traffic.templates.layout import Layout
+from fogsim.traffic.templates.net_plan import Edge, Link, NetPlan
 
 SAME_WAY, ONCOMING = "same_way", "oncoming"
 """Names of the ego's way and of that of the oncoming traffic, and of the edges on them."""

@@ -1,5 +1,6 @@
 """What stands beside a road by template, and tunnels over it: lines of structures, and the file that tells of them."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -8,7 +9,8 @@ import numpy as np
 from fogsim.errors import InputError
 from fogsim.traffic.road.structures import STRUCTURE_TYPE
 from fogsim.traffic.templates.alignment import Axis, Points
-from fogsim.traffic.templates.net_plan import Layout
+from fogsim.traffic.templates.layout import Layout
+from fogsim.traffic.templates.placement import way_length
 from fogsim.traffic.templates.xml_text import element, opening
 
 _WALL, _ROOF = 0.6, 0.8  # thickness of a tunnel's walls and roof [m]
@@ -67,9 +69,9 @@ def additional_text(layout: Layout, obstructions: Sequence[Obstruction]) -> str:
             raise InputError(
                 f"obstructions.{number}: the road has no way {one.way!r}; it has {', '.join(dict(layout.ways))}"
             )
-        if one.at + one.length > layout.length(one.way):
+        if one.at + one.length > way_length(layout, one.way):
             raise InputError(
-                f"obstructions.{number}: ends beyond its way, which is {layout.length(one.way):.0f} m long"
+                f"obstructions.{number}: ends beyond its way, which is {way_length(layout, one.way):.0f} m long"
             )
         lines += _structure(name, one.kind, _line(layout, one), (one.width, 0.0, one.height))
     if layout.tunnel is not None:
@@ -91,13 +93,14 @@ def _line(layout: Layout, one: Obstruction) -> Points:
 def _along(layout: Layout, way: str, start: float, length: float, left: float) -> Points:
     """Points at a distance to the left of a way's left border, between two places along it."""
     parts, passed = list[Points](), 0.0
-    for name in layout.way(way):
+    names = layout.way(way)
+    for name, following in itertools.zip_longest(names, names[1:]):
         axis = layout.edge(name).axis
         first, last = max(start - passed, 0.0), min(start + length - passed, axis.length)
         if last - first > 0.01:
             offset = float(axis.stations[0])
             parts.append(axis.part(offset + first, offset + last).beside(left))
-        passed += axis.length
+        passed += axis.length + (layout.between(name, following) if following else 0.0)
     points = np.concatenate(parts)
     kept = np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 0.01])
     line: Points = points[kept]

@@ -6,7 +6,7 @@ from typing import Protocol
 
 from fogsim.registry import Registry
 from fogsim.traffic.templates.along_roads import Curve, Grade, Motorway, Rural, Straight, Tunnel
-from fogsim.traffic.templates.net_plan import Layout
+from fogsim.traffic.templates.layout import Layout
 from fogsim.traffic.templates.ramp import Ramp
 from fogsim.traffic.templates.town_roads import Crossing, Roundabout, Streets
 from fogsim.traffic.templates.vehicle_types import TOWN_MIX, USUAL_MIX

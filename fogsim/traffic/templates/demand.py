@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from fogsim.traffic.templates.net_plan import Layout
+from fogsim.traffic.templates.layout import Layout
 from fogsim.traffic.templates.placement import Placed, Ways, edge_at
 from fogsim.traffic.templates.vehicle_types import SLOW, VEHICLE_KINDS, VehicleKind
 from fogsim.traffic.templates.xml_text import element, opening

@@ -63,15 +63,15 @@ class KnownWays:
         """
         return self.edges[name]
 
-    def length(self, way: str) -> float:
-        """Length of a way's edges, without what lies within junctions [m].
+    def between(self, one: str, other: str) -> float:  # noqa: ARG002 - as of `Ways`
+        """Length of the way across the junction between two edges, which is not looked up: 0.
 
         Parameters
         ----------
-        way : str
-            Its name.
+        one, other : str
+            Their ids.
         """
-        return sum(self.edge(name).length for name in self.way(way))
+        return 0.0
 
 
 def read_ways(net: Path, ways: Mapping[str, tuple[str, ...]]) -> KnownWays:

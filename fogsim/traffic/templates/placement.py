@@ -1,5 +1,6 @@
 """Where actors are when a run begins: along their ways, by themselves or beside one another."""
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -37,8 +38,8 @@ class Ways(Protocol):
         """An edge by its id."""
         ...
 
-    def length(self, way: str) -> float:
-        """Length of a way [m]."""
+    def between(self, one: str, other: str) -> float:
+        """Length of the way across the junction between two edges [m]."""
         ...
 
 
@@ -188,7 +189,7 @@ def check_placement(placed: Sequence[Placed], layout: Ways) -> None:
         actor = one.actor
         if actor.way not in ways:
             raise PlacementError(actor.name, f"the road has no way {actor.way!r}; {suggest(actor.way, ways)}")
-        length = layout.length(actor.way)
+        length = way_length(layout, actor.way)
         if not actor.length <= one.position <= length:
             room = f"{actor.length:g} … {length:.0f} m"
             raise PlacementError(actor.name, f"must begin within {room} of its way, got {one.position:.0f} m")
@@ -230,9 +231,25 @@ def edge_at(layout: Ways, way: str, position: float) -> tuple[str, float]:
         Position along it [m].
     """
     names = layout.way(way)
-    for name in names[:-1]:
-        length = layout.edge(name).length
-        if position <= length:
-            return name, position
-        position -= length
+    for name, following in itertools.pairwise(names):
+        length, across = layout.edge(name).length, layout.between(name, following)
+        if position <= length + across:
+            # Nobody begins within a junction.
+            return name, min(position, length)
+        position -= length + across
     return names[-1], min(position, layout.edge(names[-1]).length)
+
+
+def way_length(layout: Ways, way: str) -> float:
+    """Length of a way, junctions included [m].
+
+    Parameters
+    ----------
+    layout : Ways
+        The road.
+    way : str
+        The way.
+    """
+    names = layout.way(way)
+    across = (layout.between(one, other) for one, other in itertools.pairwise(names))
+    return sum(layout.edge(name).length for name in names) + sum(across)

@@ -8,7 +8,8 @@ import numpy as np
 
 from fogsim.traffic.templates.alignment import Axis, Bend, axis_of
 from fogsim.traffic.templates.along_roads import ONCOMING, SAME_WAY, Motorway, spirals_and_arc, straight_links
-from fogsim.traffic.templates.net_plan import Edge, Layout, Link, NetPlan
+from fogsim.traffic.templates.layout import Layout
+from fogsim.traffic.templates.net_plan import Edge, Link, NetPlan
 
 RAMP = "ramp"
 """Name of the way from the ramp, and of its first edge."""

@@ -9,7 +9,8 @@ import numpy as np
 
 from fogsim.traffic.templates.alignment import Axis
 from fogsim.traffic.templates.along_roads import ONCOMING, SAME_WAY
-from fogsim.traffic.templates.net_plan import Edge, Layout, Link, NetPlan, Phase
+from fogsim.traffic.templates.layout import Layout
+from fogsim.traffic.templates.net_plan import Edge, Link, NetPlan, Phase
 
 NORTH, SOUTH = "north", "south"
 """Names of the ways that come from the other roads; the ego comes from the west."""

@@ -4,6 +4,8 @@ import pytest
 
 from fogsim.traffic.templates import Actor, PlacementError, Relation, check_placement, place_actors
 from fogsim.traffic.templates.along_roads import Motorway
+from fogsim.traffic.templates.placement import edge_at, way_length
+from fogsim.traffic.templates.town_roads import Crossing
 
 EGO = Actor("ego", place=200.0)
 
@@ -42,3 +44,13 @@ def test_what_cannot_be_is_refused(actor: Actor, told: str) -> None:
     with pytest.raises(PlacementError, match=told) as error:
         check_placement(place_actors((EGO, actor)), Motorway().layout())
     assert error.value.actor == "a"
+
+
+def test_places_count_across_junctions() -> None:
+    crossing = Crossing(length=600.0, lane_width=3.25)
+    layout = crossing.layout()
+    # Each road ends 3.25 + 6 m before the middle: 290.75 m, 18.5 m across, and as much again.
+    assert edge_at(layout, "same_way", 250.0) == ("same_way", 250.0)
+    assert edge_at(layout, "same_way", 300.0) == ("same_way", pytest.approx(290.75))  # nobody begins within
+    assert edge_at(layout, "same_way", 320.0) == ("oncoming.back", pytest.approx(320.0 - 309.25))
+    assert way_length(layout, "same_way") == pytest.approx(600.0)

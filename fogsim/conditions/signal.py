@@ -24,7 +24,7 @@ class Need(StrEnum):
     EGO = "an ego"
     FRAMES = "frames"
     """A camera and estimators, which need an ego, too."""
-    ROUTE = "a route"
+    ROUTE = "a route (traffic.along)"
     """Of the ego, or ``traffic.along``."""
 
 

@@ -121,7 +121,7 @@ def traffic_setup(scenario: Scenario) -> TrafficSetup:
         additional=files.additional,
         ego=traffic.ego if traffic.has_ego else None,
         step_length=scenario.clocks.traffic_step_s,
-        keep_lane=(*traffic.keep_lane, *(name for name, actor in actors_of(scenario).items() if actor.stays_in_lane)),
+        keep_lane=tuple(dict.fromkeys((*traffic.keep_lane, *_staying_actors(scenario)))),
         warm_up_limit=traffic.warm_up_limit_s,
         warm_up=traffic.warm_up_s,
         advice_deceleration=traffic.advice_deceleration_mps2,
@@ -145,6 +145,11 @@ def _option_text(value: OptionValue, folder: Path) -> str:
     if not isinstance(value, str):
         return str(value)
     return ",".join(str(folder / name) if name and (folder / name).is_file() else name for name in value.split(","))
+
+
+def _staying_actors(scenario: Scenario) -> Iterator[str]:
+    """Actors that stay in their lanes."""
+    return (name for name, actor in actors_of(scenario).items() if actor.stays_in_lane)
 
 
 def _failed_lamps(scenario: Scenario) -> Iterator[Event]:

@@ -1,0 +1,15 @@
+import sys
+from pathlib import Path
+
+from fogsim import catalogue
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def test_the_gallery_shows_every_scenario_as_it_is(monkeypatch):
+    monkeypatch.syspath_prepend(DOCS)
+    import make_gallery
+
+    assert {picture.stem for picture in make_gallery.PICTURES.glob("*.jpg")} == set(catalogue())
+    assert make_gallery.PAGE.read_text(encoding="utf-8") == make_gallery.page(), "python docs/make_gallery.py --table"
+    del sys.modules["make_gallery"]

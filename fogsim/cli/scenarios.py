@@ -31,16 +31,17 @@ def list_command() -> None:
 
 def validate_command(files: Annotated[list[str], typer.Argument(help="Scenario files, folders or names.")]) -> None:
     """Check scenario files; every mistake is named with file, line, key, value and what is allowed."""
-    from fogsim.scenario import load_scenario
+    from fogsim.scenario.loading import load_cases
 
     bad = 0
     for file in files:
         try:
-            scenario = load_scenario(file)
+            cases = load_cases(file).cases
         except FogSimError as error:
             bad += 1
             print_error(error)
         else:
-            stdout.print(f"[green]fine:[/] {escape(file)} ({escape(scenario.name)})", soft_wrap=True)
+            number = f", {len(cases)} cases" if len(cases) > 1 else ""
+            stdout.print(f"[green]fine:[/] {escape(file)} ({escape(cases[0][1].name)}{number})", soft_wrap=True)
     if bad:
         raise typer.Exit(BAD_INPUT)

@@ -14,6 +14,7 @@ from fogsim.cli.scenario_options import CaseValues, Settings
 
 if TYPE_CHECKING:
     from fogsim.testing import FileOutcome, FogTest
+    from fogsim.testing.artefacts import Kept
 
 NOT_PASSED = 1
 """Exit code if something failed, was inconclusive, or a run went wrong."""
@@ -45,7 +46,6 @@ def check_command(
     settings: Settings = None,
 ) -> None:
     """Run scenario files with `expect:`, and exit with 0 (passed), 1 (not), 2 (bad input) or 5 (no tests)."""
-    from fogsim.testing.artefacts import keep_artefacts
     from fogsim.testing.junit import write_junit
     from fogsim.testing.page import PageContent, write_page
     from fogsim.testing.wording import totals_text
@@ -55,13 +55,15 @@ def check_command(
     number = processes or os.cpu_count() or 1
     try:
         outcomes = _run(tests, out, number, resume=resume, exit_first=exit_first)
-        kept = keep_artefacts(outcomes, out, number) if evidence else {}
+        kept = _evidence(outcomes, out, number) if evidence else {}
         for outcome in outcomes:
             _print_outcome(outcome, chosen)
             if shrink:
                 _print_smallest(outcome, chosen, out)
     except KeyboardInterrupt:
-        stdout.print("Interrupted; cases that are done are kept, and the same command with --resume goes on.")
+        stdout.print(
+            "Interrupted; cases that are done are kept, and the same command with --resume goes on.", soft_wrap=True
+        )
         raise typer.Exit(INTERRUPTED) from None
     seconds = time.monotonic() - begun
     stdout.print(f"\n{totals_text(outcomes, seconds)}")
@@ -87,7 +89,7 @@ def _asked_for(
     tests = collect(found, settings, case, asked)
     noted = {} if failed_in is None else last_failed(failed_in)
     # As of pytest: where nothing has failed, all is run.
-    tests = only_cases(tests, noted) if noted else tests
+    tests = only_cases(tests, noted) or tests
     if not tests:
         stdout.print(f"No tests: none of {len(found)} files expects anything that was asked for.")
         raise typer.Exit(NOTHING_COLLECTED)
@@ -111,6 +113,16 @@ def _run(
 
         engine = ProcessPool(processes, check_to_file)
         return run_tests(tests, out, engine, resume=resume, first_failure_ends=exit_first, watch=show)
+
+
+def _evidence(outcomes: "Sequence[FileOutcome]", out: Path, processes: int) -> "Kept":
+    from fogsim.testing.artefacts import keep_artefacts
+
+    with progress_bar(stderr) as progress:
+        task = progress.add_task("videos and plots of what did not pass", total=None)
+        return keep_artefacts(
+            outcomes, out, processes, lambda done, total: progress.update(task, completed=done, total=total)
+        )
 
 
 def _print_outcome(outcome: "FileOutcome", settings: Sequence[str]) -> None:

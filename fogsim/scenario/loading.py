@@ -17,9 +17,9 @@ from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.roads.files import DemandError, traffic_files
 from fogsim.scenario.schema import Scenario
 from fogsim.scenario.sumo_check import demand_mistakes, option_lines, step_mistake
-from fogsim.scenario.system_under_test import without_sut, without_sut_in_path
+from fogsim.scenario.system_under_test import BLOCK, without_sut, without_sut_in_path
 from fogsim.scenario.traffic_schema import Traffic
-from fogsim.scenario.variation import Case, Variation, chosen_cases, read_variation, with_case
+from fogsim.scenario.variation import KEYS, Case, Variation, chosen_cases, read_variation, with_case
 from fogsim.scenario.written_units import with_units_in_keys
 from fogsim.traffic.road.configuration import configured_files
 from fogsim.traffic.templates import PlacementError
@@ -81,6 +81,9 @@ def _is_file(path: Path) -> bool:
     """Whether there is a regular file of a name; a name that none can have is none."""
     return _exists(path) and path.is_file()
 
+
+BESIDE = (BLOCK, *KEYS)
+"""Blocks that stand in scenario files beside the keys of the schema."""
 
 LONG_RUN = 600.0
 """Longest run of a simulation that is the user's own [s]."""
@@ -332,7 +335,7 @@ def _checked_scenario(document: Document, folder: Path, named_files: bool, close
     try:
         scenario = Scenario.model_validate(data, context={"folder": folder}).model_copy(update={"directory": folder})
     except ValidationError as error:
-        raise InputError(mistake_lines(document, Scenario, error, mistakes)) from error
+        raise InputError(mistake_lines(document, Scenario, error, mistakes, BESIDE)) from error
     # A simulation that runs already, or is none of SUMO's, keeps its own time.
     uncountable = step_mistake(scenario.clocks) if named_files else None
     if uncountable:

@@ -27,7 +27,11 @@ WORDED = {
 
 
 def mistake_lines(
-    document: Document, model: type[BaseModel], error: ValidationError, further: Sequence[str] = ()
+    document: Document,
+    model: type[BaseModel],
+    error: ValidationError,
+    further: Sequence[str] = (),
+    beside: Sequence[str] = (),
 ) -> str:
     """Every mistake in a line of its own, without those that are there for another's sake.
 
@@ -43,6 +47,8 @@ def mistake_lines(
         What was found.
     further : sequence of str
         Lines about what else was found.
+    beside : sequence of str
+        Keys that may stand in the file beside those of its schema.
     """
     details = error.errors(include_url=False)
     blocks = {detail["loc"][:length] for detail in details for length in range(len(detail["loc"]))}
@@ -50,20 +56,23 @@ def mistake_lines(
     unknown = [detail["loc"] for detail in own[:MOST_TOLD] if detail["type"] == "extra_forbidden"]
     meant = {(*place[:-1], nearest(str(place[-1]), known_keys(model, place[:-1]))) for place in unknown}
     told = [
-        _mistake_line(document, model, d) for d in own[:MOST_TOLD] if d["type"] != "missing" or d["loc"] not in meant
+        _mistake_line(document, model, d, beside)
+        for d in own[:MOST_TOLD]
+        if d["type"] != "missing" or d["loc"] not in meant
     ]
     if len(own) > MOST_TOLD:
         told.append(f"{document.path}: and {len(own) - MOST_TOLD} more mistakes")
     return "\n".join([*told, *further])
 
 
-def _mistake_line(document: Document, model: type[BaseModel], detail: ErrorDetails) -> str:
+def _mistake_line(document: Document, model: type[BaseModel], detail: ErrorDetails, beside: Sequence[str]) -> str:
     """One mistake in one line."""
     location: KeyPath = tuple(detail["loc"])
     key_path = _without_kinds(location)
     where = f"{document.where(key_path)}: {dotted(key_path) or 'scenario'}"
     if detail["type"] == "extra_forbidden":
-        return f"{where}: unknown key; {suggest(str(key_path[-1]), known_keys(model, location[:-1]))}"
+        known = [*known_keys(model, location[:-1]), *(beside if len(location) == 1 else ())]
+        return f"{where}: unknown key; {suggest(str(key_path[-1]), known)}"
     if detail["type"] == "union_tag_invalid":
         context = detail["ctx"]
         allowed = [kind.strip(" '") for kind in str(context["expected_tags"]).split(",")]

@@ -1,10 +1,11 @@
 """What is kept of a case that failed: a video around the failure, and a plot of what was looked at."""
 
 import hashlib
+import itertools
 import re
 import shutil
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -60,7 +61,9 @@ Kept = Mapping[tuple[str, str, str], Artefacts]
 """What was kept, by key of the run, name and clause."""
 
 
-def keep_artefacts(outcomes: Sequence[FileOutcome], out: Path, processes: int) -> Kept:
+def keep_artefacts(
+    outcomes: Sequence[FileOutcome], out: Path, processes: int, watch: Callable[[int, int], None] = lambda _, __: None
+) -> Kept:
     """Run the telling case of each clause again that did not pass, and keep what it looked like.
 
     The same seed gives the same run; one that was inconclusive shows what did not come.
@@ -73,6 +76,8 @@ def keep_artefacts(outcomes: Sequence[FileOutcome], out: Path, processes: int) -
         Directory of the tests.
     processes : int
         Runs at once.
+    watch : callable
+        Called at the beginning and after each case, with how many are done, and how many there are.
     """
     told: dict[str, tuple[StudyRun, list[Finding]]] = {}
     for one in outcomes:
@@ -84,9 +89,9 @@ def keep_artefacts(outcomes: Sequence[FileOutcome], out: Path, processes: int) -
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
     work = KeepFailures({name: tuple(findings) for name, (_, findings) in told.items()})
-    ProcessPool(processes, work).run(
-        [replace(run, key=name) for name, (run, _) in told.items()], folder, lambda *_: None
-    )
+    runs, done = [replace(run, key=name) for name, (run, _) in told.items()], itertools.count()
+    watch(next(done), len(runs))
+    ProcessPool(processes, work).run(runs, folder, lambda *_: watch(next(done), len(runs)))
     return {
         (run.key, finding.name, finding.clause): Artefacts(
             _if_there(folder / name / f"{title_of(finding)}.svg"), _if_there(folder / name / _VIDEO)
@@ -97,8 +102,10 @@ def keep_artefacts(outcomes: Sequence[FileOutcome], out: Path, processes: int) -
 
 
 def _folder_name(test: FogTest, run: StudyRun) -> str:
-    digest = hashlib.sha256(str(test.path.resolve()).encode()).hexdigest()[:6]
-    return re.sub(r"[^A-Za-z0-9_.,=-]", "_", f"{test.name}-{digest}-{label_of(run)}".rstrip("-"))[:150]
+    """Name of the folder of a case: one that says what it is, and a digest by which it is like no other."""
+    label = label_of(run)
+    digest = hashlib.sha256(f"{test.path.resolve()} {label}".encode()).hexdigest()[:6]
+    return re.sub(r"[^A-Za-z0-9_.,=-]", "_", f"{test.name}-{digest}{'-' if label else ''}{label}")[:150]
 
 
 def title_of(finding: Finding) -> str:

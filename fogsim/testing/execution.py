@@ -1,6 +1,7 @@
 """One case: a run that is watched by what is expected of it."""
 
 import time
+import traceback
 import warnings
 from pathlib import Path
 from typing import Any
@@ -86,6 +87,7 @@ def check_to_file(scenario: Scenario, seed: int, result: Path) -> str | None:
     except FogSimError as error:
         outcome = failure(str(error))
     except Exception as error:  # noqa: BLE001 - a broken run, of a user's own method perhaps, must not stop the others
-        outcome = failure(f"{type(error).__name__}: {error}")
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        outcome = failure(f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})")
     write_json(result, {**outcome, "duration_s": round(time.monotonic() - begun, 3)})
     return outcome.get("message")

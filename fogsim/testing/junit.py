@@ -12,6 +12,7 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 from fogsim.files.atomic import write_text
+from fogsim.testing.collection import label_of
 from fogsim.testing.judgement import Judgement, Outcome
 from fogsim.testing.results import CaseResult
 from fogsim.testing.session import FileOutcome
@@ -84,6 +85,9 @@ def _broken(outcome: FileOutcome, broken: Sequence[CaseResult], settings: Sequen
     told = broken_text(broken)
     error = ET.SubElement(case, "error", type="error", message=_text(told))
     error.text = _text(f"{outcome.test.path}\n{told}\n{command_text(outcome.test, broken[0].run, settings)}\n")
+    if len(outcome.results) > 1:
+        listed = "".join(f"{label_of(one.run)}: {one.message}\n" for one in broken)
+        ET.SubElement(case, "system-out").text = _text(listed)
     return case
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from fogsim.errors import InputError
 from fogsim.scenario.document import Document, read_document
+from fogsim.scenario.loading import load_cases
 from fogsim.scenario.variation import Variation, chosen_cases, read_variation, with_case
 
 
@@ -161,3 +162,10 @@ def test_a_verdict_must_be_within_reach() -> None:
         read_variation(document({"verdict": wanted}))
     with pytest.raises(InputError, match=r"verdict.pass_rte: unknown key; did you mean 'pass_rate'"):
         varied({"run": "45 seeds"}, verdict={"pass_rte": 1})
+
+
+def test_a_misspelt_block_is_told_with_the_nearest(tmp_path: Path) -> None:
+    file = tmp_path / "a.yaml"
+    file.write_text("name: a\ntraffic: {net: a, routes: [b]}\nfog: {visibility: 80 m}\nvari: {run: 2 seeds}\n")
+    with pytest.raises(InputError, match=r"a.yaml:4: vari: unknown key; did you mean 'vary'\?"):
+        load_cases(file)

@@ -75,6 +75,26 @@ def test_bad_input_and_no_tests_have_their_codes(file: Path, command: Command) -
         assert told in done.stdout + done.stderr
 
 
+BROKEN = """
+class Broken:
+    def advise(self, belief, speed_limit, time, previous):
+        raise RuntimeError("no advice")
+"""
+
+
+def test_a_run_that_goes_wrong_is_told_with_its_place(
+    file: Path, command: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("fogsim.study.pool.ProcessPool", lambda _, work: ThisProcess(work))
+    (file.parent / "mine.py").write_text(BROKEN)
+    # The case that does not stand in the file is named like those that do.
+    wanted = ["--case", "visibility=70 m", "--set", "advice={method: 'mine:Broken', informed_by: truth}"]
+    done = command("test", str(file), *wanted, "--no-evidence", cwd=file.parent)
+    assert done.returncode == 1
+    assert "the run went wrong: visibility=70 m: RuntimeError: no advice (mine.py:4)" in done.stdout
+    assert "1 error; 1 run of 1 file" in done.stdout
+
+
 def test_one_case_in_this_process(file: Path) -> None:
     result = check_one_case(file, ["duration_s=0.3"], "visibility=5 km", seed=3)
     assert [(one.name, str(one.verdict)) for one in result.findings] == [

@@ -199,7 +199,6 @@ class DriversFog:
 
     def __init__(self) -> None:
         self._fog: FogNow | None = None
-
         self._field: FogField | None = None
 
     @property
@@ -398,8 +397,6 @@ class ClosedLoop:
     def _begin_what_is_due(self, step: Step) -> tuple[Begun, ...]:
         """Let begin what the timeline asks for after a step."""
         due = self._timeline.due(step)
-        if not due.parts:
-            return due.over
         refused = self._traffic.begin(due.actions.traffic) if due.actions.traffic else ()
         fog = self._equipment.begin(due.actions, step.time, self._periods.time(step.index + 1))
         if due.actions.fog:

@@ -14,7 +14,7 @@ from fogsim.values import Camera, CameraPose, Observation, Step
 CATEGORIES = [
     {"id": int(kind), "name": kind.name.lower(), "supercategory": "sign" if kind is SemanticClass.SIGN else "vehicle"}
     for kind in SemanticClass
-    if kind >= SemanticClass.SIGN
+    if SemanticClass.SIGN <= kind <= SemanticClass.OTHER_VEHICLE
 ]
 """COCO categories: ids are those of the semantic masks."""
 

@@ -27,6 +27,8 @@ class SemanticClass(IntEnum):
     BUS = 8
     MOTORCYCLE = 9
     OTHER_VEHICLE = 10
+    TRAFFIC_LIGHT = 11
+    PERSON = 12
 
 
 _OF_TYPE = {
@@ -108,6 +110,7 @@ def semantic_mask(step: Step) -> NDArray[np.uint8]:
     """
     table = np.full(Instance.FIRST_VEHICLE + len(step.traffic.types), SemanticClass.ROADSIDE, np.uint8)
     table[: SemanticClass.CAR] = range(SemanticClass.CAR)
+    table[Instance.TRAFFIC_LIGHT], table[Instance.PERSON] = SemanticClass.TRAFFIC_LIGHT, SemanticClass.PERSON
     table[Instance.FIRST_VEHICLE :] = [vehicle_class(body) for body in step.traffic.types]
     return np.asarray(table[step.view.instance])
 

@@ -21,7 +21,7 @@ from fogsim.scene import (
     street_lamp_heads,
     street_lighting,
     surroundings,
-    vehicle_batches,
+    traffic_batches,
 )
 from fogsim.units import DAY_ILLUMINANCE
 from fogsim.values import (
@@ -61,7 +61,7 @@ class Surrounding(NamedTuple):
     scene : Scene
         What stands still.
     vehicles : sequence of Batch
-        Every vehicle but the camera's own.
+        Every vehicle but the camera's own, persons and traffic lights.
     camera : Camera
         The pinhole.
     pose : CameraPose
@@ -271,7 +271,7 @@ class ViewRenderer:
         lights = self._lights(state, ego, pose)
         near, viewpoint = self._from_origin(state, pose)
         renderer = self._renderer_for(viewpoint)
-        view = renderer.render(vehicle_batches(near, ego), drawn, viewpoint, lamplight=bool(lights.own))
+        view = renderer.render(traffic_batches(near, ego), drawn, viewpoint, lamplight=bool(lights.own))
         radiance = self._air.radiance(view, drawn, pose, lights, time)
         return middle_samples(view, self._samples), averaged(radiance, self._samples)
 
@@ -290,7 +290,7 @@ class ViewRenderer:
         streets = lights.streets and replace(lights.streets, position=lights.streets.position - self._origin)
         lights = replace(lights, others=replace(lights.others, position=places), streets=streets)
         return Surrounding(
-            self._near_scene.whole(), vehicle_batches(near, ego), self._camera, seen_from, lights, self._sky
+            self._near_scene.whole(), traffic_batches(near, ego), self._camera, seen_from, lights, self._sky
         )
 
     def _go_to(self, place: NDArray[np.float64]) -> None:
@@ -306,11 +306,18 @@ class ViewRenderer:
         return self._make_renderer() if has_grown or self._renderer is None else self._renderer
 
     def _from_origin(self, state: TrafficState, pose: CameraPose) -> tuple[TrafficState, CameraPose]:
-        """Vehicles and camera in the coordinates of the scene."""
+        """The traffic and the camera in the coordinates of the scene."""
         if not self._shifted:
             return state, pose
         x, y, z = (np.array(pose.position) - self._origin).tolist()
-        return replace(state, position=state.position - self._origin), replace(pose, position=(x, y, z))
+        signals, persons = state.signals, state.persons
+        moved = replace(
+            state,
+            position=state.position - self._origin,
+            signals=replace(signals, position=signals.position - self._origin),
+            persons=replace(persons, position=persons.position - self._origin),
+        )
+        return moved, replace(pose, position=(x, y, z))
 
     def _lights(self, state: TrafficState, ego: int, pose: CameraPose) -> Lights:
         if not self._by_lamplight:

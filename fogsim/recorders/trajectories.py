@@ -1,5 +1,6 @@
-"""Every vehicle at every camera period, in the columns of SUMO's own floating car data."""
+"""Every vehicle and person at every camera period, in the columns of SUMO's own floating car data."""
 
+import dataclasses
 import json
 import math
 import time
@@ -17,10 +18,13 @@ from fogsim.recorders.protocol import Derived
 from fogsim.recorders.run_directory import LOG_SUFFIX
 from fogsim.recorders.table import LOG_PERIOD
 from fogsim.units import visibility_from_extinction
-from fogsim.values import TrafficStep
+from fogsim.values import TrafficState, TrafficStep
 
 MOST_ROWS_HELD = 50_000
 """Rows of one batch at most: some megabytes."""
+
+PEDESTRIAN = "pedestrian"
+"""What persons on foot have in the column of vehicles' types."""
 
 ROWS_PER_GROUP = 200_000
 """Rows of one row group at least, but for the last: what a reader has in memory at once."""
@@ -28,17 +32,20 @@ ROWS_PER_GROUP = 200_000
 TRAJECTORY_COLUMNS: Mapping[str, tuple[Any, str]] = {
     "index": (pa.int64(), "number of the camera period, as in steps.parquet"),
     "timestep_time": (pa.float64(), "SUMO's time after its step [s]; fcd-output has the time before it"),
-    "vehicle_id": (pa.string(), "vehicle"),
+    "vehicle_id": (pa.string(), "vehicle, or person on foot"),
     "vehicle_x": (pa.float64(), "east, middle of the front bumper [m]; a change of lane takes time here"),
     "vehicle_y": (pa.float64(), "north, likewise [m]"),
     "vehicle_z": (pa.float64(), "height of the road there [m]"),
     "vehicle_angle": (pa.float64(), "heading, clockwise from north [°]"),
-    "vehicle_type": (pa.string(), "kind of body (car, van, truck, bus, motorcycle), not SUMO's vType"),
+    "vehicle_type": (pa.string(), "kind of body (car, van, truck, bus, motorcycle, pedestrian), not SUMO's vType"),
     "vehicle_speed": (pa.float64(), "speed [m/s]"),
     "vehicle_lane": (pa.string(), "SUMO's lane; a change of lane is made at once here"),
-    "vehicle_slope": (pa.float64(), "slope of the road, positive uphill [°]"),
-    "vehicle_acceleration": (pa.float64(), "acceleration [m/s²]"),
-    "visibility": (pa.float64(), "true meteorological visibility at the driver's eyes [m]; null for clear air"),
+    "vehicle_slope": (pa.float64(), "slope of the road, positive uphill [°]; null for pedestrians"),
+    "vehicle_acceleration": (pa.float64(), "acceleration [m/s²]; null for pedestrians"),
+    "visibility": (
+        pa.float64(),
+        "true meteorological visibility at the driver's eyes [m]; null for clear air, pedestrians",
+    ),
 }
 """Columns of ``trajectories.parquet``: their types and meanings, named as in SUMO's fcd-output."""
 
@@ -47,11 +54,11 @@ _AnyStep = TypeVar("_AnyStep", bound=TrafficStep)
 
 
 class TrajectoryRecorder:
-    """Writes ``trajectories.parquet``: a row for each vehicle that is read and each step.
+    """Writes ``trajectories.parquet``: a row for each vehicle and each person on foot that is read, and each step.
 
-    Rows go by time, and within a time as the traffic lists the vehicles; equal steps give equal bytes. Until it is
-    closed, rows are in a log beside it (``trajectories.arrows``), at most 0.5 s after they were recorded, whatever ends
-    the process. Memory does not grow with the run.
+    Rows go by time, and within a time as the traffic lists the vehicles, then persons; equal steps give equal bytes.
+    Until it is closed, rows are in a log beside it (``trajectories.arrows``), at most 0.5 s after they were recorded,
+    whatever ends the process. Memory does not grow with the run.
 
     Parameters
     ----------
@@ -94,7 +101,7 @@ class TrajectoryRecorder:
         # The step that ends a run may show once more what was last seen.
         if traffic.time > self._last:
             self._held.append(step)
-            self._rows_held += len(traffic.ids)
+            self._rows_held += len(traffic.ids) + len(traffic.persons.ids)
             self._last = traffic.time
         now = self._clock()
         if now - self._logged >= LOG_PERIOD or self._rows_held >= MOST_ROWS_HELD:
@@ -164,7 +171,7 @@ def with_trajectories(steps: Iterable[_AnyStep], path: Path) -> Iterator[_AnySte
 
 def _batch(steps: list[TrafficStep], schema: Any) -> Any:
     """Rows of some instants (pyarrow.RecordBatch)."""
-    states = [step.traffic for step in steps]
+    states = [_with_pedestrians(step.traffic) for step in steps]
     counts = [len(state.ids) for state in states]
     position = np.concatenate([state.position for state in states])
 
@@ -189,16 +196,35 @@ def _batch(steps: list[TrafficStep], schema: Any) -> Any:
         "vehicle_acceleration": of_all("acceleration"),
         "visibility": [visibility for step in steps for visibility in _visibilities(step)],
     }
-    arrays = [pa.array(columns[field.name], type=field.type) for field in schema]
+    arrays = [pa.array(columns[field.name], type=field.type, from_pandas=True) for field in schema]
     return pa.RecordBatch.from_arrays(arrays, schema=schema)
 
 
 def _visibilities(step: TrafficStep) -> list[float | None]:
-    """Visibility at each vehicle [m]; None in clear air, and where it is not known."""
+    """Visibility at each vehicle [m]; None in clear air, where it is not known, and for persons."""
     extinctions = step.truth.vehicle_extinctions
+    persons: list[float | None] = [None] * len(step.traffic.persons.ids)
     if extinctions is None:
-        return [None] * len(step.traffic.ids)
-    return [visibility_from_extinction(k) if k > 0.0 else None for k in extinctions.tolist()]
+        return [*[None] * len(step.traffic.ids), *persons]
+    return [visibility_from_extinction(k) if k > 0.0 else None for k in extinctions.tolist()] + persons
+
+
+def _with_pedestrians(state: TrafficState) -> TrafficState:
+    """Traffic with persons on foot as further rows, of what a trajectory has; nan where they have none."""
+    persons, count = state.persons, len(state.persons.ids)
+    if not count:
+        return state
+    return dataclasses.replace(
+        state,
+        ids=state.ids + persons.ids,
+        types=state.types + (PEDESTRIAN,) * count,
+        position=np.concatenate((state.position, persons.position)),
+        heading=np.append(state.heading, persons.heading),
+        speed=np.append(state.speed, persons.speed),
+        acceleration=np.append(state.acceleration, np.full(count, np.nan)),
+        lane=state.lane + persons.lane,
+        grade=np.append(state.grade, np.full(count, np.nan)),
+    )
 
 
 def write_trajectory_table(path: Path, log: Path, complete: bool) -> None:

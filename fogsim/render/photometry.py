@@ -11,17 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.units import luminance_of
-from fogsim.values.light import Lamp
+from fogsim.values.light import SIGNAL_DIAMETER, SIGNAL_INTENSITY, Lamp, SignalLight
 from fogsim.values.scene import Surface
 
 SKY_TINT = (0.988, 1.0, 1.035)
 """Colour of the overcast sky, of luminance 1."""
 
 _RED, _AMBER, _WHITE = (1.0, 0.03, 0.015), (1.0, 0.36, 0.015), (1.0, 0.97, 0.90)
-_WARM = (1.0, 0.86, 0.66)
+_WARM, _GREEN = (1.0, 0.86, 0.66), (0.0, 1.0, 0.26)
+_LENS = SIGNAL_INTENSITY / (math.pi / 4.0 * SIGNAL_DIAMETER**2)
 _BEAMS = Lamp.LOW_BEAM | Lamp.HIGH_BEAM | Lamp.DAYTIME
 
-LAMPS: Mapping[Surface, tuple[Lamp, float, tuple[float, float, float]]] = {
+LAMPS: Mapping[Surface, tuple[Lamp | SignalLight, float, tuple[float, float, float]]] = {
     Surface.LAMP_POSITION_REAR: (Lamp.POSITION, 1300.0, _RED),
     Surface.LAMP_STOP: (Lamp.STOP, 17e3, _RED),
     Surface.LAMP_REAR_FOG: (Lamp.REAR_FOG, 20e3, _RED),
@@ -29,12 +30,15 @@ LAMPS: Mapping[Surface, tuple[Lamp, float, tuple[float, float, float]]] = {
     Surface.LAMP_INDICATOR_RIGHT: (Lamp.INDICATOR_RIGHT, 15e3, _AMBER),
     Surface.LAMP_HEAD: (_BEAMS, 30e3, _WHITE),
     Surface.LAMP_STREET: (Lamp.NONE, 30e3, _WARM),
+    Surface.LENS_RED: (SignalLight.RED, _LENS, _RED),
+    Surface.LENS_YELLOW: (SignalLight.YELLOW, _LENS, _AMBER),
+    Surface.LENS_GREEN: (SignalLight.GREEN, _LENS, _GREEN),
 }
 """Lamps that light a surface, its luminance then [cd/m²] and its colour.
 
 Luminous intensity over area: a tail lamp of 8 cd and 60 cm², a stop lamp of 100 cd and 60 cm², a rear fog lamp of
 200 cd and 100 cm², a head lamp seen beside its beam with 500 cd and 150 cm², a street lamp of 9 klm over a tenth of a
-square metre [M].
+square metre [M], a lens of a traffic light of 200 cd and 200 mm (`SIGNAL_INTENSITY`).
 """
 
 

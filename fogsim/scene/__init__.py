@@ -7,7 +7,7 @@ from fogsim.scene.signs import SIGN_KINDS
 from fogsim.scene.solids import merge
 from fogsim.scene.street_lamps import street_lamp_heads
 from fogsim.scene.surroundings import Corridor, Nearness, surroundings
-from fogsim.scene.vehicles import vehicle_batches
+from fogsim.scene.vehicles import traffic_batches, vehicle_batches
 
 __all__ = [
     "SIGN_KINDS",
@@ -21,5 +21,6 @@ __all__ = [
     "street_lamp_heads",
     "street_lighting",
     "surroundings",
+    "traffic_batches",
     "vehicle_batches",
 ]

@@ -21,6 +21,7 @@ from fogsim.scene.signs import gantries, sign_batches, sign_shapes
 from fogsim.scene.street_lamps import lamp_posts, street_lamp_shapes
 from fogsim.scene.structures import structure_batches, structure_shapes
 from fogsim.scene.terrain import Terrain
+from fogsim.scene.town import person_shapes, signal_posts, signal_shapes
 from fogsim.scene.trees import tree_shapes
 from fogsim.values.road import Lane, LaneKind, RoadNetwork, SignMap
 from fogsim.values.scene import Batch, Mesh, Scene
@@ -100,6 +101,7 @@ class ScenePlan:
         hanging = [sign for gantry in bridges for sign in gantry.signs]
         shapes = {**body_shapes(), **post_shapes(), **tree_shapes(rng), **sign_shapes(signs.signs)}
         shapes |= structure_shapes(network.structures)
+        posts += signal_posts(network.signal_heads)
         if street_lamps:
             shapes |= street_lamp_shapes()
             posts += lamp_posts(edges, index)
@@ -108,7 +110,8 @@ class ScenePlan:
         growing = trees([(edge.side, edge.line) for edge in edges], index, house_places(built), shapes, terrain, rng)
         beside = structure_batches(network.structures)
         self.lanes = len(lanes)
-        self.shapes: Mapping[str, Mesh] = shapes
+        # What moves or changes comes last: it leaves the numbers of all else as they are.
+        self.shapes: Mapping[str, Mesh] = {**shapes, **signal_shapes(), **person_shapes()}
         self.scenery = _joined([*posts, *sign_batches(signs.signs, hanging, terrain), *built, *growing, *beside])
         borders = [Border(edge, along) for edge, along in zip(edges, rails, strict=True)]
         self.ground = GroundPlan(network.areas, lanes, across, borders, bridges, index, terrain)

@@ -1,4 +1,4 @@
-"""Lit lamps that a camera may see: of other vehicles, and of streets."""
+"""Lit lamps that a camera may see: of other vehicles, of streets and of traffic lights."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fogsim.scene.bodies import LIT_AREAS, BodyLamp, bodies
 from fogsim.scene.lamp_kernels import AREA, FORWARD, FOUND, INTENSITY, LEFT, UP, LampCarriers, LampTable, find_lamps
 from fogsim.scene.street_lamps import HEIGHT, SIZE
+from fogsim.scene.town import signal_light_sources
 from fogsim.scene.vehicles import body_names
 from fogsim.units import luminance_of
 from fogsim.values.light import Beam, Lamp, LightSources, StreetLighting
@@ -75,7 +76,7 @@ def light_sources(
     Parameters
     ----------
     state : TrafficState
-        All vehicles and their lit lamps.
+        All vehicles and their lit lamps, and traffic lights.
     skip : int or None
         Row that is left out, as a rule the vehicle that carries the camera.
     eye : (3,) float64
@@ -94,6 +95,8 @@ def light_sources(
     parts = [_of_vehicles(state, skip, here, beams)] if len(state.ids) else []
     if street_lamps is not None and len(street_lamps):
         parts.append(_of_streets(street_lamps, here))
+    if state.signals.ids:
+        parts.append(signal_light_sources(state.signals, here, state.time))
     parts = [part for part in parts if len(part.intensity)]
     if len(parts) == 1:
         return parts[0]

@@ -26,7 +26,7 @@ class Surroundings:
     Attributes
     ----------
     network : RoadNetwork
-        Its lanes and areas; its route is the whole one. Places are counted from the origin.
+        Its lanes, areas and traffic lights; its route is the whole one. Places are counted from the origin.
     signs : SignMap
         Its signs, likewise.
     origin : (3,) float64
@@ -60,10 +60,12 @@ def surroundings(network: RoadNetwork, signs: SignMap, line: Points) -> Surround
     areas = _chosen(network.areas, near.reaches([area.outline for area in network.areas]))
     posts = _chosen(signs.signs, near.reaches([np.array([sign.position]) for sign in signs.signs]))
     beside = _chosen(network.structures, near.reaches([one.line for one in network.structures]))
+    heads = _chosen(network.signal_heads, near.reaches([np.array([head.post]) for head in network.signal_heads]))
     if origin.any():
         lanes = [replace(lane, centreline=lane.centreline - origin) for lane in lanes]
         areas = [replace(area, outline=area.outline - origin) for area in areas]
         beside = [replace(one, line=one.line - origin) for one in beside]
+        heads = [replace(h, position=_moved(h.position, origin), post=_moved(h.post, origin)) for h in heads]
     return Surroundings(
         replace(
             network,
@@ -71,6 +73,7 @@ def surroundings(network: RoadNetwork, signs: SignMap, line: Points) -> Surround
             route=network.route - origin,
             areas=tuple(areas),
             structures=tuple(beside),
+            signal_heads=tuple(heads),
         ),
         SignMap(tuple(replace(sign, position=_moved(sign.position, origin)) for sign in posts)),
         origin,

@@ -1,4 +1,4 @@
-"""Vehicles as batches of the bodies' shapes."""
+"""Vehicles as batches of the bodies' shapes, and with them all else that moves or changes."""
 
 import math
 from functools import lru_cache
@@ -9,8 +9,22 @@ from numpy.typing import NDArray
 
 from fogsim.jit import kernel
 from fogsim.scene.bodies import body_of
+from fogsim.scene.town import person_batches, signal_batches
 from fogsim.values.scene import Batch, Instance
 from fogsim.values.traffic import TrafficState
+
+
+def traffic_batches(state: TrafficState, skip: int | None) -> tuple[Batch, ...]:
+    """Build one batch for each shape of a vehicle, a traffic light or a person.
+
+    Parameters
+    ----------
+    state : TrafficState
+        The traffic.
+    skip : int or None
+        See `vehicle_batches`.
+    """
+    return (*vehicle_batches(state, skip), *signal_batches(state.signals, state.time), *person_batches(state.persons))
 
 
 def vehicle_batches(state: TrafficState, skip: int | None) -> tuple[Batch, ...]:

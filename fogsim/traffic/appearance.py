@@ -3,12 +3,12 @@
 import functools
 import math
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.values import Lamp
+from fogsim.values import Lamp, SignalColour
 
 BODY_KINDS = {
     "delivery": "van",
@@ -158,3 +158,17 @@ def lamps_from_many_signals(signals: Sequence[int]) -> NDArray[np.int32]:
     """
     known = len(_LAMPS_OF_SIGNALS) - 1
     return np.asarray(_LAMPS_OF_SIGNALS[np.asarray(signals, dtype=np.intp) & known])
+
+
+SIGNAL_COLOURS: Mapping[str, SignalColour] = {
+    "r": SignalColour.RED,
+    "u": SignalColour.RED_YELLOW,
+    "y": SignalColour.YELLOW,
+    "Y": SignalColour.YELLOW,
+    "g": SignalColour.GREEN,
+    "G": SignalColour.GREEN,
+    "s": SignalColour.GREEN_ARROW,
+    "o": SignalColour.BLINKING,
+    "O": SignalColour.OFF,
+}
+"""What SUMO's letters for traffic lights mean."""

@@ -7,6 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Concatenate, ParamSpec, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fogsim.errors import SimulationError
 from fogsim.traffic.collision_log import CollisionLog
 from fogsim.traffic.drivers.events import Order, Script, Situation
@@ -29,7 +32,9 @@ from fogsim.traffic.sumo.vehicle_reader import SubscribedReader, VehicleReader
 from fogsim.traffic.sumo_behaviour.scripted_actions import ScriptedActions, has_lane
 from fogsim.traffic.sumo_behaviour.speed_control import SpeedControl, SumoDesiredSpeeds
 from fogsim.traffic.sumo_drivers.drivers_perception import DriversPerception, drivers_perception
-from fogsim.values import Command, NetworkSnapshot, RoadNetwork, SignMap, TrafficSnapshot, Unplayed
+from fogsim.traffic.sumo_street.person_reader import PersonReader
+from fogsim.traffic.sumo_street.signal_reader import SignalReader
+from fogsim.values import Command, NetworkSnapshot, RoadNetwork, SignMap, TrafficSnapshot, TrafficState, Unplayed
 from fogsim.values.script import TrafficAction
 
 _NO_ADVICE = Command()
@@ -51,6 +56,7 @@ class _Run:
     script: Script
     actions: ScriptedActions
     session: str
+    persons: PersonReader
     perception: DriversPerception | None = None
     drivers: SumoDesiredSpeeds | None = None
 
@@ -95,6 +101,8 @@ class SumoTraffic:
         self._mark = 0
         self._teleported = False
         self._planned: tuple[tuple[str, ...], tuple[RoadNetwork, SignMap]] | None = None
+        self._map: RoadMap | None = None
+        self._signals: SignalReader | None = None
 
     @property
     def _running(self) -> _Run:
@@ -127,7 +135,9 @@ class SumoTraffic:
             script=script,
             actions=ScriptedActions(api, speeds, script.lamps, changes, session),
             session=session,
+            persons=PersonReader(api),
         )
+        self._signals = None
         self._seed = seed
         if self._fog is not None:
             self.enter_fog(self._fog)
@@ -182,7 +192,7 @@ class SumoTraffic:
         planned = planned_way(setup)
         if planned is None:
             return None
-        net = read_net(planned.net)
+        net = self._map = read_net(planned.net)
         if not net.edges.keys() >= set(planned.edges):
             return None
         roads = _roads(net, planned.edges, planned.additional)
@@ -196,8 +206,12 @@ class SumoTraffic:
         route = tuple(api.vehicle.getRoute(self._setup.ego))
         if self._planned is not None and self._planned[0] == route:
             return self._planned[1]
-        net = read_net(self._setup.net or loaded_net(api))
-        return _roads(net, route, self._setup.additional or loaded_additional(api))
+        return _roads(self._read_net(api), route, self._setup.additional or loaded_additional(api))
+
+    def _read_net(self, api: Api) -> RoadMap:
+        if self._map is None:
+            self._map = read_net(self._setup.net or loaded_net(api))
+        return self._map
 
     @_translates_errors
     def begin(self, actions: Sequence[TrafficAction]) -> tuple[TrafficAction, ...]:
@@ -310,7 +324,7 @@ class SumoTraffic:
         route_position, route_length = self._route.update(state.position[row])
         state = run.script.lamps.shown(run.lane_changes.smoothed(state), self._elapsed(run))
         return TrafficSnapshot(
-            state=state,
+            state=self._with_street(run, state, state.position[row]),
             ego=row,
             route_position=route_position,
             route_length=route_length,
@@ -328,12 +342,23 @@ class SumoTraffic:
         state = run.reader.state(self._command.lamps, self._heard(run))
         # Who is between lanes is on none.
         limits = [float(run.api.lane.getMaxSpeed(lane)) for lane in {*state.lane} if lane]
+        state = run.script.lamps.shown(run.lane_changes.smoothed(state), self._elapsed(run))
         return NetworkSnapshot(
-            state=run.script.lamps.shown(run.lane_changes.smoothed(state), self._elapsed(run)),
+            state=self._with_street(run, state, None),
             speed_limit=max(limits, default=math.inf),
             collisions=run.collisions.take(),
             is_over=run.api.simulation.getMinExpectedNumber() == 0,
         )
+
+    def _with_street(self, run: _Run, state: TrafficState, here: NDArray[np.float64] | None) -> TrafficState:
+        """The traffic with persons on foot and, near the ego, traffic lights."""
+        persons, signals = run.persons.state(here, run.roster.time), state.signals
+        if here is not None:
+            if self._signals is None:
+                heads = self._read_net(run.api).signal_heads if run.api.trafficlight.getIDCount() else ()
+                self._signals = SignalReader(run.api, heads)
+            signals = self._signals.state(here)
+        return replace(state, signals=signals, persons=persons) if signals.ids or persons.ids else state
 
     def _heard(self, run: _Run) -> Mapping[str, float]:
         """What everybody has heard advised, the ego its own [m/s]."""

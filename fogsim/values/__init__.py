@@ -7,7 +7,7 @@ from fogsim.values.estimate import Estimate, FogCategory, fog_category
 from fogsim.values.fault import Fault, RunningFault
 from fogsim.values.fog import FogBank, FogChange, FogField, FogPatches
 from fogsim.values.image import Frame, View
-from fogsim.values.light import Beam, HeadLamp, Lamp, Lights, LightSources, StreetLighting
+from fogsim.values.light import Beam, HeadLamp, Lamp, Lights, LightSources, SignalLight, StreetLighting
 from fogsim.values.observation import LeadMeasurement, Observation, SignSighting
 from fogsim.values.road import (
     Lane,
@@ -17,6 +17,7 @@ from fogsim.values.road import (
     PavedArea,
     RoadNetwork,
     Sign,
+    SignalHead,
     SignMap,
     Structure,
     StructureKind,
@@ -28,8 +29,10 @@ from fogsim.values.traffic import (
     Collision,
     Leader,
     NetworkSnapshot,
+    PersonState,
     SignalAhead,
     SignalColour,
+    SignalState,
     TrafficSnapshot,
     TrafficState,
 )
@@ -69,6 +72,7 @@ __all__ = [
     "NetworkSnapshot",
     "Observation",
     "PavedArea",
+    "PersonState",
     "Reason",
     "Response",
     "RoadNetwork",
@@ -80,6 +84,9 @@ __all__ = [
     "SignSighting",
     "SignalAhead",
     "SignalColour",
+    "SignalHead",
+    "SignalLight",
+    "SignalState",
     "SpeedAdvice",
     "Step",
     "StreetLighting",

@@ -22,6 +22,26 @@ class Lamp(IntFlag):
     DAYTIME = 256
 
 
+class SignalLight(IntFlag):
+    """Lit lenses of a traffic light, in bits beside those of `Lamp`; red with yellow comes before green."""
+
+    DARK = 0
+    RED = 512
+    YELLOW = 1024
+    GREEN = 2048
+
+
+SIGNAL_INTENSITY = 200.0
+"""Luminous intensity of a traffic light's lens of 200 mm toward those for whom it is meant, by day and night [cd].
+
+Asked for by day: at least 100, 200 or 400 cd (EN 12368, levels 1 to 3), 240 cd (Japan), in red 165 cd for 200 mm and
+365 cd for 300 mm (ITE VTCSH-LED 2005), 200 cd (CIE 1980); gathered by the Lighting Research Center, Rensselaer.
+"""
+
+SIGNAL_DIAMETER = 0.2
+"""Diameter of that lens [m]; one of 300 mm is as luminous and so shines 450 cd, level 3 of EN 12368."""
+
+
 @dataclass(frozen=True, slots=True)
 class Beam:
     """Luminous intensity of one lamp over direction, seen from the lamp.

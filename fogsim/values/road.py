@@ -163,6 +163,37 @@ class Structure:
 
 
 @dataclass(frozen=True, slots=True)
+class SignalHead:
+    """Three lenses one above the other that tell the drivers on a lane to stop or to go.
+
+    Attributes
+    ----------
+    signal_id : str
+        The traffic light that it belongs to, as a rule named after its junction.
+    lane_id : str
+        The lane.
+    links : tuple of int
+        Numbers of the lane's ways across the junction in the state of the traffic light.
+    position : tuple of float
+        (x, y, z) of the middle lens [m].
+    heading : float
+        Direction of travel of those it speaks to, counterclockwise from east [rad].
+    diameter : float
+        Diameter of a lens [m].
+    post : tuple of float
+        (x, y, z) of the foot of the post that carries it, perhaps by an arm over the road [m].
+    """
+
+    signal_id: str
+    lane_id: str
+    links: tuple[int, ...]
+    position: tuple[float, float, float]
+    heading: float
+    diameter: float
+    post: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
 class RoadNetwork:
     """Every lane that is drawn, and the axis of the ego's route.
 
@@ -178,6 +209,8 @@ class RoadNetwork:
         Highest speed limit of the road that leads to each point of the route [m/s]. Empty where it is not known.
     structures : tuple of Structure
         What stands beside the roads and over them.
+    signal_heads : tuple of SignalHead
+        Heads of the traffic lights.
     """
 
     lanes: tuple[Lane, ...]
@@ -185,3 +218,4 @@ class RoadNetwork:
     areas: tuple[PavedArea, ...] = ()
     route_limits: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     structures: tuple[Structure, ...] = ()
+    signal_heads: tuple[SignalHead, ...] = ()

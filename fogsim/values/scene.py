@@ -23,6 +23,8 @@ class Instance(IntEnum):
     ROAD = 2
     ROADSIDE = 3
     SIGN = 4
+    TRAFFIC_LIGHT = 5
+    PERSON = 6
     FIRST_VEHICLE = 16
 
 
@@ -30,8 +32,8 @@ class Surface(IntEnum):
     """How a vertex's surface gets its radiance.
 
     MATT is lit by the sky; PAINT likewise, with the vehicle's paint in place of its own colour; ROAD has asphalt
-    grain and painted lines; TERRAIN has grass grain; lamps add light of their own while lit, LAMP_STREET always;
-    SHEETING is MATT by day and sends the light of head lamps back to where it came from.
+    grain and painted lines; TERRAIN has grass grain; lamps and the lenses of traffic lights add light of their own
+    while lit, LAMP_STREET always; SHEETING is MATT by day and sends the light of head lamps back to where it came from.
     """
 
     MATT = 0
@@ -46,6 +48,9 @@ class Surface(IntEnum):
     LAMP_HEAD = 9
     SHEETING = 10
     LAMP_STREET = 11
+    LENS_RED = 12
+    LENS_YELLOW = 13
+    LENS_GREEN = 14
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +98,7 @@ class Batch:
     paint : (n, 3) float32
         Linear reflectance of PAINT surfaces.
     lamps : (n,) int32
-        Lit lamps, bits of `Lamp`.
+        Lit lamps, bits of `Lamp` and of `SignalLight`.
     instance : (n,) int32
         Instance id of each copy.
     """

@@ -1,4 +1,4 @@
-"""Where every vehicle is at one instant."""
+"""Where every vehicle and person is at one instant, and what the traffic lights show."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -8,9 +8,78 @@ import numpy as np
 from numpy.typing import NDArray
 
 
+class SignalColour(StrEnum):
+    """What a traffic light shows."""
+
+    RED = "red"
+    RED_YELLOW = "red_yellow"
+    YELLOW = "yellow"
+    GREEN = "green"
+    GREEN_ARROW = "green_arrow"
+    """To the right after a stop."""
+    BLINKING = "blinking"
+    OFF = "off"
+
+
+@dataclass(frozen=True, slots=True)
+class SignalState:
+    """Heads of traffic lights at one instant, as arrays; row i belongs to ``ids[i]`` and ``lane[i]``.
+
+    Attributes
+    ----------
+    ids : tuple of str
+        The traffic light that each head belongs to.
+    lane : tuple of str
+        Id of the lane to whose drivers each speaks.
+    position : (n, 3) float64
+        Middles of their middle lenses [m].
+    heading : (n,) float64
+        Direction of travel of those they speak to [rad].
+    diameter : (n,) float64
+        Diameters of their lenses [m].
+    colour : tuple of SignalColour
+        What each shows.
+    """
+
+    ids: tuple[str, ...] = ()
+    lane: tuple[str, ...] = ()
+    position: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
+    heading: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    diameter: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    colour: tuple[SignalColour, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class PersonState:
+    """Persons on foot at one instant, as arrays; row i belongs to ``ids[i]``.
+
+    Attributes
+    ----------
+    ids : tuple of str
+        Their ids.
+    position : (n, 3) float64
+        Where they stand or walk, at the height of the street [m].
+    heading : (n,) float64
+        Where they look, counterclockwise from east [rad].
+    speed : (n,) float64
+        Speed [m/s].
+    lane : tuple of str
+        Lane ids.
+    raised : (n,) bool
+        Whether they are on a footway, which lies a kerb above the street.
+    """
+
+    ids: tuple[str, ...] = ()
+    position: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
+    heading: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    speed: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    lane: tuple[str, ...] = ()
+    raised: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, np.bool_))
+
+
 @dataclass(frozen=True, slots=True)
 class TrafficState:
-    """All vehicles at one instant, as arrays; row i belongs to ``ids[i]``.
+    """All vehicles at one instant, as arrays; row i belongs to ``ids[i]``; and who and what is beside them.
 
     Attributes
     ----------
@@ -45,6 +114,10 @@ class TrafficState:
     advised_speed : (n,) float64
         Lowest speed in force that a driver has heard advised, whether they follow it or not, the ego its own [m/s];
         ``inf`` where they have heard none. Empty where nobody has.
+    signals : SignalState
+        Heads of traffic lights near the ego; none without an ego.
+    persons : PersonState
+        Persons on foot near the ego; without one, all.
     """
 
     time: float
@@ -63,6 +136,8 @@ class TrafficState:
     grade: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     free_speed: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     advised_speed: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    signals: SignalState = field(default_factory=SignalState)
+    persons: PersonState = field(default_factory=PersonState)
 
     def __post_init__(self) -> None:
         """Put everybody on the level where no grade is given."""
@@ -113,19 +188,6 @@ class Leader:
     vehicle_id: str
     gap: float
     speed: float
-
-
-class SignalColour(StrEnum):
-    """What a traffic light shows."""
-
-    RED = "red"
-    RED_YELLOW = "red_yellow"
-    YELLOW = "yellow"
-    GREEN = "green"
-    GREEN_ARROW = "green_arrow"
-    """To the right after a stop."""
-    BLINKING = "blinking"
-    OFF = "off"
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ import hashlib
 import os
 import zipfile
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import metadata
 from itertools import pairwise
 from pathlib import Path
@@ -22,11 +22,11 @@ from numpy.typing import NDArray
 
 from fogsim.files.user_cache import cache_directory
 from fogsim.traffic.road.road_map import RoadMap, edge_ranges
-from fogsim.values import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea, Sign
+from fogsim.values import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea, Sign, SignalHead
 
 _WORTHWHILE = 1_000_000  # bytes of a network's file, from which on reading takes a fifth of a second
 _MOST_FILES = 16  # of the cache; the oldest go
-_MADE_BY = ("limit_signs.py", "map_cache.py", "net_lanes.py", "network.py", "road_map.py")
+_MADE_BY = ("limit_signs.py", "map_cache.py", "net_lanes.py", "network.py", "road_map.py", "signal_heads.py")
 _MARKINGS, _KINDS, _ENDS = tuple(LaneMarking), tuple(LaneKind), tuple(LaneEnd)
 _UNREADABLE = (OSError, ValueError, KeyError, IndexError, TypeError, EOFError, zipfile.BadZipFile, zlib.error)
 
@@ -114,7 +114,7 @@ def _version() -> bytes:
 
 
 def _arrays_of(roads: RoadMap) -> Arrays:
-    lanes, areas, signs = roads.lanes, roads.areas, roads.limit_signs
+    lanes, areas, signs, heads = roads.lanes, roads.areas, roads.limit_signs, roads.signal_heads
     return {
         "edges": _text(list(roads.edges)),
         "lane_counts": np.array([len(places) for places in roads.edges.values()], np.int64),
@@ -128,6 +128,10 @@ def _arrays_of(roads: RoadMap) -> Arrays:
         "area_kinds": np.array([_KINDS.index(area.kind) for area in areas], np.uint8),
         "signs": _text([text for sign in signs for text in (sign.sign_id, sign.kind)]),
         "sign_places": np.array([(s.value, *s.position, s.heading, s.diameter) for s in signs]).reshape(-1, 6),
+        "heads": _text([text for head in heads for text in (head.signal_id, head.lane_id)]),
+        "head_places": np.array([(*h.position, h.heading, h.diameter, *h.post) for h in heads]).reshape(-1, 8),
+        "links": np.array([link for head in heads for link in head.links], np.int64),
+        "link_counts": np.array([len(head.links) for head in heads], np.int64),
         "location": _text(roads.location or ()),
     }
 
@@ -153,8 +157,17 @@ def _map_of(arrays: Mapping[str, NDArray[Any]]) -> RoadMap:
         between=arrays["between"],
         areas=tuple(PavedArea(name, outline, _KINDS[kind]) for name, outline, kind in outlines),
         limit_signs=tuple(Sign(name, kind, p[0], (p[1], p[2], p[3]), p[4], p[5]) for name, kind, p in places),
+        signal_heads=tuple(_heads(arrays)),
         location=(location[0], location[1]) if location else None,
     )
+
+
+def _heads(arrays: Mapping[str, NDArray[Any]]) -> Iterator[SignalHead]:
+    names, ends = _texts(arrays["heads"]), np.cumsum(np.append(0, arrays["link_counts"])).tolist()
+    links = [tuple(arrays["links"][start:end].tolist()) for start, end in pairwise(ends)]
+    rows = zip(names[::2], names[1::2], links, arrays["head_places"].tolist(), strict=True)
+    for signal, lane, own, (x, y, z, heading, diameter, *post) in rows:
+        yield SignalHead(signal, lane, own, (x, y, z), heading, diameter, (post[0], post[1], post[2]))
 
 
 def _lane(name: tuple[str, str], line: NDArray[np.float64], sizes: Sequence[float], codes: Sequence[int]) -> Lane:

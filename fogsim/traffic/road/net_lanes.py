@@ -1,7 +1,7 @@
 """What sumolib reads of a SUMO network, as a map of roads and signs."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from fogsim.traffic.road.limit_signs import limit_sign
 from fogsim.traffic.road.road_map import RoadMap, edge_ranges
-from fogsim.values import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea
+from fogsim.traffic.road.signal_heads import signal_heads
+from fogsim.values import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea, SignalHead
 
 _WALKING_AREA = "walkingarea"
 _OFF_ROAD = frozenset(
@@ -45,8 +46,14 @@ def map_of(net: Any, lefthand: bool) -> RoadMap:
         between=np.array(between, np.bool_),
         areas=(*_junctions(net), *_walking_areas(net)),
         limit_signs=tuple(sign for sign in signs if sign is not None),
+        signal_heads=tuple(head for edge in edges if not edge.getFunction() for head in _heads(edge, side)),
         location=_location(net),
     )
+
+
+def _heads(edge: Any, side: float) -> Iterator[SignalHead]:
+    lanes = [lane for lane in edge.getLanes() if _kind(lane) is LaneKind.CARRIAGEWAY and len(lane.getShape()) > 1]
+    return signal_heads(lanes, side)
 
 
 def _location(net: Any) -> tuple[str, str] | None:

@@ -85,7 +85,7 @@ def road_network(roads: RoadMap, route: Sequence[str], structures: tuple[Structu
     for lane in lanes:
         _check_shape(lane)
     axis, limits = route_axis(roads, route)
-    return RoadNetwork(lanes, axis, roads.areas, limits, structures)
+    return RoadNetwork(lanes, axis, roads.areas, limits, structures, roads.signal_heads)
 
 
 def _check_shape(lane: Lane) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.values import Lane, PavedArea, Sign
+from fogsim.values import Lane, PavedArea, Sign, SignalHead
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +28,8 @@ class RoadMap:
         Where roads and footways meet.
     limit_signs : tuple of Sign
         Signs where the speed limit changes.
+    signal_heads : tuple of SignalHead
+        Heads of the traffic lights.
     location : tuple of str or None
         What was added to the source's coordinates [m] and their projection, as the file has it; None if it has not.
     """
@@ -38,6 +40,7 @@ class RoadMap:
     between: NDArray[np.bool_]
     areas: tuple[PavedArea, ...]
     limit_signs: tuple[Sign, ...]
+    signal_heads: tuple[SignalHead, ...]
     location: tuple[str, str] | None
 
     def middle_lane(self, edge: str) -> Lane:

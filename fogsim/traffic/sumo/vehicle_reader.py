@@ -8,12 +8,19 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.traffic.appearance import OTHERS_LAMPS, body_kind, cross_section, lamps_from_many_signals, paint
+from fogsim.traffic.appearance import (
+    OTHERS_LAMPS,
+    SIGNAL_COLOURS,
+    body_kind,
+    cross_section,
+    lamps_from_many_signals,
+    paint,
+)
 from fogsim.traffic.sumo.claims import SPEED_FACTOR, TOP_SPEED, Claims
 from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
 from fogsim.traffic.sumo.nearby_vehicles import AllVehicles, NearbyVehicles
 from fogsim.traffic.sumo.roster import Roster
-from fogsim.values import Collision, Lamp, Leader, SignalAhead, SignalColour, TrafficState
+from fogsim.values import Collision, Lamp, Leader, SignalAhead, TrafficState
 from fogsim.values.traffic import advised_speeds
 
 LEADER_RANGE = 500.0
@@ -143,20 +150,6 @@ class VehicleBodies:
         self._kinds.append(kind)
         self._row[vehicle] = row
         return row
-
-
-_COLOURS = {
-    "r": SignalColour.RED,
-    "u": SignalColour.RED_YELLOW,
-    "y": SignalColour.YELLOW,
-    "Y": SignalColour.YELLOW,
-    "g": SignalColour.GREEN,
-    "G": SignalColour.GREEN,
-    "s": SignalColour.GREEN_ARROW,
-    "o": SignalColour.BLINKING,
-    "O": SignalColour.OFF,
-}
-"""What SUMO's letters mean."""
 
 
 class VehicleReader:
@@ -295,7 +288,7 @@ class VehicleReader:
         if self._has_signals is None:
             self._has_signals = int(self._api.trafficlight.getIDCount()) > 0
         lights = self._lights(self._ego) if self._has_signals and self._ego is not None else ()
-        return next((SignalAhead(light, _COLOURS[state], way) for light, _, way, state in lights), None)
+        return next((SignalAhead(light, SIGNAL_COLOURS[state], way) for light, _, way, state in lights), None)
 
     def collisions(self) -> list[Collision]:
         """Collisions of the last step; SUMO tells one in every step while the vehicles overlap."""

@@ -18,13 +18,7 @@ from fogsim.traffic.sumo.due_vehicles import Due, DueVehicles
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
-
-SIGNAL_INTENSITY = 200.0
-"""Luminous intensity of a signal head toward the drivers for whom it is meant, by day and by night [cd].
-
-Asked for by day: at least 100, 200 or 400 cd (EN 12368, levels 1 to 3), 240 cd (Japan), in red 165 cd for 200 mm and
-365 cd for 300 mm (ITE VTCSH-LED 2005), 200 cd (CIE 1980); gathered by the Lighting Research Center, Rensselaer.
-"""
+from fogsim.values.light import SIGNAL_INTENSITY
 
 SIGNAL_HEIGHT = 2.0
 """Height above the road of the line of sight: between eyes and signal heads [m]."""

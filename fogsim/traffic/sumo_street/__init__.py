@@ -1,0 +1,1 @@
+"""What is beside the vehicles in a SUMO simulation: traffic lights and persons on foot."""

@@ -1,0 +1,94 @@
+"""Reading persons on foot: near the ego, or all."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.traffic.sumo.link import Api, getter
+from fogsim.values import PersonState
+
+REACH = 400.0
+"""Persons farther from the ego than this are left out [m]."""
+
+LOOK_PERIOD = 0.5
+"""Who is near is asked again after this time [s]."""
+
+_MARGIN = 30.0  # farther than anybody, the ego or a person, comes in that time [m]
+_WALKING_AREA, _CROSSING = "w", "c"
+_ON_FOOT = ("pedestrian",)
+
+
+class PersonReader:
+    """Reads persons who walk or stand; those who ride are in their vehicles.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    """
+
+    def __init__(self, api: Api) -> None:
+        self._allowed = getter(api, "lane", "getAllowed")
+        names = ("getIDList", "getIDCount", "getPosition3D", "getAngle", "getSpeed", "getLaneID", "getVehicle")
+        getters = [getter(api, "person", name) for name in names]
+        self._all, self._count, self._position, self._angle, self._speed, self._lane, self._vehicle = getters
+        self._near: Sequence[str] = ()
+        self._asked = -math.inf
+        self._footways: dict[str, bool] = {}
+
+    def state(self, here: NDArray[np.float64] | None, time: float) -> PersonState:
+        """Persons on foot nearer than `REACH` to a place, or all.
+
+        Parameters
+        ----------
+        here : (3,) float64 or None
+            The place [m]; None for all.
+        time : float
+            Now [s].
+        """
+        if not self._count():
+            return _NOBODY
+        persons = self._listed(here, time)
+        if not persons:
+            return _NOBODY
+        lanes = tuple(self._lane(person) for person in persons)
+        return PersonState(
+            ids=tuple(persons),
+            position=np.array([self._position(person) for person in persons]),
+            heading=np.radians(90.0 - np.array([self._angle(person) for person in persons])),
+            speed=np.array([self._speed(person) for person in persons]),
+            lane=lanes,
+            raised=np.array([self._is_footway(lane) for lane in lanes]),
+        )
+
+    def _listed(self, here: NDArray[np.float64] | None, time: float) -> list[str]:
+        if here is None:
+            return [person for person in sorted(self._all()) if not self._vehicle(person)]
+        if not 0.0 <= time - self._asked < LOOK_PERIOD:
+            self._asked = time
+            self._near = [person for person in sorted(self._all()) if self._is_within(person, here, REACH + _MARGIN)]
+        there = {*self._all()} if self._near else ()
+        return [
+            person
+            for person in self._near
+            if person in there and not self._vehicle(person) and self._is_within(person, here, REACH)
+        ]
+
+    def _is_within(self, person: str, here: NDArray[np.float64], reach: float) -> bool:
+        x, y, _ = self._position(person)
+        return math.hypot(x - here[0], y - here[1]) < reach
+
+    def _is_footway(self, lane: str) -> bool:
+        """Whether a lane is higher than the street."""
+        if lane not in self._footways:
+            edge, _, _ = lane.rpartition("_")
+            part = edge.rpartition("_")[2] if edge.startswith(":") else ""
+            is_area = part.startswith(_WALKING_AREA)
+            on_foot = not part.startswith(_CROSSING) and lane != "" and tuple(self._allowed(lane)) == _ON_FOOT
+            self._footways[lane] = is_area or on_foot
+        return self._footways[lane]
+
+
+_NOBODY = PersonState()

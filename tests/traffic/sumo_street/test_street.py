@@ -1,0 +1,136 @@
+"""Traffic lights and persons of a real SUMO at a crossing, and where the heads stand."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fogsim.traffic import TrafficSetup, libsumo_traffic
+from fogsim.traffic.road.network import read_net
+from fogsim.traffic.road.signal_heads import ARM_HEIGHT, LARGE_DIAMETER, POST_HEIGHT, signal_heads
+from fogsim.values import Command, SignalColour, TrafficSnapshot
+
+NET = Path(__file__).resolve().parents[2] / "data" / "crossing" / "lights.net.xml"
+DEMAND = """<routes>
+<vType id="c" sigma="0" speedDev="0"/>
+<vType id="w" vClass="pedestrian" speed="1.2" sigma="0"/>
+<vehicle id="ego" type="c" depart="0" departPos="100" departSpeed="10"><route edges="WC CE"/></vehicle>
+<person id="anna" depart="0" departPos="200" type="w"><walk edges="WC CE"/></person>
+<person id="bob" depart="0" departPos="250" type="w"><walk edges="CE EC" arrivalPos="10"/></person>
+<person id="driven" depart="triggered"><ride from="WC" to="CE" lines="ego"/></person>
+</routes>"""
+
+
+def snapshots(folder: Path, steps: int) -> list[TrafficSnapshot]:
+    routes = folder / "crossing.rou.xml"
+    routes.write_text(DEMAND, encoding="utf-8")
+    setup = TrafficSetup(
+        net=NET,
+        routes=(routes,),
+        additional=(),
+        ego="ego",
+        step_length=0.5,
+        keep_lane=(),
+        warm_up_limit=10.0,
+        advice_deceleration=2.0,
+        reading_radius=2000.0,
+    )
+    traffic = libsumo_traffic(setup)
+    seen = []
+    try:
+        traffic.start(0)
+        for _ in range(steps):
+            traffic.advance(Command())
+            snapshot = traffic.observe()
+            if snapshot is None:
+                break
+            seen.append(snapshot)
+    finally:
+        traffic.close()
+    return seen
+
+
+def test_lights_and_walkers_near_the_ego_are_told(tmp_path: Path) -> None:
+    seen = snapshots(tmp_path, 12)
+    signals = seen[0].state.signals
+    assert set(signals.ids) == {"C"}
+    colours = dict(zip(signals.lane, signals.colour, strict=True))
+    ahead = seen[0].signal_ahead
+    assert ahead is not None
+    assert colours["WC_1"] is colours["EC_1"] is ahead.colour
+    assert colours["SC_1"] is colours["NC_1"] is not ahead.colour
+    assert {SignalColour.RED, SignalColour.GREEN} <= set(colours.values())
+    first, last = seen[0].state.persons, seen[-1].state.persons
+    assert last.ids == ("anna", "bob")
+    assert last.raised.all()
+    walked = last.position[0] - first.position[first.ids.index("anna")]
+    assert math.hypot(*walked[:2]) == pytest.approx(1.2 * 0.5 * (len(seen) - 1), rel=0.15)
+    assert last.heading[0] == pytest.approx(math.atan2(walked[1], walked[0]), abs=0.2)
+    # Nobody on foot is among the vehicles, or ahead of the ego as a leader.
+    assert "anna" not in seen[-1].state.ids
+    assert all(snapshot.leader is None for snapshot in seen)
+
+
+def test_each_lane_with_a_light_has_a_head_beside_its_stop_line() -> None:
+    roads = read_net(NET)
+    assert {head.lane_id for head in roads.signal_heads} == {"WC_1", "EC_1", "SC_1", "NC_1"}
+    lanes = {lane.lane_id: lane for lane in roads.lanes}
+    for head in roads.signal_heads:
+        lane = lanes[head.lane_id]
+        end, ahead = lane.centreline[-1], np.array([math.cos(head.heading), math.sin(head.heading)])
+        off = np.array(head.post[:2]) - end[:2]
+        right = off @ (ahead[1], -ahead[0])
+        assert lane.width / 2 < right < lane.width / 2 + 1.0
+        assert abs(off @ ahead) < 1e-6
+        assert head.position[2] == pytest.approx(end[2] + POST_HEIGHT)
+        assert head.links
+
+
+class FakeWay:
+    """A way across a junction, as sumolib has it."""
+
+    def __init__(self, link: int) -> None:
+        self._link = link
+
+    def getTLSID(self) -> str:  # noqa: N802 - sumolib's name
+        return "J"
+
+    def getTLLinkIndex(self) -> int:  # noqa: N802 - sumolib's name
+        return self._link
+
+
+class FakeLane:
+    """A lane that leads east, as sumolib has it."""
+
+    def __init__(self, name: str, y: float, links: tuple[int, ...]) -> None:
+        self._name, self._y, self._links = name, y, links
+
+    def getID(self) -> str:  # noqa: N802 - sumolib's name
+        return self._name
+
+    def getShape3D(self) -> list[tuple[float, float, float]]:  # noqa: N802 - sumolib's name
+        return [(0.0, self._y, 1.0), (100.0, self._y, 1.0)]
+
+    def getWidth(self) -> float:  # noqa: N802 - sumolib's name
+        return 3.2
+
+    def getSpeed(self) -> float:  # noqa: N802 - sumolib's name
+        return 13.9
+
+    def getOutgoing(self) -> list[FakeWay]:  # noqa: N802 - sumolib's name
+        return [FakeWay(link) for link in self._links]
+
+
+def test_on_wider_roads_further_lanes_have_theirs_above_them() -> None:
+    lanes = [FakeLane(f"a_{n}", 3.2 * n, links) for n, links in enumerate([(0, 1), (2,), (4, 3)])]
+    first, second, third = signal_heads(lanes, side=-1.0)
+    assert first.post == second.post == third.post == pytest.approx((100.0, -2.2, 1.0))
+    assert first.position == pytest.approx((100.0, -2.2, 1.0 + POST_HEIGHT))
+    assert second.position == pytest.approx((100.0, 3.2, 1.0 + ARM_HEIGHT))
+    assert third.position == pytest.approx((100.0, 6.4, 1.0 + ARM_HEIGHT))
+    assert third.links == (3, 4)
+    assert second.diameter == LARGE_DIAMETER
+    mirrored = [FakeLane(f"a_{n}", -3.2 * n, (n,)) for n in range(2)]
+    assert next(signal_heads(mirrored, side=1.0)).post == pytest.approx((100.0, 2.2, 1.0))
+    assert not list(signal_heads([FakeLane("a_0", 0.0, ())], side=-1.0))

@@ -21,7 +21,7 @@ class SignalColour(StrEnum):
     OFF = "off"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class SignalState:
     """Heads of traffic lights at one instant, as arrays; row i belongs to ``ids[i]`` and ``lane[i]``.
 
@@ -49,7 +49,7 @@ class SignalState:
     colour: tuple[SignalColour, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class PersonState:
     """Persons on foot at one instant, as arrays; row i belongs to ``ids[i]``.
 
@@ -75,6 +75,10 @@ class PersonState:
     speed: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     lane: tuple[str, ...] = ()
     raised: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, np.bool_))
+
+
+NO_SIGNALS, NO_PERSONS = SignalState(), PersonState()
+"""Where there are none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,8 +140,8 @@ class TrafficState:
     grade: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     free_speed: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     advised_speed: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
-    signals: SignalState = field(default_factory=SignalState)
-    persons: PersonState = field(default_factory=PersonState)
+    signals: SignalState = NO_SIGNALS
+    persons: PersonState = NO_PERSONS
 
     def __post_init__(self) -> None:
         """Put everybody on the level where no grade is given."""

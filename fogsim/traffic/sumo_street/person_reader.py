@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from fogsim.traffic.sumo.link import Api, getter
 from fogsim.values import PersonState
+from fogsim.values.traffic import NO_PERSONS
 
 REACH = 400.0
 """Persons farther from the ego than this are left out [m]."""
@@ -49,10 +50,10 @@ class PersonReader:
             Now [s].
         """
         if not self._count():
-            return _NOBODY
+            return NO_PERSONS
         persons = self._listed(here, time)
         if not persons:
-            return _NOBODY
+            return NO_PERSONS
         lanes = tuple(self._lane(person) for person in persons)
         return PersonState(
             ids=tuple(persons),
@@ -89,6 +90,3 @@ class PersonReader:
             on_foot = not part.startswith(_CROSSING) and lane != "" and tuple(self._allowed(lane)) == _ON_FOOT
             self._footways[lane] = is_area or on_foot
         return self._footways[lane]
-
-
-_NOBODY = PersonState()

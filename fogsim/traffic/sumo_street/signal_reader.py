@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from fogsim.traffic.appearance import SIGNAL_COLOURS
 from fogsim.traffic.sumo.link import Api, getter
 from fogsim.values import SignalHead, SignalState
+from fogsim.values.traffic import NO_SIGNALS
 
 REACH = 500.0
 """Traffic lights farther from the ego than this are left out [m]."""
@@ -37,7 +38,7 @@ class SignalReader:
         self._places = np.array([head.position for head in self._heads]).reshape(-1, 3)
         self._asked = np.full(2, np.inf)
         self._near: list[SignalHead] = []
-        self._last = SignalState()
+        self._last = NO_SIGNALS
 
     def state(self, here: NDArray[np.float64]) -> SignalState:
         """Heads nearer than `REACH` to a place, and what they show.

@@ -7,6 +7,7 @@ the belief at the fault's end by this method alone, over all seeds from the lowe
 if the belief of any seed leaves the truth out.
 
     python benchmarks/sensor_faults.py [--json] [--docs] [--faults …] [--methods …] [--seeds 3] [--visibility 150]
+        [--seconds 5]
 """
 
 import argparse
@@ -55,29 +56,29 @@ UNSURE_PITCH = 0.01
 METHODS = ("joint_road", "negru2013", "zhu2015", "huang2015_rough", "huang2015_lead", "lead_contrast")
 PARAMETERS = {method: inspect.signature(ESTIMATORS[method]).parameters for method in METHODS}
 
-BEGIN, LASTS, SETTLED = 5.0, 5.0, 1.0
-"""When the fault begins, how long it lasts, and how much of it is not counted yet [s]."""
+SETTLED = 1.0
+"""How much of a fault is not counted yet [s]."""
 
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "sensors.md"
 MARK, END = "<!-- table: sensor faults -->", "<!-- end of sensor faults -->"
 
 
-def steps(name: str, seed: int, visibility: float, methods: tuple[str, ...]) -> Iterator[Step]:
+def steps(name: str, seed: int, asked: argparse.Namespace) -> Iterator[Step]:
     """Steps of a drive with a fault."""
-    faults = f"[{{{FAULTS[name]}, at: {BEGIN} s, for: {LASTS} s}}]" if FAULTS[name] else "[]"
+    faults = f"[{{{FAULTS[name]}, at: {asked.seconds} s, for: {asked.seconds} s}}]" if FAULTS[name] else "[]"
     parameters = f"{{pitch_deviation: {UNSURE_PITCH}}}" if name in UNSURE else "{}"
     written = [
         f"{{method: {method}, parameters: {parameters if 'pitch_deviation' in PARAMETERS[method] else '{}'}}}"
-        for method in methods
+        for method in asked.methods
     ]
     scenario = fogsim.load_scenario(
         "motorway_fog_bank",
         [
-            f"fog={{visibility_m: {visibility}}}",
+            f"fog={{visibility_m: {asked.visibility}}}",
             f"sensors.faults={faults}",
             f"estimators=[{', '.join(written)}]",
             "clocks={camera_period_s: 0.2, decision_period_s: 1.0}",
-            f"duration_s={BEGIN + LASTS}",
+            f"duration_s={2.0 * asked.seconds}",
         ],
     )
     return fogsim.run(scenario, seed)
@@ -88,20 +89,21 @@ def holds_truth(estimate: Estimate, extinction: float) -> bool:
     return abs(estimate.extinction - extinction) <= NORMAL_90_PERCENT * estimate.standard_deviation
 
 
-def measure(name: str, seeds: int, visibility: float, methods: tuple[str, ...]) -> list[dict[str, Any]]:
+def measure(name: str, asked: argparse.Namespace) -> list[dict[str, Any]]:
     """Records of a fault, one for each method."""
+    methods = asked.methods
     said: dict[str, list[Estimate]] = {method: [] for method in methods}
     beliefs: dict[str, list[Belief]] = {method: [] for method in methods}
-    extinction = math.log(20.0) / visibility
-    for seed in range(1, seeds + 1):
+    extinction = math.log(20.0) / asked.visibility
+    for seed in range(1, asked.seeds + 1):
         fusions = {method: make("grid_filter") for method in methods}
         last: dict[str, Belief] = {}
-        for step in steps(name, seed, visibility, methods):
-            if step.time >= BEGIN + LASTS:
+        for step in steps(name, seed, asked):
+            if step.time >= 2.0 * asked.seconds:
                 break
             for method, estimate in zip(methods, step.estimates, strict=True):
                 last[method] = fusions[method].update([estimate], step.time)
-                if step.time >= BEGIN + SETTLED:
+                if step.time >= asked.seconds + SETTLED:
                     said[method].append(estimate)
         for method in methods:
             beliefs[method].append(last[method])
@@ -156,10 +158,9 @@ def main() -> None:
     parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS, help="estimators")
     parser.add_argument("--seeds", type=int, default=3, help="drives for each fault")
     parser.add_argument("--visibility", type=float, default=150.0, help="visibility [m]")
+    parser.add_argument("--seconds", type=float, default=5.0, help="time without the fault, and time with it [s]")
     asked = parser.parse_args()
-    records = [
-        one for name in asked.faults for one in measure(name, asked.seeds, asked.visibility, tuple(asked.methods))
-    ]
+    records = [one for name in asked.faults for one in measure(name, asked)]
     if asked.docs:
         before, rest = DOCS.read_text(encoding="utf-8").split(MARK, 1)
         text = f"{before}{MARK}\n\n{table(records)}\n\n{END}{rest.split(END, 1)[1]}"

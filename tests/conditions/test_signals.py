@@ -123,6 +123,9 @@ def test_on_a_lap_a_place_is_near_to_the_ego() -> None:
     step = placed(make_step(route_position=1020.0), (260.0, 0.0), (200.0, 0.0))
     step = replace(step, truth=replace(step.truth, route=twice))
     assert read("other.position", step) == pytest.approx(1080.0)
+    seam = placed(make_step(route_position=815.0), (30.0, 0.0), (0.0, 5.0))
+    seam = replace(seam, truth=replace(seam.truth, route=twice))
+    assert read("other.position", seam) == pytest.approx(850.0)
 
 
 @pytest.mark.parametrize(

@@ -36,6 +36,10 @@ class UnplayedWarning(UserWarning):
     """Events of a scenario were not played, or vehicles that it names were never there."""
 
 
+class LeftOutWarning(UserWarning):
+    """Something of a foreign file has no counterpart in FogSim, and the run goes without it."""
+
+
 class RecorderError(FogSimError, RuntimeError):
     """Recorders of a run failed; the message names them, and where the others' results are."""
 

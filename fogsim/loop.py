@@ -340,7 +340,7 @@ class ClosedLoop:
                 # The ego's way was not known before. Drivers must have had the fog about them while the road filled.
                 self._traffic.start(streams.traffic_seed)
                 snapshot = self._observe_ego()
-        self._step = self._with_unplayed(self._complete_step(0, snapshot, Command()))
+        self._step = self._with_unplayed(self._with_ending(self._complete_step(0, snapshot, Command())))
         return self._step
 
     def _enter_planned_fog(self) -> None:
@@ -391,7 +391,7 @@ class ClosedLoop:
             step = dataclasses.replace(self._step, index=index, time=time, ending=Ending.LEFT_NETWORK)
         else:
             step = self._complete_step(index, snapshot, command)
-        self._step = self._with_unplayed(dataclasses.replace(step, begun=begun))
+        self._step = self._with_unplayed(self._with_ending(dataclasses.replace(step, begun=begun)))
         return self._step
 
     def _begin_what_is_due(self, step: Step) -> tuple[Begun, ...]:
@@ -415,6 +415,11 @@ class ClosedLoop:
         if step is None or step.truth.pose is None:
             raise SimulationError("the run has not been started: call start()")
         return self._equipment.surrounding(step.traffic, step.ego, step.truth.pose)
+
+    def _with_ending(self, step: Step) -> Step:
+        """A step; one at which the scenario's end has come, with it."""
+        ended = self._timeline.ended(step)
+        return step if ended is None or step.ending is not None else dataclasses.replace(step, ending=ended)
 
     def _with_unplayed(self, step: Step) -> Step:
         """A step; one that ends a run with what was not played."""

@@ -225,6 +225,9 @@ class TrafficRun:
             ending=self._ending(index, snapshot),
             begun=begun,
         )
+        ended = self._timeline.ended(step)
+        if step.ending is None and ended is not None:
+            step = dataclasses.replace(step, ending=ended)
         if step.ending is not None:
             unplayed = self._traffic.unplayed() + self._timeline.unplayed(step)
             step = dataclasses.replace(step, unplayed=unplayed)

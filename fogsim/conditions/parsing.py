@@ -234,6 +234,11 @@ class _Text:
         for place, argument in zip(SIGNALS[signal].places, arguments, strict=True):
             if place is Place.BANK and not argument.isdecimal():
                 raise ValueError(f"{shown(self._text)}: a fog bank is named by its number, from 0; got {argument!r}")
+            if place is Place.LENGTH:
+                try:
+                    parse_quantity(argument, "m")
+                except ValueError as error:
+                    raise ValueError(f"{shown(self._text)}: {error}") from None
         return Reference(signal, arguments)
 
     def _unknown(self, written: str) -> Reference:

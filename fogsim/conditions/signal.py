@@ -63,6 +63,7 @@ class Place(Enum):
     METHOD = "estimator"
     SIGNAL = "traffic light"
     EVENT = "event"
+    LENGTH = "length"
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
@@ -12,6 +13,7 @@ from fogsim.conditions.signal import Kind, LanePlace, Need, Place, Signal
 from fogsim.kinematics import DECELERATION, REACTION_TIME, stopping_sight_distance
 from fogsim.registry import Registry
 from fogsim.units import KMH_PER_MPS
+from fogsim.units.quantities import parse_quantity
 from fogsim.values import Ending, Estimate, FogBank, Lamp, Leader, SignalAhead, SignalColour, Step
 
 FASTEST = 500.0 / KMH_PER_MPS
@@ -49,6 +51,28 @@ def _of_pair(between: Callable[[Extent, Extent], float]) -> Callable[[Moment, st
         return None if first is None or second is None else between(first, second)
 
     return value
+
+
+def _ahead(time: Callable[[Extent, Extent], float]) -> Callable[[Moment, str, str, str], float | None]:
+    """Time of one vehicle and another that is ahead of it, by a length farther than their bumpers are."""
+
+    def value(moment: Moment, one: str, other: str, length: str) -> float | None:
+        first, second = moment.extent(one), moment.extent(other)
+        further = parse_quantity(length, "m")
+        if first is None or second is None or second.begin + further <= first.end:
+            return None
+        shifted = replace(second, begin=second.begin + further, end=second.end + further)
+        found = time(first, shifted)
+        return None if math.isinf(found) else found
+
+    return value
+
+
+def _speed_difference(moment: Moment, one: str, other: str) -> float | None:
+    first, second = moment.row(one), moment.row(other)
+    if first is None or second is None:
+        return None
+    return float(moment.step.traffic.speed[first] - moment.step.traffic.speed[second])
 
 
 def _of_leader(read: Callable[[Leader, float], float]) -> Callable[[Moment], float | None]:
@@ -170,6 +194,7 @@ def _relative_error(visibility: float, truth: float) -> float | None:
 
 
 _VEHICLE, _PAIR = (Place.VEHICLE,), (Place.VEHICLE, Place.VEHICLE)
+_PAIR_AND_LENGTH = (*_PAIR, Place.LENGTH)
 
 
 def _speed(meaning: str, value: Callable[..., float | None], **further: object) -> Signal:
@@ -257,6 +282,36 @@ _OF_VEHICLES = {
         unit="s",
         least=0.0,
         places=_PAIR,
+        needs=_ROUTE,
+    ),
+}
+
+_OF_PAIRS_BEYOND = {
+    "speed_difference(X, Y)": Signal(
+        "how much faster X is than Y",
+        _speed_difference,
+        unit="m/s",
+        shown_unit="km/h",
+        least=-FASTEST,
+        most=FASTEST,
+        places=_PAIR,
+    ),
+    "headway(X, Y, LENGTH)": Signal(
+        "time that X takes at its speed for the gap to Y and a length (`0 m`, or what lies between the bumpers and the "
+        "points that a distance counts from); no value unless Y is ahead and X drives",
+        _ahead(headway_between),
+        unit="s",
+        least=0.0,
+        places=_PAIR_AND_LENGTH,
+        needs=_ROUTE,
+    ),
+    "ttc(X, Y, LENGTH)": Signal(
+        "time in which X drives the gap to Y and a length at constant speeds; no value unless Y is ahead and they "
+        "approach",
+        _ahead(time_to_meet),
+        unit="s",
+        least=0.0,
+        places=_PAIR_AND_LENGTH,
         needs=_ROUTE,
     ),
 }
@@ -376,6 +431,8 @@ _OF_FOG = {
     ),
 }
 
-SIGNALS: Registry[Signal] = Registry("signal", {**_OF_RUN, **_OF_VEHICLES, **_OF_EGO, **_OF_LIGHTS, **_OF_FOG})
+SIGNALS: Registry[Signal] = Registry(
+    "signal", {**_OF_RUN, **_OF_VEHICLES, **_OF_PAIRS_BEYOND, **_OF_EGO, **_OF_LIGHTS, **_OF_FOG}
+)
 """Every signal by name. In a name, X and Y stand for vehicles (``ego`` for the ego), METHOD for an estimator of the
 scenario, ID for a traffic light, N for the number of a fog bank, EVENT for an entry of the timeline."""

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fogsim.errors import InputError, shown
+from fogsim.openscenario import is_openscenario, read_openscenario
 from fogsim.scenario.plain_yaml import DEEPEST, MOST_BYTES, KeyPath, PlainYamlError, parse_yaml
 from fogsim.units.quantities import UNIT_OF_SUFFIX
 
@@ -20,6 +21,8 @@ TAKES_THE_PLACE_OF = {
 }
 """Setting the key on the left leaves out those beside it that exclude it: ``--set fog.visibility_m=80`` makes the fog
 homogeneous whatever kind the file has."""
+
+_FOREIGN, _TIMELINE = "scenario", "timeline"
 
 _LONGEST_SHOWN = 200
 """Most characters of an override that a message repeats."""
@@ -185,7 +188,9 @@ class Document:
 
 
 def read_document(path: Path) -> Document:
-    """Read a YAML file.
+    """Read a YAML file, or an OpenSCENARIO file (``.xosc``) as the same data.
+
+    A YAML file with ``scenario: FILE.xosc`` has what stands there, and beside it, or in its place, its own.
 
     Parameters
     ----------
@@ -198,6 +203,8 @@ def read_document(path: Path) -> Document:
         If it cannot be read, is no regular file of UTF-8 text, is too large (see `plain_yaml`), is no YAML, has a key
         twice, or is no mapping.
     """
+    if is_openscenario(path):
+        return _read_openscenario(path)
     try:
         data, lines = parse_yaml(_text(path))
     except PlainYamlError as error:
@@ -205,7 +212,48 @@ def read_document(path: Path) -> Document:
         raise InputError(f"{where}: not valid YAML: {error.problem}") from error
     if not isinstance(data, dict):
         raise InputError(f"{path}: expected a mapping of keys to values, got {type(data).__name__}")
-    return Document(path, data, {key: f"{path}:{line}" for key, line in lines.items()})
+    document = Document(path, data, {key: f"{path}:{line}" for key, line in lines.items()})
+    return _upon_openscenario(document) if _FOREIGN in data else document
+
+
+def _read_openscenario(path: Path) -> Document:
+    read = read_openscenario(path)
+    return Document(path, read.data, {key: f"{path}:{line}" for key, line in read.lines.items()})
+
+
+def _upon_openscenario(document: Document) -> Document:
+    """A document upon the OpenSCENARIO file that it names; its timeline comes after that of the file."""
+    named = document.data[_FOREIGN]
+    path = document.path.parent / str(named)
+    if not isinstance(named, str) or not is_openscenario(path):
+        raise InputError(
+            f"{document.where((_FOREIGN,))}: {_FOREIGN}: expected an OpenSCENARIO file (.xosc), got {shown(named)}"
+        )
+    below = _read_openscenario(path)
+    own = {key: value for key, value in document.data.items() if key != _FOREIGN}
+    further, origins = own.pop(_TIMELINE, []), dict(below.origins)
+    first = len(below.data[_TIMELINE]) if isinstance(further, list) else 0
+    for key, origin in document.origins.items():
+        match key:
+            case (str(block), int(place), *rest) if block == _TIMELINE:
+                origins[(block, first + place, *rest)] = origin
+            case _:
+                origins[key] = origin
+    data = _laid_upon(below.data, own)
+    data[_TIMELINE] = [*below.data[_TIMELINE], *further] if isinstance(further, list) else further
+    return Document(document.path, data, origins)
+
+
+def _laid_upon(below: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
+    """Blocks of which the upper ones' keys count; a fog is another fog as a whole."""
+    data = dict(below)
+    for key, value in own.items():
+        under = data.get(key)
+        if isinstance(under, dict) and isinstance(value, dict) and key != "fog":
+            data[key] = _laid_upon(under, value)
+        else:
+            data[key] = value
+    return data
 
 
 def _text(path: Path) -> str:

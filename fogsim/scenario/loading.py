@@ -59,7 +59,7 @@ def scenario_file(name_or_path: str | Path) -> Path:
     known = catalogue()
     if str(name_or_path) in known:
         return known[str(name_or_path)]
-    if path.suffix in {".yaml", ".yml"} or len(path.parts) > 1:
+    if path.suffix in {".yaml", ".yml", ".xosc"} or len(path.parts) > 1:
         raise InputError(f"{name_or_path}: there is no such scenario file")
     raise UnknownNameError("scenario", str(name_or_path), known)
 

@@ -18,6 +18,7 @@ from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.render import RENDERERS, ROLES
 from fogsim.scenario.camera_schema import CameraSection
 from fogsim.scenario.expect.checks import check_expectations
+from fogsim.scenario.expect.conditions import WrittenCondition
 from fogsim.scenario.expect.schema import Expectations
 from fogsim.scenario.fog import Fog
 from fogsim.scenario.roads.schema import Actors, DemandSection, Road, check_roads
@@ -83,6 +84,9 @@ class Scenario(Section):
 
     end_on_collision: Flag = True
     """Whether a collision of the ego ends the run."""
+
+    end_when: WrittenCondition | None = None
+    """Condition at which the run is over before `duration_s`, as `timeline` has them."""
 
     clocks: Clocks = Clocks()
     """The clocks."""

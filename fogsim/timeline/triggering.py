@@ -8,7 +8,7 @@ from fogsim.conditions import History, Moment, Watch
 from fogsim.scenario import Scenario
 from fogsim.scenario.timeline import TimelineEntry, actions_of, entry_name, fog_reference, told, vehicles_of
 from fogsim.units import extinction_from_visibility
-from fogsim.values import Reason, TrafficStep, Unplayed, UnplayedEvent
+from fogsim.values import Ending, Reason, TrafficStep, Unplayed, UnplayedEvent
 from fogsim.values.script import (
     Actions,
     Begun,
@@ -61,6 +61,7 @@ class Timeline:
         fog = scenario.fog.visibility_m or scenario.fog.outside_visibility_m or math.inf
         self._reference = fog_reference(scenario.timeline, extinction_from_visibility(fog))
         self._light = scenario.light.illuminance_lx
+        self._end = None if scenario.end_when is None else Watch(scenario.end_when)
         self._history = History()
         self._seen: set[str] = set()
         self._ends: list[Begun] = []
@@ -90,6 +91,16 @@ class Timeline:
         over = tuple(end for end in self._ends if end.time <= step.time + _TICK)
         self._ends = [end for end in self._ends if end not in over]
         return Due(_together([actions for _, actions in parts]), tuple((b, a.traffic) for b, a in parts), over)
+
+    def ended(self, step: TrafficStep) -> Ending | None:
+        """Whether a finished step is the last one by the scenario's ``end_when``; None if the run goes on.
+
+        Parameters
+        ----------
+        step : TrafficStep
+            The step; each of a run, in their order.
+        """
+        return Ending.END_CONDITION if self._end is not None and self._end.update(step) else None
 
     def begun(self, due: Due, refused: Collection[TrafficAction]) -> tuple[Begun, ...]:
         """What has begun, or is over, of what was due.

@@ -30,6 +30,9 @@ class Ending(StrEnum):
     COLLISION = "collision"
     TIME = "time"
     LEFT_NETWORK = "left the network"
+    END_CONDITION = "end condition"
+    """The scenario's ``end_when`` holds."""
+
     NOBODY_LEFT = "nobody left"
     """Without an ego: all vehicles have gone, and no more will come."""
 

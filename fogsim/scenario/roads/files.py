@@ -4,16 +4,12 @@ What is written lies in the user's cache directory, in a folder named after its 
 the same files, and one that is changed has others.
 """
 
-import contextlib
-import hashlib
-import os
-import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fogsim.errors import InputError, suggest
-from fogsim.files.user_cache import VARIABLE, cache_directory
+from fogsim.files.generated_files import write_generated
 from fogsim.scenario.roads.schema import NO_MEASURES, ActorSection, DemandSection, ObstructionSection, Road, measure_of
 from fogsim.scenario.schema import Scenario
 from fogsim.traffic.templates import (
@@ -38,7 +34,6 @@ from fogsim.traffic.templates import (
 )
 
 _NET, _ROUTES, _BESIDE = "road.net.xml", "road.rou.xml", "road.add.xml"
-_MOST_FOLDERS = 200  # of generated files; the oldest go
 _SECONDS_PER_HOUR = 3600.0
 
 
@@ -81,14 +76,18 @@ def traffic_files(scenario: Scenario) -> TrafficFiles:
     routes = tuple(folder / path for path in traffic.routes)
     additional = tuple(folder / path for path in traffic.additional)
     if scenario.road is None:
-        own = () if net is None or not scenario.actors else (_written({_ROUTES: _actors_on(net, scenario)}) / _ROUTES,)
+        own = (
+            ()
+            if net is None or not scenario.actors
+            else (write_generated("roads", {_ROUTES: _actors_on(net, scenario)}) / _ROUTES,)
+        )
         return TrafficFiles(net, (*own, *routes), additional)
     layout, placed = road_layout(scenario)
     _check_ways(layout, scenario.demand or DemandSection())
     demand = _demand(scenario.demand or DemandSection(), usual_mix(scenario.road.template))
     texts = {_NET: net_text(layout.net), _ROUTES: routes_text(layout, demand, placed)}
     beside = additional_text(layout, [_obstruction(one) for one in scenario.road.obstructions])
-    made = _written({**texts, **({_BESIDE: beside} if beside else {})})
+    made = write_generated("roads", {**texts, **({_BESIDE: beside} if beside else {})})
     return TrafficFiles(made / _NET, (made / _ROUTES, *routes), (*([made / _BESIDE] if beside else []), *additional))
 
 
@@ -236,36 +235,3 @@ def _demand(section: DemandSection, mix: tuple[tuple[str, float], ...]) -> Deman
         if key.endswith("_vph")
     }
     return Demand(tuple(flows.items()), mix if section.mix is None else tuple(section.mix.items()), section.turning)
-
-
-def _written(texts: dict[str, str]) -> Path:
-    digest = hashlib.sha256("\0".join(texts.values()).encode()).hexdigest()[:24]
-    folder = cache_directory() / "roads" / digest
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, text in texts.items():
-            place = folder / name
-            if place.is_file():
-                os.utime(folder)
-                continue
-            # Several processes may do so at once.
-            part = place.with_name(f"{name}.{os.getpid()}.part")
-            part.write_text(text, encoding="utf-8")
-            part.replace(place)
-    except OSError as error:
-        raise InputError(
-            f"the files of a road by template cannot be written into {folder}: {error.strerror}; name another folder "
-            f"in the environment variable {VARIABLE}"
-        ) from error
-    _leave_out_old(folder.parent)
-    return folder
-
-
-def _leave_out_old(parent: Path) -> None:
-    with contextlib.suppress(OSError):
-        for old in sorted(_folders(parent), key=lambda path: path.stat().st_mtime)[:-_MOST_FOLDERS]:
-            shutil.rmtree(old, ignore_errors=True)
-
-
-def _folders(parent: Path) -> Iterator[Path]:
-    return (path for path in parent.iterdir() if path.is_dir())

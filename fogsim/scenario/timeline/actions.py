@@ -152,8 +152,13 @@ def vehicles_of(entry: TimelineEntry) -> tuple[str, ...]:
     named = []
     for subject, doing in doings_of(entry):
         if isinstance(doing, VehicleActions):
-            named += [subject, *([doing.follow.vehicle] if doing.follow else [])]
-            named += [doing.depart.like] if doing.depart else []
+            others = [
+                doing.follow.vehicle if doing.follow else None,
+                doing.speed.like if doing.speed else None,
+                doing.change_lane.to_lane_of if doing.change_lane else None,
+                doing.depart.like if doing.depart else None,
+            ]
+            named += [subject, *(other for other in others if other is not None)]
     return tuple(dict.fromkeys(named))
 
 
@@ -169,7 +174,7 @@ def _of_vehicle(subject: str, doing: VehicleActions, now: Situation) -> list[Tra
         return None
     moves: list[TrafficAction | None] = []
     if doing.speed:
-        moves.append(_speed_change(vehicle, doing.speed, speed))
+        moves.append(_speed_change(vehicle, doing.speed, speed, now))
     if doing.brake:
         brake = doing.brake
         moves.append(_braking(vehicle, speed, brake.to_kmh / KMH_PER_MPS, brake.deceleration_mps2, brake.hold_s))
@@ -182,7 +187,7 @@ def _of_vehicle(subject: str, doing: VehicleActions, now: Situation) -> list[Tra
     if doing.stop:
         moves.append(_stopping(vehicle, doing.stop, now.position(subject)))
     if doing.change_lane:
-        moves.append(_lane_change(vehicle, doing.change_lane, now.lane(subject)))
+        moves.append(_lane_change(vehicle, doing.change_lane, subject, now))
     moves += _switches(vehicle, doing)
     whole = [move for move in moves if move is not None]
     return whole if len(whole) == len(moves) else None
@@ -206,9 +211,15 @@ def departing_vehicles(entries: Sequence[TimelineEntry]) -> frozenset[str]:
     return frozenset(subject for subject, doing in doings if isinstance(doing, VehicleActions) and doing.depart)
 
 
-def _speed_change(vehicle: str, action: SpeedAction, now: float) -> ChangeSpeed:
-    speed = action.to_kmh / KMH_PER_MPS
-    duration = abs(speed - now) / action.rate_mps2 if action.rate_mps2 else action.over_s or 0.0
+def _speed_change(vehicle: str, action: SpeedAction, begin: float, now: Situation) -> ChangeSpeed | None:
+    other = None if action.like is None else now.speed(action.like)
+    if action.to_kmh is not None:
+        speed = action.to_kmh / KMH_PER_MPS
+    elif other is not None:
+        speed = max(other * action.factor + action.plus_kmh / KMH_PER_MPS, 0.0)
+    else:
+        return None
+    duration = abs(speed - begin) / action.rate_mps2 if action.rate_mps2 else action.over_s or 0.0
     return ChangeSpeed(vehicle, speed, duration, action.shape, _endless(action.for_s))
 
 
@@ -238,10 +249,16 @@ def _stopping(vehicle: str, action: StopAction, now: float | None) -> Stop | Non
     return Stop(vehicle, max(action.position_m - now, 0.0), action.deceleration_mps2, stand)
 
 
-def _lane_change(vehicle: str, action: LaneAction, now: int | None) -> ChangeLane | None:
-    if action.lanes is None and (action.to is None or now is None):
-        return None
-    lanes = action.lanes if action.lanes is not None else (action.to or 0) - (now or 0)
+def _lane_change(vehicle: str, action: LaneAction, subject: str, now: Situation) -> ChangeLane | None:
+    lanes, wanted = action.lanes or 0, action.to
+    if action.to_lane_of is not None:
+        other = now.lane(action.to_lane_of)
+        wanted = None if other is None else other + lanes
+    if action.to is not None or action.to_lane_of is not None:
+        own = now.lane(subject)
+        if own is None or wanted is None:
+            return None
+        lanes = wanted - own
     return ChangeLane(vehicle, lanes, action.stay_s, action.duration_s, action.indicator_s)
 
 

@@ -38,6 +38,9 @@ def check_timeline(scenario: "Scenario") -> None:
         If there is anything that it could not.
     """
     refuse((("timeline", *place), told) for place, told in _mistakes(scenario))
+    if scenario.end_when is not None:
+        told = condition_mistakes(scenario.end_when, run_content(scenario))
+        refuse((("end_when",), one) for one in told)
 
 
 def _mistakes(scenario: "Scenario") -> Iterator[tuple[KeyPath, str]]:

@@ -8,6 +8,8 @@ from pydantic import (
     Field,
     TypeAdapter,
     ValidationError,
+    ValidationInfo,
+    field_validator,
     model_validator,
 )
 from pydantic_core import InitErrorDetails, PydanticCustomError
@@ -83,8 +85,17 @@ class LampActions(Section):
 class SpeedAction(Section):
     """A vehicle comes to a speed and holds it, whatever the limit and advice say; it hits nobody for that."""
 
-    to_kmh: SpeedKmh
+    to_kmh: SpeedKmh | None = None
     """Speed that a vehicle comes to, no higher than its type's `maxSpeed`."""
+
+    like: Id | None = None
+    """Or another vehicle (its id, or `ego`) whose speed at the beginning of the action it comes to."""
+
+    factor: Annotated[Number, Field(ge=0, le=100)] = 1.0
+    """Factor on that speed."""
+
+    plus_kmh: Annotated[Number, Field(ge=-500, le=500)] = 0.0
+    """What is added to it."""
 
     over_s: Time | None = None
     """Time that this takes, as far as its type can speed up; without it and the next, as fast as it can."""
@@ -100,6 +111,8 @@ class SpeedAction(Section):
 
     @model_validator(mode="after")
     def _one_pace(self) -> Self:
+        if (self.to_kmh is None) == (self.like is None):
+            raise ValueError("say which speed: to_kmh or like (another vehicle), and not both")
         given = [key for key in ("over_s", "rate_mps2") if getattr(self, key) is not None]
         if len(given) > 1 or (given and self.shape is Shape.STEP):
             raise ValueError("give over_s, rate_mps2 or shape: step, not two of them")
@@ -182,13 +195,19 @@ class LaneAction(Section):
     indicator_s: Annotated[Time, Field(le=60)] = 0.0
     """Time for which it indicates before; it does until it is over. 0 for not at all."""
 
+    to_lane_of: Id | None = None
+    """Or another vehicle (its id, or `ego`) in whose lane it goes, or `lanes` to the left of it."""
+
     stay_s: Period = 60.0
     """How long it stays there."""
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
-        if (self.lanes is None) == (self.to is None):
-            raise ValueError("say where: lanes (to the left, negative to the right) or to (number of the lane)")
+        is_told = self.lanes is not None or self.to_lane_of is not None
+        if is_told == (self.to is not None):
+            raise ValueError(
+                "say where: lanes (to the left, negative to the right), to (number of the lane) or to_lane_of"
+            )
         return self
 
 
@@ -385,9 +404,17 @@ class TimelineEntry(Section):
     repeat: Literal["once", "each"] = "once"
     """`once`: when the condition holds for the first time; `each`: each time that it comes to hold."""
 
-    do: Annotated[dict[Id, Doing | tuple[Doing, ...]], BeforeValidator(_by_subject), Field(min_length=1)]
+    do: Annotated[dict[Id, Doing | tuple[Doing, ...]], BeforeValidator(_by_subject)]
     """What, by its subjects: the id of a vehicle (or `ego`), `signal.ID`, `fog`, `light`, `sensors.camera` and other
-    sensors, each with a block or a list of blocks."""
+    sensors, each with a block or a list of blocks. `{}` in an entry with a name for nothing: it remembers that its
+    condition has held, as `happened(NAME)`."""
+
+    @field_validator("do")
+    @classmethod
+    def _something(cls, value: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
+        if not value and not info.data.get("name"):
+            raise ValueError("must say what is done, or the entry must have a name by which happened(NAME) asks for it")
+        return value
 
 
 Timeline = tuple[TimelineEntry, ...]

@@ -1,4 +1,4 @@
-"""Reference lines of OpenDRIVE roads: straight lines, arcs and spirals end to end."""
+"""Reference lines of OpenDRIVE roads: straight lines, arcs, spirals and cubic polynomials end to end."""
 
 import math
 from collections.abc import Iterable
@@ -65,6 +65,50 @@ class Piece:
 
 
 @dataclass(frozen=True, slots=True)
+class CubicPiece:
+    """A stretch of a reference line whose coordinates are cubic polynomials (``paramPoly3``).
+
+    Attributes
+    ----------
+    s, length, x, y, heading : float
+        As of `Piece`.
+    forward, left : tuple of float
+        Coefficients of the coordinates along and to the left of the first direction, constant term first.
+    is_normalised : bool
+        Whether the parameter runs from 0 to 1 along the piece, and not as far as its length.
+    """
+
+    s: float
+    length: float
+    x: float
+    y: float
+    heading: float
+    forward: tuple[float, ...]
+    left: tuple[float, ...]
+    is_normalised: bool
+
+    def at(self, distance: float) -> Place:
+        """Point at a distance from its start [m]; the parameter counts as length of the curve, as the format has it.
+
+        Parameters
+        ----------
+        distance : float
+            From its start along the line [m].
+        """
+        p = distance / self.length if self.is_normalised else distance
+        (u, du), (v, dv) = _cubic(self.forward, p), _cubic(self.left, p)
+        cosine, sine = math.cos(self.heading), math.sin(self.heading)
+        turned = math.atan2(dv, du)
+        return self.x + u * cosine - v * sine, self.y + u * sine + v * cosine, self.heading + turned
+
+
+def _cubic(coefficients: tuple[float, ...], p: float) -> tuple[float, float]:
+    """Value of a cubic and of its derivative."""
+    a, b, c, d = coefficients
+    return a + p * (b + p * (c + p * d)), b + p * (2.0 * c + p * 3.0 * d)
+
+
+@dataclass(frozen=True, slots=True)
 class PlanView:
     """A road's reference line.
 
@@ -74,7 +118,7 @@ class PlanView:
         Its pieces in order of s; for a shape that is not known, its place and name.
     """
 
-    pieces: tuple["Piece | UnknownPiece", ...]
+    pieces: tuple["Piece | CubicPiece | UnknownPiece", ...]
 
     def at(self, s: float) -> Place:
         """Point at a distance along the road.
@@ -114,7 +158,7 @@ class UnknownPiece:
             From its start along the line [m].
         """
         where = self.s + distance
-        raise ValueError(f"s = {where:g} m is on a {self.shape}; places on line, arc and spiral are known")
+        raise ValueError(f"s = {where:g} m is on a {self.shape}; places on line, arc, spiral and paramPoly3 are known")
 
 
 def plan_view(geometries: Iterable[Element]) -> PlanView:
@@ -123,7 +167,8 @@ def plan_view(geometries: Iterable[Element]) -> PlanView:
     Parameters
     ----------
     geometries : iterable of Element
-        They, with ``s``, ``x``, ``y``, ``hdg`` and ``length``, each holding ``<line>``, ``<arc>`` or ``<spiral>``.
+        They, with ``s``, ``x``, ``y``, ``hdg`` and ``length``, each holding ``<line>``, ``<arc>``, ``<spiral>`` or
+        ``<paramPoly3>``.
 
     Raises
     ------
@@ -136,10 +181,13 @@ def plan_view(geometries: Iterable[Element]) -> PlanView:
     return PlanView(pieces)
 
 
-def _piece(geometry: Element) -> Piece | UnknownPiece:
+def _piece(geometry: Element) -> Piece | CubicPiece | UnknownPiece:
     s, x, y, heading, length = _numbers(geometry, "s", "x", "y", "hdg", "length")
     shape = next(iter(geometry), None)
     tag = "geometry without a shape" if shape is None else shape.tag
+    if shape is not None and tag == "paramPoly3" and length > 0:
+        forward, left = (tuple(_numbers(shape, *(f"{c}{axis}" for c in "abcd"))) for axis in "UV")
+        return CubicPiece(s, length, x, y, heading, forward, left, shape.get("pRange") != "arcLength")
     if shape is None or tag not in ("line", "arc", "spiral") or length <= 0:
         return UnknownPiece(s, length, tag)
     start = end = 0.0

@@ -106,7 +106,7 @@ def test_lights_that_change_are_no_signs(tmp_path: Path) -> None:
     assert opendrive_signs(file(tmp_path, '<signal id="s" s="4" t="-6" dynamic="yes" type="1000001"/>')) == []
 
 
-POLYNOMIAL = '<geometry s="0" x="0" y="0" hdg="0" length="230"><paramPoly3 aU="0"/></geometry>'
+POLYNOMIAL = '<geometry s="0" x="0" y="0" hdg="0" length="230"><poly3 a="0"/></geometry>'
 
 
 @pytest.mark.parametrize(
@@ -114,7 +114,11 @@ POLYNOMIAL = '<geometry s="0" x="0" y="0" hdg="0" length="230"><paramPoly3 aU="0
     [
         ('<signal id="a" s="400" t="1"/>', CURVE, r"road '7': signal 'a': expected s on the road, 0 … 230 m, got 400"),
         ('<signal id="a" s="40"/>', CURVE, "needs the attribute 't'"),
-        ('<signal id="a" s="40" t="1"/>', POLYNOMIAL, "on a paramPoly3; places on line, arc and spiral are known"),
+        (
+            '<signal id="a" s="40" t="1"/>',
+            POLYNOMIAL,
+            "on a poly3; places on line, arc, spiral and paramPoly3 are known",
+        ),
         ('<signal id="a" s="40" t="1"/>', "", "the road has no geometry"),
         ('<signal id="a" s="40" t="1" value="fast"/>', CURVE, "expected a number for value, got 'fast'"),
         ('<signal id="a" s="4" t="1" type="274" value="9" unit="kn"/>', CURVE, "expected the speed's unit to be one"),

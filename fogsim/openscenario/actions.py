@@ -1,0 +1,255 @@
+"""Actions as blocks of FogSim's timeline."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from fogsim.openscenario.catalogs import Catalogs
+from fogsim.openscenario.entities import Vehicle
+from fogsim.openscenario.environment import environment_of, light_change
+from fogsim.openscenario.findings import Findings
+from fogsim.openscenario.positions import Positions
+from fogsim.openscenario.xml_tree import Node
+from fogsim.units import KMH_PER_MPS
+
+SHAPES = {"step": "step", "linear": "linear", "sinusoidal": "sinusoidal", "cubic": "sinusoidal"}
+"""Shapes of dynamics and the one in FogSim that is nearest."""
+
+LAMPS = {
+    "daytimeRunningLights": ("daytime",),
+    "lowBeam": ("low_beam",),
+    "highBeam": ("high_beam",),
+    "fogLights": ("front_fog", "rear_fog"),
+    "fogLightsFront": ("front_fog",),
+    "fogLightsRear": ("rear_fog",),
+    "brakeLights": ("stop",),
+    "indicatorLeft": ("indicator_left",),
+    "indicatorRight": ("indicator_right",),
+    "warningLights": ("indicator_left", "indicator_right"),
+}
+"""Lamps of each kind of light."""
+
+_UNLIT = ("licensePlateIllumination", "reversingLights", "specialPurposeLights")
+_STAY = 1e5  # Time for which a vehicle stays in the lane that it has changed to [s]
+_NEAR = 0.05  # Difference at which a speed has been reached [m/s]
+
+
+@dataclass
+class Effect:
+    """What an event does.
+
+    Attributes
+    ----------
+    do : dict
+        Blocks of an entry of the timeline, by their subjects.
+    lasts : float
+        How long that takes, as far as a time is given [s].
+    ends : list of str
+        Conditions that hold when the rest is over.
+    """
+
+    do: dict[str, dict[str, Any]] = field(default_factory=dict)
+    lasts: float = 0.0
+    ends: list[str] = field(default_factory=list)
+
+    def add(self, subject: str, **blocks: Any) -> None:
+        """Let a subject do something more."""
+        mine = self.do.setdefault(subject, {})
+        for key, block in blocks.items():
+            mine[key] = {**mine.get(key, {}), **block} if key == "lamps" else block
+
+
+@dataclass
+class Actions:
+    """Reads actions.
+
+    Attributes
+    ----------
+    vehicles : mapping from str to Vehicle
+        The vehicles.
+    catalogs : Catalogs
+        Where environments may be.
+    positions : Positions
+        Knows the map, and where everybody begins.
+    called : callable
+        A vehicle's name in conditions.
+    begins_by_day : bool
+        Whether the run does.
+    """
+
+    vehicles: Mapping[str, Vehicle]
+    catalogs: Catalogs
+    positions: Positions
+    called: Callable[[str], str]
+    begins_by_day: bool = True
+
+    @property
+    def findings(self) -> Findings:
+        """Takes what cannot be done."""
+        return self.catalogs.findings
+
+    def take(self, action: Node, actors: list[str], effect: Effect) -> None:
+        """Add what an action does.
+
+        Parameters
+        ----------
+        action : Node
+            A ``PrivateAction``, a ``GlobalAction``, or what holds one.
+        actors : list of str
+            Who does it, if it is private.
+        effect : Effect
+            Takes it.
+        """
+        for one in action.all():
+            if one.tag in ("PrivateAction", "GlobalAction", "LongitudinalAction", "LateralAction", "AppearanceAction"):
+                self.take(one, actors, effect)
+            elif one.tag == "EnvironmentAction":
+                self._environment(one, effect)
+            elif one.tag in _CONTROL:
+                self.findings.leave_out(one, "FogSim's own drivers and its adviser drive")
+            elif one.tag not in _PRIVATE:
+                self.findings.refuse(one, f"FogSim has no such action; it has {', '.join(ACTIONS)}")
+            else:
+                for actor in actors:
+                    _PRIVATE[one.tag](self, one, actor, effect)
+
+    def _environment(self, action: Node, effect: Effect) -> None:
+        read = environment_of(action, self.catalogs, self.positions.lanes)
+        if read.box is not None:
+            self.findings.refuse(action, "a box of fog may stand in Init alone; later the fog changes everywhere")
+        elif read.visibility is not None:
+            effect.add("fog", visibility_m=read.visibility)
+        if read.illuminance is not None:
+            illuminance, left_out = light_change(read.illuminance, self.begins_by_day)
+            if left_out:
+                self.findings.leave_out(action, left_out)
+            if illuminance is not None:
+                effect.add("light", illuminance_lx=round(illuminance, 1))
+
+    def _speed(self, action: Node, actor: str, effect: Effect) -> None:
+        dynamics, target = action.one("SpeedActionDynamics"), action.one("SpeedActionTarget")
+        told = {} if target is None else self._target(target)
+        if not told:
+            self.findings.refuse(
+                action, "expected a SpeedActionTarget with an AbsoluteTargetSpeed or RelativeTargetSpeed"
+            )
+            return
+        speed = {**told, **(self._pace(dynamics, effect) if dynamics else {"shape": "step"})}
+        if "rate_mps2" in speed and "to_kmh" in speed:
+            own, to = f"{self.called(actor)}.speed", speed["to_kmh"] / KMH_PER_MPS
+            effect.ends.append(f"{own} > {to - _NEAR:.9g} m/s and {own} < {to + _NEAR:.9g} m/s")
+        effect.add(actor, speed=speed)
+
+    def _target(self, target: Node) -> dict[str, Any]:
+        absolute, relative = target.one("AbsoluteTargetSpeed"), target.one("RelativeTargetSpeed")
+        if absolute is not None:
+            return {"to_kmh": max(self.findings.number(absolute, "value"), 0.0) * KMH_PER_MPS}
+        if relative is None:
+            return {}
+        other, value = relative.get("entityRef"), self.findings.number(relative, "value")
+        if other not in self.vehicles:
+            self.findings.refuse(relative, f"there is no vehicle {other!r}")
+        if relative.get("continuous", "false") == "true":
+            self.findings.leave_out(relative, "continuous: the speed is taken once, when the action begins")
+        how = self.findings.word(relative, "speedTargetValueType", ("delta", "factor"))
+        share = {"factor": value} if how == "factor" else {"plus_kmh": value * KMH_PER_MPS}
+        return {"like": self.called(other).strip('"'), **share}
+
+    def _pace(self, dynamics: Node, effect: Effect) -> dict[str, Any]:
+        shape = SHAPES[self.findings.word(dynamics, "dynamicsShape", tuple(SHAPES))]
+        value = abs(self.findings.number(dynamics, "value", 0.0))
+        by = self.findings.word(dynamics, "dynamicsDimension", ("time", "rate", "distance"))
+        dynamics.get("followingMode")
+        if shape == "step" or value == 0.0 or math.isinf(value):
+            return {"shape": "step"}
+        if by == "distance":
+            self.findings.refuse(dynamics, "dynamicsDimension: speeds change by time or rate")
+            return {}
+        if by == "time":
+            effect.lasts = max(effect.lasts, value)
+        return {"shape": shape, "over_s" if by == "time" else "rate_mps2": value}
+
+    def _lane_change(self, action: Node, actor: str, effect: Effect) -> None:
+        dynamics, target = action.one("LaneChangeActionDynamics"), action.one("LaneChangeTarget")
+        if self.findings.number(action, "targetLaneOffset", 0.0):
+            self.findings.refuse(action, "targetLaneOffset: vehicles are in the middle of their lanes; write 0")
+        lanes = None if target is None else self._lanes(target, actor)
+        if lanes is None:
+            return
+        change: dict[str, Any] = {**lanes, "stay_s": _STAY}
+        if dynamics is not None:
+            change["duration_s"] = self._duration(dynamics)
+            effect.lasts = max(effect.lasts, change["duration_s"])
+        effect.add(actor, change_lane=change)
+
+    def _duration(self, dynamics: Node) -> float:
+        shape = self.findings.word(dynamics, "dynamicsShape", tuple(SHAPES))
+        value = abs(self.findings.number(dynamics, "value", 0.0))
+        by = self.findings.word(dynamics, "dynamicsDimension", ("time", "rate", "distance"))
+        if shape == "step":
+            return 0.0
+        if by != "time":
+            self.findings.refuse(dynamics, "dynamicsDimension: changes of lane take a time")
+        return min(value, 60.0)
+
+    def _lanes(self, target: Node, actor: str) -> dict[str, Any] | None:
+        absolute, relative = target.one("AbsoluteTargetLane"), target.one("RelativeTargetLane")
+        if relative is not None:
+            other, lanes = relative.get("entityRef"), int(self.findings.number(relative, "value"))
+            if other == actor:
+                return {"lanes": lanes}
+            return {"to_lane_of": self.called(other).strip('"'), "lanes": lanes}
+        begins = self.positions.entities.get(actor)
+        if absolute is None or begins is None:
+            self.findings.refuse(target, "expected an AbsoluteTargetLane or RelativeTargetLane")
+            return None
+        road, wanted = (begins.lane.origins or ("",))[0].partition("_")[0], absolute.get("value")
+        found = [one for one in self.positions.lanes.lanes if f"{road}_{wanted}" in one.origins]
+        if not found:
+            self.findings.refuse(absolute, f"road {road!r}, where {actor} begins, has no lane {wanted!r} to drive on")
+            return None
+        return {"to": found[0].index}
+
+    def _lights(self, action: Node, actor: str, effect: Effect) -> None:
+        light, state = action.within("LightType", "VehicleLight"), action.one("LightState")
+        if light is None or state is None:
+            self.findings.refuse(action, "expected a LightType with a VehicleLight, and a LightState")
+            return
+        mode = self.findings.word(state, "mode", ("on", "off", "flashing"))
+        for key in ("luminousIntensity", "flashingOnDuration", "flashingOffDuration"):
+            # Lamps shine as their kind does, and indicators flash as the law has it.
+            state.get(key)
+        for colour in state.all("Color"):
+            self.findings.leave_out(colour, "lamps have the colour of their kind")
+        action.get("transitionTime")
+        kind = light.get("vehicleLightType")
+        if kind in _UNLIT:
+            self.findings.leave_out(light, f"vehicles have no {kind}")
+            return
+        if kind not in LAMPS:
+            self.findings.refuse(light, f"unknown light {kind!r}; known: {', '.join((*LAMPS, *_UNLIT))}")
+            return
+        effect.add(actor, lamps=dict.fromkeys(LAMPS[kind], "off" if mode == "off" else "on"))
+
+    def _keep_distance(self, action: Node, actor: str, effect: Effect) -> None:
+        headway = self.findings.number(action, "timeGap", 0.0)
+        if not headway or self.findings.word(action, "freespace", ("true", "false")) != "true":
+            self.findings.refuse(action, "a distance is kept by a timeGap with freespace=true")
+            return
+        for key in ("continuous", "coordinateSystem", "displacement"):
+            action.get(key)
+        for limits in action.all("DynamicConstraints"):
+            self.findings.leave_out(limits, "FogSim's law of following has limits of its own")
+        effect.add(actor, follow={"vehicle": self.called(action.get("entityRef")).strip('"'), "headway_s": headway})
+
+
+_PRIVATE: Mapping[str, Callable[[Actions, Node, str, Effect], None]] = {
+    "SpeedAction": Actions._speed,
+    "LaneChangeAction": Actions._lane_change,
+    "LightStateAction": Actions._lights,
+    "LongitudinalDistanceAction": Actions._keep_distance,
+}
+_CONTROL = ("ControllerAction", "ActivateControllerAction", "AssignControllerAction", "OverrideControllerValueAction")
+ACTIONS = ("EnvironmentAction", *_PRIVATE)
+"""Actions that are read."""

@@ -1,0 +1,91 @@
+"""Entries of catalogs that a file refers to."""
+
+import copy
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from fogsim.errors import InputError, shown, suggest
+from fogsim.openscenario.findings import Findings
+from fogsim.openscenario.parameters import declared, put_parameters
+from fogsim.openscenario.xml_tree import Node, read_xml
+
+LOCATIONS = {
+    "VehicleCatalog": "Vehicle",
+    "EnvironmentCatalog": "Environment",
+    "ControllerCatalog": "Controller",
+    "ManeuverCatalog": "Maneuver",
+}
+"""Kinds of catalogs that are read, and what is in them."""
+
+
+@dataclass
+class Catalogs:
+    """The catalogs that a file names.
+
+    Attributes
+    ----------
+    folder : Path
+        Folder to which their places are relative: the file's.
+    locations : Node or None
+        The element ``CatalogLocations``.
+    findings : Findings
+        Takes what cannot be found.
+    """
+
+    folder: Path
+    locations: Node | None
+    findings: Findings
+    _read: dict[Path, Node] = field(default_factory=dict)
+
+    def entry(self, reference: Node) -> Node | None:
+        """What a ``CatalogReference`` refers to, with its parameters; None if there is none, which is noted.
+
+        Parameters
+        ----------
+        reference : Node
+            The reference.
+        """
+        catalog, name = reference.get("catalogName"), reference.get("entryName")
+        given = {
+            one.get("parameterRef"): one.get("value")
+            for block in reference.all("ParameterAssignments")
+            for one in block.all("ParameterAssignment")
+        }
+        names: list[str] = []
+        for found in self._named(catalog):
+            names += [one.attributes.get("name", "") for one in found.children]
+            for one in found.children:
+                if one.attributes.get("name") == name:
+                    whole = copy.deepcopy(one)
+                    own = declared(whole, {}, self.findings)
+                    # What the reference gives goes before what the entry has.
+                    whole.children = [child for child in whole.children if child.tag != "ParameterDeclarations"]
+                    put_parameters(whole, {**own, **given}, self.findings)
+                    whole.is_read = True
+                    return whole
+        told = suggest(name, names) if names else f"there is no catalog {shown(catalog)} in the CatalogLocations"
+        self.findings.refuse(reference, f"unknown entry {shown(name)} of {catalog}; {told}")
+        return None
+
+    def _named(self, catalog: str) -> Iterator[Node]:
+        for file in self._files():
+            if file not in self._read:
+                try:
+                    self._read[file] = read_xml(file)
+                except InputError as error:
+                    self.findings.refused.append(str(error))
+                    self._read[file] = Node("", {}, file, 1, "")
+            # Whoever has copied a catalog may not have changed the name inside.
+            yield from (
+                one
+                for one in self._read[file].children
+                if one.tag == "Catalog" and catalog in (one.attributes.get("name"), file.stem)
+            )
+
+    def _files(self) -> Iterator[Path]:
+        for kind in self.locations.children if self.locations else ():
+            for place in kind.children:
+                path = self.folder / place.attributes.get("path", "")
+                if kind.tag in LOCATIONS:
+                    yield from sorted(path.glob("*.xosc")) if path.is_dir() else ([path] if path.is_file() else [])

@@ -1,0 +1,139 @@
+"""Entities of a file: vehicles with SUMO's class, size and performance."""
+
+import re
+from dataclasses import dataclass
+
+from fogsim.openscenario.catalogs import Catalogs
+from fogsim.openscenario.xml_tree import Node
+
+CLASSES = {
+    "car": "passenger",
+    "van": "delivery",
+    "truck": "truck",
+    "bus": "bus",
+    "motorbike": "motorcycle",
+    "bicycle": "bicycle",
+    "train": "rail",
+    "tram": "tram",
+}
+"""SUMO's class of each vehicle category that is read."""
+
+_NAME = re.compile(r"[\w.:#@\-]+")
+_TAKEN = ("fog", "light")
+_EGO_NAMES = ("ego", "hero", "ego_vehicle", "egovehicle")
+
+
+@dataclass(frozen=True, slots=True)
+class Vehicle:
+    """A vehicle.
+
+    Attributes
+    ----------
+    name : str
+        Its id.
+    node : Node
+        Where it is described.
+    category : str
+        OpenSCENARIO's.
+    length, width, height : float
+        Size [m].
+    front : float
+        From the reference point, the middle of the rear axle, to the front bumper [m].
+    top_speed, acceleration, deceleration : float
+        What it can do [m/s, m/s²].
+    """
+
+    name: str
+    node: Node
+    category: str
+    length: float
+    width: float
+    height: float
+    front: float
+    top_speed: float
+    acceleration: float
+    deceleration: float
+
+    @property
+    def rear(self) -> float:
+        """From the rear bumper to the reference point [m]."""
+        return self.length - self.front
+
+
+def read_vehicles(entities: Node, catalogs: Catalogs) -> dict[str, Vehicle]:
+    """Vehicles by name; what is none is noted.
+
+    Parameters
+    ----------
+    entities : Node
+        The element ``Entities``.
+    catalogs : Catalogs
+        Where it may refer to.
+    """
+    found: dict[str, Vehicle] = {}
+    for entity in entities.all("ScenarioObject"):
+        name = entity.get("name")
+        if not _NAME.fullmatch(name) or name in _TAKEN or name in found:
+            told = f"expected a name of its own of letters, digits and _ . : # @ -, which is not {' or '.join(_TAKEN)}"
+            catalogs.findings.refuse(entity, f"{told}; got {name!r}")
+            continue
+        for controller in entity.all("ObjectController"):
+            if controller.children or controller.attributes:
+                catalogs.findings.leave_out(controller, _CONTROLLER)
+        reference = entity.one("CatalogReference")
+        node = catalogs.entry(reference) if reference else entity.one("Vehicle", "Pedestrian", "MiscObject")
+        if node is None:
+            if reference is None:
+                catalogs.findings.refuse(entity, "expected a Vehicle or a CatalogReference to one")
+            continue
+        if node.tag != "Vehicle":
+            catalogs.findings.refuse(entity, f"{name} is a {node.tag}; vehicles are read, and nothing else")
+            continue
+        found[name] = _vehicle(name, node, catalogs)
+        if reference:
+            catalogs.findings.look_for_unread(node)
+    return found
+
+
+_CONTROLLER = "controllers of files are programs of other simulators; FogSim's drivers and its adviser drive"
+
+
+def _vehicle(name: str, node: Node, catalogs: Catalogs) -> Vehicle:
+    findings = catalogs.findings
+    category = findings.word(node, "vehicleCategory", tuple(CLASSES), "car")
+    for trailer in node.all("Trailer", "TrailerHitch", "TrailerCoupler"):
+        findings.refuse(trailer, "vehicles have no trailers; describe the whole as one vehicle")
+    box, performance = node.one("BoundingBox"), node.one("Performance")
+    centre, size = (box.one("Center"), box.one("Dimensions")) if box else (None, None)
+    if performance is None or centre is None or size is None:
+        findings.refuse(node, "a vehicle needs a BoundingBox with Center and Dimensions, and a Performance")
+        return Vehicle(name, node, category, 4.6, 1.85, 1.5, 3.7, 55.0, 3.0, 9.0)
+    length, width, height = (findings.number(size, key) for key in ("length", "width", "height"))
+    for key in "yz":
+        centre.get(key)
+    for key in ("maxAccelerationRate", "maxDecelerationRate"):
+        performance.get(key)
+    speed, up, down = (findings.number(performance, f"max{key}") for key in ("Speed", "Acceleration", "Deceleration"))
+    return Vehicle(
+        name,
+        node,
+        category,
+        max(length, 0.2),
+        max(width, 0.2),
+        max(height, 0.2),
+        findings.number(centre, "x") + 0.5 * length,
+        min(max(speed, 0.1), 138.0),
+        min(max(up, 0.1), 50.0),
+        min(max(down, 0.1), 50.0),
+    )
+
+
+def ego_of(vehicles: dict[str, Vehicle]) -> str:
+    """Which vehicle is the ego: one that is called so (``Ego``, ``hero``), else the first.
+
+    Parameters
+    ----------
+    vehicles : dict from str to Vehicle
+        They.
+    """
+    return next((name for name in vehicles if name.lower() in _EGO_NAMES), next(iter(vehicles), "ego"))

@@ -1,0 +1,215 @@
+"""Fog and light of an environment: ``visualRange`` is the distance at which a black target has 5 % contrast."""
+
+import datetime as dt
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fogsim.openscenario.catalogs import Catalogs
+from fogsim.openscenario.daylight import clear_sky_illuminance, sun_elevation, through_clouds
+from fogsim.openscenario.findings import Findings
+from fogsim.openscenario.xml_tree import Node
+from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes
+from fogsim.units import DAY_ILLUMINANCE
+
+_CLOUDS = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
+_OLD_CLOUDS = {"free": 0.0, "cloudy": 4.0, "overcast": 8.0, "rainy": 8.0, "skyOff": 0.0}
+"""Oktas of the words that OpenSCENARIO 1.0 has for the sky."""
+
+BRIGHTEST = 200_000.0
+_STEP = 1.0  # of a route that is looked at for where a box begins [m]
+_EDGE = 1.0  # of a box of fog, whose border is sharp [m]
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """A box of fog [m, rad]."""
+
+    centre: tuple[float, float, float]
+    length: float
+    width: float
+    height: float
+
+    def covers(self, points: Any) -> Any:
+        """Which points (n, 2) it covers."""
+        away = np.abs(np.asarray(points) - np.array(self.centre[:2]))
+        return (away[:, 0] <= 0.5 * self.length) & (away[:, 1] <= 0.5 * self.width)
+
+
+@dataclass(frozen=True, slots=True)
+class Environment:
+    """What an environment says.
+
+    Attributes
+    ----------
+    visibility : float or None
+        Meteorological visibility [m]; None if it says nothing of fog.
+    box : Box or None
+        Where the fog is; None for everywhere.
+    illuminance : float or None
+        Of the ground [lx]; None if it says nothing of light.
+    """
+
+    visibility: float | None = None
+    box: Box | None = None
+    illuminance: float | None = None
+
+
+def environment_of(action: Node, catalogs: Catalogs, lanes: OpenDriveLanes) -> Environment:
+    """What an ``EnvironmentAction`` says.
+
+    Parameters
+    ----------
+    action : Node
+        The action.
+    catalogs : Catalogs
+        Where it may refer to.
+    lanes : OpenDriveLanes
+        The map, which may tell where on earth it is.
+    """
+    findings, reference = catalogs.findings, action.one("CatalogReference")
+    node = catalogs.entry(reference) if reference else action.one("Environment")
+    if node is None:
+        return Environment()
+    weather = node.one("Weather")
+    fog = weather.one("Fog") if weather else None
+    box = fog.one("BoundingBox") if fog else None
+    read = Environment(
+        None if fog is None else _visibility(fog, findings),
+        None if box is None else _box(box, findings),
+        _illuminance(node, weather, lanes, findings),
+    )
+    if weather is not None:
+        _leave_out_weather(weather, findings)
+    condition = node.one("RoadCondition")
+    if condition and findings.number(condition, "frictionScaleFactor", 1.0) != 1.0:
+        findings.leave_out(condition, "friction of the road; advice has it as advice.parameters.friction")
+    if reference:
+        findings.look_for_unread(node)
+    return read
+
+
+def _visibility(fog: Node, findings: Findings) -> float:
+    visibility = findings.number(fog, "visualRange")
+    if visibility < 1.0:
+        findings.refuse(fog, f"visualRange: expected 1 m or more, got {visibility:g}")
+        return math.inf
+    return visibility
+
+
+def _box(node: Node, findings: Findings) -> Box:
+    centre, size = node.one("Center"), node.one("Dimensions")
+    if centre is None or size is None:
+        findings.refuse(node, "a box needs a Center and Dimensions")
+        return Box((0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
+    x, y, z = (findings.number(centre, key) for key in "xyz")
+    length, width, height = (findings.number(size, key) for key in ("length", "width", "height"))
+    return Box((x, y, z), length, width, height)
+
+
+def _illuminance(node: Node, weather: Node | None, lanes: OpenDriveLanes, findings: Findings) -> float | None:
+    clouds = _oktas(weather, findings) if weather else None
+    sun, time = (weather.one("Sun") if weather else None), node.one("TimeOfDay")
+    told = next((key for key in ("illuminance", "intensity") if sun and sun.get(key)), None)
+    moment = None if time is None else _moment(time, findings)
+    if sun is not None:
+        # The direction is of no matter in fog.
+        sun.get("azimuth")
+        elevation = findings.number(sun, "elevation", math.nan) if sun.get("elevation") else None
+        if told:
+            return min(max(findings.number(sun, told), 0.0), BRIGHTEST)
+        if elevation is not None:
+            return through_clouds(clear_sky_illuminance(elevation), clouds or 0.0)
+    if moment is None:
+        return None
+    elevation = sun_elevation(moment, lanes.latitude, lanes.longitude)
+    return through_clouds(clear_sky_illuminance(elevation), clouds or 0.0)
+
+
+def _oktas(weather: Node, findings: Findings) -> float | None:
+    word, old = weather.get("fractionalCloudCover"), weather.get("cloudState")
+    if word.removesuffix("Oktas") in _CLOUDS:
+        return min(float(_CLOUDS.index(word.removesuffix("Oktas"))), 8.0)
+    if old in _OLD_CLOUDS:
+        return _OLD_CLOUDS[old]
+    if word or old:
+        findings.refuse(weather, f"unknown cloud cover {word or old!r}")
+    return None
+
+
+def _moment(time: Node, findings: Findings) -> dt.datetime | None:
+    text = time.get("dateTime")
+    try:
+        return dt.datetime.fromisoformat(text)
+    except ValueError:
+        findings.refuse(time, f"dateTime: expected one such as 2026-11-23T08:30:00+01:00, got {text!r}")
+        return None
+
+
+def _leave_out_weather(weather: Node, findings: Findings) -> None:
+    for one in weather.all("Precipitation", "Wind", "DomeImage"):
+        falls = findings.number(one, "precipitationIntensity", findings.number(one, "intensity", 0.0))
+        if one.tag == "Precipitation" and not falls and one.get("precipitationType") in ("", "dry"):
+            continue
+        told = {"Precipitation": "rain and snow are not drawn", "Wind": "fog that is even everywhere does not drift"}
+        findings.leave_out(one, told.get(one.tag, "the sky is FogSim's"))
+
+
+def fog_block(environment: Environment, route: Any, heights: tuple[float, float] = (0.0, 0.0)) -> dict[str, Any]:
+    """The block ``fog`` of a scenario.
+
+    Parameters
+    ----------
+    environment : Environment
+        What the file says at the beginning.
+    route : (n, 2) float64
+        Middle of the ego's way [m].
+    heights : tuple of float
+        Lowest point of the way [m], and of the map.
+    """
+    visibility = math.inf if environment.visibility is None else environment.visibility
+    box = environment.box
+    if box is None:
+        return {"visibility_m": visibility}
+    banks = [
+        {"start_m": begin, "end_m": end, "visibility_m": visibility, "edge_m": min(_EDGE, end - begin)}
+        for begin, end in _stretches(np.asarray(route, dtype=np.float64), box)
+    ]
+    low, high = (box.centre[2] + side * box.height - heights[0] for side in (-0.5, 0.5))
+    return {
+        "outside_visibility_m": math.inf,
+        "banks": banks,
+        "top_m": high,
+        **({"base_m": low} if low > 0.0 else {}),
+    }
+
+
+def _stretches(route: Any, box: Box) -> list[tuple[float, float]]:
+    """Where along a way a box covers it [m]."""
+    steps = np.diff(route, axis=0)
+    ends = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
+    along = np.linspace(0.0, ends[-1], max(int(ends[-1] / _STEP) + 1, 2))
+    points = np.column_stack([np.interp(along, ends, route[:, axis]) for axis in (0, 1)])
+    inside = np.concatenate([[False], box.covers(points), [False]]).astype(int)
+    begins, stops = np.flatnonzero(np.diff(inside) == 1), np.flatnonzero(np.diff(inside) == -1) - 1
+    return [(float(along[a]), float(along[b])) for a, b in zip(begins, stops, strict=True) if b > a]
+
+
+def light_change(illuminance: float, begins_by_day: bool) -> tuple[float | None, str]:
+    """Illuminance to which daylight can change while a run lasts [lx], None for not at all; and what is left out.
+
+    Parameters
+    ----------
+    illuminance : float
+        The wanted one [lx].
+    begins_by_day : bool
+        Whether the run begins by day.
+    """
+    if not begins_by_day:
+        return None, "a run that begins by night or in twilight stays so"
+    if illuminance < DAY_ILLUMINANCE:
+        told = f"{illuminance:.3g} lx: daylight does not fall below {DAY_ILLUMINANCE:g} lx while a run lasts"
+        return DAY_ILLUMINANCE, told
+    return illuminance, ""

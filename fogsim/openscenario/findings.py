@@ -1,0 +1,161 @@
+"""What of a file FogSim cannot do, and what it leaves out: each told once, with its path and line."""
+
+import math
+import warnings
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from fogsim.errors import InputError, LeftOutWarning, shown, suggest
+from fogsim.openscenario.xml_tree import Node
+
+PASSED_OVER = {
+    "FileHeader": "who wrote the file, and when",
+    "SceneGraphFile": "a 3D model of the surroundings: FogSim draws its own",
+    "Properties": "free-form properties",
+    "Property": "free-form properties",
+    "File": "files of free-form properties",
+    "CustomContent": "free-form properties",
+    "Axles": "places of the axles",
+    "UserDefinedProperties": "free-form properties",
+    "ParameterDeclarations": "read with the parameters",
+    "CatalogLocations": "read with the catalogs",
+    "UsedArea": "part of the map that is used",
+    "ConstraintGroup": "limits of parameters",
+}
+"""Elements that change nothing in FogSim, and what they are."""
+
+ATTRIBUTES_PASSED_OVER = frozenset(
+    {"name", "model3d", "mass", "role", "animation", "maximumExecutionCount", "atmosphericPressure", "temperature"}
+)
+"""Attributes that change nothing in FogSim."""
+
+
+@dataclass
+class Findings:
+    """Collects what does not go.
+
+    Attributes
+    ----------
+    refused, left_out : list of str
+        Lines about what cannot be done, and what is left out.
+    """
+
+    refused: list[str] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
+
+    def refuse(self, node: Node, told: str) -> None:
+        """Note what FogSim cannot do.
+
+        Parameters
+        ----------
+        node : Node
+            Which element.
+        told : str
+            Why.
+        """
+        _seen(node)
+        self._add(self.refused, f"{node.where}: {told}")
+
+    def leave_out(self, node: Node, told: str) -> None:
+        """Note what FogSim leaves out.
+
+        Parameters
+        ----------
+        node : Node
+            Which element.
+        told : str
+            What that means.
+        """
+        _seen(node)
+        self._add(self.left_out, f"{node.where}: {told}")
+
+    def number(self, node: Node, key: str, default: float | None = None) -> float:
+        """Number of an attribute; one that is none is noted.
+
+        Parameters
+        ----------
+        node : Node
+            The element.
+        key : str
+            The attribute.
+        default : float or None
+            What stands for it where it is missing; None if it must be there.
+        """
+        text = node.get(key)
+        if not text and default is not None:
+            return default
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if math.isnan(value):
+            self._add(self.refused, f"{node.where}: expected a number for {key}, got {shown(text or 'nothing')}")
+            return 0.0
+        return value
+
+    def word(self, node: Node, key: str, allowed: tuple[str, ...], default: str = "") -> str:
+        """Word of an attribute; one that is not allowed is noted.
+
+        Parameters
+        ----------
+        node, key
+            As of `number`.
+        allowed : tuple of str
+            What it may be.
+        default : str
+            What stands for it where it is missing.
+        """
+        text = node.get(key) or default
+        if text not in allowed:
+            self._add(self.refused, f"{node.where}: {key}: unknown value {shown(text)}; {suggest(text, allowed)}")
+            return allowed[0]
+        return text
+
+    def look_for_unread(self, root: Node) -> None:
+        """Note what nobody has looked at.
+
+        Parameters
+        ----------
+        root : Node
+            The whole file, or a part of a catalog.
+        """
+        if root.tag in PASSED_OVER:
+            return
+        if not root.is_read:
+            self.refuse(root, "FogSim does not know this element here")
+            return
+        unread = root.attributes.keys() - root.read - ATTRIBUTES_PASSED_OVER
+        for key in sorted(unread) if root.read else ():
+            self._add(self.left_out, f"{root.where}: {key}={shown(root.attributes[key])} has no effect")
+        for child in root.children:
+            self.look_for_unread(child)
+
+    def close(self, path: Path) -> None:
+        """Tell everything.
+
+        Parameters
+        ----------
+        path : Path
+            The file.
+
+        Raises
+        ------
+        InputError
+            If there is something that cannot be done.
+        """
+        if self.refused:
+            raise InputError("\n".join(self.refused))
+        if self.left_out:
+            told = "\n".join(f"  {line.removeprefix(f'{path}:')}" for line in self.left_out)
+            warnings.warn(f"{path}: left out, for FogSim has none of it:\n{told}", LeftOutWarning, stacklevel=2)
+
+    def _add(self, lines: list[str], line: str) -> None:
+        if line not in lines:
+            lines.append(line)
+
+
+def _seen(node: Node) -> None:
+    """Mark it and what is in it, so that it is told once."""
+    for one in node.walk():
+        one.is_read = True
+        one.read.update(one.attributes)

@@ -1,0 +1,143 @@
+"""The beginning: where vehicles are, how fast they drive, their lamps, the fog and the light."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from fogsim.openscenario.actions import Actions, Effect
+from fogsim.openscenario.entities import Vehicle
+from fogsim.openscenario.environment import Environment, environment_of
+from fogsim.openscenario.xml_tree import Node
+from fogsim.traffic.road.opendrive_lanes import Spot
+
+
+@dataclass
+class Beginning:
+    """How everything begins.
+
+    Attributes
+    ----------
+    spots : dict from str to Spot
+        Reference points of the vehicles.
+    speeds : dict from str to float
+        Their speeds, as far as they are told [m/s].
+    environment : Environment
+        Fog and light.
+    effect : Effect
+        What else is done at once.
+    """
+
+    spots: dict[str, Spot] = field(default_factory=dict)
+    speeds: dict[str, float] = field(default_factory=dict)
+    environment: Environment = field(default_factory=Environment)
+    effect: Effect = field(default_factory=Effect)
+
+
+def read_beginning(init: Node | None, vehicles: Mapping[str, Vehicle], actions: Actions) -> Beginning:
+    """What ``Init`` says.
+
+    Parameters
+    ----------
+    init : Node or None
+        The element.
+    vehicles : mapping from str to Vehicle
+        The vehicles.
+    actions : Actions
+        Reads what is done beyond places, speeds, fog and light.
+    """
+    begin = Beginning(actions.positions.entities)
+    blocks = init.all("Actions") if init else []
+    for block in blocks:
+        for action in block.all("GlobalAction"):
+            _take_global(action, begin, actions)
+    private = [one for block in blocks for one in block.all("Private")]
+    _place(private, vehicles, actions)
+    for one in private:
+        for action in one.all("PrivateAction"):
+            _take_private(action, one.get("entityRef"), begin, actions)
+    for name, vehicle in vehicles.items():
+        if name not in begin.spots and not actions.findings.refused:
+            actions.findings.refuse(vehicle.node, f"{name} has no place: Init needs a TeleportAction of it")
+    return begin
+
+
+def _take_global(action: Node, begin: Beginning, actions: Actions) -> None:
+    for one in action.all():
+        if one.tag == "EnvironmentAction":
+            begin.environment = environment_of(one, actions.catalogs, actions.positions.lanes)
+        else:
+            actions.take(action, [], begin.effect)
+
+
+def _place(private: list[Node], vehicles: Mapping[str, Vehicle], actions: Actions) -> None:
+    """Place vehicles, those last whose place is relative to another's."""
+    wanted: dict[str, Node] = {}
+    for one in private:
+        name = one.get("entityRef")
+        if name not in vehicles:
+            actions.findings.refuse(one, f"there is no vehicle {name!r}")
+            continue
+        for action in one.all("PrivateAction"):
+            teleport = action.one("TeleportAction")
+            position = teleport.one("Position") if teleport else None
+            if position is not None:
+                wanted[name] = position
+    positions = actions.positions
+    while wanted:
+        ready = [n for n, position in wanted.items() if positions.refers_to(position) not in wanted] or list(wanted)
+        for name in ready:
+            spot = positions.spot(wanted.pop(name))
+            if spot is not None:
+                positions.entities[name] = spot
+
+
+def _take_private(action: Node, name: str, begin: Beginning, actions: Actions) -> None:
+    if action.one("TeleportAction"):
+        return
+    effect = Effect()
+    actions.take(action, [name], effect)
+    done = effect.do.get(name, {})
+    speed = done.pop("speed", None)
+    if speed is not None:
+        # At the beginning there is nothing that a speed could change from.
+        begin.speeds[name] = _speed(speed, begin.speeds)
+    if done:
+        begin.effect.add(name, **done)
+
+
+def _speed(block: Mapping[str, float | str], known: Mapping[str, float]) -> float:
+    if "to_kmh" in block:
+        return float(block["to_kmh"]) / 3.6
+    other = known.get(str(block["like"]), 0.0)
+    return max(other * float(block.get("factor", 1.0)) + float(block.get("plus_kmh", 0.0)) / 3.6, 0.0)
+
+
+Along = Callable[[str | Node], float | None]
+
+
+def along_route(route: tuple[str, ...], begin: Beginning, vehicles: Mapping[str, Vehicle], actions: Actions) -> Along:
+    """Position along the ego's route: of a vehicle's front bumper at the beginning, or of a position.
+
+    Parameters
+    ----------
+    route : tuple of str
+        Edges of the ego's route.
+    begin : Beginning
+        The beginning.
+    vehicles : mapping from str to Vehicle
+        The vehicles.
+    actions : Actions
+        Finds positions.
+    """
+    lengths = {lane.edge: lane.length for lane in actions.positions.lanes.lanes}
+    starts = {edge: sum(lengths[before] for before in route[:number]) for number, edge in enumerate(route)}
+
+    def position(what: str | Node) -> float | None:
+        if isinstance(what, str):
+            spot, further = begin.spots.get(what), vehicles[what].front
+        else:
+            spot, further = actions.positions.spot(what), 0.0
+        if spot is None or spot.lane.edge not in starts:
+            return None
+        return starts[spot.lane.edge] + spot.position + further
+
+    return position

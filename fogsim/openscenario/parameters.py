@@ -1,0 +1,170 @@
+"""Parameters of a file put in place of ``$name`` and ``${expression}``."""
+
+import ast
+import math
+import operator
+import re
+from collections.abc import Callable, Mapping
+
+from fogsim.errors import nearest
+from fogsim.openscenario.findings import Findings
+from fogsim.openscenario.xml_tree import Node
+
+_NAME = re.compile(r"\$([A-Za-z_][A-Za-z0-9_.]*)")
+_EXPRESSION = re.compile(r"\$\{([^{}]*)\}")
+_LONGEST = 500
+_FREE_TEXT = ("name", "description", "author", "license")
+"""Attributes in which a ``$`` that means nothing does no harm."""
+
+_UNARY: Mapping[type[ast.AST], Callable[[float], float]] = {
+    ast.USub: operator.neg,
+    ast.UAdd: operator.pos,
+    ast.Not: operator.not_,
+}
+_BINARY: Mapping[type[ast.AST], Callable[[float, float], float]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Mod: operator.mod,
+}
+_COMPARISONS: Mapping[type[ast.AST], Callable[[float, float], bool]] = {
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+    ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
+}
+_FUNCTIONS: Mapping[str, Callable[..., float]] = {
+    "round": round,
+    "floor": math.floor,
+    "ceil": math.ceil,
+    "sqrt": math.sqrt,
+    "abs": abs,
+    "pow": pow,
+    "sign": lambda x: float((x > 0) - (x < 0)),
+    "min": min,
+    "max": max,
+}
+
+Parameters = Mapping[str, str]
+"""Values of parameters by name."""
+
+
+def put_parameters(node: Node, known: Parameters, findings: Findings) -> None:
+    """Put values in place of parameters in an element and all in it, which may declare some of their own.
+
+    Parameters
+    ----------
+    node : Node
+        The element; it is changed.
+    known : mapping from str to str
+        Parameters declared around it.
+    findings : Findings
+        Takes what cannot be evaluated.
+    """
+    for key, text in node.attributes.items():
+        if "$" not in text:
+            continue
+        try:
+            node.attributes[key] = evaluated(text, known)
+        except ValueError as error:
+            if key not in _FREE_TEXT:
+                findings.refuse(node, f"{key}: {error}")
+    inside = declared(node, known, findings)
+    for child in node.children:
+        if child.tag != "ParameterDeclarations":
+            put_parameters(child, inside, findings)
+
+
+def declared(node: Node, known: Parameters, findings: Findings) -> Parameters:
+    """Parameters known in an element: those around it, and those that it declares.
+
+    Parameters
+    ----------
+    node, known, findings
+        As of `put_parameters`.
+    """
+    inside = dict(known)
+    for block in (child for child in node.children if child.tag == "ParameterDeclarations"):
+        put_parameters(block, known, findings)
+        for one in block.children:
+            one.attributes["value"] = _value_of(one, inside, findings)
+            inside[one.attributes.get("name", "")] = one.attributes["value"]
+    return inside
+
+
+def _value_of(declaration: Node, known: Parameters, findings: Findings) -> str:
+    try:
+        return evaluated(declaration.attributes.get("value", ""), known)
+    except ValueError as error:
+        findings.refuse(declaration, f"value: {error}")
+        return ""
+
+
+def evaluated(text: str, known: Parameters) -> str:
+    """A text with values in place of parameters.
+
+    Parameters
+    ----------
+    text : str
+        ``$name``, or with ``${expression}`` in it.
+    known : mapping from str to str
+        Parameters.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is not known, or an expression cannot be evaluated.
+    """
+    if (match := _NAME.fullmatch(text.strip())) is not None:
+        return _parameter(match[1], known)
+    return _EXPRESSION.sub(lambda match: _result(match[1], known), text)
+
+
+def _parameter(name: str, known: Parameters) -> str:
+    if name not in known:
+        near = nearest(name, known)
+        raise ValueError(f"unknown parameter ${name}" + (f"; did you mean ${near}?" if near else ""))
+    return known[name]
+
+
+def _result(expression: str, known: Parameters) -> str:
+    if len(expression) > _LONGEST:
+        raise ValueError(f"an expression has at most {_LONGEST} characters")
+    plain = _NAME.sub(lambda match: f" {_as_number(_parameter(match[1], known))} ", expression)
+    try:
+        value = _value(ast.parse(plain.strip(), mode="eval").body)
+    except (SyntaxError, ArithmeticError, TypeError, RecursionError) as error:
+        raise ValueError(f"cannot evaluate ${{{expression}}}: {error}") from None
+    if isinstance(value, bool):
+        return str(value).lower()
+    return repr(int(value)) if float(value).is_integer() and abs(value) < 1e15 else repr(float(value))
+
+
+def _as_number(text: str) -> str:
+    if text in ("true", "false"):
+        return text.capitalize()
+    try:
+        return repr(float(text))
+    except ValueError:
+        raise ValueError(f"expected a number in an expression, got {text!r}") from None
+
+
+def _value(node: ast.expr) -> float:
+    match node:
+        case ast.Constant(bool() | int() | float() as number):
+            return number
+        case ast.UnaryOp(op, operand) if type(op) in _UNARY:
+            return _UNARY[type(op)](_value(operand))
+        case ast.BinOp(left, op, right) if type(op) in _BINARY:
+            return _BINARY[type(op)](_value(left), _value(right))
+        case ast.BoolOp(op, values):
+            found = [bool(_value(one)) for one in values]
+            return all(found) if isinstance(op, ast.And) else any(found)
+        case ast.Compare(left, [op], [right]) if type(op) in _COMPARISONS:
+            return _COMPARISONS[type(op)](_value(left), _value(right))
+        case ast.Call(ast.Name(name), arguments, []) if name in _FUNCTIONS:
+            return _FUNCTIONS[name](*(_value(one) for one in arguments))
+    raise ValueError(f"an expression may hold numbers, parameters, + - * / %, comparisons and {', '.join(_FUNCTIONS)}")

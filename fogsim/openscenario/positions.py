@@ -1,0 +1,127 @@
+"""Where the positions of a file are on the lanes of the network."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from fogsim.openscenario.findings import Findings
+from fogsim.openscenario.xml_tree import Node
+from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, Spot
+
+
+@dataclass
+class Positions:
+    """Finds positions.
+
+    Attributes
+    ----------
+    lanes : OpenDriveLanes
+        The lanes.
+    findings : Findings
+        Takes what cannot be found.
+    entities : dict from str to Spot
+        Where entities begin, as far as that is known: relative positions refer to it.
+    """
+
+    lanes: OpenDriveLanes
+    findings: Findings
+    entities: dict[str, Spot] = field(default_factory=dict)
+
+    def refers_to(self, position: Node) -> str | None:
+        """Entity to which a position is relative; None for a position of its own.
+
+        Parameters
+        ----------
+        position : Node
+            The element ``Position``.
+        """
+        return next((one.attributes.get("entityRef") for one in position.children), None)
+
+    def spot(self, position: Node) -> Spot | None:
+        """Place of a position; None where it cannot be, which is noted.
+
+        Parameters
+        ----------
+        position : Node
+            The element ``Position``.
+        """
+        one = next(iter(position.all()), None)
+        if one is None or one.tag not in _KINDS:
+            told = f"positions are read of {', '.join(_KINDS)}"
+            self.findings.refuse(one or position, told)
+            return None
+        reference = one.get("entityRef") if one.tag.startswith("Relative") else ""
+        if reference and reference not in self.entities:
+            self.findings.refuse(one, f"there is no entity {reference!r} that has a place already")
+            return None
+        for orientation in one.all("Orientation"):
+            if any(self.findings.number(orientation, key, 0.0) for key in ("h", "p", "r")):
+                self.findings.leave_out(orientation, "vehicles stand along their lanes")
+            orientation.get("type")
+        try:
+            return _KINDS[one.tag](self, one)
+        except ValueError as error:
+            self.findings.refuse(one, str(error))
+            return None
+
+    def world(self, node: Node) -> Spot:
+        """``WorldPosition``."""
+        x, y = self._numbers(node, "x", "y")
+        heading = self.findings.number(node, "h") if "h" in node.attributes else None
+        for key in ("z", "p", "r"):
+            # On a road these follow from it.
+            node.get(key)
+        return self.lanes.at(x, y, heading)
+
+    def lane(self, node: Node) -> Spot:
+        """``LanePosition``."""
+        self._no_offset(node)
+        return self.lanes.on_lane(node.get("roadId"), node.get("laneId"), self.findings.number(node, "s"))
+
+    def road(self, node: Node) -> Spot:
+        """``RoadPosition``."""
+        s, t = self._numbers(node, "s", "t")
+        return self.lanes.at(*self.lanes.across(node.get("roadId"), s, t))
+
+    def relative_lane(self, node: Node) -> Spot:
+        """``RelativeLanePosition``; distances along the lane and along the road's line are one here."""
+        self._no_offset(node)
+        away = self.findings.number(node, "dsLane" if "dsLane" in node.attributes else "ds")
+        beside = self.lanes.beside(self.entities[node.get("entityRef")], int(self.findings.number(node, "dLane")))
+        return self.lanes.along(beside, away)
+
+    def relative_world(self, node: Node) -> Spot:
+        """``RelativeWorldPosition``."""
+        x, y, heading = self.entities[node.get("entityRef")].world
+        dx, dy = self._numbers(node, "dx", "dy")
+        node.get("dz")
+        return self.lanes.at(x + dx, y + dy, heading)
+
+    def relative_object(self, node: Node) -> Spot:
+        """``RelativeObjectPosition``."""
+        x, y, heading = self.entities[node.get("entityRef")].world
+        dx, dy = self._numbers(node, "dx", "dy")
+        node.get("dz")
+        cosine, sine = math.cos(heading), math.sin(heading)
+        return self.lanes.at(x + dx * cosine - dy * sine, y + dx * sine + dy * cosine, heading)
+
+    def _numbers(self, node: Node, *keys: str) -> tuple[float, float]:
+        first, second = (self.findings.number(node, key) for key in keys)
+        return first, second
+
+    def _no_offset(self, node: Node) -> None:
+        if self.findings.number(node, "offset", 0.0):
+            self.findings.refuse(node, "offset: vehicles are in the middle of their lanes; write 0")
+
+
+_KINDS: Mapping[str, Callable[[Positions, Node], Spot]] = {
+    "WorldPosition": Positions.world,
+    "LanePosition": Positions.lane,
+    "RoadPosition": Positions.road,
+    "RelativeLanePosition": Positions.relative_lane,
+    "RelativeWorldPosition": Positions.relative_world,
+    "RelativeObjectPosition": Positions.relative_object,
+}
+
+POSITIONS = tuple(_KINDS)
+"""Kinds of positions that are read."""

@@ -1,0 +1,242 @@
+"""An OpenSCENARIO file as the plain data of a scenario file, and SUMO's files that go with it."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fogsim.errors import InputError
+from fogsim.files.generated_files import kept_text, write_generated
+from fogsim.openscenario.actions import Actions
+from fogsim.openscenario.catalogs import Catalogs
+from fogsim.openscenario.entities import Vehicle, ego_of, read_vehicles
+from fogsim.openscenario.environment import fog_block
+from fogsim.openscenario.findings import Findings
+from fogsim.openscenario.initial import Beginning, along_route, read_beginning
+from fogsim.openscenario.parameters import put_parameters
+from fogsim.openscenario.positions import Positions
+from fogsim.openscenario.storyboard import Storyboard
+from fogsim.openscenario.triggers import Trigger, Triggers
+from fogsim.openscenario.vehicles_file import STANDS, front_spot, vehicles_text
+from fogsim.openscenario.xml_tree import Node, read_xml
+from fogsim.traffic.road.netconvert import netconvert_recipe, opendrive_net
+from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, read_opendrive_lanes
+from fogsim.units import DAY_ILLUMINANCE, KMH_PER_MPS
+
+USUAL_DURATION = 120.0
+"""Longest simulated time of a file whose stop trigger names none [s]."""
+
+NEAR_THE_END = 10.0
+"""How near to the end of its route the ego has arrived [m]."""
+
+Key = tuple[str | int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ScenarioData:
+    """Plain data of a scenario.
+
+    Attributes
+    ----------
+    data : dict
+        As a scenario file in YAML holds it.
+    lines : mapping from key path to int
+        Lines on which what keys stand for is written.
+    """
+
+    data: dict[str, Any]
+    lines: Mapping[Key, int] = field(default_factory=dict)
+
+
+def is_openscenario(path: Path) -> bool:
+    """Tell whether a file is OpenSCENARIO XML, by its name.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    """
+    return path.suffix.lower() == ".xosc"
+
+
+def read_openscenario(path: Path) -> ScenarioData:
+    """Read an OpenSCENARIO XML 1.x file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    ScenarioData
+        What a scenario file in YAML would hold; the network and the route file lie in the user's cache directory.
+
+    Raises
+    ------
+    InputError
+        If it is none, or has what FogSim cannot do: a line for each, with file, line and path of the element.
+    MissingDependencyError
+        If its roads cannot be read, for netconvert is missing.
+    """
+    root, findings = read_xml(path), Findings()
+    if root.tag != "OpenSCENARIO":
+        raise InputError(f"{path}:{root.line}: expected <OpenSCENARIO> at its top, got <{root.tag}>")
+    _check_version(root)
+    put_parameters(root, {}, findings)
+    catalogs = Catalogs(path.parent, root.one("CatalogLocations"), findings)
+    entities, storyboard = root.one("Entities"), root.one("Storyboard")
+    if entities is None or storyboard is None:
+        raise InputError(f"{path}: expected Entities and a Storyboard; catalogs and parameter files cannot be run")
+    opendrive = _opendrive(root, path)
+    net = kept_text("opendrive", opendrive, netconvert_recipe(), lambda: opendrive_net(opendrive))
+    lanes = read_opendrive_lanes(net, opendrive)
+    vehicles = read_vehicles(entities, catalogs)
+    return _Reader(path, root, findings, lanes, vehicles, storyboard).scenario(catalogs, net, opendrive)
+
+
+def _check_version(root: Node) -> None:
+    header = root.one("FileHeader")
+    major = header.get("revMajor") if header else ""
+    if major != "1":
+        raise InputError(
+            f"{root.file}:{root.line}: expected OpenSCENARIO XML 1.x (FileHeader's revMajor), got {major or 'none'!r}"
+        )
+
+
+def _opendrive(root: Node, path: Path) -> Path:
+    file = root.within("RoadNetwork", "LogicFile")
+    if file is None:
+        raise InputError(f"{path}: RoadNetwork: a LogicFile (OpenDRIVE, .xodr) is needed, for vehicles drive on roads")
+    opendrive = path.parent / file.get("filepath")
+    if opendrive.suffix.lower() != ".xodr" or not opendrive.is_file():
+        raise InputError(
+            f"{file.where}: expected an OpenDRIVE file (.xodr) that is there, got {file.get('filepath')!r}"
+        )
+    return opendrive
+
+
+@dataclass
+class _Reader:
+    path: Path
+    root: Node
+    findings: Findings
+    lanes: OpenDriveLanes
+    vehicles: Mapping[str, Vehicle]
+    storyboard: Node
+
+    def scenario(self, catalogs: Catalogs, net: str, opendrive: Path) -> ScenarioData:
+        ego = ego_of(dict(self.vehicles))
+        positions = Positions(self.lanes, self.findings)
+        story = Storyboard(catalogs, Actions(self.vehicles, catalogs, positions, lambda name: _called(name, ego)))
+        actions = story.actions
+        begin = read_beginning(self.storyboard.one("Init"), self.vehicles, actions)
+        if ego not in begin.spots:
+            # Without a route there is nothing along which anything could be measured.
+            self.findings.refuse(
+                self.root, f"no vehicle that could be the ego has a place; there are {len(self.vehicles)}"
+            )
+            self.findings.close(self.path)
+        light = begin.environment.illuminance
+        actions.begins_by_day = light is None or light >= DAY_ILLUMINANCE
+        story.find_events(self.storyboard)
+        route = self.lanes.route(front_spot(self.vehicles[ego], begin.spots[ego], self.lanes).lane.edge)
+        along = along_route(route, begin, self.vehicles, actions)
+        story.triggers = triggers = Triggers(self.vehicles, ego, positions, along, story.state)
+        entries = story.timeline()
+        stop = triggers.trigger(self.storyboard.one("StopTrigger"))
+        self.findings.look_for_unread(self.root)
+        self.findings.close(self.path)
+        begin_at_once(entries, begin, ego)
+        data = self._data(ego, begin, route)
+        lines: dict[Key, int] = {}
+        timeline = [_initial(begin, ego), *(block for _, block in entries)]
+        for place, (node, _) in enumerate(entries, start=1):
+            lines["timeline", place] = node.line
+        for mark in triggers.marks:
+            lines["timeline", len(timeline)] = mark.node.line
+            timeline.append(_mark(mark.name, mark.trigger))
+        data["timeline"] = [one for one in timeline if one]
+        if not timeline[0]:
+            lines = {("timeline", int(place) - 1): line for (_, place), line in lines.items()}
+        data |= _ending(stop, data["timeline"])
+        files = write_generated(
+            "openscenario", {"road.net.xml": net, "road.rou.xml": vehicles_text(self.vehicles, begin, self.lanes)}
+        )
+        data["traffic"] |= {
+            "net": str(files / "road.net.xml"),
+            "routes": [str(files / "road.rou.xml")],
+            "additional": [str(opendrive.resolve())],
+        }
+        return ScenarioData(data, lines)
+
+    def _data(self, ego: str, begin: Beginning, route: tuple[str, ...]) -> dict[str, Any]:
+        header = self.root.one("FileHeader")
+        middle = [one.shape for edge in route for one in self.lanes.lanes if one.edge == edge and one.index == 0]
+        light = begin.environment.illuminance
+        return {
+            "name": re.sub(r"[^A-Za-z0-9_.-]", "_", self.path.stem)[:100],
+            "description": header.get("description") if header else "",
+            "traffic": {"ego": ego, "keep_lane": list(self.vehicles), "stop_before_end_m": NEAR_THE_END},
+            "fog": fog_block(begin.environment, np.concatenate(middle)),
+            **({} if light is None else {"light": {"illuminance_lx": float(f"{light:.4g}")}}),
+        }
+
+
+def _called(name: str, ego: str) -> str:
+    return "ego" if name == ego else name
+
+
+def begin_at_once(entries: list[tuple[Node, dict[str, Any]]], begin: Beginning, ego: str) -> None:
+    """Let speeds that are ordered for the very beginning be those with which vehicles begin.
+
+    Parameters
+    ----------
+    entries : list of (Node, dict)
+        The timeline; what has been done is taken out of it.
+    begin : Beginning
+        Takes the speeds.
+    ego : str
+        The ego.
+    """
+    for _, block in entries:
+        for vehicle, done in block["do"].items() if block["when"] == "time >= 0 s" and "delay_s" not in block else ():
+            speed = done.get("speed") if isinstance(done, dict) else None
+            if speed is None or speed.get("shape") != "step" or vehicle in begin.speeds:
+                continue
+            if "to_kmh" in speed:
+                begin.speeds[vehicle] = speed["to_kmh"] / KMH_PER_MPS
+            else:
+                other = ego if speed["like"] == "ego" else speed["like"]
+                now = begin.speeds.get(other, 0.0)
+                begin.speeds[vehicle] = max(
+                    now * speed.get("factor", 1.0) + speed.get("plus_kmh", 0.0) / KMH_PER_MPS, 0.0
+                )
+
+
+def _initial(begin: Beginning, ego: str) -> dict[str, Any]:
+    """Entry of the timeline that holds what holds from the beginning: the speeds of all but the ego, and lamps."""
+    for name in begin.spots:
+        speed = begin.speeds.get(name, 0.0)
+        if name != ego or speed <= STANDS:
+            begin.effect.add(name, speed={"to_kmh": speed * KMH_PER_MPS, "shape": "step"})
+    return {"name": "Init", "when": "time >= 0 s", "do": begin.effect.do} if begin.effect.do else {}
+
+
+def _mark(name: str, trigger: Trigger) -> dict[str, Any]:
+    return {"name": name, "when": trigger.condition, **({"delay_s": trigger.delay} if trigger.delay else {}), "do": {}}
+
+
+def _ending(stop: Trigger | None, timeline: list[dict[str, Any]]) -> dict[str, Any]:
+    """When the run is over."""
+    if stop is None or not stop.condition:
+        return {"duration_s": USUAL_DURATION}
+    if stop.at is not None:
+        return {"duration_s": max(stop.at, 0.1)}
+    if not stop.delay:
+        return {"duration_s": USUAL_DURATION, "end_when": stop.condition}
+    timeline.append(_mark("stop", stop))
+    return {"duration_s": USUAL_DURATION, "end_when": "happened(stop)"}

@@ -1,0 +1,246 @@
+"""The storyboard as a timeline: acts, groups, maneuvers and events, each with a trigger in FogSim's language."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from fogsim.openscenario.actions import Actions, Effect
+from fogsim.openscenario.catalogs import Catalogs
+from fogsim.openscenario.findings import Findings
+from fogsim.openscenario.triggers import AT_ONCE, NEVER, Trigger, Triggers, both
+from fogsim.openscenario.xml_tree import Node
+
+_BEGUN, _OVER = ("startTransition", "runningState"), ("endTransition", "completeState")
+_PARTS = ("Story", "Act", "ManeuverGroup", "Maneuver", "Event", "Action")
+
+
+@dataclass
+class Entry:
+    """An event as an entry of the timeline.
+
+    Attributes
+    ----------
+    name : str
+        Its name there.
+    node : Node
+        The event.
+    actors : list of str
+        Who acts.
+    effect : Effect
+        What it does.
+    trigger : Trigger
+        When it begins; `NEVER` until it is known.
+    """
+
+    name: str
+    node: Node
+    actors: list[str]
+    effect: Effect = field(default_factory=Effect)
+    trigger: Trigger = NEVER
+
+
+@dataclass
+class Storyboard:
+    """Reads stories.
+
+    Attributes
+    ----------
+    catalogs : Catalogs
+        Where maneuvers may be.
+    actions : Actions
+        Reads what events do.
+    entries : dict from int to Entry
+        Events by the identity of their elements.
+    """
+
+    catalogs: Catalogs
+    actions: Actions
+    triggers: Triggers | None = None
+    entries: dict[int, Entry] = field(default_factory=dict)
+    _acts: dict[int, Trigger] = field(default_factory=dict)
+    _stories: list[Node] = field(default_factory=list)
+    _open: list[Node] = field(default_factory=list)
+
+    @property
+    def findings(self) -> Findings:
+        """Takes what cannot be played."""
+        return self.catalogs.findings
+
+    def find_events(self, storyboard: Node) -> None:
+        """Find every event and what it does; when comes later, for events refer to one another.
+
+        Parameters
+        ----------
+        storyboard : Node
+            The element.
+        """
+        self._stories = storyboard.all("Story")
+        for group in self._groups():
+            actors = group.one("Actors")
+            names = [one.get("entityRef") for one in actors.all("EntityRef")] if actors else []
+            if actors and actors.get("selectTriggeringEntities", "false") == "true":
+                self.findings.refuse(actors, "selectTriggeringEntities: name the actors")
+            self._executions(group)
+            for reference in group.all("CatalogReference"):
+                entry = self.catalogs.entry(reference)
+                group.children += [entry] if entry else []
+            for maneuver in group.all("Maneuver"):
+                for event in maneuver.all("Event"):
+                    self._find(event, names)
+
+    def _groups(self) -> Iterator[Node]:
+        for story in self._stories:
+            for act in story.all("Act"):
+                yield from act.all("ManeuverGroup")
+
+    def _executions(self, node: Node) -> None:
+        if node.get("maximumExecutionCount") not in ("", "1"):
+            self.findings.refuse(node, "maximumExecutionCount: everything is played once; write 1")
+
+    def _find(self, event: Node, actors: list[str]) -> None:
+        self._executions(event)
+        priority = event.get("priority")
+        if priority not in ("overwrite", "override", "parallel"):
+            self.findings.refuse(event, f"priority: expected override, overwrite or parallel, got {priority!r}")
+        entry = Entry(_free_name(event.get("name"), {one.name for one in self.entries.values()}), event, actors)
+        self.entries[id(event)] = entry
+        for action in event.all("Action"):
+            self.actions.take(action, actors, entry.effect)
+
+    def timeline(self) -> list[tuple[Node, dict[str, Any]]]:
+        """Entries of the timeline, each with the element that it stands for."""
+        triggers = self._need_triggers()
+        for story in self._stories:
+            for act in story.all("Act"):
+                self._acts[id(act)] = self._act_begins(act, triggers)
+        written = []
+        for story in self._stories:
+            for act in story.all("Act"):
+                stop = triggers.trigger(act.one("StopTrigger"))
+                for event in _events(act):
+                    entry = self.entries[id(event)]
+                    entry.trigger = self._begins(entry, act)
+                    written.append((event, _written(entry, _until(stop, triggers, event))))
+        return written
+
+    def _need_triggers(self) -> Triggers:
+        if self.triggers is None:
+            raise ValueError("expected the triggers to be there before the timeline, got none")
+        return self.triggers
+
+    def _act_begins(self, act: Node, triggers: Triggers) -> Trigger:
+        """When an act begins; what is more than a time is remembered by a mark."""
+        begins = triggers.trigger(act.one("StartTrigger")) or AT_ONCE
+        if begins.at is not None or not begins.condition:
+            return begins
+        name = _free_name(f"act_{act.get('name')}", {mark.name for mark in triggers.marks})
+        triggers.mark(name, begins, act)
+        return Trigger(f"happened({name})")
+
+    def _begins(self, entry: Entry, act: Node) -> Trigger:
+        own = self._need_triggers().trigger(entry.node.one("StartTrigger")) or AT_ONCE
+        return both(self._acts[id(act)], own)
+
+    def state(self, node: Node) -> Trigger:
+        """Condition for a state of an element of the storyboard.
+
+        Parameters
+        ----------
+        node : Node
+            A ``StoryboardElementStateCondition``.
+        """
+        kind = node.get("storyboardElementType")
+        kind = "ManeuverGroup" if kind == "maneuverGroup" else kind[:1].upper() + kind[1:]
+        name, state = node.get("storyboardElementRef"), node.get("state")
+        if kind not in _PARTS or state not in _BEGUN + _OVER:
+            self.findings.refuse(node, f"states are {', '.join(_BEGUN + _OVER)} of {', '.join(_PARTS)}")
+            return NEVER
+        found = [one for story in self._stories for one in story.walk() if _is_called(one, kind, name)]
+        if len(found) != 1:
+            self.findings.refuse(node, f"there {'are several' if found else 'is no'} {kind} {name!r}")
+            return NEVER
+        if any(one is found[0] for one in self._open):
+            self.findings.refuse(node, f"{name} waits for itself")
+            return NEVER
+        self._open.append(found[0])
+        try:
+            return self._begun(found[0]) if state in _BEGUN else self._over(found[0])
+        finally:
+            self._open.pop()
+
+    def _begun(self, part: Node) -> Trigger:
+        if part.tag in ("Event", "Action"):
+            return Trigger(f"happened({self._entry(part).name})")
+        act = next((one for one in self._all_acts() if any(inner is part for inner in one.walk())), None)
+        if act is None:
+            # A story begins with the run.
+            return AT_ONCE
+        if id(act) not in self._acts:
+            self._acts[id(act)] = self._act_begins(act, self._need_triggers())
+        return self._acts[id(act)]
+
+    def _over(self, part: Node) -> Trigger:
+        """When all events in it are over."""
+        inner = {id(event): event for act in self._all_acts() for event in _events(act)}
+        if part.tag == "Action":
+            events = [self._entry(part).node]
+        else:
+            events = [event for key, event in inner.items() if any(one is event for one in part.walk())]
+        told = []
+        for event in events:
+            entry = self.entries[id(event)]
+            begun = f"happened({entry.name})"
+            told.append(f"{begun} for {entry.effect.lasts:g} s" if entry.effect.lasts > 0.0 else begun)
+            told += [f"({end})" for end in entry.effect.ends]
+        return Trigger(" and ".join(told)) if told else AT_ONCE
+
+    def _entry(self, part: Node) -> Entry:
+        return next(one for one in self.entries.values() if any(inner is part for inner in one.node.walk()))
+
+    def _all_acts(self) -> list[Node]:
+        return [act for story in self._stories for act in story.all("Act")]
+
+
+def _events(act: Node) -> list[Node]:
+    return [e for group in act.all("ManeuverGroup") for m in group.all("Maneuver") for e in m.all("Event")]
+
+
+def _is_called(node: Node, kind: str, name: str) -> bool:
+    parts = re.split(r"::|/", name)
+    return node.tag == kind and node.attributes.get("name") == parts[-1] and all(f"[{p}]" in node.path for p in parts)
+
+
+def _free_name(wanted: str, taken: set[str]) -> str:
+    """A name for an entry of the timeline: letters, digits and _, not taken yet."""
+    name = re.sub(r"\W", "_", wanted, flags=re.ASCII)[:80] or "event"
+    name = name if name[0].isalpha() or name[0] == "_" else f"_{name}"
+    number = 1
+    free = name
+    while free in taken:
+        number += 1
+        free = f"{name}_{number}"
+    return free
+
+
+def _until(stop: Trigger | None, triggers: Triggers, node: Node) -> str:
+    """What must hold beside an event's own trigger while its act has not been stopped."""
+    if stop is None or not stop.condition:
+        return ""
+    if stop.at is not None:
+        return f"time < {max(stop.at, 0.0):g} s"
+    name = f"stop_{len(triggers.marks)}"
+    triggers.mark(name, stop, node)
+    return f"not happened({name})"
+
+
+def _written(entry: Entry, until: str) -> dict[str, Any]:
+    condition = entry.trigger.condition
+    if until:
+        condition = f"({condition}) and {until}"
+    return {
+        "name": entry.name,
+        "when": condition,
+        **({"delay_s": entry.trigger.delay} if entry.trigger.delay else {}),
+        "do": entry.effect.do,
+    }

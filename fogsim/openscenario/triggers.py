@@ -1,0 +1,394 @@
+"""Triggers as conditions of FogSim's language."""
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from fogsim.openscenario.entities import Vehicle
+from fogsim.openscenario.findings import Findings
+from fogsim.openscenario.positions import Positions
+from fogsim.openscenario.xml_tree import Node
+
+RULES = {
+    "greaterThan": ">",
+    "greaterOrEqual": ">=",
+    "lessThan": "<",
+    "lessOrEqual": "<=",
+    "equalTo": "==",
+    "notEqualTo": "!=",
+}
+"""Operators of rules."""
+
+_EDGES = ("none", "rising", "falling", "risingOrFalling")
+_WORD = re.compile(r"[A-Za-z_][\w:#@\-]*")
+_STILL = 0.1  # Speed below which a vehicle stands [m/s]
+
+
+@dataclass(frozen=True, slots=True)
+class Trigger:
+    """When something begins.
+
+    Attributes
+    ----------
+    condition : str
+        In FogSim's language; "" for never.
+    delay : float
+        Time from then [s].
+    at : float or None
+        Time that the condition stands for, if it asks for nothing else [s]; below zero for at once.
+    """
+
+    condition: str
+    delay: float = 0.0
+    at: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """An entry of the timeline that says that something has been.
+
+    Attributes
+    ----------
+    name : str
+        Its name.
+    trigger : Trigger
+        When.
+    node : Node
+        The element for whose sake it is there.
+    """
+
+    name: str
+    trigger: Trigger
+    node: Node
+
+
+AT_ONCE = Trigger("time >= 0 s", at=-1.0)
+NEVER = Trigger("")
+
+
+@dataclass(frozen=True, slots=True)
+class _Test:
+    """A condition: its text, and the comparison if it is one."""
+
+    text: str
+    signal: str = ""
+    rule: str = ""
+    value: str = ""
+    at: float | None = None
+
+
+@dataclass
+class Triggers:
+    """Reads triggers.
+
+    Attributes
+    ----------
+    vehicles : mapping from str to Vehicle
+        The vehicles.
+    ego : str
+        Which of them is the ego.
+    positions : Positions
+        Finds positions.
+    along : callable
+        Position of a spot along the ego's route [m], by an entity or a position; None beside it.
+    states : callable
+        Condition for a state of an element of the storyboard, from the condition's element.
+    marks : list of Mark
+        What must be remembered; they become entries of the timeline that do nothing.
+    """
+
+    vehicles: Mapping[str, Vehicle]
+    ego: str
+    positions: Positions
+    along: Callable[[str | Node], float | None]
+    states: Callable[[Node], Trigger]
+    marks: list[Mark] = field(default_factory=list)
+
+    @property
+    def findings(self) -> Findings:
+        """Takes what cannot be asked for."""
+        return self.positions.findings
+
+    def trigger(self, node: Node | None) -> Trigger | None:
+        """What a ``StartTrigger`` or ``StopTrigger`` stands for; None if there is none.
+
+        Parameters
+        ----------
+        node : Node or None
+            It. Without groups it never begins.
+        """
+        if node is None:
+            return None
+        groups = [self._group(group) for group in node.all("ConditionGroup")]
+        if len(groups) < 2:
+            return groups[0] if groups else NEVER
+        if len({group.delay for group in groups}) > 1:
+            self.findings.refuse(node, "groups of conditions of one trigger must have the same delay")
+        return Trigger(" or ".join(f"({group.condition})" for group in groups), groups[0].delay)
+
+    def _group(self, group: Node) -> Trigger:
+        conditions = group.all("Condition")
+        read = [self._condition(one) for one in conditions]
+        delays = [trigger.delay for trigger in read]
+        if len({*delays}) > 1:
+            self.findings.refuse(group, f"conditions of one group must have the same delay, got {delays}")
+        times = [trigger.at for trigger in read if trigger.at is not None]
+        others = list(dict.fromkeys(trigger.condition for trigger in read if trigger.at is None))
+        if not others:
+            latest = max(times, default=-1.0)
+            return at_time(latest + delays[0] if delays else latest)
+        told = [f"time >= {max(times):g} s"] if times and max(times) > 0.0 else []
+        return Trigger(" and ".join([*told, *(_bracketed(one, len(others) + len(told)) for one in others)]), delays[0])
+
+    def _condition(self, node: Node) -> Trigger:
+        delay = self.findings.number(node, "delay", 0.0)
+        edge = self.findings.word(node, "conditionEdge", _EDGES, "none")
+        for kind in node.all("ByValueCondition"):
+            for one in kind.all():
+                return self._by_value(one, edge, delay)
+        for kind in node.all("ByEntityCondition"):
+            return Trigger(self._by_entities(kind, edge), delay)
+        self.findings.refuse(node, "expected a ByValueCondition or a ByEntityCondition")
+        return NEVER
+
+    def _by_value(self, node: Node, edge: str, delay: float) -> Trigger:
+        if node.tag == "SimulationTimeCondition":
+            value = self.findings.number(node, "value")
+            rule = self.findings.word(node, "rule", tuple(RULES))
+            if rule in ("lessThan", "lessOrEqual"):
+                test = _Test(f"time {RULES[rule]} {value:g} s", "time", RULES[rule], f"{value:g} s")
+                return Trigger(self._edged(test, edge, node), delay)
+            return Trigger(f"time >= {value:g} s", delay, at=value if delay == 0.0 else None)
+        if node.tag == "StoryboardElementStateCondition":
+            found = self.states(node)
+            return found if found.at is not None and not delay else Trigger(found.condition, found.delay + delay)
+        self.findings.refuse(node, "FogSim has no such condition")
+        return NEVER
+
+    def _by_entities(self, node: Node, edge: str) -> str:
+        triggering = node.one("TriggeringEntities")
+        test = next((one for kind in node.all("EntityCondition") for one in kind.all()), None)
+        if triggering is None or test is None:
+            self.findings.refuse(node, "expected TriggeringEntities and an EntityCondition")
+            return ""
+        rule = self.findings.word(triggering, "triggeringEntitiesRule", ("any", "all"))
+        names = [one.get("entityRef") for one in triggering.all("EntityRef")]
+        if test.tag not in _TESTS:
+            self.findings.refuse(test, "FogSim has no such condition")
+            return ""
+        tests = [_TESTS[test.tag](self, test, name) for name in names if self._is_known(triggering, name)]
+        told = [self._edged(one, edge, node) for one in tests if one is not None]
+        return (" and " if rule == "all" else " or ").join(_bracketed(one, len(told)) for one in told)
+
+    def _edged(self, test: _Test, edge: str, node: Node) -> str:
+        if edge == "none" or not test.text:
+            return test.text
+        if edge == "risingOrFalling":
+            return f"({self._edged(test, 'rising', node)}) or ({self._edged(test, 'falling', node)})"
+        is_rising = edge == "rising"
+        if test.signal and test.rule in ("<", "<=", ">", ">="):
+            how = "rises above" if (test.rule[0] == ">") == is_rising else "falls below"
+            return f"{test.signal} {how} {test.value}"
+        # What was otherwise before is so now.
+        name = f"before_{len(self.marks)}"
+        now, before = (test.text, f"not ({test.text})") if is_rising else (f"not ({test.text})", test.text)
+        self.mark(name, Trigger(before), node)
+        return f"happened({name}) and ({now})"
+
+    def mark(self, name: str, trigger: Trigger, node: Node) -> None:
+        """Have something remembered.
+
+        Parameters
+        ----------
+        name, trigger, node
+            As of `Mark`.
+        """
+        self.marks.append(Mark(name, trigger, node))
+
+    def _is_known(self, node: Node, name: str) -> bool:
+        if name not in self.vehicles:
+            self.findings.refuse(node, f"there is no vehicle {name!r}")
+        return name in self.vehicles
+
+    def called(self, vehicle: str) -> str:
+        """A vehicle as conditions name it.
+
+        Parameters
+        ----------
+        vehicle : str
+            Its id.
+        """
+        return "ego" if vehicle == self.ego else vehicle if _WORD.fullmatch(vehicle) else f'"{vehicle}"'
+
+    def _compared(self, node: Node, signal: str, unit: str, shift: float = 0.0) -> _Test:
+        value = self.findings.number(node, "value") + shift
+        rule = RULES[self.findings.word(node, "rule", tuple(RULES))]
+        if rule in ("==", "!="):
+            self.findings.refuse(node, "rule: quantities of traffic are never exactly equal; take less or greater")
+        return _Test(f"{signal} {rule} {value:.9g} {unit}", signal, rule, f"{value:.9g} {unit}")
+
+    def _speed(self, node: Node, name: str) -> _Test:
+        if node.get("direction") not in ("", "longitudinal"):
+            self.findings.refuse(node, "direction: speeds are read along the road")
+        return self._compared(node, f"{self.called(name)}.speed", "m/s")
+
+    def _acceleration(self, node: Node, name: str) -> _Test:
+        node.get("direction")
+        return self._compared(node, f"{self.called(name)}.acceleration", "m/s²")
+
+    def _relative_speed(self, node: Node, name: str) -> _Test | None:
+        node.get("direction")
+        other = node.get("entityRef")
+        known = self._is_known(node, other)
+        return (
+            self._compared(node, f"speed_difference({self.called(name)}, {self.called(other)})", "m/s")
+            if known
+            else None
+        )
+
+    def _stands(self, node: Node, name: str) -> _Test:
+        duration = self.findings.number(node, "duration")
+        still = f"{self.called(name)}.speed < {_STILL} m/s"
+        return _Test(f"{still} for {duration:g} s" if duration > 0.0 else still)
+
+    def _traveled(self, node: Node, name: str) -> _Test | None:
+        return self._at_or_beyond(node, name, self.along(name))
+
+    def _at_or_beyond(self, node: Node, name: str, begin: float | None) -> _Test | None:
+        if begin is None:
+            self.findings.refuse(node, f"{name} does not begin on the ego's route, along which FogSim measures")
+            return None
+        value = f"{begin + self.findings.number(node, 'value'):.3f} m"
+        signal = f"{self.called(name)}.position"
+        return _Test(f"{signal} >= {value}", signal, ">=", value)
+
+    def _relative_distance(self, node: Node, name: str) -> _Test | None:
+        other, kind = node.get("entityRef"), node.get("relativeDistanceType")
+        node.get("coordinateSystem")
+        if not self._is_known(node, other):
+            return None
+        if kind in ("cartesianDistance", "euclidianDistance", "euclideanDistance"):
+            if self._is_free(node):
+                self.findings.leave_out(node, "straight distances are between front bumpers")
+            return self._compared(node, f"distance({self.called(name)}, {self.called(other)})", "m")
+        if kind != "longitudinal":
+            self.findings.refuse(node, f"distances are longitudinal or cartesianDistance; got {kind!r}")
+            return None
+        return self._along_the_road(node, name, other)
+
+    def _along_the_road(self, node: Node, name: str, other: str) -> _Test:
+        one, far = self.vehicles[name], self.vehicles[other]
+        free = self._is_free(node)
+        ahead = 0.0 if free else one.front + far.rear
+        behind = 0.0 if free else one.rear + far.front
+        value = self.findings.number(node, "value")
+        gap, near = f"gap({self.called(name)}, {self.called(other)})", (value - ahead, behind - value)
+        if self.findings.word(node, "rule", tuple(RULES)).startswith("less"):
+            return _Test(f"{gap} < {near[0]:.9g} m and {gap} > {near[1]:.9g} m")
+        return _Test(f"{gap} > {near[0]:.9g} m or {gap} < {near[1]:.9g} m")
+
+    def _is_free(self, node: Node) -> bool:
+        return self.findings.word(node, "freespace", ("true", "false")) == "true"
+
+    def _distance(self, node: Node, name: str) -> _Test | None:
+        for key in ("alongRoute", "coordinateSystem", "relativeDistanceType", "freespace"):
+            node.get(key)
+        place = self._place_along(node)
+        if place is None:
+            return None
+        value, signal = self.findings.number(node, "value"), f"{self.called(name)}.position"
+        place += self.vehicles[name].front
+        near, far = place - value, place + value
+        if self.findings.word(node, "rule", tuple(RULES)).startswith("less"):
+            return _Test(f"{signal} > {near:.3f} m and {signal} < {far:.3f} m")
+        return _Test(f"{signal} < {near:.3f} m or {signal} > {far:.3f} m")
+
+    def _reaches(self, node: Node, name: str) -> _Test | None:
+        place, around = self._place_along(node), self.findings.number(node, "tolerance")
+        if place is None:
+            return None
+        front, signal = self.vehicles[name].front, f"{self.called(name)}.position"
+        return _Test(f"{signal} >= {place + front - around:.3f} m and {signal} <= {place + front + around:.3f} m")
+
+    def _place_along(self, node: Node) -> float | None:
+        position = node.one("Position")
+        place = None if position is None else self.along(position)
+        if place is None:
+            self.findings.refuse(node, "its position is not on the ego's route, along which FogSim measures")
+        return place
+
+    def _headway(self, node: Node, name: str) -> _Test | None:
+        return self._between(node, name, node.get("entityRef"), "headway")
+
+    def _time_to_collision(self, node: Node, name: str) -> _Test | None:
+        target = node.within("TimeToCollisionConditionTarget", "EntityRef")
+        if target is None:
+            self.findings.refuse(node, "times to collision are with an entity")
+            return None
+        return self._between(node, name, target.get("entityRef"), "ttc")
+
+    def _between(self, node: Node, name: str, other: str, signal: str) -> _Test | None:
+        node.get("alongRoute"), node.get("coordinateSystem")
+        if node.get("relativeDistanceType") not in ("", "longitudinal"):
+            self.findings.refuse(node, "relativeDistanceType: times are of distances along the road (longitudinal)")
+        if not self._is_known(node, other):
+            return None
+        further = 0.0 if self._is_free(node) else self.vehicles[name].front + self.vehicles[other].rear
+        return self._compared(node, f"{signal}({self.called(name)}, {self.called(other)}, {further:g} m)", "s")
+
+    def _collides(self, node: Node, name: str) -> _Test:
+        if node.children:
+            self.findings.leave_out(node, "a collision with anybody counts")
+        return _Test(f"{self.called(name)}.collision")
+
+
+_TESTS: Mapping[str, Callable[[Triggers, Node, str], _Test | None]] = {
+    "SpeedCondition": Triggers._speed,
+    "AccelerationCondition": Triggers._acceleration,
+    "RelativeSpeedCondition": Triggers._relative_speed,
+    "StandStillCondition": Triggers._stands,
+    "TraveledDistanceCondition": Triggers._traveled,
+    "RelativeDistanceCondition": Triggers._relative_distance,
+    "DistanceCondition": Triggers._distance,
+    "ReachPositionCondition": Triggers._reaches,
+    "TimeHeadwayCondition": Triggers._headway,
+    "TimeToCollisionCondition": Triggers._time_to_collision,
+    "CollisionCondition": Triggers._collides,
+}
+
+CONDITIONS = ("SimulationTimeCondition", "StoryboardElementStateCondition", *_TESTS)
+"""Conditions that are read."""
+
+
+def at_time(time: float) -> Trigger:
+    """Trigger of a time alone.
+
+    Parameters
+    ----------
+    time : float
+        When [s].
+    """
+    return AT_ONCE if time <= 0.0 else Trigger(f"time >= {time:g} s", at=time)
+
+
+def both(first: Trigger, then: Trigger) -> Trigger:
+    """What begins by its own trigger once another has begun, which is remembered for it.
+
+    Parameters
+    ----------
+    first : Trigger
+        The other: of a time alone, or of an entry that has begun.
+    then : Trigger
+        Its own.
+    """
+    if not first.condition or not then.condition:
+        return NEVER
+    if first.at is not None and then.at is not None:
+        return at_time(max(first.at, then.at))
+    if first.at is not None and first.at <= 0.0:
+        return then
+    return Trigger(f"{_bracketed(first.condition, 2)} and {_bracketed(then.condition, 2)}", then.delay)
+
+
+def _bracketed(condition: str, count: int) -> str:
+    return f"({condition})" if count > 1 and (" or " in condition or " and " in condition) else condition

@@ -1,0 +1,82 @@
+"""SUMO's route file of the vehicles of a file."""
+
+from collections.abc import Mapping
+
+from fogsim.openscenario.entities import CLASSES, Vehicle
+from fogsim.openscenario.initial import Beginning
+from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, Spot
+from fogsim.traffic.templates.xml_text import element
+
+STANDS = 0.1
+"""Speed below which a vehicle has none that its driver could wish to keep [m/s]."""
+
+
+def front_spot(vehicle: Vehicle, spot: Spot, lanes: OpenDriveLanes) -> Spot:
+    """Place of a vehicle's front bumper.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        The vehicle.
+    spot : Spot
+        Its reference point.
+    lanes : OpenDriveLanes
+        The lanes.
+
+    Raises
+    ------
+    ValueError
+        If the road ends before.
+    """
+    return lanes.along(spot, vehicle.front)
+
+
+def vehicles_text(vehicles: Mapping[str, Vehicle], begin: Beginning, lanes: OpenDriveLanes) -> str:
+    """Text of the route file: each vehicle is there from the beginning, at its place and speed.
+
+    Parameters
+    ----------
+    vehicles : mapping from str to Vehicle
+        The vehicles.
+    begin : Beginning
+        Where they are, and how fast.
+    lanes : OpenDriveLanes
+        The lanes.
+    """
+    lines = []
+    for name, vehicle in vehicles.items():
+        front = front_spot(vehicle, begin.spots[name], lanes)
+        speed = begin.speeds.get(name, 0.0)
+        lines += [
+            "  " + element("vType", id=f"type.{name}", **_type(vehicle, speed, front.lane.limit)),
+            "  " + element("route", id=f"route.{name}", edges=" ".join(lanes.route(front.lane.edge))),
+            "  "
+            + element(
+                "vehicle",
+                id=name,
+                type=f"type.{name}",
+                route=f"route.{name}",
+                depart="0",
+                departLane=front.lane.index,
+                departPos=f"{front.position:.3f}",
+                departSpeed=f"{speed:.4f}",
+            ),
+        ]
+    return '<?xml version="1.0" encoding="UTF-8"?>\n<routes>\n' + "\n".join(lines) + "\n</routes>\n"
+
+
+def _type(vehicle: Vehicle, speed: float, limit: float) -> dict[str, object]:
+    """Attributes of a type of its own; its driver wishes to keep the speed that it begins with."""
+    return {
+        "vClass": CLASSES[vehicle.category],
+        "length": f"{vehicle.length:g}",
+        "width": f"{vehicle.width:g}",
+        "height": f"{vehicle.height:g}",
+        "maxSpeed": f"{vehicle.top_speed:g}",
+        "accel": f"{vehicle.acceleration:g}",
+        "decel": f"{vehicle.deceleration:g}",
+        "emergencyDecel": f"{vehicle.deceleration:g}",
+        "speedFactor": f"{speed / limit if speed > STANDS else 1.0:.6f}",
+        "speedDev": "0",
+        "sigma": "0",
+    }

@@ -1,0 +1,90 @@
+"""SUMO's netconvert, which makes networks of OpenDRIVE files: a program of its own, in the package eclipse-sumo."""
+
+import importlib.util
+import re
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+from fogsim.errors import InputError, MissingDependencyError
+
+USUAL_LIMIT = 130.0 / 3.6
+"""Speed limit of lanes of which an OpenDRIVE file tells none [m/s]."""
+
+_TYPES = ("driving", "entry", "exit", "onRamp", "offRamp", "mwyEntry", "mwyExit", "connectingRamp", "slipLane")
+"""Types of OpenDRIVE lanes on which vehicles drive; of others there are no lanes in the network."""
+
+_LONGEST_RUN = 300.0  # [s]
+_COMMENT = re.compile(r"<!--.*?-->\s*", re.DOTALL)
+
+
+def netconvert_program() -> str:
+    """Path of netconvert.
+
+    Raises
+    ------
+    MissingDependencyError
+        If it is not there.
+    """
+    package = importlib.util.find_spec("sumo")
+    folders = [Path(place) / "bin" for place in (package.submodule_search_locations or ())] if package else []
+    found = shutil.which("netconvert") or next(
+        (path for folder in folders if (path := shutil.which("netconvert", path=str(folder)))), None
+    )
+    if found is None:
+        raise MissingDependencyError(
+            "roads of OpenDRIVE files need SUMO's netconvert, which is not there; pip install 'fogsim[xodr]' brings it"
+        )
+    return found
+
+
+def netconvert_recipe() -> bytes:
+    """What a network depends on beside its OpenDRIVE file: the program, and how it is called.
+
+    Raises
+    ------
+    MissingDependencyError
+        If there is no netconvert.
+    """
+    program = Path(netconvert_program())
+    return f"{program}\0{program.stat().st_mtime_ns}\0".encode() + Path(__file__).read_bytes()
+
+
+def opendrive_net(path: Path) -> str:
+    """SUMO network of an OpenDRIVE file, in the file's own coordinates.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    str
+        Text of the network; its lanes have the parameter ``origId``, OpenDRIVE's road and lane.
+
+    Raises
+    ------
+    InputError
+        If netconvert cannot read the file.
+    MissingDependencyError
+        If there is no netconvert.
+    """
+    program = netconvert_program()
+    with tempfile.TemporaryDirectory() as folder:
+        types, net = Path(folder) / "types.typ.xml", Path(folder) / "road.net.xml"
+        lines = [f'<type id="{name}" priority="1" speed="{USUAL_LIMIT:.3f}" width="3.65"/>' for name in _TYPES]
+        types.write_text(f"<types>{''.join(lines)}</types>", encoding="utf-8")
+        command = [program, "--opendrive-files", str(path.resolve()), "-o", str(net), "-t", str(types)]
+        command += ["--output.original-names", "--offset.disable-normalization", "--opendrive.curve-resolution", "1"]
+        command += ["--no-turnarounds", "--precision", "3", "--xml-validation", "never"]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=_LONGEST_RUN, check=False)  # noqa: S603
+        except subprocess.TimeoutExpired as error:
+            raise InputError(f"{path}: netconvert has not read it within {_LONGEST_RUN:g} s") from error
+        if done.returncode or not net.is_file():
+            told = " ".join(done.stderr.split()) or f"it ended with {done.returncode}"
+            raise InputError(f"{path}: no OpenDRIVE road network that SUMO's netconvert can read: {told}")
+        # A comment at the top tells when it was made.
+        return _COMMENT.sub("", net.read_text(encoding="utf-8"))

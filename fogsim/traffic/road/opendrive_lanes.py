@@ -1,0 +1,316 @@
+"""Lanes of a network that netconvert has made of an OpenDRIVE file, found by road, lane and s, or by coordinates."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.errors import InputError
+from fogsim.traffic.road.plan_view import PlanView, plan_view
+
+FARTHEST_ROUTE = 50_000.0
+"""Length at which a route that finds no end is cut off [m]."""
+
+_TURNS = {"s": 0, "r": 1, "R": 1, "l": 2, "L": 2}
+"""Directions of connections, the one that is taken first where nothing is said."""
+
+
+@dataclass(frozen=True, slots=True)
+class RoadLane:
+    """A lane of the network.
+
+    Attributes
+    ----------
+    edge : str
+        Its edge.
+    index : int
+        Its number from the right, from 0.
+    length, width : float
+        As the network has them [m].
+    limit : float
+        Speed limit [m/s].
+    shape : (n, 2) float64
+        Its middle [m].
+    origins : tuple of str
+        OpenDRIVE's road and lane, ``road_lane``; several where they are one edge.
+    """
+
+    edge: str
+    index: int
+    length: float
+    width: float
+    limit: float
+    shape: NDArray[np.float64]
+    origins: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Spot:
+    """A place on a lane.
+
+    Attributes
+    ----------
+    lane : RoadLane
+        The lane.
+    position : float
+        Distance from its beginning, as SUMO counts it [m].
+    """
+
+    lane: RoadLane
+    position: float
+
+    @property
+    def world(self) -> tuple[float, float, float]:
+        """x, y [m] and heading [rad]."""
+        steps = np.diff(self.lane.shape, axis=0)
+        lengths = np.hypot(steps[:, 0], steps[:, 1])
+        along = self.position * float(lengths.sum()) / self.lane.length
+        ends = np.cumsum(lengths)
+        piece = min(int(np.searchsorted(ends, along)), len(lengths) - 1)
+        left = along - (ends[piece] - lengths[piece])
+        (x, y), (dx, dy) = self.lane.shape[piece], steps[piece] / lengths[piece]
+        return float(x + left * dx), float(y + left * dy), math.atan2(dy, dx)
+
+
+@dataclass(frozen=True, slots=True)
+class OpenDriveLanes:
+    """Lanes and the ways between them.
+
+    Attributes
+    ----------
+    lanes : tuple of RoadLane
+        Every lane on which vehicles drive.
+    followers : mapping from str to sequence of str
+        Edges that follow an edge, the straight one first.
+    roads : mapping from str to PlanView
+        Reference lines of the roads by their ids.
+    latitude, longitude : float or None
+        Where the map is [rad], if the file tells.
+    """
+
+    lanes: tuple[RoadLane, ...]
+    followers: Mapping[str, Sequence[str]]
+    roads: Mapping[str, PlanView]
+    latitude: float | None
+    longitude: float | None
+
+    def on_lane(self, road: str, lane: str, s: float) -> Spot:
+        """Place on a lane by OpenDRIVE's coordinates.
+
+        Parameters
+        ----------
+        road, lane : str
+            Their ids.
+        s : float
+            Distance along the road's reference line [m].
+
+        Raises
+        ------
+        ValueError
+            If there is none.
+        """
+        x, y, _ = self._reference(road, s)
+        found = [one for one in self.lanes if f"{road}_{lane}" in one.origins]
+        if not found:
+            known = sorted(
+                o.removeprefix(f"{road}_") for one in self.lanes for o in one.origins if o.startswith(f"{road}_")
+            )
+            raise ValueError(f"road {road!r} has no lane {lane!r} to drive on; it has {', '.join(known) or 'none'}")
+        # Across the road the foot of the reference point is on each lane.
+        return min((_foot(one, x, y) for one in found), key=lambda found: found[0])[1]
+
+    def across(self, road: str, s: float, t: float) -> tuple[float, float, float]:
+        """Coordinates and heading of a place beside a road's reference line.
+
+        Parameters
+        ----------
+        road : str
+            Id of the road.
+        s, t : float
+            Distance along its reference line, and to the left of it [m].
+
+        Raises
+        ------
+        ValueError
+            If there is none.
+        """
+        x, y, heading = self._reference(road, s)
+        return x - t * math.sin(heading), y + t * math.cos(heading), heading + (math.pi if t > 0.0 else 0.0)
+
+    def at(self, x: float, y: float, heading: float | None) -> Spot:
+        """Place on the nearest lane.
+
+        Parameters
+        ----------
+        x, y : float
+            Coordinates [m].
+        heading : float or None
+            Direction of travel [rad]; lanes that lead elsewhere do not count. None for any.
+
+        Raises
+        ------
+        ValueError
+            If the coordinates are on no lane.
+        """
+        feet = [_foot(one, x, y) for one in self.lanes]
+        fit = [(d, spot) for d, spot in feet if heading is None or math.cos(spot.world[2] - heading) > 0.0]
+        distance, spot = min(fit, key=lambda one: one[0], default=(math.inf, None))
+        if spot is None or distance > 0.5 * spot.lane.width + 0.01:
+            away = "" if spot is None else f"; the nearest is {distance:.1f} m away"
+            raise ValueError(f"({x:g}, {y:g}) is on no lane that leads there{away}")
+        return spot
+
+    def beside(self, spot: Spot, lanes: int) -> Spot:
+        """Place on another lane of the same edge.
+
+        Parameters
+        ----------
+        spot : Spot
+            The place.
+        lanes : int
+            How many lanes to the left.
+
+        Raises
+        ------
+        ValueError
+            If there is no such lane.
+        """
+        index = spot.lane.index + lanes
+        found = [one for one in self.lanes if one.edge == spot.lane.edge and one.index == index]
+        if not found:
+            raise ValueError(f"there is no lane {abs(lanes)} to the {'left' if lanes > 0 else 'right'}")
+        return Spot(found[0], spot.position * found[0].length / spot.lane.length)
+
+    def along(self, spot: Spot, distance: float) -> Spot:
+        """Place farther along, or before.
+
+        Parameters
+        ----------
+        spot : Spot
+            The place.
+        distance : float
+            How far [m].
+
+        Raises
+        ------
+        ValueError
+            If the road ends before.
+        """
+        lane, position = spot.lane, spot.position + distance
+        for _ in range(len(self.lanes)):
+            if 0.0 <= position <= lane.length:
+                return Spot(lane, position)
+            position, lane = self._neighbour(lane, position)
+        raise ValueError(f"{distance:g} m from there is not on the road any more")
+
+    def _neighbour(self, lane: RoadLane, position: float) -> tuple[float, RoadLane]:
+        ahead = position > lane.length
+        edges = self.followers.get(lane.edge, ()) if ahead else [e for e, f in self.followers.items() if lane.edge in f]
+        lanes = [one for one in self.lanes if edges and one.edge == edges[0]]
+        if not lanes:
+            raise ValueError(f"the road {'ends' if ahead else 'begins'} before that")
+        other = min(lanes, key=lambda one: abs(one.index - lane.index))
+        return (position - lane.length if ahead else position + other.length), other
+
+    def route(self, edge: str) -> tuple[str, ...]:
+        """Edges from one on, straight ahead where there is a choice, to the end of the road or back where it was.
+
+        Parameters
+        ----------
+        edge : str
+            The first.
+        """
+        lengths = {one.edge: one.length for one in self.lanes}
+        found, length = [edge], lengths[edge]
+        while length < FARTHEST_ROUTE and (following := self.followers.get(found[-1])):
+            if following[0] in found:
+                break
+            found.append(following[0])
+            length += lengths[found[-1]]
+        return tuple(found)
+
+    def _reference(self, road: str, s: float) -> tuple[float, float, float]:
+        if road not in self.roads:
+            raise ValueError(f"there is no road {road!r}; there are {', '.join(sorted(self.roads))}")
+        return self.roads[road].at(s)
+
+
+def _foot(lane: RoadLane, x: float, y: float) -> tuple[float, Spot]:
+    """Distance of a point to a lane [m], and the place on it that is nearest."""
+    starts, steps = lane.shape[:-1], np.diff(lane.shape, axis=0)
+    lengths = np.hypot(steps[:, 0], steps[:, 1])
+    to_point = np.array([x, y]) - starts
+    share = np.clip((to_point * steps).sum(axis=1) / lengths**2, 0.0, 1.0)
+    away = np.hypot(*(to_point - share[:, None] * steps).T)
+    piece = int(np.argmin(away))
+    along = float(lengths[:piece].sum() + share[piece] * lengths[piece])
+    return float(away[piece]), Spot(lane, along * lane.length / float(lengths.sum()))
+
+
+def read_opendrive_lanes(net: str, opendrive: Path) -> OpenDriveLanes:
+    """Lanes of a network.
+
+    Parameters
+    ----------
+    net : str
+        Text of the network, from `opendrive_net`.
+    opendrive : Path
+        The OpenDRIVE file that it was made of.
+
+    Raises
+    ------
+    InputError
+        If the file has no road to drive on.
+    """
+    root = ET.fromstring(net)  # noqa: S314 - netconvert's own output
+    lanes = tuple(_lanes(root))
+    if not lanes:
+        raise InputError(f"{opendrive}: there is no lane to drive on")
+    source = ET.parse(opendrive).getroot()  # noqa: S314 - the user's own file; expat fetches nothing
+    roads = {}
+    for road in source.iter("road"):
+        try:
+            roads[road.get("id", "")] = plan_view(road.iterfind("planView/geometry"))
+        except ValueError as error:
+            raise InputError(f"{opendrive}: road {road.get('id')!r}: {error}") from None
+    latitude, longitude = _origin(source.findtext("header/geoReference", ""))
+    return OpenDriveLanes(lanes, _followers(root, {lane.edge for lane in lanes}), roads, latitude, longitude)
+
+
+def _lanes(root: ET.Element) -> Iterator[RoadLane]:
+    for edge in root.iter("edge"):
+        for lane in edge.iter("lane") if edge.get("function") is None else ():
+            origins = next((p.get("value", "") for p in lane.iter("param") if p.get("key") == "origId"), "")
+            points = [tuple(map(float, point.split(",")[:2])) for point in lane.attrib["shape"].split()]
+            length, width = float(lane.attrib["length"]), float(lane.get("width", "3.2"))
+            yield RoadLane(
+                edge.attrib["id"],
+                int(lane.attrib["index"]),
+                length,
+                width,
+                float(lane.attrib["speed"]),
+                np.array(points, dtype=np.float64),
+                tuple(origins.split()),
+            )
+
+
+def _followers(root: ET.Element, edges: set[str]) -> dict[str, list[str]]:
+    found: dict[str, dict[str, int]] = {}
+    for one in root.iter("connection"):
+        begin, end = one.attrib["from"], one.attrib["to"]
+        if begin in edges and end in edges:
+            found.setdefault(begin, {}).setdefault(end, _TURNS.get(one.get("dir", ""), 3))
+    return {begin: sorted(ends, key=lambda end: (ends[end], end)) for begin, ends in found.items()}
+
+
+def _origin(reference: str) -> tuple[float | None, float | None]:
+    """Latitude and longitude [rad] to which a map projection refers, if it tells."""
+    terms = dict(term.partition("=")[::2] for term in reference.replace("+", " ").split())
+    try:
+        return math.radians(float(terms["lat_0"])), math.radians(float(terms.get("lon_0", "0")))
+    except (KeyError, ValueError):
+        return None, None

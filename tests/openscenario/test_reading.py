@@ -1,0 +1,144 @@
+"""OpenSCENARIO files as scenarios: places, speeds, fog, triggers, and what is refused."""
+
+import math
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fogsim.errors import InputError, LeftOutWarning
+from fogsim.openscenario import read_openscenario
+from fogsim.scenario.document import read_document
+from fogsim.scenario.loading import load_scenario
+
+DATA = Path(__file__).parents[1] / "data" / "openscenario"
+QUIET = ["renderer=none", "estimators=[]", "drivers.see_through_fog=true"]
+
+
+@pytest.fixture(scope="module")
+def cut_in() -> dict[str, Any]:
+    return read_openscenario(DATA / "cut_in_in_fog.xosc").data
+
+
+@pytest.fixture
+def changed(tmp_path: Path) -> Callable[..., Path]:
+    """A copy of a file in which some texts stand for others."""
+    shutil.copytree(DATA, tmp_path, dirs_exist_ok=True)
+
+    def change(name: str, *texts: tuple[str, str]) -> Path:
+        file = tmp_path / name
+        text = file.read_text(encoding="utf-8")
+        for old, new in texts:
+            assert old in text
+            text = text.replace(old, new, 1)
+        file.write_text(text, encoding="utf-8")
+        return file
+
+    return change
+
+
+def _entry(data: dict[str, Any], name: str) -> dict[str, Any]:
+    found: dict[str, Any] = next(entry for entry in data["timeline"] if entry["name"] == name)
+    return found
+
+
+def test_fog_light_and_parameters(cut_in: dict[str, Any]) -> None:
+    assert cut_in["fog"] == {"visibility_m": 140.0}
+    assert 5_000.0 < cut_in["light"]["illuminance_lx"] < 12_000.0
+    assert _entry(cut_in, "Init")["do"]["Overtaker"]["speed"]["to_kmh"] == pytest.approx(72 * 1.25)
+    assert _entry(cut_in, "thicker_fog") == {
+        "name": "thicker_fog",
+        "when": "time >= 4 s",
+        "do": {"fog": {"visibility_m": 60.0}},
+    }
+
+
+def test_triggers_are_conditions_of_the_language(cut_in: dict[str, Any]) -> None:
+    # Reference points are 4.8 m farther apart than bumpers: 1.4 + 2.4 before the one, 1 behind the other.
+    assert _entry(cut_in, "cut_in")["when"] == "headway(ego, Overtaker, 4.8 m) rises above 0.5 s"
+    assert _entry(cut_in, "brake")["do"]["Overtaker"]["speed"] == {
+        "to_kmh": pytest.approx(28.8),
+        "shape": "linear",
+        "rate_mps2": 2.0,
+    }
+    assert cut_in["end_when"] == "happened(stop)"
+    assert _entry(cut_in, "stop")["delay_s"] == 2.0
+
+
+def test_a_box_of_fog_is_a_bank_along_the_route() -> None:
+    with pytest.warns(LeftOutWarning, match="ObjectController"):
+        scenario = load_scenario(DATA / "slow_lead.xosc", QUIET)
+    (bank,) = scenario.fog.banks
+    # The ego's road begins at x = 100 m, the box at 250 m.
+    assert (bank.start_m, bank.end_m) == (pytest.approx(150.0, abs=1.0), pytest.approx(450.0, abs=1.0))
+    assert (bank.visibility_m, scenario.fog.outside_visibility_m, scenario.fog.top_m) == (200.0, math.inf, 40.0)
+    assert scenario.light.illuminance_lx == 20_000.0
+
+
+def test_what_is_not_supported_is_told_at_once_with_paths_and_lines(changed: Callable[..., Path]) -> None:
+    file = changed(
+        "slow_lead.xosc",
+        ('value="3.2" freespace="true" rule="lessThan"', 'value="3.2" freespace="true" rule="equalTo"'),
+        ('<StandStillCondition duration="0.5"/>', '<OffroadCondition duration="0.5"/>'),
+        ('vehicleCategory="truck"', 'vehicleCategory="trailer"'),
+        ('<LightStateAction transitionTime="0">', '<AnimationAction/><LightStateAction transitionTime="0">'),
+    )
+    with pytest.raises(InputError) as refused:
+        load_scenario(file)
+    lines = str(refused.value).splitlines()
+    assert len(lines) == 4
+    assert "slow_lead.xosc:8: /OpenSCENARIO/Entities/ScenarioObject[Lead]/Vehicle[lorry]: vehicleCategory" in lines[0]
+    assert any("/EntityCondition/TimeToCollisionCondition: rule: " in line for line in lines)
+    assert any("/EntityCondition/OffroadCondition: FogSim has no such condition" in line for line in lines)
+    assert any("/AppearanceAction/AnimationAction: FogSim has no such action" in line for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('x="150" y="-25.25"', 'x="150" y="-45"', "on no lane that leads there; the nearest is 19.8 m away"),
+        ('y="-25.25" h="0"', 'y="-25.25" h="3.14"', "on no lane that leads there"),
+        ('roadId="7" s="260"', 'roadId="8" s="260"', "there is no road '8'; there are 7"),
+        ('visualRange="200"', 'visualRange="$sight"', "unknown parameter $sight"),
+        ('visualRange="200"', 'visualRange="${200 / 0}"', "cannot evaluate"),
+        (
+            '<EntityRef entityRef="Ego"/></Actors>',
+            '<EntityRef entityRef="Ego"/><ByType/></Actors>',
+            "Actors/ByType: FogSim does",
+        ),
+        ('revMajor="1"', 'revMajor="2"', "expected OpenSCENARIO XML 1.x"),
+        ('filepath="two_lanes.xodr"', 'filepath="none.xodr"', "expected an OpenDRIVE file (.xodr) that is there"),
+        ("<OpenSCENARIO>", "<!DOCTYPE x [<!ENTITY e 'x'>]><OpenSCENARIO>", "a document type"),
+        ("</OpenSCENARIO>", "", "no XML"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::fogsim.errors.LeftOutWarning")
+def test_mistakes_are_told(changed: Callable[..., Path], old: str, new: str, told: str) -> None:
+    with pytest.raises(InputError, match="slow_lead") as refused:
+        load_scenario(changed("slow_lead.xosc", (old, new)))
+    assert told in str(refused.value)
+
+
+def test_a_yaml_file_lays_expectations_upon_it(tmp_path: Path) -> None:
+    file = tmp_path / "test.fog.yaml"
+    file.write_text(
+        f"scenario: {DATA / 'cut_in_in_fog.xosc'}\nrenderer: none\nestimators: []\nfog: {{visibility: 80 m}}\n"
+        "timeline:\n  - {name: late, when: time > 5 s, do: {Overtaker: {hazard_lights: true}}}\n"
+        "expect:\n  cuts_in: {happened: cut_in}\n  warns: {happened: late}\n",
+        encoding="utf-8",
+    )
+    scenario = load_scenario(file)
+    assert scenario.fog.visibility_m == 80.0
+    assert [entry.name for entry in scenario.timeline] == [
+        "Init",
+        "thicker_fog",
+        "faster",
+        "cut_in",
+        "brake",
+        "stop",
+        "late",
+    ]
+    assert read_document(file).where(("timeline", 6)).endswith("test.fog.yaml:6")
+    assert read_document(file).where(("timeline", 1)).endswith("cut_in_in_fog.xosc:59")

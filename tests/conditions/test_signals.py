@@ -62,6 +62,7 @@ def test_who_is_not_on_the_road_has_no_value() -> None:
     step = make_step()
     for signal, found in SIGNALS.items():
         name = signal.replace("X", "ghost").replace("Y", "ghost").replace("METHOD", "ghost").replace("ID", "ghost")
+        name = name.replace("LENGTH", "2 m")
         if "ghost" in name and name not in {"ghost.present", "ghost.collision"}:
             assert read(name.replace("N", "0"), step) is None
         elif found.kind is Kind.NUMBER:
@@ -253,3 +254,15 @@ def test_traffic_is_of_the_synthetic_kind() -> None:
     """The lane ids and sizes that the tests above go by."""
     assert traffic(0.0, 1.0).lane[0] == "motorway_1"
     assert traffic(0.0, 1.0).length[0] == 4.6
+
+
+def test_times_to_who_is_ahead_count_from_other_points() -> None:
+    ahead = placed(make_step(speed=25.0, route_position=200.0), (260.0, 0.0), (200.0, 0.0))
+    # 55.4 m between the bumpers, and 4.6 m more.
+    assert read("headway(ego, other, 4.6 m)", ahead) == pytest.approx(60.0 / 25.0)
+    assert read("ttc(ego, other, 4.6 m)", ahead) == pytest.approx(60.0 / 5.0)
+    assert read("speed_difference(ego, other)", ahead) == pytest.approx(5.0)
+    for signal in ("headway(other, ego, 0 m)", "ttc(other, ego, 0 m)"):
+        assert read(signal, ahead) is None
+    with pytest.raises(ValueError, match="expected a number and a unit such as '10 m'"):
+        parse_condition("headway(ego, other, far) < 2 s")

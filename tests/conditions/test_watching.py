@@ -146,7 +146,9 @@ NAMES = st.text("abcXYZ019_.-:# é", min_size=1, max_size=8).filter(lambda name:
 def references(draw: st.DrawFn, kind: Kind | None = None) -> Reference:
     signal = draw(st.sampled_from([name for name, found in SIGNALS.items() if kind in (None, found.kind)]))
     places = SIGNALS[signal].places
-    return Reference(signal, tuple(draw(st.just("3") if place.name == "BANK" else NAMES) for place in places))
+    special = {"BANK": "3", "LENGTH": "4.8 m"}
+    arguments = (st.just(special[place.name]) if place.name in special else NAMES for place in places)
+    return Reference(signal, tuple(draw(one) for one in arguments))
 
 
 @st.composite

@@ -88,12 +88,8 @@ def readers_folder(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Ca
         if "# policies.yaml\n" in page:
             (text,) = re.findall(r"```yaml\n(# policies\.yaml\n.*?)```", page, re.DOTALL)
             (made / "policies.yaml").write_text(text, encoding="utf-8")
-        if "# my/truck.fog.yaml\n" in page:
-            (text,) = re.findall(r"```yaml\n(# my/truck\.fog\.yaml\n.*?)```", page, re.DOTALL)
-            (made / "my" / "truck.fog.yaml").write_text(text, encoding="utf-8")
-        if "# my/truck.fog.yaml\n" in page:
-            (text,) = re.findall(r"```yaml\n(# my/truck\.fog\.yaml\n.*?)```", page, re.DOTALL)
-            (made / "my" / "truck.fog.yaml").write_text(text, encoding="utf-8")
+        for text in re.findall(r"```yaml\n(# [\w/]*truck\.fog\.yaml\n.*?)```", page, re.DOTALL):
+            (made / text.split()[1]).write_text(text, encoding="utf-8")
         if "my/scenario.yaml" in page:
             put_scenario(made)
         return made

@@ -1,4 +1,4 @@
-"""What happens in a run, one row each: the script's doings, collisions, faults of sensors, the end."""
+"""What happens in a run, one row each: the script's doings, collisions, faults of sensors, traffic lights, the end."""
 
 import json
 import math
@@ -12,16 +12,16 @@ from fogsim.files.row_log import RowLog, row_batches, row_schema
 from fogsim.recorders.protocol import Derived
 from fogsim.recorders.run_directory import EVENT_LOG
 from fogsim.recorders.table import write_table
-from fogsim.values import Step, TrafficStep
+from fogsim.values import SignalColour, Step, TrafficStep
 
 EVENT_COLUMNS: Mapping[str, tuple[Any, str]] = {
     "index": (pa.int64(), "number of the camera period, as in steps.parquet"),
     "time_s": (pa.float64(), "time since the run began"),
-    "event": (pa.string(), "script_begins, script_ends, collision, fault_begins, fault_ends or run_ends"),
-    "name": (pa.string(), "entry of the timeline, sensor and fault, or why the run ended"),
-    "what": (pa.string(), "what is done; of a collision the speed of the impact [m/s]"),
+    "event": (pa.string(), "script_begins, script_ends, collision, fault_begins, fault_ends, signal_shows or run_ends"),
+    "name": (pa.string(), "entry of the timeline, sensor and fault, traffic light, or why the run ended"),
+    "what": (pa.string(), "what is done; of a collision the speed of the impact [m/s]; lane and colour"),
     "who": (pa.string(), "vehicles, with commas between"),
-    "x_m": (pa.float64(), "where the first of them is, or else the ego: east; null if neither is there"),
+    "x_m": (pa.float64(), "where the first of them is, the signal head, or else the ego: east; null if none is there"),
     "y_m": (pa.float64(), "likewise, north"),
     "z_m": (pa.float64(), "likewise, height"),
     "why": (pa.string(), "what held of the condition when it came to hold"),
@@ -38,6 +38,7 @@ class _Event(NamedTuple):
     what: str = ""
     who: tuple[str, ...] = ()
     why: str = ""
+    place: tuple[float | None, ...] | None = None
 
 
 class EventRecorder:
@@ -60,6 +61,7 @@ class EventRecorder:
         self._log: RowLog | None = None
         self._faults: frozenset[str] = frozenset()
         self._last = -math.inf
+        self._shown: dict[tuple[str, str], SignalColour] = {}
         self._open = True
 
     def record(self, step: TrafficStep, _derived: Derived | None = None) -> None:
@@ -91,12 +93,22 @@ class EventRecorder:
         now = frozenset(fault.name for fault in step.truth.faults)
         for how, faults in (("fault_begins", now - self._faults), ("fault_ends", self._faults - now)):
             yield from (_Event(step.time, how, fault) for fault in sorted(faults))
+        yield from self._signals(step)
         if step.ending is not None:
             yield _Event(step.time, "run_ends", step.ending.value)
 
+    def _signals(self, step: TrafficStep) -> Iterator[_Event]:
+        """What heads of traffic lights show that are read for the first time, or have changed."""
+        signals = step.traffic.signals
+        for row, (signal, lane, colour) in enumerate(zip(signals.ids, signals.lane, signals.colour, strict=True)):
+            if self._shown.get((signal, lane)) is not colour:
+                self._shown[signal, lane] = colour
+                place = tuple(signals.position[row].tolist())
+                yield _Event(step.time, "signal_shows", signal, f"{lane}: {colour}", place=place)
+
     def _row(self, step: TrafficStep, event: _Event) -> tuple[object, ...]:
         row = step.traffic.row(event.who[0]) if event.who else step.ego if isinstance(step, Step) else None
-        place = (None, None, None) if row is None else step.traffic.position[row].tolist()
+        place = event.place or ((None, None, None) if row is None else step.traffic.position[row].tolist())
         told = event.name, event.what, ",".join(event.who)
         return (step.index, event.time, event.event, *told, *place, event.why)
 

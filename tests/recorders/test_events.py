@@ -9,7 +9,7 @@ import pytest
 
 from fogsim.recorders.events import EVENT_COLUMNS, EventRecorder
 from fogsim.recorders.recovery import _make_readable
-from fogsim.values import Collision, Command, Ending, Fault, TrafficState, TrafficStep, Truth
+from fogsim.values import Collision, Command, Ending, Fault, SignalColour, SignalState, TrafficState, TrafficStep, Truth
 from fogsim.values.fault import Blackout
 from fogsim.values.script import Begun
 
@@ -76,3 +76,24 @@ def test_events_of_a_process_that_died_are_there(tmp_path: Path) -> None:
         recorder.record(one)
     _make_readable(tmp_path)
     assert rows(tmp_path / "events.parquet") == EXPECTED[:2]
+
+
+def test_traffic_lights_are_told_when_they_come_near_and_when_they_change(tmp_path: Path) -> None:
+    def showing(index: int, *colours: SignalColour) -> TrafficStep:
+        count = len(colours)
+        places = np.tile((1.0, 2.0, 3.0), (count, 1))
+        signals = SignalState(("C",) * count, ("w_0", "e_0")[:count], places, np.zeros(count), np.ones(count), colours)
+        plain = step(index)
+        return replace(plain, traffic=replace(plain.traffic, signals=signals))
+
+    recorder, red, green = EventRecorder(tmp_path / "events.parquet"), SignalColour.RED, SignalColour.GREEN
+    for one in (showing(2, red), showing(3, red, green), showing(4, green, green), showing(5), showing(6, green)):
+        recorder.record(one)
+    recorder.close(complete=True)
+    told = [(row[0], row[2], row[3], row[4], row[6:9]) for row in rows(tmp_path / "events.parquet")]
+    at = (1.0, 2.0, 3.0)
+    assert [row for row in told if row[1] == "signal_shows"] == [
+        (2, "signal_shows", "C", "w_0: red", at),
+        (3, "signal_shows", "C", "e_0: green", at),
+        (4, "signal_shows", "C", "w_0: green", at),
+    ]

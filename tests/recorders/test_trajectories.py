@@ -11,7 +11,7 @@ import pytest
 from fogsim.recorders import TrajectoryRecorder, recover_run, trajectories, with_trajectories
 from fogsim.recorders.run_directory import TRAJECTORY_LOG
 from fogsim.recorders.trajectories import TRAJECTORY_COLUMNS
-from fogsim.values import Step
+from fogsim.values import PersonState, Step
 from tests.recorders.synthetic import drive
 
 STEPS = 12
@@ -51,6 +51,23 @@ def test_the_fog_at_each_vehicle_is_told_as_visibility(tmp_path: Path) -> None:
     truth = dataclasses.replace(step.truth, vehicle_extinctions=np.array([math.log(20.0) / 50.0, 0.0]))
     list(with_trajectories([unknown, dataclasses.replace(step, truth=truth)], path))
     assert [row["visibility"] for row in rows(path)] == [None, None, pytest.approx(50.0), None]
+
+
+def test_persons_on_foot_are_rows_too(tmp_path: Path) -> None:
+    path = tmp_path / "trajectories.parquet"
+    step = next(iter(drive(1)))
+    persons = PersonState(
+        ("anna",), np.array([[1.0, 2.0, 3.0]]), np.zeros(1), np.array([1.4]), ("way_0",), np.array([True])
+    )
+    list(
+        with_trajectories([dataclasses.replace(step, traffic=dataclasses.replace(step.traffic, persons=persons))], path)
+    )
+    *vehicles, walker = rows(path)
+    assert [row["vehicle_type"] for row in vehicles] == list(step.traffic.types)
+    assert (walker["vehicle_id"], walker["vehicle_type"], walker["vehicle_lane"]) == ("anna", "pedestrian", "way_0")
+    assert (walker["vehicle_x"], walker["vehicle_y"], walker["vehicle_z"]) == (1.0, 2.0, 3.0)
+    assert (walker["vehicle_speed"], walker["vehicle_angle"]) == (1.4, 90.0)
+    assert walker["vehicle_acceleration"] is walker["vehicle_slope"] is walker["visibility"] is None
 
 
 def test_a_step_that_shows_again_what_was_last_seen_adds_nothing(tmp_path: Path) -> None:

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.units import luminance_of
-from fogsim.values.light import SIGNAL_DIAMETER, SIGNAL_INTENSITY, Lamp, SignalLight
+from fogsim.values.light import SIGNAL_COLOURS, SIGNAL_DIAMETER, SIGNAL_INTENSITY, Lamp, SignalLight
 from fogsim.values.scene import Surface
 
 SKY_TINT = (0.988, 1.0, 1.035)
 """Colour of the overcast sky, of luminance 1."""
 
 _RED, _AMBER, _WHITE = (1.0, 0.03, 0.015), (1.0, 0.36, 0.015), (1.0, 0.97, 0.90)
-_WARM, _GREEN = (1.0, 0.86, 0.66), (0.0, 1.0, 0.26)
+_WARM = (1.0, 0.86, 0.66)
 _LENS = SIGNAL_INTENSITY / (math.pi / 4.0 * SIGNAL_DIAMETER**2)
 _BEAMS = Lamp.LOW_BEAM | Lamp.HIGH_BEAM | Lamp.DAYTIME
 
@@ -30,9 +30,9 @@ LAMPS: Mapping[Surface, tuple[Lamp | SignalLight, float, tuple[float, float, flo
     Surface.LAMP_INDICATOR_RIGHT: (Lamp.INDICATOR_RIGHT, 15e3, _AMBER),
     Surface.LAMP_HEAD: (_BEAMS, 30e3, _WHITE),
     Surface.LAMP_STREET: (Lamp.NONE, 30e3, _WARM),
-    Surface.LENS_RED: (SignalLight.RED, _LENS, _RED),
-    Surface.LENS_YELLOW: (SignalLight.YELLOW, _LENS, _AMBER),
-    Surface.LENS_GREEN: (SignalLight.GREEN, _LENS, _GREEN),
+    Surface.LENS_RED: (SignalLight.RED, _LENS, SIGNAL_COLOURS[SignalLight.RED]),
+    Surface.LENS_YELLOW: (SignalLight.YELLOW, _LENS, SIGNAL_COLOURS[SignalLight.YELLOW]),
+    Surface.LENS_GREEN: (SignalLight.GREEN, _LENS, SIGNAL_COLOURS[SignalLight.GREEN]),
 }
 """Lamps that light a surface, its luminance then [cd/m²] and its colour.
 

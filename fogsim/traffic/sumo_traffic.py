@@ -305,6 +305,7 @@ class SumoTraffic:
             run.roster.check_count()
         self._teleported |= self._setup.ego in run.roster.teleported
         run.lanes.update()
+        run.persons.look()
 
     @_translates_errors
     def observe(self) -> TrafficSnapshot | None:

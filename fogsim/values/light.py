@@ -1,5 +1,6 @@
 """Light that is not daylight: lamps of a vehicle, beams of head lamps, and lamps that are seen from afar."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntFlag
 
@@ -30,6 +31,13 @@ class SignalLight(IntFlag):
     YELLOW = 1024
     GREEN = 2048
 
+
+SIGNAL_COLOURS: Mapping[SignalLight, tuple[float, float, float]] = {
+    SignalLight.RED: (1.0, 0.01, 0.005),
+    SignalLight.YELLOW: (1.0, 0.36, 0.015),
+    SignalLight.GREEN: (0.0, 1.0, 0.26),
+}
+"""Linear colours of the lenses' light; those of EN 12368 are purer than screens can show."""
 
 SIGNAL_INTENSITY = 200.0
 """Luminous intensity of a traffic light's lens of 200 mm toward those for whom it is meant, by day and night [cd].

@@ -1,6 +1,7 @@
 """Persons on foot as batches of legs, trunks and heads, clothed by their ids."""
 
 import hashlib
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -45,15 +46,19 @@ def person_batches(persons: PersonState) -> tuple[Batch, ...]:
     if not persons.ids:
         return ()
     looks = np.array([_look(person) for person in persons.ids])
-    size, jacket, trousers, skin = looks[:, :3], looks[:, 3:6], looks[:, 6:9], looks[:, 9:12]
-    place = persons.position.copy()
-    place[:, 2] += KERB * persons.raised
-    pose = _poses(persons, size[:, 2], looks[:, 12])
-    parts = [_batch(HEAD, place, persons.heading, size, skin)]
-    for number in np.unique(pose).tolist():
-        own = pose == number
+    pose = _poses(persons, looks[:, 2], looks[:, 12])
+    # Who is in the same pose stands together, so that all are placed at once.
+    order = np.argsort(pose, kind="stable")
+    place, looks, pose = persons.position[order], looks[order], pose[order]
+    place[:, 2] += KERB * persons.raised[order]
+    everybody = placed(HEAD, place, persons.heading[order], looks[:, :3], instance=Instance.PERSON)
+    jacket, trousers, skin = looks[:, 3:12].astype(np.float32).reshape(-1, 3, 3).transpose(1, 0, 2)
+    ends = [0, *(np.flatnonzero(np.diff(pose)) + 1).tolist(), len(pose)]
+    parts = [replace(everybody, paint=skin)]
+    for own in map(slice, ends[:-1], ends[1:]):
         for shape, paint in ((TRUNK, jacket), (LEGS, trousers)):
-            parts.append(_batch(f"{shape}_{number}", place[own], persons.heading[own], size[own], paint[own]))
+            standing = everybody.transforms[own], paint[own], everybody.lamps[own], everybody.instance[own]
+            parts.append(Batch(f"{shape}_{pose[own.start]}", *standing))
     return tuple(parts)
 
 
@@ -62,17 +67,6 @@ def _poses(persons: PersonState, height: NDArray[np.float64], chance: NDArray[np
     gone = persons.position[:, 0] * np.cos(persons.heading) + persons.position[:, 1] * np.sin(persons.heading)
     phase = np.floor((gone / (STRIDE * height) + chance) * POSES).astype(np.int64) % POSES
     return np.where(persons.speed > SLOWEST_STRIDE, phase, STANDING)
-
-
-def _batch(
-    shape: str,
-    place: NDArray[np.float64],
-    heading: NDArray[np.float64],
-    size: NDArray[np.float64],
-    paint: NDArray[np.float64],
-) -> Batch:
-    copies = placed(shape, place, heading, size, instance=Instance.PERSON)
-    return Batch(shape, copies.transforms, paint.astype(np.float32), copies.lamps, copies.instance)
 
 
 @lru_cache(maxsize=65536)

@@ -10,7 +10,7 @@ from fogsim.scene.roadside import placed
 from fogsim.scene.solids import Material, box, disc, merge, mesh
 from fogsim.scene.town.rods import rod
 from fogsim.units import luminance_of
-from fogsim.values.light import SIGNAL_DIAMETER, SIGNAL_INTENSITY, LightSources, SignalLight
+from fogsim.values.light import SIGNAL_COLOURS, SIGNAL_DIAMETER, SIGNAL_INTENSITY, LightSources, SignalLight
 from fogsim.values.road import SignalHead
 from fogsim.values.scene import FAR, MIDDLE, SPECK, TINY, Batch, Instance, Mesh, Surface
 from fogsim.values.traffic import SignalColour, SignalState
@@ -27,11 +27,11 @@ _IN_FRONT = 0.1  # of the light before the lens [m]
 _BLACK, _STEEL = Material((0.018, 0.018, 0.018)), Material((0.17, 0.175, 0.18))
 _RIM = Material((0.55, 0.55, 0.54))
 _LENSES = (
-    (SignalLight.RED, 1.0, Material((0.075, 0.008, 0.007), Surface.LENS_RED), (1.0, 0.03, 0.015)),
-    (SignalLight.YELLOW, 0.0, Material((0.080, 0.045, 0.006), Surface.LENS_YELLOW), (1.0, 0.36, 0.015)),
-    (SignalLight.GREEN, -1.0, Material((0.008, 0.055, 0.035), Surface.LENS_GREEN), (0.0, 1.0, 0.26)),
+    (SignalLight.RED, 1.0, Material((0.075, 0.008, 0.007), Surface.LENS_RED)),
+    (SignalLight.YELLOW, 0.0, Material((0.080, 0.045, 0.006), Surface.LENS_YELLOW)),
+    (SignalLight.GREEN, -1.0, Material((0.008, 0.055, 0.035), Surface.LENS_GREEN)),
 )
-"""Of each lens: its bit, its place in cells above the middle, its material while dark, and the colour of its light."""
+"""Of each lens: its bit, its place in cells above the middle, and its material while dark."""
 
 
 _BLINK = 1.0  # period of what blinks, which is lit in the first half [s]
@@ -64,7 +64,7 @@ def _head(sides: int, visors: bool) -> Mesh:
         box((0.10, -1.25, -high - 0.45), (0.14, 1.25, high + 0.45), _BLACK),
         box((0.15, -1.36, -high - 0.56), (0.17, 1.36, high + 0.56), _RIM),
     ]
-    for _, place, lens, _ in _LENSES:
+    for _, place, lens in _LENSES:
         centre = (-0.02, 0.0, place * _CELL)
         parts.append(disc(centre, 0.5, (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), lens, sides=sides))
         if visors:
@@ -165,7 +165,7 @@ def signal_light_sources(signals: SignalState, eye: NDArray[np.float64], time: f
     lights = _lit(signals, time)
     ahead = np.column_stack((np.cos(signals.heading), np.sin(signals.heading), np.zeros(len(signals.ids))))
     parts = []
-    for bit, place, _, colour in _LENSES:
+    for bit, place, _ in _LENSES:
         lit = np.flatnonzero(lights & int(bit))
         middle = signals.position[lit] - _IN_FRONT * ahead[lit]
         middle[:, 2] += place * _CELL * signals.diameter[lit]
@@ -174,6 +174,7 @@ def signal_light_sources(signals: SignalState, eye: NDArray[np.float64], time: f
         intensity = SIGNAL_INTENSITY * (signals.diameter[lit] / SIGNAL_DIAMETER) ** 2 * facing**4
         area = math.pi / 4.0 * signals.diameter[lit] ** 2 * facing
         seen = intensity > 1e-3
+        colour = SIGNAL_COLOURS[bit]
         tint = np.tile(np.array(colour) / luminance_of(colour), (int(seen.sum()), 1))
         parts.append((middle[seen], intensity[seen], tint, area[seen]))
     return LightSources(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))

@@ -1,5 +1,6 @@
 """Reading persons on foot: near the ego, or all."""
 
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -32,6 +33,7 @@ class PersonReader:
 
     def __init__(self, api: Api) -> None:
         self._allowed = getter(api, "lane", "getAllowed")
+        self._arrived = getter(api, "simulation", "getArrivedPersonIDList")
         names = ("getIDList", "getIDCount", "getPosition3D", "getAngle", "getSpeed", "getLaneID", "getVehicle")
         getters = [getter(api, "person", name) for name in names]
         self._all, self._count, self._position, self._angle, self._speed, self._lane, self._vehicle = getters
@@ -51,31 +53,36 @@ class PersonReader:
         """
         if not self._count():
             return NO_PERSONS
-        persons = self._listed(here, time)
+        persons = [person for person in self._candidates(here, time) if not self._vehicle(person)]
+        position = np.array([self._position(person) for person in persons]).reshape(-1, 3)
+        if here is not None:
+            is_near = np.hypot(position[:, 0] - here[0], position[:, 1] - here[1]) < REACH
+            persons, position = list(itertools.compress(persons, is_near.tolist())), position[is_near]
         if not persons:
             return NO_PERSONS
         lanes = tuple(self._lane(person) for person in persons)
         return PersonState(
             ids=tuple(persons),
-            position=np.array([self._position(person) for person in persons]),
+            position=position,
             heading=np.radians(90.0 - np.array([self._angle(person) for person in persons])),
             speed=np.array([self._speed(person) for person in persons]),
             lane=lanes,
             raised=np.array([self._is_footway(lane) for lane in lanes]),
         )
 
-    def _listed(self, here: NDArray[np.float64] | None, time: float) -> list[str]:
+    def look(self) -> None:
+        """Notice in each step who has arrived."""
+        if self._near and (gone := {*self._arrived()}):
+            self._near = [person for person in self._near if person not in gone]
+
+    def _candidates(self, here: NDArray[np.float64] | None, time: float) -> Sequence[str]:
+        """Persons who may be near."""
         if here is None:
-            return [person for person in sorted(self._all()) if not self._vehicle(person)]
+            return sorted(self._all())
         if not 0.0 <= time - self._asked < LOOK_PERIOD:
             self._asked = time
             self._near = [person for person in sorted(self._all()) if self._is_within(person, here, REACH + _MARGIN)]
-        there = {*self._all()} if self._near else ()
-        return [
-            person
-            for person in self._near
-            if person in there and not self._vehicle(person) and self._is_within(person, here, REACH)
-        ]
+        return self._near
 
     def _is_within(self, person: str, here: NDArray[np.float64], reach: float) -> bool:
         x, y, _ = self._position(person)

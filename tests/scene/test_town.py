@@ -13,6 +13,7 @@ from fogsim.scene import build_scene, light_sources
 from fogsim.scene.road import KERB
 from fogsim.scene.town import person_batches, person_shapes, signal_batches, signal_posts, signal_shapes
 from fogsim.scene.town.figures import STANDING
+from fogsim.scene.town.traffic_lights import directed_share
 from fogsim.traffic.road.network import read_net, road_network
 from fogsim.units import luminance_of
 from fogsim.values import (
@@ -77,6 +78,13 @@ def test_lit_lenses_shine_200_cd_toward_those_who_approach_and_none_back() -> No
     assert seen.position[0, 2] == pytest.approx(3.3)
     assert seen.position[1, 2] == pytest.approx(2.7)
     assert len(light_sources(none, None, (300.0, 0.0, 3.0), {}).intensity) == 0
+
+
+def test_light_beside_and_below_the_axis_is_as_in_the_published_example() -> None:
+    # ITE: 475 cd straight ahead are 0.953 · 0.678 of that, 309 cd, at 5 degrees down and 10 degrees left.
+    share = directed_share(np.radians([10.0, 0.0, 120.0]), np.radians([5.0, 0.0, 0.0]))
+    assert 475.0 * share[0] == pytest.approx(309.0, abs=3.0)
+    assert share[1:].tolist() == [1.0, 0.0]
 
 
 def test_large_lenses_are_as_luminous_as_small_ones_and_so_is_their_surface() -> None:

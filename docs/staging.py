@@ -5,7 +5,7 @@ the scenario's camera sensor exposes it.
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 
@@ -18,7 +18,18 @@ from fogsim.camera import mounted_pose
 from fogsim.ego.view_rendering import ViewRenderer
 from fogsim.scenario import Scenario, build
 from fogsim.traffic.road.network import read_net, road_network
-from fogsim.values import CameraPose, Lamp, Lane, LaneMarking, RoadNetwork, Sign, SignMap, TrafficState
+from fogsim.values import (
+    CameraPose,
+    Lamp,
+    Lane,
+    LaneMarking,
+    RoadNetwork,
+    Sign,
+    SignalColour,
+    SignalState,
+    SignMap,
+    TrafficState,
+)
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 PICTURES = CHECKOUT / "docs" / "pictures"
@@ -150,7 +161,7 @@ def scenario(settings: tuple[str, ...], renderer: str, size: tuple[int, int]) ->
 def photograph(shot: Shot, renderer: str = "cpu", size: tuple[int, int] = (480, 360)) -> Taken:
     """Take a picture."""
     described, roads = scenario(shot.settings, renderer, size), network(shot.place)
-    state = traffic(roads.route, shot)
+    state = replace(traffic(roads.route, shot), signals=traffic_lights(roads))
     camera, setback = build.camera(described), build.camera_mount(described).setback
     pose = mounted_pose(camera, state.position[0], float(state.heading[0]), setback)
     view_renderer = ViewRenderer(described, roads, signs(roads.route, shot))
@@ -185,6 +196,21 @@ def traffic(route: NDArray[np.float64], shot: Shot) -> TrafficState:
         lane=("",) * n,
         lamps=np.array([int(one.lamps) for one in everyone], np.int32),
         paint=np.array([PAINTS[number % len(PAINTS)] for number in range(n)]),
+    )
+
+
+def traffic_lights(roads: RoadNetwork) -> SignalState:
+    """Traffic lights: green for those who drive east or west, red for the others."""
+    heads = roads.signal_heads
+    return SignalState(
+        ids=tuple(head.signal_id for head in heads),
+        lane=tuple(head.lane_id for head in heads),
+        position=np.array([head.position for head in heads]).reshape(-1, 3),
+        heading=np.array([head.heading for head in heads]),
+        diameter=np.array([head.diameter for head in heads]),
+        colour=tuple(
+            SignalColour.GREEN if abs(math.cos(head.heading)) > math.sqrt(0.5) else SignalColour.RED for head in heads
+        ),
     )
 
 

@@ -135,7 +135,7 @@ class SumoTraffic:
             script=script,
             actions=ScriptedActions(api, speeds, script.lamps, changes, session),
             session=session,
-            persons=PersonReader(api),
+            persons=PersonReader(api, self._link.shared),
         )
         self._signals = None
         self._seed = seed

@@ -27,6 +27,7 @@ from fogsim.dataset.encoding import png
 from fogsim.errors import InputError
 from fogsim.values import Camera, CameraPose, FogField, Sign, SignMap, Step, Truth, View
 from fogsim.values.pinhole import ray_from_pixel
+from fogsim.values.scene import Instance
 from tests.recorders.synthetic import make_step
 
 BANK = (
@@ -128,6 +129,16 @@ def test_each_sign_s_face_is_an_object_and_its_post_is_none() -> None:
     assert [r["instance"] for r in records] == [3, 4]  # after the two vehicles
     assert {r["category_id"] for r in records} == {SemanticClass.SIGN}
     assert (semantic_mask(step) == SemanticClass.SIGN).sum() == 4
+
+
+def test_traffic_lights_and_persons_have_classes_and_are_no_vehicles() -> None:
+    step = make_step(0)
+    shown = np.array([[Instance.TRAFFIC_LIGHT, Instance.PERSON, Instance.ROADSIDE, Instance.FIRST_VEHICLE]], np.int32)
+    seen = View(np.zeros((1, 4, 3), np.float32), np.ones((1, 4), np.float32), shown)
+    step = dataclasses.replace(step, view=seen)
+    expected = [SemanticClass.TRAFFIC_LIGHT, SemanticClass.PERSON, SemanticClass.ROADSIDE, SemanticClass.CAR]
+    assert semantic_mask(step).tolist() == [expected]
+    assert instance_mask(step).tolist() == [[0, 0, 0, 1]]
 
 
 def test_a_step_without_a_camera_has_no_known_transmission() -> None:

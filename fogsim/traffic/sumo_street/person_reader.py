@@ -29,9 +29,12 @@ class PersonReader:
     ----------
     api : Api
         The simulation.
+    shared : bool
+        Whether others may remove persons, of which SUMO says nothing: all are asked for each time.
     """
 
-    def __init__(self, api: Api) -> None:
+    def __init__(self, api: Api, shared: bool = False) -> None:
+        self._shared = shared
         self._allowed = getter(api, "lane", "getAllowed")
         self._arrived = getter(api, "simulation", "getArrivedPersonIDList")
         names = ("getIDList", "getIDCount", "getPosition3D", "getAngle", "getSpeed", "getLaneID", "getVehicle")
@@ -79,7 +82,7 @@ class PersonReader:
         """Persons who may be near."""
         if here is None:
             return sorted(self._all())
-        if not 0.0 <= time - self._asked < LOOK_PERIOD:
+        if self._shared or not 0.0 <= time - self._asked < LOOK_PERIOD:
             self._asked = time
             self._near = [person for person in sorted(self._all()) if self._is_within(person, here, REACH + _MARGIN)]
         return self._near

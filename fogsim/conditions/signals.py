@@ -5,8 +5,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeVar
 
-import numpy as np
-
 from fogsim.conditions.moment import Moment
 from fogsim.conditions.route_places import Extent, gap_between, headway_between, time_to_meet
 from fogsim.conditions.signal import Kind, LanePlace, Need, Place, Signal
@@ -153,7 +151,7 @@ def _straight_distance(moment: Moment, one: str, other: str) -> float | None:
     if first is None or second is None:
         return None
     position = moment.step.traffic.position
-    return float(np.linalg.norm(position[second] - position[first]))
+    return math.dist(position[second], position[first])
 
 
 def _is_in_bank(moment: Moment, number: str, vehicle: str = "ego") -> bool | None:

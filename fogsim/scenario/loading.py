@@ -363,10 +363,12 @@ def _unnamed_files(document: Document, data: dict[str, Any]) -> list[str]:
     if data.get("road") is not None:
         return []
     if "traffic" not in data:
+        # A key whose name is misspelt is told as such, and not as missing.
+        if any(nearest(key, Scenario.model_fields) == "traffic" for key in data):
+            return []
         return [f"{document.where(('traffic',))}: traffic: this key is missing; {_TRAFFIC}"]
     if not isinstance(traffic, dict):
         return []
-    # A key whose name is misspelt is told as such, and not as missing.
     meant = {nearest(key, Traffic.model_fields): value for key, value in traffic.items()}
     if meant.get("config") is not None:
         return []

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.linear_algebra import matrix_product
 from fogsim.values import SignalHead
 from fogsim.values.light import SIGNAL_DIAMETER
 
@@ -42,7 +43,7 @@ def signal_heads(lanes: Sequence[Any], side: float) -> Iterator[SignalHead]:
     for number, (lane, signal, links) in enumerate(heads):
         end = np.array(lane.getShape3D()[-1], np.float64)
         # Lanes of an edge end on a line across it, and arms reach along that.
-        place = post if number == 0 else post + across * float((end - post) @ across)
+        place = post if number == 0 else post + across * float(matrix_product(end - post, across))
         height = ARM_HEIGHT if number else POST_HEIGHT
         is_large = number > 0 or float(lane.getSpeed()) > FAST
         yield SignalHead(

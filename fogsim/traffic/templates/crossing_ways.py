@@ -35,7 +35,7 @@ class CrossingWay:
     def line(self) -> Points:
         """Its middle (n, 3) [m]: a Bézier curve that leaves and arrives in the lanes' directions."""
         one, other = self.source.lane(self.link.from_lane)[-1], self.target.lane(self.link.to_lane)[0]
-        apart = float(np.linalg.norm(other - one))
+        apart = math.dist(other, one)
         if apart < 0.5:
             return np.stack([one, other])
         return curve(one, self.source.axis.headings[-1], other, self.target.axis.headings[0])
@@ -129,7 +129,7 @@ def curve(one: Points, heading: float, other: Points, last_heading: float) -> Po
     """
     turn = abs(_turned(last_heading - heading))
     # Handles that make a quarter of a circle of a quarter turn: 4/3 tan(θ/4) of the radius.
-    reach = float(np.linalg.norm(other - one)) * (2.0 / 3.0 / (1.0 + math.cos(0.5 * turn)))
+    reach = math.dist(other, one) * (2.0 / 3.0 / (1.0 + math.cos(0.5 * turn)))
     handles = [one + reach * _direction(heading), other - reach * _direction(last_heading)]
     handles[0][2], handles[1][2] = (2 * one[2] + other[2]) / 3, (one[2] + 2 * other[2]) / 3
     t = np.linspace(0.0, 1.0, _CURVE_POINTS)[:, None]

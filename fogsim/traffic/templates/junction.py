@@ -99,7 +99,7 @@ class Junction:
         for end, following in zip(ends, [*ends[1:], ends[0]], strict=True):
             points += [end.right, end.left]
             are_one_arm = math.cos(end.inward - following.inward) > _ONE_ARM
-            if not are_one_arm and np.linalg.norm(following.right - end.left) > _SHORT:
+            if not are_one_arm and math.dist(following.right, end.left) > _SHORT:
                 points += list(curve(end.left, end.inward, following.right, following.inward + math.pi)[1:-1])
         return np.array(points)
 

@@ -1,12 +1,12 @@
 """Networks that FogSim writes beside what SUMO's own netconvert makes of the same nodes, edges and connections."""
 
-import shutil
 import subprocess
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
+import sumo
 
 from fogsim.traffic.templates import ROAD_TEMPLATES, net_text
 from fogsim.traffic.templates.alignment import Points
@@ -25,8 +25,7 @@ PLANS = {
 
 def converted(plan: NetPlan, folder: Path) -> ET.Element:
     """What netconvert makes of a plan."""
-    netconvert = shutil.which("netconvert")
-    assert netconvert is not None
+    netconvert = Path(sumo.SUMO_HOME) / "bin" / "netconvert"
     kinds = {True: "traffic_light", False: "priority"}
     nodes = [
         f'<node id="{node.name}" x="{x:.3f}" y="{y:.3f}" z="{z:.3f}" type="{kinds[node.has_signals]}" radius="4"/>'

@@ -187,10 +187,29 @@ class Document:
         return replace(self, origins=origins)
 
 
-def read_document(path: Path) -> Document:
-    """Read a YAML file, or an OpenSCENARIO file (``.xosc``) as the same data.
+def read_scenario_document(path: Path) -> Document:
+    """Read a scenario's YAML file, or an OpenSCENARIO file (``.xosc``) as the same data.
 
     A YAML file with ``scenario: FILE.xosc`` has what stands there, and beside it, or in its place, its own.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        As of `read_document`, or if the OpenSCENARIO file does not fit.
+    """
+    if is_openscenario(path):
+        return _read_openscenario(path)
+    document = read_document(path)
+    return _upon_openscenario(document) if _FOREIGN in document.data else document
+
+
+def read_document(path: Path) -> Document:
+    """Read a YAML file.
 
     Parameters
     ----------
@@ -203,8 +222,6 @@ def read_document(path: Path) -> Document:
         If it cannot be read, is no regular file of UTF-8 text, is too large (see `plain_yaml`), is no YAML, has a key
         twice, or is no mapping.
     """
-    if is_openscenario(path):
-        return _read_openscenario(path)
     try:
         data, lines = parse_yaml(_text(path))
     except PlainYamlError as error:
@@ -212,8 +229,7 @@ def read_document(path: Path) -> Document:
         raise InputError(f"{where}: not valid YAML: {error.problem}") from error
     if not isinstance(data, dict):
         raise InputError(f"{path}: expected a mapping of keys to values, got {type(data).__name__}")
-    document = Document(path, data, {key: f"{path}:{line}" for key, line in lines.items()})
-    return _upon_openscenario(document) if _FOREIGN in data else document
+    return Document(path, data, {key: f"{path}:{line}" for key, line in lines.items()})
 
 
 def _read_openscenario(path: Path) -> Document:

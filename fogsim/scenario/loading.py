@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from fogsim.errors import InputError, UnknownNameError, nearest, shown, suggest
-from fogsim.scenario.document import Document, apply_overrides, read_document
+from fogsim.scenario.document import Document, apply_overrides, read_scenario_document
 from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.roads.files import DemandError, traffic_files
@@ -117,7 +117,7 @@ def load_scenario(
         If anything does not fit; one line for each mistake, with file, line, key path, value and what is allowed.
     """
     path = scenario_file(name_or_path)
-    return _checked(read_document(path), overrides, path.parent, closed_demand=not others_add_vehicles)
+    return _checked(read_scenario_document(path), overrides, path.parent, closed_demand=not others_add_vehicles)
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +161,7 @@ def load_cases(
         As of `load_scenario`, with the first case in which something does not fit; or if there is no such case.
     """
     path = scenario_file(name_or_path)
-    document = _overridden(read_document(path), overrides)
+    document = _overridden(read_scenario_document(path), overrides)
     variation = read_variation(document)
     checked: dict[str, Scenario] = {}
     cases = []

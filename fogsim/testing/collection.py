@@ -8,7 +8,7 @@ from pathlib import Path
 
 from fogsim.errors import InputError
 from fogsim.scenario import build, resolved
-from fogsim.scenario.document import read_document
+from fogsim.scenario.document import read_scenario_document
 from fogsim.scenario.loading import SCENARIO_FILE, ScenarioCases, load_cases, scenario_file
 from fogsim.scenario.variation import NONE_FAILS, Verdict
 from fogsim.study.plan import StudyRun, file_digests
@@ -71,7 +71,7 @@ def find_files(names: Iterable[str | Path]) -> list[Path]:
 def _in_folder(folder: Path) -> Iterator[Path]:
     files = {*folder.rglob(PATTERN), *folder.rglob(SCENARIO_FILE)}
     for file in sorted(one for one in files if one.is_file() and not _is_hidden(one.relative_to(folder))):
-        if file.name != SCENARIO_FILE or EXPECT in read_document(file).data:
+        if file.name != SCENARIO_FILE or EXPECT in read_scenario_document(file).data:
             yield file
 
 

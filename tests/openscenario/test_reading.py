@@ -10,7 +10,7 @@ import pytest
 
 from fogsim.errors import InputError, LeftOutWarning
 from fogsim.openscenario import read_openscenario
-from fogsim.scenario.document import read_document
+from fogsim.scenario.document import read_scenario_document
 from fogsim.scenario.loading import load_scenario
 
 DATA = Path(__file__).parents[1] / "data" / "openscenario"
@@ -140,5 +140,5 @@ def test_a_yaml_file_lays_expectations_upon_it(tmp_path: Path) -> None:
         "stop",
         "late",
     ]
-    assert read_document(file).where(("timeline", 6)).endswith("test.fog.yaml:6")
-    assert read_document(file).where(("timeline", 1)).endswith("cut_in_in_fog.xosc:59")
+    assert read_scenario_document(file).where(("timeline", 6)).endswith("test.fog.yaml:6")
+    assert read_scenario_document(file).where(("timeline", 1)).endswith("cut_in_in_fog.xosc:59")

@@ -163,6 +163,7 @@ class _Reader:
         if not timeline[0]:
             lines = {("timeline", int(place) - 1): line for (_, place), line in lines.items()}
         data |= _ending(stop, data["timeline"])
+        data["expect"] = {block["name"]: {"happened": block["name"]} for _, block in entries}
         files = write_generated(
             "openscenario", {"road.net.xml": net, "road.rou.xml": vehicles_text(self.vehicles, begin, self.lanes)}
         )

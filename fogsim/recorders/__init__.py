@@ -6,6 +6,7 @@ from fogsim.files.atomic import write_json
 from fogsim.recorders.events import EventRecorder
 from fogsim.recorders.frame_panel import FramePanel
 from fogsim.recorders.manifest import Manifest, Status, versions
+from fogsim.recorders.openscenario import OpenScenarioRecorder
 from fogsim.recorders.protocol import (
     DERIVED_QUANTITIES,
     AnyStep_contra,
@@ -40,6 +41,7 @@ RECORDERS: Registry[RecorderFactory] = Registry(
         "report": ReportRecorder,
         "trajectories": lambda run: TrajectoryRecorder(run.directory.trajectories),
         "events": lambda run: EventRecorder(run.directory.events),
+        "openscenario": lambda run: OpenScenarioRecorder(run.directory.openscenario, run.title),
     },
 )
 """Every recorder of runs about an ego, by name."""
@@ -51,6 +53,7 @@ TRAFFIC_RECORDERS: Registry[TrafficRecorderFactory] = Registry(
         "report": TrafficReportRecorder,
         "trajectories": lambda run: TrajectoryRecorder(run.directory.trajectories),
         "events": lambda run: EventRecorder(run.directory.events),
+        "openscenario": lambda run: OpenScenarioRecorder(run.directory.openscenario, run.title),
     },
 )
 """Every recorder of runs without an ego, by name."""

@@ -35,6 +35,7 @@ _NAMES = {
     "table": "steps.parquet",
     "trajectories": "trajectories.parquet",
     "events": "events.parquet",
+    "openscenario": "scenario.xosc",
     "video": "video.mp4",
     "report": "report.html",
 }
@@ -228,6 +229,11 @@ class RunDirectory:
     def events(self) -> Path:
         """One row an event."""
         return self.unfinished / _NAMES["events"]
+
+    @property
+    def openscenario(self) -> Path:
+        """The run as an OpenSCENARIO file."""
+        return self.unfinished / _NAMES["openscenario"]
 
     @property
     def video(self) -> Path:

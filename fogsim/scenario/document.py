@@ -255,7 +255,8 @@ def _upon_openscenario(document: Document) -> Document:
                 origins[(block, first + place, *rest)] = origin
             case _:
                 origins[key] = origin
-    data = _laid_upon(below.data, own)
+    # What a file asks for by itself is that its events come; a test says what it asks for.
+    data = _laid_upon({**below.data, "expect": {}}, own)
     data[_TIMELINE] = [*below.data[_TIMELINE], *further] if isinstance(further, list) else further
     return Document(document.path, data, origins)
 

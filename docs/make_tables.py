@@ -18,6 +18,11 @@ from fogsim.estimators import ESTIMATORS
 from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.metrics import RunMetrics
+from fogsim.openscenario.actions import ACTIONS, LAMPS
+from fogsim.openscenario.entities import CLASSES
+from fogsim.openscenario.findings import ATTRIBUTES_PASSED_OVER, PASSED_OVER
+from fogsim.openscenario.positions import POSITIONS
+from fogsim.openscenario.triggers import CONDITIONS
 from fogsim.parameters import accepted_parameters, mismatch
 from fogsim.recorders.events import EVENT_COLUMNS
 from fogsim.recorders.table_columns import Column, table_columns, traffic_table_columns
@@ -216,6 +221,20 @@ def compliances() -> list[tuple[str, ...]]:
     return [(f"`{name}`", *(f"{value:g}" for value in astuple(how))) for name, how in COMPLIANCES.items()]
 
 
+def openscenario_elements() -> list[tuple[str, ...]]:
+    """Elements of OpenSCENARIO files that are read."""
+    kinds = {f"vehicleCategory {kind}": f"SUMO's class `{name}`." for kind, name in CLASSES.items()}
+    lamps = {f"vehicleLightType {kind}": ", ".join(f"`{one}`" for one in named) for kind, named in LAMPS.items()}
+    tables = (POSITIONS, ACTIONS, CONDITIONS, kinds, lamps)
+    return [(f"`{element}`", told) for table in tables for element, told in table.items()]
+
+
+def openscenario_passed_over() -> list[tuple[str, ...]]:
+    """Elements and attributes of OpenSCENARIO files that change nothing."""
+    attributes = [(f"`{name}`", "attribute") for name in sorted(ATTRIBUTES_PASSED_OVER)]
+    return [*((f"`{name}`", told) for name, told in PASSED_OVER.items()), *attributes]
+
+
 TABLES = {
     "drivers.md": {
         "speeds": (("name", "speed in fog"), speed_choices),
@@ -230,6 +249,10 @@ TABLES = {
         "signs": (("kind", "code", "meaning"), signs),
         "keys": (("key", "default", "allowed", "meaning"), scenario_keys),
         "parameters": (("method", "parameter", "default", "allowed", "meaning"), parameters),
+    },
+    "openscenario.md": {
+        "supported": (("element", "what becomes of it"), openscenario_elements),
+        "passed_over": (("element", "what it is"), openscenario_passed_over),
     },
     "tests.md": {
         "signals": (("signal", "unit or kind", "meaning", "needs"), signals),

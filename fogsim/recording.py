@@ -103,7 +103,7 @@ def record_run(
     overwrite : bool
         True to replace the results that are there, once the run is over; files that are not FogSim's stay.
     recorders : iterable of str
-        Which of `RECORDERS` write, each at most once; by default all but ``trajectories`` and ``events``.
+        Which of `RECORDERS` write, each at most once; by default those of `USUAL_RECORDERS`.
     command_line : sequence of str
         Program and arguments of the command that started it, for the manifest; empty if none did.
     watch : callable
@@ -177,8 +177,7 @@ def record_traffic(
     overwrite : bool
         As of `record_run`.
     recorders : iterable of str
-        Which of `TRAFFIC_RECORDERS` write, each at most once; by default all but ``trajectories`` and
-        ``events``.
+        Which of `TRAFFIC_RECORDERS` write, each at most once; by default `USUAL_TRAFFIC_RECORDERS`.
     command_line : sequence of str
         As of `record_run`.
     watch : callable

@@ -1,5 +1,6 @@
 """Actions as blocks of FogSim's timeline."""
 
+import inspect
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -128,6 +129,7 @@ class Actions:
                 effect.add("light", illuminance_lx=round(illuminance, 1))
 
     def _speed(self, action: Node, actor: str, effect: Effect) -> None:
+        """`speed`: absolute, or relative to a vehicle at that moment; by time or rate."""
         dynamics, target = action.one("SpeedActionDynamics"), action.one("SpeedActionTarget")
         told = {} if target is None else self._target(target)
         if not told:
@@ -158,7 +160,7 @@ class Actions:
 
     def _pace(self, dynamics: Node, effect: Effect) -> dict[str, Any]:
         shape = SHAPES[self.findings.word(dynamics, "dynamicsShape", tuple(SHAPES))]
-        value = abs(self.findings.number(dynamics, "value", 0.0))
+        value = abs(self.findings.number(dynamics, "value", 0.0, is_finite=False))
         by = self.findings.word(dynamics, "dynamicsDimension", ("time", "rate", "distance"))
         dynamics.get("followingMode")
         if shape == "step" or value == 0.0 or math.isinf(value):
@@ -171,6 +173,7 @@ class Actions:
         return {"shape": shape, "over_s" if by == "time" else "rate_mps2": value}
 
     def _lane_change(self, action: Node, actor: str, effect: Effect) -> None:
+        """`change_lane`: absolute, or relative to a vehicle; by time."""
         dynamics, target = action.one("LaneChangeActionDynamics"), action.one("LaneChangeTarget")
         if self.findings.number(action, "targetLaneOffset", 0.0):
             self.findings.refuse(action, "targetLaneOffset: vehicles are in the middle of their lanes; write 0")
@@ -185,7 +188,7 @@ class Actions:
 
     def _duration(self, dynamics: Node) -> float:
         shape = self.findings.word(dynamics, "dynamicsShape", tuple(SHAPES))
-        value = abs(self.findings.number(dynamics, "value", 0.0))
+        value = abs(self.findings.number(dynamics, "value", 0.0, is_finite=False))
         by = self.findings.word(dynamics, "dynamicsDimension", ("time", "rate", "distance"))
         if shape == "step":
             return 0.0
@@ -212,6 +215,7 @@ class Actions:
         return {"to": found[0].index}
 
     def _lights(self, action: Node, actor: str, effect: Effect) -> None:
+        """`lamps`; a flashing lamp is an indicator, or on."""
         light, state = action.within("LightType", "VehicleLight"), action.one("LightState")
         if light is None or state is None:
             self.findings.refuse(action, "expected a LightType with a VehicleLight, and a LightState")
@@ -233,6 +237,7 @@ class Actions:
         effect.add(actor, lamps=dict.fromkeys(LAMPS[kind], "off" if mode == "off" else "on"))
 
     def _keep_distance(self, action: Node, actor: str, effect: Effect) -> None:
+        """`follow`, by `timeGap` with `freespace`."""
         headway = self.findings.number(action, "timeGap", 0.0)
         if not headway or self.findings.word(action, "freespace", ("true", "false")) != "true":
             self.findings.refuse(action, "a distance is kept by a timeGap with freespace=true")
@@ -251,5 +256,8 @@ _PRIVATE: Mapping[str, Callable[[Actions, Node, str, Effect], None]] = {
     "LongitudinalDistanceAction": Actions._keep_distance,
 }
 _CONTROL = ("ControllerAction", "ActivateControllerAction", "AssignControllerAction", "OverrideControllerValueAction")
-ACTIONS = ("EnvironmentAction", *_PRIVATE)
-"""Actions that are read."""
+ACTIONS: Mapping[str, str] = {
+    "EnvironmentAction": "`fog` and `light`.",
+    **{tag: inspect.getdoc(action) or "" for tag, action in _PRIVATE.items()},
+}
+"""Actions that are read, and what becomes of each."""

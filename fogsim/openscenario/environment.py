@@ -92,7 +92,7 @@ def environment_of(action: Node, catalogs: Catalogs, lanes: OpenDriveLanes) -> E
 
 
 def _visibility(fog: Node, findings: Findings) -> float:
-    visibility = findings.number(fog, "visualRange")
+    visibility = findings.number(fog, "visualRange", is_finite=False)
     if visibility < 1.0:
         findings.refuse(fog, f"visualRange: expected 1 m or more, got {visibility:g}")
         return math.inf

@@ -69,7 +69,7 @@ class Findings:
         _seen(node)
         self._add(self.left_out, f"{node.where}: {told}")
 
-    def number(self, node: Node, key: str, default: float | None = None) -> float:
+    def number(self, node: Node, key: str, default: float | None = None, *, is_finite: bool = True) -> float:
         """Number of an attribute; one that is none is noted.
 
         Parameters
@@ -80,6 +80,8 @@ class Findings:
             The attribute.
         default : float or None
             What stands for it where it is missing; None if it must be there.
+        is_finite : bool
+            Whether it must be finite.
         """
         text = node.get(key)
         if not text and default is not None:
@@ -88,7 +90,7 @@ class Findings:
             value = float(text)
         except ValueError:
             value = math.nan
-        if math.isnan(value):
+        if math.isnan(value) or (is_finite and math.isinf(value)):
             self._add(self.refused, f"{node.where}: expected a number for {key}, got {shown(text or 'nothing')}")
             return 0.0
         return value

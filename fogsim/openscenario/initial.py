@@ -55,8 +55,15 @@ def read_beginning(init: Node | None, vehicles: Mapping[str, Vehicle], actions: 
         for action in one.all("PrivateAction"):
             _take_private(action, one.get("entityRef"), begin, actions)
     for name, vehicle in vehicles.items():
-        if name not in begin.spots and not actions.findings.refused:
-            actions.findings.refuse(vehicle.node, f"{name} has no place: Init needs a TeleportAction of it")
+        if name not in begin.spots:
+            if not actions.findings.refused:
+                actions.findings.refuse(vehicle.node, f"{name} has no place: Init needs a TeleportAction of it")
+            continue
+        try:
+            actions.positions.lanes.along(begin.spots[name], vehicle.front)
+        except ValueError as error:
+            actions.findings.refuse(vehicle.node, f"the front bumper of {name} is not on the road: {error}")
+            del begin.spots[name]
     return begin
 
 

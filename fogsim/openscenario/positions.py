@@ -1,5 +1,6 @@
 """Where the positions of a file are on the lanes of the network."""
 
+import inspect
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -65,7 +66,7 @@ class Positions:
             return None
 
     def world(self, node: Node) -> Spot:
-        """``WorldPosition``."""
+        """The nearest lane that leads there (by `h`, where it stands); the vehicle is in the lane's middle."""
         x, y = self._numbers(node, "x", "y")
         heading = self.findings.number(node, "h") if "h" in node.attributes else None
         for key in ("z", "p", "r"):
@@ -74,31 +75,31 @@ class Positions:
         return self.lanes.at(x, y, heading)
 
     def lane(self, node: Node) -> Spot:
-        """``LanePosition``."""
+        """That lane at s."""
         self._no_offset(node)
         return self.lanes.on_lane(node.get("roadId"), node.get("laneId"), self.findings.number(node, "s"))
 
     def road(self, node: Node) -> Spot:
-        """``RoadPosition``."""
+        """The lane at s and t."""
         s, t = self._numbers(node, "s", "t")
         return self.lanes.at(*self.lanes.across(node.get("roadId"), s, t))
 
     def relative_lane(self, node: Node) -> Spot:
-        """``RelativeLanePosition``; distances along the lane and along the road's line are one here."""
+        """So many lanes to the left of an entity, and so far ahead along the lane."""
         self._no_offset(node)
         away = self.findings.number(node, "dsLane" if "dsLane" in node.attributes else "ds")
         beside = self.lanes.beside(self.entities[node.get("entityRef")], int(self.findings.number(node, "dLane")))
         return self.lanes.along(beside, away)
 
     def relative_world(self, node: Node) -> Spot:
-        """``RelativeWorldPosition``."""
+        """The lane that is so far from an entity, along x and y."""
         x, y, heading = self.entities[node.get("entityRef")].world
         dx, dy = self._numbers(node, "dx", "dy")
         node.get("dz")
         return self.lanes.at(x + dx, y + dy, heading)
 
     def relative_object(self, node: Node) -> Spot:
-        """``RelativeObjectPosition``."""
+        """The lane that is so far from an entity, along its own axes."""
         x, y, heading = self.entities[node.get("entityRef")].world
         dx, dy = self._numbers(node, "dx", "dy")
         node.get("dz")
@@ -123,5 +124,5 @@ _KINDS: Mapping[str, Callable[[Positions, Node], Spot]] = {
     "RelativeObjectPosition": Positions.relative_object,
 }
 
-POSITIONS = tuple(_KINDS)
-"""Kinds of positions that are read."""
+POSITIONS: Mapping[str, str] = {tag: inspect.getdoc(kind) or "" for tag, kind in _KINDS.items()}
+"""Kinds of positions that are read, and which place each is."""

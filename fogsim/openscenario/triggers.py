@@ -1,5 +1,6 @@
 """Triggers as conditions of FogSim's language."""
 
+import inspect
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -228,15 +229,18 @@ class Triggers:
         return _Test(f"{signal} {rule} {value:.9g} {unit}", signal, rule, f"{value:.9g} {unit}")
 
     def _speed(self, node: Node, name: str) -> _Test:
+        """`X.speed`."""
         if node.get("direction") not in ("", "longitudinal"):
             self.findings.refuse(node, "direction: speeds are read along the road")
         return self._compared(node, f"{self.called(name)}.speed", "m/s")
 
     def _acceleration(self, node: Node, name: str) -> _Test:
+        """`X.acceleration`."""
         node.get("direction")
         return self._compared(node, f"{self.called(name)}.acceleration", "m/s²")
 
     def _relative_speed(self, node: Node, name: str) -> _Test | None:
+        """`speed_difference(X, Y)`."""
         node.get("direction")
         other = node.get("entityRef")
         known = self._is_known(node, other)
@@ -247,11 +251,13 @@ class Triggers:
         )
 
     def _stands(self, node: Node, name: str) -> _Test:
+        """`X.speed < 0.1 m/s for` its duration."""
         duration = self.findings.number(node, "duration")
         still = f"{self.called(name)}.speed < {_STILL} m/s"
         return _Test(f"{still} for {duration:g} s" if duration > 0.0 else still)
 
     def _traveled(self, node: Node, name: str) -> _Test | None:
+        """`X.position`, from where the vehicle begins; it must begin on the ego's route."""
         return self._at_or_beyond(node, name, self.along(name))
 
     def _at_or_beyond(self, node: Node, name: str, begin: float | None) -> _Test | None:
@@ -263,6 +269,7 @@ class Triggers:
         return _Test(f"{signal} >= {value}", signal, ">=", value)
 
     def _relative_distance(self, node: Node, name: str) -> _Test | None:
+        """`gap(X, Y)`, ahead or behind, without `freespace` between rear axles; or straight: `distance(X, Y)`."""
         other, kind = node.get("entityRef"), node.get("relativeDistanceType")
         node.get("coordinateSystem")
         if not self._is_known(node, other):
@@ -291,6 +298,7 @@ class Triggers:
         return self.findings.word(node, "freespace", ("true", "false")) == "true"
 
     def _distance(self, node: Node, name: str) -> _Test | None:
+        """`X.position` about a position on the ego's route."""
         for key in ("alongRoute", "coordinateSystem", "relativeDistanceType", "freespace"):
             node.get(key)
         place = self._place_along(node)
@@ -304,6 +312,7 @@ class Triggers:
         return _Test(f"{signal} < {near:.3f} m or {signal} > {far:.3f} m")
 
     def _reaches(self, node: Node, name: str) -> _Test | None:
+        """`X.position` within the tolerance of a position on the ego's route."""
         place, around = self._place_along(node), self.findings.number(node, "tolerance")
         if place is None:
             return None
@@ -318,9 +327,11 @@ class Triggers:
         return place
 
     def _headway(self, node: Node, name: str) -> _Test | None:
+        """`headway(X, Y, LENGTH)`, without `freespace` from rear axle to rear axle; nothing unless Y is ahead."""
         return self._between(node, name, node.get("entityRef"), "headway")
 
     def _time_to_collision(self, node: Node, name: str) -> _Test | None:
+        """`ttc(X, Y, LENGTH)`, likewise; nothing unless they approach."""
         target = node.within("TimeToCollisionConditionTarget", "EntityRef")
         if target is None:
             self.findings.refuse(node, "times to collision are with an entity")
@@ -337,6 +348,7 @@ class Triggers:
         return self._compared(node, f"{signal}({self.called(name)}, {self.called(other)}, {further:g} m)", "s")
 
     def _collides(self, node: Node, name: str) -> _Test:
+        """`X.collision`, with anybody."""
         if node.children:
             self.findings.leave_out(node, "a collision with anybody counts")
         return _Test(f"{self.called(name)}.collision")
@@ -356,8 +368,13 @@ _TESTS: Mapping[str, Callable[[Triggers, Node, str], _Test | None]] = {
     "CollisionCondition": Triggers._collides,
 }
 
-CONDITIONS = ("SimulationTimeCondition", "StoryboardElementStateCondition", *_TESTS)
-"""Conditions that are read."""
+CONDITIONS: Mapping[str, str] = {
+    "SimulationTimeCondition": "`time`.",
+    "StoryboardElementStateCondition": "`happened(EVENT)`, for states of beginning, and of being over by the time that "
+    "the actions take.",
+    **{tag: inspect.getdoc(test) or "" for tag, test in _TESTS.items()},
+}
+"""Conditions that are read, and what becomes of each."""
 
 
 def at_time(time: float) -> Trigger:

@@ -60,6 +60,8 @@ def vehicles_text(vehicles: Mapping[str, Vehicle], begin: Beginning, lanes: Open
                 departLane=front.lane.index,
                 departPos=f"{front.position:.3f}",
                 departSpeed=f"{speed:.4f}",
+                # Where the file has it, however near to the next one.
+                insertionChecks="collision",
             ),
         ]
     return '<?xml version="1.0" encoding="UTF-8"?>\n<routes>\n' + "\n".join(lines) + "\n</routes>\n"

@@ -20,6 +20,7 @@ def test_every_registered_recorder_writes_its_file(tmp_path: Path) -> None:
             "events.parquet",
             "manifest.json",
             "report.html",
+            "scenario.xosc",
             "steps.parquet",
             "trajectories.parquet",
             "video.mp4",

@@ -65,6 +65,9 @@ def study_command(
     except KeyboardInterrupt:
         stdout.print("Interrupted; finished runs are kept, and the same command goes on.")
         raise typer.Exit(INTERRUPTED) from None
+    except OSError:
+        stdout.print("Finished runs are kept; the same command goes on once the disk takes files again.")
+        raise
     missing = [row for row in rows if row["status"] != "complete"]
     for row in missing[:10]:
         stdout.print(f"[yellow]run {row['run']} failed:[/] {escape(str(row['message']))}", soft_wrap=True)

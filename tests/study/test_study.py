@@ -10,7 +10,9 @@ from types import SimpleNamespace
 import pyarrow.parquet as pq
 import pytest
 from early_motorway import EARLY
+from typer.testing import CliRunner
 
+from fogsim.cli.app import app
 from fogsim.errors import InputError
 from fogsim.files.atomic import write_json
 from fogsim.scenario import build
@@ -134,6 +136,16 @@ def test_a_full_disk_costs_no_run_and_the_same_command_goes_on(tmp_path: Path, e
     # What was done before is not run again.
     assert len(engine.run_numbers) == len(set(engine.run_numbers)) + (ending == "0.json")
     assert pq.read_table(out / "study.parquet").column("status").to_pylist() == ["complete"] * 4
+
+
+def test_the_command_says_that_finished_runs_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("fogsim.study.run_study", refuse)
+    done = CliRunner().invoke(app, ["study", str(study_file(tmp_path)), "--out", str(tmp_path / "out"), "-j", "1"])
+    assert isinstance(done.exception, OSError)
+    assert "Finished runs are kept" in done.output
 
 
 class PlayedRuns:

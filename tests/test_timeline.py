@@ -13,7 +13,7 @@ from fogsim.errors import UnplayedWarning
 from fogsim.loop import ClosedLoop
 from fogsim.scenario import Scenario, load_scenario
 from fogsim.timeline import Timeline
-from fogsim.values import Command, Lamp, Reason, Step, TrafficState, TrafficStep, Truth
+from fogsim.values import Command, Ending, Lamp, Reason, Step, TrafficState, TrafficStep, Truth
 from fogsim.values.script import Begun, ChangeFog, ChangeLane, ChangeSpeed, Depart, Stop
 
 BLIND = (EARLY, "renderer=none", "estimators=[]", "traffic.events=[]")
@@ -194,3 +194,31 @@ def test_drivers_meet_the_fog_that_a_timeline_brings() -> None:
     before = dict(zip(first.traffic.ids, first.traffic.speed, strict=True))
     slower = [before[v] - s for v, s in zip(last.traffic.ids, last.traffic.speed, strict=True) if v in before]
     assert np.median(slower) > 5.0
+
+
+def test_speeds_and_lanes_as_others_have_them() -> None:
+    timeline = Timeline(
+        scenario(
+            "{when: time >= 0 s, do: {lead: {speed: {like: ego, factor: 1.5, plus: 3.6 km/h, rate: 2 m/s²}}}}",
+            "{when: time >= 0 s, do: {lead: {change_lane: {to_lane_of: ego, lanes: 1}}}}",
+        )
+    )
+    # Nobody is called ego in traffic alone: what refers to it waits.
+    assert names(timeline, step(0.0, speed=20.0, lead=100.0)) == [[]]
+    due = timeline.due(step(0.1, speed=20.0, lead=100.0, ego=0.0))
+    assert due.actions.traffic == (
+        ChangeSpeed("lead", 31.0, pytest.approx(5.5)),
+        ChangeLane("lead", 1, 60.0),
+    )
+
+
+def test_an_entry_that_does_nothing_remembers_and_a_condition_ends_the_run() -> None:
+    timeline = Timeline(
+        scenario("{name: past, when: time > 0.1 s, delay: 0.1 s, do: {}}", settings=("end_when=happened(past)",))
+    )
+    steps, endings = [step(0.1 * i, lead=100.0) for i in range(6)], []
+    for one in steps:
+        due = timeline.due(one)
+        begun = timeline.begun(due, ())
+        endings.append(timeline.ended(dataclasses.replace(one, begun=begun)))
+    assert endings == [None] * 3 + [Ending.END_CONDITION] * 3

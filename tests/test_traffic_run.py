@@ -38,6 +38,11 @@ def test_a_run_begins_after_its_warm_up_and_lasts_its_duration(steps: list[Traff
     assert [step.ending for step in steps] == [None] * 8 + [Ending.TIME]
 
 
+def test_a_run_ends_when_its_condition_holds() -> None:
+    run = list(fogsim.run_traffic(alone(EVEN, "end_when=time >= 1 s"), 3))
+    assert [step.ending for step in run] == [None, None, Ending.END_CONDITION]
+
+
 def test_everybody_hears_what_the_meters_let_the_adviser_say(steps: list[TrafficStep]) -> None:
     assert steps[0].truth.visibility == pytest.approx(60.0)
     assert math.isinf(steps[0].command.advice.speed)

@@ -157,7 +157,7 @@ def _leave_out_weather(weather: Node, findings: Findings) -> None:
         findings.leave_out(one, told.get(one.tag, "the sky is FogSim's"))
 
 
-def fog_block(environment: Environment, route: Any, heights: tuple[float, float] = (0.0, 0.0)) -> dict[str, Any]:
+def fog_block(environment: Environment, route: Any, lowest: float) -> dict[str, Any]:
     """The block ``fog`` of a scenario.
 
     Parameters
@@ -166,8 +166,8 @@ def fog_block(environment: Environment, route: Any, heights: tuple[float, float]
         What the file says at the beginning.
     route : (n, 2) float64
         Middle of the ego's way [m].
-    heights : tuple of float
-        Lowest point of the way [m], and of the map.
+    lowest : float
+        Height of its lowest point, from which heights of fog count [m].
     """
     visibility = math.inf if environment.visibility is None else environment.visibility
     box = environment.box
@@ -177,7 +177,7 @@ def fog_block(environment: Environment, route: Any, heights: tuple[float, float]
         {"start_m": begin, "end_m": end, "visibility_m": visibility, "edge_m": min(_EDGE, end - begin)}
         for begin, end in _stretches(np.asarray(route, dtype=np.float64), box)
     ]
-    low, high = (box.centre[2] + side * box.height - heights[0] for side in (-0.5, 0.5))
+    low, high = (box.centre[2] + side * box.height - lowest for side in (-0.5, 0.5))
     return {
         "outside_visibility_m": math.inf,
         "banks": banks,

@@ -176,13 +176,15 @@ class _Reader:
 
     def _data(self, ego: str, begin: Beginning, route: tuple[str, ...]) -> dict[str, Any]:
         header = self.root.one("FileHeader")
-        middle = [one.shape for edge in route for one in self.lanes.lanes if one.edge == edge and one.index == 0]
+        way = [one for edge in route for one in self.lanes.lanes if one.edge == edge and one.index == 0]
         light = begin.environment.illuminance
         return {
             "name": re.sub(r"[^A-Za-z0-9_.-]", "_", self.path.stem)[:100],
             "description": header.get("description") if header else "",
             "traffic": {"ego": ego, "keep_lane": list(self.vehicles), "stop_before_end_m": NEAR_THE_END},
-            "fog": fog_block(begin.environment, np.concatenate(middle)),
+            "fog": fog_block(
+                begin.environment, np.concatenate([one.shape for one in way]), min(one.lowest for one in way)
+            ),
             **({} if light is None else {"light": {"illuminance_lx": float(f"{light:.4g}")}}),
         }
 

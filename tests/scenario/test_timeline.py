@@ -31,6 +31,11 @@ def mistake(entry: str, *settings: str) -> str:
         ("{lead: {stop: {}}}", "do.lead.stop: say where: position_m or after_m"),
         ("{lead: {lamps: {stopp: off}}}", "do.lead.lamps.stopp: unknown key; did you mean 'stop'"),
         ("{lead: {follow: {headway: 1 s}}}", "do.lead.follow.vehicle: field required"),
+        ("{lead: {speed: {to_kmh: 3, like: ego}}}", "do.lead.speed: say which speed: to_kmh or like"),
+        ("{lead: {speed: {over: 3 s}}}", "do.lead.speed: say which speed: to_kmh or like"),
+        ("{lead: {change_lane: {to: 1, to_lane_of: ego}}}", "do.lead.change_lane: say where: lanes"),
+        ("{lead: {speed: {like: nobody}}}", "there is no vehicle 'nobody' in "),
+        ("{lead: {change_lane: {to_lane_of: nobody}}}", "there is no vehicle 'nobody' in "),
         ("{fog: {over: 3 s}}", "do.fog: say how thick: visibility_m or density"),
         ("{light: {illuminance: 100 lx}}", "do.light.illuminance_lx: input should be greater than or equal to 1000"),
         ("{signal.C: {state: purple}}", "do.signal.C.state"),
@@ -104,3 +109,15 @@ def test_what_is_written_comes_back_as_plain_data_that_loads_again() -> None:
     assert plain[0]["do"]["lead"] == [{"lamps": {"stop": "off"}}, {"lamps": {"all": "failed"}}]
     again = load_scenario("motorway_fog_bank", [*BLIND, f"timeline={plain!r}".replace("None", "null")])
     assert again.timeline == scenario.timeline
+
+
+def test_an_end_is_a_condition_that_the_run_can_tell() -> None:
+    scenario = load_scenario("motorway_fog_bank", [*BLIND, "end_when=ego.speed < 10 km/h"])
+    assert str(scenario.end_when) == "ego.speed < 10 km/h"
+    for written, told in (
+        ("ego.sped < 3 m/s", "unknown signal"),
+        ("happened(cut_in)", "end_when: happened(cut_in): unknown event 'cut_in'"),
+    ):
+        with pytest.raises(InputError, match="end_when: ") as error:
+            load_scenario("motorway_fog_bank", [*BLIND, f"end_when={written}"])
+        assert told in str(error.value)

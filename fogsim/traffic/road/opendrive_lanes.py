@@ -35,6 +35,8 @@ class RoadLane:
         Speed limit [m/s].
     shape : (n, 2) float64
         Its middle [m].
+    lowest : float
+        Height of its lowest point [m].
     origins : tuple of str
         OpenDRIVE's road and lane, ``road_lane``; several where they are one edge.
     """
@@ -45,6 +47,7 @@ class RoadLane:
     width: float
     limit: float
     shape: NDArray[np.float64]
+    lowest: float
     origins: tuple[str, ...]
 
 
@@ -285,7 +288,7 @@ def _lanes(root: ET.Element) -> Iterator[RoadLane]:
     for edge in root.iter("edge"):
         for lane in edge.iter("lane") if edge.get("function") is None else ():
             origins = next((p.get("value", "") for p in lane.iter("param") if p.get("key") == "origId"), "")
-            points = [tuple(map(float, point.split(",")[:2])) for point in lane.attrib["shape"].split()]
+            points = [tuple(map(float, point.split(","))) for point in lane.attrib["shape"].split()]
             length, width = float(lane.attrib["length"]), float(lane.get("width", "3.2"))
             yield RoadLane(
                 edge.attrib["id"],
@@ -293,7 +296,8 @@ def _lanes(root: ET.Element) -> Iterator[RoadLane]:
                 length,
                 width,
                 float(lane.attrib["speed"]),
-                np.array(points, dtype=np.float64),
+                np.array([point[:2] for point in points], dtype=np.float64),
+                min(math.fsum(point[2:]) for point in points),
                 tuple(origins.split()),
             )
 

@@ -138,3 +138,17 @@ def test_what_is_no_opendrive_file(tmp_path: Path) -> None:
     path.write_text("<OpenDRIVE", encoding="utf-8")
     with pytest.raises(InputError, match="not an OpenDRIVE file"):
         opendrive_signs(path)
+
+
+@pytest.mark.parametrize(("p_range", "scale"), [("arcLength", 1.0), ("normalized", 200.0)])
+def test_a_parametric_cubic(p_range: str, scale: float) -> None:
+    # u = p, v = 1e-3 p² - 2e-6 p³ of a parameter in metres, 30° off east.
+    b, c, d = scale, 1e-3 * scale**2, -2e-6 * scale**3
+    at = line(
+        f'<geometry s="0" x="5" y="7" hdg="{math.pi / 6}" length="200">'
+        f'<paramPoly3 pRange="{p_range}" aU="0" bU="{b}" cU="0" dU="0" aV="0" bV="0" cV="{c}" dV="{d}"/></geometry>'
+    ).at(100.0)
+    u, v = 100.0, 10.0 - 2.0
+    assert at[0] == pytest.approx(5 + u * math.cos(math.pi / 6) - v * math.sin(math.pi / 6))
+    assert at[1] == pytest.approx(7 + u * math.sin(math.pi / 6) + v * math.cos(math.pi / 6))
+    assert at[2] == pytest.approx(math.pi / 6 + math.atan(0.2 - 0.06))

@@ -1,0 +1,205 @@
+"""Triggers as conditions of FogSim's language, and what else of a file becomes what."""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fogsim.errors import InputError, LeftOutWarning
+from fogsim.openscenario import read_openscenario
+from fogsim.openscenario.parameters import evaluated
+from fogsim.scenario.loading import load_scenario
+
+DATA = Path(__file__).parents[1] / "data" / "openscenario"
+STAND_STILL = '<StandStillCondition duration="0.5"/>'
+
+pytestmark = pytest.mark.filterwarnings("ignore::fogsim.errors.LeftOutWarning")
+
+
+@pytest.fixture
+def read(tmp_path: Path) -> Callable[..., dict[str, Any]]:
+    """Data of the slow lead vehicle's file with some texts in place of others."""
+    shutil.copytree(DATA, tmp_path, dirs_exist_ok=True)
+
+    def reading(*texts: tuple[str, str]) -> dict[str, Any]:
+        text = (DATA / "slow_lead.xosc").read_text(encoding="utf-8")
+        for old, new in texts:
+            assert old in text, old
+            text = text.replace(old, new, 1)
+        file = tmp_path / "changed.xosc"
+        file.write_text(text, encoding="utf-8")
+        # What is made of it is a scenario that FogSim takes.
+        load_scenario(file, ["renderer=none", "estimators=[]"])
+        return read_openscenario(file).data
+
+    return reading
+
+
+def _entry(data: dict[str, Any], name: str) -> dict[str, Any]:
+    found: dict[str, Any] = next(entry for entry in data["timeline"] if entry["name"] == name)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("condition", "told"),
+    [
+        ('<SpeedCondition value="3" rule="lessThan"/>', "ego.speed < 3 m/s"),
+        ('<AccelerationCondition value="-2" rule="lessOrEqual"/>', "ego.acceleration <= -2 m/s²"),
+        ('<RelativeSpeedCondition entityRef="Lead" value="1" rule="lessThan"/>', "speed_difference(ego, Lead) < 1 m/s"),
+        ('<TraveledDistanceCondition value="30"/>', "ego.position >= 83.768 m"),
+        (
+            '<RelativeDistanceCondition entityRef="Lead" relativeDistanceType="longitudinal" value="20" '
+            'freespace="false" rule="lessThan"/>',
+            # Rear axles: 3.8 m behind the ego's front bumper, 1 m ahead of the lead's rear bumper; 1 m and 7 m.
+            "gap(ego, Lead) < 15.2 m and gap(ego, Lead) > -12 m",
+        ),
+        (
+            '<RelativeDistanceCondition entityRef="Lead" relativeDistanceType="cartesianDistance" value="20"'
+            ' freespace="false" rule="greaterThan"/>',
+            "distance(ego, Lead) > 20 m",
+        ),
+        (
+            '<TimeHeadwayCondition entityRef="Lead" value="1" freespace="true" rule="lessThan"/>',
+            "headway(ego, Lead, 0 m) < 1 s",
+        ),
+        (
+            '<ReachPositionCondition tolerance="2"><Position><LanePosition roadId="7" laneId="-2" s="200"/></Position>'
+            "</ReachPositionCondition>",
+            "ego.position >= 201.671 m and ego.position <= 205.671 m",
+        ),
+        (
+            '<DistanceCondition value="50" freespace="false" rule="greaterThan"><Position><RoadPosition roadId="7" '
+            's="200" t="-5"/></Position></DistanceCondition>',
+            "ego.position < 153.671 m or ego.position > 253.671 m",
+        ),
+        ('<CollisionCondition><EntityRef entityRef="Lead"/></CollisionCondition>', "ego.collision"),
+    ],
+)
+def test_conditions(read: Callable[..., dict[str, Any]], condition: str, told: str) -> None:
+    assert told in read((STAND_STILL, condition))["end_when"]
+
+
+@pytest.mark.parametrize(
+    ("edge", "told"),
+    [
+        ("rising", "ego.speed falls below 3 m/s"),
+        ("falling", "ego.speed rises above 3 m/s"),
+        ("risingOrFalling", "(ego.speed falls below 3 m/s) or (ego.speed rises above 3 m/s)"),
+    ],
+)
+def test_edges_of_comparisons(read: Callable[..., dict[str, Any]], edge: str, told: str) -> None:
+    old = '<Condition name="stands" delay="0" conditionEdge="none">'
+    data = read((STAND_STILL, '<SpeedCondition value="3" rule="lessThan"/>'), (old, old.replace('"none"', f'"{edge}"')))
+    assert told in data["end_when"]
+
+
+def test_an_edge_of_more_than_a_comparison_remembers_what_was_before(read: Callable[..., dict[str, Any]]) -> None:
+    old = '<Condition name="stands" delay="0" conditionEdge="none">'
+    data = read((old, old.replace('"none"', '"rising"')))
+    assert "happened(before_1) and (ego.speed < 0.1 m/s for 0.5 s)" in data["end_when"]
+    assert _entry(data, "before_1")["when"] == "not (ego.speed < 0.1 m/s for 0.5 s)"
+
+
+def test_a_stop_trigger_of_a_time_is_the_duration(read: Callable[..., dict[str, Any]]) -> None:
+    text = (DATA / "slow_lead.xosc").read_text(encoding="utf-8")
+    group = text[
+        text.index('<ConditionGroup>\n        <Condition name="stands"') : text.index(
+            '<ConditionGroup>\n        <Condition name="long"'
+        )
+    ]
+    data = read((group, ""))
+    assert data["duration_s"] == 40.0
+    assert "end_when" not in data
+    assert (
+        read((group, ""), ('value="40" rule="greaterThan"', 'value="40" rule="lessThan"'))["end_when"] == "time < 40 s"
+    )
+
+
+def test_an_act_that_is_stopped_keeps_back_its_events(read: Callable[..., dict[str, Any]]) -> None:
+    stop = (
+        '<StopTrigger><ConditionGroup><Condition name="c" delay="1" conditionEdge="none"><ByEntityCondition>'
+        '<TriggeringEntities triggeringEntitiesRule="all"><EntityRef entityRef="Ego"/><EntityRef entityRef="Lead"/>'
+        '</TriggeringEntities><EntityCondition><SpeedCondition value="1" rule="lessThan"/></EntityCondition>'
+        "</ByEntityCondition></Condition></ConditionGroup></StopTrigger></Act>"
+    )
+    data = read(("</Act>", stop))
+    assert _entry(data, "brake")["when"].endswith("and not happened(stop_1)")
+    assert _entry(data, "stop_1") == {
+        "name": "stop_1",
+        "when": "ego.speed < 1 m/s and Lead.speed < 1 m/s",
+        "delay_s": 1.0,
+        "do": {},
+    }
+
+
+@pytest.mark.parametrize(
+    ("action", "told"),
+    [
+        (
+            '<SpeedAction><SpeedActionDynamics dynamicsShape="cubic" value="4" dynamicsDimension="time"/>'
+            '<SpeedActionTarget><RelativeTargetSpeed entityRef="Lead" value="2" speedTargetValueType="delta"/>'
+            "</SpeedActionTarget></SpeedAction>",
+            {"speed": {"like": "Lead", "plus_kmh": 7.2, "shape": "sinusoidal", "over_s": 4.0}},
+        ),
+        (
+            '<LongitudinalDistanceAction entityRef="Lead" timeGap="1.5" freespace="true" continuous="true"/>',
+            {"follow": {"vehicle": "Lead", "headway_s": 1.5}},
+        ),
+    ],
+)
+def test_actions(read: Callable[..., dict[str, Any]], action: str, told: dict[str, Any]) -> None:
+    text = (DATA / "slow_lead.xosc").read_text(encoding="utf-8")
+    begin = text.index("<SpeedAction>", text.index('<Event name="brake"'))
+    old = text[begin : text.index("</SpeedAction>", begin) + len("</SpeedAction>")]
+    assert _entry(read((old, action)), "brake")["do"] == {"Ego": told}
+
+
+def test_lanes_by_number_or_beside(read: Callable[..., dict[str, Any]]) -> None:
+    text = (DATA / "slow_lead.xosc").read_text(encoding="utf-8")
+    begin = text.index("<LongitudinalAction>", text.index('<Event name="brake"'))
+    old = text[begin : text.index("</LongitudinalAction>", begin) + len("</LongitudinalAction>")]
+    change = (
+        '<LateralAction><LaneChangeAction><LaneChangeActionDynamics dynamicsShape="linear" value="2.5" '
+        'dynamicsDimension="time"/><LaneChangeTarget>{}</LaneChangeTarget></LaneChangeAction></LateralAction>'
+    )
+    for target, told in (
+        ('<AbsoluteTargetLane value="-1"/>', {"to": 1}),
+        ('<RelativeTargetLane entityRef="Ego" value="1"/>', {"lanes": 1}),
+        ('<RelativeTargetLane entityRef="Lead" value="1"/>', {"to_lane_of": "Lead", "lanes": 1}),
+    ):
+        change_lane = _entry(read((old, change.format(target))), "brake")["do"]["Ego"]["change_lane"]
+        assert change_lane == {**told, "stay_s": 1e5, "duration_s": 2.5}
+
+
+def test_what_happens_at_night_is_left_out_with_a_warning(tmp_path: Path) -> None:
+    shutil.copytree(DATA, tmp_path, dirs_exist_ok=True)
+    file = tmp_path / "cut_in_in_fog.xosc"
+    text = file.read_text(encoding="utf-8").replace(
+        '<Weather><Fog visualRange="60"/></Weather>',
+        '<TimeOfDay animation="false" dateTime="2026-11-20T23:00:00+01:00"/><Weather><Fog visualRange="60"/></Weather>',
+    )
+    file.write_text(text, encoding="utf-8")
+    with pytest.warns(LeftOutWarning, match="daylight does not fall below 1000 lx"):
+        assert _entry(read_openscenario(file).data, "thicker_fog")["do"]["light"] == {"illuminance_lx": 1000.0}
+    file.write_text(text.replace('entryName="saloon"', 'entryName="coach"', 1), encoding="utf-8")
+    with pytest.raises(InputError, match="unknown entry 'coach' of Vehicles; known: saloon, lorry"):
+        read_openscenario(file)
+
+
+def test_expressions() -> None:
+    known = {"speed": "72", "is_wet": "true", "name": "lorry"}
+    for text, value in (
+        ("$name", "lorry"),
+        ("${$speed / 3.6}", "20"),
+        ("${round($speed / 7) + sqrt(4)}", "12"),
+        ("${not $is_wet}", "false"),
+        ("${$speed > 50 and 1 < 2}", "true"),
+        ("v${2 * 3}", "v6"),
+        ("${-pow(2, 3) % 5}", "2"),
+    ):
+        assert evaluated(text, known) == value
+    for text in ("$sped", "${__import__('os')}", "${$name + 1}", "${1 +}", "${(1).real}", "${'a' * 9}"):
+        with pytest.raises(ValueError, match=r"parameter|expression|evaluate"):
+            evaluated(text, known)

@@ -1,0 +1,71 @@
+"""Networks of OpenDRIVE files, and places on their lanes."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from fogsim.errors import InputError, MissingDependencyError
+from fogsim.traffic.road import netconvert
+from fogsim.traffic.road.netconvert import opendrive_net
+from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, read_opendrive_lanes
+
+ROAD = Path(__file__).parents[2] / "data" / "openscenario" / "two_lanes.xodr"
+RADIUS = 1200.0
+
+
+@pytest.fixture(scope="module")
+def lanes() -> OpenDriveLanes:
+    return read_opendrive_lanes(opendrive_net(ROAD), ROAD)
+
+
+def test_lanes_limits_and_the_place_on_earth(lanes: OpenDriveLanes) -> None:
+    assert sorted((one.edge, one.index, one.origins) for one in lanes.lanes) == [
+        ("-7", 0, ("7_-2",)), ("-7", 1, ("7_-1",)), ("7", 0, ("7_2",)), ("7", 1, ("7_1",)),
+    ]  # fmt: skip
+    assert [one.limit for one in lanes.lanes] == pytest.approx([130 / 3.6] * 4, abs=0.01)
+    assert lanes.latitude == pytest.approx(math.radians(48.2))
+
+
+@pytest.mark.parametrize(("lane", "aside", "way"), [("-1", -1.75, 0.0), ("-2", -5.25, 0.0), ("1", 1.75, math.pi)])
+def test_places_on_lanes_are_where_the_road_has_them(
+    lanes: OpenDriveLanes, lane: str, aside: float, way: float
+) -> None:
+    for s in (60.0, 499.0, 700.0, 899.0):
+        turned = max(s - 500.0, 0.0) / RADIUS
+        x = 100.0 + min(s, 500.0) + RADIUS * math.sin(turned) - aside * math.sin(turned)
+        y = -20.0 + RADIUS * (1.0 - math.cos(turned)) + aside * math.cos(turned)
+        found = lanes.on_lane("7", lane, s).world
+        assert found[:2] == pytest.approx((x, y), abs=0.05)
+        assert math.cos(found[2] - turned - way) == pytest.approx(1.0, abs=1e-4)
+        assert lanes.at(x, y, found[2]).lane.origins == (f"7_{lane}",)
+        assert lanes.at(*lanes.across("7", s, aside)).lane.origins == (f"7_{lane}",)
+
+
+def test_places_beside_and_along(lanes: OpenDriveLanes) -> None:
+    begin = lanes.on_lane("7", "-2", 100.0)
+    assert lanes.beside(begin, 1).lane.origins == ("7_-1",)
+    assert lanes.along(begin, 50.0).world[0] == pytest.approx(250.0, abs=0.1)
+    assert lanes.route("-7") == ("-7",)
+    for wrong, told in (
+        (lambda: lanes.beside(begin, 2), "no lane 2 to the left"),
+        (lambda: lanes.along(begin, 900.0), "the road ends before that"),
+        (lambda: lanes.along(begin, -101.0), "the road begins before that"),
+        (lambda: lanes.on_lane("7", "-3", 5.0), "has no lane '-3' to drive on; it has -1, -2, 1, 2"),
+        (lambda: lanes.on_lane("7", "-1", 950.0), "expected s on the road"),
+    ):
+        with pytest.raises(ValueError, match=told):
+            wrong()
+
+
+def test_what_is_no_road_is_told(tmp_path: Path) -> None:
+    file = tmp_path / "no.xodr"
+    file.write_text("<OpenDRIVE><header/></OpenDRIVE>", encoding="utf-8")
+    with pytest.raises(InputError, match=r"no\.xodr: "):
+        read_opendrive_lanes(opendrive_net(file), file)
+
+
+def test_without_netconvert_it_is_told_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(netconvert.shutil, "which", lambda *_, **__: None)
+    with pytest.raises(MissingDependencyError, match=r"pip install 'fogsim\[xodr\]'"):
+        opendrive_net(ROAD)

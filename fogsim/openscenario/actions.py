@@ -112,6 +112,8 @@ class Actions:
             elif one.tag not in _PRIVATE:
                 self.findings.refuse(one, f"FogSim has no such action; it has {', '.join(ACTIONS)}")
             else:
+                if not actors:
+                    self.findings.refuse(one, "nobody does it: the Actors of the maneuver group name no entity")
                 for actor in actors:
                     _PRIVATE[one.tag](self, one, actor, effect)
 

@@ -51,8 +51,8 @@ class Positions:
             told = f"positions are read of {', '.join(_KINDS)}"
             self.findings.refuse(one or position, told)
             return None
-        reference = one.get("entityRef") if one.tag.startswith("Relative") else ""
-        if reference and reference not in self.entities:
+        reference = one.get("entityRef") if one.tag.startswith("Relative") else None
+        if reference is not None and reference not in self.entities:
             self.findings.refuse(one, f"there is no entity {reference!r} that has a place already")
             return None
         for orientation in one.all("Orientation"):

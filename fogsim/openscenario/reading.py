@@ -1,6 +1,7 @@
 """An OpenSCENARIO file as the plain data of a scenario file, and SUMO's files that go with it."""
 
 import re
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -8,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fogsim.errors import InputError
+from fogsim.errors import InputError, LeftOutWarning
 from fogsim.files.generated_files import kept_text, write_generated
 from fogsim.openscenario.actions import Actions
 from fogsim.openscenario.catalogs import Catalogs
@@ -152,6 +153,9 @@ class _Reader:
         self.findings.close(self.path)
         begin_at_once(entries, begin, ego)
         data = self._data(ego, begin, route)
+        if begin.environment.box is not None and not data["fog"]["banks"]:
+            told = f"{self.path}: the BoundingBox of the fog lies beside the ego's way: the air is clear there"
+            warnings.warn(told, LeftOutWarning, stacklevel=2)
         lines: dict[Key, int] = {}
         timeline = [_initial(begin, ego), *(block for _, block in entries)]
         for place, (node, _) in enumerate(entries, start=1):

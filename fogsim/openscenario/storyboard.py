@@ -81,6 +81,9 @@ class Storyboard:
             names = [one.get("entityRef") for one in actors.all("EntityRef")] if actors else []
             if actors and actors.get("selectTriggeringEntities", "false") == "true":
                 self.findings.refuse(actors, "selectTriggeringEntities: name the actors")
+            for one in names:
+                if one not in self.actions.vehicles:
+                    self.findings.refuse(actors or group, f"there is no vehicle {one!r}")
             self._executions(group)
             for reference in group.all("CatalogReference"):
                 entry = self.catalogs.entry(reference)

@@ -174,6 +174,8 @@ class Triggers:
             return ""
         rule = self.findings.word(triggering, "triggeringEntitiesRule", ("any", "all"))
         names = [one.get("entityRef") for one in triggering.all("EntityRef")]
+        if not names:
+            self.findings.refuse(triggering, "expected an EntityRef at least")
         if test.tag not in _TESTS:
             self.findings.refuse(test, "FogSim has no such condition")
             return ""

@@ -77,6 +77,15 @@ def test_a_box_of_fog_is_a_bank_along_the_route() -> None:
     assert scenario.light.illuminance_lx == 20_000.0
 
 
+def test_a_box_of_fog_beside_the_way_is_told(changed: Callable[..., Path]) -> None:
+    controller = '<ObjectController><CatalogReference catalogName="Controllers" entryName="driver"/></ObjectController>'
+    file = changed(
+        "slow_lead.xosc", (controller, ""), ('<Center x="400" y="0" z="0"/>', '<Center x="400" y="500" z="0"/>')
+    )
+    with pytest.warns(LeftOutWarning, match="beside the ego's way"):
+        assert load_scenario(file, QUIET).fog.banks == ()
+
+
 def test_what_is_not_supported_is_told_at_once_with_paths_and_lines(changed: Callable[..., Path]) -> None:
     file = changed(
         "slow_lead.xosc",
@@ -101,6 +110,10 @@ def test_what_is_not_supported_is_told_at_once_with_paths_and_lines(changed: Cal
         ('x="150" y="-25.25"', 'x="150" y="-45"', "on no lane that leads there; the nearest is 19.8 m away"),
         ('y="-25.25" h="0"', 'y="-25.25" h="3.14"', "on no lane that leads there"),
         ('roadId="7" s="260"', 'roadId="8" s="260"', "there is no road '8'; there are 7"),
+        ('<EntityRef entityRef="Ego"/></Actors>', "</Actors>", "SpeedAction: nobody does it"),
+        ('<EntityRef entityRef="Ego"/></Actors>', '<EntityRef entityRef="Eho"/></Actors>', "there is no vehicle 'Eho'"),
+        ('<EntityRef entityRef="Ego"/></TriggeringEntities>', "</TriggeringEntities>", "expected an EntityRef"),
+        ("<WorldPosition", '<RelativeWorldPosition dx="1" dy="0"/><WorldPosition', "there is no entity ''"),
         ('visualRange="200"', 'visualRange="$sight"', "unknown parameter $sight"),
         ('visualRange="200"', 'visualRange="${200 / 0}"', "cannot evaluate"),
         (

@@ -19,7 +19,7 @@ HERE = Path(__file__).parent
 PICTURES = HERE / "pictures" / "gallery"
 PAGE = HERE / "gallery.md"
 SIZE = (320, 240)
-MOMENTS: dict[str, float] = {}
+MOMENTS: dict[str, float] = {"tunnel_exit_into_fog": 17.0, "highway_99_corridor": 41.0}
 """Time of the picture of a scenario whose telling moment is another [s]."""
 
 BEGIN, END = "<!-- table: gallery -->", "<!-- end of table -->"

@@ -76,7 +76,7 @@ def _open(block: dict[str, Any]) -> None:
         stem, _, suffix = key.rpartition("_")
         if stem and suffix in UNIT_OF_SUFFIX and stem not in block["properties"]:
             told = f"{value.get('description', '')} A number with its unit: `10 {UNIT_OF_SUFFIX[suffix]}`.".strip()
-            written[stem] = {"anyOf": [_WITH_UNIT, {"const": 0}, _VARIED], "description": told}
+            written[stem] = {"anyOf": [_WITH_UNIT, {"enum": [0, "inf"]}, _VARIED], "description": told}
             if key in required:
                 either.append({"anyOf": [{"required": [key]}, {"required": [stem]}]})
         elif key in required:
@@ -101,7 +101,7 @@ def _opened(value: dict[str, Any]) -> dict[str, Any]:
     for way in tuple(ways):
         if way.pop("or", value.get("or")) == "inf":
             ways.append({"enum": ["inf", "infinity", ".inf"]})
-        if way.get("type") == "number" and (way.get("minimum"), way.get("maximum")) == (0, 1):
+        if way.get("type") == "number" and -1 <= way.get("minimum", -2) and way.get("maximum", 2) <= 1:
             ways.append(_PER_CENT)
         elif way.get("type") == "object" and "additionalProperties" in way:
             # Shares by name: one of them may be written as its name.

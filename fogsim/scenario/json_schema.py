@@ -30,6 +30,7 @@ _NUMBER = r"^\s*([-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?|[-+]?inf)\s*"
 _PER_CENT = {"type": "string", "pattern": _NUMBER + r"%\s*$"}
 _WITH_UNIT = {"type": "string", "pattern": _NUMBER + r"\S.*$"}
 _VARIED = {"type": "string", "pattern": r"\$", "description": "A name of `vary`."}
+_ENDLESS = {"enum": ["inf", "infinity", ".inf"]}
 _SCALARS = {"number", "integer", "string", "boolean"}
 
 
@@ -72,11 +73,12 @@ def _open(block: dict[str, Any]) -> None:
     written: dict[str, Any] = {}
     either: list[dict[str, Any]] = []
     for key, value in block["properties"].items():
+        endless = [_ENDLESS] if any(way.get("or") == "inf" for way in (value, *value.get("anyOf", ()))) else []
         written[key] = _opened(value)
         stem, _, suffix = key.rpartition("_")
         if stem and suffix in UNIT_OF_SUFFIX and stem not in block["properties"]:
             told = f"{value.get('description', '')} A number with its unit: `10 {UNIT_OF_SUFFIX[suffix]}`.".strip()
-            written[stem] = {"anyOf": [_WITH_UNIT, {"enum": [0, "inf"]}, _VARIED], "description": told}
+            written[stem] = {"anyOf": [_WITH_UNIT, {"const": 0}, _VARIED, *endless], "description": told}
             if key in required:
                 either.append({"anyOf": [{"required": [key]}, {"required": [stem]}]})
         elif key in required:
@@ -100,12 +102,14 @@ def _opened(value: dict[str, Any]) -> dict[str, Any]:
     ways = list(plain["anyOf"]) if "anyOf" in plain else [plain]
     for way in tuple(ways):
         if way.pop("or", value.get("or")) == "inf":
-            ways.append({"enum": ["inf", "infinity", ".inf"]})
-        if way.get("type") == "number" and -1 <= way.get("minimum", -2) and way.get("maximum", 2) <= 1:
+            ways.append(_ENDLESS)
+        if way.get("type") == "number" and way.get("minimum", -2) >= -1 and way.get("maximum", 2) <= 1:
             ways.append(_PER_CENT)
         elif way.get("type") == "object" and "additionalProperties" in way:
             # Shares by name: one of them may be written as its name.
             ways.append({"type": "string"})
+            if isinstance(way["additionalProperties"], dict) and way["additionalProperties"].get("type") == "number":
+                way["additionalProperties"] = _opened(way["additionalProperties"])
     is_varied = any(way.get("type") in _SCALARS or "enum" in way for way in ways)
     return (
         {"anyOf": [*ways, _VARIED] if is_varied else ways, **told}

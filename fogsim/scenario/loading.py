@@ -14,7 +14,7 @@ from fogsim.errors import InputError, UnknownNameError, nearest, shown, suggest
 from fogsim.scenario.document import Document, apply_overrides, read_scenario_document
 from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.plain_yaml import KeyPath, dotted
-from fogsim.scenario.roads.files import DemandError, traffic_files
+from fogsim.scenario.roads.files import DemandError, traffic_files, with_way
 from fogsim.scenario.schema import Scenario
 from fogsim.scenario.sumo_check import demand_mistakes, option_lines, step_mistake
 from fogsim.scenario.system_under_test import BLOCK, without_sut, without_sut_in_path
@@ -348,6 +348,7 @@ def _checked_scenario(document: Document, folder: Path, named_files: bool, close
         raise InputError("\n".join(refused))
     _check_files(document, scenario)
     _check_placement(document, scenario)
+    scenario = with_way(scenario)
     unknown = demand_mistakes(document, scenario) if named_files and closed_demand else []
     if unknown:
         raise InputError("\n".join(unknown))

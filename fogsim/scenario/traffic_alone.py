@@ -42,7 +42,7 @@ def without_ego(written: object) -> object:
     filled = {"renderer": "none", "estimators": [], "lighting": "low_beam", **written, "advice": _advice(written)}
     if isinstance(drivers, dict):
         filled["drivers"] = {"advised": "all", **drivers}
-    if isinstance(fog, dict) and not traffic.get("along"):
+    if isinstance(fog, dict) and not _has_way(written):
         filled["fog"] = {"top_m": "inf", **fog}
     return filled
 
@@ -74,13 +74,18 @@ def _of_camera(written: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
         yield ("lighting",), f"choosing lamps {_NEEDS}; leave it out, or write low_beam"
 
 
+def _has_way(written: dict[str, Any]) -> bool:
+    """Whether there is a way along which places count: what is named, or that of a road by template."""
+    return bool(written["traffic"].get("along") or written.get("road"))
+
+
 def _of_place(written: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
     """What lies along an ego's route, or is told by it."""
     drivers, fog = written.get("drivers"), written.get("fog")
     advised = drivers.get("advised") if isinstance(drivers, dict) else None
     if advised == "ego":
         yield ("drivers", "advised"), f"ego {_NEEDS}; leave it out, or write all"
-    if written["traffic"].get("along"):
+    if _has_way(written):
         return
     what = "counts along the ego's route, and traffic.ego is none: name the road's edges in traffic.along"
     if advised in ("stretch", "signs", "equipped", "law"):

@@ -149,7 +149,8 @@ class Traffic(Section):
     """Id of the ego vehicle in the route files; `none` for traffic alone, without camera and estimators."""
 
     along: tuple[Id, ...] = ()
-    """With `ego: none`: edges, as they are driven one after the other, along which places count, not its route."""
+    """With `ego: none`: edges, as they are driven one after the other, along which places count, not its route. On a
+    road by template it is `same_way`, the whole way, if not written."""
 
     keep_lane: tuple[Id, ...] = ()
     """Vehicles that never change lane."""

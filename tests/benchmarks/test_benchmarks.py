@@ -94,3 +94,27 @@ def test_fog_costs_lives_and_an_oracle_saves_some(records: Records) -> None:
     assert oracle["collisions_mean"] < none["collisions_mean"]
     thin = records("collisions.py", "--seeds", "1", "--visibility", "1000", "--protocol", "full_road")
     assert all(r["collisions_mean"] == 0 for r in thin)
+
+
+EXPECTING = """
+name: even_fog
+duration: 1.6 s
+clocks: {camera_period: 0.2 s, decision_period: 0.4 s}
+road: {template: motorway, length: 1 km}
+actors:
+  ego: {position: 200 m, speed: 90 km/h}
+fog: {visibility: 100 m}
+camera: {width: 160, height: 120}
+estimators: [joint_road]
+expect:
+  advised: {while: time > 1 s, always: advice <= 80 km/h}
+"""
+
+
+def test_a_broken_device_is_caught(records: Records, tmp_path: Path) -> None:
+    (tmp_path / "scenario.yaml").write_text(EXPECTING, encoding="utf-8")
+    sound, blind = "none: the sound device", "adviser ignores the belief"
+    with pytest.raises(SystemExit, match="0"):
+        records("broken_devices.py", "--devices", sound, blind, "--scenarios", str(tmp_path))
+    with pytest.raises(SystemExit, match="1"):
+        records("broken_devices.py", "--devices", "no fog lamps", "--scenarios", str(tmp_path))

@@ -1,4 +1,5 @@
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,8 @@ from fogsim.scenario.json_schema import json_schema, scenario_json_schema
 from fogsim.scenario.starting import begin_scenario
 from fogsim.study.plan import StudyFile
 
-STUDIES = sorted((Path(__file__).parents[2] / "scenarios" / "studies").glob("*.yaml"))
+ROOT = Path(__file__).parents[2]
+STUDIES = sorted((ROOT / "scenarios" / "studies").glob("*.yaml"))
 
 
 @pytest.fixture(scope="module")
@@ -30,6 +32,14 @@ def test_editors_find_nothing_wrong_with_shipped_scenarios(scenarios, name):
     assert places(scenarios, catalogue()[name].read_text()) == []
 
 
+@pytest.mark.parametrize("page", ["tests", "roads"])
+def test_editors_find_nothing_wrong_with_whole_scenarios_of_the_docs(scenarios, page):
+    text = (ROOT / "docs" / f"{page}.md").read_text()
+    whole = [block for block in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL) if re.search("^name:", block, re.M)]
+    assert whole
+    assert [places(scenarios, block) for block in whole] == [[]] * len(whole)
+
+
 @pytest.mark.parametrize("study", STUDIES, ids=lambda path: path.stem)
 def test_editors_find_nothing_wrong_with_shipped_studies(study):
     assert places(Draft202012Validator(json_schema(StudyFile)), study.read_text()) == []
@@ -40,6 +50,9 @@ def test_editors_find_nothing_wrong_with_shipped_studies(study):
     [
         ("fog: {visibility: 150 m}", None),
         ("fog: {visibility_m: inf}", None),
+        ("fog: {visibility: inf}", None),
+        ("fog: {visibility: 80 m, top: inf}", None),
+        ("fog: {visibility: 80 m, base: inf}", "$.fog.base"),
         ("fog: {visibility: $fog}", None),
         ("fog: {banks: [{start: 1 km, end_m: 1200, visibility: 50 m}], outside_visibility_m: 500}", None),
         ("fog: {visibility_m: 80}\nsut: {advice: 'mine:Cautious', estimators: [joint_road]}", None),

@@ -8,7 +8,7 @@ import pytest
 
 from fogsim.errors import InputError
 from fogsim.scenario import Scenario, build, load_scenario, override, resolved
-from fogsim.scenario.roads.files import traffic_files
+from fogsim.scenario.roads.files import road_layout, traffic_files
 from fogsim.traffic.road.structures import structures
 from fogsim.traffic.templates import ROAD_TEMPLATES, net_text
 
@@ -146,3 +146,20 @@ def test_actors_drive_on_a_network_of_ones_own(tmp_path: Path) -> None:
 def test_actors_need_a_road(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"actors: go with a road by template .* or with traffic.net"):
         loaded(tmp_path, OWN_NET.replace("net: road.net.xml", "config: a.sumocfg"))
+
+
+def test_places_of_traffic_alone_count_along_the_whole_way(tmp_path: Path) -> None:
+    alone = """
+name: traffic_alone
+road: {template: crossing, lights: true}
+demand: {same_way: 540 veh/h}
+traffic: {ego: none}
+fog: {outside_visibility: 2 km, banks: [{start: 300 m, end: 400 m, visibility: 50 m}]}
+expect: {flows: {never: collisions > 0}}
+"""
+    scenario = loaded(tmp_path, alone)
+    layout, _ = road_layout(scenario)
+    assert scenario.traffic.along == layout.way("same_way")
+    assert len(scenario.traffic.along) > 1
+    named = override(scenario, ["traffic.along=[same_way]"])
+    assert named.traffic.along == ("same_way",)

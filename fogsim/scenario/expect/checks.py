@@ -45,7 +45,9 @@ def run_content(scenario: "Scenario") -> RunContent:
     """
     has_ego = scenario.traffic.has_ego
     methods = tuple(one.method for one in scenario.estimators)
-    has = {Need.EGO: has_ego, Need.ROUTE: has_ego or bool(scenario.traffic.along), Need.FRAMES: bool(methods)}
+    # On a road by template places count along its way.
+    has_way = bool(scenario.traffic.along) or scenario.road is not None
+    has = {Need.EGO: has_ego, Need.ROUTE: has_ego or has_way, Need.FRAMES: bool(methods)}
     return RunContent(
         frozenset(need for need, is_there in has.items() if is_there),
         methods,

@@ -115,6 +115,26 @@ def road_layout(scenario: Scenario) -> tuple[Layout, tuple[Placed, ...]]:
     return layout, placed
 
 
+def with_way(scenario: Scenario) -> Scenario:
+    """A scenario of traffic alone on a road by template, with the whole way as that along which places count.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Any scenario; where it is another one, or names the way, it stays as it is.
+
+    Raises
+    ------
+    PlacementError
+        If an actor cannot be where it is to be.
+    """
+    traffic = scenario.traffic
+    if scenario.road is None or traffic.has_ego or traffic.along:
+        return scenario
+    layout, _ = road_layout(scenario)
+    return scenario.model_copy(update={"traffic": traffic.model_copy(update={"along": tuple(layout.way("same_way"))})})
+
+
 def _actors_on(net: Path, scenario: Scenario) -> str:
     """Text of a route file with the actors of a scenario that has a network of its own."""
     sections = scenario.actors

@@ -1,0 +1,293 @@
+"""Whether the scenarios' expectations bite: devices that are broken on purpose, each of which a scenario must catch.
+
+Each broken device takes the place of the sound one in the shipped scenarios that expect something, the shortest first,
+until one fails. The sound device comes first, and must pass them all. The exit code is 1 if it does not, or if a broken
+one fails nowhere.
+
+    python benchmarks/broken_devices.py [--json] [--docs] [--all] [-j 2] [--devices …] [--scenarios FILES …]
+"""
+
+import argparse
+import json
+import math
+import multiprocessing
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+from fogsim.errors import InputError
+from fogsim.scenario import build
+from fogsim.testing import collect, find_files
+from fogsim.testing.collection import FogTest
+from fogsim.testing.execution import check_case
+from fogsim.values import Belief, Estimate, Lamp, Observation, SpeedAdvice
+from fogsim.values.belief import certain_belief
+
+SOUND = "none: the sound device"
+
+ROOT = Path(__file__).resolve().parent.parent
+DOCS = ROOT / "docs" / "tests.md"
+MARK, END = "<!-- table: broken devices -->", "<!-- end of broken devices -->"
+
+
+@dataclass
+class Estimator:
+    """An estimator with `told` in place of what it says."""
+
+    sound: Any
+    told: Callable[[Estimate], Estimate]
+
+    @property
+    def method(self) -> str:
+        """Name of the sound one."""
+        return str(self.sound.method)
+
+    def reset(self) -> None:
+        """As the sound one."""
+        self.sound.reset()
+
+    def update(self, observation: Observation) -> Estimate:
+        """Say something else."""
+        return self.told(self.sound.update(observation))
+
+
+@dataclass
+class LastValue(Estimator):
+    """An estimator that repeats its last value where it cannot tell."""
+
+    told: Callable[[Estimate], Estimate] = lambda estimate: estimate
+    last: Estimate | None = None
+
+    def update(self, observation: Observation) -> Estimate:
+        """Say what it said before."""
+        estimate: Estimate = self.sound.update(observation)
+        if estimate.valid or self.last is None:
+            self.last = estimate
+        return self.last
+
+
+@dataclass
+class NeverWidens:
+    """A fusion whose belief stays as it is where estimators cannot tell."""
+
+    sound: Any
+    last: Belief | None = None
+
+    def reset(self) -> None:
+        """As the sound one."""
+        self.sound.reset()
+        self.last = None
+
+    def update(self, estimates: Sequence[Estimate], time: float) -> Belief:
+        """Believe what the sound one does, or what was believed last."""
+        belief: Belief = self.sound.update(estimates, time)
+        if self.last is None or any(one.valid for one in estimates):
+            self.last = belief
+        return self.last
+
+
+@dataclass
+class Adviser:
+    """An adviser with `advised` in place of what it advises; it is given the sound adviser and its arguments."""
+
+    sound: Any
+    advised: Callable[..., SpeedAdvice]
+
+    def advise(self, belief: Belief, speed_limit: float, time: float, previous: SpeedAdvice) -> SpeedAdvice:
+        """Advise something else."""
+        return self.advised(self.sound, belief, speed_limit, time, previous)
+
+
+def blind_advice(sound: Any, _: Belief, limit: float, time: float, previous: SpeedAdvice) -> SpeedAdvice:
+    """Advice of one who ignores the belief, and takes the air for clear."""
+    advice: SpeedAdvice = sound.advise(certain_belief(0.0), limit, time, previous)
+    return advice
+
+
+def fast_advice(sound: Any, belief: Belief, limit: float, time: float, previous: SpeedAdvice) -> SpeedAdvice:
+    """Advice that is 30 % too fast."""
+    sane = replace(previous, speed=previous.speed / 1.3)
+    advice = sound.advise(belief, limit, time, sane)
+    return replace(advice, speed=1.3 * advice.speed)
+
+
+def first_advice(sound: Any, belief: Belief, limit: float, time: float, previous: SpeedAdvice) -> SpeedAdvice:
+    """The first speed that is advised, for ever."""
+    return previous if previous.speed < math.inf else sound.advise(belief, limit, time, previous)
+
+
+@dataclass
+class LateAdvice:
+    """Advice by what was believed some time ago [s]."""
+
+    delay: float = 5.0
+    heard: list[tuple[float, Belief]] = field(default_factory=list)
+
+    def __call__(self, sound: Any, belief: Belief, limit: float, time: float, previous: SpeedAdvice) -> SpeedAdvice:
+        """Advise by the old belief, and nothing before there is one."""
+        self.heard.append((time, belief))
+        old = [one for heard, one in self.heard if heard <= time - self.delay]
+        return sound.advise(old[-1], limit, time, previous) if old else previous
+
+
+@dataclass
+class NoFogLamps:
+    """A lighting policy that never lights a fog lamp."""
+
+    sound: Any
+
+    def lamps(self, belief: Belief, previous: Lamp) -> Lamp:
+        """Lamps of the sound one without fog lamps."""
+        lit: Lamp = self.sound.lamps(belief, previous)
+        return lit & ~(Lamp.FRONT_FOG | Lamp.REAR_FOG)
+
+
+def scaled(share: float, estimate: Estimate) -> Estimate:
+    """An estimate whose visibility is wrong by a share."""
+    return replace(estimate, extinction=estimate.extinction / share) if estimate.valid else estimate
+
+
+def clear(estimate: Estimate) -> Estimate:
+    """An estimate of clear air, which is sure."""
+    return replace(estimate, extinction=0.0, standard_deviation=1e-4, valid=True)
+
+
+@dataclass(frozen=True)
+class Device:
+    """A broken device.
+
+    Attributes
+    ----------
+    part : str
+        Function of `fogsim.scenario.build` whose result is broken; empty for none.
+    broken : callable
+        What takes the place of the sound part.
+    settings : tuple of str
+        Overrides of the scenario.
+    """
+
+    part: str = ""
+    broken: Callable[[Any], Any] = lambda sound: sound
+    settings: tuple[str, ...] = ()
+
+    def build(self, sound: Callable[..., Any], *arguments: Any) -> Any:
+        """Build the part, broken; of several estimators each."""
+        made = sound(*arguments)
+        return tuple(map(self.broken, made)) if isinstance(made, tuple) else self.broken(made)
+
+
+def camera_fault(fault: str) -> tuple[str, ...]:
+    """Settings of a fault that lasts 5 s, and comes back every 8 s for two minutes."""
+    spells = (f"{{{fault}, at: {begin} s, for: 5 s}}" for begin in range(2, 120, 8))
+    return (f"sensors.faults=[{', '.join(spells)}]",)
+
+
+DEVICES = {
+    SOUND: Device(),
+    "adviser ignores the belief": Device("adviser", partial(Adviser, advised=blind_advice)),
+    "adviser 30 % too fast": Device("adviser", partial(Adviser, advised=fast_advice)),
+    "adviser holds its first advice": Device("adviser", partial(Adviser, advised=first_advice)),
+    "advice 5 s late": Device("adviser", lambda sound: Adviser(sound, LateAdvice())),
+    "estimator 30 % too far": Device("estimators", partial(Estimator, told=partial(scaled, 1.3))),
+    "estimator 30 % too near": Device("estimators", partial(Estimator, told=partial(scaled, 0.7))),
+    "estimator always says clear": Device("estimators", partial(Estimator, told=clear)),
+    "estimator repeats its last value": Device("estimators", LastValue),
+    "fusion never widens": Device("fusion", NeverWidens),
+    "no fog lamps": Device("lighting_policy", NoFogLamps),
+    "camera frozen for 5 s, time and again": Device(settings=camera_fault("fault: frozen, time_stamp: delivery")),
+    "camera black for 5 s, time and again": Device(settings=camera_fault("fault: blackout")),
+    "radar dead": Device(settings=("sensors.faults=[{fault: dropout}]",)),
+    "told pitch 5° wrong": Device(settings=("camera.told.pitch_error_deg=5.0",)),
+}
+
+
+def tests_with(files: Iterable[Path], device: Device) -> Iterator[FogTest]:
+    """Tests of files with a device; those where it cannot be, as on roads without an ego, are left out."""
+    for file in files:
+        try:
+            yield from collect([file], device.settings)
+        except InputError as error:
+            if not device.settings:
+                raise
+            print(f"{file}: {str(error).splitlines()[0]}", file=sys.stderr)
+
+
+def measure(name: str, files: Sequence[Path], *, goes_on: bool) -> dict[str, Any]:
+    """Record of a device: in which scenarios which expectations fail, or are inconclusive alone."""
+    device = DEVICES[name]
+    failed: dict[str, list[str]] = {}
+    inconclusive: dict[str, list[str]] = {}
+    cases = [(test, run) for test in tests_with(files, device) for run in test.runs]
+    # First cases first, and short ones; further seeds seldom show what those do not.
+    cases.sort(key=lambda one: (one[1].number, one[1].scenario.duration_s))
+    count = 0
+    with ExitStack() as patched:
+        if device.part:
+            broken = partial(device.build, getattr(build, device.part))
+            patched.enter_context(patch.object(build, device.part, broken))
+        for test, run in cases:
+            count += 1
+            found = check_case(run.scenario, run.seed)["findings"]
+            for outcome, kept in (("failed", failed), ("inconclusive", inconclusive)):
+                names = {one["name"] for one in found if one["verdict"] == outcome}
+                if names:
+                    kept[test.name] = sorted({*kept.get(test.name, ()), *names})
+            if failed and not goes_on:
+                break
+    return {
+        "device": name,
+        "failed": failed,
+        "only_inconclusive": {key: names for key, names in inconclusive.items() if key not in failed},
+        "cases": count,
+        "cases_in_all": len(cases),
+    }
+
+
+def told(caught: dict[str, list[str]]) -> str:
+    """Scenarios with their expectations."""
+    return "; ".join(f"{scenario}: {', '.join(names)}" for scenario, names in caught.items()) or "–"
+
+
+def table(records: Sequence[dict[str, Any]]) -> str:
+    """The records as a table."""
+    lines = ["| device | fails | only inconclusive | cases run |", "|---|---|---|---|"]
+    for record in records:
+        fails, unsure = told(record["failed"]), told(record["only_inconclusive"])
+        lines.append(f"| {record['device']} | {fails} | {unsure} | {record['cases']} of {record['cases_in_all']} |")
+    return "\n".join(lines)
+
+
+def main() -> int:
+    """Run and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--json", action="store_true", help="print records")
+    parser.add_argument("--docs", action="store_true", help="put the table into docs/tests.md")
+    parser.add_argument("--all", action="store_true", help="all scenarios, also after the first that fails")
+    parser.add_argument("-j", type=int, default=1, help="devices at once")
+    parser.add_argument("--devices", nargs="+", choices=DEVICES, default=list(DEVICES))
+    parser.add_argument("--scenarios", nargs="+", default=[ROOT / "scenarios"], help="files, folders or names")
+    asked = parser.parse_args()
+    files = find_files(asked.scenarios)
+    work = partial(measure, files=files, goes_on=asked.all)
+    if asked.j == 1:
+        records = [work(name) for name in asked.devices]
+    else:
+        with multiprocessing.get_context("fork").Pool(asked.j, maxtasksperchild=1) as pool:
+            records = pool.map(work, asked.devices, chunksize=1)
+    print(json.dumps(records) if asked.json else table(records))
+    if asked.docs:
+        head, rest = DOCS.read_text(encoding="utf-8").split(MARK)
+        DOCS.write_text(f"{head}{MARK}\n\n{table(records)}\n\n{END}{rest.split(END)[1]}", encoding="utf-8")
+    wrong = [one["device"] for one in records if bool(one["failed"]) == (one["device"] == SOUND)]
+    for name in wrong:
+        print(f"not as it should be: {name}", file=sys.stderr)
+    return int(bool(wrong))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -112,7 +112,7 @@ def blind_advice(sound: Any, _: Belief, limit: float, time: float, previous: Spe
 def fast_advice(sound: Any, belief: Belief, limit: float, time: float, previous: SpeedAdvice) -> SpeedAdvice:
     """Advice that is 30 % too fast."""
     sane = replace(previous, speed=previous.speed / 1.3)
-    advice = sound.advise(belief, limit, time, sane)
+    advice: SpeedAdvice = sound.advise(belief, limit, time, sane)
     return replace(advice, speed=1.3 * advice.speed)
 
 

@@ -20,9 +20,11 @@ def list_command() -> None:
 
     table = Table(title="Scenarios", title_justify="left", box=None, pad_edge=False)
     table.add_column("name", style="bold", no_wrap=True)
+    table.add_column("test", no_wrap=True)
     table.add_column("description")
     for name in catalogue():
-        table.add_row(name, load_scenario(name).description)
+        scenario = load_scenario(name)
+        table.add_row(name, "test" if scenario.expect else "", scenario.description)
     stdout.print(table)
     stdout.print()
     for registry in (ESTIMATORS, FUSIONS, ADVISERS, LIGHTING_POLICIES, RENDERERS):

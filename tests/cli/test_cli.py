@@ -195,6 +195,8 @@ def test_list_names_scenarios_and_methods(command: Command) -> None:
     assert done.returncode == 0
     for name in ("motorway_fog_bank", "negru2013", "grid_filter", "stopping_sight_distance", "fog_lamp_rules"):
         assert name in done.stdout
+    marked = {line.split()[0]: line.split()[1] for line in done.stdout.splitlines() if len(line.split()) > 1}
+    assert (marked["rising_sun"], marked["graded_motorway"]) == ("test", "A")
 
 
 def test_signs_are_written_as_geojson(tmp_path: Path, command: Command) -> None:

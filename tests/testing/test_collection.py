@@ -7,6 +7,7 @@ import pytest
 from early_motorway import ROUTES
 
 from fogsim.errors import InputError
+from fogsim.scenario import catalogue, load_scenario
 from fogsim.testing import collect, find_files, parse_keywords
 
 Write = Callable[..., Path]
@@ -84,3 +85,11 @@ def test_mistakes_of_all_files_are_told_together(write: Write) -> None:
     assert "in the case visibility=200 km/h,run=0" in told
     assert f"{files[1]}:6: expect.safe.nevr: unknown key; did you mean 'never'?" in told
     assert "c.fog.yaml" not in told
+
+
+def test_of_the_shipped_scenarios_those_that_expect_something_are_tests() -> None:
+    folder = Path(__file__).parents[2] / "scenarios"
+    expecting = {name for name in catalogue() if load_scenario(name).expect}
+    assert {file.parent.name for file in find_files([folder])} == expecting
+    assert "rising_sun" in expecting
+    assert "graded_motorway" not in expecting

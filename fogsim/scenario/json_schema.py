@@ -102,11 +102,7 @@ def _opened(value: dict[str, Any]) -> dict[str, Any]:
     ways = list(plain["anyOf"]) if "anyOf" in plain else [plain]
     for way in tuple(ways):
         if way.pop("or", value.get("or")) == "inf":
-<<<<<<< HEAD
             ways.append(_ENDLESS)
-=======
-            ways.append({"enum": ["inf", "infinity", ".inf"]})
->>>>>>> 9372c6d (Lint)
         if way.get("type") == "number" and way.get("minimum", -2) >= -1 and way.get("maximum", 2) <= 1:
             ways.append(_PER_CENT)
         elif way.get("type") == "object" and "additionalProperties" in way:

@@ -19,7 +19,14 @@ HERE = Path(__file__).parent
 PICTURES = HERE / "pictures" / "gallery"
 PAGE = HERE / "gallery.md"
 SIZE = (320, 240)
-MOMENTS: dict[str, float] = {"tunnel_exit_into_fog": 17.0, "highway_99_corridor": 41.0}
+MOMENTS: dict[str, float] = {
+    "highway_99_corridor": 41.0,
+    "motorcycle_at_dusk": 12.0,
+    "ramp_merge": 10.0,
+    "stopped_queue_behind_curve": 37.0,
+    "tail_lamp_failure": 18.4,
+    "tunnel_exit_into_fog": 17.0,
+}
 """Time of the picture of a scenario whose telling moment is another [s]."""
 
 BEGIN, END = "<!-- table: gallery -->", "<!-- end of table -->"

@@ -133,12 +133,14 @@ class _AlwaysWatch:
         self._worst = _Worst(clause.condition, clause.is_never)
         self._counted, self._known_once = 0.0, False
         self._broken: Sight | None = None
+        self._told = ""
 
     def look(self, moment: Moment) -> None:
         counts, holds = self._scope.look(moment), self._watch.look(moment)
         if not counts or holds is None:
             return
-        self._known_once = True
+        if not self._known_once:
+            self._known_once, self._told = True, self._watch.told()
         self._counted += self._scope.elapsed
         self._worst.look(self._watch, moment)
         if holds == self._clause.is_never and self._broken is None:
@@ -156,7 +158,7 @@ class _AlwaysWatch:
             return _open(_NEVER_KNOWN, self._watch.told())
         if self._counted < self._clause.for_at_least - _TICK:
             return _open(f"it counted for {self._counted:g} s, and {self._clause.for_at_least:g} s were wanted")
-        return _passed(worst, self._watch.told() if worst is None else f"at worst {worst[2]}")
+        return _passed(worst, self._told if worst is None else f"at worst {worst[2]}")
 
 
 class _Worst:

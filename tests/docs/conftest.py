@@ -90,6 +90,8 @@ def readers_folder(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Ca
             (made / "policies.yaml").write_text(text, encoding="utf-8")
         for text in re.findall(r"```yaml\n(# [\w/]*truck\.fog\.yaml\n.*?)```", page, re.DOTALL):
             (made / text.split()[1]).write_text(text, encoding="utf-8")
+        if "tests/data/openscenario" in page:
+            shutil.copytree(CHECKOUT / "tests" / "data" / "openscenario", made / "tests" / "data" / "openscenario")
         if "my/scenario.yaml" in page:
             put_scenario(made)
         return made

@@ -18,3 +18,9 @@ gymnasium.register(
     entry_point="fogsim_envs.highway:FogHighwayEnv",
     vector_entry_point="fogsim_envs.vector:make_highway_vector",
 )
+
+gymnasium.register(
+    id="fogsim/FogAdvisory-v1",
+    entry_point="fogsim_envs.task:FogAdvisoryV1Env",
+    max_episode_steps=600,
+)

@@ -34,6 +34,8 @@ def serve(connection: "Connection[Any, Any]") -> None:
             try:
                 with _heartbeat(connection):
                     if verb == "open":
+                        if loop is not None:
+                            loop.close()
                         loop, answer = ClosedLoop(argument), None
                     elif loop is None:
                         answer = SimulationError("the host was asked for a run before it got a scenario")

@@ -66,6 +66,33 @@ def begin(scenario: Scenario, seed: int, timeout: float = TIMEOUT) -> tuple[Simu
         return _begun(HostedLoop(scenario, timeout), seed)
 
 
+def begin_anew(
+    simulation: Simulation, scenario: Scenario, seed: int, timeout: float = TIMEOUT
+) -> tuple[Simulation, Step]:
+    """Start another scenario where a simulation runs, which is over then.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        From `begin`.
+    scenario : Scenario
+        The scenario.
+    seed : int
+        Seed of the first run.
+    timeout : float
+        As of `begin` [s].
+    """
+    if not isinstance(simulation, HostedLoop):
+        simulation.close()
+        return begin(scenario, seed, timeout)
+    try:
+        simulation.change(scenario)
+    except BaseException:
+        simulation.close()
+        raise
+    return _begun(simulation, seed)
+
+
 def _begun(simulation: Simulation, seed: int) -> tuple[Simulation, Step]:
     try:
         return simulation, simulation.start(seed)
@@ -135,6 +162,18 @@ class HostedLoop:
         self._connection.close()
         self._child.kill()
         self._child.wait()
+
+    def change(self, scenario: Scenario) -> None:
+        """Let the next run be of another scenario, in the same child process.
+
+        Parameters
+        ----------
+        scenario : Scenario
+            The scenario.
+        """
+        self._scenario = scenario
+        if not self._connection.closed:
+            self._ask("open", scenario)
 
     def start(self, seed: int) -> Step:
         """Begin a run; see `fogsim.loop.ClosedLoop.start`.

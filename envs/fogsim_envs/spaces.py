@@ -37,6 +37,11 @@ LOG_VISIBILITY_SCALE = math.log(10_000.0)
 ADVISED_SPEEDS = tuple(kmh / KMH_PER_MPS for kmh in range(20, 140, 10))
 """Advised speed of each level [m/s]; one more level means "no advice"."""
 
+_SAME_SPEED = 1e-6
+"""Speeds that differ by less are the same [m/s]."""
+
+_BELOW_NONE = 1.0 - 1e-6
+
 LAMP_MODES = (
     Lamp.POSITION | Lamp.LOW_BEAM,
     Lamp.POSITION | Lamp.LOW_BEAM | Lamp.FRONT_FOG,
@@ -85,11 +90,18 @@ def observe(step: Step) -> dict[str, NDArray[Any]]:
     step : Step
         The finished step.
     """
-    signs, mask = _signs(step)
+    signs, mask = observed_signs(step)
     return {"camera": step.observation.image.copy(), "signs": signs, "signs_mask": mask, "state": _state(step)}
 
 
-def _signs(step: Step) -> tuple[NDArray[np.float32], NDArray[np.int8]]:
+def observed_signs(step: Step) -> tuple[NDArray[np.float32], NDArray[np.int8]]:
+    """Rows of signs ahead by the map, float32 (slots, features) in −1 … 1, and which of them are filled.
+
+    Parameters
+    ----------
+    step : Step
+        The finished step.
+    """
     features = np.zeros((SIGN_SLOTS, len(SIGN_FEATURES)), dtype=np.float32)
     mask = np.zeros(SIGN_SLOTS, dtype=np.int8)
     for slot, sign in enumerate(step.observation.signs[:SIGN_SLOTS]):
@@ -107,9 +119,9 @@ def _state(step: Step) -> NDArray[np.float32]:
         lead.distance / LEAD_SCALE if lead else 1.0,
         lead.relative_speed / SPEED_SCALE if lead else 0.0,
         float(estimate.valid),
-        _visibility(estimate.visibility) if estimate.valid else 1.0,
+        scaled_visibility(estimate.visibility) if estimate.valid else 1.0,
         estimate.standard_deviation / estimate.extinction if measured else 1.0,
-        _visibility(step.belief.visibility),
+        scaled_visibility(step.belief.visibility),
         step.belief.log_standard_deviation,
         advice / SPEED_SCALE if math.isfinite(advice) else 1.0,
         float(Lamp.FRONT_FOG in step.command.lamps or Lamp.REAR_FOG in step.command.lamps),
@@ -117,8 +129,14 @@ def _state(step: Step) -> NDArray[np.float32]:
     return np.clip(np.array(values, dtype=np.float32), -1.0, 1.0)
 
 
-def _visibility(visibility: float) -> float:
-    """Visibility on a logarithmic scale, 1 m … 10 km to 0 … 1."""
+def scaled_visibility(visibility: float) -> float:
+    """Visibility on a logarithmic scale, 1 m … 10 km to 0 … 1.
+
+    Parameters
+    ----------
+    visibility : float
+        Visibility [m].
+    """
     return min(math.log(max(visibility, 1.0)) / LOG_VISIBILITY_SCALE, 1.0)
 
 
@@ -141,3 +159,26 @@ def command_of(action: Any, continuous: bool) -> Command:
         level, mode = (int(a) for a in action)
         speed = math.inf if level == len(ADVISED_SPEEDS) else ADVISED_SPEEDS[level]
     return Command(advice=SpeedAdvice(speed), lamps=LAMP_MODES[mode])
+
+
+def action_of(speed: float, lamps: Lamp, continuous: bool) -> NDArray[Any]:
+    """Action that stands for an advice, or for the next lower one, the inverse of `command_of`.
+
+    Parameters
+    ----------
+    speed : float
+        Advised speed [m/s]; ``inf`` for none. Below the lowest level it is that level.
+    lamps : Lamp
+        Lamps that are to be lit: the last mode all of whose lamps are among them.
+    continuous : bool
+        Which of the two action spaces it is for.
+    """
+    mode = max(number for number, lit in enumerate(LAMP_MODES) if lit & lamps == lit or number == 0)
+    if not continuous:
+        levels = [number for number, level in enumerate(ADVISED_SPEEDS) if level <= speed + _SAME_SPEED]
+        level = len(ADVISED_SPEEDS) if math.isinf(speed) else max(levels, default=0)
+        return np.array([level, mode])
+    lowest, highest = ADVISED_SPEEDS[0], ADVISED_SPEEDS[-1]
+    # The upper end stands for no advice.
+    share = 1.0 if math.isinf(speed) else min(max((speed - lowest) / (highest - lowest), 0.0), _BELOW_NONE)
+    return np.array([2.0 * share - 1.0, 2.0 * (mode + 0.5) / len(LAMP_MODES) - 1.0], dtype=np.float32)

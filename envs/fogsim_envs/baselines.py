@@ -1,0 +1,189 @@
+"""Policies to compare an agent with: nothing, one speed, FogSim's own rule, what knows the truth, and chance."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from fogsim.kinematics import stopping_sight_distance
+from fogsim.metrics import DEFAULT_STANDARD
+from fogsim.registry import Registry, make
+from fogsim.units import KMH_PER_MPS
+from fogsim.values import Lamp
+from fogsim_envs.spaces import ADVISED_SPEEDS, LAMP_MODES, action_of
+from fogsim_envs.task.rewards import FRONT_FOG_LAMP_VISIBILITY, REAR_FOG_LAMP_VISIBILITY, TaskWeights
+
+Info = Mapping[str, Any]
+
+
+class Policy(Protocol):
+    """Chooses actions."""
+
+    def __call__(self, observation: Any, info: Info) -> NDArray[Any]:
+        """Choose the next action.
+
+        Parameters
+        ----------
+        observation : object
+            What the agent sees.
+        info : mapping
+            What the environment tells beside it.
+        """
+
+    def reset(self, seed: int) -> None:
+        """Forget earlier episodes.
+
+        Parameters
+        ----------
+        seed : int
+            Seed of the episode.
+        """
+
+
+class Unremembering:
+    """A policy that remembers nothing, in an action space of advice and lamps.
+
+    Parameters
+    ----------
+    action_space : gymnasium.Space
+        The environment's.
+    """
+
+    def __init__(self, action_space: spaces.Space[Any]) -> None:
+        self._space = action_space
+
+    def reset(self, seed: int) -> None:
+        """Do nothing: there is nothing to forget; see `Policy.reset`."""
+
+    def action(self, speed: float, lamps: Lamp) -> NDArray[Any]:
+        """The action nearest to an advice, not above it, with lamps.
+
+        Parameters
+        ----------
+        speed : float
+            Advised speed [m/s]; ``inf`` for none.
+        lamps : Lamp
+            Lamps that are to be lit.
+        """
+        return action_of(speed, lamps, isinstance(self._space, spaces.Box))
+
+
+class NoAdvice(Unremembering):
+    """Advise nothing, with dipped head lamps: what happens when drivers are left alone."""
+
+    def __call__(self, observation: Any, info: Info) -> NDArray[Any]:  # noqa: ARG002 - the protocol's parameters
+        """Choose; see `Policy`."""
+        return self.action(math.inf, LAMP_MODES[0])
+
+
+class FixedSpeed(Unremembering):
+    """Advise one speed always.
+
+    Parameters
+    ----------
+    action_space : gymnasium.Space
+        The environment's.
+    speed : float
+        The speed [m/s].
+    """
+
+    def __init__(self, action_space: spaces.Space[Any], speed: float = 50.0 / KMH_PER_MPS) -> None:
+        super().__init__(action_space)
+        self._speed = speed
+
+    def __call__(self, observation: Any, info: Info) -> NDArray[Any]:  # noqa: ARG002 - the protocol's parameters
+        """Choose; see `Policy`."""
+        return self.action(self._speed, LAMP_MODES[0])
+
+
+class BuiltInRule(Unremembering):
+    """What the scenario's own adviser and lighting policy say, by the belief in the loop."""
+
+    def __call__(self, observation: Any, info: Info) -> NDArray[Any]:  # noqa: ARG002 - the protocol's parameters
+        """Choose; see `Policy`."""
+        return self.action(info["built_in_advice_mps"], Lamp(info["built_in_lamps"]))
+
+
+class Oracle(Unremembering):
+    """Knows the sight ahead, and takes the speed at which each metre costs least by the reward's weights.
+
+    It knows nothing of what others will do, so it is no upper bound.
+
+    Parameters
+    ----------
+    action_space : gymnasium.Space
+        The environment's.
+    weights : TaskWeights
+        The reward's weights.
+    """
+
+    def __init__(self, action_space: spaces.Space[Any], weights: TaskWeights | None = None) -> None:
+        super().__init__(action_space)
+        self._weights = weights or TaskWeights()
+
+    def __call__(self, observation: Any, info: Info) -> NDArray[Any]:  # noqa: ARG002 - the protocol's parameters
+        """Choose; see `Policy`."""
+        truth, limit = info["truth"], info["speed_limit_mps"]
+        speeds = [*(speed for speed in ADVISED_SPEEDS if speed < limit), limit]
+        best = min(speeds, key=lambda speed: self._cost(speed, truth["visibility_ahead_m"], limit))
+        lamps = LAMP_MODES[0]
+        if truth["visibility_m"] < FRONT_FOG_LAMP_VISIBILITY:
+            lamps |= Lamp.FRONT_FOG
+        if truth["visibility_m"] < REAR_FOG_LAMP_VISIBILITY:
+            lamps |= Lamp.REAR_FOG
+        return self.action(math.inf if best == limit else best, lamps)
+
+    def _cost(self, speed: float, sight: float, limit: float) -> float:
+        """Cost of the way at one speed [points]."""
+        standard = DEFAULT_STANDARD
+        needed = stopping_sight_distance(speed, standard.reaction_time, standard.deceleration)
+        return self._weights.time * limit / speed + self._weights.overdriving * max(0.0, 1.0 - sight / needed)
+
+
+class RandomActions:
+    """Any action, as likely as any other.
+
+    Parameters
+    ----------
+    action_space : gymnasium.Space
+        The environment's.
+    """
+
+    def __init__(self, action_space: spaces.Space[Any]) -> None:
+        self._space = action_space
+
+    def reset(self, seed: int) -> None:
+        """Begin the numbers of an episode; see `Policy.reset`."""
+        self._space.seed(seed)
+
+    def __call__(self, observation: Any, info: Info) -> NDArray[Any]:  # noqa: ARG002 - the protocol's parameters
+        """Choose; see `Policy`."""
+        return np.asarray(self._space.sample())
+
+
+BASELINES: Registry[Callable[..., Policy]] = Registry(
+    "baseline",
+    {"none": NoAdvice, "fixed": FixedSpeed, "rule": BuiltInRule, "oracle": Oracle, "random": RandomActions},
+)
+"""Baselines by name."""
+
+
+def baseline(name: str, action_space: spaces.Space[Any]) -> Policy:
+    """Make a baseline for an environment.
+
+    Parameters
+    ----------
+    name : str
+        One of `BASELINES`.
+    action_space : gymnasium.Space
+        The environment's.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is none of that name.
+    """
+    return make(BASELINES, name, action_space)

@@ -1,0 +1,230 @@
+"""How good a policy is: return, safety and speed over episodes, with intervals."""
+
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Protocol, runtime_checkable
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.errors import InputError
+from fogsim_envs.baselines import Info, Policy, baseline
+
+RESAMPLES = 2000
+CONFIDENCE = 0.95
+
+
+@runtime_checkable
+class Predictor(Protocol):
+    """An agent of Stable-Baselines3, or one that is asked like it."""
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
+    ) -> Any:
+        """Choose an action; gives it and a state."""
+
+
+@dataclass(frozen=True, slots=True)
+class EpisodeResult:
+    """One episode.
+
+    Attributes
+    ----------
+    seed : int
+        Its seed.
+    value : float
+        Sum of its rewards, discounted as asked [points].
+    steps : int
+        Decisions.
+    time : float
+        How long it took [s].
+    ending : str
+        Why it ended.
+    struck : bool
+        Whether the ego struck somebody.
+    cost : float
+        Sum of ``info["cost"]``.
+    terms : mapping from str to float
+        Undiscounted sums of the reward's terms.
+    """
+
+    seed: int
+    value: float
+    steps: int
+    time: float
+    ending: str
+    struck: bool
+    cost: float
+    terms: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """What a policy came to.
+
+    Attributes
+    ----------
+    episodes : tuple of EpisodeResult
+        The episodes, in the order of the seeds.
+    mean, low, high : float
+        Mean return and its 95 % interval, by bootstrap over episodes [points].
+    arrived, struck : float
+        Shares of episodes in which the ego arrived, and struck somebody.
+    """
+
+    episodes: tuple[EpisodeResult, ...]
+    mean: float
+    low: float
+    high: float
+    arrived: float
+    struck: float
+
+    def __str__(self) -> str:
+        """One line."""
+        return (
+            f"return {self.mean:.1f} ({self.low:.1f} … {self.high:.1f}) over {len(self.episodes)} episodes, "
+            f"arrived {self.arrived:.0%}, struck somebody {self.struck:.0%}"
+        )
+
+    def as_json(self) -> str:
+        """All of it as JSON."""
+        return json.dumps(asdict(self))
+
+
+def evaluate(
+    policy: Policy | Predictor | str,
+    env_id: str | gymnasium.Env[Any, Any] = "fogsim/FogAdvisory-v1",
+    seeds: Iterable[int] = range(50),
+    *,
+    discount: float = 1.0,
+    **arguments: Any,
+) -> Evaluation:
+    """Run a policy once for each seed.
+
+    Parameters
+    ----------
+    policy : Policy, Predictor or str
+        Callable of observation and info; an agent with ``predict(observation, deterministic=True)``, as those of
+        Stable-Baselines3; or the name of one of `fogsim_envs.baselines.BASELINES`.
+    env_id : str or gymnasium.Env
+        The environment; one that is made here has ``split="test"`` unless told otherwise.
+    seeds : iterable of int
+        Seeds of the episodes.
+    discount : float
+        By which a reward counts less for each step that it comes later, 0 … 1.
+    **arguments
+        Arguments of the environment.
+
+    Raises
+    ------
+    InputError
+        If there are no seeds, or the discount is none.
+    """
+    numbers = tuple(seeds)
+    if not numbers:
+        raise InputError("seeds: expected at least one")
+    if not 0.0 < discount <= 1.0:
+        raise InputError(f"discount: expected a number in 0 … 1 and not 0, got {discount!r}")
+    if not isinstance(env_id, str):
+        return summarise([_episode(env_id, _policy(policy, env_id), seed, discount) for seed in numbers])
+    env = gymnasium.make(env_id, **{"split": "test", **arguments})
+    try:
+        return summarise([_episode(env, _policy(policy, env), seed, discount) for seed in numbers])
+    finally:
+        env.close()
+
+
+def summarise(episodes: Sequence[EpisodeResult]) -> Evaluation:
+    """Means and intervals over episodes.
+
+    Parameters
+    ----------
+    episodes : sequence of EpisodeResult
+        At least one.
+    """
+    values = np.array([episode.value for episode in episodes])
+    low, high = bootstrap_interval(values)
+    return Evaluation(
+        tuple(episodes),
+        float(values.mean()),
+        low,
+        high,
+        sum(episode.ending == "arrived" for episode in episodes) / len(episodes),
+        sum(episode.struck for episode in episodes) / len(episodes),
+    )
+
+
+def bootstrap_interval(values: NDArray[np.float64]) -> tuple[float, float]:
+    """95 % interval of a mean, by percentiles of resampled means.
+
+    Parameters
+    ----------
+    values : (n,) float64
+        At least one value.
+    """
+    rng = np.random.default_rng(0)
+    means = values[rng.integers(len(values), size=(RESAMPLES, len(values)))].mean(axis=1)
+    low, high = np.quantile(means, [(1.0 - CONFIDENCE) / 2.0, (1.0 + CONFIDENCE) / 2.0]).tolist()
+    return low, high
+
+
+class _Predicting:
+    """A predictor as a policy."""
+
+    def __init__(self, predictor: Predictor) -> None:
+        self._predictor = predictor
+        self._state: Any = None
+        self._starts = np.ones(1, dtype=bool)
+
+    def reset(self, seed: int) -> None:  # noqa: ARG002 - the protocol's parameters
+        self._state, self._starts = None, np.ones(1, dtype=bool)
+
+    def __call__(self, observation: Any, info: Info) -> NDArray[Any]:  # noqa: ARG002 - the protocol's parameters
+        action, self._state = self._predictor.predict(observation, self._state, self._starts, deterministic=True)
+        self._starts = np.zeros(1, dtype=bool)
+        return np.asarray(action)
+
+
+class _Plain:
+    """A bare function as a policy."""
+
+    def __init__(self, function: Any) -> None:
+        self._function = function
+
+    def reset(self, seed: int) -> None:
+        """Do nothing; see `Policy.reset`."""
+
+    def __call__(self, observation: Any, info: Info) -> NDArray[Any]:
+        return np.asarray(self._function(observation, info))
+
+
+def _policy(policy: Policy | Predictor | str, env: gymnasium.Env[Any, Any]) -> Policy:
+    if isinstance(policy, str):
+        return baseline(policy, env.action_space)
+    if isinstance(policy, Predictor):
+        return _Predicting(policy)
+    if callable(policy):
+        return policy if hasattr(policy, "reset") else _Plain(policy)
+    raise InputError(f"policy: expected a callable, an agent with predict(), or a baseline's name; got {policy!r}")
+
+
+def _episode(env: gymnasium.Env[Any, Any], policy: Policy, seed: int, discount: float) -> EpisodeResult:
+    policy.reset(seed)
+    observation, info = env.reset(seed=seed)
+    value, weight, steps, cost, over = 0.0, 1.0, 0, 0.0, False
+    terms: dict[str, float] = {}
+    while not over:
+        observation, reward, terminated, truncated, info = env.step(policy(observation, info))
+        value += weight * float(reward)
+        weight *= discount
+        steps += 1
+        cost += float(info.get("cost", 0.0))
+        for name, term in info.get("reward_terms", {}).items():
+            terms[name] = terms.get(name, 0.0) + float(term)
+        over = terminated or truncated
+    ending = info.get("ending") or "time"
+    time = float(info.get("time_s", math.nan))
+    return EpisodeResult(seed, value, steps, time, ending, info.get("fault") == "ego", cost, terms)

@@ -1,0 +1,7 @@
+"""The task of the environments from version 1 on: what an episode is, what pays, what an agent observes."""
+
+from fogsim_envs.task.advisory import FogAdvisoryV1Env
+from fogsim_envs.task.episodes import Episode, FogDistribution, ScenarioDistribution
+from fogsim_envs.task.rewards import TaskWeights
+
+__all__ = ["Episode", "FogAdvisoryV1Env", "FogDistribution", "ScenarioDistribution", "TaskWeights"]

@@ -1,0 +1,274 @@
+"""The agent advises the ego's speed and chooses its lamps, in another fog, traffic and light each episode."""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.errors import InputError, UnknownNameError
+from fogsim.loop import AdvisedDriving, spread_advice
+from fogsim.metrics import step_metrics
+from fogsim.recorders import FramePanel
+from fogsim.scenario import Scenario, build
+from fogsim.values import Command, Ending, Step
+from fogsim_envs.hosting import TIMEOUT, Simulation, begin, begin_anew, checked_timeout
+from fogsim_envs.spaces import action_space, command_of
+from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
+from fogsim_envs.task.observation import task_observation, task_space
+from fogsim_envs.task.own_driver import OwnDriver
+from fogsim_envs.task.rewards import TaskWeights, Way, fault, strikes, task_terms, time_to_collision, unseen_share
+from fogsim_envs.task.sampling import EpisodeChoice, EpisodeSource
+
+
+class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
+    """Advise a vehicle's speed and lamps in fog that only its camera can judge, another one each episode.
+
+    One step is one decision period of the scenario (0.5 s); a frame is drawn and judged in each.
+
+    ### Action
+    ``MultiDiscrete([13, 3])``, or with ``continuous=True`` ``Box(-1, 1, (2,))``
+
+    | entry | discrete | continuous |
+    |---|---|---|
+    | advised speed | level i is 20 + 10 i km/h; level 12 is no advice | −1 … 1 is 20 … 130 km/h; 1 is no advice |
+    | lamps | 0 low beam, 1 and front fog, 2 and rear fog | thirds of −1 … 1 |
+
+    ### Observation
+    With ``observation="dict"`` what the vehicle itself has; with "state" or "camera" that entry alone
+
+    | key | space | meaning |
+    |---|---|---|
+    | camera | uint8 (rows, cols, 3) | the latest frame |
+    | signs | float32 (8, 4) in −1 … 1 | signs by the map: distance / 250 m, lateral / 25 m, value / 50 m/s, size / 2 |
+    | signs_mask | 0 or 1 (8,) | which rows of ``signs`` are filled |
+    | state | float32 (21,) in −1 … 1 | see below |
+
+    ``state``: own speed / 50 m/s; speed limit / 50 m/s; distance to go / 5 km; time left / 600 s; number of the own
+    lane from the right / 5; number of lanes / 5; lead present; lead distance / 200 m; lead relative speed / 50 m/s;
+    estimate valid; estimated visibility on a log scale (1 m … 10 km to 0 … 1); relative deviation of the estimate;
+    believed visibility on the same scale: 5, 25, 50, 75, 95 % quantiles; deviation of ln k; advised speed asked for
+    / 50 m/s (1 for none); front fog lamps lit; rear fog lamp lit.
+
+    ### Reward
+    Sum of the terms in ``info["reward_terms"]``, in points (`fogsim_envs.task.TaskWeights`): progress, time, arrival,
+    overdriving, conflict, discomfort, collision, rear_fog_lamp, front_fog_lamp. A drive at the limit all the way with
+    nothing amiss is worth 90. ``info["cost"]`` is 1 for a collision in which the ego strikes somebody plus the share of
+    the stopping sight distance beyond sight, for constrained learning.
+
+    ### Episodes
+    Fog, light, traffic, what a lead vehicle does, how fast the ego's own driver goes without advice, and the errors of
+    the told calibration are drawn at each reset (`FogDistribution`, `ScenarioDistribution`);
+    ``info["episode"]`` tells them, and ``reset(options={"episode": info["episode"]})`` gives the same again. ``split``
+    "test" draws from other random numbers than "train", whatever the seeds.
+
+    ### Start and end
+    The ego is on a road that is full of traffic. Terminated by a collision of the ego, by its arrival or if it leaves
+    the network; truncated after the scenario's duration.
+
+    ### Arguments
+    scenario : name in the catalogue, file, or `fogsim.Scenario`; None for the default task's motorway
+    scenario_distribution : `ScenarioDistribution`, or a sequence of scenarios of which one is taken; None with
+        a scenario is that scenario alone
+    fog_distribution : `FogDistribution`; None with a scenario is that scenario's own fog
+    split : "train" or "test"
+    observation : "dict", "state" or "camera"
+    overrides : ``key.path=value`` each, as after ``fogsim run --set``
+    image_size : (width, height) of the camera; None keeps the scenario's
+    continuous : which action space
+    reward_weights : `TaskWeights`
+    render_mode : None or "rgb_array" (the camera frame beside a panel with estimate, truth, advice, speed and lamps)
+    timeout : how long a child process that runs the simulation may give no sign of life [s]; ``inf`` for ever
+
+    ### Version history
+    * v1: other fog, light, traffic and drivers in each episode; a reward that time and arrival count in; state with
+      speed limit, way and time left, lanes and the belief's quantiles; a hit from behind is not the agent's
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 2}  # noqa: RUF012 - Gymnasium's own way
+
+    def __init__(
+        self,
+        scenario: str | Path | Scenario | None = None,
+        *,
+        scenario_distribution: ScenarioDistribution | Sequence[str | Path | Scenario] | None = None,
+        fog_distribution: FogDistribution | None = None,
+        split: str = "train",
+        observation: str = "dict",
+        overrides: Sequence[str] = (),
+        image_size: tuple[int, int] | None = (160, 120),
+        continuous: bool = False,
+        reward_weights: TaskWeights | None = None,
+        render_mode: str | None = None,
+        timeout: float = TIMEOUT,
+    ) -> None:
+        checked_timeout(timeout)
+        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+            raise UnknownNameError("render_mode", render_mode, self.metadata["render_modes"])
+        self._timeout = timeout
+        size = () if image_size is None else (f"camera.width={image_size[0]}", f"camera.height={image_size[1]}")
+        self._source = EpisodeSource(scenario, scenario_distribution, fog_distribution, (*size, *overrides), split)
+        self._mode, self._continuous = observation, continuous
+        self._weights = reward_weights or TaskWeights()
+        self._panel = FramePanel()
+        self.render_mode = render_mode
+        self._simulation: Simulation | None = None
+        self._running: Scenario | None = None
+        self._step: Step | None = None
+        first = self._source.first_scenario()
+        build.check_frames(first, "the agent")
+        self._camera = build.camera(first)
+        self.observation_space = task_space(observation, self._camera)
+        self.action_space = action_space(continuous)
+        self.metadata = {**self.metadata, "render_fps": 1 / first.clocks.decision_period_s}
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Begin an episode.
+
+        Parameters
+        ----------
+        seed : int
+            Seed of this and the following episodes; None goes on with the numbers of before.
+        options : dict or None
+            What of the episode is not to be drawn: ``visibility`` where the fog is densest [m], ``scenario``, further
+            ``overrides`` (list of ``key.path=value``), ``driver`` of the ego, or a whole ``episode`` as
+            ``info["episode"]`` tells it.
+
+        Raises
+        ------
+        InputError
+            If an option is unknown or does not fit.
+        """
+        super().reset(seed=seed)
+        run_seed, drawn = self._source.draw(self.np_random, EpisodeChoice.of(options))
+        scenario = drawn.scenario
+        self._check_camera(scenario)
+        self._step = self._begin(scenario, run_seed)
+        self._episode, self._driver = drawn.episode, OwnDriver(drawn.episode.driver)
+        self._adviser = AdvisedDriving(scenario)
+        self._frames = build.periods(scenario).decision_frames
+        self._standard = build.safety_standard(scenario)
+        self._way_end = _route_length(self._step) - scenario.traffic.stop_before_end_m
+        length = max(self._way_end - self._step.route_position, 1.0)
+        self._way = Way(length, max(self._step.speed_limit, 1.0), scenario.duration_s)
+        self._own = self._built_in = Command()
+        self._panel = FramePanel()
+        return self._observe(), {**self._info(), "episode": self._episode.as_info()}
+
+    def _check_camera(self, scenario: Scenario) -> None:
+        camera = build.camera(scenario)
+        ours = (self._camera.width, self._camera.height, self._camera.bits)
+        if (camera.width, camera.height, camera.bits) != ours:
+            raise InputError(
+                f"{scenario.name}: expected a camera of width, height and bits {ours}, for which the observation space "
+                f"was made, got {(camera.width, camera.height, camera.bits)}: give all scenarios one image_size"
+            )
+
+    def _begin(self, scenario: Scenario, seed: int) -> Step:
+        if self._simulation is None:
+            self._simulation, step = begin(scenario, seed, self._timeout)
+        elif scenario == self._running:
+            step = self._simulation.start(seed)
+        else:
+            before, self._simulation = self._simulation, None
+            self._simulation, step = begin_anew(before, scenario, seed, self._timeout)
+        self._running = scenario
+        return step
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Let an action be in force for one decision period.
+
+        Parameters
+        ----------
+        action : array_like of two numbers
+            A member of the action space.
+
+        Raises
+        ------
+        gymnasium.error.ResetNeeded
+            If the episode is over or none has begun.
+        """
+        if self._simulation is None or self._step is None or self._step.ending is not None:
+            raise gymnasium.error.ResetNeeded("the episode is over or none has begun: call reset() before step()")
+        before, self._own = self._step, command_of(action, self._continuous)
+        self._step = self._drive(before)
+        terms = task_terms(before, self._step, self._way, self._weights, self._standard)
+        truncated = self._step.ending is Ending.TIME
+        terminated = self._step.ending is not None and not truncated
+        info = {**self._info(), "reward_terms": terms}
+        return self._observe(), float(sum(terms.values())), terminated, truncated, info
+
+    def _drive(self, before: Step) -> Step:
+        """The last step of a decision period, which begins after one."""
+        step, scenario, simulation = before, self._running, self._simulation
+        if scenario is None or simulation is None:
+            raise gymnasium.error.ResetNeeded("call reset() before step()")
+        for _ in range(self._frames):
+            asked = spread_advice(self._own, scenario, before.truth.sections)
+            step = simulation.advance(self._driver.follow(asked, step))
+            if step.ending is not None:
+                break
+        return step
+
+    def _observe(self) -> Any:
+        return task_observation(self._current, self._mode, self._own, self._way.duration, self._way_end)
+
+    @property
+    def _current(self) -> Step:
+        if self._step is None:
+            raise gymnasium.error.ResetNeeded("call reset() first")
+        return self._step
+
+    def _info(self) -> dict[str, Any]:
+        """What is told beside the observation; agents must not use ``truth``, which is for oracles and evaluation."""
+        step = self._current
+        # What the built-in adviser would say here: it remembers what it said itself, not what the agent did.
+        self._built_in = self._adviser.decide(dataclasses.replace(step, command=self._built_in))
+        return {
+            "time_s": step.time,
+            "route_position_m": step.route_position,
+            "speed_mps": float(step.traffic.speed[step.ego]),
+            "speed_limit_mps": step.speed_limit,
+            "time_to_collision_s": time_to_collision(step),
+            "collisions": len(step.collisions),
+            "fault": fault(step),
+            "ending": None if step.ending is None else step.ending.value,
+            "built_in_advice_mps": self._built_in.advice.speed,
+            "built_in_lamps": int(self._built_in.lamps),
+            "belief": {
+                "visibility_m": step.belief.visibility,
+                "visibility_low_m": step.belief.visibility_quantile(0.05),
+                "visibility_high_m": step.belief.visibility_quantile(0.95),
+            },
+            "cost": float(strikes(step)) + unseen_share(step, self._standard),
+            "unplayed": step.unplayed.lines,
+            "truth": {
+                "extinction_per_m": step.truth.extinction,
+                "visibility_m": step.truth.visibility,
+                "visibility_ahead_m": step.truth.visibility_ahead,
+            },
+        }
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Draw the latest camera frame and its panel."""
+        if self.render_mode is None:
+            gymnasium.logger.warn("render() was called, but no render_mode was given to gymnasium.make()")
+            return None
+        return self._panel.draw(self._current, step_metrics(self._current, self._standard))
+
+    def close(self) -> None:
+        """End the simulation; closing twice is allowed."""
+        if self._simulation is not None:
+            self._simulation.close()
+        self._simulation, self._step, self._running = None, None, None
+
+
+def _route_length(step: Step) -> float:
+    route = step.truth.route
+    if route is None:
+        return math.inf
+    return float(np.linalg.norm(np.diff(route, axis=0), axis=1).sum())

@@ -1,0 +1,280 @@
+"""What differs from episode to episode: fog, light, traffic, script, the ego's own driver, and the calibration."""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from fogsim.errors import InputError
+from fogsim.traffic import SPEED_CHOICES
+
+FOG_AHEAD = (200.0, 700.0)
+"""How far ahead of the ego's start the first bank begins [m]: within the first half minute."""
+
+_LIGHT = {"day": (2000.0, 40_000.0), "dusk": (10.0, 2000.0), "night": (0.1, 0.3)}
+"""Illuminance of the sky [lx]: overcast or foggy day; sun below the horizon to civil twilight's end; no moon."""
+
+_SCRIPTS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "free": (),
+        "lead": ("actors.lead={ahead_of: ego, gap_m: 70, speed_kmh: 110}",),
+        "slow_truck": ("actors.lead={type: truck, ahead_of: ego, gap_m: 200, speed_kmh: 70}",),
+        "braking_lead": ("actors.lead={ahead_of: ego, gap_m: 70, speed_kmh: 110}",),
+        "standing_vehicle": ("actors.obstacle={position_m: 1500, stands: true}",),
+    }
+)
+"""Who is about the ego, by name. Actors are few, so that networks and route files are written once."""
+
+
+@dataclass(frozen=True, slots=True)
+class Episode:
+    """One episode, as far as it was drawn.
+
+    Attributes
+    ----------
+    settings : tuple of str
+        ``key.path=value`` each, as after ``fogsim run --set``.
+    driver : str
+        How fast the ego's own driver goes in fog without advice: one of `fogsim.traffic.SPEED_CHOICES`.
+    light : str
+        "day", "dusk", "night", or "" where the scenario says it.
+    script : str
+        Name of what the vehicles about the ego do, or "".
+    """
+
+    settings: tuple[str, ...] = ()
+    driver: str = "unaffected"
+    light: str = ""
+    script: str = ""
+
+    def as_info(self) -> dict[str, Any]:
+        """Plain data for ``info["episode"]``."""
+        return {
+            "settings": list(self.settings),
+            "driver": self.driver,
+            "light": self.light,
+            "script": self.script,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class FogDistribution:
+    """Which fog there may be along the ego's way.
+
+    Attributes
+    ----------
+    visibility : (float, float)
+        Meteorological visibility where the fog is densest, log-uniform between these [m].
+    clear_share : float
+        Share of episodes without fog.
+    even_share : float
+        Share of the others in which the fog is the same everywhere; the rest has one or two banks.
+    bank_length : (float, float)
+        Length of a bank, uniform between these [m].
+    bank_edge : (float, float)
+        Length of its soft edges, log-uniform between these [m].
+    outside_visibility : (float, float)
+        Visibility outside the banks, log-uniform between these [m], but at least that in them.
+    patchy_share : float
+        Share of foggy episodes in which fog thickens and thins from place to place.
+
+    Raises
+    ------
+    InputError
+        If a range is none or a share is not in 0 … 1.
+    """
+
+    visibility: tuple[float, float] = (25.0, 1000.0)
+    clear_share: float = 0.1
+    even_share: float = 0.25
+    bank_length: tuple[float, float] = (300.0, 1500.0)
+    bank_edge: tuple[float, float] = (30.0, 300.0)
+    outside_visibility: tuple[float, float] = (200.0, 2000.0)
+    patchy_share: float = 0.25
+
+    def __post_init__(self) -> None:
+        for name in ("visibility", "bank_length", "bank_edge", "outside_visibility"):
+            _check_range(f"FogDistribution.{name}", getattr(self, name), 1.0)
+        for name in ("clear_share", "even_share", "patchy_share"):
+            _check_share(f"FogDistribution.{name}", getattr(self, name))
+
+    def draw(self, rng: np.random.Generator, visibility: float | None = None) -> dict[str, Any]:
+        """Fog of an episode, as a scenario's block ``fog``.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Random numbers; as many are drawn whatever comes out.
+        visibility : float or None
+            Visibility where it is densest [m], in place of a drawn one; ``inf`` is clear air.
+        """
+        is_clear, is_even, is_patchy, is_double = rng.random(4) < (
+            self.clear_share,
+            self.even_share,
+            self.patchy_share,
+            0.3,
+        )
+        densest, outside = _log_uniform(rng, self.visibility), _log_uniform(rng, self.outside_visibility)
+        banks = [self._bank(rng) for _ in range(2)]
+        seed = int(rng.integers(2**31))
+        if visibility is not None:
+            is_clear, densest = math.isinf(visibility), visibility
+        if is_clear:
+            return {"visibility_m": "inf"}
+        if is_even:
+            fog: dict[str, Any] = {"visibility_m": densest}
+        else:
+            fog = {
+                "outside_visibility_m": max(outside, densest),
+                "banks": _placed(banks[: 1 + bool(is_double)], densest, max(outside, densest)),
+            }
+        if is_patchy:
+            fog["patches"] = {"correlation_length_m": 100.0, "strength": 0.4, "seed": seed}
+        return fog
+
+    def _bank(self, rng: np.random.Generator) -> dict[str, float]:
+        return {
+            "ahead": float(rng.uniform(*FOG_AHEAD)),
+            "length": float(rng.uniform(*self.bank_length)),
+            "edge": _log_uniform(rng, self.bank_edge),
+            "depth": float(rng.uniform(0.3, 1.0)),
+        }
+
+
+def _placed(banks: Sequence[Mapping[str, float]], densest: float, outside: float) -> list[dict[str, float]]:
+    """Banks one after the other; the first is the densest, a further one is less dense."""
+    placed, start = [], 0.0
+    for number, bank in enumerate(banks):
+        begin = start + bank["ahead"]
+        end = begin + bank["length"]
+        share = 1.0 if number == 0 else bank["depth"]
+        inside = math.exp(share * math.log(densest) + (1.0 - share) * math.log(outside))
+        edge = min(bank["edge"], bank["length"] / 2.0)
+        placed.append({"start_m": begin, "end_m": end, "edge_m": edge, "visibility_m": inside})
+        start = end
+    return placed
+
+
+@dataclass(frozen=True, slots=True)
+class ScenarioDistribution:
+    """Which traffic, light, script and vehicle there may be.
+
+    Attributes
+    ----------
+    lanes : tuple of int
+        Lanes of the motorway, each as likely.
+    demand : tuple of float
+        Vehicles that drive as the ego does [1/h], each as likely.
+    truck_shares : tuple of float
+        Shares of trucks, each as likely.
+    light : mapping from str to float
+        Weights of "day", "dusk" and "night".
+    scripts : mapping from str to float
+        Weights of what happens about the ego: "free" (nobody in particular), "lead", "slow_truck", "braking_lead"
+        (which comes to a standstill for a while, somewhere) and "standing_vehicle" (in the ego's lane).
+    drivers : mapping from str to float
+        Weights of the ego's own driver, by `fogsim.traffic.SPEED_CHOICES`: how fast one goes in fog without advice.
+    pitch_error, focal_length_error : float
+        Standard deviation of what the estimators are told of the camera's pitch [rad], and share of its focal length.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown or a weight or number cannot be.
+    """
+
+    lanes: tuple[int, ...] = (2, 3)
+    demand: tuple[float, ...] = (300.0, 900.0, 1500.0, 2100.0)
+    truck_shares: tuple[float, ...] = (0.1, 0.25)
+    light: Mapping[str, float] = field(default_factory=lambda: {"day": 0.7, "dusk": 0.15, "night": 0.15})
+    scripts: Mapping[str, float] = field(
+        default_factory=lambda: {
+            "free": 0.2, "lead": 0.2, "slow_truck": 0.15, "braking_lead": 0.25, "standing_vehicle": 0.2,
+        }
+    )  # fmt: skip
+    drivers: Mapping[str, float] = field(default_factory=lambda: {"unaffected": 0.5, "observed": 0.3, "too_fast": 0.2})
+    pitch_error: float = math.radians(0.1)
+    focal_length_error: float = 0.005
+
+    def __post_init__(self) -> None:
+        for name, known in (("light", _LIGHT), ("scripts", _SCRIPTS), ("drivers", SPEED_CHOICES)):
+            _check_weights(f"ScenarioDistribution.{name}", getattr(self, name), list(known))
+        for name in ("lanes", "demand", "truck_shares"):
+            if not getattr(self, name):
+                raise InputError(f"ScenarioDistribution.{name}: expected at least one value to choose from, got none")
+
+    def draw(self, rng: np.random.Generator) -> Episode:
+        """An episode but for its fog.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Random numbers; as many are drawn whatever comes out.
+        """
+        light, script, driver = (_choice(rng, weights) for weights in (self.light, self.scripts, self.drivers))
+        lanes, demand, trucks = (values[int(rng.integers(len(values)))] for values in self._values())
+        illuminance = _log_uniform(rng, _LIGHT[light])
+        brakes_at, deceleration, hold = rng.uniform(500.0, 2000.0), rng.uniform(3.0, 7.0), rng.uniform(5.0, 30.0)
+        pitch, focal = rng.normal(0.0, (self.pitch_error, self.focal_length_error)).tolist()
+        settings = [
+            f"road.lanes={int(lanes)}",
+            f"demand.same_way_vph={float(demand)!r}",
+            f"demand.mix={json.dumps({'truck': float(trucks), 'van': 0.1})}",
+            f"light.illuminance_lx={illuminance!r}",
+            f"camera.told.pitch_error_deg={math.degrees(pitch)!r}",
+            f"camera.told.focal_length_error_percent={100.0 * focal!r}",
+            *_SCRIPTS[script],
+        ]
+        if script == "braking_lead":
+            brake = {"to_kmh": 0.0, "deceleration_mps2": deceleration, "hold_s": hold}
+            rule = {"when": f"lead.position > {brakes_at:.1f} m", "do": {"lead": {"brake": brake}}}
+            settings.append(f"timeline={json.dumps([rule])}")
+        return Episode(tuple(settings), driver, light, script)
+
+    def _values(self) -> tuple[Sequence[float], ...]:
+        return self.lanes, self.demand, self.truck_shares
+
+
+def fog_setting(fog: Mapping[str, Any]) -> str:
+    """Override that puts a block ``fog`` in place of a scenario's.
+
+    Parameters
+    ----------
+    fog : mapping
+        The block.
+    """
+    return f"fog={json.dumps(dict(fog))}"
+
+
+def _log_uniform(rng: np.random.Generator, limits: tuple[float, float]) -> float:
+    low, high = (math.log(limit) for limit in limits)
+    return math.exp(rng.uniform(low, high))
+
+
+def _choice(rng: np.random.Generator, weights: Mapping[str, float]) -> str:
+    names, values = list(weights), np.array(list(weights.values()), dtype=float)
+    return names[int(np.searchsorted(np.cumsum(values) / values.sum(), rng.random(), side="right"))]
+
+
+def _check_range(name: str, limits: Sequence[float], least: float) -> None:
+    low, high = limits
+    if not (least <= low <= high and math.isfinite(high)):
+        raise InputError(f"{name}: expected two numbers, {least:g} ≤ lower ≤ upper, got {tuple(limits)!r}")
+
+
+def _check_share(name: str, share: float) -> None:
+    if not 0.0 <= share <= 1.0:
+        raise InputError(f"{name}: expected a share in 0 … 1, got {share!r}")
+
+
+def _check_weights(name: str, weights: Mapping[str, float], known: Sequence[str]) -> None:
+    unknown = [one for one in weights if one not in known]
+    if unknown:
+        raise InputError(f"{name}: unknown name {unknown[0]!r}; known: {', '.join(known)}")
+    values = list(weights.values())
+    if not values or min(values) < 0.0 or not 0.0 < sum(values) < math.inf:
+        raise InputError(f"{name}: expected weights of at least 0, not all 0, got {dict(weights)!r}")

@@ -1,0 +1,149 @@
+"""What an agent of version 1 observes: only what the vehicle itself has."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from fogsim.errors import UnknownNameError
+from fogsim.values import Camera, Command, Lamp, Step
+from fogsim_envs.spaces import observation_space, observed_signs, scaled_visibility
+
+OBSERVATIONS = ("dict", "state", "camera")
+"""What can be asked for: all of it, the numbers alone, or the picture alone."""
+
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+"""Quantiles of the believed visibility that an agent is told."""
+
+SPEED_SCALE, LEAD_SCALE, WAY_SCALE, TIME_SCALE = 50.0, 200.0, 5000.0, 600.0
+
+STATE_FEATURES = (
+    "speed",
+    "speed_limit",
+    "distance_to_go",
+    "time_left",
+    "lane",
+    "lanes",
+    "lead_present",
+    "lead_distance",
+    "lead_relative_speed",
+    "estimate_valid",
+    "estimate_visibility",
+    "estimate_deviation",
+    "belief_5_percent",
+    "belief_25_percent",
+    "belief_median",
+    "belief_75_percent",
+    "belief_95_percent",
+    "belief_deviation",
+    "advised_speed",
+    "front_fog_lamps",
+    "rear_fog_lamp",
+)
+"""Meaning of the entries of ``state``; the environment's docstring gives their scales."""
+
+LANE_SCALE = 5.0
+
+
+def task_space(mode: str, camera: Camera | None) -> spaces.Space[Any]:
+    """Space of observations.
+
+    Parameters
+    ----------
+    mode : str
+        One of `OBSERVATIONS`.
+    camera : Camera or None
+        Calibration of the ego's camera; None if there is none, for "state".
+
+    Raises
+    ------
+    UnknownNameError
+        If the mode is none of them.
+    """
+    if mode not in OBSERVATIONS:
+        raise UnknownNameError("observation", mode, OBSERVATIONS)
+    state = spaces.Box(-1.0, 1.0, (len(STATE_FEATURES),), np.float32)
+    if mode == "state" or camera is None:
+        return state
+    known = observation_space(camera)
+    return known["camera"] if mode == "camera" else spaces.Dict({**known.spaces, "state": state})
+
+
+def task_observation(step: Step, mode: str, own: Command, duration: float, way_end: float) -> Any:
+    """Observation of a step. Every array is the caller's own.
+
+    Parameters
+    ----------
+    step : Step
+        The finished step.
+    mode : str
+        One of `OBSERVATIONS`.
+    own : Command
+        What the agent asked for last, whatever the driver makes of it.
+    duration : float
+        Longest time of the episode [s].
+    way_end : float
+        Position along the route at which the ego arrives [m].
+    """
+    if mode == "camera":
+        return step.observation.image.copy()
+    state = task_state(step, own, duration - step.time, way_end - step.route_position)
+    if mode == "state":
+        return state
+    signs, mask = observed_signs(step)
+    return {"camera": step.observation.image.copy(), "signs": signs, "signs_mask": mask, "state": state}
+
+
+def task_state(step: Step, own: Command, time_left: float, to_go: float) -> NDArray[np.float32]:
+    """Entries of ``state`` (`STATE_FEATURES`), float32 in −1 … 1.
+
+    Parameters
+    ----------
+    step : Step
+        The finished step.
+    own : Command
+        What the agent asked for last.
+    time_left : float
+        Time to the end of the episode [s].
+    to_go : float
+        Distance to the arrival [m].
+    """
+    lead, belief, advice = step.observation.lead, step.belief, own.advice.speed
+    lane, lanes = _lane(step)
+    values = (
+        step.observation.speed / SPEED_SCALE,
+        step.speed_limit / SPEED_SCALE,
+        to_go / WAY_SCALE,
+        time_left / TIME_SCALE,
+        lane / LANE_SCALE,
+        lanes / LANE_SCALE,
+        float(lead is not None),
+        lead.distance / LEAD_SCALE if lead else 1.0,
+        lead.relative_speed / SPEED_SCALE if lead else 0.0,
+        *_estimate(step),
+        *(scaled_visibility(belief.visibility_quantile(share)) for share in QUANTILES),
+        belief.log_standard_deviation,
+        advice / SPEED_SCALE if math.isfinite(advice) else 1.0,
+        float(Lamp.FRONT_FOG in own.lamps),
+        float(Lamp.REAR_FOG in own.lamps),
+    )
+    return np.clip(np.array(values, dtype=np.float32), -1.0, 1.0)
+
+
+def _estimate(step: Step) -> tuple[float, float, float]:
+    if not step.estimates or not step.estimates[0].valid:
+        return 0.0, 1.0, 1.0
+    estimate = step.estimates[0]
+    deviation = estimate.standard_deviation / estimate.extinction if estimate.extinction > 0.0 else 1.0
+    return 1.0, scaled_visibility(estimate.visibility), deviation
+
+
+def _lane(step: Step) -> tuple[int, int]:
+    """Number of the ego's lane from the right, and how many lanes there are."""
+    own = step.traffic.lane[step.ego]
+    ways: Mapping[str, Sequence[str]] = step.truth.carriageways
+    lanes = ways.get(own.rpartition("_")[0], ())
+    return (lanes.index(own), len(lanes)) if own in lanes else (0, max(len(lanes), 1))

@@ -1,0 +1,201 @@
+"""What an episode is worth: named terms that no standing, crawling or early end can farm."""
+
+import math
+from dataclasses import dataclass
+
+from fogsim.kinematics import stopping_sight_distance
+from fogsim.metrics import DEFAULT_STANDARD, SafetyStandard
+from fogsim.values import Ending, Lamp, Step
+
+COMFORTABLE_DECELERATION = 2.0
+"""Decelerations up to this are comfortable [m/s²] (ISO 15622: 2–3.5)."""
+
+REAR_FOG_LAMP_VISIBILITY = 50.0
+"""Rear fog lamps are lit below this visibility and not above [m] (German StVO § 17(3))."""
+
+FRONT_FOG_LAMP_VISIBILITY = 100.0
+"""Front fog lamps are lit below this visibility and not above [m] (Highway Code, rules 226 and 236)."""
+
+
+@dataclass(frozen=True, slots=True)
+class TaskWeights:
+    """Weights of the terms, in points: a drive at the limit all the way with nothing amiss is worth 90.
+
+    Attributes
+    ----------
+    progress : float
+        For the whole way, in proportion to what was driven within the limit.
+    time : float
+        Against the time that the way takes at the limit; against every second in proportion, those included that an
+        episode would have had left when it ended before the arrival.
+    arrival : float
+        For arriving.
+    overdriving : float
+        Against the whole way driven with no sight at all; in proportion to the way and to the share of the stopping
+        sight distance that lies beyond the sight.
+    conflict : float
+        Against each second at a time to collision of 0, in proportion to what is missing to the standard's, 3 s.
+    discomfort : float
+        Against each second of braking by 1 m/s² more than 2 m/s².
+    collision : float
+        Against a collision in which the ego strikes somebody.
+    rear_fog_lamp : float
+        Against the time of a way at the limit with the rear fog lamp lit above 50 m, where it dazzles those behind, or
+        dark below, where the ego is not seen.
+    front_fog_lamp : float
+        The same for the front fog lamps and 100 m, where they dazzle those who come the other way.
+    """
+
+    progress: float = 100.0
+    time: float = 30.0
+    arrival: float = 20.0
+    overdriving: float = 100.0
+    conflict: float = 2.0
+    discomfort: float = 0.5
+    collision: float = 100.0
+    rear_fog_lamp: float = 10.0
+    front_fog_lamp: float = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """The way of an episode, against which time and distance are counted.
+
+    Attributes
+    ----------
+    length : float
+        From the start to the arrival [m].
+    limit : float
+        Speed limit at the start [m/s].
+    duration : float
+        Longest time [s].
+    """
+
+    length: float
+    limit: float
+    duration: float
+
+    @property
+    def time_at_limit(self) -> float:
+        """Time that it takes at the limit [s]."""
+        return self.length / self.limit
+
+
+def task_terms(
+    before: Step, after: Step, way: Way, weights: TaskWeights, standard: SafetyStandard = DEFAULT_STANDARD
+) -> dict[str, float]:
+    """Weighted terms of the reward for one decision period; the reward is their sum.
+
+    Parameters
+    ----------
+    before, after : Step
+        First and last step of the period.
+    way : Way
+        The way.
+    weights : TaskWeights
+        The weights.
+    standard : SafetyStandard
+        Reaction time and deceleration of the stopping sight distance, and the time to collision that is a conflict.
+
+    Returns
+    -------
+    dict of str to float
+        Terms by the names of `TaskWeights`.
+    """
+    duration = after.time - before.time
+    driven = max(after.route_position - before.route_position, 0.0)
+    share = driven / way.length
+    # Who drives faster than allowed gains no more than who drives at the limit.
+    allowed = min(driven, max(before.speed_limit, after.speed_limit) * duration) / way.length
+    ended_early = after.ending not in (None, Ending.ARRIVED)
+    lost = max(way.duration - after.time, 0.0) if ended_early else 0.0
+    time = duration / way.time_at_limit
+    terms = {
+        "progress": allowed,
+        "time": -(duration + lost) / way.time_at_limit,
+        "arrival": float(after.ending is Ending.ARRIVED),
+        "overdriving": -share * unseen_share(after, standard),
+        "conflict": -duration * conflict(after, standard.time_to_collision),
+        "discomfort": -duration * max(-_acceleration(after) - COMFORTABLE_DECELERATION, 0.0),
+        "collision": -float(strikes(after)),
+        "rear_fog_lamp": -time * _amiss(after, Lamp.REAR_FOG, REAR_FOG_LAMP_VISIBILITY),
+        "front_fog_lamp": -time * _amiss(after, Lamp.FRONT_FOG, FRONT_FOG_LAMP_VISIBILITY),
+    }
+    return {name: getattr(weights, name) * value for name, value in terms.items()}
+
+
+def unseen_share(step: Step, standard: SafetyStandard) -> float:
+    """Share of the stopping sight distance that lies beyond what can be seen ahead [-].
+
+    Parameters
+    ----------
+    step : Step
+        The instant.
+    standard : SafetyStandard
+        Reaction time and deceleration.
+    """
+    speed = float(step.traffic.speed[step.ego])
+    needed = stopping_sight_distance(speed, standard.reaction_time, standard.deceleration)
+    return max(0.0, 1.0 - step.truth.visibility_ahead / needed) if needed > 0.0 else 0.0
+
+
+def time_to_collision(step: Step) -> float:
+    """Time in which the ego would strike its leader if both kept their speeds [s]; ``inf`` if it would not.
+
+    Parameters
+    ----------
+    step : Step
+        The instant.
+    """
+    speed = float(step.traffic.speed[step.ego])
+    if step.leader is None or speed <= step.leader.speed:
+        return math.inf
+    return max(step.leader.gap, 0.0) / (speed - step.leader.speed)
+
+
+def conflict(step: Step, threshold: float) -> float:
+    """How far the time to collision is below a threshold, 0 … 1.
+
+    Parameters
+    ----------
+    step : Step
+        The instant.
+    threshold : float
+        Time to collision below which there is a conflict [s].
+    """
+    return max(0.0, 1.0 - time_to_collision(step) / threshold)
+
+
+def fault(step: Step) -> str | None:
+    """Who is at fault in the ego's collision: "ego" if it strikes somebody, "other" if it is struck; None without one.
+
+    Parameters
+    ----------
+    step : Step
+        The instant.
+    """
+    if strikes(step):
+        return "ego"
+    ego = step.traffic.ids[step.ego]
+    return "other" if any(ego == one.victim for one in step.collisions) else None
+
+
+def strikes(step: Step) -> bool:
+    """Whether the ego strikes somebody.
+
+    Parameters
+    ----------
+    step : Step
+        The instant.
+    """
+    ego = step.traffic.ids[step.ego]
+    return any(ego == one.collider for one in step.collisions)
+
+
+def _acceleration(step: Step) -> float:
+    return float(step.traffic.acceleration[step.ego])
+
+
+def _amiss(step: Step, lamp: Lamp, visibility: float) -> float:
+    """Whether a lamp is lit above a visibility, or dark below."""
+    return float((lamp in step.command.lamps) != (step.truth.visibility < visibility))

@@ -1,0 +1,210 @@
+"""Draws episodes: from distributions, or as the caller of ``reset`` fixes them."""
+
+import functools
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fogsim.errors import InputError, UnknownNameError
+from fogsim.scenario import Scenario, load_scenario, override
+from fogsim.traffic import SPEED_CHOICES
+from fogsim_envs.task.episodes import Episode, FogDistribution, ScenarioDistribution, fog_setting
+
+MOTORWAY = Path(__file__).with_name("motorway.yaml")
+"""The road of the default task."""
+
+SPLITS = ("train", "test")
+"""Random numbers of which those of one are never those of another."""
+
+AnyScenario = str | Path | Scenario
+
+_KEPT_SCENARIOS = 8
+
+
+class EpisodeChoice(NamedTuple):
+    """What of an episode is not to be drawn.
+
+    Attributes
+    ----------
+    scenario : name, file, Scenario or None
+        The scenario.
+    visibility : float or None
+        Visibility where the fog is densest [m].
+    overrides : tuple of str
+        ``key.path=value`` each, after all others.
+    driver : str or None
+        The ego's own driver.
+    episode : Episode or None
+        All that is drawn.
+    """
+
+    scenario: AnyScenario | None = None
+    visibility: float | None = None
+    overrides: tuple[str, ...] = ()
+    driver: str | None = None
+    episode: Episode | None = None
+
+    @classmethod
+    def of(cls, options: Mapping[str, Any] | None) -> "EpisodeChoice":
+        """Read the options of ``reset``.
+
+        Parameters
+        ----------
+        options : mapping or None
+            Options by the names of the attributes.
+
+        Raises
+        ------
+        InputError
+            If one is unknown or does not fit.
+        """
+        given = dict(options or {})
+        for name in given:
+            if name not in cls._fields:
+                raise UnknownNameError("option of reset()", name, cls._fields)
+        overrides = given.get("overrides", ())
+        if isinstance(overrides, str) or not all(isinstance(one, str) for one in overrides):
+            raise InputError(f"options['overrides']: expected a list of 'key.path=value', got {overrides!r}")
+        return cls(
+            given.get("scenario"),
+            _checked_visibility(given.get("visibility")),
+            tuple(overrides),
+            _checked_driver(given.get("driver")),
+            _told_episode(given.get("episode")),
+        )
+
+
+class Drawn(NamedTuple):
+    """An episode and the scenario that it makes."""
+
+    episode: Episode
+    scenario: Scenario
+
+
+class EpisodeSource:
+    """What the episodes of an environment are drawn from.
+
+    Parameters
+    ----------
+    scenario : name, file, Scenario or None
+        The scenario; None for the default task's motorway.
+    distribution : ScenarioDistribution, sequence of scenarios or None
+        What of it is drawn, or which one.
+    fog : FogDistribution or None
+        Which fog is drawn.
+    overrides : tuple of str
+        ``key.path=value`` each, after what is drawn.
+    split : str
+        One of `SPLITS`.
+
+    Raises
+    ------
+    InputError
+        If an argument does not fit, or a scenario cannot be loaded.
+    """
+
+    def __init__(
+        self,
+        scenario: AnyScenario | None,
+        distribution: ScenarioDistribution | Sequence[AnyScenario] | None,
+        fog: FogDistribution | None,
+        overrides: tuple[str, ...],
+        split: str,
+    ) -> None:
+        if split not in SPLITS:
+            raise UnknownNameError("split", split, SPLITS)
+        is_default = scenario is None and distribution is None
+        self._split = SPLITS.index(split)
+        self._drawn = ScenarioDistribution() if is_default else distribution
+        self._fog = FogDistribution() if is_default and fog is None else fog
+        self._overrides = overrides
+        if isinstance(self._drawn, ScenarioDistribution) or self._drawn is None:
+            self._scenarios: tuple[AnyScenario, ...] = (MOTORWAY if scenario is None else scenario,)
+        elif scenario is not None:
+            raise InputError("scenario and scenario_distribution: give one scenario or several to draw from, not both")
+        else:
+            self._scenarios = _several(self._drawn)
+        # Most resets of a fixed scenario ask for the same one again.
+        self._load = functools.lru_cache(_KEPT_SCENARIOS)(_loaded)
+
+    def first_scenario(self) -> Scenario:
+        """A scenario of them, for what all have in common."""
+        return self._loaded(self._scenarios[0], self._overrides)
+
+    def draw(self, rng: np.random.Generator, choice: EpisodeChoice) -> tuple[int, Drawn]:
+        """Draw an episode; as many random numbers are used whatever is fixed.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Random numbers of the environment.
+        choice : EpisodeChoice
+            What is not to be drawn.
+
+        Returns
+        -------
+        int
+            Seed of the run.
+        Drawn
+            The episode.
+        """
+        number = int(rng.integers(2**30))
+        # The seeds of one split are even, of the other odd, and so are what all else is drawn by.
+        seed = 2 * number + self._split
+        own = np.random.default_rng(seed)
+        named = self._scenarios[int(own.integers(len(self._scenarios)))]
+        episode = choice.episode or self._episode(own, choice.visibility)
+        if choice.driver is not None:
+            episode = Episode(episode.settings, choice.driver, episode.light, episode.script)
+        settings = [*episode.settings, *self._overrides]
+        if choice.visibility is not None and (self._fog is None or choice.episode is not None):
+            settings.append(f"fog.visibility_m={choice.visibility!r}")
+        written = choice.scenario if choice.scenario is not None else named
+        return seed, Drawn(episode, self._loaded(written, (*settings, *choice.overrides)))
+
+    def _episode(self, rng: np.random.Generator, visibility: float | None) -> Episode:
+        episode = self._drawn.draw(rng) if isinstance(self._drawn, ScenarioDistribution) else Episode()
+        if self._fog is None:
+            return episode
+        fog = fog_setting(self._fog.draw(rng, visibility))
+        return Episode((*episode.settings, fog), episode.driver, episode.light, episode.script)
+
+    def _loaded(self, scenario: AnyScenario, settings: tuple[str, ...]) -> Scenario:
+        return override(scenario, settings) if isinstance(scenario, Scenario) else self._load(scenario, settings)
+
+
+def _loaded(scenario: str | Path, settings: tuple[str, ...]) -> Scenario:
+    return load_scenario(scenario, settings)
+
+
+def _several(scenarios: object) -> tuple[AnyScenario, ...]:
+    if isinstance(scenarios, Sequence) and not isinstance(scenarios, str) and len(scenarios):
+        return tuple(scenarios)
+    raise InputError(
+        f"scenario_distribution: expected a ScenarioDistribution, or a sequence of scenarios, got {scenarios!r}"
+    )
+
+
+def _checked_visibility(visibility: object) -> float | None:
+    if visibility is None:
+        return None
+    if isinstance(visibility, bool) or not isinstance(visibility, (int, float)) or not visibility >= 1.0:
+        raise InputError(f"options['visibility']: expected a visibility of at least 1 m, or inf, got {visibility!r}")
+    return float(visibility)
+
+
+def _checked_driver(driver: object) -> str | None:
+    if driver is not None and driver not in SPEED_CHOICES:
+        raise UnknownNameError("driver", driver, SPEED_CHOICES)
+    return None if driver is None else str(driver)
+
+
+def _told_episode(told: object) -> Episode | None:
+    if told is None or isinstance(told, Episode):
+        return told
+    keys = {"settings", "driver", "light", "script"}
+    if not isinstance(told, Mapping) or set(told) != keys:
+        raise InputError(f"options['episode']: expected what info['episode'] told, with {sorted(keys)}, got {told!r}")
+    return Episode(tuple(told["settings"]), str(told["driver"]), str(told["light"]), str(told["script"]))

@@ -127,6 +127,7 @@ class EgoEquipment:
             self._network = road, _ = network()
             self._meters = RoadMeters(self._scenario, road.route, road.route_limits)
             self._way = KnownWay(road.route, carriageways(road.lanes))
+            self._sensors.enter_road(road.structures)
         self._schedule = FaultSchedule(streams.faults)
         self.begin_faults(self._faults, 0.0)
         view = self._view_of_world(())

@@ -3,10 +3,14 @@
 import math
 from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fogsim.randomness import Streams
 from fogsim.scenario import Scenario, build
 from fogsim.sensors import (
     Fix,
+    RadarShadow,
     faulty_fix,
     faulty_lead,
     faulty_lead_sensor,
@@ -15,7 +19,8 @@ from fogsim.sensors import (
     measure_lead,
     signs_ahead,
 )
-from fogsim.values import LeadMeasurement, RunningFault, SignMap, SignSighting, TrafficSnapshot
+from fogsim.sensors.radar_shadow import HEIGHT
+from fogsim.values import LeadMeasurement, RunningFault, SignMap, SignSighting, Structure, TrafficSnapshot
 from fogsim.values.fault import Where
 
 Faults = Sequence[RunningFault]
@@ -33,6 +38,17 @@ class EgoSensors:
     def __init__(self, scenario: Scenario) -> None:
         self._radar, self._gps = build.lead_sensor(scenario), build.gps(scenario)
         self._sign_reach = scenario.sensors.sign_reach_m
+        self._shadow = RadarShadow(())
+
+    def enter_road(self, structures: Sequence[Structure]) -> None:
+        """Let the radar reach only what is not behind these.
+
+        Parameters
+        ----------
+        structures : sequence of Structure
+            What stands beside the roads and over them.
+        """
+        self._shadow = RadarShadow(structures)
 
     def lead(self, snapshot: TrafficSnapshot, faults: Faults, streams: Streams) -> LeadMeasurement | None:
         """The vehicle ahead by radar.
@@ -47,8 +63,16 @@ class EgoSensors:
             Random numbers of the run.
         """
         speed, radar = float(snapshot.state.speed[snapshot.ego]), faulty_lead_sensor(self._radar, faults)
-        measured = measure_lead(snapshot.leader, speed, radar, streams.sensors, _bearing(snapshot))
+        share = self._share_of_reach(snapshot)
+        measured = measure_lead(snapshot.leader, speed, radar, streams.sensors, _bearing(snapshot), share)
         return faulty_lead(measured, faults)
+
+    def _share_of_reach(self, snapshot: TrafficSnapshot) -> float:
+        """What stands between the ego's front bumper and its leader's rear leaves of the radar's reach [-]."""
+        rear = _rear(snapshot) if self._shadow else None
+        if rear is None:
+            return 1.0
+        return self._shadow.share_of_reach(snapshot.state.position[snapshot.ego] + (0.0, 0.0, HEIGHT), rear)
 
     def signs(
         self, snapshot: TrafficSnapshot, known: SignMap, faults: Faults, streams: Streams
@@ -73,6 +97,22 @@ class EgoSensors:
             return ()
         known = faulty_signs(known, (fault.kind for fault in faults), Where.MAP)
         return signs_ahead(known, measured.position, measured.heading, self._sign_reach)
+
+
+def _rear(snapshot: TrafficSnapshot) -> NDArray[np.float64] | None:
+    """Ends and middle of the leader's rear (3, 3), where a radar meets it [m]; None if that is not read."""
+    state, leader = snapshot.state, snapshot.leader
+    if leader is None or leader.vehicle_id not in state.ids:
+        return None
+    row = state.ids.index(leader.vehicle_id)
+    heading, length, width = (float(column[row]) for column in (state.heading, state.length, state.width))
+    forward, left = (math.cos(heading), math.sin(heading)), (-math.sin(heading), math.cos(heading))
+    aside = np.array([-0.5, 0.0, 0.5])[:, None] * width
+    points = np.zeros((3, 3))
+    points[:, :2] = aside * left - np.multiply(length, forward)
+    points[:, 2] = HEIGHT
+    rear: NDArray[np.float64] = points + state.position[row]
+    return rear
 
 
 def _bearing(snapshot: TrafficSnapshot) -> float:

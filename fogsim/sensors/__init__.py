@@ -3,12 +3,14 @@
 from fogsim.sensors.faults import check_sign_ids, faulty_fix, faulty_lead, faulty_lead_sensor, faulty_signs
 from fogsim.sensors.gps import Fix, Gps, measure_fix
 from fogsim.sensors.lead import LeadSensor, measure_lead
+from fogsim.sensors.radar_shadow import RadarShadow
 from fogsim.sensors.signs import signs_ahead
 
 __all__ = [
     "Fix",
     "Gps",
     "LeadSensor",
+    "RadarShadow",
     "check_sign_ids",
     "faulty_fix",
     "faulty_lead",

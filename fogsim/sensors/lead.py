@@ -1,4 +1,4 @@
-"""A radar-like sensor that tracks the vehicle ahead; radar waves pass through fog."""
+"""A radar-like sensor that tracks the vehicle ahead; radar waves pass through fog, not through walls."""
 
 import math
 from dataclasses import dataclass
@@ -31,7 +31,12 @@ class LeadSensor:
 
 
 def measure_lead(
-    leader: Leader | None, own_speed: float, sensor: LeadSensor, rng: np.random.Generator, bearing: float = 0.0
+    leader: Leader | None,
+    own_speed: float,
+    sensor: LeadSensor,
+    rng: np.random.Generator,
+    bearing: float = 0.0,
+    share_of_reach: float = 1.0,
 ) -> LeadMeasurement | None:
     """Measure the vehicle ahead.
 
@@ -49,6 +54,8 @@ def measure_lead(
         Source of the noise.
     bearing : float
         Angle from the own axis to the middle of its rear [rad].
+    share_of_reach : float
+        What things in the way leave of the sensor's reach toward it, 0 … 1; 0 behind something solid.
 
     Returns
     -------
@@ -56,7 +63,9 @@ def measure_lead(
         None if nothing is within reach and field of view.
     """
     distance_noise, speed_noise = rng.normal(size=2)
-    if leader is None or leader.gap > sensor.reach or 2.0 * abs(bearing) > sensor.field_of_view:
+    if leader is None or share_of_reach <= 0.0 or leader.gap > share_of_reach * sensor.reach:
+        return None
+    if 2.0 * abs(bearing) > sensor.field_of_view:
         return None
     return LeadMeasurement(
         distance=max(leader.gap + sensor.distance_deviation * float(distance_noise), 0.0),

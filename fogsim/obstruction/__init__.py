@@ -1,0 +1,5 @@
+"""Lines of sight, and what stands in them."""
+
+from fogsim.obstruction.obstructions import CLEAR_SIGHT, Obstructions, obstructions_of
+
+__all__ = ["CLEAR_SIGHT", "Obstructions", "obstructions_of"]

@@ -1,0 +1,100 @@
+"""Straight lines through upright boxes that rise with the road: compiled loops over plain arrays.
+
+A box is a row of ten numbers: where its middle line begins (x, y, z), the direction of that line in plan (x, y), what
+it rises over a metre of its length, its length, half its width, and the heights above that line between which it is.
+In coordinates along the line, across it and above it a box has faces along the axes and a straight line stays one, so
+that the part inside is what the three pairs of faces leave of it (Kay & Kajiya 1986).
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.jit import kernel
+
+NUMBERS = 10
+"""Numbers of a box."""
+
+_Array = NDArray[np.float64]
+
+
+@kernel
+def share_inside(start: _Array, end: _Array, box: _Array) -> float:
+    """Share of a straight line that lies inside a box [-]; the same from either end, and 0 for one that touches it.
+
+    Parameters
+    ----------
+    start, end : (3,) float64
+        Its ends [m].
+    box : (10,) float64
+        The box.
+    """
+    # Rounding must not depend on who looks at whom.
+    if (start[0], start[1], start[2]) > (end[0], end[1], end[2]):
+        start, end = end, start
+    x, y, step_x, step_y = start[0] - box[0], start[1] - box[1], end[0] - start[0], end[1] - start[1]
+    along, step_along = x * box[3] + y * box[4], step_x * box[3] + step_y * box[4]
+    across, step_across = y * box[3] - x * box[4], step_y * box[3] - step_x * box[4]
+    above, step_above = start[2] - box[2] - box[5] * along, end[2] - start[2] - box[5] * step_along
+    enters, leaves = 0.0, 1.0
+    for place, step, low, high in (
+        (along, step_along, 0.0, box[6]),
+        (across, step_across, -box[7], box[7]),
+        (above, step_above, box[8], box[9]),
+    ):
+        if step == 0.0:
+            if not low < place < high:
+                return 0.0
+        else:
+            first, last = (low - place) / step, (high - place) / step
+            enters, leaves = max(enters, min(first, last)), min(leaves, max(first, last))
+            if enters >= leaves:
+                return 0.0
+    return leaves - enters
+
+
+@kernel
+def add_ways_inside(starts: _Array, ends: _Array, boxes: _Array, ways: _Array) -> None:
+    """Add to each line's way what of it lies inside boxes.
+
+    Parameters
+    ----------
+    starts, ends : (n, 3) float64
+        Ends of the lines [m].
+    boxes : (m, 10) float64
+        The boxes.
+    ways : (n,) float64
+        Added to, in place [m].
+    """
+    for line in range(len(starts)):
+        x, y, z = ends[line] - starts[line]
+        length = np.sqrt(x * x + y * y + z * z)
+        for box in boxes:
+            ways[line] += share_inside(starts[line], ends[line], box) * length
+
+
+@kernel
+def find_hidden(eyes: _Array, targets: _Array, boxes: _Array, hidden: NDArray[np.bool_]) -> None:
+    """Tell for each pair of eyes whether boxes hide all points of its target.
+
+    Parameters
+    ----------
+    eyes : (n, 3) float64
+        Where the lines begin [m].
+    targets : (n, k, 3) float64
+        The points at which each pair of eyes looks [m].
+    boxes : (m, 10) float64
+        The boxes.
+    hidden : (n,) bool
+        Written to, in place.
+    """
+    for one in range(len(eyes)):
+        hidden[one] = True
+        for point in targets[one]:
+            is_free = True
+            for box in boxes:
+                if share_inside(eyes[one], point, box) > 0.0:
+                    is_free = False
+                    break
+            if is_free:
+                hidden[one] = False
+                break

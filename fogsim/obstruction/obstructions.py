@@ -1,0 +1,97 @@
+"""What stands beside roads and over them, as something that lines of sight end at."""
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fogsim.obstruction.box_kernels import NUMBERS, add_ways_inside, find_hidden
+from fogsim.values.road import Structure
+
+_SHORTEST = 1e-6
+"""Pieces of a line that are shorter than this in plan have no direction [m]."""
+
+
+class Obstructions:
+    """Boxes that hide what is behind them; ``bool`` of it is false where there are none.
+
+    Parameters
+    ----------
+    boxes : (m, 10) float64
+        The boxes, as `fogsim.obstruction.box_kernels` has them.
+    """
+
+    def __init__(self, boxes: NDArray[np.float64]) -> None:
+        self._boxes = boxes
+
+    def __len__(self) -> int:
+        """Number of boxes."""
+        return len(self._boxes)
+
+    def hide(self, eyes: ArrayLike, targets: ArrayLike) -> NDArray[np.bool_]:
+        """Whether targets are hidden: each of their points, from where they are looked at.
+
+        Parameters
+        ----------
+        eyes : (n, 3) array_like
+            Where they are looked at from [m].
+        targets : (n, k, 3) array_like
+            Points of each target [m].
+
+        Returns
+        -------
+        (n,) bool
+            The same if eyes and a single point change places.
+        """
+        starts = np.asarray(eyes, np.float64).reshape(-1, 3)
+        hidden = np.zeros(len(starts), np.bool_)
+        if len(self._boxes) and len(starts):
+            points = np.ascontiguousarray(targets, np.float64).reshape(len(starts), -1, 3)
+            find_hidden(np.ascontiguousarray(starts), points, self._boxes, hidden)
+        return hidden
+
+    def way_through(self, starts: ArrayLike, ends: ArrayLike) -> NDArray[np.float64]:
+        """How much of straight lines lies inside [m].
+
+        Parameters
+        ----------
+        starts, ends : (n, 3) array_like
+            Ends of the lines [m].
+
+        Returns
+        -------
+        (n,) float64
+            Where boxes overlap, what is in both counts twice.
+        """
+        first, last = (np.ascontiguousarray(points, np.float64).reshape(-1, 3) for points in (starts, ends))
+        ways = np.zeros(len(first))
+        if len(self._boxes):
+            add_ways_inside(first, last, self._boxes, ways)
+        return ways
+
+
+CLEAR_SIGHT = Obstructions(np.zeros((0, NUMBERS)))
+"""Nothing stands anywhere."""
+
+
+def obstructions_of(structures: Iterable[Structure]) -> Obstructions:
+    """Obstructions that structures are.
+
+    Parameters
+    ----------
+    structures : iterable of Structure
+        What stands beside the roads and over them.
+    """
+    boxes = [box for one in structures for box in _boxes(one)]
+    return Obstructions(np.array(boxes)) if boxes else CLEAR_SIGHT
+
+
+def _boxes(one: Structure) -> list[list[float]]:
+    """A box for each piece of a structure's line, which has no hole where two pieces meet."""
+    found, steps = list[list[float]](), np.diff(one.line, axis=0).tolist()
+    for (x, y, z), (step_x, step_y, rise) in zip(one.line[:-1].tolist(), steps, strict=True):
+        length = float(np.hypot(step_x, step_y))
+        if length > _SHORTEST:
+            direction = [step_x / length, step_y / length, rise / length]
+            found.append([x, y, z, *direction, length, 0.5 * one.width, one.bottom, one.top])
+    return found

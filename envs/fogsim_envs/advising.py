@@ -14,6 +14,7 @@ from fogsim.metrics import step_metrics
 from fogsim.recorders import FramePanel
 from fogsim.scenario import Scenario, build
 from fogsim.values import Ending, Step
+from fogsim_envs.actions import checked_action
 from fogsim_envs.hosting import Simulation
 from fogsim_envs.rewards import RewardWeights, reward_terms
 from fogsim_envs.spaces import action_space, command_of, observation_space, observe
@@ -107,10 +108,19 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         ----------
         action : array_like of two numbers
             A member of the action space.
+
+        Raises
+        ------
+        gymnasium.error.ResetNeeded
+            If the episode is over or none has begun.
+        InputError
+            If the action is no member of the action space.
         """
-        if self._simulation is None or self._step is None:
-            raise gymnasium.error.ResetNeeded("call reset() before step()")
-        before, chosen = self._step, command_of(action, self._continuous)
+        if self._simulation is None or self._step is None or self._step.ending is not None:
+            raise gymnasium.error.ResetNeeded("the episode is over or none has begun: call reset() before step()")
+        name = type(self).__name__ if self.spec is None else self.spec.id
+        chosen = command_of(checked_action(action, self.action_space, name), self._continuous)
+        before = self._step
         command = spread_advice(chosen, self._active, before.truth.sections)
         for _ in range(self._frames):
             self._step = self._simulation.advance(command)

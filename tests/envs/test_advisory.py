@@ -137,6 +137,8 @@ def test_time_truncates_and_tells_what_has_not_been_played() -> None:
     env = gymnasium.make(ID, image_size=(64, 48), overrides=("duration_s=2", "clocks.camera_period_s=0.5", EARLY, late))
     env.reset(seed=1)
     steps = [env.step(np.array([12, 0])) for _ in range(4)]
+    with pytest.raises(gymnasium.error.ResetNeeded, match="the episode is over"):
+        env.step(np.array([12, 0]))
     env.close()
     assert [step[2:4] for step in steps] == [(False, False)] * 3 + [(False, True)]
     assert [len(step[4]["unplayed"]) for step in steps] == [0, 0, 0, 1]
@@ -156,6 +158,17 @@ def test_rendering_shows_the_frame_beside_a_panel() -> None:
 def test_steps_need_a_reset(env: gymnasium.Env[Any, Any]) -> None:
     with pytest.raises(gymnasium.error.ResetNeeded):
         env.unwrapped.step(np.array([0, 0]))
+
+
+@pytest.mark.parametrize(("continuous", "bad"), [(False, [13, 0]), (False, [-1, 0]), (True, [0.0, math.nan])])
+def test_actions_outside_the_space_are_refused(continuous: bool, bad: list[float]) -> None:
+    env = gymnasium.make(ID, scenario=ROAD, continuous=continuous, **SMALL)
+    env.reset(seed=1)
+    with pytest.raises(InputError, match=r"^action of fogsim/FogAdvisory-v0: no member of .*; got \["):
+        env.step(bad)
+    # What was refused has not happened.
+    assert env.step(np.zeros(2))[4]["time_s"] == pytest.approx(0.5)
+    env.close()
 
 
 def test_bad_arguments() -> None:

@@ -33,6 +33,11 @@ def records(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
     [
         ("loop.py", ("--size", "64x48", "--steps", "3", "--repeat", "1"), {"env", "camera", "vehicles", "steps_per_s"}),
         (
+            "environments.py",
+            ("--env", "fogsim/FogAdvisory-v1", "--steps", "2", "--repeat", "1", "--resets", "1", "--no-workers"),
+            {"env", "camera", "vehicles", "steps_per_s", "peer_steps_per_s", "reset_ms", "reset_other_ms"},
+        ),
+        (
             "junctions.py",
             ("--seeds", "1", "--minutes", "2", "--visibility", "20"),
             {"visibility_m", "crossings", "accepted_least_s", "refused_most_s", "collisions_per_1000", "impact_mps"},

@@ -1,0 +1,158 @@
+"""Speed of environments: steps a second beside highway-env's fastest, resets, and what a second worker gains.
+
+Any id that Gymnasium knows once ``fogsim_envs`` is imported. The agent holds the middle of the action space, and time
+that resets take between two steps is not counted. highway-fast-v0, which draws no camera, is measured alternately in
+the same process, so that what else the machine does slows both: their ratio holds where speeds do not. A reset in
+another scenario is one after an episode with other options (``--other``); it goes back and forth between the two.
+Workers are processes; their ratio is two workers' steps a second over one's.
+
+    python benchmarks/environments.py [--json] [--env ID …] [--kwargs JSON] [--steps 100] [--repeat 3] [--resets 5]
+                                      [--other JSON] [--no-workers]
+"""
+
+import argparse
+import json
+import statistics
+import time
+from typing import Any
+
+import gymnasium
+import highway_env  # noqa: F401 - registers the peer
+import numpy as np
+from gymnasium import spaces
+
+import fogsim_envs  # noqa: F401 - registers the environments
+
+PEER_ID = "highway-fast-v0"
+
+Env = gymnasium.Env[Any, Any]
+
+
+def middle(space: spaces.Space[Any]) -> Any:
+    """An action that an agent may hold: the middle of its space."""
+    if isinstance(space, spaces.Dict):
+        return {name: middle(part) for name, part in space.items()}
+    if isinstance(space, spaces.Discrete):
+        return space.start + space.n // 2
+    if isinstance(space, spaces.MultiDiscrete):
+        return space.start + space.nvec // 2
+    if isinstance(space, spaces.Box):
+        return (0.5 * (space.low + space.high)).astype(space.dtype)
+    return space.sample()
+
+
+def camera_of(space: spaces.Space[Any]) -> str:
+    """Size of the pictures among the observations, or that there are none."""
+    parts = space.values() if isinstance(space, spaces.Dict) else (space,)
+    sizes = [part.shape for part in parts if isinstance(part, spaces.Box) and part.dtype == np.uint8]
+    return "none" if not sizes else f"{sizes[0][1]}x{sizes[0][0]}"
+
+
+def steps_per_second(env: Env, steps: int, action: Any) -> tuple[float, float]:
+    """Steps a second by the clock and by the processor's time, resets not counted."""
+    env.reset(seed=1)
+    spent = worked = 0.0
+    for _ in range(steps):
+        started, begun = time.perf_counter(), time.process_time()
+        *_, terminated, truncated, _ = env.step(action)
+        spent += time.perf_counter() - started
+        worked += time.process_time() - begun
+        if terminated or truncated:
+            env.reset()
+    return steps / spent, steps / worked
+
+
+def reset_ms(env: Env, options: list[dict[str, Any] | None], repeat: int) -> float:
+    """Time of a reset with each of some options in turn, the first ones not counted [ms]."""
+    times = []
+    for number in range(repeat + 1):
+        for option in options:
+            started = time.perf_counter()
+            env.reset(seed=number, options=option)
+            times.append(1e3 * (time.perf_counter() - started))
+    return round(statistics.median(times[len(options) :]), 2)
+
+
+def worker_ratio(env_id: str, kwargs: dict[str, Any], steps: int, action: Any, repeat: int) -> float:
+    """Steps a second of two workers over those of one, taken alternately."""
+    own_vectors = gymnasium.spec(env_id).vector_entry_point is not None
+    mode = None if own_vectors else "async"
+    vectors = [gymnasium.make_vec(env_id, count, vectorization_mode=mode, **kwargs) for count in (1, 2)]
+    actions = [np.stack([np.asarray(action)] * vector.num_envs) for vector in vectors]
+    ratios = []
+    for vector in vectors:
+        vector.reset(seed=1)
+    for _ in range(repeat):
+        spent = []
+        for vector, held in zip(vectors, actions, strict=True):
+            started = time.perf_counter()
+            for _ in range(steps):
+                vector.step(held)
+            spent.append(time.perf_counter() - started)
+        ratios.append(2.0 * spent[0] / spent[1])
+    for vector in vectors:
+        vector.close()
+    return round(statistics.median(ratios), 3)
+
+
+def measure(arguments: argparse.Namespace, env_id: str, peer: Env) -> dict[str, Any]:
+    """One record for one environment."""
+    env: Env = gymnasium.make(env_id, **arguments.kwargs)
+    action, peer_action = middle(env.action_space), middle(peer.action_space)
+    own, peers = [], []
+    for _ in range(arguments.repeat):
+        own.append(steps_per_second(env, arguments.steps, action))
+        peers.append(steps_per_second(peer, arguments.steps, peer_action)[0])
+    # Of the whole state only FogSim's own environments know.
+    last = getattr(env.unwrapped, "_step", None)
+    record = {
+        "env": env_id,
+        "camera": camera_of(env.observation_space),
+        "vehicles": None if last is None else len(last.traffic.ids),
+        "steps_per_s": round(statistics.median(wall for wall, _ in own), 2),
+        "steps_per_cpu_s": round(statistics.median(cpu for _, cpu in own), 2),
+        "frames_per_step": getattr(env.unwrapped, "_frames", None),
+        "peer": PEER_ID,
+        "peer_steps_per_s": round(statistics.median(peers), 2),
+        "ratio": round(statistics.median(a / b for (a, _), b in zip(own, peers, strict=True)), 3),
+        "reset_ms": reset_ms(env, [None], arguments.resets),
+        "reset_other_ms": reset_ms(env, [None, arguments.other], arguments.resets) if arguments.other else None,
+    }
+    env.close()
+    if arguments.workers:
+        record["worker_ratio"] = worker_ratio(env_id, arguments.kwargs, arguments.steps, action, arguments.repeat)
+    return record
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", action="store_true", help="print a list of flat records")
+    parser.add_argument("--env", action="append", metavar="ID", help="environment (default fogsim/FogAdvisory-v0)")
+    parser.add_argument("--kwargs", type=json.loads, default={}, metavar="JSON", help="arguments of the environments")
+    parser.add_argument("--steps", type=int, default=100, help="steps a repetition")
+    parser.add_argument("--repeat", type=int, default=3, help="repetitions")
+    parser.add_argument("--resets", type=int, default=5, help="resets of each kind")
+    parser.add_argument(
+        "--other",
+        type=json.loads,
+        default={"overrides": ["drivers.reaction_time_s=1.5"]},
+        metavar="JSON",
+        help="options of a reset that make it another scenario; null for none",
+    )
+    parser.add_argument("--no-workers", dest="workers", action="store_false", help="leave processes out")
+    arguments = parser.parse_args()
+    peer: Env = gymnasium.make(PEER_ID)
+    records = [measure(arguments, env_id, peer) for env_id in arguments.env or ["fogsim/FogAdvisory-v0"]]
+    peer.close()
+    if arguments.json:
+        print(json.dumps(records, indent=2))
+        return
+    for record in records:
+        for key, value in record.items():
+            print(f"{key:16} {value}")
+        print()
+
+
+if __name__ == "__main__":
+    main()

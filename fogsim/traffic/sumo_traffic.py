@@ -4,20 +4,20 @@ import functools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import SimulationError
+from fogsim.obstruction import CLEAR_SIGHT, Obstructions, obstructions_of
 from fogsim.traffic.collision_log import CollisionLog
 from fogsim.traffic.drivers.events import Order, Script, Situation
-from fogsim.traffic.drivers.sight import FogAccess
+from fogsim.traffic.drivers.sight import ClearAir, FogAccess
 from fogsim.traffic.road.network import read_net, road_network
 from fogsim.traffic.road.road_map import RoadMap
 from fogsim.traffic.road.signs import sign_map
-from fogsim.traffic.road.structures import structures
+from fogsim.traffic.road.structures import mentions_structures, structures
 from fogsim.traffic.setup import TrafficSetup
 from fogsim.traffic.sumo.claims import new_session
 from fogsim.traffic.sumo.command_line import command_line
@@ -34,7 +34,16 @@ from fogsim.traffic.sumo_behaviour.speed_control import SpeedControl, SumoDesire
 from fogsim.traffic.sumo_drivers.drivers_perception import DriversPerception, drivers_perception
 from fogsim.traffic.sumo_street.person_reader import PersonReader
 from fogsim.traffic.sumo_street.signal_reader import SignalReader
-from fogsim.values import Command, NetworkSnapshot, RoadNetwork, SignMap, TrafficSnapshot, TrafficState, Unplayed
+from fogsim.values import (
+    Command,
+    NetworkSnapshot,
+    RoadNetwork,
+    SignMap,
+    Structure,
+    TrafficSnapshot,
+    TrafficState,
+    Unplayed,
+)
 from fogsim.values.script import TrafficAction
 
 _NO_ADVICE = Command()
@@ -102,6 +111,7 @@ class SumoTraffic:
         self._teleported = False
         self._planned: tuple[tuple[str, ...], tuple[RoadNetwork, SignMap]] | None = None
         self._map: RoadMap | None = None
+        self._structures: tuple[Structure, ...] | None = None
         self._signals: SignalReader | None = None
 
     @property
@@ -141,6 +151,9 @@ class SumoTraffic:
         self._seed = seed
         if self._fog is not None:
             self.enter_fog(self._fog)
+        elif self._obstructions(api):
+            # What stands beside the roads hides vehicles in clear air, too.
+            self._run = replace(self._run, perception=self._perception(self._run, ClearAir()))
         self._command = _NO_ADVICE
         self._route, self._mark, self._teleported = None, 0, False
         try:
@@ -180,11 +193,28 @@ class SumoTraffic:
             setup, api, roster, session = self._setup, self._run.api, self._run.roster, self._run.session
             self._run = replace(
                 self._run,
-                perception=None
-                if setup.sight is None
-                else drivers_perception(api, fog, setup.sight, roster, self._link.remote, session, setup.net),
+                perception=self._perception(self._run, fog),
                 drivers=SumoDesiredSpeeds(api, setup, fog, self._seed, roster, session, self._link.remote),
             )
+
+    def _perception(self, run: _Run, fog: FogAccess) -> DriversPerception | None:
+        """What drivers see in a fog, past what stands beside the roads; None if they see through both."""
+        setup, remote = self._setup, self._link.remote
+        if setup.sight is None:
+            return None
+        api, roster, session = run.api, run.roster, run.session
+        standing = self._obstructions(api)
+        return drivers_perception(api, fog, setup.sight, roster, remote, session, setup.net, standing)
+
+    def _obstructions(self, api: Api) -> Obstructions:
+        """What stands beside the roads and hides others from drivers."""
+        return CLEAR_SIGHT if self._setup.sight is None else obstructions_of(self._read_structures(api))
+
+    def _read_structures(self, api: Api) -> tuple[Structure, ...]:
+        if self._structures is None:
+            files = self._setup.additional or loaded_additional(api)
+            self._structures = structures(path for path in files if mentions_structures(path))
+        return self._structures
 
     def planned_network(self) -> tuple[RoadNetwork, SignMap] | None:
         """Roads and signs along the ego's written way; see `Traffic.planned_network`."""
@@ -195,7 +225,8 @@ class SumoTraffic:
         net = self._map = read_net(planned.net)
         if not net.edges.keys() >= set(planned.edges):
             return None
-        roads = _roads(net, planned.edges, planned.additional)
+        self._structures = structures(planned.additional)
+        roads = road_network(net, planned.edges, self._structures), sign_map(net, planned.additional)
         self._planned = planned.edges, roads
         return roads
 
@@ -206,7 +237,8 @@ class SumoTraffic:
         route = tuple(api.vehicle.getRoute(self._setup.ego))
         if self._planned is not None and self._planned[0] == route:
             return self._planned[1]
-        return _roads(self._read_net(api), route, self._setup.additional or loaded_additional(api))
+        net, additional = self._read_net(api), self._setup.additional or loaded_additional(api)
+        return road_network(net, route, self._read_structures(api)), sign_map(net, additional)
 
     def _read_net(self, api: Api) -> RoadMap:
         if self._map is None:
@@ -392,8 +424,3 @@ class SumoTraffic:
         """End the simulation; see `Traffic.close`."""
         self._link.end()
         self._run = None
-
-
-def _roads(net: RoadMap, route: Sequence[str], additional: Sequence[Path]) -> tuple[RoadNetwork, SignMap]:
-    """Roads with what stands beside them, and signs."""
-    return road_network(net, route, structures(additional)), sign_map(net, additional)

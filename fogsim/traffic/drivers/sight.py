@@ -70,6 +70,20 @@ class FogAccess(Protocol):
         """
 
 
+class ClearAir:
+    """Fog that is nowhere."""
+
+    maximum_extinction = minimum_extinction = 0.0
+
+    def extinction(self, points: ArrayLike) -> NDArray[np.float64]:
+        """0 at all points (..., 3); see `FogAccess.extinction`."""
+        return np.zeros(np.shape(points)[:-1])
+
+    def optical_depth(self, start: ArrayLike, end: ArrayLike) -> NDArray[np.float64]:
+        """0 between all points (..., 3); see `FogAccess.optical_depth`."""
+        return np.zeros(np.broadcast_shapes(np.shape(start), np.shape(end))[:-1])
+
+
 @dataclass(frozen=True, slots=True)
 class DriverSight:
     """Eyes and headlamps of a driver.

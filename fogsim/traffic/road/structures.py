@@ -9,6 +9,7 @@ import sumolib
 
 from fogsim.errors import InputError, suggest
 from fogsim.traffic.road.opendrive import is_opendrive
+from fogsim.traffic.road.xml_stream import open_unpacked
 from fogsim.values import Structure, StructureKind
 
 STRUCTURE_TYPE = "fogsim.structure."
@@ -29,6 +30,20 @@ def structures(additional: Iterable[Path]) -> tuple[Structure, ...]:
         If a file is none, or a structure's kind or measures are not known.
     """
     return tuple(one for path in additional if not is_opendrive(path) for one in _marked(path))
+
+
+def mentions_structures(path: Path) -> bool:
+    """Whether a file may have structures; quicker than reading those of a large one.
+
+    Parameters
+    ----------
+    path : Path
+        The file, packed by gzip or not; a missing one has none.
+    """
+    if not path.is_file():
+        return False
+    with open_unpacked(path) as source:
+        return STRUCTURE_TYPE.encode() in source.read()
 
 
 def _marked(path: Path) -> list[Structure]:

@@ -1,9 +1,10 @@
-"""All that SUMO's drivers perceive through the fog only as far as it can be seen, part by part."""
+"""All that SUMO's drivers perceive only as far as it can be seen, through fog and past what stands beside roads."""
 
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
 
+from fogsim.obstruction import CLEAR_SIGHT, Obstructions
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.roster import Roster
@@ -77,6 +78,7 @@ def drivers_perception(
     remote: bool,
     session: str,
     net: Path | None = None,
+    obstructions: Obstructions = CLEAR_SIGHT,
 ) -> DriversPerception:
     """All parts.
 
@@ -96,15 +98,17 @@ def drivers_perception(
         Name of the session.
     net : Path or None
         Its network; None for the file that it says it has loaded.
+    obstructions : Obstructions
+        What stands beside its roads.
     """
-    leaders = Perception(api, fog, sight, roster, remote, session)
-    vehicle_sight = VehicleSight(api, fog, sight, remote)
+    leaders = Perception(api, fog, sight, roster, remote, session, obstructions)
+    vehicle_sight = VehicleSight(api, fog, sight, remote, obstructions)
     return DriversPerception(
         (
             leaders,
             LaneChanging(api, fog, sight, roster, leaders, vehicle_sight, remote, session),
             JunctionSight(api, fog, sight, roster, JunctionFoes(api, net), vehicle_sight, remote, session),
-            SignalSight(api, fog, sight, roster, session),
-            PedestrianSight(api, fog, sight, roster, session),
+            SignalSight(api, fog, sight, roster, session, obstructions),
+            PedestrianSight(api, fog, sight, roster, session, obstructions),
         )
     )

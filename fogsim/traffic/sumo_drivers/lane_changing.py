@@ -223,7 +223,7 @@ class LaneChanging:
         self._roster = roster
         self._leaders = leaders
         self._vehicle_sight = vehicle_sight
-        self._certainly_seen = max(sight.sure_distance(fog.maximum_extinction), NEAR)
+        self._certainly_seen = max(vehicle_sight.certainly_seen, NEAR)
         self._certainly_hidden = sight.hidden_distance(fog.minimum_extinction)
         self._neighbours = Neighbours(api, REACH, remote)
         self._sight = NeighbourSight(vehicle_sight, sight.reaction_time)

@@ -8,13 +8,15 @@ Sight is computed only in steps in which what a driver sees could have changed. 
 at most by the fastest approach there is, and near the edge of sight by what speeds and accelerations allow; so for a
 leader that stays the same the decision is in every step the one that computing in every step would give. A leader that
 is new (one of the two has changed lane, or somebody came within `REACH`) is noticed in the next computation, at most
-`MAX_PAUSE` later; until then SUMO's driver sees it.
+`MAX_PAUSE` later; until then SUMO's driver sees it. So is one that gets behind an obstruction; one that is behind it is
+looked for in each step.
 """
 
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from types import MappingProxyType
 
+from fogsim.obstruction import CLEAR_SIGHT, Obstructions
 from fogsim.traffic.appearance import TRAINS
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo.claims import SOLE_SESSION, SPEED_GAIN, SessionValues
@@ -22,6 +24,7 @@ from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.update_schedule import UpdateSchedule, closing_speed_bound
 from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
+from fogsim.traffic.sumo_drivers.hidden_vehicles import HiddenVehicles
 from fogsim.traffic.sumo_drivers.lane_change_switches import LaneChangeSwitch
 from fogsim.traffic.sumo_drivers.leader_sight import LeaderSight, Pair
 from fogsim.traffic.sumo_drivers.oncoming_glare import most_glare
@@ -113,6 +116,8 @@ class Perception:
         True where every call is a message to another process: leaders and speeds are subscribed to.
     session : str
         Name of the session.
+    obstructions : Obstructions
+        What stands beside the roads.
 
     Attributes
     ----------
@@ -130,7 +135,9 @@ class Perception:
         roster: Roster | None = None,
         remote: bool = False,
         session: str = SOLE_SESSION,
+        obstructions: Obstructions = CLEAR_SIGHT,
     ) -> None:
+        self._hidden_vehicles = HiddenVehicles(api, obstructions, remote) if obstructions else None
         self._ignored_leaders = IgnoredLeaders(api, session)
         self.leader, self.speed = vehicle_getters(api, remote, ("getLeader", "getSpeed"), {"getLeader": ("d", REACH)})
         self._roster = Roster(api) if roster is None else roster
@@ -190,6 +197,8 @@ class Perception:
         new, self._mark = roster.entered_since(self._mark)
         self._forget(new)
         self._leader_sight.forget(new)
+        if self._hidden_vehicles is not None:
+            self._hidden_vehicles.forget(new)
         # A vehicle that comes back from a teleport still ignores its leader.
         for follower in roster.present.intersection(new) if new else ():
             self._ignored_leaders.stop_ignoring(follower)
@@ -209,8 +218,13 @@ class Perception:
         # Most vehicles are far from any doubt, and pause for the longest time.
         certain: list[str] = []
         doubtful: list[Pair] = []
-        for follower, found in zip(due, map(self.leader, due, itertools.repeat(REACH)), strict=False):
-            leader, gap = found or _NO_LEADER
+        ahead = [found or _NO_LEADER for found in map(self.leader, due, itertools.repeat(REACH))]
+        obstructed = self._obstructed(due, ahead)
+        for follower, (leader, gap) in zip(due, ahead, strict=True):
+            if follower in obstructed:
+                self._hide(follower, leader)
+                self._pause((follower,), 0.0)
+                continue
             if not leader:
                 if follower in ignored:
                     self._reveal(follower)
@@ -229,6 +243,14 @@ class Perception:
             certain.append(follower)
         self._pause(certain, MAX_PAUSE)
         return doubtful
+
+    def _obstructed(self, followers: Sequence[str], ahead: Sequence[tuple[str, float]]) -> Collection[str]:
+        """Those whose leaders are behind something that stands beside the road."""
+        if self._hidden_vehicles is None:
+            return ()
+        pairs = [(follower, leader) for follower, (leader, _) in zip(followers, ahead, strict=True) if leader]
+        hidden = self._hidden_vehicles.are_hidden(pairs)
+        return {follower for (follower, _), is_hidden in zip(pairs, hidden, strict=True) if is_hidden}
 
     def _pause_near_edge(self, follower: str, leader: str, distance: float) -> None:
         """Leave a follower alone until the gap could have changed by a distance [m]."""

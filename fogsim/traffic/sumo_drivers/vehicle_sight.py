@@ -4,10 +4,12 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
+from fogsim.obstruction import CLEAR_SIGHT, Obstructions
 from fogsim.traffic.drivers.lamp_intensity import head_lamp_share, intensity_toward
 from fogsim.traffic.drivers.sight import BODY_MIDDLE, DriverSight, FogAccess
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
+from fogsim.traffic.sumo_drivers.hidden_vehicles import HiddenVehicles
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps, SeenVehicles
 
 NEAREST = 0.1
@@ -43,7 +45,9 @@ class LineOfSight(NamedTuple):
 
 
 class VehicleSight:
-    """Tells which vehicles drivers see, along straight lines through the fog; buildings and other vehicles hide none.
+    """Tells which vehicles drivers see, along straight lines through the fog and past what stands beside the road.
+
+    Other vehicles hide nobody.
 
     Parameters
     ----------
@@ -55,20 +59,30 @@ class VehicleSight:
         The drivers' eyes.
     remote : bool
         True where every call is a message to another process: what is asked often is subscribed to.
+    obstructions : Obstructions
+        What stands beside the roads.
     """
 
-    def __init__(self, api: Api, fog: FogAccess, sight: DriverSight, remote: bool = False) -> None:
+    def __init__(
+        self,
+        api: Api,
+        fog: FogAccess,
+        sight: DriverSight,
+        remote: bool = False,
+        obstructions: Obstructions = CLEAR_SIGHT,
+    ) -> None:
+        self._hidden_vehicles = HiddenVehicles(api, obstructions, remote) if obstructions else None
         self._fog = fog
         self._sight = sight
         self._vehicles = SeenVehicles(api, remote)
         self._position, self._angle = vehicle_getters(api, remote, ("getPosition3D", "getAngle"))
         self._extinction = fog.maximum_extinction if fog.minimum_extinction == fog.maximum_extinction else None
-        self._certainly_seen = sight.sure_distance(fog.maximum_extinction)
+        self._seen_through_fog = sight.sure_distance(fog.maximum_extinction)
 
     @property
     def certainly_seen(self) -> float:
         """Distance up to which every vehicle is seen, wherever it is and whatever its lamps [m]."""
-        return self._certainly_seen
+        return self._seen_through_fog if self._hidden_vehicles is None else 0.0
 
     def forget(self, vehicles: Iterable[str]) -> None:
         """Forget vehicles whose ids others may bear now.
@@ -79,6 +93,8 @@ class VehicleSight:
             Their ids.
         """
         self._vehicles.forget(vehicles)
+        if self._hidden_vehicles is not None:
+            self._hidden_vehicles.forget(vehicles)
 
     def sees(self, pairs: Sequence[tuple[str, str]], own_lamps: OwnLamps) -> list[bool]:
         """Whether each observer sees its target.
@@ -91,11 +107,14 @@ class VehicleSight:
             Lamps of vehicles whose lamps are not SUMO's.
         """
         lines = [self.line_of_sight(observer, target) for observer, target in pairs]
-        seen = [line.distance <= self._certainly_seen for line in lines]
+        seen = [line.distance <= self._seen_through_fog for line in lines]
         doubtful = [n for n, line in enumerate(lines) if not seen[n] and line.distance <= FARTHEST]
         for n, depth in zip(doubtful, self._optical_depths([lines[n] for n in doubtful]), strict=True):
             seen[n] = depth <= self._depth_limit(pairs[n], lines[n], own_lamps)
-        return seen
+        if self._hidden_vehicles is None:
+            return seen
+        hidden = self._hidden_vehicles.are_hidden(pairs)
+        return [is_seen and not is_hidden for is_seen, is_hidden in zip(seen, hidden, strict=True)]
 
     def line_of_sight(self, observer: str, target: str) -> LineOfSight:
         """The straight line from an observer's eyes, above the front bumper, to the nearest part of a target.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fogsim.errors import InputError
-from fogsim.traffic.road.structures import structures
+from fogsim.traffic.road.structures import mentions_structures, structures
 from fogsim.values import StructureKind
 
 WALL = """<additional>
@@ -23,6 +23,8 @@ def test_a_polygon_is_a_structure_by_its_type(tmp_path: Path) -> None:
     file.write_text(WALL, encoding="utf-8")
     (wall,) = structures([file, tmp_path / "map.xodr"])
     assert (wall.structure_id, wall.kind, wall.width, wall.bottom, wall.top) == ("w", StructureKind.WALL, 0.3, 0.0, 3.0)
+    assert mentions_structures(file)
+    assert not mentions_structures(tmp_path / "missing.xml")
     np.testing.assert_array_equal(wall.line, [[0.0, 0.0, 1.5], [10.0, 0.0, 2.0]])
 
 

@@ -104,6 +104,15 @@ class Drive:
             traffic.close()
 
 
+def beside(setup: TrafficSetup, shape: str, **sizes: float) -> TrafficSetup:
+    """The simulation with a wall along a line."""
+    file = setup.routes[0].with_name("beside.add.xml")
+    parameters = "".join(f'<param key="{key}" value="{size}"/>' for key, size in sizes.items())
+    wall = f'<poly id="w" type="fogsim.structure.wall" shape="{shape}">{parameters}</poly>'
+    file.write_text(f"<additional>{wall}</additional>", encoding="utf-8")
+    return replace(setup, additional=(file,))
+
+
 def drive(setup: TrafficSetup, visibility: float, **more: object) -> Drive:
     return Drive(libsumo_traffic(setup), visibility, **more)
 
@@ -316,3 +325,26 @@ def test_a_pedestrian_out_of_sight_is_not_yielded_to(setup_of: Callable[..., Tra
     assert min(speeds) == pytest.approx(0.0, abs=0.1)
     speeds.clear()
     assert drive(setup, 60.0, each=watch).hits == []
+    # Nor is one whom a low bridge before the crossing hides from the driver in clear air.
+    hiding = beside(setup, "295,290,0 325,290,0", width=0.5, bottom=0.3, top=6.0)
+    assert drive(hiding, CLEAR, each=watch).hits
+
+
+def test_a_wall_at_the_corner_hides_who_has_priority(setup_of: Callable[..., TrafficSetup]) -> None:
+    setup = crossing(setup_of, 125.0)
+    walled = drive(beside(setup, "150,294.5,0 296,294.5,0", width=1.0, top=4.0), CLEAR)
+    elsewhere = drive(beside(setup, "150,270,0 296,270,0", width=1.0, top=0.5), CLEAR)
+    assert walled.entered["minor"][0] < walled.entered["major"][0]
+    # What is low hides nobody: every step is that without it.
+    assert elsewhere.entered == drive(setup, CLEAR).entered
+    blind = replace(setup, sight=None)
+    through = drive(beside(blind, "150,294.5,0 296,294.5,0", width=1.0, top=4.0), CLEAR)
+    assert through.entered == drive(blind, CLEAR).entered
+
+
+def test_a_light_behind_a_low_bridge_is_seen_too_late(setup_of: Callable[..., TrafficSetup]) -> None:
+    # From 20 m before the line on, it is before the driver; until then the beam hides what hangs lower than 6 m.
+    setup = beside(at_red(setup_of), "273,290,0 273,306,0", width=1.0, bottom=1.0, top=6.0)
+    late = drive(setup, CLEAR, each=show_red).entered
+    assert late["ego"][1] > 3.0
+    assert drive(at_red(setup_of), CLEAR, each=show_red).entered == {}

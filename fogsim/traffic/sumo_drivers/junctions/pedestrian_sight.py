@@ -9,6 +9,7 @@ import functools
 import math
 from collections.abc import Iterable, Iterator
 
+from fogsim.obstruction import CLEAR_SIGHT, Obstructions
 from fogsim.traffic.appearance import OTHERS_LAMPS
 from fogsim.traffic.drivers.lamp_intensity import HEAD_LAMPS, head_lamp_share
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
@@ -33,6 +34,9 @@ where such a vehicle is at 55 m; FogSim's choice."""
 BODY_MIDDLE = 1.0
 """Height of eyes and persons above the road [m]."""
 
+HEAD = 1.65
+"""Height above the road of a person's head, which may be seen over a hedge or a wall [m]."""
+
 _OWN_PART = "persons"
 _CROSSING, _WALKING_AREA = "c", "w"
 _PLACES_ON_FOOT = (_CROSSING, _WALKING_AREA)
@@ -53,9 +57,20 @@ class PedestrianSight:
         Who is on the road.
     session : str
         Name of the session.
+    obstructions : Obstructions
+        What stands beside the roads.
     """
 
-    def __init__(self, api: Api, fog: FogAccess, sight: DriverSight, roster: Roster, session: str) -> None:
+    def __init__(
+        self,
+        api: Api,
+        fog: FogAccess,
+        sight: DriverSight,
+        roster: Roster,
+        session: str,
+        obstructions: Obstructions = CLEAR_SIGHT,
+    ) -> None:
+        self._obstructions = obstructions
         self._api = api
         self._fog = fog
         self._sight = sight
@@ -64,7 +79,8 @@ class PedestrianSight:
         self._person_position = getter(api, "person", "getPosition3D")
         self._person_count = getter(api, "person", "getIDCount")
         self._unseen = UnseenFoes(api, f"{session} {_OWN_PART}", sight.reaction_time)
-        self._certainly_seen = sight.seen_distance(fog.maximum_extinction, CONTRAST, head_lamps=0.0)
+        self._seen_through_fog = sight.seen_distance(fog.maximum_extinction, CONTRAST, head_lamps=0.0)
+        self._certainly_seen = 0.0 if obstructions else self._seen_through_fog
         self._mark = 0
         self._roads: dict[str, tuple[str, ...]] = {}
         self._next = 0.0
@@ -137,7 +153,9 @@ class PedestrianSight:
         (x, y, z), (end_x, end_y, end_z) = self._position(driver), self._person_position(person)
         eyes, end = (x, y, z + BODY_MIDDLE), (end_x, end_y, end_z + BODY_MIDDLE)
         distance = math.dist(eyes, end)
-        if distance <= self._certainly_seen:
+        if self._obstructions.hide([eyes], [[end, (end_x, end_y, end_z + HEAD)]])[0]:
+            return False
+        if distance <= self._seen_through_fog:
             return True
         lamps = own_lamps.get(driver, int(OTHERS_LAMPS)) or 0
         bearing = math.atan2(end_y - y, end_x - x) - math.radians(90.0 - self._api.vehicle.getAngle(driver))

@@ -12,6 +12,7 @@ import math
 
 import numpy as np
 
+from fogsim.obstruction import CLEAR_SIGHT, Obstructions
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo.claims import SPEED_MODE, Claims
 from fogsim.traffic.sumo.due_vehicles import Due, DueVehicles
@@ -22,6 +23,9 @@ from fogsim.values.light import SIGNAL_INTENSITY
 
 SIGNAL_HEIGHT = 2.0
 """Height above the road of the line of sight: between eyes and signal heads [m]."""
+
+EYE_HEIGHT, HEAD_HEIGHT = 1.2, 3.0
+"""Heights above the road from which and at which a light is looked for past what stands beside the road [m]."""
 
 REACH = 250.0
 """Nobody brakes for a light farther ahead than this [m]."""
@@ -62,9 +66,20 @@ class SignalSight:
         Who is on the road.
     session : str
         Name of the session.
+    obstructions : Obstructions
+        What stands beside the roads.
     """
 
-    def __init__(self, api: Api, fog: FogAccess, sight: DriverSight, roster: Roster, session: str) -> None:
+    def __init__(
+        self,
+        api: Api,
+        fog: FogAccess,
+        sight: DriverSight,
+        roster: Roster,
+        session: str,
+        obstructions: Obstructions = CLEAR_SIGHT,
+    ) -> None:
+        self._obstructions = obstructions
         self._api = api
         self._fog = fog
         self._sight = sight
@@ -77,7 +92,7 @@ class SignalSight:
         self._due = DueVehicles(roster, self._step)
         self._certainly_seen = self._certainly_hidden = math.inf
         if api.trafficlight.getIDCount():
-            self._certainly_seen = self._seen_distance(fog.maximum_extinction)
+            self._certainly_seen = 0.0 if obstructions else self._seen_distance(fog.maximum_extinction)
             self._certainly_hidden = self._seen_distance(fog.minimum_extinction)
         self._unseen: dict[str, float] = {}
         self._braking_late: dict[str, str] = {}
@@ -166,6 +181,8 @@ class SignalSight:
             return False
         x, y, z = self._api.vehicle.getPosition3D(driver)
         end_x, end_y = self._stop_line(light[0], light[1])
+        if self._obstructions.hide([(x, y, z + EYE_HEIGHT)], [[(end_x, end_y, z + HEAD_HEIGHT)]])[0]:
+            return False
         straight = max(math.hypot(end_x - x, end_y - y), 0.1)
         # The light is as far as the way to it is long, as leaders are.
         along = np.array([end_x - x, end_y - y, 0.0]) * (way / straight)

@@ -1,0 +1,109 @@
+"""Whom obstructions hide from drivers: by hand, and on a bend where the driver brakes later than without them."""
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fogsim
+from fogsim.atmosphere import FieldAccess
+from fogsim.obstruction import Obstructions, obstructions_of
+from fogsim.traffic import DriverSight
+from fogsim.traffic.sumo_drivers.hidden_vehicles import HiddenVehicles
+from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
+from fogsim.values import FogField, Structure, StructureKind
+
+PAIRS = [("me", "other"), ("other", "me")]
+BEND = """
+name: bend
+duration: 11.6 s
+clocks: {camera_period: 0.2 s, decision_period: 0.4 s}
+renderer: none
+camera: {width: 64, height: 48}
+road:
+  template: curve
+  length: 1000 m
+  limit: 100 km/h
+  curve_at: 250 m
+  curve_radius: 150 m
+  curve_turn: 90 deg
+  obstructions: OBSTRUCTIONS
+actors:
+  ego: {lane: right, position: 150 m, speed: 90 km/h}
+  wreck: {lane: right, ahead_of: ego, gap: 330 m, stands: true}
+fog: {visibility: inf}
+sut: {estimators: [], advice: none}
+"""
+WALL = "[{kind: wall, at: 230 m, length: 300 m, side: left, distance: 0.5 m}]"
+KERB = "[{kind: wall, at: 230 m, length: 300 m, side: left, distance: 0.5 m, height: 0.3 m}]"
+
+
+def across(y: tuple[float, float], height: float) -> Obstructions:
+    """A wall across my way, 20 m ahead."""
+    line = np.array([[20.0, y[0], 0.0], [20.0, y[1], 0.0]])
+    return obstructions_of([Structure("wall", StructureKind.WALL, line, 0.3, 0.0, height)])
+
+
+def two_vehicles(top: float) -> Any:
+    """I am at the origin and bound for the east; the other, 40 m long with me, is 2 m wide and so high."""
+    vehicle = SimpleNamespace(
+        getPosition3D={"me": (0.0, 0.0, 0.0), "other": (45.0, 0.0, 0.0)}.__getitem__,
+        getAngle=lambda _: 90.0,
+        getSignals=lambda _: 0,
+        getColor=lambda _: (0, 0, 0, 255),
+        getLength=lambda _: 5.0,
+        getWidth=lambda _: 2.0,
+        getHeight=lambda _: top,
+        getVehicleClass=lambda _: "passenger",
+        getShapeClass=lambda _: "",
+    )
+    return SimpleNamespace(vehicle=vehicle)
+
+
+@pytest.mark.parametrize(
+    ("y", "height", "top", "hidden"),
+    [
+        ((-9.0, 9.0), 2.0, 1.5, True),
+        ((-9.0, 9.0), 2.0, 4.0, False),  # its roof stands out over the wall
+        ((-9.0, 9.0), 0.5, 1.5, False),  # over a kerb
+        ((-9.0, 0.3), 2.0, 1.5, False),  # its left side stands out
+        ((-9.0, 0.7), 2.0, 1.5, True),
+    ],
+)
+def test_a_vehicle_is_hidden_when_every_corner_is(
+    y: tuple[float, float], height: float, top: float, hidden: bool
+) -> None:
+    api, wall = two_vehicles(top), across(y, height)
+    assert HiddenVehicles(api, wall).are_hidden(PAIRS[:1]) == [hidden]
+    clear = FieldAccess(FogField(0.0, (3000.0,) * 3))
+    sight = VehicleSight(api, clear, DriverSight(10_000.0), obstructions=wall)
+    assert sight.sees(PAIRS[:1], {}) == [not hidden]
+    assert sight.certainly_seen == 0.0
+    sight.forget(["other"])
+    assert HiddenVehicles(api, wall).are_hidden([]) == []
+
+
+def drive(folder: Path, obstructions: str, *overrides: str) -> list[fogsim.Step]:
+    file = folder / "bend.yaml"
+    file.write_text(BEND.replace("OBSTRUCTIONS", obstructions), encoding="utf-8")
+    return list(fogsim.run(fogsim.load_scenario(file, list(overrides)), seed=1))
+
+
+def test_behind_a_blind_bend_a_driver_brakes_later(tmp_path: Path) -> None:
+    def gaps(steps: list[fogsim.Step]) -> tuple[float, float]:
+        """Where the driver begins to brake, and where the radar finds the wreck for the first time [m]."""
+        braking = next(s.leader.gap for s in steps if s.leader and s.traffic.speed[s.ego] < 24.5)
+        return braking, next(s.leader.gap for s in steps if s.leader and s.observation.lead)
+
+    free, walled, low = (drive(tmp_path, one) for one in ("[]", WALL, KERB))
+    assert gaps(free)[0] > 95.0
+    assert gaps(free)[1] > 170.0
+    # The chord that touches the wall, 5.9 m inside the middle of the lane of radius 151.75 m: 2 √(2 · 151.75 · 5.9) m.
+    in_sight = gaps(walled)[1]
+    assert in_sight == pytest.approx(85.0, abs=8.0)
+    assert gaps(walled)[0] < in_sight - 20.0
+    assert [s.traffic.speed[s.ego] for s in low] == [s.traffic.speed[s.ego] for s in free]
+    through = drive(tmp_path, WALL, "drivers.see_through_fog=true")
+    assert [s.traffic.speed[s.ego] for s in through] == [s.traffic.speed[s.ego] for s in free]

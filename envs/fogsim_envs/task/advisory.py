@@ -57,7 +57,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
     ### Reward
     Sum of the terms in ``info["reward_terms"]``, in points (`fogsim_envs.task.TaskWeights`): progress, time, arrival,
     overdriving, conflict, discomfort, collision, rear_fog_lamp, front_fog_lamp. A drive at the limit all the way with
-    nothing amiss is worth 90. ``info["cost"]`` is 1 for a collision in which the ego strikes somebody plus the share of
+    nothing amiss is worth 40. ``info["cost"]`` is 1 for a collision in which the ego strikes somebody plus the share of
     the stopping sight distance beyond sight, for constrained learning.
 
     ### Episodes

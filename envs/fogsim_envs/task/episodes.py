@@ -197,8 +197,8 @@ class ScenarioDistribution:
         }
     )  # fmt: skip
     drivers: Mapping[str, float] = field(default_factory=lambda: {"unaffected": 0.5, "observed": 0.3, "too_fast": 0.2})
-    pitch_error: float = math.radians(0.1)
-    focal_length_error: float = 0.005
+    pitch_error: float = math.radians(0.3)
+    focal_length_error: float = 0.01
 
     def __post_init__(self) -> None:
         for name, known in (("light", _LIGHT), ("scripts", _SCRIPTS), ("drivers", SPEED_CHOICES)):

@@ -19,7 +19,7 @@ FRONT_FOG_LAMP_VISIBILITY = 100.0
 
 @dataclass(frozen=True, slots=True)
 class TaskWeights:
-    """Weights of the terms, in points: a drive at the limit all the way with nothing amiss is worth 90.
+    """Weights of the terms, in points: a drive at the limit all the way with nothing amiss is worth 40.
 
     Attributes
     ----------
@@ -46,10 +46,10 @@ class TaskWeights:
         The same for the front fog lamps and 100 m, where they dazzle those who come the other way.
     """
 
-    progress: float = 100.0
-    time: float = 30.0
-    arrival: float = 20.0
-    overdriving: float = 100.0
+    progress: float = 40.0
+    time: float = 10.0
+    arrival: float = 10.0
+    overdriving: float = 150.0
     conflict: float = 2.0
     discomfort: float = 0.5
     collision: float = 100.0

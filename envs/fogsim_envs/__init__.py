@@ -5,7 +5,23 @@
 `fogsim_envs.camera_wrapper.FogCameraWrapper` adds a camera in fog to any environment of highway-env.
 """
 
+import importlib
+from typing import TYPE_CHECKING, Any
+
 import gymnasium
+
+if TYPE_CHECKING:
+    from fogsim_envs.evaluation import Evaluation, evaluate
+
+__all__ = ["Evaluation", "evaluate"]
+
+
+def __getattr__(name: str) -> Any:
+    """Import the evaluation when it is asked for: registering takes a tenth of a second, and the rest seconds."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module("fogsim_envs.evaluation"), name)
+
 
 gymnasium.register(
     id="fogsim/FogAdvisory-v0",
@@ -23,4 +39,10 @@ gymnasium.register(
     id="fogsim/FogAdvisory-v1",
     entry_point="fogsim_envs.task:FogAdvisoryV1Env",
     max_episode_steps=600,
+)
+
+gymnasium.register(
+    id="fogsim/FogAdvisoryFast-v1",
+    entry_point="fogsim_envs.task:FogAdvisoryFastEnv",
+    max_episode_steps=400,
 )

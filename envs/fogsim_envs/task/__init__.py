@@ -2,6 +2,14 @@
 
 from fogsim_envs.task.advisory import FogAdvisoryV1Env
 from fogsim_envs.task.episodes import Episode, FogDistribution, ScenarioDistribution
+from fogsim_envs.task.fast import FogAdvisoryFastEnv
 from fogsim_envs.task.rewards import TaskWeights
 
-__all__ = ["Episode", "FogAdvisoryV1Env", "FogDistribution", "ScenarioDistribution", "TaskWeights"]
+__all__ = [
+    "Episode",
+    "FogAdvisoryFastEnv",
+    "FogAdvisoryV1Env",
+    "FogDistribution",
+    "ScenarioDistribution",
+    "TaskWeights",
+]

@@ -120,7 +120,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         self._running: Scenario | None = None
         self._step: Step | None = None
         first = self._source.first_scenario()
-        build.check_frames(first, "the agent")
+        self._check(first)
         self._camera = build.camera(first)
         self.observation_space = task_space(observation, self._camera)
         self.action_space = action_space(continuous)
@@ -147,7 +147,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         run_seed, drawn = self._source.draw(self.np_random, EpisodeChoice.of(options))
         scenario = drawn.scenario
         self._check_camera(scenario)
-        self._step = self._begin(scenario, run_seed)
+        self._step = self._completed(self._begin(scenario, run_seed))
         self._episode, self._driver = drawn.episode, OwnDriver(drawn.episode.driver)
         self._adviser = AdvisedDriving(scenario)
         self._frames = build.periods(scenario).decision_frames
@@ -159,7 +159,12 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         self._panel = FramePanel()
         return self._observe(), {**self._info(), "episode": self._episode.as_info()}
 
+    def _check(self, scenario: Scenario) -> None:
+        """Refuse a scenario that this environment cannot run."""
+        build.check_frames(scenario, "the agent")
+
     def _check_camera(self, scenario: Scenario) -> None:
+        self._check(scenario)
         camera = build.camera(scenario)
         ours = (self._camera.width, self._camera.height, self._camera.bits)
         if (camera.width, camera.height, camera.bits) != ours:
@@ -202,6 +207,10 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         info = {**self._info(), "reward_terms": terms}
         return self._observe(), float(sum(terms.values())), terminated, truncated, info
 
+    def _completed(self, step: Step) -> Step:
+        """A step with all that an agent is told of it; here it has that from the loop."""
+        return step
+
     def _drive(self, before: Step) -> Step:
         """The last step of a decision period, which begins after one."""
         step, scenario, simulation = before, self._running, self._simulation
@@ -209,7 +218,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
             raise gymnasium.error.ResetNeeded("call reset() before step()")
         for _ in range(self._frames):
             asked = spread_advice(self._own, scenario, before.truth.sections)
-            step = simulation.advance(self._driver.follow(asked, step))
+            step = self._completed(simulation.advance(self._driver.follow(asked, step)))
             if step.ending is not None:
                 break
         return step

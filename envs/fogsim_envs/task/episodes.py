@@ -12,9 +12,6 @@ import numpy as np
 from fogsim.errors import InputError
 from fogsim.traffic import SPEED_CHOICES
 
-FOG_AHEAD = (200.0, 700.0)
-"""How far ahead of the ego's start the first bank begins [m]: within the first half minute."""
-
 _LIGHT = {"day": (2000.0, 40_000.0), "dusk": (10.0, 2000.0), "night": (0.1, 0.3)}
 """Illuminance of the sky [lx]: overcast or foggy day; sun below the horizon to civil twilight's end; no moon."""
 
@@ -79,6 +76,8 @@ class FogDistribution:
         Length of its soft edges, log-uniform between these [m].
     outside_visibility : (float, float)
         Visibility outside the banks, log-uniform between these [m], but at least that in them.
+    ahead : (float, float)
+        From the route's beginning to the first bank, and from one bank to the next, uniform between these [m].
     patchy_share : float
         Share of foggy episodes in which fog thickens and thins from place to place.
 
@@ -94,10 +93,11 @@ class FogDistribution:
     bank_length: tuple[float, float] = (300.0, 1500.0)
     bank_edge: tuple[float, float] = (30.0, 300.0)
     outside_visibility: tuple[float, float] = (200.0, 2000.0)
+    ahead: tuple[float, float] = (300.0, 800.0)
     patchy_share: float = 0.25
 
     def __post_init__(self) -> None:
-        for name in ("visibility", "bank_length", "bank_edge", "outside_visibility"):
+        for name in ("ahead", "visibility", "bank_length", "bank_edge", "outside_visibility"):
             _check_range(f"FogDistribution.{name}", getattr(self, name), 1.0)
         for name in ("clear_share", "even_share", "patchy_share"):
             _check_share(f"FogDistribution.{name}", getattr(self, name))
@@ -138,7 +138,7 @@ class FogDistribution:
 
     def _bank(self, rng: np.random.Generator) -> dict[str, float]:
         return {
-            "ahead": float(rng.uniform(*FOG_AHEAD)),
+            "ahead": float(rng.uniform(*self.ahead)),
             "length": float(rng.uniform(*self.bank_length)),
             "edge": _log_uniform(rng, self.bank_edge),
             "depth": float(rng.uniform(0.3, 1.0)),

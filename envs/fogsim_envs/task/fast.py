@@ -1,0 +1,89 @@
+"""The task of `fogsim_envs.task.advisory` without frames: estimates are drawn as they were measured to err."""
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fogsim.scenario import Scenario, build
+from fogsim.values import Step
+from fogsim_envs.hosting import TIMEOUT
+from fogsim_envs.task.advisory import FogAdvisoryV1Env
+from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
+from fogsim_envs.task.rewards import TaskWeights
+from fogsim_envs.task.surrogate import EstimatorSurrogate, SurrogateTable
+
+_WITHOUT_FRAMES = ("renderer=none", "estimators=[]")
+_DEFAULT = ("road.length_m=2000", "demand.oncoming_vph=0", "clocks.traffic_step_s=0.5", "duration_s=200")
+
+FAST_FOG = FogDistribution(ahead=(400.0, 400.0))
+"""The ego starts 300 m before the bank."""
+
+FAST_SCENARIO = ScenarioDistribution(demand=(200.0, 500.0, 800.0, 1200.0))
+
+
+class FogAdvisoryFastEnv(FogAdvisoryV1Env):
+    """Advise a vehicle's speed and lamps in fog, without frames: for fast learning.
+
+    Action, reward, ``info`` and episodes are those of ``fogsim/FogAdvisory-v1`` (`FogAdvisoryV1Env`), the observation
+    is its ``state``. No frame is drawn: what camera and estimator would say is drawn from how negru2013 was measured
+    to err there, given visibility ahead and light (`fogsim_envs.task.surrogate`); the belief is the filter's, made of
+    that. The way is 2 km, the bank 300 m ahead of the start, and SUMO's step is 0.5 s, as long as the decision period.
+    So a policy that was learnt here can be evaluated on ``fogsim/FogAdvisory-v1`` with ``observation="state"``, by real
+    frames.
+
+    ### Arguments
+    scenario, scenario_distribution, fog_distribution, split, overrides, continuous, reward_weights, timeout : as of
+    `FogAdvisoryV1Env`
+    surrogate : file with a table of your own, made by ``benchmarks/surrogate.py --fit``; None for the one that was
+    measured
+
+    ### Version history
+    * v1: first version
+    """
+
+    metadata: dict[str, Any] = {"render_modes": [], "render_fps": 2}  # noqa: RUF012 - Gymnasium's own way
+
+    def __init__(
+        self,
+        scenario: str | Path | Scenario | None = None,
+        *,
+        scenario_distribution: ScenarioDistribution | Sequence[str | Path | Scenario] | None = None,
+        fog_distribution: FogDistribution | None = None,
+        split: str = "train",
+        overrides: Sequence[str] = (),
+        continuous: bool = False,
+        reward_weights: TaskWeights | None = None,
+        surrogate: Path | None = None,
+        timeout: float = TIMEOUT,
+    ) -> None:
+        is_default = scenario is None and scenario_distribution is None
+        table = SurrogateTable.load() if surrogate is None else SurrogateTable.load(surrogate)
+        self._surrogate = EstimatorSurrogate(table)
+        super().__init__(
+            scenario,
+            scenario_distribution=FAST_SCENARIO if is_default else scenario_distribution,
+            fog_distribution=FAST_FOG if is_default and fog_distribution is None else fog_distribution,
+            split=split,
+            observation="state",
+            overrides=(*(_DEFAULT if is_default else ()), *_WITHOUT_FRAMES, *overrides),
+            image_size=None,
+            continuous=continuous,
+            reward_weights=reward_weights,
+            timeout=timeout,
+        )
+
+    def _check(self, scenario: Scenario) -> None:
+        """Any scenario will do: nothing is drawn."""
+
+    def _begin(self, scenario: Scenario, seed: int) -> Step:
+        self._fusion, self._illuminance = build.fusion(scenario), scenario.light.illuminance_lx
+        self._surrogate.reset(np.random.default_rng((2, seed)))
+        return super()._begin(scenario, seed)
+
+    def _completed(self, step: Step) -> Step:
+        estimates = (self._surrogate.estimate(step.truth.extinction_ahead, self._illuminance),)
+        belief = self._fusion.update(estimates, step.time)
+        return dataclasses.replace(step, estimates=estimates, belief=belief)

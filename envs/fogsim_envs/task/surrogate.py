@@ -1,0 +1,186 @@
+"""What camera and estimator would say of the fog, drawn from how they were measured to err: no frame is drawn.
+
+The table is made by ``python benchmarks/surrogate.py --fit`` from runs with frames, and compared with others by the
+same command without it. An estimate's error depends on the visibility ahead and on the light, lasts from one estimate
+to the next, and has a part that stays for an episode, as that of a wrong calibration does.
+"""
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.units import visibility_from_extinction
+from fogsim.values import Estimate
+
+MEASURED = Path(__file__).with_name("surrogate.json")
+"""The table that comes with FogSim: negru2013 in 160×120 pixels, two frames a second."""
+
+LIGHTS = ("day", "dusk", "night")
+_DAY, _DUSK = 1000.0, 10.0
+"""Illuminance of the sky from which it is day, and dusk [lx]."""
+
+Table = NDArray[np.float64]
+
+
+def light_class(illuminance: float) -> int:
+    """Place in `LIGHTS` of an illuminance of the sky.
+
+    Parameters
+    ----------
+    illuminance : float
+        Illuminance [lx].
+    """
+    return 0 if illuminance >= _DAY else 1 if illuminance >= _DUSK else 2
+
+
+@dataclass(frozen=True, slots=True)
+class SurrogateTable:
+    """How an estimator was measured to err, by light (rows) and visibility ahead (columns).
+
+    Attributes
+    ----------
+    method : str
+        Name of the estimator.
+    edges : (bins + 1,) float64
+        Visibilities that part the columns [m], rising.
+    stays_valid, becomes_valid : (lights, bins) float64
+        Shares of valid estimates after a valid and after an invalid one.
+    none_seen : (lights, bins) float64
+        Share of valid estimates that say "no fog seen".
+    error : (lights, bins, quantiles) float64
+        Quantiles of ln(estimated / true k), at even shares from 0 to 1.
+    deviation : (lights, bins, quantiles) float64
+        Quantiles of ln(standard deviation / k) of those estimates, likewise.
+    none_deviation : (lights, bins, quantiles) float64
+        Quantiles of ln(standard deviation · 1 m) of estimates that say "no fog seen".
+    episode_share, persistence : float
+        Share of an error's variance that stays for an episode, and correlation of the rest from one estimate to the
+        next.
+    """
+
+    method: str
+    edges: Table
+    stays_valid: Table
+    becomes_valid: Table
+    none_seen: Table
+    error: Table
+    deviation: Table
+    none_deviation: Table
+    episode_share: float
+    persistence: float
+
+    @classmethod
+    def load(cls, path: Path = MEASURED) -> "SurrogateTable":
+        """Read a table.
+
+        Parameters
+        ----------
+        path : Path
+            File from `as_json`.
+        """
+        written: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        fields: dict[str, Any] = {
+            name: np.array(value) if isinstance(value, list) else value for name, value in written.items()
+        }
+        return cls(**fields)
+
+    def as_json(self) -> str:
+        """The table as JSON, its numbers with four digits after the point."""
+        return json.dumps({name: _rounded(getattr(self, name)) for name in self.__slots__})
+
+
+def _rounded(value: Any) -> Any:
+    """A field as JSON has it."""
+    if isinstance(value, str):
+        return value
+    return np.round(value, 4).tolist()
+
+
+class EstimatorSurrogate:
+    """Draws estimates in place of an estimator.
+
+    Parameters
+    ----------
+    table : SurrogateTable
+        How the estimator errs.
+    """
+
+    def __init__(self, table: SurrogateTable) -> None:
+        self._table = table
+        self._inner_edges = table.edges[1:-1]
+        self._own = math.sqrt(1.0 - table.persistence**2)
+        self._of_episode, self._of_frame = math.sqrt(table.episode_share), math.sqrt(1.0 - table.episode_share)
+        self.reset(np.random.default_rng(0))
+
+    def reset(self, rng: np.random.Generator) -> None:
+        """Begin an episode.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Random numbers of the episode.
+        """
+        self._rng = rng
+        self._common, self._error, self._width = rng.standard_normal(3).tolist()
+        self._was_valid = True
+
+    def estimate(self, extinction: float, illuminance: float) -> Estimate:
+        """Draw the next estimate.
+
+        Parameters
+        ----------
+        extinction : float
+            True extinction coefficient ahead [1/m].
+        illuminance : float
+            Illuminance of the sky [lx].
+        """
+        table, light = self._table, light_class(illuminance)
+        column = int(np.searchsorted(self._inner_edges, visibility_from_extinction(extinction)))
+        new, width = self._rng.standard_normal(2).tolist()
+        valid, none = self._rng.random(2).tolist()
+        self._error = table.persistence * self._error + self._own * new
+        self._width = table.persistence * self._width + self._own * width
+        likely = table.stays_valid if self._was_valid else table.becomes_valid
+        self._was_valid = valid < likely[light, column]
+        if not self._was_valid:
+            return Estimate.invalid(table.method, "drawn")
+        spread = _cumulative(self._width)
+        if none < table.none_seen[light, column]:
+            return Estimate(table.method, 0.0, math.exp(_at(table.none_deviation[light, column], spread)))
+        share = _cumulative(self._of_episode * self._common + self._of_frame * self._error)
+        # In clear air there is no k to err by a share of: the least that a visibility of 100 km stands for.
+        estimated = max(extinction, _CLEAR) * math.exp(_at(table.error[light, column], share))
+        return Estimate(table.method, estimated, estimated * math.exp(_at(table.deviation[light, column], spread)))
+
+
+_CLEAR = 3e-5
+"""Extinction coefficient by which errors in clear air are measured [1/m]."""
+
+
+def relative_extinction(estimated: float, extinction: float) -> float:
+    """Error of an estimate as the table has it, ln(estimated / true k).
+
+    Parameters
+    ----------
+    estimated, extinction : float
+        Extinction coefficients [1/m]; the estimated one positive.
+    """
+    return math.log(estimated / max(extinction, _CLEAR))
+
+
+def _cumulative(normal: float) -> float:
+    """Share of a normal distribution below a value."""
+    return 0.5 * (1.0 + math.erf(normal / math.sqrt(2.0)))
+
+
+def _at(quantiles: Table, share: float) -> float:
+    """Quantile at a share, between two of the table's by a straight line."""
+    place = share * (len(quantiles) - 1)
+    lower = min(int(place), len(quantiles) - 2)
+    low, high = quantiles[lower : lower + 2].tolist()
+    return float(low + (place - lower) * (high - low))

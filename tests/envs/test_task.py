@@ -1,0 +1,263 @@
+"""The task of version 1: episodes that differ, a reward that cannot be farmed, and what stands in for frames."""
+
+import dataclasses
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import fogsim_envs
+from fogsim.errors import InputError
+from fogsim.scenario import load_scenario
+from fogsim.values import Collision, Command, Ending, Leader, Step
+from fogsim_envs.task import FogAdvisoryV1Env, FogDistribution, ScenarioDistribution, TaskWeights
+from fogsim_envs.task.episodes import fog_setting
+from fogsim_envs.task.observation import STATE_FEATURES, task_state
+from fogsim_envs.task.rewards import Way, fault, task_terms
+from fogsim_envs.task.sampling import MOTORWAY, EpisodeChoice, EpisodeSource
+from fogsim_envs.task.surrogate import EstimatorSurrogate, SurrogateTable
+
+FAST = "fogsim/FogAdvisoryFast-v1"
+NO_ADVICE = np.array([12, 0])
+WAY = Way(length=2000.0, limit=36.0, duration=200.0)
+WEIGHTS = TaskWeights()
+
+
+@pytest.fixture(scope="module")
+def fast() -> Iterator[gymnasium.Env[Any, Any]]:
+    made = gymnasium.make(FAST)
+    yield made
+    made.close()
+
+
+@pytest.fixture(scope="module")
+def step(fast: gymnasium.Env[Any, Any]) -> Step:
+    fast.reset(seed=3, options={"visibility": 60.0})
+    task = fast.unwrapped
+    assert isinstance(task, FogAdvisoryV1Env)
+    return task._current
+
+
+def _moved(step: Step, distance: float, seconds: float, **changes: Any) -> Step:
+    position, time = step.route_position + distance, step.time + seconds
+    return dataclasses.replace(step, route_position=position, time=time, **changes)
+
+
+def _at(step: Step, speed: float, acceleration: float = 0.0) -> Step:
+    speeds, accelerations = step.traffic.speed.copy(), step.traffic.acceleration.copy()
+    speeds[step.ego], accelerations[step.ego] = speed, acceleration
+    traffic = dataclasses.replace(step.traffic, speed=speeds, acceleration=accelerations)
+    return dataclasses.replace(step, traffic=traffic, collisions=(), leader=None)
+
+
+def test_gymnasiums_checker_finds_nothing(fast: gymnasium.Env[Any, Any]) -> None:
+    check_env(fast.unwrapped, skip_render_check=True)
+
+
+def test_a_frame_is_observed_and_an_unknown_mode_refused() -> None:
+    env = gymnasium.make("fogsim/FogAdvisory-v1", image_size=(64, 48), render_mode="rgb_array")
+    observation, _ = env.reset(seed=1, options={"overrides": ["light.illuminance_lx=5000"]})
+    assert env.observation_space.contains(observation)
+    observation, reward, *_, info = env.step(NO_ADVICE)
+    assert env.observation_space.contains(observation)
+    assert reward == pytest.approx(sum(info["reward_terms"].values()))
+    assert observation["camera"].shape == (48, 64, 3)
+    assert info["cost"] >= 0.0
+    picture: Any = env.render()
+    assert picture.ndim == 3
+    env.close()
+    with pytest.raises(InputError, match=r"did you mean 'state'\?"):
+        gymnasium.make("fogsim/FogAdvisory-v1", observation="states")
+
+
+def test_episodes_differ_and_come_again(fast: gymnasium.Env[Any, Any]) -> None:
+    first, info = fast.reset(seed=7)
+    other = fast.reset()[1]
+    again, same = fast.reset(seed=7)
+    assert info["episode"] == same["episode"] != other["episode"]
+    np.testing.assert_array_equal(first, again)
+    told = fast.reset(seed=7, options={"episode": info["episode"]})[0]
+    np.testing.assert_array_equal(first, told)
+
+
+def test_what_the_caller_fixes(fast: gymnasium.Env[Any, Any]) -> None:
+    _, info = fast.reset(seed=2, options={"visibility": 45.0, "driver": "too_fast"})
+    fog = next(setting for setting in info["episode"]["settings"] if setting.startswith("fog="))
+    assert "45.0" in fog
+    assert info["episode"]["driver"] == "too_fast"
+    fast.reset(seed=2, options={"overrides": ["fog.visibility_m=70"]})
+    task = fast.unwrapped
+    assert isinstance(task, FogAdvisoryV1Env)
+    assert task._current.truth.visibility == pytest.approx(70.0)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"visibilty": 60}, "did you mean 'visibility'"),
+        ({"visibility": -5}, "at least 1 m"),
+        ({"visibility": True}, "at least 1 m"),
+        ({"overrides": "fog.visibility_m=70"}, "expected a list"),
+        ({"driver": "reckless"}, "unknown driver"),
+        ({"episode": {"fog": 1}}, r"info\['episode'\]"),
+    ],
+)
+def test_options_that_are_none(fast: gymnasium.Env[Any, Any], options: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        fast.reset(options=options)
+
+
+def test_splits_share_no_seed() -> None:
+    drawn = {}
+    for split in ("train", "test"):
+        source, rng = EpisodeSource(MOTORWAY, None, None, (), split), np.random.default_rng(0)
+        drawn[split] = {source.draw(rng, EpisodeChoice())[0] for _ in range(100)}
+    assert not drawn["train"] & drawn["test"]
+    with pytest.raises(InputError, match="unknown split"):
+        EpisodeSource(None, None, None, (), "validation")
+
+
+def test_fog_is_drawn_from_its_ranges() -> None:
+    rng = np.random.default_rng(1)
+    fogs = [FogDistribution().draw(rng) for _ in range(400)]
+    clear = [fog for fog in fogs if fog.get("visibility_m") == "inf"]
+    densest = [fog["banks"][0]["visibility_m"] if "banks" in fog else fog["visibility_m"] for fog in fogs
+               if fog not in clear]  # fmt: skip
+    assert len(clear) == pytest.approx(40, abs=15)
+    assert 25.0 <= min(densest) < 40.0
+    assert 700.0 < max(densest) <= 1000.0
+    # Log-uniform: half of them below the geometric mean.
+    assert np.mean(np.array(densest) < math.sqrt(25.0 * 1000.0)) == pytest.approx(0.5, abs=0.08)
+    for fog in (fogs[0], fogs[1], *(fog for fog in fogs if len(fog.get("banks", ())) == 2)):
+        load_scenario(MOTORWAY, [fog_setting(fog)])
+        break
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: FogDistribution(visibility=(100.0, 50.0)), "FogDistribution.visibility"),
+        (lambda: FogDistribution(clear_share=1.5), "FogDistribution.clear_share"),
+        (lambda: ScenarioDistribution(light={"noon": 1.0}), "unknown name 'noon'"),
+        (lambda: ScenarioDistribution(scripts={"lead": 0.0}), "not all 0"),
+        (lambda: ScenarioDistribution(lanes=()), "at least one"),
+    ],
+)
+def test_distributions_that_are_none(make: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        make()
+
+
+def test_a_drive_at_the_limit_is_worth_forty(step: Step) -> None:
+    clear = dataclasses.replace(step.truth, extinction=0.0, extinction_ahead=0.0)
+    before = dataclasses.replace(_at(step, 36.0), truth=clear, speed_limit=36.0, command=Command())
+    after = _moved(before, 18.0, 0.5)
+    steps = WAY.length / 18.0
+    terms = task_terms(before, after, WAY, WEIGHTS)
+    last = task_terms(before, dataclasses.replace(after, ending=Ending.ARRIVED), WAY, WEIGHTS)
+    assert steps * sum(terms.values()) + last["arrival"] == pytest.approx(40.0)
+    # Who drives twice as fast as allowed gains nothing by the way, and saves no more than the time.
+    faster = task_terms(before, _moved(before, 36.0, 0.5), WAY, WEIGHTS)
+    assert faster["progress"] == pytest.approx(terms["progress"])
+
+
+def test_standing_pays_nothing_and_an_early_end_saves_no_time(step: Step) -> None:
+    before = dataclasses.replace(_at(step, 0.0), command=Command())
+    stands = task_terms(before, _moved(before, 0.0, 0.5), WAY, WEIGHTS)
+    assert stands["progress"] == 0.0
+    assert sum(stands.values()) < 0.0
+    ego, other = step.traffic.ids[step.ego], "other"
+    struck = (Collision(step.time, other, ego, 10.0),)
+    hit = _moved(before, 0.0, 0.5, collisions=struck, ending=Ending.COLLISION)
+    terms = task_terms(before, hit, WAY, WEIGHTS)
+    assert fault(hit) == "other"
+    assert terms["collision"] == 0.0
+    remaining = (WAY.duration - hit.time) / WAY.time_at_limit
+    assert terms["time"] == pytest.approx(stands["time"] - WEIGHTS.time * remaining)
+
+
+def test_who_strikes_pays(step: Step) -> None:
+    ego = step.traffic.ids[step.ego]
+    before = _at(step, 20.0)
+    strikes = _moved(before, 10.0, 0.5, collisions=(Collision(step.time, ego, "other", 10.0),))
+    assert fault(strikes) == "ego"
+    assert task_terms(before, strikes, WAY, WEIGHTS)["collision"] == -WEIGHTS.collision
+    assert fault(before) is None
+
+
+def test_overdriving_and_conflicts_by_hand(step: Step) -> None:
+    before = dataclasses.replace(_at(step, 20.0), command=Command())
+    foggy = dataclasses.replace(before.truth, extinction=math.log(20.0) / 50.0, extinction_ahead=math.log(20.0) / 50.0)
+    after = dataclasses.replace(
+        _moved(before, 10.0, 0.5), truth=foggy, leader=Leader("a", 30.0, 5.0)
+    )
+    terms = task_terms(before, after, WAY, WEIGHTS)
+    needed = 20.0 * 2.5 + 20.0**2 / (2 * 3.4)
+    assert terms["overdriving"] == pytest.approx(-150.0 * 10.0 / 2000.0 * (1.0 - 50.0 / needed), rel=1e-3)
+    assert terms["conflict"] == pytest.approx(-2.0 * 0.5 * (1.0 - (30.0 / 15.0) / 3.0))
+    # The rear fog lamp is rightly dark at 50 m or more, the front fog lamps are not lit though they should be.
+    assert terms["front_fog_lamp"] < 0.0
+
+
+def test_state_says_nothing_of_the_truth(step: Step) -> None:
+    other = dataclasses.replace(step.truth, extinction=0.5, extinction_ahead=0.4)
+    mine = task_state(step, Command(), 100.0, 500.0)
+    np.testing.assert_array_equal(mine, task_state(dataclasses.replace(step, truth=other), Command(), 100.0, 500.0))
+    told = dict(zip(STATE_FEATURES, mine.tolist(), strict=True))
+    assert told["speed_limit"] == pytest.approx(130.0 / 3.6 / 50.0)
+    assert told["distance_to_go"] == pytest.approx(0.1)
+    assert told["lanes"] in (pytest.approx(0.4), pytest.approx(0.6))
+    belief = [told[f"belief_{name}"] for name in ("5_percent", "25_percent", "median", "75_percent", "95_percent")]
+    assert belief == sorted(belief)
+
+
+def _table(error: float, valid: float) -> SurrogateTable:
+    shape, quantiles = (3, 2), np.linspace(error - 0.2, error + 0.2, 5)
+    rows = np.broadcast_to(quantiles, (*shape, 5))
+    share = np.full(shape, valid)
+    edges = np.array([1.0, 100.0, 1e6])
+    return SurrogateTable("negru2013", edges, share, share, np.zeros(shape), rows, rows - 2.0, rows, 0.3, 0.5)
+
+
+def test_the_surrogate_draws_what_its_table_says() -> None:
+    surrogate, found = EstimatorSurrogate(_table(0.1, 0.8)), []
+    for episode in range(300):
+        surrogate.reset(np.random.default_rng(episode))
+        found += [surrogate.estimate(0.05, 5000.0) for _ in range(20)]
+    errors = np.array([math.log(one.extinction / 0.05) for one in found if one.valid])
+    assert len(errors) / len(found) == pytest.approx(0.8, abs=0.02)
+    assert np.median(errors) == pytest.approx(0.1, abs=0.02)
+    assert np.quantile(errors, [0.25, 0.75]) == pytest.approx([0.0, 0.2], abs=0.03)
+    assert errors.min() >= -0.1
+    assert errors.max() <= 0.3
+
+
+def test_the_measured_table_is_read_and_written(tmp_path: Any) -> None:
+    table = SurrogateTable.load()
+    assert table.method == "negru2013"
+    path = tmp_path / "table.json"
+    path.write_text(table.as_json(), encoding="utf-8")
+    np.testing.assert_array_equal(SurrogateTable.load(path).error, table.error)
+    assert np.all(np.diff(table.error, axis=2) >= 0.0)
+
+
+def test_baselines_are_evaluated() -> None:
+    found = fogsim_envs.evaluate("oracle", FAST, seeds=range(2), discount=0.99)
+    assert len(found.episodes) == 2
+    assert found.low <= found.mean <= found.high
+    assert "episodes" in str(found)
+    seen = []
+
+    def spy(observation: Any, info: dict[str, Any]) -> Any:
+        seen.append(info["built_in_advice_mps"])
+        return NO_ADVICE
+
+    assert fogsim_envs.evaluate(spy, FAST, seeds=[0]).episodes[0].steps == len(seen)
+    with pytest.raises(InputError, match="did you mean 'oracle'"):
+        fogsim_envs.evaluate("oracles", FAST, seeds=[0])
+    with pytest.raises(InputError, match="at least one"):
+        fogsim_envs.evaluate("none", FAST, seeds=[])

@@ -46,3 +46,9 @@ gymnasium.register(
     entry_point="fogsim_envs.task:FogAdvisoryFastEnv",
     max_episode_steps=400,
 )
+
+gymnasium.register(
+    id="fogsim/FogDrive-v1",
+    entry_point="fogsim_envs.task:FogDriveEnv",
+    max_episode_steps=600,
+)

@@ -29,6 +29,7 @@ from fogsim.traffic.sumo.planned_way import planned_way
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.route_position import GapToEgo, RoutePosition
 from fogsim.traffic.sumo.vehicle_reader import SubscribedReader, VehicleReader
+from fogsim.traffic.sumo_behaviour.ego_driving import EgoDriving
 from fogsim.traffic.sumo_behaviour.scripted_actions import ScriptedActions, has_lane
 from fogsim.traffic.sumo_behaviour.speed_control import SpeedControl, SumoDesiredSpeeds
 from fogsim.traffic.sumo_drivers.drivers_perception import DriversPerception, drivers_perception
@@ -60,6 +61,7 @@ class _Run:
     reader: VehicleReader
     lane_changes: LaneChangeSmoothing
     speeds: SpeedControl
+    driving: EgoDriving
     lanes: LaneKeeping
     collisions: CollisionLog
     script: Script
@@ -140,6 +142,7 @@ class SumoTraffic:
             reader=reader(api, setup.ego, setup.reading_radius, roster),
             lane_changes=changes,
             speeds=speeds,
+            driving=EgoDriving(api, setup.ego, setup.step_length),
             lanes=LaneKeeping(api, setup.keep_lane, roster, session),
             collisions=CollisionLog(),
             script=script,
@@ -286,7 +289,10 @@ class SumoTraffic:
         """
         run = self._running
         self._command = command
-        run.speeds.apply(self._play_script(run, command))
+        orders = self._play_script(run, command)
+        if run.driving.apply(command.control, run.roster.present) and self._setup.ego is not None:
+            orders.pop(self._setup.ego, None)
+        run.speeds.apply(orders)
         run.actions.play(self._elapsed(run), run.roster.present)
         self._update_drivers(run, command)
 

@@ -2,7 +2,7 @@
 
 from fogsim.values.belief import Belief
 from fogsim.values.camera import Camera, CameraPose, Response
-from fogsim.values.command import Command, Display, SpeedAdvice, Stretch, StretchAdvice
+from fogsim.values.command import Command, Display, EgoControl, SpeedAdvice, Stretch, StretchAdvice
 from fogsim.values.estimate import Estimate, FogCategory, fog_category
 from fogsim.values.fault import Fault, RunningFault
 from fogsim.values.fog import FogBank, FogChange, FogField, FogPatches
@@ -49,6 +49,7 @@ __all__ = [
     "Collision",
     "Command",
     "Display",
+    "EgoControl",
     "Ending",
     "Estimate",
     "Fault",

@@ -74,6 +74,23 @@ class StretchAdvice:
 
 
 @dataclass(frozen=True, slots=True)
+class EgoControl:
+    """The ego driven by hand, whoever is in the way: no driver brakes for it.
+
+    Attributes
+    ----------
+    acceleration : float
+        Acceleration along the road [m/s²], within what the vehicle's top speed leaves; it does not reverse.
+    lanes : int
+        Change of lane that begins now: how many lanes to the left, negative to the right; none where there is no such
+        lane.
+    """
+
+    acceleration: float = 0.0
+    lanes: int = 0
+
+
+@dataclass(frozen=True, slots=True)
 class Command:
     """Advice and lamps in force until the next decision.
 
@@ -92,6 +109,8 @@ class Command:
         comes there [m]; 0 for nobody.
     stretches : tuple of StretchAdvice
         Advice to all on stretches of road.
+    control : EgoControl or None
+        The ego driven by hand, in place of its driver and of the advice; None for the driver. SUMO's traffic alone.
     """
 
     advice: SpeedAdvice = field(default_factory=SpeedAdvice)
@@ -99,6 +118,7 @@ class Command:
     advised_speeds: Mapping[str, float] = field(default_factory=dict)
     advice_reach: float = 0.0
     stretches: tuple[StretchAdvice, ...] = ()
+    control: EgoControl | None = None
 
     @property
     def is_for_others(self) -> bool:

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from fogsim.errors import InputError
-from fogsim.values import Belief, Command, Display, Estimate, Lamp, SpeedAdvice, Stretch, StretchAdvice
+from fogsim.values import Belief, Command, Display, EgoControl, Estimate, Lamp, SpeedAdvice, Stretch, StretchAdvice
 
 T = TypeVar("T")
 
@@ -145,6 +145,11 @@ def checked_command(value: object) -> Command:
         _check_speed("the command", f"advised_speeds[{vehicle!r}]", speed)
     if not (_is_number(command.advice_reach) and command.advice_reach >= 0.0):
         raise InputError(f"the command: advice_reach must be at least 0 [m], got {command.advice_reach!r}")
+    if command.control is not None:
+        control = _of_type("the command's control", command.control, EgoControl)
+        if not (_is_number(control.acceleration) and math.isfinite(control.acceleration)):
+            raise InputError(f"the command: control.acceleration must be finite, got {control.acceleration!r}")
+        _check_kind("the command", "control.lanes", control.lanes, int, "a whole number of lanes to the left")
     _check_kind("the command", "stretches", command.stretches, tuple, "a tuple of StretchAdvice")
     for place, advice in enumerate(command.stretches):
         _check_stretch_advice(f"the command's stretches[{place}]", advice)

@@ -1,6 +1,7 @@
 """The task of the environments from version 1 on: what an episode is, what pays, what an agent observes."""
 
 from fogsim_envs.task.advisory import FogAdvisoryV1Env
+from fogsim_envs.task.drive import FogDriveEnv
 from fogsim_envs.task.episodes import Episode, FogDistribution, ScenarioDistribution
 from fogsim_envs.task.fast import FogAdvisoryFastEnv
 from fogsim_envs.task.rewards import TaskWeights
@@ -10,6 +11,7 @@ __all__ = [
     "FogAdvisoryFastEnv",
     "FogAdvisoryV1Env",
     "FogDistribution",
+    "FogDriveEnv",
     "ScenarioDistribution",
     "TaskWeights",
 ]

@@ -8,6 +8,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium import spaces
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError, UnknownNameError
@@ -16,6 +17,7 @@ from fogsim.metrics import step_metrics
 from fogsim.recorders import FramePanel
 from fogsim.scenario import Scenario, build
 from fogsim.values import Command, Ending, Step
+from fogsim_envs.actions import checked_action
 from fogsim_envs.hosting import TIMEOUT, Simulation, begin, begin_anew, checked_timeout
 from fogsim_envs.spaces import action_space, command_of
 from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
@@ -123,7 +125,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         self._check(first)
         self._camera = build.camera(first)
         self.observation_space = task_space(observation, self._camera)
-        self.action_space = action_space(continuous)
+        self.action_space = self._make_action_space(continuous)
         self.metadata = {**self.metadata, "render_fps": 1 / first.clocks.decision_period_s}
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
@@ -196,16 +198,27 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         ------
         gymnasium.error.ResetNeeded
             If the episode is over or none has begun.
+        InputError
+            If the action is no member of the action space.
         """
         if self._simulation is None or self._step is None or self._step.ending is not None:
             raise gymnasium.error.ResetNeeded("the episode is over or none has begun: call reset() before step()")
-        before, self._own = self._step, command_of(action, self._continuous)
+        name = type(self).__name__ if self.spec is None else self.spec.id
+        self._own = self._commanded(checked_action(action, self.action_space, name))
+        before = self._step
         self._step = self._drive(before)
         terms = task_terms(before, self._step, self._way, self._weights, self._standard)
         truncated = self._step.ending is Ending.TIME
         terminated = self._step.ending is not None and not truncated
         info = {**self._info(), "reward_terms": terms}
         return self._observe(), float(sum(terms.values())), terminated, truncated, info
+
+    def _make_action_space(self, continuous: bool) -> spaces.Space[Any]:
+        return action_space(continuous)
+
+    def _commanded(self, action: NDArray[Any]) -> Command:
+        """What a member of the action space stands for."""
+        return command_of(action, self._continuous)
 
     def _completed(self, step: Step) -> Step:
         """A step with all that an agent is told of it; here it has that from the loop."""

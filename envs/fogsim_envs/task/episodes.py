@@ -78,6 +78,8 @@ class FogDistribution:
         Visibility outside the banks, log-uniform between these [m], but at least that in them.
     ahead : (float, float)
         From the route's beginning to the first bank, and from one bank to the next, uniform between these [m].
+    reach : float
+        No bank begins farther from the route's beginning than this [m].
     patchy_share : float
         Share of foggy episodes in which fog thickens and thins from place to place.
 
@@ -94,11 +96,14 @@ class FogDistribution:
     bank_edge: tuple[float, float] = (30.0, 300.0)
     outside_visibility: tuple[float, float] = (200.0, 2000.0)
     ahead: tuple[float, float] = (300.0, 800.0)
+    reach: float = 2500.0
     patchy_share: float = 0.25
 
     def __post_init__(self) -> None:
         for name in ("ahead", "visibility", "bank_length", "bank_edge", "outside_visibility"):
             _check_range(f"FogDistribution.{name}", getattr(self, name), 1.0)
+        if self.ahead[1] > self.reach:
+            raise InputError(f"FogDistribution.reach: expected at least ahead, {self.ahead!r}, got {self.reach!r}")
         for name in ("clear_share", "even_share", "patchy_share"):
             _check_share(f"FogDistribution.{name}", getattr(self, name))
 
@@ -130,7 +135,7 @@ class FogDistribution:
         else:
             fog = {
                 "outside_visibility_m": max(outside, densest),
-                "banks": _placed(banks[: 1 + bool(is_double)], densest, max(outside, densest)),
+                "banks": _placed(banks[: 1 + bool(is_double)], densest, max(outside, densest), self.reach),
             }
         if is_patchy:
             fog["patches"] = {"correlation_length_m": 100.0, "strength": 0.4, "seed": seed}
@@ -145,14 +150,19 @@ class FogDistribution:
         }
 
 
-def _placed(banks: Sequence[Mapping[str, float]], densest: float, outside: float) -> list[dict[str, float]]:
+def _placed(
+    banks: Sequence[Mapping[str, float]], densest: float, outside: float, reach: float
+) -> list[dict[str, float]]:
     """Banks one after the other; the first is the densest, a further one is less dense."""
     placed, start = [], 0.0
     for number, bank in enumerate(banks):
         begin = start + bank["ahead"]
+        if begin > reach:
+            break
         end = begin + bank["length"]
-        share = 1.0 if number == 0 else bank["depth"]
-        inside = math.exp(share * math.log(densest) + (1.0 - share) * math.log(outside))
+        share = bank["depth"]
+        thinner = math.exp(share * math.log(densest) + (1.0 - share) * math.log(outside))
+        inside = thinner if number else densest
         edge = min(bank["edge"], bank["length"] / 2.0)
         placed.append({"start_m": begin, "end_m": end, "edge_m": edge, "visibility_m": inside})
         start = end

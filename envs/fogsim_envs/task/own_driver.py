@@ -30,6 +30,8 @@ class OwnDriver:
         step : Step
             What was finished last; the driver sees the fog itself.
         """
+        if command.control is not None:
+            return command
         visibility = step.truth.visibility_ahead
         free = step.traffic.free_speed
         in_clear_air = float(free[step.ego]) if len(free) else step.speed_limit

@@ -53,8 +53,8 @@ class TaskWeights:
     conflict: float = 2.0
     discomfort: float = 0.5
     collision: float = 100.0
-    rear_fog_lamp: float = 10.0
-    front_fog_lamp: float = 5.0
+    rear_fog_lamp: float = 15.0
+    front_fog_lamp: float = 8.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,56 @@
+"""The agent drives the ego itself: acceleration and changes of lane."""
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from fogsim.values import Command, EgoControl
+from fogsim_envs.task.advisory import FogAdvisoryV1Env
+
+ACCELERATIONS = (-8.0, -4.0, -2.0, 0.0, 1.0, 2.0)
+"""Acceleration of each level [m/s²]: an emergency, hard and gentle braking, none, and a car's usual ones."""
+
+HARDEST_BRAKING, LARGEST_ACCELERATION = 8.0, 2.5
+"""What −1 and 1 of a continuous action stand for [m/s²]; 0 is 0, and between them it is proportional."""
+
+LANE_CHANGES = (-1, 0, 1)
+"""Lanes to the left of each choice."""
+
+
+class FogDriveEnv(FogAdvisoryV1Env):
+    """Drive in fog that only the camera can judge: acceleration and lane.
+
+    Observation, reward, ``info``, episodes and arguments are those of ``fogsim/FogAdvisory-v1`` (`FogAdvisoryV1Env`).
+    Nobody brakes for the agent: it strikes whom it drives into. Lamps are chosen by the scenario's lighting policy.
+    In ``state``, the advised speed is 1.
+
+    ### Action
+    ``MultiDiscrete([6, 3])``, or with ``continuous=True`` ``Box(-1, 1, (2,))``
+
+    | entry | discrete | continuous |
+    |---|---|---|
+    | acceleration | −8, −4, −2, 0, 1, 2 m/s² | −1 … 0 is −8 … 0 m/s², 0 … 1 is 0 … 2.5 m/s² |
+    | lane | 0 one to the right, 1 keep it, 2 one to the left | thirds of −1 … 1 |
+
+    A change of lane that would leave the road is not made.
+
+    ### Version history
+    * v1: first version
+    """
+
+    def _make_action_space(self, continuous: bool) -> spaces.Space[Any]:
+        if continuous:
+            return spaces.Box(-1.0, 1.0, (2,), np.float32)
+        return spaces.MultiDiscrete([len(ACCELERATIONS), len(LANE_CHANGES)])
+
+    def _commanded(self, action: NDArray[Any]) -> Command:
+        if self._continuous:
+            pedal, wheel = action.tolist()
+            acceleration = pedal * (LARGEST_ACCELERATION if pedal > 0.0 else HARDEST_BRAKING)
+            lanes = LANE_CHANGES[min(int((wheel + 1.0) / 2.0 * len(LANE_CHANGES)), len(LANE_CHANGES) - 1)]
+        else:
+            level, choice = action.tolist()
+            acceleration, lanes = ACCELERATIONS[level], LANE_CHANGES[choice]
+        return Command(lamps=self._built_in.lamps, control=EgoControl(acceleration, lanes))

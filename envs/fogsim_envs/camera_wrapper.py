@@ -17,6 +17,7 @@ from fogsim.scenario import Scenario, build
 from fogsim.scenario.loading import clock_settings
 from fogsim.traffic.highway import (
     Fleet,
+    RouteProgress,
     control_drivers,
     is_highway_environment,
     read_snapshot,
@@ -92,6 +93,7 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
         self._drivers = drivers
         self._equipment = EgoEquipment(self._scenario)
         self._network: RoadNetwork | None = None
+        self._progress: RouteProgress | None = None
         self._drivers_fog = DriversFog()
         self._fleet: Fleet | None = None
         self._step: Step | None = None
@@ -124,7 +126,7 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
         if self._network is not None and not same_roads(self._network, network):
             self._equipment.close()
             self._equipment = EgoEquipment(self._scenario)
-        self._network = network
+        self._network, self._progress = network, RouteProgress(network.route)
         streams = spawn_streams(int(self._noise.integers(2**31)))
         fog = self._equipment.start_run(streams, lambda: (network, SignMap()))
         self._drivers_fog = self._take_over_drivers(fog, self._fleet, streams.traffic_seed)
@@ -155,10 +157,10 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
 
     def _with_frame(self, observation: Any) -> dict[str, Any]:
         """Observation with the frame of now; with the last one if the vehicle is no longer there."""
-        if self._fleet is None or self._network is None:
+        if self._fleet is None or self._progress is None:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
         reach = self._scenario.traffic.reading_radius_m
-        snapshot = read_snapshot(self._fleet, self._network.route, (), reach)
+        snapshot = read_snapshot(self._fleet, self._progress, (), reach)
         if snapshot is not None:
             index = 0 if self._step is None else self._step.index + 1
             self._step = self._equipment.complete_step(index, self._fleet.time, snapshot, _COMMAND, None)
@@ -176,5 +178,5 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
     def close(self) -> None:
         """Close the environment and free the renderer; closing twice is allowed."""
         self._equipment.close()
-        self._fleet, self._network, self._step = None, None, None
+        self._fleet, self._network, self._progress, self._step = None, None, None, None
         super().close()

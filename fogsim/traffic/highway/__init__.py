@@ -4,6 +4,7 @@ from fogsim.traffic.highway.behaviour import DriverControl, control_drivers
 from fogsim.traffic.highway.fleet import EGO, LEAD, Fleet
 from fogsim.traffic.highway.network import road_network, same_roads
 from fogsim.traffic.highway.perception import limit_sight
+from fogsim.traffic.highway.route import RouteProgress
 from fogsim.traffic.highway.snapshot import read_snapshot
 from fogsim.traffic.highway.traffic import HighwayTraffic, is_highway_environment
 
@@ -17,6 +18,7 @@ __all__ = [
     "DriverControl",
     "Fleet",
     "HighwayTraffic",
+    "RouteProgress",
     "control_drivers",
     "is_highway_environment",
     "let_drivers_meet",

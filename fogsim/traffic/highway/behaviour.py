@@ -7,11 +7,13 @@ drivers have chosen their speeds, and before the script has its way. IDM and MOB
 import math
 from collections.abc import Mapping, Sequence
 
+from highway_env.vehicle.behavior import IDMVehicle
+
 from fogsim.traffic.drivers.events import Event
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.drivers.speed_choice import DriverSetup
 from fogsim.traffic.highway.desired_speeds import HighwayDesiredSpeeds
-from fogsim.traffic.highway.fleet import Fleet
+from fogsim.traffic.highway.fleet import Fleet, acceleration
 from fogsim.traffic.highway.manoeuvres import Manoeuvres
 from fogsim.traffic.highway.perception import limit_sight
 from fogsim.values import Command, Unplayed
@@ -101,6 +103,20 @@ class DriverControl:
         orders = self._manoeuvres.plan()
         type(road).act(road)
         self._manoeuvres.apply(orders)
+
+
+def hold_at_standstill(fleet: Fleet) -> None:
+    """Let nobody who drives by IDM back away: its acceleration has no end at standstill.
+
+    Parameters
+    ----------
+    fleet : Fleet
+        The vehicles, whose drivers have decided for this step.
+    """
+    for vehicle in fleet.environment.road.vehicles:
+        if isinstance(vehicle, IDMVehicle):
+            stopping = -vehicle.speed / fleet.step_length
+            vehicle.action["acceleration"] = max(acceleration(vehicle), stopping)
 
 
 def control_drivers(

@@ -85,8 +85,9 @@ class HighwayDesiredSpeeds:
             ego = vehicle is self._fleet.ego
             desired = command.advice.speed if ego else self._desired.get(vehicle, math.inf)
             if math.isfinite(desired):
-                self._own_speed.setdefault(vehicle, vehicle.target_speed)
-                vehicle.target_speed = self._target_speed(vehicle, desired)
+                own = self._own_speed.setdefault(vehicle, vehicle.target_speed)
+                # Who is advised more than they would drive anyway does not drive faster for it.
+                vehicle.target_speed = self._target_speed(vehicle, min(desired, own))
             elif vehicle in self._own_speed:
                 vehicle.target_speed = self._own_speed.pop(vehicle)
 

@@ -10,7 +10,7 @@ from highway_env.road.lane import LineType
 from highway_env.vehicle.kinematics import Vehicle
 from numpy.typing import ArrayLike, NDArray
 
-from fogsim.linear_algebra import matrix_product
+from fogsim.traffic.highway.route import lanes_ahead, reached_at
 from fogsim.values import Lane, LaneMarking, RoadNetwork
 
 SAMPLING = 2.0
@@ -93,17 +93,6 @@ def speed_limit(lane: Any) -> float:
     return float(Vehicle.MAX_SPEED if lane.speed_limit is None else lane.speed_limit)
 
 
-def planned_route(vehicle: Any) -> Any:
-    """Lanes that a vehicle plans to drive; None if it has no plan, or is of a kind that makes none.
-
-    Parameters
-    ----------
-    vehicle : highway_env.vehicle.kinematics.Vehicle
-        The vehicle.
-    """
-    return getattr(vehicle, "route", None)
-
-
 def lane_id(index: tuple[str, str, int]) -> str:
     """Id of a lane, as in the road network.
 
@@ -127,8 +116,8 @@ def edge_id(start: str, end: str) -> str:
     return f"{start}>{end}"
 
 
-def _centreline(lane: Any) -> NDArray[np.float64]:
-    stations = np.linspace(0.0, lane.length, max(2, math.ceil(lane.length / SAMPLING) + 1))
+def _centreline(lane: Any, start: float = 0.0) -> NDArray[np.float64]:
+    stations = np.linspace(start, lane.length, max(2, math.ceil((lane.length - start) / SAMPLING) + 1))
     if np.ptp([lane.heading_at(s) for s in stations]) == 0:
         stations = stations[[0, -1]]
     return upright([lane.position(s, 0.0) for s in stations])
@@ -137,31 +126,11 @@ def _centreline(lane: Any) -> NDArray[np.float64]:
 def _route(network: Any, ego: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Points of the ego's route [m], and the speed limits on the way to them [m/s]."""
     lanes = [network.get_lane(index) for index in lanes_ahead(network, ego)]
-    lines = [_centreline(lane) for lane in lanes]
+    starts = [0.0, *(reached_at(one, following) for one, following in itertools.pairwise(lanes))]
+    lines = [_centreline(lane, start) for lane, start in zip(lanes, starts, strict=True)]
     points, limits = np.concatenate(lines), np.repeat([speed_limit(lane) for lane in lanes], list(map(len, lines)))
     apart = np.concatenate(([True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-6))
     return points[apart], limits[apart]
-
-
-def lanes_ahead(network: Any, ego: Any) -> Iterator[tuple[str, str, int]]:
-    """Lanes one after the other, from the ego's own; a route in circles is ended.
-
-    Parameters
-    ----------
-    network : highway_env.road.road.RoadNetwork
-        The network.
-    ego : highway_env.vehicle.kinematics.Vehicle
-        The ego.
-    """
-    # The library takes what has been driven off the list that it is given.
-    here, plan, passed = ego.lane_index, list(planned_route(ego) or ()), set()
-    while here not in passed:
-        yield here
-        passed.add(here)
-        lane = network.get_lane(here)
-        if plan and all(step[:2] == here[:2] for step in plan):
-            return
-        here = network.next_lane(here, route=plan, position=lane.position(lane.length, 0.0))
 
 
 def same_roads(one: RoadNetwork, other: RoadNetwork) -> bool:
@@ -177,25 +146,3 @@ def same_roads(one: RoadNetwork, other: RoadNetwork) -> bool:
         and (a.lane_id, a.width, a.speed_limit, a.left, a.right) == (b.lane_id, b.width, b.speed_limit, b.left, b.right)
         for a, b in zip(one.lanes, other.lanes, strict=True)
     )
-
-
-def station_along(line: NDArray[np.float64], point: NDArray[np.float64]) -> tuple[float, float]:
-    """How far along a polyline a point is, and the polyline's length [m].
-
-    Parameters
-    ----------
-    line : (n, 3) float64
-        The polyline [m].
-    point : (3,) float64
-        The point, taken to the nearest place of the line [m].
-    """
-    best, station, driven = math.inf, 0.0, 0.0
-    for start, end in itertools.pairwise(line):
-        along = end - start
-        length = math.hypot(*along)
-        share = float(np.clip(matrix_product(point - start, along) / length**2, 0.0, 1.0))
-        distance = math.dist(start + share * along, point)
-        if distance < best:
-            best, station = distance, driven + share * length
-        driven += length
-    return station, driven

@@ -1,13 +1,15 @@
 """highway-env's drivers react to others only once they can see them.
 
 Its drivers ask their road for the vehicles ahead and behind, in their own lane and in those to which they could change;
-in fog, a road answers with none where the driver sees none. IDM and MOBIL stay as they are.
+in fog, a road answers with none where the driver sees none. IDM and MOBIL stay as they are. At junctions a road
+tells who gives way to whom; in fog nobody does to a vehicle that they do not see.
 """
 
 import math
 from typing import Any
 
 import numpy as np
+from highway_env.road.regulation import RegulatedRoad
 from numpy.typing import NDArray
 
 from fogsim.traffic.drivers.eye_heights import EYE_HEIGHTS
@@ -30,11 +32,14 @@ def limit_sight(fog: FogAccess, fleet: Fleet, sight: DriverSight) -> None:
         The drivers' eyes.
     """
     # On this one road, not in the library: other environments of the process go on in clear air.
-    fleet.environment.road.neighbour_vehicles = VisibleNeighbours(fog, fleet, sight)
+    road = fleet.environment.road
+    road.neighbour_vehicles = neighbours = VisibleNeighbours(fog, fleet, sight)
+    if isinstance(road, RegulatedRoad):
+        road.respect_priorities = neighbours.who_gives_way
 
 
 class VisibleNeighbours:
-    """Stands in for the method ``neighbour_vehicles`` of one road.
+    """Stands in for the methods ``neighbour_vehicles`` and ``respect_priorities`` of one road.
 
     Parameters
     ----------
@@ -57,6 +62,19 @@ class VisibleNeighbours:
             front if front is not None and self._perceives(vehicle, front, rear_bumper(front)) else None,
             rear if rear is not None and self._perceives(vehicle, rear, front_bumper(rear)) else None,
         )
+
+    def who_gives_way(self, one: Any, other: Any) -> Any:
+        """Which of two vehicles whose ways cross gives way; None if its driver has not perceived the other.
+
+        Parameters
+        ----------
+        one, other : highway_env.vehicle.kinematics.Vehicle
+            The vehicles.
+        """
+        giving = type(self._fleet.environment.road).respect_priorities(one, other)
+        foe, eye = (other if giving is one else one), front_bumper(giving)
+        near_end = min(front_bumper(foe), rear_bumper(foe), key=lambda end: math.dist(eye, end))
+        return giving if self._perceives(giving, foe, near_end) else None
 
     def _perceives(self, vehicle: Any, other: Any, end: NDArray[np.float64]) -> bool:
         """Tell whether a driver sees another's near end, and has for the reaction time if it was hidden before."""

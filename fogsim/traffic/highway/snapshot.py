@@ -9,7 +9,8 @@ from highway_env.vehicle.objects import Landmark
 from numpy.typing import NDArray
 
 from fogsim.traffic.highway.fleet import Fleet, acceleration, ahead
-from fogsim.traffic.highway.network import lane_id, speed_limit, station_along, upright
+from fogsim.traffic.highway.network import lane_id, speed_limit, upright
+from fogsim.traffic.highway.route import RouteProgress
 from fogsim.values import Collision, Leader, TrafficSnapshot, TrafficState
 from fogsim.values.traffic import advised_speeds
 
@@ -44,7 +45,7 @@ def rear_bumper(vehicle: Any) -> NDArray[np.float64]:
 
 def read_snapshot(
     fleet: Fleet,
-    route: NDArray[np.float64],
+    progress: RouteProgress,
     collisions: tuple[Collision, ...],
     reach: float,
     heard: Mapping[str, float] | None = None,
@@ -55,8 +56,8 @@ def read_snapshot(
     ----------
     fleet : Fleet
         The vehicles.
-    route : (n, 3) float64
-        Polyline along the ego's route [m].
+    progress : RouteProgress
+        Follows the ego along its route from one snapshot to the next.
     collisions : tuple of Collision
         What has happened.
     reach : float
@@ -73,12 +74,11 @@ def read_snapshot(
     if ego not in vehicles:
         return None
     near = [v for v in vehicles if math.dist(v.position, ego.position) <= reach]
-    position, length = station_along(route, front_bumper(ego))
     return TrafficSnapshot(
         state=_state(fleet, near, heard or {}),
         ego=near.index(ego),
-        route_position=position,
-        route_length=length,
+        route_position=progress.update(front_bumper(ego), ego.speed < 0.0),
+        route_length=progress.length,
         speed_limit=speed_limit(ego.lane),
         leader=_leader(fleet),
         collisions=collisions,

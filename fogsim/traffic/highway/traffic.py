@@ -11,10 +11,11 @@ from fogsim.traffic.collision_log import CollisionLog
 from fogsim.traffic.drivers.events import Event
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.drivers.speed_choice import DriverSetup
-from fogsim.traffic.highway.behaviour import DriverControl, control_drivers
+from fogsim.traffic.highway.behaviour import DriverControl, control_drivers, hold_at_standstill
 from fogsim.traffic.highway.collisions import find_collisions
 from fogsim.traffic.highway.fleet import LEAD, Fleet
-from fogsim.traffic.highway.network import planned_route, road_network, same_roads, speed_limit
+from fogsim.traffic.highway.network import road_network, same_roads, speed_limit
+from fogsim.traffic.highway.route import RouteProgress, planned_route
 from fogsim.traffic.highway.snapshot import read_snapshot
 from fogsim.traffic.setup import UNTOUCHED, AfterCollision
 from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot, Unplayed
@@ -89,6 +90,7 @@ class HighwayTraffic:
         self._collisions = CollisionLog()
         self._control: DriverControl | None = None
         self._network: RoadNetwork | None = None
+        self._progress: RouteProgress | None = None
 
     @property
     def step_length(self) -> float:
@@ -125,7 +127,7 @@ class HighwayTraffic:
                 f"{type(self._environment).__name__} builds other roads at every reset, but they are drawn once: "
                 "set its config so that the roads stay the same"
             )
-        self._network = network
+        self._network, self._progress = network, RouteProgress(network.route)
         if self._fog is not None:
             self._control.enter_fog(self._fog)
 
@@ -186,6 +188,7 @@ class HighwayTraffic:
         fleet.ego_lamps = command.lamps
         control.command = command
         fleet.environment.road.act()
+        hold_at_standstill(fleet)
         fleet.environment.road.step(self.step_length)
         fleet.environment.steps += 1
         fleet.environment.time += self.step_length
@@ -200,8 +203,9 @@ class HighwayTraffic:
         The impact speed of a collision is the length of the difference of both velocities.
         """
         fleet, control = self._running()
-        route, collisions = self.network()[0].route, self._collisions.take()
-        return read_snapshot(fleet, route, collisions, self._reading_radius, control.heard())
+        if self._progress is None:
+            raise SimulationError("the traffic has not been started, or is closed")
+        return read_snapshot(fleet, self._progress, self._collisions.take(), self._reading_radius, control.heard())
 
     def unplayed(self) -> Unplayed:
         """What of the script has not been played; see `Traffic.unplayed`."""
@@ -221,9 +225,9 @@ class HighwayTraffic:
 
 def _driver_for(environment: Any) -> Any:
     """Put a driver who keeps the lane and follows by IDM into the controlled vehicle."""
-    passive, vehicles = environment.vehicle, environment.road.vehicles
+    passive, road = environment.vehicle, environment.road
     driver = IDMVehicle(
-        environment.road,
+        road,
         passive.position,
         passive.heading,
         passive.speed,
@@ -233,6 +237,9 @@ def _driver_for(environment: Any) -> Any:
         route=planned_route(passive),
         enable_lane_change=False,
     )
-    vehicles[vehicles.index(passive)] = driver
+    destination = environment.config.get("destination")
+    if driver.route is None and destination:
+        driver.plan_route_to(destination)
+    road.vehicles[road.vehicles.index(passive)] = driver
     environment.controlled_vehicles[0] = driver
     return driver

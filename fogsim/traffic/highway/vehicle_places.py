@@ -5,7 +5,8 @@ from collections.abc import Collection, Sequence
 
 from fogsim.traffic.drivers.advice_hearing import check_edges, check_start
 from fogsim.traffic.highway.fleet import Fleet
-from fogsim.traffic.highway.network import edge_id, lanes_ahead
+from fogsim.traffic.highway.network import edge_id
+from fogsim.traffic.highway.route import lanes_ahead
 from fogsim.traffic.highway.snapshot import front_bumper
 from fogsim.values import Stretch
 

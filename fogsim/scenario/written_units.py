@@ -50,8 +50,11 @@ class _Conversion:
         for key, value in written.items():
             suffixed = [] if _known(key, models) else list(_with_suffix(key, models))
             if suffixed and is_quantity(value):
-                name, number = self._quantity(suffixed, written, (*at, key))
+                name, number = self._quantity(suffixed, value, written, (*at, key))
                 result[name] = number
+            elif suffixed and isinstance(value, list) and any(is_quantity(one) for one in value):
+                read = [self._quantity(suffixed, str(one), written, (*at, key)) for one in value]
+                result[read[0][0]] = [number for _, number in read]
             elif isinstance(value, dict) and any(get_origin(_annotation(model, key)) is dict for model in models):
                 # Names that people choose, which may be those of keys.
                 inside, there = _models_of(key, models), (*at, key)
@@ -79,9 +82,10 @@ class _Conversion:
         of_kind = tuple(model for model in models if value.get("kind") in get_args(_annotation(model, "kind")))
         return self.block(value, of_kind or models, at)
 
-    def _quantity(self, suffixed: list[tuple[str, str]], written: dict[str, Any], at: KeyPath) -> tuple[str, float]:
-        key = str(at[-1])
-        name, number = _converted(suffixed, written[key])
+    def _quantity(
+        self, suffixed: list[tuple[str, str]], value: str, written: dict[str, Any], at: KeyPath
+    ) -> tuple[str, float]:
+        name, number = _converted(suffixed, value)
         if name in written:
             self._tell(at, f"the key {name} stands beside it; one of them must go")
         elif isinstance(number, ValueError):

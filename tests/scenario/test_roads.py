@@ -34,6 +34,40 @@ def loaded(folder: Path, text: str = TEXT) -> Scenario:
     return load_scenario(file)
 
 
+def test_footways_lie_beside_the_lanes_that_traffic_keeps(tmp_path: Path) -> None:
+    text = TEXT.replace("motorway, length: 4 km, lanes: 2, limit: 130 km/h", "rural, length: 1 km, footways: true")
+    files = traffic_files(
+        loaded(tmp_path, text.replace("footways: true", "footways: true, zebra_crossings: [230 m, 400 m]"))
+    )
+    assert files.net is not None
+    net, routes = (ET.parse(path).getroot() for path in (files.net, files.routes[0]))  # noqa: S314 - our own files
+    on_foot = {lane.get("id") for lane in net.iter("lane") if lane.get("allow") == "pedestrian"}
+    assert {"same_way_0", "oncoming_0", ":cut2_c0_0", ":cut1_w0_0"} <= on_foot
+    driven = [one for kind in ("vehicle", "flow") for one in routes.iter(kind)]
+    assert {one.get("departLane") for one in driven} == {"1"}
+    # Both actors, before and behind a crossing, and nobody else between them.
+    there = {one.get("id") for one in driven if (one.get("id") or "").startswith("same_way.there")}
+    assert there == {f"same_way.there.{place}.0" for place in (0, 3, 4)}
+
+
+@pytest.mark.parametrize(
+    ("road", "told"),
+    [
+        ("{template: motorway, footways: true}", "a motorway has no footways; "),
+        ("{template: straight, footway: true}", "road.footway: unknown key; did you mean 'footways'"),
+        ("{template: straight, zebra_crossings: [90 m]}", "zebra_crossings go with footways: true"),
+        ("{template: straight, footways: true, zebra_crossings: [90 m, 110 m]}", "40 m from one another"),
+        ("{template: straight, footways: true, zebra_crossings: [90 m], median: 2 m}", "without a median"),
+        ("{template: straight, footways: true, zebra_crossings: [90 m, 2 s]}", "the unit 's' does not fit"),
+        ("{template: crossing, footways: true, zebra_crossings: [90 m]}", "a crossing has no zebra_crossings_m"),
+    ],
+)
+def test_footways_that_cannot_be_are_refused(tmp_path: Path, road: str, told: str) -> None:
+    with pytest.raises(InputError, match=r"scenario.yaml:2: road") as refused:
+        loaded(tmp_path, f"name: on_foot\nroad: {road}\nfog: {{visibility: 150 m}}\n")
+    assert told in str(refused.value)
+
+
 def test_a_road_by_template_is_written_for_sumo(tmp_path: Path) -> None:
     scenario = loaded(tmp_path)
     setup = build.traffic_setup(scenario)

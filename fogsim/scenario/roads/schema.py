@@ -113,6 +113,15 @@ class Road(Section):
     lights: Flag | None = None
     """Whether a crossing has traffic lights; without, the road that crosses the ego's gives way."""
 
+    footways: Flag | None = None
+    """Whether there are footways beside the road; where streets cross, with crossings on foot over all of them."""
+
+    footway_width_m: Annotated[Length, Field(ge=1, le=10)] | None = None
+    """Width of each footway."""
+
+    zebra_crossings_m: tuple[Distance, ...] | None = None
+    """Where persons cross a road with footways: places of the crossings' middles along it."""
+
     side_limit_kmh: Annotated[SpeedKmh, Field(ge=5)] | None = None
     """Speed limit of the road that meets the ego's."""
 

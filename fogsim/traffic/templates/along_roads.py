@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 from fogsim.errors import InputError
 from fogsim.traffic.templates.alignment import Axis, Bend, axis_of
+from fogsim.traffic.templates.footpaths import STOP_TO_ZEBRA, ZEBRA_WIDTH
 from fogsim.traffic.templates.layout import Layout
-from fogsim.traffic.templates.net_plan import Edge, Link, NetPlan
+from fogsim.traffic.templates.net_plan import Edge, Link, NetPlan, ZebraPlan
 
 SAME_WAY, ONCOMING = "same_way", "oncoming"
 """Names of the ego's way and of that of the oncoming traffic, and of the edges on them."""
@@ -19,6 +20,10 @@ START = (0.0, 0.0, math.radians(20.0))
 _CREST_RADIUS = 3000.0  # of vertical curves [m]
 _SPIRAL_SHARE = 1.0 / 6.0  # length of a spiral by the radius that it leads to
 _PRIORITY = 10
+_ZEBRA_GAP = 2.0 * STOP_TO_ZEBRA + ZEBRA_WIDTH  # in the carriageway's edges, for a crossing on foot [m]
+_CUT_GAP = 1.0  # for nothing but the footway to go on [m]
+_BESIDE_ZEBRA = 15.0  # cuts are no nearer to one [m]
+_BETWEEN_ZEBRAS = 40.0  # [m]
 
 
 def chain(name: str, axes: Sequence[Axis], nodes: Sequence[str], road: "AlongRoad", lanes: int) -> tuple[Edge, ...]:
@@ -110,9 +115,24 @@ class AlongRoad:
         InputError
             If its curve or its grade is longer than the road.
         """
-        axis = self.axis()
         ends = [0.0, *sorted(cuts), self.length]
-        parts = [axis.part(*span) for span in itertools.pairwise(ends)]
+        return self.laid(list(itertools.pairwise(ends)))
+
+    def laid(self, spans: Sequence[tuple[float, float]]) -> Layout:
+        """The road in parts.
+
+        Parameters
+        ----------
+        spans : sequence of tuple of float
+            Stations between which each part lies [m].
+
+        Raises
+        ------
+        InputError
+            If its curve or its grade is longer than the road.
+        """
+        axis = self.axis()
+        parts = [axis.part(*span) for span in spans]
         nodes = ["begin", *(f"cut{number}" for number in range(1, len(parts))), "end"]
         edges = list(chain(SAME_WAY, [part.moved(-0.5 * self.median) for part in parts], nodes, self, self.lanes))
         ways = [(SAME_WAY, tuple(edge.name for edge in edges))]
@@ -212,12 +232,76 @@ class Motorway(AlongRoad):
 
 
 @dataclass(frozen=True, slots=True)
-class Straight(AlongRoad):
+class WalkedRoad(AlongRoad):
+    """A road that may have footways and zebra crossings.
+
+    Attributes
+    ----------
+    footways : bool
+        Whether there is a footway to the right of either direction.
+    footway_width : float
+        Their width [m].
+    zebra_crossings : tuple of float
+        Stations at which persons cross the road [m].
+    """
+
+    footways: bool = False
+    footway_width: float = 2.0
+    zebra_crossings: tuple[float, ...] = ()
+
+    def layout(self, cuts: Sequence[float] = ()) -> Layout:
+        """The road; see `AlongRoad.layout`.
+
+        Parameters
+        ----------
+        cuts : sequence of float
+            Stations at which the ego's way is cut into edges [m].
+
+        Raises
+        ------
+        InputError
+            If its curve or its grade is longer than the road, or where it has no room for a crossing.
+        """
+        zebras = sorted(self.zebra_crossings)
+        self._check_zebras(zebras)
+        if not self.footways:
+            return AlongRoad.layout(self, cuts)
+        # Where persons cross the road is cut anyhow.
+        far = [cut for cut in cuts if all(abs(cut - zebra) > _BESIDE_ZEBRA for zebra in zebras)]
+        gaps = sorted([*((zebra, _ZEBRA_GAP) for zebra in zebras), *((cut, _CUT_GAP) for cut in far)])
+        starts = [0.0, *(at + 0.5 * gap for at, gap in gaps)]
+        ends = [*(at - 0.5 * gap for at, gap in gaps), self.length]
+        plain = self.laid(list(zip(starts, ends, strict=True)))
+        ways = dict(plain.ways)
+        crossed = [number for number, (at, _) in enumerate(gaps, 1) if at in zebras]
+        planned = tuple(
+            ZebraPlan(f"cut{number}", ways[SAME_WAY][number - 1], ways[ONCOMING][-number]) for number in crossed
+        )
+        edges = tuple(replace(edge, footway=self.footway_width) for edge in plain.net.edges)
+        return replace(plain, net=replace(plain.net, edges=edges, zebras=planned))
+
+    def _check_zebras(self, zebras: Sequence[float]) -> None:
+        if not zebras:
+            return
+        if not self.footways:
+            raise InputError("zebra_crossings go with footways: true, which is missing")
+        if self.median or not self.oncoming_lanes:
+            raise InputError("zebra_crossings need a road of two directions without a median")
+        for one, other in itertools.pairwise([0.0, *zebras, self.length]):
+            if other - one < _BETWEEN_ZEBRAS:
+                raise InputError(
+                    f"zebra_crossings must be {_BETWEEN_ZEBRAS:g} m from one another and from both ends of the road, "
+                    f"which is {self.length:g} m long; got {one:g} and {other:g} m"
+                )
+
+
+@dataclass(frozen=True, slots=True)
+class Straight(WalkedRoad):
     """A straight, level road of two lanes."""
 
 
 @dataclass(frozen=True, slots=True)
-class Curve(AlongRoad):
+class Curve(WalkedRoad):
     """A road of two lanes with a curve to the left."""
 
     curve_radius: float = 250.0
@@ -225,14 +309,14 @@ class Curve(AlongRoad):
 
 
 @dataclass(frozen=True, slots=True)
-class Grade(AlongRoad):
+class Grade(WalkedRoad):
     """A road of two lanes that climbs."""
 
     grade: float = 0.04
 
 
 @dataclass(frozen=True, slots=True)
-class Rural(AlongRoad):
+class Rural(WalkedRoad):
     """A country road that winds, to the right and to the left in turn, and goes up and down.
 
     Its curves and grades follow one another along the whole road, and have the measures of one curve and one grade.

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from fogsim.traffic.templates.layout import Layout
+from fogsim.traffic.templates.net_plan import Edge
 from fogsim.traffic.templates.placement import Placed, Ways, edge_at
 from fogsim.traffic.templates.vehicle_types import SLOW, VEHICLE_KINDS, VehicleKind
 from fogsim.traffic.templates.xml_text import element, opening
@@ -65,7 +66,7 @@ def routes_text(layout: Layout, demand: Demand, placed: Sequence[Placed]) -> str
         The actors.
     """
     lines = [*_types(demand.mix, max(edge.lanes for edge in layout.net.edges)), *_actors(placed, layout)]
-    taken = {_taken_lane(one, layout) for one in placed}
+    taken = _taken_lanes(layout, placed)
     for way, rate in _rates(layout, demand):
         lines += _filling(layout, way, rate, taken)
         lines += _flows(layout, way, rate)
@@ -102,9 +103,18 @@ def _rates(layout: Layout, demand: Demand) -> Iterator[tuple[str, float]]:
         yield from ((name, share * rate) for name, share in shares.items() if share * rate > 0.0)
 
 
-def _taken_lane(one: Placed, layout: Layout) -> tuple[str, int]:
-    name, _ = edge_at(layout, one.actor.way, one.position)
-    return name, one.actor.lane % layout.edge(name).lanes
+def _taken_lanes(layout: Layout, placed: Sequence[Placed]) -> set[tuple[str, int]]:
+    """Edges and lanes that stay free: those of actors, and those between actors of one lane."""
+    taken = set[tuple[str, int]]()
+    reached = dict[tuple[str, int], int]()
+    for one in sorted(placed, key=lambda one: one.position):
+        names = layout.way(one.actor.way)
+        name, _ = edge_at(layout, one.actor.way, one.position)
+        lane, place = one.actor.lane % layout.edge(name).lanes, names.index(name)
+        first = reached.get((one.actor.way, lane), place)
+        taken.update((between, lane) for between in names[first : place + 1])
+        reached[one.actor.way, lane] = place
+    return taken
 
 
 def _types(mix: Sequence[tuple[str, float]], lanes: int) -> Iterator[str]:
@@ -162,14 +172,16 @@ def _actor(one: Placed, layout: Ways) -> Iterator[str]:
         depart=f"{actor.depart:g}",
         # The whole way is its route, along which places count.
         departEdge=way.index(edge),
-        departLane=lane,
+        departLane=layout.edge(edge).index(lane),
         departPos=f"{position:.2f}",
         departSpeed="0" if actor.stands else f"{speed:.3f}",
         # Where actors are at first has been checked; who comes later comes when there is room.
         insertionChecks="all" if actor.depart else "none",
     )
     if actor.stands:
-        yield "    " + element("stop", lane=f"{edge}_{lane}", endPos=f"{position:.2f}", duration=_END)
+        yield "    " + element(
+            "stop", lane=f"{edge}_{layout.edge(edge).index(lane)}", endPos=f"{position:.2f}", duration=_END
+        )
     yield "</vehicle>"
 
 
@@ -190,7 +202,7 @@ def _filling(layout: Layout, way: str, rate: float, taken: set[tuple[str, int]])
             count, due = math.floor(due), due % 1.0
             if count:
                 there = {"begin": "0", "end": "0.001", "number": count, "departPos": "random_free"}
-                yield _flow(f"{way}.there.{place}.{lane}", route, lane, there)
+                yield _flow(f"{way}.there.{place}.{lane}", route, (lane, edge), there)
 
 
 def _flows(layout: Layout, way: str, rate: float) -> Iterator[str]:
@@ -200,9 +212,10 @@ def _flows(layout: Layout, way: str, rate: float) -> Iterator[str]:
         yield element("route", id=f"route.{way}.0", edges=" ".join(layout.way(way)))
     for lane in range(first.lanes):
         coming = {"begin": "0", "end": _END, "period": f"exp({rate / first.lanes:.6f})", "departPos": "base"}
-        yield _flow(f"{way}.{lane}", f"route.{way}.0", lane, coming)
+        yield _flow(f"{way}.{lane}", f"route.{way}.0", (lane, first), coming)
 
 
-def _flow(name: str, route: str, lane: int, times: Mapping[str, object]) -> str:
+def _flow(name: str, route: str, place: tuple[int, Edge], times: Mapping[str, object]) -> str:
+    lane, edge = place
     mix = "mix.right" if lane == 0 else "mix.left"
-    return element("flow", id=name, type=mix, route=route, departLane=lane, departSpeed="desired", **times)
+    return element("flow", id=name, type=mix, route=route, departLane=edge.index(lane), departSpeed="desired", **times)

@@ -9,6 +9,7 @@ import numpy as np
 
 from fogsim.traffic.templates.alignment import Points
 from fogsim.traffic.templates.crossing_ways import CrossingWay, clockwise_from_north, curve, waiting_place
+from fogsim.traffic.templates.footpaths import WalkingArea, Zebra, place_before, walking_areas
 from fogsim.traffic.templates.net_plan import Edge, NetPlan
 
 _TURNS = {"r": 0, "s": 1, "l": 2}
@@ -30,13 +31,17 @@ class Junction:
     ways : tuple of CrossingWay
         Ways across it in the order of their numbers.
     meets : tuple of tuple of bool
-        Which ways meet which.
+        Which ways, and then crossings of persons, meet which.
     yields : tuple of tuple of bool
-        Which ways let which go first.
+        Which ways, and then crossings, let which go first.
     waits_at : tuple of (float or None)
         Share of each way after which it is waited within the junction.
     has_signals : bool
         Whether it has traffic lights.
+    zebras : tuple of Zebra
+        Crossings of persons, in the order of their numbers.
+    areas : tuple of WalkingArea
+        What joins its footways.
     """
 
     name: str
@@ -47,6 +52,8 @@ class Junction:
     yields: tuple[tuple[bool, ...], ...]
     waits_at: tuple[float | None, ...]
     has_signals: bool
+    zebras: tuple[Zebra, ...] = ()
+    areas: tuple[WalkingArea, ...] = ()
 
     @property
     def place(self) -> Points:
@@ -114,7 +121,7 @@ class _End:
 
     @classmethod
     def of(cls, edge: Edge, *, arriving: bool) -> "_End":
-        inner, outer = edge.axis.points, edge.axis.beside(-edge.width)
+        inner, outer = edge.axis.points, edge.axis.beside(-edge.outer_width)
         if arriving:
             return cls(inner[-1], outer[-1], float(edge.axis.headings[-1]))
         return cls(outer[0], inner[0], float(edge.axis.headings[0]) + math.pi)
@@ -143,31 +150,57 @@ def junctions(plan: NetPlan) -> Iterator[Junction]:
         links = [link for link in plan.links if link.source in order and edges[link.target].start == name]
         links.sort(key=lambda link: (order[link.source], link.from_lane, _TURNS[link.direction], link.to_lane))
         ways = tuple(CrossingWay(link, edges[link.source], edges[link.target]) for link in links)
-        yield _junction(name, (tuple(incoming), outgoing), ways, name in lit)
+        planned = sorted((one for one in plan.zebras if one.node == name), key=lambda one: order[one.into])
+        zebras = tuple(Zebra(f":{name}_c{k}", edges[one.into], edges[one.away]) for k, one in enumerate(planned))
+        yield _junction(name, (tuple(incoming), outgoing), (ways, zebras), name in lit)
 
 
 def _junction(
-    name: str, around: tuple[tuple[Edge, ...], tuple[Edge, ...]], ways: tuple[CrossingWay, ...], has_signals: bool
+    name: str,
+    around: tuple[tuple[Edge, ...], tuple[Edge, ...]],
+    across: tuple[tuple[CrossingWay, ...], tuple[Zebra, ...]],
+    has_signals: bool,
 ) -> Junction:
+    ways, zebras = across
     meets = tuple(tuple(way is not other and way.meets(other) for other in ways) for way in ways)
     yields = [
         [met and way.yields_to(other) for met, other in zip(row, ways, strict=True)]
         for row, way in zip(meets, ways, strict=True)
     ]
-    waits = tuple(_waits_at(number, ways, (meets[number], yields[number]), has_signals) for number in range(len(ways)))
+    lit = has_signals
+    waits = tuple(_waits_at(number, across, (meets[number], yields[number]), lit) for number in range(len(ways)))
     if has_signals:
         # Who waited within the junction leaves it when the lights have changed: those who have green then let him.
         for row, met, way in zip(yields, meets, ways, strict=True):
             for place, (other, share) in enumerate(zip(ways, waits, strict=True)):
                 row[place] |= share is not None and met[place] and way.source.priority != other.source.priority
-    return Junction(name, *around, ways, meets, tuple(map(tuple, yields)), waits, has_signals)
+    # Whoever drives lets those who cross on foot go first.
+    walked = [tuple(zebra.is_met_by(way) for zebra in zebras) for way in ways]
+    all_meet = [(*met, *crossed) for met, crossed in zip(meets, walked, strict=True)]
+    all_meet += [(*(row[k] for row in walked), *(False for _ in zebras)) for k in range(len(zebras))]
+    all_yield = [(*row, *crossed) for row, crossed in zip(yields, walked, strict=True)]
+    all_yield += [(False,) * (len(ways) + len(zebras)) for _ in zebras]
+    areas = walking_areas(name, around, zebras)
+    return Junction(name, *around, ways, tuple(all_meet), tuple(all_yield), waits, has_signals, zebras, areas)
 
 
 def _waits_at(
-    number: int, ways: Sequence[CrossingWay], rows: tuple[Sequence[bool], Sequence[bool]], has_signals: bool
+    number: int,
+    across: tuple[Sequence[CrossingWay], Sequence[Zebra]],
+    rows: tuple[Sequence[bool], Sequence[bool]],
+    has_signals: bool,
 ) -> float | None:
-    """Where a way is waited on within the junction: who turns left off the main road, or at lights, lets pass."""
+    """Where a way is waited on within the junction: who turns left off the main road, or at lights, lets pass.
+
+    Where persons cross, nobody waits within a junction without lights, and at lights who turns right waits for them.
+    """
+    ways, zebras = across
     way = ways[number]
+    if zebras and not has_signals:
+        return None
+    if way.link.direction == "r":
+        crossed = [zebra for zebra in zebras if zebra.away == way.target]
+        return place_before(way, crossed[0]) if crossed else None
     met, yielded = ([other for other, flag in zip(ways, row, strict=True) if flag] for row in rows)
     may_wait = has_signals or way.source.priority == max(other.source.priority for other in ways)
     if way.link.direction != "l" or not may_wait or not any(other.is_opposite(way) for other in yielded):

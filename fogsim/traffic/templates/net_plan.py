@@ -25,6 +25,8 @@ class Edge:
         Speed limit [m/s].
     priority : int
         At junctions the edge of more priority goes first.
+    footway : float
+        Width of the footway to its right [m]; 0 for none.
     """
 
     name: str
@@ -35,6 +37,7 @@ class Edge:
     lane_width: float
     limit: float
     priority: int = 1
+    footway: float = 0.0
 
     def lane(self, number: int) -> Points:
         """Centreline of a lane (n, 3) [m].
@@ -46,10 +49,35 @@ class Edge:
         """
         return self.axis.beside(-(self.lanes - number - 0.5) * self.lane_width)
 
+    def index(self, number: int) -> int:
+        """Number of a lane in SUMO, where a footway is lane 0.
+
+        Parameters
+        ----------
+        number : int
+            Its number from the right, from 0.
+        """
+        return number + (self.footway > 0.0)
+
+    def lane_id(self, number: int) -> str:
+        """Id of a lane.
+
+        Parameters
+        ----------
+        number : int
+            Its number from the right, from 0.
+        """
+        return f"{self.name}_{self.index(number)}"
+
     @property
     def width(self) -> float:
         """Width of all its lanes [m]."""
         return self.lanes * self.lane_width
+
+    @property
+    def outer_width(self) -> float:
+        """Width of all its lanes and its footway [m]."""
+        return self.width + self.footway
 
     @property
     def length(self) -> float:
@@ -91,11 +119,31 @@ class Phase:
         Edges that have green.
     state : str
         ``G`` for green, ``y`` for the yellow after it.
+    walks : bool
+        Whether persons may begin to cross the roads that do not have green.
     """
 
     duration: float
     greens: tuple[str, ...]
     state: str = "G"
+    walks: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ZebraPlan:
+    """Where persons cross a road at a node.
+
+    Attributes
+    ----------
+    node : str
+        The node.
+    into, away : str
+        Ids of the edges that it crosses: the one that leads to the node, and the one that leads away.
+    """
+
+    node: str
+    into: str
+    away: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,8 +158,11 @@ class NetPlan:
         What connects them.
     signals : mapping from node to phases
         Traffic lights by node, as pairs.
+    zebras : tuple of ZebraPlan
+        Where persons cross.
     """
 
     edges: tuple[Edge, ...]
     links: tuple[Link, ...] = ()
     signals: tuple[tuple[str, tuple[Phase, ...]], ...] = ()
+    zebras: tuple[ZebraPlan, ...] = ()

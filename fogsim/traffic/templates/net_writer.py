@@ -1,16 +1,21 @@
 """SUMO's network files, as netconvert writes them: `MSNet` reads what stands there, and nothing is computed anew."""
 
 import itertools
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from fogsim.traffic.templates.alignment import Points
 from fogsim.traffic.templates.crossing_ways import CrossingWay, line_length
+from fogsim.traffic.templates.footpaths import ZEBRA_WIDTH, WalkingArea, Zebra
 from fogsim.traffic.templates.junction import Junction, junctions
 from fogsim.traffic.templates.net_plan import Edge, NetPlan, Phase
 from fogsim.traffic.templates.xml_text import element, opening
 
+_ON_FOOT, _NOT_ON_FOOT = {"allow": "pedestrian"}, {"disallow": "pedestrian"}
+_ALL: Mapping[str, str] = {}
+_ON_FOOT_LIMIT = 10.0 / 3.6  # of crossings and walking areas, which is netconvert's [m/s]
 _HEADER = """<?xml version="1.0" encoding="UTF-8"?>
 <net version="1.20" junctionCornerDetail="5" limitTurnSpeed="5.50">
 """
@@ -39,7 +44,8 @@ def net_text(plan: NetPlan) -> str:
         lines += _internal_junctions(node)
     for node in nodes:
         lines += _connections(node)
-    return _HEADER + "\n".join(f"    {line}" for line in lines) + "\n</net>\n"
+    header = _HEADER.replace("limit", 'walkingareas="true" limit') if any(node.areas for node in nodes) else _HEADER
+    return header + "\n".join(f"    {line}" for line in lines) + "\n</net>\n"
 
 
 def _location(plan: NetPlan) -> str:
@@ -56,16 +62,24 @@ def _shape(line: Points) -> str:
 
 def _edge(edge: Edge) -> Iterator[str]:
     yield opening("edge", id=edge.name, from_=edge.start, to=edge.end, priority=edge.priority)
+    if edge.footway:
+        middle = edge.axis.beside(-edge.width - 0.5 * edge.footway)
+        yield "    " + _lane(edge.name, 0, edge.limit, edge.length, edge.footway, middle, _ON_FOOT)
+    others = _NOT_ON_FOOT if edge.footway else _ALL
     for number in range(edge.lanes):
-        yield "    " + _lane(edge.name, number, edge.limit, edge.length, edge.lane_width, edge.lane(number))
+        lane = (edge.index(number), edge.limit, edge.length, edge.lane_width, edge.lane(number))
+        yield "    " + _lane(edge.name, *lane, others)
     yield "</edge>"
 
 
-def _lane(edge: str, number: int, limit: float, length: float, width: float, line: Points) -> str:
+def _lane(
+    edge: str, number: int, limit: float, length: float, width: float, line: Points, allowed: Mapping[str, str]
+) -> str:
     return element(
         "lane",
         id=f"{edge}_{number}",
         index=number,
+        **allowed,
         speed=f"{limit:.2f}",
         length=f"{length:.2f}",
         width=f"{width:.2f}",
@@ -101,7 +115,19 @@ def _internal_edges(node: Junction) -> Iterator[str]:
         yield opening("edge", id=name, function="internal")
         for (_, number, line), way in members:
             length = max(0.1, line_length(line))
-            yield "    " + _lane(name, number, way.limit, length, way.target.lane_width, line)
+            others = _NOT_ON_FOOT if way.source.footway else _ALL
+            yield "    " + _lane(name, number, way.limit, length, way.target.lane_width, line, others)
+        yield "</edge>"
+    for zebra in node.zebras:
+        yield opening("edge", id=zebra.name, function="crossing", crossingEdges=f"{zebra.away.name} {zebra.into.name}")
+        length = line_length(zebra.line)
+        yield "    " + _lane(zebra.name, 0, _ON_FOOT_LIMIT, length, ZEBRA_WIDTH, zebra.line, _ON_FOOT)
+        yield "</edge>"
+    for area in node.areas:
+        yield opening("edge", id=area.name, function="walkingarea")
+        outline = area.outline
+        length = max(0.1, math.dist(outline[0], outline[-1]))
+        yield "    " + _lane(area.name, 0, _ON_FOOT_LIMIT, length, area.into.footway, outline, _ON_FOOT)
         yield "</edge>"
 
 
@@ -114,23 +140,21 @@ def _junction(node: Junction) -> Iterator[str]:
     x, y, z = node.place.tolist()
     last = [_parts(node, number)[-1][:2] for number in range(len(node.ways))]
     place = {"x": f"{x:.2f}", "y": f"{y:.2f}", **({"z": f"{z:.3f}"} if z else {})}
-    incoming = [f"{edge.name}_{number}" for edge in node.incoming for number in range(edge.lanes)]
+    incoming = [f"{edge.name}_{number}" for edge in node.incoming for number in range(edge.index(edge.lanes))]
+    incoming += [f"{_area_before(node, zebra).name}_0" for zebra in node.zebras]
     yield opening(
         "junction",
         id=node.name,
         type=node.kind,
         **place,
         incLanes=" ".join(incoming),
-        intLanes=" ".join(f"{name}_{lane}" for name, lane in last),
+        intLanes=" ".join([*(f"{name}_{lane}" for name, lane in last), *(f"{zebra.name}_0" for zebra in node.zebras)]),
         shape=_shape(node.outline()),
     )
-    for number in range(len(node.ways)):
+    for number, met in enumerate(node.meets):
+        waits = number < len(node.ways) and node.waits_at[number] is not None
         yield "    " + element(
-            "request",
-            index=number,
-            response=_bits(node.yields[number]),
-            foes=_bits(node.meets[number]),
-            cont=int(node.waits_at[number] is not None),
+            "request", index=number, response=_bits(node.yields[number]), foes=_bits(met), cont=int(waits)
         )
     yield "</junction>"
 
@@ -146,7 +170,8 @@ def _internal_junctions(node: Junction) -> Iterator[str]:
         if share is None:
             continue
         way = node.ways[number]
-        met = [n for n, meeting in enumerate(node.meets[number]) if meeting]
+        met = [n for n, meeting in enumerate(node.meets[number][: len(node.ways)]) if meeting]
+        walked = [f"{zebra.name}_0" for zebra in node.zebras if zebra.is_met_by(way)]
         lanes = dict.fromkeys(_lane_from(node.ways[n]) for n in met if node.ways[n].is_opposite(way))
         x, y, _ = _parts(node, number)[0][2][-1].tolist()
         yield element(
@@ -156,7 +181,7 @@ def _internal_junctions(node: Junction) -> Iterator[str]:
             x=f"{x:.2f}",
             y=f"{y:.2f}",
             incLanes=" ".join([_entry(node, number), *lanes]),
-            intLanes=" ".join(_entry(node, n) for n in met),
+            intLanes=" ".join([*(_entry(node, n) for n in met), *walked]),
         )
 
 
@@ -166,7 +191,16 @@ def _entry(node: Junction, number: int) -> str:
 
 
 def _lane_from(way: CrossingWay) -> str:
-    return f"{way.link.source}_{way.link.from_lane}"
+    return way.source.lane_id(way.link.from_lane)
+
+
+def _area_before(node: Junction, zebra: Zebra) -> WalkingArea:
+    """Where SUMO has a crossing begin: beside the edge that leads away."""
+    return next(area for area in node.areas if area.away == zebra.away)
+
+
+def _area_behind(node: Junction, zebra: Zebra) -> WalkingArea:
+    return next(area for area in node.areas if area.into == zebra.into)
 
 
 def _connections(node: Junction) -> Iterator[str]:
@@ -174,17 +208,32 @@ def _connections(node: Junction) -> Iterator[str]:
         signals: dict[str, object] = {"tl": node.name, "linkIndex": number} if node.has_signals else {}
         states = "Oo" if node.has_signals else "Mm"
         state = states[any(node.yields[number])]
-        yield _connection(way.link.source, way.link.from_lane, way, via=_entry(node, number), **signals, state=state)
+        first = way.source.index(way.link.from_lane)
+        yield _connection(way.link.source, first, way, via=_entry(node, number), **signals, state=state)
     for number, way in enumerate(node.ways):
         parts = _parts(node, number)
         for (name, lane, _), following in itertools.zip_longest(parts, parts[1:]):
             on: dict[str, object] = {} if following is None else {"via": f"{following[0]}_{following[1]}"}
             yield _connection(name, lane, way, **on, state="M" if following is None else "m")
+    for number, zebra in enumerate(node.zebras, len(node.ways)):
+        signals = {"tl": node.name, "linkIndex": number} if node.has_signals else {}
+        yield _path(_area_before(node, zebra).name, zebra.name, **signals)
+        yield _path(zebra.name, _area_behind(node, zebra).name)
+    for area in node.areas:
+        yield _path(area.into.name, area.name)
+        yield _path(area.name, area.away.name)
+
+
+def _path(source: str, target: str, **signals: object) -> str:
+    """Connection of persons."""
+    ends: dict[str, object] = {"from": source, "to": target, "fromLane": 0, "toLane": 0}
+    return element("connection", **ends, **signals, dir="s", state="M")
 
 
 def _connection(source: str, lane: int, way: CrossingWay, **further: object) -> str:
     link = way.link
-    ends: dict[str, object] = {"from": source, "to": link.target, "fromLane": lane, "toLane": link.to_lane}
+    to_lane = way.target.index(link.to_lane)
+    ends: dict[str, object] = {"from": source, "to": link.target, "fromLane": lane, "toLane": to_lane}
     return element("connection", **ends, dir=link.direction, **further)
 
 
@@ -192,6 +241,7 @@ def _signals(node: Junction, phases: Sequence[Phase]) -> Iterator[str]:
     yield opening("tlLogic", id=node.name, type="static", programID="0", offset="0")
     for phase in phases:
         states = [_signal(node, number, phase) for number in range(len(node.ways))]
+        states += ["G" if phase.walks and zebra.into.name not in phase.greens else "r" for zebra in node.zebras]
         yield "    " + element("phase", duration=f"{phase.duration:g}", state="".join(states))
     yield "</tlLogic>"
 
@@ -202,5 +252,8 @@ def _signal(node: Junction, number: int, phase: Phase) -> str:
         return "r"
     if phase.state == "y":
         return "y"
-    yields = zip(node.yields[number], node.ways, strict=True)
-    return "g" if any(yielded and way.link.source in phase.greens for yielded, way in yields) else "G"
+    ways = zip(node.yields[number], node.ways, strict=False)
+    yields = any(yielded and way.link.source in phase.greens for yielded, way in ways)
+    # Who turns lets those go first who walk along the road that has green.
+    walked = any(zebra.is_met_by(node.ways[number]) and zebra.into.name not in phase.greens for zebra in node.zebras)
+    return "g" if yields or walked else "G"

@@ -16,16 +16,29 @@ class KnownEdge:
     Attributes
     ----------
     lanes : int
-        How many lanes it has.
+        How many lanes it has, beside footways.
     length : float
         Its length [m].
     limit : float
         Its speed limit [m/s].
+    footways : int
+        How many footways lie to the right of its lanes.
     """
 
     lanes: int
     length: float
     limit: float
+    footways: int = 0
+
+    def index(self, number: int) -> int:
+        """Number of a lane in SUMO, which counts footways, too.
+
+        Parameters
+        ----------
+        number : int
+            Its number from the right, from 0.
+        """
+        return number + self.footways
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,9 +119,10 @@ class _Reader:
         if tag == "edge":
             self._edge = attributes.get("id", "")
         elif tag == "lane" and self._edge in self._wanted:
-            before = self.edges.get(self._edge)
-            lanes = 1 if before is None else before.lanes + 1
-            self.edges[self._edge] = KnownEdge(lanes, float(attributes["length"]), float(attributes["speed"]))
+            before = self.edges.get(self._edge, KnownEdge(0, 0.0, 0.0))
+            is_footway = attributes.get("allow") == "pedestrian"
+            measures = (float(attributes["length"]), float(attributes["speed"]))
+            self.edges[self._edge] = KnownEdge(before.lanes + (not is_footway), *measures, before.footways + is_footway)
         elif tag == "connection":
             # All edges stand before the connections between them.
             self.is_done = True

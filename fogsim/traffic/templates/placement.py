@@ -21,6 +21,10 @@ class EdgeMeasures(Protocol):
     @property
     def limit(self) -> float: ...  # noqa: D102
 
+    def index(self, number: int) -> int:
+        """Number of a lane in SUMO; lanes are counted from the right, from 0."""
+        ...
+
 
 class Ways(Protocol):
     """Ways on which actors are placed: of a `Layout`, or on a network of a user's own."""

@@ -3,14 +3,15 @@
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fogsim.traffic.templates.alignment import Axis
 from fogsim.traffic.templates.along_roads import ONCOMING, SAME_WAY
+from fogsim.traffic.templates.footpaths import ZEBRA_LEAD
 from fogsim.traffic.templates.layout import Layout
-from fogsim.traffic.templates.net_plan import Edge, Link, NetPlan, Phase
+from fogsim.traffic.templates.net_plan import Edge, Link, NetPlan, Phase, ZebraPlan
 
 NORTH, SOUTH = "north", "south"
 """Names of the ways that come from the other roads; the ego comes from the west."""
@@ -22,7 +23,9 @@ _DIRECTIONS = (math.pi, 1.5 * math.pi, 0.0, 0.5 * math.pi)
 """Where these lie as seen from the middle [rad]."""
 
 _CORNER = 6.0  # radius of a crossing's corners [m]
+_KERB_CORNER = 3.0  # radius of the corners between crossings on foot [m]
 _GREEN, _YELLOW, _RED = 25.0, 3.0, 2.0  # of traffic lights; red is when all have it [s]
+_WALK = 18.0  # green for persons [s]
 _MAIN, _SIDE = 4, 2  # priorities
 _RING_WIDTH = 5.0  # [m]
 _ASIDE, _HALF_NODE = math.radians(22.0), math.radians(13.0)  # of entries and exits of a roundabout beside their arm
@@ -100,9 +103,15 @@ class Crossing(Streets):
     ----------
     lights : bool
         Whether it has traffic lights; without, the other road gives way.
+    footways : bool
+        Whether there is a footway to the right of either direction, and crossings over all roads where they meet.
+    footway_width : float
+        Their width [m].
     """
 
     lights: bool = False
+    footways: bool = False
+    footway_width: float = 2.0
 
     def layout(self, cuts: Sequence[float] = ()) -> Layout:  # noqa: ARG002 - as of `RoadTemplate`
         """The road.
@@ -112,22 +121,32 @@ class Crossing(Streets):
         cuts : sequence of float
             None.
         """
-        inner, node = self.lane_width + _CORNER, "middle"
+        inner, node = self.lane_width + (ZEBRA_LEAD + _KERB_CORNER if self.footways else _CORNER), "middle"
         edges = [edge for number in range(4) for edge in self.arm(number, inner, (node, node), (_MAIN, _SIDE))]
         links, ways = list[Link](), list[tuple[str, tuple[str, ...]]]()
         for (number, name), (turn, steps) in itertools.product(enumerate(ARMS), _TURNS.items()):
             target = f"{ARMS[(number + steps) % 4]}.back"
             links.append(Link(name, target, direction=turn[0]))
             ways.append((name if turn == "straight" else f"{name}.{turn}", (name, target)))
-        signals = ((node, two_phases()),) if self.lights else ()
-        return Layout(NetPlan(tuple(edges), tuple(links), signals), tuple(ways), self.lane_width)
+        signals = ((node, two_phases(self.footways)),) if self.lights else ()
+        zebras = tuple(ZebraPlan(node, name, f"{name}.back") for name in ARMS) if self.footways else ()
+        if self.footways:
+            edges = [replace(edge, footway=self.footway_width) for edge in edges]
+        return Layout(NetPlan(tuple(edges), tuple(links), signals, zebras), tuple(ways), self.lane_width)
 
 
-def two_phases() -> tuple[Phase, ...]:
-    """Phases of traffic lights: one road after the other."""
+def two_phases(walks: bool = False) -> tuple[Phase, ...]:
+    """Phases of traffic lights: one road after the other.
+
+    Parameters
+    ----------
+    walks : bool
+        Whether persons cross, beside the road that has green; those who have begun have time to reach the other side.
+    """
     phases = list[Phase]()
     for greens in ((SAME_WAY, ONCOMING), (SOUTH, NORTH)):
-        phases += [Phase(_GREEN, greens), Phase(_YELLOW, greens, "y"), Phase(_RED, ())]
+        green = [Phase(_WALK, greens, walks=True), Phase(_GREEN - _WALK, greens)] if walks else [Phase(_GREEN, greens)]
+        phases += [*green, Phase(_YELLOW, greens, "y"), Phase(_RED, ())]
     return tuple(phases)
 
 

@@ -20,6 +20,13 @@ PLANS = {
     "crossing": ROAD_TEMPLATES["crossing"]().layout().net,
     "lights": ROAD_TEMPLATES["crossing"](lights=True).layout().net,  # type: ignore[call-arg]
     "roundabout": ROAD_TEMPLATES["roundabout"]().layout().net,
+    "crossing on foot": ROAD_TEMPLATES["crossing"](footways=True).layout().net,  # type: ignore[call-arg]
+    "lights on foot": ROAD_TEMPLATES["crossing"](lights=True, footways=True).layout().net,  # type: ignore[call-arg]
+    "rural on foot": ROAD_TEMPLATES["rural"](  # type: ignore[call-arg]
+        footways=True, zebra_crossings=(300.0, 700.0)
+    )
+    .layout((150.0,))
+    .net,
 }
 
 
@@ -34,12 +41,18 @@ def converted(plan: NetPlan, folder: Path) -> ET.Element:
     ]
     edges = [
         f'<edge id="{edge.name}" from="{edge.start}" to="{edge.end}" numLanes="{edge.lanes}" width="{edge.lane_width}"'
-        f' speed="{edge.limit}" priority="{edge.priority}" spreadType="right" shape="{shape(edge.axis.points)}"/>'
+        f' speed="{edge.limit}" priority="{edge.priority}" spreadType="right" shape="{shape(edge.axis.points)}"'
+        f"{sidewalk(edge.footway)}/>"
         for edge in plan.edges
     ]
+    on_foot = int(any(edge.footway for edge in plan.edges))
     links = [
-        f'<connection from="{link.source}" to="{link.target}" fromLane="{link.from_lane}" toLane="{link.to_lane}"/>'
+        f'<connection from="{link.source}" to="{link.target}" fromLane="{link.from_lane + on_foot}"'
+        f' toLane="{link.to_lane + on_foot}"/>'
         for link in plan.links
+    ] + [
+        f'<crossing node="{zebra.node}" edges="{zebra.into} {zebra.away}" width="4" priority="true"/>'
+        for zebra in plan.zebras
     ]
     files = [folder / name for name in ("n.xml", "e.xml", "c.xml")]
     for file, root, lines in zip(files, ("nodes", "edges", "connections"), (nodes, edges, links), strict=True):
@@ -47,8 +60,13 @@ def converted(plan: NetPlan, folder: Path) -> ET.Element:
     inputs = [argument for pair in zip(("-n", "-e", "-x"), map(str, files), strict=True) for argument in pair]
     out = folder / "out.net.xml"
     keep = ("--no-turnarounds", "--offset.disable-normalization", "--output.original-names", "false")
-    subprocess.run([netconvert, *inputs, "-o", str(out), *keep], check=True, capture_output=True)
+    walked = ("--walkingareas", "true") if on_foot else ()
+    subprocess.run([netconvert, *inputs, "-o", str(out), *keep, *walked], check=True, capture_output=True)
     return ET.parse(out).getroot()  # noqa: S314 - our own file
+
+
+def sidewalk(width: float) -> str:
+    return f' sidewalkWidth="{width}"' if width else ""
 
 
 def shape(points: Points) -> str:
@@ -58,7 +76,11 @@ def shape(points: Points) -> str:
 def right_of_way(net: ET.Element) -> dict[Link, tuple[frozenset[Link], frozenset[Link], str | None, str | None]]:
     """By connection: those that it meets, those that it lets go first, whether it waits inside, and its turn."""
     by_lane: dict[str, list[ET.Element]] = {}
+    names = names_on_foot(net)
+    crossings = {one.get("id") for one in net.iter("edge") if one.get("function") == "crossing"}
     for one in net.iter("connection"):
+        if (names.keys() & {one.get("from"), one.get("to")}) and one.get("to") not in crossings:
+            continue  # those of persons that are no requests
         by_lane.setdefault(f"{one.get('from')}_{one.get('fromLane')}", []).append(one)
     found = {}
     for junction in net.iter("junction"):
@@ -66,7 +88,7 @@ def right_of_way(net: ET.Element) -> dict[Link, tuple[frozenset[Link], frozenset
         if not requests:
             continue
         at = [one for lane in (junction.get("incLanes") or "").split() for one in in_order(by_lane.get(lane, []))]
-        links = [link_of(one) for one in at]
+        links = [tuple(names.get(part, part) for part in link_of(one)) for one in at]
         assert len(links) == len(requests)
         for link, one, request in zip(links, at, requests, strict=True):
             met, first = (
@@ -75,6 +97,20 @@ def right_of_way(net: ET.Element) -> dict[Link, tuple[frozenset[Link], frozenset
             )
             found[link] = met, first, request.get("cont"), (one.get("dir") or "").lower()
     return found
+
+
+def names_on_foot(net: ET.Element) -> dict[str, str]:
+    """Crossings and walking areas by the edges that they cross and join: they are numbered in any order."""
+    names = {}
+    for edge in net.iter("edge"):
+        if edge.get("function") == "crossing":
+            names[edge.get("id") or ""] = f"crossing {sorted((edge.get('crossingEdges') or '').split())}"
+        elif edge.get("function") == "walkingarea":
+            name = edge.get("id") or ""
+            ends = [(one.get("from") or "", one.get("to") or "") for one in net.iter("connection")]
+            joined = {one for pair in ends if name in pair for one in pair if not one.startswith(":")}
+            names[name] = f"area {sorted(joined)}"
+    return names
 
 
 def in_order(connections: list[ET.Element]) -> list[ET.Element]:

@@ -21,9 +21,14 @@ from fogsim.traffic.templates import (
 FLOWS = tuple((way, 0.1) for way in ("same_way", "oncoming", "ramp", "north", "south"))
 
 
-@pytest.mark.parametrize("name", ROAD_TEMPLATES)
-def test_sumo_plays_it_without_a_warning(name: str, tmp_path: Path) -> None:
-    template = ROAD_TEMPLATES[name]()
+ON_FOOT = ("rural", "crossing")
+
+
+@pytest.mark.parametrize(
+    ("name", "on_foot"), [*((name, False) for name in ROAD_TEMPLATES), *((n, True) for n in ON_FOOT)]
+)
+def test_sumo_plays_it_without_a_warning(name: str, on_foot: bool, tmp_path: Path) -> None:
+    template = ROAD_TEMPLATES[name](**({"footways": True} if on_foot else {}))  # type: ignore[arg-type]
     slow = Actor("slow", "truck", place=Relation("ego", 40.0), speed=8.0)
     broken_down = Actor("broken_down", "van", place=60.0, stands=True, lane=-1)
     standing = [broken_down] if name in ("motorway", "ramp") else []

@@ -11,8 +11,8 @@ from fogsim.errors import InputError
 from fogsim.loop import ClosedLoop
 from fogsim.scenario import Scenario, attached_scenario, build
 from fogsim.scenario.loading import clock_settings
-from fogsim.traffic.highway import EGO, HighwayTraffic, is_highway_environment
-from fogsim.values import Step
+from fogsim.traffic.highway import EGO, HighwayTraffic, OtherRoadsError, is_highway_environment
+from fogsim.values import Command, Step
 from fogsim_envs.advising import AdvisingEnv
 from fogsim_envs.rewards import RewardWeights
 
@@ -71,8 +71,8 @@ class FogHighwayEnv(AdvisingEnv):
         def load(more: Sequence[str]) -> Scenario:
             return highway_scenario(settings, visibility, [*_clocks(settings), *more])
 
-        def begin(scenario: Scenario, seed: int) -> tuple[ClosedLoop, Step]:
-            loop = ClosedLoop(scenario, _traffic(made, scenario))
+        def begin(scenario: Scenario, seed: int) -> tuple[HighwayLoop, Step]:
+            loop = HighwayLoop(made, scenario)
             try:
                 return loop, loop.start(seed)
             except BaseException:
@@ -88,6 +88,55 @@ class FogHighwayEnv(AdvisingEnv):
             reward_weights=reward_weights,
             render_mode=render_mode,
         )
+
+
+class HighwayLoop:
+    """A closed loop in an environment's traffic, built anew where the environment builds other roads.
+
+    Parameters
+    ----------
+    environment : highway_env.envs.common.abstract.AbstractEnv
+        The environment without wrappers.
+    scenario : Scenario
+        From `highway_scenario`.
+    """
+
+    def __init__(self, environment: Any, scenario: Scenario) -> None:
+        self._environment = environment
+        self._scenario = scenario
+        self._loop = self._built()
+
+    def _built(self) -> ClosedLoop:
+        return ClosedLoop(self._scenario, _traffic(self._environment, self._scenario))
+
+    def start(self, seed: int) -> Step:
+        """Begin a run; see `ClosedLoop.start`.
+
+        Parameters
+        ----------
+        seed : int
+            Seed of every random number of the run.
+        """
+        try:
+            return self._loop.start(seed)
+        except OtherRoadsError:
+            self._loop.close()
+            self._loop = self._built()
+            return self._loop.start(seed)
+
+    def advance(self, command: Command) -> Step:
+        """Move by one camera period; see `ClosedLoop.advance`.
+
+        Parameters
+        ----------
+        command : Command
+            Advice and lamps in force.
+        """
+        return self._loop.advance(command)
+
+    def close(self) -> None:
+        """End the simulation; closing twice is allowed."""
+        self._loop.close()
 
 
 def highway_config(environment: Any) -> Mapping[str, Any]:

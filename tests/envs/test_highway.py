@@ -86,6 +86,21 @@ def test_episodes_replay_and_do_not_disturb_each_other() -> None:
         assert all(np.array_equal(a[k], b[k]) and np.array_equal(a[k], c[k]) for k in a)
 
 
+def test_an_environment_may_build_other_roads_at_every_reset() -> None:
+    """Lanes of the oval are drawn by lot, with numbers that no seed sets."""
+    env = gymnasium.make(
+        ID, environment="racetrack-oval-v1", config={"length": 0, "other_vehicles": 0}, image_size=(64, 48)
+    )
+    ends = []
+    for seed in range(3):
+        env.reset(seed=seed)
+        step: Any = env.unwrapped
+        ends.append(float(np.abs(step._step.truth.route).max()))
+        assert env.step(NO_ADVICE)[4]["route_position_m"] > 0.0
+    env.close()
+    assert len(set(ends)) > 1
+
+
 def test_its_duration_truncates() -> None:
     env = gymnasium.make(ID, config={**FEW, "duration": 1.0}, image_size=(64, 48))
     env.reset(seed=1)
@@ -101,7 +116,7 @@ def reset_with(*overrides: str, steps: int = 0, advised: Any = NO_ADVICE, **conf
     for _ in range(steps):
         env.step(advised)
     environment: Any = env.unwrapped
-    vehicles = list(environment._simulation._traffic._environment.road.vehicles)
+    vehicles = list(environment._simulation._environment.road.vehicles)
     env.close()
     return vehicles
 

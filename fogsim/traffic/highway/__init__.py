@@ -6,7 +6,7 @@ from fogsim.traffic.highway.network import road_network, same_roads
 from fogsim.traffic.highway.perception import limit_sight
 from fogsim.traffic.highway.route import RouteProgress
 from fogsim.traffic.highway.snapshot import read_snapshot
-from fogsim.traffic.highway.traffic import HighwayTraffic, is_highway_environment
+from fogsim.traffic.highway.traffic import HighwayTraffic, OtherRoadsError, is_highway_environment
 
 # Their names in version 0.1.
 Conduct, take_over, let_drivers_meet = DriverControl, control_drivers, limit_sight
@@ -18,6 +18,7 @@ __all__ = [
     "DriverControl",
     "Fleet",
     "HighwayTraffic",
+    "OtherRoadsError",
     "RouteProgress",
     "control_drivers",
     "is_highway_environment",

@@ -15,11 +15,15 @@ from fogsim.traffic.highway.behaviour import DriverControl, control_drivers, hol
 from fogsim.traffic.highway.collisions import find_collisions
 from fogsim.traffic.highway.fleet import LEAD, Fleet
 from fogsim.traffic.highway.network import road_network, same_roads, speed_limit
-from fogsim.traffic.highway.route import RouteProgress, planned_route
+from fogsim.traffic.highway.route import RouteProgress, lanes_ahead, planned_route
 from fogsim.traffic.highway.snapshot import read_snapshot
 from fogsim.traffic.setup import UNTOUCHED, AfterCollision
 from fogsim.values import Command, RoadNetwork, SignMap, TrafficSnapshot, Unplayed
 from fogsim.values.script import TrafficAction
+
+
+class OtherRoadsError(SimulationError):
+    """The environment has built other roads than before, or sends the ego another way: all has to be drawn anew."""
 
 
 def is_highway_environment(environment: object) -> bool:
@@ -90,6 +94,7 @@ class HighwayTraffic:
         self._collisions = CollisionLog()
         self._control: DriverControl | None = None
         self._network: RoadNetwork | None = None
+        self._way: tuple[tuple[str, str], ...] = ()
         self._progress: RouteProgress | None = None
 
     @property
@@ -109,8 +114,11 @@ class HighwayTraffic:
         ------
         InputError
             If the script names a vehicle that is not there.
+        OtherRoadsError
+            If the environment has built other roads than before, or the ego's route leads over others: begin anew with
+            another `HighwayTraffic`, and a loop that has not drawn any.
         SimulationError
-            If the environment has no vehicle to control, or has built other roads than before.
+            If the environment has no vehicle to control.
         """
         self._environment.reset(seed=seed)
         if self._environment.vehicle is None:
@@ -121,13 +129,13 @@ class HighwayTraffic:
             self._fleet, self._drivers, self._events, seed, self._advice_deceleration, self._sight
         )
         self._hold_in_lane(self._fleet)
-        network = road_network(self._environment.road, self._fleet.ego)
-        if self._network is not None and not same_roads(self._network, network):
-            raise SimulationError(
-                f"{type(self._environment).__name__} builds other roads at every reset, but they are drawn once: "
-                "set its config so that the roads stay the same"
+        road, ego = self._environment.road, self._fleet.ego
+        network, way = road_network(road, ego), tuple(lane[:2] for lane in lanes_ahead(road.network, ego))
+        if self._network is not None and not (way == self._way and same_roads(self._network, network)):
+            raise OtherRoadsError(
+                f"{type(self._environment).__name__} has built other roads than before, or leads on others"
             )
-        self._network, self._progress = network, RouteProgress(network.route)
+        self._network, self._way, self._progress = network, way, RouteProgress(network.route)
         if self._fog is not None:
             self._control.enter_fog(self._fog)
 

@@ -17,7 +17,7 @@ from fogsim.atmosphere import FieldAccess, airlight_from_illuminance
 from fogsim.errors import InputError, SimulationError
 from fogsim.traffic import DriverSight
 from fogsim.traffic.drivers.sight import inherent_contrast
-from fogsim.traffic.highway import HighwayTraffic, road_network
+from fogsim.traffic.highway import HighwayTraffic, OtherRoadsError, road_network
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Collision, Command, FogField, Lamp, LaneMarking, SpeedAdvice, TrafficSnapshot
 
@@ -254,6 +254,19 @@ def test_advice_sets_the_speed_gently_and_lets_go() -> None:
     assert speeds[-1] == pytest.approx(25.0, abs=0.5)
 
 
+def test_advice_to_drive_faster_changes_nothing() -> None:
+    speeds = []
+    for advised in (math.inf, 30.0):
+        traffic, environment = traffic_on(EMPTY)
+        traffic.start(1)
+        environment.vehicle.target_speed = 20.0
+        for _ in range(150):
+            traffic.advance(Command(SpeedAdvice(advised)))
+        speeds.append(seen(traffic).state.speed[0])
+        traffic.close()
+    assert speeds == pytest.approx([20.0, 20.0], abs=0.2)
+
+
 def test_others_follow_advice_of_their_own() -> None:
     traffic, environment = traffic_on({"vehicles_count": 1})
     traffic.start(1)
@@ -300,7 +313,7 @@ def test_misuse() -> None:
         traffic.advance(Command())
     traffic.start(1)
     environment.configure({"lanes_count": 5})
-    with pytest.raises(SimulationError, match="other roads"):
+    with pytest.raises(OtherRoadsError, match="HighwayEnv has built other roads"):
         traffic.start(2)
     traffic.close()
     traffic.close()

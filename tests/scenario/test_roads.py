@@ -36,6 +36,7 @@ def loaded(folder: Path, text: str = TEXT) -> Scenario:
 
 def test_footways_lie_beside_the_lanes_that_traffic_keeps(tmp_path: Path) -> None:
     text = TEXT.replace("motorway, length: 4 km, lanes: 2, limit: 130 km/h", "rural, length: 1 km, footways: true")
+    text = text.replace("same_way: 540", "same_way: 1800")
     files = traffic_files(
         loaded(tmp_path, text.replace("footways: true", "footways: true, zebra_crossings: [230 m, 400 m]"))
     )

@@ -42,7 +42,8 @@ class Zebra:
     def line(self) -> Points:
         """Its middle (2, 3), from the side of the edge that leads away to the other [m]."""
         heading = float(self.into.axis.headings[-1])
-        ahead = np.array([math.cos(heading), math.sin(heading), 0.0])
+        (x, y, z), (end_x, end_y, end_z) = self.into.axis.points[-2:].tolist()
+        ahead = _ahead(heading) + np.array([0.0, 0.0, (end_z - z) / math.hypot(end_x - x, end_y - y)])
         left = np.array([-ahead[1], ahead[0], 0.0])
         middle = self.into.axis.points[-1] + (STOP_TO_ZEBRA + 0.5 * ZEBRA_WIDTH) * ahead
         return np.stack([middle + self.away.width * left, middle - self.into.width * left])

@@ -44,7 +44,7 @@ gymnasium.register(
 gymnasium.register(
     id="fogsim/FogAdvisoryFast-v1",
     entry_point="fogsim_envs.task:FogAdvisoryFastEnv",
-    max_episode_steps=400,
+    max_episode_steps=520,
 )
 
 gymnasium.register(

@@ -80,6 +80,9 @@ def run_command(
         bool | None, typer.Option("--events/--no-events", help="Write events.parquet (as a rule with a timeline).")
     ] = None,
     xosc: Annotated[bool, typer.Option("--xosc", help="Write scenario.xosc, the run as an OpenSCENARIO file.")] = False,
+    osi: Annotated[
+        bool, typer.Option("--osi", help="Write ground_truth.osi, a trace of ASAM OSI (needs fogsim[osi]).")
+    ] = False,
 ) -> None:
     """Run a scenario and write manifest.json, steps.parquet, metrics.json, video.mp4 and report.html."""
     from fogsim.recording import record_run, record_traffic
@@ -92,6 +95,7 @@ def run_command(
         "trajectories": trajectories,
         "events": bool(loaded.timeline) if events is None else events,
         "openscenario": xosc,
+        "osi": osi,
     }
     record = record_run if loaded.traffic.has_ego else record_traffic
     directory = out or Path("runs", f"{loaded.name}-{of_file.folder_name}")

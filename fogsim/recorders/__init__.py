@@ -4,9 +4,10 @@ from collections.abc import Callable
 
 from fogsim.files.atomic import write_json
 from fogsim.recorders.events import EventRecorder
+from fogsim.recorders.exchange.openscenario import OpenScenarioRecorder
+from fogsim.recorders.exchange.osi import OsiRecorder
 from fogsim.recorders.frame_panel import FramePanel
 from fogsim.recorders.manifest import Manifest, Status, versions
-from fogsim.recorders.openscenario import OpenScenarioRecorder
 from fogsim.recorders.protocol import (
     DERIVED_QUANTITIES,
     AnyStep_contra,
@@ -42,6 +43,7 @@ RECORDERS: Registry[RecorderFactory] = Registry(
         "trajectories": lambda run: TrajectoryRecorder(run.directory.trajectories),
         "events": lambda run: EventRecorder(run.directory.events),
         "openscenario": lambda run: OpenScenarioRecorder(run.directory.openscenario, run.title),
+        "osi": lambda run: OsiRecorder(run.directory.osi),
     },
 )
 """Every recorder of runs about an ego, by name."""
@@ -54,6 +56,7 @@ TRAFFIC_RECORDERS: Registry[TrafficRecorderFactory] = Registry(
         "trajectories": lambda run: TrajectoryRecorder(run.directory.trajectories),
         "events": lambda run: EventRecorder(run.directory.events),
         "openscenario": lambda run: OpenScenarioRecorder(run.directory.openscenario, run.title),
+        "osi": lambda run: OsiRecorder(run.directory.osi),
     },
 )
 """Every recorder of runs without an ego, by name."""

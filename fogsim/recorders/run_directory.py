@@ -36,6 +36,7 @@ _NAMES = {
     "trajectories": "trajectories.parquet",
     "events": "events.parquet",
     "openscenario": "scenario.xosc",
+    "osi": "ground_truth.osi",
     "video": "video.mp4",
     "report": "report.html",
 }
@@ -234,6 +235,11 @@ class RunDirectory:
     def openscenario(self) -> Path:
         """The run as an OpenSCENARIO file."""
         return self.unfinished / _NAMES["openscenario"]
+
+    @property
+    def osi(self) -> Path:
+        """The run as a trace of ASAM OSI's ground truth."""
+        return self.unfinished / _NAMES["osi"]
 
     @property
     def video(self) -> Path:

@@ -16,7 +16,7 @@ from fogsim_envs.task.rewards import TaskWeights
 from fogsim_envs.task.surrogate import EstimatorSurrogate, SurrogateTable
 
 _WITHOUT_FRAMES = ("renderer=none", "estimators=[]")
-_DEFAULT = ("road.length_m=2000", "demand.oncoming_vph=0", "clocks.traffic_step_s=0.5", "duration_s=200")
+_DEFAULT = ("road.length_m=2000", "demand.oncoming_vph=0", "clocks.traffic_step_s=0.5", "duration_s=260")
 
 FAST_FOG = FogDistribution(ahead=(400.0, 400.0), reach=1500.0)
 """The ego starts 300 m before the bank."""

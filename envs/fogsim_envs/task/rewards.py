@@ -40,8 +40,8 @@ class TaskWeights:
     collision : float
         Against a collision in which the ego strikes somebody.
     rear_fog_lamp : float
-        Against the time of a way at the limit with the rear fog lamp lit above 50 m, where it dazzles those behind, or
-        dark below, where the ego is not seen.
+        Against the whole way driven with the rear fog lamp lit above 50 m, where it dazzles those behind, or dark
+        below, where the ego is not seen.
     front_fog_lamp : float
         The same for the front fog lamps and 100 m, where they dazzle those who come the other way.
     """
@@ -109,7 +109,6 @@ def task_terms(
     allowed = min(driven, max(before.speed_limit, after.speed_limit) * duration) / way.length
     ended_early = after.ending not in (None, Ending.ARRIVED)
     lost = max(way.duration - after.time, 0.0) if ended_early else 0.0
-    time = duration / way.time_at_limit
     terms = {
         "progress": allowed,
         "time": -(duration + lost) / way.time_at_limit,
@@ -118,8 +117,8 @@ def task_terms(
         "conflict": -duration * conflict(after, standard.time_to_collision),
         "discomfort": -duration * max(-_acceleration(after) - COMFORTABLE_DECELERATION, 0.0),
         "collision": -float(strikes(after)),
-        "rear_fog_lamp": -time * _amiss(after, Lamp.REAR_FOG, REAR_FOG_LAMP_VISIBILITY),
-        "front_fog_lamp": -time * _amiss(after, Lamp.FRONT_FOG, FRONT_FOG_LAMP_VISIBILITY),
+        "rear_fog_lamp": -share * _amiss(after, Lamp.REAR_FOG, REAR_FOG_LAMP_VISIBILITY),
+        "front_fog_lamp": -share * _amiss(after, Lamp.FRONT_FOG, FRONT_FOG_LAMP_VISIBILITY),
     }
     return {name: getattr(weights, name) * value for name, value in terms.items()}
 

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from fogsim.traffic import DriverSight
-from fogsim.traffic.drivers.adaptation import adaptation
+from fogsim.traffic.drivers.adaptation import adaptation, contrast_ratio
 from fogsim.traffic.drivers.lamp_intensity import rear_intensity
 from fogsim.traffic.drivers.sight import inherent_contrast
 from fogsim.units import extinction_from_visibility
@@ -37,7 +37,7 @@ def draw_thresholds(axes: Axes) -> None:
     """What the eye asks for, over what it asks for by day."""
     eyes = [adaptation(lux) for lux in ILLUMINANCES]
     for distance, style in ((20.0, "-"), (200.0, "--")):
-        ratios = [eye.contrast_ratio(distance) for eye in eyes]
+        ratios = [contrast_ratio(eye, distance) for eye in eyes]
         axes.plot(ILLUMINANCES, ratios, style, color=COLOURS[0], label=f"contrast, car {distance:g} m away")
     day = eyes[-1].eye_threshold
     axes.plot(ILLUMINANCES, [eye.eye_threshold / day for eye in eyes], color=COLOURS[1], label="light of a lamp")

@@ -5,7 +5,14 @@ from fogsim.atmosphere.fog.airlight import airlight_from_illuminance
 from fogsim.atmosphere.fog.frustum import FrustumGrid, frustum_grid, radiance_through_grid
 from fogsim.atmosphere.fog.koschmieder import fogged_radiance
 from fogsim.atmosphere.fog.medium import field_at, with_change
-from fogsim.atmosphere.fog.optical_depth import FieldAccess, FogNow, extinction, optical_depth, optical_depth_along
+from fogsim.atmosphere.fog.optical_depth import (
+    FieldAccess,
+    FogNow,
+    distance_at_depth,
+    extinction,
+    optical_depth,
+    optical_depth_along,
+)
 from fogsim.atmosphere.lamps.phase_function import Droplets
 from fogsim.atmosphere.visibility.night_visibility import FogKind, Observer, Pavement, visibility_distance
 from fogsim.atmosphere.visibility.visibility_level import visibility_level
@@ -21,6 +28,7 @@ __all__ = [
     "Observer",
     "Pavement",
     "airlight_from_illuminance",
+    "distance_at_depth",
     "extinction",
     "field_at",
     "fogged_radiance",

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere import extinction, field_at, optical_depth_along, with_change
+from fogsim.atmosphere import distance_at_depth, extinction, field_at, with_change
 from fogsim.camera import Delivered, FaultyLens, FrameDelivery, knocked, mounted_pose
 from fogsim.ego.daylight import Ramp, brightened
 from fogsim.ego.frame_watch import FrameWatch, LeadHistory
@@ -384,13 +384,10 @@ def fog_truth(
     """
     eye, level = np.array(pose.position), math.cos(pose.road_grade)
     direction = np.array([math.cos(pose.heading) * level, math.sin(pose.heading) * level, math.sin(pose.road_grade)])
-    depth = optical_depth_along(fog, eye, direction, _SIGHT_LINE)
-    # Optical depth grows along the line, so the distance at which it reaches ln 20 is found by interpolation.
-    reached = depth[-1] >= OPTICAL_DEPTH_AT_VISIBILITY
-    sight = float(np.interp(OPTICAL_DEPTH_AT_VISIBILITY, depth, _SIGHT_LINE))
+    sight = distance_at_depth(fog, eye, direction, _SIGHT_LINE, OPTICAL_DEPTH_AT_VISIBILITY)
     return Truth(
         extinction=float(extinction(fog, eye)),
-        extinction_ahead=OPTICAL_DEPTH_AT_VISIBILITY / sight if reached else 0.0,
+        extinction_ahead=OPTICAL_DEPTH_AT_VISIBILITY / sight,
         camera=camera,
         pose=pose,
         fog=fog,

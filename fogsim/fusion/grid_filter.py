@@ -20,6 +20,7 @@ CELLS = 240
 NEAREST, FARTHEST = 10.0, 10_000.0  # [m] visibilities at the ends of the grid
 LOG_LOW, LOG_HIGH = (math.log(extinction_from_visibility(v)) for v in (FARTHEST, NEAREST))
 LOG_RANGE = LOG_HIGH - LOG_LOW
+_MOST_STEPS = 64
 
 
 @checked_parameters
@@ -70,6 +71,7 @@ class GridFilter:
         self._log_extinction.flags.writeable = False
         self._extinction = np.exp(self._log_extinction)
         self._offset = (self._log_extinction[1] - self._log_extinction[0]) * np.arange(-(CELLS - 1), CELLS)
+        self._steps: dict[float, Floats] = {}
         self.reset()
 
     def reset(self) -> None:
@@ -122,15 +124,25 @@ class GridFilter:
 
     def _diffused(self, elapsed: float) -> Floats:
         """Spread the probability over what may have happened in between, folding back at both ends of the grid."""
-        walk = self._walk(self._drift * math.sqrt(elapsed))
-        leap = np.exp(-np.abs(self._offset) / self._leap_scale)
-        leaps = -math.expm1(-self._leap_rate * elapsed)
-        step = (1.0 - leaps) * walk + leaps * leap / leap.sum()
-        spread = convolution(self._probability, step)
+        spread = convolution(self._probability, self._step(elapsed))
         inside = spread[CELLS - 1 : 2 * CELLS - 1].copy()
         inside[: CELLS - 1] += spread[CELLS - 2 :: -1]
         inside[1:] += spread[: 2 * CELLS - 2 : -1]
         return np.asarray(inside / inside.sum())
+
+    def _step(self, elapsed: float) -> Floats:
+        """Distribution over offsets in cells after some time; clocks round it to one of few numbers."""
+        known = self._steps.get(elapsed)
+        if known is not None:
+            return known
+        walk = self._walk(self._drift * math.sqrt(elapsed))
+        leap = np.exp(-np.abs(self._offset) / self._leap_scale)
+        leaps = -math.expm1(-self._leap_rate * elapsed)
+        step = np.asarray((1.0 - leaps) * walk + leaps * leap / leap.sum())
+        if len(self._steps) == _MOST_STEPS:
+            self._steps.clear()
+        self._steps[elapsed] = step
+        return step
 
     def _walk(self, deviation: float) -> Floats:
         """Distribution over offsets in cells after a random walk of a given standard deviation in ln k."""

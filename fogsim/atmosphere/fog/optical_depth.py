@@ -109,8 +109,46 @@ def optical_depth_along(
         medium_of(field_at(field, time)),
         depths,
         np.empty((2, 4 * MOST_PIECES)),
+        math.inf,
     )
     return depths
+
+
+def distance_at_depth(
+    field: FogField, start: ArrayLike, direction: ArrayLike, distances: NDArray[np.float64], depth: float
+) -> float:
+    """Distance along one direction at which an optical depth is reached [m], between places by interpolation.
+
+    Parameters
+    ----------
+    field : FogField
+        The fog now.
+    start, direction
+        As of `optical_depth_along`.
+    distances : (n,) float64
+        Ascending distances of places [m].
+    depth : float
+        The optical depth [-], more than 0.
+
+    Returns
+    -------
+    float
+        ``inf`` if it is not reached up to the last place.
+    """
+    depths = np.empty_like(distances)
+    # Distances are many where fog is thin; no place behind the one that is looked for is needed.
+    count = depths_along(
+        np.asarray(start, dtype=np.float64),
+        np.asarray(direction, dtype=np.float64),
+        distances,
+        medium_of(field_at(field, 0.0)),
+        depths,
+        np.empty((2, 4 * MOST_PIECES)),
+        depth,
+    )
+    if depths[count - 1] < depth:
+        return math.inf
+    return float(np.interp(depth, depths[:count], distances[:count]))
 
 
 @dataclass(frozen=True, slots=True)

@@ -196,7 +196,8 @@ def depths_along(
     medium: Medium,
     depths: NDArray[np.float64],
     scratch: NDArray[np.float64],
-) -> None:
+    enough: float,
+) -> int:
     """Optical depth from a point to places along one direction.
 
     Parameters
@@ -213,6 +214,13 @@ def depths_along(
         Optical depths [-]; written to.
     scratch : (2, 4 MOST_PIECES) float64
         Scratch.
+    enough : float
+        Optical depth from which on no place is looked at [-].
+
+    Returns
+    -------
+    int
+        How many places have been looked at.
     """
     cuts = np.empty(8 + 4 * medium.banks.shape[0])
     total, here, next_cut = 0.0, 0.0, 0
@@ -226,6 +234,9 @@ def depths_along(
         total += _piece_depth(start, towards, here, distances[i], pieces, medium, scratch)
         here = distances[i]
         depths[i] = total
+        if total >= enough:
+            return i + 1
+    return len(distances)
 
 
 @kernel
@@ -252,7 +263,7 @@ def depths_between(
         depths[i] = 0.0
         if distance[0] > 0.0:
             towards /= distance[0]
-            depths_along(starts[i], towards, distance, medium, depths[i : i + 1], scratch)
+            depths_along(starts[i], towards, distance, medium, depths[i : i + 1], scratch, math.inf)
 
 
 @kernel

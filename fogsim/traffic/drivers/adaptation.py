@@ -8,10 +8,11 @@ noticed, too small to have a size, as φ. By day both are what they are taken to
 
 import functools
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from fogsim.jit import kernel
 from fogsim.units import DAY_ILLUMINANCE
 from fogsim.values.eye import flux_root, luminance_root
 
@@ -63,8 +64,7 @@ _DAY_LUMINANCE = airlight_luminance(DAY_ILLUMINANCE)
 _DAY_FLUX_ROOT, _DAY_LUMINANCE_ROOT = _roots(_DAY_LUMINANCE)
 
 
-@dataclass(frozen=True, slots=True)
-class Adaptation:
+class Adaptation(NamedTuple):
     """Eyes that are adapted; made by `adaptation`.
 
     Attributes
@@ -86,19 +86,23 @@ class Adaptation:
     flux_root: float
     luminance_root: float
 
-    def contrast_ratio(self, distance: float) -> float:
-        """Smallest contrast at which a vehicle is noticed over that by day [-]: from 1 on, more in the dark.
 
-        Parameters
-        ----------
-        distance : float
-            Distance of the vehicle, which makes it small [m].
-        """
-        by_size = distance / _MINUTES
-        least = self.flux_root * by_size + self.luminance_root
-        by_day = _DAY_FLUX_ROOT * by_size + _DAY_LUMINANCE_ROOT
-        # By day Koschmieder's law knows one threshold, for small and large, in dim light and in bright.
-        return max((least / by_day) ** 2 * _DAY_LUMINANCE / min(self.luminance, _DAY_LUMINANCE), 1.0)
+@kernel
+def contrast_ratio(eyes: Adaptation, distance: float) -> float:
+    """Smallest contrast at which a vehicle is noticed over that by day [-]: from 1 on, more in the dark.
+
+    Parameters
+    ----------
+    eyes : Adaptation
+        Whose.
+    distance : float
+        Distance of the vehicle, which makes it small [m].
+    """
+    by_size = distance / _MINUTES
+    least = eyes.flux_root * by_size + eyes.luminance_root
+    by_day = _DAY_FLUX_ROOT * by_size + _DAY_LUMINANCE_ROOT
+    # By day Koschmieder's law knows one threshold, for small and large, in dim light and in bright.
+    return max((least / by_day) ** 2 * _DAY_LUMINANCE / min(eyes.luminance, _DAY_LUMINANCE), 1.0)
 
 
 @functools.lru_cache(maxsize=256)

@@ -13,15 +13,15 @@ seen and lamps that are nearly seen are seen together. Solved for e^(−τ), tha
 follow adaptation; see `fogsim.traffic.drivers.adaptation`.
 """
 
-import math
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fogsim.traffic.drivers.adaptation import AIRLIGHT_REFLECTANCE, NIGHT_EYE_THRESHOLD, adaptation
+from fogsim.traffic.drivers.adaptation import AIRLIGHT_REFLECTANCE, Adaptation, adaptation
 from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST
+from fogsim.traffic.drivers.sight_kernels import DISTANCE_TOLERANCE, depth_limit, judge_leaders, seen_distance
 from fogsim.units import CONTRAST_THRESHOLD, luminance_of
 
 BODY_MIDDLE = 1.2
@@ -29,12 +29,6 @@ BODY_MIDDLE = 1.2
 
 LEAST_CONTRAST = 0.5
 """No vehicle's rear has less contrast to the airlight than this, not even a white one [-]."""
-
-FARTHEST = 1e5
-"""Distance beyond which sight is not told apart from sight without end [m]."""
-
-DISTANCE_TOLERANCE = 0.01
-"""By how much a distance that is searched for may be too small [m]."""
 
 VERTICAL_ILLUMINANCE = 0.5
 """Illuminance of a vertical surface under an overcast sky over that of a horizontal one [-]."""
@@ -134,14 +128,13 @@ class DriverSight:
         float
             Negative for a vehicle that is not even seen without fog, ``-inf`` where there is no light at all.
         """
-        eyes = adaptation(self.illuminance, glare)
-        squared = distance * distance
-        threshold = self.contrast_threshold * eyes.contrast_ratio(distance)
-        once = inherent_contrast * eyes.airlight / (eyes.luminance * threshold)
-        once += intensity / (squared * eyes.eye_threshold)
-        twice = head_lamps * self.headlamp_reach**2 / squared * NIGHT_EYE_THRESHOLD / eyes.eye_threshold
-        inverse = 0.5 * (once + math.sqrt(once * once + 4.0 * twice))
-        return math.log(inverse) if inverse > 0.0 else -math.inf
+        eyes, threshold, reach = self._eyes(glare)
+        seen = float(inherent_contrast), float(intensity), float(head_lamps)
+        return depth_limit(eyes, threshold, reach, float(distance), *seen)
+
+    def _eyes(self, glare: float) -> tuple[Adaptation, float, float]:
+        """What kernels are told of eyes and head lamps; whole numbers would be compiled for anew."""
+        return adaptation(self.illuminance, glare), float(self.contrast_threshold), float(self.headlamp_reach)
 
     def seen_distance(
         self,
@@ -163,20 +156,37 @@ class DriverSight:
         Returns
         -------
         float
-            ``inf`` beyond `FARTHEST`.
+            ``inf`` beyond `sight_kernels.FARTHEST`.
         """
+        eyes, threshold, reach = self._eyes(glare)
+        seen = float(inherent_contrast), float(intensity), float(head_lamps)
+        return seen_distance(eyes, threshold, reach, float(extinction), *seen)
 
-        def is_seen(distance: float) -> bool:
-            limit = self.depth_limit(distance, inherent_contrast, intensity, head_lamps, glare)
-            return limit >= extinction * distance
+    def judge_leaders(
+        self, facing: NDArray[np.float64], most_glare: float, horizon: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Whether leaders are seen, and for how long that is sure to stay so [s].
 
-        near, far = 0.0, FARTHEST
-        if is_seen(far):
-            return math.inf
-        while far - near > DISTANCE_TOLERANCE:
-            middle = 0.5 * (near + far)
-            near, far = (middle, far) if is_seen(middle) else (near, middle)
-        return near
+        Parameters
+        ----------
+        facing : (10, n) float64
+            What is known of drivers and their leaders; rows of `sight_kernels`.
+        most_glare : float
+            Veil inside the eye that there may be at most [cd/m²].
+        horizon : float
+            Longest time of interest [s].
+
+        Returns
+        -------
+        (n,) float64
+            `sight_kernels.SEEN`, `HIDDEN` or, where it depends on the glare, `DAZZLED`.
+        (n,) float64
+            For how long [s].
+        """
+        judged = np.empty((2, facing.shape[1]))
+        eyes, threshold, reach = self._eyes(0.0)
+        judge_leaders(eyes, threshold, reach, adaptation(self.illuminance, most_glare), facing, horizon, judged)
+        return judged[0], judged[1]
 
     def sure_distance(self, maximum_extinction: float, most_glare: float = 0.0) -> float:
         """Distance up to which every body is seen, without any lamps, where the fog is nowhere denser than given [m].

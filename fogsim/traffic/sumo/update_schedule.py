@@ -3,6 +3,10 @@
 import itertools
 import math
 from collections.abc import Sequence
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 MAX_RELATIVE_ACCELERATION = 20.0
 """One vehicle's acceleration minus another's is never larger than this [m/s²]: emergency braking and driving off."""
@@ -15,12 +19,15 @@ _ROUNDING = 1e-6
 """Share of a step by which clocks may differ from a whole number of steps [-]."""
 
 
-def closing_speed_bound(speed: float, leader_speed: float, horizon: float) -> float:
-    """How fast the gap between two vehicles changes at most [m/s].
+Speed = TypeVar("Speed", float, NDArray[np.float64])
+
+
+def closing_speed_bound(speed: Speed, leader_speed: Speed, horizon: float) -> Speed:
+    """How fast the gap between two vehicles, or each of many gaps, changes at most [m/s].
 
     Parameters
     ----------
-    speed, leader_speed : float
+    speed, leader_speed : float or (n,) float64
         Their speeds now [m/s].
     horizon : float
         Time from now up to which the bound holds [s].

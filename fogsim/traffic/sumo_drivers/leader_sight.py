@@ -1,12 +1,30 @@
 """What drivers see of the vehicle ahead, and for how long that is sure to stay so."""
 
-from collections.abc import Collection, Sequence
+import itertools
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fogsim.traffic.appearance import OTHERS_LAMPS
-from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST, rear_intensity
+from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST as BRIGHTEST_LAMP
+from fogsim.traffic.drivers.lamp_intensity import rear_intensity
 from fogsim.traffic.drivers.sight import BODY_MIDDLE, DriverSight, FogAccess
+from fogsim.traffic.drivers.sight_kernels import (
+    BRIGHTEST,
+    CLOSING,
+    CONTRAST,
+    DAZZLED,
+    DEEPENING,
+    DEPTH,
+    DISTANCE,
+    INTENSITY,
+    NEAREST,
+    OWN,
+    OWN_STEADY,
+    SEEN,
+    STEADY,
+)
 from fogsim.traffic.sumo.link import Api, Getter, vehicle_getter
 from fogsim.traffic.sumo.update_schedule import MAX_RELATIVE_ACCELERATION, closing_speed_bound
 from fogsim.traffic.sumo_drivers.oncoming_glare import OncomingGlare, most_glare
@@ -21,6 +39,8 @@ FASTEST_DRIFT = 30.0
 
 STEADY_INTENSITY = rear_intensity(int(OTHERS_LAMPS))
 """Of the rear lamps that other drivers always light [cd]."""
+
+_STOP = int(Lamp.STOP)
 
 Pair = tuple[str, str, float]
 """Follower, leader, and SUMO's gap between them [m], which leaves out the follower's minimum gap."""
@@ -79,61 +99,63 @@ class LeaderSight:
         horizon : float
             Longest time of interest [s].
         """
+        followers, leaders, _ = zip(*pairs, strict=True)
         # SUMO's gap leaves out the follower's minimum gap.
-        distances = [max(gap + self._minimum_gap(follower), 0.1) for follower, _, gap in pairs]
-        depths = self._optical_depths(pairs, distances)
+        distances = [max(gap + self._minimum_gap(follower), NEAREST) for follower, _, gap in pairs]
+        contrasts = [self._vehicles.body(leader).contrast for leader in leaders]
+        lamps = [self._vehicles.lamps(leader, own_lamps) for leader in leaders]
+        facing = np.empty((OWN + 1, len(pairs)))
+        facing[DISTANCE], facing[CONTRAST] = distances, contrasts
+        facing[DEPTH] = self._optical_depths(followers, leaders, facing[DISTANCE])
+        facing[CLOSING], facing[DEEPENING] = self._rates(followers, leaders, horizon)
+        facing[STEADY], facing[OWN_STEADY], facing[OWN] = STEADY_INTENSITY, 1.0, 1.0
+        facing[INTENSITY] = [rear_intensity(lit) for lit in lamps]
+        facing[BRIGHTEST] = [rear_intensity(lit | _STOP) for lit in lamps]
+        if not own_lamps.keys().isdisjoint((*followers, *leaders)):
+            self._add_own_lamps(facing, pairs, own_lamps)
+        judged, pauses = self._sight.judge_leaders(facing, self._most_glare, horizon)
         return [
-            self._assess_pair(pair, distance, depth, own_lamps, horizon)
-            for pair, distance, depth in zip(pairs, distances, depths, strict=True)
+            (verdict == SEEN if verdict != DAZZLED else self._is_seen(pairs[i], facing[:, i], own_lamps), pause)
+            for i, (verdict, pause) in enumerate(zip(judged.tolist(), pauses.tolist(), strict=True))
         ]
 
-    def _assess_pair(
-        self, pair: Pair, distance: float, depth: float, own_lamps: OwnLamps, horizon: float
-    ) -> tuple[bool, float]:
-        # Plain numbers: mostly there is a pair or two, and making arrays of them would cost more than all the rest.
-        follower, leader, _ = pair
-        sight, contrast = self._sight, self._vehicles.body(leader).contrast
-        # Lamps that are commanded may go dark at once; what the others light stays.
-        steady = 0.0 if leader in own_lamps else STEADY_INTENSITY
-        own = 0.0 if follower in own_lamps else 1.0
-        if depth < sight.depth_limit(distance, contrast, steady, own, self._most_glare):
-            closing, deepening = self._rates(follower, leader, horizon)
-            farthest = distance + closing * horizon
-            spare = sight.depth_limit(farthest, contrast, steady, own, self._most_glare) - depth
-            return True, min(max(spare, 0.0) / deepening, horizon)
-        lamps = self._vehicles.lamps(leader, own_lamps)
-        own = 1.0 if self._vehicles.has_head_lamps(follower, own_lamps) else 0.0
-        intensity = rear_intensity(lamps)
-        if depth <= sight.depth_limit(distance, contrast, intensity, own):
-            # Glare costs more than all the rest, and seldom decides.
-            glare = self._most_glare
-            if glare and depth > sight.depth_limit(distance, contrast, intensity, own, glare):
-                glare = self._glare.veil(follower, leader, own_lamps)
-            if depth <= sight.depth_limit(distance, contrast, intensity, own, glare):
-                return True, 0.0
-        closing, deepening = self._rates(follower, leader, horizon)
-        nearest = max(distance - closing * horizon, 0.1)
-        # Lamps that are commanded may be commanded otherwise in any step.
-        brightest = BRIGHTEST if leader in own_lamps else rear_intensity(lamps | int(Lamp.STOP))
-        limit = sight.depth_limit(nearest, contrast, brightest)
-        return False, min(max(depth - limit, 0.0) / deepening, horizon)
+    def _add_own_lamps(self, facing: NDArray[np.float64], pairs: Sequence[Pair], own_lamps: OwnLamps) -> None:
+        for i, (follower, leader, _) in enumerate(pairs):
+            if leader in own_lamps:
+                # Lamps that are commanded may be commanded otherwise in any step.
+                facing[STEADY, i], facing[BRIGHTEST, i] = 0.0, BRIGHTEST_LAMP
+            if follower in own_lamps:
+                facing[OWN_STEADY, i] = 0.0
+                facing[OWN, i] = float(self._vehicles.has_head_lamps(follower, own_lamps))
 
-    def _optical_depths(self, pairs: Sequence[Pair], distances: Sequence[float]) -> list[float]:
-        """Optical depths between eyes and rears [-]."""
+    def _is_seen(self, pair: Pair, facing: NDArray[np.float64], own_lamps: OwnLamps) -> bool:
+        """Whether a leader is seen who is unless glare hides it, which costs more than all the rest to know."""
+        glare = self._glare.veil(pair[0], pair[1], own_lamps)
+        distance, contrast, intensity, own = facing[[DISTANCE, CONTRAST, INTENSITY, OWN]].tolist()
+        return bool(facing[DEPTH] <= self._sight.depth_limit(distance, contrast, intensity, own, glare))
+
+    def _optical_depths(
+        self, followers: Sequence[str], leaders: Sequence[str], distances: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Optical depths between eyes and rears (n,) [-]."""
         if self._min_extinction == self._max_extinction:
-            return [self._max_extinction * distance for distance in distances]
-        heights = np.array([self._vehicles.eye_height(follower) for follower, _, _ in pairs])
-        eyes = np.array([self._position(follower) for follower, _, _ in pairs])
-        towards = np.array([self._position(leader) for _, leader, _ in pairs]) - eyes
+            return self._max_extinction * distances
+        heights = np.array([self._vehicles.eye_height(follower) for follower in followers])
+        # Mostly who leads one follows another.
+        places = {vehicle: self._position(vehicle) for vehicle in {*followers, *leaders}}
+        eyes = _points(places, followers)
+        towards = _points(places, leaders) - eyes
         eyes[:, 2] += heights
         towards[:, 2] += np.minimum(heights, BODY_MIDDLE) - heights
-        share = np.array(distances) / np.sqrt(np.einsum("ij,ij->i", towards, towards))
-        depths: list[float] = self._fog.optical_depth(eyes, eyes + towards * share[:, None]).tolist()
-        return depths
+        share = distances / np.sqrt(np.einsum("ij,ij->i", towards, towards))
+        return self._fog.optical_depth(eyes, eyes + towards * share[:, None])
 
-    def _rates(self, follower: str, leader: str, horizon: float) -> tuple[float, float]:
-        """Bounds on how fast a gap closes [m/s] and on how fast its optical depth changes [1/s] up to a horizon."""
-        speed, leader_speed = float(self._speed(follower)), float(self._speed(leader))
+    def _rates(
+        self, followers: Sequence[str], leaders: Sequence[str], horizon: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Bounds (n,) on how fast gaps close [m/s] and how fast their optical depths change [1/s] up to a horizon."""
+        speeds = {vehicle: self._speed(vehicle) for vehicle in {*followers, *leaders}}
+        speed, leader_speed = (np.array([speeds[v] for v in vehicles]) for vehicles in (followers, leaders))
         closing = closing_speed_bound(speed, leader_speed, horizon)
         if self._min_extinction == self._max_extinction:
             return closing, max(self._max_extinction, LEAST_EXTINCTION) * closing
@@ -146,3 +168,9 @@ class LeaderSight:
         if known is None:
             known = self._minimum_gaps[vehicle] = float(self._get_minimum_gap(vehicle))
         return known
+
+
+def _points(places: Mapping[str, Sequence[float]], vehicles: Sequence[str]) -> NDArray[np.float64]:
+    """Places of vehicles (n, 3) [m]."""
+    flat = itertools.chain.from_iterable([places[vehicle] for vehicle in vehicles])
+    return np.fromiter(flat, np.float64, 3 * len(vehicles)).reshape(-1, 3)

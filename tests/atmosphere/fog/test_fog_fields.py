@@ -7,7 +7,15 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fogsim.atmosphere import FieldAccess, FogNow, extinction, field_at, optical_depth, optical_depth_along
+from fogsim.atmosphere import (
+    FieldAccess,
+    FogNow,
+    distance_at_depth,
+    extinction,
+    field_at,
+    optical_depth,
+    optical_depth_along,
+)
 from fogsim.atmosphere.fog.medium import PATCH_CELLS, patch_factors
 from fogsim.errors import InputError
 from fogsim.values import FogBank, FogChange, FogField, FogPatches
@@ -54,6 +62,17 @@ def test_optical_depth_along_a_line_is_that_between_its_ends(name: str) -> None:
     along = optical_depth_along(UNEVEN[name], start, direction, distances)
     between = optical_depth(UNEVEN[name], start, start + distances[:, None] * direction)
     assert np.allclose(along, between, rtol=5e-3, atol=1e-4)
+
+
+@pytest.mark.parametrize("name", UNEVEN)
+def test_the_distance_at_a_depth_is_where_the_depth_along_the_line_comes_to_it(name: str) -> None:
+    start, direction = np.array([0.0, 5.0, 1.5]), np.array([0.8, 0.592, 0.1])
+    distances = np.geomspace(1.0, 500.0, 60)
+    along = optical_depth_along(UNEVEN[name], start, direction, distances)
+    for depth in (1e-3, 0.3 * along[-1], 0.99 * along[-1]):
+        found = distance_at_depth(UNEVEN[name], start, direction, distances, float(depth))
+        assert found == np.interp(depth, along, distances)
+    assert distance_at_depth(UNEVEN[name], start, direction, distances, 1.01 * float(along[-1])) == math.inf
 
 
 def test_the_product_of_sideways_and_upward_profiles_would_be_wrong() -> None:

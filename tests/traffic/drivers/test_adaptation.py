@@ -12,6 +12,7 @@ from fogsim.traffic.drivers.adaptation import (
     NIGHT_EYE_THRESHOLD,
     VEHICLE_SIZE,
     adaptation,
+    contrast_ratio,
 )
 
 
@@ -27,13 +28,13 @@ def test_contrast_follows_adrians_threshold(illuminance: float, distance: float)
     luminance, day = adaptation(illuminance).luminance, 0.95 * 1000.0 / math.pi
     size = 2.0 * math.tan(0.5 * VEHICLE_SIZE / distance)  # the small angle, as an angle's own size
     small, large = (threshold(x, angular_size(size, 1.0), exposure_time=2.0) / x for x in (luminance, day))
-    assert adaptation(illuminance).contrast_ratio(distance) == pytest.approx(float(small / large), rel=0.02)
+    assert contrast_ratio(adaptation(illuminance), distance) == pytest.approx(float(small / large), rel=0.02)
 
 
 @pytest.mark.parametrize("distance", [0.0, 50.0, 1e5])
 def test_thresholds_rise_into_the_night_and_are_those_of_the_day_from_1000_lx_on(distance: float) -> None:
     light = np.geomspace(1e-3, 1e5, 200)
-    ratios = np.array([adaptation(lux).contrast_ratio(distance) for lux in light])
+    ratios = np.array([contrast_ratio(adaptation(lux), distance) for lux in light])
     assert np.all(np.diff(ratios) <= 0.0)
     assert np.all(ratios[light >= 1000.0] == 1.0)
     lamps = np.array([adaptation(lux).eye_threshold for lux in light])

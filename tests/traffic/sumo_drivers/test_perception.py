@@ -21,6 +21,7 @@ from fogsim.traffic import (
     libsumo_traffic,
 )
 from fogsim.traffic.drivers.lamp_intensity import rear_intensity
+from fogsim.traffic.drivers.sight_kernels import DISTANCE, HIDDEN, SEEN
 from fogsim.traffic.drivers.speed_choice import within_sight
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink, load_libsumo
 from fogsim.traffic.sumo_drivers.leader_sight import LeaderSight
@@ -87,6 +88,10 @@ class SeesFrom:
 
     def depth_limit(self, distance: float, *_: float) -> float:
         return math.inf if distance <= self.distance else -math.inf
+
+    def judge_leaders(self, facing: NDArray[np.float64], *_: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """To be looked at again in the next step."""
+        return np.where(facing[DISTANCE] <= self.distance, SEEN, HIDDEN), np.zeros(facing.shape[1])
 
 
 @pytest.fixture
@@ -208,7 +213,8 @@ def test_on_a_grade_sight_is_the_closed_form_over_the_way_along_the_road(bank: b
         assert abs(front[2] - ahead[2]) > 2.5
         sight = DriverSight(illuminance=10_000.0)
         pairs = LeaderSight(api, fog, sight, api.vehicle.getSpeed)
-        assert pairs._optical_depths([("ego", leader, gap)], [gap + 2.5]) == pytest.approx([0.03 * way], rel=1e-4)
+        depths = pairs._optical_depths(["ego"], [leader], np.array([gap + 2.5]))
+        assert depths == pytest.approx([0.03 * way], rel=1e-4)
     finally:
         link.end()
 

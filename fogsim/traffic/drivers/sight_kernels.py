@@ -1,0 +1,144 @@
+"""What drivers see, as compiled kernels: the laws are those of `fogsim.traffic.drivers.sight`."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.jit import kernel
+from fogsim.traffic.drivers.adaptation import NIGHT_EYE_THRESHOLD, Adaptation, contrast_ratio
+
+FARTHEST = 1e5
+"""Distance beyond which sight is not told apart from sight without end [m]."""
+
+DISTANCE_TOLERANCE = 0.01
+"""By how much a distance that is searched for may be too small [m]."""
+
+NEAREST = 0.1
+"""Nobody is nearer than this [m]."""
+
+
+DISTANCE, DEPTH, CLOSING, DEEPENING, CONTRAST, STEADY, INTENSITY, BRIGHTEST, OWN_STEADY, OWN = range(10)
+"""Rows of what is known of drivers and their leaders.
+
+Distance [m] and optical depth [-] between them, and bounds on how fast these change [m/s], [1/s]; the leader's inherent
+contrast [-]; the luminous intensity of its lamps: of those that are always lit, of the brightest that is lit, and that
+may be [cd]; light of the driver's own head lamps: what is always lit, and what is [-].
+"""
+
+HIDDEN, SEEN, DAZZLED = 0.0, 1.0, 2.0
+"""A leader is out of sight, or in sight; or in sight unless glare, which is not known, hides it."""
+
+
+@kernel
+def depth_limit(
+    eyes: Adaptation,
+    threshold: float,
+    reach: float,
+    distance: float,
+    contrast: float,
+    intensity: float,
+    head_lamps: float,
+) -> float:
+    """Optical depth up to which a vehicle is seen [-]; see `DriverSight.depth_limit`.
+
+    Parameters
+    ----------
+    eyes : Adaptation
+        Whose.
+    threshold : float
+        Smallest contrast that is noticed by day [-].
+    reach : float
+        Distance at which an unlit vehicle is seen in the own head lamps at night in clear air [m].
+    distance, contrast, intensity, head_lamps : float
+        Of the vehicle [m], [-], [cd], [-].
+    """
+    squared = distance * distance
+    once = contrast * eyes.airlight / (eyes.luminance * (threshold * contrast_ratio(eyes, distance)))
+    once += intensity / (squared * eyes.eye_threshold)
+    twice = head_lamps * reach**2 / squared * NIGHT_EYE_THRESHOLD / eyes.eye_threshold
+    inverse = 0.5 * (once + math.sqrt(once * once + 4.0 * twice))
+    return math.log(inverse) if inverse > 0.0 else -math.inf
+
+
+@kernel
+def seen_distance(
+    eyes: Adaptation,
+    threshold: float,
+    reach: float,
+    extinction: float,
+    contrast: float,
+    intensity: float,
+    head_lamps: float,
+) -> float:
+    """Distance up to which a vehicle is seen in even fog [m]; see `DriverSight.seen_distance`.
+
+    Parameters
+    ----------
+    eyes : Adaptation
+        Whose.
+    threshold : float
+        Smallest contrast that is noticed by day [-].
+    reach : float
+        Distance at which an unlit vehicle is seen in the own head lamps at night in clear air [m].
+    extinction : float
+        Extinction coefficient [1/m].
+    contrast, intensity, head_lamps : float
+        Of the vehicle [-], [cd], [-].
+    """
+    near, far = 0.0, FARTHEST
+    if depth_limit(eyes, threshold, reach, far, contrast, intensity, head_lamps) >= extinction * far:
+        return math.inf
+    while far - near > DISTANCE_TOLERANCE:
+        middle = 0.5 * (near + far)
+        if depth_limit(eyes, threshold, reach, middle, contrast, intensity, head_lamps) >= extinction * middle:
+            near = middle
+        else:
+            far = middle
+    return near
+
+
+@kernel
+def judge_leaders(
+    eyes: Adaptation,
+    threshold: float,
+    reach: float,
+    dazzled: Adaptation,
+    facing: NDArray[np.float64],
+    horizon: float,
+    judged: NDArray[np.float64],
+) -> None:
+    """Whether leaders are seen, and for how long that is sure to stay so.
+
+    Parameters
+    ----------
+    eyes, dazzled : Adaptation
+        The drivers' without glare, and in the most that there may be.
+    threshold, reach : float
+        As of `depth_limit`.
+    facing : (10, n) float64
+        Rows `DISTANCE` to `OWN`.
+    horizon : float
+        Longest time of interest [s].
+    judged : (2, n) float64
+        `HIDDEN`, `SEEN` or `DAZZLED`; and for how long [s]. Written to.
+    """
+    for i in range(facing.shape[1]):
+        distance, depth, contrast = facing[DISTANCE, i], facing[DEPTH, i], facing[CONTRAST, i]
+        deepening, change = facing[DEEPENING, i], facing[CLOSING, i] * horizon
+        judged[1, i] = 0.0
+        # Lamps that are commanded may go dark at once; what the others light stays.
+        steady, own = facing[STEADY, i], facing[OWN_STEADY, i]
+        if depth < depth_limit(dazzled, threshold, reach, distance, contrast, steady, own):
+            spare = depth_limit(dazzled, threshold, reach, distance + change, contrast, steady, own) - depth
+            judged[0, i], judged[1, i] = SEEN, min(max(spare, 0.0) / deepening, horizon)
+            continue
+        lit, own = facing[INTENSITY, i], facing[OWN, i]
+        if depth <= depth_limit(eyes, threshold, reach, distance, contrast, lit, own):
+            is_certain = depth <= depth_limit(dazzled, threshold, reach, distance, contrast, lit, own)
+            judged[0, i] = SEEN if is_certain else DAZZLED
+            continue
+        # Lamps that are commanded may be commanded otherwise in any step.
+        lit, nearest = facing[BRIGHTEST, i], max(distance - change, NEAREST)
+        limit = depth_limit(eyes, threshold, reach, nearest, contrast, lit, 1.0)
+        judged[0, i], judged[1, i] = HIDDEN, min(max(depth - limit, 0.0) / deepening, horizon)

@@ -20,6 +20,9 @@ MOST_PIECES = 400
 FADED = 20.0
 """Scale heights above which nothing is left of ground fog."""
 
+_BESIDE_EDGE = 1e-3
+"""So far from an edge of a bank all or nothing of it is there, however numbers are rounded [m]."""
+
 _CELLS_IN_PIECE = 2.0
 _NODES = np.array((0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970263))
 _WEIGHTS = np.array((0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692))
@@ -164,6 +167,53 @@ def _pieces_per_metre(towards: NDArray[np.float64], medium: Medium) -> float:
 
 
 @kernel
+def _is_banks_alone(medium: Medium) -> bool:
+    """Whether nothing but banks makes the fog uneven."""
+    has_layer = math.isinf(medium.layer[BASE]) and math.isinf(medium.layer[TOP])
+    return bool(has_layer and medium.layer[DECAY] == 0.0 and medium.factors.size == 1)
+
+
+@kernel
+def _banks_depth(
+    start: NDArray[np.float64],
+    towards: NDArray[np.float64],
+    near: float,
+    far: float,
+    outside: float,
+    banks: NDArray[np.float64],
+) -> float:
+    """`_piece_depth` where there are banks alone, digit for digit: four numbers are handled faster than an array."""
+    step = far - near
+    at = (near + _NODES[0] * step, near + _NODES[1] * step, near + _NODES[2] * step, near + _NODES[3] * step)
+    first_k = second_k = third_k = fourth_k = outside
+    for b in range(banks.shape[0]):
+        here = (start[0] - banks[b, 0]) * banks[b, 2] + (start[1] - banks[b, 1]) * banks[b, 3]
+        rate = towards[0] * banks[b, 2] + towards[1] * banks[b, 3]
+        first, last, edge, extra = banks[b, 4], banks[b, 5], banks[b, 6], banks[b, 7]
+        first_k += extra * _within(here + rate * at[0], first, last, edge)
+        second_k += extra * _within(here + rate * at[1], first, last, edge)
+        third_k += extra * _within(here + rate * at[2], first, last, edge)
+        fourth_k += extra * _within(here + rate * at[3], first, last, edge)
+    depth: float = _WEIGHTS[0] * first_k
+    depth += _WEIGHTS[1] * second_k
+    depth += _WEIGHTS[2] * third_k
+    depth += _WEIGHTS[3] * fourth_k
+    depth *= step
+    return depth
+
+
+@kernel
+def _within(station: float, first: float, last: float, edge: float) -> float:
+    """How much of a bank there is at a place along its axis, 0 … 1."""
+    beside = 0.5 * edge + _BESIDE_EDGE
+    if first + beside < station < last - beside:
+        return 1.0
+    if station < first - beside or station > last + beside:
+        return 0.0
+    return _smoothstep(station, first, edge) - _smoothstep(station, last, edge)
+
+
+@kernel
 def _piece_depth(
     start: NDArray[np.float64],
     towards: NDArray[np.float64],
@@ -225,18 +275,25 @@ def depths_along(
     cuts = np.empty(8 + 4 * medium.banks.shape[0])
     total, here, next_cut = 0.0, 0.0, 0
     count = _edges_crossed(start, towards, distances[-1], medium, cuts)
-    pieces = _pieces_per_metre(towards, medium)
-    for i in range(distances.shape[0]):
-        while next_cut < count and cuts[next_cut] < distances[i]:
-            total += _piece_depth(start, towards, here, cuts[next_cut], pieces, medium, scratch)
-            here = cuts[next_cut]
+    pieces, outside, banks = _pieces_per_metre(towards, medium), medium.layer[EXTINCTION], medium.banks
+    is_banks_alone = _is_banks_alone(medium)
+    i = 0
+    while i < len(distances):
+        is_cut = next_cut < count and cuts[next_cut] < distances[i]
+        there = cuts[next_cut] if is_cut else distances[i]
+        if is_banks_alone:
+            total += _banks_depth(start, towards, here, there, outside, banks)
+        else:
+            total += _piece_depth(start, towards, here, there, pieces, medium, scratch)
+        here = there
+        if is_cut:
             next_cut += 1
-        total += _piece_depth(start, towards, here, distances[i], pieces, medium, scratch)
-        here = distances[i]
+            continue
         depths[i] = total
+        i += 1
         if total >= enough:
-            return i + 1
-    return len(distances)
+            break
+    return i
 
 
 @kernel

@@ -75,6 +75,20 @@ def test_the_distance_at_a_depth_is_where_the_depth_along_the_line_comes_to_it(n
     assert distance_at_depth(UNEVEN[name], start, direction, distances, 1.01 * float(along[-1])) == math.inf
 
 
+def test_banks_alone_have_the_depth_of_banks_under_a_far_top_digit_for_digit() -> None:
+    """Where nothing else makes the fog uneven, the sum is taken by a shorter way."""
+    banks = (
+        FogBank((0.0, 0.0), (1.0, 0.0), 50.0, 160.0, 40.0, 0.05),
+        FogBank((0.0, 0.0), (0.6, 0.8), 200.0, 230.0, 60.0, -0.001),
+        FogBank((0.0, 0.0), (0.0, 1.0), 120.0, 180.0, 0.0, 0.02),
+    )
+    alone = FogField(0.003, (1000.0,) * 3, banks)
+    rng = np.random.default_rng(8)
+    starts, ends = (rng.uniform((-100, -100, 0), (300, 300, 30), (200, 3)) for _ in range(2))
+    under_top = optical_depth(dataclasses.replace(alone, top=1e7), starts, ends)
+    assert np.array_equal(optical_depth(alone, starts, ends), under_top)
+
+
 def test_the_product_of_sideways_and_upward_profiles_would_be_wrong() -> None:
     # Near the eye the line is low and outside the bank, farther off it is high and inside: K(x) h(z) cannot know.
     field, start, end = UNEVEN["bank of ground fog"], np.array([0.0, 0.0, 1.0]), np.array([240.0, 70.0, 40.0])

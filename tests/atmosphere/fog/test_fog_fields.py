@@ -79,8 +79,8 @@ def test_banks_alone_have_the_depth_of_banks_under_a_far_top_digit_for_digit() -
     """Where nothing else makes the fog uneven, the sum is taken by a shorter way."""
     banks = (
         FogBank((0.0, 0.0), (1.0, 0.0), 50.0, 160.0, 40.0, 0.05),
-        FogBank((0.0, 0.0), (0.6, 0.8), 200.0, 230.0, 60.0, -0.001),
-        FogBank((0.0, 0.0), (0.0, 1.0), 120.0, 180.0, 0.0, 0.02),
+        FogBank((0.0, 0.0), (0.6, 0.8), 200.0, 230.0, 30.0, -0.001),
+        FogBank((0.0, 0.0), (0.0, 1.0), 120.0, 180.0, 0.5, 0.02),
     )
     alone = FogField(0.003, (1000.0,) * 3, banks)
     rng = np.random.default_rng(8)

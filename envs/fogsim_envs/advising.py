@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from fogsim.errors import InputError
 from fogsim.loop import spread_advice
-from fogsim.metrics import step_metrics
-from fogsim.recorders import FramePanel
 from fogsim.scenario import Scenario, build
 from fogsim.values import Ending, Step
 from fogsim_envs.actions import checked_action
 from fogsim_envs.hosting import Simulation
+from fogsim_envs.rendering import RENDER_MODES, StepRenderer, render_modes
 from fogsim_envs.rewards import RewardWeights, reward_terms
 from fogsim_envs.spaces import action_space, command_of, observation_space, observe
 
@@ -35,7 +34,7 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         As of `FogAdvisoryEnv`.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 2}  # noqa: RUF012 - Gymnasium's own way
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 2}  # noqa: RUF012 - Gymnasium's own way
 
     def __init__(
         self,
@@ -48,8 +47,7 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         reward_weights: RewardWeights | None,
         render_mode: str | None,
     ) -> None:
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise InputError(f"unknown render_mode {render_mode!r}; known: None, 'rgb_array'")
+        self._renderer = StepRenderer(render_mode, type(self).__name__)
         size = () if image_size is None else (f"camera.width={image_size[0]}", f"camera.height={image_size[1]}")
         self._load = load
         self._begin = begin
@@ -59,7 +57,6 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         self._weights = reward_weights or RewardWeights()
         self._simulation: Simulation | None = None
         self._step: Step | None = None
-        self._panel = FramePanel()
         self.render_mode = render_mode
         self._act_in(self._scenario)
         self.observation_space = cast("spaces.Space[Observation]", observation_space(build.camera(self._scenario)))
@@ -71,7 +68,8 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         self._active = scenario
         self._frames = build.periods(scenario).decision_frames
         self._standard = build.safety_standard(scenario)
-        self.metadata = {**self.metadata, "render_fps": 1 / scenario.clocks.decision_period_s}
+        rate = 1 / scenario.clocks.decision_period_s
+        self.metadata = {**self.metadata, "render_modes": render_modes(), "render_fps": rate}
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -91,15 +89,19 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         if build.camera(scenario) != build.camera(self._scenario):
             raise InputError("overrides of reset() must not change the camera: the observation space is fixed")
         if scenario != self._active:
-            self.close()
+            self._end_simulation()
             self._act_in(scenario)
         run_seed = int(self.np_random.integers(2**31))
         if self._simulation is None:
             self._simulation, self._step = self._begin(scenario, run_seed)
         else:
             self._step = self._simulation.start(run_seed)
-        self._panel = FramePanel()
+        self._renderer.begin_episode()
+        self._show(self._step)
         return observe(self._step), _info(self._step)
+
+    def _show(self, step: Step) -> None:
+        self._renderer.show(step, self._standard, self.metadata["render_fps"])
 
     def step(self, action: NDArray[Any]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Let an action be in force for one decision period.
@@ -127,6 +129,7 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
             if self._step.ending is not None:
                 break
         after = self._step
+        self._show(after)
         terms = reward_terms(before, after, self._weights, self._standard)
         truncated = after.ending is Ending.TIME
         terminated = after.ending is not None and not truncated
@@ -134,16 +137,17 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         return observe(after), float(sum(terms.values())), terminated, truncated, info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Draw the latest camera frame and its panel."""
-        if self.render_mode is None:
-            gymnasium.logger.warn("render() was called, but no render_mode was given to gymnasium.make()")
-            return None
+        """Draw the latest camera frame and its panel; with a window, each step is drawn as it is made."""
         if self._step is None:
             raise gymnasium.error.ResetNeeded("call reset() before render()")
-        return self._panel.draw(self._step, step_metrics(self._step, self._standard))
+        return self._renderer.render(self._step, self._standard)
 
     def close(self) -> None:
-        """End the simulation; closing twice is allowed."""
+        """End the simulation and close the window; closing twice is allowed."""
+        self._renderer.close()
+        self._end_simulation()
+
+    def _end_simulation(self) -> None:
         if self._simulation is not None:
             self._simulation.close()
         self._simulation, self._step = None, None

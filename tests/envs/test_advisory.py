@@ -1,6 +1,7 @@
 """The environments as Gymnasium and its users see them."""
 
 import math
+import sys
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+import pygame
 import pytest
 from early_motorway import EARLY
 from gymnasium.utils.env_checker import check_env
@@ -15,6 +17,8 @@ from gymnasium.utils.env_checker import check_env
 import fogsim
 import fogsim_envs  # noqa: F401 - registers the environments
 from fogsim.errors import InputError
+from fogsim.metrics import DEFAULT_STANDARD
+from fogsim_envs.rendering import StepRenderer
 from fogsim_envs.spaces import ADVISED_SPEEDS, LAMP_MODES, command_of
 
 ID = "fogsim/FogAdvisory-v0"
@@ -145,14 +149,47 @@ def test_time_truncates_and_tells_what_has_not_been_played() -> None:
     assert steps[-1][4]["unplayed"][0].startswith("traffic.events.0 (brake of lead at_time_s=300): its time")
 
 
-def test_rendering_shows_the_frame_beside_a_panel() -> None:
-    env = gymnasium.make(ID, render_mode="rgb_array", **MOTORWAY)
+def test_rendering_shows_the_frame_beside_a_panel_in_an_array_and_in_a_window(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    settings: dict[str, Any] = {**MOTORWAY, "disable_env_checker": True}
+    env = gymnasium.make(ID, render_mode="rgb_array", **settings)
     env.reset(seed=1)
-    picture = env.render()
+    picture: Any = env.render()
     env.close()
-    assert isinstance(picture, np.ndarray)
     assert picture.dtype == np.uint8
     assert picture.shape[1] > 640
+    env = gymnasium.make(ID, render_mode="human", **settings)
+    env.reset(seed=1)
+    shown = pygame.surfarray.array3d(pygame.display.get_surface()).swapaxes(0, 1)
+    assert env.render() is None
+    env.close()
+    assert np.array_equal(shown, picture)
+    assert not pygame.display.get_init()
+
+
+def test_a_window_needs_a_display(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(sys, "platform", "linux")
+    with pytest.raises(InputError, match="render_mode: 'human' opens a window, and there is no display here"):
+        gymnasium.make(ID, scenario=ROAD, render_mode="human", **SMALL)
+    # Gymnasium's checker tries all that an environment has.
+    env = gymnasium.make(ID, scenario=ROAD, **SMALL)
+    assert env.metadata["render_modes"] == ["rgb_array"]
+    monkeypatch.setenv("SDL_VIDEODRIVER", "no such driver")
+    with pytest.raises(InputError, match=r"could not open a window: .*; take 'rgb_array'"):
+        StepRenderer("human", "x").show(_a_step(env), DEFAULT_STANDARD, 2.0)
+    env.close()
+    with pytest.raises(InputError, match="unknown render_mode 'ansi'"):
+        StepRenderer("ansi", "x")
+
+
+def _a_step(env: gymnasium.Env[Any, Any]) -> Any:
+    env.reset(seed=1)
+    environment: Any = env.unwrapped
+    return environment._step
 
 
 def test_steps_need_a_reset(env: gymnasium.Env[Any, Any]) -> None:

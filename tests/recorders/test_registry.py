@@ -18,6 +18,7 @@ def test_every_registered_recorder_writes_its_file(tmp_path: Path) -> None:
         directory.finish({})
         assert directory.files() == [
             "events.parquet",
+            "ground_truth.osi",
             "manifest.json",
             "report.html",
             "scenario.xosc",

@@ -1,0 +1,115 @@
+"""Write the tables of docs/environments.md that are measured: what each baseline is worth.
+
+    python docs/make_environment_tables.py [--episodes 50] [--ids fogsim/FogAdvisory-v1 fogsim/FogAdvisoryFast-v1]
+
+Half an hour for all. ``--agent NAME=FILE`` adds a row for an agent of Stable-Baselines3 (a .zip file of its PPO).
+"""
+
+import argparse
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fogsim_envs import Evaluation, evaluate
+from fogsim_envs.baselines import BASELINES
+from fogsim_envs.evaluation import bootstrap_interval
+
+PAGE = Path(__file__).with_name("environments.md")
+DISCOUNTS = (1.0, 0.99)
+DENSITIES = {300.0: "300 vehicles/h", 2100.0: "2100 vehicles/h"}
+
+
+def rows(env_id: str, episodes: int, agents: dict[str, Any]) -> list[str]:
+    """A row for each policy."""
+    names = {**{name: name for name in BASELINES}, **agents}
+    return [_row(name, policy, env_id, episodes) for name, policy in names.items()]
+
+
+def _row(name: str, policy: Any, env_id: str, episodes: int) -> str:
+    state = {"observation": "state"} if not isinstance(policy, str) and "Fast" not in env_id else {}
+    found = evaluate(policy, env_id, seeds=range(episodes), discount=DISCOUNTS[1], **state)
+    whole = [sum(episode.terms.values()) for episode in found.episodes]
+    cells = [
+        name,
+        _interval(np.array(whole)),
+        f"{found.mean:.1f} ({found.low:.1f} … {found.high:.1f})",
+        f"{found.arrived:.0%}".replace("%", " %"),
+        f"{found.struck:.0%}".replace("%", " %"),
+        *(f"{_mean_term(found, term):.1f}" for term in ("time", "overdriving", "rear_fog_lamp")),
+        f"{np.mean([episode.time for episode in found.episodes]):.0f} s",
+    ]
+    return "| " + " | ".join(cells) + " |"
+
+
+def _interval(values: np.ndarray) -> str:
+    low, high = bootstrap_interval(values)
+    return f"{values.mean():.1f} ({low:.1f} … {high:.1f})"
+
+
+def _mean_term(found: Evaluation, term: str) -> float:
+    return float(np.mean([episode.terms[term] for episode in found.episodes]))
+
+
+def density_rows(env_id: str, episodes: int) -> list[str]:
+    """A row for each baseline, a column for each density."""
+    written = []
+    for name in BASELINES:
+        cells = []
+        for demand in DENSITIES:
+            found = evaluate(name, env_id, seeds=range(episodes), overrides=[f"demand.same_way_vph={demand!r}"])
+            cells.append(f"{found.mean:.1f} ({found.low:.1f} … {found.high:.1f})")
+        written.append("| " + " | ".join([name, *cells]) + " |")
+    return written
+
+
+def table(text: str, name: str, header: list[str], body: list[str]) -> str:
+    """The page's text with a table put in."""
+    lines = ["| " + " | ".join(header) + " |", "|" + " --- |" * len(header), *body]
+    pattern = rf"(<!-- table: {re.escape(name)} -->\n).*?(\n<!-- end of table -->)"
+    new, count = re.subn(
+        pattern, lambda found: found[1] + "\n" + "\n".join(lines) + "\n" + found[2], text, flags=re.DOTALL
+    )
+    if count != 1:
+        raise SystemExit(f"docs/environments.md has {count} places for the table {name!r}")
+    return new
+
+
+def main() -> None:
+    """Write the tables that the command line asks for."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--episodes", type=int, default=50)
+    parser.add_argument("--ids", nargs="*", default=["fogsim/FogAdvisory-v1", "fogsim/FogAdvisoryFast-v1"])
+    parser.add_argument("--density", action="store_true", help="the table over densities, too")
+    parser.add_argument("--agent", action="append", default=[], help="NAME=FILE of an agent of Stable-Baselines3's PPO")
+    asked = parser.parse_args()
+    agents = {name: _loaded(path) for name, _, path in (one.partition("=") for one in asked.agent)}
+    header = [
+        "policy",
+        "return, γ = 1",
+        "γ = 0.99",
+        "arrived",
+        "struck",
+        "time",
+        "overdriving",
+        "rear lamp",
+        "duration",
+    ]
+    text = PAGE.read_text(encoding="utf-8")
+    for env_id in asked.ids:
+        text = table(text, f"returns {env_id}", header, rows(env_id, asked.episodes, agents))
+    if asked.density:
+        fast = "fogsim/FogAdvisoryFast-v1"
+        text = table(text, "densities", ["policy", *DENSITIES.values()], density_rows(fast, asked.episodes))
+    PAGE.write_text(text, encoding="utf-8")
+
+
+def _loaded(path: str) -> Any:
+    from stable_baselines3 import PPO  # noqa: PLC0415 - an extra
+
+    return PPO.load(path)
+
+
+if __name__ == "__main__":
+    main()

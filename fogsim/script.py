@@ -12,7 +12,8 @@ from typing import Any
 
 import yaml
 
-from fogsim.conditions import Condition, parse_condition
+from fogsim.conditions import Condition
+from fogsim.conditions.terms import SignalTerm, all_of, any_of, condition, held, negated, signal
 from fogsim.errors import InputError, suggest
 from fogsim.files.atomic import refuse_existing, refuse_missing_folder, write_text
 from fogsim.scenario import Scenario, load_scenario
@@ -45,12 +46,13 @@ from fogsim.scenario.sensor_schema import LeadNarrowViewSection as LeadNarrowVie
 from fogsim.scenario.sensor_schema import LeadNoiseSection as LeadNoise
 from fogsim.scenario.sensor_schema import SignsMissingSection as SignsMissing
 from fogsim.scenario.sensor_schema import SignsMovedSection as SignsMoved
+from fogsim.scenario.timeline.lamps import LampActions, LampSides, StopLampSides
 from fogsim.scenario.timeline.schema import (
     BrakeAction,
     BreakDownAction,
+    DepartAction,
     FogActions,
     FollowAction,
-    LampActions,
     LaneAction,
     LightActions,
     SignalActions,
@@ -65,178 +67,6 @@ from fogsim.scenario.variation.cases import Verdict
 from fogsim.units.quantities import UNIT_OF_SUFFIX
 
 _TRAFFIC_FILES = ("config", "net")
-
-
-@dataclass(frozen=True, slots=True)
-class SignalTerm:
-    """A signal of the run, of which conditions are made: ``signal("ego.ttc") >= "1.5 s"``.
-
-    Attributes
-    ----------
-    text : str
-        The signal as files have it.
-    """
-
-    text: str
-
-    def __str__(self) -> str:
-        return self.text
-
-    def __lt__(self, other: "Comparand") -> Condition:
-        return condition(f"{self} < {other}")
-
-    def __le__(self, other: "Comparand") -> Condition:
-        return condition(f"{self} <= {other}")
-
-    def __gt__(self, other: "Comparand") -> Condition:
-        return condition(f"{self} > {other}")
-
-    def __ge__(self, other: "Comparand") -> Condition:
-        return condition(f"{self} >= {other}")
-
-    def is_(self, word: str) -> Condition:
-        """It is a word, as a lane may be ``right``.
-
-        Parameters
-        ----------
-        word : str
-            The word.
-        """
-        return condition(f"{self} == {word}")
-
-    def is_not(self, word: str) -> Condition:
-        """It is not a word.
-
-        Parameters
-        ----------
-        word : str
-            The word.
-        """
-        return condition(f"{self} != {word}")
-
-    def includes(self, word: str) -> Condition:
-        """A word is among its words, as a lamp is among lit ones.
-
-        Parameters
-        ----------
-        word : str
-            The word.
-        """
-        return condition(f"{self} include {word}")
-
-    def falls_below(self, quantity: str) -> Condition:
-        """It was not below a quantity a camera period before, and is now.
-
-        Parameters
-        ----------
-        quantity : str
-            With its unit.
-        """
-        return condition(f"{self} falls below {quantity}")
-
-    def rises_above(self, quantity: str) -> Condition:
-        """It was not above a quantity a camera period before, and is now.
-
-        Parameters
-        ----------
-        quantity : str
-            With its unit.
-        """
-        return condition(f"{self} rises above {quantity}")
-
-    def becomes(self, word: str) -> Condition:
-        """It was not a word a camera period before, and is now.
-
-        Parameters
-        ----------
-        word : str
-            The word.
-        """
-        return condition(f"{self} becomes {word}")
-
-    def changes(self) -> Condition:
-        """It is another than a camera period before."""
-        return condition(f"{self} changes")
-
-
-Comparand = str | SignalTerm
-"""What a signal is compared with: a quantity with its unit, or another signal."""
-
-
-def signal(text: str) -> SignalTerm:
-    """A signal of the run.
-
-    Parameters
-    ----------
-    text : str
-        As in files: ``ego.ttc``, ``gap(ego, slow)``, ``fog.visibility_at_camera``.
-    """
-    return SignalTerm(text)
-
-
-def condition(text: str | SignalTerm) -> Condition:
-    """A condition from its text, or from a signal that is true or false by itself.
-
-    Parameters
-    ----------
-    text : str or SignalTerm
-        As in files.
-
-    Raises
-    ------
-    InputError
-        If it is none.
-    """
-    try:
-        return parse_condition(str(text))
-    except ValueError as error:
-        raise InputError(f"condition {str(text)!r}: {error}") from None
-
-
-def all_of(*conditions: Condition) -> Condition:
-    """All conditions hold.
-
-    Parameters
-    ----------
-    *conditions : Condition
-        At least one.
-    """
-    return parse_condition({"all": [str(one) for one in conditions]})
-
-
-def any_of(*conditions: Condition) -> Condition:
-    """At least one of the conditions holds.
-
-    Parameters
-    ----------
-    *conditions : Condition
-        At least one.
-    """
-    return parse_condition({"any": [str(one) for one in conditions]})
-
-
-def negated(one: Condition) -> Condition:
-    """A condition is false.
-
-    Parameters
-    ----------
-    one : Condition
-        The condition.
-    """
-    return parse_condition({"not": str(one)})
-
-
-def held(one: Condition, time: str) -> Condition:
-    """A condition has been true for a time without a break.
-
-    Parameters
-    ----------
-    one : Condition
-        The condition.
-    time : str
-        With its unit.
-    """
-    return condition(f"({one}) for {time}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -403,6 +233,7 @@ __all__ = [
     "Clocks",
     "Condition",
     "Demand",
+    "DepartAction",
     "Drivers",
     "Expectation",
     "Exposure",
@@ -414,6 +245,7 @@ __all__ = [
     "GpsPositionBias",
     "InformedMethod",
     "LampActions",
+    "LampSides",
     "LaneAction",
     "LeadBias",
     "LeadDropout",
@@ -432,6 +264,7 @@ __all__ = [
     "SignsMoved",
     "SpeedAction",
     "StopAction",
+    "StopLampSides",
     "TimelineEntry",
     "Traffic",
     "Varied",

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from fogsim.lighting.beams import front_fog_beam, high_beam, low_beam
 from fogsim.values import Beam, HeadLamp, Lamp
+from fogsim.values.light import Side, burning
 
 
 def _beams() -> dict[Lamp, Beam]:
@@ -60,5 +61,8 @@ def own_head_lamps(
             fog = lamp is Lamp.FRONT_FOG
             aside = where.fog_half_spacing if fog else where.half_spacing
             up = (where.fog_height if fog else where.height) - mount_height
-            lit += [HeadLamp((setback - where.behind_bumper, side, up), beam) for side in (aside, -aside)]
+            offsets = [
+                offset for side, offset in ((Side.LEFT, aside), (Side.RIGHT, -aside)) if burning(lamps, side) & lamp
+            ]
+            lit += [HeadLamp((setback - where.behind_bumper, offset, up), beam) for offset in offsets]
     return tuple(lit)

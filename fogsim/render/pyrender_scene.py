@@ -18,7 +18,7 @@ from fogsim.render.photometry import lamp_radiance, lighting_bits, zenith_lumina
 from fogsim.render.road_paint import painted_road
 from fogsim.render.shading.surfaces import light_share
 from fogsim.values.camera import Camera, CameraPose
-from fogsim.values.light import HeadLamp, Lights
+from fogsim.values.light import HeadLamp, Lights, dark_shift
 from fogsim.values.pinhole import camera_axes
 from fogsim.values.scene import Batch, Mesh, Scene, Surface
 
@@ -267,10 +267,10 @@ def _copies(library: Any, shape: Mesh, batch: Batch, own: NDArray[np.bool_], whi
     painted = shape.surface == int(Surface.PAINT)
     reflectance = np.where(painted[:, None], paint, shape.reflectance)
     surface = shape.surface[shape.faces[:, 0]]
-    lit = [kind for kind in np.unique(surface).tolist() if _is_lit(Surface(kind), lamps)]
+    shining = _shining(shape, surface, lamps)
     instance = instance or int(shape.instance[0])
-    for kind in (None, *lit):
-        chosen = ~np.isin(surface, lit) if kind is None else surface == kind
+    for kind in (None, *np.unique(surface[shining]).tolist()):
+        chosen = ~shining if kind is None else shining & (surface == kind)
         if not chosen.any():
             continue
         mesh = replace(shape, faces=shape.faces[chosen])
@@ -281,9 +281,13 @@ def _copies(library: Any, shape: Mesh, batch: Batch, own: NDArray[np.bool_], whi
         yield Part(library.Node(title, mesh=made), instance, radiance)
 
 
-def _is_lit(surface: Surface, lamps: int) -> bool:
-    bits = lighting_bits(surface)
-    return bits < 0 or bool(bits & lamps)
+def _shining(shape: Mesh, surface: NDArray[np.int32], lamps: int) -> NDArray[np.bool_]:
+    """Triangles of lamps that are lit."""
+    across = shape.positions[shape.faces][:, :, 1].mean(axis=1)
+    bits = np.array([lighting_bits(Surface(kind)) for kind in range(len(Surface))])[surface]
+    is_stop = surface == int(Surface.LAMP_STOP)
+    dark = np.array([lamps >> dark_shift(y, stop) for y, stop in zip(across.tolist(), is_stop.tolist(), strict=True)])
+    return np.asarray((bits < 0) | (bits & lamps & ~dark != 0))
 
 
 def _mesh(

@@ -30,6 +30,7 @@ from fogsim.scenario.fog import fog_along
 from fogsim.scenario.roads.files import actors_of, traffic_files
 from fogsim.scenario.schema import NO_RENDERER, Scenario
 from fogsim.scenario.timeline import scripted_fog
+from fogsim.scenario.timeline.lamps import LampActions, lamp_switches
 from fogsim.scenario.traffic_schema import AnyEvent, Brake, BreakDown, ChangeLane, LampsFail
 from fogsim.sensors import Gps, LeadSensor
 from fogsim.traffic import (
@@ -128,7 +129,7 @@ def traffic_setup(scenario: Scenario) -> TrafficSetup:
         reading_radius=traffic.reading_radius_m,
         events=(
             *(e for place, one in enumerate(traffic.events) for e in _events(one, place)),
-            *_failed_lamps(scenario),
+            *_switched_lamps(scenario),
         ),
         sight=driver_sight(scenario),
         drivers=driver_setup(scenario),
@@ -152,11 +153,12 @@ def _staying_actors(scenario: Scenario) -> Iterator[str]:
     return (name for name, actor in actors_of(scenario).items() if actor.stays_in_lane)
 
 
-def _failed_lamps(scenario: Scenario) -> Iterator[Event]:
-    """Actors whose lamps have failed before the run begins."""
+def _switched_lamps(scenario: Scenario) -> Iterator[Event]:
+    """Actors whose lamps are not their own when the run begins."""
     for name, actor in scenario.actors.items():
-        if actor.lamps == "failed":
-            yield LampFailureEvent(name, Trigger(None, 0.0, None, f"actors.{name}.lamps"))
+        if actor.lamps != "on":
+            switches = tuple(lamp_switches(name, actor.lamps)) if isinstance(actor.lamps, LampActions) else ()
+            yield LampFailureEvent(name, Trigger(None, 0.0, None, f"actors.{name}.lamps"), switches)
 
 
 def _events(written: AnyEvent, place: int) -> tuple[Event, ...]:

@@ -29,6 +29,8 @@ class LampTable(NamedTuple):
         Bits of `Lamp` that light each.
     intensity : (n,) float64
         Along its axis [cd].
+    dark_shift : (n,) int64
+        By how many bits the lit ones are shifted to tell where a lamp is dark; see `fogsim.values.light.DARK_SHIFT`.
     forwards : (n,) float64
         1 for a lamp that shines ahead, −1 for one that shines back.
     of_body : (bodies, most) int64
@@ -41,6 +43,7 @@ class LampTable(NamedTuple):
     area: NDArray[np.float64]
     mask: NDArray[np.int64]
     intensity: NDArray[np.float64]
+    dark_shift: NDArray[np.int64]
     forwards: NDArray[np.float64]
     of_body: NDArray[np.int64]
     signals: int
@@ -104,7 +107,7 @@ def find_lamps(
         ahead, above = onward * level + dz * rise, dz * level - onward * rise
         for column in range(lamps.of_body.shape[1]):
             lamp = lamps.of_body[vehicles.body[row], column]
-            bits = vehicles.lit[row] & lamps.mask[lamp]
+            bits = vehicles.lit[row] & lamps.mask[lamp] & ~(vehicles.lit[row] >> lamps.dark_shift[lamp])
             # The eye sees lamps at the front from before it, those at the rear from behind it.
             before = ahead > 0.0 if lamps.forwards[lamp] > 0.0 else ahead + length < 0.0
             if lamp < 0 or bits == 0 or not before:

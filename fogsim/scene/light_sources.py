@@ -13,7 +13,7 @@ from fogsim.scene.street_lamps import HEIGHT, SIZE
 from fogsim.scene.town import signal_light_sources
 from fogsim.scene.vehicles import body_names
 from fogsim.units import luminance_of
-from fogsim.values.light import Beam, Lamp, LightSources, StreetLighting
+from fogsim.values.light import Beam, Lamp, LightSources, StreetLighting, dark_shift
 from fogsim.values.luminous_intensity import luminous_intensity
 from fogsim.values.scene import Surface
 from fogsim.values.traffic import TrafficState
@@ -206,6 +206,9 @@ def _lamps() -> _Lamps:
             area=np.array(area),
             mask=np.array(mask),
             intensity=np.array(intensity),
+            dark_shift=np.array(
+                [dark_shift(y, bool(bits & int(Lamp.STOP))) for (_, y, _), bits in zip(place, mask, strict=True)]
+            ),
             forwards=np.array(forwards),
             of_body=np.array([member + [-1] * (most - len(member)) for member in members]),
             signals=_SIGNALS,

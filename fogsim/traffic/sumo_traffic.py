@@ -331,7 +331,7 @@ class SumoTraffic:
 
     def _update_drivers(self, run: _Run, command: Command) -> None:
         if run.perception is not None:
-            run.perception.update(self._setup.ego, self._command.lamps, run.script.dark)
+            run.perception.update(self._setup.ego, self._command.lamps, run.script.lamps)
         if run.drivers is not None:
             run.drivers.update(command)
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import IntFlag
+from enum import IntFlag, StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,88 @@ class Lamp(IntFlag):
     INDICATOR_LEFT = 64
     INDICATOR_RIGHT = 128
     DAYTIME = 256
+
+
+class Side(StrEnum):
+    """Where on a vehicle a lamp of its kind is; in the middle there are third stop lamps."""
+
+    LEFT = "left"
+    RIGHT = "right"
+    MIDDLE = "middle"
+
+
+DARK_SHIFT: Mapping[Side, int] = {Side.LEFT: 12, Side.RIGHT: 21, Side.MIDDLE: 25}
+"""By how many bits a kind of lamp is shifted where the lamps on one side are dark while others of the kind burn.
+
+These bits lie beside those of `Lamp` and of `SignalLight`. In the middle there is a bit for `Lamp.STOP` alone.
+"""
+
+MIDDLE = 0.05
+"""Lamps nearer to the middle plane of a vehicle than this belong to no side, as a share of its width [-]."""
+
+NEVER_APART = 62
+"""A shift by which no bit is left, for lamps in the middle that are the only ones of their kind."""
+
+MIDDLE_LAMPS = Lamp.STOP
+"""Kinds of which a lamp in the middle is switched apart."""
+
+ALL_LAMPS = Lamp(sum(Lamp))
+"""Every kind of lamp."""
+
+
+def dark_shift(across: float, is_stop_lamp: bool) -> int:
+    """Shift, as of `DARK_SHIFT`, for a lamp by its place.
+
+    Parameters
+    ----------
+    across : float
+        How far left of a vehicle's middle it is, as a share of the width [-].
+    is_stop_lamp : bool
+        Whether it is one.
+    """
+    if abs(across) >= MIDDLE:
+        return DARK_SHIFT[Side.LEFT if across > 0.0 else Side.RIGHT]
+    return DARK_SHIFT[Side.MIDDLE] if is_stop_lamp else NEVER_APART
+
+
+def burning(lamps: int, side: Side) -> int:
+    """Kinds of lamps that burn on a side of a vehicle, bits of `Lamp`.
+
+    Parameters
+    ----------
+    lamps : int
+        Lit lamps as `TrafficState.lamps` has them.
+    side : Side
+        The side.
+    """
+    kinds = MIDDLE_LAMPS if side is Side.MIDDLE else ALL_LAMPS
+    return lamps & ~(lamps >> DARK_SHIFT[side]) & int(kinds)
+
+
+def dark_on(kinds: int, side: Side) -> int:
+    """Bits that say that lamps on a side are dark.
+
+    Parameters
+    ----------
+    kinds : int
+        Their kinds, bits of `Lamp`.
+    side : Side
+        The side.
+    """
+    return (kinds & int(MIDDLE_LAMPS if side is Side.MIDDLE else ALL_LAMPS)) << DARK_SHIFT[side]
+
+
+def settled(lamps: int) -> int:
+    """Lit lamps without the kinds that burn on no side.
+
+    Parameters
+    ----------
+    lamps : int
+        Lit lamps with sides that are dark, perhaps also of kinds that are not lit.
+    """
+    lit = {side: burning(lamps, side) for side in Side}
+    kinds = lit[Side.LEFT] | lit[Side.RIGHT] | lit[Side.MIDDLE]
+    return kinds | sum(dark_on(kinds & ~lit[side], side) for side in Side)
 
 
 class SignalLight(IntFlag):

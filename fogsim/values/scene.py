@@ -98,7 +98,7 @@ class Batch:
     paint : (n, 3) float32
         Linear reflectance of PAINT surfaces.
     lamps : (n,) int32
-        Lit lamps, bits of `Lamp` and of `SignalLight`.
+        Lit lamps, bits of `Lamp` and of `SignalLight`, and of `fogsim.values.light.dark_on`.
     instance : (n,) int32
         Instance id of each copy.
     """

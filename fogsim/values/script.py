@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from fogsim.values.fault import Fault
-from fogsim.values.light import Lamp
+from fogsim.values.light import Lamp, Side
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,6 +153,8 @@ class SetLamps:
         Lamps that are dark for ever.
     automatic : Lamp
         Lamps that are the vehicle's own again.
+    side : Side or None
+        The side on which they are; None for all of a kind.
     """
 
     vehicle: str
@@ -160,6 +162,7 @@ class SetLamps:
     dark: Lamp = Lamp.NONE
     failed: Lamp = Lamp.NONE
     automatic: Lamp = Lamp.NONE
+    side: Side | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -106,7 +106,7 @@ class TrafficState:
     lane : tuple of str
         Lane ids.
     lamps : (n,) int32
-        Lit lamps, bits of `Lamp`.
+        Lit lamps, bits of `Lamp`; where one side of a kind is dark, with the bits of `fogsim.values.light.dark_on`.
     paint : (n, 3) float64
         Linear reflectance of the paint, 0 … 1.
     grade : (n,) float64

@@ -11,8 +11,12 @@ from fogsim.render.shading import layout
 from fogsim.render.shading.layout import Array, Copies, Light, Meshes, Spans, Wide
 from fogsim.render.shading.lines import PERIOD
 from fogsim.render.vectors import Triple, Vector, columns_times, cross, dot, plus, row, rows_times, scaled, unit
+from fogsim.values.light import DARK_SHIFT, MIDDLE, NEVER_APART, Side
 from fogsim.values.scene import Surface
 
+_LEFT, _RIGHT, _MIDDLE = DARK_SHIFT[Side.LEFT], DARK_SHIFT[Side.RIGHT], DARK_SHIFT[Side.MIDDLE]
+_SOME_DARK = 1 << _LEFT
+_STOP = int(Surface.LAMP_STOP)
 _ROAD, _PAINT, _SHEETING = int(Surface.ROAD), int(Surface.PAINT), int(Surface.SHEETING)
 _PER_PI = 1.0 / math.pi
 _WHITE_SHEETING = 0.66  # its reflectance
@@ -140,7 +144,10 @@ def set_surfaces(
             paint if kind == _PAINT else row(colours, j),
             paint if kind == _PAINT else row(colours, k),
         )
-        shining = masks[kind] < 0 or (integers[copy, 15] & masks[kind]) != 0
+        lit = integers[copy, 15] & masks[kind]
+        if lit > 0 and integers[copy, 15] >= _SOME_DARK:
+            lit &= ~(integers[copy, 15] >> _dark_shift(positions[i, 1] + positions[j, 1] + positions[k, 1], kind))
+        shining = masks[kind] < 0 or lit != 0
         glow = row(lamps, kind) if shining else (0.0, 0.0, 0.0)
         white = (
             light.white * light_share(a[0], a[1], a[2]),
@@ -152,6 +159,14 @@ def set_surfaces(
             # Times the distance, by which each pixel divides; over a flat triangle the product is the same everywhere.
             facing = -dot(a, p), -dot(b, q), -dot(c, r)
             _set_lamp_response(surface, number, kind == _SHEETING, p, tints, facing, planes)
+
+
+@kernel
+def _dark_shift(across: float, kind: int) -> int:
+    """Shift for the lamps on the side of a body on which a triangle is, from three times how far left it is."""
+    if abs(across) >= 3.0 * MIDDLE:
+        return _LEFT if across > 0.0 else _RIGHT
+    return _MIDDLE if kind == _STOP else NEVER_APART
 
 
 @kernel

@@ -3,10 +3,11 @@
 import math
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, WrapValidator, field_validator, model_validator
 
 from fogsim.errors import UnknownNameError, suggest
 from fogsim.scenario.section import Distance, Flag, Id, Length, Number, Section, Share, SpeedKmh, Time, Whole
+from fogsim.scenario.timeline.lamps import LampActions
 from fogsim.traffic.templates import RAMP, ROAD_TEMPLATES, VEHICLE_KINDS, measures
 from fogsim.units.quantities import is_quantity, parse_quantity
 
@@ -217,6 +218,15 @@ class DemandSection(Section):
         return {**value, "car": max(rest, 0.0)}
 
 
+def _all_or_some(value: object, _: object) -> object:
+    if isinstance(value, dict | LampActions):
+        return LampActions.model_validate(value)
+    word = {True: "on"}.get(value, value) if isinstance(value, bool) else value
+    if word not in ("on", "failed"):
+        raise ValueError("must be on, failed, or a block of lamps such as {position: {left: failed}}")
+    return word
+
+
 def _check_type(name: str) -> str:
     if name not in VEHICLE_KINDS:
         raise ValueError(str(UnknownNameError("vehicle type", name, VEHICLE_KINDS)))
@@ -262,8 +272,9 @@ class ActorSection(Section):
     stands: Flag = False
     """Whether it stands still for good."""
 
-    lamps: Literal["on", "failed"] = "on"
-    """Whether its lamps shine, or have failed."""
+    lamps: Annotated[Literal["on", "failed"] | LampActions, WrapValidator(_all_or_some)] = "on"
+    """Whether its lamps shine (`on`), have `failed`, or which of them are what when the run begins, as in `timeline`:
+    `{position: {left: failed}}`."""
 
     keeps_lane: Flag | None = None
     """Whether it stays in its lane where nothing scripted makes it change; by default all do but those on a ramp."""
@@ -291,6 +302,13 @@ class ActorSection(Section):
     def stays_in_lane(self) -> bool:
         """Whether it stays in its lane."""
         return self.on != RAMP if self.keeps_lane is None else self.keeps_lane
+
+    @model_validator(mode="after")
+    def _has_two_sides(self) -> Self:
+        if self.type == "motorcycle" and isinstance(self.lamps, LampActions) and self.lamps.kinds_by_side():
+            told = " and ".join(self.lamps.kinds_by_side())
+            raise ValueError(f"lamps: {told} of a motorcycle are single; write one word for each")
+        return self
 
 
 Actors = dict[Id, ActorSection]

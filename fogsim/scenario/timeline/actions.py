@@ -6,11 +6,11 @@ from collections.abc import Iterator, Sequence
 from typing import Protocol
 
 from fogsim.scenario.sensor_schema import fault_of
+from fogsim.scenario.timeline.lamps import lamp_switches
 from fogsim.scenario.timeline.schema import (
     DepartAction,
     Doing,
     FogActions,
-    LampActions,
     LaneAction,
     LightActions,
     SignalActions,
@@ -21,6 +21,7 @@ from fogsim.scenario.timeline.schema import (
 )
 from fogsim.units import KMH_PER_MPS, extinction_from_visibility
 from fogsim.values import Fault, FogChange, FogField, Lamp
+from fogsim.values.light import ALL_LAMPS
 from fogsim.values.script import (
     Actions,
     ChangeFog,
@@ -36,7 +37,6 @@ from fogsim.values.script import (
     TrafficAction,
 )
 
-_ALL = Lamp(sum(Lamp))
 _HAZARD = Lamp.INDICATOR_LEFT | Lamp.INDICATOR_RIGHT
 _STATES = {"red": "r", "yellow": "y", "green": "G", "off": "O"}
 
@@ -230,11 +230,11 @@ def _braking(vehicle: str, now: float, speed: float, deceleration: float, hold: 
 
 def _switches(vehicle: str, doing: VehicleActions) -> Iterator[SetLamps]:
     if doing.break_down and not doing.break_down.lamps:
-        yield SetLamps(vehicle, failed=_ALL)
+        yield SetLamps(vehicle, failed=ALL_LAMPS)
     if doing.break_down and doing.break_down.hazard_lights:
         yield SetLamps(vehicle, lit=_HAZARD)
     if doing.lamps is not None:
-        yield _lamps(vehicle, doing.lamps)
+        yield from lamp_switches(vehicle, doing.lamps)
     if doing.hazard_lights is not None:
         lit, own = (_HAZARD, Lamp.NONE) if doing.hazard_lights else (Lamp.NONE, _HAZARD)
         yield SetLamps(vehicle, lit=lit, automatic=own)
@@ -260,16 +260,6 @@ def _lane_change(vehicle: str, action: LaneAction, subject: str, now: Situation)
             return None
         lanes = wanted - own
     return ChangeLane(vehicle, lanes, action.stay_s, action.duration_s, action.indicator_s)
-
-
-def _lamps(vehicle: str, written: LampActions) -> SetLamps:
-    """Switches of lamps, which files name as `Lamp` does in small letters."""
-    states = {lamp: getattr(written, (lamp.name or "").lower()) or written.all for lamp in Lamp}
-
-    def those(state: str) -> Lamp:
-        return Lamp(sum(lamp for lamp, value in states.items() if value == state))
-
-    return SetLamps(vehicle, those("on"), those("off"), those("failed"), those("automatic"))
 
 
 def _density(action: FogActions, reference: float) -> float:

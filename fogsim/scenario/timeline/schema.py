@@ -34,52 +34,8 @@ from fogsim.scenario.section import (
     Whole,
 )
 from fogsim.scenario.sensor_schema import AnyFault
+from fogsim.scenario.timeline.lamps import LampActions
 from fogsim.values.script import Shape
-
-Switch = Literal["on", "off", "failed", "automatic"]
-"""State of a lamp: lit or dark by hand, dark for ever, or the vehicle's own."""
-
-
-def _word(value: object) -> object:
-    """Words that YAML takes for truth values."""
-    return {True: "on", False: "off"}[value] if isinstance(value, bool) else value
-
-
-Lit = Annotated[Switch, BeforeValidator(_word)] | None
-
-
-class LampActions(Section):
-    """Lamps switched by hand: `on`, `off`, `failed` (dark for ever), or `automatic`, the vehicle's own again."""
-
-    position: Lit = None
-    """Position lamps."""
-
-    low_beam: Lit = None
-    """Low beam."""
-
-    high_beam: Lit = None
-    """High beam."""
-
-    front_fog: Lit = None
-    """Front fog lamps."""
-
-    rear_fog: Lit = None
-    """Rear fog lamps."""
-
-    stop: Lit = None
-    """Stop lamps."""
-
-    indicator_left: Lit = None
-    """Left indicators."""
-
-    indicator_right: Lit = None
-    """Right indicators."""
-
-    daytime: Lit = None
-    """Daytime running lamps."""
-
-    all: Lit = None
-    """Every lamp but those of which something else is said."""
 
 
 class SpeedAction(Section):

@@ -4,8 +4,9 @@ import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 
-from fogsim.traffic.drivers.playing import ALL_LAMPS, Lamps
+from fogsim.traffic.drivers.playing import Lamps
 from fogsim.values import Reason, Unplayed, UnplayedEvent
+from fogsim.values.light import ALL_LAMPS
 from fogsim.values.script import ChangeLane, SetLamps
 
 Order = tuple[float, float]
@@ -135,7 +136,7 @@ class LaneChangeEvent:
 
 @dataclass(frozen=True, slots=True)
 class LampFailureEvent:
-    """All lamps of a vehicle go dark.
+    """Lamps of a vehicle go dark, or are switched by hand.
 
     Attributes
     ----------
@@ -143,10 +144,13 @@ class LampFailureEvent:
         Its id.
     trigger : Trigger
         When.
+    switches : tuple of SetLamps
+        Which, and how; all of them fail if there are none.
     """
 
     vehicle: str
     trigger: Trigger
+    switches: tuple[SetLamps, ...] = ()
 
 
 Event = BrakeEvent | LaneChangeEvent | LampFailureEvent
@@ -277,7 +281,8 @@ class Script:
             if isinstance(event, BrakeEvent):
                 self._braking[event] = situation.time
             elif isinstance(event, LampFailureEvent):
-                self.lamps.switch(SetLamps(event.vehicle, failed=ALL_LAMPS))
+                for switch in event.switches or (SetLamps(event.vehicle, failed=ALL_LAMPS),):
+                    self.lamps.switch(switch)
         return begun
 
     def _lane_changes(self, begun: Iterable[Event], situation: Situation) -> tuple[ChangeLane, ...]:

@@ -9,9 +9,13 @@ import functools
 import math
 
 from fogsim.values import Lamp
+from fogsim.values.light import Side, burning
 
 REAR_LAMPS = ((int(Lamp.REAR_FOG), 200.0), (int(Lamp.STOP), 100.0), (int(Lamp.POSITION), 8.0))
 """Luminous intensity of one rear lamp, brightest first [cd]: within UNECE's 150–300, 60–185 and 4–12."""
+
+THIRD_STOP_LAMP = 40.0
+"""Luminous intensity of the third stop lamp, where it burns alone [cd]: within UNECE's 25–110 (R148, S3)."""
 
 BRIGHTEST = REAR_LAMPS[0][1]
 """Luminous intensity of the brightest rear lamp [cd]."""
@@ -40,15 +44,54 @@ down has 0.52, 0.22, 0.05 at 5°, 10°, 20°, the mean of both sides."""
 
 
 @functools.lru_cache(maxsize=1024)
-def rear_intensity(lamps: int) -> float:
-    """Luminous intensity of the brightest rear lamp that is lit [cd].
+def kinds_that_burn(lamps: int) -> int:
+    """Kinds of lamps of which that on the left or that on the right burns, bits of `Lamp`.
 
     Parameters
     ----------
     lamps : int
-        Bits of `Lamp`.
+        Lit lamps as `TrafficState.lamps` has them; here and below there may be dark sides of kinds that are not lit.
     """
-    return next((intensity for lamp, intensity in REAR_LAMPS if lamps & lamp), 0.0)
+    return burning(lamps, Side.LEFT) | burning(lamps, Side.RIGHT)
+
+
+@functools.lru_cache(maxsize=1024)
+def head_lamps_that_burn(lamps: int) -> tuple[int, ...]:
+    """Beams, bits of `Lamp`, of each of a vehicle's two head lamps that burns.
+
+    Parameters
+    ----------
+    lamps : int
+        Its lit lamps.
+    """
+    return tuple(lit for side in (Side.LEFT, Side.RIGHT) if (lit := burning(lamps, side) & HEAD_LAMPS))
+
+
+def burning_head_lamps(lamps: int) -> float:
+    """Share of a vehicle's head lamps that burn [-].
+
+    Parameters
+    ----------
+    lamps : int
+        Its lit lamps.
+    """
+    return 0.5 * len(head_lamps_that_burn(lamps))
+
+
+@functools.lru_cache(maxsize=1024)
+def rear_intensity(lamps: int) -> float:
+    """Luminous intensity of the brightest rear lamp that is lit [cd].
+
+    Of two alike each is seen by itself, so that one that fails changes nothing as long as the other one burns.
+
+    Parameters
+    ----------
+    lamps : int
+        Lit lamps.
+    """
+    kinds = kinds_that_burn(lamps)
+    third = THIRD_STOP_LAMP if burning(lamps, Side.MIDDLE) else 0.0
+    return max(next((intensity for lamp, intensity in REAR_LAMPS if kinds & lamp), 0.0), third)
 
 
 def intensity_toward(lamps: int, length: float, ahead: float, aside: float) -> float:
@@ -57,19 +100,21 @@ def intensity_toward(lamps: int, length: float, ahead: float, aside: float) -> f
     Parameters
     ----------
     lamps : int
-        Its lit lamps, bits of `Lamp`.
+        Its lit lamps.
     length : float
         Its length [m].
     ahead, aside : float
         Where the eye is, from the middle of the front bumper: ahead of it and to either side [m].
     """
+    kinds = kinds_that_burn(lamps)
     if not lamps:
         return 0.0
-    has_position_lamps = bool(lamps & int(Lamp.POSITION))
-    least = LIT_ROAD_INTENSITY if lamps & HEAD_LAMPS else LEAST_INTENSITY if has_position_lamps else 0.0
+    has_position_lamps = bool(kinds & int(Lamp.POSITION))
+    lit_road = LIT_ROAD_INTENSITY * burning_head_lamps(lamps)
+    least = max(lit_road, LEAST_INTENSITY if has_position_lamps else 0.0)
     aside = abs(aside)
     if ahead > 0.0:
-        return max(_front_intensity(lamps, math.atan2(aside, ahead)), least)
+        return max(_front_intensity(kinds, math.atan2(aside, ahead)), least)
     if ahead < -length:
         return max(rear_intensity(lamps) * _dimming(math.atan2(aside, -length - ahead)), least)
     return SIDE_MARKER if has_position_lamps and length > SHORTEST_WITH_MARKERS else least

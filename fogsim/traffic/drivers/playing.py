@@ -8,10 +8,8 @@ from typing import Protocol
 import numpy as np
 
 from fogsim.values import Lamp, TrafficState
+from fogsim.values.light import Side, dark_on, settled
 from fogsim.values.script import ChangeLane, ChangeSpeed, Follow, SetLamps, Shape, Stop, TrafficAction
-
-ALL_LAMPS = Lamp(sum(Lamp))
-"""Every lamp of a vehicle."""
 
 BESIDE_STANDSTILL = 2.0
 """Gap that a following vehicle leaves when it stands [m]."""
@@ -146,14 +144,19 @@ class _Indicating:
 class Lamps:
     """Lamps that are switched by hand, have failed, or indicate a change of lane."""
 
-    _switches: dict[str, _Switches] = field(default_factory=dict)
+    _switches: dict[str, dict[Side, _Switches]] = field(default_factory=dict)
     _indicating: dict[str, _Indicating] = field(default_factory=dict)
 
     @property
     def dark(self) -> frozenset[str]:
         """Vehicles of which nothing can be seen but the body: no lamp that would shine by itself is lit."""
-        seen = Lamp.POSITION | Lamp.LOW_BEAM
-        return frozenset(v for v, s in self._switches.items() if (s.dark | s.failed) & seen == seen and not s.lit)
+        seen = int(Lamp.POSITION | Lamp.LOW_BEAM)
+        return frozenset(vehicle for vehicle in self._switches if not settled(self.switched(vehicle, seen)))
+
+    @property
+    def vehicles(self) -> frozenset[str]:
+        """Vehicles of which a lamp is, or was once, not their own."""
+        return frozenset(self._switches)
 
     def switch(self, action: SetLamps) -> None:
         """Switch lamps.
@@ -163,10 +166,31 @@ class Lamps:
         action : SetLamps
             Which.
         """
-        now = self._switches.setdefault(action.vehicle, _Switches())
-        now.failed |= action.failed
-        now.lit = (now.lit & ~(action.dark | action.automatic) | action.lit) & ~now.failed
-        now.dark = now.dark & ~(action.lit | action.automatic) | action.dark
+        sides = self._switches.setdefault(action.vehicle, {side: _Switches() for side in Side})
+        for now in sides.values() if action.side is None else (sides[action.side],):
+            now.failed |= action.failed
+            now.lit = (now.lit & ~(action.dark | action.automatic) | action.lit) & ~now.failed
+            now.dark = now.dark & ~(action.lit | action.automatic) | action.dark
+
+    def switched(self, vehicle: str, own: int) -> int:
+        """Lamps of a vehicle as they are switched, with the bits of every side that is dark.
+
+        Parameters
+        ----------
+        vehicle : str
+            Its id.
+        own : int
+            Lamps that it would have lit by itself, bits of `Lamp`.
+        """
+        lamps = own
+        for side, switches in self._switches.get(vehicle, {}).items():
+            # A kind that is lit by hand on one side, and not by itself, is dark on the others.
+            others = [other for other in self._switches[vehicle] if other is not side]
+            lit = int(switches.lit) & ~own
+            lamps |= lit
+            lamps |= dark_on(int(switches.dark | switches.failed), side)
+            lamps |= sum(dark_on(lit & ~int(self._switches[vehicle][other].lit), other) for other in others)
+        return lamps
 
     def indicate(self, indicating: _Indicating) -> None:
         """Let a vehicle indicate.
@@ -194,12 +218,12 @@ class Lamps:
             return state
         lamps = state.lamps.copy()
         for vehicle in touched:
-            row, switches = state.ids.index(vehicle), self._switches.get(vehicle, _Switches())
-            lit = Lamp(int(lamps[row]))
+            row = state.ids.index(vehicle)
+            lit = int(lamps[row])
             if vehicle in self._indicating:
                 left = self._indicating[vehicle].change.lanes > 0
-                lit |= Lamp.INDICATOR_LEFT if left else Lamp.INDICATOR_RIGHT
-            lamps[row] = int((lit | switches.lit) & ~(switches.dark | switches.failed))
+                lit |= int(Lamp.INDICATOR_LEFT if left else Lamp.INDICATOR_RIGHT)
+            lamps[row] = settled(self.switched(vehicle, lit))
         return replace(state, lamps=lamps.astype(np.int32))
 
 

@@ -10,9 +10,9 @@ from fogsim.errors import InputError, suggest
 from fogsim.kinematics import decelerated_speed
 from fogsim.linear_algebra import matrix_product
 from fogsim.traffic.drivers.events import Event, Order, Script, Situation, signed_gap
-from fogsim.traffic.drivers.playing import ALL_LAMPS
 from fogsim.traffic.highway.fleet import LEAD, Fleet, acceleration
 from fogsim.values import Unplayed
+from fogsim.values.light import ALL_LAMPS
 from fogsim.values.script import ChangeLane, SetLamps, TrafficAction
 
 
@@ -161,7 +161,7 @@ class Manoeuvres:
 def _is_playable(action: TrafficAction) -> TypeGuard[ChangeLane | SetLamps]:
     if isinstance(action, ChangeLane):
         return action.duration is None and action.indicator == 0.0
-    return isinstance(action, SetLamps) and action.failed == ALL_LAMPS
+    return isinstance(action, SetLamps) and action.failed == ALL_LAMPS and action.side is None
 
 
 def _lane_over(vehicle: Any, lanes: int) -> tuple[str, str, int]:

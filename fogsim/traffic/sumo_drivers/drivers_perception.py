@@ -5,6 +5,8 @@ from pathlib import Path
 from typing import Protocol
 
 from fogsim.obstruction import CLEAR_SIGHT, Obstructions
+from fogsim.traffic.appearance import OTHERS_LAMPS
+from fogsim.traffic.drivers.playing import Lamps
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.roster import Roster
@@ -47,7 +49,7 @@ class DriversPerception:
     def __init__(self, parts: Sequence[PerceivedPart]) -> None:
         self._parts = tuple(parts)
 
-    def update(self, ego: str | None, ego_lamps: Lamp, dark: frozenset[str]) -> None:
+    def update(self, ego: str | None, ego_lamps: Lamp, lamps: Lamps) -> None:
         """Tell SUMO's drivers, before a step, what they do not see.
 
         Parameters
@@ -56,11 +58,11 @@ class DriversPerception:
             Id of the ego, whose lamps are not SUMO's, if there is one.
         ego_lamps : Lamp
             Its lit lamps.
-        dark : frozenset of str
-            Vehicles whose lamps have failed.
+        lamps : Lamps
+            Lamps that are switched by hand or have failed.
         """
         own_lamps: OwnLamps = {} if ego is None else {ego: int(ego_lamps)}
-        own_lamps.update(dict.fromkeys(dark, None))
+        own_lamps.update((v, lamps.switched(v, own_lamps.get(v, int(OTHERS_LAMPS)))) for v in lamps.vehicles)
         for part in self._parts:
             part.update(own_lamps)
 

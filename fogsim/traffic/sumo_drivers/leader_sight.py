@@ -126,7 +126,7 @@ class LeaderSight:
                 facing[STEADY, i], facing[BRIGHTEST, i] = 0.0, BRIGHTEST_LAMP
             if follower in own_lamps:
                 facing[OWN_STEADY, i] = 0.0
-                facing[OWN, i] = float(self._vehicles.has_head_lamps(follower, own_lamps))
+                facing[OWN, i] = self._vehicles.head_lamps(follower, own_lamps)
 
     def _is_seen(self, pair: Pair, facing: NDArray[np.float64], own_lamps: OwnLamps) -> bool:
         """Whether a leader is seen who is unless glare hides it, which costs more than all the rest to know."""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.traffic.drivers.lamp_intensity import HEAD_LAMPS, beam_intensity
+from fogsim.traffic.drivers.lamp_intensity import beam_intensity, head_lamps_that_burn
 from fogsim.traffic.drivers.sight import FogAccess
 from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
 from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
@@ -26,8 +26,6 @@ lay 0.2 … 0.3 cd/m² over the eye, high beams 10 and more."""
 
 LAMP_HEIGHT = 0.65
 """Of head lamps above the road [m]."""
-
-LAMPS_OF_A_PAIR = 2.0
 
 _Point = tuple[float, float, float]
 
@@ -128,10 +126,11 @@ class OncomingGlare:
             if not 0.0 < distance < self._farthest or angle > 0.5 * math.pi:
                 continue
             off_axis = abs(math.remainder(bearing + math.pi - math.radians(90.0 - self._angle(vehicle)), math.tau))
-            lit = self._vehicles.lamps(vehicle, own_lamps) & HEAD_LAMPS
-            if lit and off_axis < 0.5 * math.pi:
+            lamps = self._vehicles.lamps(vehicle, own_lamps)
+            pair = head_lamps_that_burn(lamps)
+            if pair and off_axis < 0.5 * math.pi:
                 ends.append((lamp_x, lamp_y, lamp_z + LAMP_HEIGHT))
-                light.append(LAMPS_OF_A_PAIR * beam_intensity(lit, math.degrees(off_axis)) / distance**2)
+                light.append(sum(beam_intensity(lit, math.degrees(off_axis)) for lit in pair) / distance**2)
                 angles.append(angle)
         if not ends:
             return 0.0

@@ -3,15 +3,19 @@
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from fogsim.traffic.appearance import OTHERS_LAMPS, lamps_from_signals, paint
+from fogsim.traffic.appearance import OTHERS_LAMPS, body_kind, lamps_from_signals, paint
 from fogsim.traffic.drivers.eye_heights import eye_height
-from fogsim.traffic.drivers.lamp_intensity import HEAD_LAMPS
+from fogsim.traffic.drivers.lamp_intensity import burning_head_lamps
 from fogsim.traffic.drivers.sight import inherent_contrast
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
+from fogsim.values.light import MIDDLE_LAMPS, Side, dark_on
 
-OwnLamps = dict[str, int | None]
-"""Lamps, as bits of `Lamp`, of vehicles whose lamps are not SUMO's; None where all have failed."""
+OwnLamps = dict[str, int]
+"""Lamps, as `TrafficState.lamps` has them, of vehicles whose lamps are not SUMO's; with the sides that have failed."""
+
+_NO_THIRD_STOP_LAMP = frozenset({"truck", "motorcycle"})
+"""Body kinds without a stop lamp in the middle beside two others."""
 
 
 class SeenBody(NamedTuple):
@@ -23,11 +27,14 @@ class SeenBody(NamedTuple):
         [m]
     contrast : float
         To the airlight without fog between, 0 … 1.
+    missing : int
+        Bits of sides on which there is no lamp.
     """
 
     length: float
     width: float
     contrast: float
+    missing: int
 
 
 class SeenVehicles:
@@ -74,7 +81,10 @@ class SeenVehicles:
         known = self._bodies.get(vehicle)
         if known is None:
             contrast = inherent_contrast(paint(vehicle, self._get_colour(vehicle)))
-            known = SeenBody(float(self._get_length(vehicle)), float(self._get_width(vehicle)), contrast)
+            length = float(self._get_length(vehicle))
+            kind = body_kind(self._get_class(vehicle), self._get_shape(vehicle), length)
+            missing = dark_on(int(MIDDLE_LAMPS), Side.MIDDLE) if kind in _NO_THIRD_STOP_LAMP else 0
+            known = SeenBody(length, float(self._get_width(vehicle)), contrast, missing)
             self._bodies[vehicle] = known
         return known
 
@@ -93,7 +103,7 @@ class SeenVehicles:
         return known
 
     def lamps(self, vehicle: str, own_lamps: OwnLamps) -> int:
-        """Lit lamps of a vehicle, bits of `Lamp`.
+        """Lit lamps of a vehicle, with sides that are dark.
 
         Parameters
         ----------
@@ -102,12 +112,13 @@ class SeenVehicles:
         own_lamps : dict
             Lamps of vehicles whose lamps are not SUMO's.
         """
-        own = own_lamps.get(vehicle, int(OTHERS_LAMPS))
-        return 0 if own is None else own | lamps_from_signals(self._signals(vehicle))
+        own = own_lamps.get(vehicle)
+        usual = lamps_from_signals(self._signals(vehicle))
+        return usual | int(OTHERS_LAMPS) if own is None else usual | own | self.body(vehicle).missing
 
     @staticmethod
-    def has_head_lamps(vehicle: str, own_lamps: OwnLamps) -> bool:
-        """Whether a vehicle's head lamps are lit; those of SUMO's vehicles are, as `OTHERS_LAMPS` says.
+    def head_lamps(vehicle: str, own_lamps: OwnLamps) -> float:
+        """Share of a vehicle's head lamps that burn [-]; those of SUMO's vehicles do, as `OTHERS_LAMPS` says.
 
         Parameters
         ----------
@@ -116,4 +127,5 @@ class SeenVehicles:
         own_lamps : dict
             Lamps of vehicles whose lamps are not SUMO's.
         """
-        return bool((own_lamps.get(vehicle, int(OTHERS_LAMPS)) or 0) & HEAD_LAMPS)
+        own = own_lamps.get(vehicle)
+        return 1.0 if own is None else burning_head_lamps(own)

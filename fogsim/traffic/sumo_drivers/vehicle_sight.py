@@ -145,8 +145,7 @@ class VehicleSight:
         observer, target = pair
         body = self._vehicles.body(target)
         intensity = intensity_toward(self._vehicles.lamps(target, own_lamps), body.length, line.ahead, line.aside)
-        is_lit = self._vehicles.has_head_lamps(observer, own_lamps)
-        head_lamps = head_lamp_share(line.bearing) if is_lit else 0.0
+        head_lamps = self._vehicles.head_lamps(observer, own_lamps) * head_lamp_share(line.bearing)
         return self._sight.depth_limit(line.distance, body.contrast, intensity, head_lamps)
 
     def _optical_depths(self, lines: Sequence[LineOfSight]) -> Sequence[float]:

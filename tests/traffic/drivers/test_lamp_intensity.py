@@ -8,12 +8,15 @@ from fogsim.traffic.drivers.lamp_intensity import (
     LEAST_INTENSITY,
     LIT_ROAD_INTENSITY,
     SIDE_MARKER,
+    THIRD_STOP_LAMP,
     beam_intensity,
+    burning_head_lamps,
     head_lamp_share,
     intensity_toward,
     rear_intensity,
 )
 from fogsim.values import Lamp
+from fogsim.values.light import Side, dark_on
 from fogsim.values.luminous_intensity import luminous_intensity
 
 LIT = int(Lamp.POSITION | Lamp.LOW_BEAM)
@@ -63,3 +66,21 @@ def test_lamps_are_as_bright_from_the_left_as_from_the_right_and_dimmer_off_thei
         off_axis = [intensity_toward(LIT, 5.0, ahead, aside) for aside in (0.0, 5.0, 20.0, 60.0)]
         assert off_axis == sorted(off_axis, reverse=True)
         assert off_axis[2] == intensity_toward(LIT, 5.0, ahead, -20.0)
+
+
+def test_what_is_seen_follows_the_lamps_that_burn() -> None:
+    """One of two changes nothing from behind; where both are dark, the third stop lamp or the tail lamps count."""
+    left, right = (dark_on(int(Lamp.STOP), side) for side in (Side.LEFT, Side.RIGHT))
+    braking = LIT | int(Lamp.STOP)
+    assert rear_intensity(braking | left) == rear_intensity(braking | right) == 100.0
+    assert rear_intensity(braking | left | right) == THIRD_STOP_LAMP
+    assert rear_intensity(braking | left | right | dark_on(int(Lamp.STOP), Side.MIDDLE)) == 8.0
+    tails = [dark_on(int(Lamp.POSITION), side) for side in (Side.LEFT, Side.RIGHT)]
+    assert [rear_intensity(LIT | tails[0]), rear_intensity(LIT | sum(tails))] == [8.0, 0.0]
+
+
+def test_one_dead_head_lamp_lights_half_the_road_and_is_still_seen_from_ahead() -> None:
+    dead = LIT | dark_on(int(Lamp.LOW_BEAM), Side.RIGHT)
+    assert [burning_head_lamps(lamps) for lamps in (LIT, dead, int(Lamp.POSITION))] == [1.0, 0.5, 0.0]
+    assert intensity_toward(dead, 5.0, 30.0, 0.0) == intensity_toward(LIT, 5.0, 30.0, 0.0)
+    assert intensity_toward(dead, 5.0, -2.5, 30.0) == 0.5 * LIT_ROAD_INTENSITY

@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.traffic.drivers.playing import ALL_LAMPS, BESIDE_STANDSTILL, Lamps, Motion, Playing, speed_on_the_way
+from fogsim.traffic.drivers.playing import BESIDE_STANDSTILL, Lamps, Motion, Playing, speed_on_the_way
 from fogsim.values import Lamp, TrafficState
+from fogsim.values.light import ALL_LAMPS, Side, burning, dark_on
 from fogsim.values.script import ChangeLane, ChangeSpeed, Follow, SetLamps, Shape, Stop
 
 STEP = 0.1
@@ -118,6 +119,25 @@ def test_lamps_are_lit_dark_failed_and_the_vehicles_own_again() -> None:
     lamps.switch(SetLamps("a", failed=ALL_LAMPS))
     assert shown() == Lamp.NONE
     assert lamps.dark == {"a"}
+
+
+def test_single_lamps_fail_side_by_side() -> None:
+    lamps, own = Lamps(), Lamp.POSITION | Lamp.LOW_BEAM | Lamp.STOP
+
+    def shown(lit: Lamp = own) -> int:
+        return int(lamps.shown(state_of(lit), 0.0).lamps[0])
+
+    lamps.switch(SetLamps("a", failed=Lamp.POSITION, side=Side.LEFT))
+    assert shown() == int(own) | dark_on(int(Lamp.POSITION), Side.LEFT)
+    assert [burning(shown(), side) for side in Side] == [int(own ^ Lamp.POSITION), int(own), int(Lamp.STOP)]
+    lamps.switch(SetLamps("a", lit=Lamp.REAR_FOG, side=Side.RIGHT))
+    assert shown() & int(Lamp.REAR_FOG)
+    assert not burning(shown(), Side.LEFT) & Lamp.REAR_FOG
+    lamps.switch(SetLamps("a", failed=Lamp.POSITION, side=Side.RIGHT))
+    assert not shown() & int(Lamp.POSITION)  # with both, the kind is dark as if it had failed as a whole
+    assert shown(Lamp.STOP) & int(Lamp.STOP)
+    lamps.switch(SetLamps("a", failed=ALL_LAMPS))
+    assert shown() == 0
 
 
 def test_who_indicates_before_a_change_of_lane_does_until_it_is_over() -> None:

@@ -14,10 +14,10 @@ import pytest
 from fogsim.atmosphere import FieldAccess, airlight_from_illuminance
 from fogsim.errors import InputError
 from fogsim.traffic import AfterCollision, BrakeEvent, DriverSight, Event, LampFailureEvent, LaneChangeEvent, Trigger
-from fogsim.traffic.drivers.playing import ALL_LAMPS
 from fogsim.traffic.highway import HighwayTraffic
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Command, FogField, TrafficSnapshot
+from fogsim.values.light import ALL_LAMPS
 from fogsim.values.script import ChangeLane, ChangeSpeed, SetLamps, SetSignal
 
 ONE_LANE = {"vehicles_count": 1, "lanes_count": 1}

@@ -24,12 +24,14 @@ from fogsim.traffic.sumo_drivers.oncoming_glare import (
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps, SeenVehicles
 from fogsim.units import extinction_from_visibility
 from fogsim.values import FogField, Lamp
+from fogsim.values.light import ALL_LAMPS, Side, dark_on
 
 NET = Path(__file__).resolve().parents[2] / "data" / "grid" / "grid.net.xml"
 ROUTES = """<routes><vType id="c" length="5" width="1.8"/><route id="r" edges="B0C0"/><route id="s" edges="C0B0"/>
   <vehicle id="leader" type="c" route="r" depart="0" departPos="65" departLane="0" color="0,0,0"/>
   <vehicle id="me" type="c" route="r" depart="0" departPos="10" departLane="0"/>
   <vehicle id="coming" type="c" route="s" depart="0" departPos="40" departLane="0"/></routes>"""
+ALL_DARK = sum(dark_on(int(ALL_LAMPS), side) for side in Side)
 HIGH_BEAM: OwnLamps = {"coming": int(Lamp.LOW_BEAM | Lamp.HIGH_BEAM)}
 
 
@@ -72,18 +74,20 @@ def test_the_veil_is_that_of_the_lamps_that_come(api: Any) -> None:
 
 
 def test_only_lit_head_lamps_that_face_the_driver_dazzle(api: Any) -> None:
-    assert veil(api, "me", "leader", 300.0, {"coming": None}) == 0.0
-    assert veil(api, "coming", "me", 300.0, {"me": 0, "leader": None}) == 0.0
+    assert veil(api, "me", "leader", 300.0, {"coming": ALL_DARK}) == 0.0
+    assert veil(api, "coming", "me", 300.0, {"me": 0, "leader": ALL_DARK}) == 0.0
     assert veil(api, "me", "leader", 300.0, HIGH_BEAM) > 5.0 * veil(api, "me", "leader", 300.0, {})
     assert veil(api, "me", "leader", 1e6, HIGH_BEAM) <= MOST_GLARE
+    one_dead = {"coming": int(Lamp.LOW_BEAM) | dark_on(int(Lamp.LOW_BEAM), Side.LEFT)}
+    assert veil(api, "me", "leader", 300.0, one_dead) == pytest.approx(0.5 * veil(api, "me", "leader", 300.0, {}))
 
 
 def test_a_dazzled_driver_sees_an_unlit_leader_later(api: Any) -> None:
     """The same leader, 50 m ahead in thin fog: by head lamps alone it is seen, against high beams it is not."""
     pairs = [("me", "leader", 50.0 - api.vehicle.getMinGap("me"))]
     sight = LeaderSight(api, even(1e5), DriverSight(0.01), api.vehicle.getSpeed)
-    dark: OwnLamps = {"leader": None}
-    assert sight.assess(pairs, {**dark, "coming": None}, 0.5) == [(True, 0.0)]
+    dark: OwnLamps = {"leader": ALL_DARK}
+    assert sight.assess(pairs, {**dark, "coming": ALL_DARK}, 0.5) == [(True, 0.0)]
     assert sight.assess(pairs, {**dark, **HIGH_BEAM}, 0.5)[0][0] is False
 
 

@@ -12,9 +12,10 @@ from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
 from fogsim.traffic.sumo_drivers.vehicle_sight import NEAREST, VehicleSight
 from fogsim.units import extinction_from_visibility
 from fogsim.values import FogBank, FogField, Lamp
+from fogsim.values.light import ALL_LAMPS, Side, dark_on
 
 DAY, NIGHT = DriverSight(10_000.0), DriverSight(0.01)
-DARK: OwnLamps = {"other": None}
+DARK: OwnLamps = {"other": sum(dark_on(int(ALL_LAMPS), side) for side in Side)}
 LENGTH, WIDTH = 5.0, 2.0
 EAST = 90.0
 PAIR = [("me", "other")]

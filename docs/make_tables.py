@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import astuple, fields
 from pathlib import Path
-from typing import Any, get_args, get_origin
+from typing import Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -50,7 +50,9 @@ def scenario_keys(model: type[BaseModel] = Scenario, prefix: str = "") -> list[t
         if model is TimelineEntry:
             # What is wrong with sensors is told where it stands for the whole run.
             inner = [one for one in inner if not issubclass(one, FaultSection)]
-        if not inner:
+        if not inner or _has_words(field.annotation):
+            # Where a word may stand, a block beside it is told in the same row.
+            inner = []
             key = field.alias or name
             allowed = _allowed(schema["properties"][key], schema.get("$defs", {}))
             told = " ".join((field.description or "").split())
@@ -96,6 +98,9 @@ def _allowed_of_type(schema: dict[str, Any], definitions: dict[str, Any]) -> str
         schema = shares
     if isinstance(shares, dict) and "enum" in shares:
         return f"by name, each {_allowed(shares, definitions)}"
+    keys = schema.get("properties", {})
+    if keys and "method" not in keys:
+        return f"block of {', '.join(f'`{key}`' for key in keys)}"
     if "minimum" not in schema:
         words = {"boolean": "true, false", "string": schema.get("format", "text")}
         return words.get(schema["type"], "by name, each a truth value, number or text" if shares else "method")
@@ -107,6 +112,10 @@ def _models_in(annotation: Any) -> list[type[BaseModel]]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     return [model for part in get_args(annotation) for model in _models_in(part)]
+
+
+def _has_words(annotation: Any) -> bool:
+    return get_origin(annotation) is Literal or any(_has_words(part) for part in get_args(annotation))
 
 
 def columns() -> list[tuple[str, ...]]:

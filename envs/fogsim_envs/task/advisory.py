@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.loop import AdvisedDriving, spread_advice
-from fogsim.metrics import step_metrics
-from fogsim.recorders import FramePanel
 from fogsim.scenario import Scenario, build
 from fogsim.values import Command, Ending, Step
 from fogsim_envs.actions import checked_action
 from fogsim_envs.hosting import TIMEOUT, Simulation, begin, begin_anew, checked_timeout
+from fogsim_envs.rendering import RENDER_MODES, StepRenderer, render_modes
 from fogsim_envs.spaces import action_space, command_of
 from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
 from fogsim_envs.task.observation import task_observation, task_space
@@ -83,7 +82,8 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
     image_size : (width, height) of the camera; None keeps the scenario's
     continuous : which action space
     reward_weights : `TaskWeights`
-    render_mode : None or "rgb_array" (the camera frame beside a panel with estimate, truth, advice, speed and lamps)
+    render_mode : None, "rgb_array" (the camera frame beside a panel with estimate, truth, advice, speed and lamps), or
+    "human" (that in a window, each step as long as it takes)
     timeout : how long a child process that runs the simulation may give no sign of life [s]; ``inf`` for ever
 
     ### Version history
@@ -91,7 +91,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
       speed limit, way and time left, lanes and the belief's quantiles; a hit from behind is not the agent's
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 2}  # noqa: RUF012 - Gymnasium's own way
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 2}  # noqa: RUF012 - Gymnasium's own way
 
     def __init__(
         self,
@@ -116,7 +116,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         self._source = EpisodeSource(scenario, scenario_distribution, fog_distribution, (*size, *overrides), split)
         self._mode, self._continuous = observation, continuous
         self._weights = reward_weights or TaskWeights()
-        self._panel = FramePanel()
+        self._renderer = StepRenderer(render_mode, type(self).__name__)
         self.render_mode = render_mode
         self._simulation: Simulation | None = None
         self._running: Scenario | None = None
@@ -126,7 +126,8 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         self._camera = build.camera(first)
         self.observation_space = task_space(observation, self._camera)
         self.action_space = self._make_action_space(continuous)
-        self.metadata = {**self.metadata, "render_fps": 1 / first.clocks.decision_period_s}
+        modes = [mode for mode in self.metadata["render_modes"] if mode in render_modes()]
+        self.metadata = {"render_modes": modes, "render_fps": 1 / first.clocks.decision_period_s}
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begin an episode.
@@ -158,7 +159,8 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         length = max(self._way_end - self._step.route_position, 1.0)
         self._way = Way(length, max(self._step.speed_limit, 1.0), scenario.duration_s)
         self._own = self._built_in = Command()
-        self._panel = FramePanel()
+        self._renderer.begin_episode()
+        self._show()
         return self._observe(), {**self._info(), "episode": self._episode.as_info()}
 
     def _check(self, scenario: Scenario) -> None:
@@ -207,6 +209,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         self._own = self._commanded(checked_action(action, self.action_space, name))
         before = self._step
         self._step = self._drive(before)
+        self._show()
         terms = task_terms(before, self._step, self._way, self._weights, self._standard)
         truncated = self._step.ending is Ending.TIME
         terminated = self._step.ending is not None and not truncated
@@ -276,14 +279,15 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         }
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Draw the latest camera frame and its panel."""
-        if self.render_mode is None:
-            gymnasium.logger.warn("render() was called, but no render_mode was given to gymnasium.make()")
-            return None
-        return self._panel.draw(self._current, step_metrics(self._current, self._standard))
+        """Draw the latest camera frame and its panel; with a window, each step is drawn as it is made."""
+        return self._renderer.render(self._current, self._standard)
+
+    def _show(self) -> None:
+        self._renderer.show(self._current, self._standard, self.metadata["render_fps"])
 
     def close(self) -> None:
-        """End the simulation; closing twice is allowed."""
+        """End the simulation and close the window; closing twice is allowed."""
+        self._renderer.close()
         if self._simulation is not None:
             self._simulation.close()
         self._simulation, self._step, self._running = None, None, None

@@ -26,13 +26,11 @@ def __getattr__(name: str) -> Any:
 gymnasium.register(
     id="fogsim/FogAdvisory-v0",
     entry_point="fogsim_envs.advisory:FogAdvisoryEnv",
-    vector_entry_point="fogsim_envs.vector:make_vector",
 )
 
 gymnasium.register(
     id="fogsim/FogHighway-v0",
     entry_point="fogsim_envs.highway:FogHighwayEnv",
-    vector_entry_point="fogsim_envs.vector:make_highway_vector",
 )
 
 gymnasium.register(

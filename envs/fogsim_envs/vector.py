@@ -1,7 +1,12 @@
-"""Many environments at once, each in a process of its own."""
+"""Many environments at once, each in a process of its own, whose loss is told.
+
+`gymnasium.make_vec` runs all of them one after another (``vectorization_mode="sync"``) or in processes (``"async"``);
+there a process that is killed shows as a bare ``BrokenPipeError``, and one that stands still is waited for for ever.
+"""
 
 import contextlib
 import functools
+import importlib
 import multiprocessing
 import sys
 import time
@@ -21,42 +26,55 @@ TIMEOUT = 600.0
 _CLOSE_TIMEOUT = 10.0
 
 
-def make_vector(num_envs: int = 1, timeout: float = TIMEOUT, **kwargs: Any) -> AsyncVectorEnv:
-    """Make a vector environment for `gymnasium.make_vec`, which by itself would put all of them into one process.
+def make_vector(
+    id: str = "fogsim/FogAdvisory-v0",  # noqa: A002 - as of `gymnasium.make_vec`
+    num_envs: int = 1,
+    timeout: float = TIMEOUT,
+    *,
+    wrappers: Sequence[Callable[[gymnasium.Env[Any, Any]], gymnasium.Env[Any, Any]]] = (),
+    context: str | None = None,
+    **kwargs: Any,
+) -> AsyncVectorEnv:
+    """Make a vector environment that tells of lost processes, unlike `gymnasium.make_vec` in its mode ``async``.
 
     Parameters
     ----------
+    id : str
+        Of the environment.
     num_envs : int
         How many.
     timeout : float
         How long one step or reset of all may take [s], more than 0; ``inf`` for ever. Then all are ended with a
         `SimulationError`.
+    wrappers : sequence of callable
+        Put about each environment, the first innermost.
+    context : str or None
+        How workers are started: "fork", "spawn" or "forkserver"; None for Python's own way, or a clean server process
+        where this process has drawn pictures.
     **kwargs
         Arguments of each environment.
+
+    Raises
+    ------
+    InputError
+        If the time is none.
     """
-    return _workers("fogsim_envs:fogsim/FogAdvisory-v0", num_envs, timeout, kwargs)
+    limit, make = checked_timeout(timeout), functools.partial(_wrapped, id, tuple(wrappers), kwargs)
+    # A GL context does not survive a fork.
+    context = context or ("forkserver" if "OpenGL" in sys.modules else None)
+    return _Workers([make] * num_envs, limit, context)
 
 
-def make_highway_vector(num_envs: int = 1, timeout: float = TIMEOUT, **kwargs: Any) -> AsyncVectorEnv:
-    """Make a vector environment of ``fogsim/FogHighway-v0``, as `make_vector` does of the other.
-
-    Parameters
-    ----------
-    num_envs : int
-        How many.
-    timeout : float
-        As of `make_vector` [s].
-    **kwargs : object
-        Arguments of each environment.
-    """
-    return _workers("fogsim_envs:fogsim/FogHighway-v0", num_envs, timeout, kwargs)
-
-
-def _workers(environment: str, num_envs: int, timeout: float, arguments: Mapping[str, Any]) -> AsyncVectorEnv:
-    make = functools.partial(gymnasium.make, environment, **arguments)
-    # A GL context does not survive a fork: where one may exist, workers start from a clean server process.
-    context = "forkserver" if "OpenGL" in sys.modules else None
-    return _Workers([make] * num_envs, checked_timeout(timeout), context)
+def _wrapped(
+    environment: str,
+    wrappers: Sequence[Callable[[gymnasium.Env[Any, Any]], gymnasium.Env[Any, Any]]],
+    arguments: Mapping[str, Any],
+) -> gymnasium.Env[Any, Any]:
+    importlib.import_module("fogsim_envs")
+    made: gymnasium.Env[Any, Any] = gymnasium.make(environment, **arguments)
+    for wrapper in wrappers:
+        made = wrapper(made)
+    return made
 
 
 class _Workers(AsyncVectorEnv):

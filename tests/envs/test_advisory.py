@@ -13,6 +13,7 @@ import pygame
 import pytest
 from early_motorway import EARLY
 from gymnasium.utils.env_checker import check_env
+from gymnasium.wrappers import RecordEpisodeStatistics
 
 import fogsim
 import fogsim_envs  # noqa: F401 - registers the environments
@@ -223,7 +224,14 @@ def test_a_loaded_scenario_serves_as_well() -> None:
 
 
 def test_vector_environments_run_in_processes_of_their_own() -> None:
-    envs = gymnasium.make_vec(ID, num_envs=2, **MOTORWAY)
+    envs = gymnasium.make_vec(
+        ID,
+        num_envs=2,
+        vectorization_mode="async",
+        vector_kwargs={"shared_memory": False},
+        wrappers=[RecordEpisodeStatistics],
+        **MOTORWAY,
+    )
     try:
         observation, _ = envs.reset(seed=[3, 3])
         assert observation["camera"].shape == (2, 48, 64, 3)

@@ -1,8 +1,9 @@
 """highway-env's environments in fog as Gymnasium and its users see them."""
 
+import functools
 import math
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import gymnasium
@@ -10,10 +11,12 @@ import highway_env  # noqa: F401 - registers its environments
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from gymnasium.wrappers import TimeLimit
 
 import fogsim_envs  # noqa: F401 - registers the environments
 from fogsim.errors import InputError
 from fogsim_envs.camera_wrapper import FogCameraWrapper
+from fogsim_envs.vector import make_vector
 
 ID = "fogsim/FogHighway-v0"
 FEW = {"vehicles_count": 8}
@@ -145,11 +148,16 @@ def test_the_scenarios_events_happen_here_too() -> None:
     assert reset_with(steps=20, **one_lane)[1].speed > 15.0
 
 
-def test_vector_environments() -> None:
-    envs = gymnasium.make_vec(ID, num_envs=2, **SMALL)
+@pytest.mark.parametrize("make", [gymnasium.make_vec, make_vector])
+def test_vector_environments(make: Callable[..., Any]) -> None:
+    """Gymnasium's, one after another in this process, and ours in processes of their own do the same."""
+    one_step = functools.partial(TimeLimit, max_episode_steps=1)
+    envs = make(ID, num_envs=2, wrappers=[one_step], **SMALL)
     try:
         observation, _ = envs.reset(seed=[3, 3])
         assert np.array_equal(observation["camera"][0], observation["camera"][1])
+        assert observation["state"][0, 0] > 0.0
+        assert envs.step(np.array([[2, 0], [12, 0]]))[3].tolist() == [True, True]
     finally:
         envs.close()
 

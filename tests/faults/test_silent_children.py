@@ -17,6 +17,7 @@ from fogsim.scenario import scenario_from_config
 from fogsim.values import Command
 from fogsim_envs import host
 from fogsim_envs.hosting import HostedLoop
+from fogsim_envs.vector import make_vector
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no signal there stops a process and lets it go on")
 
@@ -93,8 +94,8 @@ def test_a_child_that_works_gives_signs_of_life(monkeypatch: pytest.MonkeyPatch)
 
 @pytest.mark.parametrize(("fault", "message"), [("SIGSTOP", "have not answered for 3 s"), ("SIGKILL", "has ended")])
 def test_a_worker_of_a_vector_environment_that_is_lost_is_told(fault: str, message: str) -> None:
-    envs: Any = gymnasium.make_vec(ID, num_envs=1, **SMALL)
-    worker = envs.processes[0]
+    envs: Any = make_vector(ID, num_envs=2, **SMALL)
+    worker, other = envs.processes
     envs._timeout = 3.0
     os.kill(worker.pid, getattr(signal, fault))
     if fault == "SIGKILL":
@@ -102,8 +103,9 @@ def test_a_worker_of_a_vector_environment_that_is_lost_is_told(fault: str, messa
     with pytest.raises(SimulationError, match=message):
         envs.reset(seed=1)
     assert not worker.is_alive()
+    assert not other.is_alive()
     with pytest.raises(gymnasium.error.ClosedEnvironmentError):
-        envs.step(np.array([[0, 0]]))
+        envs.step(np.array([[0, 0], [0, 0]]))
     envs.close()
 
 
@@ -112,4 +114,4 @@ def test_a_limit_that_is_no_time_is_refused(timeout: float) -> None:
     with pytest.raises(InputError, match="timeout: expected a time of more than 0 s"):
         gymnasium.make(ID, timeout=timeout, **SMALL)
     with pytest.raises(InputError, match="timeout: expected a time of more than 0 s"):
-        gymnasium.make_vec(ID, num_envs=1, timeout=timeout, **SMALL)
+        make_vector(ID, timeout=timeout, **SMALL)

@@ -76,7 +76,7 @@ class LibsumoLink:
         if sumo.isLoaded() and self._sumo is None:
             raise SimulationRunningError(
                 "another SUMO simulation runs in this process, and libsumo can hold only one: close the other one "
-                "first, or run this one in its own process (gymnasium.make_vec and AsyncVectorEnv do that for "
+                "first, or run this one in its own process (gymnasium's AsyncVectorEnv does that for "
                 "environments)"
             )
         if self._outputs is not None:

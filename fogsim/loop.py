@@ -347,7 +347,7 @@ class ClosedLoop:
         """Have drivers in the fog from the beginning, where the ego's way, along which it lies, is known already."""
         planned = self._traffic.planned_network()
         if planned is not None:
-            fog = build.fog_field(self._scenario, planned[0].route)
+            fog = build.fog_field(self._scenario, planned[0].route, planned[0].structures)
             if not self._drivers_fog.is_about(fog):
                 self._drivers_fog.enter(fog, self._traffic)
 

@@ -7,11 +7,12 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere import Air
+from fogsim.atmosphere import Air, TunnelLight
 from fogsim.camera import averaged, middle_samples, supersampled
 from fogsim.ego.near_scene import FEW_LANES, NearScene
 from fogsim.errors import InputError
 from fogsim.lighting import LampMount, own_head_lamps
+from fogsim.obstruction import tunnels_of
 from fogsim.render import LIMITED, Renderer, RenderError, make_renderer
 from fogsim.scenario import Scenario, build
 from fogsim.scene import (
@@ -125,7 +126,7 @@ class NoView:
 
     def __init__(self, scenario: Scenario, network: RoadNetwork, signs: SignMap, body: str = build.CAR) -> None:
         self.signs = signs
-        self.fog: FogField = build.fog_field(scenario, network.route)
+        self.fog: FogField = build.fog_field(scenario, network.route, network.structures)
         camera = build.camera(scenario, body)
         size = (camera.height, camera.width)
         empty = np.full(size, np.inf, np.float32), np.zeros(size, np.int32)
@@ -189,15 +190,17 @@ class ViewRenderer:
 
     def __init__(self, scenario: Scenario, network: RoadNetwork, signs: SignMap, body: str = build.CAR) -> None:
         self.signs = signs
-        self.fog: FogField = build.fog_field(scenario, network.route)
+        self.fog: FogField = build.fog_field(scenario, network.route, network.structures)
         self._camera, self._samples = build.camera(scenario, body), scenario.camera.samples
         self._drawn_camera = supersampled(self._camera, self._samples)
         self._setback = build.camera_mount(scenario, body).setback
         self._scenario, self._network = scenario, network
         self._by_lamplight = scenario.light.illuminance_lx < DAY_ILLUMINANCE
         self._mount = LampMount()
-        self._air = Air(self.fog, scenario.fog.droplets)
+        self._tunnels = tunnels_of(network.structures)
+        self._air = Air(self.fog, scenario.fog.droplets, self._tunnels)
         self._renderer: Renderer | None = None
+        self._unlit_renderer: Renderer | None = None
         self._is_closed = False
         self._plan_scene_along(network.route)
         if self._by_lamplight:
@@ -217,6 +220,9 @@ class ViewRenderer:
         if len(self._street_lamps) and self._by_lamplight:
             self._sky = max(self._sky, DARKEST_SKY)
             self._streets = street_lighting(self._street_lamps, self._sky)
+        if self._tunnels:
+            self._sky = max(self._sky, DARKEST_SKY)
+        self._tunnel_light = TunnelLight(self._tunnels, self._sky)
         self._free_renderer()
         if self._near_scene.is_whole:
             self._make_renderer()
@@ -227,9 +233,10 @@ class ViewRenderer:
         return self._renderer
 
     def _free_renderer(self) -> None:
-        if self._renderer is not None:
-            self._renderer.close()
-        self._renderer = None
+        for renderer in (self._renderer, self._unlit_renderer):
+            if renderer is not None:
+                renderer.close()
+        self._renderer = self._unlit_renderer = None
 
     def enter_fog(self, fog: FogField) -> None:
         """Look through another fog from now on.
@@ -271,7 +278,11 @@ class ViewRenderer:
         lights = self._lights(state, ego, pose)
         near, viewpoint = self._from_origin(state, pose)
         renderer = self._renderer_for(viewpoint)
-        view = renderer.render(traffic_batches(near, ego), drawn, viewpoint, lamplight=bool(lights.own))
+        vehicles = traffic_batches(near, ego)
+        view = renderer.render(vehicles, drawn, viewpoint, lamplight=bool(lights.own))
+        if self._tunnel_light.is_seen_by(pose):
+            own = self._unlit().render(vehicles, drawn, viewpoint).radiance
+            view = self._tunnel_light.on(view, own, drawn, pose)
         radiance = self._air.radiance(view, drawn, pose, lights, time)
         return middle_samples(view, self._samples), averaged(radiance, self._samples)
 
@@ -304,6 +315,12 @@ class ViewRenderer:
         """The renderer of a scene that has what is seen from a viewpoint."""
         has_grown = self._near_scene.reach(self._drawn_camera, viewpoint)
         return self._make_renderer() if has_grown or self._renderer is None else self._renderer
+
+    def _unlit(self) -> Renderer:
+        """A renderer of the same scene without the sky's light, which shows what shines by itself."""
+        if self._unlit_renderer is None:
+            self._unlit_renderer = make_renderer(self._scenario.renderer, self._near_scene.scene, DARKEST_SKY)
+        return self._unlit_renderer
 
     def _from_origin(self, state: TrafficState, pose: CameraPose) -> tuple[TrafficState, CameraPose]:
         """The traffic and the camera in the coordinates of the scene."""

@@ -82,16 +82,26 @@ def obstructions_of(structures: Iterable[Structure]) -> Obstructions:
     structures : iterable of Structure
         What stands beside the roads and over them.
     """
-    boxes = [box for one in structures for box in _boxes(one)]
+    boxes = [box for one in structures for box in box_rows(one.line, 0.5 * one.width, (one.bottom, one.top))]
     return Obstructions(np.array(boxes)) if boxes else CLEAR_SIGHT
 
 
-def _boxes(one: Structure) -> list[list[float]]:
-    """A box for each piece of a structure's line, which has no hole where two pieces meet."""
-    found, steps = list[list[float]](), np.diff(one.line, axis=0).tolist()
-    for (x, y, z), (step_x, step_y, rise) in zip(one.line[:-1].tolist(), steps, strict=True):
+def box_rows(line: NDArray[np.float64], half_width: float, heights: tuple[float, float]) -> list[tuple[float, ...]]:
+    """A box for each piece of a line; where two pieces meet, nobody looks between.
+
+    Parameters
+    ----------
+    line : (n, 3) float64
+        The middle [m].
+    half_width : float
+        To either side of it [m].
+    heights : tuple of float
+        Above it, between which the boxes are [m].
+    """
+    found, steps = list[tuple[float, ...]](), np.diff(line, axis=0).tolist()
+    for start, (step_x, step_y, rise) in zip(line[:-1].tolist(), steps, strict=True):
         length = float(np.hypot(step_x, step_y))
         if length > _SHORTEST:
-            direction = [step_x / length, step_y / length, rise / length]
-            found.append([x, y, z, *direction, length, 0.5 * one.width, one.bottom, one.top])
+            direction = (step_x / length, step_y / length, rise / length)
+            found.append((*start, *direction, length, half_width, *heights))
     return found

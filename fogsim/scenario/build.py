@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +25,7 @@ from fogsim.estimators import ESTIMATORS, Estimator
 from fogsim.fusion import FUSIONS, Fusion
 from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy
 from fogsim.metrics import SafetyStandard
+from fogsim.obstruction import tunnels_of
 from fogsim.scenario.drivers import driver_setup, driver_sight
 from fogsim.scenario.fog import fog_along
 from fogsim.scenario.roads.files import actors_of, traffic_files
@@ -43,7 +44,7 @@ from fogsim.traffic import (
 )
 from fogsim.traffic.sumo.options import OptionValue
 from fogsim.units import KMH_PER_MPS, clock_time
-from fogsim.values import Camera, FogField
+from fogsim.values import Camera, FogField, Structure
 
 AIRLIGHT_EXPOSURE = 0.6
 """Share of saturation at which the fixed exposure puts the airlight: bright fog, yet room for lamps above it."""
@@ -333,7 +334,7 @@ def gps(scenario: Scenario) -> Gps:
     return Gps(section.position_deviation_m, math.radians(section.heading_deviation_deg))
 
 
-def fog_field(scenario: Scenario, route: NDArray[np.float64]) -> FogField:
+def fog_field(scenario: Scenario, route: NDArray[np.float64], structures: Sequence[Structure] = ()) -> FogField:
     """Fog of a scenario, laid along the ego's route.
 
     Parameters
@@ -342,8 +343,11 @@ def fog_field(scenario: Scenario, route: NDArray[np.float64]) -> FogField:
         The scenario.
     route : (n, 3) float64
         Polyline along the route [m].
+    structures : sequence of Structure
+        What stands beside the roads and over them; tunnels keep fog out.
     """
-    fog = fog_along(scenario.fog, airlight_from_illuminance(scenario.light.illuminance_lx), route)
+    airlight = airlight_from_illuminance(scenario.light.illuminance_lx)
+    fog = fog_along(scenario.fog, airlight, route, tunnels_of(structures))
     return scripted_fog(scenario.timeline, fog)
 
 

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from collections.abc import Sequence
 from typing import Annotated, Self
 
 import numpy as np
@@ -9,9 +10,26 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from fogsim.atmosphere import Droplets
-from fogsim.scenario.section import Distance, Length, Moment, Number, Place, Section, Seed, SpeedKmh, Top, Visibility
+from fogsim.obstruction import Tunnel
+from fogsim.scenario.section import (
+    Distance,
+    Length,
+    Moment,
+    Number,
+    Place,
+    Reach,
+    Section,
+    Seed,
+    SpeedKmh,
+    Top,
+    Visibility,
+)
 from fogsim.units import KMH_PER_MPS, extinction_from_visibility
-from fogsim.values import FogBank, FogChange, FogField, FogPatches
+from fogsim.values import FogBank, FogChange, FogField, FogPatches, FogShelter
+
+_BESIDE_TUNNEL = 30.0
+"""How far beside a tunnel's walls there is no fog either [m]: nobody sees it, but rays to the walls are compared with
+neighbours that would pass through them."""
 
 
 class Bank(Section):
@@ -130,6 +148,9 @@ class Fog(Section):
     forward_scatter_deg: Annotated[Number, Field(ge=0.01, le=10)] = 1.0
     """Width of that blur (standard deviation)."""
 
+    in_tunnels_m: Reach = 10.0
+    """How far fog reaches into tunnels, where it thins to nothing; `inf` fills them."""
+
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
         homogeneous = self.visibility_m is not None
@@ -177,7 +198,9 @@ class Fog(Section):
         )
 
 
-def fog_along(fog: Fog, airlight: tuple[float, float, float], route: NDArray[np.float64]) -> FogField:
+def fog_along(
+    fog: Fog, airlight: tuple[float, float, float], route: NDArray[np.float64], tunnels: Sequence[Tunnel] = ()
+) -> FogField:
     """Fog laid along a route.
 
     Parameters
@@ -188,6 +211,8 @@ def fog_along(fog: Fog, airlight: tuple[float, float, float], route: NDArray[np.
         Airlight near the ground per channel [cd/m²].
     route : (n, 3) float64
         Polyline along the route [m].
+    tunnels : sequence of Tunnel
+        Tunnels that keep it out.
     """
     visibility = fog.visibility_m if fog.visibility_m is not None else fog.outside_visibility_m
     outside = extinction_from_visibility(math.inf if visibility is None else visibility)
@@ -208,7 +233,17 @@ def fog_along(fog: Fog, airlight: tuple[float, float, float], route: NDArray[np.
         airlight_shading=fog.airlight_shading,
         forward_scatter=fog.forward_scatter,
         forward_scatter_width=math.radians(fog.forward_scatter_deg),
+        shelters=tuple(_shelter(tunnel, fog.in_tunnels_m) for tunnel in tunnels if math.isfinite(fog.in_tunnels_m)),
     )
+
+
+def _shelter(tunnel: Tunnel, reach: float) -> FogShelter:
+    """A shelter along the straight line between a tunnel's portals, so wide that one looks at no fog past its walls."""
+    (x, y), (end_x, end_y) = tunnel.line[0, :2].tolist(), tunnel.line[-1, :2].tolist()
+    length = math.hypot(end_x - x, end_y - y)
+    axis = ((end_x - x) / length, (end_y - y) / length)
+    aside = np.abs((tunnel.line[:, 1] - y) * axis[0] - (tunnel.line[:, 0] - x) * axis[1]).max()
+    return FogShelter((x, y), axis, length, reach, float(aside) + tunnel.half_width + _BESIDE_TUNNEL)
 
 
 def _changes(fog: Fog, ground: float) -> tuple[FogChange, ...]:

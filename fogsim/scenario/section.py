@@ -98,6 +98,9 @@ def _endless(least: float) -> object:
     return Field(strict=True, ge=least, json_schema_extra={"maximum": FARTHEST, "or": "inf"})
 
 
+Reach = Annotated[float, _endless(0.0), BeforeValidator(_infinity), AfterValidator(_far_or_endless)]
+"""Length that may be infinite [m]."""
+
 Visibility = Annotated[float, _endless(1.0), BeforeValidator(_infinity), AfterValidator(_far_or_endless)]
 """A meteorological visibility [m]; inf is clear air."""
 

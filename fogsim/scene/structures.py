@@ -17,8 +17,7 @@ _MATERIALS = {
     StructureKind.HEDGE: Material((0.035, 0.065, 0.02)),
     StructureKind.BUILDING: Material((0.46, 0.43, 0.37)),
     StructureKind.TRUCK: Material((0.30, 0.33, 0.37)),
-    # No light of the sky gets into a tunnel, and its walls are lit as by the sky: sooty concrete stands for that.
-    StructureKind.TUNNEL: Material((0.035, 0.034, 0.032)),
+    StructureKind.TUNNEL: Material((0.30, 0.29, 0.27)),
 }
 _UP = np.array([0.0, 0.0, 1.0])
 

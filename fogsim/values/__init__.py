@@ -5,7 +5,7 @@ from fogsim.values.camera import Camera, CameraPose, Response
 from fogsim.values.command import Command, Display, EgoControl, SpeedAdvice, Stretch, StretchAdvice
 from fogsim.values.estimate import Estimate, FogCategory, fog_category
 from fogsim.values.fault import Fault, RunningFault
-from fogsim.values.fog import FogBank, FogChange, FogField, FogPatches
+from fogsim.values.fog import FogBank, FogChange, FogField, FogPatches, FogShelter
 from fogsim.values.image import Frame, View
 from fogsim.values.light import Beam, HeadLamp, Lamp, Lights, LightSources, SignalLight, StreetLighting
 from fogsim.values.observation import LeadMeasurement, Observation, SignSighting
@@ -58,6 +58,7 @@ __all__ = [
     "FogChange",
     "FogField",
     "FogPatches",
+    "FogShelter",
     "Frame",
     "HeadLamp",
     "Lamp",

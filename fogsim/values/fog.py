@@ -49,6 +49,31 @@ class FogBank:
 
 
 @dataclass(frozen=True, slots=True)
+class FogShelter:
+    """A place into which fog does not get: a tunnel, and what is beside and over it.
+
+    Attributes
+    ----------
+    origin : tuple of float
+        (x, y) of the middle of the portal from which `length` is measured [m].
+    axis : tuple of float
+        Unit vector (x, y) to the middle of the other portal.
+    length : float
+        Distance of the portals [m].
+    reach : float
+        How far from the portals fog reaches in [m]: over this distance it thins to nothing.
+    half_width : float
+        To the sides, there is no fog within this distance of the axis [m].
+    """
+
+    origin: tuple[float, float]
+    axis: tuple[float, float]
+    length: float
+    reach: float
+    half_width: float
+
+
+@dataclass(frozen=True, slots=True)
 class FogPatches:
     """Random thick and thin places: the extinction times a log-normal factor of mean 1.
 
@@ -115,8 +140,8 @@ class FogField:
     """Extinction coefficient and airlight in space and time.
 
     The extinction coefficient is k = (`extinction` + what the banks add) · h(z) · (factor of the patches) · (density
-    of the time), where h is 1 between `base` and `top`, falls to 0 beyond them over smooth edges, and falls by e over
-    each `scale_height` above `ground`. Banks and patches drift with the wind.
+    of the time) · (1 − share of a shelter), where h is 1 between `base` and `top`, falls to 0 beyond them over smooth
+    edges, and falls by e over each `scale_height` above `ground`. Banks and patches drift with the wind.
 
     Attributes
     ----------
@@ -144,6 +169,8 @@ class FogField:
         Velocity (x, y) with which banks and patches drift [m/s].
     changes : tuple of FogChange
         The fog over time, in order of time; empty for fog that does not change.
+    shelters : tuple of FogShelter
+        Places without fog; they stay where they are.
     reachable_densities : tuple of float
         Factors of the extinction coefficient that a script may bring beside those of `changes` [-].
     airlight_shading : float
@@ -170,6 +197,7 @@ class FogField:
     airlight_shading: float = 0.0
     forward_scatter: float = 0.0
     forward_scatter_width: float = math.radians(1.0)
+    shelters: tuple[FogShelter, ...] = ()
     reachable_densities: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:

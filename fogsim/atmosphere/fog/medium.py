@@ -8,10 +8,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.values import FogBank, FogChange, FogField
+from fogsim.values import FogBank, FogChange, FogField, FogShelter
 
 EXTINCTION, BASE, BASE_EDGE, TOP, TOP_EDGE, GROUND, DECAY = range(7)
 """Places of the numbers in `Medium.layer`."""
+
+_LEAST_REACH = 0.5
+"""Fog does not end at a portal more sharply than over this [m]."""
+
+_SHELTER_SIDE = 20.0
+"""Thickness of a shelter's soft edges to the sides [m]: they lie behind its walls."""
 
 _TURN = 0.5
 """Angle between the patches' grid and the world's axes [rad], so that no road meets the same patches over and over."""
@@ -38,12 +44,16 @@ class Medium(NamedTuple):
         turn, drift (x, y) [m].
     factors : (z, y, x) float32
         Factors of the patches on their periodic grid; one cell where there are none.
+    shelters : (n, 9) float64
+        Origin (x, y), axis (x, y), where fog is half gone beyond the first portal and before the last, the length of
+        these edges, where it is half back to the sides, and the length of those edges [m].
     """
 
     layer: NDArray[np.float64]
     banks: NDArray[np.float64]
     frame: NDArray[np.float64]
     factors: NDArray[np.float32]
+    shelters: NDArray[np.float64]
 
 
 def field_at(field: FogField, time: float) -> FogField:
@@ -181,7 +191,20 @@ def medium_of(field: FogField) -> Medium:
     heights = (field.base, field.base_edge, field.top, field.top_edge, field.ground)
     layer = np.array((field.extinction, *heights, 1.0 / field.scale_height))
     banks = [(*b.origin, *b.axis, b.start, b.end, b.edge, b.extra_extinction) for b in field.banks]
-    return Medium(layer, np.array(banks, dtype=np.float64).reshape(-1, 8), frame, factors)
+    shelters = [_shelter_row(shelter) for shelter in field.shelters]
+    return Medium(
+        layer,
+        np.array(banks, dtype=np.float64).reshape(-1, 8),
+        frame,
+        factors,
+        np.array(shelters, dtype=np.float64).reshape(-1, 9),
+    )
+
+
+def _shelter_row(shelter: FogShelter) -> tuple[float, ...]:
+    reach = min(max(shelter.reach, _LEAST_REACH), 0.5 * shelter.length)
+    along = (0.5 * reach, shelter.length - 0.5 * reach, reach)
+    return *shelter.origin, *shelter.axis, *along, shelter.half_width + 0.5 * _SHELTER_SIDE, _SHELTER_SIDE
 
 
 def has_closed_form(field: FogField) -> bool:
@@ -193,7 +216,8 @@ def has_closed_form(field: FogField) -> bool:
         The fog.
     """
     return (
-        (field.patches is None or field.patches.strength == 0)
+        not field.shelters
+        and (field.patches is None or field.patches.strength == 0)
         and math.isinf(field.scale_height)
         and math.isinf(field.base)
         and field.top_edge == 0

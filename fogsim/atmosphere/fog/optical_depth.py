@@ -187,14 +187,14 @@ class FieldAccess:
     def minimum_extinction(self) -> float:
         """Extinction coefficient that is reached always and everywhere below the fog's top [1/m].
 
-        0 for fog that thins with height or has lifted, since a road may lead out of it, and for a layer so shallow that
-        drivers look over it. Banks do not overlap.
+        0 for fog that thins with height or has lifted, since a road may lead out of it, where there are tunnels, and
+        for a layer so shallow that drivers look over it. Banks do not overlap.
         """
         field = self.field
         bases = (field.base, *(change.base for change in field.changes))
         lowest_top = min((field.top, *(change.top for change in field.changes))) - 0.5 * field.top_edge
         is_shallow = lowest_top < field.ground + HIGHEST_EYES
-        if math.isfinite(field.scale_height) or max(bases) > -math.inf or is_shallow:
+        if field.shelters or math.isfinite(field.scale_height) or max(bases) > -math.inf or is_shallow:
             return 0.0
         thinnest = field.extinction + min((0.0, *(bank.extra_extinction for bank in field.banks)))
         return thinnest * min(self._densities) * float(self._factors.min())

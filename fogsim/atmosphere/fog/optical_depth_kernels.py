@@ -1,9 +1,10 @@
 """Extinction at a place and optical depth along a line: the one integral that everything in the fog goes by.
 
-The extinction is a product of cubics (soft edges of banks and of the layer), an exponential (scale height) and the
-patches' factor. Between the places where a line crosses an edge the cubics are plain polynomials, of degree 6 at most
-together, which Gauss's rule with four points integrates exactly, as it does the exponential over two scale heights to
-3·10⁻⁷ and the patches over two cells of theirs to a thousandth.
+The extinction is a product of cubics (soft edges of banks, of the layer and of tunnels), an exponential (scale height)
+and the patches' factor. Between the places where a line crosses an edge the cubics are plain polynomials, of degree 6
+at most together, which Gauss's rule with four points integrates exactly, as it does the exponential over two scale
+heights to 3·10⁻⁷ and the patches over two cells of theirs to a thousandth. At portals within a bank's edge the degree
+is 9.
 """
 
 import math
@@ -108,6 +109,15 @@ def extinctions_on_ray(
     if decay > 0.0:
         for i in range(at.shape[0]):
             values[i] *= math.exp(-max(z + dz * at[i] - ground, 0.0) * decay)
+    for b in range(medium.shelters.shape[0]):
+        shelter = medium.shelters[b]
+        station = (x - shelter[0]) * shelter[2] + (y - shelter[1]) * shelter[3]
+        aside = (y - shelter[1]) * shelter[2] - (x - shelter[0]) * shelter[3]
+        rate, aside_rate = dx * shelter[2] + dy * shelter[3], dy * shelter[2] - dx * shelter[3]
+        for i in range(at.shape[0]):
+            here, beside = station + rate * at[i], abs(aside + aside_rate * at[i])
+            inside = _smoothstep(here, shelter[4], shelter[6]) - _smoothstep(here, shelter[5], shelter[6])
+            values[i] *= 1.0 - inside * (1.0 - _smoothstep(beside, shelter[7], shelter[8]))
     if factors.size > 1:
         level, upright, cosine, sine = frame[0], frame[1], frame[2], frame[3]
         across = ((x - frame[4]) * cosine + (y - frame[5]) * sine) * level
@@ -136,6 +146,28 @@ def _mark(cuts: NDArray[np.float64], count: int, here: float, rate: float, value
 
 
 @kernel
+def _portals_crossed(
+    start: NDArray[np.float64],
+    towards: NDArray[np.float64],
+    length: float,
+    shelters: NDArray[np.float64],
+    cuts: NDArray[np.float64],
+    count: int,
+) -> int:
+    """Insert the distances at which a line crosses edges of shelters; returns the new count."""
+    for shelter in shelters:
+        x, y = start[0] - shelter[0], start[1] - shelter[1]
+        along, along_rate = x * shelter[2] + y * shelter[3], towards[0] * shelter[2] + towards[1] * shelter[3]
+        across, across_rate = y * shelter[2] - x * shelter[3], towards[1] * shelter[2] - towards[0] * shelter[3]
+        for side in (-0.5, 0.5):
+            for middle in (shelter[4], shelter[5]):
+                count = _mark(cuts, count, along, along_rate, middle + side * shelter[6], length)
+            for hand in (-1.0, 1.0):
+                count = _mark(cuts, count, across, across_rate, hand * (shelter[7] + side * shelter[8]), length)
+    return count
+
+
+@kernel
 def _edges_crossed(
     start: NDArray[np.float64], towards: NDArray[np.float64], length: float, medium: Medium, cuts: NDArray[np.float64]
 ) -> int:
@@ -153,7 +185,7 @@ def _edges_crossed(
         for middle in (bank[4], bank[5]):
             for side in (-0.5, 0.5):
                 count = _mark(cuts, count, here, rate, middle + side * bank[6], length)
-    return count
+    return _portals_crossed(start, towards, length, medium.shelters, cuts, count)
 
 
 @kernel
@@ -272,7 +304,7 @@ def depths_along(
     int
         How many places have been looked at.
     """
-    cuts = np.empty(8 + 4 * medium.banks.shape[0])
+    cuts = np.empty(8 + 4 * medium.banks.shape[0] + 8 * medium.shelters.shape[0])
     total, here, next_cut = 0.0, 0.0, 0
     count = _edges_crossed(start, towards, distances[-1], medium, cuts)
     pieces, outside, banks = _pieces_per_metre(towards, medium), medium.layer[EXTINCTION], medium.banks

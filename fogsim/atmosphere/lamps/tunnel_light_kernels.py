@@ -1,0 +1,204 @@
+"""What of a picture is in a tunnel, and how it is lit there: compiled loops over pixels."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.jit import kernel
+from fogsim.obstruction.box_kernels import share_inside
+
+_Array = NDArray[np.float64]
+_Picture = NDArray[np.float32]
+
+_CEILING = 0.25
+"""What is no farther than this below the upper face of a tunnel's space is its ceiling [m]."""
+
+_FARTHEST = 1e5
+"""What is farther is the sky [m]."""
+
+
+class TunnelSpace(NamedTuple):
+    """A tunnel, as kernels read it.
+
+    Attributes
+    ----------
+    boxes : (m, 10) float64
+        Its space, in order along it.
+    stations : (m,) float64
+        Where along it each box begins [m].
+    length : float
+        Length from portal to portal [m].
+    """
+
+    boxes: NDArray[np.float64]
+    stations: NDArray[np.float64]
+    length: float
+
+
+class Luminaires(NamedTuple):
+    """Lamps in a row under the ceiling.
+
+    Attributes
+    ----------
+    illuminance : float
+        What they give the road, over what the sky gives it outside [-].
+    luminance : float
+        Of each of them [cd/m²].
+    spacing, size, half_width : float
+        From one to the next, how long each is, and half its width [m].
+    """
+
+    illuminance: float
+    luminance: float
+    spacing: float
+    size: float
+    half_width: float
+
+
+@kernel
+def sky_share(distance: float, half_width: float, height: float) -> float:
+    """Share of an even sky's light that comes through a portal to the road before or behind it [-].
+
+    The configuration factor from a small level surface to an upright rectangle that stands on its plane, centred
+    before it, in its closed form.
+
+    Parameters
+    ----------
+    distance : float
+        From the portal [m], not negative; half of the sky is seen right at it.
+    half_width, height : float
+        Half the portal's width, and its height [m].
+    """
+    if distance <= 0.0:
+        return 0.5
+    slanted = math.sqrt(distance * distance + height * height)
+    return (math.atan(half_width / distance) - distance / slanted * math.atan(half_width / slanted)) / math.pi
+
+
+@kernel
+def daylight_share(station: float, length: float, half_width: float, height: float) -> float:
+    """Share of the sky's light on a road in a tunnel, or before it [-].
+
+    Parameters
+    ----------
+    station : float
+        Place along the tunnel from its first portal, negative before it [m].
+    length : float
+        From portal to portal [m].
+    half_width, height : float
+        Half its width, and its height [m].
+    """
+    if station < 0.0:
+        return 1.0 - sky_share(-station, half_width, height)
+    if station > length:
+        return 1.0 - sky_share(station - length, half_width, height)
+    return sky_share(station, half_width, height) + sky_share(length - station, half_width, height)
+
+
+@kernel
+def _place_in(space: TunnelSpace, x: float, y: float, z: float, before: float) -> tuple[int, float, float, float]:
+    """Box in which, or before which, a place is, or −1; and where it is along it, across it and above it [m]."""
+    last = len(space.boxes) - 1
+    for number in range(last + 1):
+        box = space.boxes[number]
+        east, north = x - box[0], y - box[1]
+        along, across = east * box[3] + north * box[4], north * box[3] - east * box[4]
+        low = -before if number == 0 else 0.0
+        high = box[6] + (before if number == last else 0.0)
+        above = z - box[2] - box[5] * along
+        if low <= along <= high and abs(across) <= box[7] and box[8] < above < box[9]:
+            return number, along, across, above
+    return -1, 0.0, 0.0, 0.0
+
+
+@kernel
+def light_pixels(
+    radiance: _Picture,
+    own: _Picture,
+    distance: _Picture,
+    rays: _Array,
+    eye: _Array,
+    space: TunnelSpace,
+    lamps: Luminaires,
+    before: float,
+) -> None:
+    """Light what is seen of a tunnel and of the road before its portals, in place.
+
+    Parameters
+    ----------
+    radiance : (rows, cols, 3) float32
+        The scene in the light of the whole sky [cd/m²]; written to.
+    own : (rows, cols, 3) float32
+        What surfaces shine by themselves, without the sky [cd/m²].
+    distance : (rows, cols) float32
+        Distance along the ray [m].
+    rays : (3, 3) float64
+        Takes a pixel (u, v, 1) to its viewing ray.
+    eye : (3,) float64
+        Where the camera is [m].
+    space : TunnelSpace
+        The tunnel.
+    lamps : Luminaires
+        Its lamps.
+    before : float
+        How far before a portal the road is looked at [m].
+    """
+    for v in range(distance.shape[0]):
+        for u in range(distance.shape[1]):
+            reach = float(distance[v, u])
+            if not reach < _FARTHEST:
+                continue
+            a, b, c = _ray(rays, u, v)
+            number, along, across, above = _place_in(
+                space, eye[0] + a * reach, eye[1] + b * reach, eye[2] + c * reach, before
+            )
+            if number < 0:
+                continue
+            box, station = space.boxes[number], space.stations[number] + along
+            share = daylight_share(station, space.length, box[7], box[9])
+            if 0.0 <= station <= space.length:
+                share += lamps.illuminance
+                is_lamp = station % lamps.spacing < lamps.size and abs(across) < lamps.half_width
+                if above > box[9] - _CEILING and is_lamp:
+                    radiance[v, u, :] = lamps.luminance
+                    continue
+            for channel in range(3):
+                shining = own[v, u, channel]
+                radiance[v, u, channel] = shining + (radiance[v, u, channel] - shining) * share
+
+
+@kernel
+def _ray(rays: _Array, u: int, v: int) -> tuple[float, float, float]:
+    """Unit vector along a pixel's viewing ray."""
+    a = rays[0, 0] * u + rays[0, 1] * v + rays[0, 2]
+    b = rays[1, 0] * u + rays[1, 1] * v + rays[1, 2]
+    c = rays[2, 0] * u + rays[2, 1] * v + rays[2, 2]
+    length = math.sqrt(a * a + b * b + c * c)
+    return a / length, b / length, c / length
+
+
+@kernel
+def find_pixels_within(distance: _Picture, rays: _Array, eye: _Array, boxes: _Array, within: NDArray[np.bool_]) -> None:
+    """Find the pixels whose rays pass through a tunnel's space before they end.
+
+    Parameters
+    ----------
+    distance, rays, eye
+        As of `light_pixels`.
+    boxes : (m, 10) float64
+        The space.
+    within : (rows, cols) bool
+        Made true where they do.
+    """
+    end = np.empty(3)
+    for v in range(distance.shape[0]):
+        for u in range(distance.shape[1]):
+            a, b, c = _ray(rays, u, v)
+            reach = min(float(distance[v, u]), _FARTHEST)
+            end[0], end[1], end[2] = eye[0] + a * reach, eye[1] + b * reach, eye[2] + c * reach
+            for box in boxes:
+                if share_inside(eye, end, box) > 0.0:
+                    within[v, u] = True
+                    break

@@ -15,6 +15,9 @@ _Picture = NDArray[np.float32]
 _CEILING = 0.25
 """What is no farther than this below the upper face of a tunnel's space is its ceiling [m]."""
 
+_UNDER_CEILING = 0.25
+"""What a ceiling gets of the road's light, over what renderers give undersides [-]: a tenth, which the road returns."""
+
 _FARTHEST = 1e5
 """What is farther is the sky [m]."""
 
@@ -160,10 +163,11 @@ def light_pixels(
             share = daylight_share(station, space.length, box[7], box[9])
             if 0.0 <= station <= space.length:
                 share += lamps.illuminance
-                is_lamp = station % lamps.spacing < lamps.size and abs(across) < lamps.half_width
-                if above > box[9] - _CEILING and is_lamp:
-                    radiance[v, u, :] = lamps.luminance
-                    continue
+                if above > box[9] - _CEILING:
+                    if station % lamps.spacing < lamps.size and abs(across) < lamps.half_width:
+                        radiance[v, u, :] = lamps.luminance
+                        continue
+                    share *= _UNDER_CEILING
             for channel in range(3):
                 shining = own[v, u, channel]
                 radiance[v, u, channel] = shining + (radiance[v, u, channel] - shining) * share

@@ -33,6 +33,8 @@ that the sky has in the median where lamps stand out of it [linear grey levels].
 BEAM = 1.15
 """Luminance of the own lane over that of both sides from which on it may be a beam's [-]."""
 
+OVERHEAD = 0.08
+"""Angle from straight ahead within which there is open sky above the lane, or a roof [rad]."""
 
 Strip = tuple[NDArray[np.int64], NDArray[np.int64]]
 
@@ -61,7 +63,8 @@ def lit_by_lamps(level: Pixels, camera: Camera) -> str:
     What the sky alone lights is never brighter than the sky, however bright its surface and however dense the fog: a
     perfectly white road has the mean luminance of the sky, and air along the way at most that of the sky behind it.
     Oncoming lamps brighten the fog along the horizon, so the sky is measured above that. Street lamps brighten the sky,
-    too; but they stand out of it, and own lamps still light the own lane more than what lies beside it.
+    too; but they stand out of it, and own lamps still light the own lane more than what lies beside it. In a tunnel the
+    ceiling over the lane is darker than the road, though bright walls may be seen at the height of the sky.
 
     Parameters
     ----------
@@ -74,7 +77,11 @@ def lit_by_lamps(level: Pixels, camera: Camera) -> str:
     luminance = linear_luminance(level[view.rows], camera.response, camera.bits)
     sky, road = columns_apart(luminance[:-ROAD_ROWS], SKY_STEP), luminance[-ROAD_ROWS:]
     lane = _row_medians(road, view.lane)
-    if median(lane) > quantile(sky, BRIGHT_SHARE):
+    middle, aside = camera.principal_point[0], OVERHEAD * camera.focal_length
+    first, last = max(math.ceil(middle - aside), 0), max(math.floor(middle + aside) + 1, 0)
+    overhead = np.ascontiguousarray(luminance[:-ROAD_ROWS, first:last])
+    above = quantile(overhead if overhead.size else sky, BRIGHT_SHARE)
+    if median(lane) > min(above, quantile(sky, BRIGHT_SHARE)):
         return "the road is brighter than the sky, so lamps light it: this is a daytime method"
     shining = float(np.count_nonzero(sky >= LAMP)) >= LAMPS_SHARE * sky.size and median(sky) < DARK_SKY
     if shining and _has_beam(lane, _row_medians(road, view.left), _row_medians(road, view.right)):

@@ -1,4 +1,4 @@
-"""Make docs/pictures/roads.jpg, roads by template as the ego sees them: ``python docs/make_road_pictures.py``."""
+"""Make docs/pictures/roads.jpg and tunnel.jpg, roads as the ego sees them: ``python docs/make_road_pictures.py``."""
 
 import tempfile
 from pathlib import Path
@@ -42,16 +42,35 @@ SIDE_FLOWS = {
     "roundabout": sides,
 }
 
+TUNNEL = "{template: tunnel, tunnel_at: 300 m, tunnel_length: 300 m}"
+PLACES = {"25 m before": 265, "after 8 m": 298, "in the middle": 440, "12 m before the exit": 578}
+"""Where the ego begins [m], a second and 10 m before the picture, by title."""
 
-def picture(road: str, ego: str, time: float) -> NDArray[np.uint8]:
+
+def tunnel_pictures() -> list[tuple[str, NDArray[np.uint8]]]:
+    """A tunnel in fog, by day and by night."""
+    return [
+        (f"{place}, {light:g} lx", picture(TUNNEL, f"{{position: {at} m, speed: 36 km/h}}", 1.0, 60, light))
+        for light in (20_000.0, 1.0)
+        for place, at in PLACES.items()
+    ]
+
+
+def picture(
+    road: str, ego: str, time: float, visibility: float = 1500.0, illuminance: float = 20_000.0
+) -> NDArray[np.uint8]:
     """What the ego's camera sees."""
     template = road.strip("{}").split(",")[0].removeprefix("template: ")
     flows = "same_way: 300 veh/h, oncoming: 300 veh/h" + SIDE_FLOWS.get(template, "")
-    text = f"name: road\nroad: {road}\ndemand: {{{flows}}}\nactors:\n  ego: {ego}\nfog: {{visibility: 1500 m}}\n"
+    text = (
+        f"name: road\nroad: {road}\ndemand: {{{flows}}}\nactors:\n  ego: {ego}\nfog: {{visibility: {visibility:g} m}}\n"
+    )
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "scenario.yaml")
         file.write_text(text, encoding="utf-8")
-        scenario = fogsim.load_scenario(file, ["camera.width=400", "camera.height=300", "renderer=cpu"])
+        scenario = fogsim.load_scenario(
+            file, ["camera.width=400", "camera.height=300", "renderer=cpu", f"light.illuminance_lx={illuminance}"]
+        )
     with fogsim.ClosedLoop(scenario) as loop:
         step = loop.start(1)
         while step.time < time:
@@ -63,6 +82,7 @@ def main() -> None:
     """Make the picture."""
     taken = [(title, picture(*scene)) for title, scene in SCENES.items()]
     sheet(taken, 3).save(PICTURES / "roads.jpg", quality=88)
+    sheet(tunnel_pictures(), 4).save(PICTURES / "tunnel.jpg", quality=88)
 
 
 if __name__ == "__main__":

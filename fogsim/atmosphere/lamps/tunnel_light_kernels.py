@@ -12,7 +12,7 @@ from fogsim.obstruction.box_kernels import share_inside
 _Array = NDArray[np.float64]
 _Picture = NDArray[np.float32]
 
-_CEILING = 0.25
+_CEILING = 0.12
 """What is no farther than this below the upper face of a tunnel's space is its ceiling [m]."""
 
 _UNDER_CEILING = 0.25

@@ -80,3 +80,14 @@ def test_a_lit_lane_below_a_glow_is_told_and_a_mirrored_one_too() -> None:
 def test_an_image_that_shows_little_of_sky_or_road_is_no_trouble(height: int) -> None:
     camera = replace(CAMERA, height=height, principal_point=(159.5, 2.0), pitch=0.0)
     assert lit_by_lamps(np.full((height, 320), 90, np.uint8), camera) == ""
+
+
+def test_under_a_ceiling_that_is_darker_than_the_road_there_is_no_daylight() -> None:
+    """As in a tunnel: bright walls reach up to the height of the sky, and lamps shine under the ceiling."""
+    picture = np.full((240, 320, 3), 190, np.uint8)
+    picture[130:] = 110
+    open_air = picture.copy()
+    picture[:110, 130:190] = 50
+    picture[40:44, 150:170] = 255
+    assert "lamps" in lit_by_lamps(picture, CAMERA)
+    assert not lit_by_lamps(open_air, CAMERA)

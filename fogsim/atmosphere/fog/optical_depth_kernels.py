@@ -202,7 +202,8 @@ def _pieces_per_metre(towards: NDArray[np.float64], medium: Medium) -> float:
 def _is_banks_alone(medium: Medium) -> bool:
     """Whether nothing but banks makes the fog uneven."""
     has_layer = math.isinf(medium.layer[BASE]) and math.isinf(medium.layer[TOP])
-    return bool(has_layer and medium.layer[DECAY] == 0.0 and medium.factors.size == 1)
+    is_even = medium.layer[DECAY] == 0.0 and medium.factors.size == 1
+    return bool(has_layer and is_even and len(medium.shelters) == 0)
 
 
 @kernel

@@ -1,7 +1,10 @@
 """A finished step as conditions look at it: with what has happened before, and with places along the route."""
 
+import functools
+
 from fogsim.conditions.route_places import Extent, Route, RoutePlace, extent_of
-from fogsim.values import Step, TrafficStep
+from fogsim.values import Step, TrafficState, TrafficStep
+from fogsim.values.traffic import with_persons
 
 EGO = "ego"
 """What the ego is called in conditions, whatever its id."""
@@ -35,6 +38,11 @@ class Moment:
         """The step if there is an ego; None otherwise."""
         return self.step if isinstance(self.step, Step) else None
 
+    @functools.cached_property
+    def traffic(self) -> TrafficState:
+        """The traffic, with persons on foot behind the vehicles."""
+        return with_persons(self.step.traffic)
+
     def vehicle_id(self, vehicle: str) -> str:
         """Id of a vehicle: the ego's own for ``ego``.
 
@@ -47,14 +55,16 @@ class Moment:
         return step.traffic.ids[step.ego] if step is not None and vehicle == EGO else vehicle
 
     def row(self, vehicle: str) -> int | None:
-        """Row of a vehicle in the traffic; None if it is not on the road now.
+        """Row of a vehicle or person in `traffic`; None if it is not on the road now.
 
         Parameters
         ----------
         vehicle : str
             As a condition has it.
         """
-        return self.step.traffic.row(self.vehicle_id(vehicle))
+        name = self.vehicle_id(vehicle)
+        row = self.step.traffic.row(name)
+        return self.traffic.row(name) if row is None and self.step.traffic.persons.ids else row
 
     def position(self, vehicle: str) -> float | None:
         """How far along the route a vehicle's front bumper is [m], in the ego's own count; None if it is not there.
@@ -78,7 +88,7 @@ class Moment:
             As a condition has it.
         """
         row, place = self.row(vehicle), self._place(vehicle)
-        return None if row is None or place is None else extent_of(place, self.step.traffic, row)
+        return None if row is None or place is None else extent_of(place, self.traffic, row)
 
     def _place(self, vehicle: str) -> RoutePlace | None:
         if vehicle not in self._places:
@@ -99,7 +109,7 @@ class Moment:
     def _on_route(self, route: Route, row: int) -> RoutePlace | None:
         """Place of a vehicle by the polyline alone."""
         if row not in self._by_row:
-            traffic, step = self.step.traffic, self.ego_step
+            traffic, step = self.traffic, self.ego_step
             near = None if step is None else step.route_position
             self._by_row[row] = route.locate(traffic.position[row], float(traffic.heading[row]), near)
         return self._by_row[row]

@@ -70,7 +70,7 @@ def _speed_difference(moment: Moment, one: str, other: str) -> float | None:
     first, second = moment.row(one), moment.row(other)
     if first is None or second is None:
         return None
-    return float(moment.step.traffic.speed[first] - moment.step.traffic.speed[second])
+    return float(moment.traffic.speed[first] - moment.traffic.speed[second])
 
 
 def _of_leader(read: Callable[[Leader, float], float]) -> Callable[[Moment], float | None]:
@@ -99,7 +99,7 @@ def _lamps(moment: Moment, vehicle: str) -> frozenset[str] | None:
     row = moment.row(vehicle)
     if row is None:
         return None
-    lit = Lamp(int(moment.step.traffic.lamps[row]))
+    lit = Lamp(int(moment.traffic.lamps[row]))
     return frozenset(str(lamp.name).lower() for lamp in lit)
 
 
@@ -107,7 +107,7 @@ def _lane(moment: Moment, vehicle: str) -> LanePlace | None:
     row = moment.row(vehicle)
     if row is None:
         return None
-    lane = moment.step.traffic.lane[row]
+    lane = moment.traffic.lane[row]
     edge, _, number = lane.rpartition("_")
     beside = moment.step.truth.carriageways.get(edge, ())
     if lane in beside:
@@ -123,13 +123,13 @@ def _advice(moment: Moment) -> float:
 
 
 def _heard(moment: Moment, row: int) -> float:
-    heard = moment.step.traffic.advised_speed
+    heard = moment.traffic.advised_speed
     return float(heard[row]) if len(heard) else math.inf
 
 
 def _seen(moment: Moment, row: int) -> float:
     seen = moment.step.truth.vehicle_extinctions
-    return math.nan if seen is None else _visibility(float(seen[row]))
+    return math.nan if seen is None or row >= len(seen) else _visibility(float(seen[row]))
 
 
 def _visibility(extinction: float) -> float:
@@ -150,7 +150,7 @@ def _straight_distance(moment: Moment, one: str, other: str) -> float | None:
     first, second = moment.row(one), moment.row(other)
     if first is None or second is None:
         return None
-    position = moment.step.traffic.position
+    position = moment.traffic.position
     return math.dist(position[second], position[first])
 
 
@@ -159,7 +159,7 @@ def _is_in_bank(moment: Moment, number: str, vehicle: str = "ego") -> bool | Non
     if row is None or fog is None or int(number) >= len(fog.banks):
         return None
     bank: FogBank = fog.banks[int(number)]
-    east, north, _ = moment.step.traffic.position[row]
+    east, north, _ = moment.traffic.position[row]
     along = (east - bank.origin[0]) * bank.axis[0] + (north - bank.origin[1]) * bank.axis[1]
     return bool(bank.start <= along <= bank.end)
 
@@ -211,7 +211,11 @@ _OF_RUN = {
         Kind.WORD,
         words=ENDING_WORDS,
     ),
-    "collisions": Signal("pairs of vehicles that have collided so far", lambda m: float(len(m.collisions)), least=0.0),
+    "collisions": Signal(
+        "pairs of vehicles, or of a vehicle and a person, that have collided so far",
+        lambda m: float(len(m.collisions)),
+        least=0.0,
+    ),
     "happened(EVENT)": Signal(
         "whether an entry of the timeline, by its name or as `timeline.N`, has begun",
         lambda m, name: name in m.begun,
@@ -227,10 +231,10 @@ _OF_VEHICLES = {
         Kind.FLAG,
         places=_VEHICLE,
     ),
-    "X.speed": _speed("speed", _of_vehicle(lambda m, i: float(m.step.traffic.speed[i])), most=FASTEST, places=_VEHICLE),
+    "X.speed": _speed("speed", _of_vehicle(lambda m, i: float(m.traffic.speed[i])), most=FASTEST, places=_VEHICLE),
     "X.acceleration": Signal(
         "acceleration along the heading",
-        _of_vehicle(lambda m, i: float(m.step.traffic.acceleration[i])),
+        _of_vehicle(lambda m, i: float(m.traffic.acceleration[i])),
         unit="m/s^2",
         least=-HARDEST,
         most=HARDEST,

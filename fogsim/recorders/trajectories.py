@@ -1,6 +1,5 @@
 """Every vehicle and person at every camera period, in the columns of SUMO's own floating car data."""
 
-import dataclasses
 import json
 import math
 import time
@@ -18,13 +17,11 @@ from fogsim.recorders.protocol import Derived
 from fogsim.recorders.run_directory import LOG_SUFFIX
 from fogsim.recorders.table import LOG_PERIOD
 from fogsim.units import visibility_from_extinction
-from fogsim.values import TrafficState, TrafficStep
+from fogsim.values import TrafficStep
+from fogsim.values.traffic import with_persons
 
 MOST_ROWS_HELD = 50_000
 """Rows of one batch at most: some megabytes."""
-
-PEDESTRIAN = "pedestrian"
-"""What persons on foot have in the column of vehicles' types."""
 
 ROWS_PER_GROUP = 200_000
 """Rows of one row group at least, but for the last: what a reader has in memory at once."""
@@ -171,7 +168,7 @@ def with_trajectories(steps: Iterable[_AnyStep], path: Path) -> Iterator[_AnySte
 
 def _batch(steps: list[TrafficStep], schema: Any) -> Any:
     """Rows of some instants (pyarrow.RecordBatch)."""
-    states = [_with_pedestrians(step.traffic) for step in steps]
+    states = [with_persons(step.traffic) for step in steps]
     counts = [len(state.ids) for state in states]
     position = np.concatenate([state.position for state in states])
 
@@ -207,24 +204,6 @@ def _visibilities(step: TrafficStep) -> list[float | None]:
     if extinctions is None:
         return [*[None] * len(step.traffic.ids), *persons]
     return [visibility_from_extinction(k) if k > 0.0 else None for k in extinctions.tolist()] + persons
-
-
-def _with_pedestrians(state: TrafficState) -> TrafficState:
-    """Traffic with persons on foot as further rows, of what a trajectory has; nan where they have none."""
-    persons, count = state.persons, len(state.persons.ids)
-    if not count:
-        return state
-    return dataclasses.replace(
-        state,
-        ids=state.ids + persons.ids,
-        types=state.types + (PEDESTRIAN,) * count,
-        position=np.concatenate((state.position, persons.position)),
-        heading=np.append(state.heading, persons.heading),
-        speed=np.append(state.speed, persons.speed),
-        acceleration=np.append(state.acceleration, np.full(count, np.nan)),
-        lane=state.lane + persons.lane,
-        grade=np.append(state.grade, np.full(count, np.nan)),
-    )
 
 
 def write_trajectory_table(path: Path, log: Path, complete: bool) -> None:

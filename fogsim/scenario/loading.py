@@ -399,7 +399,7 @@ def _check_placement(document: Document, scenario: Scenario) -> None:
     try:
         traffic_files(scenario)
     except (PlacementError, DemandError) as error:
-        at = ("actors", error.actor) if isinstance(error, PlacementError) else ("demand", error.key)
+        at = ("actors", error.actor) if isinstance(error, PlacementError) else ("demand", *error.key.split("."))
         raise InputError(f"{document.where(at)}: {dotted(at)}: {error.told}") from error
     except InputError as error:
         raise InputError(f"{document.where(('road',))}: road: {error}") from error

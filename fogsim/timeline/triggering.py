@@ -20,6 +20,7 @@ from fogsim.values.script import (
     SetSignal,
     TrafficAction,
 )
+from fogsim.values.traffic import with_persons
 
 _TICK = 1e-6
 """Rounding of times [s]."""
@@ -81,6 +82,7 @@ class Timeline:
         moment = self._history.moment(step)
         now = _Now(moment)
         self._seen.update(step.traffic.ids)
+        self._seen.update(step.traffic.persons.ids)
         parts: list[tuple[Begun, Actions]] = []
         for entry in self._entries:
             entry.look(moment)
@@ -178,7 +180,7 @@ class _Entry:
             return None
         if not self._has_held or not self.is_due(step.time):
             return Reason.NEVER_HELD
-        absent = [vehicle for vehicle in self.vehicles(step) if step.traffic.row(vehicle) is None]
+        absent = [vehicle for vehicle in self.vehicles(step) if with_persons(step.traffic).row(vehicle) is None]
         return Reason.NEVER_SEEN if any(vehicle not in seen for vehicle in absent) else Reason.LEFT
 
 
@@ -193,14 +195,20 @@ class _Now:
 
     def speed(self, vehicle: str) -> float | None:
         row = self._moment.row(vehicle)
-        return None if row is None else float(self._moment.step.traffic.speed[row])
+        return None if row is None else float(self._moment.traffic.speed[row])
 
     def position(self, vehicle: str) -> float | None:
         return self._moment.position(vehicle)
 
     def lane(self, vehicle: str) -> int | None:
         row = self._moment.row(vehicle)
-        number = "" if row is None else self._moment.step.traffic.lane[row].rpartition("_")[2]
+        if row is None:
+            return None
+        lane = self._moment.traffic.lane[row]
+        edge, _, number = lane.rpartition("_")
+        beside = self._moment.step.truth.carriageways.get(edge, ())
+        if lane in beside:
+            return beside.index(lane)
         return int(number) if number.isdecimal() else None
 
 

@@ -21,6 +21,7 @@ UNIT_OF_SUFFIX = {
     "cd": "cd",
     "cdpm2": "cd/m^2",
     "vph": "veh/h",
+    "pph": "persons/h",
 }
 """Units of keys of files by the end of their name: ``speed_kmh`` is in km/h."""
 
@@ -121,4 +122,5 @@ def _units() -> "pint.UnitRegistry[float]":
 
     units: pint.UnitRegistry[float] = pint.UnitRegistry()
     units.define("vehicle = [] = veh = vehicles")
+    units.define("person = [] = pers = persons")
     return units

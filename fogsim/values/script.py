@@ -212,7 +212,23 @@ class Depart:
     speed: float | None = None
 
 
-TrafficAction = ChangeSpeed | Follow | Stop | ChangeLane | SetLamps | SetSignal | Depart
+@dataclass(frozen=True, slots=True)
+class Walk:
+    """A person on foot walks at another speed from now on.
+
+    Attributes
+    ----------
+    person : str
+        Its id.
+    speed : float
+        The speed [m/s].
+    """
+
+    person: str
+    speed: float
+
+
+TrafficAction = ChangeSpeed | Follow | Stop | ChangeLane | SetLamps | SetSignal | Depart | Walk
 """What a traffic simulation can be told to do at once."""
 
 

@@ -1,7 +1,7 @@
 """Where every vehicle and person is at one instant, and what the traffic lights show."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
@@ -160,6 +160,44 @@ class TrafficState:
             return self.ids.index(vehicle_id)
         except ValueError:
             return None
+
+
+PEDESTRIAN = "pedestrian"
+"""Kind of body of persons on foot where they are rows among vehicles."""
+
+_PERSON_LENGTH, _PERSON_WIDTH, _PERSON_HEIGHT = 0.4, 0.6, 1.7  # [m]
+
+
+def with_persons(state: TrafficState) -> TrafficState:
+    """Traffic with persons on foot as further rows, behind the vehicles'; nan for what they do not have.
+
+    Parameters
+    ----------
+    state : TrafficState
+        The traffic; without persons it is given back as it is.
+    """
+    persons, count = state.persons, len(state.persons.ids)
+    if not count:
+        return state
+    unknown = np.full(count, np.nan)
+    return replace(
+        state,
+        ids=state.ids + persons.ids,
+        types=state.types + (PEDESTRIAN,) * count,
+        position=np.concatenate((state.position, persons.position)),
+        heading=np.append(state.heading, persons.heading),
+        speed=np.append(state.speed, persons.speed),
+        acceleration=np.append(state.acceleration, unknown),
+        length=np.append(state.length, np.full(count, _PERSON_LENGTH)),
+        width=np.append(state.width, np.full(count, _PERSON_WIDTH)),
+        height=np.append(state.height, np.full(count, _PERSON_HEIGHT)),
+        lane=state.lane + persons.lane,
+        lamps=np.append(state.lamps, np.zeros(count, np.int32)),
+        paint=np.concatenate((state.paint, np.full((count, 3), np.nan))),
+        grade=np.append(state.grade, unknown),
+        free_speed=np.append(state.free_speed, unknown) if len(state.free_speed) else state.free_speed,
+        advised_speed=np.append(state.advised_speed, unknown) if len(state.advised_speed) else state.advised_speed,
+    )
 
 
 def advised_speeds(ids: Sequence[str], heard: Mapping[str, float]) -> NDArray[np.float64]:

@@ -14,14 +14,17 @@ from fogsim.scenario.roads.schema import NO_MEASURES, ActorSection, DemandSectio
 from fogsim.scenario.schema import Scenario
 from fogsim.traffic.templates import (
     ROAD_TEMPLATES,
+    WALKING_SPEED,
     Actor,
     Demand,
+    Footfall,
     Layout,
     Obstruction,
     Placed,
     PlacementError,
     Relation,
     RoadTemplate,
+    Walker,
     actors_text,
     additional_text,
     check_placement,
@@ -85,7 +88,9 @@ def traffic_files(scenario: Scenario) -> TrafficFiles:
     layout, placed = road_layout(scenario)
     _check_ways(layout, scenario.demand or DemandSection())
     demand = _demand(scenario.demand or DemandSection(), usual_mix(scenario.road.template))
-    texts = {_NET: net_text(layout.net), _ROUTES: routes_text(layout, demand, placed)}
+    walkers = [_walker(name, section) for name, section in scenario.actors.items() if section.is_person]
+    footfall = _footfall(scenario.demand or DemandSection(), layout)
+    texts = {_NET: net_text(layout.net), _ROUTES: routes_text(layout, demand, placed, walkers, footfall)}
     beside = additional_text(layout, [_obstruction(one) for one in scenario.road.obstructions])
     made = write_generated("roads", {**texts, **({_BESIDE: beside} if beside else {})})
     return TrafficFiles(made / _NET, (made / _ROUTES, *routes), (*([made / _BESIDE] if beside else []), *additional))
@@ -107,7 +112,7 @@ def road_layout(scenario: Scenario) -> tuple[Layout, tuple[Placed, ...]]:
     if scenario.road is None:
         raise ValueError("expected a scenario with a road by template, got one without")
     template = _template(scenario.road)
-    sections = actors_of(scenario)
+    sections = vehicles_of(scenario)
     placed = place_actors([_actor(name, sections) for name in sections])
     on_the_way = [one for one in placed if one.actor.way == "same_way"]
     layout = template.layout(cuts_around(on_the_way, template.free_length))
@@ -138,6 +143,9 @@ def with_way(scenario: Scenario) -> Scenario:
 def _actors_on(net: Path, scenario: Scenario) -> str:
     """Text of a route file with the actors of a scenario that has a network of its own."""
     sections = scenario.actors
+    for name, section in sections.items():
+        if section.is_person:
+            raise PlacementError(name, "a person walks on a road by template; write those of a network into its routes")
     edges = {name: _declared(name, sections).edges for name in sections}
     for name, way in edges.items():
         if not way:
@@ -206,6 +214,39 @@ def actors_of(scenario: Scenario) -> dict[str, ActorSection]:
     if scenario.road is None or not scenario.traffic.has_ego:
         return dict(scenario.actors)
     return {scenario.traffic.ego: ActorSection(), **scenario.actors}
+
+
+def vehicles_of(scenario: Scenario) -> dict[str, ActorSection]:
+    """Actors of a scenario that are vehicles, by their ids.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+    return {name: section for name, section in actors_of(scenario).items() if not section.is_person}
+
+
+def _walker(name: str, section: ActorSection) -> Walker:
+    return Walker(
+        name,
+        section.on or "same_way",
+        section.side == "left",
+        200.0 if section.position_m is None else section.position_m,
+        WALKING_SPEED if section.speed_kmh is None else section.speed_kmh / 3.6,
+        section.depart_s or 0.0,
+        section.crosses_at_m,
+        section.waits,
+    )
+
+
+def _footfall(section: DemandSection, layout: Layout) -> Footfall:
+    persons = section.persons
+    for key, lacks in (("along_pph", not layout.net.edges[0].footway), ("across_pph", not layout.net.zebras)):
+        if lacks and getattr(persons, key):
+            needed = "road.footways: true" if key == "along_pph" else "road.footways: true and road.zebra_crossings"
+            raise DemandError(f"persons.{key}", f"the road has nothing for persons there; give {needed}")
+    return Footfall(persons.along_pph / _SECONDS_PER_HOUR, persons.across_pph / _SECONDS_PER_HOUR)
 
 
 def _template(road: Road) -> RoadTemplate:

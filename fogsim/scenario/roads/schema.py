@@ -181,6 +181,16 @@ def measure_of(key: str) -> tuple[str, float]:
     return (stem, _SI[suffix]) if suffix in _SI else (key, 1.0)
 
 
+class PersonsSection(Section):
+    """Persons on foot on a road with footways; they are there from the beginning, and differ with the seed."""
+
+    along_pph: Flow = 0.0
+    """Persons who walk along each footway, in both directions together [persons/h]."""
+
+    across_pph: Flow = 0.0
+    """Persons who cross at each zebra crossing, from both sides together [persons/h]."""
+
+
 class DemandSection(Section):
     """Traffic beside the actors, on a road by template: it is there from the beginning, and differs with the seed."""
 
@@ -198,6 +208,9 @@ class DemandSection(Section):
 
     south_vph: Flow = 0.0
     """Vehicles that come from the right there."""
+
+    persons: PersonsSection = PersonsSection()
+    """Persons on foot."""
 
     turning: Share = 0.2
     """Share of vehicles that turn where roads meet, half of them to either side."""
@@ -233,11 +246,18 @@ def _check_type(name: str) -> str:
     return name
 
 
+PERSON = "person"
+"""Type of actors on foot."""
+
+_OF_PERSONS = frozenset({"side", "crosses_at_m", "waits"})
+_OF_BOTH = frozenset({"type", "on", "position_m", "speed_kmh", "depart_s"})
+
+
 class ActorSection(Section):
-    """A vehicle and where it is when the run begins."""
+    """A vehicle, or a person on foot, and where it is when the run begins."""
 
     type: str = "car"
-    """Type of the vehicle."""
+    """Type of the vehicle; or `person`, who walks on the footways of a road by template."""
 
     on: Id | None = None
     """Way that it takes on a road by template; by default `same_way`, or that of the actor that it is placed by."""
@@ -264,7 +284,8 @@ class ActorSection(Section):
     """That gap."""
 
     speed_kmh: SpeedKmh | None = None
-    """Speed with which it begins, and which it keeps where nothing slows it; by default that of the road and type."""
+    """Speed with which it begins, and which it keeps where nothing slows it; by default that of the road and type, and
+    5 of persons."""
 
     depart_s: Time | None = None
     """When it appears; the ego's appearance begins the run. By default 0, or as the actor that it is placed by."""
@@ -279,10 +300,36 @@ class ActorSection(Section):
     keeps_lane: Flag | None = None
     """Whether it stays in its lane where nothing scripted makes it change; by default all do but those on a ramp."""
 
+    side: Literal["left", "right"] = "right"
+    """Side of the road on whose footway a person begins."""
+
+    crosses_at_m: Distance | None = None
+    """Place along its way of the crossing at which a person crosses; without it, it walks on to the way's end."""
+
+    waits: Flag = False
+    """Whether a person waits where it begins until the timeline says `walk`."""
+
     @field_validator("type")
     @classmethod
     def _known_type(cls, value: str) -> str:
-        return _check_type(value)
+        if value not in VEHICLE_KINDS and value != PERSON:
+            raise ValueError(str(UnknownNameError("type", value, (*VEHICLE_KINDS, PERSON))))
+        return value
+
+    @property
+    def is_person(self) -> bool:
+        """Whether it is on foot."""
+        return self.type == PERSON
+
+    @model_validator(mode="after")
+    def _keys_of_its_kind(self) -> Self:
+        others = (
+            self.model_fields_set - _OF_BOTH - _OF_PERSONS if self.is_person else self.model_fields_set & _OF_PERSONS
+        )
+        for key in sorted(others):
+            has = sorted(_OF_BOTH | _OF_PERSONS if self.is_person else set(type(self).model_fields) - _OF_PERSONS)
+            raise ValueError(f"a {self.type} has no {key}; {suggest(key, has)}")
+        return self
 
     @model_validator(mode="after")
     def _placed_once(self) -> Self:
@@ -301,7 +348,7 @@ class ActorSection(Section):
     @property
     def stays_in_lane(self) -> bool:
         """Whether it stays in its lane."""
-        return self.on != RAMP if self.keeps_lane is None else self.keeps_lane
+        return not self.is_person and (self.on != RAMP if self.keeps_lane is None else self.keeps_lane)
 
     @model_validator(mode="after")
     def _has_two_sides(self) -> Self:

@@ -35,6 +35,7 @@ from fogsim.values.script import (
     Shape,
     Stop,
     TrafficAction,
+    Walk,
 )
 
 _HAZARD = Lamp.INDICATOR_LEFT | Lamp.INDICATOR_RIGHT
@@ -172,6 +173,8 @@ def _of_vehicle(subject: str, doing: VehicleActions, now: Situation) -> list[Tra
         return _departure(vehicle, doing.depart, now) if speed is None else None
     if speed is None:
         return None
+    if doing.walk:
+        return [Walk(vehicle, doing.walk.speed_kmh / KMH_PER_MPS)]
     moves: list[TrafficAction | None] = []
     if doing.speed:
         moves.append(_speed_change(vehicle, doing.speed, speed, now))

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from fogsim.conditions import EGO, condition_mistakes, signals_of
 from fogsim.conditions import vehicles_of as vehicles_of_signal
+from fogsim.errors import suggest
 from fogsim.scenario.expect.checks import run_content
 from fogsim.scenario.expect.conditions import refuse
 from fogsim.scenario.plain_yaml import KeyPath
@@ -54,9 +55,22 @@ def _mistakes(scenario: "Scenario") -> Iterator[tuple[KeyPath, str]]:
         if not scenario.traffic.has_ego and EGO in vehicles_of(entry):
             yield (number, "do"), "it tells of the ego, and traffic.ego is none"
         for subject, doing in doings_of(entry):
-            told = _mistake(doing, scenario)
+            told = _mistake(doing, scenario) or _person_mistake(subject, doing, scenario)
             if told:
                 yield (number, "do", subject), told
+
+
+def _person_mistake(subject: str, doing: Doing, scenario: "Scenario") -> str | None:
+    """What persons and vehicles cannot do that the others can."""
+    if not isinstance(doing, VehicleActions):
+        return None
+    actor = scenario.actors.get(subject)
+    if actor is not None and actor.is_person and not doing.walk:
+        return f"{subject} is a person, who can walk and nothing else"
+    if doing.walk and (subject == EGO or (actor is not None and not actor.is_person)):
+        persons = [name for name, one in scenario.actors.items() if one.is_person]
+        return f"{subject} is a vehicle, and persons walk; {suggest(subject, persons) if persons else 'there are none'}"
+    return None
 
 
 def _mistake(doing: Doing, scenario: "Scenario") -> str | None:

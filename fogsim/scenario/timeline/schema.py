@@ -183,8 +183,15 @@ class DepartAction(Section):
     """Its speed; that of the other one if not given."""
 
 
+class WalkAction(Section):
+    """A person who waits, or walks, walks on at a speed."""
+
+    speed_kmh: Annotated[SpeedKmh, Field(ge=0.5, le=20)] = 5.0
+    """The speed."""
+
+
 class VehicleActions(Section):
-    """What a vehicle does; what is given begins together."""
+    """What a vehicle does, or a person on foot, who can `walk`; what is given begins together."""
 
     speed: SpeedAction | None = None
     """Come to a speed and hold it."""
@@ -213,12 +220,17 @@ class VehicleActions(Section):
     depart: DepartAction | None = None
     """Come onto the road, for an id that is in no file."""
 
+    walk: WalkAction | None = None
+    """Walk, for a person."""
+
     @model_validator(mode="after")
     def _one_motion(self) -> Self:
         motions = ("speed", "brake", "follow", "stop", "break_down")
         given = [key for key in motions if getattr(self, key) is not None]
         if len(given) > 1:
             raise ValueError(f"{' and '.join(given)} cannot begin together: each sets the speed; take two entries")
+        if self.walk and len(self.model_fields_set) > 1:
+            raise ValueError("walk stands by itself: a person does nothing else")
         if self.depart and len(self.model_fields_set) > 1:
             raise ValueError("depart stands by itself: what the vehicle does then is another entry")
         return self

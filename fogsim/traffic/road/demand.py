@@ -1,4 +1,4 @@
-"""Which vehicles a simulation can have, as its route and additional files say, without starting SUMO."""
+"""Which vehicles and persons a simulation can have, as its route and additional files say, without starting SUMO."""
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
@@ -151,6 +151,10 @@ class _DemandReader:
             self._take(attributes, (attributes.get("id", ""),))
         elif tag == "flow":
             self._take_flow(attributes)
+        elif tag == "person":
+            self._take(attributes, (attributes.get("id", ""),))
+        elif tag == "personFlow":
+            self._take_flow(attributes)
         elif tag == "route":
             self._take_route(attributes)
         elif tag == "routeDistribution":
@@ -162,7 +166,7 @@ class _DemandReader:
             self._reroutes = True
 
     def end(self, tag: str) -> None:
-        if tag in {"vehicle", "trip", "flow"}:
+        if tag in {"vehicle", "trip", "flow", "person", "personFlow"}:
             self._inside = ((), None)
 
     def _take_flow(self, attributes: Mapping[str, str]) -> None:

@@ -38,7 +38,7 @@ def depart(api: Api, action: Depart, present: Collection[str]) -> bool:
     while at < len(edges) - 1 and place > _length(api, edges[at]):
         place -= _length(api, edges[at])
         at += 1
-    lane = int(get.getLaneIndex(like)) if action.lane is None else action.lane
+    lane = int(get.getLaneIndex(like)) if action.lane is None else action.lane + _footways(api, edges[at])
     if not 0.0 <= place <= _length(api, edges[at]) or lane >= int(api.edge.getLaneNumber(edges[at])):
         return False
     route = f"fogsim.{action.vehicle}.{api.simulation.getTime():g}"
@@ -53,6 +53,12 @@ def depart(api: Api, action: Depart, present: Collection[str]) -> bool:
         departSpeed=f"{speed:.3f}",
     )
     return True
+
+
+def _footways(api: Api, edge: str) -> int:
+    """Number of footways to the right of an edge's lanes, which SUMO counts among them."""
+    lanes = range(int(api.edge.getLaneNumber(edge)))
+    return sum(tuple(api.lane.getAllowed(f"{edge}_{lane}")) == ("pedestrian",) for lane in lanes)
 
 
 def _length(api: Api, edge: str) -> float:

@@ -1,4 +1,4 @@
-"""Actions of a script in SUMO: imposed speeds, changes of lane, lamps and traffic lights."""
+"""Actions of a script in SUMO: imposed speeds, changes of lane, lamps, traffic lights and persons who walk."""
 
 from collections.abc import Collection, Sequence
 
@@ -10,7 +10,7 @@ from fogsim.traffic.sumo.route_position import GapToEgo
 from fogsim.traffic.sumo_behaviour.departures import depart
 from fogsim.traffic.sumo_behaviour.signal_control import SignalControl
 from fogsim.traffic.sumo_behaviour.speed_control import SpeedControl
-from fogsim.values.script import ChangeLane, Depart, SetSignal, TrafficAction
+from fogsim.values.script import ChangeLane, Depart, SetSignal, TrafficAction, Walk
 
 _REGARD_OF_OTHERS, _NO_COLLISION = 3 << 8, 1 << 8
 """Bits of SUMO's lane-change mode on what of others a change that is asked for regards, and those for as much as does
@@ -79,11 +79,20 @@ class ScriptedActions:
                 self._signals.begin(action, time)
             elif isinstance(action, Depart):
                 refused += [] if depart(self._api, action, present) else [action]
+            elif isinstance(action, Walk):
+                refused += [] if self._walk(action) else [action]
             elif action.vehicle not in present or not self._has_lane(action):
                 refused.append(action)
             else:
                 self._playing.begin(action, motion)
         return tuple(refused)
+
+    def _walk(self, action: Walk) -> bool:
+        person = self._api.person
+        if action.person not in person.getIDList():
+            return False
+        person.setSpeed(action.person, action.speed)
+        return True
 
     def _has_lane(self, action: TrafficAction) -> bool:
         return not isinstance(action, ChangeLane) or has_lane(self._api, action.vehicle, action.lanes)

@@ -5,6 +5,7 @@ from fogsim.traffic.templates.catalogue import ROAD_TEMPLATES, RoadTemplate, mea
 from fogsim.traffic.templates.demand import Demand, actors_text, cuts_around, routes_text
 from fogsim.traffic.templates.layout import Layout
 from fogsim.traffic.templates.net_writer import net_text
+from fogsim.traffic.templates.on_foot import WALKING_SPEED, Footfall, Walker
 from fogsim.traffic.templates.own_net import KnownWays, read_ways
 from fogsim.traffic.templates.placement import Actor, Placed, PlacementError, Relation, check_placement, place_actors
 from fogsim.traffic.templates.ramp import RAMP
@@ -14,8 +15,10 @@ __all__ = [
     "RAMP",
     "ROAD_TEMPLATES",
     "VEHICLE_KINDS",
+    "WALKING_SPEED",
     "Actor",
     "Demand",
+    "Footfall",
     "KnownWays",
     "Layout",
     "Obstruction",
@@ -23,6 +26,7 @@ __all__ = [
     "PlacementError",
     "Relation",
     "RoadTemplate",
+    "Walker",
     "actors_text",
     "additional_text",
     "check_placement",

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from fogsim.traffic.templates.layout import Layout
 from fogsim.traffic.templates.net_plan import Edge
+from fogsim.traffic.templates.on_foot import Footfall, Walker, walkers_text
 from fogsim.traffic.templates.placement import Placed, Ways, edge_at
 from fogsim.traffic.templates.vehicle_types import SLOW, VEHICLE_KINDS, VehicleKind
 from fogsim.traffic.templates.xml_text import element, opening
@@ -53,7 +54,13 @@ def cuts_around(placed: Sequence[Placed], length: float) -> tuple[float, ...]:
     return tuple(cut for cut in (first, last) if _SHORTEST < cut < length - _SHORTEST)
 
 
-def routes_text(layout: Layout, demand: Demand, placed: Sequence[Placed]) -> str:
+def routes_text(
+    layout: Layout,
+    demand: Demand,
+    placed: Sequence[Placed],
+    walkers: Sequence[Walker] = (),
+    footfall: Footfall = Footfall(),  # noqa: B008 - a constant
+) -> str:
     """Text of a route file.
 
     Parameters
@@ -64,13 +71,22 @@ def routes_text(layout: Layout, demand: Demand, placed: Sequence[Placed]) -> str
         Traffic beside the actors.
     placed : sequence of Placed
         The actors.
+    walkers : sequence of Walker
+        Persons that a scenario places.
+    footfall : Footfall
+        Persons beside them.
+
+    Raises
+    ------
+    PlacementError
+        If a person cannot walk where it is to.
     """
     lines = [*_types(demand.mix, max(edge.lanes for edge in layout.net.edges)), *_actors(placed, layout)]
     taken = _taken_lanes(layout, placed)
     for way, rate in _rates(layout, demand):
         lines += _filling(layout, way, rate, taken)
         lines += _flows(layout, way, rate)
-    return _routes(lines)
+    return _routes([*lines, *walkers_text(layout, walkers, footfall)])
 
 
 def actors_text(ways: Ways, placed: Sequence[Placed]) -> str:

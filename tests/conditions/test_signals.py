@@ -19,6 +19,7 @@ from fogsim.values import (
     FogField,
     Lamp,
     Leader,
+    PersonState,
     SignalAhead,
     SignalColour,
     SpeedAdvice,
@@ -92,6 +93,23 @@ def test_gaps_and_times_along_the_route(
     for signal, expected in (("gap", gap), ("ttc", ttc), ("headway", headway)):
         found = read(f"{signal}(ego, other)", step)
         assert found == (None if expected is None else pytest.approx(expected)), signal
+
+
+def test_persons_are_asked_for_as_vehicles_are() -> None:
+    step = placed(make_step(speed=25.0, route_position=200.0), (260.0, -3.5), (200.0, 0.0))
+    crossing = {"heading": np.array([0.5 * math.pi]), "speed": np.array([1.4]), "lane": (":cut1_c0_0",)}
+    persons = PersonState(("child",), np.array([[230.0, -2.0, 0.0]]), raised=np.zeros(1, np.bool_), **crossing)
+    step = replace(step, traffic=replace(step.traffic, persons=persons))
+    assert read("child.speed", step) == pytest.approx(1.4)
+    assert read("child.position", step) == pytest.approx(230.0)
+    assert read("gap(ego, child)", step) == pytest.approx(30.0)
+    assert read("ttc(ego, child)", step) == pytest.approx(30.0 / 25.0)
+    assert read("distance(ego, child)", step) == pytest.approx(math.hypot(30.0, 2.0))
+    assert read("child.present", step) is True
+    # What persons do not have they are not said to have.
+    for signal in ("child.acceleration", "child.visibility"):
+        assert read(signal, step) is None
+    assert read("other.speed", step) == 20.0
 
 
 def test_the_gap_the_other_way_has_the_other_sign() -> None:

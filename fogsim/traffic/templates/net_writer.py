@@ -15,6 +15,7 @@ from fogsim.traffic.templates.xml_text import element, opening
 
 _ON_FOOT, _NOT_ON_FOOT = {"allow": "pedestrian"}, {"disallow": "pedestrian"}
 _ALL: Mapping[str, str] = {}
+_ZEBRA_SIGHT = 100  # from so far drivers see whether somebody crosses; SUMO's 4.5 m is for corners [m]
 _ON_FOOT_LIMIT = 10.0 / 3.6  # of crossings and walking areas, which is netconvert's [m/s]
 _HEADER = """<?xml version="1.0" encoding="UTF-8"?>
 <net version="1.20" junctionCornerDetail="5" limitTurnSpeed="5.50">
@@ -209,6 +210,8 @@ def _connections(node: Junction) -> Iterator[str]:
         states = "Oo" if node.has_signals else "Mm"
         state = states[any(node.yields[number])]
         first = way.source.index(way.link.from_lane)
+        if any(node.yields[number]) and not any(node.yields[number][: len(node.ways)]):
+            signals["visibility"] = _ZEBRA_SIGHT
         yield _connection(way.link.source, first, way, via=_entry(node, number), **signals, state=state)
     for number, way in enumerate(node.ways):
         parts = _parts(node, number)

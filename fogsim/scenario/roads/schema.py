@@ -323,11 +323,12 @@ class ActorSection(Section):
 
     @model_validator(mode="after")
     def _keys_of_its_kind(self) -> Self:
-        others = (
-            self.model_fields_set - _OF_BOTH - _OF_PERSONS if self.is_person else self.model_fields_set & _OF_PERSONS
-        )
+        fields = type(self).model_fields
+        # A scenario that is written out in full has the defaults of the others' keys, too.
+        given = {key for key in self.model_fields_set if getattr(self, key) != fields[key].default}
+        others = given - _OF_BOTH - _OF_PERSONS if self.is_person else given & _OF_PERSONS
         for key in sorted(others):
-            has = sorted(_OF_BOTH | _OF_PERSONS if self.is_person else set(type(self).model_fields) - _OF_PERSONS)
+            has = sorted(_OF_BOTH | _OF_PERSONS if self.is_person else set(fields) - _OF_PERSONS)
             raise ValueError(f"a {self.type} has no {key}; {suggest(key, has)}")
         return self
 

@@ -7,6 +7,7 @@ import pytest
 
 import fogsim
 from fogsim.errors import InputError
+from fogsim.scenario import override
 from fogsim.traffic.templates import ROAD_TEMPLATES, Footfall, Layout, PlacementError, Walker
 from fogsim.traffic.templates.on_foot import walkers_text, zebra_places
 from fogsim.values import Ending
@@ -80,6 +81,11 @@ expect:
   hidden: {eventually: "happened(steps_out) and gap(ego, child) < 20 m and ttc(ego, child) < 1 s"}
   safe: {never: child.collision}
 """
+
+
+def test_persons_are_kept_as_they_are_written_out(scenario: Path) -> None:
+    loaded = fogsim.load_scenario(scenario)
+    assert override(loaded, []).actors == loaded.actors
 
 
 @pytest.fixture

@@ -1,15 +1,16 @@
-"""Daylight that a script makes brighter or darker; by day the picture goes with it in proportion."""
+"""Daylight that a script makes brighter or darker."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fogsim.atmosphere import airlight_from_illuminance
 from fogsim.values import FogField
 
 
 @dataclass(frozen=True, slots=True)
 class Ramp:
-    """A quantity that goes over from one value to another, evenly.
+    """A quantity that goes over from one value to another, evenly or by the same factor in each second.
 
     Attributes
     ----------
@@ -19,12 +20,15 @@ class Ramp:
         The value after; None for the same.
     begun, duration : float
         When it begins to change, and how long that takes [s].
+    by_factors : bool
+        Whether its logarithm goes over evenly, and not the value itself; both values are positive then.
     """
 
     first: float
     last: float | None = None
     begun: float = 0.0
     duration: float = 0.0
+    by_factors: bool = False
 
     def at(self, time: float) -> float:
         """The value at a time.
@@ -38,9 +42,11 @@ class Ramp:
             return self.first
         if time >= self.begun + self.duration:
             return self.last
+        if self.by_factors:
+            return float(self.first * (self.last / self.first) ** ((time - self.begun) / self.duration))
         return float(np.interp(time, [self.begun, self.begun + self.duration], [self.first, self.last]))
 
-    def turned(self, time: float, value: float, duration: float) -> "Ramp":
+    def turned(self, time: float, value: float, duration: float, by_factors: bool = False) -> "Ramp":
         """The quantity when from a time on it goes elsewhere.
 
         Parameters
@@ -51,21 +57,21 @@ class Ramp:
             Value to come to.
         duration : float
             Time that it takes [s].
+        by_factors : bool
+            See `Ramp`; not where the value is 0 now.
         """
-        return Ramp(self.at(time), value, time, duration)
+        first = self.at(time)
+        return Ramp(first, value, time, duration, by_factors and first > 0.0)
 
 
-def brightened(fog: FogField, factor: float) -> FogField:
-    """Fog by brighter daylight.
+def in_daylight(fog: FogField, illuminance: float) -> FogField:
+    """Fog by another daylight.
 
     Parameters
     ----------
     fog : FogField
         The fog.
-    factor : float
-        How much brighter [-].
+    illuminance : float
+        Horizontal illuminance of the sky [lx].
     """
-    if factor == 1.0:
-        return fog
-    red, green, blue = fog.airlight
-    return replace(fog, airlight=(red * factor, green * factor, blue * factor))
+    return replace(fog, airlight=airlight_from_illuminance(illuminance))

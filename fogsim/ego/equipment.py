@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere import distance_at_depth, extinction, field_at, with_change
 from fogsim.camera import Delivered, FaultyLens, FrameDelivery, knocked, mounted_pose
-from fogsim.ego.daylight import Ramp, brightened
+from fogsim.ego.daylight import Ramp, in_daylight
 from fogsim.ego.frame_watch import FrameWatch, LeadHistory
 from fogsim.ego.measurements import EgoSensors
 from fogsim.ego.road_meters import RoadMeters
@@ -72,7 +72,8 @@ class EgoEquipment:
         self._sensors = EgoSensors(scenario)
         self._faults = tuple(fault_of(written) for written in scenario.sensors.faults)
         self._schedule: FaultSchedule | None = None
-        self._light = Ramp(1.0)
+        self._light = Ramp(scenario.light.illuminance_lx)
+        self._daylight = self._light.first
         self._fog: FogField | None = None
         self._fog_now: FogField | None = None
         self._glass, self._delivery = FaultyLens(), FrameDelivery()
@@ -141,7 +142,8 @@ class EgoEquipment:
         self._watch.reset()
         self._leads.reset()
         self._streams = streams
-        self._light = Ramp(1.0)
+        self._light = Ramp(self._scenario.light.illuminance_lx)
+        self._daylight = self._light.first
         if self._fog is None:
             self._fog = view.fog
         self._enter_fog(self._fog)
@@ -194,7 +196,7 @@ class EgoEquipment:
         if actions.fog:
             self._enter_fog(fog)
         for light in actions.light:
-            self._light = self._light.turned(time, light.factor, light.duration)
+            self._light = self._light.turned(time, light.illuminance, light.duration, light.by_factors)
         if actions.faults:
             self.begin_faults(actions.faults, first_time)
         return fog
@@ -255,13 +257,14 @@ class EgoEquipment:
             raise SimulationError("the run has not been started, or is closed")
         faults = schedule.at(time)
         renderer, state, ego = self._view_of_world(faults), snapshot.state, snapshot.ego
-        camera, brightness = knocked(self._camera, [one.kind for one in faults]), np.float32(self._light.at(time))
-        pose, fog = self._pose(state, ego), brightened(field_at(renderer.fog, time), float(brightness))
+        camera, light = knocked(self._camera, [one.kind for one in faults]), self._light.at(time)
+        if light != self._daylight:
+            self._daylight = light
+            self._enter_fog(in_daylight(renderer.fog, light))
+        pose, fog = self._pose(state, ego), field_at(renderer.fog, time)
         sections, known = meters.measure(fog), tuple(one.fault for one in faults)
         truth = fog_truth(fog, pose, camera, renderer.signs, state, sections, self._way, known)
-        view, radiance = renderer.render(state, ego, pose, time, camera)
-        if brightness != 1.0:
-            view, radiance = replace(view, radiance=view.radiance * brightness), radiance * brightness
+        view, radiance = renderer.render(state, ego, pose, time, camera, light)
         image = self._camera_sensor.take(self._glass.look_through(radiance, camera, faults), streams.camera)
         frame = Frame(*self._delivery.deliver(Delivered(time, image), faults), self._assumed_camera)
         observation = Observation(

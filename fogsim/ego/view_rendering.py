@@ -15,6 +15,7 @@ from fogsim.lighting import LampMount, own_head_lamps
 from fogsim.obstruction import tunnels_of
 from fogsim.render import LIMITED, Renderer, RenderError, make_renderer
 from fogsim.scenario import Scenario, build
+from fogsim.scenario.timeline import darkest_light
 from fogsim.scene import (
     Corridor,
     ScenePlan,
@@ -99,7 +100,13 @@ class EgoView(Protocol):
         """Look through another fog; see `ViewRenderer.enter_fog`."""
 
     def render(
-        self, state: TrafficState, ego: int, pose: CameraPose, time: float, camera: Camera | None = None
+        self,
+        state: TrafficState,
+        ego: int,
+        pose: CameraPose,
+        time: float,
+        camera: Camera | None = None,
+        illuminance: float | None = None,
     ) -> tuple[View, NDArray[np.float32]]:
         """Draw; see `ViewRenderer.render`."""
 
@@ -195,7 +202,9 @@ class ViewRenderer:
         self._drawn_camera = supersampled(self._camera, self._samples)
         self._setback = build.camera_mount(scenario, body).setback
         self._scenario, self._network = scenario, network
-        self._by_lamplight = scenario.light.illuminance_lx < DAY_ILLUMINANCE
+        self._daylight = scenario.light.illuminance_lx
+        # Lamps that were lit in the picture only from a moment on would be a jump in it.
+        self._by_lamplight = darkest_light(scenario.timeline, self._daylight) < DAY_ILLUMINANCE
         self._mount = LampMount()
         self._tunnels = tunnels_of(network.structures)
         self._air = Air(self.fog, scenario.fog.droplets, self._tunnels)
@@ -211,14 +220,14 @@ class ViewRenderer:
         scenario, around = self._scenario, surroundings(self._network, self.signs, line)
         rng = np.random.default_rng(scenario.scenery_seed)
         plan = ScenePlan(around.network, around.signs, rng, street_lamps=scenario.street_lamps)
-        self._origin, self._shifted, self._streets = around.origin, bool(np.any(around.origin)), None
+        self._origin, self._shifted = around.origin, bool(np.any(around.origin))
         self._known = None if around.whole else Corridor(line, _LEEWAY)
         # Other renderers may draw what is farther away.
         self._near_scene = NearScene(plan, FEW_LANES if scenario.renderer in LIMITED else plan.lanes)
-        self._sky = scenario.light.illuminance_lx
         self._street_lamps = street_lamp_heads(self._near_scene.scene) + around.origin
+        self._streets = None
+        self._sky = self._sky_of(self._daylight)
         if len(self._street_lamps) and self._by_lamplight:
-            self._sky = max(self._sky, DARKEST_SKY)
             self._streets = street_lighting(self._street_lamps, self._sky)
         if self._tunnels:
             self._sky = max(self._sky, DARKEST_SKY)
@@ -226,6 +235,18 @@ class ViewRenderer:
         self._free_renderer()
         if self._near_scene.is_whole:
             self._make_renderer()
+
+    def _sky_of(self, illuminance: float) -> float:
+        """Illuminance of the sky in which the scene is drawn [lx]."""
+        return max(illuminance, DARKEST_SKY) if len(self._street_lamps) and self._by_lamplight else illuminance
+
+    def _set_daylight(self, illuminance: float) -> None:
+        if illuminance == self._daylight:
+            return
+        self._daylight, self._sky = illuminance, self._sky_of(illuminance)
+        self._streets = self._streets and replace(self._streets, sky_illuminance=self._sky)
+        if self._renderer is not None:
+            self._renderer.set_daylight(self._sky)
 
     def _make_renderer(self) -> Renderer:
         self._free_renderer()
@@ -249,7 +270,13 @@ class ViewRenderer:
         self.fog = self._air.field = fog
 
     def render(
-        self, state: TrafficState, ego: int, pose: CameraPose, time: float, camera: Camera | None = None
+        self,
+        state: TrafficState,
+        ego: int,
+        pose: CameraPose,
+        time: float,
+        camera: Camera | None = None,
+        illuminance: float | None = None,
     ) -> tuple[View, NDArray[np.float32]]:
         """Draw what is there, and what of it reaches the camera through the air.
 
@@ -265,6 +292,9 @@ class ViewRenderer:
             Time since the run began [s].
         camera : Camera or None
             Its true calibration now, if it is another than at the beginning.
+        illuminance : float or None
+            Horizontal illuminance of the daylight now [lx]; None for the scenario's. The fog's airlight is that of the
+            fog that was entered.
 
         Returns
         -------
@@ -273,6 +303,7 @@ class ViewRenderer:
         (rows, cols, 3) float32
             Linear radiance at the camera [cd/m²], the mean of a pixel's samples.
         """
+        self._set_daylight(self._scenario.light.illuminance_lx if illuminance is None else illuminance)
         self._go_to(state.position[ego])
         drawn = self._drawn_camera if camera is None else supersampled(camera, self._samples)
         lights = self._lights(state, ego, pose)

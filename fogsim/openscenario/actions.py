@@ -8,7 +8,7 @@ from typing import Any
 
 from fogsim.openscenario.catalogs import Catalogs
 from fogsim.openscenario.entities import Vehicle
-from fogsim.openscenario.environment import environment_of, light_change
+from fogsim.openscenario.environment import environment_of
 from fogsim.openscenario.findings import Findings
 from fogsim.openscenario.positions import Positions
 from fogsim.openscenario.xml_tree import Node
@@ -75,15 +75,12 @@ class Actions:
         Knows the map, and where everybody begins.
     called : callable
         A vehicle's name in conditions.
-    begins_by_day : bool
-        Whether the run does.
     """
 
     vehicles: Mapping[str, Vehicle]
     catalogs: Catalogs
     positions: Positions
     called: Callable[[str], str]
-    begins_by_day: bool = True
 
     @property
     def findings(self) -> Findings:
@@ -124,11 +121,7 @@ class Actions:
         elif read.visibility is not None:
             effect.add("fog", visibility_m=read.visibility)
         if read.illuminance is not None:
-            illuminance, left_out = light_change(read.illuminance, self.begins_by_day)
-            if left_out:
-                self.findings.leave_out(action, left_out)
-            if illuminance is not None:
-                effect.add("light", illuminance_lx=round(illuminance, 1))
+            effect.add("light", illuminance_lx=float(f"{read.illuminance:.4g}"))
 
     def _speed(self, action: Node, actor: str, effect: Effect) -> None:
         """`speed`: absolute, or relative to a vehicle at that moment; by time or rate."""

@@ -12,7 +12,6 @@ from fogsim.openscenario.daylight import clear_sky_illuminance, sun_elevation, t
 from fogsim.openscenario.findings import Findings
 from fogsim.openscenario.xml_tree import Node
 from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes
-from fogsim.units import DAY_ILLUMINANCE
 
 _CLOUDS = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
 _OLD_CLOUDS = {"free": 0.0, "cloudy": 4.0, "overcast": 8.0, "rainy": 8.0, "skyOff": 0.0}
@@ -195,21 +194,3 @@ def _stretches(route: Any, box: Box) -> list[tuple[float, float]]:
     inside = np.concatenate([[False], box.covers(points), [False]]).astype(int)
     begins, stops = np.flatnonzero(np.diff(inside) == 1), np.flatnonzero(np.diff(inside) == -1) - 1
     return [(float(along[a]), float(along[b])) for a, b in zip(begins, stops, strict=True) if b > a]
-
-
-def light_change(illuminance: float, begins_by_day: bool) -> tuple[float | None, str]:
-    """Illuminance to which daylight can change while a run lasts [lx], None for not at all; and what is left out.
-
-    Parameters
-    ----------
-    illuminance : float
-        The wanted one [lx].
-    begins_by_day : bool
-        Whether the run begins by day.
-    """
-    if not begins_by_day:
-        return None, "a run that begins by night or in twilight stays so"
-    if illuminance < DAY_ILLUMINANCE:
-        told = f"{illuminance:.3g} lx: daylight does not fall below {DAY_ILLUMINANCE:g} lx while a run lasts"
-        return DAY_ILLUMINANCE, told
-    return illuminance, ""

@@ -25,7 +25,7 @@ from fogsim.openscenario.vehicles_file import STANDS, front_spot, vehicles_text
 from fogsim.openscenario.xml_tree import Node, read_xml
 from fogsim.traffic.road.netconvert import netconvert_recipe, opendrive_net
 from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, read_opendrive_lanes
-from fogsim.units import DAY_ILLUMINANCE, KMH_PER_MPS
+from fogsim.units import KMH_PER_MPS
 
 USUAL_DURATION = 120.0
 """Longest simulated time of a file whose stop trigger names none [s]."""
@@ -141,8 +141,6 @@ class _Reader:
                 self.root, f"no vehicle that could be the ego has a place; there are {len(self.vehicles)}"
             )
             self.findings.close(self.path)
-        light = begin.environment.illuminance
-        actions.begins_by_day = light is None or light >= DAY_ILLUMINANCE
         story.find_events(self.storyboard)
         route = self.lanes.route(front_spot(self.vehicles[ego], begin.spots[ego], self.lanes).lane.edge)
         along = along_route(route, begin, self.vehicles, actions)

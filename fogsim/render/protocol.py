@@ -17,7 +17,17 @@ class RenderError(FogSimError, RuntimeError):
 
 
 class Renderer(Protocol):
-    """Draws one scene for any camera; made for one scene and one daylight."""
+    """Draws one scene for any camera."""
+
+    def set_daylight(self, illuminance: float) -> None:
+        """Draw by another daylight from now on.
+
+        Parameters
+        ----------
+        illuminance : float
+            Horizontal illuminance of the sky [lx], not negative.
+        """
+        ...
 
     def render(self, vehicles: Sequence[Batch], camera: Camera, pose: CameraPose, lamplight: bool = False) -> View:
         """Draw the scene and the vehicles as they are now.

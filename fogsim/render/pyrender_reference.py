@@ -52,13 +52,23 @@ class PyrenderReference:
         self._context = context()
         self._pyrender = load_pyrender()
         self._scene: Scene | None = scene
-        self._white = max(illuminance / np.pi, 1e-6)
-        self._zenith = zenith_luminance(illuminance) * np.array(SKY_TINT)
+        self.set_daylight(illuminance)
         self._nodes = empty_scene(self._pyrender, illuminance, self._white)
         self._still = list(still_parts(self._pyrender, scene, self._white))
         for part in self._still:
             self._nodes.add_node(part.node)
         self._drawer: Any = None
+
+    def set_daylight(self, illuminance: float) -> None:
+        """Draw by another daylight from now on; what pyrender draws is a share of it.
+
+        Parameters
+        ----------
+        illuminance : float
+            Horizontal illuminance of the sky [lx], not negative.
+        """
+        self._white = max(illuminance / np.pi, 1e-6)
+        self._zenith = zenith_luminance(illuminance) * np.array(SKY_TINT)
 
     def render(self, vehicles: Sequence[Batch], camera: Camera, pose: CameraPose, lamplight: bool = False) -> View:
         """Draw the scene and the vehicles (see `Renderer.render`).

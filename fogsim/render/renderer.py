@@ -52,6 +52,16 @@ class SceneRenderer:
         self._still = len(shape)
         self._chosen = _room(0)
 
+    def set_daylight(self, illuminance: float) -> None:
+        """Draw by another daylight from now on.
+
+        Parameters
+        ----------
+        illuminance : float
+            Horizontal illuminance of the sky [lx], not negative.
+        """
+        self._shading.set_daylight(illuminance)
+
     def render(self, vehicles: Sequence[Batch], camera: Camera, pose: CameraPose, lamplight: bool = False) -> View:
         """Draw the scene and the vehicles (see `Renderer.render`).
 

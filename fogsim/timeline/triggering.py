@@ -61,7 +61,6 @@ class Timeline:
         self._entries = tuple(_Entry(written, number) for number, written in enumerate(scenario.timeline))
         fog = scenario.fog.visibility_m or scenario.fog.outside_visibility_m or math.inf
         self._reference = fog_reference(scenario.timeline, extinction_from_visibility(fog))
-        self._light = scenario.light.illuminance_lx
         self._end = None if scenario.end_when is None else Watch(scenario.end_when)
         self._history = History()
         self._seen: set[str] = set()
@@ -86,7 +85,7 @@ class Timeline:
         parts: list[tuple[Begun, Actions]] = []
         for entry in self._entries:
             entry.look(moment)
-            actions = actions_of(entry.written, now, self._reference, self._light) if entry.is_due(step.time) else None
+            actions = actions_of(entry.written, now, self._reference) if entry.is_due(step.time) else None
             if actions is not None:
                 parts.append((entry.begin(step.time, moment), actions))
         self._ends += [end for begun, actions in parts if (end := _end(begun, actions)) is not None]

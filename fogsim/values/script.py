@@ -250,18 +250,21 @@ class ChangeFog:
 
 @dataclass(frozen=True, slots=True)
 class ChangeLight:
-    """Daylight becomes brighter or darker, and stays daylight.
+    """Daylight becomes brighter or darker.
 
     Attributes
     ----------
-    factor : float
-        Horizontal illuminance to come to, over that of the scenario [-].
+    illuminance : float
+        Horizontal illuminance to come to [lx].
     duration : float
         Time that it takes [s].
+    by_factors : bool
+        Whether it changes by the same factor in each second, as dusk and dawn do, and not by as many lux.
     """
 
-    factor: float
+    illuminance: float
     duration: float = 0.0
+    by_factors: bool = False
 
 
 @dataclass(frozen=True, slots=True)

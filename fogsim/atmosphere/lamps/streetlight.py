@@ -113,7 +113,7 @@ class StreetLight:
     def _about(self, pose: CameraPose, fog: FogField, lamps: StreetLighting) -> _Map:
         """The map about the camera, made anew only if the camera, the lamps or the fog have moved."""
         eye, known = np.array(pose.position[:2]), self._map
-        if known is not None and known.lamps is lamps and np.abs(eye - known.middle).max() < _STAY:
+        if known is not None and known.lamps.position is lamps.position and np.abs(eye - known.middle).max() < _STAY:
             middle = known.middle
         else:
             middle, known = eye, None

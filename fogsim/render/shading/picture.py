@@ -51,8 +51,7 @@ class Shading:
             table.first_face,
         )
         light = Light(
-            white=illuminance / np.pi,
-            zenith=zenith_luminance(illuminance) * np.array(SKY_TINT),
+            *_white_and_zenith(illuminance),
             terrain=np.array((height, *reflectance)),
             lamp_masks=np.array([lighting_bits(surface) for surface in Surface], np.int32),
             lamp_radiance=np.array([lamp_radiance(surface) for surface in Surface]),
@@ -61,6 +60,17 @@ class Shading:
         self._bands, self._memory = Bands(), Memory()
         # For each band.
         self._rows, self._spans = [memory_for_row(0), memory_for_row(0)], [_room(0, 0), _room(0, 0)]
+
+    def set_daylight(self, illuminance: float) -> None:
+        """Shade by another daylight from now on.
+
+        Parameters
+        ----------
+        illuminance : float
+            Horizontal illuminance of the sky [lx].
+        """
+        white, zenith = _white_and_zenith(illuminance)
+        self._scene = self._scene._replace(light=self._scene.light._replace(white=white, zenith=zenith))
 
     def view(
         self, triangle_ids: NDArray[np.int32], drawing: Drawing, camera: Camera, pose: CameraPose, lamplight: bool
@@ -108,6 +118,11 @@ class Shading:
             # Bands change, and so does what is seen.
             spans = self._spans[band] = _room(pixels + pixels // 4, triangle_ids + triangle_ids // 2)
         return spans
+
+
+def _white_and_zenith(illuminance: float) -> tuple[float, NDArray[np.float64]]:
+    """Luminances of a white surface and of the zenith by an illuminance [cd/m²]."""
+    return illuminance / np.pi, zenith_luminance(illuminance) * np.array(SKY_TINT)
 
 
 class ShadedScene(NamedTuple):

@@ -3,6 +3,7 @@
 from fogsim.scenario.timeline.actions import (
     Situation,
     actions_of,
+    darkest_light,
     departing_vehicles,
     doings_of,
     entry_name,
@@ -22,6 +23,7 @@ __all__ = [
     "TimelineEntry",
     "actions_of",
     "check_timeline",
+    "darkest_light",
     "departing_vehicles",
     "doings_of",
     "entry_name",

@@ -58,7 +58,7 @@ class Situation(Protocol):
         """Number of its lane from the right."""
 
 
-def actions_of(entry: TimelineEntry, now: Situation, reference: float, light: float) -> Actions | None:
+def actions_of(entry: TimelineEntry, now: Situation, reference: float) -> Actions | None:
     """What an entry begins.
 
     Parameters
@@ -69,8 +69,6 @@ def actions_of(entry: TimelineEntry, now: Situation, reference: float, light: fl
         Where everybody is.
     reference : float
         Extinction coefficient to which densities refer, from `fog_reference` [1/m].
-    light : float
-        Illuminance of the scenario [lx].
 
     Returns
     -------
@@ -95,7 +93,7 @@ def actions_of(entry: TimelineEntry, now: Situation, reference: float, light: fl
             case FogActions():
                 fog.append(ChangeFog(_density(doing, reference), doing.over_s))
             case LightActions():
-                lights.append(ChangeLight(doing.illuminance_lx / light, doing.over_s))
+                lights.append(ChangeLight(doing.illuminance_lx, doing.over_s, doing.course == "factors"))
             case _:
                 faults.append(fault_of(doing))
     return Actions(tuple(traffic), tuple(fog), tuple(lights), tuple(faults))
@@ -289,6 +287,20 @@ def fog_reference(entries: Sequence[TimelineEntry], extinction: float) -> float:
         if isinstance(doing, FogActions) and doing.visibility_m is not None
     ]
     return extinction if extinction > 0.0 else max(wanted, default=0.0)
+
+
+def darkest_light(entries: Sequence[TimelineEntry], illuminance: float) -> float:
+    """Lowest horizontal illuminance that there may be in a run [lx].
+
+    Parameters
+    ----------
+    entries : sequence of TimelineEntry
+        The timeline.
+    illuminance : float
+        Illuminance with which it begins [lx].
+    """
+    doings = [doing for entry in entries for _, doing in doings_of(entry)]
+    return min([illuminance, *(doing.illuminance_lx for doing in doings if isinstance(doing, LightActions))])
 
 
 def scripted_fog(entries: Sequence[TimelineEntry], fog: FogField) -> FogField:

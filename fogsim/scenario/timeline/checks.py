@@ -24,6 +24,9 @@ from fogsim.units import DAY_ILLUMINANCE
 if TYPE_CHECKING:
     from fogsim.scenario.schema import Scenario
 
+DAYLIGHT_RENDERER = "reference"
+"""Name of the renderer that draws by daylight only."""
+
 
 def check_timeline(scenario: "Scenario") -> None:
     """Refuse a timeline that a run of its scenario could not play.
@@ -80,12 +83,17 @@ def _mistake(doing: Doing, scenario: "Scenario") -> str | None:
         return _fog_mistake(doing, scenario)
     if not scenario.traffic.has_ego:
         return "daylight and sensors concern an ego's camera, and traffic.ego is none"
-    illuminance = scenario.light.illuminance_lx
-    if isinstance(doing, LightActions) and illuminance < DAY_ILLUMINANCE:
+    return _light_mistake(doing, scenario) if isinstance(doing, LightActions) else None
+
+
+def _light_mistake(doing: LightActions, scenario: "Scenario") -> str | None:
+    if scenario.renderer == DAYLIGHT_RENDERER and doing.illuminance_lx < DAY_ILLUMINANCE:
         return (
-            f"daylight changes by day alone, and light.illuminance_lx is {illuminance:g}, less than "
-            f"{DAY_ILLUMINANCE:g}, where lamps light the road"
+            f"illuminance_lx is {doing.illuminance_lx:g}, and the renderer {DAYLIGHT_RENDERER} knows no lamplight, "
+            f"which there is below {DAY_ILLUMINANCE:g}; take opengl or cpu"
         )
+    if doing.course == "factors" and scenario.light.illuminance_lx == 0.0:
+        return "course: factors goes on from the light that there is, and light.illuminance_lx is 0"
     return None
 
 

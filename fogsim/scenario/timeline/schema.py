@@ -278,11 +278,20 @@ class FogActions(Section):
 class LightActions(Section):
     """How daylight changes."""
 
-    illuminance_lx: Annotated[Number, Field(ge=1000, le=200_000)]
-    """Horizontal illuminance to come to; by day alone, where no lamps light the road."""
+    illuminance_lx: Annotated[Number, Field(ge=0, le=200_000)]
+    """Horizontal illuminance to come to. If any is below 1000, where lamps light the road, they do in the whole run."""
 
     over_s: Time = 0.0
     """Time that this takes."""
+
+    course: Literal["lux", "factors"] = "lux"
+    """`lux`: by as many lux in each second; `factors`: by the same factor, as dusk and dawn do."""
+
+    @model_validator(mode="after")
+    def _never_dark(self) -> Self:
+        if self.course == "factors" and self.illuminance_lx == 0.0:
+            raise ValueError("no factor leads to illuminance_lx: 0; write 0.0001, an overcast night, or course: lux")
+        return self
 
 
 Doing = VehicleActions | SignalActions | FogActions | LightActions | AnyFault

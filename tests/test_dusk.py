@@ -1,0 +1,84 @@
+"""Daylight that changes while a run lasts, into the night: pictures without a jump, and what is refused."""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+import fogsim
+from fogsim.camera import mounted_pose
+from fogsim.ego.daylight import Ramp, in_daylight
+from fogsim.ego.view_rendering import ViewRenderer
+from fogsim.scenario import build
+from fogsim.values import Lamp, SignMap
+from tests.test_grades import SETTINGS, road, traffic
+
+DUSK = "timeline=[{when: time >= 1 s, do: {light: {illuminance: 0.05 lx, over: 60 s, course: factors}}}]"
+LIT = Lamp.POSITION | Lamp.LOW_BEAM
+Picture = Callable[[float], np.ndarray]
+
+
+def pictures(*settings: str) -> Iterator[Picture]:
+    """What the camera of one scenario gets by an illuminance [lx]."""
+    scenario = fogsim.load_scenario("motorway_fog_bank", [*SETTINGS, "fog={visibility_m: 150}", *settings])
+    view_renderer, state = ViewRenderer(scenario, road(0.0), SignMap()), traffic(0.0, 400.0, LIT)
+    pose = mounted_pose(build.camera(scenario), state.position[0], 0.0, build.camera_mount(scenario).setback, 0.0)
+    clear = view_renderer.fog
+
+    def picture(illuminance: float) -> np.ndarray:
+        view_renderer.enter_fog(in_daylight(clear, illuminance))
+        _, radiance = view_renderer.render(state, 0, pose, 0.0, None, illuminance)
+        return radiance.copy()
+
+    yield picture
+    view_renderer.close()
+
+
+@pytest.fixture(scope="module")
+def at_dusk() -> Iterator[Picture]:
+    yield from pictures("light.illuminance_lx=10000", DUSK)
+
+
+def test_frames_go_on_across_the_limit_of_day_and_night(at_dusk: Picture) -> None:
+    above, below = at_dusk(1000.0), at_dusk(999.9)
+    np.testing.assert_allclose(below, above, rtol=1e-3)
+    assert below.mean() < above.mean()
+
+
+def test_the_night_that_falls_is_the_night_that_was_there(at_dusk: Picture) -> None:
+    (night,) = (picture(0.05) for picture in pictures("light.illuminance_lx=0.05"))
+    np.testing.assert_array_equal(at_dusk(0.05), night)
+
+
+def test_daylight_and_lamplight_add(at_dusk: Picture) -> None:
+    """Daylight is proportional to the illuminance, and lamps burn alike at any."""
+    dim, twice, dark = (at_dusk(lux).astype(np.float64) for lux in (10.0, 20.0, 0.0))
+    np.testing.assert_allclose(twice - dim, dim - dark, rtol=1e-3, atol=1e-3)
+    assert dark.max() > 10.0
+
+
+def test_by_day_alone_no_lamps_are_drawn() -> None:
+    brighter = "timeline=[{when: time >= 1 s, do: {light: {illuminance: 20000 lx}}}]"
+    (day,) = (picture(20_000.0) for picture in pictures("light.illuminance_lx=10000", brighter))
+    (same,) = (picture(20_000.0) for picture in pictures("light.illuminance_lx=20000"))
+    np.testing.assert_array_equal(day, same)
+
+
+def test_dusk_takes_the_same_factor_each_second() -> None:
+    dusk = Ramp(10_000.0).turned(1.0, 0.01, 60.0, by_factors=True)
+    assert [dusk.at(time) for time in (0.0, 1.0, 31.0, 61.0, 90.0)] == pytest.approx([1e4, 1e4, 10.0, 0.01, 0.01])
+    assert Ramp(0.0).turned(0.0, 10.0, 10.0, by_factors=True).at(5.0) == 5.0  # no factor leads away from nothing
+
+
+@pytest.mark.parametrize(
+    ("settings", "told"),
+    [
+        (["renderer=reference"], "the renderer reference knows no lamplight"),
+        (["light.illuminance_lx=0"], "goes on from the light that there is, and light.illuminance_lx is 0"),
+        (["timeline.0.do.light.illuminance_lx=0"], "no factor leads to illuminance_lx: 0"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(settings: list[str], told: str) -> None:
+    dusk = DUSK.replace("illuminance: 0.05 lx", "illuminance_lx: 0.05")
+    with pytest.raises(fogsim.InputError, match=told):
+        fogsim.load_scenario("motorway_fog_bank", [dusk, *settings])

@@ -3,12 +3,12 @@
 import dataclasses
 import math
 import warnings
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Protocol, Self
 
-from fogsim.advice import VehicleAdviser
+from fogsim.advice import Adviser, VehicleAdviser
 from fogsim.atmosphere import FogNow
 from fogsim.ego.equipment import EgoEquipment
 from fogsim.ego.view_rendering import Surrounding
@@ -114,7 +114,7 @@ class AdvisedDriving:
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
-        self._adviser = build.adviser(scenario)
+        self._ask_adviser = _questions_to(build.adviser(scenario))
         self._lighting = build.lighting_policy(scenario)
         self._frames = build.periods(scenario).decision_frames
         self._road = RoadAdvice(scenario) if scenario.drivers.advised in DISPLAYS else None
@@ -135,14 +135,19 @@ class AdvisedDriving:
         if self._road is not None:
             advice, stretches = self._road.advise(step)
             return Command(advice=advice, lamps=lamps, stretches=stretches)
-        advice = checked_advice(self._scenario.advice.method, self._ask_adviser(step))
+        advice = checked_advice(
+            self._scenario.advice.method, self._ask_adviser(step, known_fog(step, self._scenario.advice))
+        )
         return spread_advice(Command(advice=advice, lamps=lamps), self._scenario)
 
-    def _ask_adviser(self, step: Step) -> SpeedAdvice:
-        known, adviser, previous = known_fog(step, self._scenario.advice), self._adviser, step.command.advice
-        if isinstance(adviser, VehicleAdviser):
-            return adviser.advise_vehicle(known, step.observation, step.speed_limit, step.time, previous)
-        return adviser.advise(known, step.speed_limit, step.time, previous)
+
+def _questions_to(adviser: Adviser | VehicleAdviser) -> Callable[[Step, Belief], SpeedAdvice]:
+    """A function that asks an adviser what it says after a step, by what is known of the fog."""
+    if isinstance(adviser, VehicleAdviser):
+        return lambda step, known: adviser.advise_vehicle(
+            known, step.observation, step.speed_limit, step.time, step.command.advice
+        )
+    return lambda step, known: adviser.advise(known, step.speed_limit, step.time, step.command.advice)
 
 
 def known_fog(step: Step, method: InformedMethod) -> Belief:

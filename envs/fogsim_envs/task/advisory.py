@@ -251,6 +251,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
     def _info(self) -> dict[str, Any]:
         """What is told beside the observation; agents must not use ``truth``, which is for oracles and evaluation."""
         step = self._current
+        low, median, high = step.belief.visibility_quantiles((0.05, 0.5, 0.95))
         # What the built-in adviser would say here: it remembers what it said itself, not what the agent did.
         self._built_in = self._adviser.decide(dataclasses.replace(step, command=self._built_in))
         return {
@@ -265,9 +266,9 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
             "built_in_advice_mps": self._built_in.advice.speed,
             "built_in_lamps": int(self._built_in.lamps),
             "belief": {
-                "visibility_m": step.belief.visibility,
-                "visibility_low_m": step.belief.visibility_quantile(0.05),
-                "visibility_high_m": step.belief.visibility_quantile(0.95),
+                "visibility_m": median,
+                "visibility_low_m": low,
+                "visibility_high_m": high,
             },
             "cost": float(strikes(step)) + unseen_share(step, self._standard),
             "unplayed": step.unplayed.lines,

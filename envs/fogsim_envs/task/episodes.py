@@ -200,7 +200,7 @@ class ScenarioDistribution:
     lanes: tuple[int, ...] = (2, 3)
     demand: tuple[float, ...] = (300.0, 900.0, 1500.0, 2100.0)
     truck_shares: tuple[float, ...] = (0.1, 0.25)
-    light: Mapping[str, float] = field(default_factory=lambda: {"day": 0.7, "dusk": 0.15, "night": 0.15})
+    light: Mapping[str, float] = field(default_factory=lambda: {"day": 0.5, "dusk": 0.2, "night": 0.3})
     scripts: Mapping[str, float] = field(
         default_factory=lambda: {
             "free": 0.2, "lead": 0.2, "slow_truck": 0.15, "braking_lead": 0.25, "standing_vehicle": 0.2,

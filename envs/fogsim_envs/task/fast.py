@@ -15,7 +15,7 @@ from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
 from fogsim_envs.task.rewards import TaskWeights
 from fogsim_envs.task.surrogate import EstimatorSurrogate, SurrogateTable
 
-_WITHOUT_FRAMES = ("renderer=none", "estimators=[]")
+_WITHOUT_FRAMES = ("renderer=none", "estimators=[]", "camera.width=16", "camera.height=16")
 _DEFAULT = ("road.length_m=2000", "demand.oncoming_vph=0", "clocks.traffic_step_s=0.5", "duration_s=260")
 
 FAST_FOG = FogDistribution(ahead=(400.0, 400.0), reach=1500.0)

@@ -124,7 +124,7 @@ def task_state(step: Step, own: Command, time_left: float, to_go: float) -> NDAr
         lead.distance / LEAD_SCALE if lead else 1.0,
         lead.relative_speed / SPEED_SCALE if lead else 0.0,
         *_estimate(step),
-        *(scaled_visibility(belief.visibility_quantile(share)) for share in QUANTILES),
+        *map(scaled_visibility, belief.visibility_quantiles(QUANTILES)),
         belief.log_standard_deviation,
         advice / SPEED_SCALE if math.isfinite(advice) else 1.0,
         float(Lamp.FRONT_FOG in own.lamps),

@@ -1,0 +1,94 @@
+"""Episodes of the baselines as a data set for learning from demonstrations: ``python -m fogsim_envs.demonstrations``.
+
+The data set is one of Minari (https://minari.farama.org), in Minari's own place (``MINARI_DATASETS_PATH``).
+"""
+
+import argparse
+from typing import Any
+
+import gymnasium
+
+from fogsim.errors import FogSimError, InputError, MissingDependencyError
+from fogsim_envs.baselines import BASELINES, baseline
+
+
+def record_demonstrations(name: str, env_id: str, episodes: int, data_set: str, **arguments: Any) -> Any:
+    """Run a baseline and keep its episodes.
+
+    Parameters
+    ----------
+    name : str
+        One of `fogsim_envs.baselines.BASELINES`.
+    env_id : str
+        The environment.
+    episodes : int
+        How many, with the seeds 0, 1, …; at least 1.
+    data_set : str
+        Id of the data set, such as ``fogsim/advisory/rule-v1``.
+    **arguments
+        Arguments of the environment.
+
+    Returns
+    -------
+    minari.MinariDataset
+        The data set.
+
+    Raises
+    ------
+    InputError
+        If there are to be no episodes, or there is such a data set already.
+    UnknownNameError
+        If there is no such baseline.
+    MissingDependencyError
+        If Minari is not installed.
+    """
+    minari = _import_minari()
+    if episodes < 1:
+        raise InputError(f"episodes: expected at least 1, got {episodes}")
+    if data_set in minari.list_local_datasets():
+        raise InputError(f"data set {data_set!r} is there already: choose another id, or minari delete {data_set}")
+    env = minari.DataCollector(gymnasium.make(env_id, **arguments))
+    try:
+        policy = baseline(name, env.action_space)
+        for seed in range(episodes):
+            policy.reset(seed)
+            observation, info = env.reset(seed=seed)
+            over = False
+            while not over:
+                observation, _, terminated, truncated, info = env.step(policy(observation, info))
+                over = terminated or truncated
+            print(f"\r{seed + 1} of {episodes} episodes", end="", flush=True)  # noqa: T201 - a command's progress
+        print()  # noqa: T201
+        return env.create_dataset(
+            dataset_id=data_set,
+            algorithm_name=f"FogSim's baseline {name}",
+            description=f"{episodes} episodes of {env_id}, seeds 0 to {episodes - 1}",
+        )
+    finally:
+        env.close()
+
+
+def _import_minari() -> Any:
+    try:
+        import minari  # noqa: PLC0415 - an extra
+    except ImportError as error:
+        raise MissingDependencyError(f"data sets need Minari ({error}): pip install 'fogsim[rl]'") from error
+    return minari
+
+
+def main() -> None:
+    """Run it from the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--policy", default="rule", help=f"one of {', '.join(BASELINES)}")
+    parser.add_argument("--env", default="fogsim_envs:fogsim/FogAdvisoryFast-v1")
+    parser.add_argument("--episodes", type=int, default=100)
+    parser.add_argument("--id", default="", help="id of the data set [fogsim/advisory/POLICY-v1]")
+    asked = parser.parse_args()
+    try:
+        record_demonstrations(asked.policy, asked.env, asked.episodes, asked.id or f"fogsim/advisory/{asked.policy}-v1")
+    except FogSimError as error:
+        parser.exit(2, f"error: {error}\n")
+
+
+if __name__ == "__main__":
+    main()

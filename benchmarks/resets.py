@@ -1,7 +1,8 @@
 """Time and memory of resets: milliseconds each, and growth of the process per reset.
 
-Three parts, each in a process of its own: ``sumo`` is libsumo's bare ``load``; ``traffic`` adds our traffic stage and
-the steps until the ego is on the road; ``environment`` is the whole of fogsim/FogAdvisory-v0, with a frame rendered.
+Four parts, each in a process of its own: ``sumo`` is libsumo's bare ``load``; ``traffic`` adds our traffic stage and
+the steps until the ego is on the road; ``environment`` is the whole of fogsim/FogAdvisory-v0, with a frame rendered,
+and ``highway`` of fogsim/FogHighway-v0, without SUMO.
 The first quarter of the resets is not counted (libraries load, caches fill, the allocator's pools settle). Growth is
 that of the resident set, and of what the C library's allocator has handed out and not got back (glibc only), which
 tells a leak from scattered free memory.
@@ -81,7 +82,20 @@ def environment(size: str) -> Iterator[Reset]:
     env.close()
 
 
-PARTS = {"sumo": sumo, "traffic": traffic, "environment": environment}
+@contextmanager
+def highway(size: str) -> Iterator[Reset]:
+    """Everything but SUMO."""
+    width, height = map(int, size.split("x"))
+    env = gymnasium.make("fogsim/FogHighway-v0", image_size=(width, height))
+
+    def reset(seed: int) -> None:
+        env.reset(seed=seed)
+
+    yield reset
+    env.close()
+
+
+PARTS = {"sumo": sumo, "traffic": traffic, "environment": environment, "highway": highway}
 
 
 class _HeapFigures(ctypes.Structure):
@@ -124,7 +138,7 @@ def measure(part: str, resets: int, size: str) -> dict[str, Any]:
         grown_heap = None if heap is None or heap_now is None else round((heap_now - heap) / counted, 2)
     return {
         "part": part,
-        "env": ENV_ID if part == "environment" else None,
+        "env": {"environment": ENV_ID, "highway": "fogsim/FogHighway-v0"}.get(part),
         "resets": resets,
         "ms_median": round(statistics.median(spent[warm_up:]), 1),
         "ms_max": round(max(spent[warm_up:]), 1),
@@ -139,7 +153,7 @@ def main() -> None:
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
     parser.add_argument("--resets", type=int, default=200, help="how many resets")
     parser.add_argument("--size", default="64x48", help="camera WIDTHxHEIGHT")
-    parser.add_argument("--part", action="append", choices=PARTS, help="what is reset (default: all three)")
+    parser.add_argument("--part", action="append", choices=PARTS, help="what is reset (default: all four)")
     arguments = parser.parse_args()
     records = []
     for part in arguments.part or PARTS:

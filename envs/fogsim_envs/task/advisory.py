@@ -45,7 +45,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
     | key | space | meaning |
     |---|---|---|
     | camera | uint8 (rows, cols, 3) | the latest frame |
-    | signs | float32 (8, 4) in −1 … 1 | signs by the map: distance / 250 m, lateral / 25 m, value / 50 m/s, size / 2 |
+    | signs | float32 (32,) in −1 … 1 | 8 signs by the map: distance / 250 m, lateral / 25 m, value / 50 m/s, size / 2 |
     | signs_mask | 0 or 1 (8,) | which rows of ``signs`` are filled |
     | state | float32 (21,) in −1 … 1 | see below |
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fogsim.errors import UnknownNameError
 from fogsim.values import Camera, Command, Lamp, Step
-from fogsim_envs.spaces import observation_space, observed_signs, scaled_visibility
+from fogsim_envs.spaces import SIGN_FEATURES, SIGN_SLOTS, observation_space, observed_signs, scaled_visibility
 
 OBSERVATIONS = ("dict", "state", "camera")
 """What can be asked for: all of it, the numbers alone, or the picture alone."""
@@ -69,7 +69,9 @@ def task_space(mode: str, camera: Camera | None) -> spaces.Space[Any]:
     if mode == "state" or camera is None:
         return state
     known = observation_space(camera)
-    return known["camera"] if mode == "camera" else spaces.Dict({**known.spaces, "state": state})
+    # Flat, as libraries expect of what is no picture.
+    signs = spaces.Box(-1.0, 1.0, (SIGN_SLOTS * len(SIGN_FEATURES),), np.float32)
+    return known["camera"] if mode == "camera" else spaces.Dict({**known.spaces, "signs": signs, "state": state})
 
 
 def task_observation(step: Step, mode: str, own: Command, duration: float, way_end: float) -> Any:
@@ -94,7 +96,7 @@ def task_observation(step: Step, mode: str, own: Command, duration: float, way_e
     if mode == "state":
         return state
     signs, mask = observed_signs(step)
-    return {"camera": step.observation.image.copy(), "signs": signs, "signs_mask": mask, "state": state}
+    return {"camera": step.observation.image.copy(), "signs": signs.ravel(), "signs_mask": mask, "state": state}
 
 
 def task_state(step: Step, own: Command, time_left: float, to_go: float) -> NDArray[np.float32]:

@@ -14,6 +14,7 @@ from fogsim.errors import InputError, UnknownNameError, nearest, shown, suggest
 from fogsim.scenario.document import Document, apply_overrides, read_scenario_document
 from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.plain_yaml import KeyPath, dotted
+from fogsim.scenario.roads.departures import entering_vehicles
 from fogsim.scenario.roads.files import DemandError, traffic_files, with_way
 from fogsim.scenario.schema import Scenario
 from fogsim.scenario.sumo_check import demand_mistakes, option_lines, step_mistake
@@ -348,6 +349,7 @@ def _checked_scenario(document: Document, folder: Path, named_files: bool, close
         raise InputError("\n".join(refused))
     _check_files(document, scenario)
     _check_placement(document, scenario)
+    _check_departures(document, scenario)
     scenario = with_way(scenario)
     unknown = demand_mistakes(document, scenario) if named_files and closed_demand else []
     if unknown:
@@ -391,6 +393,17 @@ def _check_files(document: Document, scenario: Scenario) -> None:
         raise InputError("\n".join(_no_file(document, scenario.directory, *one) for one in missing))
     if traffic.config is not None:
         configured_files(scenario.directory / traffic.config)
+
+
+def _check_departures(document: Document, scenario: Scenario) -> None:
+    try:
+        entering_vehicles(scenario)
+    except PlacementError as error:
+        for number, entry in enumerate(scenario.timeline):
+            if error.actor in entry.do:
+                at: KeyPath = ("timeline", number, "do", error.actor)
+                raise InputError(f"{document.where(at)}: {dotted(at)}.depart: {error.told}") from error
+        raise
 
 
 def _check_placement(document: Document, scenario: Scenario) -> None:

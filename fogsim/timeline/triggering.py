@@ -6,7 +6,9 @@ from dataclasses import dataclass, field
 
 from fogsim.conditions import History, Moment, Watch
 from fogsim.scenario import Scenario
+from fogsim.scenario.roads.departures import Entries, entering_vehicles
 from fogsim.scenario.timeline import TimelineEntry, actions_of, entry_name, fog_reference, told, vehicles_of
+from fogsim.scenario.timeline.schema import DepartAction
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Ending, Reason, TrafficStep, Unplayed, UnplayedEvent
 from fogsim.values.script import (
@@ -16,6 +18,7 @@ from fogsim.values.script import (
     ChangeLane,
     ChangeLight,
     ChangeSpeed,
+    Enter,
     Follow,
     SetSignal,
     TrafficAction,
@@ -61,6 +64,7 @@ class Timeline:
         self._entries = tuple(_Entry(written, number) for number, written in enumerate(scenario.timeline))
         fog = scenario.fog.visibility_m or scenario.fog.outside_visibility_m or math.inf
         self._reference = fog_reference(scenario.timeline, extinction_from_visibility(fog))
+        self._entering = entering_vehicles(scenario)
         self._end = None if scenario.end_when is None else Watch(scenario.end_when)
         self._history = History()
         self._seen: set[str] = set()
@@ -79,7 +83,7 @@ class Timeline:
         if not self._entries:
             return NOTHING_DUE
         moment = self._history.moment(step)
-        now = _Now(moment)
+        now = _Now(moment, self._entering)
         self._seen.update(step.traffic.ids)
         self._seen.update(step.traffic.persons.ids)
         parts: list[tuple[Begun, Actions]] = []
@@ -186,8 +190,9 @@ class _Entry:
 class _Now:
     """Where vehicles are at one moment; see `fogsim.scenario.timeline.Situation`."""
 
-    def __init__(self, moment: Moment) -> None:
+    def __init__(self, moment: Moment, entering: Entries) -> None:
         self._moment = moment
+        self._entering = entering
 
     def vehicle_id(self, vehicle: str) -> str:
         return self._moment.vehicle_id(vehicle)
@@ -209,6 +214,9 @@ class _Now:
         if lane in beside:
             return beside.index(lane)
         return int(number) if number.isdecimal() else None
+
+    def entry(self, vehicle: str, action: DepartAction) -> Enter:
+        return self._entering[vehicle, action]
 
 
 def _together(parts: list[Actions]) -> Actions:

@@ -203,12 +203,43 @@ class Depart:
         Lane from the right; None for the other one's.
     speed : float or None
         Its speed [m/s]; None for the other one's.
+    kind : str
+        Its type, of `fogsim.traffic.templates.VEHICLE_KINDS`; the other one's where it is empty.
     """
 
     vehicle: str
     like: str
     gap: float
     lane: int | None = None
+    speed: float | None = None
+    kind: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Enter:
+    """A vehicle comes onto the road on a way of its own.
+
+    Attributes
+    ----------
+    vehicle : str
+        Its id, which nobody on the road has.
+    kind : str
+        Its type, of `fogsim.traffic.templates.VEHICLE_KINDS`.
+    edges : tuple of str
+        Its way, from the edge on which it begins; the way between two that do not follow one another is looked for.
+    position : float
+        Place of its front bumper on that edge [m].
+    lane : int
+        SUMO's number of its lane there.
+    speed : float or None
+        Speed with which it begins and which it keeps where it can [m/s]; None for what its type and the limit allow.
+    """
+
+    vehicle: str
+    kind: str
+    edges: tuple[str, ...]
+    position: float
+    lane: int = 0
     speed: float | None = None
 
 
@@ -228,7 +259,7 @@ class Walk:
     speed: float
 
 
-TrafficAction = ChangeSpeed | Follow | Stop | ChangeLane | SetLamps | SetSignal | Depart | Walk
+TrafficAction = ChangeSpeed | Follow | Stop | ChangeLane | SetLamps | SetSignal | Depart | Enter | Walk
 """What a traffic simulation can be told to do at once."""
 
 

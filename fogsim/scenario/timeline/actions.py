@@ -29,6 +29,7 @@ from fogsim.values.script import (
     ChangeLight,
     ChangeSpeed,
     Depart,
+    Enter,
     Follow,
     SetLamps,
     SetSignal,
@@ -56,6 +57,9 @@ class Situation(Protocol):
 
     def lane(self, vehicle: str) -> int | None:
         """Number of its lane from the right."""
+
+    def entry(self, vehicle: str, action: DepartAction) -> Enter:
+        """Where a vehicle begins that departs on a way of its own."""
 
 
 def actions_of(entry: TimelineEntry, now: Situation, reference: float) -> Actions | None:
@@ -195,8 +199,11 @@ def _of_vehicle(subject: str, doing: VehicleActions, now: Situation) -> list[Tra
 
 
 def _departure(vehicle: str, action: DepartAction, now: Situation) -> list[TrafficAction] | None:
+    if action.like is None or action.gap_m is None:
+        return [now.entry(vehicle, action)]
     speed = None if action.speed_kmh is None else action.speed_kmh / KMH_PER_MPS
-    departing = Depart(vehicle, now.vehicle_id(action.like), action.gap_m, action.lane, speed)
+    lane = action.lane if isinstance(action.lane, int) else None
+    departing = Depart(vehicle, now.vehicle_id(action.like), action.gap_m, lane, speed, action.type or "")
     return None if now.speed(action.like) is None else [departing]
 
 

@@ -14,7 +14,7 @@ from pydantic import (
 )
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from fogsim.errors import suggest
+from fogsim.errors import UnknownNameError, suggest
 from fogsim.scenario.expect.conditions import WrittenCondition
 from fogsim.scenario.mistakes import known_keys
 from fogsim.scenario.plain_yaml import KeyPath
@@ -35,6 +35,7 @@ from fogsim.scenario.section import (
 )
 from fogsim.scenario.sensor_schema import AnyFault
 from fogsim.scenario.timeline.lamps import LampActions
+from fogsim.traffic.templates import VEHICLE_KINDS
 from fogsim.values.script import Shape
 
 
@@ -168,19 +169,51 @@ class LaneAction(Section):
 
 
 class DepartAction(Section):
-    """A vehicle that is not there yet comes onto the road near another one, and drives on as that one would."""
+    """A vehicle that is not there yet comes onto the road: near another one, whose way it takes, or on its own."""
 
-    like: Id
-    """The other one, or `ego`: its type and the rest of its way are the new one's."""
+    like: Id | None = None
+    """Another one, or `ego`, near which it begins: its type and the rest of its way are the new one's."""
 
-    gap_m: Place
+    gap_m: Place | None = None
     """Gap to it along the road, bumper to bumper: positive ahead, negative behind."""
 
-    lane: Annotated[Whole, Field(ge=0, le=20)] | None = None
-    """Number of the lane from the right, from 0; that of the other one if not given."""
+    type: str | None = None
+    """Its type, as of actors; by default that of the other one, or a car."""
+
+    on: Id | None = None
+    """Without another one, its way on a road by template; by default `same_way`."""
+
+    edges: tuple[Id, ...] = ()
+    """Or its way on a network: edges; between those that do not follow one another SUMO finds the way."""
+
+    position_m: Annotated[Number, Field(ge=0)] | None = None
+    """Position of its front bumper along its way, or along the first of its edges; by default at the beginning."""
+
+    lane: Literal["right", "left"] | Annotated[Whole, Field(ge=0, le=20)] | None = None
+    """Lane: `right`, `left`, or its number from the right, from 0; by default the other one's, or the right one."""
 
     speed_kmh: SpeedKmh | None = None
-    """Its speed; that of the other one if not given."""
+    """Its speed; by default that of the other one, or what its type and the limit allow."""
+
+    @field_validator("type")
+    @classmethod
+    def _known_type(cls, value: str | None) -> str | None:
+        if value is not None and value not in VEHICLE_KINDS:
+            raise ValueError(str(UnknownNameError("vehicle type", value, VEHICLE_KINDS)))
+        return value
+
+    @model_validator(mode="after")
+    def _one_place(self) -> Self:
+        if (self.like is None) != (self.gap_m is None):
+            raise ValueError("like and gap_m go together: near whom, and how far")
+        own = [key for key in ("on", "edges", "position_m") if key in self.model_fields_set]
+        if self.like is not None and own:
+            raise ValueError(f"give like, or a way of its own ({' and '.join(own)}), not both")
+        if self.like is not None and isinstance(self.lane, str):
+            raise ValueError("lane: beside like it is a number from the right, from 0")
+        if self.on is not None and self.edges:
+            raise ValueError("give on (a road by template) or edges (a network), not both")
+        return self
 
 
 class WalkAction(Section):

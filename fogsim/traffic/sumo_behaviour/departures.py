@@ -1,9 +1,14 @@
 """Vehicles that a script brings onto the road."""
 
-from collections.abc import Collection
+import itertools
+from collections.abc import Collection, Sequence
 
 from fogsim.traffic.sumo.link import Api
-from fogsim.values.script import Depart
+from fogsim.traffic.templates.vehicle_types import VEHICLE_KINDS
+from fogsim.values.script import Depart, Enter
+
+_UNLIMITED = 10.0
+"""Factor on the limit [-] of those whose top speed is the one that they keep."""
 
 
 def depart(api: Api, action: Depart, present: Collection[str]) -> bool:
@@ -26,9 +31,9 @@ def depart(api: Api, action: Depart, present: Collection[str]) -> bool:
     get, like = api.vehicle, action.like
     if action.vehicle in present or like not in present:
         return False
-    length = float(get.getLength(like))
-    # Of the same type, it is as long.
-    place = float(get.getLanePosition(like)) + action.gap + (length if action.gap >= 0.0 else -length)
+    kind = _type(api, action.vehicle, action.kind) if action.kind else get.getTypeID(like)
+    length = float(get.getLength(like)) if action.gap < 0.0 else -float(api.vehicletype.getLength(kind))
+    place = float(get.getLanePosition(like)) + action.gap - length
     edges, at = list(get.getRoute(like)), int(get.getRouteIndex(like))
     if str(get.getRoadID(like)).startswith(":"):
         place += _length(api, edges[at])
@@ -47,7 +52,7 @@ def depart(api: Api, action: Depart, present: Collection[str]) -> bool:
     get.add(
         action.vehicle,
         route,
-        typeID=get.getTypeID(like),
+        typeID=kind,
         departLane=str(lane),
         departPos=f"{place:.3f}",
         departSpeed=f"{speed:.3f}",
@@ -59,6 +64,76 @@ def _footways(api: Api, edge: str) -> int:
     """Number of footways to the right of an edge's lanes, which SUMO counts among them."""
     lanes = range(int(api.edge.getLaneNumber(edge)))
     return sum(tuple(api.lane.getAllowed(f"{edge}_{lane}")) == ("pedestrian",) for lane in lanes)
+
+
+def enter(api: Api, action: Enter, present: Collection[str]) -> bool:
+    """Bring a vehicle onto the road on a way of its own; SUMO waits with it as long as it would hit somebody.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    action : Enter
+        Which, and where.
+    present : collection of str
+        Vehicles on the road.
+
+    Returns
+    -------
+    bool
+        False if there is such a vehicle already, or no way leads along its edges.
+    """
+    if action.vehicle in present:
+        return False
+    kind = _type(api, action.vehicle, action.kind, action.speed)
+    way = _whole_way(api, action.edges, kind)
+    if not way:
+        return False
+    route = f"fogsim.{action.vehicle}.{api.simulation.getTime():g}"
+    api.route.add(route, way)
+    api.vehicle.add(
+        action.vehicle,
+        route,
+        typeID=kind,
+        departLane=str(action.lane),
+        departPos=f"{action.position:.3f}",
+        departSpeed="desired" if action.speed is None else f"{action.speed:.3f}",
+    )
+    return True
+
+
+def _whole_way(api: Api, edges: Sequence[str], kind: str) -> list[str]:
+    """The edges with those between them; none where one cannot be reached."""
+    way = list(edges[:1])
+    for one, other in itertools.pairwise(edges):
+        found = list(api.simulation.findRoute(one, other, kind).edges)
+        if not found:
+            return []
+        way += found[1:]
+    return way
+
+
+def _type(api: Api, vehicle: str, name: str, steady: float | None = None) -> str:
+    """SUMO's type of a vehicle of a kind, made for it; who begins with a speed keeps it, as actors do."""
+    get, kind, made = api.vehicletype, VEHICLE_KINDS[name], f"fogsim.{name}.{vehicle}"
+    if made not in get.getIDList():
+        get.copy("DEFAULT_VEHTYPE", made)
+    factor, deviation, *_ = (float(part) for part in kind.speed_factor.removeprefix("normc(")[:-1].split(","))
+    get.setVehicleClass(made, kind.vehicle_class)
+    for setter, value in (
+        (get.setLength, kind.length),
+        (get.setWidth, kind.width),
+        (get.setHeight, kind.height),
+        (get.setMaxSpeed, steady or kind.top_speed),
+        (get.setSpeedFactor, factor if steady is None else _UNLIMITED),
+        (get.setSpeedDeviation, deviation if steady is None else 0.0),
+        (get.setTau, kind.headway),
+        (get.setAccel, kind.acceleration),
+        (get.setDecel, kind.deceleration),
+        (get.setImperfection, kind.imperfection if steady is None else 0.0),
+    ):
+        setter(made, value)
+    return made
 
 
 def _length(api: Api, edge: str) -> float:

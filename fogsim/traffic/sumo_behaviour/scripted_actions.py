@@ -7,10 +7,10 @@ from fogsim.traffic.sumo.claims import LANE_CHANGE_MODE, Claims
 from fogsim.traffic.sumo.lane_changes import LaneChangeSmoothing
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.route_position import GapToEgo
-from fogsim.traffic.sumo_behaviour.departures import depart
+from fogsim.traffic.sumo_behaviour.departures import depart, enter
 from fogsim.traffic.sumo_behaviour.signal_control import SignalControl
 from fogsim.traffic.sumo_behaviour.speed_control import SpeedControl
-from fogsim.values.script import ChangeLane, Depart, SetSignal, TrafficAction, Walk
+from fogsim.values.script import ChangeLane, Depart, Enter, SetSignal, TrafficAction, Walk
 
 _REGARD_OF_OTHERS, _NO_COLLISION = 3 << 8, 1 << 8
 """Bits of SUMO's lane-change mode on what of others a change that is asked for regards, and those for as much as does
@@ -79,6 +79,8 @@ class ScriptedActions:
                 self._signals.begin(action, time)
             elif isinstance(action, Depart):
                 refused += [] if depart(self._api, action, present) else [action]
+            elif isinstance(action, Enter):
+                refused += [] if enter(self._api, action, present) else [action]
             elif isinstance(action, Walk):
                 refused += [] if self._walk(action) else [action]
             elif action.vehicle not in present or not self._has_lane(action):

@@ -1,0 +1,109 @@
+"""Vehicles that a timeline brings onto the road with a type and a way of their own."""
+
+from pathlib import Path
+
+import pytest
+
+import fogsim
+from fogsim import script as fs
+from fogsim.scenario.roads.departures import entering_vehicles
+from fogsim.values import Step
+from fogsim.values.script import Enter
+from tests.data.early_motorway import EARLY
+
+ROAD = """
+name: late_comers
+duration: 4 s
+road: {template: ramp, lanes: 2, limit: 100 km/h}
+actors: {ego: {position: 100 m, speed: 80 km/h}}
+fog: {visibility: 500 m}
+renderer: none
+sut: {estimators: [], advice: none}
+timeline:
+  - when: time >= 1 s
+    do:
+      lorry: {depart: {type: lorry, position: 300 m, lane: left, speed: 60 km/h}}
+      merging: {depart: {type: motorcycle, on: ramp, position: 50 m}}
+      near: {depart: {like: ego, gap: 100 m, type: coach, speed: 70 km/h}}
+"""
+MOTORWAY = "timeline=[{{when: time >= 0 s, do: {{new: {{depart: {{{}}}}}}}}}]"
+
+
+def scenario_of(folder: Path, text: str) -> fogsim.Scenario:
+    path = folder / "late.fog.yaml"
+    path.write_text(text, encoding="utf-8")
+    return fogsim.load_scenario(path)
+
+
+def row_of(step: Step, vehicle: str) -> tuple[str, float, float, str]:
+    row = step.traffic.row(vehicle)
+    assert row is not None
+    state = step.traffic
+    return state.types[row], float(state.length[row]), float(state.speed[row]), state.lane[row]
+
+
+def test_they_come_as_they_are_to(tmp_path: Path) -> None:
+    step, first = None, {}
+    for step in fogsim.run(scenario_of(tmp_path, ROAD)):
+        first.update({v: step.time for v in step.traffic.ids if v not in first})
+    assert step is not None
+    assert step.unplayed is None or not step.unplayed
+    assert {first[vehicle] for vehicle in ("lorry", "merging", "near")} <= {1.1, 1.2}
+    kind, length, speed, lane = row_of(step, "lorry")
+    assert (kind, length, lane[-2:]) == ("truck", 9.2, "_1")
+    assert speed == pytest.approx(60.0 / 3.6, abs=0.1)
+    assert row_of(step, "merging")[:2] == ("motorcycle", 2.2)
+    assert row_of(step, "near")[:2] == ("bus", 12.5)
+
+
+def test_of_a_network_edges_are_given_and_the_way_between_them_is_found() -> None:
+    settings = [
+        "renderer=none",
+        "estimators=[]",
+        "duration_s=3",
+        EARLY,
+        MOTORWAY.format("edges: [approach, exit], lane: 2"),
+    ]
+    scenario = fogsim.load_scenario("motorway_fog_bank", settings)
+    assert list(entering_vehicles(scenario).values()) == [Enter("new", "car", ("approach", "exit"), 4.6, 2)]
+    *_, step = fogsim.run(scenario)
+    assert row_of(step, "new")[3] == "approach_2"
+
+
+def test_python_says_the_same(tmp_path: Path) -> None:
+    written = scenario_of(tmp_path, ROAD)
+    assert scenario_of(tmp_path, fs.to_yaml(written)).timeline == written.timeline
+    (doing,) = written.timeline[0].do["merging"]  # type: ignore[misc]
+    assert doing == fs.VehicleActions(depart=fs.DepartAction(type="motorcycle", on="ramp", position_m=50))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        (
+            "type: lorry",
+            "type: lory",
+            "depart.type: unknown vehicle type 'lory'; did you mean 'lorry'",
+        ),
+        ("on: ramp", "on: rampe", "timeline.0.do.merging.depart: the road has no way 'rampe'; did you mean 'ramp'"),
+        ("position: 300 m", "position: 30 km", "timeline.0.do.lorry.depart: must begin within 9.2 …"),
+        ("lane: left", "lane: 5", "timeline.0.do.lorry.depart: there are lanes 0 to 1, got 5"),
+        ("on: ramp", "edges: [a]", "timeline.0.do.merging.depart: edges go with a network"),
+        ("like: ego, gap: 100 m", "like: ego", "timeline.0.do.near.depart: like and gap_m go together"),
+        ("like: ego", "position: 5 m, like: ego", "give like, or a way of its own (position_m), not both"),
+    ],
+)
+def test_mistakes_are_told_at_their_place(tmp_path: Path, old: str, new: str, told: str) -> None:
+    with pytest.raises(fogsim.InputError) as error:
+        scenario_of(tmp_path, ROAD.replace(old, new))
+    assert told in str(error.value)
+
+
+def test_edges_of_a_network_are_looked_up() -> None:
+    for depart, told in (
+        ("edges: [aproach]", "the net has no edge 'aproach'; did you mean 'approach'"),
+        ("edges: [approach], position: 9 km", "position_m counts along 'approach'"),
+        ("type: car", "on a network write edges"),
+    ):
+        with pytest.raises(fogsim.InputError, match=told):
+            fogsim.load_scenario("motorway_fog_bank", [MOTORWAY.format(depart)])

@@ -78,7 +78,10 @@ def _open(block: dict[str, Any]) -> None:
         stem, _, suffix = key.rpartition("_")
         if stem and suffix in UNIT_OF_SUFFIX and stem not in block["properties"]:
             told = f"{value.get('description', '')} A number with its unit: `10 {UNIT_OF_SUFFIX[suffix]}`.".strip()
-            written[stem] = {"anyOf": [_WITH_UNIT, {"const": 0}, _VARIED, *endless], "description": told}
+            ways = [_WITH_UNIT, {"const": 0}, _VARIED, *endless]
+            if any(way.get("type") == "array" for way in (value, *value.get("anyOf", ()))):
+                ways.append({"type": "array", "items": {"anyOf": [_WITH_UNIT, {"const": 0}, _VARIED]}})
+            written[stem] = {"anyOf": ways, "description": told}
             if key in required:
                 either.append({"anyOf": [{"required": [key]}, {"required": [stem]}]})
         elif key in required:

@@ -73,7 +73,7 @@ def add_ways_inside(starts: _Array, ends: _Array, boxes: _Array, ways: _Array) -
 
 
 @kernel
-def find_hidden(eyes: _Array, targets: _Array, boxes: _Array, hidden: NDArray[np.bool_]) -> None:
+def find_hidden(eyes: _Array, targets: _Array, boxes: _Array, bounds: _Array, hidden: NDArray[np.bool_]) -> None:
     """Tell for each pair of eyes whether boxes hide all points of its target.
 
     Parameters
@@ -84,17 +84,38 @@ def find_hidden(eyes: _Array, targets: _Array, boxes: _Array, hidden: NDArray[np
         The points at which each pair of eyes looks [m].
     boxes : (m, 10) float64
         The boxes.
+    bounds : (m, 4) float64
+        Least and most of x, and of y, that each box has [m].
     hidden : (n,) bool
         Written to, in place.
     """
+    near = np.empty(len(boxes), np.int64)
     for one in range(len(eyes)):
-        hidden[one] = True
+        count = _boxes_near(eyes[one], targets[one], bounds, near)
+        hidden[one] = count > 0
         for point in targets[one]:
             is_free = True
-            for box in boxes:
-                if share_inside(eyes[one], point, box) > 0.0:
+            for number in near[:count]:
+                if share_inside(eyes[one], point, boxes[number]) > 0.0:
                     is_free = False
                     break
             if is_free:
                 hidden[one] = False
                 break
+
+
+@kernel
+def _boxes_near(eyes: _Array, points: _Array, bounds: _Array, near: NDArray[np.int64]) -> int:
+    """Write the numbers of those boxes that may be between eyes and points; returns how many."""
+    west = east = eyes[0]
+    south = north = eyes[1]
+    for point in points:
+        west, east = min(west, point[0]), max(east, point[0])
+        south, north = min(south, point[1]), max(north, point[1])
+    count = 0
+    for number in range(len(bounds)):
+        box = bounds[number]
+        if box[0] <= east and box[1] >= west and box[2] <= north and box[3] >= south:
+            near[count] = number
+            count += 1
+    return count

@@ -23,6 +23,7 @@ class Obstructions:
 
     def __init__(self, boxes: NDArray[np.float64]) -> None:
         self._boxes = boxes
+        self._bounds = _bounds(boxes)
 
     def __len__(self) -> int:
         """Number of boxes."""
@@ -47,7 +48,7 @@ class Obstructions:
         hidden = np.zeros(len(starts), np.bool_)
         if len(self._boxes) and len(starts):
             points = np.ascontiguousarray(targets, np.float64).reshape(len(starts), -1, 3)
-            find_hidden(np.ascontiguousarray(starts), points, self._boxes, hidden)
+            find_hidden(np.ascontiguousarray(starts), points, self._boxes, self._bounds, hidden)
         return hidden
 
     def way_through(self, starts: ArrayLike, ends: ArrayLike) -> NDArray[np.float64]:
@@ -68,6 +69,14 @@ class Obstructions:
         if len(self._boxes):
             add_ways_inside(first, last, self._boxes, ways)
         return ways
+
+
+def _bounds(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Least and most of x, and of y, that each box has (m, 4) [m]."""
+    aside = boxes[:, 7, None] * np.abs(boxes[:, [4, 3]])
+    ends = np.stack([boxes[:, :2], boxes[:, :2] + boxes[:, 6, None] * boxes[:, 3:5]])
+    low, high = ends.min(axis=0) - aside, ends.max(axis=0) + aside
+    return np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=1)
 
 
 CLEAR_SIGHT = Obstructions(np.zeros((0, NUMBERS)))

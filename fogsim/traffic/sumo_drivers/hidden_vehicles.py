@@ -1,7 +1,10 @@
 """Which vehicles are behind what stands beside the road, to a driver's eyes."""
 
-import math
-from collections.abc import Iterable, Sequence
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
 
 from fogsim.obstruction import Obstructions
 from fogsim.traffic.sumo.link import Api, vehicle_getter
@@ -9,6 +12,9 @@ from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
 from fogsim.traffic.sumo_drivers.seen_vehicles import SeenVehicles
 
 _Point = tuple[float, float, float]
+
+_CORNERS = np.array(list(itertools.product((-1.0, 0.0), (-0.5, 0.5), (0.5, 1.0))))
+"""From the middle of the front bumper ahead, to the left and up, in lengths, widths and heights."""
 
 
 class HiddenVehicles:
@@ -29,6 +35,7 @@ class HiddenVehicles:
         self._vehicles = SeenVehicles(api, remote)
         self._position, self._angle = vehicle_getters(api, remote, ("getPosition3D", "getAngle"))
         self._height = vehicle_getter(api, "getHeight")
+        self._sizes: dict[str, _Point] = {}
 
     def forget(self, vehicles: Iterable[str]) -> None:
         """Forget vehicles whose ids others may bear now.
@@ -38,7 +45,10 @@ class HiddenVehicles:
         vehicles : iterable of str
             Their ids.
         """
-        self._vehicles.forget(vehicles)
+        gone = tuple(vehicles)
+        for vehicle in gone:
+            self._sizes.pop(vehicle, None)
+        self._vehicles.forget(gone)
 
     def are_hidden(self, pairs: Sequence[tuple[str, str]]) -> list[bool]:
         """Whether each observer's target is hidden, however clear the air is.
@@ -50,22 +60,30 @@ class HiddenVehicles:
         """
         if not pairs:
             return []
-        eyes, corners = [self._eyes(observer) for observer, _ in pairs], [self._corners(target) for _, target in pairs]
-        hidden: list[bool] = self._obstructions.hide(eyes, corners).tolist()
+        # Mostly who leads one follows another.
+        places = {vehicle: self._position(vehicle) for pair in pairs for vehicle in pair}
+        eyes = np.array([places[observer] for observer, _ in pairs])
+        eyes[:, 2] += [self._vehicles.eye_height(observer) for observer, _ in pairs]
+        targets = [target for _, target in pairs]
+        hidden: list[bool] = self._obstructions.hide(eyes, self._corners(targets, places)).tolist()
         return hidden
 
-    def _eyes(self, observer: str) -> _Point:
-        x, y, z = self._position(observer)
-        return x, y, z + self._vehicles.eye_height(observer)
+    def _corners(self, targets: Sequence[str], places: Mapping[str, _Point]) -> NDArray[np.float64]:
+        """Corners of bodies (n, 8, 3) [m], of which the lower ones are halfway up."""
+        heading = np.radians(90.0 - np.array([self._angle(target) for target in targets]))
+        sizes = np.array([self._size(target) for target in targets])
+        forward = np.stack([np.cos(heading), np.sin(heading)], axis=1)[:, None]
+        left = forward[..., ::-1] * (-1.0, 1.0)
+        offsets = sizes[:, None] * _CORNERS
+        corners = np.array([places[target] for target in targets])[:, None] + np.zeros((1, len(_CORNERS), 1))
+        corners[..., :2] += offsets[..., :1] * forward + offsets[..., 1:2] * left
+        corners[..., 2] += offsets[..., 2]
+        return corners
 
-    def _corners(self, target: str) -> list[_Point]:
-        """The body's eight corners, of which the lower ones are halfway up."""
-        x, y, z = self._position(target)
-        heading, body = math.radians(90.0 - self._angle(target)), self._vehicles.body(target)
-        east, north, half, top = math.cos(heading), math.sin(heading), 0.5 * body.width, float(self._height(target))
-        return [
-            (x - back * east - left * north, y - back * north + left * east, z + height)
-            for height in (0.5 * top, top)
-            for back in (0.0, body.length)
-            for left in (-half, half)
-        ]
+    def _size(self, vehicle: str) -> _Point:
+        """Length, width and height [m]."""
+        known = self._sizes.get(vehicle)
+        if known is None:
+            body = self._vehicles.body(vehicle)
+            known = self._sizes[vehicle] = body.length, body.width, float(self._height(vehicle))
+        return known

@@ -20,6 +20,7 @@ PICTURES = HERE / "pictures" / "gallery"
 PAGE = HERE / "gallery.md"
 SIZE = (320, 240)
 MOMENTS: dict[str, float] = {
+    "city_fog": 12.0,
     "highway_99_corridor": 41.0,
     "motorcycle_at_dusk": 12.0,
     "pedestrian_crossing_fog": 21.0,

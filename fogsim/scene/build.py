@@ -19,7 +19,7 @@ from fogsim.scene.road import FAST, free_edges
 from fogsim.scene.roadside import placed, post_shapes, stations, trees
 from fogsim.scene.signs import gantries, sign_batches, sign_shapes
 from fogsim.scene.street_lamps import lamp_posts, street_lamp_shapes
-from fogsim.scene.structures import structure_batches, structure_shapes
+from fogsim.scene.structures import building_places, structure_batches, structure_shapes
 from fogsim.scene.terrain import Terrain
 from fogsim.scene.town import person_shapes, signal_posts, signal_shapes
 from fogsim.scene.trees import tree_shapes
@@ -105,9 +105,11 @@ class ScenePlan:
         if street_lamps:
             shapes |= street_lamp_shapes()
             posts += lamp_posts(edges, index)
-        built = houses(edges, index, terrain, rng)
+        walls = building_places(network.structures)
+        built = houses(edges, index, terrain, rng, walls)
         shapes |= shapes_in_use(house_shapes(), built)
-        growing = trees([(edge.side, edge.line) for edge in edges], index, house_places(built), shapes, terrain, rng)
+        taken = np.concatenate([house_places(built), walls])
+        growing = trees([(edge.side, edge.line) for edge in edges], index, taken, shapes, terrain, rng)
         beside = structure_batches(network.structures)
         self.lanes = len(lanes)
         # What moves or changes comes last: it leaves the numbers of all else as they are.

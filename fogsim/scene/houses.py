@@ -10,7 +10,7 @@ from fogsim.scene.edges import Edge
 from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.polyline import Points
 from fogsim.scene.road import TOWN
-from fogsim.scene.roadside import Spacing, placed, stations
+from fogsim.scene.roadside import Spacing, apart, placed, stations
 from fogsim.scene.solids import GLASS, Material, merge, polygon, quad
 from fogsim.scene.terrain import Terrain
 from fogsim.values.scene import FAR, TINY, Batch, Mesh
@@ -91,7 +91,9 @@ def _pane(x: float, low: float, width: float, height: float, y: float, material:
     return quad([(a, y + 0.02 * side, b) for a, b in _box(x, low, width, height)], material, (0.0, side, 0.0))
 
 
-def houses(edges: Sequence[Edge], index: LaneIndex, terrain: Terrain, rng: np.random.Generator) -> list[Batch]:
+def houses(
+    edges: Sequence[Edge], index: LaneIndex, terrain: Terrain, rng: np.random.Generator, buildings: Points
+) -> list[Batch]:
     """Houses that face the streets, where there is room.
 
     Parameters
@@ -104,13 +106,15 @@ def houses(edges: Sequence[Edge], index: LaneIndex, terrain: Terrain, rng: np.ra
         The land.
     rng : numpy Generator
         What chooses them.
+    buildings : (n, 3) float64
+        Places along the walls of buildings that the network's files tell of, near which there are no others [m].
     """
     found: dict[str, list[tuple[Points, float, float]]] = {}
     taken = Spacing(1.8 * HOUSE_RADIUS)
     plots = [_plots(edge) for edge in edges if edge.speed_limit <= TOWN]
     places = np.concatenate([np.zeros((0, 3)), *(own for own, _ in plots)])
     facing = np.concatenate([np.zeros(0), *(turn for _, turn in plots)])
-    room = index.clearance(places) > HOUSE_RADIUS
+    room = (index.clearance(places) > HOUSE_RADIUS) & apart(places, buildings, _PLOT)
     for place, turn, free in zip(places, facing.tolist(), room.tolist(), strict=True):
         built, kind, size = rng.random() < 0.8, int(rng.integers(len(_KINDS))), rng.uniform(0.9, 1.12)
         if built and free and taken.takes(place):

@@ -174,20 +174,28 @@ def trees(
         What scatters them.
     """
     near = _scatter(free, rng, spacing=10.0, nearest=13.0, reach=38.0, clumps=90.0)
-    near = near[(index.clearance(near) > TREE_CLEARANCE) & _apart(near, taken, 11.0)]
+    near = near[(index.clearance(near) > TREE_CLEARANCE) & apart(near, taken, 11.0)]
     conifers = _clumps(near[:, :2], 160.0, rng) + 0.35 * rng.normal(size=len(near)) > 0.1
     batches = []
     for name, members in (("conifer", conifers), ("broad_leaved", ~conifers)):
         kinds = sorted(shape for shape in shapes if shape.startswith(name) and ":" not in shape)
         batches += _planted(near[members], kinds, terrain, rng, height=(6.0, 15.0), slender=1.0)
     far = _scatter(free, rng, spacing=60.0, nearest=75.0, reach=170.0, clumps=400.0)
-    far = far[(index.clearance(far) > 25.0) & _apart(far, taken, 35.0)]
+    far = far[(index.clearance(far) > 25.0) & apart(far, taken, 35.0)]
     kinds = sorted(shape for shape in shapes if shape.startswith("woodland") and ":" not in shape)
     return batches + _planted(far, kinds, terrain, rng, height=(9.0, 16.0), slender=5.0, clear_of=index)
 
 
-def _apart(places: Points, taken: Points, distance: float) -> NDArray[np.bool_]:
-    """Which places lie farther than a distance [m] from every place that is taken."""
+def apart(places: Points, taken: Points, distance: float) -> NDArray[np.bool_]:
+    """Which places lie farther than a distance from every place that is taken.
+
+    Parameters
+    ----------
+    places, taken : (n, 3) and (m, 3) float64
+        The places [m].
+    distance : float
+        The distance, across heights [m].
+    """
     order = np.argsort(places[:, 0], kind="stable")
     apart = np.empty(len(places), np.bool_)
     apart[order] = _sorted_apart(places[order], taken, distance)
@@ -196,7 +204,7 @@ def _apart(places: Points, taken: Points, distance: float) -> NDArray[np.bool_]:
 
 @kernel
 def _sorted_apart(places: Points, taken: Points, distance: float) -> NDArray[np.bool_]:
-    """Which places (n, 3), from west to east, lie apart from every one that is taken (see `_apart`)."""
+    """Which places (n, 3), from west to east, lie apart from every one that is taken (see `apart`)."""
     apart, east = np.ones(len(places), np.bool_), np.ascontiguousarray(places[:, 0])
     for k in range(len(taken)):
         x, y = taken[k, 0], taken[k, 1]

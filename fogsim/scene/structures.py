@@ -19,6 +19,7 @@ _MATERIALS = {
     StructureKind.TRUCK: Material((0.30, 0.33, 0.37)),
     StructureKind.TUNNEL: Material((0.30, 0.29, 0.27)),
 }
+_SPACING = 5.0  # of places along walls [m]
 _UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -42,6 +43,18 @@ def structure_batches(structures: Sequence[Structure]) -> list[Batch]:
         The structures.
     """
     return [placed(name, line[:1], np.zeros(1)) for name, _, line in _pieces(structures)]
+
+
+def building_places(structures: Sequence[Structure]) -> Points:
+    """Places along the walls of buildings (n, 3) [m], near which nothing is put by chance.
+
+    Parameters
+    ----------
+    structures : sequence of Structure
+        Structures of all kinds.
+    """
+    walls = [refined(one.line, _SPACING) for one in structures if one.kind is StructureKind.BUILDING]
+    return np.concatenate([np.zeros((0, 3)), *walls])
 
 
 def _pieces(structures: Sequence[Structure]) -> Iterator[tuple[str, Structure, Points]]:

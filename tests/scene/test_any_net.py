@@ -7,7 +7,19 @@ from fogsim.scene import build_scene, street_lamp_heads
 from fogsim.scene.junctions import free_borders, walkable
 from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.road import KERB
-from fogsim.values import Lane, LaneKind, LaneMarking, Mesh, PavedArea, RoadNetwork, Scene, SignMap, Surface
+from fogsim.values import (
+    Lane,
+    LaneKind,
+    LaneMarking,
+    Mesh,
+    PavedArea,
+    RoadNetwork,
+    Scene,
+    SignMap,
+    Structure,
+    StructureKind,
+    Surface,
+)
 
 
 def build(network: RoadNetwork) -> Scene:
@@ -92,6 +104,22 @@ def test_houses_of_a_street_keep_their_distance_however_many_there_are() -> None
     apart = np.linalg.norm(places[:, None] - places[None], axis=2)
     assert len(places) > 40
     assert apart[~np.eye(len(places), dtype=bool)].min() > 16.0
+
+
+def test_nothing_is_put_by_chance_where_a_building_stands() -> None:
+    line, solid = np.array([[0.0, 0, 0], [400, 0, 0]]), LaneMarking.SOLID
+    street = Lane("a", "a", line, 3.2, 13.9, solid, solid, outermost=True)
+    wall = line * 0.5 + np.array([0.0, 12.0, 0.0])
+    building = Structure("b", StructureKind.BUILDING, wall, 0.6, 0.0, 20.0)
+    bare, built = (build(RoadNetwork((street,), line, structures=own)) for own in ((), (building,)))
+
+    def beside_the_wall(scene: Scene) -> int:
+        batches = [b for b in scene.scenery if b.shape.startswith(("house", "conifer", "broad_leaved"))]
+        places = np.concatenate([b.transforms[:, :2, 3] for b in batches])
+        return int(np.sum((places[:, 0] < 200.0) & (np.abs(places[:, 1] - 12.0) < 10.0)))
+
+    assert beside_the_wall(bare) > 3
+    assert beside_the_wall(built) == 0
 
 
 def test_a_footway_ends_where_a_road_lies_across_it() -> None:

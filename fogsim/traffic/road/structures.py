@@ -69,6 +69,7 @@ def _structure(path: Path, shape: Any) -> Structure:
         raise InputError(f"{where}: a structure needs <param key={error} value='…'/>") from None
     except ValueError as error:
         raise InputError(f"{where}: a structure needs numbers for its shape, width, bottom and top: {error}") from None
+    line = line[[True, *np.any(line[1:] != line[:-1], axis=1)]]  # a corner that is told twice has no direction
     if len(line) < 2 or width <= 0.0 or top <= bottom:
         raise InputError(f"{where}: a structure needs a line of two points or more, a width, and a top over its bottom")
     return Structure(str(shape.id), StructureKind(kind), line, width, bottom, top)

@@ -27,8 +27,8 @@ STOREYS = 6  # where the map does not tell
 WALL = 0.6  # width of the walls that stand for a house [m]
 STREETS = ("Siltasaarenkatu", "Unioninkatu", "Kaisaniemenkatu", "Vilhonkatu")
 FOLDER = Path("scenarios/city_fog")
-NOTICE = """<!-- © OpenStreetMap contributors. This file is made from OpenStreetMap by tools/make_city_net.py and is available
-     under the Open Database License 1.0: https://opendatacommons.org/licenses/odbl/1-0/. See NOTICE beside it. -->
+NOTICE = """<!-- © OpenStreetMap contributors. This file is made from OpenStreetMap by tools/make_city_net.py and is
+     available under the Open Database License 1.0: https://opendatacommons.org/licenses/odbl/1-0/. See NOTICE. -->
 """
 OPTIONS = (
     "--keep-edges.by-vclass=passenger",

@@ -1,6 +1,5 @@
 """The air between a scene and a camera: what fog and lamplight make of a drawn view."""
 
-import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,8 +11,6 @@ from fogsim.atmosphere.lamps.halos import Halos
 from fogsim.atmosphere.lamps.lamplight import OwnLamplight
 from fogsim.atmosphere.lamps.phase_function import Droplets
 from fogsim.atmosphere.lamps.streetlight import StreetLight
-from fogsim.atmosphere.lamps.tunnel_light import is_within, pixels_within
-from fogsim.obstruction import Tunnel
 from fogsim.values import Camera, CameraPose, FogField, HeadLamp, Lights, View
 
 _UNLIT = Lights.none()
@@ -34,8 +31,6 @@ class Air:
     droplets : Droplets
         Sizes of its droplets, which set how lamplight is scattered.
 
-    tunnels : sequence of Tunnel
-        Tunnels, which the field's shelters keep free of fog.
 
     Attributes
     ----------
@@ -43,14 +38,8 @@ class Air:
         The fog; another one from when it is set.
     """
 
-    def __init__(
-        self,
-        field: FogField,
-        droplets: Droplets = Droplets.MODERATE_RADIATION,
-        tunnels: Sequence[Tunnel] = (),
-    ) -> None:
+    def __init__(self, field: FogField, droplets: Droplets = Droplets.MODERATE_RADIATION) -> None:
         self.field = field
-        self._tunnels = tunnels
         self._own, self._halos, self._streets = OwnLamplight(droplets), Halos(droplets), StreetLight()
 
     def prepare(self, camera: Camera, lamps: Sequence[tuple[HeadLamp, ...]]) -> None:
@@ -102,26 +91,12 @@ class Air:
         """
         field = field_at(self.field, time)
         lit = view if lights.streets is None else self._streets.on(view, camera, pose, field, lights.streets)
-        radiance = self._daytime_luminance(lit, field, camera, pose)
+        radiance = daytime_luminance(lit, field, camera, pose)
         if lights.own:
             self._own.add(radiance, view, camera, pose, field, lights.own)
         if len(lights.others.intensity):
             self._halos.add(radiance, view, camera, pose, field, lights.others)
         return radiance
-
-    def _daytime_luminance(self, view: View, field: FogField, camera: Camera, pose: CameraPose) -> NDArray[np.float32]:
-        """What arrives through the fog by day, from inside tunnels or into them.
-
-        A field's shelter is wider than its tunnel, for the sake of who looks out of it: from outside, only rays that
-        pass through the tunnel itself are sheltered.
-        """
-        radiance = daytime_luminance(view, field, camera, pose)
-        if not field.shelters or is_within(self._tunnels, pose.position):
-            return radiance
-        open_air = daytime_luminance(view, dataclasses.replace(field, shelters=()), camera, pose)
-        within = pixels_within(self._tunnels, view, camera, pose)
-        open_air[within] = radiance[within]
-        return open_air
 
     def transmittance(self, view: View, camera: Camera, pose: CameraPose, time: float = 0.0) -> NDArray[np.float32]:
         """Transmittance T = e^(−τ) up to what each pixel shows.

@@ -207,7 +207,7 @@ class ViewRenderer:
         self._by_lamplight = darkest_light(scenario.timeline, self._daylight) < DAY_ILLUMINANCE
         self._mount = LampMount()
         self._tunnels = tunnels_of(network.structures)
-        self._air = Air(self.fog, scenario.fog.droplets, self._tunnels)
+        self._air = Air(self.fog, scenario.fog.droplets)
         self._renderer: Renderer | None = None
         self._unlit_renderer: Renderer | None = None
         self._is_closed = False

@@ -27,10 +27,6 @@ from fogsim.scenario.section import (
 from fogsim.units import KMH_PER_MPS, extinction_from_visibility
 from fogsim.values import FogBank, FogChange, FogField, FogPatches, FogShelter
 
-_BESIDE_TUNNEL = 30.0
-"""How far beside a tunnel's walls there is no fog either [m]: nobody sees it, but rays to the walls are compared with
-neighbours that would pass through them."""
-
 
 class Bank(Section):
     """A fog bank along the ego's route; start and end are where it is half as dense as inside."""
@@ -238,12 +234,8 @@ def fog_along(
 
 
 def _shelter(tunnel: Tunnel, reach: float) -> FogShelter:
-    """A shelter along the straight line between a tunnel's portals, so wide that one looks at no fog past its walls."""
-    (x, y), (end_x, end_y) = tunnel.line[0, :2].tolist(), tunnel.line[-1, :2].tolist()
-    length = math.hypot(end_x - x, end_y - y)
-    axis = ((end_x - x) / length, (end_y - y) / length)
-    aside = np.abs((tunnel.line[:, 1] - y) * axis[0] - (tunnel.line[:, 0] - x) * axis[1]).max()
-    return FogShelter((x, y), axis, length, reach, float(aside) + tunnel.half_width + _BESIDE_TUNNEL)
+    points = tuple((x, y, z) for x, y, z in tunnel.line.tolist())
+    return FogShelter(points, tunnel.half_width, tunnel.height, reach)
 
 
 def _changes(fog: Fog, ground: float) -> tuple[FogChange, ...]:

@@ -50,27 +50,22 @@ class FogBank:
 
 @dataclass(frozen=True, slots=True)
 class FogShelter:
-    """A place into which fog does not get: a tunnel, and what is beside and over it.
+    """A tunnel, into which fog does not get.
 
     Attributes
     ----------
-    origin : tuple of float
-        (x, y) of the middle of the portal from which `length` is measured [m].
-    axis : tuple of float
-        Unit vector (x, y) to the middle of the other portal.
-    length : float
-        Distance of the portals [m].
+    line : tuple of (float, float, float)
+        Points along its middle on the road, from one portal to the other [m].
+    half_width, height : float
+        Half of its width, walls included, and the height of its ceiling [m].
     reach : float
         How far from the portals fog reaches in [m]: over this distance it thins to nothing.
-    half_width : float
-        To the sides, there is no fog within this distance of the axis [m].
     """
 
-    origin: tuple[float, float]
-    axis: tuple[float, float]
-    length: float
-    reach: float
+    line: tuple[tuple[float, float, float], ...]
     half_width: float
+    height: float
+    reach: float
 
 
 @dataclass(frozen=True, slots=True)

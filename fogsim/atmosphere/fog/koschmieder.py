@@ -10,6 +10,7 @@ from fogsim.atmosphere.fog.forward_scatter import add_forward_scatter, pixel_wid
 from fogsim.atmosphere.fog.frustum import frustum_grid, radiance_through_grid
 from fogsim.atmosphere.fog.koschmieder_kernels import BankedFog, fog_rows
 from fogsim.atmosphere.fog.medium import has_closed_form
+from fogsim.atmosphere.fog.shelters import is_sheltered, sheltered_pixels
 from fogsim.jit import Bands
 from fogsim.values import Camera, CameraPose, FogBank, FogField, View
 from fogsim.values.pinhole import ray_from_pixel
@@ -64,6 +65,21 @@ def transmittance(view: View, field: FogField, camera: Camera, pose: CameraPose)
 
 
 def _through_fog(view: View, field: FogField, camera: Camera, pose: CameraPose) -> NDArray[np.float32]:
+    """What arrives through the fog, from inside tunnels or into them.
+
+    A tunnel's fog is kept away wider than its walls, for the sake of who looks out of it: from outside, only rays that
+    pass through the tunnel itself are sheltered.
+    """
+    radiance = _through_field(view, field, camera, pose)
+    if not field.shelters or is_sheltered(field.shelters, pose.position):
+        return radiance
+    open_air = _through_field(view, dataclasses.replace(field, shelters=()), camera, pose)
+    within = sheltered_pixels(field.shelters, view, camera, pose)
+    open_air[within] = radiance[within]
+    return open_air
+
+
+def _through_field(view: View, field: FogField, camera: Camera, pose: CameraPose) -> NDArray[np.float32]:
     """Closed form where it holds, from below the fog's top and through even fog or banks; else the grid."""
     if has_closed_form(field) and pose.position[2] <= field.top:
         return fogged_radiance(view, field, pose.position, ray_from_pixel(camera, pose))

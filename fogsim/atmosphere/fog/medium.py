@@ -16,8 +16,9 @@ EXTINCTION, BASE, BASE_EDGE, TOP, TOP_EDGE, GROUND, DECAY = range(7)
 _LEAST_REACH = 0.5
 """Fog does not end at a portal more sharply than over this [m]."""
 
-_SHELTER_SIDE = 20.0
-"""Thickness of a shelter's soft edges to the sides [m]: they lie behind its walls."""
+_BESIDE_SHELTER, _SHELTER_SIDE = 30.0, 20.0
+"""How far beside a tunnel's walls there is no fog either, and over how much more it comes back [m]: nobody sees it from
+within, but rays to the walls are compared with neighbours that would pass through them."""
 
 _TURN = 0.5
 """Angle between the patches' grid and the world's axes [rad], so that no road meets the same patches over and over."""
@@ -202,9 +203,14 @@ def medium_of(field: FogField) -> Medium:
 
 
 def _shelter_row(shelter: FogShelter) -> tuple[float, ...]:
-    reach = min(max(shelter.reach, _LEAST_REACH), 0.5 * shelter.length)
-    along = (0.5 * reach, shelter.length - 0.5 * reach, reach)
-    return *shelter.origin, *shelter.axis, *along, shelter.half_width + 0.5 * _SHELTER_SIDE, _SHELTER_SIDE
+    """A slab across the straight line between a tunnel's portals, wide enough for its bends."""
+    (x, y, _), (end_x, end_y, _) = shelter.line[0], shelter.line[-1]
+    length = math.hypot(end_x - x, end_y - y)
+    east, north = (end_x - x) / length, (end_y - y) / length
+    bend = max(abs((py - y) * east - (px - x) * north) for px, py, _ in shelter.line)
+    reach = min(max(shelter.reach, _LEAST_REACH), 0.5 * length)
+    aside = bend + shelter.half_width + _BESIDE_SHELTER + 0.5 * _SHELTER_SIDE
+    return x, y, east, north, 0.5 * reach, length - 0.5 * reach, reach, aside, _SHELTER_SIDE
 
 
 def has_closed_form(field: FogField) -> bool:

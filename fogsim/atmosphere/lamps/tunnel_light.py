@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.lamps.tunnel_light_kernels import Luminaires, TunnelSpace, find_pixels_within, light_pixels
-from fogsim.obstruction import Obstructions, Tunnel
+from fogsim.atmosphere.lamps.tunnel_light_kernels import Luminaires, TunnelSpace, light_pixels
+from fogsim.obstruction import Tunnel
 from fogsim.values import Camera, CameraPose, View
 from fogsim.values.pinhole import ray_from_pixel
 
@@ -76,39 +76,6 @@ class TunnelLight:
         for space, lamps in self._lit:
             light_pixels(radiance, np.ascontiguousarray(own, np.float32), distance, rays, eye, space, lamps, _BEFORE)
         return dataclasses.replace(view, radiance=radiance)
-
-
-def pixels_within(tunnels: Sequence[Tunnel], view: View, camera: Camera, pose: CameraPose) -> NDArray[np.bool_]:
-    """Pixels whose rays pass through a tunnel (rows, cols).
-
-    Parameters
-    ----------
-    tunnels : sequence of Tunnel
-        The tunnels.
-    view : View
-        What is drawn.
-    camera, pose : Camera, CameraPose
-        The camera.
-    """
-    distance, rays = np.ascontiguousarray(view.distance, np.float32), ray_from_pixel(camera, pose)
-    within = np.zeros(distance.shape, np.bool_)
-    for tunnel in tunnels:
-        find_pixels_within(distance, rays, np.array(pose.position, np.float64), tunnel.boxes(), within)
-    return within
-
-
-def is_within(tunnels: Sequence[Tunnel], place: tuple[float, float, float]) -> bool:
-    """Whether a place is in a tunnel.
-
-    Parameters
-    ----------
-    tunnels : sequence of Tunnel
-        The tunnels.
-    place : tuple of float
-        (x, y, z) [m].
-    """
-    above = (place[0], place[1], place[2] + 0.01)
-    return any(Obstructions(tunnel.boxes()).way_through([place], [above])[0] > 0.0 for tunnel in tunnels)
 
 
 def _space_and_lamps(tunnel: Tunnel, sky_illuminance: float) -> tuple[TunnelSpace, Luminaires]:

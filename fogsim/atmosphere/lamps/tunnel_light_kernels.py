@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.atmosphere.fog.shelter_kernels import FARTHEST, ray
 from fogsim.jit import kernel
-from fogsim.obstruction.box_kernels import share_inside
 
 _Array = NDArray[np.float64]
 _Picture = NDArray[np.float32]
@@ -17,9 +17,6 @@ _CEILING = 0.12
 
 _UNDER_CEILING = 0.25
 """What a ceiling gets of the road's light, over what renderers give undersides [-]: a tenth, which the road returns."""
-
-_FARTHEST = 1e5
-"""What is farther is the sky [m]."""
 
 
 class TunnelSpace(NamedTuple):
@@ -151,9 +148,9 @@ def light_pixels(
     for v in range(distance.shape[0]):
         for u in range(distance.shape[1]):
             reach = float(distance[v, u])
-            if not reach < _FARTHEST:
+            if not reach < FARTHEST:
                 continue
-            a, b, c = _ray(rays, u, v)
+            a, b, c = ray(rays, u, v)
             number, along, across, above = _place_in(
                 space, eye[0] + a * reach, eye[1] + b * reach, eye[2] + c * reach, before
             )
@@ -171,38 +168,3 @@ def light_pixels(
             for channel in range(3):
                 shining = own[v, u, channel]
                 radiance[v, u, channel] = shining + (radiance[v, u, channel] - shining) * share
-
-
-@kernel
-def _ray(rays: _Array, u: int, v: int) -> tuple[float, float, float]:
-    """Unit vector along a pixel's viewing ray."""
-    a = rays[0, 0] * u + rays[0, 1] * v + rays[0, 2]
-    b = rays[1, 0] * u + rays[1, 1] * v + rays[1, 2]
-    c = rays[2, 0] * u + rays[2, 1] * v + rays[2, 2]
-    length = math.sqrt(a * a + b * b + c * c)
-    return a / length, b / length, c / length
-
-
-@kernel
-def find_pixels_within(distance: _Picture, rays: _Array, eye: _Array, boxes: _Array, within: NDArray[np.bool_]) -> None:
-    """Find the pixels whose rays pass through a tunnel's space before they end.
-
-    Parameters
-    ----------
-    distance, rays, eye
-        As of `light_pixels`.
-    boxes : (m, 10) float64
-        The space.
-    within : (rows, cols) bool
-        Made true where they do.
-    """
-    end = np.empty(3)
-    for v in range(distance.shape[0]):
-        for u in range(distance.shape[1]):
-            a, b, c = _ray(rays, u, v)
-            reach = min(float(distance[v, u]), _FARTHEST)
-            end[0], end[1], end[2] = eye[0] + a * reach, eye[1] + b * reach, eye[2] + c * reach
-            for box in boxes:
-                if share_inside(eye, end, box) > 0.0:
-                    within[v, u] = True
-                    break

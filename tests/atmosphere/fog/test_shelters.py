@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 from fogsim.atmosphere import Air, FieldAccess, extinction, optical_depth, optical_depth_along
-from fogsim.obstruction import Tunnel
 from fogsim.scenario import build, load_scenario
 from fogsim.values import Camera, CameraPose, FogField, FogShelter, Structure, StructureKind, View
 
 K = 0.06
-SHELTER = FogShelter((100.0, 0.0), (1.0, 0.0), 400.0, 10.0, 35.0)
+SHELTER = FogShelter(((100.0, 0.0, 0.0), (500.0, 0.0, 0.0)), 5.0, 5.2, 10.0)
 OPEN = FogField(K, (3000.0, 3000.0, 3000.0))
 FIELD = dataclasses.replace(OPEN, shelters=(SHELTER,))
 EYES = 1.2
@@ -56,7 +55,7 @@ def tunnel_field(*settings: str) -> FogField:
 
 def test_a_scenarios_tunnels_keep_its_fog_out_unless_asked() -> None:
     (shelter,) = tunnel_field().shelters
-    assert (shelter.origin, shelter.axis, shelter.length, shelter.reach) == ((200.0, 3.0), (1.0, 0.0), 400.0, 10.0)
+    assert shelter == FogShelter(((200.0, 3.0, 0.0), (600.0, 3.0, 0.0)), 6.0, 5.2, 10.0)
     assert tunnel_field("in_tunnels_m=50").shelters[0].reach == 50.0
     assert tunnel_field("in_tunnels_m=inf").shelters == ()
     sharp = tunnel_field("in_tunnels_m=0")
@@ -66,13 +65,15 @@ def test_a_scenarios_tunnels_keep_its_fog_out_unless_asked() -> None:
 def test_from_outside_only_the_tunnel_itself_is_clear() -> None:
     """A camera 20 m before the portal: fog up to it, none behind it, and all of it past the tunnel's side."""
     camera, pose = Camera(64, 48, 60.0, (31.5, 23.5), 1.4), CameraPose((80.0, 0.0, 1.4), 0.0)
-    tunnel = Tunnel(np.array([[100.0, 0.0, 0.0], [500.0, 0.0, 0.0]]), 6.0, 5.2)
     black = np.zeros((48, 64, 3), np.float32)
     view = View(black, np.full((48, 64), 200.0, np.float32), np.zeros((48, 64), np.int32))
-    radiance = Air(FIELD, tunnels=(tunnel,)).radiance(view, camera, pose)[..., 1]
+    radiance = Air(FIELD).radiance(view, camera, pose)[..., 1]
     air = 3000.0
     within, past = radiance[24, 32], radiance[24, 10]
     assert within == pytest.approx(air * (1.0 - math.exp(-K * 25.0)), rel=0.02)
     assert past == pytest.approx(air * (1.0 - math.exp(-K * 200.0)), rel=0.001)
     inside = dataclasses.replace(pose, position=(250.0, 0.0, 1.4))
-    assert Air(FIELD, tunnels=(tunnel,)).radiance(view, camera, inside)[24, 32, 1] == pytest.approx(0.0, abs=1.0)
+    share = Air(FIELD).transmittance(view, camera, pose)
+    assert share[24, 32] == pytest.approx(math.exp(-K * 25.0), rel=0.02)
+    assert share[24, 10] == pytest.approx(math.exp(-K * 200.0), abs=1e-4)
+    assert Air(FIELD).radiance(view, camera, inside)[24, 32, 1] == pytest.approx(0.0, abs=1.0)

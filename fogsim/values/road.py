@@ -164,14 +164,14 @@ class Structure:
 
 @dataclass(frozen=True, slots=True)
 class SignalHead:
-    """Three lenses one above the other that tell the drivers on a lane to stop or to go.
+    """Three lenses one above the other that tell the drivers on a lane to stop or to go; or two that tell persons.
 
     Attributes
     ----------
     signal_id : str
         The traffic light that it belongs to, as a rule named after its junction.
     lane_id : str
-        The lane.
+        The lane; for those who walk over a crossing against its direction, the crossing's edge.
     links : tuple of int
         Numbers of the lane's ways across the junction in the state of the traffic light.
     position : tuple of float
@@ -182,6 +182,8 @@ class SignalHead:
         Diameter of a lens [m].
     post : tuple of float
         (x, y, z) of the foot of the post that carries it, perhaps by an arm over the road [m].
+    on_foot : bool
+        Whether it speaks to persons who cross, with a red figure above a green one.
     """
 
     signal_id: str
@@ -191,6 +193,7 @@ class SignalHead:
     heading: float
     diameter: float
     post: tuple[float, float, float]
+    on_foot: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,6 +39,8 @@ class SignalState:
         Diameters of their lenses [m].
     colour : tuple of SignalColour
         What each shows.
+    on_foot : (n,) bool
+        Whether each speaks to persons who cross; empty where none does.
     """
 
     ids: tuple[str, ...] = ()
@@ -47,6 +49,7 @@ class SignalState:
     heading: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     diameter: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     colour: tuple[SignalColour, ...] = ()
+    on_foot: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, np.bool_))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -95,6 +95,27 @@ def test_large_lenses_are_as_luminous_as_small_ones_and_so_is_their_surface() ->
         assert luminance == pytest.approx(luminance_of(lamp_radiance(Surface.LENS_GREEN)), rel=2e-3)
 
 
+def test_heads_for_persons_have_two_figures_that_shine_less() -> None:
+    shown = showing(SignalColour.RED, SignalColour.GREEN, SignalColour.GREEN)
+    shown = dataclasses.replace(shown, on_foot=np.array([True, True, False]))
+    head, walk = signal_batches(shown, 0.0)
+    assert (head.shape, walk.shape) == ("signal_head", "signal_walk")
+    assert walk.lamps.tolist() == [int(SignalLight.RED), int(SignalLight.GREEN)]
+    assert head.lamps.tolist() == [int(SignalLight.GREEN)]
+    state = dataclasses.replace(traffic(0.0, 10.0), signals=shown, ids=(), types=())
+    seen = light_sources(state, None, (-300.0, 0.0, 3.0), {})
+    red, green, full = seen.intensity.tolist()
+    assert full == pytest.approx(200.0, rel=1e-3)
+    assert red == pytest.approx(green) == pytest.approx(0.3 * full)
+    assert seen.position[:, 2] == pytest.approx([3.15, 2.85, 2.7])
+    # The figures' share of a lens is what is drawn of them.
+    mesh = signal_shapes()["signal_walk"]
+    green_faces = mesh.faces[(mesh.surface[mesh.faces] == Surface.LENS_GREEN).all(axis=1)]
+    corners = mesh.positions[green_faces]
+    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
+    assert area / (0.25 * math.pi) == pytest.approx(0.3, abs=0.03)
+
+
 def test_heads_above_the_road_hang_on_an_arm_of_a_post() -> None:
     beside = dataclasses.replace(HEAD, lane_id="a_0", position=(0.0, -6.0, 2.75), diameter=0.2)
     posts, arms = signal_posts([beside, HEAD])
@@ -110,7 +131,7 @@ def test_heads_above_the_road_hang_on_an_arm_of_a_post() -> None:
 def test_shapes_of_heads_look_back_at_those_who_approach() -> None:
     for name, shape in signal_shapes().items():
         lenses = shape.surface == Surface.LENS_GREEN
-        assert lenses.any() == name.startswith("signal_head")
+        assert lenses.any() == name.startswith(("signal_head", "signal_walk"))
         assert (shape.normals[lenses, 0] < -0.99).all()
 
 

@@ -15,8 +15,8 @@ from fogsim.values.road import SignalHead
 from fogsim.values.scene import FAR, MIDDLE, SPECK, TINY, Batch, Instance, Mesh, Surface
 from fogsim.values.traffic import SignalColour, SignalState
 
-HEAD, POST, ARM = "signal_head", "signal_post", "signal_arm"
-"""Names of the shapes: a head of lenses of 1 m, a post of 1 m height, an arm of 1 m length."""
+HEAD, POST, ARM, WALK = "signal_head", "signal_post", "signal_arm", "signal_walk"
+"""Names of the shapes: a head of lenses of 1 m, a post of 1 m height, an arm of 1 m length, a head for persons."""
 
 _CELL = 1.5  # height and width of a lens's part of the housing, in diameters
 _ABOVE = 0.25  # of posts over the middle of their head or arm [m]
@@ -33,6 +33,9 @@ _LENSES = (
 )
 """Of each lens: its bit, its place in cells above the middle, and its material while dark."""
 
+
+_FIGURE_SHARE = 0.3
+"""Of a lens's face and light, what is the figure that persons see [-]."""
 
 _BLINK = 1.0  # period of what blinks, which is lit in the first half [s]
 _LIT = {
@@ -51,9 +54,10 @@ def signal_shapes() -> dict[str, Mesh]:
     """Shapes of heads, which look to −x, and of posts and arms, with their levels of detail."""
     levels = (("", 20, True), (MIDDLE, 10, True), (FAR, 6, False), (TINY, 4, False))
     heads = {HEAD + ending: _head(sides, visors) for ending, sides, visors in levels}
+    walks = {WALK + ending: _walk(sides) for ending, sides, _ in (*levels, (SPECK, 4, False))}
     posts = {POST + ending: _post(sides) for ending, sides in (("", 12), (MIDDLE, 6), (FAR, 4))}
     arms = {ARM + ending: _arm(sides) for ending, sides in (("", 10), (MIDDLE, 6), (FAR, 4))}
-    return {**heads, HEAD + SPECK: _head(4, False), **posts, **arms}
+    return {**heads, HEAD + SPECK: _head(4, False), **walks, **posts, **arms}
 
 
 def _head(sides: int, visors: bool) -> Mesh:
@@ -69,6 +73,20 @@ def _head(sides: int, visors: bool) -> Mesh:
         parts.append(disc(centre, 0.5, (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), lens, sides=sides))
         if visors:
             parts.append(_visor(place * _CELL, sides))
+    return merge(parts)
+
+
+def _walk(sides: int) -> Mesh:
+    """Head for persons: a standing red figure above a striding green one."""
+    parts = [box((0.0, -0.5 * _CELL, -_CELL), (0.6, 0.5 * _CELL, _CELL), _BLACK)]
+    for light, place, lens in _LENSES:
+        if light is not SignalLight.YELLOW:
+            middle, stride = 0.5 * place * _CELL, 0.2 if light is SignalLight.GREEN else 0.16
+            parts.append(disc((-0.02, 0.0, middle + 0.33), 0.11, (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), lens, sides=sides))
+            corners = ((0.14, 0.18), (-0.14, 0.18), (-stride, -0.45), (stride, -0.45))
+            points = np.array([(-0.02, y, middle + z) for y, z in corners])
+            normals = np.tile((-1.0, 0.0, 0.0), (4, 1))
+            parts.append(mesh(points, np.array([(0, 1, 2), (0, 2, 3)]), normals, lens))
     return merge(parts)
 
 
@@ -139,9 +157,20 @@ def signal_batches(signals: SignalState, time: float) -> tuple[Batch, ...]:
     """
     if not signals.ids:
         return ()
-    size = np.repeat(signals.diameter[:, None], 3, axis=1)
-    heads = placed(HEAD, signals.position, signals.heading, size, instance=Instance.TRAFFIC_LIGHT)
-    return (Batch(HEAD, heads.transforms, heads.paint, _lit(signals, time), heads.instance),)
+    size, lit = np.repeat(signals.diameter[:, None], 3, axis=1), _lit(signals, time)
+    on_foot = _on_foot(signals)
+    batches = []
+    for shape, rows in ((HEAD, np.flatnonzero(~on_foot)), (WALK, np.flatnonzero(on_foot))):
+        if len(rows):
+            there = signals.position[rows], signals.heading[rows], size[rows]
+            heads = placed(shape, *there, instance=Instance.TRAFFIC_LIGHT)
+            batches.append(Batch(shape, heads.transforms, heads.paint, lit[rows], heads.instance))
+    return tuple(batches)
+
+
+def _on_foot(signals: SignalState) -> NDArray[np.bool_]:
+    """Which heads speak to persons."""
+    return signals.on_foot if len(signals.on_foot) else np.zeros(len(signals.ids), np.bool_)
 
 
 def _lit(signals: SignalState, time: float) -> NDArray[np.int32]:
@@ -168,13 +197,16 @@ def signal_light_sources(signals: SignalState, eye: NDArray[np.float64], time: f
     for bit, place, _ in _LENSES:
         lit = np.flatnonzero(lights & int(bit))
         middle = signals.position[lit] - _IN_FRONT * ahead[lit]
-        middle[:, 2] += place * _CELL * signals.diameter[lit]
+        walked = _on_foot(signals)[lit]
+        middle[:, 2] += np.where(walked, 0.5 * place, place) * _CELL * signals.diameter[lit]
         to_lens = middle - eye
         forward = np.einsum("ij,ij->i", to_lens, ahead[lit])
         left = to_lens[:, 1] * ahead[lit, 0] - to_lens[:, 0] * ahead[lit, 1]
         share = directed_share(np.arctan2(left, forward), np.arctan2(to_lens[:, 2], np.hypot(forward, left)))
         intensity = SIGNAL_INTENSITY * (signals.diameter[lit] / SIGNAL_DIAMETER) ** 2 * share
-        area = math.pi / 4.0 * signals.diameter[lit] ** 2 * np.maximum(forward, 0.0) / np.linalg.norm(to_lens, axis=1)
+        face = np.where(walked, _FIGURE_SHARE, 1.0)
+        intensity, full = intensity * face, math.pi / 4.0 * face
+        area = full * signals.diameter[lit] ** 2 * np.maximum(forward, 0.0) / np.linalg.norm(to_lens, axis=1)
         seen = intensity > 1e-3
         colour = SIGNAL_COLOURS[bit]
         tint = np.tile(np.array(colour) / luminance_of(colour), (int(seen.sum()), 1))

@@ -130,6 +130,7 @@ def _arrays_of(roads: RoadMap) -> Arrays:
         "sign_places": np.array([(s.value, *s.position, s.heading, s.diameter) for s in signs]).reshape(-1, 6),
         "heads": _text([text for head in heads for text in (head.signal_id, head.lane_id)]),
         "head_places": np.array([(*h.position, h.heading, h.diameter, *h.post) for h in heads]).reshape(-1, 8),
+        "heads_on_foot": np.array([head.on_foot for head in heads], np.bool_),
         "links": np.array([link for head in heads for link in head.links], np.int64),
         "link_counts": np.array([len(head.links) for head in heads], np.int64),
         "location": _text(roads.location or ()),
@@ -165,9 +166,10 @@ def _map_of(arrays: Mapping[str, NDArray[Any]]) -> RoadMap:
 def _heads(arrays: Mapping[str, NDArray[Any]]) -> Iterator[SignalHead]:
     names, ends = _texts(arrays["heads"]), np.cumsum(np.append(0, arrays["link_counts"])).tolist()
     links = [tuple(arrays["links"][start:end].tolist()) for start, end in pairwise(ends)]
-    rows = zip(names[::2], names[1::2], links, arrays["head_places"].tolist(), strict=True)
-    for signal, lane, own, (x, y, z, heading, diameter, *post) in rows:
-        yield SignalHead(signal, lane, own, (x, y, z), heading, diameter, (post[0], post[1], post[2]))
+    places = zip(arrays["head_places"].tolist(), arrays["heads_on_foot"].tolist(), strict=True)
+    rows = zip(names[::2], names[1::2], links, places, strict=True)
+    for signal, lane, own, ((x, y, z, heading, diameter, *post), on_foot) in rows:
+        yield SignalHead(signal, lane, own, (x, y, z), heading, diameter, (post[0], post[1], post[2]), on_foot)
 
 
 def _lane(name: tuple[str, str], line: NDArray[np.float64], sizes: Sequence[float], codes: Sequence[int]) -> Lane:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fogsim.traffic.road.limit_signs import limit_sign
 from fogsim.traffic.road.road_map import RoadMap, edge_ranges
-from fogsim.traffic.road.signal_heads import signal_heads
+from fogsim.traffic.road.signal_heads import crossing_heads, signal_heads
 from fogsim.values import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea, SignalHead
 
 _WALKING_AREA = "walkingarea"
@@ -46,14 +46,16 @@ def map_of(net: Any, lefthand: bool) -> RoadMap:
         between=np.array(between, np.bool_),
         areas=(*_junctions(net), *_walking_areas(net)),
         limit_signs=tuple(sign for sign in signs if sign is not None),
-        signal_heads=tuple(head for edge in edges if not edge.getFunction() for head in _heads(edge, side)),
+        signal_heads=tuple(head for edge in edges for head in _heads(edge, side)),
         location=_location(net),
     )
 
 
 def _heads(edge: Any, side: float) -> Iterator[SignalHead]:
+    if edge.getFunction() == "crossing":
+        return crossing_heads(edge.getLanes()[0], side)
     lanes = [lane for lane in edge.getLanes() if _kind(lane) is LaneKind.CARRIAGEWAY and len(lane.getShape()) > 1]
-    return signal_heads(lanes, side)
+    return signal_heads([] if edge.getFunction() else lanes, side)
 
 
 def _location(net: Any) -> tuple[str, str] | None:

@@ -20,6 +20,10 @@ FAST = 16.7
 POST_HEIGHT, ARM_HEIGHT = 2.75, 5.5
 """Height of the middle lens beside and above the road [m]: footways are clear to 2.1 m, roads to 4.5 m."""
 
+ON_FOOT_HEIGHT = 2.4
+"""Height of the middle of heads for persons [m]."""
+
+_BEYOND, _BESIDE_CROSSING = 0.5, 0.4  # of posts of such heads, from the end and the border of their crossing [m]
 _BESIDE = 0.6  # of posts, beyond the edge of the outermost lane [m]
 
 
@@ -54,6 +58,38 @@ def signal_heads(lanes: Sequence[Any], side: float) -> Iterator[SignalHead]:
             heading=heading,
             diameter=LARGE_DIAMETER if is_large else SIGNAL_DIAMETER,
             post=_tuple(post),
+        )
+
+
+def crossing_heads(crossing: Any, side: float) -> Iterator[SignalHead]:
+    """Heads for persons: beyond both ends of a crossing with lights, beside it.
+
+    Parameters
+    ----------
+    crossing : sumolib.net.lane.Lane
+        Lane of the crossing.
+    side : float
+        Side that vehicles keep to: 1 for the left, −1 for the right.
+    """
+    edge = crossing.getEdge()
+    ways = [way for source in edge.getIncoming() for way in source.getConnections(edge) if way.getTLSID()]
+    line = np.array(crossing.getShape3D(), np.float64)
+    if not ways or len(line) < 2:
+        return
+    for name, there in ((crossing.getID(), line), (edge.getID(), line[::-1])):
+        heading = _heading(there)
+        ahead = np.array([math.cos(heading), math.sin(heading), 0.0])
+        across = side * np.array([-ahead[1], ahead[0], 0.0])
+        post = there[-1] + _BEYOND * ahead + (0.5 * float(crossing.getWidth()) + _BESIDE_CROSSING) * across
+        yield SignalHead(
+            signal_id=ways[0].getTLSID(),
+            lane_id=name,
+            links=(ways[0].getTLLinkIndex(),),
+            position=_tuple(post + np.array([0.0, 0.0, ON_FOOT_HEIGHT])),
+            heading=heading,
+            diameter=SIGNAL_DIAMETER,
+            post=_tuple(post),
+            on_foot=True,
         )
 
 

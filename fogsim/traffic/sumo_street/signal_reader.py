@@ -69,6 +69,7 @@ class SignalReader:
             position=self._places[near],
             heading=np.array([head.heading for head in heads]),
             diameter=np.array([head.diameter for head in heads]),
+            on_foot=np.array([head.on_foot for head in heads] if any(head.on_foot for head in heads) else [], np.bool_),
         )
 
 

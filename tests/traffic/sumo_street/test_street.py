@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from fogsim.traffic import TrafficSetup, libsumo_traffic
+from fogsim.traffic.road.map_cache import compacted
 from fogsim.traffic.road.network import read_net
 from fogsim.traffic.road.signal_heads import ARM_HEIGHT, LARGE_DIAMETER, POST_HEIGHT, signal_heads
 from fogsim.values import Command, SignalColour, TrafficSnapshot
@@ -60,6 +61,10 @@ def test_lights_and_walkers_near_the_ego_are_told(tmp_path: Path) -> None:
     assert ahead is not None
     assert colours["WC_1"] is colours["EC_1"] is ahead.colour
     assert colours["SC_1"] is colours["NC_1"] is not ahead.colour
+    # Persons cross the road that has red.
+    assert [lane for lane, on_foot in zip(signals.lane, signals.on_foot, strict=True) if on_foot][:1] == [":C_c0_0"]
+    assert colours[":C_c0_0"] is colours[":C_c0"] is not colours[":C_c1_0"]
+    assert colours[":C_c0_0"] in {SignalColour.RED, SignalColour.GREEN}
     assert {SignalColour.RED, SignalColour.GREEN} <= set(colours.values())
     first, last = seen[0].state.persons, seen[-1].state.persons
     assert last.ids == ("anna", "bob")
@@ -75,9 +80,10 @@ def test_lights_and_walkers_near_the_ego_are_told(tmp_path: Path) -> None:
 
 def test_each_lane_with_a_light_has_a_head_beside_its_stop_line() -> None:
     roads = read_net(NET)
-    assert {head.lane_id for head in roads.signal_heads} == {"WC_1", "EC_1", "SC_1", "NC_1"}
+    heads = [head for head in roads.signal_heads if not head.on_foot]
+    assert {head.lane_id for head in heads} == {"WC_1", "EC_1", "SC_1", "NC_1"}
     lanes = {lane.lane_id: lane for lane in roads.lanes}
-    for head in roads.signal_heads:
+    for head in heads:
         lane = lanes[head.lane_id]
         end, ahead = lane.centreline[-1], np.array([math.cos(head.heading), math.sin(head.heading)])
         off = np.array(head.post[:2]) - end[:2]
@@ -86,6 +92,23 @@ def test_each_lane_with_a_light_has_a_head_beside_its_stop_line() -> None:
         assert abs(off @ ahead) < 1e-6
         assert head.position[2] == pytest.approx(end[2] + POST_HEIGHT)
         assert head.links
+
+
+def test_crossings_with_lights_have_heads_for_persons_beyond_either_end() -> None:
+    roads = read_net(NET)
+    assert compacted(roads).signal_heads == roads.signal_heads
+    heads = {head.lane_id: head for head in roads.signal_heads if head.on_foot}
+    assert set(heads) == {name for number in range(4) for name in (f":C_c{number}", f":C_c{number}_0")}
+    lanes = {lane.lane_id: lane for lane in roads.lanes}
+    for number in range(4):
+        there, back = heads[f":C_c{number}_0"], heads[f":C_c{number}"]
+        line = lanes[there.lane_id].centreline
+        assert there.links == back.links
+        assert math.cos(there.heading - back.heading) == pytest.approx(-1.0)
+        for head, end in ((there, line[-1]), (back, line[0])):
+            off, ahead = np.array(head.post[:2]) - end[:2], np.array([math.cos(head.heading), math.sin(head.heading)])
+            assert off @ ahead == pytest.approx(0.5)
+            assert off @ (ahead[1], -ahead[0]) > 0.5 * lanes[there.lane_id].width
 
 
 class FakeWay:

@@ -186,7 +186,7 @@ class DepartAction(Section):
     edges: tuple[Id, ...] = ()
     """Or its way on a network: edges; between those that do not follow one another SUMO finds the way."""
 
-    position_m: Annotated[Number, Field(ge=0)] | None = None
+    position_m: Distance | None = None
     """Position of its front bumper along its way, or along the first of its edges; by default at the beginning."""
 
     lane: Literal["right", "left"] | Annotated[Whole, Field(ge=0, le=20)] | None = None

@@ -72,6 +72,28 @@ class LastValue(Estimator):
 
 
 @dataclass
+class TrustsTheMap:
+    """An estimator that takes every sign of the map for seen: it never says less than the way to the farthest."""
+
+    sound: Any
+
+    @property
+    def method(self) -> str:
+        """Name of the sound one."""
+        return str(self.sound.method)
+
+    def reset(self) -> None:
+        """As the sound one."""
+        self.sound.reset()
+
+    def update(self, observation: Observation) -> Estimate:
+        """Say that it sees as far as the map goes, or farther."""
+        estimate: Estimate = self.sound.update(observation)
+        farthest = max((sign.distance for sign in observation.signs), default=0.0)
+        return scaled(max(farthest / estimate.visibility, 1.0), estimate) if estimate.valid else estimate
+
+
+@dataclass
 class NeverWidens:
     """A fusion whose belief stays as it is where estimators cannot tell."""
 
@@ -197,6 +219,7 @@ DEVICES = {
     "estimator 30 % too near": Device("estimators", partial(Estimator, told=partial(scaled, 0.7))),
     "estimator always says clear": Device("estimators", partial(Estimator, told=clear)),
     "estimator repeats its last value": Device("estimators", LastValue),
+    "estimator trusts the sign map": Device("estimators", TrustsTheMap),
     "fusion never widens": Device("fusion", NeverWidens),
     "no fog lamps": Device("lighting_policy", NoFogLamps),
     "camera frozen for 5 s, time and again": Device(settings=camera_fault("fault: frozen, time_stamp: delivery")),

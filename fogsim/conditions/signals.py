@@ -350,6 +350,14 @@ _OF_EGO = {
         _of_step(lambda s: stopping_sight_distance(float(s.traffic.speed[s.ego]), REACTION_TIME, DECELERATION)),
         needs=_EGO,
     ),
+    "ego.signs": Signal(
+        "signs ahead that the ego's map tells of", _of_step(lambda s: len(s.observation.signs)), least=0.0, needs=_EGO
+    ),
+    "ego.sign_distance": _metres(
+        "how far ahead the nearest of them is, as the map has it; inf without one",
+        _of_step(lambda s: min((sign.distance for sign in s.observation.signs), default=math.inf)),
+        needs=_EGO,
+    ),
     "advice": _speed("advised speed in force: the ego's; without one, the lowest anywhere; inf for none", _advice),
     "limit": _speed("speed limit where the ego is", _of_step(lambda s: s.speed_limit), needs=_EGO),
     "lamps": Signal(

@@ -22,6 +22,7 @@ from fogsim.values import (
     PersonState,
     SignalAhead,
     SignalColour,
+    SignSighting,
     SpeedAdvice,
     Step,
     StretchAdvice,
@@ -217,6 +218,14 @@ def test_sight_and_stopping() -> None:
     eyes = replace(step.truth, vehicle_extinctions=np.array([0.03, 0.0]))
     assert read("other.visibility", replace(step, truth=eyes)) == pytest.approx(math.log(20.0) / 0.03)
     assert read("ego.visibility", replace(step, truth=eyes)) == math.inf
+
+
+def test_what_the_map_tells_of_signs() -> None:
+    step = make_step()
+    assert (read("ego.signs", step), read("ego.sign_distance", step)) == (0, math.inf)
+    signs = tuple(SignSighting(f"{far}", "yield", math.nan, far, -5.0, 0.9) for far in (90.0, 40.0))
+    seen = replace(step, observation=replace(step.observation, signs=signs))
+    assert (read("ego.signs", seen), read("ego.sign_distance", seen)) == (2, 40.0)
 
 
 def test_banks() -> None:

@@ -25,6 +25,7 @@ MOMENTS: dict[str, float] = {
     "motorcycle_at_dusk": 12.0,
     "pedestrian_crossing_fog": 21.0,
     "ramp_merge": 10.0,
+    "sign_missing_and_moved": 4.0,
     "stopped_queue_behind_curve": 37.0,
     "tail_lamp_failure": 18.4,
     "tunnel_exit_into_fog": 17.0,

@@ -351,7 +351,7 @@ _OF_EGO = {
         needs=_EGO,
     ),
     "ego.signs": Signal(
-        "signs ahead that the ego's map tells of", _of_step(lambda s: len(s.observation.signs)), least=0.0, needs=_EGO
+        "signs ahead of which the map tells", _of_step(lambda s: float(len(s.observation.signs))), least=0.0, needs=_EGO
     ),
     "ego.sign_distance": _metres(
         "how far ahead the nearest of them is, as the map has it; inf without one",

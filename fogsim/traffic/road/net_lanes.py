@@ -52,10 +52,11 @@ def map_of(net: Any, lefthand: bool) -> RoadMap:
 
 
 def _heads(edge: Any, side: float) -> Iterator[SignalHead]:
-    if edge.getFunction() == "crossing":
-        return crossing_heads(edge.getLanes()[0], side)
+    function = edge.getFunction()
+    if function:
+        return crossing_heads(edge.getLanes()[0], side) if function == "crossing" else iter(())
     lanes = [lane for lane in edge.getLanes() if _kind(lane) is LaneKind.CARRIAGEWAY and len(lane.getShape()) > 1]
-    return signal_heads([] if edge.getFunction() else lanes, side)
+    return signal_heads(lanes, side)
 
 
 def _location(net: Any) -> tuple[str, str] | None:

@@ -24,7 +24,7 @@ MOMENTS: dict[str, float] = {
     "highway_99_corridor": 41.0,
     "motorcycle_at_dusk": 12.0,
     "pedestrian_crossing_fog": 21.0,
-    "ramp_merge": 10.0,
+    "ramp_merge": 33.0,
     "sign_missing_and_moved": 4.0,
     "stopped_queue_behind_curve": 37.0,
     "tail_lamp_failure": 18.4,

@@ -8,6 +8,9 @@ from numpy.typing import ArrayLike, NDArray
 from fogsim.obstruction.box_kernels import NUMBERS, add_ways_inside, find_hidden
 from fogsim.values.road import Structure
 
+_STRAIGHT = 0.01
+"""Points of a line that are no farther from the straight one without them are left out [m]."""
+
 _SHORTEST = 1e-6
 """Pieces of a line that are shorter than this in plan have no direction [m]."""
 
@@ -96,7 +99,7 @@ def obstructions_of(structures: Iterable[Structure]) -> Obstructions:
 
 
 def box_rows(line: NDArray[np.float64], half_width: float, heights: tuple[float, float]) -> list[tuple[float, ...]]:
-    """A box for each piece of a line; where two pieces meet, nobody looks between.
+    """A box for each piece of a line that is straight to a centimetre; where two pieces meet, nobody looks between.
 
     Parameters
     ----------
@@ -107,6 +110,7 @@ def box_rows(line: NDArray[np.float64], half_width: float, heights: tuple[float,
     heights : tuple of float
         Above it, between which the boxes are [m].
     """
+    line = _straightened(line)
     found, steps = list[tuple[float, ...]](), np.diff(line, axis=0).tolist()
     for start, (step_x, step_y, rise) in zip(line[:-1].tolist(), steps, strict=True):
         length = float(np.hypot(step_x, step_y))
@@ -114,3 +118,15 @@ def box_rows(line: NDArray[np.float64], half_width: float, heights: tuple[float,
             direction = (step_x / length, step_y / length, rise / length)
             found.append((*start, *direction, length, half_width, *heights))
     return found
+
+
+def _straightened(line: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A line without the points that it does not need (Douglas & Peucker 1973)."""
+    along, places = line[-1] - line[0], line - line[0]
+    share = (places * along).sum(axis=1) / max(float((along * along).sum()), _SHORTEST**2)
+    off = places - share.clip(0.0, 1.0)[:, None] * along
+    away = (off * off).sum(axis=1)
+    farthest = int(away.argmax())
+    if away[farthest] <= _STRAIGHT**2:
+        return line[[0, -1]]
+    return np.concatenate([_straightened(line[: farthest + 1])[:-1], _straightened(line[farthest:])])

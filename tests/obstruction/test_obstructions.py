@@ -78,3 +78,14 @@ def test_without_obstructions_nothing_is_hidden() -> None:
     assert not CLEAR_SIGHT.way_through([(0.0, 0.0, 0.0)], [(1.0, 0.0, 0.0)]).any()
     assert WALL.hide(np.zeros((0, 3)), np.zeros((0, 4, 3))).shape == (0,)
     assert not obstructions_of([structure([[1.0, 1.0, 0.0], [1.0, 1.0, 4.0]])])
+
+
+def test_a_line_has_no_more_boxes_than_it_has_bends() -> None:
+    straight = structure([[float(x), 0.0, 0.1 * x] for x in range(100)])
+    assert len(obstructions_of([straight])) == 1
+    there_and_back = structure([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0], [10.0, 5.0, 0.0], [0.0, 0.0, 0.0]])
+    assert len(obstructions_of([there_and_back])) == 3
+    angle = np.linspace(0.0, 1.0, 400)
+    arc = obstructions_of([structure(np.stack([200 * np.cos(angle), 200 * np.sin(angle), 0 * angle], 1).tolist())])
+    # Chords of 2 √(2 · 200 m · 1 cm) = 4 m.
+    assert 40 < len(arc) < 110

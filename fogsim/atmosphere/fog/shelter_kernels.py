@@ -6,10 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
-from fogsim.obstruction.box_kernels import share_inside
 
 FARTHEST = 1e5
 """What is farther is the sky [m]."""
+
+_BELOW = 1.0
+"""How far below its road a portal reaches [m]: what is drawn may lie a little lower."""
 
 _Array = NDArray[np.float64]
 _Picture = NDArray[np.float32]
@@ -34,26 +36,32 @@ def ray(rays: _Array, u: int, v: int) -> tuple[float, float, float]:
 
 
 @kernel
-def find_pixels_within(distance: _Picture, rays: _Array, eye: _Array, boxes: _Array, within: NDArray[np.bool_]) -> None:
-    """Find the pixels whose rays pass through a tunnel's space before they end.
+def find_pixels_within(
+    distance: _Picture, rays: _Array, eye: _Array, portals: _Array, within: NDArray[np.bool_]
+) -> None:
+    """Find the pixels whose rays pass through a tunnel's portal before they end.
 
     Parameters
     ----------
     distance, rays, eye
         Distance along the ray of each pixel (rows, cols) [m], the matrix (3, 3) that takes a pixel (u, v, 1) to its
         viewing ray, and where the camera is (3,) [m].
-    boxes : (m, 10) float64
-        The space.
+    portals : (n, 7) float64
+        Middle on the road (x, y, z), direction of the road in plan (x, y), half the width, and the height [m].
     within : (rows, cols) bool
         Made true where they do.
     """
-    end = np.empty(3)
-    for v in range(distance.shape[0]):
-        for u in range(distance.shape[1]):
-            a, b, c = ray(rays, u, v)
-            reach = min(float(distance[v, u]), FARTHEST)
-            end[0], end[1], end[2] = eye[0] + a * reach, eye[1] + b * reach, eye[2] + c * reach
-            for box in boxes:
-                if share_inside(eye, end, box) > 0.0:
+    for number in range(len(portals)):
+        x, y, z = portals[number, 0] - eye[0], portals[number, 1] - eye[1], portals[number, 2] - eye[2]
+        east, north, half_width, height = portals[number, 3:]
+        ahead, aside = x * east + y * north, y * east - x * north
+        for v in range(distance.shape[0]):
+            for u in range(distance.shape[1]):
+                a = rays[0, 0] * u + rays[0, 1] * v + rays[0, 2]
+                b = rays[1, 0] * u + rays[1, 1] * v + rays[1, 2]
+                c = rays[2, 0] * u + rays[2, 1] * v + rays[2, 2]
+                reach = ahead / (a * east + b * north)
+                is_through = reach > 0.0 and abs(reach * (b * east - a * north) - aside) < half_width
+                is_before = reach * reach * (a * a + b * b + c * c) < distance[v, u] * distance[v, u]
+                if is_through and is_before and -_BELOW < reach * c - z < height:
                     within[v, u] = True
-                    break

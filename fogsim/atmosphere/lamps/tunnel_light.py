@@ -7,7 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.lamps.tunnel_light_kernels import Luminaires, TunnelSpace, light_pixels
+from fogsim.atmosphere.lamps.tunnel_light_kernels import (
+    BEFORE,
+    STEP,
+    Luminaires,
+    TunnelSpace,
+    daylight_share,
+    light_pixels,
+)
 from fogsim.obstruction import Tunnel
 from fogsim.values import Camera, CameraPose, View
 from fogsim.values.pinhole import ray_from_pixel
@@ -20,9 +27,6 @@ SPACING, SIZE, WIDTH = 8.0, 1.2, 0.3
 
 _UTILANCE = 0.6
 """Share of the lamps' light that comes to the road [-]."""
-
-_BEFORE = 40.0
-"""Farther before a portal than this, a tunnel takes less than a thousandth of the sky's light from the road [m]."""
 
 
 class TunnelLight:
@@ -74,7 +78,7 @@ class TunnelLight:
         distance, rays = np.ascontiguousarray(view.distance, np.float32), ray_from_pixel(camera, pose)
         eye = np.array(pose.position, np.float64)
         for space, lamps in self._lit:
-            light_pixels(radiance, np.ascontiguousarray(own, np.float32), distance, rays, eye, space, lamps, _BEFORE)
+            light_pixels(radiance, np.ascontiguousarray(own, np.float32), distance, rays, eye, space, lamps)
         return dataclasses.replace(view, radiance=radiance)
 
 
@@ -84,4 +88,7 @@ def _space_and_lamps(tunnel: Tunnel, sky_illuminance: float) -> tuple[TunnelSpac
     # What a lamp sends out, to all sides alike, lights its part of the road.
     flux = LAMPS_ON_ROAD * SPACING * 2.0 * tunnel.half_width / _UTILANCE
     lamps = Luminaires(LAMPS_ON_ROAD / sky_illuminance, flux / (math.pi * SIZE * WIDTH), SPACING, SIZE, 0.5 * WIDTH)
-    return TunnelSpace(boxes, stations, float(boxes[:, 6].sum())), lamps
+    length = float(boxes[:, 6].sum())
+    places = np.arange(-BEFORE, length + BEFORE + 2.0 * STEP, STEP)
+    daylight = np.array([daylight_share(place, length, boxes[0, 7], boxes[0, 9]) for place in places.tolist()])
+    return TunnelSpace(boxes, stations, length, daylight), lamps

@@ -15,6 +15,12 @@ _Picture = NDArray[np.float32]
 _CEILING = 0.12
 """What is no farther than this below the upper face of a tunnel's space is its ceiling [m]."""
 
+BEFORE = 40.0
+"""Farther before a portal than this, a tunnel takes less than a thousandth of the sky's light from the road [m]."""
+
+STEP = 0.05
+"""From one to the next place of which the daylight is known; between them it is interpolated [m]."""
+
 _UNDER_CEILING = 0.25
 """What a ceiling gets of the road's light, over what renderers give undersides [-]: a tenth, which the road returns."""
 
@@ -30,11 +36,14 @@ class TunnelSpace(NamedTuple):
         Where along it each box begins [m].
     length : float
         Length from portal to portal [m].
+    daylight : (n,) float64
+        Share of the sky's light each `STEP` along it, from `BEFORE` before it to as far beyond it [-].
     """
 
     boxes: NDArray[np.float64]
     stations: NDArray[np.float64]
     length: float
+    daylight: NDArray[np.float64]
 
 
 class Luminaires(NamedTuple):
@@ -98,15 +107,15 @@ def daylight_share(station: float, length: float, half_width: float, height: flo
 
 
 @kernel
-def _place_in(space: TunnelSpace, x: float, y: float, z: float, before: float) -> tuple[int, float, float, float]:
+def _place_in(space: TunnelSpace, x: float, y: float, z: float) -> tuple[int, float, float, float]:
     """Box in which, or before which, a place is, or −1; and where it is along it, across it and above it [m]."""
     last = len(space.boxes) - 1
     for number in range(last + 1):
         box = space.boxes[number]
         east, north = x - box[0], y - box[1]
         along, across = east * box[3] + north * box[4], north * box[3] - east * box[4]
-        low = -before if number == 0 else 0.0
-        high = box[6] + (before if number == last else 0.0)
+        low = -BEFORE if number == 0 else 0.0
+        high = box[6] + (BEFORE if number == last else 0.0)
         above = z - box[2] - box[5] * along
         if low <= along <= high and abs(across) <= box[7] and box[8] < above < box[9]:
             return number, along, across, above
@@ -122,7 +131,6 @@ def light_pixels(
     eye: _Array,
     space: TunnelSpace,
     lamps: Luminaires,
-    before: float,
 ) -> None:
     """Light what is seen of a tunnel and of the road before its portals, in place.
 
@@ -142,8 +150,6 @@ def light_pixels(
         The tunnel.
     lamps : Luminaires
         Its lamps.
-    before : float
-        How far before a portal the road is looked at [m].
     """
     for v in range(distance.shape[0]):
         for u in range(distance.shape[1]):
@@ -151,13 +157,13 @@ def light_pixels(
             if not reach < FARTHEST:
                 continue
             a, b, c = ray(rays, u, v)
-            number, along, across, above = _place_in(
-                space, eye[0] + a * reach, eye[1] + b * reach, eye[2] + c * reach, before
-            )
+            number, along, across, above = _place_in(space, eye[0] + a * reach, eye[1] + b * reach, eye[2] + c * reach)
             if number < 0:
                 continue
             box, station = space.boxes[number], space.stations[number] + along
-            share = daylight_share(station, space.length, box[7], box[9])
+            place = (station + BEFORE) / STEP
+            step = int(place)
+            share = space.daylight[step] + (space.daylight[step + 1] - space.daylight[step]) * (place - step)
             if 0.0 <= station <= space.length:
                 share += lamps.illuminance
                 if above > box[9] - _CEILING:

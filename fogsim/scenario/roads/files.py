@@ -89,7 +89,7 @@ def traffic_files(scenario: Scenario) -> TrafficFiles:
     _check_ways(layout, scenario.demand or DemandSection())
     demand = _demand(scenario.demand or DemandSection(), usual_mix(scenario.road.template))
     walkers = [_walker(name, section) for name, section in scenario.actors.items() if section.is_person]
-    footfall = _footfall(scenario.demand or DemandSection(), layout)
+    footfall = _footfall(scenario, layout)
     texts = {_NET: net_text(layout.net), _ROUTES: routes_text(layout, demand, placed, walkers, footfall)}
     beside = additional_text(layout, [_obstruction(one) for one in scenario.road.obstructions])
     made = write_generated("roads", {**texts, **({_BESIDE: beside} if beside else {})})
@@ -240,13 +240,14 @@ def _walker(name: str, section: ActorSection) -> Walker:
     )
 
 
-def _footfall(section: DemandSection, layout: Layout) -> Footfall:
-    persons = section.persons
+def _footfall(scenario: Scenario, layout: Layout) -> Footfall:
+    persons, traffic = (scenario.demand or DemandSection()).persons, scenario.traffic
     for key, lacks in (("along_pph", not layout.net.edges[0].footway), ("across_pph", not layout.net.zebras)):
         if lacks and getattr(persons, key):
             needed = "road.footways: true" if key == "along_pph" else "road.footways: true and road.zebra_crossings"
             raise DemandError(f"persons.{key}", f"the road has nothing for persons there; give {needed}")
-    return Footfall(persons.along_pph / _SECONDS_PER_HOUR, persons.across_pph / _SECONDS_PER_HOUR)
+    until = scenario.duration_s + (traffic.warm_up_limit_s if traffic.has_ego else traffic.warm_up_s)
+    return Footfall(persons.along_pph / _SECONDS_PER_HOUR, persons.across_pph / _SECONDS_PER_HOUR, until)
 
 
 def _template(road: Road) -> RoadTemplate:

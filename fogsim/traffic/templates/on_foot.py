@@ -1,7 +1,7 @@
 """Who is on foot on a road: persons that a scenario places, and those who walk along footways and cross at random."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from fogsim.traffic.templates.footpaths import STOP_TO_ZEBRA, ZEBRA_WIDTH
@@ -16,7 +16,6 @@ WALKING_SPEED = 5.0 / 3.6
 WAITING_SPEED = 1e-3
 """Of a person who waits to be told to walk [m/s]: SUMO's persons do not stand still on a footway."""
 
-_END = 1_000_000  # of flows [s]
 _BESIDE = 15.0  # from a crossing to where those who cross come from, and go to [m]
 _NEAR = 15.0  # as far as this from a crossing's middle a place means that crossing [m]
 _SHORTEST = 25.0  # footway on which persons are from the beginning [m]
@@ -68,10 +67,13 @@ class Footfall:
         Persons who walk along each footway, in both directions together [1/s].
     across : float
         Persons who cross at each crossing, from both sides together [1/s].
+    until : float
+        When the last of them come [s]: SUMO makes all persons of a flow when it reads it.
     """
 
     along: float = 0.0
     across: float = 0.0
+    until: float = 600.0
 
 
 def walkers_text(layout: Layout, walkers: Sequence[Walker], footfall: Footfall) -> list[str]:
@@ -96,9 +98,9 @@ def walkers_text(layout: Layout, walkers: Sequence[Walker], footfall: Footfall) 
         lines.append(_person_type(_TYPE, WALKING_SPEED, _SPEEDS))
     for way, names in layout.ways:
         if footfall.along and "." not in way and all(layout.edge(name).footway for name in names):
-            lines += _along(layout, way, 0.5 * footfall.along)
+            lines += _along(layout, way, (0.5 * footfall.along, footfall.until))
     for zebra in layout.net.zebras if footfall.across else ():
-        lines += _across(zebra, 0.5 * footfall.across)
+        lines += _across(zebra, (0.5 * footfall.across, footfall.until))
     # SUMO reads no further than the time that it needs: who comes later stands last.
     return lines + [line for walker in sorted(walkers, key=lambda one: one.depart) for line in _walker(walker, layout)]
 
@@ -209,9 +211,9 @@ def zebra_places(layout: Layout, way: str) -> dict[ZebraPlan, float]:
     return found
 
 
-def _along(layout: Layout, way: str, rate: float) -> Iterator[str]:
-    """Persons on the footway to the right of a way, as many in either direction."""
-    names = layout.way(way)
+def _along(layout: Layout, way: str, flow: tuple[float, float]) -> Iterator[str]:
+    """Persons on the footway to the right of a way, so many per second in either direction [1/s] until a time [s]."""
+    names, (rate, until) = layout.way(way), flow
     for sense, ordered in (("", names), (".back", names[::-1])):
         due = 0.0
         for name in ordered:
@@ -223,19 +225,19 @@ def _along(layout: Layout, way: str, rate: float) -> Iterator[str]:
                 yield from _flow(f"{way}.walks{sense}.{name}", there, (name, ordered[-1]), "random")
         first, last = layout.edge(ordered[0]), layout.edge(ordered[-1])
         start, end = (first.length, 0.0) if sense else (0.0, last.length)
-        coming = {"begin": "0", "end": _END, "period": f"exp({rate:.6f})", "departPos": f"{start:.2f}"}
+        coming = {"begin": "0", "end": f"{until:g}", "period": f"exp({rate:.6f})", "departPos": f"{start:.2f}"}
         yield from _flow(f"{way}.walks{sense}", coming, (first.name, last.name), f"{end:.2f}")
 
 
-def _across(zebra: ZebraPlan, rate: float) -> Iterator[str]:
-    """Persons who cross, as many from either side."""
-    coming = {"begin": "0", "end": _END, "period": f"exp({rate:.6f})"}
+def _across(zebra: ZebraPlan, flow: tuple[float, float]) -> Iterator[str]:
+    """Persons who cross, so many per second from either side [1/s] until a time [s]."""
+    coming = {"begin": "0", "end": f"{flow[1]:g}", "period": f"exp({flow[0]:.6f})"}
     near, far = f"-{_BESIDE:g}", f"{_BESIDE:g}"
     for one, other, start, end in ((zebra.into, zebra.away, near, far), (zebra.away, zebra.into, far, near)):
         yield from _flow(f"{zebra.node}.{one}.crosses", {**coming, "departPos": start}, (one, other), end)
 
 
-def _flow(name: str, times: dict[str, object], ends: tuple[str, str], arrival: str) -> Iterator[str]:
+def _flow(name: str, times: Mapping[str, object], ends: tuple[str, str], arrival: str) -> Iterator[str]:
     yield opening("personFlow", id=name, type=_TYPE, **times)
     yield "    " + element("walk", from_=ends[0], to=ends[1], arrivalPos=arrival)
     yield "</personFlow>"

@@ -49,7 +49,7 @@ def records(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
         ),
         (
             "resets.py",
-            ("--resets", "2", "--part", "sumo", "--part", "environment"),
+            ("--resets", "2", "--part", "environment"),
             {"ms_median", "growth_kib_per_reset"},
         ),
         (

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import count
 
 import cv2
+import numba
 import numpy as np
 
 from fogsim.values import Camera, Response
@@ -47,26 +48,29 @@ class Scene:
     colour: bool = False
 
 
+@numba.njit(cache=True)
+def _hashed(mixed):
+    """A number from -0.5 to 0.5 that looks random."""
+    mixed ^= mixed >> 13
+    mixed *= 1274126177
+    mixed ^= mixed >> 16
+    return (mixed & 0xFFFF) / 65535.0 - 0.5
+
+
+@numba.njit(cache=True)
 def hash_noise(x, y, seed):
-    """Smooth noise of unit deviation, uniform hashes of a lattice in between."""
-    i, j = np.floor(x), np.floor(y)
-    fx, fy = x - i, y - j
-    fx, fy = fx * fx * (3 - 2 * fx), fy * fy * (3 - 2 * fy)
-
-    left, top = i.astype(np.int64) * 73856093, (j.astype(np.int64) * 19349663) ^ (seed * 83492791)
-    right, bottom = left + 73856093, ((j.astype(np.int64) + 1) * 19349663) ^ (seed * 83492791)
-
-    def at(a, b):
-        mixed = a ^ b
-        mixed ^= mixed >> 13
-        mixed *= 1274126177
-        mixed ^= mixed >> 16
-        mixed &= 0xFFFF
-        return mixed / 65535.0 - 0.5
-
-    near = at(left, top) * (1 - fx) + at(right, top) * fx
-    far = at(left, bottom) * (1 - fx) + at(right, bottom) * fx
-    return (near * (1 - fy) + far * fy) / 0.17
+    """Smooth noise of unit deviation at places (n,): uniform hashes of a lattice, and between them."""
+    out = np.empty(x.size)
+    for index in range(x.size):
+        i, j = np.floor(x[index]), np.floor(y[index])
+        fx, fy = x[index] - i, y[index] - j
+        fx, fy = fx * fx * (3 - 2 * fx), fy * fy * (3 - 2 * fy)
+        left, top = np.int64(i) * 73856093, (np.int64(j) * 19349663) ^ (seed * 83492791)
+        right, bottom = left + 73856093, ((np.int64(j) + 1) * 19349663) ^ (seed * 83492791)
+        near = _hashed(left ^ top) * (1 - fx) + _hashed(right ^ top) * fx
+        far = _hashed(left ^ bottom) * (1 - fx) + _hashed(right ^ bottom) * fx
+        out[index] = (near * (1 - fy) + far * fy) / 0.17
+    return out
 
 
 def albedo(scene, ahead, right, seed):

@@ -17,7 +17,7 @@ Found with libsumo 1.28 on a 2-core Linux machine, growth per reset of resident 
     traffic       750 resets   2.1 KiB / 1.7 KiB   (counted from the 250th on)
     environment  1000 resets   3.1 KiB / 2.1 KiB
 
-    highway      1500 resets   8.2 KiB / 3.1 KiB   (on a busy machine; no Python object is left, and bare highway-v0 has 3.6)
+    highway      1500 resets   8.2 KiB / 3.1 KiB   (no Python object is left; bare highway-v0 has 3.6)
 
 So most of what grows is SUMO's own ``load``, below 2 KiB each whether the seed changes or not, some 2 MiB in 1000
 resets; our stages, the scene, the renderer and the estimators add at most 0.5 KiB to it. The resident set settles

@@ -37,7 +37,7 @@ def mistake(entry: str, *settings: str) -> str:
         ("{lead: {speed: {like: nobody}}}", "there is no vehicle 'nobody' in "),
         ("{lead: {change_lane: {to_lane_of: nobody}}}", "there is no vehicle 'nobody' in "),
         ("{fog: {over: 3 s}}", "do.fog: say how thick: visibility_m or density"),
-        ("{light: {illuminance: 100 lx}}", "do.light.illuminance_lx: input should be greater than or equal to 1000"),
+        ("{light: {illuminance: -1 lx}}", "do.light.illuminance_lx: input should be greater than or equal to 0"),
         ("{signal.C: {state: purple}}", "do.signal.C.state"),
         ("{sensors.camera: {fault: blackoud}}", "do.sensors.camera"),
         ("{leed: {brake: {}}}", "do.leed: there is no vehicle 'leed' in "),
@@ -74,7 +74,7 @@ def test_mistakes_of_conditions_and_names() -> None:
             "fog={outside_visibility_m: inf, banks: [{start_m: 100, end_m: 900, visibility_m: 40}]}",
             "outside the banks the air is clear; write density",
         ),
-        ("light: {illuminance: 2000 lx}", "light.illuminance_lx=10", "daylight changes by day alone"),
+        ("light: {illuminance: 20 lx}", "renderer=reference", "the renderer reference knows no lamplight"),
     ],
 )
 def test_what_does_not_fit_the_scenario_is_told(do: str, setting: str, told: str) -> None:

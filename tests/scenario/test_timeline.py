@@ -74,7 +74,11 @@ def test_mistakes_of_conditions_and_names() -> None:
             "fog={outside_visibility_m: inf, banks: [{start_m: 100, end_m: 900, visibility_m: 40}]}",
             "outside the banks the air is clear; write density",
         ),
-        ("light: {illuminance: 20 lx}", "renderer=reference", "the renderer reference knows no lamplight"),
+        (
+            "light: {illuminance: 20 lx, course: factors}",
+            "light.illuminance_lx=0",
+            "goes on from the light that there is",
+        ),
     ],
 )
 def test_what_does_not_fit_the_scenario_is_told(do: str, setting: str, told: str) -> None:

@@ -226,6 +226,7 @@ class TrafficRun:
             command=command,
             ending=self._ending(index, snapshot),
             begun=begun,
+            waiting=snapshot.waiting,
         )
         ended = self._timeline.ended(step)
         if step.ending is None and ended is not None:

@@ -9,7 +9,9 @@ from typing import Any
 
 from fogsim.errors import FogSimError, SimulationError
 from fogsim.loop import ClosedLoop
-from fogsim.values import Step
+from fogsim.scenario import Scenario
+from fogsim.traffic_run import TrafficRun
+from fogsim.values import Step, TrafficStep
 
 HEARTBEAT_PERIOD = 1.0
 """Time between two signs of life while a request is worked on [s]."""
@@ -26,8 +28,8 @@ def serve(connection: "Connection[Any, Any]") -> None:
     connection : Connection
         The pipe to the parent; its end ends the simulation.
     """
-    loop: ClosedLoop | None = None
-    answer: Step | FogSimError | None
+    loop: ClosedLoop | TrafficRun | None = None
+    answer: Step | tuple[TrafficStep, float] | FogSimError | None
     try:
         while True:
             verb, argument = connection.recv()
@@ -36,7 +38,7 @@ def serve(connection: "Connection[Any, Any]") -> None:
                     if verb == "open":
                         if loop is not None:
                             loop.close()
-                        loop, answer = ClosedLoop(argument), None
+                        loop, answer = _simulation(argument), None
                     elif loop is None:
                         answer = SimulationError("the host was asked for a run before it got a scenario")
                     else:
@@ -49,6 +51,10 @@ def serve(connection: "Connection[Any, Any]") -> None:
     finally:
         if loop is not None:
             loop.close()
+
+
+def _simulation(scenario: Scenario) -> ClosedLoop | TrafficRun:
+    return ClosedLoop(scenario) if scenario.traffic.has_ego else TrafficRun(scenario)
 
 
 @contextlib.contextmanager

@@ -14,7 +14,8 @@ from typing import Any, Protocol, cast
 from fogsim.errors import InputError, SimulationError, SimulationRunningError
 from fogsim.loop import ClosedLoop
 from fogsim.scenario import Scenario
-from fogsim.values import Command, Step
+from fogsim.traffic_run import TrafficRun
+from fogsim.values import Command, Step, TrafficStep
 
 TIMEOUT = 60.0
 """How long a child process may give no sign of life unless something else is asked for [s]."""
@@ -101,8 +102,67 @@ def _begun(simulation: Simulation, seed: int) -> tuple[Simulation, Step]:
         raise
 
 
-class HostedLoop:
-    """A closed loop in a child process; one that is lost is replaced when a run is begun.
+class TrafficSimulation(Protocol):
+    """What an environment needs of traffic without an ego, wherever it runs."""
+
+    def start(self, seed: int) -> tuple[TrafficStep, float]:
+        """Begin a run; see `fogsim.traffic_run.TrafficRun.start`.
+
+        Parameters
+        ----------
+        seed : int
+            Seed of every random number of the run.
+        """
+
+    def advance(self, command: Command) -> tuple[TrafficStep, float]:
+        """Move by one camera period; see `fogsim.traffic_run.TrafficRun.advance`.
+
+        Parameters
+        ----------
+        command : Command
+            Advice to drivers.
+        """
+
+    def close(self) -> None:
+        """End the simulation; closing twice is allowed."""
+
+
+def begin_traffic(
+    simulation: TrafficSimulation | None, scenario: Scenario, seed: int, timeout: float = TIMEOUT
+) -> tuple[TrafficSimulation, TrafficStep]:
+    """Start a scenario without an ego, here or in a child process if another simulation runs here.
+
+    Parameters
+    ----------
+    simulation : TrafficSimulation or None
+        What ran before, which is over then.
+    scenario : Scenario
+        The scenario.
+    seed : int
+        Seed of the run.
+    timeout : float
+        As of `begin` [s].
+    """
+    begun: TrafficSimulation
+    if isinstance(simulation, HostedTraffic):
+        simulation.change(scenario)
+        begun = simulation
+    else:
+        if simulation is not None:
+            simulation.close()
+        begun = TrafficRun(scenario)
+    try:
+        return begun, begun.start(seed)[0]
+    except SimulationRunningError:
+        begun = HostedTraffic(scenario, timeout)
+        return begun, begun.start(seed)[0]
+    except BaseException:
+        begun.close()
+        raise
+
+
+class _Host:
+    """A simulation in a child process; one that is lost is replaced when a run is begun.
 
     Parameters
     ----------
@@ -175,6 +235,23 @@ class HostedLoop:
         if not self._connection.closed:
             self._ask("open", scenario)
 
+    def _start(self, seed: int) -> object:
+        if self._connection.closed:
+            self._open()
+        return self._ask("start", seed)
+
+    def close(self) -> None:
+        """End the child process; closing twice is allowed."""
+        self._connection.close()
+        try:
+            self._child.wait(_CLOSE_TIMEOUT)
+        except subprocess.TimeoutExpired:
+            self._abandon()
+
+
+class HostedLoop(_Host):
+    """A closed loop in a child process; see `_Host` for parameters."""
+
     def start(self, seed: int) -> Step:
         """Begin a run; see `fogsim.loop.ClosedLoop.start`.
 
@@ -183,9 +260,7 @@ class HostedLoop:
         seed : int
             Seed of every random number of the run.
         """
-        if self._connection.closed:
-            self._open()
-        return cast("Step", self._ask("start", seed))
+        return cast("Step", self._start(seed))
 
     def advance(self, command: Command) -> Step:
         """Move by one camera period; see `fogsim.loop.ClosedLoop.advance`.
@@ -197,13 +272,29 @@ class HostedLoop:
         """
         return cast("Step", self._ask("advance", command))
 
-    def close(self) -> None:
-        """End the child process; closing twice is allowed."""
-        self._connection.close()
-        try:
-            self._child.wait(_CLOSE_TIMEOUT)
-        except subprocess.TimeoutExpired:
-            self._abandon()
+
+class HostedTraffic(_Host):
+    """Traffic without an ego in a child process; see `_Host` for parameters."""
+
+    def start(self, seed: int) -> tuple[TrafficStep, float]:
+        """Begin a run; see `fogsim.traffic_run.TrafficRun.start`.
+
+        Parameters
+        ----------
+        seed : int
+            Seed of every random number of the run.
+        """
+        return cast("tuple[TrafficStep, float]", self._start(seed))
+
+    def advance(self, command: Command) -> tuple[TrafficStep, float]:
+        """Move by one camera period; see `fogsim.traffic_run.TrafficRun.advance`.
+
+        Parameters
+        ----------
+        command : Command
+            Advice to drivers.
+        """
+        return cast("tuple[TrafficStep, float]", self._ask("advance", command))
 
 
 def checked_timeout(timeout: float) -> float | None:

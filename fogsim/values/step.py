@@ -135,6 +135,8 @@ class TrafficStep:
         What of the script has not been played, on the step that ends a run; empty on all others.
     begun : tuple of Begun
         What of the script began in this period.
+    waiting : int
+        Without an ego: vehicles that were to come by now and find no room to; 0 with one, where nobody counts them.
     """
 
     index: int
@@ -146,6 +148,7 @@ class TrafficStep:
     ending: Ending | None
     unplayed: Unplayed = NOTHING_UNPLAYED
     begun: tuple[Begun, ...] = ()
+    waiting: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -154,7 +157,7 @@ class Step(TrafficStep):
 
     Attributes
     ----------
-    index, time, traffic, collisions, truth, command, ending, unplayed, begun
+    index, time, traffic, collisions, truth, command, ending, unplayed, begun, waiting
         As of `TrafficStep`.
     ego : int
         Row of the ego vehicle in `traffic`.

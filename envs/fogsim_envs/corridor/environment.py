@@ -1,0 +1,328 @@
+"""One agent a message sign along a road in fog: what each shows, for everybody's safety and time."""
+
+import functools
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from fogsim.errors import InputError, MissingDependencyError
+from fogsim.road_advice import RoadAdvice, stretch_advices
+from fogsim.scenario import Scenario, build, load_scenario, override
+from fogsim.values import Command, Display, Ending, TrafficStep
+from fogsim_envs.actions import checked_action
+from fogsim_envs.corridor.loops import InductionLoops
+from fogsim_envs.corridor.observation import (
+    SHOWN_SPEEDS,
+    RoadKnowledge,
+    corridor_space,
+    loop_places,
+    measured_visibilities,
+    sign_observation,
+)
+from fogsim_envs.corridor.rewards import CorridorReward, CorridorWeights
+from fogsim_envs.corridor.road import SignedRoad, signed_road
+from fogsim_envs.hosting import TIMEOUT, TrafficSimulation, begin_traffic, checked_timeout
+from fogsim_envs.task.episodes import FogDistribution
+from fogsim_envs.task.sampling import EpisodeChoice, EpisodeSource
+
+try:
+    from pettingzoo import ParallelEnv
+except ImportError as error:  # pragma: no cover - the tests have it
+    raise MissingDependencyError(f"FogCorridor needs PettingZoo ({error}): pip install 'fogsim[rl]'") from error
+
+MOTORWAY = Path(__file__).with_name("motorway.yaml")
+"""The road of the default task."""
+
+CORRIDOR_FOG = FogDistribution(ahead=(500.0, 2500.0), reach=4000.0)
+"""Fog anywhere along the default road."""
+
+DEMANDS = (600.0, 1200.0, 1800.0, 2400.0)
+"""Demand of the default task, each as likely [1/h]."""
+
+
+class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not typed
+    """Show speeds on the message signs of a motorway in fog, a sign an agent; a ``pettingzoo.ParallelEnv``.
+
+    One step is one decision period of the scenario (30 s). Agents are ``sign_0``, ``sign_1``, … in the direction of
+    travel. Drivers read a sign in passing, keep it to the next one, and follow it as ``drivers.compliance`` says.
+
+    ### Action
+    ``Discrete(6)``: 40, 60, 80, 100, 120 km/h, or none.
+
+    ### Observation
+    float32 (13,) in 0 … 1, of the decision period that is over:
+
+    | entries | meaning | scale |
+    |---|---|---|
+    | 0, 1, 2 | loop halfway to the sign before: flow; mean speed; anybody passed | / 2500 /h and lane; / 50 m/s; 0, 1 |
+    | 3, 4, 5 | loop halfway to the next sign, likewise | |
+    | 6 | visibility meter at the sign: up to 2 km, 10 % deviation | logarithmic, 1 m … 10 km to 0 … 1 |
+    | 7, 8, 9 | speed shown so far by this sign, the one before, the next | / 50 m/s; 1 for none |
+    | 10, 11, 12 | speed limit; place along the road; time left | / 50 m/s; share; share |
+
+    ``state()`` is all of them one after another.
+
+    ### Reward
+    The same to all: the sum of ``infos[agent]["reward_terms"]``, in points (`CorridorWeights`): delay, overdriving,
+    conflict, collision, of all vehicles. Who finds no room to come onto the road pays its delay there, so nothing is
+    won by a queue that nobody counts.
+
+    ### Episodes
+    Fog and demand are drawn at each reset; ``options`` of `reset` fix ``visibility``, ``scenario``, ``overrides`` or a
+    whole ``episode``, as of `fogsim_envs.task.FogAdvisoryV1Env`. Vehicles are on the road from the beginning; the signs
+    are dark for the first period, in which the loops count. Truncated after the scenario's duration.
+
+    ### Arguments
+    scenario : name, file, or `fogsim.Scenario` with ``traffic.ego: none`` and ``drivers.advised: signs``; None for the
+    default task's motorway
+    fog_distribution : `FogDistribution`; None with a scenario is that scenario's own fog
+    split : "train" or "test"
+    overrides : ``key.path=value`` each, as after ``fogsim run --set``
+    reward_weights : `CorridorWeights`
+    timeout : how long a child process that runs the simulation may give no sign of life [s]; ``inf`` for ever
+
+    ### Version history
+    * v1: first version
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012 - PettingZoo's own way
+        "name": "fogsim/FogCorridor-v1",
+        "render_modes": [],
+        "is_parallelizable": True,
+    }
+    render_mode = None
+
+    def __init__(
+        self,
+        scenario: str | Path | Scenario | None = None,
+        *,
+        fog_distribution: FogDistribution | None = None,
+        split: str = "train",
+        overrides: Sequence[str] = (),
+        reward_weights: CorridorWeights | None = None,
+        timeout: float = TIMEOUT,
+    ) -> None:
+        checked_timeout(timeout)
+        self._timeout, self._weights = timeout, reward_weights or CorridorWeights()
+        drawn = _default_scenarios() if scenario is None else None
+        fog = CORRIDOR_FOG if scenario is None and fog_distribution is None else fog_distribution
+        self._source = EpisodeSource(scenario, drawn, fog, tuple(overrides), split)
+        self._road = signed_road(self._source.first_scenario())
+        self.possible_agents = [f"sign_{number}" for number in range(len(self._road.starts))]
+        self.agents: list[str] = []
+        self._observation_spaces = {agent: corridor_space() for agent in self.possible_agents}
+        self._action_spaces = {agent: spaces.Discrete(len(SHOWN_SPEEDS)) for agent in self.possible_agents}
+        size = len(self.possible_agents) * int(np.prod(corridor_space().shape))
+        self.state_space = spaces.Box(0.0, 1.0, (size,), np.float32)
+        self._rng = np.random.default_rng()
+        self._simulation: TrafficSimulation | None = None
+        self._observed: dict[str, NDArray[np.float32]] = {}
+
+    def observation_space(self, agent: str) -> spaces.Box:
+        """Space of what an agent observes, always the same object.
+
+        Parameters
+        ----------
+        agent : str
+            One of `possible_agents`.
+        """
+        return self._observation_spaces[agent]
+
+    def action_space(self, agent: str) -> spaces.Discrete:
+        """Space of what an agent may do, always the same object.
+
+        Parameters
+        ----------
+        agent : str
+            One of `possible_agents`.
+        """
+        return self._action_spaces[agent]
+
+    def reset(
+        self, seed: int | None = None, options: Mapping[str, Any] | None = None
+    ) -> tuple[dict[str, NDArray[np.float32]], dict[str, dict[str, Any]]]:
+        """Begin an episode.
+
+        Parameters
+        ----------
+        seed : int or None
+            Seed of this and the following episodes; None goes on with the numbers of before.
+        options : mapping or None
+            What of the episode is not to be drawn. The key ``options`` is passed over: PettingZoo's own checks give it.
+
+        Raises
+        ------
+        InputError
+            If an option is unknown or does not fit, or the scenario has another number of signs.
+        """
+        if seed is not None:
+            self._rng = np.random.default_rng(seed)
+        known = {name: value for name, value in (options or {}).items() if name != "options"}
+        run_seed, drawn = self._source.draw(self._rng, EpisodeChoice.of(known))
+        scenario = drawn.scenario
+        self._road = self._checked_road(scenario)
+        self._simulation, self._step = begin_traffic(self._simulation, scenario, run_seed, self._timeout)
+        self._loops = InductionLoops(
+            loop_places(self._road.starts, self._road.length), self._road.axis, scenario.traffic.along
+        )
+        self._meters = np.random.default_rng((3, run_seed))
+        self._rule = RoadAdvice(scenario)
+        self._frames = build.periods(scenario).decision_frames
+        self._standard, self._duration = build.safety_standard(scenario), scenario.duration_s
+        self._shown = (math.inf,) * len(self.possible_agents)
+        self.agents = list(self.possible_agents)
+        self._move()
+        infos = self._infos({})
+        episode = drawn.episode.as_info()
+        return self._observe(), {agent: {**info, "episode": episode} for agent, info in infos.items()}
+
+    def _checked_road(self, scenario: Scenario) -> SignedRoad:
+        road = signed_road(scenario)
+        if len(road.starts) != len(self.possible_agents):
+            raise InputError(
+                f"reset(): the scenario has {len(road.starts)} signs, and the environment was made with "
+                f"{len(self.possible_agents)}"
+            )
+        return road
+
+    def step(
+        self, actions: Mapping[str, Any]
+    ) -> tuple[
+        dict[str, NDArray[np.float32]],
+        dict[str, float],
+        dict[str, bool],
+        dict[str, bool],
+        dict[str, dict[str, Any]],
+    ]:
+        """Let the signs show something for a decision period.
+
+        Parameters
+        ----------
+        actions : mapping from str to int
+            A level of each agent.
+
+        Raises
+        ------
+        InputError
+            If an agent's action is missing, or no member of its space.
+        gymnasium.error.ResetNeeded
+            If the episode is over or none has begun.
+        """
+        if not self.agents:
+            raise gymnasium.error.ResetNeeded("the episode is over or none has begun: call reset() before step()")
+        if set(actions) != set(self.agents):
+            raise InputError(f"actions: expected one for each of {', '.join(self.agents)}, got {', '.join(actions)}")
+        levels = [int(checked_action(actions[agent], self._action_spaces[agent], agent)) for agent in self.agents]
+        self._shown = tuple(SHOWN_SPEEDS[level] for level in levels)
+        terms = self._move()
+        observed, infos, all_agents = self._observe(), self._infos(terms), self.agents
+        ending = self._step.ending
+        truncated = ending is Ending.TIME
+        if ending is not None:
+            self.agents = []
+        return (
+            observed,
+            dict.fromkeys(all_agents, float(sum(terms.values()))),
+            dict.fromkeys(all_agents, ending is not None and not truncated),
+            dict.fromkeys(all_agents, truncated),
+            infos,
+        )
+
+    def _move(self) -> dict[str, float]:
+        """Move by a decision period with what is shown; the terms of its reward."""
+        if self._simulation is None:
+            raise gymnasium.error.ResetNeeded("call reset() before step()")
+        sections = tuple(section.stretch for section in self._step.truth.sections)
+        command = Command(stretches=stretch_advices(sections, self._shown, Display.MESSAGE_SIGN))
+        reward = CorridorReward(self._weights, self._standard)
+        for _ in range(self._frames):
+            before = self._step.time
+            self._step, _ = self._simulation.advance(command)
+            elapsed = self._step.time - before
+            self._loops.count(self._step.traffic, elapsed)
+            reward.add(self._step, elapsed)
+            if self._step.ending is not None:
+                break
+        return reward.terms()
+
+    def _observe(self) -> dict[str, NDArray[np.float32]]:
+        sections = self._step.truth.sections
+        known = RoadKnowledge(
+            self._loops.read(),
+            measured_visibilities(sections, self._meters),
+            self._shown,
+            self._road.lanes,
+            max(1.0 - self._step.time / self._duration, 0.0),
+        )
+        self._observed = {
+            agent: sign_observation(number, known, sections[number], self._road.length)
+            for number, agent in enumerate(self.possible_agents)
+        }
+        return {agent: observed.copy() for agent, observed in self._observed.items()}
+
+    def state(self) -> NDArray[np.float32]:
+        """What all signs observe, one after another: for critics who know everything that is known.
+
+        Raises
+        ------
+        gymnasium.error.ResetNeeded
+            If no episode has begun.
+        """
+        if not self._observed:
+            raise gymnasium.error.ResetNeeded("call reset() first")
+        return np.concatenate([self._observed[agent] for agent in self.possible_agents])
+
+    def _infos(self, terms: dict[str, float]) -> dict[str, dict[str, Any]]:
+        """What is told beside the observations; agents must not use ``truth``."""
+        step = self._step
+        advised = _by_start(self._rule, step)
+        common = {
+            "reward_terms": terms,
+            "time_s": step.time,
+            "vehicles": len(step.traffic.ids),
+            "waiting": step.waiting,
+            "ending": None if step.ending is None else step.ending.value,
+        }
+        return {
+            agent: {
+                **common,
+                "built_in_advice_mps": advised.get(section.stretch.start, math.inf),
+                "truth": {"extinction_per_m": section.extinction},
+            }
+            for agent, section in zip(self.possible_agents, step.truth.sections, strict=True)
+        }
+
+    def close(self) -> None:
+        """End the simulation; closing twice is allowed."""
+        if self._simulation is not None:
+            self._simulation.close()
+        self._simulation, self.agents = None, []
+
+
+def parallel_env(**kwargs: Any) -> FogCorridorEnv:
+    """Make the environment; see `FogCorridorEnv` for arguments.
+
+    Parameters
+    ----------
+    **kwargs
+        Arguments of `FogCorridorEnv`.
+    """
+    return FogCorridorEnv(**kwargs)
+
+
+def _by_start(rule: RoadAdvice, step: TrafficStep) -> dict[float, float]:
+    """What the scenario's adviser would show, by the place of the sign [m/s]."""
+    told = rule.advise_traffic(step)
+    return {one.stretch.start: one.speed for one in told}
+
+
+@functools.cache
+def _default_scenarios() -> tuple[Scenario, ...]:
+    base = load_scenario(MOTORWAY)
+    return tuple(override(base, [f"demand.same_way_vph={demand!r}"]) for demand in DEMANDS)

@@ -38,7 +38,7 @@ def serve(connection: "Connection[Any, Any]") -> None:
                     if verb == "open":
                         if loop is not None:
                             loop.close()
-                        loop, answer = _simulation(argument), None
+                        loop, answer = simulation_of(argument), None
                     elif loop is None:
                         answer = SimulationError("the host was asked for a run before it got a scenario")
                     else:
@@ -53,7 +53,14 @@ def serve(connection: "Connection[Any, Any]") -> None:
             loop.close()
 
 
-def _simulation(scenario: Scenario) -> ClosedLoop | TrafficRun:
+def simulation_of(scenario: Scenario) -> ClosedLoop | TrafficRun:
+    """The simulation that a scenario asks for: about its ego, or of traffic alone.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
     return ClosedLoop(scenario) if scenario.traffic.has_ego else TrafficRun(scenario)
 
 

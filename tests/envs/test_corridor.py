@@ -105,6 +105,8 @@ def test_actions_that_are_none_are_refused(signs: FogCorridorEnv, actions: dict[
 def test_what_does_not_fit_is_refused(signs: FogCorridorEnv) -> None:
     with pytest.raises(InputError, match="visibilty"):
         signs.reset(options={"visibilty": 60.0})
+    with pytest.raises(InputError, match="driver"):
+        signs.reset(options={"driver": "unaffected"})
     with pytest.raises(InputError, match="has 1 signs"):
         signs.reset(options={"overrides": ["drivers.signs.at_m=[300]"]})
     with pytest.raises(InputError, match=r"drivers\.advised: signs"):

@@ -86,7 +86,7 @@ def test_a_child_that_works_gives_signs_of_life(monkeypatch: pytest.MonkeyPatch)
             pipe.said.append(("closed", None))
 
     monkeypatch.setattr(host, "HEARTBEAT_PERIOD", 0.01)
-    monkeypatch.setattr(host, "ClosedLoop", Busy)
+    monkeypatch.setattr(host, "simulation_of", Busy)
     host.serve(pipe)  # type: ignore[arg-type]  # of a connection, only these two methods are used
     assert pipe.said[:3] == [("working", None)] * 3
     assert pipe.said[-2:] == [("done", None), ("closed", None)]

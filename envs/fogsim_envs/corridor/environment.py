@@ -164,6 +164,8 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
         if seed is not None:
             self._rng = np.random.default_rng(seed)
         known = {name: value for name, value in (options or {}).items() if name != "options"}
+        if "driver" in known:
+            raise InputError("options['driver']: is the ego's, and the road has none; it is drivers.speed_choice here")
         run_seed, drawn = self._source.draw(self._rng, EpisodeChoice.of(known))
         scenario = drawn.scenario
         self._road = self._checked_road(scenario)

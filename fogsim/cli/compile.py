@@ -8,15 +8,14 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from itertools import islice
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
 from fogsim.cli.printing import stderr, stdout
-from fogsim.units import extinction_from_visibility
-from fogsim.values import Camera, Frame, LeadMeasurement, Observation
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from fogsim.estimators import Estimator
+    from fogsim.values import Camera
 
 _SIZES = ((160, 120), (640, 480))
 """Pictures that are estimated: methods choose what they do by size [px]."""
@@ -103,6 +102,7 @@ def _estimate_visibility() -> None:
     """Let every daytime method, also as published, read pictures of a foggy road with a vehicle ahead that leaves."""
     from fogsim.estimators import ESTIMATORS
     from fogsim.parameters import accepted_parameters
+    from fogsim.values import Camera
 
     for width, height in _SIZES:
         camera = Camera(width, height, 0.9 * width, (width / 2, height / 2), 1.4, pitch=0.03)
@@ -112,8 +112,12 @@ def _estimate_visibility() -> None:
                 _read(factory(camera=camera, **parameters), camera)
 
 
-def _read(estimator: "Estimator", camera: Camera) -> None:
+def _read(estimator: "Estimator", camera: "Camera") -> None:
     """Let a method read pictures in colour and, in the end, in grey."""
+    import numpy as np
+
+    from fogsim.values import Frame, LeadMeasurement, Observation
+
     for index in range(4):
         distance = 25.0 + 5.0 * index
         image = _foggy_road(camera, distance)
@@ -121,8 +125,12 @@ def _read(estimator: "Estimator", camera: Camera) -> None:
         estimator.update(Observation(frame, 20.0, LeadMeasurement(distance, 5.0), ()))
 
 
-def _foggy_road(camera: Camera, lead: float, visibility: float = 120.0) -> NDArray[np.uint8]:
+def _foggy_road(camera: "Camera", lead: float, visibility: float = 120.0) -> "NDArray[np.uint8]":
     """Picture of a straight road in fog with lane marks and a dark vehicle ahead: (rows, cols, 3) uint8."""
+    import numpy as np
+
+    from fogsim.units import extinction_from_visibility
+
     rows, cols = np.mgrid[: camera.height, : camera.width].astype(np.float64)
     below = rows - camera.horizon_row
     ahead = np.where(below > 0.5, camera.row_distance / np.maximum(below, 0.5), _SKY)

@@ -2,12 +2,13 @@
 
 import sys
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from fogsim.values import Step, TrafficStep
+if TYPE_CHECKING:
+    from fogsim.values import TrafficStep
 
 STARTING = "starting; a first run compiles for some seconds"
 """Description of a bar before the first step."""
@@ -53,7 +54,7 @@ class SimulationProgress:
         self._progress = progress_bar(console, stays=True)
         self._task = self._progress.add_task(STARTING, total=duration)
 
-    def show(self, step: TrafficStep) -> None:
+    def show(self, step: "TrafficStep") -> None:
         """Move the bar.
 
         Parameters
@@ -61,6 +62,8 @@ class SimulationProgress:
         step : TrafficStep
             The step that is finished.
         """
+        from fogsim.values import Step
+
         task = self._progress.tasks[self._task]
         rate = step.time / task.elapsed if task.elapsed else 0.0
         found = f"V ≈ {step.belief.visibility:.0f} m" if isinstance(step, Step) else f"{len(step.traffic.ids)} vehicles"

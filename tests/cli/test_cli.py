@@ -219,3 +219,9 @@ def test_doctor_finds_everything_here(command: Command) -> None:
 def test_version_and_help(command: Command) -> None:
     assert command("--version").stdout.startswith("fogsim ")
     assert "KEY.PATH=VALUE" in command("run", "--help").stdout
+
+
+def test_the_command_line_starts_without_what_only_its_commands_need() -> None:
+    code = "import sys, fogsim.cli.app\nprint({'numpy', 'numba', 'cv2', 'pyarrow', 'matplotlib'} & {*sys.modules})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "set()"

@@ -139,7 +139,8 @@ def test_options_exist(page: str) -> None:
         if program == "fogsim":
             assert options <= {name for one in KNOWN[name].params for name in (*one.opts, *one.secondary_opts)}, line
         else:
-            assert options <= set(re.findall(r'"(--[\w-]+)"', (CHECKOUT / name).read_text(encoding="utf-8"))), line
+            file = f"envs/{rest[0].replace('.', '/')}.py" if name == "-m" else name
+            assert options <= set(re.findall(r'"(--[\w-]+)"', (CHECKOUT / file).read_text(encoding="utf-8"))), line
 
 
 SETTINGS = {

@@ -34,7 +34,7 @@ class CorridorWeights:
     """
 
     delay: float = 0.1
-    overdriving: float = 0.5
+    overdriving: float = 0.3
     conflict: float = 0.1
     collision: float = 20.0
 

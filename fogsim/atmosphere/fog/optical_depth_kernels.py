@@ -24,6 +24,9 @@ FADED = 20.0
 _BESIDE_EDGE = 1e-3
 """So far from an edge of a bank all or nothing of it is there, however numbers are rounded [m]."""
 
+_LEAST_RATE = 1e-12
+"""A line that comes nearer to an edge more slowly than this goes along it [-]."""
+
 _CELLS_IN_PIECE = 2.0
 _NODES = np.array((0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970263))
 _WEIGHTS = np.array((0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692))
@@ -132,7 +135,7 @@ def extinctions_on_ray(
 @kernel
 def _mark(cuts: NDArray[np.float64], count: int, here: float, rate: float, value: float, length: float) -> int:
     """Insert the distance at which a coordinate takes a value, in order; returns the new count."""
-    if abs(rate) < 1e-12 or math.isinf(value):
+    if abs(rate) < _LEAST_RATE or math.isinf(value):
         return count
     at = (value - here) / rate
     if not 0.0 < at < length:
@@ -208,20 +211,15 @@ def _is_banks_alone(medium: Medium) -> bool:
 
 @kernel
 def _banks_depth(
-    start: NDArray[np.float64],
-    towards: NDArray[np.float64],
-    near: float,
-    far: float,
-    outside: float,
-    banks: NDArray[np.float64],
+    x: float, y: float, dx: float, dy: float, near: float, far: float, outside: float, banks: NDArray[np.float64]
 ) -> float:
-    """`_piece_depth` where there are banks alone, digit for digit: four numbers are handled faster than an array."""
+    """`_piece_depth` where there are banks alone, digit for digit: numbers are handled faster than arrays."""
     step = far - near
     at = (near + _NODES[0] * step, near + _NODES[1] * step, near + _NODES[2] * step, near + _NODES[3] * step)
     first_k = second_k = third_k = fourth_k = outside
     for b in range(banks.shape[0]):
-        here = (start[0] - banks[b, 0]) * banks[b, 2] + (start[1] - banks[b, 1]) * banks[b, 3]
-        rate = towards[0] * banks[b, 2] + towards[1] * banks[b, 3]
+        here = (x - banks[b, 0]) * banks[b, 2] + (y - banks[b, 1]) * banks[b, 3]
+        rate = dx * banks[b, 2] + dy * banks[b, 3]
         first, last, edge, extra = banks[b, 4], banks[b, 5], banks[b, 6], banks[b, 7]
         first_k += extra * _within(here + rate * at[0], first, last, edge)
         second_k += extra * _within(here + rate * at[1], first, last, edge)
@@ -233,6 +231,31 @@ def _banks_depth(
     depth += _WEIGHTS[3] * fourth_k
     depth *= step
     return depth
+
+
+@kernel
+def _depth_through_banks(
+    x: float, y: float, dx: float, dy: float, length: float, outside: float, banks: NDArray[np.float64]
+) -> float:
+    """Optical depth of a line that begins at (x, y) [m] and goes (dx, dy) a metre, where there are banks alone [-]."""
+    total, here = 0.0, 0.0
+    # Seldom does a line cross an edge; where it does, the next one is looked for, so that none need be kept.
+    while True:
+        there = length
+        for b in range(banks.shape[0]):
+            station = (x - banks[b, 0]) * banks[b, 2] + (y - banks[b, 1]) * banks[b, 3]
+            rate = dx * banks[b, 2] + dy * banks[b, 3]
+            if abs(rate) < _LEAST_RATE:
+                continue
+            for end in (banks[b, 4], banks[b, 5]):
+                for side in (-0.5, 0.5):
+                    at = (end + side * banks[b, 6] - station) / rate
+                    if here < at < there:
+                        there = at
+        total += _banks_depth(x, y, dx, dy, here, there, outside, banks)
+        if there == length:
+            return total
+        here = there
 
 
 @kernel
@@ -315,7 +338,7 @@ def depths_along(
         is_cut = next_cut < count and cuts[next_cut] < distances[i]
         there = cuts[next_cut] if is_cut else distances[i]
         if is_banks_alone:
-            total += _banks_depth(start, towards, here, there, outside, banks)
+            total += _banks_depth(start[0], start[1], towards[0], towards[1], here, there, outside, banks)
         else:
             total += _piece_depth(start, towards, here, there, pieces, medium, scratch)
         here = there
@@ -346,13 +369,17 @@ def depths_between(
     medium, depths, scratch
         As for `depths_along`.
     """
-    distance, towards = np.empty(1), np.empty(3)
+    distance, towards, is_banks_alone = np.empty(1), np.empty(3), _is_banks_alone(medium)
     for i in range(starts.shape[0]):
         towards[:] = ends[i] - starts[i]
-        distance[0] = math.sqrt(towards[0] ** 2 + towards[1] ** 2 + towards[2] ** 2)
+        length = math.sqrt(towards[0] ** 2 + towards[1] ** 2 + towards[2] ** 2)
         depths[i] = 0.0
-        if distance[0] > 0.0:
-            towards /= distance[0]
+        if length > 0.0 and is_banks_alone:
+            x, y, dx, dy = starts[i, 0], starts[i, 1], towards[0] / length, towards[1] / length
+            depths[i] = _depth_through_banks(x, y, dx, dy, length, medium.layer[EXTINCTION], medium.banks)
+        elif length > 0.0:
+            distance[0] = length
+            towards /= length
             depths_along(starts[i], towards, distance, medium, depths[i : i + 1], scratch, math.inf)
 
 

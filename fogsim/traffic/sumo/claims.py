@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from fogsim.traffic.sumo.link import Api
+from fogsim.traffic.sumo.link import Api, vehicle_getter
 
 SOLE_SESSION = "1"
 """Name of a session that has its simulation for itself."""
@@ -157,7 +157,10 @@ class SessionValues(Generic[_Value]):
 
     def __init__(self, api: Api, name: str) -> None:
         self._vehicles = api.vehicle
+        self._read = vehicle_getter(api, "getParameter")
         self._key = f"fogsim.{name}"
+        # What was written last, so that it need not be taken apart again unless somebody else has written since.
+        self._written: dict[str, tuple[str, dict[str, _Value]]] = {}
 
     def read(self, vehicle: str) -> dict[str, _Value]:
         """Values of a vehicle, by session.
@@ -167,9 +170,12 @@ class SessionValues(Generic[_Value]):
         vehicle : str
             Its id.
         """
-        text = self._vehicles.getParameter(vehicle, self._key)
-        values: dict[str, _Value] = json.loads(text) if text else {}
-        return values
+        text = self._read(vehicle, self._key)
+        if not text:
+            self._written.pop(vehicle, None)
+            return {}
+        known, values = self._written.get(vehicle, ("", {}))
+        return dict(values) if text == known else dict(json.loads(text))
 
     def write(self, vehicle: str, values: dict[str, _Value]) -> None:
         """Replace the values of a vehicle.
@@ -181,7 +187,9 @@ class SessionValues(Generic[_Value]):
         values : dict
             Value by session; an empty one removes the key.
         """
-        self._vehicles.setParameter(vehicle, self._key, json.dumps(values) if values else "")
+        text = json.dumps(values) if values else ""
+        self._written[vehicle] = text, dict(values)
+        self._vehicles.setParameter(vehicle, self._key, text)
 
 
 class Claims:

@@ -55,6 +55,11 @@ class UpdateSchedule:
     def _number(self, time: float) -> int:
         return math.floor(time / self._step + _ROUNDING)
 
+    def _step_at(self, time: float) -> int:
+        """Number of the step in which who is due at a time is looked at."""
+        number = max(math.floor(time / self._step + _ROUNDING), self._current + 1)
+        return number - number % self._batch if number - self._current >= self._batch else number
+
     def unscheduled(self, vehicles: Sequence[str]) -> list[str]:
         """Those of some vehicles that wait for no step, each once.
 
@@ -80,10 +85,21 @@ class UpdateSchedule:
             When they are due at the latest [s].
         """
         if vehicles:
-            number = max(self._number(time), self._current + 1)
-            if number - self._current >= self._batch:
-                number -= number % self._batch
-            self._due.setdefault(number, []).extend(vehicles)
+            self._due.setdefault(self._step_at(time), []).extend(vehicles)
+
+    def add_each(self, vehicles: Sequence[str], times: Sequence[float]) -> None:
+        """Schedule vehicles as `add` does, each for a time of its own.
+
+        Parameters
+        ----------
+        vehicles : sequence of str
+            Their ids.
+        times : sequence of float
+            When they are due at the latest [s].
+        """
+        due = self._due
+        for vehicle, time in zip(vehicles, times, strict=True):
+            due.setdefault(self._step_at(time), []).append(vehicle)
 
     def bring_forward(self, vehicle: str) -> None:
         """Make a vehicle that waits due in the next step; one that waits for nothing stays so.

@@ -45,8 +45,10 @@ class FogChoices:
         if not len(changed):
             return
         of, here = rows[changed], extinction[changed]
-        values, which = np.unique(here, return_inverse=True)
-        visibilities = [visibility_from_extinction(k) for k in values.tolist()]
+        # Mostly there are some twenty, which np.unique would take longer to sort.
+        place: dict[float, int] = {}
+        which = [place.setdefault(k, len(place)) for k in here.tolist()]
+        visibilities = [visibility_from_extinction(k) for k in place]
         seen = [drivers_visibility(self._sight, visibility) for visibility in visibilities]
         reaches = [leader_reach(self._sight, visibility) for visibility in visibilities]
         limits = np.array([[kind.top_speed(reach) for reach in reaches] for kind in table.kinds])

@@ -259,12 +259,16 @@ class Perception:
 
     def _decide_by_sight(self, pairs: Sequence[Pair], own_lamps: OwnLamps) -> None:
         assessed = self._leader_sight.assess(pairs, own_lamps, MAX_PAUSE)
+        now, ignored, emerging = self._roster.time, self._ignored, self._emerging
+        due: list[float] = []
         for (follower, leader, _), (is_seen, pause) in zip(pairs, assessed, strict=True):
             if not is_seen:
-                self._hide(follower, leader)
-            elif follower in self._ignored and self._reacts(follower, leader):
+                if follower in emerging or ignored.get(follower) != leader:
+                    self._hide(follower, leader)
+            elif follower in ignored and self._reacts(follower, leader):
                 self._reveal(follower)
-            self._pause((follower,), 0.0 if follower in self._emerging else pause)
+            due.append(now if follower in emerging else now + pause)
+        self._schedule.add_each([follower for follower, _, _ in pairs], due)
 
     def _pause(self, followers: Sequence[str], pause: float) -> None:
         self._schedule.add(followers, self._roster.time + pause)

@@ -37,34 +37,52 @@ _GAIN = 0.05
 _PATIENCE = 0.5
 """Time that a process compiles before it says so [s]: one kernel more is no news, a first run is."""
 
+_NEWS_PERIOD = 10.0
+"""Time between two lines on what has been compiled [s]."""
 
-class _Announcement(event.Listener):  # type: ignore[misc] # numba is untyped
-    """Tells the user once in a process that the time goes into compiling, and that it will not the next time."""
 
-    def __init__(self) -> None:
-        self._depth = 0
+class Announcement(event.Listener):  # type: ignore[misc] # numba is untyped
+    """Tells the user that the time goes into compiling, and that it will not the next time; then how far it has come.
+
+    Parameters
+    ----------
+    tell : callable
+        Gets what is told.
+    clock : callable
+        Gives the time [s].
+    """
+
+    def __init__(self, tell: Callable[[str], object], clock: Callable[[], float] = time.monotonic) -> None:
+        self._tell, self._clock = tell, clock
+        self._depth = self._compiled = 0
         self._spent = self._started = 0.0
+        self._told: float | None = None
 
     def on_start(self, _: Any) -> None:
         """Begin to count at the outermost kernel; those that it calls are compiled within it."""
         if self._depth == 0:
-            if self._spent > _PATIENCE:
-                event.unregister("numba:compile", self)
-                logging.getLogger(__package__).warning(
-                    "fogsim: compiling for this processor, about a minute, the first time only "
+            self._started = self._clock()
+            if self._told is None and self._spent > _PATIENCE:
+                self._told = self._started
+                self._tell(
+                    "fogsim: compiling for this processor, one to three minutes, the first time only "
                     "(ahead of time and on all cores: fogsim compile)"
                 )
-            self._started = time.monotonic()
         self._depth += 1
 
     def on_end(self, compiling: Any) -> None:
-        """Count what was compiled."""
+        """Count what was compiled, and tell now and then."""
         self._depth -= 1
         if self._depth == 0 and compiling.data["dispatcher"].py_func.__module__.startswith(f"{__package__}."):
-            self._spent += time.monotonic() - self._started
+            now = self._clock()
+            self._compiled += 1
+            self._spent += now - self._started
+            if self._told is not None and now - self._told > _NEWS_PERIOD:
+                self._told = now
+                self._tell(f"fogsim: compiled {self._compiled} functions in {self._spent:.0f} s")
 
 
-event.register("numba:compile", _Announcement())
+event.register("numba:compile", Announcement(logging.getLogger(__package__).warning))
 
 
 def kernel(function: F) -> F:

@@ -4,10 +4,12 @@ import platform
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
+from typing import Annotated
 
 import typer
 from rich.table import Table
 
+from fogsim.cli.compile import compile_command
 from fogsim.cli.printing import escape, stdout
 from fogsim.errors import FogSimError
 
@@ -45,7 +47,11 @@ class Finding:
     detail: str
 
 
-def doctor_command() -> None:
+def doctor_command(
+    ahead: Annotated[
+        bool, typer.Option("--compile", help="Also compile ahead what a first run would, as `fogsim compile` does.")
+    ] = False,
+) -> None:
     """Say what works on this machine, what is missing, and how to get it."""
     findings = examine()
     table = Table(box=None, show_header=False, pad_edge=False)
@@ -54,6 +60,8 @@ def doctor_command() -> None:
     stdout.print(table)
     if not all(finding.works for finding in findings):
         raise typer.Exit(1)
+    if ahead:
+        compile_command()
 
 
 def examine() -> list[Finding]:

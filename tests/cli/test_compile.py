@@ -4,10 +4,11 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from fogsim import Camera, Frame, Observation
+from fogsim import Camera, Frame, Observation, jit
 from fogsim.cli.compile import _foggy_road
 from fogsim.estimators import ESTIMATORS
 
@@ -48,3 +49,19 @@ def test_methods_can_read_the_picture_that_they_are_compiled_with(method: str, s
     estimate = ESTIMATORS[method](camera=camera).update(Observation(Frame(0.0, _foggy_road(camera, 40.0), camera)))
     assert estimate.valid
     assert estimate.visibility == pytest.approx(120.0, rel=0.15)
+
+
+def test_it_says_how_far_compiling_has_come() -> None:
+    told: list[str] = []
+    times = iter([0.0, 1.0, 1.0, 6.0, 6.0, 13.0, 13.0, 14.0])
+    announcement = jit.Announcement(told.append, lambda: next(times))
+    compiled = SimpleNamespace(data={"dispatcher": SimpleNamespace(py_func=jit.kernel)})
+    announcement.on_start(None)
+    announcement.on_end(compiled)
+    assert not told
+    for _ in range(3):
+        announcement.on_start(None)
+        announcement.on_end(compiled)
+    assert len(told) == 2
+    assert "compiling for this processor" in told[0]
+    assert told[1] == "fogsim: compiled 3 functions in 13 s"

@@ -27,7 +27,7 @@ runpy.run_module("fogsim", run_name="__main__")
     ("module", "number", "command"),
     [
         ("rich.console", signal.SIGINT, ["--version"]),
-        ("numpy", signal.SIGHUP, ["--version"]),
+        ("numpy", signal.SIGHUP, ["validate", "motorway_fog_bank"]),
         ("numba", signal.SIGTERM, ["run", "motorway_fog_bank"]),
         ("pyarrow", signal.SIGINT, ["run", "motorway_fog_bank"]),
     ],

@@ -11,6 +11,13 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 OWN = {"fogsim", "fogsim_envs"}
 BROUGHT_ALONG = {"OpenGL": "pyrender", "pydantic_core": "pydantic"}
 """Imports that a dependency pins to what it works with, and that one."""
+OPTIONAL = {
+    "minari": ("rl", "minari"),
+    "osi3": ("osi", "osi-python"),
+    "pettingzoo": ("rl", "pettingzoo"),
+    "ray": ("ray", "ray"),
+}
+"""Imports that only some of the work needs: the extra that brings each along, and the distribution."""
 
 
 def imported(path: Path) -> set[str]:
@@ -27,12 +34,13 @@ def names_of(requirements: list[str]) -> set[str]:
 def test_every_import_is_a_declared_dependency_and_every_dependency_is_imported() -> None:
     project = tomllib.loads((CHECKOUT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     declared = names_of(project["dependencies"])
-    extras = names_of(project["optional-dependencies"]["ray"])
     sources = [*(CHECKOUT / "fogsim").rglob("*.py"), *(CHECKOUT / "envs").rglob("*.py")]
     names = set().union(*map(imported, sources)) - OWN - set(sys.stdlib_module_names)
-    assert extras <= names
+    assert set(OPTIONAL) <= names
+    for extra, distribution in OPTIONAL.values():
+        assert distribution in names_of(project["optional-dependencies"][extra])
     # pytest itself imports its plug-in, so that it is there whenever that is.
-    names -= {*extras, "pytest"}
+    names -= {*OPTIONAL, "pytest"}
     distributions = packages_distributions()
     needed = {BROUGHT_ALONG.get(name, distributions[name][0].lower().replace("_", "-")) for name in names}
     assert needed == declared

@@ -1,0 +1,1 @@
+"""Parts of the loop from a scenario: clocks, traffic, fog, sensors, methods; all of them in `fogsim.scenario.build`."""

@@ -1,0 +1,157 @@
+"""From a scenario to its methods: estimators, fusion, advisers, lighting, and what measures them."""
+
+import dataclasses
+
+from fogsim.advice import ADVISERS, Adviser, VehicleAdviser
+from fogsim.errors import InputError
+from fogsim.estimators import ESTIMATORS, Estimator
+from fogsim.fusion import FUSIONS, Fusion
+from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy
+from fogsim.metrics import SafetyStandard
+from fogsim.scenario.schema import NO_RENDERER, Scenario
+from fogsim.values import Camera
+
+
+def check_ego(scenario: Scenario, who: str) -> None:
+    """Refuse a scenario without an ego.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    who : str
+        Who needs it, for the message.
+
+    Raises
+    ------
+    InputError
+        If its ego is none.
+    """
+    if not scenario.traffic.has_ego:
+        raise InputError(
+            f"{who} needs an ego vehicle, and traffic.ego is none; name one, or run traffic alone with fogsim "
+            "run, fogsim study or fogsim.run_traffic"
+        )
+
+
+def check_frames(scenario: Scenario, who: str) -> None:
+    """Refuse a scenario that draws no frames.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    who : str
+        Who needs them, for the message.
+
+    Raises
+    ------
+    InputError
+        If its renderer is "none", or its ego is.
+    """
+    check_ego(scenario, who)
+    if scenario.renderer == NO_RENDERER:
+        raise InputError(f"{who} needs frames, and renderer: none draws none; choose auto, opengl, cpu or reference")
+
+
+def estimators(scenario: Scenario, assumed: Camera) -> tuple[Estimator, ...]:
+    """Estimators of a scenario, with the calibration that the vehicle assumes.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    assumed : Camera
+        The assumed calibration.
+    """
+    return tuple(ESTIMATORS.find(e.method, scenario.directory)(assumed, **e.parameters) for e in scenario.estimators)
+
+
+def fusion(scenario: Scenario) -> Fusion:
+    """Fusion of a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+    return FUSIONS.find(scenario.fusion.method, scenario.directory)(**scenario.fusion.parameters)
+
+
+def adviser(scenario: Scenario) -> Adviser | VehicleAdviser:
+    """Speed adviser of a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+    return ADVISERS.find(scenario.advice.method, scenario.directory)(**scenario.advice.parameters)
+
+
+def road_adviser(scenario: Scenario) -> Adviser:
+    """Speed adviser of a scenario, who advises roads.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+
+    Raises
+    ------
+    InputError
+        If it needs the sensors of a vehicle.
+    """
+    advising = adviser(scenario)
+    if isinstance(advising, VehicleAdviser):
+        raise InputError(
+            f"advice: {scenario.advice.method!r} goes by a vehicle's own sensors (advise_vehicle), which roads do not "
+            f"have; with drivers.advised: {scenario.drivers.advised} take an adviser with advise()"
+        )
+    return advising
+
+
+def own_methods(scenario: Scenario) -> dict[str, str]:
+    """Versions of the methods of a scenario that are not FogSim's, by their names.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+    folder = scenario.directory
+    found = {
+        **{one.method: ESTIMATORS.version(one.method, folder) for one in scenario.estimators},
+        scenario.fusion.method: FUSIONS.version(scenario.fusion.method, folder),
+        scenario.advice.method: ADVISERS.version(scenario.advice.method, folder),
+        scenario.lighting.method: LIGHTING_POLICIES.version(scenario.lighting.method, folder),
+    }
+    return {name: version for name, version in found.items() if version is not None}
+
+
+def safety_standard(scenario: Scenario) -> SafetyStandard:
+    """What a run is judged by: the reaction time and deceleration that its advice counts with, where it has them.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+    advising, usual = adviser(scenario), SafetyStandard()
+    return dataclasses.replace(
+        usual,
+        reaction_time=getattr(advising, "reaction_time", usual.reaction_time),
+        deceleration=getattr(advising, "deceleration", usual.deceleration),
+    )
+
+
+def lighting_policy(scenario: Scenario) -> LightingPolicy:
+    """Lighting policy of a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+    policy = LIGHTING_POLICIES.find(scenario.lighting.method, scenario.directory)
+    return policy(**scenario.lighting.parameters)

@@ -1,0 +1,171 @@
+"""From a scenario to the ego's sensors, and what they are told of themselves."""
+
+import dataclasses
+import math
+
+from fogsim.atmosphere import airlight_from_illuminance
+from fogsim.camera import USUAL_MOUNTS, AutoExposure, BodyPitch, CameraMount, CameraSensor, Metering, Sensor, Suspension
+from fogsim.scenario.schema import Scenario
+from fogsim.sensors import Gps, LeadSensor
+from fogsim.values import Camera
+
+AIRLIGHT_EXPOSURE = 0.6
+"""Share of saturation at which the fixed exposure puts the airlight: bright fog, yet room for lamps above it."""
+
+CAR = "car"
+"""Body kind of an ego of which no more is known."""
+
+METERED_PERCENT = {Metering.HIGHLIGHTS: 65.0, Metering.LOG_AVERAGE: 18.0}
+"""Share of saturation at which automatic exposure holds what it meters, where a scenario does not say [%]."""
+
+
+def camera_mount(scenario: Scenario, body: str = CAR) -> CameraMount:
+    """Where on the ego its camera is.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    body : str
+        Body kind of the ego, which settles what the scenario leaves open; see `TrafficState.types`.
+    """
+    section, usual = scenario.camera, USUAL_MOUNTS[body]
+    return CameraMount(
+        height=usual.height if section.mount_height_m is None else section.mount_height_m,
+        setback=usual.setback if section.setback_m is None else section.setback_m,
+    )
+
+
+def camera(scenario: Scenario, body: str = CAR) -> Camera:
+    """Calibration of the ego's camera.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    body : str
+        Body kind of the ego; see `camera_mount`.
+    """
+    section = scenario.camera
+    by_view = 0.5 * section.width / math.tan(0.5 * math.radians(section.field_of_view_deg))
+    return Camera(
+        width=section.width,
+        height=section.height,
+        focal_length=section.focal_length_px or by_view,
+        principal_point=section.principal_point_px or (section.width / 2, section.height / 2),
+        mount_height=camera_mount(scenario, body).height,
+        pitch=math.radians(section.pitch_deg),
+        roll=math.radians(section.roll_deg),
+        response=section.response,
+        bits=section.bits,
+    )
+
+
+def assumed_camera(scenario: Scenario, body: str = CAR) -> Camera:
+    """Calibration that the ego's estimators assume, with the scenario's errors in it.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    body : str
+        Body kind of the ego; see `camera_mount`.
+    """
+    true, told = camera(scenario, body), scenario.camera.told
+    return dataclasses.replace(
+        true,
+        mount_height=true.mount_height * (1.0 + told.mount_height_error_percent / 100.0),
+        pitch=true.pitch + math.radians(told.pitch_error_deg),
+        roll=true.roll + math.radians(told.roll_error_deg),
+        focal_length=true.focal_length * (1.0 + told.focal_length_error_percent / 100.0),
+    )
+
+
+def camera_sensor(scenario: Scenario) -> CameraSensor:
+    """What takes the pictures of the ego's camera.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+    section = scenario.camera
+    auto = auto_exposure(scenario) if section.automatic else None
+    period = scenario.clocks.camera_period_s
+    return CameraSensor(camera(scenario), sensor(scenario), auto, section.lens_shading, period, section.lens_glare)
+
+
+def sensor(scenario: Scenario) -> Sensor:
+    """Image sensor of the ego's camera, at the exposure that it has if it is fixed.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+    section = scenario.camera
+    airlight = max(airlight_from_illuminance(scenario.light.illuminance_lx))
+    return Sensor(
+        saturation_luminance=section.saturation_luminance_cdpm2 or airlight / AIRLIGHT_EXPOSURE,
+        full_well=section.full_well_e,
+        read_noise=section.read_noise_e,
+        bits=section.bits,
+    )
+
+
+def auto_exposure(scenario: Scenario) -> AutoExposure:
+    """How the ego's camera sets its own exposure.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+    section = scenario.camera.exposure
+    percent = METERED_PERCENT[section.metering] if section.target_percent is None else section.target_percent
+    return AutoExposure(
+        metering=section.metering,
+        target=percent / 100.0,
+        time_constant=section.time_constant_s,
+        brightest=section.brightest_cdpm2,
+        ungained=section.ungained_cdpm2,
+        darkest=section.darkest_cdpm2,
+    )
+
+
+def body_pitch(scenario: Scenario) -> BodyPitch:
+    """How the ego's body pitches when it brakes.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+    body = scenario.camera.body
+    suspension = Suspension(math.radians(body.pitch_deg_per_mps2), body.time_constant_s)
+    return BodyPitch(suspension, scenario.clocks.camera_period_s)
+
+
+def lead_sensor(scenario: Scenario) -> LeadSensor:
+    """Radar of the ego.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+    lead = scenario.sensors.lead
+    view = math.radians(lead.field_of_view_deg)
+    return LeadSensor(lead.reach_m, lead.distance_deviation_m, lead.speed_deviation_mps, view)
+
+
+def gps(scenario: Scenario) -> Gps:
+    """Satellite positioning of the ego.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+    section = scenario.sensors.gps
+    return Gps(section.position_deviation_m, math.radians(section.heading_deviation_deg))

@@ -96,7 +96,8 @@ class EgoSensors:
         if measured is None:
             return ()
         known = faulty_signs(known, (fault.kind for fault in faults), Where.MAP)
-        return signs_ahead(known, measured.position, measured.heading, self._sign_reach)
+        grade = float(state.grade[ego])
+        return signs_ahead(known, measured.position, measured.heading, self._sign_reach, grade=grade)
 
 
 def _rear(snapshot: TrafficSnapshot) -> NDArray[np.float64] | None:

@@ -12,7 +12,12 @@ FACING = math.cos(math.radians(60.0))
 
 
 def signs_ahead(
-    signs: SignMap, position: NDArray[np.float64], heading: float, reach: float, corridor: float = 25.0
+    signs: SignMap,
+    position: NDArray[np.float64],
+    heading: float,
+    reach: float,
+    corridor: float = 25.0,
+    grade: float = 0.0,
 ) -> tuple[SignSighting, ...]:
     """Signs ahead of a vehicle by the map, nearest first.
 
@@ -28,6 +33,8 @@ def signs_ahead(
         Largest distance ahead [m].
     corridor : float
         Largest lateral offset [m].
+    grade : float
+        Inclination of the road under the vehicle, positive uphill [rad]; heights count from this plane.
 
     Returns
     -------
@@ -42,5 +49,8 @@ def signs_ahead(
         lateral = dy * forward[0] - dx * forward[1]
         faces = math.cos(sign.heading - heading) > FACING
         if faces and 0.0 < distance <= reach and abs(lateral) <= corridor:
-            seen.append(SignSighting(sign.sign_id, sign.kind, sign.value, distance, lateral, sign.diameter))
+            height = (sign.position[2] - float(position[2])) * math.cos(grade) - distance * math.sin(grade)
+            facing = math.remainder(sign.heading - heading, 2.0 * math.pi)
+            what = (sign.sign_id, sign.kind, sign.value)
+            seen.append(SignSighting(*what, distance, lateral, sign.diameter, height, facing))
     return tuple(sorted(seen, key=lambda s: s.distance))

@@ -42,6 +42,10 @@ class SignSighting:
         Offset to the left of the vehicle's axis [m].
     diameter : float
         Size of its face [m].
+    height : float
+        Middle of its face above the plane of the road at the front bumper [m].
+    facing : float
+        How far its face is turned from square to the vehicle's axis, counterclockwise seen from above [rad].
     """
 
     sign_id: str
@@ -50,6 +54,8 @@ class SignSighting:
     distance: float
     lateral: float
     diameter: float
+    height: float = 2.2
+    facing: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

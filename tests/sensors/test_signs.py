@@ -30,3 +30,17 @@ def test_distance_and_offset_in_the_vehicles_frame() -> None:
     (seen,) = signs_ahead(SignMap((sign("s", 3.0, 50.0, math.pi / 2),)), np.zeros(3), math.pi / 2, reach=100.0)
     assert seen.distance == pytest.approx(50.0)
     assert seen.lateral == pytest.approx(-3.0)  # to the right
+
+
+def test_height_counts_from_the_road_and_facing_from_square() -> None:
+    face = Sign("s", "stop", 0.0, (-50.0, -4.0, 12.5), 0.1 - math.pi, 0.9)
+    (seen,) = signs_ahead(SignMap((face,)), np.array([0.0, 0.0, 10.0]), math.pi, reach=100.0)
+    assert seen.height == pytest.approx(2.5)
+    assert seen.facing == pytest.approx(0.1)
+
+
+def test_uphill_a_sign_stands_as_high_above_the_road_as_on_the_level() -> None:
+    grade = math.radians(4.0)
+    face = Sign("s", "stop", 0.0, (80.0, -4.0, 80.0 * math.tan(grade) + 2.5), 0.0, 0.9)
+    (seen,) = signs_ahead(SignMap((face,)), np.zeros(3), 0.0, reach=100.0, grade=grade)
+    assert seen.height == pytest.approx(2.5 * math.cos(grade))

@@ -65,6 +65,7 @@ def compile_kernels() -> Iterator[str]:
         pending: dict[Future[None], str] = {
             pool.submit(_drive, *_DRIVES[first]): first,
             pool.submit(_estimate_visibility): "estimators",
+            pool.submit(_detect_signs): "signs",
         }
         while pending:
             for done in wait(pending, return_when=FIRST_COMPLETED).done:
@@ -123,6 +124,22 @@ def _read(estimator: "Estimator", camera: "Camera") -> None:
         image = _foggy_road(camera, distance)
         frame = Frame(0.1 * index, image if index < 3 else np.ascontiguousarray(image[:, :, 0]), camera)
         estimator.update(Observation(frame, 20.0, LeadMeasurement(distance, 5.0), ()))
+
+
+def _detect_signs() -> None:
+    """Look for signs of both sizes that are treated differently, in a picture and in its luminance."""
+    import numpy as np
+
+    from fogsim.values import Camera
+    from fogsim.vision.light.luminance import linear_luminance, linear_pixels
+    from fogsim.vision.symmetry.detection import SearchRegion, detect_signs
+
+    camera = Camera(160, 120, 160.0, (80.0, 60.0), 1.4)
+    rows, cols = np.mgrid[:120, :160]
+    picture = np.where(np.hypot(rows - 60, cols - 80) < 24.0, 90, 180).astype(np.uint8)
+    for image in (picture, np.repeat(picture[:, :, None], 3, axis=2)):
+        for seen in (linear_pixels(image, camera), linear_luminance(image, camera.response)):
+            detect_signs(seen, [SearchRegion(80.0, 60.0, 8.0, 8.0, 24.0)])
 
 
 def _foggy_road(camera: "Camera", lead: float, visibility: float = 120.0) -> "NDArray[np.uint8]":

@@ -1,0 +1,128 @@
+"""Where signs that the map says lie ahead are looked for in a picture."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from fogsim.values.camera import Camera
+from fogsim.values.observation import SignSighting
+from fogsim.vision.symmetry.detection import SearchRegion
+
+GATE = 3.0
+"""Standard deviations that a sign may be off its place [-]."""
+
+NEAREST = 3.0
+"""Signs nearer to the camera than this are not looked for: they leave the picture [m]."""
+
+SMALLEST = 3.0
+"""Least radius of a sign that is looked for [px]."""
+
+
+@dataclass(frozen=True, slots=True)
+class PoseDeviation:
+    """How well the place of a sign relative to the camera is known, as standard deviations.
+
+    Attributes
+    ----------
+    position : float
+        Of the sign by the map about the vehicle by its fix, along and across [m].
+    height : float
+        Of the sign above the road [m].
+    heading, pitch : float
+        Of the camera's direction [rad].
+    """
+
+    position: float = 0.5
+    height: float = 0.15
+    heading: float = math.radians(0.2)
+    pitch: float = math.radians(0.1)
+
+
+@dataclass(frozen=True, slots=True)
+class ProjectedSign:
+    """A sign of the map as the told camera should see it.
+
+    Attributes
+    ----------
+    sighting : SignSighting
+        What the map says.
+    distance : float
+        From the camera to the sign along the line of sight [m].
+    u, v : float
+        Column and row of the middle of its face [px].
+    radius : float
+        Half of its diameter [px].
+    deviation_u, deviation_v : float
+        Standard deviations of column and row [px].
+    expected : bool
+        Whether the picture should show all of it: if not, that it is not found says nothing.
+    """
+
+    sighting: SignSighting
+    distance: float
+    u: float
+    v: float
+    radius: float
+    deviation_u: float
+    deviation_v: float
+    expected: bool
+
+    @property
+    def region(self) -> SearchRegion:
+        """Where it is looked for."""
+        return SearchRegion(self.u, self.v, GATE * self.deviation_u, GATE * self.deviation_v, self.radius)
+
+
+def project_sightings(
+    sightings: Iterable[SignSighting], camera: Camera, setback: float, deviation: PoseDeviation | None = None
+) -> tuple[ProjectedSign, ...]:
+    """Project what the map says through the told camera.
+
+    Parameters
+    ----------
+    sightings : iterable of SignSighting
+        Signs ahead by the map.
+    camera : Camera
+        The assumed calibration.
+    setback : float
+        Distance of the camera behind the front bumper, from which the map's distances count [m].
+    deviation : PoseDeviation or None
+        How well the place of a sign is known; None for the usual.
+
+    Returns
+    -------
+    tuple of ProjectedSign
+        Signs of which the picture may show something, in the order of the sightings: none that is behind the camera,
+        outside the picture by more than it can be off its place, or too small.
+    """
+    known = PoseDeviation() if deviation is None else deviation
+    projected = (_projected(sighting, camera, setback, known) for sighting in sightings)
+    return tuple(sign for sign in projected if sign is not None)
+
+
+def _projected(sighting: SignSighting, camera: Camera, setback: float, known: PoseDeviation) -> ProjectedSign | None:
+    ahead, up = sighting.distance + setback, sighting.height - camera.mount_height
+    cosine, sine = math.cos(camera.pitch), math.sin(camera.pitch)
+    depth = ahead * cosine - up * sine
+    numbers = (ahead, up, sighting.lateral, sighting.diameter)
+    if not all(map(math.isfinite, numbers)) or depth < NEAREST or sighting.diameter <= 0.0:
+        return None
+    scale = camera.focal_length / depth
+    x, y = -scale * sighting.lateral, -scale * (ahead * sine + up * cosine)
+    radius = 0.5 * scale * sighting.diameter
+    if radius < SMALLEST:
+        return None
+    level = y + camera.focal_length * math.tan(camera.pitch)
+    off_x = math.hypot(scale * known.position, x / depth * known.position, camera.focal_length * known.heading)
+    off_y = math.hypot(scale * known.height, level / depth * known.position, camera.focal_length * known.pitch)
+    cosine, sine = math.cos(camera.roll), math.sin(camera.roll)
+    u0, v0 = camera.principal_point
+    u, v = u0 + x * cosine - y * sine, v0 + x * sine + y * cosine
+    off_u, off_v = math.hypot(off_x * cosine, off_y * sine), math.hypot(off_x * sine, off_y * cosine)
+    beside = max(-u, u - (camera.width - 1))
+    above = max(-v, v - (camera.height - 1))
+    if beside > GATE * off_u or above > GATE * off_v:
+        return None
+    expected = beside < -radius - off_u and above < -radius - off_v
+    distance = math.hypot(ahead, up, sighting.lateral)
+    return ProjectedSign(sighting, distance, u, v, radius, off_u, off_v, expected)

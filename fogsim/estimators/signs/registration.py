@@ -1,0 +1,84 @@
+"""Which of the detected signs are those of the map."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from fogsim.estimators.signs.regions import GATE, ProjectedSign
+from fogsim.vision.symmetry.detection import LARGER, SMALLER, SignDetection
+
+SIZE_DEVIATION, BLUR = 0.1, 0.4
+"""Standard deviation of a detected radius about the map's: relative to it, and by what blurs small signs [px]."""
+
+FALSE_ALARMS = 0.05
+"""Detections in a region that are no sign of the map [-]."""
+
+DETECTED = 0.9
+"""Share of signs that are detected, for the confidence in a pair [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Registration:
+    """A detection taken for a sign of the map.
+
+    Attributes
+    ----------
+    sign : ProjectedSign
+        The sign.
+    detection : SignDetection
+        The detection.
+    confidence : float
+        p(c): probability that the detection is this sign and no false alarm [-].
+    """
+
+    sign: ProjectedSign
+    detection: SignDetection
+    confidence: float
+
+
+def register_signs(signs: Sequence[ProjectedSign], detections: Sequence[SignDetection]) -> tuple[Registration, ...]:
+    """Pair detections with signs of the map, each with one at most, so that the pairs are likeliest together.
+
+    A pair is possible within `GATE` standard deviations of column, row and size together. Its likelihood is that of the
+    offsets over that of a false alarm anywhere in the sign's region: p(c) = P q / (P q + λ), after Gabb et al. (2014)
+    and Bar-Shalom's association probabilities.
+
+    Parameters
+    ----------
+    signs : sequence of ProjectedSign
+        Signs that the map says lie ahead.
+    detections : sequence of SignDetection
+        What was found.
+
+    Returns
+    -------
+    tuple of Registration
+        In the order of the signs; signs without a detection are left out.
+    """
+    ratios = np.array([[_likelihood_ratio(sign, one) for one in detections] for sign in signs])
+    if ratios.size == 0:
+        return ()
+    gain = np.log1p(ratios)
+    pairs = zip(*(found.tolist() for found in linear_sum_assignment(gain, maximize=True)), strict=True)
+    return tuple(
+        Registration(signs[i], detections[j], float(ratios[i, j] / (1.0 + ratios[i, j])))
+        for i, j in pairs
+        if ratios[i, j] > 0.0
+    )
+
+
+def _likelihood_ratio(sign: ProjectedSign, detection: SignDetection) -> float:
+    """Likelihood of a detection as this sign over that as a false alarm [-]; 0 outside the gate."""
+    a, b = (detection.u - sign.u) / sign.deviation_u, (detection.v - sign.v) / sign.deviation_v
+    size_deviation = math.hypot(SIZE_DEVIATION, BLUR / sign.radius)
+    c = math.log(detection.radius / sign.radius) / size_deviation
+    square = a * a + b * b + c * c
+    if square > GATE * GATE:
+        return 0.0
+    density = math.exp(-0.5 * square) / (2.0 * math.pi) ** 1.5
+    density /= sign.deviation_u * sign.deviation_v * size_deviation
+    area: float = 4.0 * GATE * GATE * sign.deviation_u * sign.deviation_v * math.log(LARGER / SMALLER)
+    return float(DETECTED * density * area / FALSE_ALARMS)

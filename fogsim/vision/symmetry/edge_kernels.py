@@ -1,0 +1,179 @@
+"""Edges of a piece of a picture as points between pixels, each with its direction, above the picture's own noise."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.jit import kernel
+from fogsim.vision.light.pixel_kernels import LinearPixels, pixel_luminance
+
+Floats = NDArray[np.float32]
+
+X, Y, NX, NY, SNR = range(5)
+"""Columns of edge points: place [px], unit gradient [-], gradient over its noise [-]."""
+
+_RAYLEIGH_MEDIAN = 1.1774
+"""Median of the length of a vector of two standard normal components."""
+
+
+@kernel
+def cut_luminance(image: LinearPixels, top: int, left: int, rows: int, cols: int) -> Floats:
+    """Luminance of a piece of an image.
+
+    Parameters
+    ----------
+    image : LinearPixels
+        The image.
+    top, left, rows, cols : int
+        The piece, which lies within the image [px].
+
+    Returns
+    -------
+    (rows, cols) float32
+        Linear grey levels.
+    """
+    piece = np.empty((rows, cols), np.float32)
+    for row in range(rows):
+        for col in range(cols):
+            piece[row, col] = pixel_luminance(image, top + row, left + col)
+    return piece
+
+
+@kernel
+def shrunk(piece: Floats, factor: int) -> Floats:
+    """Means over squares of pixels; what is left over at the right and below is dropped.
+
+    Parameters
+    ----------
+    piece : (rows, cols) float32
+        Part of a picture.
+    factor : int
+        Side of the squares [px].
+
+    Returns
+    -------
+    (rows // factor, cols // factor) float32
+        Their means.
+    """
+    rows, cols = piece.shape[0] // factor, piece.shape[1] // factor
+    means = np.empty((rows, cols), np.float32)
+    for row in range(rows):
+        for col in range(cols):
+            total = np.float32(0.0)
+            for i in range(row * factor, (row + 1) * factor):
+                for j in range(col * factor, (col + 1) * factor):
+                    total += piece[i, j]
+            means[row, col] = total / np.float32(factor * factor)
+    return means
+
+
+@kernel
+def gradients(piece: Floats) -> tuple[Floats, Floats, Floats]:
+    """Gradient by derivatives of a binomial window, of standard deviation 1 px across and 0.7 px along.
+
+    Parameters
+    ----------
+    piece : (rows, cols) float32
+        Part of a picture, at least 5 × 5.
+
+    Returns
+    -------
+    tuple of (rows, cols) float32
+        Derivatives along columns and rows, and the length of both [1/px]; 0 within 2 px of the border.
+    """
+    rows, cols = piece.shape
+    smooth, slope = np.zeros_like(piece), np.zeros_like(piece)
+    sixteenth, eighth, two = np.float32(1 / 16), np.float32(1 / 8), np.float32(2.0)
+    four, six = np.float32(4.0), np.float32(6.0)
+    for row in range(2, rows - 2):
+        for col in range(cols):
+            a, b, c = piece[row - 2, col], piece[row - 1, col], piece[row, col]
+            d, e = piece[row + 1, col], piece[row + 2, col]
+            smooth[row, col] = (a + e + four * (b + d) + six * c) * sixteenth
+            slope[row, col] = (e - a + two * (d - b)) * eighth
+    along, down, length = np.zeros_like(piece), np.zeros_like(piece), np.zeros_like(piece)
+    for row in range(2, rows - 2):
+        for col in range(2, cols - 2):
+            a, b, c = smooth[row, col - 2], smooth[row, col - 1], smooth[row, col + 1]
+            gx = (smooth[row, col + 2] - a + two * (c - b)) * eighth
+            gy = slope[row, col - 2] + slope[row, col + 2] + four * (slope[row, col - 1] + slope[row, col + 1])
+            gy = (gy + six * slope[row, col]) * sixteenth
+            along[row, col], down[row, col] = gx, gy
+            length[row, col] = math.sqrt(gx * gx + gy * gy)
+    return along, down, length
+
+
+@kernel
+def gradient_noise(length: Floats, share: float, least: float) -> float:
+    """Standard deviation of each component of the gradient by noise [1/px].
+
+    Parameters
+    ----------
+    length : (rows, cols) float32
+        Lengths of the gradient.
+    share : float
+        Share of pixels that are taken for even, whose gradient is noise alone [-].
+    least : float
+        Least answer, for pictures without noise [1/px].
+    """
+    inner = length[2:-2, 2:-2].copy().ravel()
+    if inner.size == 0:
+        return least
+    # The quantile of a Rayleigh distribution says its scale.
+    quantile = np.partition(inner, int(share * inner.size))[int(share * inner.size)]
+    return max(float(quantile) / math.sqrt(-2.0 * math.log(1.0 - share)), least)
+
+
+@kernel
+def edge_points(
+    along: Floats, down: Floats, length: Floats, noise: float, least: float
+) -> tuple[Floats, NDArray[np.int32]]:
+    """Ridges of the gradient, each placed between pixels by a parabola across it.
+
+    Parameters
+    ----------
+    along, down, length : (rows, cols) float32
+        See `gradients`.
+    noise : float
+        See `gradient_noise` [1/px].
+    least : float
+        Least length of the gradient over its noise [-].
+
+    Returns
+    -------
+    points : (n, 5) float32
+        See `X`; by rows and, within a row, by columns of the pixel that they come from.
+    number : (rows, cols) int32
+        Number of the point that comes from each pixel, or −1.
+    """
+    rows, cols = length.shape
+    number = np.full((rows, cols), -1, np.int32)
+    points = np.empty((rows * cols, 5), np.float32)
+    found = 0
+    for row in range(3, rows - 3):
+        for col in range(3, cols - 3):
+            here = length[row, col]
+            if here < least * noise:
+                continue
+            gx, gy = along[row, col], down[row, col]
+            nx, ny = gx / here, gy / here
+            before, after = _interpolated(length, row - ny, col - nx), _interpolated(length, row + ny, col + nx)
+            if before > here or after >= here:
+                continue
+            bend = before - 2.0 * here + after
+            shift = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
+            points[found, X], points[found, Y] = col + shift * nx, row + shift * ny
+            points[found, NX], points[found, NY], points[found, SNR] = nx, ny, here / noise
+            number[row, col] = found
+            found += 1
+    return points[:found].copy(), number
+
+
+@kernel
+def _interpolated(values: Floats, row: float, col: float) -> float:
+    i, j = int(row), int(col)
+    down, right = row - i, col - j
+    upper = values[i, j] * (1.0 - right) + values[i, j + 1] * right
+    lower = values[i + 1, j] * (1.0 - right) + values[i + 1, j + 1] * right
+    return float(upper * (1.0 - down) + lower * down)

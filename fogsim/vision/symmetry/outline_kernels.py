@@ -1,0 +1,147 @@
+"""How much of an outline the edges of a picture bear out, and where it fits them best."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.jit import kernel
+from fogsim.vision.symmetry.edge_kernels import NX, NY, X, Y
+
+Floats = NDArray[np.float32]
+
+SAMPLES = 24
+"""Places on an outline at which edges are looked for."""
+
+_ALIGNED = 0.88
+"""Least cosine between an edge's gradient and the normal of the outline: within 28° [-]."""
+
+_MOST_CHANGES = 2
+"""Changes between dark and bright surroundings along an outline that cost nothing: sky above, trees below."""
+
+_HOPELESS, _ALIKE = 0.35, 0.05
+"""Share below which an outline is not fitted, and difference of shares of outlines that are seen alike [-]."""
+
+_ENOUGH = 6
+"""Places seen from which on the outline is fitted."""
+
+
+@kernel
+def support(points: Floats, number: NDArray[np.int32], outline: Floats, x: float, y: float, radius: float) -> Floats:
+    """Compare an outline with the edges near it.
+
+    Parameters
+    ----------
+    points, number
+        See `fogsim.vision.symmetry.edge_kernels.edge_points`.
+    outline : (SAMPLES, 4) float32
+        Places on the outline of radius 1 about the middle, and its outward normals there.
+    x, y, radius : float
+        Where and how large the outline is supposed to be [px].
+
+    Returns
+    -------
+    (4,) float32
+        Share of the places that have a fitting edge [-], and how much farther right, down and larger the outline fits
+        them best [px].
+    """
+    tolerance = min(max(0.13 * radius, 0.8), 1.5)
+    seen, changes, last = 0, 0, 0.0
+    a = np.zeros((3, 3))
+    b = np.zeros(3)
+    for k in range(outline.shape[0]):
+        nx, ny = outline[k, 2], outline[k, 3]
+        off, polarity = _nearest_edge(points, number, x + radius * outline[k, 0], y + radius * outline[k, 1], nx, ny)
+        if abs(off) > tolerance:
+            continue
+        seen += 1
+        if last * polarity < 0.0:
+            changes += 1
+        last = polarity
+        gains = (float(nx), float(ny), float(outline[k, 0] * nx + outline[k, 1] * ny))
+        for i in range(3):
+            b[i] += gains[i] * off
+            for j in range(3):
+                a[i, j] += gains[i] * gains[j]
+    result = np.zeros(4, np.float32)
+    result[0] = (seen - max(changes - _MOST_CHANGES, 0)) / outline.shape[0]
+    if seen >= _ENOUGH:
+        _solve(a, b, result)
+    return result
+
+
+@kernel
+def _nearest_edge(
+    points: Floats, number: NDArray[np.int32], x: float, y: float, nx: float, ny: float
+) -> tuple[float, float]:
+    """Offset along a normal [px], infinite if none is near, and direction of the edge nearest to a place."""
+    off, polarity = math.inf, 0.0
+    row, col = math.floor(y + 0.5), math.floor(x + 0.5)
+    for i in range(max(row - 1, 0), min(row + 2, number.shape[0])):
+        for j in range(max(col - 1, 0), min(col + 2, number.shape[1])):
+            at = number[i, j]
+            if at >= 0:
+                along = points[at, NX] * nx + points[at, NY] * ny
+                across = (points[at, X] - x) * nx + (points[at, Y] - y) * ny
+                if abs(along) > _ALIGNED and abs(across) < abs(off):
+                    off, polarity = across, along
+    return off, polarity
+
+
+@kernel
+def _solve(a: NDArray[np.float64], b: NDArray[np.float64], result: Floats) -> None:
+    """Solve three equations by Cramer's rule into the last three places of a result; nothing if they are singular."""
+    whole = _determinant(a)
+    if whole < 1e-3 * a[0, 0] * a[1, 1] * a[2, 2]:
+        return
+    for k in range(3):
+        changed = a.copy()
+        changed[:, k] = b
+        result[1 + k] = min(max(_determinant(changed) / whole, -1.5), 1.5)
+
+
+@kernel
+def _determinant(a: NDArray[np.float64]) -> float:
+    return float(
+        a[0, 0] * (a[1, 1] * a[2, 2] - a[1, 2] * a[2, 1])
+        - a[0, 1] * (a[1, 0] * a[2, 2] - a[1, 2] * a[2, 0])
+        + a[0, 2] * (a[1, 0] * a[2, 1] - a[1, 1] * a[2, 0])
+    )
+
+
+@kernel
+def fitted(points: Floats, number: NDArray[np.int32], outlines: Floats, candidate: Floats, radii: Floats) -> Floats:
+    """Outline that is borne out best about a candidate for its middle, fitted to the edges.
+
+    Parameters
+    ----------
+    points, number
+        See `fogsim.vision.symmetry.edge_kernels.edge_points`.
+    outlines : (shapes, SAMPLES, 4) float32
+        Outlines to choose from, see `support`.
+    candidate : (2,) float32
+        Place (x, y) of the middle [px].
+    radii : (m,) float32
+        Radii to choose from, the least first [px].
+
+    Returns
+    -------
+    (5,) float32
+        Middle (x, y) and radius [px], share of the outline that is seen [-] and number of the outline.
+    """
+    best = np.zeros(5, np.float32)
+    for shape in range(outlines.shape[0]):
+        for k in range(radii.size):
+            x, y, radius = float(candidate[0]), float(candidate[1]), float(radii[k])
+            found = support(points, number, outlines[shape], x, y, radius)
+            if found[0] < _HOPELESS:
+                continue
+            for _ in range(2):
+                x, y, radius = x + found[1], y + found[2], radius + found[3]
+                found = support(points, number, outlines[shape], x, y, radius)
+            within = 0.9 * radii[0] <= radius <= 1.1 * radii[-1]
+            # Of two outlines that are seen alike, the larger one is the sign's, the other one that of its field.
+            larger = found[0] > best[3] - _ALIKE and radius > 1.08 * best[2]
+            if within and (larger or (found[0] > best[3] and radius > best[2] / 1.08) or found[0] > best[3] + _ALIKE):
+                best[0], best[1], best[2], best[3], best[4] = x, y, radius, found[0], shape
+    return best

@@ -1,0 +1,108 @@
+import math
+
+import cv2
+import numpy as np
+import pytest
+
+from fogsim.values import Camera
+from fogsim.vision.light.luminance import linear_luminance, linear_pixels
+from fogsim.vision.symmetry.detection import SearchRegion, SignDetection, detect_signs
+from fogsim.vision.symmetry.outlines import OUTLINES, polygon_outline
+
+FINE = 8
+CORNERS = {
+    "disc": [(math.cos(0.1 * k), math.sin(0.1 * k)) for k in range(63)],
+    "octagon": [(1.08 * math.cos((k + 0.5) * math.pi / 4), 1.08 * math.sin((k + 0.5) * math.pi / 4)) for k in range(8)],
+    "square": [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)],
+    "diamond": [(-1.0, 0.0), (0.0, -1.0), (1.0, 0.0), (0.0, 1.0)],
+    "warning": [(0.0, -0.866), (1.0, 0.866), (-1.0, 0.866)],
+    "yield": [(0.0, 0.866), (1.0, -0.866), (-1.0, -0.866)],
+}
+
+
+def picture(
+    shape: str, u: float, v: float, radius: float, contrast: float = 40.0, noise: float = 1.0, ring: float = 0.8
+) -> np.ndarray:
+    """A sign darker than the sky with a brighter field in it, blurred: (120, 160) float32."""
+    fine = np.full((120 * FINE, 160 * FINE), 200.0, np.float32)
+    for size, level in ((1.0, contrast), (ring, 0.2 * contrast)):
+        corners = [
+            ((u + 0.5 + size * radius * x) * FINE, (v + 0.5 + size * radius * y) * FINE) for x, y in CORNERS[shape]
+        ]
+        cv2.fillPoly(fine, [np.round(np.array(corners) - 0.5).astype(np.int32)], 200.0 - level)
+    drawn = cv2.GaussianBlur(cv2.resize(fine, (160, 120), interpolation=cv2.INTER_AREA), (0, 0), 0.6)
+    drawn += np.random.default_rng(3).normal(0.0, noise, drawn.shape)
+    return np.round(drawn).clip(0, 255).astype(np.float32)
+
+
+def nearest(found: tuple[SignDetection, ...], u: float, v: float) -> SignDetection:
+    return min(found, key=lambda one: math.dist((one.u, one.v), (u, v)))
+
+
+@pytest.mark.parametrize("shape", ["disc", "octagon", "square", "diamond"])
+@pytest.mark.parametrize(("radius", "contrast"), [(5.0, 40.0), (8.0, 8.0), (25.0, 40.0)])
+def test_middle_and_size_are_found_between_pixels(shape: str, radius: float, contrast: float) -> None:
+    (found, *others) = detect_signs(picture(shape, 82.3, 57.6, radius, contrast), [SearchRegion(86, 54, 9, 9, radius)])
+    assert not others
+    assert found.u == pytest.approx(82.3, abs=0.3)
+    assert found.v == pytest.approx(57.6, abs=0.3)
+    # A border that is narrower than the blur seems to lie outside itself; an octagon looks like a disc 5 % larger, and
+    # a square of 10 pixels like a disc that is larger still.
+    assert 0.0 < found.radius - radius < (0.4 + 0.06 * radius if radius >= 8.0 else 0.3 * radius)
+    assert found.strength > 0.85
+
+
+@pytest.mark.parametrize("shape", ["warning", "yield"])
+@pytest.mark.parametrize("radius", [8.0, 20.0])
+def test_triangles_are_found_about_the_middle_of_their_height(shape: str, radius: float) -> None:
+    (found,) = detect_signs(picture(shape, 82.3, 57.6, radius), [SearchRegion(86, 54, 9, 9, radius)])
+    assert math.dist((found.u, found.v), (82.3, 57.6)) < 0.06 * radius
+
+
+def test_the_whole_picture_is_searched_for_signs_of_many_sizes() -> None:
+    drawn = np.concatenate([picture("disc", 40.2, 30.7, 6.0), picture("octagon", 90.0, 60.0, 22.0)], axis=1)
+    found = detect_signs(drawn)
+    assert len(found) == 2
+    assert math.dist((nearest(found, 40.2, 30.7).u, nearest(found, 40.2, 30.7).v), (40.2, 30.7)) < 0.5
+    assert math.dist((nearest(found, 250.0, 60.0).u, nearest(found, 250.0, 60.0).v), (250.0, 60.0)) < 0.7
+
+
+def test_a_sign_of_a_tenth_of_the_contrast_is_found_where_noise_is_a_tenth() -> None:
+    """What counts is the picture's own noise; rounding to whole grey levels is some."""
+    faint = np.random.default_rng(0).normal(200.0, 0.4, (120, 160)) - 0.06 * (200.0 - picture("disc", 82, 57, 8.0))
+    region = SearchRegion(82, 57, 9, 9, 8.0)
+    assert detect_signs(faint.astype(np.float32), [region])
+    assert not detect_signs(picture("disc", 82, 57, 8.0, 2.4, noise=4.0), [region])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_noise_and_texture_are_no_signs(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    noise = rng.normal(150.0, 5.0, (120, 160)).astype(np.float32)
+    texture = cv2.GaussianBlur(rng.normal(0.0, 60.0, (120, 160)).astype(np.float32), (0, 0), 1.5) + 120.0
+    for even in (noise, texture, np.full((120, 160), 90.0, np.float32)):
+        assert detect_signs(even, [SearchRegion(80, 60, 30, 30, radius) for radius in (4.0, 8.0, 16.0)]) == ()
+
+
+def test_of_an_image_only_regions_are_converted_to_the_same_luminance() -> None:
+    camera = Camera(160, 120, 160.0, (80.0, 60.0), 1.4, response="srgb")
+    image = np.repeat(picture("disc", 82.0, 57.0, 8.0).astype(np.uint8)[:, :, None], 3, axis=2)
+    region = SearchRegion(80, 60, 9, 9, 8.0)
+    whole = detect_signs(linear_luminance(image, camera.response), [region])
+    assert detect_signs(linear_pixels(image, camera), [region]) == whole != ()
+
+
+def test_regions_beyond_the_border_and_without_extent_do_no_harm() -> None:
+    drawn = picture("disc", 3.0, 57.0, 8.0)
+    assert detect_signs(drawn, []) == ()
+    assert detect_signs(drawn, [SearchRegion(-90, 60, 9, 9, 8.0), SearchRegion(80, 900, 9, 9, 8.0)]) == ()
+    detect_signs(drawn, [SearchRegion(0, 0, 0, 0, 3.0), SearchRegion(80, 60, 500, 500, 60.0)])
+    detect_signs(drawn[:4, :4], [SearchRegion(2, 2, 1, 1, 8.0)])
+
+
+def test_outlines_are_even_and_their_normals_point_outward() -> None:
+    normals = np.linalg.norm(OUTLINES[:, :, 2:], axis=2)
+    assert np.allclose(normals, 1.0, atol=1e-6)
+    assert ((OUTLINES[:, :, :2] * OUTLINES[:, :, 2:]).sum(axis=2) > 0.2).all()
+    square = polygon_outline([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+    assert np.allclose(np.abs(square[:, :2]).max(axis=1), 1.0)

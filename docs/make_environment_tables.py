@@ -1,33 +1,45 @@
-"""Write the tables of docs/environments.md that are measured: what each baseline is worth.
+"""Write the tables of docs/environments.md that are measured: what each baseline is worth, how near the surrogate is.
 
-    python docs/make_environment_tables.py [--episodes 50] [--ids fogsim/FogAdvisory-v1 fogsim/FogAdvisoryFast-v1]
+    python docs/make_environment_tables.py [--episodes 50] [--ids fogsim/FogAdvisory-v1 …] [--density] [--surrogate]
 
 Half an hour for all. ``--agent NAME=FILE`` adds a row for an agent of Stable-Baselines3 (a .zip file of its PPO).
 """
 
 import argparse
+import json
 import re
+import subprocess
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from fogsim.units import KMH_PER_MPS
+from fogsim.values import Lamp
 from fogsim_envs import Evaluation, evaluate
 from fogsim_envs.baselines import BASELINES
 from fogsim_envs.evaluation import bootstrap_interval
+from fogsim_envs.spaces import action_of
 
 PAGE = Path(__file__).with_name("environments.md")
 DISCOUNTS = (1.0, 0.99)
 DENSITIES = {300.0: "300 vehicles/h", 2100.0: "2100 vehicles/h"}
+CRAWLING = "crawling"
+"""Name of 20 km/h always, the least that can be advised: what an agent would do that found standing to pay."""
 
 
-def rows(env_id: str, episodes: int, agents: dict[str, Any]) -> list[str]:
-    """A row for each policy."""
-    names = {**{name: name for name in BASELINES}, **agents}
-    return [_row(name, policy, env_id, episodes) for name, policy in names.items()]
+def rows(env_id: str, episodes: int, agents: dict[str, str]) -> list[str]:
+    """A row for each policy, two at a time."""
+    names = {**{name: name for name in BASELINES}, CRAWLING: CRAWLING, **agents}
+    with ProcessPoolExecutor(max_workers=2) as pool:
+        return list(pool.map(partial(_row, env_id=env_id, episodes=episodes), names, names.values()))
 
 
-def _row(name: str, policy: Any, env_id: str, episodes: int) -> str:
+def _row(name: str, given: str, *, env_id: str, episodes: int) -> str:
+    policy = _policy(given)
     state = {"observation": "state"} if not isinstance(policy, str) and "Fast" not in env_id else {}
     found = evaluate(policy, env_id, seeds=range(episodes), discount=DISCOUNTS[1], **state)
     whole = [sum(episode.terms.values()) for episode in found.episodes]
@@ -41,6 +53,12 @@ def _row(name: str, policy: Any, env_id: str, episodes: int) -> str:
         f"{np.mean([episode.time for episode in found.episodes]):.0f} s",
     ]
     return "| " + " | ".join(cells) + " |"
+
+
+def _policy(given: str) -> Any:
+    if given == CRAWLING:
+        return lambda _, info: action_of(20.0 / KMH_PER_MPS, Lamp(info["built_in_lamps"]), continuous=False)
+    return given if given in BASELINES else _loaded(given)
 
 
 def _interval(values: np.ndarray) -> str:
@@ -64,6 +82,28 @@ def density_rows(env_id: str, episodes: int) -> list[str]:
     return written
 
 
+def surrogate_rows(episodes: int) -> list[str]:
+    """A row for each light and class of visibility."""
+    command = [sys.executable, "benchmarks/surrogate.py", "--json", "--episodes", str(episodes)]
+    done = subprocess.run(  # noqa: S603 - our own program
+        command, cwd=PAGE.parent.parent, capture_output=True, text=True, check=True
+    )
+    return ["| " + " | ".join(_surrogate_cells(record)) + " |" for record in json.loads(done.stdout)]
+
+
+def _surrogate_cells(record: dict[str, Any]) -> list[str]:
+    above = record["visibility_to_m"]
+    errors = [record[name] for name in ("median_error", "surrogate_median_error", "distance")]
+    return [
+        record["light"],
+        f"{record['visibility_from_m']:.0f} … " + ("∞" if above is None else f"{above:.0f}") + " m",
+        str(record["estimates"]),
+        f"{100 * record['valid_share']:.0f} / {100 * record['surrogate_valid_share']:.0f} %",
+        "–" if errors[0] is None else f"{100 * errors[0]:+.0f} / {100 * errors[1]:+.0f} %",
+        "–" if errors[2] is None else f"{errors[2]:.2f}",
+    ]
+
+
 def table(text: str, name: str, header: list[str], body: list[str]) -> str:
     """The page's text with a table put in."""
     lines = ["| " + " | ".join(header) + " |", "|" + " --- |" * len(header), *body]
@@ -82,9 +122,10 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, default=50)
     parser.add_argument("--ids", nargs="*", default=["fogsim/FogAdvisory-v1", "fogsim/FogAdvisoryFast-v1"])
     parser.add_argument("--density", action="store_true", help="the table over densities, too")
+    parser.add_argument("--surrogate", action="store_true", help="the table of the surrogate's errors, too")
     parser.add_argument("--agent", action="append", default=[], help="NAME=FILE of an agent of Stable-Baselines3's PPO")
     asked = parser.parse_args()
-    agents = {name: _loaded(path) for name, _, path in (one.partition("=") for one in asked.agent)}
+    agents = {name: path for name, _, path in (one.partition("=") for one in asked.agent)}
     header = [
         "policy",
         "return, γ = 1",
@@ -102,6 +143,9 @@ def main() -> None:
     if asked.density:
         fast = "fogsim/FogAdvisoryFast-v1"
         text = table(text, "densities", ["policy", *DENSITIES.values()], density_rows(fast, asked.episodes))
+    if asked.surrogate:
+        header = ["light", "visibility ahead", "estimates", "valid: real / drawn", "median error of k", "KS distance"]
+        text = table(text, "surrogate", header, surrogate_rows(asked.episodes))
     PAGE.write_text(text, encoding="utf-8")
 
 

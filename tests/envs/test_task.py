@@ -255,6 +255,10 @@ def test_baselines_are_evaluated() -> None:
         return NO_ADVICE
 
     assert fogsim_envs.evaluate(spy, FAST, seeds=[0]).episodes[0].steps == len(seen)
+    shifted = [dataclasses.replace(one, value=one.value - 2.0) for one in found.episodes]
+    assert found.minus(dataclasses.replace(found, episodes=tuple(shifted))) == pytest.approx((2.0, 2.0, 2.0))
+    with pytest.raises(InputError, match=r"of the seeds \[0, 1\], got \[0\]"):
+        found.minus(dataclasses.replace(found, episodes=found.episodes[:1]))
     with pytest.raises(InputError, match="did you mean 'oracle'"):
         fogsim_envs.evaluate("oracles", FAST, seeds=[0])
     with pytest.raises(InputError, match="at least one"):

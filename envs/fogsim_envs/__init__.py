@@ -46,6 +46,12 @@ gymnasium.register(
 )
 
 gymnasium.register(
+    id="fogsim/FogHighway-v1",
+    entry_point="fogsim_envs.task.highway:FogHighwayV1Env",
+    max_episode_steps=1200,
+)
+
+gymnasium.register(
     id="fogsim/FogDrive-v1",
     entry_point="fogsim_envs.task:FogDriveEnv",
     max_episode_steps=600,

@@ -61,15 +61,11 @@ class FogHighwayEnv(AdvisingEnv):
         reward_weights: RewardWeights | None = None,
         render_mode: str | None = None,
     ) -> None:
-        made: Any = gymnasium.make(environment).unwrapped
-        if not is_highway_environment(made):
-            raise InputError(f"environment must be an id of highway-env, such as 'highway-v0'; got {environment!r}")
-        # Leaders across the joints of roads are seen too, unless the user says otherwise.
-        made.configure({"neighbour_vehicles_connected_lanes": True, **config})
+        made = highway_environment(environment, config)
         settings = highway_config(made)
 
         def load(more: Sequence[str]) -> Scenario:
-            return highway_scenario(settings, visibility, [*_clocks(settings), *more])
+            return highway_scenario(settings, visibility, more)
 
         def begin(scenario: Scenario, seed: int) -> tuple[HighwayLoop, Step]:
             loop = HighwayLoop(made, scenario)
@@ -139,6 +135,29 @@ class HighwayLoop:
         self._loop.close()
 
 
+def highway_environment(environment: str, config: Mapping[str, Any]) -> Any:
+    """Make a highway-env environment.
+
+    Parameters
+    ----------
+    environment : str
+        Its id.
+    config : mapping
+        Its configuration.
+
+    Raises
+    ------
+    InputError
+        If it is none of highway-env's.
+    """
+    made: Any = gymnasium.make(environment).unwrapped
+    if not is_highway_environment(made):
+        raise InputError(f"environment must be an id of highway-env, such as 'highway-v0'; got {environment!r}")
+    # Leaders across the joints of roads are seen too, unless the user says otherwise.
+    made.configure({"neighbour_vehicles_connected_lanes": True, **config})
+    return made
+
+
 def highway_config(environment: Any) -> Mapping[str, Any]:
     """Configuration of a highway-env environment without wrappers.
 
@@ -170,7 +189,8 @@ def highway_scenario(config: Mapping[str, Any], visibility: float, overrides: Se
     """
     duration = [f"duration_s={float(config['duration'])!r}"] if "duration" in config else []
     fog = f"fog.visibility_m={visibility!r}"
-    scenario = attached_scenario(EGO, [*duration, fog, f"traffic.stop_before_end_m={END_MARGIN!r}", *overrides])
+    margin = f"traffic.stop_before_end_m={END_MARGIN!r}"
+    scenario = attached_scenario(EGO, [*duration, fog, margin, *_clocks(config), *overrides])
     traffic = scenario.traffic
     foreign = [key for key in ("config", "net", "routes", "additional") if getattr(traffic, key)]
     if foreign or traffic.ego != EGO:

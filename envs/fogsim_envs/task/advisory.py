@@ -3,7 +3,6 @@
 import dataclasses
 import math
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -23,7 +22,7 @@ from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
 from fogsim_envs.task.observation import task_observation, task_space
 from fogsim_envs.task.own_driver import OwnDriver
 from fogsim_envs.task.rewards import TaskWeights, Way, fault, strikes, task_terms, time_to_collision, unseen_share
-from fogsim_envs.task.sampling import EpisodeChoice, EpisodeSource
+from fogsim_envs.task.sampling import AnyScenario, EpisodeChoice, EpisodeSource
 
 
 class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
@@ -72,7 +71,8 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
     the network; truncated after the scenario's duration.
 
     ### Arguments
-    scenario : name in the catalogue, file, or `fogsim.Scenario`; None for the default task's motorway
+    scenario : name in the catalogue, file, `fogsim.Scenario`, or a function that makes one with overrides; None for the
+        default task's motorway
     scenario_distribution : `ScenarioDistribution`, or a sequence of scenarios of which one is taken; None with
         a scenario is that scenario alone
     fog_distribution : `FogDistribution`; None with a scenario is that scenario's own fog
@@ -95,9 +95,9 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
 
     def __init__(
         self,
-        scenario: str | Path | Scenario | None = None,
+        scenario: AnyScenario | None = None,
         *,
-        scenario_distribution: ScenarioDistribution | Sequence[str | Path | Scenario] | None = None,
+        scenario_distribution: ScenarioDistribution | Sequence[AnyScenario] | None = None,
         fog_distribution: FogDistribution | None = None,
         split: str = "train",
         observation: str = "dict",
@@ -155,7 +155,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         self._adviser = AdvisedDriving(scenario)
         self._frames = build.periods(scenario).decision_frames
         self._standard = build.safety_standard(scenario)
-        self._way_end = _route_length(self._step) - scenario.traffic.stop_before_end_m
+        self._way_end = self._arrival(self._step, scenario)
         length = max(self._way_end - self._step.route_position, 1.0)
         self._way = Way(length, max(self._step.speed_limit, 1.0), scenario.duration_s)
         self._own = self._built_in = Command()
@@ -176,6 +176,10 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
                 f"{scenario.name}: expected a camera of width, height and bits {ours}, for which the observation space "
                 f"was made, got {(camera.width, camera.height, camera.bits)}: give all scenarios one image_size"
             )
+
+    def _arrival(self, step: Step, scenario: Scenario) -> float:
+        """Position along the route at which the ego arrives [m]."""
+        return _route_length(step) - scenario.traffic.stop_before_end_m
 
     def _begin(self, scenario: Scenario, seed: int) -> Step:
         if self._simulation is None:

@@ -1,7 +1,7 @@
 """Draws episodes: from distributions, or as the caller of ``reset`` fixes them."""
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,7 +18,8 @@ MOTORWAY = Path(__file__).with_name("motorway.yaml")
 SPLITS = ("train", "test")
 """Random numbers of which those of one are never those of another."""
 
-AnyScenario = str | Path | Scenario
+AnyScenario = str | Path | Scenario | Callable[[Sequence[str]], Scenario]
+"""A name in the catalogue, a file, a scenario, or what makes one with ``key.path=value`` each."""
 
 _KEPT_SCENARIOS = 8
 
@@ -88,8 +89,8 @@ class EpisodeSource:
 
     Parameters
     ----------
-    scenario : name, file, Scenario or None
-        The scenario; None for the default task's motorway.
+    scenario : name, file, Scenario, callable or None
+        The scenario, or what makes it with overrides; None for the default task's motorway.
     distribution : ScenarioDistribution, sequence of scenarios or None
         What of it is drawn, or which one.
     fog : FogDistribution or None
@@ -172,7 +173,9 @@ class EpisodeSource:
         return Episode((*episode.settings, fog), episode.driver, episode.light, episode.script)
 
     def _loaded(self, scenario: AnyScenario, settings: tuple[str, ...]) -> Scenario:
-        return override(scenario, settings) if isinstance(scenario, Scenario) else self._load(scenario, settings)
+        if isinstance(scenario, Scenario):
+            return override(scenario, settings)
+        return scenario(settings) if callable(scenario) else self._load(scenario, settings)
 
 
 def _loaded(scenario: str | Path, settings: tuple[str, ...]) -> Scenario:

@@ -1,0 +1,135 @@
+"""The task of `fogsim_envs.task.advisory` on the roads and in the traffic of highway-env."""
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from fogsim.errors import InputError
+from fogsim.scenario import Scenario
+from fogsim.traffic.highway import EGO
+from fogsim.values import Ending, Step
+from fogsim_envs.highway import HighwayLoop, highway_config, highway_environment, highway_scenario
+from fogsim_envs.hosting import TIMEOUT
+from fogsim_envs.task.advisory import FogAdvisoryV1Env
+from fogsim_envs.task.episodes import Episode, FogDistribution, ScenarioDistribution
+from fogsim_envs.task.rewards import TaskWeights
+
+HIGHWAY_FOG = FogDistribution(ahead=(100.0, 500.0), reach=1000.0, bank_length=(300.0, 800.0))
+"""Banks that begin on the first kilometre of the way."""
+
+WAY = 1500.0
+"""Way that the ego has to go [m]."""
+
+DURATION = 150.0
+"""Longest time that it has for it, where the configuration sets none [s]."""
+
+_DRAWN = ("light.", "camera.told.")
+
+
+class HighwayDistribution(ScenarioDistribution):
+    """Which light, driver and errors of the told calibration there may be; roads and traffic are highway-env's."""
+
+    def draw(self, rng: np.random.Generator) -> Episode:
+        """An episode but for its fog; see `ScenarioDistribution.draw`.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Random numbers; as many are drawn whatever comes out.
+        """
+        drawn = super().draw(rng)
+        settings = tuple(one for one in drawn.settings if one.startswith(_DRAWN))
+        return Episode(settings, drawn.driver, drawn.light)
+
+
+class FogHighwayV1Env(FogAdvisoryV1Env):
+    """Advise a vehicle's speed and lamps in fog, in the traffic of highway-env, in another fog each episode.
+
+    Action, observation, reward and ``info`` are those of ``fogsim/FogAdvisory-v1`` (`FogAdvisoryV1Env`); highway-env
+    has no signs, so ``signs_mask`` is 0. The ego keeps its lane and follows its leader by IDM; advice sets its target
+    speed. Others choose their speed in fog and follow leaders that they see, as in ``fogsim/FogHighway-v0``.
+
+    ### Episodes
+    Fog, light, the ego's own driver and the errors of the told calibration are drawn at each reset (`FogDistribution`,
+    `HighwayDistribution`), traffic by highway-env from the same seed. ``split`` "test" draws from other random numbers
+    than "train".
+
+    ### Start and end
+    A reset of the highway-env environment. Terminated by a collision of the ego, by its arrival after ``way`` metres or
+    at the end of its road; truncated after the environment's ``duration``.
+
+    ### Arguments
+    environment : id of a highway-env environment
+    config : its configuration; ``duration`` is 150 s where it is not among it
+    way : how far the ego has to go [m]; less where the road ends before
+    scenario_distribution : `HighwayDistribution`
+    fog_distribution, split, observation, overrides, image_size, continuous, reward_weights, render_mode : as of
+    `FogAdvisoryV1Env`; of ``traffic`` no overrides that name files or the ego
+
+    ### Version history
+    * v1: another fog, light and driver in each episode; the task's reward, in which time and arrival count
+    * v0: homogeneous fog (`fogsim_envs.highway.FogHighwayEnv`)
+    """
+
+    def __init__(
+        self,
+        environment: str = "highway-v0",
+        config: Mapping[str, Any] | None = None,
+        *,
+        way: float = WAY,
+        scenario_distribution: HighwayDistribution | None = None,
+        fog_distribution: FogDistribution = HIGHWAY_FOG,
+        split: str = "train",
+        observation: str = "dict",
+        overrides: Sequence[str] = (),
+        image_size: tuple[int, int] | None = (160, 120),
+        continuous: bool = False,
+        reward_weights: TaskWeights | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        if not way > 0.0:
+            raise InputError(f"way: expected more than 0 m, got {way!r}")
+        self._way_length = way
+        self._environment = highway_environment(environment, {"duration": DURATION, **(config or {})})
+        settings = highway_config(self._environment)
+        super().__init__(
+            lambda more: highway_scenario(settings, math.inf, more),
+            scenario_distribution=scenario_distribution or HighwayDistribution(),
+            fog_distribution=fog_distribution,
+            split=split,
+            observation=observation,
+            overrides=overrides,
+            image_size=image_size,
+            continuous=continuous,
+            reward_weights=reward_weights,
+            render_mode=render_mode,
+            timeout=TIMEOUT,
+        )
+
+    def _check(self, scenario: Scenario) -> None:
+        super()._check(scenario)
+        if scenario.traffic.ego != EGO:
+            raise InputError(
+                f"options['scenario']: roads are highway-env's own here; leave it out; got {scenario.name!r}"
+            )
+
+    def _arrival(self, step: Step, scenario: Scenario) -> float:
+        return min(step.route_position + self._way_length, super()._arrival(step, scenario))
+
+    def _begin(self, scenario: Scenario, seed: int) -> Step:
+        self._way_end = math.inf
+        if self._simulation is None or scenario != self._running:
+            if self._simulation is not None:
+                self._simulation.close()
+                self._simulation = None
+            self._simulation = HighwayLoop(self._environment, scenario)
+        self._running = scenario
+        return self._simulation.start(seed)
+
+    def _completed(self, step: Step) -> Step:
+        if step.ending is None and step.route_position >= self._way_end:
+            return dataclasses.replace(step, ending=Ending.ARRIVED)
+        return step

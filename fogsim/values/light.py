@@ -132,9 +132,9 @@ SIGNAL_DIAMETER = 0.2
 """Diameter of that lens [m]; one of 300 mm is as luminous and so shines 450 cd, level 3 of EN 12368."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Beam:
-    """Luminous intensity of one lamp over direction, seen from the lamp.
+    """Luminous intensity of one lamp over direction, seen from the lamp; a beam equals none but itself.
 
     Attributes
     ----------

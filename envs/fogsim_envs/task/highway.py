@@ -9,7 +9,6 @@ import numpy as np
 
 from fogsim.errors import InputError
 from fogsim.scenario import Scenario
-from fogsim.traffic.highway import EGO
 from fogsim.values import Ending, Step
 from fogsim_envs.highway import HighwayLoop, highway_config, highway_environment, highway_scenario
 from fogsim_envs.hosting import TIMEOUT
@@ -109,12 +108,23 @@ class FogHighwayV1Env(FogAdvisoryV1Env):
             timeout=TIMEOUT,
         )
 
-    def _check(self, scenario: Scenario) -> None:
-        super()._check(scenario)
-        if scenario.traffic.ego != EGO:
-            raise InputError(
-                f"options['scenario']: roads are highway-env's own here; leave it out; got {scenario.name!r}"
-            )
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Begin an episode; see `FogAdvisoryV1Env.reset`, but for ``scenario``, which there is none to choose from.
+
+        Parameters
+        ----------
+        seed, options
+            As of `FogAdvisoryV1Env.reset`.
+
+        Raises
+        ------
+        InputError
+            If an option is unknown or does not fit.
+        """
+        if options and "scenario" in options:
+            given = options["scenario"]
+            raise InputError(f"options['scenario']: roads and traffic are highway-env's own here; got {given!r}")
+        return super().reset(seed=seed, options=options)
 
     def _arrival(self, step: Step, scenario: Scenario) -> float:
         return min(step.route_position + self._way_length, super()._arrival(step, scenario))

@@ -5,6 +5,7 @@ w = t / (FOLD + |t|), which is fine near the axis, where cut-offs are, and coars
 """
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,10 +30,14 @@ PHASE_SIZE = 1024
 
 _STEP = math.radians(0.5)
 _CELLS = 512
+_REMEMBERED = 16
 
 
+@lru_cache(_REMEMBERED)
 def lamp_table(beam: Beam) -> NDArray[np.float32]:
-    """Luminous intensity of a lamp as a stack of tables, the first sharp, the others ever more blurred.
+    """Luminous intensity of a lamp as a stack of tables, the first sharp, the others ever more blurred; read-only.
+
+    The latest are remembered, since the same lamps are in every scene.
 
     Parameters
     ----------
@@ -64,7 +69,9 @@ def lamp_table(beam: Beam) -> NDArray[np.float32]:
         cells = FIRST_BLUR * 2.0**level / _STEP
         smooth = np.fft.irfft2(spectrum * np.exp(-2.0 * (math.pi * cells) ** 2 * (down**2 + across**2)), even.shape)
         stack.append(np.maximum(_bilinear(smooth, elevation / _STEP + _CELLS // 2, azimuth / _STEP + _CELLS // 2), 0.0))
-    return np.ascontiguousarray(np.stack(stack), dtype=np.float32)
+    table = np.ascontiguousarray(np.stack(stack), dtype=np.float32)
+    table.flags.writeable = False
+    return table
 
 
 def _bilinear(table: NDArray[np.float64], row: NDArray[np.float64], column: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -15,7 +15,7 @@ from fogsim.atmosphere.lamps.plane_pieces import piece_length
 from fogsim.atmosphere.lamps.veil import FOLD_DISTANCE, INTERVALS, lit_air, node_distances, veil_along, veil_rays
 from fogsim.atmosphere.lamps.veil_kernels import LitAir, VeilRays
 from fogsim.linear_algebra import matrix_product
-from fogsim.values import Beam, Camera, CameraPose, FogField, HeadLamp, View
+from fogsim.values import Camera, CameraPose, FogField, HeadLamp, View
 from fogsim.values.pinhole import camera_axes, ray_from_pixel
 
 _AT_REST = CameraPose((0.0, 0.0, 0.0), 0.0)
@@ -44,7 +44,6 @@ class _Group:
 class _Memory:
     """What was computed and may be wanted again: it saves time and changes nothing."""
 
-    tables: list[tuple[Beam, NDArray[np.float32]]] = field(default_factory=list)
     rays: dict[Camera, tuple[VeilRays, NDArray[np.float32]]] = field(default_factory=dict)
     groups: dict[tuple[object, ...], _Group] = field(default_factory=dict)
     veils: dict[tuple[int, float], tuple[_Group, NDArray[np.float32]]] = field(default_factory=dict)
@@ -133,14 +132,6 @@ class OwnLamplight:
             _keep(self._memory.rays, camera, (veil_rays(camera), ray_map.astype(np.float32)))
         return self._memory.rays[camera]
 
-    def _table(self, beam: Beam) -> NDArray[np.float32]:
-        for known, table in self._memory.tables:
-            if known is beam:
-                return table
-        table = lamp_table(beam)
-        self._memory.tables = [*self._memory.tables[1 - _REMEMBERED :], (beam, table)]
-        return table
-
     def _groups(self, camera: Camera, lamps: tuple[HeadLamp, ...]) -> list[_Group]:
         colours = dict.fromkeys(lamp.colour for lamp in lamps)
         return [self._group(camera, tuple(lamp for lamp in lamps if lamp.colour == colour)) for colour in colours]
@@ -154,7 +145,7 @@ class OwnLamplight:
         places = list(dict.fromkeys(lamp.offset for lamp in lamps))
         # Lamps in one housing shine together.
         tables = [
-            np.stack([self._table(lamp.beam) for lamp in lamps if lamp.offset == place]).sum(axis=0) for place in places
+            np.stack([lamp_table(lamp.beam) for lamp in lamps if lamp.offset == place]).sum(axis=0) for place in places
         ]
         group = _Group(
             lamps=lamps,

@@ -16,7 +16,7 @@ from fogsim.scenario import load_scenario
 from fogsim.values import Collision, Command, Ending, Leader, Step
 from fogsim_envs.task import FogAdvisoryV1Env, FogDistribution, ScenarioDistribution, TaskWeights
 from fogsim_envs.task.episodes import fog_setting
-from fogsim_envs.task.observation import STATE_FEATURES, task_state
+from fogsim_envs.task.observation import STATE_FEATURES, scaled_visibility, task_state
 from fogsim_envs.task.rewards import Way, fault, task_terms
 from fogsim_envs.task.sampling import MOTORWAY, EpisodeChoice, EpisodeSource
 from fogsim_envs.task.surrogate import EstimatorSurrogate, SurrogateTable
@@ -206,11 +206,12 @@ def test_state_says_nothing_of_the_truth(step: Step) -> None:
     mine = task_state(step, Command(), 100.0, 500.0)
     np.testing.assert_array_equal(mine, task_state(dataclasses.replace(step, truth=other), Command(), 100.0, 500.0))
     told = dict(zip(STATE_FEATURES, mine.tolist(), strict=True))
-    assert told["speed_limit"] == pytest.approx(130.0 / 3.6 / 50.0, rel=1e-4)
-    assert told["distance_to_go"] == pytest.approx(0.1)
+    assert told["speed_limit"] == pytest.approx(130.0 / 3.6 / 25.0 - 1.0, rel=1e-4)
+    assert told["distance_to_go"] == pytest.approx(500.0 / 2500.0 - 1.0)
     assert told["lanes"] in (pytest.approx(0.4), pytest.approx(0.6))
     belief = [told[f"belief_{name}"] for name in ("5_percent", "25_percent", "median", "75_percent", "95_percent")]
     assert belief == sorted(belief)
+    assert [scaled_visibility(one) for one in (0.0, 10.0, 100.0, 1000.0, math.inf)] == [-1.0, -1.0, 0.0, 1.0, 1.0]
 
 
 def _table(error: float, valid: float) -> SurrogateTable:

@@ -48,11 +48,11 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
     | signs_mask | 0 or 1 (8,) | which rows of ``signs`` are filled |
     | state | float32 (21,) in −1 … 1 | see below |
 
-    ``state``: own speed / 50 m/s; speed limit / 50 m/s; distance to go / 5 km; time left / 600 s; number of the own
-    lane from the right / 5; number of lanes / 5; lead present; lead distance / 200 m; lead relative speed / 50 m/s;
-    estimate valid; estimated visibility on a log scale (1 m … 10 km to 0 … 1); relative deviation of the estimate;
+    ``state``: own speed / 25 m/s − 1; speed limit, likewise; distance to go / 2.5 km − 1; time left / 300 s − 1; number
+    of the own lane from the right / 5; number of lanes / 5; lead present; lead distance / 100 m − 1; relative speed of
+    the lead / 25 m/s; estimate valid; log10 of the estimated visibility / 100 m; relative deviation of the estimate;
     believed visibility on the same scale: 5, 25, 50, 75, 95 % quantiles; deviation of ln k; advised speed asked for
-    / 50 m/s (1 for none); front fog lamps lit; rear fog lamp lit.
+    / 25 m/s − 1 (1 for none); front fog lamps lit; rear fog lamp lit. All are clipped to −1 … 1.
 
     ### Reward
     Sum of the terms in ``info["reward_terms"]``, in points (`fogsim_envs.task.TaskWeights`): progress, time, arrival,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fogsim.errors import UnknownNameError
 from fogsim.values import Camera, Command, Lamp, Step
-from fogsim_envs.spaces import SIGN_FEATURES, SIGN_SLOTS, observation_space, observed_signs, scaled_visibility
+from fogsim_envs.spaces import SIGN_FEATURES, SIGN_SLOTS, observation_space, observed_signs
 
 OBSERVATIONS = ("dict", "state", "camera")
 """What can be asked for: all of it, the numbers alone, or the picture alone."""
@@ -18,7 +18,9 @@ OBSERVATIONS = ("dict", "state", "camera")
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 """Quantiles of the believed visibility that an agent is told."""
 
-SPEED_SCALE, LEAD_SCALE, WAY_SCALE, TIME_SCALE = 50.0, 200.0, 5000.0, 600.0
+SPEED, LEAD, WAY, TIME, VISIBILITY = 25.0, 100.0, 2500.0, 300.0, 100.0
+"""What is 0 in ``state``: speed [m/s], lead's distance [m], way [m], time [s], visibility [m]. Nothing is −1, twice
+that 1; of visibilities a tenth is −1 and tenfold 1. So what matters in fog fills the range, as networks wish."""
 
 STATE_FEATURES = (
     "speed",
@@ -116,19 +118,19 @@ def task_state(step: Step, own: Command, time_left: float, to_go: float) -> NDAr
     lead, belief, advice = step.observation.lead, step.belief, own.advice.speed
     lane, lanes = _lane(step)
     values = (
-        step.observation.speed / SPEED_SCALE,
-        step.speed_limit / SPEED_SCALE,
-        to_go / WAY_SCALE,
-        time_left / TIME_SCALE,
+        step.observation.speed / SPEED - 1.0,
+        step.speed_limit / SPEED - 1.0,
+        to_go / WAY - 1.0,
+        time_left / TIME - 1.0,
         lane / LANE_SCALE,
         lanes / LANE_SCALE,
         float(lead is not None),
-        lead.distance / LEAD_SCALE if lead else 1.0,
-        lead.relative_speed / SPEED_SCALE if lead else 0.0,
+        lead.distance / LEAD - 1.0 if lead else 1.0,
+        lead.relative_speed / SPEED if lead else 0.0,
         *_estimate(step),
         *map(scaled_visibility, belief.visibility_quantiles(QUANTILES)),
         belief.log_standard_deviation,
-        advice / SPEED_SCALE if math.isfinite(advice) else 1.0,
+        advice / SPEED - 1.0 if math.isfinite(advice) else 1.0,
         float(Lamp.FRONT_FOG in own.lamps),
         float(Lamp.REAR_FOG in own.lamps),
     )
@@ -141,6 +143,17 @@ def _estimate(step: Step) -> tuple[float, float, float]:
     estimate = step.estimates[0]
     deviation = estimate.standard_deviation / estimate.extinction if estimate.extinction > 0.0 else 1.0
     return 1.0, scaled_visibility(estimate.visibility), deviation
+
+
+def scaled_visibility(visibility: float) -> float:
+    """Visibility on a logarithmic scale: −1 for 10 m or less, 0 for 100 m, 1 for 1 km or more.
+
+    Parameters
+    ----------
+    visibility : float
+        Visibility [m]; it may be infinite.
+    """
+    return min(max(math.log10(max(visibility, 1e-9) / VISIBILITY), -1.0), 1.0) if math.isfinite(visibility) else 1.0
 
 
 def _lane(step: Step) -> tuple[int, int]:

@@ -127,19 +127,20 @@ def _read(estimator: "Estimator", camera: "Camera") -> None:
 
 
 def _detect_signs() -> None:
-    """Look for signs of both sizes that are treated differently, in a picture and in its luminance."""
+    """Look for a sign in a grey picture, one in colour, one of more bits, and one of light."""
     import numpy as np
 
-    from fogsim.values import Camera
-    from fogsim.vision.light.luminance import linear_luminance, linear_pixels
     from fogsim.vision.symmetry.detection import SearchRegion, detect_signs
 
-    camera = Camera(160, 120, 160.0, (80.0, 60.0), 1.4)
     rows, cols = np.mgrid[:120, :160]
     picture = np.where(np.hypot(rows - 60, cols - 80) < 24.0, 90, 180).astype(np.uint8)
-    for image in (picture, np.repeat(picture[:, :, None], 3, axis=2)):
-        for seen in (linear_pixels(image, camera), linear_luminance(image, camera.response)):
-            detect_signs(seen, [SearchRegion(80.0, 60.0, 8.0, 8.0, 24.0)])
+    for image in (
+        picture,
+        np.repeat(picture[:, :, None], 3, axis=2),
+        picture.astype(np.uint16),
+        picture.astype(np.float32),
+    ):
+        detect_signs(image, [SearchRegion(80.0, 60.0, 8.0, 8.0, 24.0)])
 
 
 def _foggy_road(camera: "Camera", lead: float, visibility: float = 120.0) -> "NDArray[np.uint8]":

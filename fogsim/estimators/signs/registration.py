@@ -10,7 +10,7 @@ from scipy.optimize import linear_sum_assignment
 from fogsim.estimators.signs.regions import GATE, ProjectedSign
 from fogsim.vision.symmetry.detection import LARGER, SMALLER, SignDetection
 
-SIZE_DEVIATION, BLUR = 0.1, 0.4
+SIZE_DEVIATION, BLUR = 0.15, 0.4
 """Standard deviation of a detected radius about the map's: relative to it, and by what blurs small signs [px]."""
 
 FALSE_ALARMS = 0.05

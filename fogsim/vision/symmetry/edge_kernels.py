@@ -6,66 +6,85 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
-from fogsim.vision.light.pixel_kernels import LinearPixels, pixel_luminance
 
 Floats = NDArray[np.float32]
+Picture = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.float32]
 
 X, Y, NX, NY, SNR = range(5)
 """Columns of edge points: place [px], unit gradient [-], gradient over its noise [-]."""
 
-_RAYLEIGH_MEDIAN = 1.1774
-"""Median of the length of a vector of two standard normal components."""
-
 
 @kernel
-def cut_luminance(image: LinearPixels, top: int, left: int, rows: int, cols: int) -> Floats:
-    """Luminance of a piece of an image.
+def shrunk(image: Picture, top: int, left: int, rows: int, cols: int, factor: int) -> Floats:
+    """Cut a piece out of a picture, each value the mean over a square of pixels.
 
     Parameters
     ----------
-    image : LinearPixels
-        The image.
-    top, left, rows, cols : int
-        The piece, which lies within the image [px].
-
-    Returns
-    -------
-    (rows, cols) float32
-        Linear grey levels.
-    """
-    piece = np.empty((rows, cols), np.float32)
-    for row in range(rows):
-        for col in range(cols):
-            piece[row, col] = pixel_luminance(image, top + row, left + col)
-    return piece
-
-
-@kernel
-def shrunk(piece: Floats, factor: int) -> Floats:
-    """Means over squares of pixels; what is left over at the right and below is dropped.
-
-    Parameters
-    ----------
-    piece : (rows, cols) float32
-        Part of a picture.
+    image : (all rows, all cols, channels) uint8, uint16 or float32
+        The picture.
+    top, left : int
+        First row and column of the piece [px].
+    rows, cols : int
+        Size of the piece, in squares.
     factor : int
         Side of the squares [px].
 
     Returns
     -------
-    (rows // factor, cols // factor) float32
+    (channels, rows, cols) float32
         Their means.
     """
-    rows, cols = piece.shape[0] // factor, piece.shape[1] // factor
-    means = np.empty((rows, cols), np.float32)
+    piece = np.empty((image.shape[2], rows, cols), np.float32)
+    share = np.float32(1.0 / (factor * factor))
     for row in range(rows):
         for col in range(cols):
-            total = np.float32(0.0)
-            for i in range(row * factor, (row + 1) * factor):
-                for j in range(col * factor, (col + 1) * factor):
-                    total += piece[i, j]
-            means[row, col] = total / np.float32(factor * factor)
-    return means
+            for channel in range(image.shape[2]):
+                total = np.float32(0.0)
+                for i in range(top + row * factor, top + (row + 1) * factor):
+                    for j in range(left + col * factor, left + (col + 1) * factor):
+                        total += np.float32(image[i, j, channel])
+                piece[channel, row, col] = total * share
+    return piece
+
+
+@kernel
+def clearest_gradients(piece: Floats, share: float, least: float) -> tuple[Floats, Floats, Floats]:
+    """Gradient of whichever channel shows it clearest above its own noise.
+
+    Parameters
+    ----------
+    piece : (channels, rows, cols) float32
+        Part of a picture, at least 5 × 5.
+    share : float
+        Share of pixels that are taken for even, whose gradient is noise alone [-].
+    least : float
+        Least standard deviation of a component of the gradient by noise, for pictures without [1/px].
+
+    Returns
+    -------
+    tuple of (rows, cols) float32
+        Gradient along columns and rows and its length, over the standard deviation of a component by noise [-].
+    """
+    along, down, length = gradients(piece[0])
+    _scale(along, down, length, 1.0 / gradient_noise(length, share, least))
+    for channel in range(1, piece.shape[0]):
+        x, y, both = gradients(piece[channel])
+        _scale(x, y, both, 1.0 / gradient_noise(both, share, least))
+        for row in range(length.shape[0]):
+            for col in range(length.shape[1]):
+                if both[row, col] > length[row, col]:
+                    along[row, col], down[row, col] = x[row, col], y[row, col]
+                    length[row, col] = both[row, col]
+    return along, down, length
+
+
+@kernel
+def _scale(along: Floats, down: Floats, length: Floats, by: float) -> None:
+    for row in range(length.shape[0]):
+        for col in range(length.shape[1]):
+            along[row, col] *= by
+            down[row, col] *= by
+            length[row, col] *= by
 
 
 @kernel
@@ -126,24 +145,20 @@ def gradient_noise(length: Floats, share: float, least: float) -> float:
 
 
 @kernel
-def edge_points(
-    along: Floats, down: Floats, length: Floats, noise: float, least: float
-) -> tuple[Floats, NDArray[np.int32]]:
+def edge_points(along: Floats, down: Floats, length: Floats, least: float) -> tuple[Floats, NDArray[np.int32]]:
     """Ridges of the gradient, each placed between pixels by a parabola across it.
 
     Parameters
     ----------
     along, down, length : (rows, cols) float32
-        See `gradients`.
-    noise : float
-        See `gradient_noise` [1/px].
+        See `clearest_gradients`.
     least : float
-        Least length of the gradient over its noise [-].
+        Least length of the gradient [-].
 
     Returns
     -------
     points : (n, 5) float32
-        See `X`; by rows and, within a row, by columns of the pixel that they come from.
+        See `X`; by the row of the pixel that they come from, and within a row by its column.
     number : (rows, cols) int32
         Number of the point that comes from each pixel, or −1.
     """
@@ -154,7 +169,7 @@ def edge_points(
     for row in range(3, rows - 3):
         for col in range(3, cols - 3):
             here = length[row, col]
-            if here < least * noise:
+            if here < least:
                 continue
             gx, gy = along[row, col], down[row, col]
             nx, ny = gx / here, gy / here
@@ -164,7 +179,7 @@ def edge_points(
             bend = before - 2.0 * here + after
             shift = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
             points[found, X], points[found, Y] = col + shift * nx, row + shift * ny
-            points[found, NX], points[found, NY], points[found, SNR] = nx, ny, here / noise
+            points[found, NX], points[found, NY], points[found, SNR] = nx, ny, here
             number[row, col] = found
             found += 1
     return points[:found].copy(), number

@@ -19,8 +19,11 @@ _ALIGNED = 0.88
 _MOST_CHANGES = 2
 """Changes between dark and bright surroundings along an outline that cost nothing: sky above, trees below."""
 
-_HOPELESS, _ALIKE = 0.35, 0.05
-"""Share below which an outline is not fitted, and difference of shares of outlines that are seen alike [-]."""
+_HOPELESS, _GAIN = 0.35, 0.3
+"""Share below which an outline is not fitted, and the most that fitting is thought to add to a share [-]."""
+
+_ALIKE = 0.05
+"""Difference of shares of outlines that are seen alike [-]."""
 
 _ENOUGH = 6
 """Places seen from which on the outline is fitted."""
@@ -42,11 +45,11 @@ def support(points: Floats, number: NDArray[np.int32], outline: Floats, x: float
     Returns
     -------
     (4,) float32
-        Share of the places that have a fitting edge [-], and how much farther right, down and larger the outline fits
-        them best [px].
+        Share of the places that have a fitting edge, less where it fits worse [-], and how much farther right, down and
+        larger the outline fits them best [px].
     """
     tolerance = min(max(0.13 * radius, 0.8), 1.5)
-    seen, changes, last = 0, 0, 0.0
+    seen, near, changes, last = 0, 0.0, 0, 0.0
     a = np.zeros((3, 3))
     b = np.zeros(3)
     for k in range(outline.shape[0]):
@@ -55,6 +58,7 @@ def support(points: Floats, number: NDArray[np.int32], outline: Floats, x: float
         if abs(off) > tolerance:
             continue
         seen += 1
+        near += 1.0 - (off / tolerance) ** 2
         if last * polarity < 0.0:
             changes += 1
         last = polarity
@@ -64,7 +68,7 @@ def support(points: Floats, number: NDArray[np.int32], outline: Floats, x: float
             for j in range(3):
                 a[i, j] += gains[i] * gains[j]
     result = np.zeros(4, np.float32)
-    result[0] = (seen - max(changes - _MOST_CHANGES, 0)) / outline.shape[0]
+    result[0] = (near - max(changes - _MOST_CHANGES, 0)) / outline.shape[0]
     if seen >= _ENOUGH:
         _solve(a, b, result)
     return result
@@ -134,7 +138,7 @@ def fitted(points: Floats, number: NDArray[np.int32], outlines: Floats, candidat
         for k in range(radii.size):
             x, y, radius = float(candidate[0]), float(candidate[1]), float(radii[k])
             found = support(points, number, outlines[shape], x, y, radius)
-            if found[0] < _HOPELESS:
+            if found[0] < max(_HOPELESS, best[3] - _GAIN):
                 continue
             for _ in range(2):
                 x, y, radius = x + found[1], y + found[2], radius + found[3]
@@ -145,3 +149,24 @@ def fitted(points: Floats, number: NDArray[np.int32], outlines: Floats, candidat
             if within and (larger or (found[0] > best[3] and radius > best[2] / 1.08) or found[0] > best[3] + _ALIKE):
                 best[0], best[1], best[2], best[3], best[4] = x, y, radius, found[0], shape
     return best
+
+
+@kernel
+def edge_density(number: NDArray[np.int32], x: float, y: float, reach: float) -> float:
+    """Edge points over pixels in a square about a place [-].
+
+    Parameters
+    ----------
+    number : (rows, cols) int32
+        See `fogsim.vision.symmetry.edge_kernels.edge_points`.
+    x, y : float
+        Its middle [px].
+    reach : float
+        Half of its side [px].
+    """
+    count = area = 0
+    for row in range(max(int(y - reach), 0), min(int(y + reach) + 1, number.shape[0])):
+        for col in range(max(int(x - reach), 0), min(int(x + reach) + 1, number.shape[1])):
+            area += 1
+            count += number[row, col] >= 0
+    return count / max(area, 1)

@@ -9,9 +9,13 @@ from fogsim.jit import kernel
 from fogsim.vision.symmetry.edge_kernels import NX, NY, SNR, X, Y
 
 Floats = NDArray[np.float32]
+Numbers = NDArray[np.int32]
 
 OPPOSITE = -0.9
 """Largest cosine between two gradients that are opposite: within 26° [-]."""
+
+_FACING = 0.4
+"""Least product of the cosines between two gradients and the line through their points [-]."""
 
 _SIDES = ((0.0, 1.0), (math.sqrt(0.75), -0.5), (-math.sqrt(0.75), -0.5))
 """Outward normals of an upright triangle with its tip up, row downward."""
@@ -21,83 +25,58 @@ _ALIGNED = 0.97
 
 
 @kernel
-def pair_votes(points: Floats, rows: int, cols: int, nearest: float, farthest: float) -> Floats:
+def pair_votes(points: Floats, number: Numbers, nearest: float, farthest: float) -> Floats:
     """Accumulate the middles of pairs of points with opposite gradients along the line between them.
 
     Parameters
     ----------
-    points : (n, 5) float32
-        Edge points by rows, see `fogsim.vision.symmetry.edge_kernels.edge_points`.
-    rows, cols : int
-        Size of the picture's piece [px].
+    points, number
+        See `fogsim.vision.symmetry.edge_kernels.edge_points`.
     nearest, farthest : float
         Distances between the two points of a pair [px].
 
     Returns
     -------
     (rows, cols) float32
-        Votes: one that counts fully comes from two points that face each other squarely, and weighs as the weaker of
-        their gradients does on a logarithmic scale.
+        Votes, one place a pixel: one that counts fully comes from two points that face each other squarely, and weighs
+        as the weaker of their gradients does on a logarithmic scale.
     """
-    votes = np.zeros((rows, cols), np.float32)
-    n = points.shape[0]
-    weight = np.log1p(points[:, SNR])
+    rows = number.shape[0]
+    votes = np.zeros(number.shape, np.float32)
     starts = np.zeros(rows + 1, np.int64)
-    for i in range(n):
-        starts[int(points[i, Y] + 0.5) + 1] += 1
     for row in range(rows):
-        starts[row + 1] += starts[row]
-    # Points are sorted by the pixel that they come from; that of the place may be the next one.
-    order = np.empty(n, np.int64)
-    filled = starts[:-1].copy()
-    for i in range(n):
-        row = int(points[i, Y] + 0.5)
-        order[filled[row]] = i
-        filled[row] += 1
-    reach = int(farthest) + 1
+        starts[row + 1] = starts[row] + (number[row] >= 0).sum()
+    x, y, nx, ny = points[:, X].copy(), points[:, Y].copy(), points[:, NX].copy(), points[:, NY].copy()
+    weight = np.log1p(points[:, SNR])
+    least, most = nearest * nearest, farthest * farthest
     for row in range(rows):
-        for other in range(row, min(row + reach, rows)):
+        for other in range(row, min(row + int(farthest) + 2, rows)):
             first = starts[other]
-            for a in range(starts[row], starts[row + 1]):
-                i = order[a]
-                x = points[i, X]
-                while first < starts[other + 1] and points[order[first], X] < x - farthest - 2.0:
+            for i in range(starts[row], starts[row + 1]):
+                while first < starts[other + 1] and x[first] < x[i] - farthest - 1.0:
                     first += 1
-                for b in range(max(first, a + 1), starts[other + 1]):
-                    j = order[b]
-                    if points[j, X] > x + farthest + 2.0:
+                for j in range(max(first, i + 1), starts[other + 1]):
+                    dx, dy = x[j] - x[i], y[j] - y[i]
+                    if dx > farthest + 1.0:
                         break
-                    _vote(points, weight, i, j, nearest, farthest, votes)
+                    square, opposed = dx * dx + dy * dy, nx[i] * nx[j] + ny[i] * ny[j]
+                    if opposed > OPPOSITE or square < least or square > most:
+                        continue
+                    facing = -(dx * nx[i] + dy * ny[i]) * (dx * nx[j] + dy * ny[j]) / square
+                    if facing > _FACING:
+                        value = -opposed * facing * min(weight[i], weight[j])
+                        _add(votes, 0.5 * (x[i] + x[j]), 0.5 * (y[i] + y[j]), value)
     return votes
 
 
 @kernel
-def _vote(points: Floats, weight: Floats, i: int, j: int, nearest: float, farthest: float, votes: Floats) -> None:
-    opposed = points[i, NX] * points[j, NX] + points[i, NY] * points[j, NY]
-    if opposed > OPPOSITE:
-        return
-    dx, dy = points[j, X] - points[i, X], points[j, Y] - points[i, Y]
-    distance = math.sqrt(dx * dx + dy * dy)
-    if distance < nearest or distance > farthest:
-        return
-    one = (dx * points[i, NX] + dy * points[i, NY]) / distance
-    other = -(dx * points[j, NX] + dy * points[j, NY]) / distance
-    if one * other < 0.4:
-        return
-    value = -opposed * one * other * min(weight[i], weight[j])
-    _add(votes, 0.5 * (points[i, X] + points[j, X]), 0.5 * (points[i, Y] + points[j, Y]), value)
-
-
-@kernel
-def triangle_votes(points: Floats, rows: int, cols: int, radius: float, direction: float) -> Floats:
+def triangle_votes(points: Floats, number: Numbers, radius: float, direction: float) -> Floats:
     """Accumulate the middles of the upright triangles of which two points lie on two sides.
 
     Parameters
     ----------
-    points : (n, 5) float32
-        Edge points.
-    rows, cols : int
-        Size of the picture's piece [px].
+    points, number
+        See `fogsim.vision.symmetry.edge_kernels.edge_points`.
     radius : float
         Half of the triangles' width [px].
     direction : float
@@ -108,7 +87,7 @@ def triangle_votes(points: Floats, rows: int, cols: int, radius: float, directio
     (rows, cols) float32
         Votes for the middle between tip and base; see `pair_votes` for their weight.
     """
-    votes = np.zeros((rows, cols), np.float32)
+    votes = np.zeros(number.shape, np.float32)
     n = points.shape[0]
     side, polarity = np.full(n, -1, np.int64), np.zeros(n)
     for i in range(n):

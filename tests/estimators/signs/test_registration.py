@@ -32,7 +32,7 @@ def test_each_detection_is_one_signs_and_the_whole_is_likeliest() -> None:
 def test_nothing_is_paired_beyond_the_gate() -> None:
     one = sign("one", 48.0)
     assert register_signs([one], [at(one, off_u=3.1 * one.deviation_u)]) == ()
-    assert register_signs([one], [at(one, size=1.5)]) == ()
+    assert register_signs([one], [at(one, size=1.7)]) == ()
     assert register_signs([], [at(one)]) == register_signs([one], []) == ()
 
 

@@ -272,6 +272,7 @@ class EgoEquipment:
             speed=float(state.speed[ego]),
             lead=self._sensors.lead(snapshot, faults, streams),
             signs=self._sensors.signs(snapshot, network[1], faults, streams),
+            camera_setback=self._setback,
         )
         estimates = self._estimate(frame, observation, time)
         return Step(

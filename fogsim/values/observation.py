@@ -1,11 +1,21 @@
 """What a vehicle knows: the only thing that estimators and agents are given."""
 
+import math
+import zlib
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.errors import InputError
+from fogsim.values.camera import Camera
 from fogsim.values.image import Frame
+
+SIGN_MAP_REACH, SIGN_MAP_SIZE = 255.0, 2.0
+"""Distance at which a sign's distance is 1 in the picture of the map, and size at which its size is 255 [m]."""
+
+FROM_ABOVE = (64, 64)
+"""Rows and columns of the map from above: 4 m and 1 m each, the vehicle below the middle of the last row."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,12 +82,15 @@ class Observation:
         The tracked vehicle ahead, if the sensor has one.
     signs : tuple of SignSighting
         Signs ahead by the map, nearest first.
+    camera_setback : float
+        Distance of the camera behind the front bumper, from which distances count [m].
     """
 
     frame: Frame | NDArray[np.uint8] | NDArray[np.uint16]
     speed: float = 0.0
     lead: LeadMeasurement | None = None
     signs: tuple[SignSighting, ...] = ()
+    camera_setback: float = 0.0
 
     @property
     def image(self) -> NDArray[np.uint8] | NDArray[np.uint16]:
@@ -88,3 +101,69 @@ class Observation:
     def time(self) -> float:
         """Instant of the exposure [s]; 0 for a bare array."""
         return self.frame.time if isinstance(self.frame, Frame) else 0.0
+
+    @property
+    def sign_map(self) -> NDArray[np.uint8]:
+        """(rows, cols, 3) uint8: the signs of the map where the told camera and the believed pose put them.
+
+        Channels: kind (`sign_kind_code`); distance, 255 at the bumper and 1 at 254 m or more; size, 255 for a face of
+        2 m or more; all 0 where there is no sign. What hides a sign in the world is unknown to it. It is drawn whenever
+        it is asked for.
+
+        Raises
+        ------
+        InputError
+            If the frame is a bare array, of which no camera is known.
+        """
+        if not isinstance(self.frame, Frame):
+            raise InputError("sign_map: expected a fogsim.Frame, whose camera says where signs are; got a bare array")
+        camera = self.frame.camera
+        picture = np.zeros((camera.height, camera.width, 3), np.uint8)
+        # Nearer signs hide farther ones.
+        for sign in sorted(self.signs, key=lambda one: -one.distance):
+            _paint_sign(picture, sign, camera, self.camera_setback)
+        return picture
+
+    @property
+    def sign_map_from_above(self) -> NDArray[np.uint8]:
+        """`FROM_ABOVE` uint8: kinds of the signs ahead by the map (`sign_kind_code`), 0 where there is none."""
+        rows, columns = FROM_ABOVE
+        picture = np.zeros(FROM_ABOVE, np.uint8)
+        for sign in sorted(self.signs, key=lambda one: -one.distance):
+            row, column = rows - 1 - math.floor(sign.distance / 4.0), columns // 2 - math.floor(sign.lateral) - 1
+            if 0 <= row < rows and 0 <= column < columns:
+                picture[row, column] = sign_kind_code(sign.kind)
+        return picture
+
+
+def sign_kind_code(kind: str) -> int:
+    """Number of a kind of sign in pictures of the map, 1 … 255: the same for the same kind, always.
+
+    Parameters
+    ----------
+    kind : str
+        Sign code.
+    """
+    return 1 + zlib.crc32(f"sign kind {kind}".encode()) % 255
+
+
+def _paint_sign(picture: NDArray[np.uint8], sign: SignSighting, camera: Camera, setback: float) -> None:
+    """Paint the face of a sign into the map's picture, as an ellipse; nothing if it is behind the camera."""
+    ahead, up = sign.distance + setback, sign.height - camera.mount_height
+    depth = ahead * math.cos(camera.pitch) - up * math.sin(camera.pitch)
+    if depth <= 0.0:
+        return
+    scale = camera.focal_length / depth
+    x, y = -scale * sign.lateral, -scale * (ahead * math.sin(camera.pitch) + up * math.cos(camera.pitch))
+    cosine, sine = math.cos(camera.roll), math.sin(camera.roll)
+    u, v = camera.principal_point[0] + x * cosine - y * sine, camera.principal_point[1] + x * sine + y * cosine
+    tall = max(0.5 * scale * sign.diameter, 0.5)
+    wide = max(tall * abs(math.cos(sign.facing)), 0.5)
+    left, right = max(math.ceil(u - wide), 0), min(math.floor(u + wide) + 1, camera.width)
+    top, bottom = max(math.ceil(v - tall), 0), min(math.floor(v + tall) + 1, camera.height)
+    if left >= right or top >= bottom:
+        return
+    inside = ((np.arange(left, right) - u) / wide) ** 2 + ((np.arange(top, bottom)[:, None] - v) / tall) ** 2 <= 1.0
+    near = max(round(SIGN_MAP_REACH - sign.distance), 1)
+    size = min(round(255.0 * sign.diameter / SIGN_MAP_SIZE), 255)
+    picture[top:bottom, left:right][inside] = (sign_kind_code(sign.kind), min(near, 255), size)

@@ -13,10 +13,10 @@ from gymnasium.utils.env_checker import check_env
 import fogsim_envs
 from fogsim.errors import InputError
 from fogsim.scenario import load_scenario
-from fogsim.values import Collision, Command, Ending, Leader, Step
+from fogsim.values import Collision, Command, Ending, Leader, SignSighting, Step
 from fogsim_envs.task import FogAdvisoryV1Env, FogDistribution, ScenarioDistribution, TaskWeights
 from fogsim_envs.task.episodes import fog_setting
-from fogsim_envs.task.observation import STATE_FEATURES, scaled_visibility, task_state
+from fogsim_envs.task.observation import STATE_FEATURES, scaled_visibility, task_observation, task_space, task_state
 from fogsim_envs.task.rewards import Way, fault, task_terms
 from fogsim_envs.task.sampling import MOTORWAY, EpisodeChoice, EpisodeSource
 from fogsim_envs.task.surrogate import EstimatorSurrogate, SurrogateTable
@@ -199,6 +199,19 @@ def test_overdriving_and_conflicts_by_hand(step: Step) -> None:
     assert terms["conflict"] == pytest.approx(-2.0 * 0.5 * (1.0 - (30.0 / 15.0) / 3.0))
     # The rear fog lamp is rightly dark at 50 m or more, the front fog lamps are not lit though they should be.
     assert terms["front_fog_lamp"] < 0.0
+
+
+def test_the_map_rides_along_as_a_channel_or_an_entry(step: Step) -> None:
+    sign = SignSighting("a", "stop", 0.0, 30.0, -3.0, 0.9)
+    seen = dataclasses.replace(step, observation=dataclasses.replace(step.observation, signs=(sign,)))
+    camera = step.truth.camera
+    channel = task_observation(seen, "camera+sign_map", Command(), 100.0, 500.0)
+    assert task_space("camera+sign_map", camera).contains(channel)
+    np.testing.assert_array_equal(channel[:, :, :3], step.observation.image)
+    assert set(np.unique(channel[:, :, 3])) == {0, 225}
+    whole = task_observation(seen, "dict+sign_map", Command(), 100.0, 500.0)
+    assert task_space("dict+sign_map", camera).contains(whole)
+    np.testing.assert_array_equal(whole["sign_map"][:, :, 1], channel[:, :, 3])
 
 
 def test_state_says_nothing_of_the_truth(step: Step) -> None:

@@ -39,7 +39,9 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
     | lamps | 0 low beam, 1 and front fog, 2 and rear fog | thirds of −1 … 1 |
 
     ### Observation
-    With ``observation="dict"`` what the vehicle itself has; with "state" or "camera" that entry alone
+    With ``observation="dict"`` what the vehicle itself has; with "state" or "camera" that entry alone.
+    "dict+sign_map" has the map's picture too, ``sign_map`` (`fogsim.Observation.sign_map`, uint8 (rows, cols, 3));
+    "camera+sign_map" is the frame with a fourth channel: how near the signs of the map are
 
     | key | space | meaning |
     |---|---|---|
@@ -77,7 +79,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         a scenario is that scenario alone
     fog_distribution : `FogDistribution`; None with a scenario is that scenario's own fog
     split : "train" or "test"
-    observation : "dict", "state" or "camera"
+    observation : "dict", "state", "camera", "camera+sign_map" or "dict+sign_map"
     overrides : ``key.path=value`` each, as after ``fogsim run --set``
     image_size : (width, height) of the camera; None keeps the scenario's
     continuous : which action space

@@ -12,8 +12,8 @@ from fogsim.errors import UnknownNameError
 from fogsim.values import Camera, Command, Lamp, Step
 from fogsim_envs.spaces import SIGN_FEATURES, SIGN_SLOTS, observation_space, observed_signs
 
-OBSERVATIONS = ("dict", "state", "camera")
-"""What can be asked for: all of it, the numbers alone, or the picture alone."""
+OBSERVATIONS = ("dict", "state", "camera", "camera+sign_map", "dict+sign_map")
+"""What can be asked for: all of it, the numbers alone, or the picture alone; these with the picture of the sign map."""
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 """Quantiles of the believed visibility that an agent is told."""
@@ -73,7 +73,15 @@ def task_space(mode: str, camera: Camera | None) -> spaces.Space[Any]:
     known = observation_space(camera)
     # Flat, as libraries expect of what is no picture.
     signs = spaces.Box(-1.0, 1.0, (SIGN_SLOTS * len(SIGN_FEATURES),), np.float32)
-    return known["camera"] if mode == "camera" else spaces.Dict({**known.spaces, "signs": signs, "state": state})
+    shape, depth = (camera.height, camera.width), np.uint8 if camera.bits == 8 else np.uint16
+    return {
+        "camera": known["camera"],
+        "camera+sign_map": spaces.Box(0, 2**camera.bits - 1, (*shape, 4), depth),
+        "dict": spaces.Dict({**known.spaces, "signs": signs, "state": state}),
+        "dict+sign_map": spaces.Dict(
+            {**known.spaces, "sign_map": spaces.Box(0, 255, (*shape, 3), np.uint8), "signs": signs, "state": state}
+        ),
+    }[mode]
 
 
 def task_observation(step: Step, mode: str, own: Command, duration: float, way_end: float) -> Any:
@@ -94,11 +102,15 @@ def task_observation(step: Step, mode: str, own: Command, duration: float, way_e
     """
     if mode == "camera":
         return step.observation.image.copy()
+    if mode == "camera+sign_map":
+        nearness = step.observation.sign_map[:, :, 1:2]
+        return np.concatenate([step.observation.image, nearness], axis=2, dtype=step.observation.image.dtype)
     state = task_state(step, own, duration - step.time, way_end - step.route_position)
     if mode == "state":
         return state
     signs, mask = observed_signs(step)
-    return {"camera": step.observation.image.copy(), "signs": signs.ravel(), "signs_mask": mask, "state": state}
+    whole = {"camera": step.observation.image.copy(), "signs": signs.ravel(), "signs_mask": mask, "state": state}
+    return {**whole, "sign_map": step.observation.sign_map} if mode == "dict+sign_map" else whole
 
 
 def task_state(step: Step, own: Command, time_left: float, to_go: float) -> NDArray[np.float32]:

@@ -38,11 +38,12 @@ def test_roll_turns_it_and_a_turned_sign_is_narrow() -> None:
 
 
 def test_nearer_signs_hide_farther_ones_and_far_ones_are_a_pixel() -> None:
-    behind = dataclasses.replace(SIGN, sign_id="b", kind="stop", distance=250.0, lateral=-4.0 * 252.0 / 40.0, height=7.7)
+    in_line = {"distance": 250.0, "lateral": -4.0 * 252.0 / 40.0, "height": 7.7}
+    behind = dataclasses.replace(SIGN, sign_id="b", kind="stop", **in_line)
     picture = seen(behind, SIGN).sign_map
     assert set(np.unique(picture[:, :, 1])) == {0, 255 - 38}
     alone = seen(behind).sign_map
-    assert (1 <= np.count_nonzero(alone[:, :, 0])) and alone.max() > 0
+    assert 1 <= np.count_nonzero(alone[:, :, 0]) <= 12
 
 
 @pytest.mark.parametrize("sign", [dataclasses.replace(SIGN, distance=-5.0), dataclasses.replace(SIGN, lateral=-900.0)])

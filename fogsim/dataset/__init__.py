@@ -1,7 +1,7 @@
 """Camera frames with their ground truth: from a step in Python, or as a data set on disk."""
 
 from fogsim.dataset.encoding import decoded_depth, decoded_transmission, encoded_depth, encoded_transmission, read_png
-from fogsim.dataset.ground_truth import SemanticClass, depth, instance_mask, semantic_mask, transmission
+from fogsim.dataset.ground_truth import SemanticClass, depth, instance_mask, semantic_mask, sign_picture, transmission
 from fogsim.dataset.write import WrittenDataset, write_dataset
 
 __all__ = [
@@ -15,6 +15,7 @@ __all__ = [
     "instance_mask",
     "read_png",
     "semantic_mask",
+    "sign_picture",
     "transmission",
     "write_dataset",
 ]

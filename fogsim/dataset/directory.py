@@ -16,7 +16,7 @@ from fogsim.files.writer_lock import LOCK_NAME, WriterLock
 
 IDENTITY = "dataset.json"
 ANNOTATIONS = "annotations.json"
-LAYERS = ("frames", "depth", "instance", "semantic", "transmission")
+LAYERS = ("frames", "depth", "instance", "semantic", "transmission", "sign_map", "signs")
 """Folders of the images."""
 
 _RECORDS = "records"

@@ -1,5 +1,6 @@
 """What is truly seen in a step's frame: how much light comes through the air, and what each pixel belongs to."""
 
+import math
 from enum import IntEnum
 
 import numpy as np
@@ -9,6 +10,7 @@ from fogsim.atmosphere import Air
 from fogsim.errors import InputError
 from fogsim.linear_algebra import matrix_product
 from fogsim.values import Step, Truth, View
+from fogsim.values.observation import sign_map_values
 from fogsim.values.pinhole import ray_from_pixel
 from fogsim.values.scene import Instance
 
@@ -142,6 +144,34 @@ def instance_mask(step: Step) -> NDArray[np.uint16]:
         sign = _sign_of(_places(step.view, step.truth, rows, cols), step.truth)
         mask[rows, cols] = np.where(sign >= 0, sign + 1 + vehicles, 0)
     return mask
+
+
+def sign_picture(step: Step, instance: NDArray[np.uint16]) -> NDArray[np.uint8]:
+    """The signs whose faces are in the frame and turned to it, coded as those of the map are in `Observation.sign_map`.
+
+    Parameters
+    ----------
+    step : Step
+        Of `fogsim.run` and its kin.
+    instance : (rows, cols) uint16
+        From `instance_mask`.
+
+    Returns
+    -------
+    (rows, cols, 3) uint8
+        Kind, distance and size; 0 where no sign is seen, whatever the fog leaves of it.
+    """
+    picture = np.zeros((*instance.shape, 3), np.uint8)
+    first = 1 + len(step.traffic.ids)
+    (x, y, _), heading = step.traffic.position[step.ego], float(step.traffic.heading[step.ego])
+    signs = () if step.truth.signs is None else step.truth.signs.signs
+    for number in np.unique(instance[instance >= first]).tolist():
+        sign = signs[number - first]
+        if math.cos(sign.heading - heading) <= 0.0:
+            continue
+        ahead = (sign.position[0] - x) * math.cos(heading) + (sign.position[1] - y) * math.sin(heading)
+        picture[instance == number] = sign_map_values(sign.kind, ahead, sign.diameter)
+    return picture
 
 
 def _places(view: View, truth: Truth, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from fogsim.dataset.annotations import coco, frame_record, object_records
 from fogsim.dataset.directory import DatasetDirectory
 from fogsim.dataset.encoding import DEPTH_UNIT, TRANSMISSION_UNIT, encoded_depth, encoded_transmission
-from fogsim.dataset.ground_truth import SemanticClass, depth, instance_mask, semantic_mask, transmission
+from fogsim.dataset.ground_truth import SemanticClass, depth, instance_mask, semantic_mask, sign_picture, transmission
 from fogsim.dataset.inputs import identity
 from fogsim.errors import InputError
 from fogsim.interruption import Interruption
@@ -160,6 +160,8 @@ def _write_frame(directory: DatasetDirectory, number: int, step: Step, run_numbe
         "instance": instance,
         "semantic": semantic_mask(step),
         "transmission": encoded_transmission(through),
+        "sign_map": step.observation.sign_map,
+        "signs": sign_picture(step, instance),
     }
     about = {"width": image.shape[1], "height": image.shape[0], "run": run_number, "seed": seed + run_number}
     objects = object_records(step, instance, through)

@@ -147,6 +147,22 @@ def sign_kind_code(kind: str) -> int:
     return 1 + zlib.crc32(f"sign kind {kind}".encode()) % 255
 
 
+def sign_map_values(kind: str, distance: float, diameter: float) -> tuple[int, int, int]:
+    """Values of the channels of a sign's pixels in pictures of the map; see `Observation.sign_map`.
+
+    Parameters
+    ----------
+    kind : str
+        Sign code.
+    distance : float
+        Distance ahead of the front bumper [m].
+    diameter : float
+        Size of its face [m].
+    """
+    nearness = min(max(round(SIGN_MAP_REACH - distance), 1), 255)
+    return sign_kind_code(kind), nearness, min(round(255.0 * diameter / SIGN_MAP_SIZE), 255)
+
+
 def _paint_sign(picture: NDArray[np.uint8], sign: SignSighting, camera: Camera, setback: float) -> None:
     """Paint the face of a sign into the map's picture, as an ellipse; nothing if it is behind the camera."""
     ahead, up = sign.distance + setback, sign.height - camera.mount_height
@@ -164,6 +180,4 @@ def _paint_sign(picture: NDArray[np.uint8], sign: SignSighting, camera: Camera, 
     if left >= right or top >= bottom:
         return
     inside = ((np.arange(left, right) - u) / wide) ** 2 + ((np.arange(top, bottom)[:, None] - v) / tall) ** 2 <= 1.0
-    near = max(round(SIGN_MAP_REACH - sign.distance), 1)
-    size = min(round(255.0 * sign.diameter / SIGN_MAP_SIZE), 255)
-    picture[top:bottom, left:right][inside] = (sign_kind_code(sign.kind), min(near, 255), size)
+    picture[top:bottom, left:right][inside] = sign_map_values(sign.kind, sign.distance, sign.diameter)

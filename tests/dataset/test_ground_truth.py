@@ -20,12 +20,14 @@ from fogsim.dataset import (
     instance_mask,
     read_png,
     semantic_mask,
+    sign_picture,
     transmission,
 )
 from fogsim.dataset.annotations import object_records
 from fogsim.dataset.encoding import png
 from fogsim.errors import InputError
 from fogsim.values import Camera, CameraPose, FogField, Sign, SignMap, Step, Truth, View
+from fogsim.values.observation import sign_map_values
 from fogsim.values.pinhole import ray_from_pixel
 from fogsim.values.scene import Instance
 from tests.recorders.synthetic import make_step
@@ -129,6 +131,10 @@ def test_each_sign_s_face_is_an_object_and_its_post_is_none() -> None:
     assert [r["instance"] for r in records] == [3, 4]  # after the two vehicles
     assert {r["category_id"] for r in records} == {SemanticClass.SIGN}
     assert (semantic_mask(step) == SemanticClass.SIGN).sum() == 4
+    picture = sign_picture(step, objects)
+    np.testing.assert_array_equal(picture[:, :, 0] > 0, objects == 3)
+    ahead = 20.0 - float(step.traffic.position[step.ego, 0])
+    assert picture[objects == 3][0].tolist() == list(sign_map_values(signs[0].kind, ahead, signs[0].diameter))
 
 
 def test_traffic_lights_and_persons_have_classes_and_are_no_vehicles() -> None:

@@ -46,7 +46,7 @@ def test_every_file_is_there_and_of_one_size(whole: Path) -> None:
     expected = {f"{layer}/{n:06d}.png" for layer in LAYERS for n in range(FRAMES)}
     expected |= {f"records/{n:06d}.json" for n in range(FRAMES)} | {"annotations.json", "dataset.json"}
     assert names == expected
-    types = dict.fromkeys(LAYERS, "uint16") | {"frames": "uint8", "semantic": "uint8"}
+    types = dict.fromkeys(LAYERS, "uint16") | dict.fromkeys(("frames", "semantic", "sign_map", "signs"), "uint8")
     for layer in LAYERS:
         image = read_png(whole / layer / "000004.png")
         assert (image.shape[:2], str(image.dtype)) == ((72, 96), types[layer])

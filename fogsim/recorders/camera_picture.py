@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
+from fogsim.recorders.sign_marks import draw_signs, sign_looks
 from fogsim.recorders.style import AMBER, BELIEF, GROUND, Colour, font
 from fogsim.values import Estimate, Frame, Observation, Step
 from fogsim.values.camera_response import eight_bit
@@ -20,7 +21,7 @@ _ROWS: dict[str, tuple[str, Colour]] = {
 
 
 def draw_camera_picture(step: Step) -> Image.Image:
-    """Draw the camera's image into 640 × 480 pixels, its aspect kept, with marks at the rows that were found.
+    """Draw the camera's image into 640 × 480 pixels, its aspect kept, with marks at rows and signs that were found.
 
     Parameters
     ----------
@@ -34,6 +35,7 @@ def draw_camera_picture(step: Step) -> Image.Image:
     picture.paste(scaled, (left, top))
     scale = scaled.height / pixels.shape[0]
     draw = ImageDraw.Draw(picture)
+    draw_signs(draw, sign_looks(step), scale, (left, top), scaled.size)
     for key, (label, colour) in _ROWS.items():
         row = _first_row(step.estimates, key)
         if row is not None and 0 <= row <= pixels.shape[0] - 1:

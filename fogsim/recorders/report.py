@@ -12,7 +12,7 @@ from fogsim.files.atomic import write_text
 from fogsim.recorders.camera_picture import scale_image
 from fogsim.recorders.manifest import versions
 from fogsim.recorders.protocol import AnyStep_contra, Derived, RunInformation
-from fogsim.recorders.report_data import Album, Curves, ReportPicture
+from fogsim.recorders.report_data import Album, Curves, ReportPicture, SignBook, SignRow
 from fogsim.recorders.report_figures import draw_figures
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Step
@@ -28,6 +28,9 @@ _UNITS: Mapping[str, str] = {
     "_share": "%",
 }
 """Unit by the end of a key."""
+
+MOST_SIGNS = 60
+"""Signs of which the report tells."""
 
 PAGE_STYLE = """
 :root { color-scheme: light; }
@@ -76,6 +79,8 @@ class ReportContent:
         Caption and PNG of each figure.
     pictures : sequence of ReportPicture
         Camera images.
+    signs : sequence of SignRow
+        Signs of the map that were ahead.
     footer : mapping from str to str
         Seed and versions.
     """
@@ -89,6 +94,7 @@ class ReportContent:
     meanings: Mapping[str, str]
     figures: Sequence[tuple[str, bytes]]
     pictures: Sequence[ReportPicture]
+    signs: Sequence[SignRow]
     footer: Mapping[str, str]
 
 
@@ -112,6 +118,7 @@ def render_report(content: ReportContent) -> str:
             _summary_table(content.metrics, content.meanings),
             _methods_table(content.metrics, content.meanings),
             _figures(content.figures, recorded=content.recorded),
+            _signs_table(content.signs),
             _pictures(content.pictures),
             _footer(content.footer),
             "</body>\n</html>\n",
@@ -165,6 +172,27 @@ def _figures(figures: Sequence[tuple[str, bytes]], *, recorded: bool) -> str:
     if not figures:
         return f"<p>{'Figures are of whole runs; the rows are a table.' if recorded else 'No step was recorded.'}</p>"
     return "<h2>Figures</h2>\n" + "\n".join(_figure(png, caption, caption) for caption, png in figures)
+
+
+def _signs_table(signs: Sequence[SignRow]) -> str:
+    """Show the signs of the map that were ahead, and from where they were first seen."""
+    if not signs:
+        return ""
+    head = "".join(f'<th class="value">{name}</th>' for name in ("on the map from", "first seen at", "nearest"))
+    rows = [
+        f"<tr><td>{escape(sign.sign_id)}</td><td>{escape(sign.kind)}</td>"
+        + "".join(
+            f'<td class="value">{"–" if distance is None else f"{distance:.0f} m"}</td>'
+            for distance in (sign.mapped_at, sign.first_seen, sign.nearest)
+        )
+        + "</tr>"
+        for sign in signs[:MOST_SIGNS]
+    ]
+    table = f"<table><tr><th>sign</th><th>kind</th>{head}</tr>\n" + "\n".join(rows) + "\n</table>"
+    more = f"and {len(signs) - MOST_SIGNS} more; " if len(signs) > MOST_SIGNS else ""
+    seen = sum(sign.first_seen is not None for sign in signs)
+    note = f"{more}{seen} of {len(signs)} were found in a picture, by methods that look for signs."
+    return f'<h2>Signs of the map</h2>\n{table}\n<p class="note">{note}</p>'
 
 
 def _pictures(pictures: Sequence[ReportPicture]) -> str:
@@ -264,6 +292,10 @@ class StepReport(ABC, Generic[AnyStep_contra]):
         """Camera images; none where there is no camera."""
         return ()
 
+    def _signs(self) -> Sequence[SignRow]:
+        """Signs of the map; none where there is no ego."""
+        return ()
+
     def close(self, complete: bool) -> None:
         """Write the report; it says so if the run was cut short.
 
@@ -285,6 +317,7 @@ class StepReport(ABC, Generic[AnyStep_contra]):
             # Figures take longer than somebody waits who has pressed Ctrl-C.
             figures=self._figures() if self._last is not None and complete else [],
             pictures=self._pictures(),
+            signs=self._signs(),
             footer=_footnotes(self._information.seed),
         )
         write_text(self._information.directory.report, render_report(content))
@@ -303,17 +336,21 @@ class ReportRecorder(StepReport[Step]):
     def __init__(self, information: RunInformation) -> None:
         super().__init__(information)
         self._curves = Curves(estimates={method: [] for method in information.methods})
-        self._album = Album()
+        self._album, self._book = Album(), SignBook()
 
     def _remember(self, step: Step, derived: Derived) -> None:
         self._curves.add(step, derived)
         self._album.add(step)
+        self._book.add(step)
 
     def _figures(self) -> Sequence[tuple[str, bytes]]:
         return draw_figures(self._curves)
 
     def _pictures(self) -> Sequence[ReportPicture]:
         return self._album.chosen()
+
+    def _signs(self) -> Sequence[SignRow]:
+        return self._book.rows
 
 
 def _footnotes(seed: int) -> Mapping[str, str]:

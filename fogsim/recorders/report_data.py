@@ -1,13 +1,14 @@
 """What the report remembers of a run: curves over time, and a few pictures spread over it."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.recorders.camera_picture import shown_image
 from fogsim.recorders.protocol import Derived
+from fogsim.recorders.sign_marks import sign_looks
 from fogsim.units import finite_or_none
 from fogsim.values import Step
 
@@ -151,3 +152,54 @@ class Album:
         count = min(MOST_PICTURES, len(pictures))
         places = np.linspace(0, len(pictures) - 1, count).round().astype(int)
         return [pictures[place] for place in places]
+
+
+@dataclass(frozen=True, slots=True)
+class SignRow:
+    """What became of a sign of the map in a run.
+
+    Attributes
+    ----------
+    sign_id, kind : str
+        The sign by the map.
+    mapped_at : float
+        Distance at which the map first had it ahead [m].
+    first_seen : float or None
+        Distance at which it was first detected in a picture [m]; None if it never was.
+    nearest : float
+        Least distance at which it was ahead [m].
+    """
+
+    sign_id: str
+    kind: str
+    mapped_at: float
+    first_seen: float | None
+    nearest: float
+
+
+class SignBook:
+    """Signs of the map that were ahead in a run."""
+
+    def __init__(self) -> None:
+        self._rows: dict[str, SignRow] = {}
+
+    @property
+    def rows(self) -> tuple[SignRow, ...]:
+        """One for each sign, in the order in which they came."""
+        return tuple(self._rows.values())
+
+    def add(self, step: Step) -> None:
+        """Take in one step.
+
+        Parameters
+        ----------
+        step : Step
+            The finished step.
+        """
+        if not step.observation.signs:
+            return
+        seen = {look.sign_id: look.first_seen for look in sign_looks(step)}
+        for sign in step.observation.signs:
+            row = self._rows.get(sign.sign_id) or SignRow(sign.sign_id, sign.kind, sign.distance, None, sign.distance)
+            first = row.first_seen if seen.get(sign.sign_id) is None else seen[sign.sign_id]
+            self._rows[sign.sign_id] = replace(row, first_seen=first, nearest=min(row.nearest, sign.distance))

@@ -3,7 +3,7 @@
 from fogsim.values.belief import Belief
 from fogsim.values.camera import Camera, CameraPose, Response
 from fogsim.values.command import Command, Display, EgoControl, SpeedAdvice, Stretch, StretchAdvice
-from fogsim.values.estimate import Estimate, FogCategory, fog_category
+from fogsim.values.estimate import Estimate, FogCategory, SignLook, fog_category
 from fogsim.values.fault import Fault, RunningFault
 from fogsim.values.fog import FogBank, FogChange, FogField, FogPatches, FogShelter
 from fogsim.values.image import Frame, View
@@ -82,6 +82,7 @@ __all__ = [
     "RunningFault",
     "Scene",
     "Sign",
+    "SignLook",
     "SignMap",
     "SignSighting",
     "SignalAhead",

@@ -39,6 +39,35 @@ def fog_category(visibility: float) -> FogCategory:
 
 
 @dataclass(frozen=True, slots=True)
+class SignLook:
+    """What came of looking for a sign of the map in a picture; ``Estimate.diagnostics["signs"]`` is a tuple of them.
+
+    Attributes
+    ----------
+    sign_id : str
+        Its id in the sign map.
+    u, v : float
+        Column and row of its middle: where it was detected, else where the map has it [px].
+    radius : float
+        Half of its diameter there [px].
+    distance : float
+        Distance by the map [m].
+    detected : bool
+        Whether this picture shows it.
+    first_seen : float or None
+        Distance at which it was first detected [m]; None as long as it was not.
+    """
+
+    sign_id: str
+    u: float
+    v: float
+    radius: float
+    distance: float
+    detected: bool = False
+    first_seen: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Estimate:
     """An estimate of the extinction coefficient, or the statement that there is none.
 

@@ -163,18 +163,42 @@ def sign_map_values(kind: str, distance: float, diameter: float) -> tuple[int, i
     return sign_kind_code(kind), nearness, min(round(255.0 * diameter / SIGN_MAP_SIZE), 255)
 
 
-def _paint_sign(picture: NDArray[np.uint8], sign: SignSighting, camera: Camera, setback: float) -> None:
-    """Paint the face of a sign into the map's picture, as an ellipse; nothing if it is behind the camera."""
+def sign_place(sign: SignSighting, camera: Camera, setback: float) -> tuple[float, float, float, float] | None:
+    """Where a camera has the face of a sign, as an ellipse; None for one behind it.
+
+    Parameters
+    ----------
+    sign : SignSighting
+        What the map says.
+    camera : Camera
+        The told camera.
+    setback : float
+        Its distance behind the front bumper [m].
+
+    Returns
+    -------
+    tuple of float, or None
+        Column and row of its middle, half its width and half its height [px].
+    """
     ahead, up = sign.distance + setback, sign.height - camera.mount_height
     depth = ahead * math.cos(camera.pitch) - up * math.sin(camera.pitch)
     if depth <= 0.0:
-        return
+        return None
     scale = camera.focal_length / depth
     x, y = -scale * sign.lateral, -scale * (ahead * math.sin(camera.pitch) + up * math.cos(camera.pitch))
     cosine, sine = math.cos(camera.roll), math.sin(camera.roll)
     u, v = camera.principal_point[0] + x * cosine - y * sine, camera.principal_point[1] + x * sine + y * cosine
-    tall = max(0.5 * scale * sign.diameter, 0.5)
-    wide = max(tall * abs(math.cos(sign.facing)), 0.5)
+    tall = 0.5 * scale * sign.diameter
+    return u, v, tall * abs(math.cos(sign.facing)), tall
+
+
+def _paint_sign(picture: NDArray[np.uint8], sign: SignSighting, camera: Camera, setback: float) -> None:
+    """Paint the face of a sign into the map's picture, as an ellipse; nothing if it is behind the camera."""
+    place = sign_place(sign, camera, setback)
+    if place is None:
+        return
+    u, v, wide, tall = place
+    wide, tall = max(wide, 0.5), max(tall, 0.5)
     left, right = max(math.ceil(u - wide), 0), min(math.floor(u + wide) + 1, camera.width)
     top, bottom = max(math.ceil(v - tall), 0), min(math.floor(v + tall) + 1, camera.height)
     if left >= right or top >= bottom:

@@ -1,0 +1,99 @@
+"""Marks over a picture at the signs of the map: where it has them, which were found, and from how far."""
+
+from collections.abc import Iterable
+
+from PIL import ImageDraw
+
+from fogsim.recorders.style import ADVICE, GROUND, MUTED, Colour, font
+from fogsim.values import Frame, SignLook, Step
+from fogsim.values.observation import sign_place
+
+LEAST_RADIUS = 4.0
+"""Least radius of a mark [px]."""
+
+MOST = 8
+"""Signs that are marked, the nearest; more would hide the picture."""
+
+
+def sign_looks(step: Step) -> tuple[SignLook, ...]:
+    """What is known of the signs ahead: by the first method that looks for them, else by the map alone.
+
+    Parameters
+    ----------
+    step : Step
+        The finished step.
+    """
+    observation = step.observation
+    looked = next((found for one in step.estimates if (found := looks_of(one.diagnostics.get("signs")))), ())
+    if not isinstance(observation.frame, Frame):
+        return looked
+    known, camera = {look.sign_id for look in looked}, observation.frame.camera
+    places = [(sign, sign_place(sign, camera, observation.camera_setback)) for sign in observation.signs]
+    return looked + tuple(
+        SignLook(sign.sign_id, *place[:2], place[3], sign.distance)
+        for sign, place in places
+        if place is not None and sign.sign_id not in known
+    )
+
+
+def looks_of(diagnostic: object) -> tuple[SignLook, ...]:
+    """Looks for signs in a diagnostic of an estimate; none if it is something else.
+
+    Parameters
+    ----------
+    diagnostic : object
+        ``Estimate.diagnostics["signs"]``.
+    """
+    if not isinstance(diagnostic, tuple):
+        return ()
+    return tuple(look for look in diagnostic if isinstance(look, SignLook))
+
+
+def draw_signs(
+    draw: ImageDraw.ImageDraw, signs: Iterable[SignLook], scale: float, origin: tuple[int, int], size: tuple[int, int]
+) -> None:
+    """Mark signs: a thin circle where the map has one, a bright one with its distances where it was detected.
+
+    Parameters
+    ----------
+    draw : ImageDraw
+        Onto the drawing.
+    signs : iterable of SignLook
+        The signs.
+    scale : float
+        Pixels of the drawing for one of the image [-].
+    origin : tuple of int
+        Column and row of the drawing at which the image begins [px].
+    size : tuple of int
+        Columns and rows of the image in the drawing [px].
+    """
+    for sign in sorted(signs, key=lambda one: one.distance)[:MOST]:
+        u, v, radius = (sign.u + 0.5) * scale, (sign.v + 0.5) * scale, max(sign.radius * scale, LEAST_RADIUS)
+        if -radius < u < size[0] + radius and -radius < v < size[1] + radius:
+            _mark(draw, sign, (u + origin[0], v + origin[1]), radius + 2.0)
+
+
+def _mark(draw: ImageDraw.ImageDraw, sign: SignLook, middle: tuple[float, float], radius: float) -> None:
+    (u, v), colour = middle, ADVICE if sign.detected else MUTED
+    width = 2 if sign.detected else 1
+    _circle(draw, u, v, radius + 1.0, width + 2, GROUND)
+    _circle(draw, u, v, radius, width, colour)
+    place = (u, v - radius - 3)
+    draw.text(place, sign_text(sign), fill=colour, font=font(10), anchor="ms", stroke_width=2, stroke_fill=GROUND)
+
+
+def _circle(draw: ImageDraw.ImageDraw, u: float, v: float, radius: float, width: int, colour: Colour) -> None:
+    draw.ellipse([(u - radius, v - radius), (u + radius, v + radius)], outline=colour, width=width)
+
+
+def sign_text(sign: SignLook) -> str:
+    """Distance by the map, and that at which the sign was first seen.
+
+    Parameters
+    ----------
+    sign : SignLook
+        The sign.
+    """
+    if sign.first_seen is None:
+        return f"{sign.distance:.0f} m"
+    return f"{sign.distance:.0f} m, seen from {sign.first_seen:.0f} m"

@@ -8,8 +8,8 @@ from fogsim.values.camera import Camera
 from fogsim.values.observation import SignSighting
 from fogsim.vision.symmetry.detection import SearchRegion
 
-GATE = 3.0
-"""Standard deviations that a sign may be off its place [-]."""
+GATE = 3.3
+"""Standard deviations that a sign's column and row may be off: 0.2 % of signs are farther off [-]."""
 
 NEAREST = 3.0
 """Signs nearer to the camera than this are not looked for: they leave the picture [m]."""

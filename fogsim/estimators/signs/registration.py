@@ -10,6 +10,9 @@ from scipy.optimize import linear_sum_assignment
 from fogsim.estimators.signs.regions import GATE, ProjectedSign
 from fogsim.vision.symmetry.detection import LARGER, SMALLER, SignDetection
 
+LIMIT = 4.0
+"""Standard deviations that column, row and size of a detection may be off together: 0.1 % are farther off [-]."""
+
 SIZE_DEVIATION, BLUR = 0.15, 0.4
 """Standard deviation of a detected radius about the map's: relative to it, and by what blurs small signs [px]."""
 
@@ -42,9 +45,9 @@ class Registration:
 def register_signs(signs: Sequence[ProjectedSign], detections: Sequence[SignDetection]) -> tuple[Registration, ...]:
     """Pair detections with signs of the map, each with one at most, so that the pairs are likeliest together.
 
-    A pair is possible within `GATE` standard deviations of column, row and size together. Its likelihood is that of the
-    offsets over that of a false alarm anywhere in the sign's region: p(c) = P q / (P q + λ), after Gabb et al. (2014)
-    and Bar-Shalom's association probabilities.
+    A pair is possible within `LIMIT` standard deviations of column, row and size together. Its likelihood q is that of
+    the offsets over that of a false alarm anywhere in the sign's region: p(c) = P q / (P q + λ) with the share P of
+    signs that are detected and the false alarms λ in a region, as of a probabilistic data association with one target.
 
     Parameters
     ----------
@@ -76,7 +79,7 @@ def _likelihood_ratio(sign: ProjectedSign, detection: SignDetection) -> float:
     size_deviation = math.hypot(SIZE_DEVIATION, BLUR / sign.radius)
     c = math.log(detection.radius / sign.radius) / size_deviation
     square = a * a + b * b + c * c
-    if square > GATE * GATE:
+    if square > LIMIT * LIMIT:
         return 0.0
     density = math.exp(-0.5 * square) / (2.0 * math.pi) ** 1.5
     density /= sign.deviation_u * sign.deviation_v * size_deviation

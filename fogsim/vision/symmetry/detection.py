@@ -127,18 +127,24 @@ def detect_signs(
     Returns
     -------
     tuple of SignDetection
-        The strongest first; of those in the same place one.
+        The surest first; of those in the same place one.
     """
     pixels: NDArray[Any] = np.ascontiguousarray(image if image.ndim == 3 else image[:, :, None])
-    searches = _tiles(pixels.shape[:2], radii) if regions is None else ((one, SMALLER, LARGER) for one in regions)
+    searches = list(_tiles(pixels.shape[:2], radii) if regions is None else _near(regions))
+    # A picture of many tiles gives chance as many more occasions; signs of the map may each be mistaken once.
+    surprise = SURPRISE + (math.log(len(searches)) if regions is None else 0.0)
     found: list[_Found] = []
     for region, smaller, larger in searches:
         found += _search(pixels, region, region.radius * smaller, region.radius * larger, least_strength)
-    return _distinct(found)
+    return _distinct([one for one in found if one[0] >= surprise])
 
 
 _Found = tuple[float, SignDetection]
 """How surprising it is, and a detection."""
+
+
+def _near(regions: Iterable[SearchRegion]) -> Iterable[tuple[SearchRegion, float, float]]:
+    return ((region, SMALLER, LARGER) for region in regions)
 
 
 def _tiles(size: tuple[int, ...], radii: tuple[float, float]) -> Iterable[tuple[SearchRegion, float, float]]:
@@ -183,21 +189,21 @@ def _search(pixels: Picture, region: SearchRegion, smallest: float, largest: flo
 def _in_piece(
     piece: Floats, box: tuple[float, float, float, float], smallest: float, largest: float
 ) -> Iterable[tuple[float, float, float, float, float]]:
-    """Outlines (surprise, x, y, radius, share seen) that no chance bears out in a piece of a picture."""
+    """Outlines (surprise, x, y, radius, share seen) for which there is evidence in a piece of a picture."""
     points, number = edge_points(*clearest_gradients(piece, EVEN, LEAST_NOISE), LEAST_GRADIENT)
     if len(points) < SAMPLES // 4:
         return
     apart = max(round(0.4 * smallest), 1)
     votes = [(pair_votes(points, number, 1.35 * smallest, 2.3 * largest), _EVEN_SIDED, CANDIDATES)]
+    sizes = (largest * np.array(TRIANGLES)).astype(np.float32)
     for outlines, direction in ((_TIP_UP, 1.0), (_TIP_DOWN, -1.0)):
-        votes += [(triangle_votes(points, number, size * largest, direction), outlines, 1) for size in TRIANGLES]
+        votes += [(accumulated, outlines, 1) for accumulated in triangle_votes(points, number, sizes, direction)]
     radii = np.geomspace(smallest, largest, 8).astype(np.float32)
     for accumulated, outlines, most in votes:
         for candidate in peaks(accumulated, box, apart, 4.0, most):
             x, y, radius, share, _ = fitted(points, number, outlines, candidate[:2].copy(), radii).tolist()
-            surprise = _surprise(share, radius, edge_density(number, x, y, 2.2 * radius)) if share > 0.0 else 0.0
-            if surprise >= SURPRISE:
-                yield surprise, x, y, radius, share
+            if share > 0.0:
+                yield _surprise(share, radius, edge_density(number, x, y, 2.2 * radius)), x, y, radius, share
 
 
 _EVEN_SIDED, _TIP_UP, _TIP_DOWN = OUTLINES[:3].copy(), OUTLINES[3:4].copy(), OUTLINES[4:].copy()

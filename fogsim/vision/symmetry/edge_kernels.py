@@ -136,7 +136,8 @@ def gradient_noise(length: Floats, share: float, least: float) -> float:
     least : float
         Least answer, for pictures without noise [1/px].
     """
-    inner = length[2:-2, 2:-2].copy().ravel()
+    # A quarter of the pixels tells as well.
+    inner = length[2:-2:2, 2:-2:2].copy().ravel()
     if inner.size == 0:
         return least
     # The quantile of a Rayleigh distribution says its scale.

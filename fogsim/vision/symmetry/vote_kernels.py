@@ -70,49 +70,51 @@ def pair_votes(points: Floats, number: Numbers, nearest: float, farthest: float)
 
 
 @kernel
-def triangle_votes(points: Floats, number: Numbers, radius: float, direction: float) -> Floats:
+def triangle_votes(points: Floats, number: Numbers, radii: Floats, direction: float) -> Floats:
     """Accumulate the middles of the upright triangles of which two points lie on two sides.
 
     Parameters
     ----------
     points, number
         See `fogsim.vision.symmetry.edge_kernels.edge_points`.
-    radius : float
-        Half of the triangles' width [px].
+    radii : (m,) float32
+        Halves of the triangles' widths, the largest last [px].
     direction : float
         1 with the tip up, −1 with the tip down.
 
     Returns
     -------
-    (rows, cols) float32
+    (m, rows, cols) float32
         Votes for the middle between tip and base; see `pair_votes` for their weight.
     """
-    votes = np.zeros(number.shape, np.float32)
-    n = points.shape[0]
-    side, polarity = np.full(n, -1, np.int64), np.zeros(n)
-    for i in range(n):
+    votes = np.zeros((radii.size, *number.shape), np.float32)
+    # Lines: normal of the side, place along it and across it, weight, direction of the gradient.
+    lines, n = np.empty((points.shape[0], 7), np.float32), 0
+    for i in range(points.shape[0]):
         for k in range(3):
-            along = points[i, NX] * _SIDES[k][0] + points[i, NY] * _SIDES[k][1] * direction
+            a, b = _SIDES[k][0], _SIDES[k][1] * direction
+            along = points[i, NX] * a + points[i, NY] * b
             if abs(along) > _ALIGNED:
-                side[i], polarity[i] = k, 1.0 if along > 0.0 else -1.0
-    inner, lift = radius / math.sqrt(3.0), radius * (0.5 * math.sqrt(3.0) - 1.0 / math.sqrt(3.0))
+                x, y = points[i, X], points[i, Y]
+                lines[n, 0], lines[n, 1], lines[n, 2], lines[n, 3] = a, b, x * a + y * b, y * a - x * b
+                lines[n, 4], lines[n, 5], lines[n, 6] = y, math.log1p(points[i, SNR]), math.copysign(1.0, along)
+                n += 1
+    lift = 0.5 * math.sqrt(3.0) - 1.0 / math.sqrt(3.0)
     for i in range(n):
-        if side[i] < 0:
-            continue
-        ax, ay = _SIDES[side[i]][0], _SIDES[side[i]][1] * direction
         for j in range(i + 1, n):
-            if side[j] < 0 or side[j] == side[i] or polarity[i] != polarity[j]:
+            if lines[j, 4] > lines[i, 4] + 2.0 * radii[-1]:
+                break
+            area = lines[i, 0] * lines[j, 1] - lines[i, 1] * lines[j, 0]
+            if abs(area) < 0.5 or lines[i, 6] != lines[j, 6]:
                 continue
-            bx, by = _SIDES[side[j]][0], _SIDES[side[j]][1] * direction
-            # The middle of the inscribed circle lies as far inside both sides.
-            p = points[i, X] * ax + points[i, Y] * ay - inner
-            q = points[j, X] * bx + points[j, Y] * by - inner
-            area = ax * by - ay * bx
-            x, y = (p * by - q * ay) / area, (ax * q - bx * p) / area
-            beside = -(points[i, X] - x) * ay + (points[i, Y] - y) * ax
-            other = -(points[j, X] - x) * by + (points[j, Y] - y) * bx
-            if abs(beside) < radius and abs(other) < radius:
-                _add(votes, x, y - lift * direction, min(math.log1p(points[i, SNR]), math.log1p(points[j, SNR])))
+            for k in range(radii.size):
+                # The middle of the inscribed circle lies as far inside both sides.
+                p, q = lines[i, 2] - radii[k] / math.sqrt(3.0), lines[j, 2] - radii[k] / math.sqrt(3.0)
+                x, y = (p * lines[j, 1] - q * lines[i, 1]) / area, (lines[i, 0] * q - lines[j, 0] * p) / area
+                one = lines[i, 3] - (y * lines[i, 0] - x * lines[i, 1])
+                other = lines[j, 3] - (y * lines[j, 0] - x * lines[j, 1])
+                if abs(one) < radii[k] and abs(other) < radii[k]:
+                    _add(votes[k], x, y - lift * radii[k] * direction, min(lines[i, 5], lines[j, 5]))
     return votes
 
 

@@ -31,17 +31,17 @@ def test_each_detection_is_one_signs_and_the_whole_is_likeliest() -> None:
 
 def test_nothing_is_paired_beyond_the_gate() -> None:
     one = sign("one", 48.0)
-    assert register_signs([one], [at(one, off_u=3.1 * one.deviation_u)]) == ()
-    assert register_signs([one], [at(one, size=1.7)]) == ()
+    assert register_signs([one], [at(one, off_u=4.1 * one.deviation_u)]) == ()
+    assert register_signs([one], [at(one, size=2.0)]) == ()
     assert register_signs([], [at(one)]) == register_signs([one], []) == ()
 
 
 def test_confidence_falls_from_near_one_with_the_offset() -> None:
     one = sign("one", 48.0)
     confidence = [
-        register_signs([one], [at(one, off_u=off * one.deviation_u)])[0].confidence for off in (0.0, 1.0, 2.0, 2.9)
+        register_signs([one], [at(one, off_u=off * one.deviation_u)])[0].confidence for off in (0.0, 1.0, 2.0, 3.9)
     ]
     assert confidence == sorted(confidence, reverse=True)
     assert confidence[0] > 0.98
-    assert 0.3 < confidence[3] < 0.9
+    assert 0.01 < confidence[3] < 0.2
     assert confidence[0] == pytest.approx(register_signs([one], [at(one)])[0].confidence)

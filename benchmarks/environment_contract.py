@@ -43,6 +43,7 @@ ENVIRONMENTS: dict[str, dict[str, Any]] = {
     "fogsim/FogHighway-v0": {"image_size": SIZE},
     "fogsim/FogAdvisory-v1": {"image_size": SIZE},
     "fogsim/FogDrive-v1": {"image_size": SIZE},
+    "fogsim/FogHighway-v1": {"image_size": SIZE},
     "fogsim/FogAdvisoryFast-v1": {},
 }
 NOT_ACTIONS: tuple[Any, ...] = (-1, [-1, 0], [99, 0], [math.nan, 0.0], [0, 0, 0], "fast", None)

@@ -48,7 +48,7 @@ gymnasium.register(
 gymnasium.register(
     id="fogsim/FogHighway-v1",
     entry_point="fogsim_envs.task.highway:FogHighwayV1Env",
-    max_episode_steps=1200,
+    max_episode_steps=375,
 )
 
 gymnasium.register(

@@ -191,6 +191,8 @@ def highway_scenario(config: Mapping[str, Any], visibility: float, overrides: Se
     fog = f"fog.visibility_m={visibility!r}"
     margin = f"traffic.stop_before_end_m={END_MARGIN!r}"
     scenario = attached_scenario(EGO, [*duration, fog, margin, *_clocks(config), *overrides])
+    if scenario.road is not None:
+        raise InputError("road: roads and vehicles are highway-env's own here; leave this key out")
     traffic = scenario.traffic
     foreign = [key for key in ("config", "net", "routes", "additional") if getattr(traffic, key)]
     if foreign or traffic.ego != EGO:
@@ -212,6 +214,19 @@ def _clocks(config: Mapping[str, Any]) -> list[str]:
     step = 1.0 / config["simulation_frequency"]
     camera = step * max(1, round(CAMERA_PERIOD / step))
     return clock_settings(step, camera, camera * max(1, round(DECISION_PERIOD / camera)))
+
+
+def one_frame_clocks(config: Mapping[str, Any]) -> list[str]:
+    """Overrides by which there is one frame a decision.
+
+    Parameters
+    ----------
+    config : mapping
+        The environment's configuration.
+    """
+    step = 1.0 / config["simulation_frequency"]
+    decision = step * max(1, round(DECISION_PERIOD / step))
+    return clock_settings(step, decision, decision)
 
 
 def _traffic(environment: Any, scenario: Scenario) -> HighwayTraffic:

@@ -1,5 +1,6 @@
 """fogsim/FogHighway-v1: the task of version 1 on highway-env's roads."""
 
+import dataclasses
 import warnings
 from collections.abc import Iterator
 from typing import Any
@@ -11,10 +12,12 @@ from gymnasium.utils.env_checker import check_env
 
 import fogsim_envs  # noqa: F401 - registers the environments
 from fogsim.errors import InputError, UnknownNameError
+from fogsim_envs.task.highway import HighwayDistribution
 
 ID = "fogsim/FogHighway-v1"
 SMALL: dict[str, Any] = {"config": {"vehicles_count": 8}, "image_size": (64, 48)}
 NO_ADVICE = np.array([12, 0])
+_DRAWN = ("light.", "camera.told.", "traffic.events=", "fog=")
 
 
 @pytest.fixture
@@ -25,7 +28,14 @@ def env() -> Iterator[gymnasium.Env[Any, Any]]:
 
 
 def test_gymnasiums_checker_finds_nothing(caplog: pytest.LogCaptureFixture) -> None:
-    env = gymnasium.make(ID, observation="state", **SMALL)
+    # On a short road by day, what is drawn anew for each of the checker's resets is soon made.
+    env = gymnasium.make(
+        ID,
+        environment="lane-keeping-v0",
+        observation="state",
+        image_size=(64, 48),
+        overrides=["light.illuminance_lx=5000"],
+    )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(env.unwrapped, skip_render_check=True)
@@ -55,7 +65,29 @@ def test_episodes_differ_repeat_and_are_told(env: gymnasium.Env[Any, Any]) -> No
     np.testing.assert_equal(again, observation)
     assert not np.array_equal(other["camera"], observation["camera"])
     assert not observation["signs_mask"].any()
-    assert all(one.startswith(("light.", "camera.told.", "fog=")) for one in info["episode"]["settings"])
+    assert all(one.startswith(_DRAWN) for one in info["episode"]["settings"])
+
+
+def test_scripts_lights_and_drivers_are_drawn_by_their_weights() -> None:
+    night = HighwayDistribution(light={"night": 1.0}, scripts={"braking_lead": 1.0}, drivers={"too_fast": 1.0})
+    rng = np.random.default_rng(1)
+    episodes = [night.draw(rng) for _ in range(5)]
+    assert {(one.light, one.script, one.driver) for one in episodes} == {("night", "braking_lead", "too_fast")}
+    assert len({one.settings for one in episodes}) == 5
+    assert all(one.settings[-1].startswith('traffic.events=[{"kind": "brake", "vehicle": "lead"') for one in episodes)
+    free = dataclasses.replace(night, scripts={"standing_vehicle": 1.0}).draw(rng)
+    assert free.script == "free"
+    assert all(one.startswith(_DRAWN) for one in free.settings)
+
+
+def test_a_braking_leader_is_played(env: gymnasium.Env[Any, Any]) -> None:
+    episode = HighwayDistribution(scripts={"braking_lead": 1.0}).draw(np.random.default_rng(1))
+    _, info = env.reset(seed=1, options={"episode": episode})
+    assert info["episode"]["script"] == "braking_lead"
+    with pytest.raises(InputError, match="road: roads and vehicles are highway-env's own"):
+        env.reset(seed=1, options={"overrides": ["road={template: motorway, length_m: 1000}"]})
+    with pytest.raises(InputError, match=r"clocks\.traffic_step_s: highway-env moves by"):
+        env.reset(seed=1, options={"overrides": ["clocks.traffic_step_s=0.1"]})
 
 
 def test_what_does_not_fit_is_refused(env: gymnasium.Env[Any, Any]) -> None:

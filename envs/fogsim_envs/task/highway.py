@@ -1,6 +1,7 @@
 """The task of `fogsim_envs.task.advisory` on the roads and in the traffic of highway-env."""
 
 import dataclasses
+import json
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -9,8 +10,15 @@ import numpy as np
 
 from fogsim.errors import InputError
 from fogsim.scenario import Scenario
+from fogsim.traffic.highway import LEAD
 from fogsim.values import Ending, Step
-from fogsim_envs.highway import HighwayLoop, highway_config, highway_environment, highway_scenario
+from fogsim_envs.highway import (
+    HighwayLoop,
+    highway_config,
+    highway_environment,
+    highway_scenario,
+    one_frame_clocks,
+)
 from fogsim_envs.hosting import TIMEOUT
 from fogsim_envs.task.advisory import FogAdvisoryV1Env
 from fogsim_envs.task.episodes import Episode, FogDistribution, ScenarioDistribution
@@ -29,7 +37,10 @@ _DRAWN = ("light.", "camera.told.")
 
 
 class HighwayDistribution(ScenarioDistribution):
-    """Which light, driver and errors of the told calibration there may be; roads and traffic are highway-env's."""
+    """Which light, driver and errors of the told calibration there may be, and whether the leader brakes.
+
+    Roads and traffic are highway-env's; of ``scripts``, "braking_lead" is the one that can be played there.
+    """
 
     def draw(self, rng: np.random.Generator) -> Episode:
         """An episode but for its fog; see `ScenarioDistribution.draw`.
@@ -41,7 +52,18 @@ class HighwayDistribution(ScenarioDistribution):
         """
         drawn = super().draw(rng)
         settings = tuple(one for one in drawn.settings if one.startswith(_DRAWN))
-        return Episode(settings, drawn.driver, drawn.light)
+        begin, deceleration, hold = rng.uniform(3.0, 25.0), rng.uniform(3.0, 6.0), rng.uniform(5.0, 20.0)
+        if drawn.script != "braking_lead":
+            return Episode(settings, drawn.driver, drawn.light, "free")
+        brake = {
+            "kind": "brake",
+            "vehicle": LEAD,
+            "at_time_s": begin,
+            "to_speed_kmh": 0.0,
+            "deceleration_mps2": deceleration,
+            "hold_s": hold,
+        }
+        return Episode((*settings, f"traffic.events={json.dumps([brake])}"), drawn.driver, drawn.light, drawn.script)
 
 
 class FogHighwayV1Env(FogAdvisoryV1Env):
@@ -49,19 +71,20 @@ class FogHighwayV1Env(FogAdvisoryV1Env):
 
     Action, observation, reward and ``info`` are those of ``fogsim/FogAdvisory-v1`` (`FogAdvisoryV1Env`); highway-env
     has no signs, so ``signs_mask`` is 0. The ego keeps its lane and follows its leader by IDM; advice sets its target
-    speed. Others choose their speed in fog and follow leaders that they see, as in ``fogsim/FogHighway-v0``.
+    speed. Others choose their speed in fog and follow leaders that they see, as in ``fogsim/FogHighway-v0``. One step
+    has one frame and is about 0.5 s, in whole steps of highway-env: 0.4 s in ``highway-fast-v0``.
 
     ### Episodes
-    Fog, light, the ego's own driver and the errors of the told calibration are drawn at each reset (`FogDistribution`,
-    `HighwayDistribution`), traffic by highway-env from the same seed. ``split`` "test" draws from other random numbers
-    than "train".
+    Fog, light, whether the leader brakes to a standstill for a while, the ego's own driver and the errors of the told
+    calibration are drawn at each reset (`FogDistribution`, `HighwayDistribution`), traffic by highway-env from the same
+    seed. ``split`` "test" draws from other random numbers than "train".
 
     ### Start and end
     A reset of the highway-env environment. Terminated by a collision of the ego, by its arrival after ``way`` metres or
     at the end of its road; truncated after the environment's ``duration``.
 
     ### Arguments
-    environment : id of a highway-env environment
+    environment : id of a highway-env environment; in ``highway-v0`` a step takes nine times as long
     config : its configuration; ``duration`` is 150 s where it is not among it
     way : how far the ego has to go [m]; less where the road ends before
     scenario_distribution : `HighwayDistribution`
@@ -75,7 +98,7 @@ class FogHighwayV1Env(FogAdvisoryV1Env):
 
     def __init__(
         self,
-        environment: str = "highway-v0",
+        environment: str = "highway-fast-v0",
         config: Mapping[str, Any] | None = None,
         *,
         way: float = WAY,
@@ -95,7 +118,7 @@ class FogHighwayV1Env(FogAdvisoryV1Env):
         self._environment = highway_environment(environment, {"duration": DURATION, **(config or {})})
         settings = highway_config(self._environment)
         super().__init__(
-            lambda more: highway_scenario(settings, math.inf, more),
+            lambda more: highway_scenario(settings, math.inf, [*one_frame_clocks(settings), *more]),
             scenario_distribution=scenario_distribution or HighwayDistribution(),
             fog_distribution=fog_distribution,
             split=split,

@@ -14,9 +14,11 @@ from pathlib import Path
 from subprocess import CompletedProcess
 from typing import Any
 
+import gymnasium
 import pytest
 import typer
 
+import fogsim_envs  # noqa: F401 - registers the environments
 from fogsim.cli.app import app
 from fogsim.scenario import catalogue, load_scenario
 
@@ -38,6 +40,8 @@ MENTIONS = {page: re.findall(r"`((?:fogsim|python) [^`]+)`", text) for page, tex
 KNOWN: dict[str, Any] = typer.main.get_command(app).commands  # type: ignore[attr-defined]  # a group has commands
 PARSED_ONLY = ("reproduce", "recover", "compile")
 """Commands that take minutes, that need a run that was killed (tests/faults has some), or that `make test` has run."""
+TRAINS = "stable_baselines3"
+"""What takes a quarter of an hour and an extra: examples/train_ppo.py is that, tried by hand."""
 TRUTH = "sut.advice={method: stopping_sight_distance, informed_by: truth}"
 BLIND = ("--set", "renderer=none", "--set", "estimators=[]", "--set", TRUTH, "--case", "visibility=200 m,run=0")
 SHORT = ("--set", "camera.width=64", "--set", "camera.height=48", "--set", "duration_s=0.5")
@@ -101,7 +105,7 @@ def test_what_is_printed_runs(
     for page, text in TEXTS.items():
         lines = [shlex.split(line, comments=True) for line in LINES[page]]
         quick: list[str | list[str]] = [shortened(line) for line in lines if is_quick(line)]
-        quick += [block.replace("8813", str(listening)) for block in PYTHON[page]]
+        quick += [block.replace("8813", str(listening)) for block in PYTHON[page] if TRAINS not in block]
         folder = str(readers_folder(text)) if quick else ""
         items += [(page, folder, item) for item in quick]
     done = python(RUNNER, json.dumps(items), str(early_motorway))
@@ -122,6 +126,15 @@ def test_what_is_printed_runs(
     ]
     assert max(time for time, _ in loops) > 4.0
     assert loops[-1][1] == pytest.approx(120.0, rel=0.3)
+
+
+def test_what_trains_can_be_read() -> None:
+    blocks = [block for page in TEXTS for block in PYTHON[page] if TRAINS in block]
+    assert blocks
+    for block in blocks:
+        compile(block, "page", "exec")
+        for name in re.findall(r"fogsim/\w+-v\d", block):
+            assert name in gymnasium.registry
 
 
 @pytest.mark.parametrize("page", TEXTS)

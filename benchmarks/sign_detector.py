@@ -9,8 +9,8 @@ the map's regions, a frame, that are no sign: `with` one standing there, and whe
 (`without`). Times are of one processor: projection, detection and registration of three signs, and a whole frame.
 Constants were chosen with `--pool 0`; what is reported is of `--pool 1`.
 
-    python benchmarks/sign_detector.py [--json] [--pool 1] [--draws 8] [--pictures fogsim painted] [--visibilities 50 …]
-        [--frames 20]
+    python benchmarks/sign_detector.py [--json] [--pool 1] [--draws 8] [--pictures fogsim painted] [--kinds stop …]
+        [--visibilities 50 …] [--distances 10 …] [--frames 20]
 """
 
 import argparse
@@ -46,7 +46,7 @@ from fogsim.vision.symmetry.detection import detect_signs
 
 OWN_KINDS = ("speed_limit", "no_entry", "stop", "priority", "variable_speed_limit", "warning", "yield")
 OWN_TRIANGLES = ("warning", "yield")
-DISTANCES = tuple(range(10, 171, 10))
+DISTANCES = tuple(float(far) for far in range(10, 171, 10))
 DETECTED = 0.8
 """Share of signs from which they count as detectable [-]."""
 
@@ -80,9 +80,9 @@ def looked(shot: Shot, rng: np.random.Generator, *, standing: bool = True) -> Lo
 Shots = Callable[[str | None, Sequence[float], float], Iterator[Shot]]
 
 
-def painted(rng: np.random.Generator) -> Shots:
+def painted(rng: np.random.Generator, kinds: int) -> Shots:
     """Painted pictures, each with another of a few backgrounds."""
-    backgrounds = [painted_background(CAMERA, rng) for _ in range(6)]
+    backgrounds = [painted_background(CAMERA, rng) for _ in range(min(kinds, 8))]
 
     def shots(kind: str | None, distances: Sequence[float], visibility: float) -> Iterator[Shot]:
         for distance in distances:
@@ -101,19 +101,20 @@ def own(rng: np.random.Generator) -> Shots:
     return shots
 
 
-def operating_range(detected: NDArray[np.float64]) -> float:
+def operating_range(distances: Sequence[float], detected: NDArray[np.float64]) -> float:
     """Largest distance up to which signs are detectable [m], by shares that fall with the distance."""
     falling = isotonic_regression(detected, increasing=False).x
     held = int((falling >= DETECTED).sum())
-    return float(DISTANCES[held - 1]) if held else 0.0
+    return distances[held - 1] if held else 0.0
 
 
 def measured(
-    shots: Shots, kind: str, visibility: float, draws: int, rng: np.random.Generator
+    shots: Shots, kind: str, visibility: float, distances: Sequence[float], draws: int, rng: np.random.Generator
 ) -> tuple[float, list[Look], list[Look]]:
     """Operating range [m], looks at half of it, and looks where no sign stands."""
-    looks_by_distance = [[looked(shot, rng) for shot in shots(kind, [d] * draws, visibility)] for d in DISTANCES]
-    reach = operating_range(np.array([np.mean([one.detected for one in each]) for each in looks_by_distance]))
+    looks_by_distance = [[looked(shot, rng) for shot in shots(kind, [d] * draws, visibility)] for d in distances]
+    shares = np.array([np.mean([one.detected for one in each]) for each in looks_by_distance])
+    reach = operating_range(distances, shares)
     half = rng.uniform(0.4, 0.5, 2 * draws) * max(reach, 20.0)
     near = [looked(shot, rng) for shot in shots(kind, half.tolist(), visibility)]
     anywhere = rng.uniform(10.0, max(reach, 20.0), draws)
@@ -121,22 +122,22 @@ def measured(
     return reach, near, empty
 
 
-def records(
-    pictures: str, visibilities: Sequence[float], draws: int, rng: np.random.Generator
-) -> Iterator[dict[str, Any]]:
+def records(pictures: str, told: argparse.Namespace, rng: np.random.Generator) -> Iterator[dict[str, Any]]:
     """One record a visibility and kind, then one of all but triangles."""
-    shots = (painted if pictures == "painted" else own)(rng)
+    kinds = told.kinds or (tuple(FIGURES) if pictures == "painted" else OWN_KINDS)
+    shots = painted(rng, len(kinds)) if pictures == "painted" else own(rng)
     triangles = TRIANGLES if pictures == "painted" else OWN_TRIANGLES
     whole: list[Look] = []
     nothing: list[Look] = []
-    for kind in FIGURES if pictures == "painted" else OWN_KINDS:
-        for visibility in visibilities:
-            reach, near, empty = measured(shots, kind, visibility, draws, rng)
+    for kind in kinds:
+        for visibility in told.visibilities:
+            reach, near, empty = measured(shots, kind, visibility, told.distances, told.draws, rng)
             yield _record(pictures, kind, visibility, reach, near, empty)
             if kind not in triangles:
                 whole += near
                 nothing += empty
-    yield _record(pictures, "all but triangles", None, None, whole, nothing)
+    if whole:
+        yield _record(pictures, "all but triangles", None, None, whole, nothing)
 
 
 def _record(
@@ -192,18 +193,24 @@ def main() -> None:
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--pool", type=int, default=1)
     parser.add_argument("--draws", type=int, default=8)
-    parser.add_argument("--frames", type=int, default=20)
+    parser.add_argument("--frames", type=int, default=20, help="frames that are timed, 0 for none")
     parser.add_argument("--pictures", nargs="*", choices=("fogsim", "painted"), default=("fogsim", "painted"))
+    parser.add_argument("--kinds", nargs="*")
     parser.add_argument("--visibilities", nargs="*", type=float, default=(50.0, 100.0, 200.0, 400.0))
+    parser.add_argument("--distances", nargs="*", type=float, default=DISTANCES)
     told = parser.parse_args()
     found: list[dict[str, Any]] = []
     for pictures in told.pictures:
-        for record in records(pictures, told.visibilities, told.draws, np.random.default_rng([told.pool, 18])):
+        for record in records(pictures, told, np.random.default_rng([told.pool, 18])):
             found.append(record)
             if not told.json:
                 print(_line(record), flush=True)
-    found.append(timed(told.frames))
-    print(json.dumps(found, indent=1) if told.json else _line(found[-1]))
+    if told.frames:
+        found.append(timed(told.frames))
+        if not told.json:
+            print(_line(found[-1]))
+    if told.json:
+        print(json.dumps(found, indent=1))
 
 
 def _line(record: dict[str, Any]) -> str:

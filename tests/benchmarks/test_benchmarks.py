@@ -43,6 +43,14 @@ def records(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
             {"visibility_m", "crossings", "accepted_least_s", "refused_most_s", "collisions_per_1000", "impact_mps"},
         ),
         (
+            "sign_detector.py",
+            (
+                *("--pictures", "painted", "--kinds", "stop", "--visibilities", "100"),
+                *("--distances", "20", "40", "--draws", "1", "--frames", "0"),
+            ),
+            {"pictures", "kind", "operating_range_m", "recall_half_pct", "false_alarms_with", "false_alarms_without"},
+        ),
+        (
             "metrics.py",
             ("--frames", "none", "--vehicles", "6", "--seconds", "4", "--block", "2"),
             {"frames", "vehicles_read", "ms_step", "ms_metrics", "share", "share_low", "share_high", "blocks"},

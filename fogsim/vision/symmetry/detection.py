@@ -30,7 +30,7 @@ LEAST_NOISE = 0.08
 LEAST_GRADIENT = 4.0
 """Gradient of an edge over its noise [-]."""
 
-LEAST_SHARE = 0.7
+LEAST_SHARE = 0.68
 """Share of its outline that a sign must show [-]."""
 
 SURPRISE = 6.0

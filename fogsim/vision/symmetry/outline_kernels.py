@@ -25,6 +25,9 @@ _HOPELESS, _GAIN = 0.35, 0.3
 _ALIKE = 0.05
 """Difference of shares of outlines that are seen alike [-]."""
 
+_WITHOUT_QUARTER = 0.5
+"""Most that is seen of an outline of which one quarter is not [-]."""
+
 _ENOUGH = 6
 """Places seen from which on the outline is fitted."""
 
@@ -49,7 +52,7 @@ def support(points: Floats, number: NDArray[np.int32], outline: Floats, x: float
         larger the outline fits them best [px].
     """
     tolerance = min(max(0.13 * radius, 0.8), 1.5)
-    seen, near, changes, last = 0, 0.0, 0, 0.0
+    seen, changes, last, near = 0, 0, 0.0, np.zeros(4)
     a = np.zeros((3, 3))
     b = np.zeros(3)
     for k in range(outline.shape[0]):
@@ -58,7 +61,7 @@ def support(points: Floats, number: NDArray[np.int32], outline: Floats, x: float
         if abs(off) > tolerance:
             continue
         seen += 1
-        near += 1.0 - (off / tolerance) ** 2
+        near[4 * k // outline.shape[0]] += 1.0 - (off / tolerance) ** 2
         if last * polarity < 0.0:
             changes += 1
         last = polarity
@@ -68,7 +71,9 @@ def support(points: Floats, number: NDArray[np.int32], outline: Floats, x: float
             for j in range(3):
                 a[i, j] += gains[i] * gains[j]
     result = np.zeros(4, np.float32)
-    result[0] = (near - max(changes - _MOST_CHANGES, 0)) / outline.shape[0]
+    share = (near.sum() - max(changes - _MOST_CHANGES, 0)) / outline.shape[0]
+    # Three sides of a square are those of a gap between windows.
+    result[0] = min(share, _WITHOUT_QUARTER + 4.0 * near.min() / outline.shape[0])
     if seen >= _ENOUGH:
         _solve(a, b, result)
     return result

@@ -57,13 +57,13 @@ def main() -> None:
     workers.close()
     for env_id, arguments in ((FAST, {}), (CAMERA, {"observation": "state"})):
         if env_id == FAST or asked.camera:
-            print(env_id)  # noqa: T201 - a script says what it found
+            print(env_id)
             policies = {"PPO": agent, "rule": "rule", "oracle": "oracle"}
             found = {name: evaluate(one, env_id, seeds=range(50), **arguments) for name, one in policies.items()}
             for name, one in found.items():
-                print(f"  {name}: {one}")  # noqa: T201
+                print(f"  {name}: {one}")
             mean, low, high = found["PPO"].minus(found["rule"])
-            print(f"  PPO over the rule, on the same seeds: {mean:+.1f} ({low:+.1f} … {high:+.1f})")  # noqa: T201
+            print(f"  PPO over the rule, on the same seeds: {mean:+.1f} ({low:+.1f} … {high:+.1f})")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """Write the tables of docs/environments.md that are measured: what each baseline is worth, how near the surrogate is.
 
     python docs/make_environment_tables.py [--episodes 50] [--ids fogsim/FogAdvisory-v1 …] [--density] [--surrogate]
+        [--corridor]
 
 Half an hour for all. ``--agent NAME=FILE`` adds a row for an agent of Stable-Baselines3 (a .zip file of its PPO).
 """
@@ -27,6 +28,7 @@ from fogsim_envs.spaces import action_of
 PAGE = Path(__file__).with_name("environments.md")
 DISCOUNTS = (1.0, 0.99)
 DENSITIES = {300.0: "300 vehicles/h", 2100.0: "2100 vehicles/h"}
+CORRIDOR_TERMS = ("delay", "overdriving", "conflict", "collision")
 CRAWLING = "crawling"
 """Name of 20 km/h always, the least that can be advised: what an agent would do that found standing to pay."""
 
@@ -84,11 +86,32 @@ def density_rows(env_id: str, episodes: int) -> list[str]:
 
 def surrogate_rows(episodes: int) -> list[str]:
     """A row for each light and class of visibility."""
-    command = [sys.executable, "benchmarks/surrogate.py", "--json", "--episodes", str(episodes)]
+    return ["| " + " | ".join(_surrogate_cells(record)) + " |" for record in _measured("surrogate", episodes)]
+
+
+def corridor_rows(episodes: int) -> list[str]:
+    """A row for each policy of message signs, the best first."""
+    records = sorted(_measured("corridor", episodes), key=lambda record: -record["return"])
+    return ["| " + " | ".join(_corridor_cells(record)) + " |" for record in records]
+
+
+def _measured(benchmark: str, episodes: int) -> list[dict[str, Any]]:
+    command = [sys.executable, f"benchmarks/{benchmark}.py", "--json", "--episodes", str(episodes)]
     done = subprocess.run(  # noqa: S603 - our own program
         command, cwd=PAGE.parent.parent, capture_output=True, text=True, check=True
     )
-    return ["| " + " | ".join(_surrogate_cells(record)) + " |" for record in json.loads(done.stdout)]
+    return list(json.loads(done.stdout))
+
+
+def _corridor_cells(record: dict[str, Any]) -> list[str]:
+    gain = [f"{record[name]:+.1f}" for name in ("gain", "gain_low", "gain_high")]
+    return [
+        record["policy"],
+        f"{record['return']:.1f} ({record['low']:.1f} … {record['high']:.1f})",
+        f"{gain[0]} ({gain[1]} … {gain[2]})",
+        f"{100 * record['collided']:.0f} %",
+        *(f"{record[term]:.1f}" for term in CORRIDOR_TERMS),
+    ]
 
 
 def _surrogate_cells(record: dict[str, Any]) -> list[str]:
@@ -123,6 +146,7 @@ def main() -> None:
     parser.add_argument("--ids", nargs="*", default=["fogsim/FogAdvisory-v1", "fogsim/FogAdvisoryFast-v1"])
     parser.add_argument("--density", action="store_true", help="the table over densities, too")
     parser.add_argument("--surrogate", action="store_true", help="the table of the surrogate's errors, too")
+    parser.add_argument("--corridor", action="store_true", help="the table of FogCorridor's policies, too")
     parser.add_argument("--agent", action="append", default=[], help="NAME=FILE of an agent of Stable-Baselines3's PPO")
     asked = parser.parse_args()
     agents = {name: path for name, _, path in (one.partition("=") for one in asked.agent)}
@@ -146,6 +170,9 @@ def main() -> None:
     if asked.surrogate:
         header = ["light", "visibility ahead", "estimates", "valid: real / drawn", "median error of k", "KS distance"]
         text = table(text, "surrogate", header, surrogate_rows(asked.episodes))
+    if asked.corridor:
+        header = ["policy", "return", "gain over dark signs", "episodes with collisions", *CORRIDOR_TERMS]
+        text = table(text, "returns fogsim/FogCorridor-v1", header, corridor_rows(asked.episodes))
     PAGE.write_text(text, encoding="utf-8")
 
 

@@ -177,13 +177,18 @@ def baseline(name: str, action_space: spaces.Space[Any]) -> Policy:
     Parameters
     ----------
     name : str
-        One of `BASELINES`.
+        One of `BASELINES`, or for a message sign of `fogsim_envs.corridor.baselines.SIGN_BASELINES`.
     action_space : gymnasium.Space
-        The environment's.
+        The environment's, or the sign's.
 
     Raises
     ------
     UnknownNameError
         If there is none of that name.
     """
+    if isinstance(action_space, spaces.Discrete):
+        # Who has signs has PettingZoo, without which that room cannot be imported.
+        from fogsim_envs.corridor.baselines import SIGN_BASELINES  # noqa: PLC0415
+
+        return make(SIGN_BASELINES, name, action_space)
     return make(BASELINES, name, action_space)

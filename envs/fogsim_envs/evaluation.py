@@ -16,6 +16,9 @@ from fogsim_envs.baselines import Info, Policy, baseline
 RESAMPLES = 2000
 CONFIDENCE = 0.95
 
+CORRIDOR = "fogsim/FogCorridor-v1"
+"""The id that is PettingZoo's, not Gymnasium's."""
+
 
 @runtime_checkable
 class Predictor(Protocol):
@@ -44,7 +47,7 @@ class EpisodeResult:
     ending : str
         Why it ended.
     struck : bool
-        Whether the ego struck somebody.
+        Whether the ego struck somebody; without an ego, whether anybody did.
     cost : float
         Sum of ``info["cost"]``.
     terms : mapping from str to float
@@ -72,7 +75,7 @@ class Evaluation:
     mean, low, high : float
         Mean return and its 95 % interval, by bootstrap over episodes [points].
     arrived, struck : float
-        Shares of episodes in which the ego arrived, and struck somebody.
+        Shares of episodes in which the ego arrived, and struck somebody (without an ego: nobody arrives, anybody).
     """
 
     episodes: tuple[EpisodeResult, ...]
@@ -118,7 +121,7 @@ class Evaluation:
 
 def evaluate(
     policy: Policy | Predictor | str,
-    env_id: str | gymnasium.Env[Any, Any] = "fogsim/FogAdvisory-v1",
+    env_id: Any = "fogsim/FogAdvisory-v1",
     seeds: Iterable[int] = range(50),
     *,
     discount: float = 1.0,
@@ -130,9 +133,11 @@ def evaluate(
     ----------
     policy : Policy, Predictor or str
         Callable of observation and info; an agent with ``predict(observation, deterministic=True)``, as those of
-        Stable-Baselines3; or the name of one of `fogsim_envs.baselines.BASELINES`.
-    env_id : str or gymnasium.Env
-        The environment; one that is made here has ``split="test"`` unless told otherwise.
+        Stable-Baselines3; or the name of one of `fogsim_envs.baselines.BASELINES` (of FogCorridor:
+        `fogsim_envs.corridor.baselines.SIGN_BASELINES`).
+    env_id : str, gymnasium.Env or pettingzoo.ParallelEnv
+        The environment; one that is made here has ``split="test"`` unless told otherwise. Of several agents
+        (``fogsim/FogCorridor-v1``) each asks the policy by itself, and all are paid the same.
     seeds : iterable of int
         Seeds of the episodes.
     discount : float
@@ -151,12 +156,27 @@ def evaluate(
     if not 0.0 < discount <= 1.0:
         raise InputError(f"discount: expected a number in 0 … 1 and not 0, got {discount!r}")
     if not isinstance(env_id, str):
-        return summarise([_episode(env_id, _policy(policy, env_id), seed, discount) for seed in numbers])
-    env = gymnasium.make(env_id, **{"split": "test", **arguments})
+        return summarise([_episode_of(policy, env_id, seed, discount) for seed in numbers])
+    env = _made(env_id, {"split": "test", **arguments})
     try:
-        return summarise([_episode(env, _policy(policy, env), seed, discount) for seed in numbers])
+        return summarise([_episode_of(policy, env, seed, discount) for seed in numbers])
     finally:
         env.close()
+
+
+def _made(env_id: str, arguments: Mapping[str, Any]) -> Any:
+    if env_id.rpartition(":")[2] != CORRIDOR:
+        return gymnasium.make(env_id, **arguments)
+    # It needs PettingZoo, an extra.
+    from fogsim_envs.corridor import parallel_env  # noqa: PLC0415
+
+    return parallel_env(**arguments)
+
+
+def _episode_of(policy: Policy | Predictor | str, env: Any, seed: int, discount: float) -> EpisodeResult:
+    if isinstance(env, gymnasium.Env):
+        return _episode(env, _policy(policy, env.action_space), seed, discount)
+    return _parallel_episode(env, policy, seed, discount)
 
 
 def summarise(episodes: Sequence[EpisodeResult]) -> Evaluation:
@@ -223,9 +243,9 @@ class _Plain:
         return np.asarray(self._function(observation, info))
 
 
-def _policy(policy: Policy | Predictor | str, env: gymnasium.Env[Any, Any]) -> Policy:
+def _policy(policy: Policy | Predictor | str, action_space: gymnasium.Space[Any]) -> Policy:
     if isinstance(policy, str):
-        return baseline(policy, env.action_space)
+        return baseline(policy, action_space)
     if isinstance(policy, Predictor):
         return _Predicting(policy)
     if callable(policy):
@@ -233,20 +253,47 @@ def _policy(policy: Policy | Predictor | str, env: gymnasium.Env[Any, Any]) -> P
     raise InputError(f"policy: expected a callable, an agent with predict(), or a baseline's name; got {policy!r}")
 
 
+class _Sums:
+    """What the rewards of an episode come to."""
+
+    def __init__(self, discount: float) -> None:
+        self._discount, self._weight = discount, 1.0
+        self.value, self.steps, self.cost = 0.0, 0, 0.0
+        self.terms: dict[str, float] = {}
+
+    def add(self, reward: float, info: Info) -> None:
+        self.value += self._weight * float(reward)
+        self._weight *= self._discount
+        self.steps += 1
+        self.cost += float(info.get("cost", 0.0))
+        for name, term in info.get("reward_terms", {}).items():
+            self.terms[name] = self.terms.get(name, 0.0) + float(term)
+
+    def result(self, seed: int, info: Info, struck: bool) -> EpisodeResult:
+        ending, time = info.get("ending") or "time", float(info.get("time_s", math.nan))
+        return EpisodeResult(seed, self.value, self.steps, time, ending, struck, self.cost, self.terms)
+
+
 def _episode(env: gymnasium.Env[Any, Any], policy: Policy, seed: int, discount: float) -> EpisodeResult:
     policy.reset(seed)
     observation, info = env.reset(seed=seed)
-    value, weight, steps, cost, over = 0.0, 1.0, 0, 0.0, False
-    terms: dict[str, float] = {}
+    sums, over = _Sums(discount), False
     while not over:
         observation, reward, terminated, truncated, info = env.step(policy(observation, info))
-        value += weight * float(reward)
-        weight *= discount
-        steps += 1
-        cost += float(info.get("cost", 0.0))
-        for name, term in info.get("reward_terms", {}).items():
-            terms[name] = terms.get(name, 0.0) + float(term)
+        sums.add(float(reward), info)
         over = terminated or truncated
-    ending = info.get("ending") or "time"
-    time = float(info.get("time_s", math.nan))
-    return EpisodeResult(seed, value, steps, time, ending, info.get("fault") == "ego", cost, terms)
+    return sums.result(seed, info, info.get("fault") == "ego")
+
+
+def _parallel_episode(env: Any, policy: Policy | Predictor | str, seed: int, discount: float) -> EpisodeResult:
+    """One episode of several agents who are paid the same."""
+    policies = {agent: _policy(policy, env.action_space(agent)) for agent in env.possible_agents}
+    for number, one in enumerate(policies.values()):
+        one.reset(len(policies) * seed + number)
+    observations, infos = env.reset(seed=seed)
+    first, sums = env.possible_agents[0], _Sums(discount)
+    while env.agents:
+        actions = {agent: policies[agent](observations[agent], infos[agent]) for agent in env.agents}
+        observations, rewards, _, _, infos = env.step(actions)
+        sums.add(rewards[first], infos[first])
+    return sums.result(seed, infos[first], sums.terms["collision"] < 0.0)

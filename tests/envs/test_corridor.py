@@ -6,13 +6,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from pettingzoo.test import parallel_api_test, parallel_seed_test
 
 from fogsim.errors import InputError
 from fogsim.metrics import DEFAULT_STANDARD
 from fogsim.values import Collision, Command, RoadSection, Stretch, TrafficState, TrafficStep, Truth
+from fogsim_envs import evaluate
+from fogsim_envs.baselines import baseline
 from fogsim_envs.corridor import CorridorWeights, FogCorridorEnv, parallel_env
+from fogsim_envs.corridor.baselines import DARK
 from fogsim_envs.corridor.loops import InductionLoops, LoopReading
 from fogsim_envs.corridor.observation import CORRIDOR_FEATURES, RoadKnowledge, loop_places, sign_observation
 from fogsim_envs.corridor.rewards import CorridorReward, lost_share, overdriven
@@ -114,6 +118,43 @@ def test_what_does_not_fit_is_refused(signs: FogCorridorEnv) -> None:
     signs.agents = []
     with pytest.raises(ResetNeeded):
         signs.step({})
+
+
+def test_policies_of_signs_are_evaluated(signs: FogCorridorEnv) -> None:
+    asked: list[float] = []
+
+    def spy(observation: Any, info: dict[str, Any]) -> int:
+        asked.append(info["built_in_advice_mps"])
+        return DARK
+
+    found = evaluate(spy, signs, seeds=[3, 4])
+    dark = evaluate("none", signs, seeds=[3, 4])
+    assert [one.value for one in found.episodes] == [one.value for one in dark.episodes]
+    # Two signs in two periods of half a minute after the first, in which the loops count.
+    assert len(asked) == 2 * 2 * 2
+    assert [one.steps for one in found.episodes] == [2, 2]
+    assert found.mean == pytest.approx(np.mean([sum(one.terms.values()) for one in found.episodes]))
+    assert {one.ending for one in found.episodes} == {"time"}
+    with pytest.raises(InputError, match="did you mean 'rule'"):
+        evaluate("rules", signs, seeds=[0])
+
+
+@pytest.mark.parametrize(
+    ("name", "advised", "level"),
+    [("none", 20.0, 5), ("fixed", math.inf, 1), ("rule", 75.0 / 3.6, 1), ("rule", 5.0, 0), ("rule", math.inf, 5)],
+)
+def test_baselines_of_a_sign(name: str, advised: float, level: int) -> None:
+    assert baseline(name, spaces.Discrete(6))(None, {"built_in_advice_mps": advised}) == level
+
+
+def test_chance_comes_again() -> None:
+    policy = baseline("random", spaces.Discrete(6))
+    policy.reset(4)
+    first = [int(policy(None, {})) for _ in range(20)]
+    policy.reset(4)
+    assert first == [int(policy(None, {})) for _ in range(20)]
+    assert set(first) <= set(range(6))
+    assert len(set(first)) > 3
 
 
 def test_loops_count_who_passes_on_their_road_and_begin_anew() -> None:

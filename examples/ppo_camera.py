@@ -229,7 +229,8 @@ def note(folder: Path, row: dict[str, float]) -> None:
     figure = Figure(figsize=(6, 3.5), layout="constrained")
     axes = figure.add_subplot()
     axes.plot([one["minutes"] for one in rows], [one["return"] for one in rows])
-    axes.set(xlabel="training [min]", ylabel=f"return, mean of the last {RECENT} episodes", title="PPO on pictures alone")
+    axes.set(title="PPO on pictures alone", xlabel="training [min]")
+    axes.set_ylabel(f"return, mean of the last {RECENT} episodes")
     axes.grid(alpha=0.3)
     figure.savefig(folder / "curve.png", dpi=120)
 

@@ -155,6 +155,17 @@ def _record(
     }
 
 
+def whole_pictures(visibilities: Sequence[float], draws: int, rng: np.random.Generator) -> dict[str, Any]:
+    """Signs 30 m ahead and false alarms in whole pictures of FogSim, without a map."""
+    seen = []
+    for visibility in visibilities:
+        for shot in (one for kind in OWN_KINDS[:draws] for one in fogsim_shots(kind, [30.0], visibility, rng)):
+            found = detect_signs(shot.image)
+            right = [one for one in found if math.dist((one.u, one.v), (shot.u, shot.v)) < 0.5 * shot.radius]
+            seen.append(Look(bool(right), len(found) - len(right)))
+    return _record("fogsim, whole", "all", None, 30.0, seen, seen)
+
+
 def timed(frames: int) -> dict[str, Any]:
     """Processor time of frames of 1400 × 600 with three signs ahead, least of several means [ms]."""
     rng = np.random.default_rng(0)
@@ -205,6 +216,10 @@ def main() -> None:
             found.append(record)
             if not told.json:
                 print(_line(record), flush=True)
+        if pictures == "fogsim":
+            found.append(whole_pictures(told.visibilities, told.draws, np.random.default_rng([told.pool, 19])))
+            if not told.json:
+                print(_line(found[-1]))
     if told.frames:
         found.append(timed(told.frames))
         if not told.json:

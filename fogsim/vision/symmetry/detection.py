@@ -30,11 +30,12 @@ LEAST_NOISE = 0.08
 LEAST_GRADIENT = 4.0
 """Gradient of an edge over its noise [-]."""
 
-LEAST_SHARE = 0.68
-"""Share of its outline that a sign must show [-]."""
+LEAST_SHARE, UNTOLD_SHARE = 0.68, 0.85
+"""Share of its outline that a sign must show where the map has one, and anywhere else [-]."""
 
-SURPRISE = 6.0
-"""Negative logarithm of the probability that edges which lie at random bear an outline out as well [-]."""
+SURPRISE, UNTOLD_SURPRISE = 6.0, 12.0
+"""Negative logarithm of the probability that edges which lie at random bear an outline out as well [-]; in one of the
+tiles of a whole picture, for any of them."""
 
 FITTING = 1.5
 """Area about a place on an outline in which an edge fits, times the share of directions that do [px]."""
@@ -100,7 +101,7 @@ def detect_signs(
     image: Picture,
     regions: Iterable[SearchRegion] | None = None,
     *,
-    least_strength: float = LEAST_SHARE,
+    least_strength: float | None = None,
     radii: tuple[float, float] = (4.0, 32.0),
 ) -> tuple[SignDetection, ...]:
     """Find signs by the symmetry of their outlines.
@@ -119,8 +120,8 @@ def detect_signs(
         Pixel values as they are; whatever they are proportional to does not matter, for noise is measured.
     regions : iterable of SearchRegion or None
         Where to look, and for what size; None looks all over the picture.
-    least_strength : float
-        Least share of an outline that must be seen [-].
+    least_strength : float or None
+        Least share of an outline that must be seen [-]; None for 0.68 in regions and 0.85 without.
     radii : tuple of float
         Least and greatest radius where there are no regions [px].
 
@@ -130,21 +131,22 @@ def detect_signs(
         The surest first; of those in the same place one.
     """
     pixels: NDArray[Any] = np.ascontiguousarray(image if image.ndim == 3 else image[:, :, None])
-    searches = list(_tiles(pixels.shape[:2], radii) if regions is None else _near(regions))
-    # A picture of many tiles gives chance as many more occasions; signs of the map may each be mistaken once.
-    surprise = SURPRISE + (math.log(len(searches)) if regions is None else 0.0)
+    if regions is None:
+        searches = list(_tiles(pixels.shape[:2], radii))
+        # So many tiles give chance as many occasions.
+        surprise, share = UNTOLD_SURPRISE + math.log(len(searches)), UNTOLD_SHARE
+    else:
+        searches = [(region, SMALLER, LARGER) for region in regions]
+        surprise, share = SURPRISE, LEAST_SHARE
+    share = share if least_strength is None else least_strength
     found: list[_Found] = []
     for region, smaller, larger in searches:
-        found += _search(pixels, region, region.radius * smaller, region.radius * larger, least_strength)
+        found += _search(pixels, region, region.radius * smaller, region.radius * larger, share)
     return _distinct([one for one in found if one[0] >= surprise])
 
 
 _Found = tuple[float, SignDetection]
 """How surprising it is, and a detection."""
-
-
-def _near(regions: Iterable[SearchRegion]) -> Iterable[tuple[SearchRegion, float, float]]:
-    return ((region, SMALLER, LARGER) for region in regions)
 
 
 def _tiles(size: tuple[int, ...], radii: tuple[float, float]) -> Iterable[tuple[SearchRegion, float, float]]:

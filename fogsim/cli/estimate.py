@@ -13,7 +13,8 @@ from fogsim.cli.progress import progress_bar
 from fogsim.errors import InputError
 
 if TYPE_CHECKING:
-    from fogsim.offline import FrameEstimates, OverlayFile, Source
+    from fogsim.offline import FrameEstimates, OverlayFile, SignWatch, Source
+    from fogsim.values import Camera
 
 
 def estimate_command(
@@ -40,6 +41,11 @@ def estimate_command(
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace an overlay or a guessed camera file.")
     ] = False,
+    signs: Annotated[Path | None, typer.Option(help="Map of signs: GeoJSON, points in WGS 84. With --track.")] = None,
+    track: Annotated[
+        Path | None, typer.Option(help="Where the camera was: .gpx, or .csv with time_s, latitude, longitude.")
+    ] = None,
+    track_offset: Annotated[float, typer.Option(help="Seconds of the track at the first image.")] = 0.0,
     guess_camera: Annotated[
         bool, typer.Option("--guess-camera", help="Write the camera file from the images, and stop.")
     ] = False,
@@ -65,7 +71,9 @@ def estimate_command(
     ):
         if value is not None:
             raise InputError(f"{option} goes with --guess-camera; else the camera file has it")
-    _estimate(images, camera, method or ["all"], as_json, overlay, sequence, rate, overwrite)
+    _estimate(
+        images, camera, method or ["all"], as_json, overlay, sequence, rate, overwrite, (signs, track, track_offset)
+    )
 
 
 def _estimate(
@@ -77,6 +85,7 @@ def _estimate(
     sequence: bool | None,
     rate: float | None,
     overwrite: bool,
+    mapped: tuple[Path | None, Path | None, float],
 ) -> None:
     from fogsim.offline import (
         OverlayFile,
@@ -92,16 +101,19 @@ def _estimate(
     calibration = load_calibration(camera_file)
     print_remarks("assumed", calibration.remarks)
     source, camera = straightened(find_source(images, sequence=sequence, rate=rate), calibration)
+    watch = _watch(mapped, source, camera)
     with contextlib.ExitStack() as stack:
         drawn = overlay and stack.enter_context(OverlayFile(overlay, source, camera, methods, overwrite=overwrite))
         progress = stack.enter_context(progress_bar(stderr))
         task = progress.add_task(source.description, total=source.count)
         if not as_json:
             _say(table_heading(source, methods))
-        for result in estimates_of(source, camera, methods):
+        for result in estimates_of(source, camera, methods, watch):
             _show(result, source, methods, as_json, drawn or None)
             unusable += [result.picture.error] if result.picture.error else []
             progress.advance(task)
+    if watch is not None:
+        _tell_signs(watch, as_json)
     if overlay is not None:
         stderr.print(f"overlay: {escape(overlay)}", soft_wrap=True)
     if unusable:
@@ -109,6 +121,31 @@ def _estimate(
         for reason in unusable:
             stderr.print(f"  {escape(reason, in_one_line=True)}", soft_wrap=True)
         raise typer.Exit(BAD_INPUT)
+
+
+def _watch(mapped: tuple[Path | None, Path | None, float], source: "Source", camera: "Camera") -> "SignWatch | None":
+    from fogsim.offline import watch_signs
+
+    signs, track, offset = mapped
+    if signs is None and track is None:
+        return None
+    if signs is None or track is None:
+        lacking = "--signs" if signs is None else "--track"
+        raise InputError(
+            f"--signs and --track go together, and {lacking} is missing: a map says nothing without places"
+        )
+    watch, remarks = watch_signs(signs, track, source, camera, offset)
+    print_remarks("assumed", remarks)
+    return watch
+
+
+def _tell_signs(watch: "SignWatch", as_json: bool) -> None:
+    from fogsim.offline import summary_rows
+
+    if not as_json:
+        for line in summary_rows(watch.summary()):
+            _say(printable(line, in_one_line=True))
+    print_remarks("signs", watch.remarks())
 
 
 def _show(

@@ -6,7 +6,8 @@ from fogsim.offline.guess import CameraGuess, guess_camera
 from fogsim.offline.input_paths import find_source
 from fogsim.offline.overlay import OverlayFile
 from fogsim.offline.rectification import Straightener, straightened
-from fogsim.offline.results import record_lines, table_heading, table_rows
+from fogsim.offline.results import record_lines, summary_rows, table_heading, table_rows
+from fogsim.offline.sign_watch import SignSummary, SignWatch, watch_signs
 from fogsim.offline.source import ImageFiles, Picture, Source, VideoFile
 
 __all__ = [
@@ -15,6 +16,8 @@ __all__ = [
     "ImageFiles",
     "OverlayFile",
     "Picture",
+    "SignSummary",
+    "SignWatch",
     "Source",
     "Straightener",
     "VideoFile",
@@ -28,7 +31,9 @@ __all__ = [
     "record_lines",
     "refuse_existing",
     "straightened",
+    "summary_rows",
     "table_heading",
     "table_rows",
+    "watch_signs",
     "write_camera",
 ]

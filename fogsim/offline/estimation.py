@@ -12,8 +12,9 @@ from fogsim.offline.camera_file import Calibration
 from fogsim.offline.image_files import Pixels
 from fogsim.offline.input_paths import find_source
 from fogsim.offline.rectification import straightened
+from fogsim.offline.sign_watch import SignWatch, watch_signs
 from fogsim.offline.source import Picture, Source
-from fogsim.values import Camera, Estimate, Frame, Observation
+from fogsim.values import Camera, Estimate, Frame, Observation, SignLook, SignSighting
 
 ALL = "all"
 """Stands for every method of the registry."""
@@ -32,10 +33,13 @@ class FrameEstimates:
         The image, or the reason why it could not be used.
     estimates : tuple of Estimate
         One for each method in their order; empty if the image could not be used.
+    signs : tuple of SignLook
+        Signs of the map that the image should show; empty without a map.
     """
 
     picture: Picture
     estimates: tuple[Estimate, ...]
+    signs: tuple[SignLook, ...] = ()
 
 
 def chosen_methods(names: Sequence[str]) -> tuple[str, ...]:
@@ -65,6 +69,8 @@ def estimate_images(
     *,
     sequence: bool | None = None,
     rate: float | None = None,
+    signs: Path | None = None,
+    track: Path | None = None,
 ) -> Iterator[FrameEstimates]:
     """Estimate the fog in a person's own images or video.
 
@@ -81,6 +87,9 @@ def estimate_images(
         Whether images follow one another in time, so that methods may use earlier ones; None to tell by their names.
     rate : float or None
         Images of a sequence in a second [1/s]; None for 10.
+    signs, track : Path or None
+        A map of signs, GeoJSON, and the positions of the drive from its first image on, GPX or CSV: both or neither;
+        see `fogsim.offline.watch_signs`.
 
     Yields
     ------
@@ -91,15 +100,20 @@ def estimate_images(
     ------
     InputError
         If there are no images, a method is unknown, the first images do not fit the camera, its lens folds the image,
-        or none can be read.
+        none can be read, or map and track cannot be used.
     """
+    if (signs is None) != (track is None):
+        raise InputError("signs and track go together: a map says nothing without places, nor places without a map")
     names = [methods] if isinstance(methods, str) else methods
     calibration = Calibration(camera) if isinstance(camera, Camera) else camera
     source, pinhole = straightened(find_source(inputs, sequence=sequence, rate=rate), calibration)
-    return estimates_of(source, pinhole, chosen_methods(names))
+    watch = None if signs is None or track is None else watch_signs(signs, track, source, pinhole)[0]
+    return estimates_of(source, pinhole, chosen_methods(names), watch)
 
 
-def estimates_of(source: Source, camera: Camera, methods: Sequence[str]) -> Iterator[FrameEstimates]:
+def estimates_of(
+    source: Source, camera: Camera, methods: Sequence[str], watch: SignWatch | None = None
+) -> Iterator[FrameEstimates]:
     """Estimate the fog in the images of a source; see `estimate_images`.
 
     An image that does not fit the camera is passed over like one that cannot be read, unless none has fitted before:
@@ -113,6 +127,8 @@ def estimates_of(source: Source, camera: Camera, methods: Sequence[str]) -> Iter
         Their calibration.
     methods : sequence of str
         Names in the registry.
+    watch : SignWatch or None
+        Signs along the drive.
     """
     bench = _Bench(camera, methods)
     fitted = False
@@ -125,7 +141,8 @@ def estimates_of(source: Source, camera: Camera, methods: Sequence[str]) -> Iter
         if not source.temporal:
             bench.reset()
         try:
-            estimates = bench.estimates(picture.image, picture.time)
+            sightings = None if watch is None else watch.sightings(picture.time)
+            estimates = bench.estimates(picture.image, picture.time, sightings or ())
         except InputError as error:
             told = f"{_place(source, picture)}: {error}"
             if not fitted:
@@ -133,7 +150,8 @@ def estimates_of(source: Source, camera: Camera, methods: Sequence[str]) -> Iter
             yield FrameEstimates(replace(picture, image=None, error=told), ())
             continue
         fitted = True
-        yield FrameEstimates(picture, estimates)
+        looks = () if watch is None or sightings is None else watch.look(picture.image, picture.time, sightings)
+        yield FrameEstimates(picture, estimates, looks)
     if not fitted:
         raise InputError(f"none of the {count} images can be read" if count > 1 else "the only image cannot be read")
 
@@ -169,8 +187,8 @@ class _Bench:
     def _all(self) -> Iterable[Estimator]:
         return (one for estimators in self._estimators.values() for one in estimators)
 
-    def estimates(self, image: Pixels, time: float) -> tuple[Estimate, ...]:
-        """Estimates of all methods from an image.
+    def estimates(self, image: Pixels, time: float, signs: tuple[SignSighting, ...]) -> tuple[Estimate, ...]:
+        """Estimates of all methods from an image, and the signs that the map has ahead.
 
         Raises
         ------
@@ -186,7 +204,7 @@ class _Bench:
             )
         if camera not in self._estimators:
             self._estimators[camera] = self._made(camera)
-        observation = Observation(Frame(time, pixels, camera))
+        observation = Observation(Frame(time, pixels, camera), signs=signs)
         return tuple(estimator.update(observation) for estimator in self._estimators[camera])
 
 

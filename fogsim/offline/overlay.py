@@ -17,6 +17,7 @@ from fogsim.offline.image_files import Pixels
 from fogsim.offline.results import interval_text, metres
 from fogsim.offline.source import Source
 from fogsim.recorders.camera_picture import found_row, scale_image
+from fogsim.recorders.sign_marks import draw_signs
 from fogsim.recorders.style import GROUND, MUTED, TEXT, Colour, font, method_colours
 from fogsim.recorders.video import Encoder, encoder_command
 from fogsim.values import Camera, Estimate
@@ -72,6 +73,7 @@ class Overlay:
             shown = _shown(result.picture.image, self._bits)
             canvas.paste(scale_image(shown, self.size[0], self._picture_height), (0, 0))
         draw = ImageDraw.Draw(canvas)
+        draw_signs(draw, result.signs, self._scale, (0, 0), (self.size[0], self._picture_height))
         valid = [estimate for estimate in result.estimates if estimate.valid]
         for estimate in valid:
             self._draw_band(draw, estimate)

@@ -2,11 +2,12 @@
 
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from fogsim.offline.estimation import FrameEstimates
+from fogsim.offline.sign_watch import SignSummary
 from fogsim.offline.source import Source
-from fogsim.values import Estimate
+from fogsim.values import Estimate, SignLook
 
 ENDLESS = 10_000.0
 """Visibility from which on one speaks of clear air [m]."""
@@ -42,7 +43,7 @@ DIGITS = 6
 
 
 def record_lines(result: FrameEstimates) -> Iterator[str]:
-    """JSON objects of an image: one for each method, or one with an ``error``.
+    """JSON objects of an image: one for each method and one with its ``signs``, if any; or one with an ``error``.
 
     Parameters
     ----------
@@ -58,6 +59,21 @@ def record_lines(result: FrameEstimates) -> Iterator[str]:
         yield json.dumps({"frame": result.picture.name, "error": result.picture.error})
     for estimate in result.estimates:
         yield json.dumps(_record(result.picture.name, estimate), allow_nan=False)
+    if result.signs:
+        signs = [_sign_record(sign) for sign in result.signs]
+        yield json.dumps({"frame": result.picture.name, "signs": signs}, allow_nan=False)
+
+
+def _sign_record(sign: SignLook) -> dict[str, object]:
+    return {
+        "sign_id": sign.sign_id,
+        "distance_m": _number(sign.distance),
+        "detected": sign.detected,
+        "u_px": _number(sign.u),
+        "v_px": _number(sign.v),
+        "radius_px": _number(sign.radius),
+        "first_seen_m": _number(sign.first_seen),
+    }
 
 
 def _record(name: str | int, estimate: Estimate) -> dict[str, object]:
@@ -120,6 +136,21 @@ def table_rows(source: Source, methods: Sequence[str], result: FrameEstimates) -
     shown = name if len(name) <= _MOST_NAME else "…" + name[1 - _MOST_NAME :]
     for estimate in result.estimates:
         yield _line(widths, (shown, estimate.method, *_cells(estimate)))
+
+
+def summary_rows(signs: Iterable[SignSummary]) -> Iterator[str]:
+    """Table of the signs of a drive; nothing where there were none.
+
+    Parameters
+    ----------
+    signs : iterable of SignSummary
+        What became of each.
+    """
+    for number, sign in enumerate(signs):
+        if number == 0:
+            yield f"{'sign':<20}  {'kind':<20}  {'first seen at':>13}  {'seen in':>7}  {'missed in':>9}"
+        first = "not seen" if sign.first_seen is None else f"{sign.first_seen:.0f} m"
+        yield f"{sign.sign_id:<20}  {sign.kind:<20}  {first:>13}  {sign.detections:>7}  {sign.misses:>9}"
 
 
 def _widths(source: Source, methods: Sequence[str]) -> tuple[int, int]:

@@ -67,19 +67,30 @@ def draw_signs(
     size : tuple of int
         Columns and rows of the image in the drawing [px].
     """
+    written: list[tuple[float, float, float, float]] = []
     for sign in sorted(signs, key=lambda one: one.distance)[:MOST]:
         u, v, radius = (sign.u + 0.5) * scale, (sign.v + 0.5) * scale, max(sign.radius * scale, LEAST_RADIUS)
         if -radius < u < size[0] + radius and -radius < v < size[1] + radius:
-            _mark(draw, sign, (u + origin[0], v + origin[1]), radius + 2.0)
+            _mark(draw, sign, (u + origin[0], v + origin[1]), radius + 2.0, written)
 
 
-def _mark(draw: ImageDraw.ImageDraw, sign: SignLook, middle: tuple[float, float], radius: float) -> None:
+def _mark(
+    draw: ImageDraw.ImageDraw,
+    sign: SignLook,
+    middle: tuple[float, float],
+    radius: float,
+    written: list[tuple[float, float, float, float]],
+) -> None:
+    """Mark a sign; its distance is left out where it would stand upon that of a nearer one."""
     (u, v), colour = middle, ADVICE if sign.detected else MUTED
     width = 2 if sign.detected else 1
     _circle(draw, u, v, radius + 1.0, width + 2, GROUND)
     _circle(draw, u, v, radius, width, colour)
-    place = (u, v - radius - 3)
-    draw.text(place, sign_text(sign), fill=colour, font=font(10), anchor="ms", stroke_width=2, stroke_fill=GROUND)
+    place, text = (u, v - radius - 3), sign_text(sign)
+    left, top, right, bottom = draw.textbbox(place, text, font=font(12), anchor="ms", stroke_width=2)
+    if all(right < x0 or left > x1 or bottom < y0 or top > y1 for x0, y0, x1, y1 in written):
+        written.append((left, top, right, bottom))
+        draw.text(place, text, fill=colour, font=font(12), anchor="ms", stroke_width=2, stroke_fill=GROUND)
 
 
 def _circle(draw: ImageDraw.ImageDraw, u: float, v: float, radius: float, width: int, colour: Colour) -> None:

@@ -245,3 +245,25 @@ def test_odd_names_of_images_and_outputs_work_and_are_printed_escaped(estimate, 
     assert len(out.splitlines()) == 2
     assert (out + err).replace("\n", "").isprintable()
     assert {path.name for path in folder.iterdir()} == {"camera.yaml", "drive", overlay}
+
+
+def test_signs_of_an_own_map_are_looked_for_and_what_became_of_them_is_told(estimate, folder: Path) -> None:
+    place = {"type": "Point", "coordinates": [25.0, 60.0005]}
+    features = [{"type": "Feature", "id": "s", "geometry": place, "properties": {"kind": "stop", "diameter_m": 2.0}}]
+    (folder / "map.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    rows = [f"{0.1 * index},{60.0 + 1e-5 * index},25.0,0" for index in range(3)]
+    (folder / "track.csv").write_text("\n".join(["time_s,latitude,longitude,heading_deg", *rows]))
+    drive = ("drive", "--camera", "camera.yaml", "--method", "zhu2015")
+    code, out, err = estimate(*drive, "--signs", "map.geojson", "--track", "track.csv")
+    assert code == 0
+    assert out.splitlines()[-1].split()[:4] == ["s", "stop", "not", "seen"]
+    assert "assumed: map.geojson: 1 sign with no height_m" in err
+    assert "none of the 1 signs that images should show was found" in err
+    code, out, err = estimate(*drive, "--json", "--signs", "map.geojson", "--track", "track.csv")
+    assert [record["signs"][0]["detected"] for line in out.splitlines() if "signs" in (record := json.loads(line))] == [
+        False
+    ] * 3
+    for option, other in (("--signs", "--track"), ("--track", "--signs")):
+        code, _, err = estimate(*drive, option, "track.csv")
+        assert code == 2
+        assert f"--signs and --track go together, and {other} is missing" in err

@@ -1,0 +1,205 @@
+"""A person's own map of signs: GeoJSON, points in WGS 84."""
+
+import json
+import math
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fogsim.errors import InputError
+from fogsim.recorders.sign_map import NET
+from fogsim.scene import SIGN_KINDS
+from fogsim.units import KMH_PER_MPS
+
+USUAL_HEIGHT, USUAL_DIAMETER = 2.2, 0.6
+"""Height of the middle of a face above the road, and its size, where the map tells none [m]."""
+
+WGS84 = ("CRS84", "4326")
+"""What names of the coordinate frame end in that GeoJSON may be in."""
+
+
+@dataclass(frozen=True, slots=True)
+class GeographicSign:
+    """A sign of the map.
+
+    Attributes
+    ----------
+    sign_id, kind : str
+        Its id, and its kind.
+    value : float
+        What it says, for a speed limit the speed [m/s].
+    longitude, latitude : float
+        Where it stands, WGS 84 [rad].
+    height : float
+        Middle of its face above the road [m].
+    diameter : float
+        Size of its face [m].
+    heading : float or None
+        Direction of travel of those it speaks to, counterclockwise from east [rad]; None if the map does not tell.
+    """
+
+    sign_id: str
+    kind: str
+    value: float
+    longitude: float
+    latitude: float
+    height: float
+    diameter: float
+    heading: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class SignFile:
+    """A map, and what was assumed about it.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    signs : tuple of GeographicSign
+        At least one, each with an id of its own.
+    remarks : tuple of str
+        What was assumed or passed over.
+    """
+
+    path: Path
+    signs: tuple[GeographicSign, ...]
+    remarks: tuple[str, ...]
+
+
+def load_sign_file(path: Path) -> SignFile:
+    """Read a map of signs: a GeoJSON FeatureCollection of points, as ``fogsim signs`` writes it where it has WGS 84.
+
+    Properties: ``kind`` (needed), ``height_m``, ``diameter_m``, ``heading_deg`` (clockwise from north, the direction of
+    travel of those whom the sign is for), ``speed_limit_kmh``. Features that are no points are passed over.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is no GeoJSON, its coordinates are no degrees of WGS 84, it has no signs, a sign
+        has no kind or an impossible number, or two have one id.
+    """
+    told = _read(path)
+    _refuse_other_frames(path, told)
+    features = told.get("features")
+    if not isinstance(features, list):
+        raise InputError(f'{path}: expected a GeoJSON FeatureCollection with "features", got {_kind_of(told)}')
+    points = [(number, one) for number, one in enumerate(features) if _is_point(one)]
+    if not points:
+        raise InputError(f"{path}: the map has no signs: expected features that are points, got {len(features)} others")
+    signs = tuple(_sign(f"{path}: feature {number}", number, one) for number, one in points)
+    twice = [sign_id for sign_id, count in Counter(sign.sign_id for sign in signs).items() if count > 1]
+    if twice:
+        raise InputError(f"{path}: two signs have the id {twice[0]!r}; each needs one of its own, or none")
+    return SignFile(path, signs, tuple(_remarks(path, signs, points, len(features) - len(points))))
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        told = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"--signs {path}: cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        raise InputError(f"--signs {path}: expected GeoJSON: {error}") from error
+    if not isinstance(told, dict):
+        raise InputError(f"--signs {path}: expected a GeoJSON FeatureCollection, got {type(told).__name__}")
+    return told
+
+
+def _kind_of(told: Mapping[str, Any]) -> str:
+    return f"type {told['type']!r}" if "type" in told else "no type"
+
+
+def _refuse_other_frames(path: Path, told: Mapping[str, Any]) -> None:
+    """Refuse a map that says itself that it is not in longitude and latitude."""
+    if told.get("coordinates") == NET:
+        raise InputError(
+            f"{path}: its points are x and y of a SUMO network, which tells no projection; expected longitude and "
+            "latitude, WGS 84"
+        )
+    frame = told.get("crs")
+    name = str(frame.get("properties", {}).get("name", frame)) if isinstance(frame, dict) else str(frame or "CRS84")
+    if not name.endswith(WGS84):
+        raise InputError(f"{path}: the map is in {name}; expected longitude and latitude, WGS 84 (EPSG:4326)")
+
+
+def _is_point(feature: Any) -> bool:
+    geometry = feature.get("geometry") if isinstance(feature, dict) else None
+    return isinstance(geometry, dict) and geometry.get("type") == "Point"
+
+
+def _sign(where: str, number: int, feature: Mapping[str, Any]) -> GeographicSign:
+    told = feature.get("properties")
+    told = told if isinstance(told, dict) else {}
+    kind = told.get("kind")
+    if not isinstance(kind, str) or not kind:
+        raise InputError(f'{where}: a sign needs a property "kind", as "speed_limit" or "stop", got {kind!r}')
+    longitude, latitude = _place(where, feature["geometry"].get("coordinates"))
+    heading = _number(where, told, "heading_deg", None, -360.0, 360.0)
+    limit = _number(where, told, "speed_limit_kmh", math.nan, 0.0, 300.0) / KMH_PER_MPS
+    return GeographicSign(
+        str(feature.get("id", told.get("id", number))),
+        kind,
+        limit,
+        math.radians(longitude),
+        math.radians(latitude),
+        _number(where, told, "height_m", USUAL_HEIGHT, 0.0, 20.0),
+        _number(where, told, "diameter_m", USUAL_DIAMETER, 0.1, 10.0),
+        None if math.isnan(heading) else math.radians(90.0 - heading),
+    )
+
+
+def _place(where: str, told: Any) -> tuple[float, float]:
+    """Longitude and latitude [deg]."""
+    if not isinstance(told, list) or len(told) < 2 or not all(_is_number(one) for one in told[:2]):
+        raise InputError(f"{where}: expected coordinates [longitude, latitude], got {told!r}")
+    longitude, latitude = map(float, told[:2])
+    if abs(longitude) > 180.0 or abs(latitude) > 90.0:
+        raise InputError(
+            f"{where}: expected longitude within ±180° and latitude within ±90° (WGS 84), got {told[:2]}: "
+            "the map is in another coordinate frame"
+        )
+    return longitude, latitude
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _number(where: str, told: Mapping[str, Any], key: str, usual: float | None, least: float, most: float) -> float:
+    """Number of a property; NaN for one that is not there and has no usual value."""
+    value = told.get(key)
+    if value is None:
+        return math.nan if usual is None else usual
+    if not _is_number(value) or not least <= value <= most:
+        raise InputError(f"{where}: {key} must be a number within {least:g} … {most:g}, got {value!r}")
+    return float(value)
+
+
+def _remarks(path: Path, signs: tuple[GeographicSign, ...], points: list[tuple[int, Any]], others: int) -> list[str]:
+    def without(key: str) -> int:
+        return sum((one.get("properties") or {}).get(key) is None for _, one in points)
+
+    assumed = [
+        (without("height_m"), f"no height_m: {USUAL_HEIGHT} m above the road are assumed"),
+        (without("diameter_m"), f"no diameter_m: {USUAL_DIAMETER} m are assumed"),
+        (without("heading_deg"), "no heading_deg: they are taken to face the vehicle that comes nearest"),
+    ]
+    remarks = [f"{path}: {_count(count)} with {what}" for count, what in assumed if count]
+    unknown = sorted({sign.kind for sign in signs if sign.kind.removeprefix("xodr.") not in SIGN_KINDS})
+    if unknown:
+        remarks.append(f"{path}: kinds that FogSim does not know, looked for as any sign: {', '.join(unknown[:5])}")
+    if others:
+        remarks.append(f"{path}: {others} features that are no points are passed over")
+    return remarks
+
+
+def _count(count: int) -> str:
+    return "1 sign" if count == 1 else f"{count} signs"

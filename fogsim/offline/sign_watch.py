@@ -1,0 +1,260 @@
+"""Signs of a person's own map along their own drive: where each image should show them, and which it does."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.errors import InputError
+from fogsim.estimators.signs.regions import PoseDeviation, ProjectedSign, project_sightings
+from fogsim.estimators.signs.registration import Registration, register_signs
+from fogsim.estimators.signs.track import SignTrack, SignTracks
+from fogsim.offline.image_files import Pixels
+from fogsim.offline.sign_file import SignFile, load_sign_file
+from fogsim.offline.source import Source
+from fogsim.offline.track_file import GeographicPose, Track, load_track, metres_per_radian
+from fogsim.sensors import signs_ahead
+from fogsim.values import Camera, Sign, SignLook, SignMap, SignSighting
+from fogsim.vision.symmetry.detection import detect_signs
+
+REACH = 250.0
+"""Distance ahead as far as which signs are looked for [m]."""
+
+OWN_DRIVE = PoseDeviation(position=2.0, height=0.4, heading=math.radians(1.0), pitch=math.radians(0.3))
+"""How well places are known by a receiver in a car and a map that was drawn from pictures."""
+
+FAR_AWAY = 10_000.0
+"""Distance between track and map from which on they are in different frames, or of different drives [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class SignSummary:
+    """What became of a sign on a drive.
+
+    Attributes
+    ----------
+    sign_id, kind : str
+        The sign by the map.
+    first_seen : float or None
+        Distance at which it was first detected [m]; None if it never was, or once only.
+    detections, misses : int
+        Images that showed it, and that should have and did not.
+    """
+
+    sign_id: str
+    kind: str
+    first_seen: float | None
+    detections: int
+    misses: int
+
+
+class SignWatch:
+    """Signs of a map along a track, looked for in image after image.
+
+    The track is taken to be the camera's, and the road before it to be a plane.
+
+    Parameters
+    ----------
+    signs : SignFile
+        The map.
+    track : Track
+        The drive.
+    camera : Camera
+        The calibration of its camera.
+    offset : float
+        Time of the track at the first image [s].
+
+    Raises
+    ------
+    InputError
+        If no sign is near the track.
+    """
+
+    def __init__(self, signs: SignFile, track: Track, camera: Camera, offset: float = 0.0) -> None:
+        self._track, self._camera, self._offset = track, camera, offset
+        self._signs = signs.signs
+        self._longitude = np.array([sign.longitude for sign in signs.signs])
+        self._latitude = np.array([sign.latitude for sign in signs.signs])
+        self._nearest = self._nearest_positions(signs.path)
+        self._tracks = SignTracks()
+        self._passed: list[SignTrack] = []
+        self._images = self._outside = 0
+
+    def sightings(self, time: float) -> tuple[SignSighting, ...] | None:
+        """Signs ahead by the map; None where the track does not tell the place.
+
+        Parameters
+        ----------
+        time : float
+            Time from the first image [s].
+        """
+        pose = self._track.pose_at(time + self._offset)
+        self._images += 1
+        if pose is None:
+            self._outside += 1
+            return None
+        return signs_ahead(self._around(pose), np.zeros(3), pose.heading, REACH)
+
+    def look(self, image: Pixels, time: float, sightings: tuple[SignSighting, ...]) -> tuple[SignLook, ...]:
+        """Look for signs in an image.
+
+        Parameters
+        ----------
+        image : (rows, cols[, 3]) uint8 or uint16
+            The image.
+        time : float
+            Its time [s].
+        sightings : tuple of SignSighting
+            Signs ahead by the map.
+
+        Returns
+        -------
+        tuple of SignLook
+            One for each sign of which the image may show something.
+        """
+        expected = project_sightings(sightings, self._camera, 0.0, OWN_DRIVE)
+        found = register_signs(expected, detect_signs(image, [sign.region for sign in expected]))
+        self._passed += self._tracks.update(time, expected, found)
+        pairs = {one.sign.sighting.sign_id: one for one in found}
+        known = {one.sign.sighting.sign_id: one for one in self._tracks.tracks}
+        return tuple(_look(sign, pairs.get(sign.sighting.sign_id), known[sign.sighting.sign_id]) for sign in expected)
+
+    def summary(self) -> Iterator[SignSummary]:
+        """What became of each sign, in the order in which they came."""
+        known: dict[str, SignSummary] = {}
+        for track in (*self._passed, *self._tracks.tracks):
+            sign, first = track.sign.sighting, track.first_seen if track.confirmed else None
+            # A sign at the border of what can be seen may come more than once.
+            was = known.get(sign.sign_id) or SignSummary(sign.sign_id, sign.kind, None, 0, 0)
+            first = first if was.first_seen is None else was.first_seen
+            counts = (was.detections + track.detections, was.misses + track.misses)
+            known[sign.sign_id] = SignSummary(sign.sign_id, sign.kind, first, *counts)
+        yield from known.values()
+
+    def remarks(self) -> Iterator[str]:
+        """What is wrong with map, track and camera, by what came of it."""
+        signs = list(self.summary())
+        if self._outside:
+            times = self._track.time[[0, -1]] - self._offset
+            yield (
+                f"{self._outside} of {self._images} images are not covered by the track, which has "
+                f"{times[0]:.1f} … {times[1]:.1f} s from the first image, gaps left out: no signs there"
+            )
+        if self._outside < self._images and not signs:
+            yield (
+                "no image should show any sign of the map: do they face the other way (heading_deg), does the track "
+                "begin at another time (--track-offset), or are they too small in the images?"
+            )
+        if signs and not any(sign.detections for sign in signs):
+            yield (
+                f"none of the {len(signs)} signs that images should show was found: the map may be in another "
+                "coordinate frame or the track at another time (--track-offset), or fog hides them all"
+            )
+
+    def _around(self, pose: GeographicPose) -> SignMap:
+        """Signs within reach in the plane that touches the ellipsoid at a pose, whose origin that is."""
+        east, north = metres_per_radian(pose.latitude)
+        x = east * np.remainder(self._longitude - pose.longitude + math.pi, 2.0 * math.pi) - east * math.pi
+        y = north * (self._latitude - pose.latitude)
+        return SignMap(
+            tuple(self._placed(j, x[j], y[j]) for j in np.flatnonzero(np.hypot(x, y) <= 1.1 * REACH).tolist())
+        )
+
+    def _placed(self, number: int, x: float, y: float) -> Sign:
+        sign, heading = self._signs[number], self._signs[number].heading
+        if heading is None:
+            heading = float(self._track.heading[self._nearest[number]])
+        return Sign(sign.sign_id, sign.kind, sign.value, (float(x), float(y), sign.height), heading, sign.diameter)
+
+    def _nearest_positions(self, path: Path) -> NDArray[np.intp]:
+        """Number of the track's position nearest to each sign.
+
+        Raises
+        ------
+        InputError
+            If no sign is near any position.
+        """
+        distance, nearest = _apart(self._track, self._longitude, self._latitude)
+        if distance.min() > REACH:
+            swapped, _ = _apart(self._track, self._latitude, self._longitude)
+            hint = ""
+            if swapped.min() <= REACH:
+                hint = ": longitude and latitude are swapped in the map; GeoJSON has longitude first"
+            elif distance.min() > FAR_AWAY:
+                hint = ": map and track are in different coordinate frames, or of different drives"
+            raise InputError(
+                f"{path}: no sign lies near the track {self._track.path}; the nearest is {_far(distance.min())} "
+                f"away{hint}"
+            )
+        return nearest
+
+
+def _apart(
+    track: Track, longitude: NDArray[np.float64], latitude: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Least distance of each sign to the track's positions [m], and the number of that position."""
+    distance, nearest = np.empty(len(longitude)), np.empty(len(longitude), np.intp)
+    east, north = metres_per_radian(float(track.latitude.mean()))
+    for number, (one, other) in enumerate(zip(longitude, latitude, strict=True)):
+        turned = np.remainder(one - track.longitude + math.pi, 2.0 * math.pi) - math.pi
+        square = (east * turned) ** 2 + (north * (other - track.latitude)) ** 2
+        nearest[number] = square.argmin()
+        distance[number] = math.sqrt(square[nearest[number]])
+    return distance, nearest
+
+
+def _far(distance: float) -> str:
+    return f"{distance / 1000.0:.0f} km" if distance > FAR_AWAY else f"{distance:.0f} m"
+
+
+def _look(sign: ProjectedSign, pair: Registration | None, track: SignTrack) -> SignLook:
+    first = track.first_seen if track.confirmed else None
+    look = SignLook(sign.sighting.sign_id, sign.u, sign.v, sign.radius, sign.distance, pair is not None, first)
+    if pair is None:
+        return look
+    return replace(look, u=pair.detection.u, v=pair.detection.v, radius=pair.detection.radius)
+
+
+def watch_signs(
+    signs: Path, track: Path, source: Source, camera: Camera, offset: float = 0.0
+) -> tuple[SignWatch, tuple[str, ...]]:
+    """Read a map of signs and a track for the images of a source.
+
+    Parameters
+    ----------
+    signs : Path
+        GeoJSON; see `fogsim.offline.sign_file.load_sign_file`.
+    track : Path
+        GPX or CSV; see `fogsim.offline.track_file.load_track`.
+    source : Source
+        The images; a sequence, a video or one image.
+    camera : Camera
+        Their calibration.
+    offset : float
+        Time of the track at the first image [s].
+
+    Returns
+    -------
+    tuple of SignWatch and of str
+        For `estimates_of`, and what was assumed about the map.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be used, the images are stills, or the track ends before the first image.
+    """
+    if source.count > 1 and not source.temporal:
+        raise InputError("--track tells places at times, and these images are stills, which have none: add --sequence")
+    if not math.isfinite(offset):
+        raise InputError(f"--track-offset must be a number of seconds, got {offset!r}")
+    mapped, driven = load_sign_file(signs), load_track(track)
+    first, last = driven.time[[0, -1]] - offset
+    if first > source.period * max(source.count - 1, 0) or last < 0.0:
+        raise InputError(
+            f"--track {track}: covers {first:.1f} … {last:.1f} s from the first image, and the images "
+            f"0 … {source.period * max(source.count - 1, 0):.1f} s: see --track-offset"
+        )
+    return SignWatch(mapped, driven, camera, offset), mapped.remarks

@@ -1,0 +1,234 @@
+"""Where a vehicle was: GPX or CSV, WGS 84."""
+
+import csv
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import NamedTuple
+from xml.etree import ElementTree as ET
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.errors import InputError
+
+SEMI_MAJOR, FLATTENING = 6_378_137.0, 1.0 / 298.257223563
+"""Ellipsoid of WGS 84: semi-major axis [m], flattening [-] (NIMA TR8350.2, 2000, table 3.1)."""
+
+LONGEST_GAP = 5.0
+"""Time without a position after which the track is taken to be interrupted [s]."""
+
+MOVING, MOST_LOOKED_AT = 10.0, 100
+"""Way over which a direction of travel is told from positions [m], and among how many of them before and after."""
+
+COLUMNS: Mapping[str, tuple[str, ...]] = {
+    "time": ("time_s", "time"),
+    "latitude": ("latitude", "lat"),
+    "longitude": ("longitude", "lon"),
+}
+"""Columns of a CSV file, and how each may be called."""
+
+
+class GeographicPose(NamedTuple):
+    """Where the camera is and which way it drives.
+
+    Attributes
+    ----------
+    longitude, latitude : float
+        WGS 84 [rad].
+    heading : float
+        Direction of travel, counterclockwise from east [rad].
+    """
+
+    longitude: float
+    latitude: float
+    heading: float
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """A drive's positions.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    time : (n,) float64
+        Increasing [s].
+    longitude, latitude : (n,) float64
+        WGS 84 [rad].
+    heading : (n,) float64
+        Direction of travel without jumps, counterclockwise from east [rad].
+    """
+
+    path: Path
+    time: NDArray[np.float64]
+    longitude: NDArray[np.float64]
+    latitude: NDArray[np.float64]
+    heading: NDArray[np.float64]
+
+    def pose_at(self, time: float) -> GeographicPose | None:
+        """Pose at an instant between two positions; None where the track does not have it.
+
+        Parameters
+        ----------
+        time : float
+            Instant in the track's time [s].
+        """
+        after = int(np.searchsorted(self.time, time))
+        if time < self.time[0] or after == len(self.time):
+            return None
+        before = max(after - 1, 0)
+        if self.time[after] - self.time[before] > LONGEST_GAP:
+            return None
+        columns = (self.longitude, self.latitude, self.heading)
+        return GeographicPose(*(float(np.interp(time, self.time, column)) for column in columns))
+
+
+def metres_per_radian(latitude: float) -> tuple[float, float]:
+    """Way east and north for an angle of longitude and latitude on the ellipsoid of WGS 84.
+
+    The radii of curvature are M = a (1 − e²) / (1 − e² sin²φ)^1.5 along the meridian and N = a / √(1 − e² sin²φ)
+    across it, so that the way east is N cos φ.
+
+    Parameters
+    ----------
+    latitude : float
+        Latitude φ [rad].
+
+    Returns
+    -------
+    tuple of float
+        East and north [m/rad].
+    """
+    square = FLATTENING * (2.0 - FLATTENING)
+    share = 1.0 - square * math.sin(latitude) ** 2
+    return SEMI_MAJOR * math.cos(latitude) / math.sqrt(share), SEMI_MAJOR * (1.0 - square) / share**1.5
+
+
+def load_track(path: Path) -> Track:
+    """Read the positions of a drive.
+
+    GPX: the points of all tracks, whose time counts from the first. CSV with a heading line: ``time_s`` (or ``time`` as
+    ISO 8601, which counts from the first), ``latitude`` and ``longitude`` in degrees, and perhaps ``heading_deg``,
+    clockwise from north. Without headings they follow from positions at least `MOVING` apart.
+
+    Parameters
+    ----------
+    path : Path
+        The file: ``.gpx`` or ``.csv``.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is of another kind or broken, has fewer than two positions, its time goes back, or
+        it never moves and tells no headings.
+    """
+    readers = {".gpx": _gpx_points, ".csv": _csv_points}
+    if path.suffix.lower() not in readers:
+        raise InputError(f"--track {path}: expected a name that ends in .gpx or .csv")
+    try:
+        points = list(readers[path.suffix.lower()](path))
+    except OSError as error:
+        raise InputError(f"--track {path}: cannot be read: {error.strerror}") from error
+    points = [one for number, one in enumerate(points) if number == 0 or one[0] != points[number - 1][0]]
+    if len(points) < 2:
+        raise InputError(f"--track {path}: expected two positions with different times or more, got {len(points)}")
+    time, latitude, longitude, told = np.array(points).T
+    back = np.flatnonzero(np.diff(time) < 0)
+    if back.size:
+        raise InputError(f"--track {path}: time goes back after position {back[0] + 1} of {len(points)}")
+    longitude, latitude = np.unwrap(np.radians(longitude)), np.radians(latitude)
+    return Track(path, time, longitude, latitude, _headings(path, longitude, latitude, told))
+
+
+Point = tuple[float, float, float, float]
+"""Time [s], latitude, longitude, and heading clockwise from north [deg], NaN if it is not told."""
+
+
+def _gpx_points(path: Path) -> Iterator[Point]:
+    try:
+        root = ET.parse(path).getroot()  # noqa: S314 - the user's own file; expat fetches nothing
+    except ET.ParseError as error:
+        raise InputError(f"--track {path}: expected GPX: {error}") from error
+    start = None
+    for number, point in enumerate(root.iterfind(".//{*}trkpt")):
+        where = f"--track {path}: point {number}"
+        told = (point.findtext("{*}time") or "").strip()
+        if not told:
+            raise InputError(f"{where} has no <time>, so nothing says which image it belongs to")
+        time = _instant(where, told)
+        start = time if start is None else start
+        yield time - start, *_degrees(where, point.get("lat"), point.get("lon")), math.nan
+
+
+def _csv_points(path: Path) -> Iterator[Point]:
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        rows = csv.DictReader(file)
+        names = rows.fieldnames or ()
+        column = {meant: _column(path, names, known) for meant, known in COLUMNS.items()}
+        counted, start = column["time"] == "time_s", None
+        for row in rows:
+            where = f"--track {path}: line {rows.line_num}"
+            told = row[column["time"]] or ""
+            time = _float(where, "time_s", told) if counted else _instant(where, told)
+            start = (0.0 if counted else time) if start is None else start
+            heading = _float(where, "heading_deg", row["heading_deg"]) if row.get("heading_deg") else math.nan
+            yield time - start, *_degrees(where, row[column["latitude"]], row[column["longitude"]]), heading
+
+
+def _column(path: Path, names: Sequence[str], known: Sequence[str]) -> str:
+    for name in known:
+        if name in names:
+            return name
+    raise InputError(f"--track {path}: expected a column {' or '.join(known)}, got {', '.join(names) or 'none'}")
+
+
+def _instant(where: str, told: str) -> float:
+    try:
+        return datetime.fromisoformat(told).timestamp()
+    except ValueError as error:
+        raise InputError(f"{where}: expected a time as 2026-05-04T07:08:09.5Z, got {told!r}") from error
+
+
+def _degrees(where: str, latitude: str | None, longitude: str | None) -> tuple[float, float]:
+    north, east = _float(where, "latitude", latitude), _float(where, "longitude", longitude)
+    if abs(north) > 90.0 or abs(east) > 180.0:
+        raise InputError(f"{where}: expected latitude within ±90° and longitude within ±180°, got {north:g}, {east:g}")
+    return north, east
+
+
+def _float(where: str, name: str, told: str | None) -> float:
+    try:
+        value = float(told or "")
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(f"{where}: {name} must be a number, got {told!r}")
+    return value
+
+
+def _headings(
+    path: Path, longitude: NDArray[np.float64], latitude: NDArray[np.float64], told: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Directions of travel: as they are told, else by the way from the position before to the one after."""
+    if not np.isnan(told).any():
+        return np.unwrap(np.radians(90.0 - told))
+    east, north = metres_per_radian(float(latitude.mean()))
+    place = np.stack((east * longitude, north * latitude), axis=1)
+    found = np.full(len(place), math.nan)
+    for number in range(len(place)):
+        start = max(number - MOST_LOOKED_AT, 0)
+        near = place[start : number + MOST_LOOKED_AT + 1]
+        apart = np.hypot(*(near - place[number]).T) >= 0.5 * MOVING
+        before, after = np.flatnonzero(apart[: number - start]), np.flatnonzero(apart[number - start :])
+        first = near[before[-1]] if before.size else place[number]
+        last = near[number - start + after[0]] if after.size else place[number]
+        if np.hypot(*(last - first)) >= 0.5 * MOVING:
+            found[number] = math.atan2(*(last - first)[::-1])
+    known = np.flatnonzero(~np.isnan(found))
+    if not known.size:
+        raise InputError(f"--track {path}: the track never moves by {MOVING:g} m; give heading_deg in a CSV file")
+    return np.interp(np.arange(len(found)), known, np.unwrap(found[known]))

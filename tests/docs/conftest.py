@@ -1,5 +1,6 @@
 """What a reader of the pages has at hand: a SUMO simulation, photographs, a video, a scenario and a camera file."""
 
+import json
 import os
 import re
 import shlex
@@ -114,6 +115,19 @@ def put_pictures(folder: Path, calibration: str) -> None:
         encoder = Encoder(encoder_command(folder / name, 0.1, (camera.width, camera.height)))
         encoder.write(image.tobytes())
         encoder.finish()
+    put_map(folder)
+
+
+def put_map(folder: Path) -> None:
+    """Put map.geojson with a sign, and drive.gpx that leads past it, into a folder."""
+    place = {"type": "Point", "coordinates": [24.9, 60.2005]}
+    signs = [{"type": "Feature", "geometry": place, "properties": {"kind": "stop"}}]
+    (folder / "map.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": signs}), encoding="utf-8")
+    points = [
+        f'<trkpt lat="{60.2 + 1e-4 * second}" lon="24.9"><time>2026-05-04T07:08:0{second}Z</time></trkpt>'
+        for second in range(9)
+    ]
+    (folder / "drive.gpx").write_text(f"<gpx><trk><trkseg>{''.join(points)}</trkseg></trk></gpx>", encoding="utf-8")
 
 
 def put_scenario(folder: Path) -> None:

@@ -1,12 +1,15 @@
 """Photons in fog: veils of head lamps and halos of lamps, to which the models of `fogsim.atmosphere` are compared.
 
     python benchmarks/monte_carlo.py halo tests/data/monte_carlo_halo.csv --photons 1000000
+    python benchmarks/monte_carlo.py lobes tests/data/monte_carlo_lobes.csv --photons 4000000
+    python benchmarks/monte_carlo.py origins fogsim/atmosphere/data/light_origins.csv --photons 6000000
     python benchmarks/monte_carlo.py veil tests/data/monte_carlo_veil.csv --photons 400000
 
-Slow (minutes), seeded, and independent of the models: it shares with them only the tables of beams and phase functions.
+Slow (minutes), seeded, and independent of the models: it shares with them only the tables of lamps and phase functions.
 """
 
 import argparse
+import itertools
 import math
 from pathlib import Path
 
@@ -14,6 +17,7 @@ import numpy as np
 from numba import njit
 
 from fogsim.lighting.beams import high_beam, low_beam
+from fogsim.scene.light_sources import STREET_ANGLES, STREET_INTENSITIES
 from fogsim.units import extinction_from_visibility
 from fogsim.values.luminous_intensity import luminous_intensity
 
@@ -23,6 +27,19 @@ STEP = math.radians(0.02)
 HALO_DEPTHS = np.array([0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0])
 HALO_EDGES = np.radians(np.concatenate((np.geomspace(0.5, 60.0, 19), [80.0, 100.0, 130.0, 180.0])))
 HALO_END = 30.0
+LOBE_FOGS = ("heavy_advection", "heavy_radiation", "moderate_radiation")
+LOBE_DEPTHS = np.array([0.5, 1.0, 2.0, 3.0])
+LOBE_EDGES = np.radians([[1.8, 2.2], [4.6, 5.4], [9.2, 10.8], [18.5, 21.5], [28.0, 32.0], [37.0, 43.0], [56.0, 64.0]])
+SIDES = {"right": 0.0, "up": 0.5 * math.pi, "left": math.pi, "down": -0.5 * math.pi}
+"""Where a line of sight passes a lamp, as the lamp sees it: angle from its right to above."""
+
+ORIGIN_DEPTHS = np.array([0.3, 0.7, 1.5, 3.0, 6.0])
+ORIGIN_ANGLES = np.radians([0.35, 0.7, 1.4, 2.8, 5.5, 9.5, 15.0, 22.0, 31.0, 43.0, 60.0, 85.0, 120.0, 170.0])
+ORIGIN_EMITTED = np.radians(
+    [0.0, 1.0, 2.5, 5.0, 9.0, 14.0, 20.0, 28.0, 38.0, 50.0, 65.0, 85.0, 110.0, 135.0, 155.0, 168.0, 180.0]
+)
+ORIGIN_TURNS = np.radians([0.0, 1.5, 5.0, 12.0, 25.0, 45.0, 75.0, 115.0, 180.0])
+LOBE_STEP = math.radians(0.5)
 VEIL_FOGS = ("heavy_advection", "heavy_radiation", "moderate_radiation")
 VISIBILITIES = (30.0, 50.0, 80.0, 100.0, 150.0, 200.0, 300.0, 500.0)
 DIRECTIONS = ((0.0, -2.02), (0.0, 2.0), (0.0, 8.0), (0.0, -8.0), (10.0, 0.0), (-15.0, -4.0))
@@ -118,6 +135,124 @@ def halo(photons, rng, cosines, depths, edges, end):
 
 
 @njit(cache=False)
+def shone(table, step, azimuth, elevation, aside, across, up, out):
+    """Intensities that a lamp shines in directions about that to the eye: its share along it, to its right and up."""
+    cosine, sine = math.cos(elevation), math.sin(elevation)
+    for n in range(len(out)):
+        # The direction is turned about the way to the eye, to where the line of sight passes the lamp.
+        turn = across * math.cos(out[n]) - up * math.sin(out[n])
+        rise = across * math.sin(out[n]) + up * math.cos(out[n])
+        level, z = aside * cosine - rise * sine, aside * sine + rise * cosine
+        right = math.atan2(turn, level) + azimuth
+        right = (right + math.pi) % (2.0 * math.pi)
+        row = int((math.asin(min(1.0, max(-1.0, z))) + 0.5 * math.pi) / step + 0.5)
+        out[n] = table[row, int(right / step + 0.5)]
+
+
+@njit(cache=False)
+def left_at(nx, ny, nz, dx, dy, dz, sx, sy, sz):
+    """How light left a lamp that now arrives at an eye: along the way to the eye, toward the line of sight, and aside.
+
+    Directions: the eye as the lamp sees it, the flight that ends in the eye, and that with which the light left.
+    """
+    along = nx * dx + ny * dy + nz * dz
+    # Across the way to the eye, where the line of sight passes the lamp: against the flight.
+    qx, qy, qz = along * nx - dx, along * ny - dy, along * nz - dz
+    sine = math.sqrt(qx * qx + qy * qy + qz * qz)
+    qx, qy, qz = qx / sine, qy / sine, qz / sine
+    px, py, pz = ny * qz - nz * qy, nz * qx - nx * qz, nx * qy - ny * qx
+    return sx * nx + sy * ny + sz * nz, sx * qx + sy * qy + sz * qz, sx * px + sy * py + sz * pz
+
+
+@njit(cache=False)
+def origins(photons, rng, cosines, depths, angles, emitted, turns, end):
+    """How the scattered light that an eye sees about a lamp had left the lamp: weights, not normalized.
+
+    By depth, angle of the line of sight off the lamp, angle between the direction in which the light left and the way
+    to the eye, and the turn of the former about the latter from the side on which the line of sight passes, 0 ... pi.
+    """
+    out = np.zeros((len(depths), len(angles) - 1, len(emitted) - 1, len(turns) - 1))
+    for _ in range(photons):
+        x = y = z = 0.0
+        sz, azimuth = 2.0 * rng.random() - 1.0, 2 * math.pi * rng.random()
+        flat = math.sqrt(1.0 - sz * sz)
+        sx, sy = flat * math.cos(azimuth), flat * math.sin(azimuth)
+        dx, dy, dz = sx, sy, sz
+        order = 0
+        while x * x + y * y + z * z < end * end:
+            length = -math.log(1.0 - rng.random())
+            along, square = x * dx + y * dy + z * dz, x * x + y * y + z * z
+            for j in range(len(depths)):
+                inside = along * along - square + depths[j] ** 2
+                if order == 0 or inside <= 0:
+                    continue
+                for sign in (-1.0, 1.0):
+                    t, r = -along + sign * math.sqrt(inside), depths[j]
+                    if not 0 < t <= length:
+                        continue
+                    cosine = min(1.0, max(-1.0, (along + t) / r))
+                    b = np.searchsorted(angles, math.acos(cosine)) - 1
+                    if not 0 <= b < out.shape[1]:
+                        continue
+                    ahead, a, c = left_at((x + t * dx) / r, (y + t * dy) / r, (z + t * dz) / r, dx, dy, dz, sx, sy, sz)
+                    k = np.searchsorted(emitted, math.acos(min(1.0, max(-1.0, ahead)))) - 1
+                    m = np.searchsorted(turns, abs(math.atan2(c, a))) - 1
+                    out[j, b, max(k, 0), max(m, 0)] += 1.0 / max(abs(cosine), 0.02)
+            x, y, z = x + length * dx, y + length * dy, z + length * dz
+            cosine = cosines[int(rng.random() * len(cosines))]
+            dx, dy, dz = turned(dx, dy, dz, cosine, 2 * math.pi * rng.random())
+            order += 1
+    return out
+
+
+@njit(cache=False)
+def lobe_halo(photons, rng, cosines, depths, edges, end, step, tables, eyes, sides):
+    """Radiance scattered about lamps that shine unevenly, times R² [cd], by depth, bin, lamp and side.
+
+    Photons leave in all directions alike, and remember theirs: whoever sees one arrive knows where, as seen from the
+    lamp, it left, and so what any lamp, turned to the eye anyhow, would have given it. Each counts with its mirror
+    image too.
+    """
+    total = np.zeros((len(depths), len(edges), len(tables), len(sides)))
+    places = np.empty(len(sides))
+    for _ in range(photons):
+        x = y = z = 0.0
+        sz, azimuth = 2.0 * rng.random() - 1.0, 2 * math.pi * rng.random()
+        flat = math.sqrt(1.0 - sz * sz)
+        sx, sy = flat * math.cos(azimuth), flat * math.sin(azimuth)
+        dx, dy, dz = sx, sy, sz
+        order = 0
+        while x * x + y * y + z * z < end * end:
+            length = -math.log(1.0 - rng.random())
+            along, square = x * dx + y * dy + z * dz, x * x + y * y + z * z
+            for j in range(len(depths)):
+                inside = along * along - square + depths[j] ** 2
+                # Lines of sight within 90° of the lamp see light that leaves the sphere.
+                t = -along + math.sqrt(max(inside, 0.0))
+                if order == 0 or inside <= 0 or not 0 < t <= length:
+                    continue
+                cosine = (along + t) / depths[j]
+                angle = math.acos(min(1.0, cosine))
+                for b in range(len(edges)):
+                    if not edges[b, 0] <= angle < edges[b, 1]:
+                        continue
+                    r = depths[j]
+                    ahead, a, c = left_at((x + t * dx) / r, (y + t * dy) / r, (z + t * dz) / r, dx, dy, dz, sx, sy, sz)
+                    for i in range(len(tables)):
+                        for mirror in (-1.0, 1.0):
+                            places[:] = sides
+                            shone(tables[i], step, eyes[i, 0], eyes[i, 1], ahead, a, mirror * c, places)
+                            total[j, b, i] += 0.5 * places / cosine
+            x, y, z = x + length * dx, y + length * dy, z + length * dz
+            cosine = cosines[int(rng.random() * len(cosines))]
+            dx, dy, dz = turned(dx, dy, dz, cosine, 2 * math.pi * rng.random())
+            order += 1
+    for b in range(len(edges)):
+        total[:, b] /= 2 * math.pi * (math.cos(edges[b, 0]) - math.cos(edges[b, 1])) * photons
+    return total
+
+
+@njit(cache=False)
 def scattered_back(x, y, z, dx, dy, dz, k, phase, step, beam, lamps, lamp_size):
     """Light of the lamps that droplets at a place scatter back along a path [cd/m² per optical depth]."""
     total = 0.0
@@ -185,6 +320,70 @@ def write_halo(out, photons):
                     file.write(f"{fog}," + ",".join(f"{n:.5g}" for n in numbers) + "\n")
 
 
+def lobe_sources():
+    """Lamps by name: intensity over elevation and azimuth [cd], and where the eye is (right, up) [degrees]."""
+    right, up = np.linspace(-math.pi, math.pi, 721), np.linspace(-0.5 * math.pi, 0.5 * math.pi, 361)[:, None]
+    facing = np.maximum(np.cos(up) * np.cos(right), 0.0)
+    h, v = np.degrees(np.broadcast_arrays(np.where(facing > 0, right, math.pi), up))
+    front = facing > 1e-9
+    low, high = (np.where(front, luminous_intensity(beam(), right, up), 0.0) for beam in (low_beam, high_beam))
+    street = np.interp(up + 0.5 * math.pi, STREET_ANGLES, STREET_INTENSITIES) + 0.0 * right
+    return {
+        "even": (np.ones_like(facing), (0.0, 0.0)),
+        "cosine": (facing**4, (0.0, 0.0)),
+        "wide": (front * np.exp(-0.5 * ((h / 15.0) ** 2 + (v / 8.0) ** 2)), (0.0, 0.0)),
+        "wide_below": (front * np.exp(-0.5 * ((h / 15.0) ** 2 + (v / 8.0) ** 2)), (5.0, 5.0)),
+        "narrow": (front * np.exp(-0.5 * ((h / 10.0) ** 2 + (v / 5.0) ** 2)), (0.0, 0.0)),
+        "low_beam": (low, (-4.0, 0.7)),
+        "low_beam_near": (low, (-12.0, 2.5)),
+        "high_beam": (high, (-4.0, 0.7)),
+        "street_lamp": (street, (0.0, -15.0)),
+    }
+
+
+def write_lobes(out, photons):
+    """Table of halos of lamps that shine unevenly."""
+    sources = lobe_sources()
+    tables = np.ascontiguousarray(np.stack([table for table, _ in sources.values()]), dtype=np.float32)
+    eyes, sides = np.radians([eye for _, eye in sources.values()]), np.array(list(SIDES.values()))
+    with out.open("w", encoding="utf-8") as file:
+        file.write("# Radiance scattered about lamps that shine unevenly in endless fog, times R^2 [cd].\n")
+        file.write("# Lamps: `lobe_sources`; optical depth k R; middle of each bin of angles [degrees]; on which\n")
+        file.write("# side of the lamp, as it sees it, the line of sight passes. Its direct light is left out.\n")
+        file.write(f"# Command: python benchmarks/monte_carlo.py lobes {out} --photons {photons}\n")
+        file.write(f"fog,optical_depth,angle,lamp,{','.join(SIDES)}\n")
+        for seed, fog in enumerate(LOBE_FOGS):
+            rng, cosines = np.random.default_rng(seed), likely_cosines(phase_table(fog))
+            fixed = (LOBE_DEPTHS, LOBE_EDGES, HALO_END, LOBE_STEP, tables, eyes, sides)
+            total = lobe_halo(photons, rng, cosines, *fixed)
+            for (j, depth), (b, angle), (i, name) in itertools.product(
+                enumerate(LOBE_DEPTHS), enumerate(np.degrees(LOBE_EDGES.mean(axis=1))), enumerate(sources)
+            ):
+                file.write(f"{fog},{depth:g},{angle:g},{name}," + ",".join(f"{n:.4g}" for n in total[j, b, i]) + "\n")
+
+
+def write_origins(out, photons):
+    """Table of where light leaves a lamp that is seen scattered about it."""
+    with out.open("w", encoding="utf-8") as file:
+        file.write("# How scattered light that an eye sees about a lamp had left it, in endless fog: shares [1e-5].\n")
+        file.write("# Optical depth k R; angle of the line of sight off the lamp [degrees], middle of its bin.\n")
+        file.write("# Columns: angle between the way to the eye and where it left (edges: `emitted`), in each the\n")
+        file.write("# turn of the latter about the former from the side of the line of sight (edges: `turned`).\n")
+        for name, edges in (("emitted", ORIGIN_EMITTED), ("turned", ORIGIN_TURNS)):
+            file.write(f"# {name} " + " ".join(f"{angle:g}" for angle in np.degrees(edges)) + "\n")
+        file.write(f"# Command: python benchmarks/monte_carlo.py origins {out} --photons {photons}\n")
+        count = (len(ORIGIN_EMITTED) - 1) * (len(ORIGIN_TURNS) - 1)
+        file.write("fog,optical_depth,angle," + ",".join(f"s{n}" for n in range(count)) + "\n")
+        for seed, fog in enumerate(FOGS):
+            rng, cosines = np.random.default_rng(100 + seed), likely_cosines(phase_table(fog))
+            bins = (ORIGIN_DEPTHS, ORIGIN_ANGLES, ORIGIN_EMITTED, ORIGIN_TURNS, HALO_END)
+            weights = origins(photons, rng, cosines, *bins)
+            middles = np.degrees(np.sqrt(ORIGIN_ANGLES[1:] * ORIGIN_ANGLES[:-1]))
+            for (j, depth), (b, angle) in itertools.product(enumerate(ORIGIN_DEPTHS), enumerate(middles)):
+                shares = weights[j, b].reshape(-1) / weights[j, b].sum()
+                file.write(f"{fog},{depth:g},{angle:.4g}," + ",".join(f"{1e5 * share:.0f}" for share in shares) + "\n")
+
+
 def ray(right, up):
     """A direction (forward, left, up) and how far one sees along it [m]: the road, or a target 40 m ahead on it."""
     a, e = math.radians(right), math.radians(up)
@@ -221,11 +420,12 @@ def write_veil(out, paths):
 def main():
     """Write a table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=("halo", "veil"))
+    parser.add_argument("what", choices=("halo", "lobes", "origins", "veil"))
     parser.add_argument("out", type=Path)
     parser.add_argument("--photons", type=int, default=400_000)
     arguments = parser.parse_args()
-    {"halo": write_halo, "veil": write_veil}[arguments.what](arguments.out, arguments.photons)
+    writers = {"halo": write_halo, "lobes": write_lobes, "origins": write_origins, "veil": write_veil}
+    writers[arguments.what](arguments.out, arguments.photons)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from fogsim.values.estimate import Estimate, FogCategory, SignLook, fog_category
 from fogsim.values.fault import Fault, RunningFault
 from fogsim.values.fog import FogBank, FogChange, FogField, FogPatches, FogShelter
 from fogsim.values.image import Frame, View
-from fogsim.values.light import Beam, HeadLamp, Lamp, Lights, LightSources, SignalLight, StreetLighting
+from fogsim.values.light import Beam, HeadLamp, Lamp, LampLobes, Lights, LightSources, SignalLight, StreetLighting
 from fogsim.values.observation import LeadMeasurement, Observation, SignSighting
 from fogsim.values.road import (
     Lane,
@@ -62,6 +62,7 @@ __all__ = [
     "Frame",
     "HeadLamp",
     "Lamp",
+    "LampLobes",
     "Lane",
     "LaneEnd",
     "LaneKind",

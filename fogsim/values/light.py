@@ -171,6 +171,28 @@ class HeadLamp:
 
 
 @dataclass(frozen=True, slots=True)
+class LampLobes:
+    """How lamps shine in other directions than toward the camera.
+
+    Attributes
+    ----------
+    kinds : tuple of Beam
+        Kinds of lamps.
+    kind : (n,) int64
+        Number of each lamp's kind, −1 for one that shines alike in all directions.
+    scale : (n,) float64
+        Intensity of each over that of its kind.
+    forward : (n, 3) float64
+        Unit vector along the axis of each.
+    """
+
+    kinds: tuple[Beam, ...]
+    kind: NDArray[np.int64]
+    scale: NDArray[np.float64]
+    forward: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
 class LightSources:
     """Lit lamps that the camera may see: of other vehicles and of streets.
 
@@ -184,12 +206,15 @@ class LightSources:
         Linear colours of luminance 1.
     area : (n,) float64
         Luminous area as the camera sees it [m²].
+    lobes : LampLobes or None
+        How they shine in other directions; None where all shine alike in all.
     """
 
     position: NDArray[np.float64]
     intensity: NDArray[np.float64]
     colour: NDArray[np.float64]
     area: NDArray[np.float64]
+    lobes: LampLobes | None = None
 
     @classmethod
     def none(cls) -> "LightSources":

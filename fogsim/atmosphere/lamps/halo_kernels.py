@@ -18,12 +18,14 @@ from fogsim.atmosphere.lamps.halo_lamps import (
     PLACE_V,
     RANGE,
     SHOWN,
+    SIDES,
     STRENGTH,
     TOWARDS,
     WIDE_FOLD,
     WIDE_SIZE,
     lamp_profile,
 )
+from fogsim.atmosphere.lamps.lobe_kernels import Angles, side_profiles
 from fogsim.jit import kernel
 from fogsim.units import LUMINANCE_WEIGHTS
 
@@ -31,6 +33,7 @@ _LAST_WIDE = np.float32(WIDE_SIZE - 1.001)
 _FOLD = np.float32(WIDE_FOLD)
 _TWO, _ONE, _ZERO = np.float32(2.0), np.float32(1.0), np.float32(0.0)
 _LEAST = np.float32(1e-20)
+_FOUR, _LAST_SIDE = np.float32(4.0), np.float32(SIDES - 0.001)
 _NEXT = np.uint32(1)
 _FIRST, _SECOND, _THREE = np.uint64(1), np.uint64(2), np.uint64(3)
 _RED, _GREEN, _BLUE = (np.float32(share) for share in LUMINANCE_WEIGHTS)
@@ -39,9 +42,12 @@ _RED, _GREEN, _BLUE = (np.float32(share) for share in LUMINANCE_WEIGHTS)
 @kernel
 def add_wide_glows(
     directions: NDArray[np.float32],
+    up: NDArray[np.float64],
     lamps: NDArray[np.float64],
+    light: NDArray[np.float32],
     table: NDArray[np.float32],
     log_depth: NDArray[np.float64],
+    angles: Angles,
     faintest: float,
     out: NDArray[np.float32],
 ) -> None:
@@ -51,12 +57,18 @@ def add_wide_glows(
     ----------
     directions : (3, m) float32
         Unit vectors of its pixels in the camera's axes.
+    up : (3,) float64
+        What is above, in the camera's axes.
     lamps : (n, COLUMNS) float64
         Table of lamps.
+    light : (n, angles · SIDES) float32
+        Light of their glows [lx].
     table : (depths, WIDE_SIZE) float32
-        Profiles of unit strength.
+        Profiles of light of 1 lx.
     log_depth : (depths,) float64
         ln τ of the profiles.
+    angles : Angles
+        Of the profiles' entries.
     faintest : float
         Glows that are nowhere brighter are left out [cd/m²].
     out : (4, m) float32
@@ -64,26 +76,57 @@ def add_wide_glows(
     """
     red, green, blue, near = out[0], out[1], out[2], out[3]
     count = red.shape[0]
-    place, profile = np.empty(count, np.float32), np.empty(WIDE_SIZE, np.float32)
-    x, y, z = directions[0], directions[1], directions[2]
-    for lamp in lamps:
+    place, turn = np.empty(count, np.float32), np.empty(count, np.float32)
+    profile, profiles = np.empty(WIDE_SIZE, np.float32), np.empty((SIDES + 1, WIDE_SIZE), np.float32)
+    flat, size = profiles.reshape(-1), np.uint32(WIDE_SIZE)
+    for i in range(lamps.shape[0]):
+        lamp = lamps[i]
         lamp_profile(table, lamp, HIDDEN_SHARE, log_depth, profile)
-        if profile[0] < faintest:
+        if profile[0] * light[i].max() < faintest:
             continue
-        lx, ly, lz = np.float32(lamp[TOWARDS]), np.float32(lamp[TOWARDS + 1]), np.float32(lamp[TOWARDS + 2])
-        for p in range(count):
-            square = max(_TWO - _TWO * (x[p] * lx + y[p] * ly + z[p] * lz), _ZERO)
-            place[p] = square / (square + _FOLD) * _LAST_WIDE
+        side_profiles(profile, light[i], angles, profiles)
+        _place_about(directions, up, lamp, place, turn)
         r, g, b = np.float32(lamp[COLOUR]), np.float32(lamp[COLOUR + 1]), np.float32(lamp[COLOUR + 2])
         n = (_RED * r + _GREEN * g + _BLUE * b) / np.float32(lamp[RANGE])
         for p in range(count):
-            entry = np.uint32(place[p])
-            place[p] = profile[entry] + (profile[entry + _NEXT] - profile[entry]) * (place[p] - np.float32(entry))
+            entry, side = np.uint32(place[p]), np.uint32(turn[p])
+            onward, around, first = place[p] - np.float32(entry), turn[p] - np.float32(side), side * size + entry
+            low = flat[first] + (flat[first + _NEXT] - flat[first]) * onward
+            high = flat[first + size] + (flat[first + size + _NEXT] - flat[first + size]) * onward
+            place[p] = low + (high - low) * around
         for p in range(count):
             red[p] += place[p] * r
             green[p] += place[p] * g
             blue[p] += place[p] * b
             near[p] += place[p] * n
+
+
+@kernel
+def _place_about(
+    directions: NDArray[np.float32],
+    up: NDArray[np.float64],
+    lamp: NDArray[np.float64],
+    place: NDArray[np.float32],
+    turn: NDArray[np.float32],
+) -> None:
+    """Entry of directions in a lamp's profile, and the side of it on which they pass, as the lamp sees them."""
+    x, y, z = directions[0], directions[1], directions[2]
+    ax, ay, az = lamp[TOWARDS], lamp[TOWARDS + 1], lamp[TOWARDS + 2]
+    bx, by, bz = up[1] * az - up[2] * ay, up[2] * ax - up[0] * az, up[0] * ay - up[1] * ax
+    level = max(math.sqrt(bx * bx + by * by + bz * bz), 1e-6)
+    bx, by, bz = bx / level, by / level, bz / level
+    lx, ly, lz = np.float32(ax), np.float32(ay), np.float32(az)
+    rx, ry, rz = np.float32(bx), np.float32(by), np.float32(bz)
+    ux, uy, uz = np.float32(ay * bz - az * by), np.float32(az * bx - ax * bz), np.float32(ax * by - ay * bx)
+    quarter = np.float32(SIDES / 4)
+    for p in range(place.shape[0]):
+        square = max(_TWO - _TWO * (x[p] * lx + y[p] * ly + z[p] * lz), _ZERO)
+        place[p] = square / (square + _FOLD) * _LAST_WIDE
+        right, above = x[p] * rx + y[p] * ry + z[p] * rz, x[p] * ux + y[p] * uy + z[p] * uz
+        # An angle about the lamp without trigonometry: the share of a quarter turn by |above| / (|right| + |above|).
+        bend = abs(above) / (abs(right) + abs(above) + _LEAST)
+        half = bend if right >= _ZERO else _TWO - bend
+        turn[p] = min((half if above >= _ZERO else _FOUR - half) * quarter, _LAST_SIDE)
 
 
 @kernel
@@ -117,6 +160,7 @@ def add_middle_glows(
     cell: NDArray[np.float64],
     reach: float,
     lamps: NDArray[np.float64],
+    light: NDArray[np.float32],
     table: NDArray[np.float32],
     log_depth: NDArray[np.float64],
     faintest: float,
@@ -132,14 +176,18 @@ def add_middle_glows(
         Width and height of a cell [px], and `reach` on the axis in cells.
     reach : float
         Angle from a lamp within which something is lacking [rad].
+    light : (n, CORE_SIZE) float32
+        Light of the glows at the profiles' entries [lx].
     out : (4, rows, cols) float32
         The coarse image; added to.
     """
     rows, columns = out.shape[1], out.shape[2]
     profile, scale = np.empty(CORE_SIZE, np.float32), np.float32((CORE_SIZE - 1.0) / reach)
     last = np.float32(CORE_SIZE - 1.001)
-    for lamp in lamps:
+    for i in range(lamps.shape[0]):
+        lamp = lamps[i]
         lamp_profile(table, lamp, 0.0, log_depth, profile)
+        profile *= light[i]
         if lamp[AHEAD] <= BEHIND or profile[0] < faintest:
             continue
         lx, ly, lz = np.float32(lamp[TOWARDS]), np.float32(lamp[TOWARDS + 1]), np.float32(lamp[TOWARDS + 2])
@@ -153,11 +201,11 @@ def add_middle_glows(
                 place = np.sqrt(max(_TWO - _TWO * cosine, _ZERO)) * scale
                 if place < last:
                     entry = np.uint32(place)
-                    light = profile[entry] + (profile[entry + _NEXT] - profile[entry]) * (place - np.float32(entry))
-                    out[0, v, u] += light * r
-                    out[1, v, u] += light * g
-                    out[2, v, u] += light * b
-                    out[3, v, u] += light * n
+                    glow = profile[entry] + (profile[entry + _NEXT] - profile[entry]) * (place - np.float32(entry))
+                    out[0, v, u] += glow * r
+                    out[1, v, u] += glow * g
+                    out[2, v, u] += glow * b
+                    out[3, v, u] += glow * n
 
 
 @kernel

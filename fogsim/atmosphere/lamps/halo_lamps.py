@@ -29,6 +29,9 @@ WIDE_FOLD = 0.02
 CORE_SIZE = 64
 """Entries of a lamp's profile near it, evenly over the chord or the distance on the image."""
 
+SIDES = 8
+"""Sides of a lamp, 45° apart, from its right over above, on which its glow may differ."""
+
 HIDDEN_SHARE = 0.5
 """Share of the wide glow that is left of a lamp that something hides, which casts a shadow into the fog as well."""
 
@@ -161,7 +164,7 @@ def select_lamps(
     light : LampLight
         Of all lamps.
     chosen : (n,) int64
-        Numbers of the projected ones among them.
+        Numbers of the projected ones among them; those of the kept ones come first afterwards.
     depth : (n,) float64
         Optical depths to those [-].
     farthest : float
@@ -180,6 +183,7 @@ def select_lamps(
             continue
         lamp, number = lamps[count], chosen[i]
         lamp[:] = lamps[i]
+        chosen[count] = number
         square = lamp[RANGE] ** 2
         fade = _smooth(4.0 * (1.0 - depth[i] / farthest)) * _smooth(lamp[AHEAD] / BEHIND)
         lamp[DEPTH], lamp[STRENGTH] = depth[i], intensity[number] / square * fade
@@ -194,15 +198,23 @@ def select_lamps(
 
 
 @kernel
-def merge_lamps(lamps: NDArray[np.float64], apart: float, fused: NDArray[np.float64]) -> int:
+def merge_lamps(
+    lamps: NDArray[np.float64],
+    light: NDArray[np.float32],
+    apart: float,
+    fused: NDArray[np.float64],
+    fused_light: NDArray[np.float32],
+) -> int:
     """Draw together lamps that are close to each other on the image, at like ranges; their count.
 
-    What is left for them is the sum of their strengths, at the middle of their light.
+    What is left for them is the sum of their light, at its middle.
 
     Parameters
     ----------
     lamps, fused : (n, COLUMNS) float64
         Table of lamps before and after; `fused` is written to.
+    light, fused_light : (n, entries) float32
+        Light of their glows [lx]; `fused_light` is written to.
     apart : float
         Distance on the image from which lamps are drawn separately [px].
     """
@@ -215,9 +227,10 @@ def merge_lamps(lamps: NDArray[np.float64], apart: float, fused: NDArray[np.floa
                 found = j
                 break
         if found < 0:
-            fused[count] = lamps[i]
+            fused[count], fused_light[count] = lamps[i], light[i]
             count += 1
             continue
+        fused_light[found] += light[i]
         strength = fused[found, STRENGTH] + lamps[i, STRENGTH]
         share = lamps[i, STRENGTH] / strength if strength > 0.0 else 0.0
         for column in range(COLUMNS):
@@ -287,7 +300,7 @@ def lamp_profile(
     log_depth: NDArray[np.float64],
     out: NDArray[np.float32],
 ) -> None:
-    """Profile of a lamp's glow beyond its core [cd/m²].
+    """Profile of a lamp's glow beyond its core, were its light 1 lx [cd/m²].
 
     Parameters
     ----------
@@ -303,7 +316,7 @@ def lamp_profile(
         Written to.
     """
     row, share, factor = _row_of(lamp[DEPTH], log_depth)
-    gain = np.float32(lamp[STRENGTH] * factor * (left + (1.0 - left) * lamp[SHOWN]))
+    gain = np.float32(factor * (left + (1.0 - left) * lamp[SHOWN]))
     low, high, part = table[row], table[row + 1], np.float32(share)
     for n in range(out.shape[0]):
         out[n] = gain * (low[n] + (high[n] - low[n]) * part)
@@ -312,6 +325,7 @@ def lamp_profile(
 @kernel
 def core_profiles(
     lamps: NDArray[np.float64],
+    light: NDArray[np.float32],
     glow: GlowLines,
     soft: float,
     reach: float,
@@ -326,6 +340,8 @@ def core_profiles(
     ----------
     lamps : (n, COLUMNS) float64
         Table of lamps.
+    light : (n, CORE_SIZE) float32
+        Light of their glows at the entries [lx].
     glow : GlowLines
         The glow.
     soft : float
@@ -346,13 +362,13 @@ def core_profiles(
     for i in range(lamps.shape[0]):
         lamp = lamps[i]
         row, share, factor = _row_of(lamp[DEPTH], log_depth)
-        gain = lamp[STRENGTH] * factor * lamp[SHOWN]
+        gain = factor * lamp[SHOWN]
         # Off the axis a pixel sees a smaller angle.
         angle = pixel * max(lamp[AHEAD], BEHIND) ** 1.5
         flat = lamp[PIXELS] * angle**2 / math.pi + (0.5 * angle) ** 2
         chord = math.sqrt(flat)
         place = min(chord / (chord + fold) * (line.shape[0] - 1), line.shape[0] - 2.0)
-        peak = gain * max(lines[row, int(place)], lines[row + 1, int(place)]) / chord
+        peak = light[i, 0] * gain * max(lines[row, int(place)], lines[row + 1, int(place)]) / chord
         bright[i] = peak > faintest and lamp[AHEAD] > BEHIND
         if not bright[i]:
             continue
@@ -362,4 +378,4 @@ def core_profiles(
             x = n / (CORE_SIZE - 1.0)
             square = (reach * angle * x) ** 2
             sharp, blunt = _glow(math.sqrt(square + flat), line, fold), _glow(math.sqrt(square + soft**2), line, fold)
-            core[i, n] = (sharp - blunt) * (1.0 - x**4) ** 2
+            core[i, n] = light[i, n] * (sharp - blunt) * (1.0 - x**4) ** 2

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,8 @@ from fogsim.atmosphere.lamps.halo_lamps import (
     CORE_SIZE,
     DEPTH,
     RANGE,
+    SIDES,
+    WIDE_FOLD,
     WIDE_SIZE,
     GlowLines,
     LampLight,
@@ -34,6 +36,9 @@ from fogsim.atmosphere.lamps.halo_lamps import (
     project_lamps,
     select_lamps,
 )
+from fogsim.atmosphere.lamps.lobe_kernels import Angles, mean_light
+from fogsim.atmosphere.lamps.lobe_memory import LobeMemory
+from fogsim.atmosphere.lamps.lobes import light_origins
 from fogsim.atmosphere.lamps.phase_function import Droplets
 from fogsim.values import Camera, CameraPose, FogField, LightSources, View
 from fogsim.values.pinhole import camera_axes
@@ -73,6 +78,8 @@ class _Plan:
         Radius within which glow is flat on the coarse image, and that of what the coarsest lacks [rad].
     wide, middle : (depths, entries) float32
         Profiles on the coarsest image, and of what is missing there.
+    wide_angles, middle_angles, core_angles : Angles
+        Of the entries of these profiles, and of the cores.
     """
 
     cell: NDArray[np.float64]
@@ -84,6 +91,9 @@ class _Plan:
     reach: float
     wide: NDArray[np.float32]
     middle: NDArray[np.float32]
+    wide_angles: Angles
+    middle_angles: Angles
+    core_angles: Angles
 
 
 class Halos:
@@ -98,6 +108,10 @@ class Halos:
     def __init__(self, droplets: Droplets = Droplets.MODERATE_RADIATION) -> None:
         self._droplets = Droplets(droplets)
         self._plans: dict[Camera, _Plan] = {}
+
+    @cached_property
+    def _lobes(self) -> LobeMemory:
+        return LobeMemory(self._droplets)
 
     def prepare(self, camera: Camera) -> None:
         """Compute beforehand what depends on camera and droplets alone.
@@ -134,14 +148,16 @@ class Halos:
             The lamps.
         """
         distance = np.ascontiguousarray(view.distance, dtype=np.float32)
-        lamps = _lamps_in_view(camera, pose, fog, sources, distance)
+        lamps, chosen = _lamps_in_view(camera, pose, fog, sources, distance)
         if not len(lamps):
             return
         rows, columns = distance.shape
         image = luminance.reshape(rows, 3 * columns)
         faintest = FAINTEST * mean_luminance(image, 16)
         if np.any(lamps[:, DEPTH] > 0):
-            self._add_glow(image, distance, camera, lamps, faintest)
+            light = self._lobes.light(lamps, chosen, np.array(pose.position, dtype=np.float64), sources)
+            above = np.ascontiguousarray(camera_axes(camera, pose)[:, 2])
+            self._add_glow(image, distance, camera, above, lamps, light, faintest)
         drawn = np.ascontiguousarray(view.radiance, dtype=np.float32).reshape(rows, 3 * columns)
         add_direct_light(lamps, camera.focal_length, SMALL, faintest, drawn, image)
 
@@ -150,22 +166,30 @@ class Halos:
         image: NDArray[np.float32],
         distance: NDArray[np.float32],
         camera: Camera,
+        above: NDArray[np.float64],
         lamps: NDArray[np.float64],
+        light: NDArray[np.float32],
         faintest: float,
     ) -> None:
         plan, glow = self._plan(camera), _glow_lines(self._droplets)
-        lamps, glows = _merged(lamps, _SAME_CORE), _merged(lamps, _SAME_GLOW * float(plan.cell[0]))
+        lamps, light = _merged(lamps, light, _SAME_CORE)
+        glows, shone = _merged(lamps, light, _SAME_GLOW * float(plan.cell[0]))
         coarsest = np.zeros((4, *plan.half_shape), np.float32)
-        coarse = np.empty((4, *plan.shape), np.float32)
-        add_wide_glows(plan.half_directions, glows, plan.wide, glow.log_depth, faintest, coarsest.reshape(4, -1))
+        coarse, middle = np.empty((4, *plan.shape), np.float32), np.empty((len(glows), CORE_SIZE), np.float32)
+        wide = (plan.wide, glow.log_depth, plan.wide_angles, faintest, coarsest.reshape(4, -1))
+        add_wide_glows(plan.half_directions, above, glows, shone, *wide)
         upsample_grid(coarsest, coarse)
-        add_middle_glows(plan.directions, plan.cell, plan.reach, glows, plan.middle, glow.log_depth, faintest, coarse)
+        mean_light(shone, SIDES, plan.middle_angles, middle)
+        near = (glows, middle, plan.middle, glow.log_depth, faintest, coarse)
+        add_middle_glows(plan.directions, plan.cell, plan.reach, *near)
         flat = coarse.reshape(4, -1)
         divide_by_luminance(flat)
         add_upsampled(flat, plan.shape[1], distance, image)
         core, bright = np.empty((len(lamps), CORE_SIZE), np.float32), np.empty(len(lamps), np.bool_)
+        core_light = np.empty_like(core)
+        mean_light(light, SIDES, plan.core_angles, core_light)
         pixel, reach = 1.0 / camera.focal_length, _REACH_CELLS * float(plan.cell[0])
-        core_profiles(lamps, glow, plan.soft, reach, pixel, faintest, core, bright)
+        core_profiles(lamps, core_light, glow, plan.soft, reach, pixel, faintest, core, bright)
         add_glow_cores(lamps, bright, reach, core, distance, image)
 
     def _plan(self, camera: Camera) -> _Plan:
@@ -184,15 +208,18 @@ def _glow_lines(droplets: Droplets) -> GlowLines:
     return GlowLines(values, log_depth, FOLD_CHORD)
 
 
-def _merged(lamps: NDArray[np.float64], apart: float) -> NDArray[np.float64]:
-    fused = np.empty_like(lamps)
-    return fused[: merge_lamps(lamps, apart, fused)]
+def _merged(
+    lamps: NDArray[np.float64], light: NDArray[np.float32], apart: float
+) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
+    fused, fused_light = np.empty_like(lamps), np.empty_like(light)
+    count = merge_lamps(lamps, light, apart, fused, fused_light)
+    return fused[:count], fused_light[:count]
 
 
 def _lamps_in_view(
     camera: Camera, pose: CameraPose, fog: FogField, sources: LightSources, distance: NDArray[np.float32]
-) -> NDArray[np.float64]:
-    """Table of the lamps that shine toward the camera from before it."""
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Table of the lamps that shine toward the camera from before it, and their numbers."""
     eye, axes = np.array(pose.position, dtype=np.float64), camera_axes(camera, pose)
     count = len(sources.intensity)
     lamps, chosen = np.empty((count, COLUMNS)), np.empty(count, np.int64)
@@ -204,7 +231,8 @@ def _lamps_in_view(
     else:
         depth = optical_depth(fog, eye, places)
     light = LampLight(sources.intensity, sources.colour, sources.area)
-    return lamps[: select_lamps(light, chosen, depth, FARTHEST, camera.focal_length, distance, lamps)]
+    count = select_lamps(light, chosen, depth, FARTHEST, camera.focal_length, distance, lamps)
+    return lamps[:count], chosen[:count]
 
 
 def _plan(camera: Camera, droplets: Droplets) -> _Plan:
@@ -214,6 +242,9 @@ def _plan(camera: Camera, droplets: Droplets) -> _Plan:
     wide, middle = np.empty((_DEPTHS, WIDE_SIZE), np.float32), np.empty((_DEPTHS, CORE_SIZE), np.float32)
     soft, reach = _SOFT_CELLS * angle, 2.0 * _REACH_CELLS * angle
     profile_tables(_glow_lines(droplets), soft, 2.0 * soft, reach, wide, middle)
+    folded = np.minimum(np.arange(WIDE_SIZE) / (WIDE_SIZE - 1.0), 0.995)
+    even, core = np.arange(CORE_SIZE) / (CORE_SIZE - 1.0), _REACH_CELLS * camera.width / (2 * cells)
+    origins = light_origins(droplets).angle
     shape, half_shape = (2 * rows + 1, 2 * cells + 1), (rows + 1, cells + 1)
     return _Plan(
         cell=np.array(((camera.width - 1) / (2 * cells), (camera.height - 1) / (2 * rows), 2.0 * _REACH_CELLS)),
@@ -225,7 +256,17 @@ def _plan(camera: Camera, droplets: Droplets) -> _Plan:
         reach=reach,
         wide=wide,
         middle=middle,
+        wide_angles=_angles(2.0 * np.arcsin(np.minimum(np.sqrt(WIDE_FOLD * folded / (1.0 - folded)) / 2, 1)), origins),
+        middle_angles=_angles(reach * even, origins),
+        core_angles=_angles(core / camera.focal_length * even, origins),
     )
+
+
+def _angles(angle: NDArray[np.float64], known: NDArray[np.float64]) -> Angles:
+    """Where angles lie among those that are known, in their logarithm."""
+    place = np.interp(np.log(np.maximum(angle, 1e-6)), np.log(known), np.arange(len(known)))
+    entry = np.minimum(place.astype(np.int64), len(known) - 2)
+    return Angles(entry, (place - entry).astype(np.float32))
 
 
 def _directions(camera: Camera, shape: tuple[int, int]) -> NDArray[np.float32]:

@@ -211,7 +211,8 @@ def signal_light_sources(signals: SignalState, eye: NDArray[np.float64], time: f
         colour = SIGNAL_COLOURS[bit]
         tint = np.tile(np.array(colour) / luminance_of(colour), (int(seen.sum()), 1))
         parts.append((middle[seen], intensity[seen], tint, area[seen]))
-    return LightSources(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+    middle, intensity, tint, area = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    return LightSources(middle, intensity, tint, area)
 
 
 def directed_share(aside: NDArray[np.float64], below: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 
 from fogsim.lighting.beams import high_beam, low_beam
-from fogsim.scene.light_sources import STREET_ANGLES, STREET_INTENSITIES
+from fogsim.scene.lamps import STREET_ANGLES, STREET_INTENSITIES
 from fogsim.units import extinction_from_visibility
 from fogsim.values.luminous_intensity import luminous_intensity
 
@@ -366,22 +366,25 @@ def write_origins(out, photons):
     """Table of where light leaves a lamp that is seen scattered about it."""
     with out.open("w", encoding="utf-8") as file:
         file.write("# How scattered light that an eye sees about a lamp had left it, in endless fog: shares [1e-5].\n")
-        file.write("# Optical depth k R; angle of the line of sight off the lamp [degrees], middle of its bin.\n")
+        file.write("# Optical depth k R; angle of the line of sight off the lamp [degrees], middle of its bin; radiance\n")
+        file.write("# there about a lamp that shines alike in all directions, times R^2 / I.\n")
         file.write("# Columns: angle between the way to the eye and where it left (edges: `emitted`), in each the\n")
         file.write("# turn of the latter about the former from the side of the line of sight (edges: `turned`).\n")
         for name, edges in (("emitted", ORIGIN_EMITTED), ("turned", ORIGIN_TURNS)):
             file.write(f"# {name} " + " ".join(f"{angle:g}" for angle in np.degrees(edges)) + "\n")
         file.write(f"# Command: python benchmarks/monte_carlo.py origins {out} --photons {photons}\n")
         count = (len(ORIGIN_EMITTED) - 1) * (len(ORIGIN_TURNS) - 1)
-        file.write("fog,optical_depth,angle," + ",".join(f"s{n}" for n in range(count)) + "\n")
+        file.write("fog,optical_depth,angle,glow," + ",".join(f"s{n}" for n in range(count)) + "\n")
         for seed, fog in enumerate(FOGS):
             rng, cosines = np.random.default_rng(100 + seed), likely_cosines(phase_table(fog))
             bins = (ORIGIN_DEPTHS, ORIGIN_ANGLES, ORIGIN_EMITTED, ORIGIN_TURNS, HALO_END)
             weights = origins(photons, rng, cosines, *bins)
             middles = np.degrees(np.sqrt(ORIGIN_ANGLES[1:] * ORIGIN_ANGLES[:-1]))
             for (j, depth), (b, angle) in itertools.product(enumerate(ORIGIN_DEPTHS), enumerate(middles)):
-                shares = weights[j, b].reshape(-1) / weights[j, b].sum()
-                file.write(f"{fog},{depth:g},{angle:.4g}," + ",".join(f"{1e5 * share:.0f}" for share in shares) + "\n")
+                total = weights[j, b].sum()
+                solid = 2 * math.pi * (math.cos(ORIGIN_ANGLES[b]) - math.cos(ORIGIN_ANGLES[b + 1]))
+                shares, glow = weights[j, b].reshape(-1) / total, total / (solid * photons)
+                file.write(f"{fog},{depth:g},{angle:.4g},{glow:.4g}," + ",".join(f"{1e5 * share:.0f}" for share in shares) + "\n")
 
 
 def ray(right, up):

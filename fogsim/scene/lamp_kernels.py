@@ -7,12 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
+from fogsim.values.luminous_intensity import FALL_OFF
 
-FORWARD, LEFT, UP, INTENSITY, AREA, FOUND = range(3, 9)
+_FALL_OFF = FALL_OFF * math.log(10.0) * 180.0 / math.pi  # of the logarithm, per radian
+
+FORWARD, LEFT, UP, INTENSITY, AREA, FULL_INTENSITY, AXIS = range(3, 10)
+FOUND = 13
 """Columns of what is found of a lamp, and their count.
 
-First its place [m]; then the way from it to the eye in the vehicle's axes [m], its intensity toward the eye [cd] and
-its luminous area as the eye sees it [m²].
+First its place [m]; then the way from it to the eye in the vehicle's axes [m], its intensity toward the eye [cd], its
+luminous area as the eye sees it [m²], its intensity along its axis [cd], and its axis (3).
 """
 
 
@@ -37,6 +41,12 @@ class LampTable(NamedTuple):
         Lamps of each body, then −1.
     signals : int
         Bits of lamps whose intensity is that of the table; that of others is left at 0.
+    lobe : (n,) int64
+        Number of the way each shines.
+    azimuths, elevations : (a,) and (e,) float64
+        Ascending angles beside and above a lamp's axis from 0 on [rad].
+    log_share : (lobes, e, a) float64
+        ln of the share of its axial intensity that a lamp shines there, alike on both sides.
     """
 
     place: NDArray[np.float64]
@@ -47,6 +57,10 @@ class LampTable(NamedTuple):
     forwards: NDArray[np.float64]
     of_body: NDArray[np.int64]
     signals: int
+    lobe: NDArray[np.int64]
+    azimuths: NDArray[np.float64]
+    elevations: NDArray[np.float64]
+    log_share: NDArray[np.float64]
 
 
 class LampCarriers(NamedTuple):
@@ -69,6 +83,30 @@ class LampCarriers(NamedTuple):
     size: NDArray[np.float64]
     lit: NDArray[np.int64]
     body: NDArray[np.int64]
+
+
+@kernel
+def _before(axis: NDArray[np.float64], value: float) -> tuple[int, float]:
+    """Entry of an axis before a value, and the share of the next one; values beyond its ends are as those."""
+    entry = 0
+    while entry < axis.shape[0] - 2 and value > axis[entry + 1]:
+        entry += 1
+    return entry, min(max((value - axis[entry]) / (axis[entry + 1] - axis[entry]), 0.0), 1.0)
+
+
+@kernel
+def _share_toward(lamps: LampTable, lamp: int, forward: float, left: float, up: float) -> float:
+    """Share of its axial intensity that a lamp shines in a direction in the vehicle's axes."""
+    ahead = forward * lamps.forwards[lamp]
+    azimuth, elevation = math.atan2(abs(left), ahead), math.atan2(abs(up), math.hypot(ahead, left))
+    column, aside = _before(lamps.azimuths, azimuth)
+    row, above = _before(lamps.elevations, elevation)
+    table = lamps.log_share[lamps.lobe[lamp]]
+    low = table[row, column] + (table[row, column + 1] - table[row, column]) * aside
+    high = table[row + 1, column] + (table[row + 1, column + 1] - table[row + 1, column]) * aside
+    beyond_sides = max(azimuth - lamps.azimuths[lamps.azimuths.shape[0] - 1], 0.0)
+    beyond_ends = max(elevation - lamps.elevations[lamps.elevations.shape[0] - 1], 0.0)
+    return math.exp(low + (high - low) * above - _FALL_OFF * math.hypot(beyond_sides, beyond_ends))
 
 
 @kernel
@@ -116,13 +154,16 @@ def find_lamps(
             forward, left, up = ahead - x, aside - y, above - z
             far = math.sqrt(forward * forward + left * left + up * up + 1e-12)
             facing = max(forward * lamps.forwards[lamp] / far, 0.0)
-            one, square = found[count], facing * facing
+            one, sign = found[count], lamps.forwards[lamp]
             over = x * level - z * rise
             one[0] = position[row, 0] + over * cosine - y * sine
             one[1] = position[row, 1] + over * sine + y * cosine
             one[2] = position[row, 2] + x * rise + z * level
             one[FORWARD], one[LEFT], one[UP] = forward, left, up
-            one[INTENSITY] = lamps.intensity[lamp] * square * square if bits & lamps.signals else 0.0
+            full = lamps.intensity[lamp] if bits & lamps.signals else 0.0
+            one[FULL_INTENSITY] = full
+            one[INTENSITY] = full * _share_toward(lamps, lamp, forward, left, up) if full > 0.0 else 0.0
+            one[AXIS], one[AXIS + 1], one[AXIS + 2] = sign * level * cosine, sign * level * sine, sign * rise
             one[AREA] = lamps.area[lamp] * width * height * facing
             which[0, count], which[1, count] = lamp, bits
             count += 1

@@ -8,12 +8,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.scene.bodies import LIT_AREAS, BodyLamp, bodies
-from fogsim.scene.lamp_kernels import AREA, FORWARD, FOUND, INTENSITY, LEFT, UP, LampCarriers, LampTable, find_lamps
+from fogsim.scene.lamp_kernels import (
+    AREA,
+    AXIS,
+    FORWARD,
+    FOUND,
+    FULL_INTENSITY,
+    INTENSITY,
+    LEFT,
+    UP,
+    LampCarriers,
+    LampTable,
+    find_lamps,
+)
+from fogsim.scene.lamps import (
+    FULL,
+    LOBE_AZIMUTHS,
+    LOBE_ELEVATIONS,
+    SIGNAL_LOBES,
+    STREET_ANGLES,
+    STREET_INTENSITIES,
+    STREET_LOBE,
+    SignalLobe,
+    signal_shares,
+    sum_of_beams,
+)
 from fogsim.scene.street_lamps import HEIGHT, SIZE
 from fogsim.scene.town import signal_light_sources
 from fogsim.scene.vehicles import body_names
 from fogsim.units import luminance_of
-from fogsim.values.light import Beam, Lamp, LightSources, StreetLighting, dark_shift
+from fogsim.values.light import Beam, Lamp, LampLobes, LightSources, StreetLighting, dark_shift
 from fogsim.values.luminous_intensity import luminous_intensity
 from fogsim.values.scene import Surface
 from fogsim.values.traffic import TrafficState
@@ -48,11 +72,8 @@ _FOG_HEIGHT, _FOG_INSET = 0.55, 1.0  # front fog lamps lie below the head lamps:
 _FOG_AREA = 0.010  # [m²]
 _SIGNALS = ~int(Lamp.LOW_BEAM | Lamp.HIGH_BEAM | Lamp.FRONT_FOG)  # lamps whose intensity no beam tells
 
-STREET_ANGLES = np.radians([0.0, 30.0, 50.0, 60.0, 65.0, 70.0, 75.0, 80.0, 85.0, 90.0])
-"""Angles from straight down to which `STREET_INTENSITIES` belong [rad]."""
-
-STREET_INTENSITIES = np.array([1500.0, 1800.0, 2400.0, 2900.0, 3000.0, 2900.0, 2000.0, 1000.0, 500.0, 0.0])
-"""Intensity of a street lamp of about 8 klm on a mast of 8 m [cd]."""
+_LOBES: Mapping[Lamp, SignalLobe] = {Lamp.REAR_FOG: SignalLobe.REAR_FOG, Lamp.DAYTIME: SignalLobe.DAYTIME}
+"""How lamps shine; those that are not named as signals do."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +110,7 @@ def light_sources(
     Returns
     -------
     LightSources
-        Lamps that face away are left out. Signal lamps are dimmer off their axis by the fourth power of its cosine.
+        Lamps that face away are left out.
     """
     here = np.asarray(eye, np.float64)
     parts = [_of_vehicles(state, skip, here, beams)] if len(state.ids) else []
@@ -103,7 +124,19 @@ def light_sources(
     if not parts:
         return LightSources.none()
     names = ("position", "intensity", "colour", "area")
-    return LightSources(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+    position, intensity, colour, area = (np.concatenate([getattr(part, name) for part in parts]) for name in names)
+    return LightSources(position, intensity, colour, area, _all_lobes([part.lobes for part in parts]))
+
+
+def _all_lobes(parts: Sequence[LampLobes | None]) -> LampLobes | None:
+    """Lobes of all parts of the lamps."""
+    known = [part for part in parts if part is not None]
+    if len(known) < len(parts):
+        return None
+    kinds = tuple(dict.fromkeys(kind for part in known for kind in part.kinds))
+    numbers = [np.array([kinds.index(kind) for kind in part.kinds], np.int64)[part.kind] for part in known]
+    scale, forward = (np.concatenate([getattr(part, name) for part in known]) for name in ("scale", "forward"))
+    return LampLobes(kinds, np.concatenate(numbers), scale, forward)
 
 
 def _of_vehicles(
@@ -124,13 +157,28 @@ def _of_vehicles(
     found, lit = found[:count], lit[:, :count]
     _add_beams(found[:, INTENSITY], lit[1], (found[:, FORWARD], found[:, LEFT], found[:, UP]), beams)
     seen = np.flatnonzero(found[:, INTENSITY] > 1e-3)
-    found = found[seen]
+    found, lit = found[seen], lit[:, seen]
     return LightSources(
         np.ascontiguousarray(found[:, :3]),
         np.ascontiguousarray(found[:, INTENSITY]),
-        table.colour[lit[0, seen]],
+        table.colour[lit[0]],
         np.ascontiguousarray(found[:, AREA]),
+        _lobes(table, found, lit, beams),
     )
+
+
+def _lobes(table: _Lamps, found: NDArray[np.float64], lit: NDArray[np.int64], beams: Mapping[Lamp, Beam]) -> LampLobes:
+    """How the lamps found shine: signals by their lobes, head lamps and front fog lamps by what burns of them."""
+    kinds, kind = list(SIGNAL_LOBES), table.lamps.lobe[lit[0]]
+    scale = found[:, FULL_INTENSITY] / FULL
+    burning = lit[1] & sum(map(int, beams))
+    for bits in np.unique(burning).tolist():
+        if bits:
+            chosen = burning == bits
+            kind = np.where(chosen, len(kinds), kind)
+            scale = np.where(chosen, 1.0, scale)
+            kinds.append(sum_of_beams(tuple(beam for lamp, beam in beams.items() if bits & lamp)))
+    return LampLobes(tuple(kinds), kind, scale, np.ascontiguousarray(found[:, AXIS : AXIS + 3]))
 
 
 @lru_cache(maxsize=16)
@@ -163,7 +211,9 @@ def _of_streets(heads: NDArray[np.float64], eye: NDArray[np.float64]) -> LightSo
     length, width, depth = SIZE
     # The surface bulges below the head, so that it does not vanish when seen from the side.
     area = length * width * down + 0.5 * (length + width) * depth * np.sqrt(1.0 - down**2)
-    return LightSources(heads[near], intensity, np.tile(_luminance_one(_WARM), (len(near), 1)), area)
+    count = len(near)
+    lobes = LampLobes((STREET_LOBE,), np.zeros(count, np.int64), np.ones(count), np.tile((1.0, 0.0, 0.0), (count, 1)))
+    return LightSources(heads[near], intensity, np.tile(_luminance_one(_WARM), (count, 1)), area, lobes)
 
 
 def street_lighting(heads: NDArray[np.float64], sky_illuminance: float) -> StreetLighting:
@@ -212,8 +262,17 @@ def _lamps() -> _Lamps:
             forwards=np.array(forwards),
             of_body=np.array([member + [-1] * (most - len(member)) for member in members]),
             signals=_SIGNALS,
+            lobe=np.array([_lobe_of(bits) for bits in mask], np.int64),
+            azimuths=LOBE_AZIMUTHS,
+            elevations=LOBE_ELEVATIONS,
+            log_share=signal_shares(),
         ),
     )
+
+
+def _lobe_of(bits: int) -> SignalLobe:
+    """How a lamp shines that is lit by some bits, where they are signals."""
+    return next((lobe for lamp, lobe in _LOBES.items() if bits & lamp), SignalLobe.SIGNAL)
 
 
 def _rows_of(

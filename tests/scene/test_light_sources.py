@@ -5,8 +5,9 @@ import pytest
 
 from fogsim.scene import build_scene, light_sources, street_lamp_heads, street_lighting, vehicle_batches
 from fogsim.scene.bodies import body_shapes
-from fogsim.scene.light_sources import STREET_ANGLES, STREET_INTENSITIES
+from fogsim.scene.lamps import FULL, SIGNAL_LOBES, STREET_ANGLES, STREET_INTENSITIES, SignalLobe
 from fogsim.values import Beam, Lamp, LightSources, RoadNetwork, SignMap, Surface, TrafficState
+from fogsim.values.luminous_intensity import luminous_intensity
 
 SHAPES = body_shapes()
 FLAT = Beam(np.radians([-90.0, 90.0]), np.radians([-90.0, 90.0]), np.full((2, 2), 500.0))
@@ -118,7 +119,8 @@ def test_daytime_lamps_are_dimmer_off_their_axis() -> None:
     ahead = light_sources(one(Lamp.DAYTIME, heading=np.pi, gap=100.0), None, EYE, BEAMS)
     aside = light_sources(one(Lamp.DAYTIME, heading=np.pi - 0.5, gap=100.0), None, EYE, BEAMS)
     assert ahead.intensity == pytest.approx(np.full(2, 600.0), rel=0.03)
-    assert aside.intensity == pytest.approx(600.0 * np.cos(0.5) ** 4, rel=0.05)
+    by_lobe = luminous_intensity(SIGNAL_LOBES[SignalLobe.DAYTIME], 0.5, 0.0) / FULL
+    assert aside.intensity == pytest.approx(600.0 * by_lobe, rel=0.05)
 
 
 def test_street_lamps_within_400_m_shine_by_their_angle(motorway: RoadNetwork) -> None:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,15 @@ from fogsim.scene.roadside import placed
 from fogsim.scene.solids import Material, box, disc, merge, mesh
 from fogsim.scene.town.rods import rod
 from fogsim.units import luminance_of
-from fogsim.values.light import SIGNAL_COLOURS, SIGNAL_DIAMETER, SIGNAL_INTENSITY, LightSources, SignalLight
+from fogsim.values.light import (
+    SIGNAL_COLOURS,
+    SIGNAL_DIAMETER,
+    SIGNAL_INTENSITY,
+    Beam,
+    LampLobes,
+    LightSources,
+    SignalLight,
+)
 from fogsim.values.road import SignalHead
 from fogsim.values.scene import FAR, MIDDLE, SPECK, TINY, Batch, Instance, Mesh, Surface
 from fogsim.values.traffic import SignalColour, SignalState
@@ -205,14 +214,24 @@ def signal_light_sources(signals: SignalState, eye: NDArray[np.float64], time: f
         share = directed_share(np.arctan2(left, forward), np.arctan2(to_lens[:, 2], np.hypot(forward, left)))
         intensity = SIGNAL_INTENSITY * (signals.diameter[lit] / SIGNAL_DIAMETER) ** 2 * share
         face = np.where(walked, _FIGURE_SHARE, 1.0)
-        intensity, full = intensity * face, math.pi / 4.0 * face
-        area = full * signals.diameter[lit] ** 2 * np.maximum(forward, 0.0) / np.linalg.norm(to_lens, axis=1)
+        intensity, surface = intensity * face, math.pi / 4.0 * face
+        area = surface * signals.diameter[lit] ** 2 * np.maximum(forward, 0.0) / np.linalg.norm(to_lens, axis=1)
         seen = intensity > 1e-3
         colour = SIGNAL_COLOURS[bit]
         tint = np.tile(np.array(colour) / luminance_of(colour), (int(seen.sum()), 1))
-        parts.append((middle[seen], intensity[seen], tint, area[seen]))
-    middle, intensity, tint, area = (np.concatenate(columns) for columns in zip(*parts, strict=True))
-    return LightSources(middle, intensity, tint, area)
+        full = SIGNAL_INTENSITY * (signals.diameter[lit] / SIGNAL_DIAMETER) ** 2 * face
+        parts.append((middle[seen], intensity[seen], tint, area[seen], full[seen], -ahead[lit][seen]))
+    middle, intensity, tint, area, full, facing = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    lobes = LampLobes((_lens(),), np.zeros(len(full), np.int64), full / SIGNAL_INTENSITY, facing)
+    return LightSources(middle, intensity, tint, area, lobes)
+
+
+@cache
+def _lens() -> Beam:
+    """How a lens of 200 mm shines, of which those above its axis are not told apart from its axis."""
+    azimuth, elevation = np.radians(np.linspace(-90.0, 90.0, 61)), np.radians(np.linspace(-90.0, 30.0, 61))
+    share = directed_share(*np.broadcast_arrays(azimuth, -elevation[:, None]))
+    return Beam(azimuth, elevation, SIGNAL_INTENSITY * share)
 
 
 def directed_share(aside: NDArray[np.float64], below: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -366,11 +366,13 @@ def write_origins(out, photons):
     """Table of where light leaves a lamp that is seen scattered about it."""
     with out.open("w", encoding="utf-8") as file:
         file.write("# How scattered light that an eye sees about a lamp had left it, in endless fog: shares [1e-5].\n")
-        file.write("# Optical depth k R; angle of the line of sight off the lamp [degrees], middle of its bin; radiance\n")
+        file.write(
+            "# Optical depth k R; angle of the line of sight off the lamp [degrees], middle of its bin; radiance\n"
+        )
         file.write("# there about a lamp that shines alike in all directions, times R^2 / I.\n")
         file.write("# Columns: angle between the way to the eye and where it left (edges: `emitted`), in each the\n")
         file.write("# turn of the latter about the former from the side of the line of sight (edges: `turned`).\n")
-        for name, edges in (("emitted", ORIGIN_EMITTED), ("turned", ORIGIN_TURNS)):
+        for name, edges in (("seen", ORIGIN_ANGLES), ("emitted", ORIGIN_EMITTED), ("turned", ORIGIN_TURNS)):
             file.write(f"# {name} " + " ".join(f"{angle:g}" for angle in np.degrees(edges)) + "\n")
         file.write(f"# Command: python benchmarks/monte_carlo.py origins {out} --photons {photons}\n")
         count = (len(ORIGIN_EMITTED) - 1) * (len(ORIGIN_TURNS) - 1)
@@ -384,7 +386,11 @@ def write_origins(out, photons):
                 total = weights[j, b].sum()
                 solid = 2 * math.pi * (math.cos(ORIGIN_ANGLES[b]) - math.cos(ORIGIN_ANGLES[b + 1]))
                 shares, glow = weights[j, b].reshape(-1) / total, total / (solid * photons)
-                file.write(f"{fog},{depth:g},{angle:.4g},{glow:.4g}," + ",".join(f"{1e5 * share:.0f}" for share in shares) + "\n")
+                file.write(
+                    f"{fog},{depth:g},{angle:.4g},{glow:.4g},"
+                    + ",".join(f"{1e5 * share:.0f}" for share in shares)
+                    + "\n"
+                )
 
 
 def ray(right, up):

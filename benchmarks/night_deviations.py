@@ -18,13 +18,16 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere.lamps.glow import glow, narasimhan_nayar, scattered_once
 from fogsim.atmosphere.lamps.lamp_tables import lamp_table
+from fogsim.atmosphere.lamps.lobes import lobe_glow
 from fogsim.atmosphere.lamps.phase_function import Droplets, henyey_greenstein, phase_function
 from fogsim.atmosphere.lamps.veil import FOLD_DISTANCE, INTERVALS, lit_air, ray_pieces, veil_along
 from fogsim.atmosphere.lamps.veil_kernels import VeilRays
 from fogsim.atmosphere.visibility.night_visibility import FogKind, high_beam_veil, visibility_distance
-from fogsim.lighting.beams import high_beam, low_beam, scaled_beam
+from fogsim.lighting.beams import front_fog_beam, high_beam, low_beam, luminous_flux, scaled_beam
+from fogsim.scene.lamps import FULL, SIGNAL_LOBES, STREET_LOBE, SignalLobe
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Beam
+from fogsim.values.luminous_intensity import luminous_intensity
 
 DATA = Path(__file__).parents[1] / "tests" / "data"
 LAMPS = ((1.8, 0.6, -0.85), (1.8, -0.6, -0.85))
@@ -179,6 +182,64 @@ def limits() -> Rows:
     ]
 
 
+def lobes() -> Rows:
+    """Glow of lamps that shine unevenly over that of photons, up to 43° off: smallest and largest of fogs and sides."""
+    rows = photons("monte_carlo_lobes.csv")
+    rows = rows[rows["angle"] < 45.0]
+    depths = list(dict.fromkeys(rows["optical_depth"]))
+    table: Rows = [("lamp", *(f"τ = {depth:g}" for depth in depths), "share within a quarter [%]")]
+    for name, (beam, unit, eye) in lobe_lamps().items():
+        ratios = []
+        for depth in depths:
+            for droplets in dict.fromkeys(rows["fog"]):
+                some = rows[(rows["fog"] == droplets) & (rows["optical_depth"] == depth) & (rows["lamp"] == name)]
+                counted = np.stack([some[side] for side in ("right", "up", "left", "down")], axis=1)
+                ours = lobe_glow(depth, np.radians(some["angle"]), beam, eye, Droplets(droplets))[:, ::2]
+                ratios.append(ours / (unit * counted))
+        at_depth = np.array(ratios).reshape(len(depths), -1)
+        ranges = [f"{some.min():.2f} … {some.max():.2f}" for some in at_depth]
+        inside = np.mean(np.abs(np.log(at_depth)) < math.log(1.25))
+        table.append((name.replace("_", " "), *ranges, f"{100 * inside:.0f}"))
+    return table
+
+
+def lobe_lamps() -> dict[str, tuple[Beam, float, tuple[float, float]]]:
+    """Lamps of the photons' table by name: beam, its unit in the table [cd], and direction to the eye [rad]."""
+    right, up = np.linspace(-math.pi, math.pi, 361), np.linspace(-0.5 * math.pi, 0.5 * math.pi, 181)
+    facing = np.maximum(np.cos(up)[:, None] * np.cos(right), 0.0)
+
+    def bell(aside: float, above: float) -> Beam:
+        square = (np.degrees(right) / aside) ** 2 + (np.degrees(up)[:, None] / above) ** 2
+        return Beam(right, up, 1e3 * np.where(facing > 1e-9, np.exp(-0.5 * square), 0.0))
+
+    lamps = {
+        "cosine": (Beam(right, up, 1e3 * facing**4), 1e3, (0.0, 0.0)),
+        "wide": (bell(15.0, 8.0), 1e3, (0.0, 0.0)),
+        "wide_below": (bell(15.0, 8.0), 1e3, (5.0, 5.0)),
+        "narrow": (bell(10.0, 5.0), 1e3, (0.0, 0.0)),
+        "low_beam": (low_beam(), 1.0, (-4.0, 0.7)),
+        "low_beam_near": (low_beam(), 1.0, (-12.0, 2.5)),
+        "high_beam": (high_beam(), 1.0, (-4.0, 0.7)),
+        "street_lamp": (STREET_LOBE, 1.0, (0.0, -15.0)),
+    }
+    return {name: (beam, unit, (math.radians(h), math.radians(v))) for name, (beam, unit, (h, v)) in lamps.items()}
+
+
+def lamp_fluxes() -> Rows:
+    """What lamps shine in all: intensity along the axis, beside and above it, and flux."""
+    axial = {"rear position": (8.0, SignalLobe.SIGNAL), "stop": (100.0, SignalLobe.SIGNAL)}
+    axial |= {"rear fog": (200.0, SignalLobe.REAR_FOG), "daytime": (600.0, SignalLobe.DAYTIME)}
+    lamps = {name: scaled_beam(SIGNAL_LOBES[lobe], full / FULL) for name, (full, lobe) in axial.items()}
+    lamps |= {"low beam": low_beam(), "high beam": high_beam(), "front fog": front_fog_beam(), "street": STREET_LOBE}
+    table: Rows = [("lamp", "axis [cd]", "10° aside [cd]", "10° above [cd]", "flux [lm]")]
+    for name, beam in lamps.items():
+        ways = ((0.0, 0.0), (10.0, 0.0), (0.0, 10.0))
+        cells = [f"{float(luminous_intensity(beam, *np.radians(way))):.3g}" for way in ways]
+        flux = luminous_flux(beam, (-math.pi, math.pi), (-0.5 * math.pi, 0.5 * math.pi))
+        table.append((name, *(cells if name != "street" else ("–",) * 3), f"{flux:.3g}"))
+    return table
+
+
 def scattered_between(phase: Callable[[NDArray[np.float64]], NDArray[np.float64]], low: float, high: float) -> float:
     """Share of scattered light that is turned by angles between two [rad]."""
     angle = np.linspace(low, high, 2001)
@@ -198,7 +259,7 @@ def directions() -> Rows:
 
 def main() -> None:
     """Print them all."""
-    for table in (veils, veils_of_gallen, glows, limits, directions):
+    for table in (veils, veils_of_gallen, glows, lobes, lamp_fluxes, limits, directions):
         heading, *rows = table()
         lines = [heading, tuple("---" for _ in heading), *rows]
         print("\n".join("| " + " | ".join(cells) + " |" for cells in lines) + "\n")

@@ -83,6 +83,8 @@ TABLES: dict[str, tuple[str, Callable[[], Rows]]] = {
     "night-veils": ("docs/night.md", night_deviations.veils),
     "night-gallen2014": ("docs/night.md", night_deviations.veils_of_gallen),
     "night-glows": ("docs/night.md", night_deviations.glows),
+    "night-lobes": ("docs/night.md", night_deviations.lobes),
+    "night-lamps": ("docs/night.md", night_deviations.lamp_fluxes),
     "night-limits": ("docs/night.md", night_deviations.limits),
     "night-directions": ("docs/night.md", night_deviations.directions),
     "zhu2015": ("docs/estimators.md", zhu2015),

@@ -1,7 +1,7 @@
 """From luminance to pixel values: metering, exposure, photon and read noise, response and quantisation."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cache
 
@@ -43,12 +43,18 @@ class Sensor:
         Standard deviation of the read-out noise [e⁻].
     bits : int
         Bit depth: 8, 10 or 12.
+    black_level : float
+        Share of full scale at which it reads no light [-].
+    gained_read_noise : float or None
+        Read-out noise at very high gain [e⁻], where what comes after the amplifier no longer counts; None for the same.
     """
 
     saturation_luminance: float
     full_well: float = 10_000.0
     read_noise: float = 5.0
     bits: int = 8
+    black_level: float = 0.0
+    gained_read_noise: float | None = None
 
 
 def expose(radiance: NDArray[np.float32], sensor: Sensor, response: Response, rng: np.random.Generator) -> Pixels:
@@ -78,10 +84,12 @@ def expose(radiance: NDArray[np.float32], sensor: Sensor, response: Response, rn
     key = int(rng.integers(1 << 62))
     rows, columns, _ = radiance.shape
     light, values = np.ascontiguousarray(radiance, dtype=np.float32).reshape(-1), out.reshape(-1)
+    scale = 1.0 - sensor.black_level
     exposure = Exposure(
-        gain=np.float32(1.0 / sensor.saturation_luminance),
-        shot_variance=np.float32(1.0 / sensor.full_well),
-        read_variance=np.float32((sensor.read_noise / sensor.full_well) ** 2),
+        gain=np.float32(scale / sensor.saturation_luminance),
+        shot_variance=np.float32(scale / sensor.full_well),
+        read_variance=np.float32((scale * sensor.read_noise / sensor.full_well) ** 2),
+        black_level=np.float32(sensor.black_level),
         first_key=np.uint32(key & 0xFFFFFFFF),
         second_key=np.uint32(key >> 32),
     )
@@ -205,7 +213,8 @@ def sensor_at(sensor: Sensor, saturation: float, auto: AutoExposure) -> Sensor:
     """Sensor at an exposure.
 
     Exposure time makes no noise. Where even the longest is too short the signal is amplified, and the fewer electrons
-    that then fill a pixel's range make it noisier.
+    that then fill a pixel's range make it noisier. What the read-out adds after the amplifier counts for ever less
+    electrons, as EMVA 1288 cameras show.
 
     Parameters
     ----------
@@ -216,5 +225,8 @@ def sensor_at(sensor: Sensor, saturation: float, auto: AutoExposure) -> Sensor:
     auto : AutoExposure
         Where gain begins.
     """
-    filled = sensor.full_well * min(1.0, saturation / auto.ungained)
-    return Sensor(saturation, filled, sensor.read_noise, sensor.bits)
+    share, noise = min(1.0, saturation / auto.ungained), sensor.read_noise
+    if sensor.gained_read_noise is not None:
+        before = sensor.gained_read_noise
+        noise = math.sqrt(before**2 + (noise**2 - before**2) * share**2)
+    return replace(sensor, saturation_luminance=saturation, full_well=sensor.full_well * share, read_noise=noise)

@@ -31,6 +31,8 @@ class Exposure(NamedTuple):
         Exposure relative to saturation per luminance [m²/cd].
     shot_variance, read_variance : float32
         Variance of the shot noise per exposure, and of the read noise, relative to saturation².
+    black_level : float32
+        What the sensor reads without light, relative to saturation.
     first_key, second_key : uint32
         What tells the noise of one frame from that of another.
     """
@@ -38,6 +40,7 @@ class Exposure(NamedTuple):
     gain: np.float32
     shot_variance: np.float32
     read_variance: np.float32
+    black_level: np.float32
     first_key: np.uint32
     second_key: np.uint32
 
@@ -72,6 +75,7 @@ def develop(
     table, one by one. Slices, since an offset index would be checked for its sign.
     """
     gain, shot_variance, read_variance = exposure.gain, exposure.shot_variance, exposure.read_variance
+    black_level = exposure.black_level
     top, half = np.float32(response.shape[0] - 1), np.float32(0.5)
     zero, one = np.float32(0.0), np.float32(1.0)
     index = np.empty(BLOCK, np.uint32)
@@ -90,6 +94,7 @@ def develop(
             square = off * off
             noise = off * (first + square * (third + square * fifth))
             signal += noise * np.float32(math.sqrt(shot_variance * signal + read_variance))
+            signal += black_level
             signal = signal if signal > zero else zero
             signal = signal if signal < one else one
             index[i] = np.uint32(np.int32(signal * top + half))

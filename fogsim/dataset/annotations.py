@@ -162,7 +162,7 @@ def _calibration(camera: Camera | None) -> dict[str, Any] | None:
         "roll_rad": camera.roll,
         "response": camera.response.value,
         "bits": camera.bits,
-    }
+    } | ({"black_level": camera.black_level} if camera.black_level > 0 else {})
 
 
 def _pose(pose: CameraPose | None) -> dict[str, Any] | None:

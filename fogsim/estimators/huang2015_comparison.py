@@ -175,7 +175,7 @@ def crop_vehicle(image: Pixels, camera: Camera, distance: float) -> VehicleCrop:
     level = levelled(image, camera)
 
     def luminance_of(rows: slice, cols: slice) -> NDArray[np.float32]:
-        return linear_luminance(level[rows, cols], camera.response, camera.bits)
+        return linear_luminance(level[rows, cols], camera.response, camera.bits, camera.black_level)
 
     return vehicle_crop(camera, distance, luminance_of, partial(_sky_above, level, camera, distance))
 
@@ -187,7 +187,7 @@ def _sky_above(image: Pixels, camera: Camera, distance: float) -> SkyReading:
         raise CannotTellError("no sky is in the image")
     top, side = max(bottom - max(camera.height // 16, 4), 0), camera.width // 6
     pixels = image[top:bottom, side : camera.width - side]
-    luminance = linear_luminance(pixels, camera.response, camera.bits)
+    luminance = linear_luminance(pixels, camera.response, camera.bits, camera.black_level)
     bright = float(np.percentile(luminance, 80, method="lower"))
     if bright < MIN_AIRLIGHT:
         raise CannotTellError("too dark above the horizon: this is a daytime method")

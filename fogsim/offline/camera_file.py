@@ -102,6 +102,9 @@ class CameraFile(Section):
     bits: Literal[8, 10, 12] = 8
     """Bit depth of the pixel values; images of 16 bits without it use the whole range."""
 
+    black_level_percent: Number = Field(default=0.0, ge=0, le=25)
+    """Share of full scale, before the response, at which the sensor reads no light."""
+
 
 def load_camera(path: Path) -> Camera:
     """Read the file of a camera whose images need no straightening.
@@ -183,6 +186,7 @@ def load_calibration(path: Path) -> Calibration:
         roll=math.radians(keys.roll_deg),
         response=keys.response or assumed,
         bits=keys.bits,
+        black_level=keys.black_level_percent / 100.0,
     )
     try:
         remarks = () if keys.response else (remark,)

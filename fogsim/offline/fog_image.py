@@ -55,9 +55,9 @@ def fog_image(
     colours = image.reshape(*image.shape[:2], -1)
     channels = min(colours.shape[2], 3)
     transmittance = np.exp(-extinction * distance)[..., None]
-    light = exposure_of(colours[..., :channels] / full, camera.response)
-    air = exposure_of(airlight[:channels] / full, camera.response)
-    fogged = respond(light * transmittance + air * (1.0 - transmittance), camera.response)
+    light = exposure_of(colours[..., :channels] / full, camera.response, camera.black_level)
+    air = exposure_of(airlight[:channels] / full, camera.response, camera.black_level)
+    fogged = respond(light * transmittance + air * (1.0 - transmittance), camera.response, camera.black_level)
     out = colours.copy()
     out[..., :channels] = np.rint(np.clip(fogged, 0.0, 1.0) * full)
     return out.reshape(image.shape)

@@ -126,6 +126,12 @@ class CameraSection(Section):
     read_noise_e: Annotated[Number, Field(ge=0, le=1e6)] = 5.0
     """Standard deviation of the read noise in electrons."""
 
+    gained_read_noise_e: Annotated[Number, Field(ge=0, le=1e6)] | None = None
+    """Read noise in electrons at very high gain, to which it falls; if not given, it is the same at every gain."""
+
+    black_level_percent: Number = Field(default=0.0, ge=0, le=25)
+    """Share of full scale at which the sensor reads no light; estimators are told. 0 cuts noise about the dark off."""
+
     response: Response = Response.SRGB
     """Curve from light to pixel values: `linear`, `gamma` (2.2) or `srgb`."""
 
@@ -143,6 +149,11 @@ class CameraSection(Section):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
+        if self.gained_read_noise_e is not None and self.gained_read_noise_e > self.read_noise_e:
+            raise ValueError(
+                f"gained_read_noise_e must be at most read_noise_e, "
+                f"got {self.gained_read_noise_e:g} and {self.read_noise_e:g}"
+            )
         if self.exposure.mode == "auto" and self.saturation_luminance_cdpm2 is not None:
             raise ValueError(
                 "saturation_luminance_cdpm2 is that of a fixed exposure, but exposure.mode is auto; leave one out"

@@ -7,9 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
-from fogsim.values.luminous_intensity import FALL_OFF
-
-_FALL_OFF = FALL_OFF * math.log(10.0) * 180.0 / math.pi  # of the logarithm, per radian
 
 FORWARD, LEFT, UP, INTENSITY, AREA, FULL_INTENSITY, AXIS = range(3, 10)
 FOUND = 13
@@ -47,6 +44,8 @@ class LampTable(NamedTuple):
         Ascending angles beside and above a lamp's axis from 0 on [rad].
     log_share : (lobes, e, a) float64
         ln of the share of its axial intensity that a lamp shines there, alike on both sides.
+    fall_off : float
+        How fast that falls beyond the axes' ends [1/rad].
     """
 
     place: NDArray[np.float64]
@@ -61,6 +60,7 @@ class LampTable(NamedTuple):
     azimuths: NDArray[np.float64]
     elevations: NDArray[np.float64]
     log_share: NDArray[np.float64]
+    fall_off: float
 
 
 class LampCarriers(NamedTuple):
@@ -106,7 +106,7 @@ def _share_toward(lamps: LampTable, lamp: int, forward: float, left: float, up: 
     high = table[row + 1, column] + (table[row + 1, column + 1] - table[row + 1, column]) * aside
     beyond_sides = max(azimuth - lamps.azimuths[lamps.azimuths.shape[0] - 1], 0.0)
     beyond_ends = max(elevation - lamps.elevations[lamps.elevations.shape[0] - 1], 0.0)
-    return math.exp(low + (high - low) * above - _FALL_OFF * math.hypot(beyond_sides, beyond_ends))
+    return math.exp(low + (high - low) * above - lamps.fall_off * math.hypot(beyond_sides, beyond_ends))
 
 
 @kernel

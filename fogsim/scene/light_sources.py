@@ -1,5 +1,6 @@
 """Lit lamps that a camera may see: of other vehicles, of streets and of traffic lights."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
@@ -38,7 +39,7 @@ from fogsim.scene.town import signal_light_sources
 from fogsim.scene.vehicles import body_names
 from fogsim.units import luminance_of
 from fogsim.values.light import Beam, Lamp, LampLobes, LightSources, StreetLighting, dark_shift
-from fogsim.values.luminous_intensity import luminous_intensity
+from fogsim.values.luminous_intensity import FALL_OFF, luminous_intensity
 from fogsim.values.scene import Surface
 from fogsim.values.traffic import TrafficState
 
@@ -266,6 +267,7 @@ def _lamps() -> _Lamps:
             azimuths=LOBE_AZIMUTHS,
             elevations=LOBE_ELEVATIONS,
             log_share=signal_shares(),
+            fall_off=FALL_OFF * math.log(10.0) / math.radians(1.0),
         ),
     )
 

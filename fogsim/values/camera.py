@@ -11,6 +11,10 @@ BIT_DEPTHS = (8, 10, 12)
 """Bit depths that a camera can have."""
 
 
+MOST_BLACK = 0.25
+"""Largest black level that a camera can have, as a share of full scale [-]."""
+
+
 class Response(StrEnum):
     """How a camera turns exposure into pixel values: proportional, power 1/2.2, or IEC 61966-2-1."""
 
@@ -55,6 +59,9 @@ class Camera:
         scenario therefore default to.
     bits : int
         Bit depth of the pixel values, which are 0 … 2^bits − 1: 8, 10 or 12.
+    black_level : float
+        Share of full scale, before the response, at which the sensor reads no light, so that noise about the dark is
+        not cut off: 0 … 0.25.
     """
 
     width: int
@@ -66,6 +73,7 @@ class Camera:
     roll: float = 0.0
     response: Response = Response.LINEAR
     bits: int = 8
+    black_level: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse a calibration that no camera can have.
@@ -89,6 +97,8 @@ class Camera:
             raise InputError(f"camera roll must lie within ±π rad, got {self.roll!r}")
         if not (_whole(self.bits) and self.bits in BIT_DEPTHS):
             raise InputError(f"camera bits must be 8, 10 or 12, got {self.bits!r}")
+        if not (_finite(self.black_level) and 0 <= self.black_level <= MOST_BLACK):
+            raise InputError(f"camera black_level must lie in 0 … {MOST_BLACK:g}, got {self.black_level!r}")
         for name in ("width", "height", "bits"):
             object.__setattr__(self, name, int(getattr(self, name)))
 

@@ -9,7 +9,7 @@ GAMMA = 2.2
 """Exponent of `Response.GAMMA` [-]."""
 
 
-def respond(exposure: NDArray[np.float64], response: Response) -> NDArray[np.float64]:
+def respond(exposure: NDArray[np.float64], response: Response, black_level: float = 0.0) -> NDArray[np.float64]:
     """Signal for a relative exposure, both 0 … 1 (sRGB: IEC 61966-2-1).
 
     Parameters
@@ -18,7 +18,11 @@ def respond(exposure: NDArray[np.float64], response: Response) -> NDArray[np.flo
         Exposure relative to saturation.
     response : Response
         The curve.
+    black_level : float
+        Share of full scale at which the sensor reads no light, beneath the curve [-].
     """
+    if black_level > 0:
+        exposure = black_level + (1.0 - black_level) * exposure
     match response:
         case Response.LINEAR:
             return exposure
@@ -42,8 +46,10 @@ def eight_bit(image: NDArray[np.uint8] | NDArray[np.uint16], bits: int) -> NDArr
     return (image >> (bits - 8)).astype(np.uint8) if bits > 8 else image.astype(np.uint8, copy=False)
 
 
-def exposure_of(signal: NDArray[np.float64], response: Response) -> NDArray[np.float64]:
+def exposure_of(signal: NDArray[np.float64], response: Response, black_level: float = 0.0) -> NDArray[np.float64]:
     """Relative exposure behind a signal, both 0 … 1: the inverse of `respond` (sRGB: IEC 61966-2-1).
+
+    Of a signal below the black level, as noise makes some, it is negative, so that means over pixels stay right.
 
     Parameters
     ----------
@@ -51,11 +57,12 @@ def exposure_of(signal: NDArray[np.float64], response: Response) -> NDArray[np.f
         Signal relative to the largest pixel value.
     response : Response
         The curve.
+    black_level : float
+        Share of full scale at which the sensor reads no light [-].
     """
-    match response:
-        case Response.LINEAR:
-            return signal
-        case Response.GAMMA:
-            return np.asarray(signal**GAMMA)
-        case Response.SRGB:
-            return np.where(signal <= 0.04045, signal / 12.92, ((signal + 0.055) / 1.055) ** 2.4)
+    linear = signal
+    if response is Response.GAMMA:
+        linear = np.asarray(signal**GAMMA)
+    elif response is Response.SRGB:
+        linear = np.where(signal <= 0.04045, signal / 12.92, ((signal + 0.055) / 1.055) ** 2.4)
+    return (linear - black_level) / (1.0 - black_level) if black_level > 0 else linear

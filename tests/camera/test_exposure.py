@@ -1,10 +1,13 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from fogsim.camera import Sensor, expose
-from fogsim.camera.exposure import response_table
+from fogsim.camera.exposure import AutoExposure, Metering, response_table, sensor_at
 from fogsim.values import Response
 from fogsim.values.camera_response import respond
+from fogsim.vision.light.luminance import linear_luminance
 
 SENSOR = Sensor(saturation_luminance=5000.0, full_well=10_000.0, read_noise=5.0)
 
@@ -105,3 +108,27 @@ def test_too_bright_saturates_and_black_stays_black() -> None:
     rng = np.random.default_rng(4)
     assert expose(grey(1e6), SENSOR, Response.LINEAR, rng).min() == 255
     assert expose(grey(0.0), SENSOR, Response.LINEAR, rng).max() <= 1
+
+
+@pytest.mark.parametrize("response", [Response.LINEAR, Response.SRGB])
+def test_faint_luminances_stay_apart_above_a_black_level(response: Response) -> None:
+    """Without one, noise that is cut off at black adds as much as 0.02 cd/m² does."""
+    dark = Sensor(saturation_luminance=5.0, full_well=1000.0, read_noise=5.0)
+
+    def read(luminance: float, sensor: Sensor) -> float:
+        image = expose(grey(luminance, 400), sensor, response, np.random.default_rng(3))
+        return 5.0 / 255.0 * float(linear_luminance(image, response, 8, sensor.black_level).mean(dtype=np.float64))
+
+    assert read(0.0, dark) > 0.008
+    above = replace(dark, black_level=0.05)
+    assert [read(light, above) for light in (0.0, 0.01, 0.02)] == pytest.approx([0.0, 0.01, 0.02], abs=0.003)
+    assert read(2.0, above) == pytest.approx(2.0, rel=0.01)
+    assert expose(grey(6.0, 4), above, response, np.random.default_rng(0)).min() >= 254
+
+
+def test_read_noise_falls_with_gain() -> None:
+    auto = AutoExposure(Metering.HIGHLIGHTS, 0.65, 0.0, brightest=1e5, ungained=100.0, darkest=1.0)
+    falling = Sensor(1.0, full_well=10_000.0, read_noise=5.0, gained_read_noise=1.5)
+    assert sensor_at(falling, 500.0, auto).read_noise == 5.0
+    assert sensor_at(falling, 1.0, auto).read_noise == pytest.approx(1.5, abs=0.01)
+    assert sensor_at(SENSOR, 1.0, auto).read_noise == 5.0

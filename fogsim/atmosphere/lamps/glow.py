@@ -92,12 +92,16 @@ def glow(depth: ArrayLike, angle: ArrayLike, droplets: Droplets) -> NDArray[np.f
     first = 1.0 - forward_share(phase)
     total = scattered_once(depth, angle, phase, first)
     last = LOSS_OF_DIFFUSE_LIGHT * (1.0 - mean_cosine(phase))
-    for spread, loss in zip(SPREADS, (LOSS_ONCE_SPREAD, last), strict=True):
-        wide = blurred(phase, spread)
+    for wide, loss in zip(_blurred_phases(droplets), (LOSS_ONCE_SPREAD, last), strict=True):
         more = scattered_once(depth, angle, wide, loss) - scattered_once(depth, angle, wide, first)
         total = total + np.maximum(more, 0.0)
         first = min(first, loss)
     return total
+
+
+@cache
+def _blurred_phases(droplets: Droplets) -> tuple[PhaseFunction, ...]:
+    return tuple(blurred(phase_function(droplets), spread) for spread in SPREADS)
 
 
 def mean_cosine(phase: PhaseFunction) -> float:

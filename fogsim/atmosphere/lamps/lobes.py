@@ -4,7 +4,8 @@ Of the scattered light that an eye sees at an angle γ off a lamp, each part had
 scattered once at the angle Θ − γ from the way to the eye, on the side on which the line of sight passes; light
 scattered more often about there, too, but spread. How much left where was counted on photons, once for all lamps
 (`benchmarks/monte_carlo.py origins`): the glow of a lamp is that of one that shines alike in all directions
-(`fogsim.atmosphere.lamps.glow`), with the mean of the lamp's intensity over those directions in place of its intensity.
+(`fogsim.atmosphere.lamps.glow`), with the mean of the lamp's intensity over those directions in place of its intensity,
+times what photons give of that glow.
 """
 
 import math
@@ -27,6 +28,7 @@ AZIMUTH_FOLD, ELEVATION_FOLD = 0.12, 0.06
 AZIMUTHS, ELEVATIONS = 21, 17
 """Directions to the eye in a table."""
 
+_GLOWS = 6  # angles in each bin of them at which the glow is computed
 _HALVES = 2  # directions in each bin of emitted angles
 
 
@@ -47,6 +49,8 @@ class Origins:
         the eye [rad].
     share : (t, g, e, m) float64
         Of the light, what left in each bin; adds up to 1 for each depth and angle.
+    excess : (t, g) float64
+        Luminance about a lamp that shines alike in all directions, over that of `fogsim.atmosphere.lamps.glow` [-].
     """
 
     log_depth: NDArray[np.float64]
@@ -54,6 +58,7 @@ class Origins:
     emitted: NDArray[np.float64]
     turned: NDArray[np.float64]
     share: NDArray[np.float64]
+    excess: NDArray[np.float64]
 
 
 @cache
@@ -66,13 +71,28 @@ def light_origins(droplets: Droplets) -> Origins:
         What the fog is made of.
     """
     lines = (files("fogsim.atmosphere") / "data" / "light_origins.csv").read_text(encoding="utf-8").splitlines()
-    emitted, turned = (_edges(lines, name) for name in ("emitted", "turned"))
+    seen, emitted, turned = (_edges(lines, name) for name in ("seen", "emitted", "turned"))
     rows = [line.split(",", 1)[1] for line in lines if line.startswith(f"{Droplets(droplets)},")]
     table = np.array([[float(cell) for cell in row.split(",")] for row in rows])
-    depths, angles = np.unique(table[:, 0]), np.unique(table[:, 1])
-    share = table[:, 2:].reshape(len(depths), len(angles), len(emitted) - 1, len(turned) - 1)
+    depths = np.unique(table[:, 0])
+    share = table[:, 3:].reshape(len(depths), len(seen) - 1, len(emitted) - 1, len(turned) - 1)
     share /= share.sum(axis=(2, 3), keepdims=True)
-    return Origins(np.log(depths), np.radians(angles), emitted, 0.5 * (turned[1:] + turned[:-1]), share)
+    return Origins(
+        np.log(depths),
+        np.sqrt(seen[1:] * seen[:-1]),
+        emitted,
+        0.5 * (turned[1:] + turned[:-1]),
+        share,
+        table[:, 2].reshape(len(depths), -1) / _mean_glow(depths, seen, droplets),
+    )
+
+
+def _mean_glow(depths: NDArray[np.float64], seen: NDArray[np.float64], droplets: Droplets) -> NDArray[np.float64]:
+    """Glow (t, g) at optical depths, the mean over bins of angles by their solid angle."""
+    part = (np.arange(_GLOWS) + 0.5) / _GLOWS
+    angle = seen[:-1, None] + (seen[1:] - seen[:-1])[:, None] * part
+    luminance = glow(depths[:, None], angle.reshape(-1), droplets).reshape(len(depths), *angle.shape)
+    return np.asarray((luminance * np.sin(angle)).sum(axis=2) / np.sin(angle).sum(axis=1))
 
 
 def _edges(lines: list[str], name: str) -> NDArray[np.float64]:
@@ -85,6 +105,8 @@ def mean_intensity(
     lobe: Beam, azimuth: NDArray[np.float64], elevation: NDArray[np.float64], droplets: Droplets
 ) -> NDArray[np.float64]:
     """Mean intensity of a lamp over the directions in which what is seen of its glow had left it.
+
+    It is what the closed glow is to be multiplied by, and so also holds what photons give over that, 0.7 … 1.2.
 
     Parameters
     ----------
@@ -112,7 +134,8 @@ def mean_intensity(
     weight = np.sin(emitted).reshape(bins, _HALVES)
     weight /= weight.sum(axis=1, keepdims=True)
     in_bins = np.einsum("nehamb,eh->neam", shone.reshape(len(shone), bins, _HALVES, SIDES, -1, 2), 0.5 * weight)
-    return np.asarray(np.einsum("tgem,neam->ntga", origins.share, in_bins))
+    mean = np.einsum("tgem,neam->ntga", origins.share, in_bins)
+    return np.asarray(mean * origins.excess[..., None])
 
 
 def _shone_about(

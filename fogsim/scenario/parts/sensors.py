@@ -58,6 +58,7 @@ def camera(scenario: Scenario, body: str = CAR) -> Camera:
         roll=math.radians(section.roll_deg),
         response=section.response,
         bits=section.bits,
+        black_level=section.black_level_percent / 100.0,
     )
 
 
@@ -110,6 +111,8 @@ def sensor(scenario: Scenario) -> Sensor:
         full_well=section.full_well_e,
         read_noise=section.read_noise_e,
         bits=section.bits,
+        black_level=section.black_level_percent / 100.0,
+        gained_read_noise=section.gained_read_noise_e,
     )
 
 

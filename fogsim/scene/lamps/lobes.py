@@ -106,5 +106,5 @@ def sum_of_beams(beams: tuple[Beam, ...]) -> Beam:
     azimuth, elevation = (
         np.unique(np.concatenate([getattr(beam, name) for beam in beams])) for name in ("azimuth", "elevation")
     )
-    together = sum(luminous_intensity(beam, azimuth, elevation[:, None]) for beam in beams)
-    return Beam(azimuth, elevation, np.asarray(together, dtype=np.float64))
+    each = np.stack([luminous_intensity(beam, azimuth, elevation[:, None]) for beam in beams])
+    return Beam(azimuth, elevation, each.sum(axis=0))

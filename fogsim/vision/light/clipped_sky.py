@@ -105,10 +105,13 @@ def _censored(values: Pixels, camera: Camera) -> tuple[float, float]:
     lower = int(np.argmin(np.abs(upto[: top - 1] - LOWER * upto[top - 1])))
     if upto[lower] < LEAST:
         return 0.0, 0.0
-    high, low = (float(v) for v in 255.0 * exposure_of(np.array([top - 0.5, lower + 0.5]) / top, camera.response))
+    high, low = (
+        float(v)
+        for v in 255.0 * exposure_of(np.array([top - 0.5, lower + 0.5]) / top, camera.response, camera.black_level)
+    )
     above, below = _NORMAL.inv_cdf(1.0 - share), _NORMAL.inv_cdf(float(upto[lower]))
     if above - below < LEAST:
         return 0.0, 0.0
     noise = (high - low) / (above - below)
-    mean = float(linear_table(camera.response, camera.bits)[values].mean(dtype=np.float64))
+    mean = float(linear_table(camera.response, camera.bits, camera.black_level)[values].mean(dtype=np.float64))
     return high - above * noise - mean, noise

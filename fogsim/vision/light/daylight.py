@@ -74,7 +74,7 @@ def lit_by_lamps(level: Pixels, camera: Camera) -> str:
         The assumed calibration.
     """
     view = _view_of(camera)
-    luminance = linear_luminance(level[view.rows], camera.response, camera.bits)
+    luminance = linear_luminance(level[view.rows], camera.response, camera.bits, camera.black_level)
     sky, road = columns_apart(luminance[:-ROAD_ROWS], SKY_STEP), luminance[-ROAD_ROWS:]
     lane = _row_medians(road, view.lane)
     middle, aside = camera.principal_point[0], OVERHEAD * camera.focal_length

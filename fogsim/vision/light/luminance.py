@@ -14,8 +14,8 @@ from fogsim.vision.light import pixel_kernels
 from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels
 
 
-@lru_cache(maxsize=3 * len(Response))
-def linear_table(response: Response, bits: int = 8) -> NDArray[np.float32]:
+@lru_cache(maxsize=6 * len(Response))
+def linear_table(response: Response, bits: int = 8, black_level: float = 0.0) -> NDArray[np.float32]:
     """Light behind each pixel value, in linear grey levels that are the same for every bit depth.
 
     Parameters
@@ -24,14 +24,16 @@ def linear_table(response: Response, bits: int = 8) -> NDArray[np.float32]:
         The assumed response of the camera.
     bits : int
         Its bit depth.
+    black_level : float
+        Its black level, as a share of full scale [-].
 
     Returns
     -------
     (2^bits,) float32
-        Linear grey levels 0 … 255, read-only; the first is 0 and the last 255. sRGB: IEC 61966-2-1.
+        Linear grey levels, read-only: 0 at the black level, 255 the last. sRGB: IEC 61966-2-1.
     """
     share = np.arange(2**bits, dtype=np.float64) / (2**bits - 1)
-    table: NDArray[np.float32] = (255.0 * exposure_of(share, response)).astype(np.float32)
+    table: NDArray[np.float32] = (255.0 * exposure_of(share, response, black_level)).astype(np.float32)
     table.flags.writeable = False
     return table
 
@@ -46,13 +48,13 @@ def linear_pixels(image: Pixels, camera: Camera) -> LinearPixels:
     camera : Camera
         The assumed calibration.
     """
-    table = linear_table(camera.response, camera.bits)
+    table = linear_table(camera.response, camera.bits, camera.black_level)
     weights = np.array(LUMINANCE_WEIGHTS if image.ndim == 3 else (1.0,), np.float32)
     pixels: NDArray[Any] = np.ascontiguousarray(image if image.ndim == 3 else image[:, :, None])
     return LinearPixels(pixels, weights[:, None] * table)
 
 
-def linear_luminance(image: Pixels, response: Response, bits: int = 8) -> NDArray[np.float32]:
+def linear_luminance(image: Pixels, response: Response, bits: int = 8, black_level: float = 0.0) -> NDArray[np.float32]:
     """Undo a camera's response and weigh the colours to luminance (ITU-R BT.709).
 
     Parameters
@@ -63,6 +65,8 @@ def linear_luminance(image: Pixels, response: Response, bits: int = 8) -> NDArra
         The assumed response of the camera.
     bits : int
         Its bit depth.
+    black_level : float
+        Its black level, as a share of full scale [-].
 
     Returns
     -------
@@ -79,7 +83,7 @@ def linear_luminance(image: Pixels, response: Response, bits: int = 8) -> NDArra
     if image.dtype != expected:
         raise InputError(f"an image of {bits} bits must have dtype {np.dtype(expected)}, got {image.dtype}")
     # A copy of the cached table: numba would compile a second kernel for a read-only array.
-    table = linear_table(response, bits).copy()
+    table = linear_table(response, bits, black_level).copy()
     pixels: NDArray[Any] = np.ascontiguousarray(image)
     luminance_of = pixel_kernels.grey_luminance if pixels.ndim == 2 else pixel_kernels.colour_luminance
     return luminance_of(pixels, table)

@@ -82,7 +82,7 @@ def is_ramp(curves: StripCurves, geometry: StripGeometry, camera: Camera) -> boo
     seen = curves.variance[0] > 0
     if int(seen.sum()) < 3:
         return False
-    table = linear_table(camera.response, camera.bits)
+    table = linear_table(camera.response, camera.bits, camera.black_level)
     values = np.interp(curves.luminance[0][seen], table, np.arange(table.size)) * (255.0 / (table.size - 1))
     rows = geometry.below[seen] - geometry.below[seen].mean()
     slope = float(matrix_product(rows, values)) / float(matrix_product(rows, rows))

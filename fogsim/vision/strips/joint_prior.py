@@ -48,7 +48,7 @@ def _airlight(sky: Sky, camera: Camera) -> tuple[float, float, float]:
     deviation, upward = (math.hypot(SKY_DEVIATION * sky.luminance, apart) for apart in (sky.deviation, sky.upward))
     if not sky.is_clipped:
         return sky.luminance, deviation, upward
-    table = linear_table(camera.response, camera.bits)
+    table = linear_table(camera.response, camera.bits, camera.black_level)
     level = float(table[-1] - table[-2]) * (2**camera.bits / 256.0)
     if sky.saturated > MOSTLY:
         return 255.0 + level, 2.0 * level, OVEREXPOSURE * 255.0

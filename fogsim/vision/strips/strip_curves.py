@@ -75,7 +75,10 @@ def strip_curves(
         out = np.zeros((len(geometry.left), 3, geometry.first.size))
     else:
         out = np.stack([known.luminance, known.variance, known.scatter], axis=1)
-    rows, table = np.stack([geometry.first, geometry.last]), linear_table(camera.response, camera.bits)
+    rows, table = (
+        np.stack([geometry.first, geometry.last]),
+        linear_table(camera.response, camera.bits, camera.black_level),
+    )
     metres = (geometry.right - geometry.left) * (geometry.distance / camera.focal_length)
     pieces = np.maximum(metres / GRAIN, 1.0) * np.maximum(geometry.extent / GRAIN, 1.0)
     for strip, values in enumerate(out):

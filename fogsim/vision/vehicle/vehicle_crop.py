@@ -299,7 +299,7 @@ def noise_gain(luminance: NDArray[np.float32], sky: float, camera: Camera) -> fl
     camera : Camera
         The assumed calibration.
     """
-    table = linear_table(camera.response, camera.bits)
+    table = linear_table(camera.response, camera.bits, camera.black_level)
     slope = np.gradient(table.astype(np.float64))
     here, there = (int(np.searchsorted(table, level)) for level in (float(np.median(luminance)), sky))
     most = table.size - 1

@@ -89,7 +89,7 @@ STREET_LOBE: Beam = _street_lobe()
 
 def signal_shares() -> NDArray[np.float64]:
     """Ln of the share of its axial intensity that each kind of signal lamp shines (kinds, elevations, azimuths)."""
-    return np.log(np.array([_SHARES[kind] for kind in SignalLobe]))
+    return np.asarray(np.log(np.array([_SHARES[kind] for kind in SignalLobe])))
 
 
 @lru_cache(maxsize=64)

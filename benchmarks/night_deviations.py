@@ -234,9 +234,9 @@ def lamp_fluxes() -> Rows:
     table: Rows = [("lamp", "axis [cd]", "10° aside [cd]", "10° above [cd]", "flux [lm]")]
     for name, beam in lamps.items():
         ways = ((0.0, 0.0), (10.0, 0.0), (0.0, 10.0))
-        cells = [f"{float(luminous_intensity(beam, *np.radians(way))):.3g}" for way in ways]
+        cells = [f"{float(f'{luminous_intensity(beam, *np.radians(way)):.3g}'):g}" for way in ways]
         flux = luminous_flux(beam, (-math.pi, math.pi), (-0.5 * math.pi, 0.5 * math.pi))
-        table.append((name, *(cells if name != "street" else ("–",) * 3), f"{flux:.3g}"))
+        table.append((name, *(cells if name != "street" else ("–",) * 3), f"{float(f'{flux:.3g}'):g}"))
     return table
 
 

@@ -30,10 +30,10 @@ LEAST_NOISE = 0.08
 LEAST_GRADIENT = 4.0
 """Gradient of an edge over its noise [-]."""
 
-LEAST_SHARE, UNTOLD_SHARE = 0.68, 0.85
+LEAST_SHARE, UNTOLD_SHARE = 0.66, 0.85
 """Share of its outline that a sign must show where the map has one, and anywhere else [-]."""
 
-SURPRISE, UNTOLD_SURPRISE = 6.0, 12.0
+SURPRISE, UNTOLD_SURPRISE = 9.0, 14.0
 """Negative logarithm of the probability that edges which lie at random bear an outline out as well [-]; in one of the
 tiles of a whole picture, for any of them."""
 
@@ -121,7 +121,7 @@ def detect_signs(
     regions : iterable of SearchRegion or None
         Where to look, and for what size; None looks all over the picture.
     least_strength : float or None
-        Least share of an outline that must be seen [-]; None for 0.68 in regions and 0.85 without.
+        Least share of an outline that must be seen [-]; None for 0.66 in regions and 0.85 without.
     radii : tuple of float
         Least and greatest radius where there are no regions [px].
 

@@ -22,8 +22,8 @@ _MOST_CHANGES = 2
 _HOPELESS, _GAIN = 0.35, 0.3
 """Share below which an outline is not fitted, and the most that fitting is thought to add to a share [-]."""
 
-_ALIKE = 0.05
-"""Difference of shares of outlines that are seen alike [-]."""
+_BY_CHANCE = 0.35
+"""Share of an outline that is no evidence for it [-]."""
 
 _WITHOUT_QUARTER = 0.5
 """Most that is seen of an outline of which one quarter is not [-]."""
@@ -33,7 +33,9 @@ _ENOUGH = 6
 
 
 @kernel
-def support(points: Floats, number: NDArray[np.int32], outline: Floats, x: float, y: float, radius: float) -> Floats:
+def support(
+    points: Floats, number: NDArray[np.int32], outline: Floats, x: float, y: float, radius: float, reach: int
+) -> Floats:
     """Compare an outline with the edges near it.
 
     Parameters
@@ -44,6 +46,8 @@ def support(points: Floats, number: NDArray[np.int32], outline: Floats, x: float
         Places on the outline of radius 1 about the middle, and its outward normals there.
     x, y, radius : float
         Where and how large the outline is supposed to be [px].
+    reach : int
+        Rows and columns about each place in which edges are looked for: 1, or 2 for a first look [px].
 
     Returns
     -------
@@ -51,13 +55,14 @@ def support(points: Floats, number: NDArray[np.int32], outline: Floats, x: float
         Share of the places that have a fitting edge, less where it fits worse [-], and how much farther right, down and
         larger the outline fits them best [px].
     """
-    tolerance = min(max(0.13 * radius, 0.8), 1.5)
+    tolerance = reach * min(max(0.13 * radius, 0.8), 1.5)
     seen, changes, last, near = 0, 0, 0.0, np.zeros(4)
     a = np.zeros((3, 3))
     b = np.zeros(3)
     for k in range(outline.shape[0]):
         nx, ny = outline[k, 2], outline[k, 3]
-        off, polarity = _nearest_edge(points, number, x + radius * outline[k, 0], y + radius * outline[k, 1], nx, ny)
+        px, py = x + radius * outline[k, 0], y + radius * outline[k, 1]
+        off, polarity = _nearest_edge(points, number, (px, py), (nx, ny), reach)
         if abs(off) > tolerance:
             continue
         seen += 1
@@ -81,13 +86,18 @@ def support(points: Floats, number: NDArray[np.int32], outline: Floats, x: float
 
 @kernel
 def _nearest_edge(
-    points: Floats, number: NDArray[np.int32], x: float, y: float, nx: float, ny: float
+    points: Floats,
+    number: NDArray[np.int32],
+    place: tuple[float, float],
+    normal: tuple[float, float],
+    reach: int,
 ) -> tuple[float, float]:
     """Offset along a normal [px], infinite if none is near, and direction of the edge nearest to a place."""
     off, polarity = math.inf, 0.0
+    (x, y), (nx, ny) = place, normal
     row, col = math.floor(y + 0.5), math.floor(x + 0.5)
-    for i in range(max(row - 1, 0), min(row + 2, number.shape[0])):
-        for j in range(max(col - 1, 0), min(col + 2, number.shape[1])):
+    for i in range(max(row - reach, 0), min(row + reach + 1, number.shape[0])):
+        for j in range(max(col - reach, 0), min(col + reach + 1, number.shape[1])):
             at = number[i, j]
             if at >= 0:
                 along = points[at, NX] * nx + points[at, NY] * ny
@@ -138,20 +148,20 @@ def fitted(points: Floats, number: NDArray[np.int32], outlines: Floats, candidat
     (5,) float32
         Middle (x, y) and radius [px], share of the outline that is seen [-] and number of the outline.
     """
-    best = np.zeros(5, np.float32)
+    best, most = np.zeros(5, np.float32), 0.0
     for shape in range(outlines.shape[0]):
         for k in range(radii.size):
             x, y, radius = float(candidate[0]), float(candidate[1]), float(radii[k])
-            found = support(points, number, outlines[shape], x, y, radius)
-            if found[0] < max(_HOPELESS, best[3] - _GAIN):
+            found = support(points, number, outlines[shape], x, y, radius, 2)
+            if (found[0] + _GAIN - _BY_CHANCE) * radius < most or found[0] < _HOPELESS:
                 continue
-            for _ in range(2):
+            for _ in range(3):
                 x, y, radius = x + found[1], y + found[2], radius + found[3]
-                found = support(points, number, outlines[shape], x, y, radius)
-            within = 0.9 * radii[0] <= radius <= 1.1 * radii[-1]
+                found = support(points, number, outlines[shape], x, y, radius, 1)
             # Of two outlines that are seen alike, the larger one is the sign's, the other one that of its field.
-            larger = found[0] > best[3] - _ALIKE and radius > 1.08 * best[2]
-            if within and (larger or (found[0] > best[3] and radius > best[2] / 1.08) or found[0] > best[3] + _ALIKE):
+            evidence = (found[0] - _BY_CHANCE) * radius
+            if evidence > most and 0.9 * radii[0] <= radius <= 1.1 * radii[-1]:
+                most = evidence
                 best[0], best[1], best[2], best[3], best[4] = x, y, radius, found[0], shape
     return best
 

@@ -257,7 +257,11 @@ def painted_shot(
     radius, k = 0.5 * DIAMETER * scale, extinction_from_visibility(visibility)
     left, top = max(round(u) - _WIDE // 2, 0), max(round(v) - _HIGH // 2, 0)
     piece = (slice(top, min(top + _HIGH, CAMERA.height)), slice(left, min(left + _WIDE, CAMERA.width)))
-    through = np.exp(-k * background.depth[piece])[..., None]
+    depth = background.depth[piece].copy()
+    # What rises behind the sign is behind it.
+    rising = slice(0, max(math.ceil(CAMERA.horizon_row) - top, 0))
+    depth[rising] = np.maximum(depth[rising], 1.1 * (distance + SETBACK))
+    through = np.exp(-k * depth)[..., None]
     light = background.light[piece] * through + (1.0 - through)
     u, v = u - left, v - top
     if kind is not None:

@@ -91,6 +91,7 @@ def records(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
             ("--visibility", "100", "--duration", "1"),
             {"V_met", "road", "method", "frames", "valid", "bias", "median", "p95", "held"},
         ),
+        ("sign_map.py", ("--size", "64x48", "--steps", "2"), {"camera", "signs", "step_ms", "sign_map_ms"}),
         ("traffic.py", ("--vehicles", "20", "--seconds", "1"), {"vehicles", "ms_sumo", "ms_total", "ratio"}),
     ],
 )

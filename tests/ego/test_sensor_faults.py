@@ -95,6 +95,27 @@ def test_signs_that_have_gone_are_not_drawn_but_stay_on_the_map(plain: list[Step
     assert all(step.observation.signs == () and step.truth.signs.signs for step in forgotten)
 
 
+def test_the_picture_of_the_sign_map_knows_nothing_of_the_truth() -> None:
+    truths = [
+        ("fog.visibility_m=400", "sensors.faults=[]"),
+        (
+            "fog.visibility_m=40",
+            "sensors.faults=[{sensor: signs, fault: moved, along: 9 m, left: 3 m},"
+            " {fault: calibration, pitch: 2 deg, focal_length: 5 %}]",
+        ),
+    ]
+    settings = ["camera.width=160", "camera.height=120", "duration_s=0.4", "expect={}"]
+    runs = [
+        list(fogsim.run(fogsim.load_scenario("sign_missing_and_moved", [*settings, *truth]), seed=2))
+        for truth in truths
+    ]
+    for one, other in zip(*runs, strict=True):
+        assert other.truth.signs != one.truth.signs
+        assert one.observation.sign_map.any()
+        np.testing.assert_array_equal(other.observation.sign_map, one.observation.sign_map)
+        np.testing.assert_array_equal(other.observation.sign_map_from_above, one.observation.sign_map_from_above)
+
+
 @pytest.mark.parametrize(
     ("fault", "told"),
     [

@@ -44,19 +44,19 @@ def measure(size: str, steps: int) -> dict[str, Any]:
 def main() -> None:
     """Print a record, or a line, for each size."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="one JSON object a line")
+    parser.add_argument("--json", action="store_true", help="a list of records")
     parser.add_argument("--size", action="append", help="WIDTHxHEIGHT of the camera; may be repeated")
     parser.add_argument("--steps", type=int, default=60)
     arguments = parser.parse_args()
-    for size in arguments.size or ["320x240", "640x480"]:
-        record = measure(size, arguments.steps)
-        if arguments.json:
-            print(json.dumps(record))
-        else:
-            print(
-                f"{size}: {record['signs']:.0f} signs, {record['sign_map_ms']:.3f} ms beside "
-                f"{record['step_ms']:.1f} ms a step, {record['share_percent']:.2f} %"
-            )
+    records = [measure(size, arguments.steps) for size in arguments.size or ("320x240", "640x480")]
+    if arguments.json:
+        print(json.dumps(records))
+        return
+    for record in records:
+        print(
+            f"{record['camera']}: {record['signs']:.0f} signs, {record['sign_map_ms']:.3f} ms beside "
+            f"{record['step_ms']:.1f} ms a step, {record['share_percent']:.2f} %"
+        )
 
 
 if __name__ == "__main__":

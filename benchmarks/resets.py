@@ -1,8 +1,10 @@
 """Time and memory of resets: milliseconds each, and growth of the process per reset.
 
-Four parts, each in a process of its own: ``sumo`` is libsumo's bare ``load``; ``traffic`` adds our traffic stage and
-the steps until the ego is on the road; ``environment`` is the whole of fogsim/FogAdvisory-v0, with a frame rendered,
-and ``highway`` of fogsim/FogHighway-v0, without SUMO.
+Parts, each in a process of its own: ``sumo`` is libsumo's bare ``load``; ``traffic`` adds our traffic stage and the
+steps until the ego is on the road; ``environment`` is the whole of fogsim/FogAdvisory-v0, with a frame rendered, and
+``highway`` of fogsim/FogHighway-v0, without SUMO. ``episodes`` is the bare ``load`` of what fogsim/FogAdvisory-v1
+draws, another road and traffic each time, and ``advisory-v1``, ``fast-v1``, ``drive-v1`` and ``highway-v1`` are those
+environments.
 The first quarter of the resets is not counted (libraries load, caches fill, the allocator's pools settle). Growth is
 that of the resident set, and of what the C library's allocator has handed out and not got back (glibc only), which
 tells a leak from scattered free memory.
@@ -26,28 +28,34 @@ slowly, so short runs show more.
 
 import argparse
 import ctypes
+import functools
 import json
 import multiprocessing
 import os
 import statistics
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
 import gymnasium
+import numpy as np
 
 import fogsim
 import fogsim_envs  # noqa: F401 - registers the environments
 from fogsim.scenario import build
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo_traffic import SumoTraffic, command_line
+from fogsim_envs.task.sampling import EpisodeChoice, EpisodeSource
 
-ENV_ID, SCENARIO = "fogsim/FogAdvisory-v0", "motorway_fog_bank"
+SCENARIO = "motorway_fog_bank"
 
 Reset = Callable[[int], object]
 """Resets once with a seed."""
+
+Part = Callable[[str], AbstractContextManager[Reset]]
+"""Makes what is reset, with cameras of a size."""
 
 
 @contextmanager
@@ -72,23 +80,24 @@ def traffic(_: str) -> Iterator[Reset]:
 
 
 @contextmanager
-def environment(size: str) -> Iterator[Reset]:
-    """Everything."""
-    width, height = map(int, size.split("x"))
-    env = gymnasium.make(ENV_ID, image_size=(width, height))
+def episodes(_: str) -> Iterator[Reset]:
+    """SUMO alone, on the roads and with the demand that fogsim/FogAdvisory-v1 draws."""
+    link, source = LibsumoLink(), EpisodeSource(None, None, None, (), "train")
 
     def reset(seed: int) -> None:
-        env.reset(seed=seed)
+        _, drawn = source.draw(np.random.default_rng(seed), EpisodeChoice())
+        link.begin(command_line(build.traffic_setup(drawn.scenario), seed))
 
     yield reset
-    env.close()
+    link.end()
 
 
 @contextmanager
-def highway(size: str) -> Iterator[Reset]:
-    """Everything but SUMO."""
+def environment(size: str, env_id: str) -> Iterator[Reset]:
+    """Everything; an environment that draws no frames needs no size."""
     width, height = map(int, size.split("x"))
-    env = gymnasium.make("fogsim/FogHighway-v0", image_size=(width, height))
+    settings = {} if env_id == FAST_ID else {"image_size": (width, height)}
+    env = gymnasium.make(env_id, **settings)
 
     def reset(seed: int) -> None:
         env.reset(seed=seed)
@@ -97,7 +106,21 @@ def highway(size: str) -> Iterator[Reset]:
     env.close()
 
 
-PARTS = {"sumo": sumo, "traffic": traffic, "environment": environment, "highway": highway}
+FAST_ID = "fogsim/FogAdvisoryFast-v1"
+ENVIRONMENTS = {
+    "environment": "fogsim/FogAdvisory-v0",
+    "highway": "fogsim/FogHighway-v0",
+    "advisory-v1": "fogsim/FogAdvisory-v1",
+    "fast-v1": FAST_ID,
+    "drive-v1": "fogsim/FogDrive-v1",
+    "highway-v1": "fogsim/FogHighway-v1",
+}
+PARTS: dict[str, Part] = {
+    "sumo": sumo,
+    "traffic": traffic,
+    "episodes": episodes,
+    **{part: functools.partial(environment, env_id=env_id) for part, env_id in ENVIRONMENTS.items()},
+}
 
 
 class _HeapFigures(ctypes.Structure):
@@ -140,7 +163,7 @@ def measure(part: str, resets: int, size: str) -> dict[str, Any]:
         grown_heap = None if heap is None or heap_now is None else round((heap_now - heap) / counted, 2)
     return {
         "part": part,
-        "env": {"environment": ENV_ID, "highway": "fogsim/FogHighway-v0"}.get(part),
+        "env": ENVIRONMENTS.get(part),
         "resets": resets,
         "ms_median": round(statistics.median(spent[warm_up:]), 1),
         "ms_max": round(max(spent[warm_up:]), 1),
@@ -155,7 +178,7 @@ def main() -> None:
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
     parser.add_argument("--resets", type=int, default=200, help="how many resets")
     parser.add_argument("--size", default="64x48", help="camera WIDTHxHEIGHT")
-    parser.add_argument("--part", action="append", choices=PARTS, help="what is reset (default: all four)")
+    parser.add_argument("--part", action="append", choices=PARTS, help="what is reset (default: all)")
     arguments = parser.parse_args()
     records = []
     for part in arguments.part or PARTS:

@@ -168,6 +168,27 @@ class NoView:
         """Do nothing: there is nothing to be freed."""
 
 
+def prepare_lamplight(scenario: Scenario, body: str = build.CAR) -> None:
+    """Compute what every `ViewRenderer` by lamplight needs, whatever its road: once a process, else when first needed.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Its camera and droplets count.
+    body : str
+        Body kind of the ego.
+
+    Raises
+    ------
+    InputError
+        If the beam of a lamp has holes.
+    """
+    camera, setback = build.camera(scenario, body), build.camera_mount(scenario, body).setback
+    mount, air = LampMount(), Air(FogField(0.0, airlight=(0.0, 0.0, 0.0)), scenario.fog.droplets)
+    lamps = [own_head_lamps(lit, camera.mount_height, setback, mount) for lit in _USUAL]
+    air.prepare(supersampled(camera, scenario.camera.samples), lamps)
+
+
 class ViewRenderer:
     """The world of a scenario as the camera on its ego sees it.
 

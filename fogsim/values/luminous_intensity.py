@@ -64,7 +64,7 @@ def luminous_intensity(beam: Beam, azimuth: ArrayLike, elevation: ArrayLike) -> 
     azimuth, elevation : array_like
         Directions to the right of the axis and above the horizontal through the lamp [rad]; they broadcast.
     """
-    right, up = np.broadcast_arrays(np.asarray(azimuth, dtype=np.float64), np.asarray(elevation, dtype=np.float64))
+    right, up = np.asarray(azimuth, dtype=np.float64), np.asarray(elevation, dtype=np.float64)
     table = np.log(np.maximum(beam.intensity, FLOOR))
     column, column_share, beyond_sides = _place(beam.azimuth, right)
     row, row_share, beyond_ends = _place(beam.elevation, up)

@@ -13,6 +13,7 @@ from gymnasium.utils.env_checker import check_env
 import fogsim_envs
 from fogsim.errors import InputError
 from fogsim.scenario import load_scenario
+from fogsim.scenario.fog import Fog
 from fogsim.values import Collision, Command, Ending, Leader, SignSighting, Step
 from fogsim_envs.task import FogAdvisoryV1Env, FogDistribution, ScenarioDistribution, TaskWeights
 from fogsim_envs.task.episodes import fog_setting
@@ -135,6 +136,22 @@ def test_fog_is_drawn_from_its_ranges() -> None:
     for fog in (fogs[0], fogs[1], *(fog for fog in fogs if len(fog.get("banks", ())) == 2)):
         load_scenario(MOTORWAY, [fog_setting(fog)])
         break
+
+
+def test_edges_of_banks_never_meet() -> None:
+    near = FogDistribution(clear_share=0.0, even_share=0.0, ahead=(1.0, 100.0), bank_edge=(250.0, 300.0))
+    rng = np.random.default_rng(1)
+    double = [fog for fog in (Fog.model_validate(near.draw(rng)) for _ in range(60)) if len(fog.banks) == 2]
+    gaps = [two.start_m - one.end_m for one, two in (fog.banks for fog in double)]
+    # Of half an edge each, and no more than that where a bank is drawn to be nearer.
+    assert min(gaps) == pytest.approx(251.0, abs=25.0)
+
+
+@pytest.mark.parametrize(
+    ("light", "prepared"), [({"day": 1.0, "night": 0.0}, False), ({"day": 0.9, "dusk": 0.1}, True)]
+)
+def test_a_night_that_may_come_is_prepared(light: dict[str, float], prepared: bool) -> None:
+    assert EpisodeSource(None, ScenarioDistribution(light=light), None, (), "train").may_be_dark is prepared
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from fogsim.ego.view_rendering import prepare_lamplight
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.loop import AdvisedDriving, spread_advice
 from fogsim.scenario import Scenario, build
@@ -126,6 +127,9 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         first = self._source.first_scenario()
         self._check(first)
         self._camera = build.camera(first)
+        if self._source.may_be_dark and first.renderer != "none":
+            # Once a process; else the first night's reset would take half a second longer than others.
+            prepare_lamplight(first)
         self.observation_space = task_space(observation, self._camera)
         self.action_space = self._make_action_space(continuous)
         modes = [mode for mode in self.metadata["render_modes"] if mode in render_modes()]

@@ -150,22 +150,27 @@ class FogDistribution:
         }
 
 
+_BETWEEN = 1.0
+"""Least distance between the edges of two banks [m]."""
+
+
 def _placed(
     banks: Sequence[Mapping[str, float]], densest: float, outside: float, reach: float
 ) -> list[dict[str, float]]:
     """Banks one after the other; the first is the densest, a further one is less dense."""
-    placed, start = [], 0.0
+    placed, start, free_from = [], 0.0, 0.0
     for number, bank in enumerate(banks):
-        begin = start + bank["ahead"]
+        edge = min(bank["edge"], bank["length"] / 2.0)
+        # Soft edges are centred on where a bank begins and ends, and must not meet.
+        begin = max(start + bank["ahead"], free_from + edge / 2.0)
         if begin > reach:
             break
         end = begin + bank["length"]
         share = bank["depth"]
         thinner = math.exp(share * math.log(densest) + (1.0 - share) * math.log(outside))
         inside = thinner if number else densest
-        edge = min(bank["edge"], bank["length"] / 2.0)
         placed.append({"start_m": begin, "end_m": end, "edge_m": edge, "visibility_m": inside})
-        start = end
+        start, free_from = end, end + edge / 2.0 + _BETWEEN
     return placed
 
 
@@ -216,6 +221,11 @@ class ScenarioDistribution:
         for name in ("lanes", "demand", "truck_shares"):
             if not getattr(self, name):
                 raise InputError(f"ScenarioDistribution.{name}: expected at least one value to choose from, got none")
+
+    @property
+    def darkest(self) -> float:
+        """Least illuminance of the sky that may be drawn [lx]."""
+        return min(_LIGHT[name][0] for name, weight in self.light.items() if weight > 0.0)
 
     def draw(self, rng: np.random.Generator) -> Episode:
         """An episode but for its fog.

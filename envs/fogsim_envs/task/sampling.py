@@ -10,6 +10,7 @@ import numpy as np
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.scenario import Scenario, load_scenario, override
 from fogsim.traffic import SPEED_CHOICES
+from fogsim.units import DAY_ILLUMINANCE
 from fogsim_envs.task.episodes import Episode, FogDistribution, ScenarioDistribution, fog_setting
 
 MOTORWAY = Path(__file__).with_name("motorway.yaml")
@@ -133,6 +134,11 @@ class EpisodeSource:
     def first_scenario(self) -> Scenario:
         """A scenario of them, for what all have in common."""
         return self._loaded(self._scenarios[0], self._overrides)
+
+    @property
+    def may_be_dark(self) -> bool:
+        """Whether lamps may be lit where light is drawn."""
+        return isinstance(self._drawn, ScenarioDistribution) and self._drawn.darkest < DAY_ILLUMINANCE
 
     def draw(self, rng: np.random.Generator, choice: EpisodeChoice) -> tuple[int, Drawn]:
         """Draw an episode; as many random numbers are used whatever is fixed.

@@ -64,16 +64,47 @@ def scattered_once(
     steps : int
         Steps of the integral.
     """
-    t, gamma = np.broadcast_arrays(np.asarray(depth, dtype=np.float64), np.asarray(angle, dtype=np.float64))
-    t, gamma = t[..., None], gamma[..., None]
+    sight = _lines_of_sight(depth, angle, steps)
+    return _scattered(sight, phase(sight.scattering), loss)
+
+
+@dataclass(frozen=True, slots=True)
+class _LinesOfSight:
+    """Steps along lines of sight, in the last axis; see `scattered_once`.
+
+    Attributes
+    ----------
+    scattering : (…, angles, steps) float64
+        Scattering angle, which the depth of the source does not change [rad].
+    way : (…, steps) float64
+        Optical depth from the source to the step and from there to the eye [-].
+    weight : (steps,) float64
+        Of the steps [-].
+    scale : (…) float64
+        What the mean over steps is multiplied with [rad].
+    """
+
+    scattering: NDArray[np.float64]
+    way: NDArray[np.float64]
+    weight: NDArray[np.float64]
+    scale: NDArray[np.float64]
+
+
+def _lines_of_sight(depth: ArrayLike, angle: ArrayLike, steps: int) -> _LinesOfSight:
+    t, gamma = np.asarray(depth, dtype=np.float64)[..., None], np.asarray(angle, dtype=np.float64)[..., None]
     even = (np.arange(steps) + 0.5) / steps
     # The scattering angle runs from γ at the eye to π at infinity, in steps that are small where γ may be in the peak.
     scattering = gamma + (math.pi - gamma) * even**3
     sine = np.sin(gamma)
     way = t * sine / np.sin(scattering)
     to_eye = t * (np.cos(gamma) - sine * np.cos(scattering) / np.sin(scattering))
-    lit = phase(scattering) * np.exp(-loss * (way + to_eye))
-    return np.asarray((lit * 3.0 * even**2).mean(axis=-1) * ((math.pi - gamma) * t / sine)[..., 0])
+    return _LinesOfSight(scattering, way + to_eye, even**2, ((math.pi - gamma) * t / sine)[..., 0])
+
+
+def _scattered(sight: _LinesOfSight, phase: NDArray[np.float64], loss: float) -> NDArray[np.float64]:
+    """P₁, with the phase function at the steps' scattering angles [1/sr]."""
+    lit = phase * np.exp(-loss * sight.way)
+    return np.asarray((lit * 3.0 * sight.weight).mean(axis=-1) * sight.scale)
 
 
 def glow(depth: ArrayLike, angle: ArrayLike, droplets: Droplets) -> NDArray[np.float64]:
@@ -90,10 +121,12 @@ def glow(depth: ArrayLike, angle: ArrayLike, droplets: Droplets) -> NDArray[np.f
     """
     phase = phase_function(droplets)
     first = 1.0 - forward_share(phase)
-    total = scattered_once(depth, angle, phase, first)
+    sight = _lines_of_sight(depth, angle, _STEPS)
+    total = _scattered(sight, phase(sight.scattering), first)
     last = LOSS_OF_DIFFUSE_LIGHT * (1.0 - mean_cosine(phase))
     for wide, loss in zip(_blurred_phases(droplets), (LOSS_ONCE_SPREAD, last), strict=True):
-        more = scattered_once(depth, angle, wide, loss) - scattered_once(depth, angle, wide, first)
+        turned = wide(sight.scattering)
+        more = _scattered(sight, turned, loss) - _scattered(sight, turned, first)
         total = total + np.maximum(more, 0.0)
         first = min(first, loss)
     return total

@@ -65,17 +65,17 @@ def lamp_table(beam: Beam) -> NDArray[np.float32]:
     even = luminous_intensity(beam, angles, angles[:, None]) * inside * inside[:, None]
     spectrum = np.fft.rfft2(even)
     down, across = np.fft.fftfreq(_CELLS)[:, None], np.fft.rfftfreq(_CELLS)
+    row, column = elevation / _STEP + _CELLS // 2, azimuth / _STEP + _CELLS // 2
     for level in range(BLURS - 1):
         cells = FIRST_BLUR * 2.0**level / _STEP
         smooth = np.fft.irfft2(spectrum * np.exp(-2.0 * (math.pi * cells) ** 2 * (down**2 + across**2)), even.shape)
-        stack.append(np.maximum(_bilinear(smooth, elevation / _STEP + _CELLS // 2, azimuth / _STEP + _CELLS // 2), 0.0))
+        stack.append(np.maximum(_bilinear(smooth, row, column), 0.0))
     table = np.ascontiguousarray(np.stack(stack), dtype=np.float32)
     table.flags.writeable = False
     return table
 
 
 def _bilinear(table: NDArray[np.float64], row: NDArray[np.float64], column: NDArray[np.float64]) -> NDArray[np.float64]:
-    row, column = np.broadcast_arrays(row, column)
     i, j = row.astype(np.int64), column.astype(np.int64)
     down, right = row - i, column - j
     low = table[i, j] * (1 - right) + table[i, j + 1] * right

@@ -1,7 +1,7 @@
 """Light of the own head lamps: on what the camera sees, and in the fog between."""
 
-from dataclasses import dataclass, field
-from typing import TypeVar
+from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,26 +27,13 @@ _REMEMBERED = 16
 _HIGHEST = 50.0
 """Height above the camera up to which own lamps light the fog [m]."""
 
-K = TypeVar("K")
-V = TypeVar("V")
-
 
 @dataclass(frozen=True, slots=True)
 class _Group:
     """Lamps of one colour, ready for drawing."""
 
-    lamps: tuple[HeadLamp, ...]
     light: LampGroup
     air: LitAir
-
-
-@dataclass(slots=True)
-class _Memory:
-    """What was computed and may be wanted again: it saves time and changes nothing."""
-
-    rays: dict[Camera, tuple[VeilRays, NDArray[np.float32]]] = field(default_factory=dict)
-    groups: dict[tuple[object, ...], _Group] = field(default_factory=dict)
-    veils: dict[tuple[int, float], tuple[_Group, NDArray[np.float32]]] = field(default_factory=dict)
 
 
 class OwnLamplight:
@@ -60,7 +47,7 @@ class OwnLamplight:
 
     def __init__(self, droplets: Droplets = Droplets.MODERATE_RADIATION) -> None:
         self._droplets = Droplets(droplets)
-        self._memory = _Memory()
+        self._veils: dict[tuple[int, float], tuple[_Group, NDArray[np.float32]]] = {}
 
     def prepare(self, camera: Camera, lamps: tuple[HeadLamp, ...]) -> None:
         """Compute beforehand what depends on camera, lamps and droplets alone.
@@ -105,7 +92,7 @@ class OwnLamplight:
         """
         rows, columns = view.distance.shape
         response = np.zeros((0, columns, 3), np.float32) if view.lamp_response is None else view.lamp_response
-        rays, ray_map = self._rays(camera)
+        rays, ray_map = _rays(camera)
         mean, local = _extinction_on(rays, camera, pose, fog)
         for group in self._groups(camera, lamps):
             grid = VeilGrid(
@@ -125,39 +112,10 @@ class OwnLamplight:
                 luminance.reshape(rows, 3 * columns),
             )
 
-    def _rays(self, camera: Camera) -> tuple[VeilRays, NDArray[np.float32]]:
-        """Rays of the veil, and the map from pixels to rays by (forward, right, up)."""
-        if camera not in self._memory.rays:
-            ray_map = matrix_product(_MIRROR, ray_from_pixel(camera, _AT_REST))
-            _keep(self._memory.rays, camera, (veil_rays(camera), ray_map.astype(np.float32)))
-        return self._memory.rays[camera]
-
     def _groups(self, camera: Camera, lamps: tuple[HeadLamp, ...]) -> list[_Group]:
         colours = dict.fromkeys(lamp.colour for lamp in lamps)
-        return [self._group(camera, tuple(lamp for lamp in lamps if lamp.colour == colour)) for colour in colours]
-
-    def _group(self, camera: Camera, lamps: tuple[HeadLamp, ...]) -> _Group:
-        key = (camera, *((id(lamp.beam), lamp.offset, lamp.colour) for lamp in lamps))
-        known = self._memory.groups.get(key)
-        # An identity may have passed from a beam that is gone to another one.
-        if known is not None and all(a.beam is b.beam for a, b in zip(known.lamps, lamps, strict=True)):
-            return known
-        places = list(dict.fromkeys(lamp.offset for lamp in lamps))
-        # Lamps in one housing shine together.
-        tables = [
-            np.stack([lamp_table(lamp.beam) for lamp in lamps if lamp.offset == place]).sum(axis=0) for place in places
-        ]
-        group = _Group(
-            lamps=lamps,
-            light=LampGroup(
-                places=matrix_product(np.array(places, dtype=np.float32), _MIRROR.astype(np.float32)),
-                tables=np.stack([table[0] for table in tables]),
-                colour=np.array(lamps[0].colour, dtype=np.float32),
-            ),
-            air=lit_air(self._rays(camera)[0], list(zip(places, tables, strict=True)), self._droplets),
-        )
-        _keep(self._memory.groups, key, group)
-        return group
+        of_colour = [tuple(lamp for lamp in lamps if lamp.colour == colour) for colour in colours]
+        return [_group(camera, together, self._droplets) for together in of_colour]
 
     def _veil(self, group: _Group, mean: NDArray[np.float32], local: NDArray[np.float32]) -> NDArray[np.float32]:
         if mean.size > 1:
@@ -165,16 +123,38 @@ class OwnLamplight:
         if mean[0, 0] == 0:
             return np.zeros((0, INTERVALS + 1), np.float32)
         key = (id(group), float(mean[0, 0]))
-        if key not in self._memory.veils:
-            _keep(self._memory.veils, key, (group, veil_along(group.air, local, mean)))
-        return self._memory.veils[key][1]
+        # An identity may have passed from a group that was forgotten to another one.
+        known = self._veils.get(key)
+        if known is None or known[0] is not group:
+            while len(self._veils) >= _REMEMBERED:
+                del self._veils[next(iter(self._veils))]
+            known = self._veils[key] = (group, veil_along(group.air, local, mean))
+        return known[1]
 
 
-def _keep(memory: dict[K, V], key: K, value: V) -> None:
-    """Remember a value, and forget the oldest where there are many."""
-    while len(memory) >= _REMEMBERED:
-        del memory[next(iter(memory))]
-    memory[key] = value
+@lru_cache(_REMEMBERED)
+def _rays(camera: Camera) -> tuple[VeilRays, NDArray[np.float32]]:
+    """Rays of the veil, and the map from pixels to rays by (forward, right, up)."""
+    ray_map = matrix_product(_MIRROR, ray_from_pixel(camera, _AT_REST))
+    return veil_rays(camera), ray_map.astype(np.float32)
+
+
+@lru_cache(_REMEMBERED)
+def _group(camera: Camera, lamps: tuple[HeadLamp, ...], droplets: Droplets) -> _Group:
+    """Lamps of one colour, by what is the same in every scene: the next one's renderer needs not compute it anew."""
+    places = list(dict.fromkeys(lamp.offset for lamp in lamps))
+    # Lamps in one housing shine together.
+    tables = [
+        np.stack([lamp_table(lamp.beam) for lamp in lamps if lamp.offset == place]).sum(axis=0) for place in places
+    ]
+    return _Group(
+        light=LampGroup(
+            places=matrix_product(np.array(places, dtype=np.float32), _MIRROR.astype(np.float32)),
+            tables=np.stack([table[0] for table in tables]),
+            colour=np.array(lamps[0].colour, dtype=np.float32),
+        ),
+        air=lit_air(_rays(camera)[0], list(zip(places, tables, strict=True)), droplets),
+    )
 
 
 def _extinction_on(

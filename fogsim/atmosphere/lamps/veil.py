@@ -11,6 +11,7 @@ four numbers below were fitted to photons (`benchmarks/monte_carlo.py veil`); th
 """
 
 import math
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,14 +92,18 @@ def lit_air(
     """
     shape = (len(rays.directions), len(rays.at))
     straight, turned, path = (np.zeros(shape, np.float32) for _ in range(3))
-    phase = phase_function(droplets)
-    phases = ScatteringPhase(phase_table(phase), phase_table(blurred(phase, PHASE_SPREAD)), SPREAD)
     air = LitAir(straight, turned, path)
     for offset, table in lamps:
-        add_scattered_light(rays, np.array(offset, dtype=np.float64), table, phases, air)
+        add_scattered_light(rays, np.array(offset, dtype=np.float64), table, _scattering_phase(droplets), air)
     path /= np.maximum(straight + turned, np.float32(1e-30))
     path += rays.at.astype(np.float32)
     return air
+
+
+@cache
+def _scattering_phase(droplets: Droplets) -> ScatteringPhase:
+    phase = phase_function(droplets)
+    return ScatteringPhase(phase_table(phase), phase_table(blurred(phase, PHASE_SPREAD)), SPREAD)
 
 
 def veil_along(air: LitAir, extinction: NDArray[np.float32], mean: NDArray[np.float32]) -> NDArray[np.float32]:

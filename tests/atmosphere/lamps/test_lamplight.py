@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from fogsim.atmosphere.air import Air
+from fogsim.atmosphere.lamps import lamplight
 from fogsim.atmosphere.lamps.lamplight import OwnLamplight
+from fogsim.atmosphere.lamps.phase_function import Droplets
 from fogsim.errors import InputError
 from fogsim.lighting.beams import low_beam
 from fogsim.lighting.head_lamps import own_head_lamps
@@ -121,3 +123,11 @@ def test_preparing_changes_nothing():
     assert np.array_equal(
         prepared.radiance(road_view(), CAMERA, POSE, lights), fresh.radiance(road_view(), CAMERA, POSE, lights)
     )
+
+
+def test_light_in_the_air_is_computed_once_a_process(monkeypatch):
+    OwnLamplight().prepare(CAMERA, LOW)
+    monkeypatch.setattr(lamplight, "lit_air", lambda *_: pytest.fail("computed anew"))
+    OwnLamplight().prepare(CAMERA, LOW)
+    with pytest.raises(pytest.fail.Exception, match="anew"):
+        OwnLamplight(Droplets.HEAVY_ADVECTION).prepare(CAMERA, LOW)

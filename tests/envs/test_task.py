@@ -9,6 +9,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from gymnasium.wrappers import FlattenObservation
 
 import fogsim_envs
 from fogsim.errors import InputError
@@ -73,6 +74,24 @@ def test_a_frame_is_observed_and_an_unknown_mode_refused() -> None:
     env.close()
     with pytest.raises(InputError, match=r"did you mean 'state'\?"):
         gymnasium.make("fogsim/FogAdvisory-v1", observation="states")
+
+
+@pytest.mark.parametrize("name", ["FogAdvisory", "FogAdvisoryFast", "FogDrive", "FogHighway"])
+def test_a_version_says_when_it_is_over_and_solved_and_what_has_changed(name: str) -> None:
+    spec = gymnasium.spec(f"fogsim/{name}-v1")
+    assert spec.max_episode_steps is not None
+    # Of 40 points, which a drive at the limit with nothing amiss is worth.
+    assert spec.reward_threshold is not None
+    assert 0.0 < spec.reward_threshold < 40.0
+    kind = gymnasium.envs.registration.load_env_creator(str(spec.entry_point))
+    assert "### Version history\n    * v1: " in (kind.__doc__ or "")
+
+
+@pytest.mark.parametrize(("mode", "size"), [("state", 21), ("camera", 64 * 48 * 3)])
+def test_what_is_flattened_has_no_pixels_among_numbers(mode: str, size: int) -> None:
+    env = gymnasium.make("fogsim/FogAdvisory-v1", observation=mode, image_size=(64, 48))
+    assert FlattenObservation(env).observation_space.shape == (size,)
+    env.close()
 
 
 def test_episodes_differ_and_come_again(fast: gymnasium.Env[Any, Any]) -> None:

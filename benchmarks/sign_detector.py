@@ -133,9 +133,9 @@ def records(pictures: str, told: argparse.Namespace, rng: np.random.Generator) -
         for visibility in told.visibilities:
             reach, near, empty = measured(shots, kind, visibility, told.distances, told.draws, rng)
             yield _record(pictures, kind, visibility, reach, near, empty)
+            nothing += empty
             if kind not in triangles:
                 whole += near
-                nothing += empty
     if whole:
         yield _record(pictures, "all but triangles", None, None, whole, nothing)
 

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from fogsim import __version__
+from fogsim.cli.calibrate import calibrate
 from fogsim.cli.compile import compile_command
 from fogsim.cli.dataset import dataset_command
 from fogsim.cli.doctor import doctor_command
@@ -65,6 +66,7 @@ app.command("signs")(signs_command)
 app.command("dataset")(dataset_command)
 app.command("fog")(fog_command)
 app.command("estimate")(estimate_command)
+app.add_typer(calibrate, name="calibrate")
 app.command("reproduce")(reproduce_command)
 app.command("compile")(compile_command)
 app.command("doctor")(doctor_command)

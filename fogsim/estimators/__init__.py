@@ -10,6 +10,7 @@ from fogsim.estimators.joint_road import JointRoad
 from fogsim.estimators.lead_contrast import LeadContrast
 from fogsim.estimators.negru2013 import Negru2013
 from fogsim.estimators.protocol import Estimator
+from fogsim.estimators.signs.belaroussi2015 import Belaroussi2015
 from fogsim.estimators.zhu2015 import Zhu2015
 from fogsim.registry import Registry
 from fogsim.values.camera import Camera
@@ -22,6 +23,7 @@ ESTIMATORS: Registry[Callable[..., Estimator]] = Registry(
         "huang2015": Huang2015,
         "huang2015_rough": Huang2015Rough,
         "huang2015_lead": Huang2015Lead,
+        "belaroussi2015": Belaroussi2015,
         "joint_road": JointRoad,
         "lead_contrast": LeadContrast,
     },

@@ -3,7 +3,7 @@
 from typing import Protocol
 
 from fogsim.registry import Registry
-from fogsim.reproduce import drivers, huang2015, negru2013, zhu2015
+from fogsim.reproduce import belaroussi2015, drivers, huang2015, negru2013, zhu2015
 from fogsim.reproduce.result import Reproduction, Watch, unwatched
 
 
@@ -20,6 +20,7 @@ REPRODUCTIONS: Registry[Evaluation] = Registry(
         "negru2013": negru2013.reproduce,
         "zhu2015": zhu2015.reproduce,
         "huang2015": huang2015.reproduce,
+        "belaroussi2015": belaroussi2015.reproduce,
         "drivers": drivers.reproduce,
     },
 )

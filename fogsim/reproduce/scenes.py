@@ -33,11 +33,17 @@ NOISELESS = Sensor(saturation_luminance=AIRLIGHT, full_well=1e9, read_noise=0.0)
 _LENGTH, _WIDTH = 1500.0, 3.5  # of the lanes [m]
 
 
-def straight_road() -> RoadNetwork:
-    """Two lanes of opposite directions, straight along x; too slow for guard rails, too fast for a town."""
+def straight_road(length: float = _LENGTH) -> RoadNetwork:
+    """Two lanes of opposite directions, straight along x; too slow for guard rails, too fast for a town.
+
+    Parameters
+    ----------
+    length : float
+        How far it goes [m].
+    """
 
     def lane(name: str, left: float, ways: int) -> Lane:
-        line = np.array([[-50.0, left, 0.0], [_LENGTH, left, 0.0]])[::ways]
+        line = np.array([[-50.0, left, 0.0], [length, left, 0.0]])[::ways]
         return Lane(name, name, line, _WIDTH, 70 / 3.6, LaneMarking.DASHED, LaneMarking.SOLID, outermost=True)
 
     forward = lane("out", 0.0, 1)

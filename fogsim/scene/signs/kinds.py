@@ -23,6 +23,7 @@ from fogsim.scene.signs.symbols import (
     skidding_car,
     text,
     two_cars,
+    walking_figure,
 )
 from fogsim.scene.solids import Material, disc, merge
 from fogsim.units import KMH_PER_MPS
@@ -111,6 +112,9 @@ SIGN_KINDS: Mapping[str, SignKind] = {
     "priority_road": SignKind("priority road", "306", lambda _: _priority()),
     "no_entry": SignKind("no entry", "267", lambda _: _no_entry()),
     "no_overtaking": SignKind("no overtaking", "276", lambda _: disc_face(two_cars())),
+    "pedestrian_crossing": SignKind(
+        "pedestrian crossing", "350", lambda _: plate_face(walking_figure(), field=BLUE, border=FIELD)
+    ),
     "motorway": SignKind("motorway", "330.1", lambda _: plate_face(motorway(), field=BLUE, border=FIELD)),
     "warning": SignKind("danger", "101", lambda _: warning_face(exclamation())),
     "fog_warning": SignKind("fog, reduced visibility", "101.fog", lambda _: warning_face(fog())),

@@ -23,6 +23,8 @@ BLUE = _sheeting(0.02, 0.07, 0.30)
 DIODES = Material((0.95, 0.93, 0.85))
 RED_DIODES = Material((0.75, 0.06, 0.05))
 
+_BARS = (-0.28, -0.14, 0.0, 0.14, 0.28)
+
 Corners = Sequence[tuple[float, float]]
 _X, _Y, _Z = np.eye(3)
 
@@ -227,6 +229,20 @@ def fog() -> Mesh:
 def two_cars() -> Mesh:
     """Red car that overtakes a black one."""
     return merge([_shifted(_car_from_behind(m), x, -0.11, 0.25) for m, x in ((RED, -0.16), (BLACK, 0.16))])
+
+
+def walking_figure() -> Mesh:
+    """Person who walks, above the bars of a crossing."""
+    head = disc((0.03, 0.29, 0.0), 0.065, _X, _Y, FIELD, sides=12, instance=Instance.SIGN)
+    limbs = (
+        [(0.01, 0.21), (-0.02, 0.0)],
+        [(-0.02, 0.0), (0.10, -0.12), (0.13, -0.27)],
+        [(-0.03, 0.0), (-0.10, -0.14), (-0.19, -0.26)],
+        [(0.01, 0.17), (0.11, 0.06), (0.19, 0.04)],
+        [(0.0, 0.17), (-0.12, 0.08), (-0.15, -0.03)],
+    )
+    bars = [flat([(x - 0.04, -0.41), (x + 0.04, -0.41), (x + 0.04, -0.34), (x - 0.04, -0.34)], FIELD) for x in _BARS]
+    return merge((head, *(line(points, 0.075, FIELD) for points in limbs), *bars))
 
 
 def motorway() -> Mesh:

@@ -1,0 +1,71 @@
+"""``fogsim calibrate …``: what methods must know of a camera before they can tell anything."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from fogsim.cli.printing import INTERRUPTED, escape, stderr, stdout
+from fogsim.cli.progress import progress_bar
+from fogsim.errors import InputError
+from fogsim.interruption import interruptible
+
+calibrate = typer.Typer(no_args_is_help=True, help="Measure what a method must know of a camera.")
+
+
+@calibrate.callback()
+def _commands() -> None:
+    """Keep ``signs`` a command of its own beside those to come."""
+
+
+@calibrate.command("signs")
+def calibrate_signs_command(
+    camera: Annotated[Path, typer.Option(help="Camera file (docs/estimate.md), of images that are straight.")],
+    sign_diameter: Annotated[float, typer.Option(help="Size of the signs in m.", min=0.1, max=5.0)] = 0.9,
+    out: Annotated[Path, typer.Option(help="File of the calibration.")] = Path("signs_range.json"),
+    approaches: Annotated[int, typer.Option(help="Signs that are driven up to in each fog.", min=4)] = 24,
+    seed: Annotated[int, typer.Option(help="Of places, errors and noise.", min=0)] = 0,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it is there already.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the calibration in place of the table.")] = False,
+) -> None:
+    """From how far signs are detected in fog: the operating range that belaroussi2015 turns into a visibility."""
+    from fogsim.files.atomic import write_bytes
+    from fogsim.offline.camera_file import load_camera
+    from fogsim.reproduce.sign_calibration import measure_operating_range
+
+    if out.exists() and not overwrite:
+        raise InputError(f"--out {out} is there already; --overwrite replaces it")
+    if not out.parent.is_dir():
+        raise InputError(f"--out {out}: there is no folder {out.parent}")
+    known, done = load_camera(camera), 0
+    with progress_bar(stderr) as progress:
+        task = progress.add_task("signs: a first run compiles for some seconds", total=approaches)
+
+        def watch(steps: int, _: int) -> None:
+            nonlocal done
+            done = steps
+            progress.update(task, completed=steps, description=f"signs: {steps} of {approaches} approaches")
+
+        try:
+            with interruptible():
+                measured = measure_operating_range(known, sign_diameter, approaches=approaches, seed=seed, watch=watch)
+        except KeyboardInterrupt:
+            progress.stop()
+            stderr.print(f"interrupted after {done} of {approaches} approaches; nothing is written", soft_wrap=True)
+            raise typer.Exit(INTERRUPTED) from None
+    write_bytes(out, (measured.as_json() + "\n").encode())
+    if as_json:
+        typer.echo(json.dumps(json.loads(measured.as_json())))
+        return
+    table = Table("V_met [m]", "80 % detection [m]", "first detection [m]", box=None, pad_edge=False)
+    rows = zip(measured.visibility, measured.operating_range, measured.first_detection, measured.deviation, strict=True)
+    for visibility, reach, first, deviation in rows:
+        table.add_row(f"{visibility:.0f}", f"{reach:.0f}", f"{first:.0f} ± {deviation:.0f}")
+    stdout.print(table)
+    low, high = measured.reach
+    told = f"tells V_met between {low:.0f} and {high:.0f} m of first detection, up to {measured.farthest:.0f} m"
+    stdout.print(
+        f"{told if low < high else 'tells nothing: resolution sets the range, not fog'}: {escape(out)}", soft_wrap=True
+    )

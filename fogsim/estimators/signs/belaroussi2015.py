@@ -1,0 +1,209 @@
+"""Belaroussi & Gruyer (2015): the distance at which signs of the map are first detected tells the visibility."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from fogsim.errors import InputError
+from fogsim.estimators.image_check import ObservationCheck
+from fogsim.estimators.signs.mixture import majority, reduced
+from fogsim.estimators.signs.operating_range import OperatingRange
+from fogsim.estimators.signs.regions import PoseDeviation
+from fogsim.estimators.signs.track import SignTrack
+from fogsim.estimators.signs.watch import SignWatch, Watched
+from fogsim.parameters import Range, checked_parameters
+from fogsim.units import extinction_from_visibility
+from fogsim.values.camera import Camera
+from fogsim.values.estimate import Estimate
+from fogsim.values.observation import Observation
+
+FORGOTTEN = 0.05
+"""p(c) below which a sign does not count any more [-]."""
+
+LIKE = 0.1
+"""Largest difference of the calibrated focal length from the camera's, relative to it [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """One sign's measurement: its visibility [m] and standard deviation [m], p(c), and when and where it was made."""
+
+    visibility: float
+    deviation: float
+    confidence: float
+    time: float
+    way: float
+
+
+@checked_parameters
+class Belaroussi2015:
+    """Signs of the map are detected in the picture; where each was first detected tells the fog.
+
+    A sign comes out of the fog at d_sign, the operating range of the detector, of which the visibility is a function
+    that was calibrated for the camera: `fogsim calibrate signs`. Each sign gives one measurement; k-means with three
+    clusters sets outliers aside, and a mixture of normal distributions is reduced to one (sections 4.2 to 4.4). What a
+    sign says fades with the way driven since and with time. Where the curve is flat, or was not measured, a sign tells
+    nothing: the distance at which it came out was set by the camera's resolution.
+
+    Belaroussi & Gruyer, "Road sign-aided estimation of visibility conditions", MVA 2015. The detector is `fogsim.vision
+    .symmetry`, after the Bilateral Chinese Transform.
+
+    Parameters
+    ----------
+    camera : Camera
+        The assumed calibration.
+    operating_range : str, OperatingRange or None
+        File of the calibration, of this camera; without it nothing can be told.
+    as_published : bool
+        Whether the curve is the paper's cubic through the distances of 80 % detection, in place of the monotone one
+        through the distances of first detection, and p(c) is 1.
+    setback : float
+        Distance of the camera behind the front bumper [m].
+    position_deviation : float
+        Standard deviation of a sign's place by map and own position [m].
+    heading_deviation, pitch_deviation : float
+        Standard deviations of the own heading, and of the true pitch about the assumed one [rad].
+    fading_way, fading_time : float
+        Way [m] and time [s] after which a sign's p(c) is 1/e of what it was.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or is of a camera of another focal length.
+    """
+
+    method = "belaroussi2015"
+
+    def __init__(
+        self,
+        camera: Camera,
+        *,
+        operating_range: str | OperatingRange | None = None,
+        as_published: bool = False,
+        setback: Annotated[float, Range(0.0, 10.0, "m")] = 1.7,
+        position_deviation: Annotated[float, Range(0.0, 100.0, "m")] = 0.5,
+        heading_deviation: Annotated[float, Range(0.0, 1.0, "rad")] = math.radians(0.2),
+        pitch_deviation: Annotated[float, Range(0.0, 1.0, "rad")] = math.radians(0.1),
+        fading_way: Annotated[float, Range(1.0, 1e9, "m")] = 700.0,
+        fading_time: Annotated[float, Range(1.0, 1e9, "s")] = 45.0,
+    ) -> None:
+        self._check = ObservationCheck(camera)
+        self._range = _checked_range(operating_range, camera)
+        self._as_published = as_published
+        deviation = PoseDeviation(position_deviation, heading=heading_deviation, pitch=pitch_deviation)
+        self._watch = SignWatch(camera, setback, deviation)
+        self._fading_way, self._fading_time = fading_way, fading_time
+        self._horizon = camera.horizon_row
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all signs."""
+        self._check.reset()
+        self._watch.reset()
+        self._counted: set[str] = set()
+        self._seen: list[_Seen] = []
+        self._way, self._time = 0.0, -math.inf
+        self._least: tuple[float, float] | None = None
+
+    def update(self, observation: Observation) -> Estimate:
+        """Look for the signs ahead, and estimate from all that were seen to come out of the fog.
+
+        Parameters
+        ----------
+        observation : Observation
+            Its image, time, speed and signs are used.
+
+        Returns
+        -------
+        Estimate
+            Diagnostics: ``signs``, how many count; ``single_visibilities`` of them [m]; ``sign_boxes``, (left, right,
+            top, bottom) of those that were found [px]; ``visibility_at_least`` [m], of a sign that was seen from beyond
+            the curve's range; or ``reason``.
+
+        Raises
+        ------
+        InputError
+            If camera, image or time do not fit (see `fogsim.estimators.image_check`), or two signs have one id.
+        """
+        image = self._check.image_of(observation)
+        time = observation.time
+        if math.isfinite(self._time):
+            self._way += observation.speed * max(time - self._time, 0.0)
+        self._time = time
+        watched = self._watch.look(image, observation.signs, time)
+        found: dict[str, object] = {"horizon_row": self._horizon, "sign_boxes": _boxes(watched)}
+        if self._range is None:
+            why = "the detector is not calibrated for this camera: fogsim calibrate signs, parameter operating_range"
+            return Estimate.invalid(self.method, why, **found)
+        self._count(watched, self._range)
+        return self._estimate(found)
+
+    def _count(self, watched: Watched, measured: OperatingRange) -> None:
+        """Measurements of the signs that are confirmed now."""
+        self._counted -= {track.sign.sighting.sign_id for track in watched.passed}
+        for track in self._watch.tracks:
+            if track.confirmed and track.first_seen is not None and track.sign.sighting.sign_id not in self._counted:
+                self._counted.add(track.sign.sighting.sign_id)
+                self._add(track, track.first_seen, measured)
+
+    def _add(self, track: SignTrack, first_seen: float, measured: OperatingRange) -> None:
+        confidence = 1.0 if self._as_published else track.confidence
+        if self._as_published:
+            told: tuple[float, float] | None = measured.visibility_by_cubic(first_seen), 0.0
+        elif track.unseen_before is None:
+            # Who sees a sign at the first look may have been able to see it before: no first detection.
+            told = None
+        else:
+            told = measured.visibility_at(first_seen)
+        if told is not None and math.isfinite(told[0]) and told[0] > 0.0:
+            self._seen.append(_Seen(*told, confidence, self._time, self._way))
+        elif first_seen > measured.reach[1]:
+            self._least = measured.farthest, self._time
+
+    def _estimate(self, found: dict[str, object]) -> Estimate:
+        weighted = [(one, self._weight(one)) for one in self._seen]
+        weighted = [(one, weight) for one, weight in weighted if weight >= FORGOTTEN]
+        self._seen = [one for one, _ in weighted]
+        if self._least is not None and self._time - self._least[1] < self._fading_time:
+            found["visibility_at_least"] = self._least[0]
+        if not weighted:
+            why = self._watch.trouble or "no sign has come out of the fog yet"
+            if "visibility_at_least" in found:
+                why = f"signs are seen from beyond the curve's range: at least {found['visibility_at_least']:.0f} m"
+            return Estimate.invalid(self.method, why, **found)
+        values, weights = [one.visibility for one, _ in weighted], [weight for _, weight in weighted]
+        chosen = majority(values, weights)
+        kept = [(v, w) for v, w, keep in zip(values, weights, chosen, strict=True) if keep]
+        mean, deviation = reduced([v for v, _ in kept], [w for _, w in kept])
+        single = [one.deviation for (one, _), keep in zip(weighted, chosen, strict=True) if keep]
+        # Signs that agree by chance are no better than their number allows.
+        deviation = max(deviation, math.hypot(*single) / len(single))
+        k = extinction_from_visibility(mean)
+        found |= {"signs": len(kept), "single_visibilities": tuple(values)}
+        return Estimate(self.method, k, k * deviation / mean, diagnostics=found)
+
+    def _weight(self, one: _Seen) -> float:
+        faded = (self._way - one.way) / self._fading_way + (self._time - one.time) / self._fading_time
+        return one.confidence * math.exp(-faded)
+
+
+def _checked_range(given: object, camera: Camera) -> OperatingRange | None:
+    if given is None:
+        return None
+    if not isinstance(given, str | OperatingRange):
+        raise InputError(f"operating_range must be a file of `fogsim calibrate signs`, got {given!r}")
+    measured = OperatingRange.read(Path(given)) if isinstance(given, str) else given
+    if abs(measured.focal_length / camera.focal_length - 1.0) > LIKE:
+        name = f"{given}: " if isinstance(given, str) else ""
+        raise InputError(
+            f"{name}operating_range was calibrated for a focal length of {measured.focal_length:g} px, and the camera "
+            f"has {camera.focal_length:g} px: calibrate it for this camera"
+        )
+    return measured
+
+
+def _boxes(watched: Watched) -> tuple[tuple[float, float, float, float], ...]:
+    """(left, right, top, bottom) of the signs that were found [px]."""
+    found = [one.detection for one in watched.found]
+    return tuple((one.u - one.radius, one.u + one.radius, one.v - one.radius, one.v + one.radius) for one in found)

@@ -1,0 +1,70 @@
+"""Many signs' visibilities as one: outliers set aside by clusters, the rest reduced to a normal distribution."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+CLUSTERS = 3
+"""Too large, too small, and right (section 4.3)."""
+
+_ROUNDS = 50
+
+
+def majority(values: Sequence[float], weights: Sequence[float]) -> NDArray[np.bool_]:
+    """Which values are in the weightiest of three clusters, by weighted k-means on a line.
+
+    Parameters
+    ----------
+    values : sequence of float
+        Visibilities of single signs.
+    weights : sequence of float
+        p(c) of each, more than 0.
+
+    Returns
+    -------
+    (n,) bool
+        All of them, where there are fewer than four: there is no majority among three.
+    """
+    x, w = np.asarray(values, dtype=np.float64), np.asarray(weights, dtype=np.float64)
+    if len(x) <= CLUSTERS:
+        return np.ones(len(x), dtype=bool)
+    order = np.argsort(x, kind="stable")
+    share = (np.cumsum(w[order]) - 0.5 * w[order]) / w.sum()
+    middles = np.interp((np.arange(CLUSTERS) + 0.5) / CLUSTERS, share, x[order])
+    nearest = np.zeros(len(x), dtype=np.intp)
+    for _ in range(_ROUNDS):
+        nearest = np.argmin(np.abs(x[:, None] - middles), axis=1)
+        moved = [
+            np.average(x[nearest == i], weights=w[nearest == i]) if (nearest == i).any() else middles[i]
+            for i in range(CLUSTERS)
+        ]
+        if np.array_equal(moved, middles):
+            break
+        middles = np.array(moved)
+    return np.asarray(nearest == np.argmax([w[nearest == i].sum() for i in range(CLUSTERS)]))
+
+
+def reduced(values: Sequence[float], weights: Sequence[float]) -> tuple[float, float]:
+    """Mean and standard deviation of a mixture of normal distributions, one for each value (eq. 2).
+
+    Parameters
+    ----------
+    values : sequence of float
+        At least one.
+    weights : sequence of float
+        p(c) of each, more than 0.
+
+    Returns
+    -------
+    mean : float
+        μ = Σ p z / Σ p.
+    deviation : float
+        √( Σ p (z − μ)² / ((M − 1)/M Σ p) ); of one value 1 / (√(2π) p), as of its own distribution.
+    """
+    z, p = np.asarray(values, dtype=np.float64), np.asarray(weights, dtype=np.float64)
+    mean, count = float((p * z).sum() / p.sum()), len(z)
+    if count == 1:
+        return mean, 1.0 / (math.sqrt(2.0 * math.pi) * float(p[0]))
+    return mean, math.sqrt(float((p * (z - mean) ** 2).sum() / ((count - 1) / count * p.sum())))

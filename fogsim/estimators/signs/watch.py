@@ -1,0 +1,116 @@
+"""Looks for the signs of the map in frame after frame, and tells why nothing can be made of them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.errors import InputError
+from fogsim.estimators.signs.regions import PoseDeviation, ProjectedSign, project_sightings
+from fogsim.estimators.signs.registration import Registration, register_signs
+from fogsim.estimators.signs.track import SignTrack, SignTracks
+from fogsim.values.camera import Camera
+from fogsim.values.observation import SignSighting
+from fogsim.vision.symmetry.detection import detect_signs
+
+STRANGE = 3
+"""Signs in a row of which none was found where the map has it, from which on the map is doubted."""
+
+WELL_SEEN = 30.0
+"""Distance within which a sign must have been looked for to be told from one that is too far to see [m]."""
+
+Detector = Callable[..., tuple[object, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """What one frame showed of the signs ahead.
+
+    Attributes
+    ----------
+    signs : tuple of ProjectedSign
+        Where the map has them.
+    found : tuple of Registration
+        Those that were detected.
+    passed : tuple of SignTrack
+        Signs that are no longer ahead.
+    """
+
+    signs: tuple[ProjectedSign, ...]
+    found: tuple[Registration, ...]
+    passed: tuple[SignTrack, ...]
+
+
+class SignWatch:
+    """Projects the map's signs into the picture, detects and registers them, and follows each.
+
+    Parameters
+    ----------
+    camera : Camera
+        The assumed calibration.
+    setback : float
+        Distance of the camera behind the front bumper [m].
+    deviation : PoseDeviation
+        How well the place of a sign is known.
+    """
+
+    def __init__(self, camera: Camera, setback: float, deviation: PoseDeviation) -> None:
+        self._camera, self._setback, self._deviation = camera, setback, deviation
+        self._tracks = SignTracks()
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all signs."""
+        self._tracks.reset()
+        self._lost = 0
+        self._told = False
+
+    @property
+    def tracks(self) -> tuple[SignTrack, ...]:
+        """Signs ahead."""
+        return self._tracks.tracks
+
+    def look(
+        self, image: NDArray[np.uint8] | NDArray[np.uint16], sightings: tuple[SignSighting, ...], time: float
+    ) -> Watched:
+        """Look for the signs of one frame.
+
+        Parameters
+        ----------
+        image : (rows, cols[, 3]) uint8 or uint16
+            The picture.
+        sightings : tuple of SignSighting
+            What the map says; ids that come twice are refused.
+        time : float
+            When [s].
+
+        Raises
+        ------
+        InputError
+            If two signs have one id.
+        """
+        ids = [one.sign_id for one in sightings]
+        if len(set(ids)) < len(ids):
+            twice = next(one for one in ids if ids.count(one) > 1)
+            raise InputError(f"the ids of a map's signs must differ, got {twice!r} twice; its value names one sign")
+        self._told = self._told or bool(sightings)
+        signs = project_sightings(sightings, self._camera, self._setback, self._deviation)
+        found = register_signs(signs, detect_signs(image, [sign.region for sign in signs])) if signs else ()
+        passed = self._tracks.update(time, signs, found)
+        for track in passed:
+            if track.confirmed:
+                self._lost = 0
+            elif track.unseen_before is not None and track.unseen_before < WELL_SEEN:
+                self._lost += 1
+        return Watched(signs, found, passed)
+
+    @property
+    def trouble(self) -> str:
+        """Why no sign can be seen; empty if one might be."""
+        if self._lost >= STRANGE:
+            return (
+                f"none of the last {self._lost} signs was found where the map has it: the map may be in another "
+                "coordinate frame, or the camera be told wrongly"
+            )
+        return "" if self._told else "the map tells of no sign ahead; sensors.sign_reach_m and the map decide that"

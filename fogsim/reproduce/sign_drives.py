@@ -1,0 +1,133 @@
+"""Staged drives past signs in fog of any density: what the ego's camera sees, and what its map says."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fogsim.camera import Sensor, expose
+from fogsim.render import make_renderer
+from fogsim.reproduce.scenes import AIRLIGHT, ILLUMINANCE, foggy_radiance, straight_road
+from fogsim.scene import build_scene
+from fogsim.sensors import signs_ahead
+from fogsim.units import extinction_from_visibility
+from fogsim.values import (
+    Camera,
+    CameraPose,
+    Frame,
+    Observation,
+    Sign,
+    SignMap,
+)
+
+SETBACK = 1.7
+"""Distance of the camera behind the front bumper [m]."""
+
+SPEED = 20.0
+"""Speed of the vehicle [m/s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class PoseNoise:
+    """How far off map and own pose are, as standard deviations.
+
+    Attributes
+    ----------
+    position : float
+        Of signs in the map, along and across [m].
+    heading, pitch : float
+        Of the believed heading and of the told pitch [rad].
+    """
+
+    position: float = 0.5
+    heading: float = math.radians(0.2)
+    pitch: float = math.radians(0.1)
+
+
+@dataclass(frozen=True, slots=True)
+class SignDrive:
+    """A drive past signs along a straight road.
+
+    Attributes
+    ----------
+    camera : Camera
+        The told calibration.
+    signs : tuple of Sign
+        Signs as they stand, along x.
+    places : tuple of float
+        Where the front bumper is at each frame [m].
+    noise : PoseNoise
+        How far off map and own pose are.
+    grey : float
+        Pixel value of the airlight, 0 … 255.
+    reach : float
+        How far ahead the map is read [m].
+    """
+
+    camera: Camera
+    signs: tuple[Sign, ...]
+    places: tuple[float, ...]
+    noise: PoseNoise = PoseNoise()
+    grey: float = 200.0
+    reach: float = 400.0
+
+
+def observed(
+    drive: SignDrive, visibilities: Sequence[float], rng: np.random.Generator
+) -> Iterator[dict[float, Observation]]:
+    """Observations of a drive, frame by frame, in homogeneous fog of each visibility.
+
+    Parameters
+    ----------
+    drive : SignDrive
+        The drive.
+    visibilities : sequence of float
+        Meteorological visibilities [m].
+    rng : numpy.random.Generator
+        Errors of map, pose and pixels, and where trees stand.
+    """
+    noise, told = drive.noise, drive.camera
+    known = SignMap(tuple(_misplaced(sign, noise.position, rng) for sign in drive.signs))
+    length = max(drive.places) + 2.0 * drive.reach
+    scene = build_scene(straight_road(length), SignMap(drive.signs), np.random.default_rng(rng.integers(2**31)))
+    true = replace(told, pitch=told.pitch + rng.normal(0.0, noise.pitch))
+    sensor = Sensor(AIRLIGHT * 255.0 / drive.grey)
+    renderer = make_renderer("auto", scene, illuminance=ILLUMINANCE)
+    try:
+        for x in drive.places:
+            pose = CameraPose((x - SETBACK, 0.0, true.mount_height), heading=0.0)
+            view = renderer.render((), true, pose)
+            place = np.array([x, 0.0, 0.0])
+            signs = signs_ahead(known, place, rng.normal(0.0, noise.heading), drive.reach)
+            seen = {}
+            for visibility in visibilities:
+                light = foggy_radiance(view, pose, true, extinction_from_visibility(visibility))
+                image = expose(light, sensor, told.response, rng).astype(np.uint8)
+                seen[visibility] = Observation(Frame(x / SPEED, image, told), SPEED, None, signs, SETBACK)
+            yield seen
+    finally:
+        renderer.close()
+
+
+def sign_beside(name: str, kind: str, place: float, diameter: float, rng: np.random.Generator) -> Sign:
+    """A sign on the right of the road, somewhere where signs stand.
+
+    Parameters
+    ----------
+    name, kind : str
+        Its id and kind.
+    place : float
+        Where along the road [m].
+    diameter : float
+        Size of its face [m].
+    rng : numpy.random.Generator
+        Chooses its offset, its height and, of a limit, its number.
+    """
+    position = (place, -float(rng.uniform(4.0, 6.5)), float(rng.uniform(1.9, 2.5)))
+    return Sign(name, kind, float(rng.choice((50, 70, 80, 100))) / 3.6, position, 0.0, diameter)
+
+
+def _misplaced(sign: Sign, deviation: float, rng: np.random.Generator) -> Sign:
+    x, y, z = sign.position
+    return replace(sign, position=(x + rng.normal(0.0, deviation), y + rng.normal(0.0, deviation), z))

@@ -3,6 +3,7 @@
     python benchmarks/monte_carlo.py halo tests/data/monte_carlo_halo.csv --photons 1000000
     python benchmarks/monte_carlo.py lobes tests/data/monte_carlo_lobes.csv --photons 4000000
     python benchmarks/monte_carlo.py origins fogsim/atmosphere/data/light_origins.csv --photons 6000000
+    python benchmarks/monte_carlo.py road tests/data/monte_carlo_road.csv --photons 60000
     python benchmarks/monte_carlo.py veil tests/data/monte_carlo_veil.csv --photons 400000
 
 Slow (minutes), seeded, and independent of the models: it shares with them only the tables of lamps and phase functions.
@@ -302,6 +303,72 @@ def veil(paths, rng, k, towards, reach, phases, cosines, step, beam, lamps, grou
     return means[0], errors[0], means[2], errors[1]
 
 
+@njit(cache=False)
+def shone_down(x, y, z, k, beam, lamps):
+    """Illuminance by which lamps light the road at a place, were the fog to scatter nothing into their beams [lx]."""
+    total = 0.0
+    for i in range(len(lamps)):
+        lx, ly, lz = x - lamps[i, 0], y - lamps[i, 1], z - lamps[i, 2]
+        if lx <= 0:
+            continue
+        square = lx * lx + ly * ly + lz * lz
+        s = math.sqrt(square)
+        h = (math.atan2(-ly, lx) / math.pi + 0.5) * (beam.shape[1] - 1)
+        v = (math.asin(lz / s) / math.pi + 0.5) * (beam.shape[0] - 1)
+        total += beam[int(v), int(h)] * -lz / (s * square) * math.exp(-k * s)
+    return total
+
+
+@njit(cache=False)
+def road_light(paths, rng, k, towards, reach, phases, cosines, step, beam, lamps, ground, albedo):
+    """Radiance of the sky by light that a Lambertian road has returned, and its standard error [cd/m^2]; see `veil`."""
+    near, sums = 0.3, np.zeros(2)
+    span = math.log(reach / near)
+    for _ in range(paths):
+        r = near * math.exp(span * rng.random())
+        weight = k * math.exp(-k * r) * r * span
+        dx, dy, dz = towards[0], towards[1], towards[2]
+        x, y, z = r * dx, r * dy, r * dz
+        light, returned = 0.0, 1.0
+        while k * math.sqrt(x * x + y * y + z * z) < 20.0 and returned > 1e-3:
+            cosine = cosines[int(rng.random() * len(cosines))]
+            dx, dy, dz = turned(dx, dy, dz, cosine, 2 * math.pi * rng.random())
+            length = -math.log(1.0 - rng.random()) / k
+            if z + length * dz < ground:
+                t = (ground - z) / dz
+                x, y, z = x + t * dx, y + t * dy, ground
+                returned *= albedo
+                light += returned * shone_down(x, y, z, k, beam, lamps) / math.pi
+                up, azimuth = rng.random(), 2 * math.pi * rng.random()
+                dx, dy, dz = math.sqrt(up) * math.cos(azimuth), math.sqrt(up) * math.sin(azimuth), math.sqrt(1.0 - up)
+                length = -math.log(1.0 - rng.random()) / k
+            x, y, z = x + length * dx, y + length * dy, z + length * dz
+            if returned < 1.0:
+                light += returned * scattered_back(x, y, z, dx, dy, dz, k, phases[1], step, beam, lamps, LAMP_SIZES[1])
+        sums += np.array([weight * light, (weight * light) ** 2])
+    mean = sums[0] / paths
+    return mean, math.sqrt(max(sums[1] / paths - mean * mean, 0.0) / paths)
+
+
+def write_road(out, paths):
+    """Table of the sky's light by what the road returns."""
+    grid = np.linspace(-math.pi / 2, math.pi / 2, 1441)
+    table = luminous_intensity(low_beam(), grid, grid[:, None])
+    with out.open("w", encoding="utf-8") as file:
+        file.write("# Radiance of the sky ahead by what a road of albedo 0.1 returns of own low beams [cd/m^2].\n")
+        file.write("# Eye and lamps as in monte_carlo_veil.csv; angles above the horizon [degrees]; standard errors.\n")
+        file.write(f"# Command: python benchmarks/monte_carlo.py road {out} --photons {paths}\n")
+        file.write("fog,visibility,up,road,error\n")
+        for fog, visibility, up in itertools.product(
+            ("heavy_advection", "moderate_radiation"), (50, 100, 200), (5, 10, 20)
+        ):
+            phase, towards = phase_table(fog), ray(0.0, up)[0]
+            phases, k = np.stack((phase, without_peak(phase))), extinction_from_visibility(visibility)
+            fixed = (phases, likely_cosines(phase), STEP, table, LAMPS, -EYE_HEIGHT, 0.1)
+            result = road_light(paths, np.random.default_rng(1), k, towards, 400.0, *fixed)
+            file.write(f"{fog},{visibility},{up}," + ",".join(f"{n:.4g}" for n in result) + "\n")
+
+
 def write_halo(out, photons):
     """Table of halos."""
     with out.open("w", encoding="utf-8") as file:
@@ -429,11 +496,12 @@ def write_veil(out, paths):
 def main():
     """Write a table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=("halo", "lobes", "origins", "veil"))
+    parser.add_argument("what", choices=("halo", "lobes", "origins", "road", "veil"))
     parser.add_argument("out", type=Path)
     parser.add_argument("--photons", type=int, default=400_000)
     arguments = parser.parse_args()
-    writers = {"halo": write_halo, "lobes": write_lobes, "origins": write_origins, "veil": write_veil}
+    writers = {"halo": write_halo, "lobes": write_lobes, "origins": write_origins}
+    writers |= {"road": write_road, "veil": write_veil}
     writers[arguments.what](arguments.out, arguments.photons)
 
 

@@ -10,8 +10,10 @@ from fogsim.atmosphere.fog.medium import field_at
 from fogsim.atmosphere.lamps.halos import Halos
 from fogsim.atmosphere.lamps.lamplight import OwnLamplight
 from fogsim.atmosphere.lamps.phase_function import Droplets
+from fogsim.atmosphere.lamps.road_glow import RoadGlow
 from fogsim.atmosphere.lamps.streetlight import StreetLight
 from fogsim.values import Camera, CameraPose, FogField, HeadLamp, Lights, View
+from fogsim.values.light import joined_sources
 
 _UNLIT = Lights.none()
 
@@ -41,6 +43,7 @@ class Air:
     def __init__(self, field: FogField, droplets: Droplets = Droplets.MODERATE_RADIATION) -> None:
         self.field = field
         self._own, self._halos, self._streets = OwnLamplight(droplets), Halos(droplets), StreetLight()
+        self._road = RoadGlow()
 
     def prepare(self, camera: Camera, lamps: Sequence[tuple[HeadLamp, ...]]) -> None:
         """Compute beforehand what depends on lamps alone, which else takes the time of many frames when first lit.
@@ -94,8 +97,11 @@ class Air:
         radiance = daytime_luminance(lit, field, camera, pose)
         if lights.own:
             self._own.add(radiance, view, camera, pose, field, lights.own)
-        if len(lights.others.intensity):
-            self._halos.add(radiance, view, camera, pose, field, lights.others)
+        sources = lights.others
+        if lights.own and field.extinction > 0:
+            sources = joined_sources((sources, self._road.sources(lights.own, camera, pose, field)))
+        if len(sources.intensity):
+            self._halos.add(radiance, view, camera, pose, field, sources)
         return radiance
 
     def transmittance(self, view: View, camera: Camera, pose: CameraPose, time: float = 0.0) -> NDArray[np.float32]:

@@ -38,7 +38,7 @@ from fogsim.scene.street_lamps import HEIGHT, SIZE
 from fogsim.scene.town import signal_light_sources
 from fogsim.scene.vehicles import body_names
 from fogsim.units import luminance_of
-from fogsim.values.light import Beam, Lamp, LampLobes, LightSources, StreetLighting, dark_shift
+from fogsim.values.light import Beam, Lamp, LampLobes, LightSources, StreetLighting, dark_shift, joined_sources
 from fogsim.values.luminous_intensity import FALL_OFF, luminous_intensity
 from fogsim.values.scene import Surface
 from fogsim.values.traffic import TrafficState
@@ -119,25 +119,7 @@ def light_sources(
         parts.append(_of_streets(street_lamps, here))
     if state.signals.ids:
         parts.append(signal_light_sources(state.signals, here, state.time))
-    parts = [part for part in parts if len(part.intensity)]
-    if len(parts) == 1:
-        return parts[0]
-    if not parts:
-        return LightSources.none()
-    names = ("position", "intensity", "colour", "area")
-    position, intensity, colour, area = (np.concatenate([getattr(part, name) for part in parts]) for name in names)
-    return LightSources(position, intensity, colour, area, _all_lobes([part.lobes for part in parts]))
-
-
-def _all_lobes(parts: Sequence[LampLobes | None]) -> LampLobes | None:
-    """Lobes of all parts of the lamps."""
-    known = [part for part in parts if part is not None]
-    if len(known) < len(parts):
-        return None
-    kinds = tuple(dict.fromkeys(kind for part in known for kind in part.kinds))
-    numbers = [np.array([kinds.index(kind) for kind in part.kinds], np.int64)[part.kind] for part in known]
-    scale, forward = (np.concatenate([getattr(part, name) for part in known]) for name in ("scale", "forward"))
-    return LampLobes(kinds, np.concatenate(numbers), scale, forward)
+    return joined_sources(parts)
 
 
 def _of_vehicles(

@@ -1,6 +1,6 @@
 """Light that is not daylight: lamps of a vehicle, beams of head lamps, and lamps that are seen from afar."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntFlag, StrEnum
 
@@ -191,6 +191,11 @@ class LampLobes:
     scale: NDArray[np.float64]
     forward: NDArray[np.float64]
 
+    @classmethod
+    def alike(cls, count: int) -> "LampLobes":
+        """So many lamps that shine alike in all directions."""
+        return cls((), np.full(count, -1, np.int64), np.ones(count), np.zeros((count, 3)))
+
 
 @dataclass(frozen=True, slots=True)
 class LightSources:
@@ -220,6 +225,31 @@ class LightSources:
     def none(cls) -> "LightSources":
         """No lamp at all."""
         return cls(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)), np.zeros(0))
+
+
+def joined_sources(parts: Sequence[LightSources]) -> LightSources:
+    """Lamps of several groups as one.
+
+    Parameters
+    ----------
+    parts : sequence of LightSources
+        The groups.
+    """
+    parts = [part for part in parts if len(part.intensity)]
+    if len(parts) == 1:
+        return parts[0]
+    if not parts:
+        return LightSources.none()
+    names = ("position", "intensity", "colour", "area")
+    position, intensity, colour, area = (np.concatenate([getattr(part, name) for part in parts]) for name in names)
+    if all(part.lobes is None for part in parts):
+        return LightSources(position, intensity, colour, area)
+    lobes = [part.lobes or LampLobes.alike(len(part.intensity)) for part in parts]
+    kinds = tuple(dict.fromkeys(kind for part in lobes for kind in part.kinds))
+    # The last number is that of lamps of no kind.
+    numbers = [np.array([*(kinds.index(kind) for kind in part.kinds), -1], np.int64)[part.kind] for part in lobes]
+    scale, forward = (np.concatenate([getattr(part, name) for part in lobes]) for name in ("scale", "forward"))
+    return LightSources(position, intensity, colour, area, LampLobes(kinds, np.concatenate(numbers), scale, forward))
 
 
 @dataclass(frozen=True, slots=True)

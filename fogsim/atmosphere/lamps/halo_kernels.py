@@ -13,10 +13,10 @@ from fogsim.atmosphere.lamps.halo_lamps import (
     CORE_SIZE,
     DEPTH,
     HIDDEN_SHARE,
+    NEARNESS,
     PIXELS,
     PLACE_U,
     PLACE_V,
-    RANGE,
     SHOWN,
     SIDES,
     STRENGTH,
@@ -87,7 +87,7 @@ def add_wide_glows(
         side_profiles(profile, light[i], angles, profiles)
         _place_about(directions, up, lamp, place, turn)
         r, g, b = np.float32(lamp[COLOUR]), np.float32(lamp[COLOUR + 1]), np.float32(lamp[COLOUR + 2])
-        n = (_RED * r + _GREEN * g + _BLUE * b) / np.float32(lamp[RANGE])
+        n = (_RED * r + _GREEN * g + _BLUE * b) * np.float32(lamp[NEARNESS])
         for p in range(count):
             entry, side = np.uint32(place[p]), np.uint32(turn[p])
             onward, around, first = place[p] - np.float32(entry), turn[p] - np.float32(side), side * size + entry
@@ -192,7 +192,7 @@ def add_middle_glows(
             continue
         lx, ly, lz = np.float32(lamp[TOWARDS]), np.float32(lamp[TOWARDS + 1]), np.float32(lamp[TOWARDS + 2])
         r, g, b = np.float32(lamp[COLOUR]), np.float32(lamp[COLOUR + 1]), np.float32(lamp[COLOUR + 2])
-        n = (_RED * r + _GREEN * g + _BLUE * b) / np.float32(lamp[RANGE])
+        n = (_RED * r + _GREEN * g + _BLUE * b) * np.float32(lamp[NEARNESS])
         u0, v0, half = lamp[PLACE_U] / cell[0], lamp[PLACE_V] / cell[1], cell[2] / lamp[AHEAD] ** 2 + 1.0
         for v in range(max(0, math.ceil(v0 - half)), min(rows, math.floor(v0 + half) + 1)):
             for u in range(max(0, math.ceil(u0 - half)), min(columns, math.floor(u0 + half) + 1)):
@@ -316,7 +316,7 @@ def add_glow_cores(
     for i in range(lamps.shape[0]):
         if not bright[i]:
             continue
-        u0, v0, near, profile = lamps[i, PLACE_U], lamps[i, PLACE_V], np.float32(1.0 / lamps[i, RANGE]), profiles[i]
+        u0, v0, near, profile = lamps[i, PLACE_U], lamps[i, PLACE_V], np.float32(lamps[i, NEARNESS]), profiles[i]
         red, green = np.float32(lamps[i, COLOUR]), np.float32(lamps[i, COLOUR + 1])
         blue = np.float32(lamps[i, COLOUR + 2])
         for v in range(max(0, math.ceil(v0 - reach)), min(rows, math.floor(v0 + reach) + 1)):

@@ -10,12 +10,13 @@ from fogsim.jit import kernel
 
 PLACE_U, PLACE_V, AHEAD, RANGE, DEPTH, STRENGTH, SHOWN, AREA, PIXELS = range(9)
 COLOUR, TOWARDS = 9, 12
-COLUMNS = 15
+NEARNESS = 15
+COLUMNS = 16
 """Columns of a table of lamps.
 
 Place on the image [px], cosine of the angle off the camera's axis, range [m], optical depth, illuminance at the eye
 were the air clear [lx], the share of the lamp that nothing hides, luminous area as a solid angle [sr] and in pixels,
-colour (3) and direction in the camera's axes (3).
+colour (3), direction in the camera's axes (3), and what it adds to the mean 1 / R by which surfaces cut glows [1/m].
 """
 
 BEHIND = 0.2
@@ -35,6 +36,8 @@ SIDES = 8
 HIDDEN_SHARE = 0.5
 """Share of the wide glow that is left of a lamp that something hides, which casts a shadow into the fog as well."""
 
+_EXTENDED = 0.004  # solid angle above which a source is no lamp but a lit piece of road [sr]
+_EXTENDED_NEARNESS = 0.25  # so that such, which are near, do not uncover the glow of far lamps
 _NEAREST = 0.5  # lamps nearer than this are not drawn [m]
 _BEFORE = 1.0  # a surface so far before a lamp may be the lamp's own vehicle [m]
 _SAME_RANGE = 0.15  # share by which ranges of lamps may differ that are drawn as one
@@ -191,6 +194,9 @@ def select_lamps(
         # A pixel sees the solid angle cos³ / f² of its direction off the axis.
         lamp[AREA] = area[number] / square
         lamp[PIXELS] = lamp[AREA] * focal**2 / max(lamp[AHEAD], BEHIND) ** 3
+        lamp[NEARNESS] = 1.0 / lamp[RANGE]
+        if lamp[AREA] > _EXTENDED:
+            lamp[NEARNESS] *= _EXTENDED_NEARNESS
         for c in range(3):
             lamp[COLOUR + c] = colour[number, c]
         count += 1

@@ -15,7 +15,7 @@ from fogsim.atmosphere.lamps.lobes import (
     table_directions,
 )
 from fogsim.atmosphere.lamps.phase_function import Droplets
-from fogsim.values import Beam, LightSources
+from fogsim.values import Beam, LampLobes, LightSources
 
 
 class LobeMemory:
@@ -68,9 +68,7 @@ class LobeMemory:
         return light
 
     def _shapes(self, sources: LightSources, chosen: NDArray[np.int64]) -> LampShapes:
-        lobes, count = sources.lobes, len(sources.intensity)
-        if lobes is None:
-            return LampShapes(np.full(count, -1, np.int64), np.ones(count), np.zeros((count, 3)))
+        lobes = sources.lobes or LampLobes.alike(len(sources.intensity))
         numbers = np.full(len(lobes.kinds) + 1, -1, np.int64)
         for kind in np.unique(lobes.kind[chosen]).tolist():
             if kind >= 0:

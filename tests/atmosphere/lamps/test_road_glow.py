@@ -1,0 +1,45 @@
+"""What the road returns of the own head lamps' light: photons, and where it is."""
+
+import math
+
+import numpy as np
+import pytest
+
+from fogsim.atmosphere.lamps.halos import Halos
+from fogsim.atmosphere.lamps.phase_function import Droplets
+from fogsim.atmosphere.lamps.road_glow import ROAD_ALBEDO, RoadGlow
+from fogsim.lighting.beams import low_beam
+from fogsim.values import Camera, CameraPose, HeadLamp
+from tests.atmosphere.night_scene import empty_view, fog
+from tests.atmosphere.tables import read_table
+
+CAMERA = Camera(160, 120, 100.0, (79.5, 79.5), 1.5, 0.0)
+POSE = CameraPose((0.0, 0.0, 1.5), 0.0)
+LOW = tuple(HeadLamp((1.8, side, -0.85), low_beam()) for side in (0.6, -0.6))
+
+
+@pytest.mark.parametrize("droplets", [Droplets.HEAVY_ADVECTION, Droplets.MODERATE_RADIATION])
+def test_the_sky_over_a_lit_road_is_that_of_photons(droplets):
+    rows = read_table("monte_carlo_road.csv")
+    for row in rows[(rows["fog"] == droplets) & (rows["error"] < 0.1 * rows["road"])]:
+        field, out = fog(float(row["visibility"])), np.zeros((120, 160, 3), np.float32)
+        sources = RoadGlow().sources(LOW, CAMERA, POSE, field)
+        Halos(droplets).add(out, empty_view(CAMERA), CAMERA, POSE, field, sources)
+        drawn = np.interp(
+            79.5 - 100.0 * math.tan(math.radians(row["up"])), np.arange(120), out[:, 79:81, 1].mean(axis=1)
+        )
+        assert 0.75 < drawn / row["road"] < 1.5
+
+
+def test_lit_pieces_of_road_lie_ahead_on_it_and_return_its_share():
+    turned = CameraPose((100.0, 50.0, 6.5), math.pi / 2)
+    sources = RoadGlow().sources(LOW, CAMERA, turned, fog(math.inf))
+    assert sources.position[:, 2] == pytest.approx(np.full(5, 5.0))
+    assert (np.diff(sources.position[:, 1]) > 0).all()
+    assert np.abs(sources.position[:, 0] - 100.0).max() < 1.0
+    assert sources.lobes is not None
+    # A Lambertian surface shines π times its intensity straight up.
+    flux = math.pi * 1000.0 * sources.lobes.scale.sum()
+    assert 60.0 < flux < 0.95 * ROAD_ALBEDO * 2 * 517.0
+    dense = RoadGlow().sources(LOW, CAMERA, turned, fog(50))
+    assert (dense.intensity < sources.intensity).all()

@@ -130,7 +130,8 @@ def detect_signs(
     tuple of SignDetection
         The surest first; of those in the same place one.
     """
-    pixels: NDArray[Any] = np.ascontiguousarray(image if image.ndim == 3 else image[:, :, None])
+    # numba would compile all anew for an array that cannot be written.
+    pixels: NDArray[Any] = np.require(image if image.ndim == 3 else image[:, :, None], requirements=["C", "W"])
     if regions is None:
         searches = list(_tiles(pixels.shape[:2], radii))
         # So many tiles give chance as many occasions.

@@ -8,6 +8,7 @@ Half an hour for all. ``--agent NAME=FILE`` adds a row for an agent of Stable-Ba
 
 import argparse
 import json
+import math
 import re
 import subprocess
 import sys
@@ -122,7 +123,7 @@ def _surrogate_cells(record: dict[str, Any]) -> list[str]:
         f"{record['visibility_from_m']:.0f} … " + ("∞" if above is None else f"{above:.0f}") + " m",
         str(record["estimates"]),
         f"{100 * record['valid_share']:.0f} / {100 * record['surrogate_valid_share']:.0f} %",
-        "–" if errors[0] is None else f"{100 * errors[0]:+.0f} / {100 * errors[1]:+.0f} %",
+        "–" if errors[0] is None else f"{math.exp(errors[0]):.2f} / {math.exp(errors[1]):.2f}",
         "–" if errors[2] is None else f"{errors[2]:.2f}",
     ]
 
@@ -168,7 +169,8 @@ def main() -> None:
         fast = "fogsim/FogAdvisoryFast-v1"
         text = table(text, "densities", ["policy", *DENSITIES.values()], density_rows(fast, asked.episodes))
     if asked.surrogate:
-        header = ["light", "visibility ahead", "estimates", "valid: real / drawn", "median error of k", "KS distance"]
+        ratio = "median k / true k: real / drawn"
+        header = ["light", "visibility ahead", "estimates", "valid: real / drawn", ratio, "KS distance"]
         text = table(text, "surrogate", header, surrogate_rows(asked.episodes))
     if asked.corridor:
         header = ["policy", "return", "gain over dark signs", "episodes with collisions", *CORRIDOR_TERMS]

@@ -2,23 +2,23 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
-from fogsim.estimators.signs.regions import PoseDeviation, ProjectedSign, project_sightings
-from fogsim.estimators.signs.registration import Registration, register_signs
-from fogsim.estimators.signs.track import SignTrack, SignTracks
+from fogsim.estimators.signs.regions import PoseDeviation
+from fogsim.estimators.signs.track import SignTrack
+from fogsim.estimators.signs.watch import SignWatch as Watch
+from fogsim.estimators.signs.watch import sign_looks
 from fogsim.offline.image_files import Pixels
 from fogsim.offline.sign_file import SignFile, load_sign_file
 from fogsim.offline.source import Source
 from fogsim.offline.track_file import GeographicPose, Track, load_track, metres_per_radian
 from fogsim.sensors import signs_ahead
 from fogsim.values import Camera, Sign, SignLook, SignMap, SignSighting
-from fogsim.vision.symmetry.detection import detect_signs
 
 REACH = 250.0
 """Distance ahead as far as which signs are looked for [m]."""
@@ -74,12 +74,12 @@ class SignWatch:
     """
 
     def __init__(self, signs: SignFile, track: Track, camera: Camera, offset: float = 0.0) -> None:
-        self._track, self._camera, self._offset = track, camera, offset
+        self._track, self._offset = track, offset
         self._signs = signs.signs
         self._longitude = np.array([sign.longitude for sign in signs.signs])
         self._latitude = np.array([sign.latitude for sign in signs.signs])
         self._nearest = self._nearest_positions(signs.path)
-        self._tracks = SignTracks()
+        self._watch = Watch(camera, 0.0, OWN_DRIVE)
         self._passed: list[SignTrack] = []
         self._images = self._outside = 0
 
@@ -115,17 +115,14 @@ class SignWatch:
         tuple of SignLook
             One for each sign of which the image may show something.
         """
-        expected = project_sightings(sightings, self._camera, 0.0, OWN_DRIVE)
-        found = register_signs(expected, detect_signs(image, [sign.region for sign in expected]))
-        self._passed += self._tracks.update(time, expected, found)
-        pairs = {one.sign.sighting.sign_id: one for one in found}
-        known = {one.sign.sighting.sign_id: one for one in self._tracks.tracks}
-        return tuple(_look(sign, pairs.get(sign.sighting.sign_id), known[sign.sighting.sign_id]) for sign in expected)
+        watched = self._watch.look(image, sightings, time)
+        self._passed += watched.passed
+        return sign_looks(watched, self._watch.tracks)
 
     def summary(self) -> Iterator[SignSummary]:
         """What became of each sign, in the order in which they came."""
         known: dict[str, SignSummary] = {}
-        for track in (*self._passed, *self._tracks.tracks):
+        for track in (*self._passed, *self._watch.tracks):
             sign, first = track.sign.sighting, track.first_seen if track.confirmed else None
             # A sign at the border of what can be seen may come more than once.
             was = known.get(sign.sign_id) or SignSummary(sign.sign_id, sign.kind, None, 0, 0)
@@ -208,14 +205,6 @@ def _apart(
 
 def _far(distance: float) -> str:
     return f"{distance / 1000.0:.0f} km" if distance > FAR_AWAY else f"{distance:.0f} m"
-
-
-def _look(sign: ProjectedSign, pair: Registration | None, track: SignTrack) -> SignLook:
-    first = track.first_seen if track.confirmed else None
-    look = SignLook(sign.sighting.sign_id, sign.u, sign.v, sign.radius, sign.distance, pair is not None, first)
-    if pair is None:
-        return look
-    return replace(look, u=pair.detection.u, v=pair.detection.v, radius=pair.detection.radius)
 
 
 def watch_signs(

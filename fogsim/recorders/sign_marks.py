@@ -24,7 +24,7 @@ def sign_looks(step: Step) -> tuple[SignLook, ...]:
         The finished step.
     """
     observation = step.observation
-    looked = next((found for one in step.estimates if (found := looks_of(one.diagnostics.get("signs")))), ())
+    looked = next((found for one in step.estimates if (found := looks_of(one.diagnostics.get("sign_looks")))), ())
     if not isinstance(observation.frame, Frame):
         return looked
     known, camera = {look.sign_id for look in looked}, observation.frame.camera
@@ -42,7 +42,7 @@ def looks_of(diagnostic: object) -> tuple[SignLook, ...]:
     Parameters
     ----------
     diagnostic : object
-        ``Estimate.diagnostics["signs"]``.
+        ``Estimate.diagnostics["sign_looks"]``.
     """
     if not isinstance(diagnostic, tuple):
         return ()

@@ -40,7 +40,7 @@ def fog_category(visibility: float) -> FogCategory:
 
 @dataclass(frozen=True, slots=True)
 class SignLook:
-    """What came of looking for a sign of the map in a picture; ``Estimate.diagnostics["signs"]`` is a tuple of them.
+    """What came of looking for a sign of the map in a picture: ``Estimate.diagnostics["sign_looks"]`` has them.
 
     Attributes
     ----------

@@ -18,7 +18,7 @@ SIGN = SignSighting("s<1>", "stop", 0.0, 30.0, -4.0, 0.9)
 
 
 def seen(*signs: SignSighting, looks: object = ()) -> Step:
-    step = make_step(estimates=(estimate("m", 100.0), estimate("by_signs", 100.0, signs=looks)))
+    step = make_step(estimates=(estimate("m", 100.0), estimate("by_signs", 100.0, sign_looks=looks)))
     return dataclasses.replace(step, observation=dataclasses.replace(step.observation, signs=signs))
 
 

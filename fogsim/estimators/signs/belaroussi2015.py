@@ -11,7 +11,7 @@ from fogsim.estimators.signs.mixture import majority, reduced
 from fogsim.estimators.signs.operating_range import OperatingRange
 from fogsim.estimators.signs.regions import PoseDeviation
 from fogsim.estimators.signs.track import SignTrack
-from fogsim.estimators.signs.watch import SignWatch, Watched
+from fogsim.estimators.signs.watch import SignWatch, Watched, sign_looks
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera
@@ -118,8 +118,9 @@ class Belaroussi2015:
         -------
         Estimate
             Diagnostics: ``signs``, how many count; ``single_visibilities`` of them [m]; ``sign_boxes``, (left, right,
-            top, bottom) of those that were found [px]; ``visibility_at_least`` [m], of a sign that was seen from beyond
-            the curve's range; or ``reason``.
+            top, bottom) of those that were found [px]; ``sign_looks``, a `SignLook` of each that is ahead;
+            ``visibility_at_least`` [m], of a sign that was seen from beyond the curve's range; or
+            ``reason``.
 
         Raises
         ------
@@ -133,6 +134,7 @@ class Belaroussi2015:
         self._time = time
         watched = self._watch.look(image, observation.signs, time)
         found: dict[str, object] = {"horizon_row": self._horizon, "sign_boxes": _boxes(watched)}
+        found["sign_looks"] = sign_looks(watched, self._watch.tracks)
         if self._range is None:
             why = "the detector is not calibrated for this camera: fogsim calibrate signs, parameter operating_range"
             return Estimate.invalid(self.method, why, **found)

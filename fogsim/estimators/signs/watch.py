@@ -1,7 +1,7 @@
 """Looks for the signs of the map in frame after frame, and tells why nothing can be made of them."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from fogsim.estimators.signs.regions import PoseDeviation, ProjectedSign, projec
 from fogsim.estimators.signs.registration import Registration, register_signs
 from fogsim.estimators.signs.track import SignTrack, SignTracks
 from fogsim.values.camera import Camera
+from fogsim.values.estimate import SignLook
 from fogsim.values.observation import SignSighting
 from fogsim.vision.symmetry.detection import detect_signs
 
@@ -114,3 +115,27 @@ class SignWatch:
                 "coordinate frame, or the camera be told wrongly"
             )
         return "" if self._told else "the map tells of no sign ahead; sensors.sign_reach_m and the map decide that"
+
+
+def sign_looks(watched: Watched, tracks: Iterable[SignTrack]) -> tuple[SignLook, ...]:
+    """What came of looking for each sign that the picture may show, for ``Estimate.diagnostics["sign_looks"]``.
+
+    Parameters
+    ----------
+    watched : Watched
+        What the frame showed.
+    tracks : iterable of SignTrack
+        Signs ahead after it.
+    """
+    pairs = {one.sign.sighting.sign_id: one for one in watched.found}
+    known = {one.sign.sighting.sign_id: one for one in tracks}
+    ids = [sign.sighting.sign_id for sign in watched.signs]
+    return tuple(_look(sign, pairs.get(one), known[one]) for one, sign in zip(ids, watched.signs, strict=True))
+
+
+def _look(sign: ProjectedSign, pair: Registration | None, track: SignTrack) -> SignLook:
+    first = track.first_seen if track.confirmed else None
+    look = SignLook(sign.sighting.sign_id, sign.u, sign.v, sign.radius, sign.distance, pair is not None, first)
+    if pair is None:
+        return look
+    return replace(look, u=pair.detection.u, v=pair.detection.v, radius=pair.detection.radius)

@@ -81,6 +81,7 @@ def reproduce(
     setups: Sequence[Setup] = SETUPS,
     approaches: int = 12,
     *,
+    fogs: Sequence[float] = CALIBRATED,
     watch: Watch = unwatched,
 ) -> Reproduction:
     """Run the evaluation again.
@@ -93,6 +94,8 @@ def reproduce(
         The cameras.
     approaches : int
         Drives of each calibration.
+    fogs : sequence of float
+        Visibilities of the calibration [m].
     watch : Watch
         Is told of every tenth image.
     """
@@ -104,7 +107,7 @@ def reproduce(
             watch(before + done, total)
 
         measured = measure_operating_range(
-            setup.camera, DIAMETER, CALIBRATED, approaches=approaches, seed=1, watch=calibrating
+            setup.camera, DIAMETER, fogs, approaches=approaches, seed=1, watch=calibrating
         )
         ranges.append(measured)
         found: list[dict[str, Cell]] = []

@@ -77,8 +77,8 @@ def add_wide_glows(
     red, green, blue, near = out[0], out[1], out[2], out[3]
     count = red.shape[0]
     place, turn = np.empty(count, np.float32), np.empty(count, np.float32)
-    profile, profiles = np.empty(WIDE_SIZE, np.float32), np.empty((SIDES + 1, WIDE_SIZE), np.float32)
-    flat, size = profiles.reshape(-1), np.uint32(WIDE_SIZE)
+    profile, profiles = np.empty(WIDE_SIZE, np.float32), np.empty((WIDE_SIZE, SIDES + 1), np.float32)
+    flat, size = profiles.reshape(-1), np.uint32(SIDES + 1)
     for i in range(lamps.shape[0]):
         lamp = lamps[i]
         lamp_profile(table, lamp, HIDDEN_SHARE, log_depth, profile)
@@ -90,10 +90,10 @@ def add_wide_glows(
         n = (_RED * r + _GREEN * g + _BLUE * b) * np.float32(lamp[NEARNESS])
         for p in range(count):
             entry, side = np.uint32(place[p]), np.uint32(turn[p])
-            onward, around, first = place[p] - np.float32(entry), turn[p] - np.float32(side), side * size + entry
-            low = flat[first] + (flat[first + _NEXT] - flat[first]) * onward
-            high = flat[first + size] + (flat[first + size + _NEXT] - flat[first + size]) * onward
-            place[p] = low + (high - low) * around
+            onward, around, first = place[p] - np.float32(entry), turn[p] - np.float32(side), entry * size + side
+            low = flat[first] + (flat[first + _NEXT] - flat[first]) * around
+            high = flat[first + size] + (flat[first + size + _NEXT] - flat[first + size]) * around
+            place[p] = low + (high - low) * onward
         for p in range(count):
             red[p] += place[p] * r
             green[p] += place[p] * g

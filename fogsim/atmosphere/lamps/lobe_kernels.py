@@ -197,15 +197,16 @@ def side_profiles(
         Light of the glow [lx].
     angles : Angles
         Of the profile's entries.
-    out : (sides + 1, entries) float32
+    out : (entries, sides + 1) float32
         Luminance [cd/m²], that of the first side once more at the end; written to.
     """
-    sides = out.shape[0] - 1
-    for side in range(sides + 1):
-        line, column = out[side], side % sides
-        for n in range(unit.shape[0]):
-            low = light[angles.entry[n] * sides + column]
-            line[n] = unit[n] * (low + (light[(angles.entry[n] + 1) * sides + column] - low) * angles.share[n])
+    sides = out.shape[1] - 1
+    for n in range(unit.shape[0]):
+        first, line, share, gain = angles.entry[n] * sides, out[n], angles.share[n], unit[n]
+        low, high = light[first : first + sides], light[first + sides : first + 2 * sides]
+        for side in range(sides):
+            line[side] = gain * (low[side] + (high[side] - low[side]) * share)
+        line[sides] = line[0]
 
 
 @kernel

@@ -24,11 +24,12 @@ Found with libsumo 1.28 on a 2-core Linux machine, growth per reset of resident 
     episodes     1000 resets   1.4 KiB / 1.4 KiB
     advisory-v1  1000 resets  12.7 KiB / 1.4 KiB
     fast-v1      1000 resets   3.4 KiB / 1.4 KiB
+    highway-v1    240 resets  none     / none      (counted from the 60th on)
 
 So most of what grows is SUMO's own ``load``, below 2 KiB each whether the seed changes or not, some 2 MiB in 1000
 resets; our stages, the scene, the renderer and the estimators add at most 0.5 KiB to it. The resident set settles
 slowly, so short runs show more. Also where each reset has another road what is not given back is what ``load`` keeps;
-the resident set grows more, by free memory that is scattered among scenes of different sizes.
+the resident set grows more, which is no memory in use: probably free memory scattered among scenes of all sizes.
 """
 
 import argparse

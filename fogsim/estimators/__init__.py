@@ -1,4 +1,4 @@
-"""Visibility estimators, one method a module, in one registry: published ones and two of this project's own."""
+"""Visibility estimators, one method a module, in one registry: published ones and three of this project's own."""
 
 from collections.abc import Callable
 
@@ -11,6 +11,7 @@ from fogsim.estimators.lead_contrast import LeadContrast
 from fogsim.estimators.negru2013 import Negru2013
 from fogsim.estimators.protocol import Estimator
 from fogsim.estimators.signs.belaroussi2015 import Belaroussi2015
+from fogsim.estimators.signs.sign_contrast import SignContrast
 from fogsim.estimators.zhu2015 import Zhu2015
 from fogsim.registry import Registry
 from fogsim.values.camera import Camera
@@ -26,6 +27,7 @@ ESTIMATORS: Registry[Callable[..., Estimator]] = Registry(
         "belaroussi2015": Belaroussi2015,
         "joint_road": JointRoad,
         "lead_contrast": LeadContrast,
+        "sign_contrast": SignContrast,
     },
     group="fogsim.estimators",
     methods=("update", "reset"),

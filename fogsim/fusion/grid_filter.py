@@ -12,7 +12,7 @@ from fogsim.linear_algebra import convolution
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import extinction_from_visibility
 from fogsim.values.belief import Belief
-from fogsim.values.estimate import Estimate
+from fogsim.values.estimate import Estimate, ExtinctionBounds
 
 Floats = NDArray[np.float64]
 
@@ -21,6 +21,9 @@ NEAREST, FARTHEST = 10.0, 10_000.0  # [m] visibilities at the ends of the grid
 LOG_LOW, LOG_HIGH = (math.log(extinction_from_visibility(v)) for v in (FARTHEST, NEAREST))
 LOG_RANGE = LOG_HIGH - LOG_LOW
 _MOST_STEPS = 64
+
+LEAST_UNBOUND = 0.2
+"""Least share of bounds that are taken for wrong [-]: signs that bound the fog may be missing or hidden."""
 
 
 @checked_parameters
@@ -32,7 +35,8 @@ class GridFilter:
     fog without claiming any particular visibility; a share of estimates is taken for outliers that could be anything.
     Neighbouring frames share their errors (road texture, pitch), so an estimate counts only for the share of
     `correlation_time` that has passed since the one before: the likelihood is raised to that power. Invalid estimates
-    change nothing; time alone widens the belief. Before the first estimate every ln k on the grid is equally likely.
+    change nothing but by their bounds, beyond which k is as unlikely as bounds are wrong; time alone widens the belief.
+    Before the first estimate every ln k on the grid is equally likely.
 
     Parameters
     ----------
@@ -106,6 +110,8 @@ class GridFilter:
         for estimate in estimates:
             if estimate.valid and math.isfinite(estimate.extinction) and math.isfinite(estimate.standard_deviation):
                 log_likelihood += self._weight * self._log_likelihood(estimate)
+            elif estimate.bounds is not None:
+                log_likelihood += self._weight * self._log_likelihood_within(estimate.bounds)
         # The largest exponent is zero: no product of densities can overflow, and the sum cannot vanish.
         posterior = self._probability * np.exp(log_likelihood - log_likelihood.max())
         self._probability = posterior / posterior.sum()
@@ -167,3 +173,20 @@ class GridFilter:
         # An outlier is any ln k on the grid: 1 / (k LOG_RANGE) in k, and no more than that at k̂ = 0.
         outlier = 1.0 / (LOG_RANGE * max(measured, deviation))
         return np.asarray(np.log1p((1.0 - self._outlier_share) / self._outlier_share * density / outlier))
+
+    def _log_likelihood_within(self, bounds: ExtinctionBounds) -> Floats:
+        """Logarithm of the likelihood of each cell by bounds of k, at most 0."""
+        softness = max(bounds.softness, self._relative_floor)
+        inside = np.ones(CELLS)
+        if bounds.most < math.inf:
+            inside *= _normal_share((math.log(max(bounds.most, 1e-12)) - self._log_extinction) / softness)
+        if bounds.least > 0.0:
+            inside *= _normal_share((self._log_extinction - math.log(bounds.least)) / softness)
+        # Signs that are told wrongly are more than other outliers, and the belief must survive two of them.
+        share = max(self._outlier_share, LEAST_UNBOUND)
+        return np.asarray(np.log(share + (1.0 - share) * inside))
+
+
+def _normal_share(deviations: Floats) -> Floats:
+    """Share of a normal distribution below so many standard deviations [-]."""
+    return np.array([0.5 * math.erfc(-x / math.sqrt(2.0)) for x in deviations.tolist()])

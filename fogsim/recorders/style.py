@@ -39,7 +39,17 @@ def font(size: int, *, bold: bool = False) -> ImageFont.FreeTypeFont:
     return ImageFont.truetype(str(path), size, layout_engine=ImageFont.Layout.BASIC)
 
 
-_NAMED = ("negru2013", "zhu2015", "huang2015", "huang2015_rough", "huang2015_lead", "joint_road", "lead_contrast")
+_NAMED = (
+    "negru2013",
+    "zhu2015",
+    "huang2015",
+    "huang2015_rough",
+    "huang2015_lead",
+    "joint_road",
+    "lead_contrast",
+    "belaroussi2015",
+    "sign_contrast",
+)
 """Methods that the first colours belong to, whichever others stand beside them."""
 
 ON_DARK: tuple[Colour, ...] = (

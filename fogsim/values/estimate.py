@@ -68,6 +68,23 @@ class SignLook:
 
 
 @dataclass(frozen=True, slots=True)
+class ExtinctionBounds:
+    """What is known of the extinction coefficient where it cannot be estimated: that it is at most or at least so much.
+
+    Attributes
+    ----------
+    most, least : float
+        k is likely at most, and at least, this [1/m]; ``inf`` and 0 where nothing is known.
+    softness : float
+        Standard deviation of either end in ln k [-].
+    """
+
+    most: float = math.inf
+    least: float = 0.0
+    softness: float = 0.1
+
+
+@dataclass(frozen=True, slots=True)
 class Estimate:
     """An estimate of the extinction coefficient, or the statement that there is none.
 
@@ -83,6 +100,8 @@ class Estimate:
         False if the method cannot tell from this frame; the numbers then say nothing.
     diagnostics : mapping
         What the method found on the way (rows, bands, reasons), for overlays and debugging.
+    bounds : ExtinctionBounds or None
+        Of an estimate that is not valid: what is known all the same ("at least 250 m").
     """
 
     method: str
@@ -90,6 +109,7 @@ class Estimate:
     standard_deviation: float
     valid: bool = True
     diagnostics: Mapping[str, object] = field(default_factory=dict)
+    bounds: ExtinctionBounds | None = None
 
     @classmethod
     def invalid(cls, method: str, reason: str, **diagnostics: object) -> "Estimate":
@@ -113,9 +133,15 @@ class Estimate:
 
     @property
     def visibility_interval(self) -> tuple[float, float]:
-        """Central 90 % interval of the meteorological visibility [m]; (0, inf) if not valid."""
+        """Central 90 % interval of the meteorological visibility [m]; what the bounds leave, (0, inf), if not valid."""
         if not self.valid:
-            return (0.0, math.inf)
+            if self.bounds is None:
+                return (0.0, math.inf)
+            widened = math.exp(NORMAL_90_PERCENT * self.bounds.softness)
+            return (
+                visibility_from_extinction(self.bounds.most * widened),
+                visibility_from_extinction(self.bounds.least / widened),
+            )
         half_width = NORMAL_90_PERCENT * self.standard_deviation
         return (
             visibility_from_extinction(self.extinction + half_width),

@@ -20,8 +20,11 @@ from fogsim.estimators import ESTIMATORS, make
 from fogsim.registry import parameters
 from fogsim.values import Camera, Estimate, Frame, LeadMeasurement, Observation, Response
 
-NOT_BY_DAY: dict[str, str] = {}
-"""Methods that cannot tell from a drive by day, and where their relations are tested instead."""
+NOT_BY_DAY = {
+    "belaroussi2015": "needs signs: tests/estimators/signs/test_belaroussi2015.py",
+    "sign_contrast": "needs signs: tests/estimators/signs/test_sign_contrast.py",
+}
+"""Methods that cannot tell from this drive by day, and where their relations are tested instead."""
 
 METHODS = sorted(set(ESTIMATORS) - set(NOT_BY_DAY))
 RANGES = (14.0, 18.0, 22.0, 26.0, 30.0, 35.0, 40.0, 45.0, 50.0)

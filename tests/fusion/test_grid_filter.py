@@ -1,3 +1,4 @@
+import dataclasses
 import math
 
 import numpy as np
@@ -7,6 +8,7 @@ from fogsim.errors import InputError, UnknownNameError
 from fogsim.fusion import FUSIONS, make
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import Estimate
+from fogsim.values.estimate import ExtinctionBounds
 
 
 def measured(visibility, relative=0.1):
@@ -179,3 +181,28 @@ def test_names_and_parameters_are_checked():
     for name, value in {"drift": 0.0, "leap_rate": -1.0, "outlier_share": 1.0, "correlation_time": math.nan}.items():
         with pytest.raises(InputError, match=name):
             make("grid_filter", **{name: value})
+
+
+def test_bounds_of_an_estimate_that_is_not_valid_move_the_belief_to_their_side():
+    def told(bounds):
+        estimate = dataclasses.replace(Estimate.invalid("test", "only a bound"), bounds=bounds)
+        return make("grid_filter").update([estimate], 0.0)
+
+    far = told(ExtinctionBounds(most=k_of(250.0)))
+    assert 1.0 - share_below(far, 200.0) > 0.85
+    near = told(ExtinctionBounds(least=k_of(60.0)))
+    assert share_below(near, 80.0) > 0.6
+    assert told(None).probability == pytest.approx(np.full(240, 1 / 240))
+
+
+def share_below(belief, visibility):
+    return float(belief.probability[np.exp(belief.log_extinction) > k_of(visibility)].sum())
+
+
+def test_a_wrong_bound_does_not_outweigh_good_estimates():
+    fusion = make("grid_filter")
+    feed(fusion, [measured(300.0)] * 20)
+    wrong = dataclasses.replace(
+        Estimate.invalid("test", "a sign is missing"), bounds=ExtinctionBounds(least=k_of(30.0))
+    )
+    assert feed(fusion, [wrong] * 5, start=2.0).visibility == pytest.approx(300.0, rel=0.15)

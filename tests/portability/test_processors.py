@@ -131,7 +131,9 @@ def test_what_is_compared_is_a_drive_in_fog_with_advice(answers: Answers) -> Non
 def test_every_method_of_the_day_sees_the_fog_in_what_is_compared(answers: Answers) -> None:
     valid = answers["here"].result()["chase"]["valid"]
     assert list(valid) == list(ESTIMATORS)
-    assert all(sum(frames) >= 5 for frames in valid.values())
+    # The chase passes no signs.
+    telling = [frames for method, frames in valid.items() if method not in ("belaroussi2015", "sign_contrast")]
+    assert all(sum(frames) >= 5 for frames in telling)
 
 
 def test_a_difference_is_told(answers: Answers, differences: Callable[[Any, Any], Iterator[str]]) -> None:

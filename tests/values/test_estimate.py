@@ -1,12 +1,13 @@
 """What an estimate says: its visibility, the interval of it, and negru2013's categories."""
 
+import dataclasses
 import math
 
 import pytest
 
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Estimate
-from fogsim.values.estimate import FogCategory, fog_category
+from fogsim.values.estimate import ExtinctionBounds, FogCategory, fog_category
 
 
 @pytest.mark.parametrize(
@@ -33,3 +34,10 @@ def test_no_estimate_says_nothing() -> None:
     nothing = Estimate.invalid("negru2013", "no road", row=7)
     assert (nothing.valid, nothing.visibility_interval) == (False, (0.0, math.inf))
     assert nothing.diagnostics == {"reason": "no road", "row": 7}
+
+
+def test_bounds_are_the_interval_of_what_is_not_estimated() -> None:
+    at_least = ExtinctionBounds(most=extinction_from_visibility(250.0), softness=0.1)
+    bound = dataclasses.replace(Estimate.invalid("belaroussi2015", "flat"), bounds=at_least)
+    low, high = bound.visibility_interval
+    assert (low, high) == (pytest.approx(250.0 / math.exp(0.16448536)), math.inf)

@@ -13,10 +13,17 @@ from fogsim.estimators.signs.track import SignTrack, SignTracks
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import SignLook
 from fogsim.values.observation import SignSighting
+from fogsim.vision.light.daylight import lit_by_lamps
+from fogsim.vision.light.luminance import linear_pixels
+from fogsim.vision.lines.horizon import calibrated_horizon, levelled
+from fogsim.vision.strips.sky import Sky, sky_above
 from fogsim.vision.symmetry.detection import detect_signs
 
 STRANGE = 3
 """Signs in a row of which none was found where the map has it, from which on the map is doubted."""
+
+MIN_AIRLIGHT = 6.0
+"""Sky darker than this is no day [linear grey levels]."""
 
 WELL_SEEN = 30.0
 """Distance within which a sign must have been looked for to be told from one that is too far to see [m]."""
@@ -36,11 +43,17 @@ class Watched:
         Those that were detected.
     passed : tuple of SignTrack
         Signs that are no longer ahead.
+    sky : Sky or None
+        The sky, if there are signs to look for and it is seen.
+    night : str
+        Why the picture is none by day, or nothing.
     """
 
     signs: tuple[ProjectedSign, ...]
     found: tuple[Registration, ...]
     passed: tuple[SignTrack, ...]
+    sky: Sky | None = None
+    night: str = ""
 
 
 class SignWatch:
@@ -58,6 +71,7 @@ class SignWatch:
 
     def __init__(self, camera: Camera, setback: float, deviation: PoseDeviation) -> None:
         self._camera, self._setback, self._deviation = camera, setback, deviation
+        self._margin = 3.0 * calibrated_horizon(camera, deviation.pitch).standard_deviation + 2.0
         self._tracks = SignTracks()
         self.reset()
 
@@ -97,6 +111,11 @@ class SignWatch:
             raise InputError(f"the ids of a map's signs must differ, got {twice!r} twice; its value names one sign")
         self._told = self._told or bool(sightings)
         signs = project_sightings(sightings, self._camera, self._setback, self._deviation)
+        sky, night = self._daylight(image) if signs else (None, "")
+        if night:
+            # What lamps light is seen farther than by day, and what they do not less far.
+            self._tracks.reset()
+            return Watched((), (), (), sky, night)
         found = register_signs(signs, detect_signs(image, [sign.region for sign in signs])) if signs else ()
         passed = self._tracks.update(time, signs, found)
         for track in passed:
@@ -104,7 +123,14 @@ class SignWatch:
                 self._lost = 0
             elif track.unseen_before is not None and track.unseen_before < WELL_SEEN:
                 self._lost += 1
-        return Watched(signs, found, passed)
+        return Watched(signs, found, passed, sky)
+
+    def _daylight(self, image: NDArray[np.uint8] | NDArray[np.uint16]) -> tuple[Sky | None, str]:
+        level = levelled(image, self._camera)
+        sky = sky_above(linear_pixels(level, self._camera), self._camera, self._margin)
+        if sky is not None and sky.luminance < MIN_AIRLIGHT:
+            return sky, "too dark above the horizon: this is a daytime method"
+        return sky, lit_by_lamps(level, self._camera)
 
     @property
     def trouble(self) -> str:

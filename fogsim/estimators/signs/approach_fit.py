@@ -1,0 +1,174 @@
+"""Extinction from how the light of a sign's face changes while it comes nearer."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.estimators.signs.face_light import FaceLight
+from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
+
+Floats = NDArray[np.float64]
+
+GRID = OPTICAL_DEPTH_AT_VISIBILITY / np.geomspace(8000.0, 10.0, 300)
+"""Extinction coefficients that are weighed [1/m], evenly in their logarithms."""
+
+AIRLIGHT, CLIPPED_AIRLIGHT = 0.008, 0.05
+"""Relative deviation of the airlight at the sign from the sky's, and where the sky is clipped [-]."""
+
+DARKNESS = 0.02
+"""Deviation of what a sign's black sends, over the airlight [-]: gloss, dirt, and red that is not as red."""
+
+REGISTRATION = 0.012
+"""Relative deviation of a single look's contrast by what is not noise: its layout, its place within the pixels [-]."""
+
+BRIGHTNESS, BRIGHTNESS_DEVIATION = 0.5, 0.35
+"""What a white face would send without fog over the airlight, divided by its reflectance, and its deviation [-]."""
+
+HUBER, ROUNDS = 2.0, 3
+"""Standard deviations from which on a look counts less [-], and rounds of weighing."""
+
+MAX_MISFIT = 12.0
+"""Mean square of the standardised residuals beyond which it is no sign that is seen [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class FaceLook:
+    """One look at a sign.
+
+    Attributes
+    ----------
+    distance : float
+        From the camera by the map [m].
+    face : FaceLight
+        What its face sends.
+    airlight : float
+        Luminance of the sky [linear grey levels].
+    clipped : bool
+        Whether the sky is clipped.
+    """
+
+    distance: float
+    face: FaceLight
+    airlight: float
+    clipped: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ApproachFit:
+    """What the approach to one sign says.
+
+    Attributes
+    ----------
+    log_likelihood : (300,) float64
+        For each k of `GRID`, the largest 0 [-].
+    misfit : float
+        Mean square of the standardised residuals at the likeliest k [-].
+    """
+
+    log_likelihood: Floats
+    misfit: float
+
+
+def fit_approach(looks: Sequence[FaceLook], range_deviation: float) -> ApproachFit:
+    """Weigh every extinction coefficient by the looks at one sign.
+
+    By Koschmieder's law the face's black has the contrast −(1 − g) e^(−kd) + ε to the airlight, and its slope over
+    reflectance is Q e^(−kd): the brightness Q, the black's own light g and the airlight's error ε are the sign's own,
+    and are fitted for each k. A constant error of the map's distance changes Q and g alone.
+
+    Parameters
+    ----------
+    looks : sequence of FaceLook
+        From different distances.
+    range_deviation : float
+        Standard deviation of a single distance about what is common to all [m].
+    """
+    distance = np.array([one.distance for one in looks])
+    airlight = np.array([one.airlight for one in looks])
+    seen = np.array([(one.face.black, one.face.slope) for one in looks]) / airlight[:, None]
+    seen[:, 0] -= 1.0
+    noise = np.array([one.face.variance for one in looks]) / airlight[:, None] ** 2
+    unsure = CLIPPED_AIRLIGHT if any(one.clipped for one in looks) else AIRLIGHT
+    weight, at = np.ones(len(looks)), 0
+    for _ in range(ROUNDS):
+        squares, residuals = _profile(distance, seen, noise, weight, unsure, range_deviation)
+        at = int(np.argmin(squares))
+        square = residuals[at]
+        weight = np.minimum(1.0, HUBER / np.sqrt(np.maximum(square, 1e-9)))
+    misfit = float((weight * residuals[at]).sum() / max(2 * len(looks) - 3, 1))
+    scaled = -0.5 * (squares - squares[at]) / max(misfit, 1.0)
+    return ApproachFit(scaled, misfit)
+
+
+def _profile(
+    distance: Floats, seen: Floats, noise: Floats, weight: Floats, unsure: float, range_deviation: float
+) -> tuple[Floats, Floats]:
+    """Least sum of squares for each k, and each look's own (k, looks)."""
+    k = GRID[:, None]
+    fall = np.exp(-k * distance)
+    # What is not noise scales a contrast; taken along the usual face, so that what was seen decides no weights.
+    relative = (REGISTRATION**2 + (k * range_deviation) ** 2) * fall**2
+    a = noise[:, 0] + relative
+    b = noise[:, 1] + BRIGHTNESS**2 * relative
+    c = noise[:, 2] - BRIGHTNESS * relative * 0.5
+    determinant = np.maximum(a * b - c * c, 1e-30)
+    aa, bb, ab = b / determinant, a / determinant, -c / determinant
+    first, second = seen[:, 0] + fall, np.broadcast_to(seen[:, 1], fall.shape) - BRIGHTNESS * fall
+    # Linear unknowns: g and ε in the first, the brightness beyond the usual in the second.
+    rows = ((fall, np.zeros_like(fall)), (np.ones_like(fall), np.zeros_like(fall)), (np.zeros_like(fall), fall))
+    priors = (DARKNESS**-2.0, unsure**-2.0, BRIGHTNESS_DEVIATION**-2.0)
+    matrix, right = np.zeros((len(GRID), 3, 3)), np.zeros((len(GRID), 3))
+    for i, (p, q) in enumerate(rows):
+        left_p, left_q = weight * (aa * p + ab * q), weight * (ab * p + bb * q)
+        right[:, i] = (left_p * first + left_q * second).sum(axis=1)
+        for j, (r, s) in enumerate(rows):
+            matrix[:, i, j] = (left_p * r + left_q * s).sum(axis=1)
+        matrix[:, i, i] += priors[i]
+    solved = _solved(matrix, right)
+    g, offset, brighter = (solved[:, i, None] for i in range(3))
+    first, second = first - g * fall - offset, second - brighter * fall
+    own = aa * first**2 + bb * second**2 + 2.0 * ab * first * second
+    # The logarithm of the determinant: variances depend on k.
+    whole = (weight * (own + np.log(determinant))).sum(axis=1)
+    return whole + (solved**2 * np.array(priors)).sum(axis=1), own
+
+
+def _solved(matrix: Floats, right: Floats) -> Floats:
+    """Solutions of many small positive definite systems, by Gauss's elimination."""
+    matrix, right = matrix.copy(), right.copy()
+    count = right.shape[1]
+    for i in range(count):
+        for j in range(i + 1, count):
+            share = matrix[:, j, i] / matrix[:, i, i]
+            matrix[:, j] -= share[:, None] * matrix[:, i]
+            right[:, j] -= share * right[:, i]
+    for i in reversed(range(count)):
+        right[:, i] = (right[:, i] - (matrix[:, i, i + 1 :] * right[:, i + 1 :]).sum(axis=1)) / matrix[:, i, i]
+    return right
+
+
+def extinction_of(fits: Sequence[ApproachFit], wrong_share: float) -> tuple[float, float, Floats]:
+    """Mean and standard deviation of k [1/m] after several signs, some of which may be wrong, and k's cumulative share.
+
+    Parameters
+    ----------
+    fits : sequence of ApproachFit
+        One of each sign.
+    wrong_share : float
+        Share of signs that are not what the map says [-].
+    """
+    likelihoods = [np.exp(np.maximum(fit.log_likelihood, -700.0)) for fit in fits]
+    likelihoods = [one / one.mean() for one in likelihoods]
+    shares = [np.log((1.0 - wrong_share) * one + wrong_share) for one in likelihoods]
+    likeliest = int(np.argmax(np.sum(shares, axis=0)))
+    # A sign counts for the probability that it is right, there where most of them agree.
+    right = [(1.0 - wrong_share) * one[likeliest] for one in likelihoods]
+    total = np.sum([r / (r + wrong_share) * fit.log_likelihood for r, fit in zip(right, fits, strict=True)], axis=0)
+    probability = np.exp(total - total.max())
+    probability /= probability.sum()
+    mean = float((probability * GRID).sum())
+    deviation = math.sqrt(float((probability * (GRID - mean) ** 2).sum()))
+    return mean, deviation, np.cumsum(probability)

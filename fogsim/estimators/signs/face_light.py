@@ -1,0 +1,214 @@
+"""How bright the face of a sign is in a picture: the light that all of it sends, and what its reflectance adds."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.estimators.signs.layout import Layout, face_maps
+from fogsim.linear_algebra import inverse_of, matrix_product, times
+
+Floats = NDArray[np.float64]
+
+ROUNDS, MARGIN = 2, 1.35
+"""Rounds in which the place is refined, and how far around the face the background is seen, over its radius [-]."""
+
+LEAST_NOISE = 0.15
+"""Least standard deviation of a pixel [linear grey levels]."""
+
+MOST_PIXELS = 1600
+"""Pixels that are compared, about; larger faces are sampled."""
+
+
+EDGES = 0.3
+"""Standard deviation of where an edge is seen in single pixels: sampling, sharpening, compression [px]."""
+
+FIRST_NOISE = 1.0
+"""Standard deviation of a pixel before it is measured [linear grey levels]."""
+
+SYMBOL = 0.05
+"""Standard deviation of a symbol's mean light, relative to the picture's there [-]."""
+
+UNKNOWN = 1e6
+"""Variance of what a face does not tell [linear grey levels²]."""
+
+# Place [px], relative size and blur [px].
+_LEAST, _MOST = np.array([-1.5, -1.5, 0.9, 0.3]), np.array([1.5, 1.5, 1.1, 2.0])
+LOOSE = (np.array([0.0, 0.0, 1.0, 0.5]), np.array([0.7, 0.7, 0.03, 0.15]))
+"""Place [px], relative size and blur [px] by detection, map and distance, and their standard deviations. The blur has
+the pixels' own size in it."""
+
+PLACED = np.array([0.15, 0.15, 0.015, 0.1])
+"""Their standard deviations once the face has been fitted."""
+
+SEPARABLE = 8.0
+"""Radius from which the areas of a face are told apart [px]; of smaller ones only the mean luminance counts."""
+
+LAYOUT = 0.005
+"""Deviation of a face's reflectance from its layout's, over that of white [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Face:
+    """What is fitted: a layout, half of its diameter [px], and width over height of a face that is turned [-]."""
+
+    layout: Layout
+    radius: float
+    narrowed: float
+
+    @property
+    def is_even(self) -> bool:
+        """Whether it has one reflectance."""
+        return len(self.layout.areas) == 1
+
+    def columns(self, right: Floats, down: Floats, state: Floats) -> Floats:
+        """What the picture is a sum of: face, background and its slopes, reflectance, symbol; state as in `LOOSE`."""
+        u, v, size, blur = state.tolist()
+        radius, blur = size * self.radius, max(blur, 0.2)
+        covered, shine, box = face_maps(self.layout, right - u, down - v, radius, blur, self.narrowed)
+        bare = 1.0 - covered
+        found = [covered, bare, bare * right / self.radius, bare * down / self.radius]
+        found += [] if self.is_even else [shine]
+        found += [] if box is None else [box]
+        return np.stack(found, axis=1)
+
+    def prior(self, seen: Floats, columns: Floats) -> Floats:
+        """Inverse variances of the columns' shares before the picture is seen."""
+        known = np.zeros(columns.shape[1])
+        if self.layout.symbol is not None:
+            known[-1] = (SYMBOL * max(float(np.median(seen)), 1.0)) ** -2.0
+        return known
+
+
+@dataclass(frozen=True, slots=True)
+class FaceLight:
+    """Luminance of a face as a line through its reflectance: L = black + slope · ρ.
+
+    Attributes
+    ----------
+    black, slope : float
+        Luminance at reflectance 0, and what a reflectance of 1 adds [linear grey levels].
+    variance : tuple of float
+        Variances of both and their covariance.
+    """
+
+    black: float
+    slope: float
+    variance: tuple[float, ...]
+
+
+def face_light(
+    light: NDArray[np.float32], place: tuple[float, float], radius: float, layout: Layout, narrowed: float
+) -> FaceLight | None:
+    """Fit a face of known layout, before a background with an even slope, to a part of a picture.
+
+    By Koschmieder's law the fog turns L0 = E ρ into L = A (1 − T) + E ρ T whatever the reflectance, so white, red and
+    dark parts of a face lie on one line, whose height and slope each tell the transmittance T.
+
+    Parameters
+    ----------
+    light : (rows, cols) float32
+        Luminance around the sign [linear grey levels].
+    place : (float, float)
+        Column and row of its middle there [px].
+    radius : float
+        Half of its diameter [px].
+    layout : Layout
+        Its face.
+    narrowed : float
+        Width over height of a face that is turned [-].
+
+    Returns
+    -------
+    FaceLight or None
+        None if too little of it is in the picture.
+    """
+    rows, cols = np.mgrid[: light.shape[0], : light.shape[1]].astype(np.float64)
+    right, down = (cols - place[0]).ravel(), (rows - place[1]).ravel()
+    reach = MARGIN * radius + 2.0
+    # Below the face stands its post.
+    near = (np.hypot(right, down) < reach) & ~((np.abs(right) < 0.25 * radius + 1.0) & (down > 0.9 * radius))
+    picked = np.flatnonzero(near)[:: max(1, round(near.sum() / MOST_PIXELS))]
+    if picked.size < 20:
+        return None
+    right, down, seen = right[picked], down[picked], light.ravel()[picked].astype(np.float64)
+    state, weight = LOOSE[0], np.full(picked.size, FIRST_NOISE**-2.0)
+    face = Face(layout, radius, narrowed)
+    for _ in range(ROUNDS):
+        fit = _placed(seen, right, down, face, state, weight, LOOSE)
+        weight, state = _weights(fit.residual, np.hypot(right, down) / radius, 0.0 * fit.steep), fit.state
+    weight = _weights(fit.residual, np.hypot(right, down) / radius, fit.steep)
+    fit = _placed(seen, right, down, face, state, weight, (state, PLACED))
+    columns = face.columns(right, down, state)
+    # An error of the layout is the same in many pixels: it does not average out as noise does.
+    unsure = LAYOUT * abs(float(fit.solved[1] - fit.solved[0]))
+    wider = 1.0 + unsure**2 * float((weight * columns[:, 0]).sum())
+    return _line(face, columns, fit.solved, wider * fit.covariance)
+
+
+def _weights(residual: Floats, reach: Floats, steep: Floats) -> Floats:
+    """Inverse variances of the pixels: what lies behind a sign is less even than its face, and edges are not sharp."""
+    inner, outer = (reach < 0.9) & (steep < np.median(steep)), reach > 1.1
+    noise = max(float(np.sqrt(np.mean(residual[inner] ** 2))) if inner.any() else 0.0, LEAST_NOISE)
+    behind = max(float(np.sqrt(np.mean(residual[outer] ** 2))) if outer.any() else noise, noise)
+    return np.asarray(1.0 / (np.where(reach > 1.0, behind, noise) ** 2 + (EDGES * steep) ** 2))
+
+
+class _Fit(NamedTuple):
+    """Shares of the columns and their covariance, residuals, better place, size and blur, and steepness [levels/px]."""
+
+    solved: Floats
+    covariance: Floats
+    residual: Floats
+    state: Floats
+    steep: Floats
+
+
+def _placed(
+    seen: Floats,
+    right: Floats,
+    down: Floats,
+    face: Face,
+    state: Floats,
+    weight: Floats,
+    known: tuple[Floats, Floats],
+) -> _Fit:
+    """Fit the face, and what would place it better; known are its place, size and blur and their deviations."""
+    columns = face.columns(right, down, state)
+    prior = face.prior(seen, columns)
+    first = _least_squares(columns, seen, weight, prior, np.zeros(len(prior)))[0]
+    now = times(columns, first)
+    changes = []
+    for i, by in enumerate((0.1, 0.1, 0.01, 0.05)):
+        moved = state.copy()
+        moved[i] += by
+        changes.append((times(face.columns(right, down, moved), first) - now) / by)
+    usual, deviation = known
+    target = np.concatenate([np.zeros(len(first)), usual - state])
+    whole = np.column_stack([columns, *changes])
+    solved, covariance = _least_squares(whole, seen, weight, np.concatenate([prior, deviation**-2.0]), target)
+    better = np.clip(state + solved[-4:], _LEAST, _MOST)
+    return _Fit(solved, covariance, seen - times(whole, solved), better, np.hypot(changes[0], changes[1]))
+
+
+def _line(face: Face, columns: Floats, solved: Floats, covariance: Floats) -> FaceLight:
+    """Luminance over reflectance; of what is even, or too small to tell its areas, only one point of that line."""
+    if not face.is_even and face.radius >= SEPARABLE:
+        return FaceLight(float(solved[0]), float(solved[4]), tuple(covariance[[0, 4, 0], [0, 4, 4]].tolist()))
+    # What its areas send together: the mean over all that the face covers.
+    shares = np.zeros(len(solved))
+    shares[0], areas = 1.0, columns[:, 4:].sum(axis=0) / columns[:, 0].sum()
+    shares[4 : columns.shape[1]] = areas
+    mean, variance = float((shares * solved).sum()), float((shares * times(covariance, shares)).sum())
+    reflectance = face.layout.areas[0][1] if face.is_even else float(areas[0])
+    return FaceLight(mean, 0.0, (variance + reflectance**2 * UNKNOWN, UNKNOWN, -reflectance * UNKNOWN))
+
+
+def _least_squares(
+    columns: Floats, seen: Floats, weight: Floats, prior: Floats, target: Floats
+) -> tuple[Floats, Floats]:
+    weighted = columns * weight[:, None]
+    normal = np.asarray(matrix_product(weighted.T, columns)) + np.diag(prior)
+    covariance = inverse_of(normal)
+    return times(covariance, times(weighted.T, seen) + prior * target), covariance

@@ -8,8 +8,10 @@ import pytest
 
 from fogsim.atmosphere.air import Air
 from fogsim.atmosphere.lamps import lamplight
+from fogsim.atmosphere.lamps.halos import Halos
 from fogsim.atmosphere.lamps.lamplight import OwnLamplight
 from fogsim.atmosphere.lamps.phase_function import Droplets
+from fogsim.atmosphere.lamps.road_glow import RoadGlow
 from fogsim.errors import InputError
 from fogsim.lighting.beams import low_beam
 from fogsim.lighting.head_lamps import own_head_lamps
@@ -113,7 +115,12 @@ def test_air_adds_lamplight_to_twilight():
     air, view = Air(field), road_view()
     lights = Lights(LOW, LightSources.none())
     by_day = air.radiance(view, CAMERA, POSE)
-    np.testing.assert_allclose(air.radiance(view, CAMERA, POSE, lights) - by_day, drawn(field), rtol=0.0, atol=2e-6)
+    lit = by_day + drawn(field)
+    road = lit.copy()
+    Halos().add(road, view, CAMERA, POSE, field, RoadGlow().sources(LOW, CAMERA, POSE, field))
+    np.testing.assert_allclose(air.radiance(view, CAMERA, POSE, lights), road, rtol=0.0, atol=2e-6)
+    # The road sends back a part of what the lamps themselves add.
+    assert 0.005 * drawn(field).sum() < (road - lit).sum() < 0.05 * drawn(field).sum()
 
 
 def test_preparing_changes_nothing():

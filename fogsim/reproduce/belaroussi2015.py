@@ -22,10 +22,10 @@ DIAMETER = 0.9
 STEP, IMAGES = 5.0, 504
 """Way between two images [m], and how many there are in each fog."""
 
-APART, FIRST = 100.0, 480.0
+APART, FIRST = 100.0, 600.0
 """Way between two signs, and to the first of them [m]; the paper tells neither."""
 
-REACH = 450.0
+REACH = 560.0
 """How far ahead the map is read [m]."""
 
 PUBLISHED = {100.0: 72.0, 150.0: 172.0, 200.0: 218.0, 250.0: 245.0, 300.0: 285.0, 400.0: None}

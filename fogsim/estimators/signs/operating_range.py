@@ -127,7 +127,10 @@ class OperatingRange:
             data = json.loads(path.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
             reason = error.strerror if isinstance(error, OSError) else error
-            raise InputError(f"{path}: no calibration of a sign detector can be read: {reason}") from error
+            raise InputError(
+                f"operating_range must be a file of `fogsim calibrate signs`, got {str(path)!r}: no calibration of a "
+                f"sign detector can be read: {reason}"
+            ) from error
         names = ("focal_length_px", "diameter_m", *_COLUMNS.values())
         if not isinstance(data, Mapping) or set(data) != set(names):
             given = sorted(data) if isinstance(data, Mapping) else shown(data)

@@ -89,7 +89,7 @@ def test_the_file_comes_back_and_mistakes_are_named(tmp_path: Path) -> None:
         file.write_text(json.dumps({**data, **change}), encoding="utf-8")
         with pytest.raises(InputError, match=rf"range\.json: .*{message}"):
             OperatingRange.read(file)
-    with pytest.raises(InputError, match=r"none\.json: no calibration"):
+    with pytest.raises(InputError, match=r"none\.json': no calibration"):
         Belaroussi2015(CAMERA, operating_range=str(tmp_path / "none.json"))
     with pytest.raises(InputError, match="focal length of 140 px, and the camera has 700 px"):
         Belaroussi2015(dataclasses.replace(CAMERA, focal_length=700.0), operating_range=RANGE)

@@ -150,8 +150,8 @@ def _solved(matrix: Floats, right: Floats) -> Floats:
     return right
 
 
-def extinction_of(fits: Sequence[ApproachFit], wrong_share: float) -> tuple[float, float, Floats]:
-    """Mean and standard deviation of k [1/m] after several signs, some of which may be wrong, and k's cumulative share.
+def extinction_of(fits: Sequence[ApproachFit], wrong_share: float) -> tuple[float, float]:
+    """Mean and standard deviation of k [1/m] after several signs, some of which may be wrong.
 
     Parameters
     ----------
@@ -171,4 +171,4 @@ def extinction_of(fits: Sequence[ApproachFit], wrong_share: float) -> tuple[floa
     probability /= probability.sum()
     mean = float((probability * GRID).sum())
     deviation = math.sqrt(float((probability * (GRID - mean) ** 2).sum()))
-    return mean, deviation, np.cumsum(probability)
+    return mean, deviation

@@ -1,7 +1,8 @@
 """Belaroussi & Gruyer (2015): the distance at which signs of the map are first detected tells the visibility."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -15,11 +16,14 @@ from fogsim.estimators.signs.watch import SignWatch, Watched, sign_looks
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera
-from fogsim.values.estimate import Estimate
+from fogsim.values.estimate import Estimate, ExtinctionBounds
 from fogsim.values.observation import Observation
 
 FORGOTTEN = 0.05
 """p(c) below which a sign does not count any more [-]."""
+
+SOFTNESS = 0.1
+"""Standard deviation of a bound, in ln k [-]."""
 
 LIKE = 0.1
 """Largest difference of the calibrated focal length from the camera's, relative to it [-]."""
@@ -173,7 +177,7 @@ class Belaroussi2015:
             why = self._watch.trouble or "no sign has come out of the fog yet"
             if "visibility_at_least" in found:
                 why = f"signs are seen from beyond the curve's range: at least {found['visibility_at_least']:.0f} m"
-            return Estimate.invalid(self.method, why, **found)
+            return replace(Estimate.invalid(self.method, why, **found), bounds=self._bounds(found))
         values, weights = [one.visibility for one, _ in weighted], [weight for _, weight in weighted]
         chosen = majority(values, weights)
         kept = [(v, w) for v, w, keep in zip(values, weights, chosen, strict=True) if keep]
@@ -184,6 +188,14 @@ class Belaroussi2015:
         k = extinction_from_visibility(mean)
         found |= {"signs": len(kept), "single_visibilities": tuple(values)}
         return Estimate(self.method, k, k * deviation / mean, diagnostics=found)
+
+    @staticmethod
+    def _bounds(found: Mapping[str, object]) -> ExtinctionBounds | None:
+        """What a sign that was seen from beyond the curve's end says: there is at least that visibility."""
+        least = found.get("visibility_at_least")
+        if not isinstance(least, float):
+            return None
+        return ExtinctionBounds(most=extinction_from_visibility(least), softness=SOFTNESS)
 
     def _weight(self, one: _Seen) -> float:
         faded = (self._way - one.way) / self._fading_way + (self._time - one.time) / self._fading_time

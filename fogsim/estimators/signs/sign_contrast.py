@@ -2,7 +2,7 @@
 
 import math
 from collections import deque
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 import numpy as np
@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.signs.approach_fit import (
-    GRID,
     MAX_MISFIT,
     ApproachFit,
     FaceLook,
@@ -24,7 +23,7 @@ from fogsim.estimators.signs.registration import Registration
 from fogsim.estimators.signs.watch import SignWatch, sign_looks
 from fogsim.parameters import Range, checked_parameters
 from fogsim.values.camera import Camera
-from fogsim.values.estimate import Estimate, ExtinctionBounds
+from fogsim.values.estimate import Estimate
 from fogsim.values.observation import Observation
 from fogsim.vision.light.luminance import linear_luminance
 from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation
@@ -49,10 +48,7 @@ SYSTEMATIC = 0.02
 """Relative deviation of k that all signs share [-]."""
 
 WORST = 0.4
-"""Largest deviation of k relative to itself for an estimate; beyond it bounds are told [-]."""
-
-BOUND_SHARE = 0.05
-"""Probability beyond a bound [-]."""
+"""Largest deviation of k relative to itself for an estimate [-]."""
 
 
 @dataclass(slots=True)
@@ -146,7 +142,7 @@ class SignContrast:
         -------
         Estimate
             Diagnostics: ``sign_looks``, the `SignLook` of each that was looked for, ``approaches``, how many count, and
-            ``looks``, how many at these; or ``reason``, and bounds where only those are known.
+            ``looks``, how many at these; or ``reason``.
 
         Raises
         ------
@@ -219,16 +215,7 @@ class SignContrast:
         if time - counted[-1].time > self._hold:
             return Estimate.invalid(self.method, "no sign is being looked at", **found)
         fits = [one.fit for one in counted if one.fit is not None]
-        k, deviation, cumulative = extinction_of(fits, self._wrong_share)
+        k, deviation = extinction_of(fits, self._wrong_share)
         if deviation > WORST * k:
-            invalid = Estimate.invalid(self.method, "the signs' light has not changed enough yet", **found)
-            return replace(invalid, bounds=_bounds(cumulative))
+            return Estimate.invalid(self.method, "the signs' light has not changed enough yet", **found)
         return Estimate(self.method, k, math.hypot(deviation, SYSTEMATIC * k), diagnostics=found)
-
-
-def _bounds(cumulative: NDArray[np.float64]) -> ExtinctionBounds | None:
-    """What is known of k where it cannot be told."""
-    least, most = (float(GRID[int(np.searchsorted(cumulative, share))]) for share in (BOUND_SHARE, 1.0 - BOUND_SHARE))
-    # The ends of the grid bound nothing.
-    most, least = (math.inf if most > 0.9 * GRID[-1] else most), (0.0 if least < 1.1 * GRID[0] else least)
-    return None if (most, least) == (math.inf, 0.0) else ExtinctionBounds(most, least)

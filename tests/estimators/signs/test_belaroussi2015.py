@@ -154,6 +154,8 @@ def test_signs_from_beyond_the_curve_are_a_bound_and_no_number() -> None:
     assert not estimate.valid
     assert estimate.diagnostics["visibility_at_least"] == pytest.approx(RANGE.farthest)
     assert "at least" in str(estimate.diagnostics["reason"])
+    assert estimate.bounds is not None
+    assert math.log(20.0) / estimate.bounds.most == pytest.approx(RANGE.farthest)
     published, told = estimator(as_published=True)
     told.tracks = (track("a", 199.0),)
     assert published.update(seen(0.0)).valid

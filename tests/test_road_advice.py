@@ -14,6 +14,7 @@ from fogsim.ego.road_meters import RoadMeters
 from fogsim.errors import InputError
 from fogsim.road_advice import RoadAdvice
 from fogsim.scenario import Scenario, build
+from fogsim.scenario.parts import methods
 from fogsim.scenario.road_sections import road_sections, section_limits
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Display, FogField, RoadSection, SpeedAdvice, Step, Stretch
@@ -171,6 +172,6 @@ def test_compliance_by_display_begins_with_that_of_all() -> None:
 @pytest.mark.parametrize("speed", [math.nan, -1.0])
 def test_an_adviser_that_returns_no_speed_is_named(speed: float, monkeypatch: pytest.MonkeyPatch) -> None:
     broken = SimpleNamespace(advise=lambda *_: SpeedAdvice(speed))
-    monkeypatch.setattr(build, "adviser", lambda _: broken)
+    monkeypatch.setattr(methods, "adviser", lambda _: broken)
     with pytest.raises(InputError, match=rf"adviser 'netherlands_a16': advise\(\).*speed.*{speed:g}"):
         RoadAdvice(scenario("drivers.advised=signs", A16)).advise(step([60.0]))

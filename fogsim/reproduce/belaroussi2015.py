@@ -128,8 +128,8 @@ def _track(setup: Setup, measured: OperatingRange, images: int) -> Iterator[list
     wanted = np.arange(FIRST, max(places[-1], FIRST + 1.0), APART).tolist()
     signs = tuple(sign_beside(f"s{i}", KINDS[i % len(KINDS)], x, DIAMETER, rng) for i, x in enumerate(wanted))
     drive = SignDrive(setup.camera, signs, places, PoseNoise(), 200.0, REACH)
-    ours = {v: Belaroussi2015(setup.camera, operating_range=measured) for v in PUBLISHED}
-    cubic = {v: Belaroussi2015(setup.camera, operating_range=measured, as_published=True) for v in PUBLISHED}
+    ours = {v: Belaroussi2015(setup.camera).calibrated(measured) for v in PUBLISHED}
+    cubic = {v: Belaroussi2015(setup.camera, as_published=True).calibrated(measured) for v in PUBLISHED}
     last: dict[float, dict[str, Cell]] = {v: {} for v in PUBLISHED}
     for image, seen in enumerate(observed(drive, tuple(PUBLISHED), rng)):
         for visibility, observation in seen.items():

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 
-from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, Frame, Observation, SignSighting
 
 CAMERA = Camera(480, 240, 1100.0, (60.0, 180.0), 1.4)
@@ -21,7 +20,7 @@ def picture(distance: float, visibility: float, *, standing: bool = True, seed: 
     """Grey picture: fog, a road darker than it, and the sign: white rim, red ring, white field."""
     ahead = distance + SETBACK
     scale = CAMERA.focal_length / ahead
-    k, rows = extinction_from_visibility(visibility), np.arange(CAMERA.height)[:, None]
+    k, rows = math.log(20.0) / (visibility), np.arange(CAMERA.height)[:, None]
     below = np.maximum(rows - CAMERA.horizon_row, 1e-3)
     road = AIRLIGHT * (1.0 - 0.6 * np.exp(-k * CAMERA.row_distance / below))
     mean = np.repeat(np.where(rows > CAMERA.horizon_row, road, AIRLIGHT), CAMERA.width, axis=1)

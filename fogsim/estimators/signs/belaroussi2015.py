@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Self
 
 from fogsim.errors import InputError
 from fogsim.estimators.image_check import ObservationCheck
@@ -21,6 +21,9 @@ from fogsim.values.observation import Observation
 
 FORGOTTEN = 0.05
 """p(c) below which a sign does not count any more [-]."""
+
+SYSTEMATIC = 0.08
+"""Deviation of a drive's visibility that all of its signs share, relative to it: how the picture is exposed [-]."""
 
 SOFTNESS = 0.1
 """Standard deviation of a bound, in ln k [-]."""
@@ -57,7 +60,7 @@ class Belaroussi2015:
     ----------
     camera : Camera
         The assumed calibration.
-    operating_range : str, OperatingRange or None
+    operating_range : str or None
         File of the calibration, of this camera; without it nothing can be told.
     as_published : bool
         Whether the curve is the paper's cubic through the distances of 80 % detection, in place of the monotone one
@@ -83,7 +86,7 @@ class Belaroussi2015:
         self,
         camera: Camera,
         *,
-        operating_range: str | OperatingRange | None = None,
+        operating_range: str | None = None,
         as_published: bool = False,
         setback: Annotated[float, Range(0.0, 10.0, "m")] = 1.7,
         position_deviation: Annotated[float, Range(0.0, 100.0, "m")] = 0.5,
@@ -93,13 +96,30 @@ class Belaroussi2015:
         fading_time: Annotated[float, Range(1.0, 1e9, "s")] = 45.0,
     ) -> None:
         self._check = ObservationCheck(camera)
-        self._range = _checked_range(operating_range, camera)
+        self._camera = camera
+        self._range = None if operating_range is None else _read_range(operating_range, camera)
         self._as_published = as_published
         deviation = PoseDeviation(position_deviation, heading=heading_deviation, pitch=pitch_deviation)
         self._watch = SignWatch(camera, setback, deviation)
         self._fading_way, self._fading_time = fading_way, fading_time
         self._horizon = camera.horizon_row
         self.reset()
+
+    def calibrated(self, measured: OperatingRange) -> Self:
+        """Take a calibration that was not read from a file.
+
+        Parameters
+        ----------
+        measured : OperatingRange
+            Of this camera.
+
+        Raises
+        ------
+        InputError
+            If it is of a camera of another focal length.
+        """
+        self._range = _checked_range(measured, self._camera)
+        return self
 
     def reset(self) -> None:
         """Forget all signs."""
@@ -183,8 +203,8 @@ class Belaroussi2015:
         kept = [(v, w) for v, w, keep in zip(values, weights, chosen, strict=True) if keep]
         mean, deviation = reduced([v for v, _ in kept], [w for _, w in kept])
         single = [one.deviation for (one, _), keep in zip(weighted, chosen, strict=True) if keep]
-        # Signs that agree by chance are no better than their number allows.
-        deviation = max(deviation, math.hypot(*single) / len(single))
+        # Signs of one drive share exposure and told pitch, so what the calibration scatters by does not average out.
+        deviation = max(deviation, math.hypot(sum(single) / len(single), SYSTEMATIC * mean))
         k = extinction_from_visibility(mean)
         found |= {"signs": len(kept), "single_visibilities": tuple(values)}
         return Estimate(self.method, k, k * deviation / mean, diagnostics=found)
@@ -202,16 +222,17 @@ class Belaroussi2015:
         return one.confidence * math.exp(-faded)
 
 
-def _checked_range(given: object, camera: Camera) -> OperatingRange | None:
-    if given is None:
-        return None
-    if not isinstance(given, str | OperatingRange):
-        raise InputError(f"operating_range must be a file of `fogsim calibrate signs`, got {given!r}")
-    measured = OperatingRange.read(Path(given)) if isinstance(given, str) else given
+def _read_range(path: str, camera: Camera) -> OperatingRange:
+    try:
+        return _checked_range(OperatingRange.read(Path(path)), camera)
+    except InputError as error:
+        raise InputError(f"operating_range: {error}") from error
+
+
+def _checked_range(measured: OperatingRange, camera: Camera) -> OperatingRange:
     if abs(measured.focal_length / camera.focal_length - 1.0) > LIKE:
-        name = f"{given}: " if isinstance(given, str) else ""
         raise InputError(
-            f"{name}operating_range was calibrated for a focal length of {measured.focal_length:g} px, and the camera "
+            f"the operating range was calibrated for a focal length of {measured.focal_length:g} px, and the camera "
             f"has {camera.focal_length:g} px: calibrate it for this camera"
         )
     return measured

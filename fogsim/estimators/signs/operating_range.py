@@ -12,6 +12,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import isotonic_regression
 
 from fogsim.errors import InputError, shown
+from fogsim.linear_algebra import inverse_of, matrix_product, times
 
 FLAT = 0.35
 """Deviation of one sign's visibility, relative to it, from which on the curve is flat: distances tell no more [-]."""
@@ -68,9 +69,12 @@ class OperatingRange:
     @property
     def cubic(self) -> tuple[float, ...]:
         """Coefficients a, b, c, d of d_vis = a d³ + b d² + c d + d₀ through the operating ranges (eq. 1), from a on."""
-        degree = min(3, len(set(self.operating_range)) - 1)
-        fitted = np.polyfit(self.operating_range, self.visibility, max(degree, 0))
-        return (*np.zeros(3 - max(degree, 0)).tolist(), *fitted.tolist())
+        # In units of the largest distance, so that powers are of one size.
+        scale = max(self.operating_range)
+        powers = (np.array(self.operating_range) / scale)[:, None] ** np.arange(3, -1, -1)
+        normal = inverse_of(matrix_product(powers.T, powers))
+        found = times(normal, times(np.ascontiguousarray(powers.T), np.array(self.visibility)))
+        return tuple((found / scale ** np.arange(3, -1, -1)).tolist())
 
     def visibility_by_cubic(self, distance: float) -> float:
         """Visibility of a distance of first detection by the published cubic [m]; it need not be monotone.

@@ -69,11 +69,15 @@ class OperatingRange:
     @property
     def cubic(self) -> tuple[float, ...]:
         """Coefficients a, b, c, d of d_vis = a d³ + b d² + c d + d₀ through the operating ranges (eq. 1), from a on."""
+        # Where no class of distances has 80 % there is no operating range to fit.
+        known = np.array(self.operating_range) > 0.0
+        if not known.any():
+            return (0.0, 0.0, 0.0, math.nan)
         # In units of the largest distance, so that powers are of one size.
         scale = max(self.operating_range)
-        powers = (np.array(self.operating_range) / scale)[:, None] ** np.arange(3, -1, -1)
+        powers = (np.array(self.operating_range)[known] / scale)[:, None] ** np.arange(3, -1, -1)
         normal = inverse_of(matrix_product(powers.T, powers))
-        found = times(normal, times(np.ascontiguousarray(powers.T), np.array(self.visibility)))
+        found = times(normal, times(np.ascontiguousarray(powers.T), np.array(self.visibility)[known]))
         return tuple((found / scale ** np.arange(3, -1, -1)).tolist())
 
     def visibility_by_cubic(self, distance: float) -> float:

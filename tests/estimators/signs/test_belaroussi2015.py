@@ -72,6 +72,11 @@ def test_the_published_cubic_goes_through_the_operating_ranges() -> None:
     measured = OperatingRange(140.0, 0.9, visibility, ranges, ranges, (1.0,) * 5)
     assert measured.cubic == pytest.approx(truth.tolist(), rel=1e-3)
     assert measured.visibility_by_cubic(100.0) == pytest.approx(np.polyval(truth, 100.0))
+    # A fog in which no distance has 80 % is not fitted.
+    more = {name: (*getattr(measured, name), 0.0) for name in ("operating_range", "first_detection", "deviation")}
+    with_none = dataclasses.replace(measured, visibility=(*visibility, 2.0 * visibility[-1]), **more)
+    assert with_none.cubic == pytest.approx(measured.cubic, rel=1e-6)
+    assert math.isnan(dataclasses.replace(measured, operating_range=(0.0,) * 5).visibility_by_cubic(50.0))
 
 
 def test_the_file_comes_back_and_mistakes_are_named(tmp_path: Path) -> None:

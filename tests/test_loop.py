@@ -18,7 +18,7 @@ from fogsim.errors import SimulationError
 from fogsim.loop import ClosedLoop, DriversFog, spread_advice
 from fogsim.scenario import Scenario
 from fogsim.traffic.sumo_traffic import SumoTraffic
-from fogsim.values import Command, Display, Ending, FogChange, FogField, SpeedAdvice, Step, Stretch, StretchAdvice
+from fogsim.values import Command, Display, Ending, FogChange, FogField, Lamp, SpeedAdvice, Step, Stretch, StretchAdvice
 
 SMALL = (EARLY, "camera.width=160", "camera.height=120", "duration_s=4")
 
@@ -127,6 +127,12 @@ def test_estimators_never_see_the_truth(monkeypatch: pytest.MonkeyPatch) -> None
         assert [e.extinction for e in a.estimates] == [e.extinction for e in b.estimates]
         assert np.array_equal(a.belief.probability, b.belief.probability)
         assert a.command == b.command
+
+
+def test_a_vehicle_knows_which_of_its_lamps_are_switched_on() -> None:
+    first, *_, last = fogsim.run(small("fog.visibility_m=60", "duration_s=2"), seed=1)
+    assert first.observation.lamps == Lamp.POSITION | Lamp.LOW_BEAM
+    assert last.observation.lamps == first.observation.lamps | Lamp.FRONT_FOG == last.command.lamps
 
 
 def test_estimators_are_told_a_calibration_that_may_be_wrong() -> None:

@@ -46,6 +46,7 @@ from fogsim.values import (
     Truth,
 )
 from fogsim.values.fault import FaultKind, Where
+from fogsim.values.light import ALL_LAMPS
 from fogsim.values.result_checks import checked_belief, checked_estimate
 from fogsim.values.script import Actions
 
@@ -273,6 +274,7 @@ class EgoEquipment:
             lead=self._sensors.lead(snapshot, faults, streams),
             signs=self._sensors.signs(snapshot, network[1], faults, streams),
             camera_setback=self._setback,
+            lamps=ALL_LAMPS & int(state.lamps[ego]),
         )
         estimates = self._estimate(frame, observation, time)
         return Step(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fogsim.errors import InputError
 from fogsim.values.camera import Camera
 from fogsim.values.image import Frame
+from fogsim.values.light import Lamp
 
 SIGN_MAP_REACH, SIGN_MAP_SIZE = 255.0, 2.0
 """Distance at which a sign's distance is 1 in the picture of the map, and size at which its size is 255 [m]."""
@@ -84,6 +85,8 @@ class Observation:
         Signs ahead by the map, nearest first.
     camera_setback : float
         Distance of the camera behind the front bumper, from which distances count [m].
+    lamps : Lamp or None
+        Own lamps that are switched on, whether each of them burns or not; None where the vehicle does not tell.
     """
 
     frame: Frame | NDArray[np.uint8] | NDArray[np.uint16]
@@ -91,6 +94,7 @@ class Observation:
     lead: LeadMeasurement | None = None
     signs: tuple[SignSighting, ...] = ()
     camera_setback: float = 0.0
+    lamps: Lamp | None = None
 
     @property
     def image(self) -> NDArray[np.uint8] | NDArray[np.uint16]:

@@ -6,7 +6,7 @@ from fogsim.files.atomic import write_json
 from fogsim.recorders.events import EventRecorder
 from fogsim.recorders.exchange.openscenario import OpenScenarioRecorder
 from fogsim.recorders.exchange.osi import OsiRecorder
-from fogsim.recorders.frame_panel import FramePanel
+from fogsim.recorders.frame_panel import PICTURE_SIZE, FramePanel
 from fogsim.recorders.manifest import Manifest, Status, versions
 from fogsim.recorders.protocol import (
     DERIVED_QUANTITIES,
@@ -69,6 +69,7 @@ USUAL_TRAFFIC_RECORDERS = ("table", "report")
 
 __all__ = [
     "DERIVED_QUANTITIES",
+    "PICTURE_SIZE",
     "RECORDERS",
     "TRAFFIC_RECORDERS",
     "USUAL_RECORDERS",

@@ -1,7 +1,7 @@
 """One frame of the video: the camera's image, and beside it what is true, believed, advised and lit."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,9 @@ PANEL_WIDTH = 384
 FRAME_WIDTH = camera_picture.WIDTH + PANEL_WIDTH
 FRAME_HEIGHT = camera_picture.HEIGHT
 
+PICTURE_SIZE = camera_picture.WIDTH, camera_picture.HEIGHT
+"""Width and height of the picture beside the panel [px]."""
+
 _LEFT, _RIGHT = camera_picture.WIDTH + 16, FRAME_WIDTH - 16
 _SPEED_X, _ADVICE_X, _LIMIT_X = _LEFT, _LEFT + 148, _RIGHT - 27
 _BANNER_TIME = 3.0
@@ -61,9 +64,16 @@ _SPEED_AXIS = Axis(0.0, 160.0, (50.0, 100.0))
 
 
 class FramePanel:
-    """Draws frames one after another; it remembers the last minute for its charts, and the last collision."""
+    """Draws frames one after another; it remembers the last minute for its charts, and the last collision.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    draw_picture : callable
+        Draws what stands beside the panel, of `PICTURE_SIZE`; the camera's image if not given.
+    """
+
+    def __init__(self, draw_picture: Callable[[Step], Image.Image] = draw_camera_picture) -> None:
+        self._draw_picture = draw_picture
         width = _RIGHT - _LEFT
         self._visibility = StripChart(
             (width, 92),
@@ -93,7 +103,7 @@ class FramePanel:
             The frame, red first.
         """
         frame = self._background.copy()
-        picture = draw_camera_picture(step)
+        picture = self._draw_picture(step)
         self._draw_banners(ImageDraw.Draw(picture), step)
         frame.paste(picture, (0, 0))
         draw = ImageDraw.Draw(frame)

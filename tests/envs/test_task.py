@@ -31,7 +31,7 @@ WEIGHTS = TaskWeights()
 
 @pytest.fixture(scope="module")
 def fast() -> Iterator[gymnasium.Env[Any, Any]]:
-    made = gymnasium.make(FAST)
+    made = gymnasium.make(FAST, render_mode="rgb_array")
     yield made
     made.close()
 
@@ -291,6 +291,14 @@ def test_the_measured_table_is_read_and_written(tmp_path: Any) -> None:
     path.write_text(table.as_json(), encoding="utf-8")
     np.testing.assert_array_equal(SurrogateTable.load(path).error, table.error)
     assert np.all(np.diff(table.error, axis=2) >= 0.0)
+
+
+def test_without_frames_the_road_is_drawn_from_above(fast: gymnasium.Env[Any, Any], step: Step) -> None:
+    del step  # which the environment shows
+    picture = fast.render()
+    assert isinstance(picture, np.ndarray)
+    assert picture.shape == (480, 1024, 3)
+    assert picture.std() > 5.0
 
 
 def test_baselines_are_evaluated() -> None:

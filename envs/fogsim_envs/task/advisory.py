@@ -119,7 +119,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         self._source = EpisodeSource(scenario, scenario_distribution, fog_distribution, (*size, *overrides), split)
         self._mode, self._continuous = observation, continuous
         self._weights = reward_weights or TaskWeights()
-        self._renderer = StepRenderer(render_mode, type(self).__name__)
+        self._renderer = self._make_renderer(render_mode)
         self.render_mode = render_mode
         self._simulation: Simulation | None = None
         self._running: Scenario | None = None
@@ -168,6 +168,9 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         self._renderer.begin_episode()
         self._show()
         return self._observe(), {**self._info(), "episode": self._episode.as_info()}
+
+    def _make_renderer(self, render_mode: str | None) -> StepRenderer:
+        return StepRenderer(render_mode, type(self).__name__)
 
     def _check(self, scenario: Scenario) -> None:
         """Refuse a scenario that this environment cannot run."""

@@ -10,10 +10,12 @@ import numpy as np
 from fogsim.scenario import Scenario, build
 from fogsim.values import Step
 from fogsim_envs.hosting import TIMEOUT
+from fogsim_envs.rendering import RENDER_MODES, StepRenderer
 from fogsim_envs.task.advisory import FogAdvisoryV1Env
 from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
 from fogsim_envs.task.rewards import TaskWeights
 from fogsim_envs.task.surrogate import EstimatorSurrogate, SurrogateTable
+from fogsim_envs.view_from_above import draw_view_from_above
 
 _WITHOUT_FRAMES = ("renderer=none", "estimators=[]", "camera.width=16", "camera.height=16")
 _DEFAULT = ("road.length_m=2000", "demand.oncoming_vph=0", "clocks.traffic_step_s=0.5", "duration_s=260")
@@ -37,6 +39,8 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
     ### Arguments
     scenario, scenario_distribution, fog_distribution, split, overrides, continuous, reward_weights, timeout : as of
     `FogAdvisoryV1Env`
+    render_mode : None, "rgb_array" (road, traffic and fog from above beside a panel with belief, truth, advice, speed
+    and lamps), or "human", which shows it in a window
     surrogate : file with a table of your own, made by ``benchmarks/surrogate.py --fit``; None for the one that was
     measured
 
@@ -44,7 +48,7 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
     * v1: first version
     """
 
-    metadata: dict[str, Any] = {"render_modes": [], "render_fps": 2}  # noqa: RUF012 - Gymnasium's own way
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 2}  # noqa: RUF012 - Gymnasium's own way
 
     def __init__(
         self,
@@ -56,6 +60,7 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
         overrides: Sequence[str] = (),
         continuous: bool = False,
         reward_weights: TaskWeights | None = None,
+        render_mode: str | None = None,
         surrogate: Path | None = None,
         timeout: float = TIMEOUT,
     ) -> None:
@@ -72,8 +77,12 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
             image_size=None,
             continuous=continuous,
             reward_weights=reward_weights,
+            render_mode=render_mode,
             timeout=timeout,
         )
+
+    def _make_renderer(self, render_mode: str | None) -> StepRenderer:
+        return StepRenderer(render_mode, type(self).__name__, draw_view_from_above)
 
     def _check(self, scenario: Scenario) -> None:
         """Any scenario will do: nothing is drawn."""

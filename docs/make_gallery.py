@@ -13,7 +13,7 @@ from pathlib import Path
 from PIL import Image
 
 import fogsim
-from fogsim.recorders.camera_picture import scale_image, shown_image
+from fogsim.recorders.panel.camera_picture import scale_image, shown_image
 
 HERE = Path(__file__).parent
 PICTURES = HERE / "pictures" / "gallery"

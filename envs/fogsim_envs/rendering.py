@@ -12,12 +12,10 @@ from typing import Any
 import gymnasium
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.metrics import SafetyStandard, step_metrics
 from fogsim.recorders import FramePanel
-from fogsim.recorders.camera_picture import draw_camera_picture
 from fogsim.values import Step
 
 RENDER_MODES = ("human", "rgb_array")
@@ -47,8 +45,8 @@ class StepRenderer:
         One of `RENDER_MODES`, or None to draw nothing.
     title : str
         Of the window.
-    draw_picture : callable
-        Draws what stands beside the panel; the camera's image if not given.
+    make_panel : callable
+        Makes the panel of an episode; with the camera's image beside it if not given.
 
     Raises
     ------
@@ -58,9 +56,7 @@ class StepRenderer:
         If a window is asked for, and there is no display.
     """
 
-    def __init__(
-        self, mode: str | None, title: str, draw_picture: Callable[[Step], Image.Image] = draw_camera_picture
-    ) -> None:
+    def __init__(self, mode: str | None, title: str, make_panel: Callable[[], FramePanel] = FramePanel) -> None:
         if mode is not None and mode not in RENDER_MODES:
             raise UnknownNameError("render_mode", mode, RENDER_MODES)
         if mode == "human" and not has_display():
@@ -70,12 +66,12 @@ class StepRenderer:
             )
         self._mode = mode
         self._window = _Window(title)
-        self._draw_picture = draw_picture
+        self._make_panel = make_panel
         self.begin_episode()
 
     def begin_episode(self) -> None:
         """Forget the steps of before."""
-        self._panel = FramePanel(self._draw_picture)
+        self._panel = self._make_panel()
         self._drawn: tuple[Step, NDArray[np.uint8]] | None = None
 
     def show(self, step: Step, standard: SafetyStandard, rate: float) -> None:

@@ -16,7 +16,7 @@ from fogsim.offline.estimation import FrameEstimates
 from fogsim.offline.image_files import Pixels
 from fogsim.offline.results import interval_text, metres
 from fogsim.offline.source import Source
-from fogsim.recorders.camera_picture import found_row, scale_image
+from fogsim.recorders.panel.camera_picture import found_row, scale_image
 from fogsim.recorders.sign_marks import draw_signs
 from fogsim.recorders.style import GROUND, MUTED, TEXT, Colour, font, method_colours
 from fogsim.recorders.video import Encoder, encoder_command

@@ -6,8 +6,9 @@ from fogsim.files.atomic import write_json
 from fogsim.recorders.events import EventRecorder
 from fogsim.recorders.exchange.openscenario import OpenScenarioRecorder
 from fogsim.recorders.exchange.osi import OsiRecorder
-from fogsim.recorders.frame_panel import PICTURE_SIZE, FramePanel
 from fogsim.recorders.manifest import Manifest, Status, versions
+from fogsim.recorders.panel.frame_panel import PICTURE_SIZE, FramePanel
+from fogsim.recorders.panel.view_from_above import draw_view_from_above
 from fogsim.recorders.protocol import (
     DERIVED_QUANTITIES,
     AnyStep_contra,
@@ -93,6 +94,7 @@ __all__ = [
     "TrafficReportRecorder",
     "TrajectoryRecorder",
     "VideoRecorder",
+    "draw_view_from_above",
     "encoder_report",
     "recover_run",
     "versions",

@@ -9,8 +9,8 @@ from html import escape
 from typing import Generic
 
 from fogsim.files.atomic import write_text
-from fogsim.recorders.camera_picture import scale_image
 from fogsim.recorders.manifest import versions
+from fogsim.recorders.panel.camera_picture import scale_image
 from fogsim.recorders.protocol import AnyStep_contra, Derived, RunInformation
 from fogsim.recorders.report_data import Album, Curves, ReportPicture, SignBook, SignRow
 from fogsim.recorders.report_figures import draw_figures

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.recorders.camera_picture import shown_image
+from fogsim.recorders.panel.camera_picture import shown_image
 from fogsim.recorders.protocol import Derived
 from fogsim.recorders.sign_marks import sign_looks
 from fogsim.units import finite_or_none

@@ -9,7 +9,7 @@ import imageio_ffmpeg
 
 from fogsim.errors import FogSimError, MissingDependencyError
 from fogsim.files.atomic import partial_path, publish
-from fogsim.recorders.frame_panel import FRAME_HEIGHT, FRAME_WIDTH, FramePanel
+from fogsim.recorders.panel.frame_panel import FRAME_HEIGHT, FRAME_WIDTH, FramePanel
 from fogsim.recorders.protocol import Derived
 from fogsim.values import Step
 

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from fogsim.metrics import step_metrics
 from fogsim.recorders import FramePanel
-from fogsim.recorders.camera_picture import draw_camera_picture, scale_image
-from fogsim.recorders.strip_chart import Axis, Curve, StripChart
+from fogsim.recorders.panel.camera_picture import draw_camera_picture, scale_image
+from fogsim.recorders.panel.strip_chart import Axis, Curve, StripChart
 from fogsim.recorders.style import ALARM, AMBER, BELIEF, TRUTH
 from fogsim.values import Collision, Ending, Frame, Lamp, Leader, Step
 from tests.recorders.synthetic import drive, estimate, make_step

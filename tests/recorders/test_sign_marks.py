@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.recorders.camera_picture import draw_camera_picture
+from fogsim.recorders.panel.camera_picture import draw_camera_picture
 from fogsim.recorders.report_data import SignBook
 from fogsim.recorders.sign_marks import looks_of, sign_looks, sign_text
 from fogsim.recorders.style import ADVICE, MUTED, Colour

@@ -2,11 +2,15 @@
 
 import dataclasses
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from fogsim.atmosphere import extinction
+from fogsim.recorders import FramePanel, draw_view_from_above
 from fogsim.scenario import Scenario, build
 from fogsim.values import Step
 from fogsim_envs.hosting import TIMEOUT
@@ -15,7 +19,6 @@ from fogsim_envs.task.advisory import FogAdvisoryV1Env
 from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
 from fogsim_envs.task.rewards import TaskWeights
 from fogsim_envs.task.surrogate import EstimatorSurrogate, SurrogateTable
-from fogsim_envs.view_from_above import draw_view_from_above
 
 _WITHOUT_FRAMES = ("renderer=none", "estimators=[]", "camera.width=16", "camera.height=16")
 _DEFAULT = ("road.length_m=2000", "demand.oncoming_vph=0", "clocks.traffic_step_s=0.5", "duration_s=260")
@@ -82,7 +85,7 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
         )
 
     def _make_renderer(self, render_mode: str | None) -> StepRenderer:
-        return StepRenderer(render_mode, type(self).__name__, draw_view_from_above)
+        return StepRenderer(render_mode, type(self).__name__, _panel_beside_view_from_above)
 
     def _check(self, scenario: Scenario) -> None:
         """Any scenario will do: nothing is drawn."""
@@ -96,3 +99,12 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
         estimates = (self._surrogate.estimate(step.truth.extinction_ahead, self._illuminance),)
         belief = self._fusion.update(estimates, step.time)
         return dataclasses.replace(step, estimates=estimates, belief=belief)
+
+
+def _panel_beside_view_from_above() -> FramePanel:
+    return FramePanel(lambda step: draw_view_from_above(step, partial(_extinction_now, step)))
+
+
+def _extinction_now(step: Step, places: NDArray[np.float64]) -> NDArray[np.float64]:
+    fog = step.truth.fog
+    return np.zeros(places.shape[:-1]) if fog is None else extinction(fog, places, step.time)

@@ -1,13 +1,13 @@
 """A picture of a run without a camera: road, vehicles and fog about the ego, as seen from above."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from fogsim.atmosphere import extinction
-from fogsim.recorders import PICTURE_SIZE
+from fogsim.recorders.panel.frame_panel import PICTURE_SIZE
 from fogsim.recorders.style import ADVICE, AMBER, LINE, TEXT, TRUTH, font
 from fogsim.values import Lamp, Step
 
@@ -20,6 +20,9 @@ _BEHIND = 80.0
 _CELL = 10
 """Side of the squares of even fog [px]."""
 
+Extinctions = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+"""Gives the extinction coefficient at (n, m, 3) places [1/m]."""
+
 _CLEAR, _DENSE = 1e-3, 0.15
 """Extinction coefficients of the darkest and the brightest fog [1/m]: V_met of 3 km and of 20 m."""
 
@@ -29,13 +32,15 @@ _LONGER, _WIDER = 1.5, 3.0
 """Vehicles are drawn longer and wider than they are, so that they can be told apart."""
 
 
-def draw_view_from_above(step: Step) -> Image.Image:
+def draw_view_from_above(step: Step, extinction: Extinctions) -> Image.Image:
     """Draw a step, the ego heading to the right: the denser the fog, the brighter; an arc where the sight ends.
 
     Parameters
     ----------
     step : Step
         The step.
+    extinction : callable
+        The fog now.
 
     Returns
     -------
@@ -43,7 +48,7 @@ def draw_view_from_above(step: Step) -> Image.Image:
         Picture of the size of the panel's camera picture.
     """
     axes = _axes(step)
-    picture = _fog(step, axes)
+    picture = _fog(step, axes, extinction)
     draw = ImageDraw.Draw(picture)
     if step.truth.route is not None:
         draw.line([tuple(point) for point in _pixels(step.truth.route, step, axes)], fill=LINE, width=round(8 * SCALE))
@@ -67,7 +72,7 @@ def _pixels(points: NDArray[np.float64], step: Step, axes: NDArray[np.float64]) 
     return SCALE * ahead_and_right + (_BEHIND * SCALE, PICTURE_SIZE[1] / 2)
 
 
-def _fog(step: Step, axes: NDArray[np.float64]) -> Image.Image:
+def _fog(step: Step, axes: NDArray[np.float64], extinction: Extinctions) -> Image.Image:
     """The extinction coefficient as a grey map, in equal steps of its logarithm."""
     width, height = PICTURE_SIZE
     columns, rows = np.meshgrid(np.arange(_CELL / 2, width, _CELL), np.arange(_CELL / 2, height, _CELL))
@@ -75,8 +80,7 @@ def _fog(step: Step, axes: NDArray[np.float64]) -> Image.Image:
     places = np.zeros((*ahead.shape, 3))
     places[..., :2] = ahead[..., None] * axes[0] + right[..., None] * axes[1] + step.traffic.position[step.ego, :2]
     places[..., 2] = step.traffic.position[step.ego, 2] + 1.2
-    found = np.zeros(ahead.shape) if step.truth.fog is None else extinction(step.truth.fog, places, step.time)
-    share = np.log(np.clip(found, _CLEAR, _DENSE) / _CLEAR) / math.log(_DENSE / _CLEAR)
+    share = np.log(np.clip(extinction(places), _CLEAR, _DENSE) / _CLEAR) / math.log(_DENSE / _CLEAR)
     grey = np.round(_DARKEST + (_BRIGHTEST - _DARKEST) * share).astype(np.uint8)
     return Image.fromarray(grey).resize(PICTURE_SIZE, Image.Resampling.BILINEAR).convert("RGB")
 

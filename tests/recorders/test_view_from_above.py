@@ -1,22 +1,26 @@
-"""The picture of the environment without frames."""
+"""A step from above."""
 
 import dataclasses
 
 import numpy as np
 
-from fogsim.recorders import PICTURE_SIZE
+from fogsim.recorders import PICTURE_SIZE, draw_view_from_above
+from fogsim.recorders.panel.view_from_above import SCALE, Extinctions
 from fogsim.recorders.style import ADVICE, TEXT, TRUTH
 from fogsim.units import extinction_from_visibility
-from fogsim.values import FogBank, FogField, Step
-from fogsim_envs.view_from_above import SCALE, draw_view_from_above
+from fogsim.values import Step
 from tests.recorders.synthetic import make_step
 
 EGO = 128, 240
 """Column and row of the ego's front bumper."""
 
 
-def pixels(step: Step) -> np.ndarray:
-    picture = draw_view_from_above(step)
+def clear(places: np.ndarray) -> np.ndarray:
+    return np.zeros(places.shape[:2])
+
+
+def pixels(step: Step, fog: Extinctions = clear) -> np.ndarray:
+    picture = draw_view_from_above(step, fog)
     assert picture.size == PICTURE_SIZE
     return np.asarray(picture)
 
@@ -40,13 +44,11 @@ def test_vehicles_are_where_they_are_whatever_the_heading() -> None:
 
 def test_denser_fog_is_brighter_and_an_arc_ends_the_sight() -> None:
     step = make_step()
-    bank = FogBank((0.0, 0.0), (1.0, 0.0), 100.0, 900.0, 10.0, extra_extinction=extinction_from_visibility(50.0))
-    fog = FogField(extinction_from_visibility(1000.0), (1.0,) * 3, banks=(bank,))
-    truth = dataclasses.replace(step.truth, fog=fog, extinction_ahead=extinction_from_visibility(100.0))
-    picture = pixels(dataclasses.replace(step, truth=truth))
+    truth = dataclasses.replace(step.truth, extinction_ahead=extinction_from_visibility(100.0))
+    picture = pixels(dataclasses.replace(step, truth=truth), lambda places: 0.05 * (places[..., 0] > 100.0) + 0.003)
     before, within = picture[100, EGO[0] + 30, 0], picture[100, EGO[0] + round(200 * SCALE), 0]
     assert within > 1.5 * before
     edge = EGO[0] + round(100 * SCALE)
     assert has(picture, TRUTH, slice(edge - 3, edge + 3), slice(EGO[1] - 30, EGO[1] + 30))
-    clear = dataclasses.replace(step, truth=dataclasses.replace(step.truth, extinction_ahead=0.0))
-    assert not has(pixels(clear), TRUTH, slice(0, 640), slice(0, 480))
+    endless = dataclasses.replace(step, truth=dataclasses.replace(step.truth, extinction_ahead=0.0))
+    assert not has(pixels(endless), TRUTH, slice(0, 640), slice(0, 480))

@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from fogsim.recorders import camera_picture
-from fogsim.recorders.camera_picture import draw_camera_picture
+from fogsim.recorders.panel import camera_picture
+from fogsim.recorders.panel.camera_picture import draw_camera_picture
+from fogsim.recorders.panel.strip_chart import Axis, Curve, StripChart
 from fogsim.recorders.protocol import Derived
-from fogsim.recorders.strip_chart import Axis, Curve, StripChart
 from fogsim.recorders.style import (
     ADVICE,
     ALARM,

@@ -393,10 +393,11 @@ class ClosedLoop:
         snapshot, index = self._traffic.observe(), self._step.index + 1
         if snapshot is None:
             time = self._periods.time(index)
-            step = dataclasses.replace(self._step, index=index, time=time, ending=Ending.LEFT_NETWORK)
+            step = dataclasses.replace(self._step, index=index, time=time, ending=Ending.LEFT_NETWORK, begun=())
         else:
             step = self._complete_step(index, snapshot, command)
-        self._step = self._with_unplayed(self._with_ending(dataclasses.replace(step, begun=begun)))
+        step = dataclasses.replace(step, begun=begun) if begun else step
+        self._step = self._with_unplayed(self._with_ending(step))
         return self._step
 
     def _begin_what_is_due(self, step: Step) -> tuple[Begun, ...]:

@@ -1,7 +1,7 @@
 """Where the camera is, its samples, glare, exposure, noise, response and quantisation."""
 
 from fogsim.camera.delivery import Delivered, FrameDelivery
-from fogsim.camera.exposure import AutoExposure, Metering, Pixels, Sensor, expose
+from fogsim.camera.exposure import AutoExposure, Metering, Pixels, Sensor, expose, unexposed
 from fogsim.camera.faulty_lens import FaultyLens
 from fogsim.camera.glare import LensGlare
 from fogsim.camera.mount import USUAL_MOUNTS, BodyPitch, CameraMount, Suspension, knocked, mounted_pose
@@ -32,4 +32,5 @@ __all__ = [
     "middle_samples",
     "mounted_pose",
     "supersampled",
+    "unexposed",
 ]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fogsim.camera.exposure_kernels import Exposure, develop, luminance_samples
 from fogsim.jit import Bands
-from fogsim.values import Response
+from fogsim.values import Camera, Response
 from fogsim.values.camera_response import respond
 
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
@@ -100,6 +100,25 @@ def expose(radiance: NDArray[np.float32], sensor: Sensor, response: Response, rn
 
     Bands().work(expose_rows, rows, columns)
     return out
+
+
+def unexposed(camera: Camera) -> Pixels:
+    """What a camera hands out before its first exposure: a black picture, read-only.
+
+    Parameters
+    ----------
+    camera : Camera
+        Its size and bit depth count.
+
+    Returns
+    -------
+    (rows, cols, 3) uint8, or uint16 for more than 8 bits
+        Zeros.
+    """
+    shape = (camera.height, camera.width, 3)
+    black: Pixels = np.zeros(shape, np.uint8) if camera.bits == 8 else np.zeros(shape, np.uint16)
+    black.setflags(write=False)
+    return black
 
 
 @cache

@@ -74,9 +74,10 @@ class Moment:
         vehicle : str
             As a condition has it.
         """
-        step, place = self.ego_step, self._place(vehicle)
+        step = self.ego_step
         if step is not None and self.row(vehicle) == step.ego:
             return step.route_position
+        place = self._place(vehicle)
         return None if place is None else place.front
 
     def extent(self, vehicle: str) -> Extent | None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere import distance_at_depth, extinction, field_at, with_change
-from fogsim.camera import Delivered, FaultyLens, FrameDelivery, knocked, mounted_pose
+from fogsim.camera import Delivered, FaultyLens, FrameDelivery, knocked, mounted_pose, unexposed
 from fogsim.ego.daylight import Ramp, in_daylight
 from fogsim.ego.frame_watch import FrameWatch, LeadHistory
 from fogsim.ego.measurements import EgoSensors
@@ -95,6 +95,7 @@ class EgoEquipment:
         self._camera = build.camera(scenario, body)
         self._setback = build.camera_mount(scenario, body).setback
         self._assumed_camera = build.assumed_camera(scenario, body)
+        self._unexposed = unexposed(self._camera)
         self._estimators = build.estimators(scenario, self._assumed_camera)
 
     def start_run(
@@ -266,7 +267,10 @@ class EgoEquipment:
         sections, known = meters.measure(fog), tuple(one.fault for one in faults)
         truth = fog_truth(fog, pose, camera, renderer.signs, state, sections, self._way, known)
         view, radiance = renderer.render(state, ego, pose, time, camera, light)
-        image = self._camera_sensor.take(self._glass.look_through(radiance, camera, faults), streams.camera)
+        if radiance is None:
+            image = self._unexposed
+        else:
+            image = self._camera_sensor.take(self._glass.look_through(radiance, camera, faults), streams.camera)
         frame = Frame(*self._delivery.deliver(Delivered(time, image), faults), self._assumed_camera)
         observation = Observation(
             frame=frame,
@@ -325,6 +329,8 @@ class EgoEquipment:
 
     def _estimate(self, frame: Frame, observation: Observation, time: float) -> tuple[Estimate, ...]:
         """What each estimator says; none is asked about a frame that tells nothing new."""
+        if not self._estimators:
+            return ()
         self._leads.add(time, observation.lead)
         if why := self._watch.why_no_news(frame, observation.speed):
             return tuple(Estimate.invalid(estimator.method, why) for estimator in self._estimators)

@@ -107,8 +107,8 @@ class EgoView(Protocol):
         time: float,
         camera: Camera | None = None,
         illuminance: float | None = None,
-    ) -> tuple[View, NDArray[np.float32]]:
-        """Draw; see `ViewRenderer.render`."""
+    ) -> tuple[View, NDArray[np.float32] | None]:
+        """Draw; see `ViewRenderer.render`. No radiance where there is nothing to be seen."""
 
     def surrounding(self, state: TrafficState, ego: int, pose: CameraPose) -> Surrounding:
         """What is drawn; see `ViewRenderer.surrounding`."""
@@ -118,7 +118,7 @@ class EgoView(Protocol):
 
 
 class NoView:
-    """A view without a scene, for runs that need no camera: the sensor looks into darkness.
+    """A view without a scene, for runs that need no camera: its pictures are black.
 
     Parameters
     ----------
@@ -137,8 +137,7 @@ class NoView:
         camera = build.camera(scenario, body)
         size = (camera.height, camera.width)
         empty = np.full(size, np.inf, np.float32), np.zeros(size, np.int32)
-        self._black = np.zeros((*size, 3), np.float32)
-        self._view = View(self._black, *empty)
+        self._view = View(np.zeros((*size, 3), np.float32), *empty)
 
     def enter_fog(self, fog: FogField) -> None:
         """Look through another fog; see `ViewRenderer.enter_fog`.
@@ -150,9 +149,9 @@ class NoView:
         """
         self.fog = fog
 
-    def render(self, *_: object) -> tuple[View, NDArray[np.float32]]:
+    def render(self, *_: object) -> tuple[View, None]:
         """Draw nothing; see `ViewRenderer.render`."""
-        return self._view, self._black
+        return self._view, None
 
     def surrounding(self, *_: object) -> Surrounding:
         """Refuse; see `ViewRenderer.surrounding`.

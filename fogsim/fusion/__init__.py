@@ -4,11 +4,12 @@ from collections.abc import Callable
 
 from fogsim import registry
 from fogsim.fusion.grid_filter import GridFilter
+from fogsim.fusion.no_fusion import NoFusion
 from fogsim.fusion.protocol import Fusion
 from fogsim.registry import Registry
 
 FUSIONS: Registry[Callable[..., Fusion]] = Registry(
-    "fusion", {"grid_filter": GridFilter}, group="fogsim.fusion", methods=("update", "reset")
+    "fusion", {"grid_filter": GridFilter, "none": NoFusion}, group="fogsim.fusion", methods=("update", "reset")
 )
 """Every fusion by name: called with keyword parameters it gives a `Fusion`."""
 

@@ -151,9 +151,11 @@ class _Entry:
         self._waiting: list[tuple[float, str]] = []
 
     def look(self, moment: Moment) -> None:
-        """See whether the condition holds now."""
+        """See whether the condition holds now; what has begun once for all is not looked at again."""
+        if self._has_held and self.written.repeat == "once":
+            return
         holds = bool(self._watch.look(moment))
-        comes = holds and not self._held and not (self._has_held and self.written.repeat == "once")
+        comes = holds and not self._held
         self._held = holds
         self._has_held |= holds
         if comes:

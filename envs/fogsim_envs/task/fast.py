@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fogsim.atmosphere import extinction
 from fogsim.recorders import FramePanel, draw_view_from_above
 from fogsim.scenario import Scenario, build
+from fogsim.scenario.section import Method
 from fogsim.values import Step
 from fogsim_envs.hosting import TIMEOUT
 from fogsim_envs.rendering import RENDER_MODES, StepRenderer
@@ -93,7 +94,8 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
     def _begin(self, scenario: Scenario, seed: int) -> Step:
         self._fusion, self._illuminance = build.fusion(scenario), scenario.light.illuminance_lx
         self._surrogate.reset(np.random.default_rng((2, seed)))
-        return super()._begin(scenario, seed)
+        # The belief is made here, of estimates that the loop knows nothing of.
+        return super()._begin(scenario.model_copy(update={"fusion": Method(method="none")}), seed)
 
     def _completed(self, step: Step) -> Step:
         estimates = (self._surrogate.estimate(step.truth.extinction_ahead, self._illuminance),)

@@ -1,0 +1,32 @@
+"""No fusion, for runs whose belief nobody asks for."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fogsim.fusion.grid_filter import CELLS, LOG_HIGH, LOG_LOW
+from fogsim.values.belief import Belief
+from fogsim.values.estimate import Estimate
+
+
+class NoFusion:
+    """Believes all visibilities between 10 m and 10 km equally likely, whatever is estimated."""
+
+    def __init__(self) -> None:
+        belief = Belief(np.linspace(LOG_LOW, LOG_HIGH, CELLS), np.full(CELLS, 1.0 / CELLS))
+        for array in (belief.log_extinction, belief.probability):
+            array.flags.writeable = False
+        self._belief = belief
+
+    def update(self, estimates: Sequence[Estimate], time: float) -> Belief:  # noqa: ARG002 - the protocol's parameters
+        """Say what is believed, which is always the same; see `Fusion.update`.
+
+        Parameters
+        ----------
+        estimates, time
+            As of `Fusion.update`.
+        """
+        return self._belief
+
+    def reset(self) -> None:
+        """Do nothing: there is nothing to be forgotten."""

@@ -22,7 +22,7 @@ FADED = 20.0
 """Scale heights above which nothing is left of ground fog."""
 
 _BESIDE_EDGE = 1e-3
-"""So far from an edge of a bank all or nothing of it is there, however numbers are rounded [m]."""
+"""So far from an edge of a bank or layer all or nothing of it is there, however numbers are rounded [m]."""
 
 _LEAST_RATE = 1e-12
 """A line that comes nearer to an edge more slowly than this goes along it [-]."""
@@ -202,11 +202,13 @@ def _pieces_per_metre(towards: NDArray[np.float64], medium: Medium) -> float:
 
 
 @kernel
-def _is_banks_alone(medium: Medium) -> bool:
-    """Whether nothing but banks makes the fog uneven."""
-    has_layer = math.isinf(medium.layer[BASE]) and math.isinf(medium.layer[TOP])
-    is_even = medium.layer[DECAY] == 0.0 and medium.factors.size == 1
-    return bool(has_layer and is_even and len(medium.shelters) == 0)
+def _is_banks_alone(height: float, other: float, medium: Medium) -> bool:
+    """Whether nothing but banks makes the fog uneven between two heights [m]."""
+    layer = medium.layer
+    is_above_base = min(height, other) > layer[BASE] + 0.5 * layer[BASE_EDGE] + _BESIDE_EDGE
+    is_below_top = max(height, other) < layer[TOP] - 0.5 * layer[TOP_EDGE] - _BESIDE_EDGE
+    is_even = layer[DECAY] == 0.0 and medium.factors.size == 1
+    return bool(is_above_base and is_below_top and is_even and len(medium.shelters) == 0)
 
 
 @kernel
@@ -332,7 +334,7 @@ def depths_along(
     total, here, next_cut = 0.0, 0.0, 0
     count = _edges_crossed(start, towards, distances[-1], medium, cuts)
     pieces, outside, banks = _pieces_per_metre(towards, medium), medium.layer[EXTINCTION], medium.banks
-    is_banks_alone = _is_banks_alone(medium)
+    is_banks_alone = _is_banks_alone(start[2], start[2] + towards[2] * distances[-1], medium)
     i = 0
     while i < len(distances):
         is_cut = next_cut < count and cuts[next_cut] < distances[i]
@@ -369,12 +371,12 @@ def depths_between(
     medium, depths, scratch
         As for `depths_along`.
     """
-    distance, towards, is_banks_alone = np.empty(1), np.empty(3), _is_banks_alone(medium)
+    distance, towards = np.empty(1), np.empty(3)
     for i in range(starts.shape[0]):
         towards[:] = ends[i] - starts[i]
         length = math.sqrt(towards[0] ** 2 + towards[1] ** 2 + towards[2] ** 2)
         depths[i] = 0.0
-        if length > 0.0 and is_banks_alone:
+        if length > 0.0 and _is_banks_alone(starts[i, 2], ends[i, 2], medium):
             x, y, dx, dy = starts[i, 0], starts[i, 1], towards[0] / length, towards[1] / length
             depths[i] = _depth_through_banks(x, y, dx, dy, length, medium.layer[EXTINCTION], medium.banks)
         elif length > 0.0:

@@ -18,7 +18,7 @@ from fogsim.atmosphere import (
 )
 from fogsim.atmosphere.fog.medium import PATCH_CELLS, patch_factors
 from fogsim.errors import InputError
-from fogsim.values import FogBank, FogChange, FogField, FogPatches
+from fogsim.values import FogBank, FogChange, FogField, FogPatches, FogShelter
 from tests.atmosphere.fields import AIRLIGHT, BANK, PATCHES, UNEVEN, brute_force
 
 GROUND_FOG = FogField(0.05, AIRLIGHT, scale_height=4.0)
@@ -75,7 +75,7 @@ def test_the_distance_at_a_depth_is_where_the_depth_along_the_line_comes_to_it(n
     assert distance_at_depth(UNEVEN[name], start, direction, distances, 1.01 * float(along[-1])) == math.inf
 
 
-def test_banks_alone_have_the_depth_of_banks_under_a_far_top_digit_for_digit() -> None:
+def test_banks_alone_have_the_depth_of_banks_and_a_far_tunnel_digit_for_digit() -> None:
     """Where nothing else makes the fog uneven, the sum is taken by a shorter way."""
     banks = (
         FogBank((0.0, 0.0), (1.0, 0.0), 50.0, 160.0, 40.0, 0.05),
@@ -85,8 +85,13 @@ def test_banks_alone_have_the_depth_of_banks_under_a_far_top_digit_for_digit() -
     alone = FogField(0.003, (1000.0,) * 3, banks)
     rng = np.random.default_rng(8)
     starts, ends = (rng.uniform((-100, -100, 0), (300, 300, 30), (200, 3)) for _ in range(2))
-    under_top = optical_depth(dataclasses.replace(alone, top=1e7), starts, ends)
-    assert np.array_equal(optical_depth(alone, starts, ends), under_top)
+    tunnel = FogShelter(((1e7, 1e7, 0.0), (1.1e7, 1.2e7, 0.0)), 5.0, 5.0, 50.0)
+    beside_tunnel = optical_depth(dataclasses.replace(alone, shelters=(tunnel,)), starts, ends)
+    assert np.array_equal(optical_depth(alone, starts, ends), beside_tunnel)
+    under_top = dataclasses.replace(alone, base=-5.0, base_edge=2.0, top=50.0, top_edge=30.0)
+    assert np.array_equal(optical_depth(under_top, starts, ends), beside_tunnel)
+    under_low_top = dataclasses.replace(under_top, top=40.0)
+    assert not np.array_equal(optical_depth(under_low_top, starts, ends), beside_tunnel)
 
 
 def test_the_product_of_sideways_and_upward_profiles_would_be_wrong() -> None:

@@ -119,35 +119,36 @@ class AdvisedDriving:
         self._frames = build.periods(scenario).decision_frames
         self._road = RoadAdvice(scenario) if scenario.drivers.advised in DISPLAYS else None
 
-    def decide(self, step: Step) -> Command:
-        """Command for the next camera period; the one in force between decisions.
+    def decide(self, step: Step, previous: Command | None = None) -> Command:
+        """Command for the next camera period; the one before between decisions.
 
         Parameters
         ----------
         step : Step
             What was finished last.
+        previous : Command or None
+            What this policy has asked for before; None for what was in force.
         """
+        previous = step.command if previous is None else previous
         if step.index % self._frames:
-            return step.command
-        previous = step.command
+            return previous
         lit = known_fog(step, self._scenario.lighting)
         lamps = checked_lamps(self._scenario.lighting.method, self._lighting.lamps(lit, previous.lamps))
         if self._road is not None:
             advice, stretches = self._road.advise(step)
             return Command(advice=advice, lamps=lamps, stretches=stretches)
-        advice = checked_advice(
-            self._scenario.advice.method, self._ask_adviser(step, known_fog(step, self._scenario.advice))
-        )
+        known = known_fog(step, self._scenario.advice)
+        advice = checked_advice(self._scenario.advice.method, self._ask_adviser(step, known, previous.advice))
         return spread_advice(Command(advice=advice, lamps=lamps), self._scenario)
 
 
-def _questions_to(adviser: Adviser | VehicleAdviser) -> Callable[[Step, Belief], SpeedAdvice]:
-    """A function that asks an adviser what it says after a step, by what is known of the fog."""
+def _questions_to(adviser: Adviser | VehicleAdviser) -> Callable[[Step, Belief, SpeedAdvice], SpeedAdvice]:
+    """A function that asks an adviser what it says after a step, by what is known of the fog, after what it said."""
     if isinstance(adviser, VehicleAdviser):
-        return lambda step, known: adviser.advise_vehicle(
-            known, step.observation, step.speed_limit, step.time, step.command.advice
+        return lambda step, known, previous: adviser.advise_vehicle(
+            known, step.observation, step.speed_limit, step.time, previous
         )
-    return lambda step, known: adviser.advise(known, step.speed_limit, step.time, step.command.advice)
+    return lambda step, known, previous: adviser.advise(known, step.speed_limit, step.time, previous)
 
 
 def known_fog(step: Step, method: InformedMethod) -> Belief:

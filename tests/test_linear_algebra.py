@@ -33,7 +33,8 @@ def test_a_product_is_that_of_matrices(left: tuple[int, ...], right: tuple[int, 
 def test_products_for_kernels_are_the_same() -> None:
     a, b, c = RNG.normal(size=(5, 4)), RNG.normal(size=(4, 7)), RNG.normal(size=4)
     np.testing.assert_allclose(times(a, c), a @ c, rtol=1e-13, atol=1e-15)
-    np.testing.assert_allclose(convolution(b[0], c), np.convolve(b[0], c), rtol=1e-13, atol=1e-15)
+    for one, other in ((b[0], c), (c, b[0]), (RNG.normal(size=9), c[:2]), (c[:1], c)):
+        np.testing.assert_allclose(convolution(one, other), np.convolve(one, other), rtol=1e-13, atol=1e-15)
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 5, 9])

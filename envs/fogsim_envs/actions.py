@@ -43,10 +43,11 @@ def checked_action(action: object, space: spaces.Space[Any], name: str) -> NDArr
         raise _refusal(action, space, name, "expected numbers")
     if given.shape != space.shape:
         raise _refusal(action, space, name, f"expected the shape {space.shape}, got {given.shape}")
-    if not np.isfinite(given).all():
-        raise _refusal(action, space, name, "expected finite numbers")
-    if not isinstance(space, spaces.Box) and (given != np.rint(given)).any():
-        raise _refusal(action, space, name, "expected whole numbers")
+    if given.dtype.kind == "f":
+        if not np.isfinite(given).all():
+            raise _refusal(action, space, name, "expected finite numbers")
+        if not isinstance(space, spaces.Box) and (given != np.rint(given)).any():
+            raise _refusal(action, space, name, "expected whole numbers")
     lowest, highest = _limits(space)
     # Whole numbers are compared as they came, as a short type would wrap; others as the space rounds them.
     member = given.astype(space.dtype) if isinstance(space, spaces.Box) else given

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.jit import kernel
 from fogsim.values import TrafficState
 
 FARTHEST_ASIDE = 30.0
@@ -41,13 +42,12 @@ class Route:
     """
 
     def __init__(self, points: NDArray[np.float64]) -> None:
-        self.points = points
+        self.points, self._corners = points, np.array(points, np.float64)
         steps = np.diff(points, axis=0)
         self._length = np.linalg.norm(steps, axis=1)
         self._start = np.concatenate(([0.0], np.cumsum(self._length)[:-1]))
         self._direction = steps / np.maximum(self._length, 1e-9)[:, None]
-        # Columns apart are three times as fast as rows.
-        self._columns = tuple((points[:-1, i].copy(), self._direction[:, i].copy()) for i in range(3))
+        self._at, self._aside = np.empty(len(steps)), np.empty(len(steps))
 
     def locate(self, position: NDArray[np.float64], heading: float, near: float | None = None) -> RoutePlace | None:
         """Nearest place on the route; None if it is farther than `FARTHEST_ASIDE`.
@@ -61,12 +61,8 @@ class Route:
         near : float or None
             A position along the route: of several places that are as near, the one nearest to it [m].
         """
-        ways = [float(place) - start for place, (start, _) in zip(position, self._columns, strict=True)]
-        at = sum(way * part for way, (_, part) in zip(ways, self._columns, strict=True))
-        at = np.minimum(np.maximum(at, 0.0), self._length)
-        away = [way - at * part for way, (_, part) in zip(ways, self._columns, strict=True)]
-        aside = np.sqrt(sum(part * part for part in away))
-        nearest = int(np.argmin(aside))
+        at, aside = self._at, self._aside
+        nearest = nearest_piece(position, self._corners, self._direction, self._length, at, aside)
         if aside[nearest] > FARTHEST_ASIDE:
             return None
         if near is not None:
@@ -78,6 +74,40 @@ class Route:
         x, y, _ = self._direction[nearest]
         along = float(x) * math.cos(heading) + float(y) * math.sin(heading)
         return RoutePlace(float(self._start[nearest] + at[nearest]), along)
+
+
+@kernel
+def nearest_piece(
+    place: NDArray[np.float64],
+    points: NDArray[np.float64],
+    direction: NDArray[np.float64],
+    length: NDArray[np.float64],
+    at: NDArray[np.float64],
+    aside: NDArray[np.float64],
+) -> int:
+    """Find the piece of a polyline that is nearest to a place, the first of several.
+
+    Parameters
+    ----------
+    place : (3,) float64
+        The place [m].
+    points : (n + 1, 3) float64
+        Points of the polyline [m].
+    direction, length : (n, 3), (n,) float64
+        Unit vectors along its pieces, and their lengths [m].
+    at, aside : (n,) float64
+        Where on each piece its nearest point is, and how far from the place [m]; written to.
+    """
+    nearest = 0
+    for i in range(len(length)):
+        x, y, z = place[0] - points[i, 0], place[1] - points[i, 1], place[2] - points[i, 2]
+        along = x * direction[i, 0] + y * direction[i, 1] + z * direction[i, 2]
+        along = min(max(along, 0.0), length[i])
+        x, y, z = x - along * direction[i, 0], y - along * direction[i, 1], z - along * direction[i, 2]
+        at[i], aside[i] = along, math.sqrt(x * x + y * y + z * z)
+        if aside[i] < aside[nearest]:
+            nearest = i
+    return nearest
 
 
 @dataclass(frozen=True, slots=True)

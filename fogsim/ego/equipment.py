@@ -397,8 +397,9 @@ def fog_truth(
     eye, level = np.array(pose.position), math.cos(pose.road_grade)
     direction = np.array([math.cos(pose.heading) * level, math.sin(pose.heading) * level, math.sin(pose.road_grade)])
     sight = distance_at_depth(fog, eye, direction, _SIGHT_LINE, OPTICAL_DEPTH_AT_VISIBILITY)
+    here, drivers = _extinctions(fog, eye, traffic)
     return Truth(
-        extinction=float(extinction(fog, eye)),
+        extinction=here,
         extinction_ahead=OPTICAL_DEPTH_AT_VISIBILITY / sight,
         camera=camera,
         pose=pose,
@@ -408,8 +409,21 @@ def fog_truth(
         route=None if way is None else way.route,
         carriageways={} if way is None else way.carriageways,
         faults=faults,
-        vehicle_extinctions=None if traffic is None else extinction(fog, traffic.position + _EYES),
+        vehicle_extinctions=drivers,
     )
+
+
+def _extinctions(
+    fog: FogField, eye: NDArray[np.float64], traffic: TrafficState | None
+) -> tuple[float, NDArray[np.float64] | None]:
+    """Extinction coefficients at a camera, and at the eyes of the drivers of some traffic, if there is any [1/m]."""
+    if traffic is None:
+        return float(extinction(fog, eye)), None
+    places = np.empty((1 + len(traffic.position), 3))
+    places[0] = eye
+    np.add(traffic.position, _EYES, out=places[1:])
+    found = extinction(fog, places)
+    return float(found[0]), found[1:]
 
 
 def carriageways(lanes: Iterable[Lane]) -> dict[str, tuple[str, ...]]:

@@ -134,7 +134,8 @@ class GridFilter:
         inside = spread[CELLS - 1 : 2 * CELLS - 1].copy()
         inside[: CELLS - 1] += spread[CELLS - 2 :: -1]
         inside[1:] += spread[: 2 * CELLS - 2 : -1]
-        return np.asarray(inside / inside.sum())
+        inside /= inside.sum()
+        return inside
 
     def _step(self, elapsed: float) -> Floats:
         """Distribution over offsets in cells after some time; clocks round it to one of few numbers."""

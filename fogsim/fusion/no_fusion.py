@@ -13,20 +13,18 @@ class NoFusion:
     """Believes all visibilities between 10 m and 10 km equally likely, whatever is estimated."""
 
     def __init__(self) -> None:
-        belief = Belief(np.linspace(LOG_LOW, LOG_HIGH, CELLS), np.full(CELLS, 1.0 / CELLS))
-        for array in (belief.log_extinction, belief.probability):
-            array.flags.writeable = False
-        self._belief = belief
+        self._log_extinction = np.linspace(LOG_LOW, LOG_HIGH, CELLS)
+        self._log_extinction.flags.writeable = False
 
     def update(self, estimates: Sequence[Estimate], time: float) -> Belief:  # noqa: ARG002 - the protocol's parameters
-        """Say what is believed, which is always the same; see `Fusion.update`.
+        """Say what is believed, always the same; see `Fusion.update`.
 
         Parameters
         ----------
         estimates, time
             As of `Fusion.update`.
         """
-        return self._belief
+        return Belief(self._log_extinction, np.full(CELLS, 1.0 / CELLS))
 
     def reset(self) -> None:
         """Do nothing: there is nothing to be forgotten."""

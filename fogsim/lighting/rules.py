@@ -42,10 +42,10 @@ class FogLampRules:
         belief, previous
             What is believed about the fog, and lamps lit now.
         """
-        lit = BY_DAY
+        lit, visibility = BY_DAY, belief.visibility
         for lamp, threshold in ((Lamp.REAR_FOG, self.rear_fog_below), (Lamp.FRONT_FOG, self.front_fog_below)):
             margin = 1.0 + self.hysteresis if lamp in previous else 1.0
-            if belief.visibility < threshold * margin:
+            if visibility < threshold * margin:
                 lit |= lamp
         return lit
 

@@ -66,6 +66,6 @@ def measure_fix(position: NDArray[np.float64], heading: float, gps: Gps, rng: np
     rng : numpy.random.Generator
         Source of the noise; three numbers are drawn in every call.
     """
-    east, north, turned = rng.normal(size=3)
+    east, north, turned = rng.standard_normal(3).tolist()
     noise = gps.position_deviation * np.array([east, north, 0.0])
-    return Fix(position + noise, heading + gps.heading_deviation * float(turned))
+    return Fix(position + noise, heading + gps.heading_deviation * turned)

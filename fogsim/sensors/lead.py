@@ -62,12 +62,12 @@ def measure_lead(
     LeadMeasurement or None
         None if nothing is within reach and field of view.
     """
-    distance_noise, speed_noise = rng.normal(size=2)
+    distance_noise, speed_noise = rng.standard_normal(2).tolist()
     if leader is None or share_of_reach <= 0.0 or leader.gap > share_of_reach * sensor.reach:
         return None
     if 2.0 * abs(bearing) > sensor.field_of_view:
         return None
     return LeadMeasurement(
-        distance=max(leader.gap + sensor.distance_deviation * float(distance_noise), 0.0),
-        relative_speed=leader.speed - own_speed + sensor.speed_deviation * float(speed_noise),
+        distance=max(leader.gap + sensor.distance_deviation * distance_noise, 0.0),
+        relative_speed=leader.speed - own_speed + sensor.speed_deviation * speed_noise,
     )

@@ -1,12 +1,13 @@
 """What is believed about the fog after many estimates."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.linear_algebra import matrix_product
+from fogsim.jit import kernel
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 
 
@@ -43,8 +44,9 @@ class Belief:
         shares : (n,) sequence of float
             Probabilities in 0 … 1.
         """
-        cumulative = np.cumsum(self.probability) - 0.5 * self.probability
-        log_extinctions = np.interp([1.0 - share for share in shares], cumulative, self.log_extinction)
+        log_extinctions = 1.0 - np.array(shares)
+        # Copies are of one type, for which the kernel is compiled.
+        put_quantiles(np.array(self.log_extinction, float), np.array(self.probability, float), log_extinctions)
         return tuple((OPTICAL_DEPTH_AT_VISIBILITY / np.exp(log_extinctions)).tolist())
 
     @property
@@ -55,8 +57,36 @@ class Belief:
     @property
     def log_standard_deviation(self) -> float:
         """Standard deviation of ln k [-]."""
-        mean = float(matrix_product(self.probability, self.log_extinction))
-        return float(np.sqrt(matrix_product(self.probability, (self.log_extinction - mean) ** 2)))
+        mean = float((self.probability * self.log_extinction).sum())
+        return math.sqrt((self.probability * (self.log_extinction - mean) ** 2).sum())
+
+
+@kernel
+def put_quantiles(values: NDArray[np.float64], probability: NDArray[np.float64], shares: NDArray[np.float64]) -> None:
+    """Put quantiles in the place of shares, by straight lines between the middles of cells.
+
+    Parameters
+    ----------
+    values, probability : (n,) float64
+        Centres of the cells, ascending, and their probabilities.
+    shares : (m,) float64
+        Probabilities in 0 … 1; written to.
+    """
+    last = len(values) - 1
+    for i in range(len(shares)):
+        share, quantile = shares[i], values[last]
+        total = before = 0.0
+        for j in range(len(values)):
+            total += probability[j]
+            middle = total - 0.5 * probability[j]
+            if middle > share:
+                quantile = values[j]
+                if j > 0:
+                    slope = (values[j] - values[j - 1]) / (middle - before)
+                    quantile = slope * (share - before) + values[j - 1]
+                break
+            before = middle
+        shares[i] = quantile
 
 
 THINNEST = 1e-6

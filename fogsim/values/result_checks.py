@@ -73,7 +73,7 @@ def checked_belief(method: str, value: object) -> Belief:
         raise InputError(
             f"{who}: log_extinction and probability must be of one length, got {len(cells)} and {len(probability)}"
         )
-    if not (math.isfinite(cells[0]) and math.isfinite(cells[-1]) and bool(np.all(cells[1:] > cells[:-1]))):
+    if not (math.isfinite(cells[0]) and math.isfinite(cells[-1]) and bool((cells[1:] > cells[:-1]).all())):
         raise InputError(f"{who}: log_extinction must be finite and ascending, got {cells!r}")
     least, total = float(probability.min()), float(probability.sum())
     if not (least >= 0.0 and abs(total - 1.0) <= _SUM_TOLERANCE):

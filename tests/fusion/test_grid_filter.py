@@ -173,7 +173,7 @@ def test_time_must_be_finite_and_not_go_back(instant):
 
 
 def test_names_and_parameters_are_checked():
-    assert list(FUSIONS) == ["grid_filter"]
+    assert list(FUSIONS) == ["grid_filter", "none"]
     with pytest.raises(UnknownNameError, match="grid_filter"):
         make("grid_filtre")
     with pytest.raises(InputError, match="drift"):
@@ -181,6 +181,12 @@ def test_names_and_parameters_are_checked():
     for name, value in {"drift": 0.0, "leap_rate": -1.0, "outlier_share": 1.0, "correlation_time": math.nan}.items():
         with pytest.raises(InputError, match=name):
             make("grid_filter", **{name: value})
+
+
+def test_no_fusion_believes_everything_equally_likely_whatever_is_estimated():
+    told = make("none").update([Estimate("test", 0.03, 0.001)], 1.0)
+    assert told.probability == pytest.approx(1.0 / len(told.probability))
+    np.testing.assert_array_equal(told.log_extinction, make("grid_filter").update([], 0.0).log_extinction)
 
 
 def test_bounds_of_an_estimate_that_is_not_valid_move_the_belief_to_their_side():

@@ -1,6 +1,5 @@
 """The agent advises the ego's speed and chooses its lamps, in another fog, traffic and light each episode."""
 
-import dataclasses
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -266,7 +265,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         step = self._current
         low, median, high = step.belief.visibility_quantiles((0.05, 0.5, 0.95))
         # What the built-in adviser would say here: it remembers what it said itself, not what the agent did.
-        self._built_in = self._adviser.decide(dataclasses.replace(step, command=self._built_in))
+        self._built_in = self._adviser.decide(step, self._built_in)
         return {
             "time_s": step.time,
             "route_position_m": step.route_position,

@@ -146,7 +146,8 @@ def task_state(step: Step, own: Command, time_left: float, to_go: float) -> NDAr
         float(Lamp.FRONT_FOG in own.lamps),
         float(Lamp.REAR_FOG in own.lamps),
     )
-    return np.clip(np.array(values, dtype=np.float32), -1.0, 1.0)
+    state = np.array(values, dtype=np.float32)
+    return np.minimum(np.maximum(state, -1.0, out=state), 1.0, out=state)
 
 
 def _estimate(step: Step) -> tuple[float, float, float]:

@@ -5,6 +5,7 @@ same command without it. An estimate's error depends on the visibility ahead and
 to the next, and has a part that stays for an episode, as that of a wrong calibration does.
 """
 
+import bisect
 import json
 import math
 from dataclasses import dataclass
@@ -112,7 +113,7 @@ class EstimatorSurrogate:
 
     def __init__(self, table: SurrogateTable) -> None:
         self._table = table
-        self._inner_edges = table.edges[1:-1]
+        self._inner_edges = table.edges[1:-1].tolist()
         self._own = math.sqrt(1.0 - table.persistence**2)
         self._of_episode, self._of_frame = math.sqrt(table.episode_share), math.sqrt(1.0 - table.episode_share)
         self.reset(np.random.default_rng(0))
@@ -140,7 +141,7 @@ class EstimatorSurrogate:
             Illuminance of the sky [lx].
         """
         table, light = self._table, light_class(illuminance)
-        column = int(np.searchsorted(self._inner_edges, visibility_from_extinction(extinction)))
+        column = bisect.bisect_left(self._inner_edges, visibility_from_extinction(extinction))
         new, width = self._rng.standard_normal(2).tolist()
         valid, none = self._rng.random(2).tolist()
         self._error = table.persistence * self._error + self._own * new

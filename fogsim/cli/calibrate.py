@@ -17,7 +17,7 @@ calibrate = typer.Typer(no_args_is_help=True, help="Measure what a method must k
 
 @calibrate.callback()
 def _commands() -> None:
-    """Keep ``signs`` a command of its own beside those to come."""
+    """What is calibrated is named by a command of its own."""
 
 
 @calibrate.command("signs")
@@ -68,4 +68,53 @@ def calibrate_signs_command(
     told = f"tells V_met between {low:.0f} and {high:.0f} m of first detection, up to {measured.farthest:.0f} m"
     stdout.print(
         f"{told if low < high else 'tells nothing: resolution sets the range, not fog'}: {escape(out)}", soft_wrap=True
+    )
+
+
+@calibrate.command("halos")
+def calibrate_halos_command(
+    camera: Annotated[Path, typer.Option(help="Camera file (docs/estimate.md), of images that are straight.")],
+    out: Annotated[Path, typer.Option(help="File of the calibration.")] = Path("halos.json"),
+    scenes: Annotated[int, typer.Option(help="Scenes that are drawn, each in clear air and in fog.", min=4)] = 80,
+    lens_glare: Annotated[
+        float, typer.Option(help="Share of lamps' light that the lens scatters.", min=0.0, max=1.0)
+    ] = 0.01,
+    seed: Annotated[int, typer.Option(help="Of scenes, exposures and noise.", min=0)] = 0,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it is there already.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the calibration in place of a line.")] = False,
+) -> None:
+    """How steeply light falls off about lamps in clear air and in fog: below which Br50 gallen2014 sees fog."""
+    from fogsim.files.atomic import write_bytes
+    from fogsim.offline.camera_file import load_camera
+    from fogsim.reproduce.halo_calibration import measure_halo_threshold
+
+    if out.exists() and not overwrite:
+        raise InputError(f"--out {out} is there already; --overwrite replaces it")
+    if not out.parent.is_dir():
+        raise InputError(f"--out {out}: there is no folder {out.parent}")
+    known, done = load_camera(camera), 0
+    with progress_bar(stderr) as progress:
+        task = progress.add_task("halos: a first run compiles for some seconds", total=scenes)
+
+        def watch(steps: int, _: int) -> None:
+            nonlocal done
+            done = steps
+            progress.update(task, completed=steps, description=f"halos: {steps} of {scenes} scenes")
+
+        try:
+            with interruptible():
+                measured = measure_halo_threshold(known, scenes, glare=lens_glare, seed=seed, watch=watch)
+        except KeyboardInterrupt:
+            progress.stop()
+            stderr.print(f"interrupted after {done} of {scenes} scenes; nothing is written", soft_wrap=True)
+            raise typer.Exit(INTERRUPTED) from None
+    write_bytes(out, (measured.as_json() + "\n").encode())
+    if as_json:
+        typer.echo(json.dumps(json.loads(measured.as_json())))
+        return
+    stdout.print(
+        f"fog below a mean Br50 of {measured.steepness:g} levels a pixel (of {measured.pictures} pictures, "
+        f"{100 * measured.false_alarms:.1f} % of the clear and {100 * measured.misses:.1f} % of the foggy ones are "
+        f"taken for the other): {escape(out)}",
+        soft_wrap=True,
     )

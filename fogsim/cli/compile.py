@@ -66,6 +66,7 @@ def compile_kernels() -> Iterator[str]:
             pool.submit(_drive, *_DRIVES[first]): first,
             pool.submit(_estimate_visibility): "estimators",
             pool.submit(_detect_signs): "signs",
+            pool.submit(_find_lamps): "lamps",
         }
         while pending:
             for done in wait(pending, return_when=FIRST_COMPLETED).done:
@@ -141,6 +142,18 @@ def _detect_signs() -> None:
         picture.astype(np.float32),
     ):
         detect_signs(image, [SearchRegion(80.0, 60.0, 8.0, 8.0, 24.0)])
+
+
+def _find_lamps() -> None:
+    """Look for the halo of a lamp in a picture of 8 bits, and in one of more."""
+    import numpy as np
+
+    from fogsim.estimators.night.halos import HaloWatch
+
+    rows, cols = np.mgrid[:120, :160]
+    level = 255.0 * np.exp(-np.maximum(np.hypot(rows - 60, cols - 80) - 4.0, 0.0) / 8.0)
+    for image, bits in ((level.astype(np.uint8), 8), ((16.0 * level).astype(np.uint16), 12)):
+        HaloWatch().look(image, bits)
 
 
 def _foggy_road(camera: "Camera", lead: float, visibility: float = 120.0) -> "NDArray[np.uint8]":

@@ -1,0 +1,198 @@
+"""Fog by the halos about lamps, after gallen2014 section III-B: whether there is any, never how much."""
+
+import json
+import math
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from fogsim.errors import InputError, shown
+from fogsim.values.camera import Camera, Response
+from fogsim.vision.light.pixel_kernels import Pixels
+from fogsim.vision.sources.halo_profile import Halo, halos_of
+from fogsim.vision.sources.source_tree import SourceTree, source_tree
+
+PUBLISHED = 9.0
+"""The paper's threshold of the mean Br50, of its camera [levels of 255 a pixel]."""
+
+WINDOW = 25
+"""Frames of the sliding mean: a second of the paper's."""
+
+
+@dataclass(frozen=True, slots=True)
+class HaloThreshold:
+    """Mean Br50 below which there is fog, measured for one camera.
+
+    Attributes
+    ----------
+    width, height : int
+        Size of the camera's pictures [px].
+    focal_length : float
+        Its focal length [px].
+    response : str
+        Its response.
+    black_level : float
+        Its black level [-].
+    steepness : float
+        The threshold [levels of 255 a pixel].
+    false_alarms, misses : float
+        Share of pictures of clear nights, and of fog, that it gets wrong of those it was chosen on [-].
+    pictures : int
+        How many pictures with a halo it was chosen on.
+
+    Raises
+    ------
+    InputError
+        If the numbers do not fit.
+    """
+
+    width: int
+    height: int
+    focal_length: float
+    response: str
+    black_level: float
+    steepness: float
+    false_alarms: float
+    misses: float
+    pictures: int
+
+    def __post_init__(self) -> None:
+        positive = (self.width, self.height, self.focal_length, self.steepness, self.pictures)
+        told: tuple[object, ...] = (*positive, self.black_level, self.false_alarms, self.misses)
+        finite = all(isinstance(one, int | float) and math.isfinite(one) for one in told)
+        if not finite or min(positive) <= 0 or self.response not in list(Response):
+            raise InputError(f"expected finite numbers, sizes and threshold above 0, got {shown(asdict(self))}")
+
+    def as_json(self) -> str:
+        """The threshold as a file has it."""
+        return json.dumps(asdict(self), indent=2)
+
+    @classmethod
+    def read(cls, path: Path) -> "HaloThreshold":
+        """Read a file that `fogsim calibrate halos` wrote.
+
+        Parameters
+        ----------
+        path : Path
+            The file.
+
+        Raises
+        ------
+        InputError
+            If it cannot be read or is none.
+        """
+        try:
+            data: Any = json.loads(path.read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError, ValueError) as error:
+            raise InputError(f"{path}: expected a file that fogsim calibrate halos wrote: {error}") from error
+        names = list(cls.__dataclass_fields__)
+        if not isinstance(data, Mapping) or sorted(data) != sorted(names):
+            raise InputError(f"{path}: expected the keys {', '.join(names)}, got {shown(data)}")
+        return cls(**data)
+
+    def checked_for(self, camera: Camera) -> "HaloThreshold":
+        """Itself, if it was measured for a camera.
+
+        Parameters
+        ----------
+        camera : Camera
+            The told calibration.
+
+        Raises
+        ------
+        InputError
+            If it was measured for another one; both are named.
+        """
+        mine, theirs = _traits(self), _traits(camera)
+        if mine != theirs:
+            raise InputError(
+                f"the threshold of halos was calibrated for a camera of {mine}, and this one has {theirs}: "
+                "fogsim calibrate halos"
+            )
+        return self
+
+
+def _traits(of: HaloThreshold | Camera) -> str:
+    response = Response(of.response).value
+    return (
+        f"{of.width}x{of.height} px, focal length {of.focal_length:.6g} px, response {response}, "
+        f"black level {of.black_level:g}"
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class HaloReading:
+    """What the halos of one picture say.
+
+    Attributes
+    ----------
+    steepness : float or None
+        Mean Br50 of this picture [levels of 255 a pixel]; None without a halo.
+    smoothed : float or None
+        Its mean over the last pictures that had one, this one among them; None without a halo.
+    is_fog : bool or None
+        Whether there is fog, by the smoothed value; None without a halo.
+    halos : tuple of Halo
+        Of the sources that were selected.
+    tree : SourceTree
+        All sources.
+    """
+
+    steepness: float | None
+    smoothed: float | None
+    is_fog: bool | None
+    halos: tuple[Halo, ...]
+    tree: SourceTree
+
+
+class HaloWatch:
+    """Looks at the halos of picture after picture.
+
+    Parameters
+    ----------
+    threshold : float
+        Mean Br50 below which there is fog [levels of 255 a pixel].
+    window : int
+        Pictures of the sliding mean; 1 for every picture by itself.
+    """
+
+    def __init__(self, threshold: float = PUBLISHED, window: int = WINDOW) -> None:
+        self._threshold = threshold
+        self._last: deque[float | None] = deque(maxlen=window)
+
+    def reset(self) -> None:
+        """Forget the pictures before."""
+        self._last.clear()
+
+    def look(self, image: Pixels, bits: int = 8) -> HaloReading:
+        """Look at one picture.
+
+        Parameters
+        ----------
+        image : (rows, cols) or (rows, cols, 3) uint8, or uint16 for more than 8 bits
+            Pixel values.
+        bits : int
+            Their bit depth.
+        """
+        tree = source_tree(image, bits)
+        halos = halos_of(tree)
+        steepness = mean_steepness(halos)
+        self._last.append(steepness)
+        if steepness is None:
+            return HaloReading(None, None, None, halos, tree)
+        seen = [one for one in self._last if one is not None]
+        smoothed = sum(seen) / len(seen)
+        return HaloReading(steepness, smoothed, smoothed < self._threshold, halos, tree)
+
+
+def mean_steepness(halos: tuple[Halo, ...]) -> float | None:
+    """Mean Br50 of a picture [levels of 255 a pixel]; None without a halo.
+
+    Parameters
+    ----------
+    halos : tuple of Halo
+        Of the sources that were selected.
+    """
+    return sum(one.steepness for one in halos) / len(halos) if halos else None

@@ -1,0 +1,112 @@
+"""Which mean Br50 parts fog from clear nights with a camera: many staged scenes, exposures and strengths of lamps."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from fogsim.errors import InputError
+from fogsim.estimators.night.halos import HaloThreshold, mean_steepness
+from fogsim.reproduce.night_scenes import GLARE, NightRoad, NightScene, NightVehicle
+from fogsim.reproduce.result import Steps, Watch, unwatched
+from fogsim.values import Camera, Lamp
+from fogsim.vision.sources.halo_profile import halos_of
+from fogsim.vision.sources.source_tree import source_tree
+
+FOGS = (200.0, 100.0, 50.0)
+"""Visibilities of the fogs that are to be told from clear nights [m]."""
+
+EXPOSURES, STRENGTHS = (0.6, 1.6), (0.6, 1.6)
+"""Range of exposures over the automatic one, and of lamps' intensities over the usual ones [-]."""
+
+_LIT = Lamp.POSITION | Lamp.LOW_BEAM
+
+
+def random_scene(rng: np.random.Generator, strengths: tuple[float, float] = STRENGTHS) -> NightScene:
+    """A road by night with at least one lamp that is seen.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Draws it: street lamps on every second road, a vehicle ahead on more than half, up to two oncoming ones.
+    strengths : tuple of float
+        Range of the lamps' intensity over the usual one [-].
+    """
+    vehicles = []
+    if rng.random() < 0.6:
+        lamps = _LIT | Lamp.STOP if rng.random() < 0.3 else _LIT
+        vehicles.append(NightVehicle(_between(rng, 12.0, 90.0), 0.1, lamps))
+    street = bool(rng.random() < 0.5)
+    least = 0 if street or vehicles else 1
+    oncoming = range(max(int(rng.integers(0, 3)), least))
+    vehicles += [NightVehicle(_between(rng, 15.0, 200.0), 3.5, _LIT, oncoming=True) for _ in oncoming]
+    return NightScene(float(rng.uniform(0.0, 150.0)), tuple(vehicles), street, strength=_between(rng, *strengths))
+
+
+def measure_halo_threshold(
+    camera: Camera, scenes: int = 80, *, glare: float = GLARE, seed: int = 0, watch: Watch = unwatched
+) -> HaloThreshold:
+    """Draw scenes in clear air and in fog, and choose the threshold that errs as seldom in either.
+
+    Parameters
+    ----------
+    camera : Camera
+        The told calibration.
+    scenes : int
+        How many scenes are drawn, each in clear air and in all fogs.
+    glare : float
+        Share of lamps' light that the camera's lens scatters [-].
+    seed : int
+        Of scenes, exposures and noise.
+    watch : Watch
+        Is told of every scene.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than 4 scenes, or no picture has a halo.
+    """
+    if scenes < 4:
+        raise InputError(f"scenes: expected at least 4, got {scenes}")
+    steps, clear, fog = Steps(scenes, watch), list[float](), list[float]()
+    with NightRoad(camera, glare=glare, seed=seed) as road:
+        for number in range(scenes):
+            rng = np.random.default_rng((seed, number))
+            scene, exposure = random_scene(rng), _between(rng, *EXPOSURES)
+            for visibility, radiance in zip((math.inf, *FOGS), road.radiances(scene, (math.inf, *FOGS)), strict=True):
+                picture = road.photograph(radiance, exposure, rng)
+                steepness = mean_steepness(halos_of(source_tree(picture, camera.bits)))
+                if steepness is not None:
+                    (clear if visibility == math.inf else fog).append(steepness)
+            steps.advance()
+    if not clear or not fog:
+        raise InputError(f"no lamp makes a halo in pictures of {camera.width}x{camera.height} px: a larger picture")
+    steepness, wrong, missed = parting(clear, fog)
+    traits = camera.width, camera.height, camera.focal_length, camera.response.value, camera.black_level
+    return HaloThreshold(*traits, round(steepness, 2), wrong, missed, len(clear) + len(fog))
+
+
+def parting(clear: Sequence[float], fog: Sequence[float]) -> tuple[float, float, float]:
+    """Value below which the fewest of one kind and above which the fewest of the other lie, and both shares.
+
+    Parameters
+    ----------
+    clear, fog : sequence of float
+        Values on clear nights, which are large, and in fog, which are small.
+    """
+    high, low = np.sort(clear), np.sort(fog)
+    candidates = np.unique(np.concatenate((high, low)))
+    candidates = np.concatenate((candidates, 0.5 * (candidates[1:] + candidates[:-1])))
+    candidates.sort()
+    wrong = np.searchsorted(high, candidates, side="left") / len(high)
+    missed = 1.0 - np.searchsorted(low, candidates, side="left") / len(low)
+    worst = np.maximum(wrong, missed)
+    best = np.flatnonzero(worst == worst.min())
+    # In the middle of what is as good.
+    chosen = int(best[len(best) // 2])
+    return float(candidates[chosen]), float(wrong[chosen]), float(missed[chosen])
+
+
+def _between(rng: np.random.Generator, low: float, high: float) -> float:
+    """A number whose logarithm is even between two."""
+    return float(np.exp(rng.uniform(math.log(low), math.log(high))))

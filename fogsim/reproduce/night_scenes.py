@@ -1,0 +1,193 @@
+"""Staged scenes by night: a straight road with signs and lane marks, lamps along it, vehicles with theirs."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.atmosphere import Air
+from fogsim.atmosphere.lamps.phase_function import Droplets
+from fogsim.camera.exposure import AutoExposure, Metering, Pixels, Sensor, expose, metered_luminance, sensor_at
+from fogsim.camera.exposure import wanted_saturation as saturation_for
+from fogsim.camera.glare import LensGlare
+from fogsim.lighting import LampMount, own_head_lamps
+from fogsim.render import Renderer, make_renderer
+from fogsim.reproduce.scenes import StagedVehicle, staged_traffic, straight_road
+from fogsim.reproduce.sign_drives import sign_beside
+from fogsim.scene import build_scene, light_sources, street_lamp_heads, street_lighting, vehicle_batches
+from fogsim.units import extinction_from_visibility
+from fogsim.values import Camera, CameraPose, FogField, Lamp, Lights, LightSources, SignMap, TrafficState
+
+SETBACK = 1.7
+"""Distance of the camera behind the front bumper [m]."""
+
+DARK = 1e-4
+"""Horizontal illuminance of the sky: an overcast night without a moon [lx]."""
+
+CLEAR = 1e-6
+"""Extinction coefficient of a clear night [1/m]."""
+
+AUTOMATIC = AutoExposure(Metering.HIGHLIGHTS, 0.6, 0.0, 1e5, 100.0, 4.0)
+"""As scenarios have it, but that it follows at once."""
+
+GLARE = 0.01
+"""Share of lamps' light that the lens scatters, as a scenario's camera does unless told otherwise [-]."""
+
+_SIGNS_APART = 70.0
+_FAR = 1200.0
+_CAR = StagedVehicle()
+
+
+@dataclass(frozen=True, slots=True)
+class NightVehicle:
+    """A vehicle with its lamps lit.
+
+    Attributes
+    ----------
+    distance : float
+        From the camera to its end that is nearer [m].
+    left : float
+        How far its middle is left of the camera [m].
+    lamps : Lamp
+        What is lit.
+    oncoming : bool
+        Whether it comes toward the camera.
+    vehicle : StagedVehicle
+        What it is.
+    """
+
+    distance: float
+    left: float = 0.0
+    lamps: Lamp = Lamp.POSITION | Lamp.LOW_BEAM
+    oncoming: bool = False
+    vehicle: StagedVehicle = _CAR
+
+
+@dataclass(frozen=True, slots=True)
+class NightScene:
+    """What there is at one instant.
+
+    Attributes
+    ----------
+    place : float
+        Where along the road the camera is [m].
+    vehicles : tuple of NightVehicle
+        Others on the road.
+    street_lamps : bool
+        Whether street lamps are lit.
+    own : Lamp
+        Lit lamps of the vehicle that carries the camera.
+    strength : float
+        Intensity of all other lamps over the usual one [-].
+    """
+
+    place: float = 0.0
+    vehicles: tuple[NightVehicle, ...] = ()
+    street_lamps: bool = False
+    own: Lamp = Lamp.POSITION | Lamp.LOW_BEAM
+    strength: float = 1.0
+
+
+class NightRoad:
+    """A straight road by night, as a camera sees it.
+
+    Parameters
+    ----------
+    camera : Camera
+        The true calibration.
+    droplets : Droplets
+        What the fog is made of.
+    glare : float
+        Share of lamps' light that the lens scatters [-].
+    seed : int
+        Where signs and trees stand.
+    """
+
+    def __init__(
+        self, camera: Camera, droplets: Droplets = Droplets.MODERATE_RADIATION, glare: float = GLARE, seed: int = 0
+    ) -> None:
+        rng = np.random.default_rng(seed)
+        places = np.arange(30.0, _FAR, _SIGNS_APART)
+        signs = SignMap(tuple(sign_beside(f"s{x:.0f}", "speed_limit", float(x), 0.7, rng) for x in places))
+        self.camera, self._glare = camera, LensGlare(camera, glare) if glare > 0 else None
+        self._renderers: dict[bool, Renderer] = {}
+        self._heads: dict[bool, NDArray[np.float64]] = {}
+        for lit in (False, True):
+            scene = build_scene(straight_road(_FAR), signs, np.random.default_rng(seed), street_lamps=lit)
+            self._renderers[lit] = make_renderer("auto", scene, illuminance=DARK)
+            self._heads[lit] = street_lamp_heads(scene)
+        self._air = Air(FogField(CLEAR, (0.0, 0.0, 0.0)), droplets)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for renderer in self._renderers.values():
+            renderer.close()
+
+    def radiances(self, scene: NightScene, visibilities: Sequence[float]) -> list[NDArray[np.float32]]:
+        """What the camera gets of a scene in homogeneous fog of each visibility (rows, cols, 3) [cd/m²].
+
+        Parameters
+        ----------
+        scene : NightScene
+            What there is.
+        visibilities : sequence of float
+            Meteorological visibilities [m]; ``inf`` for a clear night.
+        """
+        camera, lit = self.camera, scene.street_lamps
+        pose = CameraPose((scene.place, 0.0, camera.mount_height), heading=0.0)
+        traffic = _traffic(scene)
+        view = self._renderers[lit].render(vehicle_batches(traffic, None), camera, pose, lamplight=True)
+        mount = LampMount()
+        others = light_sources(traffic, None, pose.position, mount.beams, self._heads[lit] if lit else None)
+        streets = street_lighting(self._heads[lit], DARK) if lit else None
+        own = own_head_lamps(scene.own, camera.mount_height, SETBACK, mount)
+        lights = Lights(own, _scaled(others, scene.strength), streets)
+        out = []
+        for visibility in visibilities:
+            self._air.field = FogField(max(extinction_from_visibility(visibility), CLEAR), (1e-5, 1e-5, 1e-5))
+            out.append(self._air.radiance(view, camera, pose, lights))
+        return out
+
+    def photograph(self, radiance: NDArray[np.float32], exposure: float, rng: np.random.Generator) -> Pixels:
+        """Take a picture at an exposure relative to the automatic one.
+
+        Parameters
+        ----------
+        radiance : (rows, cols, 3) float32
+            From `radiances` [cd/m²].
+        exposure : float
+            Light that is gathered, over what automatic exposure gathers [-].
+        rng : numpy.random.Generator
+            Of the noise.
+        """
+        saturation = saturation_for(metered_luminance(radiance, AUTOMATIC.metering), AUTOMATIC) / exposure
+        sensor = Sensor(saturation, bits=self.camera.bits, black_level=self.camera.black_level)
+        sensor = sensor_at(sensor, saturation, AUTOMATIC)
+        light = radiance if self._glare is None else self._glare.scatter(radiance, saturation)
+        return expose(light, sensor, self.camera.response, rng)
+
+
+def _traffic(scene: NightScene) -> TrafficState:
+    standing = [
+        (scene.place + one.distance, replace(one.vehicle, left=one.left, name=f"vehicle {number}"))
+        for number, one in enumerate(scene.vehicles)
+    ]
+    state = staged_traffic(standing)
+    position = state.position.copy()
+    turned = np.array([one.oncoming for one in scene.vehicles], dtype=bool)
+    # A vehicle's place is its front bumper's: of one that comes toward the camera, that of its nearer end.
+    position[turned, 0] -= state.length[turned]
+    lamps = np.array([int(one.lamps) for one in scene.vehicles], np.int32)
+    return replace(state, position=position, heading=np.where(turned, np.pi, 0.0), lamps=lamps)
+
+
+def _scaled(sources: LightSources, strength: float) -> LightSources:
+    lobes = sources.lobes and replace(sources.lobes, scale=sources.lobes.scale * strength)
+    return replace(sources, intensity=sources.intensity * strength, lobes=lobes)

@@ -24,9 +24,6 @@ from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST
 from fogsim.traffic.drivers.sight_kernels import DISTANCE_TOLERANCE, depth_limit, judge_leaders, seen_distance
 from fogsim.units import CONTRAST_THRESHOLD, luminance_of
 
-BODY_MIDDLE = 1.2
-"""Height above the road at which a vehicle is looked at by those whose eyes are higher [m]."""
-
 LEAST_CONTRAST = 0.5
 """No vehicle's rear has less contrast to the airlight than this, not even a white one [-]."""
 

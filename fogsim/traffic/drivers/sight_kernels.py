@@ -1,6 +1,7 @@
 """What drivers see, as compiled kernels: the laws are those of `fogsim.traffic.drivers.sight`."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,9 @@ DISTANCE_TOLERANCE = 0.01
 NEAREST = 0.1
 """Nobody is nearer than this [m]."""
 
+BODY_MIDDLE = 1.2
+"""Height above the road at which a vehicle is looked at by those whose eyes are higher [m]."""
+
 
 DISTANCE, DEPTH, CLOSING, DEEPENING, CONTRAST, STEADY, INTENSITY, BRIGHTEST, OWN_STEADY, OWN = range(10)
 """Rows of what is known of drivers and their leaders.
@@ -28,6 +32,75 @@ may be [cd]; light of the driver's own head lamps: what is always lit, and what 
 
 HIDDEN, SEEN, DAZZLED = 0.0, 1.0, 2.0
 """A leader is out of sight, or in sight; or in sight unless glare, which is not known, hides it."""
+
+
+X, Y, Z, SPEED, MINIMUM_GAP, BODY_CONTRAST, EYE_HEIGHT = range(7)
+"""Columns of what is known of a vehicle: where its front bumper is [m], its speed [m/s], its driver's minimum gap [m],
+the contrast of its body [-], and its driver's eyes above the road [m]."""
+
+
+class Closing(NamedTuple):
+    """Bounds on how fast gaps and what lies in them change.
+
+    Attributes
+    ----------
+    speed : float
+        By how much one vehicle's speed changes, on the average over the time that is looked ahead [m/s].
+    drift : float
+        How fast fog drifts and changes [m/s].
+    extinction : float
+        Extinction coefficient that is exceeded nowhere [1/m].
+    is_even : bool
+        Whether the fog is the same everywhere, so that nothing but the gap changes its optical depth.
+    """
+
+    speed: float
+    drift: float
+    extinction: float
+    is_even: bool
+
+
+@kernel
+def face_leaders(
+    vehicles: NDArray[np.float64],
+    behind: NDArray[np.int64],
+    ahead: NDArray[np.int64],
+    gaps: NDArray[np.float64],
+    closing: Closing,
+    facing: NDArray[np.float64],
+    lines: NDArray[np.float64],
+) -> None:
+    """Put down where leaders are, how fast that changes, and the lines on which drivers look at them.
+
+    Parameters
+    ----------
+    vehicles : (m, 7) float64
+        Columns `X` to `EYE_HEIGHT`.
+    behind, ahead : (n,) int64
+        Rows of followers and leaders.
+    gaps : (n,) float64
+        SUMO's gaps between them [m], which leave out the followers' minimum gaps.
+    closing : Closing
+        Bounds on how fast that changes.
+    facing : (10, n) float64
+        Rows `DISTANCE`, `CLOSING`, `DEEPENING` and `CONTRAST` are written.
+    lines : (2, n, 3) float64
+        The drivers' eyes, and the leaders' rears at that height, at most in the middle of their bodies [m]; written to.
+    """
+    for i in range(gaps.size):
+        own, other = vehicles[behind[i]], vehicles[ahead[i]]
+        facing[DISTANCE, i] = max(gaps[i] + own[MINIMUM_GAP], NEAREST)
+        facing[CONTRAST, i] = other[BODY_CONTRAST]
+        facing[CLOSING, i] = abs(other[SPEED] - own[SPEED]) + closing.speed
+        # In a bank that one end has reached and the other has not, each end counts by itself; and the fog drifts.
+        apart = own[SPEED] + other[SPEED] + 2.0 * closing.speed + closing.drift
+        facing[DEEPENING, i] = closing.extinction * (facing[CLOSING, i] if closing.is_even else apart)
+        x, y, z = other[X] - own[X], other[Y] - own[Y], other[Z] - own[Z]
+        height = own[EYE_HEIGHT]
+        z += min(height, BODY_MIDDLE) - height
+        share = facing[DISTANCE, i] / math.sqrt(x * x + y * y + z * z)
+        lines[0, i] = own[X], own[Y], own[Z] + height
+        lines[1, i] = own[X] + x * share, own[Y] + y * share, own[Z] + height + z * share
 
 
 @kernel

@@ -10,24 +10,27 @@ from numpy.typing import NDArray
 from fogsim.traffic.appearance import OTHERS_LAMPS, lamps_from_signals
 from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST as BRIGHTEST_LAMP
 from fogsim.traffic.drivers.lamp_intensity import rear_intensity
-from fogsim.traffic.drivers.sight import BODY_MIDDLE, DriverSight, FogAccess
+from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.drivers.sight_kernels import (
     BRIGHTEST,
-    CLOSING,
     CONTRAST,
     DAZZLED,
-    DEEPENING,
     DEPTH,
     DISTANCE,
+    EYE_HEIGHT,
     INTENSITY,
-    NEAREST,
+    MINIMUM_GAP,
     OWN,
     OWN_STEADY,
     SEEN,
+    SPEED,
     STEADY,
+    Closing,
+    Z,
+    face_leaders,
 )
 from fogsim.traffic.sumo.link import Api, Getter, vehicle_getter
-from fogsim.traffic.sumo.update_schedule import MAX_RELATIVE_ACCELERATION, closing_speed_bound
+from fogsim.traffic.sumo.update_schedule import closing_speed_bound
 from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
 from fogsim.traffic.sumo_drivers.oncoming_glare import OncomingGlare, most_glare
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps, SeenVehicles
@@ -41,8 +44,6 @@ FASTEST_DRIFT = 30.0
 
 STEADY_INTENSITY = rear_intensity(int(OTHERS_LAMPS))
 """Of the rear lamps that other drivers always light [cd]."""
-
-_MINIMUM_GAP, _CONTRAST, _EYES = range(3)
 
 Pair = tuple[str, str, float]
 """Follower, leader, and SUMO's gap between them [m], which leaves out the follower's minimum gap."""
@@ -68,7 +69,8 @@ class LeaderSight:
     def __init__(self, api: Api, fog: FogAccess, sight: DriverSight, speed: Getter, remote: bool = False) -> None:
         self._speed = speed
         self._fog = fog
-        self._min_extinction, self._max_extinction = fog.minimum_extinction, fog.maximum_extinction
+        self._max_extinction = fog.maximum_extinction
+        self._is_even = fog.minimum_extinction == fog.maximum_extinction
         self._sight = sight
         self._position = vehicle_getter(api, "getPosition3D")
         (self._signals,) = vehicle_getters(api, remote, ("getSignals",))
@@ -103,29 +105,38 @@ class LeaderSight:
         horizon : float
             Longest time of interest [s].
         """
-        followers, leaders, gaps = zip(*pairs, strict=True)
-        # Mostly who leads one follows another.
-        place = {vehicle: i for i, vehicle in enumerate(dict.fromkeys((*followers, *leaders)))}
-        behind, ahead = (np.array([place[v] for v in vehicles]) for vehicles in (followers, leaders))
-        traits = self._look_up(place)
-        facing = np.empty((OWN + 1, len(pairs)))
-        # SUMO's gap leaves out the follower's minimum gap.
-        facing[DISTANCE] = np.maximum(gaps + traits[behind, _MINIMUM_GAP], NEAREST)
-        facing[CONTRAST] = traits[ahead, _CONTRAST]
-        facing[DEPTH] = self._optical_depths(tuple(place), behind, ahead, facing[DISTANCE], traits[behind, _EYES])
-        speeds = np.fromiter(map(self._speed, place), np.float64, len(place))
-        facing[CLOSING], facing[DEEPENING] = self._rates(speeds[behind], speeds[ahead], horizon)
-        facing[STEADY], facing[OWN_STEADY], facing[OWN] = STEADY_INTENSITY, 1.0, 1.0
-        facing[INTENSITY : BRIGHTEST + 1] = np.transpose(
-            [_rear_light(signals) for signals in map(self._signals, leaders)]
-        )
-        if not own_lamps.keys().isdisjoint(place):
+        facing = self._facing(pairs, horizon)
+        if own_lamps:
             self._add_own_lamps(facing, pairs, own_lamps)
         judged, pauses = self._sight.judge_leaders(facing, self._most_glare, horizon)
         return [
             (verdict == SEEN if verdict != DAZZLED else self._is_seen(pairs[i], facing[:, i], own_lamps), pause)
             for i, (verdict, pause) in enumerate(zip(judged.tolist(), pauses.tolist(), strict=True))
         ]
+
+    def _facing(self, pairs: Sequence[Pair], horizon: float) -> NDArray[np.float64]:
+        """What is known of followers and their leaders (10, n), all with the lamps that SUMO's drivers light."""
+        followers, leaders, gaps = zip(*pairs, strict=True)
+        # Mostly who leads one follows another.
+        place = {vehicle: i for i, vehicle in enumerate(dict.fromkeys((*followers, *leaders)))}
+        rows = np.array([place[v] for v in (*followers, *leaders)], dtype=np.int64).reshape(2, -1)
+        facing, lines = np.empty((OWN + 1, len(pairs))), np.empty((2, len(pairs), 3))
+        extinction = max(self._max_extinction, LEAST_EXTINCTION) if self._is_even else self._max_extinction
+        closing = Closing(closing_speed_bound(0.0, 0.0, horizon), FASTEST_DRIFT, extinction, self._is_even)
+        face_leaders(self._read(place), rows[0], rows[1], np.array(gaps, dtype=np.float64), closing, facing, lines)
+        facing[DEPTH] = self._max_extinction * facing[DISTANCE] if self._is_even else self._fog.optical_depth(*lines)
+        facing[STEADY], facing[OWN_STEADY : OWN + 1] = STEADY_INTENSITY, 1.0
+        facing[INTENSITY], facing[BRIGHTEST] = zip(*map(_rear_light, map(self._signals, leaders)), strict=True)
+        return facing
+
+    def _read(self, vehicles: Collection[str]) -> NDArray[np.float64]:
+        """What is known of vehicles (n, 7), where they are and how fast first."""
+        read = np.empty((len(vehicles), EYE_HEIGHT + 1))
+        flat = itertools.chain.from_iterable(map(self._position, vehicles))
+        read[:, : Z + 1] = np.fromiter(flat, np.float64, 3 * len(vehicles)).reshape(-1, 3)
+        read[:, SPEED] = np.fromiter(map(self._speed, vehicles), np.float64, len(vehicles))
+        read[:, MINIMUM_GAP:] = self._look_up(vehicles)
+        return read
 
     def _look_up(self, vehicles: Collection[str]) -> NDArray[np.float64]:
         """What never changes about vehicles (n, 3): minimum gap [m], contrast [-], height of the driver's eyes [m]."""
@@ -155,37 +166,6 @@ class LeaderSight:
         glare = self._glare.veil(pair[0], pair[1], own_lamps)
         distance, contrast, intensity, own = facing[[DISTANCE, CONTRAST, INTENSITY, OWN]].tolist()
         return bool(facing[DEPTH] <= self._sight.depth_limit(distance, contrast, intensity, own, glare))
-
-    def _optical_depths(
-        self,
-        vehicles: Sequence[str],
-        behind: NDArray[np.intp],
-        ahead: NDArray[np.intp],
-        distances: NDArray[np.float64],
-        heights: NDArray[np.float64],
-    ) -> NDArray[np.float64]:
-        """Optical depths (n,) between eyes at heights [m] above those behind and the rears of those ahead [-]."""
-        if self._min_extinction == self._max_extinction:
-            return self._max_extinction * distances
-        flat = itertools.chain.from_iterable(map(self._position, vehicles))
-        places = np.fromiter(flat, np.float64, 3 * len(vehicles)).reshape(-1, 3)
-        eyes = places[behind]
-        towards = places[ahead] - eyes
-        eyes[:, 2] += heights
-        towards[:, 2] += np.minimum(heights, BODY_MIDDLE) - heights
-        share = distances / np.sqrt(np.einsum("ij,ij->i", towards, towards))
-        return self._fog.optical_depth(eyes, eyes + towards * share[:, None])
-
-    def _rates(
-        self, speed: NDArray[np.float64], leader_speed: NDArray[np.float64], horizon: float
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Bounds (n,) on how fast gaps close [m/s] and how fast their optical depths change [1/s] up to a horizon."""
-        closing = closing_speed_bound(speed, leader_speed, horizon)
-        if self._min_extinction == self._max_extinction:
-            return closing, max(self._max_extinction, LEAST_EXTINCTION) * closing
-        # In a bank that one end has reached and the other has not, each end counts by itself; and the fog drifts.
-        together = speed + leader_speed + MAX_RELATIVE_ACCELERATION * horizon
-        return closing, self._max_extinction * (together + FASTEST_DRIFT)
 
 
 @functools.lru_cache(maxsize=1024)

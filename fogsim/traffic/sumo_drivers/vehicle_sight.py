@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 from fogsim.obstruction import CLEAR_SIGHT, Obstructions
 from fogsim.traffic.drivers.lamp_intensity import head_lamp_share, intensity_toward
-from fogsim.traffic.drivers.sight import BODY_MIDDLE, DriverSight, FogAccess
+from fogsim.traffic.drivers.sight import DriverSight, FogAccess
+from fogsim.traffic.drivers.sight_kernels import BODY_MIDDLE
 from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
 from fogsim.traffic.sumo_drivers.hidden_vehicles import HiddenVehicles

@@ -20,9 +20,8 @@ from fogsim.traffic import (
     Trigger,
     libsumo_traffic,
 )
-from fogsim.traffic.drivers.eye_heights import EYE_HEIGHTS
 from fogsim.traffic.drivers.lamp_intensity import rear_intensity
-from fogsim.traffic.drivers.sight_kernels import DISTANCE, HIDDEN, SEEN
+from fogsim.traffic.drivers.sight_kernels import DEPTH, DISTANCE, HIDDEN, SEEN
 from fogsim.traffic.drivers.speed_choice import within_sight
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink, load_libsumo
 from fogsim.traffic.sumo_drivers.leader_sight import LeaderSight
@@ -214,9 +213,7 @@ def test_on_a_grade_sight_is_the_closed_form_over_the_way_along_the_road(bank: b
         assert abs(front[2] - ahead[2]) > 2.5
         sight = DriverSight(illuminance=10_000.0)
         pairs = LeaderSight(api, fog, sight, api.vehicle.getSpeed)
-        behind, eyes = np.array([0]), np.array([EYE_HEIGHTS["car"]])
-        depths = pairs._optical_depths(("ego", leader), behind, behind + 1, np.array([gap + 2.5]), eyes)
-        assert depths == pytest.approx([0.03 * way], rel=1e-4)
+        assert pairs._facing([("ego", leader, gap)], 0.5)[DEPTH] == pytest.approx([0.03 * way], rel=1e-4)
     finally:
         link.end()
 

@@ -25,25 +25,32 @@ _OUT_OF_FOG = 1e-9
 
 
 @kernel
-def _split_at_sharp_edges(
+def _sharp_rise(height: float, edge: float, eye: float) -> float:
+    """How far a sharp base or top is above the eye [m]; ``inf`` for one that is soft, or nowhere."""
+    return math.inf if edge > 0.0 or math.isinf(height) else height - eye
+
+
+@kernel
+def _crossing(rise: float, slope: float) -> float:
+    """Distance at which a ray of a slope has risen by so much [m]; ``inf`` where it never does."""
+    return rise / slope if rise * slope > 0.0 else math.inf
+
+
+@kernel
+def _split_at_sharp_edge(
     eye: NDArray[np.float64],
     direction: NDArray[np.float64],
+    crossing: float,
     distances: NDArray[np.float64],
     medium: Medium,
     pieces: NDArray[np.float64],
 ) -> None:
-    """Put right the optical depths of those intervals in which a ray crosses a sharp base or top."""
+    """Put right the optical depth of the interval in which a ray crosses a sharp base or top."""
     halves, values = np.empty(2), np.empty(2)
-    for middle, edge in ((BASE, BASE_EDGE), (TOP, TOP_EDGE)):
-        rise = medium.layer[middle] - eye[2]
-        if medium.layer[edge] > 0.0 or math.isinf(rise) or rise * direction[2] <= 0.0:
-            continue
-        crossing = rise / direction[2]
-        if crossing < distances[distances.shape[0] - 2]:
-            n = np.searchsorted(distances, crossing)
-            halves[0], halves[1] = 0.5 * (distances[n - 1] + crossing), 0.5 * (crossing + distances[n])
-            extinctions_on_ray(eye, direction, halves, medium, values)
-            pieces[n] = values[0] * (crossing - distances[n - 1]) + values[1] * (distances[n] - crossing)
+    n = np.searchsorted(distances, crossing)
+    halves[0], halves[1] = 0.5 * (distances[n - 1] + crossing), 0.5 * (crossing + distances[n])
+    extinctions_on_ray(eye, direction, halves, medium, values)
+    pieces[n] = values[0] * (crossing - distances[n - 1]) + values[1] * (distances[n] - crossing)
 
 
 @kernel
@@ -72,27 +79,35 @@ def grid_depths(
     """
     last = distances.shape[0] - 1
     at, values, pieces = np.empty(2 * last - 1), np.empty(2 * last - 1), np.zeros(last + 1)
-    for n in range(last):
-        at[2 * n] = distances[n]
-        if n < last - 1:
-            at[2 * n + 1] = 0.5 * (distances[n] + distances[n + 1])
-    top, decay = medium.layer[TOP], medium.layer[DECAY]
+    widths = np.diff(distances)
+    at[::2], at[1::2] = distances[:last], 0.5 * (distances[: last - 1] + distances[1:last])
+    layer, top, decay = medium.layer, medium.layer[TOP], medium.layer[DECAY]
+    rises = _sharp_rise(layer[BASE], layer[BASE_EDGE], eye[2]), _sharp_rise(layer[TOP], layer[TOP_EDGE], eye[2])
     for m in range(directions.shape[0]):
         extinctions_on_ray(eye, directions[m], at, medium, values)
-        for n in range(1, last):
-            mean = (values[2 * n - 2] + 4.0 * values[2 * n - 1] + values[2 * n]) / 6.0
-            pieces[n] = mean * (distances[n] - distances[n - 1])
-        _split_at_sharp_edges(eye, directions[m], distances, medium, pieces)
+        for n in range(last - 1):
+            mean = (values[2 * n] + 4.0 * values[2 * n + 1] + values[2 * n + 2]) / 6.0
+            pieces[n + 1] = mean * widths[n]
+        for sharp in rises:
+            crossing = _crossing(sharp, directions[m, 2])
+            if crossing < distances[last - 1]:
+                _split_at_sharp_edge(eye, directions[m], crossing, distances, medium, pieces)
         rise = max(directions[m, 2], _OUT_OF_FOG)
         rest = max(top - eye[2] - distances[last - 1] * directions[m, 2], 0.0) / rise
         if decay > 0.0:
             rest = min(rest, 1.0 / (decay * rise))
         pieces[last] = values[2 * last - 2] * min(rest, ENDLESS)
+        # One thing in each loop, that those without sums become vector instructions.
+        for n in range(last):
+            extinction[m, n] = values[2 * n]
+        extinction[m, last] = values[2 * last - 2]
         total = 0.0
         for n in range(last + 1):
             total += pieces[n]
-            extinction[m, n] = values[2 * min(n, last - 1)]
-            depth[m, n] = min(total, OPAQUE)
+            pieces[n] = total
+        for n in range(last + 1):
+            depth[m, n] = min(pieces[n], OPAQUE)
+        pieces[0] = 0.0
 
 
 class PixelGrid(NamedTuple):

@@ -67,6 +67,36 @@ def _height_profile(z: float, base: float, base_edge: float, top: float, top_edg
 
 
 @kernel
+def _is_within_layer(height: float, other: float, layer: NDArray[np.float64]) -> bool:
+    """Whether all of the extinction is left between two heights."""
+    is_above_base = min(height, other) > layer[BASE] + 0.5 * layer[BASE_EDGE] + _BESIDE_EDGE
+    is_below_top = max(height, other) < layer[TOP] - 0.5 * layer[TOP_EDGE] - _BESIDE_EDGE
+    return bool(is_above_base and is_below_top)
+
+
+@kernel
+def _leave_out_shelters(
+    x: float,
+    y: float,
+    dx: float,
+    dy: float,
+    at: NDArray[np.float64],
+    shelters: NDArray[np.float64],
+    values: NDArray[np.float64],
+) -> None:
+    """Take from values at distances along a ray what is not there in tunnels."""
+    for b in range(shelters.shape[0]):
+        shelter = shelters[b]
+        station = (x - shelter[0]) * shelter[2] + (y - shelter[1]) * shelter[3]
+        aside = (y - shelter[1]) * shelter[2] - (x - shelter[0]) * shelter[3]
+        rate, aside_rate = dx * shelter[2] + dy * shelter[3], dy * shelter[2] - dx * shelter[3]
+        for i in range(at.shape[0]):
+            here, beside = station + rate * at[i], abs(aside + aside_rate * at[i])
+            inside = _smoothstep(here, shelter[4], shelter[6]) - _smoothstep(here, shelter[5], shelter[6])
+            values[i] *= 1.0 - inside * (1.0 - _smoothstep(beside, shelter[7], shelter[8]))
+
+
+@kernel
 def extinctions_on_ray(
     start: NDArray[np.float64],
     towards: NDArray[np.float64],
@@ -83,7 +113,7 @@ def extinctions_on_ray(
     towards : (3,) float64
         Unit vector along it.
     at : (n,) float64
-        Distances [m].
+        Ascending distances [m].
     medium : Medium
         The fog.
     values : (n,) float64
@@ -92,44 +122,70 @@ def extinctions_on_ray(
     Notes
     -----
     One pass over the places for each part of the field: handing arrays to a function for every single place would take
-    longer than what is computed there.
+    longer than what is computed there. None for a part that is the same at both ends of the ray, and so between.
     """
-    layer, banks, frame, factors = medium.layer, medium.banks, medium.frame, medium.factors
-    base, base_edge, top, top_edge = layer[BASE], layer[BASE_EDGE], layer[TOP], layer[TOP_EDGE]
-    ground, decay = layer[GROUND], layer[DECAY]
+    layer, banks = medium.layer, medium.banks
     x, y, z = start[0], start[1], start[2]
     dx, dy, dz = towards[0], towards[1], towards[2]
     values[:] = layer[EXTINCTION]
+    # Here, while the rest has functions of its own: handing arrays over for every ray takes as long as most banks do.
     for b in range(banks.shape[0]):
         here = (x - banks[b, 0]) * banks[b, 2] + (y - banks[b, 1]) * banks[b, 3]
         rate = dx * banks[b, 2] + dy * banks[b, 3]
         first, last, edge, extra = banks[b, 4], banks[b, 5], banks[b, 6], banks[b, 7]
+        beside, one, other = 0.5 * edge + _BESIDE_EDGE, here + rate * at[0], here + rate * at[at.shape[0] - 1]
+        low, high = min(one, other), max(one, other)
+        if high < min(first, last) - beside or low > max(first, last) + beside:
+            continue
+        if first + beside < low and high < last - beside:
+            for i in range(at.shape[0]):
+                values[i] += extra
+            continue
         for i in range(at.shape[0]):
             station = here + rate * at[i]
             values[i] += extra * (_smoothstep(station, first, edge) - _smoothstep(station, last, edge))
+    if layer[DECAY] > 0.0 or not _is_within_layer(z + dz * at[0], z + dz * at[at.shape[0] - 1], layer):
+        _thin_with_height(z, dz, at, layer, values)
+    if medium.shelters.shape[0] > 0:
+        _leave_out_shelters(x, y, dx, dy, at, medium.shelters, values)
+    if medium.factors.size > 1:
+        _make_patchy(start, towards, at, medium, values)
+
+
+@kernel
+def _thin_with_height(
+    z: float, dz: float, at: NDArray[np.float64], layer: NDArray[np.float64], values: NDArray[np.float64]
+) -> None:
+    """Leave of values along a ray, which begins at a height [m] and rises by so much a metre, what is left there."""
+    base, base_edge, top, top_edge = layer[BASE], layer[BASE_EDGE], layer[TOP], layer[TOP_EDGE]
+    ground, decay = layer[GROUND], layer[DECAY]
     for i in range(at.shape[0]):
         values[i] *= _height_profile(z + dz * at[i], base, base_edge, top, top_edge)
     if decay > 0.0:
         for i in range(at.shape[0]):
             values[i] *= math.exp(-max(z + dz * at[i] - ground, 0.0) * decay)
-    for b in range(medium.shelters.shape[0]):
-        shelter = medium.shelters[b]
-        station = (x - shelter[0]) * shelter[2] + (y - shelter[1]) * shelter[3]
-        aside = (y - shelter[1]) * shelter[2] - (x - shelter[0]) * shelter[3]
-        rate, aside_rate = dx * shelter[2] + dy * shelter[3], dy * shelter[2] - dx * shelter[3]
-        for i in range(at.shape[0]):
-            here, beside = station + rate * at[i], abs(aside + aside_rate * at[i])
-            inside = _smoothstep(here, shelter[4], shelter[6]) - _smoothstep(here, shelter[5], shelter[6])
-            values[i] *= 1.0 - inside * (1.0 - _smoothstep(beside, shelter[7], shelter[8]))
-    if factors.size > 1:
-        level, upright, cosine, sine = frame[0], frame[1], frame[2], frame[3]
-        across = ((x - frame[4]) * cosine + (y - frame[5]) * sine) * level
-        along = ((y - frame[5]) * cosine - (x - frame[4]) * sine) * level
-        across_rate, along_rate = (dx * cosine + dy * sine) * level, (dy * cosine - dx * sine) * level
-        for i in range(at.shape[0]):
-            values[i] *= _patch_factor(
-                across + across_rate * at[i], along + along_rate * at[i], (z + dz * at[i]) * upright, factors
-            )
+
+
+@kernel
+def _make_patchy(
+    start: NDArray[np.float64],
+    towards: NDArray[np.float64],
+    at: NDArray[np.float64],
+    medium: Medium,
+    values: NDArray[np.float64],
+) -> None:
+    """Multiply values at distances along a ray by the factors of the patches there."""
+    frame, factors = medium.frame, medium.factors
+    x, y, z = start[0], start[1], start[2]
+    dx, dy, dz = towards[0], towards[1], towards[2]
+    level, upright, cosine, sine = frame[0], frame[1], frame[2], frame[3]
+    across = ((x - frame[4]) * cosine + (y - frame[5]) * sine) * level
+    along = ((y - frame[5]) * cosine - (x - frame[4]) * sine) * level
+    across_rate, along_rate = (dx * cosine + dy * sine) * level, (dy * cosine - dx * sine) * level
+    for i in range(at.shape[0]):
+        values[i] *= _patch_factor(
+            across + across_rate * at[i], along + along_rate * at[i], (z + dz * at[i]) * upright, factors
+        )
 
 
 @kernel
@@ -204,11 +260,8 @@ def _pieces_per_metre(towards: NDArray[np.float64], medium: Medium) -> float:
 @kernel
 def _is_banks_alone(height: float, other: float, medium: Medium) -> bool:
     """Whether nothing but banks makes the fog uneven between two heights [m]."""
-    layer = medium.layer
-    is_above_base = min(height, other) > layer[BASE] + 0.5 * layer[BASE_EDGE] + _BESIDE_EDGE
-    is_below_top = max(height, other) < layer[TOP] - 0.5 * layer[TOP_EDGE] - _BESIDE_EDGE
-    is_even = layer[DECAY] == 0.0 and medium.factors.size == 1
-    return bool(is_above_base and is_below_top and is_even and len(medium.shelters) == 0)
+    is_even = medium.layer[DECAY] == 0.0 and medium.factors.size == 1 and len(medium.shelters) == 0
+    return bool(is_even and _is_within_layer(height, other, medium.layer))
 
 
 @kernel

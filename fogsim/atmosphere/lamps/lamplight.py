@@ -13,7 +13,7 @@ from fogsim.atmosphere.lamps.lamplight_kernels import LampGroup, VeilGrid, add_o
 from fogsim.atmosphere.lamps.phase_function import Droplets
 from fogsim.atmosphere.lamps.plane_pieces import piece_length
 from fogsim.atmosphere.lamps.veil import FOLD_DISTANCE, INTERVALS, lit_air, node_distances, veil_along, veil_rays
-from fogsim.atmosphere.lamps.veil_kernels import LitAir, VeilRays
+from fogsim.atmosphere.lamps.veil_kernels import LitAir, VeilRays, average_extinctions
 from fogsim.linear_algebra import matrix_product
 from fogsim.values import Camera, CameraPose, FogField, HeadLamp, View
 from fogsim.values.pinhole import camera_axes, ray_from_pixel
@@ -170,9 +170,6 @@ def _extinction_on(
     extinction, depth = np.empty(shape, np.float32), np.empty(shape, np.float32)
     directions = np.ascontiguousarray(matrix_product(rays.directions.astype(np.float64), to_world.T))
     grid_depths(np.array(pose.position), directions, distances, medium_of(fog), extinction, depth)
-    lengths = distances.astype(np.float32)
-    local = np.diff(depth, axis=1) / np.diff(lengths)
-    mean = np.empty_like(depth)
-    mean[:, 0] = extinction[:, 0]
-    mean[:, 1:] = depth[:, 1:] / lengths[1:]
-    return mean, local
+    local = np.empty((shape[0], shape[1] - 1), np.float32)
+    average_extinctions(distances.astype(np.float32), depth, local, extinction)
+    return extinction, local

@@ -18,7 +18,14 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere.lamps.lamp_tables import phase_table
 from fogsim.atmosphere.lamps.phase_function import Droplets, blurred, phase_function
-from fogsim.atmosphere.lamps.veil_kernels import LitAir, ScatteringPhase, VeilRays, add_scattered_light, integrate_veil
+from fogsim.atmosphere.lamps.veil_kernels import (
+    PIECES,
+    LitAir,
+    ScatteringPhase,
+    VeilRays,
+    add_scattered_light,
+    integrate_veil,
+)
 from fogsim.linear_algebra import matrix_product
 from fogsim.values import Camera, CameraPose
 from fogsim.values.pinhole import camera_axes
@@ -36,7 +43,6 @@ FOLD_DISTANCE = 10.0
 """Nodes lie evenly over r / (r + FOLD_DISTANCE) [m]."""
 
 INTERVALS = 32
-PIECES = 4
 CELL_PIXELS = 10
 """Pixels between two rays; there are 40 … 64 cells across the image."""
 

@@ -10,6 +10,9 @@ from fogsim.atmosphere.fog.koschmieder_kernels import transmittances
 from fogsim.atmosphere.lamps.lamp_tables import BLURS, FIRST_BLUR, FOLD, PHASE_SIZE, SIZE
 from fogsim.jit import kernel
 
+PIECES = 4
+"""Pieces of a ray between two of its nodes."""
+
 LAMP_SIZE = 0.08
 """Radius of a lamp's face [m]: seen from near, its beam is blurred by as much."""
 
@@ -143,6 +146,30 @@ def add_scattered_light(
 
 
 @kernel
+def average_extinctions(
+    distances: NDArray[np.float32], depth: NDArray[np.float32], local: NDArray[np.float32], mean: NDArray[np.float32]
+) -> None:
+    """Mean extinction coefficients along rays.
+
+    Parameters
+    ----------
+    distances : (nodes,) float32
+        Of the nodes, ascending from 0 [m].
+    depth : (m, nodes) float32
+        Optical depths from the eye to them [-].
+    local : (m, nodes - 1) float32
+        Means between nodes [1/m]; written to.
+    mean : (m, nodes) float32
+        At the eye, and from then on means from the eye to each node [1/m]; all but the first are written to.
+    """
+    for m in range(depth.shape[0]):
+        for n in range(distances.shape[0] - 1):
+            local[m, n] = (depth[m, n + 1] - depth[m, n]) / (distances[n + 1] - distances[n])
+        for n in range(1, distances.shape[0]):
+            mean[m, n] = depth[m, n] / distances[n]
+
+
+@kernel
 def integrate_veil(
     air: LitAir,
     extinction: NDArray[np.float32],
@@ -165,24 +192,25 @@ def integrate_veil(
     """
     straight, turned, path = air.straight, air.turned, air.path
     pieces, intervals = path.shape[1], veil.shape[1] - 1
-    each = pieces // intervals
     depth, kept = np.empty(pieces, np.float32), np.empty(pieces, np.float32)
-    power = np.empty(pieces, np.int32)
+    power, light = np.empty(pieces, np.int32), np.empty(intervals, np.float32)
     uniform_rays, uniform_way = extinction.shape[0] == 1, extinction.shape[1] == 1
+    # Four pieces at a time and one thing in each loop, which become vector instructions.
     for m in range(path.shape[0]):
         ray = 0 if uniform_rays else m
         for i in range(intervals):
-            k = mean[ray, 0 if uniform_way else i]
-            for n in range(i * each, (i + 1) * each):
-                depth[n] = loss * k * path[m, n]
+            k = loss * mean[ray, 0 if uniform_way else i]
+            for n in range(PIECES):
+                depth[PIECES * i + n] = k * path[m, PIECES * i + n]
         transmittances(depth, power, kept)
+        for n in range(pieces):
+            straight_kept = kept[n] * kept[n]
+            kept[n] = straight[m, n] * straight_kept + turned[m, n] * (kept[n] - straight_kept)
+        for i in range(intervals):
+            n = PIECES * i
+            light[i] = ((kept[n] + kept[n + 1]) + kept[n + 2]) + kept[n + 3]
         total = np.float32(0.0)
         veil[m, 0] = total
         for i in range(intervals):
-            k = extinction[ray, 0 if uniform_way else i]
-            light = np.float32(0.0)
-            for n in range(i * each, (i + 1) * each):
-                straight_kept = kept[n] * kept[n]
-                light += straight[m, n] * straight_kept + turned[m, n] * (kept[n] - straight_kept)
-            total += k * light
+            total += extinction[ray, 0 if uniform_way else i] * light[i]
             veil[m, i + 1] = total

@@ -16,7 +16,8 @@ from fogsim.atmosphere import (
     optical_depth,
     optical_depth_along,
 )
-from fogsim.atmosphere.fog.medium import PATCH_CELLS, patch_factors
+from fogsim.atmosphere.fog.medium import PATCH_CELLS, medium_of, patch_factors
+from fogsim.atmosphere.fog.optical_depth_kernels import extinctions_on_ray
 from fogsim.errors import InputError
 from fogsim.values import FogBank, FogChange, FogField, FogPatches, FogShelter
 from tests.atmosphere.fields import AIRLIGHT, BANK, PATCHES, UNEVEN, brute_force
@@ -73,6 +74,19 @@ def test_the_distance_at_a_depth_is_where_the_depth_along_the_line_comes_to_it(n
         found = distance_at_depth(UNEVEN[name], start, direction, distances, float(depth))
         assert found == np.interp(depth, along, distances)
     assert distance_at_depth(UNEVEN[name], start, direction, distances, 1.01 * float(along[-1])) == math.inf
+
+
+@pytest.mark.parametrize("name", UNEVEN)
+def test_a_whole_ray_has_the_extinction_of_its_places_one_by_one_digit_for_digit(name: str) -> None:
+    """Parts of the fog that are the same at both ends of a ray are not looked at in between."""
+    medium, at = medium_of(field_at(UNEVEN[name], 0.0)), np.geomspace(0.5, 400.0, 40)
+    for direction in ((0.8, 0.6, 0.0), (0.6, 0.79, 0.12), (-0.8, 0.6, 0.0)):
+        start, towards = np.array([0.0, 5.0, 1.5]), np.array(direction)
+        whole, each = np.empty(len(at)), np.empty(len(at))
+        extinctions_on_ray(start, towards, at, medium, whole)
+        for i in range(len(at)):
+            extinctions_on_ray(start, towards, at[i : i + 1], medium, each[i : i + 1])
+        assert np.array_equal(whole, each)
 
 
 def test_banks_alone_have_the_depth_of_banks_and_a_far_tunnel_digit_for_digit() -> None:

@@ -67,6 +67,7 @@ def compile_kernels() -> Iterator[str]:
             pool.submit(_estimate_visibility): "estimators",
             pool.submit(_detect_signs): "signs",
             pool.submit(_find_lamps): "lamps",
+            pool.submit(_read_own_beams): "methods of the night",
         }
         while pending:
             for done in wait(pending, return_when=FIRST_COMPLETED).done:
@@ -125,6 +126,22 @@ def _read(estimator: "Estimator", camera: "Camera") -> None:
         image = _foggy_road(camera, distance)
         frame = Frame(0.1 * index, image if index < 3 else np.ascontiguousarray(image[:, :, 0]), camera)
         estimator.update(Observation(frame, 20.0, LeadMeasurement(distance, 5.0), ()))
+
+
+def _read_own_beams() -> None:
+    """Let methods of the night read pictures of a lit road, in colour and in grey."""
+    import numpy as np
+
+    from fogsim.calibration.veil_references import usual_references
+    from fogsim.estimators.night.night_road import NightRoad
+    from fogsim.values import Camera, Lamp, Observation
+
+    camera = Camera(160, 120, 144.0, (80.0, 60.0), 1.4, pitch=0.03)
+    lit = np.repeat(np.linspace(10, 120, 120).astype(np.uint8)[:, None], 160, axis=1)
+    estimator = NightRoad(camera)
+    estimator.take_references(usual_references)
+    for image in (np.repeat(lit[:, :, None], 3, axis=2), lit):
+        estimator.update(Observation(image, lamps=Lamp.LOW_BEAM))
 
 
 def _detect_signs() -> None:

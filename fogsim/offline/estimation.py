@@ -6,8 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from fogsim.calibration.veil_references import usual_references
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.estimators import ESTIMATORS, Estimator, make
+from fogsim.estimators.night.references import TakesReferences
 from fogsim.offline.camera_file import Calibration
 from fogsim.offline.image_files import Pixels
 from fogsim.offline.input_paths import find_source
@@ -177,7 +179,11 @@ class _Bench:
         self._estimators: dict[Camera, list[Estimator]] = {camera: self._made(camera)}
 
     def _made(self, camera: Camera) -> list[Estimator]:
-        return [make(name, camera) for name in self._methods]
+        made = [make(name, camera) for name in self._methods]
+        for estimator in made:
+            if isinstance(estimator, TakesReferences):
+                estimator.take_references(usual_references)
+        return made
 
     def reset(self) -> None:
         """Forget all earlier images."""

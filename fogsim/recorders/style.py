@@ -49,6 +49,7 @@ _NAMED = (
     "lead_contrast",
     "belaroussi2015",
     "sign_contrast",
+    "night_road",
 )
 """Methods that the first colours belong to, whichever others stand beside them."""
 
@@ -62,18 +63,18 @@ ON_DARK: tuple[Colour, ...] = (
     (0, 150, 30),
     (150, 135, 180),
     (225, 0, 210),
-    (180, 195, 0),
-    (255, 225, 180),
-    (195, 165, 105),
-    (90, 255, 120),
     (165, 240, 240),
     (255, 150, 180),
-    (75, 150, 255),
+    (255, 237, 204),
+    (189, 159, 123),
+    (0, 105, 182),
+    (180, 195, 0),
+    (90, 255, 120),
 )
 """Colours as far apart as sixteen can be on a dark ground, the first ones farthest from the panel's belief and truth.
 
-The least colour difference of any two (CIE 1976, ΔE of L*a*b*) is 19 for normal sight and for any of the three
-dichromacies as Machado et al. 2009 simulate them; found by search over a grid of all colours of L* 48 … 94.
+The least colour difference of any two (CIE 1976, ΔE of L*a*b*) is 18 for normal sight and for any of the three
+dichromacies as Machado et al. 2009 simulate them; found by search over a grid of all colours of L* 43 … 95.
 """
 
 ON_LIGHT: tuple[Colour, ...] = (
@@ -88,11 +89,11 @@ ON_LIGHT: tuple[Colour, ...] = (
     (120, 30, 135),
     (195, 165, 135),
     (255, 135, 90),
-    (240, 45, 0),
-    (0, 150, 30),
     (0, 180, 255),
     (60, 15, 60),
     (0, 0, 240),
+    (240, 45, 0),
+    (0, 150, 30),
 )
 """The same on a white ground, ΔE 18 or more.
 

@@ -3,8 +3,10 @@
 import dataclasses
 
 from fogsim.advice import ADVISERS, Adviser, VehicleAdviser
+from fogsim.calibration.veil_references import usual_references
 from fogsim.errors import InputError
 from fogsim.estimators import ESTIMATORS, Estimator
+from fogsim.estimators.night.references import TakesReferences
 from fogsim.fusion import FUSIONS, Fusion
 from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy
 from fogsim.metrics import SafetyStandard
@@ -64,7 +66,11 @@ def estimators(scenario: Scenario, assumed: Camera) -> tuple[Estimator, ...]:
     assumed : Camera
         The assumed calibration.
     """
-    return tuple(ESTIMATORS.find(e.method, scenario.directory)(assumed, **e.parameters) for e in scenario.estimators)
+    made = tuple(ESTIMATORS.find(e.method, scenario.directory)(assumed, **e.parameters) for e in scenario.estimators)
+    for estimator in made:
+        if isinstance(estimator, TakesReferences):
+            estimator.take_references(usual_references)
+    return made
 
 
 def fusion(scenario: Scenario) -> Fusion:

@@ -1,0 +1,147 @@
+"""References of the veil as a file of a calibration, or computed when they are first needed."""
+
+import io
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.errors import InputError, shown
+from fogsim.estimators.night.references import ReferenceSource, VeilReferences
+from fogsim.values.camera import Camera, Response
+from fogsim.values.light import Lamp
+
+USUAL_SETBACK = 1.9
+"""Distance of the camera behind the front bumper where no vehicle tells it [m]."""
+
+_KEYS = {"head", "visibility", "veil", "road"}
+
+
+class References:
+    """References of one camera for the lamps that may be lit.
+
+    Parameters
+    ----------
+    camera : Camera
+        The assumed calibration.
+    path : str or None
+        File of ``fogsim calibrate veil``; without one there are none until `source` is set.
+
+    Attributes
+    ----------
+    source : callable or None
+        Where references come from without a file.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or is of another camera.
+    """
+
+    def __init__(self, camera: Camera, path: str | None) -> None:
+        self._camera = camera
+        self._read = [] if path is None else read_references(Path(path))
+        self._path = path
+        self.source: ReferenceSource | None = None
+        for one in self._read:
+            if _without_noise(one.camera) != _without_noise(camera):
+                raise InputError(
+                    f"references must be of the told camera, {camera}, and {path} has those of {one.camera}; "
+                    "fogsim calibrate veil makes them"
+                )
+
+    def find(self, lamps: Lamp, setback: float) -> tuple[VeilReferences, ...]:
+        """References for the lamps that are lit, of the same visibilities for each kind of droplets, if there are any.
+
+        Parameters
+        ----------
+        lamps : Lamp
+            Low beams, high beams, front fog lamps.
+        setback : float
+            Distance of the camera behind the front bumper [m]; 0 where it is not told.
+
+        Raises
+        ------
+        InputError
+            If the file has none for them.
+        """
+        if self._path is None:
+            if self.source is None:
+                return ()
+            return self.source(_without_noise(self._camera), lamps, round(setback or USUAL_SETBACK, 3))
+        found = tuple(one for one in self._read if one.lamps == lamps)
+        if not found:
+            has = ", ".join(dict.fromkeys(lamp_names(one.lamps) for one in self._read))
+            raise InputError(f"{self._path} has no references for {lamp_names(lamps)}; it has {has}")
+        return found
+
+
+def lamp_names(lamps: Lamp) -> str:
+    """Lamps in words.
+
+    Parameters
+    ----------
+    lamps : Lamp
+        The lamps.
+    """
+    return "+".join(str(lamp.name).lower() for lamp in Lamp if lamp and lamp in lamps)
+
+
+def _without_noise(camera: Camera) -> Camera:
+    """What of a camera decides where it sees what."""
+    return replace(camera, bits=8, black_level=0.0, response=Response.LINEAR)
+
+
+def references_as_bytes(references: Sequence[VeilReferences]) -> bytes:
+    """The file of a calibration.
+
+    Parameters
+    ----------
+    references : sequence of VeilReferences
+        Of one camera, each for other lamps.
+    """
+    arrays: dict[str, NDArray[Any]] = {}
+    for index, one in enumerate(references):
+        head = {"camera": asdict(one.camera), "lamps": int(one.lamps), "droplets": one.droplets}
+        head |= {"setback": one.setback}
+        arrays[f"head{index}"] = np.array(json.dumps(head))
+        for name in ("visibility", "veil", "road"):
+            arrays[f"{name}{index}"] = getattr(one, name)
+    file = io.BytesIO()
+    np.savez_compressed(file, allow_pickle=False, **arrays)
+    return file.getvalue()
+
+
+def read_references(path: Path) -> list[VeilReferences]:
+    """Read the file of a calibration.
+
+    Parameters
+    ----------
+    path : Path
+        As `references_as_bytes` makes it.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or is no such file.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return [_one(file, index) for index in range(max(len(file.files) // len(_KEYS), 1))]
+    except (OSError, ValueError, KeyError, TypeError, EOFError, InputError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else shown(error)
+        raise InputError(
+            f"references must be a file of `fogsim calibrate veil`, got {str(path)!r}: no references can be read: "
+            f"{reason}"
+        ) from error
+
+
+def _one(file: Any, index: int) -> VeilReferences:
+    head = json.loads(str(file[f"head{index}"]))
+    camera = Camera(**{**head["camera"], "principal_point": tuple(head["camera"]["principal_point"])})
+    arrays = (np.asarray(file[f"{name}{index}"], np.float64) for name in ("visibility", "veil", "road"))
+    return VeilReferences(camera, Lamp(head["lamps"]), str(head["droplets"]), float(head["setback"]), *arrays)

@@ -10,6 +10,9 @@ from fogsim.errors import InputError
 LEAST_LUMINANCE = 1e-6
 """Luminance below which the formulas are read at this value [cd/m²]."""
 
+SMALLEST_ANGLE = math.radians(0.1)
+"""Angle from which on the general formula is known, to 100° [rad]; below it is read at this angle."""
+
 LEAST_ANGLE = math.radians(1.0)
 """Angle below which the formula is read at this angle [rad]; it is known from 1° to 30°."""
 
@@ -65,6 +68,41 @@ def veiling_luminance(illuminance: ArrayLike, angle: ArrayLike, age: float = 25.
     InputError
         If an illuminance or the age is negative or not finite, or an angle is not in 0 … π.
     """
+    light, theta = _checked_glare(illuminance, angle, age)
+    degrees = np.degrees(np.maximum(theta, LEAST_ANGLE))
+    return np.asarray(10.0 * light * (1.0 + (age / 70.0) ** 4) / degrees**2)
+
+
+def disability_glare(
+    illuminance: ArrayLike, angle: ArrayLike, age: float = 25.0, pigmentation: float = 0.5
+) -> NDArray[np.float64]:
+    """Veil of disability glare by the general formula of CIE 146:2002, from 0.1° to 100° [cd/m²].
+
+    L_v / E = 10/θ³ + (5/θ² + 0.1 p/θ) (1 + (A/62.5)⁴) + 0.0025 p, θ in degrees. Several sources add.
+
+    Parameters
+    ----------
+    illuminance, angle, age
+        As of `veiling_luminance`; an angle of less than 0.1° counts as 0.1°.
+    pigmentation : float
+        p [-]: 0 for black eyes, 0.5 for brown, 1 for light blue, 1.2 for very light ones.
+
+    Raises
+    ------
+    InputError
+        As `veiling_luminance`, or if the pigmentation is not in 0 … 1.2.
+    """
+    light, theta = _checked_glare(illuminance, angle, age)
+    if not 0.0 <= pigmentation <= 1.2:
+        raise InputError(f"pigmentation of the eye must lie in 0 … 1.2, got {pigmentation!r}")
+    degrees = np.degrees(np.maximum(theta, SMALLEST_ANGLE))
+    by_age = (5.0 / degrees**2 + 0.1 * pigmentation / degrees) * (1.0 + (age / 62.5) ** 4)
+    return np.asarray(light * (10.0 / degrees**3 + by_age + 0.0025 * pigmentation))
+
+
+def _checked_glare(
+    illuminance: ArrayLike, angle: ArrayLike, age: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     light, theta = np.asarray(illuminance, dtype=np.float64), np.asarray(angle, dtype=np.float64)
     if not (np.all(np.isfinite(light)) and np.all(light >= 0)):
         raise InputError(f"illuminance at the eye must be finite and not negative [lx], got {illuminance!r}")
@@ -72,5 +110,4 @@ def veiling_luminance(illuminance: ArrayLike, angle: ArrayLike, age: float = 25.
         raise InputError(f"angle of a glare source must lie in 0 … π rad, got {angle!r}")
     if not (age > 0 and math.isfinite(age)):
         raise InputError(f"age must be positive [years], got {age!r}")
-    degrees = np.degrees(np.maximum(theta, LEAST_ANGLE))
-    return np.asarray(10.0 * light * (1.0 + (age / 70.0) ** 4) / degrees**2)
+    return light, theta

@@ -21,8 +21,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from fogsim.traffic.drivers.adaptation import AIRLIGHT_REFLECTANCE, Adaptation, adaptation
 from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST
+from fogsim.traffic.drivers.own_beams import HIGH_BEAM_LIGHT
 from fogsim.traffic.drivers.sight_kernels import DISTANCE_TOLERANCE, depth_limit, judge_leaders, seen_distance
-from fogsim.units import CONTRAST_THRESHOLD, luminance_of
+from fogsim.units import CONTRAST_THRESHOLD, DAY_ILLUMINANCE, luminance_of
 
 LEAST_CONTRAST = 0.5
 """No vehicle's rear has less contrast to the airlight than this, not even a white one [-]."""
@@ -116,9 +117,9 @@ class DriverSight:
         intensity : float
             Luminous intensity of its brightest lamp toward the eye [cd].
         head_lamps : float
-            Light of the own head lamps toward it over that straight ahead [-]; 0 while they are dark.
+            Light of the own head lamps toward it over that of low beams straight ahead [-]; 0 while they are dark.
         glare : float
-            Veil inside the eye from others' head lamps [cd/m²].
+            Veil inside the eye from others' head lamps, and before it from own high beams in fog [cd/m²].
 
         Returns
         -------
@@ -207,7 +208,9 @@ class DriverSight:
         brightest : float
             Luminous intensity of the brightest lamp that there may be [cd].
         """
-        return self.seen_distance(minimum_extinction, 1.0, brightest) + DISTANCE_TOLERANCE
+        # By day nobody sees by head lamps.
+        own = HIGH_BEAM_LIGHT if self.illuminance < DAY_ILLUMINANCE else 1.0
+        return self.seen_distance(minimum_extinction, 1.0, brightest, own) + DISTANCE_TOLERANCE
 
 
 def inherent_contrast(paint: tuple[float, float, float]) -> float:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fogsim.traffic.appearance import OTHERS_LAMPS, lamps_from_signals
 from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST as BRIGHTEST_LAMP
 from fogsim.traffic.drivers.lamp_intensity import rear_intensity
+from fogsim.traffic.drivers.own_beams import high_beam_veil, uses_high_beam
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.drivers.sight_kernels import (
     BRIGHTEST,
@@ -109,6 +110,8 @@ class LeaderSight:
         if own_lamps:
             self._add_own_lamps(facing, pairs, own_lamps)
         judged, pauses = self._sight.judge_leaders(facing, self._most_glare, horizon)
+        if own_lamps and self._most_glare > 0.0:
+            self._doubt_own_beams(judged, pauses, pairs, own_lamps)
         return [
             (verdict == SEEN if verdict != DAZZLED else self._is_seen(pairs[i], facing[:, i], own_lamps), pause)
             for i, (verdict, pause) in enumerate(zip(judged.tolist(), pauses.tolist(), strict=True))
@@ -138,6 +141,17 @@ class LeaderSight:
         read[:, MINIMUM_GAP:] = self._look_up(vehicles)
         return read
 
+    @staticmethod
+    def _doubt_own_beams(
+        judged: NDArray[np.float64], pauses: NDArray[np.float64], pairs: Sequence[Pair], own_lamps: OwnLamps
+    ) -> None:
+        """Look anew, one by one, for drivers with high beams, which veil the fog; and soon, for those who may have."""
+        for i, (follower, _, _) in enumerate(pairs):
+            if follower in own_lamps:
+                pauses[i] = 0.0
+                if uses_high_beam(own_lamps[follower]):
+                    judged[i] = DAZZLED
+
     def _look_up(self, vehicles: Collection[str]) -> NDArray[np.float64]:
         """What never changes about vehicles (n, 3): minimum gap [m], contrast [-], height of the driver's eyes [m]."""
         known = self._rows
@@ -163,9 +177,19 @@ class LeaderSight:
 
     def _is_seen(self, pair: Pair, facing: NDArray[np.float64], own_lamps: OwnLamps) -> bool:
         """Whether a leader is seen who is unless glare hides it, which costs more than all the rest to know."""
-        glare = self._glare.veil(pair[0], pair[1], own_lamps)
+        follower, leader, _ = pair
+        glare = self._glare.veil(follower, leader, own_lamps)
+        if uses_high_beam(own_lamps.get(follower, 0)):
+            glare += high_beam_veil(self._extinction_at(follower))
         distance, contrast, intensity, own = facing[[DISTANCE, CONTRAST, INTENSITY, OWN]].tolist()
         return bool(facing[DEPTH] <= self._sight.depth_limit(distance, contrast, intensity, own, glare))
+
+    def _extinction_at(self, vehicle: str) -> float:
+        """Extinction coefficient where a vehicle is [1/m]."""
+        if self._is_even:
+            return self._max_extinction
+        x, y, z = self._position(vehicle)
+        return float(self._fog.extinction((x, y, z + self._vehicles.eye_height(vehicle))))
 
 
 @functools.lru_cache(maxsize=1024)

@@ -1,4 +1,4 @@
-"""Glare of head lamps that come toward a driver on the other side of the road."""
+"""Glare of head lamps that come toward a driver on the other side of the road, and of high beams in the mirrors."""
 
 import math
 from collections.abc import Sequence
@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.traffic.drivers.lamp_intensity import beam_intensity, head_lamps_that_burn
+from fogsim.traffic.drivers.own_beams import uses_high_beam
 from fogsim.traffic.drivers.sight import FogAccess
 from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
 from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps, SeenVehicles
 from fogsim.units import DAY_ILLUMINANCE
-from fogsim.values.eye import veiling_luminance
+from fogsim.values.eye import disability_glare
 
 FARTHEST_SOURCE = 200.0
 """Lamps farther away than this are left out [m]."""
@@ -26,6 +27,10 @@ lay 0.2 … 0.3 cd/m² over the eye, high beams 10 and more."""
 
 LAMP_HEIGHT = 0.65
 """Of head lamps above the road [m]."""
+
+MIRROR_ANGLE, MIRROR_SHARE = math.radians(40.0), 0.8
+"""Where a driver sees what is behind, from straight ahead [rad], and how much of its light [-]: the mirror inside and
+that beside the driver at about 40° to either side, of the 40 % each that UNECE R46 asks for at least."""
 
 _Point = tuple[float, float, float]
 
@@ -108,7 +113,29 @@ class OncomingGlare:
         """
         edges = {e for vehicle in (observer, target) for e in self._opposite.of(self._road(vehicle))}
         oncoming = [v for edge in sorted(edges) for v in self._on_edge(edge)]
-        return min(self._veil_of(observer, target, oncoming, own_lamps), MOST_GLARE) if oncoming else 0.0
+        veil = self._veil_of(observer, target, oncoming, own_lamps) if oncoming else 0.0
+        dazzling = [v for v, lamps in own_lamps.items() if v != observer and uses_high_beam(lamps)]
+        return min(veil + self._veil_in_mirrors(observer, dazzling, own_lamps), MOST_GLARE) if dazzling else veil
+
+    def _veil_in_mirrors(self, observer: str, dazzling: Sequence[str], own_lamps: OwnLamps) -> float:
+        """Veil of high beams that follow an observer on the same road [cd/m²]."""
+        x, y, z = self._position(observer)
+        eyes, heading = (x, y, z + self._vehicles.eye_height(observer)), math.radians(90.0 - self._angle(observer))
+        total = 0.0
+        for vehicle in dazzling:
+            if vehicle not in self._on_edge(self._road(observer)):
+                continue
+            lamp_x, lamp_y, lamp_z = self._position(vehicle)
+            lamp = lamp_x, lamp_y, lamp_z + LAMP_HEIGHT
+            distance = math.dist(eyes, lamp)
+            behind = (x - lamp_x) * math.cos(heading) + (y - lamp_y) * math.sin(heading)
+            if not 0.0 < behind <= distance < self._farthest:
+                continue
+            off_axis = math.degrees(math.acos(behind / distance))
+            light = sum(beam_intensity(lit, off_axis) for lit in head_lamps_that_burn(own_lamps[vehicle]))
+            light *= MIRROR_SHARE * math.exp(-float(self._optical_depths(eyes, [lamp])[0])) / distance**2
+            total += float(disability_glare(light, MIRROR_ANGLE))
+        return total
 
     def _veil_of(self, observer: str, target: str, oncoming: Sequence[str], own_lamps: OwnLamps) -> float:
         x, y, z = self._position(observer)
@@ -135,7 +162,7 @@ class OncomingGlare:
         if not ends:
             return 0.0
         dimmed = light * np.exp(-self._optical_depths((x, y, z + height), ends))
-        return float(veiling_luminance(dimmed, angles).sum())
+        return min(float(disability_glare(dimmed, angles).sum()), MOST_GLARE)
 
     def _optical_depths(self, eyes: _Point, ends: Sequence[_Point]) -> NDArray[np.float64]:
         if self._fog.minimum_extinction == self._fog.maximum_extinction:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from fogsim.traffic.appearance import OTHERS_LAMPS, body_kind, lamps_from_signals, paint
 from fogsim.traffic.drivers.eye_heights import eye_height
-from fogsim.traffic.drivers.lamp_intensity import burning_head_lamps
+from fogsim.traffic.drivers.own_beams import head_lamp_light
 from fogsim.traffic.drivers.sight import inherent_contrast
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
@@ -118,7 +118,7 @@ class SeenVehicles:
 
     @staticmethod
     def head_lamps(vehicle: str, own_lamps: OwnLamps) -> float:
-        """Share of a vehicle's head lamps that burn [-]; those of SUMO's vehicles do, as `OTHERS_LAMPS` says.
+        """Light of a vehicle's head lamps over that of low beams [-]; SUMO's vehicles have these, by `OTHERS_LAMPS`.
 
         Parameters
         ----------
@@ -128,4 +128,4 @@ class SeenVehicles:
             Lamps of vehicles whose lamps are not SUMO's.
         """
         own = own_lamps.get(vehicle)
-        return 1.0 if own is None else burning_head_lamps(own)
+        return 1.0 if own is None else head_lamp_light(own)

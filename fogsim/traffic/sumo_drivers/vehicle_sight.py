@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from fogsim.obstruction import CLEAR_SIGHT, Obstructions
 from fogsim.traffic.drivers.lamp_intensity import head_lamp_share, intensity_toward
+from fogsim.traffic.drivers.own_beams import high_beam_veil, uses_high_beam
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.drivers.sight_kernels import BODY_MIDDLE
 from fogsim.traffic.sumo.link import Api
@@ -147,7 +148,11 @@ class VehicleSight:
         body = self._vehicles.body(target)
         intensity = intensity_toward(self._vehicles.lamps(target, own_lamps), body.length, line.ahead, line.aside)
         head_lamps = self._vehicles.head_lamps(observer, own_lamps) * head_lamp_share(line.bearing)
-        return self._sight.depth_limit(line.distance, body.contrast, intensity, head_lamps)
+        glare = 0.0
+        if uses_high_beam(own_lamps.get(observer, 0)):
+            known = self._extinction
+            glare = high_beam_veil(float(self._fog.extinction(line.eyes)) if known is None else known)
+        return self._sight.depth_limit(line.distance, body.contrast, intensity, head_lamps, glare)
 
     def _optical_depths(self, lines: Sequence[LineOfSight]) -> Sequence[float]:
         if self._extinction is not None:

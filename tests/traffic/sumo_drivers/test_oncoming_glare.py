@@ -61,7 +61,7 @@ def test_the_other_side_of_a_road_leads_back(api: Any) -> None:
 
 
 def test_the_veil_is_that_of_the_lamps_that_come(api: Any) -> None:
-    """Vos (2003), written out: L = 10 E (1 + (25/70)⁴) / θ², E of two low beams through the fog."""
+    """CIE 146's general formula, written out for 25 years and brown eyes, E of two low beams through the fog."""
     eyes, lamps, target = (np.array(api.vehicle.getPosition3D(v)) for v in ("me", "coming", "leader"))
     apart = lamps - eyes + np.array([0.0, 0.0, LAMP_HEIGHT - EYE_HEIGHTS["car"]])
     distance = float(np.linalg.norm(apart))
@@ -69,7 +69,8 @@ def test_the_veil_is_that_of_the_lamps_that_come(api: Any) -> None:
     light = 2.0 * beam_intensity(int(Lamp.LOW_BEAM), math.degrees(math.atan2(abs(apart[1]), apart[0]))) / distance**2
     for visibility in (math.inf, 60.0):
         seen = light * math.exp(-extinction_from_visibility(visibility) * distance)
-        expected = 10.0 * seen * (1.0 + (25.0 / 70.0) ** 4) / theta**2
+        by_age = (5.0 / theta**2 + 0.05 / theta) * (1.0 + (25.0 / 62.5) ** 4)
+        expected = seen * (10.0 / theta**3 + by_age + 0.00125)
         assert veil(api, "me", "leader", visibility, {}) == pytest.approx(expected, rel=1e-6)
 
 
@@ -80,6 +81,31 @@ def test_only_lit_head_lamps_that_face_the_driver_dazzle(api: Any) -> None:
     assert veil(api, "me", "leader", 1e6, HIGH_BEAM) <= MOST_GLARE
     one_dead = {"coming": int(Lamp.LOW_BEAM) | dark_on(int(Lamp.LOW_BEAM), Side.LEFT)}
     assert veil(api, "me", "leader", 300.0, one_dead) == pytest.approx(0.5 * veil(api, "me", "leader", 300.0, {}))
+
+
+def test_high_beams_that_follow_dazzle_in_the_mirrors(api: Any) -> None:
+    """0.8 of 2 × 34 kcd at 55 m lay 18 lx on the eye, at 40° 0.1 cd/m²: a third of oncoming low beams', and no less."""
+    following = {"me": int(Lamp.HIGH_BEAM), "coming": ALL_DARK}
+    in_mirrors = veil(api, "leader", "leader", math.inf, following)
+    assert 0.05 < in_mirrors < 0.2
+    assert in_mirrors > veil(api, "leader", "leader", 60.0, following) > 0.0
+    assert veil(api, "leader", "leader", math.inf, {**following, "me": int(Lamp.LOW_BEAM)}) == 0.0
+    assert veil(api, "me", "leader", math.inf, {"leader": int(Lamp.HIGH_BEAM), "coming": ALL_DARK}) == 0.0
+
+
+def test_own_high_beams_show_an_unlit_leader_from_farther(api: Any) -> None:
+    pairs = [("me", "leader", 50.0 - api.vehicle.getMinGap("me"))]
+    dark: OwnLamps = {"leader": ALL_DARK, "coming": ALL_DARK}
+
+    def sees(visibility: float, lamps: Lamp) -> bool:
+        sight = LeaderSight(api, even(visibility), DriverSight(0.01, 40.0), api.vehicle.getSpeed)
+        return sight.assess(pairs, {**dark, "me": int(lamps)}, 0.5)[0][0]
+
+    assert [sees(3000.0, Lamp.LOW_BEAM), sees(3000.0, Lamp.HIGH_BEAM), sees(100.0, Lamp.HIGH_BEAM)] == [
+        False,
+        True,
+        False,
+    ]
 
 
 def test_a_dazzled_driver_sees_an_unlit_leader_later(api: Any) -> None:

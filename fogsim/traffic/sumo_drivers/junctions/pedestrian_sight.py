@@ -11,7 +11,8 @@ from collections.abc import Iterable, Iterator
 
 from fogsim.obstruction import CLEAR_SIGHT, Obstructions
 from fogsim.traffic.appearance import OTHERS_LAMPS
-from fogsim.traffic.drivers.lamp_intensity import burning_head_lamps, head_lamp_share
+from fogsim.traffic.drivers.lamp_intensity import head_lamp_share
+from fogsim.traffic.drivers.own_beams import head_lamp_light
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
@@ -157,7 +158,7 @@ class PedestrianSight:
             return False
         if distance <= self._seen_through_fog:
             return True
-        lamps = burning_head_lamps(own_lamps.get(driver, int(OTHERS_LAMPS)))
+        lamps = head_lamp_light(own_lamps.get(driver, int(OTHERS_LAMPS)))
         bearing = math.atan2(end_y - y, end_x - x) - math.radians(90.0 - self._api.vehicle.getAngle(driver))
         share = lamps * HEAD_LAMP_SHARE * head_lamp_share(math.remainder(bearing, math.tau))
         limit = self._sight.depth_limit(distance, CONTRAST, 0.0, share)

@@ -11,7 +11,8 @@ from fogsim.traffic import DriverSight
 from fogsim.traffic.appearance import OTHERS_LAMPS, lamps_from_signals, paint
 from fogsim.traffic.drivers.eye_heights import eye_height
 from fogsim.traffic.drivers.lamp_intensity import rear_intensity
-from fogsim.traffic.drivers.sight import BODY_MIDDLE, inherent_contrast
+from fogsim.traffic.drivers.sight import inherent_contrast
+from fogsim.traffic.drivers.sight_kernels import BODY_MIDDLE
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo_drivers.perception import MAX_PAUSE, REACH, Perception
 from fogsim.values import FogBank, FogField, Lamp

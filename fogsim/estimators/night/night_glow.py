@@ -104,7 +104,7 @@ class NightGlow:
         distance = math.nan
         if observation.lead is not None:
             distance = observation.lead.distance + (observation.camera_setback or self._setback)
-        found: dict[str, object] = {"lead_distance": distance}
+        found: dict[str, object] = {"lead_distance": distance} if math.isfinite(distance) else {}
         why = self._trouble_of(image, distance)
         lamps = why or find_tail_lamps(image, self._camera, distance)
         if isinstance(lamps, str):
@@ -125,7 +125,7 @@ class NightGlow:
 
     def _trouble_of(self, image: Pixels, distance: float) -> str:
         """Why a picture can tell nothing, before it is looked at closely."""
-        if math.isnan(distance):
+        if not math.isfinite(distance):
             return "there is no range: the radar has no vehicle ahead"
         if image.ndim == 2:
             return "the picture is grey: the red of tail lamps cannot be told from the own lamps' light"

@@ -102,8 +102,8 @@ def test_why_nothing_can_be_told() -> None:
     assert "daylight" in reason(dataclasses.replace(seen, frame=np.full((240, 320, 3), 200, np.uint8)))
     assert "shows no lamp" in reason(dataclasses.replace(seen, frame=np.full((240, 320, 3), 20, np.uint8)))
     assert "too little red light" in reason(dataclasses.replace(seen, frame=picture(30.0, 1e6)))
-    beside = picture(30.0, 100.0)
-    beside[:112, :150] = np.minimum(1.5 * beside[:112, :150], 255.0).astype(np.uint8)
+    # Lamps whose light lies 5° beside them.
+    beside = np.maximum(np.minimum(np.roll(picture(30.0, 100.0), 25, axis=1), 195), picture(30.0, 1e6))
     assert "evenly" in reason(dataclasses.replace(seen, frame=beside))
 
 

@@ -325,7 +325,9 @@ class ViewRenderer:
         """
         self._set_daylight(self._scenario.light.illuminance_lx if illuminance is None else illuminance)
         self._go_to(state.position[ego])
-        drawn = self._drawn_camera if camera is None else supersampled(camera, self._samples)
+        drawn = self._drawn_camera
+        if camera is not None and camera != self._camera:
+            drawn = supersampled(camera, self._samples)
         lights = self._lights(state, ego, pose)
         near, viewpoint = self._from_origin(state, pose)
         renderer = self._renderer_for(viewpoint)

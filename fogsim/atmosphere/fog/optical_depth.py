@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fogsim.atmosphere.fog.medium import field_at, medium_of
+from fogsim.atmosphere.fog.medium import Medium, field_at, medium_of
 from fogsim.atmosphere.fog.optical_depth_kernels import MOST_PIECES, depths_along, depths_between, extinctions
 from fogsim.values import FogField
 
@@ -32,9 +32,13 @@ def extinction(field: FogField, points: ArrayLike, time: float = 0.0) -> NDArray
     (...) float64
         k ≥ 0; 0 above the top of the fog.
     """
+    return _extinctions(medium_of(field_at(field, time)), points)
+
+
+def _extinctions(medium: Medium, points: ArrayLike) -> NDArray[np.float64]:
     places = np.asarray(points, dtype=np.float64)
     values = np.empty(places.shape[:-1])
-    extinctions(np.ascontiguousarray(places.reshape(-1, 3)), medium_of(field_at(field, time)), values.reshape(-1))
+    extinctions(np.ascontiguousarray(places.reshape(-1, 3)), medium, values.reshape(-1))
     return values
 
 
@@ -57,16 +61,15 @@ def optical_depth(field: FogField, start: ArrayLike, end: ArrayLike, time: float
     (...) float64
         τ ≥ 0; the transmittance is exp(−τ).
     """
+    return _optical_depths(medium_of(field_at(field, time)), start, end)
+
+
+def _optical_depths(medium: Medium, start: ArrayLike, end: ArrayLike) -> NDArray[np.float64]:
     from_, to = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
-    shape = np.broadcast_shapes(from_.shape, to.shape)
+    shape = from_.shape if from_.shape == to.shape else np.broadcast_shapes(from_.shape, to.shape)
     depths = np.empty(shape[:-1])
-    depths_between(
-        _rows(from_, shape),
-        _rows(to, shape),
-        medium_of(field_at(field, time)),
-        depths.reshape(-1),
-        np.empty((2, 4 * MOST_PIECES)),
-    )
+    scratch = np.empty((2, 4 * MOST_PIECES))
+    depths_between(_rows(from_, shape), _rows(to, shape), medium, depths.reshape(-1), scratch)
     return depths
 
 
@@ -246,6 +249,7 @@ class FogNow:
     def __init__(self, field: FogField) -> None:
         self._always = FieldAccess(field)
         self._now = field_at(field, 0.0)
+        self._medium = medium_of(self._now)
 
     def change(self, field: FogField) -> None:
         """Let the fog be another one over time, of the same bounds.
@@ -265,7 +269,9 @@ class FogNow:
         time : float
             Time since the run began [s].
         """
-        self._now = field_at(self._always.field, time)
+        now = field_at(self._always.field, time)
+        if now is not self._now:
+            self._now, self._medium = now, medium_of(now)
 
     @property
     def maximum_extinction(self) -> float:
@@ -285,7 +291,7 @@ class FogNow:
         points : (..., 3) array_like
             Places [m].
         """
-        return extinction(self._now, points)
+        return _extinctions(self._medium, points)
 
     def optical_depth(self, start: ArrayLike, end: ArrayLike) -> NDArray[np.float64]:
         """Optical depth between points now [-].
@@ -295,4 +301,4 @@ class FogNow:
         start, end : (..., 3) array_like
             Ends of the lines of sight [m].
         """
-        return optical_depth(self._now, start, end)
+        return _optical_depths(self._medium, start, end)

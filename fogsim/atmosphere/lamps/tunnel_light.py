@@ -59,6 +59,8 @@ class TunnelLight:
         reach : float
             Tunnels beyond this are small in it [m].
         """
+        if not len(self._boxes):
+            return False
         near = self._boxes[:, :2] - np.array(pose.position[:2])
         return bool(np.any(np.hypot(near[:, 0], near[:, 1]) < reach + self._boxes[:, 6]))
 

@@ -97,9 +97,12 @@ class UpdateSchedule:
         times : sequence of float
             When they are due at the latest [s].
         """
-        due = self._due
+        due, step_at, last, number = self._due, self._step_at, math.nan, 0
         for vehicle, time in zip(vehicles, times, strict=True):
-            due.setdefault(self._step_at(time), []).append(vehicle)
+            # Mostly many wait as long as they may, and so for the same time.
+            if time != last:
+                last, number = time, step_at(time)
+            due.setdefault(number, []).append(vehicle)
 
     def bring_forward(self, vehicle: str) -> None:
         """Make a vehicle that waits due in the next step; one that waits for nothing stays so.

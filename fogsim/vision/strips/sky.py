@@ -140,7 +140,7 @@ def _shading(
     image: LinearPixels, camera: Camera, rows: NDArray[np.int64], bright: Floats, noise: float
 ) -> _Shading | None:
     """Sky of even slopes behind a lens; None where it does not fill most of its rows, or is black."""
-    if rows.size < 2 or float(np.median(bright)) <= 0.0:
+    if rows.size < 2 or median(bright) <= 0.0:
         return None
     axis = np.array([*camera.principal_point, camera.horizon_row, camera.focal_length])
     found, covariance, seen = sky_kernels.sky_shading(image, rows, axis, bright, noise)

@@ -181,7 +181,8 @@ class LeaderSight:
         glare = self._glare.veil(follower, leader, own_lamps)
         if uses_high_beam(own_lamps.get(follower, 0)):
             glare += high_beam_veil(self._extinction_at(follower))
-        if glare == 0.0:
+        elif glare == 0.0:
+            # Without glare the kernel has looked already.
             return True
         distance, contrast, intensity, own = facing[[DISTANCE, CONTRAST, INTENSITY, OWN]].tolist()
         return bool(facing[DEPTH] <= self._sight.depth_limit(distance, contrast, intensity, own, glare))

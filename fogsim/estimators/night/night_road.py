@@ -58,6 +58,12 @@ MODEL_DEVIATION = 0.045
 LEAST_DEVIATION = 1e-3
 """Deviation of k by what else is lit: verges, trees, signs [1/m]."""
 
+LEAST_WEIGHT = 0.85
+"""Mean weight of the cells below which others' lamps shine over too much of the picture [-]."""
+
+OUTSHONE = 1.0
+"""Deviation of ln k by lamps of others, over the weight that the cells have lost to them [-]."""
+
 BETWEEN = 9
 """References that are interpolated about the likeliest one."""
 
@@ -222,6 +228,9 @@ class NightRoad:
         found["droplets"] = references[kind].droplets
         if fit.explained < LEAST_EXPLAINED or even > MOST_EVEN * float(seen.luminance.max()):
             return Estimate.invalid(self.method, "other light than that of the own head lamps", **found)
+        outshone = 1.0 - float(fit.weight.mean())
+        if outshone > 1.0 - LEAST_WEIGHT:
+            return Estimate.invalid(self.method, "lamps of others outshine what the own ones light", **found)
         extinction = np.array([extinction_from_visibility(one) for one in references[0].visibility.tolist()])
         if best == 0:
             reason = "fog so dense that only the densest reference is like it"
@@ -235,7 +244,8 @@ class NightRoad:
             most = _most(extinction, np.logaddexp.reduce(likelihoods, axis=0))
             return Estimate(self.method, 0.0, most / NORMAL_95_PERCENT, diagnostics=found)
         value = math.exp(log_extinction)
-        deviation = math.hypot(value * math.hypot(deviation, MODEL_DEVIATION), LEAST_DEVIATION)
+        relative = math.hypot(deviation, MODEL_DEVIATION, OUTSHONE * outshone)
+        deviation = math.hypot(value * relative, LEAST_DEVIATION)
         return Estimate(self.method, value, deviation, diagnostics=found)
 
     def _refined(

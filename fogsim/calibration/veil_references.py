@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere import Air
 from fogsim.atmosphere.lamps.phase_function import Droplets
+from fogsim.errors import UnknownNameError
 from fogsim.estimators.night.cells import camera_of_cells
 from fogsim.estimators.night.references import VeilReferences
 from fogsim.lighting import LampMount, own_head_lamps
@@ -161,3 +162,25 @@ def usual_references(camera: Camera, lamps: Lamp, setback: float) -> tuple[VeilR
         Distance of the camera behind the front bumper [m].
     """
     return compute_references(camera, lamps, setback)
+
+
+def lamps_named(text: str) -> Lamp:
+    """Head lamps by their names, such as "low_beam+front_fog".
+
+    Parameters
+    ----------
+    text : str
+        Names, joined by "+".
+
+    Raises
+    ------
+    UnknownNameError
+        If one is none of low_beam, high_beam and front_fog.
+    """
+    known = {str(lamp.name).lower(): lamp for lamp in (Lamp.LOW_BEAM, Lamp.HIGH_BEAM, Lamp.FRONT_FOG)}
+    found = Lamp.NONE
+    for name in text.split("+"):
+        if name.strip().lower() not in known:
+            raise UnknownNameError("head lamp", name, known)
+        found |= known[name.strip().lower()]
+    return found

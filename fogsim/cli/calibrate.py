@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.table import Table
@@ -11,6 +11,9 @@ from fogsim.cli.printing import INTERRUPTED, escape, stderr, stdout
 from fogsim.cli.progress import progress_bar
 from fogsim.errors import InputError
 from fogsim.interruption import interruptible
+
+if TYPE_CHECKING:
+    from fogsim.estimators.night.references import VeilReferences
 
 calibrate = typer.Typer(no_args_is_help=True, help="Measure what a method must know of a camera.")
 
@@ -116,5 +119,54 @@ def calibrate_halos_command(
         f"fog below a mean Br50 of {measured.steepness:g} levels a pixel (of {measured.pictures} pictures, "
         f"{100 * measured.false_alarms:.1f} % of the clear and {100 * measured.misses:.1f} % of the foggy ones are "
         f"taken for the other): {escape(out)}",
+        soft_wrap=True,
+    )
+
+
+@calibrate.command("veil")
+def calibrate_veil_command(
+    camera: Annotated[Path, typer.Option(help="Camera file (docs/estimate.md), of images that are straight.")],
+    lamps: Annotated[
+        Path | None, typer.Option(help="File of the head lamps (docs/night.md). Default: a car's.")
+    ] = None,
+    lit: Annotated[
+        list[str] | None,
+        typer.Option(metavar="LAMPS", help="Lamps that are lit together, such as low_beam+front_fog; may be repeated."),
+    ] = None,
+    setback: Annotated[float, typer.Option(help="Metres from the front bumper back to the lens.", min=0, max=10)] = 1.9,
+    published: Annotated[
+        bool, typer.Option("--published", help="The paper's six visibilities in place of twenty.")
+    ] = False,
+    out: Annotated[Path, typer.Option(help="File of the references.")] = Path("veil.npz"),
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it is there already.")] = False,
+) -> None:
+    """What the own head lamps show in fog of any density: references of gallen2014_veil and night_road."""
+    from fogsim.calibration.veil_references import (
+        LOG_SPACED_VISIBILITIES,
+        PUBLISHED_VISIBILITIES,
+        compute_references,
+        lamps_named,
+    )
+    from fogsim.estimators.night.reference_file import references_as_bytes
+    from fogsim.files.atomic import write_bytes
+    from fogsim.lighting import LampMount
+    from fogsim.offline.camera_file import load_camera
+    from fogsim.offline.lamp_file import load_lamps
+
+    if out.exists() and not overwrite:
+        raise InputError(f"--out {out} is there already; --overwrite replaces it")
+    if not out.parent.is_dir():
+        raise InputError(f"--out {out}: there is no folder {out.parent}")
+    known, mount = load_camera(camera), LampMount() if lamps is None else load_lamps(lamps)
+    sets = [lamps_named(one) for one in lit or ["low_beam", "high_beam", "low_beam+front_fog"]]
+    visibilities = PUBLISHED_VISIBILITIES if published else LOG_SPACED_VISIBILITIES
+    made: list[VeilReferences] = []
+    with progress_bar(stderr) as progress:
+        for one in progress.track(sets, description="veil: references of each set of lamps"):
+            made += compute_references(known, one, setback, visibilities=visibilities, mount=mount)
+    write_bytes(out, references_as_bytes(made))
+    stdout.print(
+        f"{len(visibilities) - 1} visibilities from {visibilities[0]:g} to {visibilities[-2]:g} m and a clear night, for "
+        f"{len(sets)} sets of lamps and {len(made) // len(sets)} kinds of droplets: {escape(out)}",
         soft_wrap=True,
     )

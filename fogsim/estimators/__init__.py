@@ -10,6 +10,7 @@ from fogsim.estimators.joint_road import JointRoad
 from fogsim.estimators.lead_contrast import LeadContrast
 from fogsim.estimators.negru2013 import Negru2013
 from fogsim.estimators.night.night_glow import NightGlow
+from fogsim.estimators.night.gallen2014_veil import Gallen2014Veil
 from fogsim.estimators.night.night_road import NightRoad
 from fogsim.estimators.protocol import Estimator
 from fogsim.estimators.signs.belaroussi2015 import Belaroussi2015
@@ -30,6 +31,7 @@ ESTIMATORS: Registry[Callable[..., Estimator]] = Registry(
         "joint_road": JointRoad,
         "lead_contrast": LeadContrast,
         "sign_contrast": SignContrast,
+        "gallen2014_veil": Gallen2014Veil,
         "night_road": NightRoad,
         "night_glow": NightGlow,
     },

@@ -50,6 +50,7 @@ _NAMED = (
     "belaroussi2015",
     "sign_contrast",
     "night_road",
+    "gallen2014_veil",
 )
 """Methods that the first colours belong to, whichever others stand beside them."""
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.night.cells import CellMeans, camera_of_cells, cell_means, cell_size
-from fogsim.estimators.night.reference_file import References
+from fogsim.estimators.night.reference_file import HEAD_LAMPS, References
 from fogsim.estimators.night.references import ReferenceSource, VeilReferences
 from fogsim.estimators.night.veil_fit import Parts, VeilFit, fit_veil
 from fogsim.parameters import Range, checked_parameters
@@ -22,8 +22,6 @@ from fogsim.values.observation import Observation
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.pixel_kernels import Pixels
 from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation
-
-HEAD_LAMPS = Lamp.LOW_BEAM | Lamp.HIGH_BEAM | Lamp.FRONT_FOG
 
 NEAREST, FARTHEST, HALF_LANE = 5.0, 80.0, 1.4
 """The road is looked at between these distances, and so far to the left and right of the own middle [m]."""

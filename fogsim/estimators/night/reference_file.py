@@ -15,6 +15,9 @@ from fogsim.estimators.night.references import ReferenceSource, VeilReferences
 from fogsim.values.camera import Camera, Response
 from fogsim.values.light import Lamp
 
+HEAD_LAMPS = Lamp.LOW_BEAM | Lamp.HIGH_BEAM | Lamp.FRONT_FOG
+"""Lamps that throw light ahead."""
+
 USUAL_SETBACK = 1.9
 """Distance of the camera behind the front bumper where no vehicle tells it [m]."""
 

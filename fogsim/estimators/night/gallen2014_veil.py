@@ -1,0 +1,188 @@
+"""Fog by night from the shape of the own head lamps' veil: Gallen et al. 2014, sections III-A and III-D."""
+
+from collections import deque
+from dataclasses import replace
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.estimators.image_check import ObservationCheck
+from fogsim.estimators.night.cells import CellMeans, cell_means, cell_size
+from fogsim.estimators.night.reference_file import HEAD_LAMPS, References
+from fogsim.estimators.night.references import ReferenceSource
+from fogsim.estimators.night.veil_correlation import (
+    VeilScores,
+    VeilTemplates,
+    visibility_by_parabola,
+    visibility_by_peak,
+)
+from fogsim.parameters import Range, checked_parameters
+from fogsim.units import extinction_from_visibility
+from fogsim.values.camera import Camera, Response
+from fogsim.values.estimate import Estimate
+from fogsim.values.light import Lamp
+from fogsim.values.observation import Observation
+from fogsim.vision.light.daylight import lit_by_lamps
+from fogsim.vision.light.luminance import linear_pixels
+
+PUBLISHED = (15.0, 50.0, 100.0, 200.0, 500.0)
+"""Visibilities of the simulated references (figure 12) beside that of a clear night [m]."""
+
+BANDS = ((50.0, 10.0), (100.0, 20.0), (200.0, 40.0), (np.inf, 100.0))
+"""Published accuracy: up to a visibility, so much [m] (section IV-C)."""
+
+LIGHT_FOG = 300.0
+"""Visibility from which fog is light, and is not to be detected [m] (table I)."""
+
+MOST_CLIPPED = 0.3
+"""Share of the cells that may be as bright as can be told."""
+
+LEAST_BRIGHT = 8.0
+"""Pixel value that something must have."""
+
+NORMAL_95_PERCENT = 1.645
+
+
+@checked_parameters
+class Gallen2014Veil:
+    """Correlation of the mean of some frames with references of the own head lamps' veil (Gallen et al. 2014).
+
+    Each reference is compared inside its own mask, by Otsu's threshold, by the zero-mean normalised cross-correlation;
+    the best score detects fog. The visibility is that at the top of exp(a V² + b V + c) through the scores of six
+    references (equation 13), and its error the published one.
+
+    As published, that top lies far off where references are far apart: the scores of ideal pictures give half as much
+    again to five times the visibility above 100 m. By default references in equal steps of ln V, one mask for all, and
+    a parabola in ln V through Fisher's z of the three best take their place. Road, albedo and amplitude stay unused, so
+    in thin fog, where the veil's shape hardly depends on the visibility, both read what the road does; `NightRoad` does
+    not.
+
+    Parameters
+    ----------
+    camera : Camera
+        The assumed calibration.
+    references : str or None
+        File of ``fogsim calibrate veil``; see `NightRoad`.
+    frames : int
+        How many successive frames are composed.
+    median : bool
+        Whether the rank filter composes them in place of the mean.
+    threshold : float
+        Score from which on there is fog; 0.4 in figure 11.
+    as_published : bool
+        Whether the visibility is found to the letter of the paper.
+
+    Raises
+    ------
+    InputError
+        If a parameter is out of range, or the file cannot be read or is of another camera.
+    """
+
+    method = "gallen2014_veil"
+
+    def __init__(
+        self,
+        camera: Camera,
+        *,
+        references: str | None = None,
+        frames: Annotated[int, Range(1, 1000)] = 10,
+        median: bool = False,
+        threshold: Annotated[float, Range(0.0, 1.0)] = 0.4,
+        as_published: bool = False,
+    ) -> None:
+        self._camera, self._check = camera, ObservationCheck(camera)
+        # Scores are of pixel values, not of light.
+        self._values = replace(camera, response=Response.LINEAR, black_level=0.0)
+        self._references = References(camera, references)
+        self._frames, self._median = int(frames), median
+        self._threshold, self._as_published = threshold, as_published
+        self.reset()
+
+    def take_references(self, source: ReferenceSource) -> None:
+        """Take references from a source where no file was named; see `TakesReferences`.
+
+        Parameters
+        ----------
+        source : callable
+            Gives them when they are first needed.
+        """
+        self._references.source = source
+
+    def reset(self) -> None:
+        """Forget all earlier frames."""
+        self._check.reset()
+        self._earlier: deque[CellMeans] = deque(maxlen=self._frames)
+        self._templates: tuple[Lamp, VeilTemplates] | None = None
+
+    def update(self, observation: Observation) -> Estimate:
+        """Estimate the fog from the mean of the last images and the lamps that are lit.
+
+        Parameters
+        ----------
+        observation : Observation
+            Its image, lamps and the camera's place are used; if it does not tell lamps, low beams are assumed.
+
+        Returns
+        -------
+        Estimate
+            Diagnostics: ``score`` (best), ``scores`` by reference, ``detected``, whether fog is likelier than a clear
+            night; or ``reason``.
+
+        Raises
+        ------
+        InputError
+            If camera, image or time do not fit (see `fogsim.estimators.image_check`).
+        """
+        image = self._check.image_of(observation)
+        lit = HEAD_LAMPS & (Lamp.LOW_BEAM if observation.lamps is None else observation.lamps)
+        if not lit:
+            return Estimate.invalid(self.method, "no head lamp is lit: this is a method for the night")
+        means = cell_means(linear_pixels(image, self._values), cell_size(self._camera))
+        if why := self._unfit(image, means):
+            return Estimate.invalid(self.method, why)
+        templates = self._templates_of(lit, observation.camera_setback)
+        if templates is None:
+            return Estimate.invalid(self.method, "it has no references; fogsim calibrate veil makes them")
+        self._earlier.append(means)
+        return self._estimate(templates.scores(self._composed()))
+
+    def _unfit(self, image: NDArray[np.uint8] | NDArray[np.uint16], means: CellMeans) -> str:
+        if float(means.luminance.max()) < LEAST_BRIGHT:
+            return "too dark: the head lamps light nothing"
+        if float((means.luminance > 250.0).mean()) > MOST_CLIPPED:
+            return "the picture is saturated"
+        # By day the sky is the brightest there is.
+        return "" if lit_by_lamps(image, self._camera) else "no lamps light the road: this is a method for the night"
+
+    def _templates_of(self, lit: Lamp, setback: float) -> VeilTemplates | None:
+        if self._templates is None or self._templates[0] != lit:
+            self._earlier.clear()
+            found = self._references.find(lit, setback)
+            if not found:
+                return None
+            wanted = PUBLISHED if self._as_published else ()
+            of_camera = replace(found[0], camera=self._camera)
+            self._templates = lit, VeilTemplates(of_camera, wanted, common_mask=not self._as_published)
+        return self._templates[1]
+
+    def _composed(self) -> NDArray[np.float64]:
+        frames = np.array([one.luminance for one in self._earlier])
+        composed: NDArray[np.float64] = np.median(frames, axis=0) if self._median else frames.mean(axis=0)
+        return composed
+
+    def _estimate(self, scores: VeilScores) -> Estimate:
+        best = float(np.nanmax(np.nan_to_num(scores.score, nan=-1.0)))
+        found: dict[str, object] = {"score": best, "scores": tuple(scores.score.tolist())}
+        found["detected"] = best >= self._threshold and not scores.clear >= best
+        if not found["detected"]:
+            least = extinction_from_visibility(LIGHT_FOG)
+            return Estimate(self.method, 0.0, least / NORMAL_95_PERCENT, diagnostics=found)
+        visibility = (visibility_by_parabola if self._as_published else visibility_by_peak)(scores)
+        if visibility is None:
+            return Estimate.invalid(self.method, "the scores have no top between the references", **found)
+        extinction = extinction_from_visibility(visibility)
+        accuracy = next(error for most, error in BANDS if visibility < most)
+        return Estimate(
+            self.method, extinction, extinction * accuracy / visibility / NORMAL_95_PERCENT, diagnostics=found
+        )

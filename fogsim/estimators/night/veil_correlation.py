@@ -1,0 +1,173 @@
+"""The own head lamps' veil by correlation with references: Gallen et al. 2014, sections III-A and III-D."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.estimators.night.references import VeilReferences
+from fogsim.linear_algebra import inverse_of, matrix_product
+from fogsim.values.camera import Camera, Response
+from fogsim.values.camera_response import respond
+
+OTSU_BINS = 256
+
+LEAST_SCORES = 3
+"""Scores that a parabola goes through."""
+
+
+class VeilScores(NamedTuple):
+    """How like a picture is to each reference.
+
+    Attributes
+    ----------
+    visibility : (n,) float64
+        Of the references, without that of a clear night [m].
+    score : (n,) float64
+        Zero-mean normalised cross-correlation inside each reference's mask, −1 … 1; NaN where the mask is empty.
+    clear : float
+        That with the reference of a clear night; NaN if there is none.
+    """
+
+    visibility: NDArray[np.float64]
+    score: NDArray[np.float64]
+    clear: float
+
+
+class VeilTemplates:
+    """References as a camera has them, each with the mask of its veil.
+
+    Each is a luminance map of veil and road, normalised to 0 … 255 and bent by the camera's response, of which Otsu's
+    threshold keeps what is bright.
+
+    Parameters
+    ----------
+    references : VeilReferences
+        The references.
+    nearest_to : sequence of float
+        Visibilities of which the nearest reference is taken each [m]; all are if none is named.
+    common_mask : bool
+        Whether one mask, that of the images' mean, serves them all; scores within masks of their own differ by these.
+    """
+
+    def __init__(
+        self, references: VeilReferences, nearest_to: Sequence[float] = (), *, common_mask: bool = False
+    ) -> None:
+        foggy = np.flatnonzero(np.isfinite(references.visibility))
+        log_visibility = np.log(references.visibility[foggy])
+        chosen = [int(np.abs(log_visibility - math.log(one)).argmin()) for one in nearest_to]
+        foggy = foggy[sorted(set(chosen))] if chosen else foggy
+        self.visibility = references.visibility[foggy]
+        clear = np.flatnonzero(np.isinf(references.visibility))[:1]
+        lit = (references.veil + references.road)[[*foggy, *clear]]
+        self._images = [_as_image(one, references.camera) for one in lit]
+        masked = [np.mean(self._images, axis=0)] * len(self._images) if common_mask else self._images
+        self._masks = [np.flatnonzero(one.ravel() > otsu_threshold(one)) for one in masked]
+
+    def scores(self, picture: NDArray[np.float64]) -> VeilScores:
+        """Compare a picture with each reference.
+
+        Parameters
+        ----------
+        picture : (rows, cols) float64
+            Pixel values by cells.
+        """
+        flat = picture.ravel()
+        found = [
+            correlation(flat[mask], image.ravel()[mask]) for image, mask in zip(self._images, self._masks, strict=True)
+        ]
+        count = len(self.visibility)
+        return VeilScores(self.visibility, np.array(found[:count]), found[count] if len(found) > count else math.nan)
+
+
+def _as_image(luminance: NDArray[np.float64], camera: Camera) -> NDArray[np.float64]:
+    share = luminance / max(float(luminance.max()), 1e-30)
+    image: NDArray[np.float64] = 255.0 * respond(share, Response(camera.response))
+    return image
+
+
+def correlation(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+    """Zero-mean normalised cross-correlation (ZNCC), −1 … 1; NaN where either is even.
+
+    Parameters
+    ----------
+    one, other : (n,) float64
+        Values at the same places.
+    """
+    if one.size == 0:
+        return math.nan
+    a, b = one - one.mean(), other - other.mean()
+    power = float((a * a).sum() * (b * b).sum())
+    return float((a * b).sum()) / math.sqrt(power) if power > 0.0 else math.nan
+
+
+def otsu_threshold(image: NDArray[np.float64]) -> float:
+    """Value that parts an image into two classes with the least variance within them (Otsu 1979).
+
+    Parameters
+    ----------
+    image : (rows, cols) float64
+        Values 0 … 255.
+    """
+    count, edges = np.histogram(image, bins=OTSU_BINS, range=(0.0, 255.0))
+    middle = 0.5 * (edges[:-1] + edges[1:])
+    below, weight = np.cumsum(count * middle), np.cumsum(count).astype(np.float64)
+    total, all_of_it = weight[-1], below[-1]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        between = (all_of_it * weight / total - below) ** 2 / (weight * (total - weight))
+    if not np.isfinite(between).any():
+        return float(edges[-1])
+    return float(edges[1 + int(np.nanargmax(np.where(np.isfinite(between), between, np.nan)))])
+
+
+def visibility_by_parabola(scores: VeilScores) -> float | None:
+    """Visibility at the top of S = exp(a V² + b V + c) through the scores, −b / 2a [m] (equations 13 and 14).
+
+    Parameters
+    ----------
+    scores : VeilScores
+        The scores; those that are not above 0 have no logarithm and are left out.
+
+    Returns
+    -------
+    float or None
+        None where the parabola has no top at a visibility above 0.
+    """
+    some = np.nan_to_num(scores.score, nan=-1.0) > 0.0
+    if np.count_nonzero(some) < LEAST_SCORES:
+        return None
+    # In units of the largest visibility, so that powers are of one size.
+    scale = float(scores.visibility[some].max())
+    powers = (scores.visibility[some] / scale)[:, None] ** np.arange(2, -1, -1)
+    side = matrix_product(np.ascontiguousarray(powers.T), np.log(scores.score[some]))
+    a, b, _ = matrix_product(inverse_of(matrix_product(powers.T, powers)), side).tolist()
+    return -b / (2.0 * a) * scale if a < 0.0 < b else None
+
+
+def visibility_by_peak(scores: VeilScores) -> float | None:
+    """Visibility at the top of a parabola in ln V through the three best of Fisher's z of the scores [m].
+
+    References in equal steps of ln V have scores that are nearly such a parabola about the best one; one in V through
+    references far apart is none, and is off by half and more in thin fog.
+
+    Parameters
+    ----------
+    scores : VeilScores
+        The scores.
+
+    Returns
+    -------
+    float or None
+        None where the best reference is the first or last, so that there is no top.
+    """
+    z = np.arctanh(np.clip(np.nan_to_num(scores.score, nan=-1.0), -0.999999, 0.999999))
+    best = int(np.argmax(z))
+    if not 0 < best < len(z) - 1:
+        return None
+    before, here, after = z[best - 1 : best + 2].tolist()
+    bend = before - 2.0 * here + after
+    step = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
+    place = np.log(scores.visibility[best - 1 : best + 2])
+    return float(np.exp(np.interp(step, (-1.0, 0.0, 1.0), place)))

@@ -166,7 +166,7 @@ def calibrate_veil_command(
             made += compute_references(known, one, setback, visibilities=visibilities, mount=mount)
     write_bytes(out, references_as_bytes(made))
     stdout.print(
-        f"{len(visibilities) - 1} visibilities from {visibilities[0]:g} to {visibilities[-2]:g} m and a clear night, for "
-        f"{len(sets)} sets of lamps and {len(made) // len(sets)} kinds of droplets: {escape(out)}",
+        f"{len(visibilities) - 1} visibilities from {visibilities[0]:g} to {visibilities[-2]:g} m and a clear night, "
+        f"for {len(sets)} sets of lamps and {len(made) // len(sets)} kinds of droplets: {escape(out)}",
         soft_wrap=True,
     )

@@ -9,8 +9,8 @@ from fogsim.estimators.huang2015_rough import Huang2015Rough
 from fogsim.estimators.joint_road import JointRoad
 from fogsim.estimators.lead_contrast import LeadContrast
 from fogsim.estimators.negru2013 import Negru2013
-from fogsim.estimators.night.night_glow import NightGlow
 from fogsim.estimators.night.gallen2014_veil import Gallen2014Veil
+from fogsim.estimators.night.night_glow import NightGlow
 from fogsim.estimators.night.night_road import NightRoad
 from fogsim.estimators.protocol import Estimator
 from fogsim.estimators.signs.belaroussi2015 import Belaroussi2015

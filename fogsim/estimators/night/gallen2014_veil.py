@@ -25,6 +25,7 @@ from fogsim.values.light import Lamp
 from fogsim.values.observation import Observation
 from fogsim.vision.light.daylight import lit_by_lamps
 from fogsim.vision.light.luminance import linear_pixels
+from fogsim.vision.lines.horizon import levelled
 
 PUBLISHED = (15.0, 50.0, 100.0, 200.0, 500.0)
 """Visibilities of the simulated references (figure 12) beside that of a clear night [m]."""
@@ -37,6 +38,9 @@ LIGHT_FOG = 300.0
 
 MOST_CLIPPED = 0.3
 """Share of the cells that may be as bright as can be told."""
+
+LEAST_ROWS = 4
+"""Rows that must be seen above and below the horizon."""
 
 LEAST_BRIGHT = 8.0
 """Pixel value that something must have."""
@@ -148,12 +152,19 @@ class Gallen2014Veil:
         return self._estimate(templates.scores(self._composed()))
 
     def _unfit(self, image: NDArray[np.uint8] | NDArray[np.uint16], means: CellMeans) -> str:
+        row = self._camera.horizon_row
+        if not LEAST_ROWS <= row <= self._camera.height - 1 - LEAST_ROWS:
+            return f"the horizon (row {row:.1f}) is outside the image, or at its border"
         if float(means.luminance.max()) < LEAST_BRIGHT:
             return "too dark: the head lamps light nothing"
         if float((means.luminance > 250.0).mean()) > MOST_CLIPPED:
             return "the picture is saturated"
         # By day the sky is the brightest there is.
-        return "" if lit_by_lamps(image, self._camera) else "no lamps light the road: this is a method for the night"
+        return (
+            ""
+            if lit_by_lamps(levelled(image, self._camera), self._camera)
+            else "no lamps light the road: this is a method for the night"
+        )
 
     def _templates_of(self, lit: Lamp, setback: float) -> VeilTemplates | None:
         if self._templates is None or self._templates[0] != lit:

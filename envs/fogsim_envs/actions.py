@@ -48,10 +48,8 @@ def checked_action(action: object, space: spaces.Space[Any], name: str) -> NDArr
             raise _refusal(action, space, name, "expected finite numbers")
         if not isinstance(space, spaces.Box) and (given != np.rint(given)).any():
             raise _refusal(action, space, name, "expected whole numbers")
-    lowest, highest = _limits(space)
-    # Whole numbers are compared as they came, as a short type would wrap; others as the space rounds them.
-    member = given.astype(space.dtype) if isinstance(space, spaces.Box) else given
-    if (member < lowest).any() or (member > highest).any():
+    if not _is_within(given, space):
+        lowest, highest = _limits(space)
         raise _refusal(action, space, name, f"expected {lowest.tolist()} to {highest.tolist()}")
     return given.astype(space.dtype)
 
@@ -63,6 +61,18 @@ def _numbers(action: object) -> NDArray[Any] | None:
     except (TypeError, ValueError):
         return None
     return given if given.dtype.kind in "iuf" else None
+
+
+def _is_within(given: NDArray[Any], space: ActionSpace) -> bool:
+    """Whether finite numbers of the space's shape are within its limits."""
+    if isinstance(space, spaces.Box):
+        # Compared as the space rounds them.
+        member = given.astype(space.dtype)
+        return bool((member >= space.low).all() and (member <= space.high).all())
+    # Few whole numbers, compared as they came: a short type would wrap.
+    count = space.n if isinstance(space, spaces.Discrete) else space.nvec
+    limits = zip(np.ravel(space.start).tolist(), np.ravel(count).tolist(), strict=True)
+    return all(0 <= one - first < number for one, (first, number) in zip(given.ravel().tolist(), limits, strict=True))
 
 
 def _limits(space: ActionSpace) -> tuple[NDArray[Any], NDArray[Any]]:

@@ -66,13 +66,9 @@ class Route:
         if aside[nearest] > FARTHEST_ASIDE:
             return None
         if near is not None:
-            candidates = np.flatnonzero(aside <= aside[nearest] + _AS_NEAR)
-            nearest = int(candidates[np.argmin(np.abs(self._start[candidates] + at[candidates] - near))])
-            # Points of one piece of the way are all as near: the nearest of those about this one is meant.
-            about = candidates[np.abs(self._start[candidates] - self._start[nearest]) <= 2.0 * FARTHEST_ASIDE]
-            nearest = int(about[np.argmin(aside[about])])
-        x, y, _ = self._direction[nearest]
-        along = float(x) * math.cos(heading) + float(y) * math.sin(heading)
+            nearest = piece_about(float(near), self._start, at, aside, nearest)
+        x, y, _ = self._direction[nearest].tolist()
+        along = x * math.cos(heading) + y * math.sin(heading)
         return RoutePlace(float(self._start[nearest] + at[nearest]), along)
 
 
@@ -108,6 +104,37 @@ def nearest_piece(
         if aside[i] < aside[nearest]:
             nearest = i
     return nearest
+
+
+@kernel
+def piece_about(
+    near: float, start: NDArray[np.float64], at: NDArray[np.float64], aside: NDArray[np.float64], nearest: int
+) -> int:
+    """Find, of pieces that are about as near to a place as the nearest, the one that is nearest along the polyline.
+
+    Parameters
+    ----------
+    near : float
+        A position along the polyline [m].
+    start : (n,) float64
+        Where its pieces begin along it [m].
+    at, aside : (n,) float64
+        From `nearest_piece`.
+    nearest : int
+        The nearest piece.
+    """
+    farthest, here, least = aside[nearest] + _AS_NEAR, -1, math.inf
+    for i in range(len(start)):
+        apart = abs(start[i] + at[i] - near)
+        if aside[i] <= farthest and (here < 0 or apart < least):
+            here, least = i, apart
+    # Points of one piece of the way are all as near: the nearest of those about this one is meant.
+    found = here
+    for i in range(len(start)):
+        is_about = aside[i] <= farthest and abs(start[i] - start[here]) <= 2.0 * FARTHEST_ASIDE
+        if is_about and (aside[i] < aside[found] or (aside[i] == aside[found] and i < found)):
+            found = i
+    return found
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,8 +6,10 @@ from numbers import Real
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fogsim.errors import InputError
+from fogsim.jit import kernel
 from fogsim.values import Belief, Command, Display, EgoControl, Estimate, Lamp, SpeedAdvice, Stretch, StretchAdvice
 
 T = TypeVar("T")
@@ -73,14 +75,31 @@ def checked_belief(method: str, value: object) -> Belief:
         raise InputError(
             f"{who}: log_extinction and probability must be of one length, got {len(cells)} and {len(probability)}"
         )
-    if not (math.isfinite(cells[0]) and math.isfinite(cells[-1]) and bool((cells[1:] > cells[:-1]).all())):
+    # Copies are of one type, for which the kernel is compiled.
+    is_ascending, least, total = distribution_of(np.array(cells, float), np.array(probability, float))
+    if not (is_ascending and math.isfinite(cells[0]) and math.isfinite(cells[-1])):
         raise InputError(f"{who}: log_extinction must be finite and ascending, got {cells!r}")
-    least, total = float(probability.min()), float(probability.sum())
     if not (least >= 0.0 and abs(total - 1.0) <= _SUM_TOLERANCE):
         raise InputError(
             f"{who}: probability must be at least 0 and add up to 1, got from {least:.6g} on and a sum of {total:.6g}"
         )
     return belief
+
+
+@kernel
+def distribution_of(cells: NDArray[np.float64], probability: NDArray[np.float64]) -> tuple[bool, float, float]:
+    """Whether cells ascend, and the least of their probabilities and the sum; NaN where one is none.
+
+    Parameters
+    ----------
+    cells, probability : (n,) float64
+        As of a `Belief`, at least one.
+    """
+    ascends, least, total = True, probability[0], probability[0]
+    for i in range(1, len(cells)):
+        ascends &= cells[i] > cells[i - 1]
+        least, total = min(least, probability[i]), total + probability[i]
+    return ascends, least, total
 
 
 def checked_advice(method: str, value: object) -> SpeedAdvice:

@@ -51,6 +51,7 @@ _NAMED = (
     "sign_contrast",
     "night_road",
     "gallen2014_veil",
+    "night_glow",
 )
 """Methods that the first colours belong to, whichever others stand beside them."""
 

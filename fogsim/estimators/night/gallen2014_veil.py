@@ -159,12 +159,9 @@ class Gallen2014Veil:
             return "too dark: the head lamps light nothing"
         if float((means.luminance > 250.0).mean()) > MOST_CLIPPED:
             return "the picture is saturated"
-        # By day the sky is the brightest there is.
-        return (
-            ""
-            if lit_by_lamps(levelled(image, self._camera), self._camera)
-            else "no lamps light the road: this is a method for the night"
-        )
+        if lit_by_lamps(levelled(image, self._camera), self._camera):
+            return ""
+        return "no lamps light the road: this is a method for the night"
 
     def _templates_of(self, lit: Lamp, setback: float) -> VeilTemplates | None:
         if self._templates is None or self._templates[0] != lit:

@@ -81,10 +81,11 @@ NORMAL_95_PERCENT = 1.645
 
 
 class _Cells(NamedTuple):
-    """Where cells look: angle below the horizon and to the right of the axis [rad], and which are of use."""
+    """Where cells look: angle below the horizon and to the right of the axis [rad]; which see sky, which are of use."""
 
     below: NDArray[np.float64]
     aside: NDArray[np.float64]
+    sky: NDArray[np.bool_]
     used: NDArray[np.bool_]
 
 
@@ -194,7 +195,7 @@ class NightRoad:
         self._earlier.append(cell_means(linear_pixels(_green(image), self._camera), cell_size(self._camera)))
         means = _mean(self._earlier)
         used = self._cells.used & ~means.clipped & ~self._hidden(observation)
-        if why := _too_little(means, used):
+        if why := _too_little(means, used, self._cells.sky):
             return Estimate.invalid(self.method, why)
         references = self._references.find(lit, observation.camera_setback)
         if not references:
@@ -270,7 +271,7 @@ def _cells(camera: Camera) -> _Cells:
     distance = camera.mount_height / np.maximum(below, 1e-6)
     road = (distance > NEAREST) & (distance < FARTHEST) & (np.abs(aside * distance) < HALF_LANE)
     sky = (below < -LOW_SKY) & (below > -HIGH_SKY) & (np.abs(aside) < HALF_SKY)
-    return _Cells(below, aside, road | sky)
+    return _Cells(below, aside, sky, road | sky)
 
 
 def _green(image: Pixels) -> Pixels:
@@ -286,12 +287,15 @@ def _mean(frames: deque[CellMeans]) -> CellMeans:
     return CellMeans(luminance, np.logical_or.reduce([frame.clipped for frame in frames]))
 
 
-def _too_little(means: CellMeans, used: NDArray[np.bool_]) -> str:
+def _too_little(means: CellMeans, used: NDArray[np.bool_], sky: NDArray[np.bool_]) -> str:
     """Why nothing can be told from the cells of use; empty if something may."""
-    if np.count_nonzero(used) < LEAST_CELLS:
+    if np.count_nonzero(used) < LEAST_CELLS or not sky.any():
         return "too little is seen that is neither too bright nor too dark"
-    if float(np.quantile(means.luminance[used], 0.99)) < LEAST_PEAK:
+    bright = float(np.quantile(means.luminance[used], 0.99))
+    if bright < LEAST_PEAK:
         return "too dark: the head lamps light nothing"
+    if float(np.median(means.luminance[sky])) > MOST_EVEN * bright:
+        return "light of the day, or of lamps all around"
     return ""
 
 

@@ -72,7 +72,7 @@ def test_what_it_cannot_tell() -> None:
     night = night_picture(60.0)
     day = night_picture(60.0, daylight=300.0, saturation=400.0)
     for picture, known, why in (
-        (day, {}, "other light"),
+        (day, {}, "light of the day"),
         (np.full_like(night, 255), {}, "too bright nor too dark"),
         (np.full_like(night, 1), {}, "too dark"),
         (night, {"lamps": Lamp.POSITION}, "no head lamp is lit"),

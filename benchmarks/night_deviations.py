@@ -22,8 +22,9 @@ from fogsim.atmosphere.lamps.lobes import lobe_glow
 from fogsim.atmosphere.lamps.phase_function import Droplets, henyey_greenstein, phase_function
 from fogsim.atmosphere.lamps.veil import FOLD_DISTANCE, INTERVALS, lit_air, ray_pieces, veil_along
 from fogsim.atmosphere.lamps.veil_kernels import VeilRays
-from fogsim.atmosphere.visibility.night_visibility import FogKind, high_beam_veil, visibility_distance
+from fogsim.atmosphere.visibility.night_visibility import FogKind, high_beam_veil
 from fogsim.lighting.beams import front_fog_beam, high_beam, low_beam, luminous_flux, scaled_beam
+from fogsim.reproduce.night.limits import clear_low_sight, equal_sight
 from fogsim.scene.lamps import FULL, SIGNAL_LOBES, STREET_LOBE, SignalLobe
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Beam
@@ -128,28 +129,10 @@ def glows() -> Rows:
     return table
 
 
-def turning_point(difference: Callable[[float], float], low: float = 20.0, high: float = 5000.0) -> float:
-    """Visibility at which a difference turns positive [m], `low` if it is so all along."""
-    if difference(low) > 0:
-        return low
-    for _ in range(40):
-        middle = math.sqrt(low * high)
-        low, high = (low, middle) if difference(middle) > 0 else (middle, high)
-    return high
-
-
-def equal_sight(low: Beam, kind: FogKind, veil_share: float) -> str:
+def equal_or_less(low: Beam, kind: FogKind, veil_share: float) -> str:
     """V_met at which high and low beams show equally far (gallen2014 eq. 11)."""
-    found = turning_point(
-        lambda v: visibility_distance(high_beam(), v, kind) - visibility_distance(low, v, kind, veil_share=veil_share)
-    )
+    found = equal_sight(low, kind, veil_share)
     return "< 20" if found <= 20.0 else f"{found:.0f}"
-
-
-def clear_low_sight(low: Beam, kind: FogKind) -> str:
-    """V_met at which high beams show as far as low beams do in clear air (gallen2014 eq. 12)."""
-    far = visibility_distance(low, math.inf)
-    return f"{turning_point(lambda v: visibility_distance(high_beam(), v, kind) - far):.0f}"
 
 
 def limits() -> Rows:
@@ -161,22 +144,22 @@ def limits() -> Rows:
         ("high beam × 1, low beam × 0.3, low beam's veil 0.1 of the high beam's", "", "", ""),
         (
             "V_met at which both beams show equally far (eq. 11)",
-            *(f"{equal_sight(third, kind, 0.1)} m" for kind in FogKind),
+            *(f"{equal_or_less(third, kind, 0.1)} m" for kind in FogKind),
             "100 m",
         ),
         (
             "V_met at which high beams show as far as low beams in clear air (eq. 12)",
-            *(f"{clear_low_sight(third, kind)} m" for kind in FogKind),
+            *(f"{clear_low_sight(third, kind):.0f} m" for kind in FogKind),
             "300 m",
         ),
         (
             "low beam as measured in the US (× 1): eq. 12",
-            *(f"{clear_low_sight(low_beam(), kind)} m" for kind in FogKind),
+            *(f"{clear_low_sight(low_beam(), kind):.0f} m" for kind in FogKind),
             "300 m",
         ),
         (
             "one veil for both beams, low × 1 / 0.5 / 0.25: eq. 11",
-            *(" / ".join(equal_sight(one, kind, 1.0) for one in several) + " m" for kind in FogKind),
+            *(" / ".join(equal_or_less(one, kind, 1.0) for one in several) + " m" for kind in FogKind),
             "100 m",
         ),
     ]

@@ -89,7 +89,7 @@ def calibrate_halos_command(
     """How steeply light falls off about lamps in clear air and in fog: below which Br50 gallen2014 sees fog."""
     from fogsim.files.atomic import write_bytes
     from fogsim.offline.camera_file import load_camera
-    from fogsim.reproduce.halo_calibration import measure_halo_threshold
+    from fogsim.reproduce.night.halo_calibration import measure_halo_threshold
 
     if out.exists() and not overwrite:
         raise InputError(f"--out {out} is there already; --overwrite replaces it")

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from fogsim.cli.app import app
 from fogsim.errors import InputError
 from fogsim.estimators.night.halos import HaloThreshold
-from fogsim.reproduce.halo_calibration import measure_halo_threshold, parting
+from fogsim.reproduce.night.halo_calibration import measure_halo_threshold, parting
 from fogsim.values import Camera, Response
 
 FILE = """

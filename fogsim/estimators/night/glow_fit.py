@@ -34,7 +34,7 @@ INTENSITIES = (8.0, 108.0, 208.0)
 for the first, 60 … 260 and 150 … 300 more for the others."""
 
 RED_SHARE = 4.1
-"""Red less green light of a red lamp over its luminance, which is a quarter of a white lamp's of the same red [-]."""
+"""Red light of a red lamp, beyond that of white light, over its luminance [-]: red is a quarter of a white lamp's."""
 
 ROAD_LUMINANCE = 1.65
 """Usual luminance of the near road in low beams [cd/m²]."""

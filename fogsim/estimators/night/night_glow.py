@@ -45,10 +45,10 @@ class NightGlow:
     """Fog from the glow about the tail lamps of the vehicle ahead.
 
     Droplets spread a lamp's light the wider the more optical depth τ = k R lies before it, and the glow falls off with
-    the range the faster; the radar tells R. The red light about the lamps, less the green, is free of the own lamps'
-    veil. Its profile at several ranges is compared with FogSim's formula of the glow (`fogsim.atmosphere.lamps`) on the
-    linear response. The lamps' intensity is free within what is usual, and the same at all ranges; the near road in the
-    own beams tells the exposure. Four kinds of droplets, two kinds of lamps and three shares of glare of the lens are
+    the range the faster; the radar tells R. The red light about the lamps, less that of white light, is free of the own
+    lamps' veil. Its profile at several ranges is compared with FogSim's formula of the glow (`fogsim.atmosphere.lamps`)
+    on the linear response. The lamps' intensity is free within what is usual, and the same at all ranges; the near road
+    in the own beams tells the exposure. Four kinds of droplets, two of lamps and three shares of glare of the lens are
     equally likely beforehand. Cores of lamps are saturated and not used.
 
     Parameters

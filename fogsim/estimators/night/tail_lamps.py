@@ -30,8 +30,11 @@ SEED = 0.8
 DIM = 0.35
 """Red, as a share of full scale, that is no lamp's even where it is the brightest [-]."""
 
-RED = 1.6
-"""Red over green around a lamp from which on it is a tail lamp's [-]."""
+EXCESS = (-1.43, 0.43)
+"""What is added to red of green and blue [-]: neither neutral nor warm white light, as of other lamps, is then left."""
+
+RED = 0.12
+"""Least share that is left of red about a tail lamp [-]."""
 
 ANGLES = np.radians(np.geomspace(0.8, 16.0, 14))
 """Angles off the middle of the lamps at which the glow is measured, ring by ring [rad]."""
@@ -78,7 +81,7 @@ class RedGlow:
     u, v : (rings, sectors) float64
         Where it was measured [px].
     log_red : (rings, sectors) float64
-        Ln of red less green, of full exposure; NaN where it cannot be told.
+        Ln of the red beyond that of white light, of full exposure; NaN where it cannot be told.
     noise : (rings, sectors) float64
         Its standard deviation by the pixels' noise [-].
     """
@@ -147,7 +150,7 @@ def _pair(place: Floats, area: Floats, scale: float) -> TailLamps:
 
 
 def red_glow(image: Pixels, camera: Camera, lamps: TailLamps) -> RedGlow:
-    """Measure the red light about tail lamps: red less green, so that the white light of the own lamps drops out.
+    """Measure the red light about tail lamps, without the red of white light: the own lamps' and others'.
 
     Parameters
     ----------
@@ -169,15 +172,11 @@ def red_glow(image: Pixels, camera: Camera, lamps: TailLamps) -> RedGlow:
         if box is None:
             continue
         patch = exposure_of(image[box].astype(np.float64) / full, camera.response, camera.black_level)
-        red, green = patch[..., 0], patch[..., 1]
-        level, excess = float(red.mean()), float((red - green).mean())
-        deviation = float((red - green).std()) / math.sqrt(red.size)
-        if (
-            float(red.max()) < FULL
-            and level > LEAST
-            and excess > 4.0 * deviation
-            and excess > (RED - 1.0) * 0.2 * level
-        ):
+        red = patch[..., 0]
+        beyond = red + EXCESS[0] * patch[..., 1] + EXCESS[1] * patch[..., 2]
+        level, excess = float(red.mean()), float(beyond.mean())
+        deviation = float(beyond.std()) / math.sqrt(red.size)
+        if float(red.max()) < FULL and level > LEAST and excess > 4.0 * deviation and excess > RED * level:
             log_red[at], noise[at] = math.log(excess), deviation / excess
     return RedGlow(u, v, log_red, noise)
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from fogsim.errors import InputError
 from fogsim.estimators.night.halos import HaloThreshold, mean_steepness
-from fogsim.reproduce.night_scenes import GLARE, NightRoad, NightScene, NightVehicle
+from fogsim.reproduce.night.scenes import GLARE, NightRoad, NightScene, NightVehicle
 from fogsim.reproduce.result import Steps, Watch, unwatched
 from fogsim.values import Camera, Lamp
 from fogsim.vision.sources.halo_profile import halos_of

@@ -1,0 +1,190 @@
+"""Fog by the lamps of others: halos told from clear nights, and the glow of tail lamps ahead (docs/night.md).
+
+``python benchmarks/night_sources.py --part halos`` calibrates a threshold on one pool of scenes and counts on another,
+at exposures and strengths of lamps that the calibration did not see; ``--part glow`` drives up to a vehicle ahead;
+``--part speed`` takes the time of both. Constants were chosen on ``--pool 1`` and 2; what is reported is of 7.
+"""
+
+import argparse
+import json
+import math
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from fogsim.atmosphere.lamps.phase_function import Droplets
+from fogsim.estimators.night.halos import HaloWatch, mean_steepness
+from fogsim.estimators.night.night_glow import NightGlow
+from fogsim.reproduce.night.halo_calibration import measure_halo_threshold, random_scene
+from fogsim.reproduce.night.scenes import SETBACK, NightRoad, NightScene, NightVehicle
+from fogsim.reproduce.scenes import StagedVehicle
+from fogsim.units import extinction_from_visibility
+from fogsim.values import Camera, Estimate, Frame, Lamp, LeadMeasurement, Observation, Response
+from fogsim.vision.sources.halo_profile import halos_of
+from fogsim.vision.sources.source_tree import source_tree
+
+PAPERS_CAMERA = Camera(1280, 800, 1150.0, (639.5, 399.5), 1.38, pitch=0.035, response=Response.SRGB)
+SMALL_CAMERA = Camera(640, 480, 577.0, (319.5, 239.5), 1.38, pitch=0.035, response=Response.SRGB)
+VISIBILITIES = (math.inf, 300.0, 200.0, 150.0, 100.0, 70.0, 50.0)
+UNSEEN = ((0.4, 0.6), (1.6, 2.2))
+"""Exposures, and strengths of lamps, outside what the calibration draws."""
+
+LOW = Lamp.POSITION | Lamp.LOW_BEAM
+LOOKS = 14  # on the way up to a vehicle ahead
+Record = dict[str, object]
+
+
+def halo_records(camera: Camera, pool: int, scenes: int) -> list[Record]:
+    """How often fog is seen, picture by picture, in clear air and in fog."""
+    measured = measure_halo_threshold(camera, seed=0)
+    counts: dict[tuple[str, float], list[int]] = {}
+    with NightRoad(camera, seed=pool) as road:
+        for number in range(scenes):
+            rng = np.random.default_rng((pool, number))
+            for name in ("like the calibration's", "unseen"):
+                scene, exposure = (random_scene(rng), rng.uniform(0.6, 1.6))
+                if name == "unseen":
+                    scene, exposure = random_scene(rng, UNSEEN[rng.integers(2)]), rng.uniform(*UNSEEN[rng.integers(2)])
+                for visibility, light in zip(VISIBILITIES, road.radiances(scene, VISIBILITIES), strict=True):
+                    steepness = mean_steepness(halos_of(source_tree(road.photograph(light, exposure, rng))))
+                    counted = counts.setdefault((name, visibility), [0, 0, 0])
+                    counted[0] += 1
+                    if steepness is not None:
+                        counted[1] += 1
+                        counted[2] += steepness < measured.steepness
+    return [
+        {
+            "exposures and lamps": name,
+            "V_met [m]": visibility if math.isfinite(visibility) else "clear",
+            "pictures": pictures,
+            "with halos": seen,
+            "taken for fog [%]": round(100.0 * fog / seen, 2) if seen else None,
+            "threshold": measured.steepness,
+        }
+        for (name, visibility), (pictures, seen, fog) in counts.items()
+    ]
+
+
+def approach(
+    road: NightRoad, rng: np.random.Generator, *, oncoming: bool, looks: int = LOOKS
+) -> Iterator[tuple[Observation, float]]:
+    """A drive up to a vehicle in fog of one visibility, frame by frame, and k."""
+    visibility = float(np.exp(rng.uniform(math.log(35.0), math.log(400.0))))
+    nearest = float(rng.uniform(14.0, 35.0))
+    farthest = nearest * float(rng.uniform(1.3, 3.0))
+    lamps = (LOW, LOW | Lamp.STOP, LOW | Lamp.REAR_FOG)[rng.integers(3)]
+    red, green, blue = rng.uniform(0.05, 0.5, 3) if rng.random() < 0.5 else np.full(3, rng.uniform(0.03, 0.7))
+    paint = (float(red), float(green), float(blue))
+    vehicle = StagedVehicle("truck", 10.0, 2.5, 3.6, paint) if rng.random() < 0.25 else StagedVehicle(paint=paint)
+    strength, exposure = np.exp(rng.uniform(-0.7, 0.7, 2)).tolist()
+    left, place, other = float(rng.normal(0.0, 0.3)), float(rng.uniform(0.0, 100.0)), float(rng.uniform(40.0, 150.0))
+    for number, distance in enumerate(np.geomspace(farthest, nearest, looks).tolist()):
+        vehicles = [NightVehicle(distance, left, lamps, vehicle=vehicle)]
+        if oncoming and other - 20.0 * number > 12.0:
+            vehicles.append(NightVehicle(other - 20.0 * number, 3.5, LOW, oncoming=True))
+        scene = NightScene(place + 8.0 * number, tuple(vehicles), strength=strength)
+        image = road.photograph(road.radiances(scene, [visibility])[0], exposure, rng)
+        lead = LeadMeasurement(distance - SETBACK + float(rng.normal(0.0, 0.25)), 0.0)
+        frame = Frame(float(number), image, road.camera)
+        seen = Observation(frame, 20.0, lead, camera_setback=SETBACK, lamps=LOW)
+        yield seen, extinction_from_visibility(visibility)
+
+
+def glow_records(camera: Camera, pool: int, drives: int) -> list[Record]:
+    """What `NightGlow` says on drives up to a vehicle ahead, alone and with oncoming traffic."""
+    return [_glow_record(camera, pool, drives, oncoming=oncoming) for oncoming in (False, True)]
+
+
+def _glow_record(camera: Camera, pool: int, drives: int, *, oncoming: bool) -> Record:
+    found: list[tuple[Estimate, float]] = []
+    for kind, droplets in enumerate(Droplets):
+        for share, glare in enumerate((0.0, 0.01, 0.02)):
+            with NightRoad(camera, droplets, glare, seed=pool) as road:
+                for number in range(drives):
+                    estimator = NightGlow(camera)
+                    drawn = np.random.default_rng((pool, kind, share, number))
+                    found += [(estimator.update(seen), k) for seen, k in approach(road, drawn, oncoming=oncoming)]
+    valid = [(told, k) for told, k in found if told.valid]
+    bounded = [(told.bounds, k) for told, k in found if told.bounds is not None]
+    inside = [abs(told.extinction - k) <= 1.645 * told.standard_deviation for told, k in valid]
+    errors = np.array([math.log(told.extinction / k) for told, k in valid])
+    return {
+        "oncoming traffic": oncoming,
+        "pictures": len(found),
+        "valid": len(valid),
+        "90 % intervals hold [%]": round(100.0 * float(np.mean(inside)), 1),
+        "median of ln k over the true": round(float(np.median(errors)), 3),
+        "rms of ln": round(float(np.sqrt((errors**2).mean())), 3),
+        "bounds": len(bounded),
+        "90 % bounds hold [%]": round(100.0 * float(np.mean([one.least <= k <= one.most for one, k in bounded])), 1),
+    }
+
+
+def speed_records() -> list[Record]:
+    """Processor time of a picture of 1280×800, the median of many on the worst of some scenes."""
+    out: list[Record] = []
+    with NightRoad(PAPERS_CAMERA) as road:
+        for name, scene in (
+            ("street lamps and traffic", NightScene(10.0, _traffic(), street_lamps=True)),
+            ("traffic", NightScene(10.0, _traffic())),
+            ("nobody", NightScene(10.0)),
+        ):
+            for visibility, light in zip(
+                (math.inf, 200.0, 50.0), road.radiances(scene, (math.inf, 200.0, 50.0)), strict=True
+            ):
+                image = road.photograph(light, 1.0, np.random.default_rng(0))
+                seen = Observation(image, 20.0, LeadMeasurement(38.3, 0.0), camera_setback=SETBACK, lamps=LOW)
+                watch, glow = HaloWatch(), NightGlow(PAPERS_CAMERA)
+                out.append(
+                    {
+                        "scene": name,
+                        "V_met [m]": visibility if math.isfinite(visibility) else "clear",
+                        "halos [ms]": _milliseconds(lambda watch=watch, image=image: watch.look(image)),
+                        "night_glow [ms]": _milliseconds(lambda glow=glow, seen=seen: glow.update(seen)),
+                    }
+                )
+    return out
+
+
+def _traffic() -> tuple[NightVehicle, ...]:
+    return NightVehicle(40.0, 0.1, LOW | Lamp.REAR_FOG), NightVehicle(60.0, 3.5, LOW, oncoming=True)
+
+
+def _milliseconds(call: Callable[[], object], times: int = 30) -> float:
+    call()
+    spent = []
+    for _ in range(times):
+        started = time.process_time()
+        call()
+        spent.append(time.process_time() - started)
+    return round(1e3 * float(np.median(spent)), 2)
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--part", choices=("halos", "glow", "speed"), default="halos", help="what is measured")
+    parser.add_argument("--pool", type=int, default=7, help="which scenes or drives")
+    parser.add_argument("--count", type=int, default=80, help="scenes; drives for each droplets and glare")
+    parser.add_argument("--small", action="store_true", help="pictures of 640×480 in place of 1280×800")
+    parser.add_argument("--json", action="store_true", help="print a list of flat records")
+    arguments = parser.parse_args()
+    camera = SMALL_CAMERA if arguments.small else PAPERS_CAMERA
+    match arguments.part:
+        case "halos":
+            found = halo_records(camera, arguments.pool, arguments.count)
+        case "glow":
+            found = glow_records(camera, arguments.pool, arguments.count)
+        case _:
+            found = speed_records()
+    if arguments.json:
+        print(json.dumps(found, indent=2))
+        return
+    print("| " + " | ".join(found[0]) + " |\n" + "|---" * len(found[0]) + "|")
+    for one in found:
+        print("| " + " | ".join("–" if value is None else str(value) for value in one.values()) + " |")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,172 @@
+"""Gallen et al. (2014), section III-C: fog by halos where there are lamps, by the own lamps' veil where none is."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Self
+
+from fogsim.errors import InputError
+from fogsim.estimators.image_check import ObservationCheck
+from fogsim.estimators.night.gallen2014_veil import Gallen2014Veil
+from fogsim.estimators.night.halos import PUBLISHED, WINDOW, HaloReading, HaloThreshold, HaloWatch
+from fogsim.estimators.night.references import ReferenceSource
+from fogsim.parameters import Range, checked_parameters
+from fogsim.units import extinction_from_visibility
+from fogsim.values.camera import Camera
+from fogsim.values.estimate import Estimate, ExtinctionBounds
+from fogsim.values.observation import Observation
+from fogsim.vision.light.daylight import lit_by_lamps
+
+DENSE, LIGHT = 100.0, 300.0
+"""Visibilities between the paper's classes of fog [m] (table I)."""
+
+SURELY_SEEN, HARDLY_SEEN = 200.0, 1000.0
+"""Visibilities of the thinnest fog that halos surely show, and of what they may take for fog at most [m]."""
+
+SOFTNESS = 0.3
+"""Standard deviation of these, in ln k [-]."""
+
+
+def fog_class(visibility: float) -> int:
+    """The paper's class of fog: 3, dense, below 100 m; 2, fog; 1, light fog, above 300 m (table I).
+
+    Parameters
+    ----------
+    visibility : float
+        Meteorological visibility [m].
+    """
+    return 3 if visibility < DENSE else 2 if visibility <= LIGHT else 1
+
+
+@checked_parameters
+class Gallen2014:
+    """Halos about lamps first, the own head lamps' veil without lamps (figure 9).
+
+    Where lamps are seen, the mean Br50 of their halos tells whether there is fog, but not how much: estimates are then
+    not valid and have bounds. Where none is, the veil is compared with references, which tells how much.
+
+    Gallen, Cord, Hautière, Dumont & Aubert, "Nighttime Visibility Analysis and Estimation Method in the Presence of
+    Dense Fog", IEEE Transactions on Intelligent Transportation Systems, 2014.
+
+    Parameters
+    ----------
+    camera : Camera
+        The assumed calibration.
+    halos : str or None
+        File of ``fogsim calibrate halos``, of this camera; without it the paper's threshold 9 of its own camera serves.
+    references : str or None
+        File of ``fogsim calibrate veil``; see `NightRoad`.
+    window : int
+        Pictures over which the mean Br50 is smoothed.
+    as_published : bool
+        Whether the veil's visibility is found, and halos' threshold is, to the letter of the paper.
+
+    Raises
+    ------
+    InputError
+        If a parameter is out of range, or a file cannot be read or is of another camera.
+    """
+
+    method = "gallen2014"
+
+    def __init__(
+        self,
+        camera: Camera,
+        *,
+        halos: str | None = None,
+        references: str | None = None,
+        window: Annotated[int, Range(1, 10_000)] = WINDOW,
+        as_published: bool = False,
+    ) -> None:
+        self._camera, self._check = camera, ObservationCheck(camera)
+        self._window, self._as_published = int(window), as_published
+        self._veil = Gallen2014Veil(camera, references=references, as_published=as_published)
+        self._watch = HaloWatch(PUBLISHED, self._window)
+        if halos is not None:
+            self.calibrated(_read_threshold(halos))
+
+    def calibrated(self, measured: HaloThreshold) -> Self:
+        """Take a threshold that was not read from a file.
+
+        Parameters
+        ----------
+        measured : HaloThreshold
+            Of this camera.
+
+        Raises
+        ------
+        InputError
+            If it is of another camera.
+        """
+        threshold = measured.checked_for(self._camera).steepness
+        self._watch = HaloWatch(PUBLISHED if self._as_published else threshold, self._window)
+        return self
+
+    def take_references(self, source: ReferenceSource) -> None:
+        """Take references from a source where no file was named; see `TakesReferences`.
+
+        Parameters
+        ----------
+        source : callable
+            Gives them when they are first needed.
+        """
+        self._veil.take_references(source)
+
+    def reset(self) -> None:
+        """Forget all earlier frames."""
+        self._check.reset()
+        self._watch.reset()
+        self._veil.reset()
+
+    def update(self, observation: Observation) -> Estimate:
+        """Look for lamps, and where there are none for the veil.
+
+        Parameters
+        ----------
+        observation : Observation
+            Its image, lamps and the camera's place are used.
+
+        Returns
+        -------
+        Estimate
+            Diagnostics: ``by``, "halos" or "veil"; ``detected``, whether there is fog; by halos ``steepness``, the mean
+            Br50 of this picture, ``smoothed`` over pictures [levels a pixel], and ``lamps``, how many; by the veil what
+            `Gallen2014Veil` tells, and ``fog_class`` 1 … 3; or ``reason``.
+
+        Raises
+        ------
+        InputError
+            If camera, image or time do not fit (see `fogsim.estimators.image_check`).
+        """
+        image = self._check.image_of(observation)
+        if not lit_by_lamps(image, self._camera):
+            return Estimate.invalid(self.method, "no lamps light the road: this is a method for the night")
+        reading = self._watch.look(image, self._camera.bits)
+        if reading.is_fog is not None:
+            return self._by_halos(reading)
+        told = self._veil.update(observation)
+        found = {**told.diagnostics, "by": "veil"}
+        if told.valid:
+            found["fog_class"] = fog_class(told.visibility)
+        return replace(told, method=self.method, diagnostics=found)
+
+    def _by_halos(self, reading: HaloReading) -> Estimate:
+        found: dict[str, object] = {"by": "halos", "detected": reading.is_fog, "lamps": len(reading.halos)}
+        found |= {"steepness": reading.steepness, "smoothed": reading.smoothed}
+        if reading.is_fog:
+            why, bounds = (
+                "halos show fog, but not how much",
+                ExtinctionBounds(least=extinction_from_visibility(HARDLY_SEEN), softness=SOFTNESS),
+            )
+        else:
+            why, bounds = (
+                "lamps have no halo: there is no dense fog",
+                ExtinctionBounds(most=extinction_from_visibility(SURELY_SEEN), softness=SOFTNESS),
+            )
+        return replace(Estimate.invalid(self.method, why, **found), bounds=bounds)
+
+
+def _read_threshold(path: str) -> HaloThreshold:
+    try:
+        return HaloThreshold.read(Path(path))
+    except InputError as error:
+        raise InputError(f"halos: {error}") from error

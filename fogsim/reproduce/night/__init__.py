@@ -1,0 +1,1 @@
+"""Scenes by night, and gallen2014 run again on them."""

@@ -4,6 +4,7 @@ from typing import Protocol
 
 from fogsim.registry import Registry
 from fogsim.reproduce import belaroussi2015, drivers, huang2015, negru2013, zhu2015
+from fogsim.reproduce.night import gallen2014
 from fogsim.reproduce.result import Reproduction, Watch, unwatched
 
 
@@ -21,6 +22,7 @@ REPRODUCTIONS: Registry[Evaluation] = Registry(
         "zhu2015": zhu2015.reproduce,
         "huang2015": huang2015.reproduce,
         "belaroussi2015": belaroussi2015.reproduce,
+        "gallen2014": gallen2014.reproduce,
         "drivers": drivers.reproduce,
     },
 )

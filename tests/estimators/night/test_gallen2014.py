@@ -1,0 +1,74 @@
+"""Halos where there are lamps, the veil where there are none, in pictures that no renderer drew."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from fogsim.errors import InputError
+from fogsim.estimators import make
+from fogsim.estimators.night.gallen2014 import Gallen2014, fog_class
+from fogsim.estimators.night.halos import HaloThreshold
+from fogsim.values import Camera, Lamp, Observation, Response
+from tests.vision.sources.night_pictures import in_colour, picture
+
+CAMERA = Camera(320, 240, 300.0, (159.5, 119.5), 1.4, pitch=0.03, response=Response.SRGB)
+MEASURED = HaloThreshold(320, 240, 300.0, "srgb", 0.0, 30.0, 0.01, 0.01, 100)
+LAMPS = ((80.0, 60.0, 4.0, 300.0), (220.0, 70.0, 6.0, 300.0))
+LIT = Lamp.POSITION | Lamp.LOW_BEAM
+
+
+def seen(lamps=(), glow=0.0):
+    """A road that own lamps light, under a dark sky."""
+    level = picture(lamps, glow=glow)
+    level[140:] = np.maximum(level[140:], 60)
+    return Observation(in_colour(level), lamps=LIT)
+
+
+def test_halos_tell_fog_but_not_how_much() -> None:
+    method = Gallen2014(CAMERA).calibrated(MEASURED)
+    foggy = method.update(seen(LAMPS, glow=30.0))
+    assert (foggy.method, foggy.valid, foggy.diagnostics["by"]) == ("gallen2014", False, "halos")
+    assert foggy.diagnostics["detected"]
+    assert foggy.diagnostics["lamps"] == 2
+    assert foggy.visibility_interval[1] < 2000.0
+    method.reset()
+    clear = method.update(seen(LAMPS))
+    assert clear.diagnostics["detected"] is False
+    assert clear.visibility_interval[0] > 100.0
+    assert clear.visibility_interval[1] == float("inf")
+
+
+def test_without_lamps_the_veil_is_asked() -> None:
+    told = Gallen2014(CAMERA).calibrated(MEASURED).update(seen())
+    assert told.method == "gallen2014"
+    assert told.diagnostics["by"] == "veil"
+    assert "no references" in told.diagnostics["reason"]
+
+
+def test_published_threshold_and_daylight() -> None:
+    halo = seen(LAMPS, glow=10.0)
+    (measured, published) = (
+        make("gallen2014", CAMERA, window=1, as_published=flag).calibrated(MEASURED).update(halo).diagnostics
+        for flag in (False, True)
+    )
+    assert 9.0 < measured["steepness"] < 30.0
+    assert (measured["detected"], published["detected"]) == (True, False)
+    day = np.full((240, 320, 3), 200, np.uint8)
+    day[125:] = 90
+    assert "for the night" in Gallen2014(CAMERA).update(Observation(day, lamps=LIT)).diagnostics["reason"]
+
+
+def test_files_and_thresholds_of_others_are_refused(tmp_path) -> None:
+    with pytest.raises(InputError, match=r"halos: .*expected a file that fogsim calibrate halos wrote"):
+        Gallen2014(CAMERA, halos=str(tmp_path / "none.json"))
+    file = tmp_path / "halos.json"
+    file.write_text(dataclasses.replace(MEASURED, width=640).as_json(), encoding="utf-8")
+    with pytest.raises(InputError, match=r"640x240.*320x240"):
+        Gallen2014(CAMERA, halos=str(file))
+    file.write_text(MEASURED.as_json(), encoding="utf-8")
+    assert Gallen2014(CAMERA, halos=str(file)).update(seen(LAMPS, glow=30.0)).diagnostics["detected"]
+
+
+def test_classes_of_fog() -> None:
+    assert [fog_class(one) for one in (50.0, 100.0, 300.0, 301.0)] == [3, 2, 2, 1]

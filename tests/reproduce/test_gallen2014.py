@@ -9,8 +9,8 @@ CAMERA = Camera(240, 160, 220.0, (119.5, 79.5), 1.38, pitch=0.035, response=Resp
 
 def test_the_evaluation_runs_small() -> None:
     steps = []
-    found = reproduce(CAMERA, Size(3, 4, (25.0, 150.0), 2), watch=lambda done, total: steps.append((done, total)))
-    assert steps[-1][0] == steps[-1][1] == 4 + 4 * 3 + 2
+    found = reproduce(CAMERA, Size(2, 4, (25.0, 150.0), 1), watch=lambda done, total: steps.append((done, total)))
+    assert steps[-1][0] == steps[-1][1] == 4 + 4 * 2 + 2
     halos, veil, bands, figure, limits = found.all_tables
     assert [row[0] for row in halos.rows[1:]] == ["clear 1", "clear 2", "fog 1", "fog 2", "the paper, right"]
     assert [row[0] for row in veil.rows[1:]] == ["25.0", "150.0"]

@@ -113,12 +113,8 @@ class NightRoad:
         places = np.arange(30.0, _FAR, _SIGNS_APART)
         signs = SignMap(tuple(sign_beside(f"s{x:.0f}", "speed_limit", float(x), 0.7, rng) for x in places))
         self.camera, self._glare = camera, LensGlare(camera, glare) if glare > 0 else None
-        self._renderers: dict[bool, Renderer] = {}
-        self._heads: dict[bool, NDArray[np.float64]] = {}
-        for lit in (False, True):
-            scene = build_scene(straight_road(_FAR), signs, np.random.default_rng(seed), street_lamps=lit)
-            self._renderers[lit] = make_renderer("auto", scene, illuminance=DARK)
-            self._heads[lit] = street_lamp_heads(scene)
+        self._signs, self._seed = signs, seed
+        self._drawn: dict[bool, tuple[Renderer, NDArray[np.float64]]] = {}
         self._air = Air(FogField(CLEAR, (0.0, 0.0, 0.0)), droplets)
 
     def __enter__(self) -> Self:
@@ -127,8 +123,16 @@ class NightRoad:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        for renderer in self._renderers.values():
+        for renderer, _ in self._drawn.values():
             renderer.close()
+
+    def _scene(self, lit: bool) -> tuple[Renderer, NDArray[np.float64]]:
+        """What draws the road with or without street lamps, and where these shine (n, 3) [m]."""
+        if lit not in self._drawn:
+            trees = np.random.default_rng(self._seed)
+            scene = build_scene(straight_road(_FAR), self._signs, trees, street_lamps=lit)
+            self._drawn[lit] = make_renderer("auto", scene, illuminance=DARK), street_lamp_heads(scene)
+        return self._drawn[lit]
 
     def radiances(self, scene: NightScene, visibilities: Sequence[float]) -> list[NDArray[np.float32]]:
         """What the camera gets of a scene in homogeneous fog of each visibility (rows, cols, 3) [cd/m²].
@@ -141,12 +145,13 @@ class NightRoad:
             Meteorological visibilities [m]; ``inf`` for a clear night.
         """
         camera, lit = self.camera, scene.street_lamps
+        renderer, heads = self._scene(lit)
         pose = CameraPose((scene.place, 0.0, camera.mount_height), heading=0.0)
         traffic = _traffic(scene)
-        view = self._renderers[lit].render(vehicle_batches(traffic, None), camera, pose, lamplight=True)
+        view = renderer.render(vehicle_batches(traffic, None), camera, pose, lamplight=True)
         mount = LampMount()
-        others = light_sources(traffic, None, pose.position, mount.beams, self._heads[lit] if lit else None)
-        streets = street_lighting(self._heads[lit], DARK) if lit else None
+        others = light_sources(traffic, None, pose.position, mount.beams, heads if lit else None)
+        streets = street_lighting(heads, DARK) if lit else None
         own = own_head_lamps(scene.own, camera.mount_height, SETBACK, mount)
         lights = Lights(own, _scaled(others, scene.strength), streets)
         out = []

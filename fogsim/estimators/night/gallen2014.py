@@ -4,9 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Self
 
-from fogsim.errors import InputError
 from fogsim.estimators.image_check import ObservationCheck
-from fogsim.estimators.night.gallen2014_veil import Gallen2014Veil
+from fogsim.estimators.night.gallen2014_veil import LEAST_ROWS, Gallen2014Veil
 from fogsim.estimators.night.halos import PUBLISHED, WINDOW, HaloReading, HaloThreshold, HaloWatch
 from fogsim.estimators.night.references import ReferenceSource
 from fogsim.parameters import Range, checked_parameters
@@ -15,6 +14,7 @@ from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate, ExtinctionBounds
 from fogsim.values.observation import Observation
 from fogsim.vision.light.daylight import lit_by_lamps
+from fogsim.vision.lines.horizon import levelled
 
 DENSE, LIGHT = 100.0, 300.0
 """Visibilities between the paper's classes of fog [m] (table I)."""
@@ -82,7 +82,7 @@ class Gallen2014:
         self._veil = Gallen2014Veil(camera, references=references, as_published=as_published)
         self._watch = HaloWatch(PUBLISHED, self._window)
         if halos is not None:
-            self.calibrated(_read_threshold(halos))
+            self.calibrated(HaloThreshold.read(Path(halos)))
 
     def calibrated(self, measured: HaloThreshold) -> Self:
         """Take a threshold that was not read from a file.
@@ -138,7 +138,11 @@ class Gallen2014:
             If camera, image or time do not fit (see `fogsim.estimators.image_check`).
         """
         image = self._check.image_of(observation)
-        if not lit_by_lamps(image, self._camera):
+        row = self._camera.horizon_row
+        if not LEAST_ROWS <= row <= self._camera.height - 1 - LEAST_ROWS:
+            why = f"the horizon (row {row:.1f}) is outside the image, or at its border"
+            return Estimate.invalid(self.method, why)
+        if not lit_by_lamps(levelled(image, self._camera), self._camera):
             return Estimate.invalid(self.method, "no lamps light the road: this is a method for the night")
         reading = self._watch.look(image, self._camera.bits)
         if reading.is_fog is not None:
@@ -163,10 +167,3 @@ class Gallen2014:
                 ExtinctionBounds(most=extinction_from_visibility(SURELY_SEEN), softness=SOFTNESS),
             )
         return replace(Estimate.invalid(self.method, why, **found), bounds=bounds)
-
-
-def _read_threshold(path: str) -> HaloThreshold:
-    try:
-        return HaloThreshold.read(Path(path))
-    except InputError as error:
-        raise InputError(f"halos: {error}") from error

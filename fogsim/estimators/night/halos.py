@@ -83,14 +83,19 @@ class HaloThreshold:
         InputError
             If it cannot be read or is none.
         """
+        wanted = f"halos must be a file of `fogsim calibrate halos`, got {str(path)!r}"
         try:
             data: Any = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError, ValueError) as error:
-            raise InputError(f"{path}: expected a file that fogsim calibrate halos wrote: {error}") from error
+        except (OSError, ValueError) as error:
+            reason = error.strerror if isinstance(error, OSError) else error
+            raise InputError(f"{wanted}: no threshold can be read: {reason}") from error
         names = list(cls.__dataclass_fields__)
         if not isinstance(data, Mapping) or sorted(data) != sorted(names):
-            raise InputError(f"{path}: expected the keys {', '.join(names)}, got {shown(data)}")
-        return cls(**data)
+            raise InputError(f"{wanted}: expected the keys {', '.join(names)}, got {shown(data)}")
+        try:
+            return cls(**data)
+        except InputError as error:
+            raise InputError(f"{wanted}: {error}") from error
 
     def checked_for(self, camera: Camera) -> "HaloThreshold":
         """Itself, if it was measured for a camera.

@@ -52,7 +52,7 @@ def test_a_threshold_of_another_camera_is_refused_and_both_are_named() -> None:
 def test_what_is_no_threshold_is_refused(tmp_path: Path, text: str) -> None:
     file = tmp_path / "halos.json"
     file.write_text(text, encoding="utf-8")
-    with pytest.raises(InputError, match="expected"):
+    with pytest.raises(InputError, match="halos must be a file of"):
         HaloThreshold.read(file)
 
 

@@ -60,7 +60,7 @@ def test_published_threshold_and_daylight() -> None:
 
 
 def test_files_and_thresholds_of_others_are_refused(tmp_path) -> None:
-    with pytest.raises(InputError, match="halos must be a file of `fogsim calibrate halos`, got .*none.json"):
+    with pytest.raises(InputError, match=r"halos must be a file of `fogsim calibrate halos`, got .*none.json"):
         Gallen2014(CAMERA, halos=str(tmp_path / "none.json"))
     file = tmp_path / "halos.json"
     file.write_text(dataclasses.replace(MEASURED, width=640).as_json(), encoding="utf-8")

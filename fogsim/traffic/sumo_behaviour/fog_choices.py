@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.traffic.drivers.following import FollowingModel
-from fogsim.traffic.drivers.leader_reach import drivers_visibility, leader_reach
+from fogsim.traffic.drivers.leader_reach import LeaderReach, drivers_visibility, leader_reach
 from fogsim.traffic.drivers.sight import DriverSight
 from fogsim.traffic.drivers.speed_choice import SPEED_CHOICES, DriverSetup, speed_share, unaffected
 from fogsim.traffic.sumo_behaviour.driver_table import Column, DriverTable
@@ -44,19 +44,18 @@ class FogChoices:
         changed = np.flatnonzero(extinction != table.values[rows, Column.EXTINCTION])
         if not len(changed):
             return
-        of, here = rows[changed], extinction[changed]
+        of, here = rows[changed], extinction[changed].tolist()
         # Mostly there are some twenty, which np.unique would take longer to sort.
-        place: dict[float, int] = {}
-        which = [place.setdefault(k, len(place)) for k in here.tolist()]
-        visibilities = [visibility_from_extinction(k) for k in place]
-        seen = [drivers_visibility(self._sight, visibility) for visibility in visibilities]
-        reaches = [leader_reach(self._sight, visibility) for visibility in visibilities]
-        limits = np.array([[kind.top_speed(reach) for reach in reaches] for kind in table.kinds])
-        kinds = table.values[of, Column.KIND].astype(np.intp)
-        table.values[of, Column.EXTINCTION] = here
-        table.values[of, Column.VISIBILITY] = np.array(seen)[which]
-        table.values[of, Column.BODY_REACH] = np.array([reach.by_body for reach in reaches])[which]
-        table.values[of, Column.REACH] = np.array([reach.farthest for reach in reaches])[which]
-        table.values[of, Column.CHOICE] = np.array([self._choice(visibility) for visibility in seen])[which]
-        table.values[of, Column.SHARE] = np.array([speed_share(self._choice, v) for v in seen])[which]
-        table.values[of, Column.LIMIT] = limits[kinds, which]
+        found = {k: self._choose_in(k) for k in dict.fromkeys(here)}
+        kinds = table.values[of, Column.KIND].astype(np.intp).tolist()
+        # The table's last columns.
+        table.values[of, Column.EXTINCTION :] = [
+            (*found[k][0], table.kinds[kind].top_speed(found[k][1])) for k, kind in zip(here, kinds, strict=True)
+        ]
+
+    def _choose_in(self, extinction: float) -> tuple[tuple[float, ...], LeaderReach]:
+        """Columns `EXTINCTION` to `SHARE` in a fog, and how far away leaders are seen in it."""
+        visibility = visibility_from_extinction(extinction)
+        seen, reach = drivers_visibility(self._sight, visibility), leader_reach(self._sight, visibility)
+        chosen = self._choice(seen), speed_share(self._choice, seen)
+        return (extinction, seen, reach.by_body, reach.farthest, *chosen), reach

@@ -1,4 +1,4 @@
-"""Write the tables of docs/policies.md: ``python docs/make_study_tables.py [--check] STUDY_FOLDER …``.
+"""Write the tables of studies into their pages: ``python docs/make_study_tables.py [--check] STUDY_FOLDER …``.
 
 A folder is what ``fogsim study scenarios/studies/NAME.yaml`` has written, ``runs/NAME`` by default; its ``study.csv``
 and ``comparison.csv`` are read. Each cell of a table has a mean and, in brackets, the interval of its difference to
@@ -16,6 +16,9 @@ from pathlib import Path
 from make_tables import HERE, filled
 
 PAGE = HERE / "policies.md"
+PAGES = {"lighting_policies": HERE.parent / "scenarios" / "rural_night_fog" / "README.md"}
+"""Pages of studies whose tables are not in docs/policies.md."""
+
 Cells = tuple[str, ...]
 
 P_SHOWN = 0.05
@@ -42,6 +45,15 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
         EGO,
         OVERDRIVING,
         COLLISIONS,
+    ),
+    "lighting_policies": (
+        ("mean_own_sight_m", "own sight [m]", 1.0, 1),
+        ("high_beam_time_share", "high beams [% of time]", 100.0, 0),
+        ("glare_dealt_time_share", "glare dealt [% of time]", 100.0, 1),
+        ("glare_dealt_s", "glare dealt [driver-s]", 1.0, 1),
+        ("max_glare_dealt_cdpm2", "largest veil dealt [cd/m²]", 1.0, 2),
+        ("ego_collisions", "hits the dark car [% of runs]", 100.0, 0),
+        ("ego_max_impact_speed_mps", "impact [km/h]", 3.6, 0),
     ),
     "field_sizes": (SPEED, SPREAD, OVERDRIVING, CONFLICTS, ("traffic_collisions", "collisions a run", 1.0, 2)),
 }
@@ -96,13 +108,14 @@ def main() -> int:
         if folder.name not in COLUMNS:
             parser.error(f"no study of the docs is called {folder.name!r}; there are {', '.join(COLUMNS)}")
         heading, *rows = table(folder, COLUMNS[folder.name])
-        text = PAGE.read_text(encoding="utf-8")
+        page = PAGES.get(folder.name, PAGE)
+        text = page.read_text(encoding="utf-8")
         new = filled(text, folder.name, heading, rows)
         if new != text and arguments.check:
             stale = True
-            print(f"{PAGE.name}: {folder.name} is not up to date")  # noqa: T201 - the line is the result
+            print(f"{page.name}: {folder.name} is not up to date")  # noqa: T201 - the line is the result
         elif not arguments.check:
-            PAGE.write_text(new, encoding="utf-8")
+            page.write_text(new, encoding="utf-8")
             for name in FIGURES.get(folder.name, ()):
                 shutil.copy(folder / "figures" / f"{name}.svg", HERE / "pictures" / f"{folder.name}_{name}.svg")
     return int(stale)

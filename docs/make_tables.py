@@ -17,6 +17,7 @@ from fogsim.conditions import SIGNALS
 from fogsim.estimators import ESTIMATORS
 from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
+from fogsim.lighting.legal import LAWS
 from fogsim.metrics import RunMetrics
 from fogsim.openscenario.actions import ACTIONS, LAMPS
 from fogsim.openscenario.entities import CLASSES
@@ -178,6 +179,21 @@ def parameters() -> list[tuple[str, ...]]:
     return rows
 
 
+def laws() -> list[tuple[str, ...]]:
+    """Rules of lighting by country, each with its source."""
+    told = {
+        "rear_fog_below": "rear fog lamps below",
+        "front_fog_below": "front fog lamps below",
+        "high_beam_from": "high beams from",
+        "near_lead": "no high beams on who is ahead within",
+    }
+    return [
+        (f"`{country}`", what, f"{getattr(law, name):g}", law.sources[name])
+        for country, law in LAWS.items()
+        for name, what in told.items()
+    ]
+
+
 def _shown_default(default: object) -> str:
     """A parameter's default value as a table shows it."""
     if default is None or default is inspect.Parameter.empty:
@@ -266,6 +282,7 @@ TABLES = {
     "tests.md": {
         "signals": (("signal", "unit or kind", "meaning", "needs"), signals),
     },
+    "night.md": {"laws": (("rules", "what", "from, up to [m]", "source"), laws)},
     "results.md": {
         "columns": (("column", "type", "meaning"), columns),
         "traffic_columns": (("column", "type", "meaning"), traffic_columns),

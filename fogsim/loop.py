@@ -13,6 +13,7 @@ from fogsim.atmosphere import FogNow
 from fogsim.ego.equipment import EgoEquipment
 from fogsim.ego.view_rendering import Surrounding
 from fogsim.errors import SimulationError, UnplayedWarning
+from fogsim.lighting import LightingPolicy, VehicleLightingPolicy
 from fogsim.randomness import spawn_streams
 from fogsim.road_advice import RoadAdvice, stretch_advices
 from fogsim.scenario import Scenario, build
@@ -27,6 +28,7 @@ from fogsim.values import (
     Command,
     Ending,
     FogField,
+    LampChoice,
     RoadSection,
     SpeedAdvice,
     Step,
@@ -34,7 +36,7 @@ from fogsim.values import (
     TrafficStep,
 )
 from fogsim.values.belief import certain_belief
-from fogsim.values.result_checks import checked_advice, checked_command, checked_lamps
+from fogsim.values.result_checks import checked_advice, checked_command, checked_lamp_choice, checked_lamps
 
 
 def run(
@@ -115,7 +117,7 @@ class AdvisedDriving:
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
         self._ask_adviser = _questions_to(build.adviser(scenario))
-        self._lighting = build.lighting_policy(scenario)
+        self._ask_lighting = _lighting_questions(build.lighting_policy(scenario), scenario.lighting.method)
         self._frames = build.periods(scenario).decision_frames
         self._road = RoadAdvice(scenario) if scenario.drivers.advised in DISPLAYS else None
 
@@ -133,13 +135,14 @@ class AdvisedDriving:
         if step.index % self._frames:
             return previous
         lit = known_fog(step, self._scenario.lighting)
-        lamps = checked_lamps(self._scenario.lighting.method, self._lighting.lamps(lit, previous.lamps))
+        lamps = self._ask_lighting(step, lit, LampChoice(previous.lamps, previous.lamp_wish))
+        lighting = Command(lamps=lamps.lamps, lamp_wish=lamps.wish)
         if self._road is not None:
             advice, stretches = self._road.advise(step)
-            return Command(advice=advice, lamps=lamps, stretches=stretches)
+            return dataclasses.replace(lighting, advice=advice, stretches=stretches)
         known = known_fog(step, self._scenario.advice)
         advice = checked_advice(self._scenario.advice.method, self._ask_adviser(step, known, previous.advice))
-        return spread_advice(Command(advice=advice, lamps=lamps), self._scenario)
+        return spread_advice(dataclasses.replace(lighting, advice=advice), self._scenario)
 
 
 def _questions_to(adviser: Adviser | VehicleAdviser) -> Callable[[Step, Belief, SpeedAdvice], SpeedAdvice]:
@@ -149,6 +152,17 @@ def _questions_to(adviser: Adviser | VehicleAdviser) -> Callable[[Step, Belief, 
             known, step.observation, step.speed_limit, step.time, previous
         )
     return lambda step, known, previous: adviser.advise(known, step.speed_limit, step.time, previous)
+
+
+def _lighting_questions(
+    policy: LightingPolicy | VehicleLightingPolicy, name: str
+) -> Callable[[Step, Belief, LampChoice], LampChoice]:
+    """A function that asks a lighting policy likewise."""
+    if isinstance(policy, VehicleLightingPolicy):
+        return lambda step, known, previous: checked_lamp_choice(
+            name, policy.choose_lamps(known, step.observation, step.time, previous)
+        )
+    return lambda _, known, previous: LampChoice(checked_lamps(name, policy.lamps(known, previous.lamps)))
 
 
 def known_fog(step: Step, method: InformedMethod) -> Belief:

@@ -13,6 +13,7 @@ from fogsim.atmosphere import distance_at_depth, extinction, field_at, with_chan
 from fogsim.camera import Delivered, FaultyLens, FrameDelivery, knocked, mounted_pose, unexposed
 from fogsim.ego.daylight import Ramp, in_daylight
 from fogsim.ego.frame_watch import FrameWatch, LeadHistory
+from fogsim.ego.light_sensing import LightSensing, lamp_effects
 from fogsim.ego.measurements import EgoSensors
 from fogsim.ego.road_meters import RoadMeters
 from fogsim.ego.sensor_faults import FaultSchedule
@@ -71,6 +72,7 @@ class EgoEquipment:
         self._camera_sensor = build.camera_sensor(scenario)
         self._body_pitch = build.body_pitch(scenario)
         self._sensors = EgoSensors(scenario)
+        self._light_sensing = LightSensing(scenario)
         self._faults = tuple(fault_of(written) for written in scenario.sensors.faults)
         self._schedule: FaultSchedule | None = None
         self._light = Ramp(scenario.light.illuminance_lx)
@@ -266,6 +268,8 @@ class EgoEquipment:
         pose, fog = self._pose(state, ego), field_at(renderer.fog, time)
         sections, known = meters.measure(fog), tuple(one.fault for one in faults)
         truth = fog_truth(fog, pose, camera, renderer.signs, state, sections, self._way, known)
+        effects = lamp_effects(state, ego, fog, truth.extinction_ahead, light)
+        truth = truth if effects is None else replace(truth, lamp_effects=effects)
         view, radiance = renderer.render(state, ego, pose, time, camera, light)
         if radiance is None:
             image = self._unexposed
@@ -279,6 +283,7 @@ class EgoEquipment:
             signs=self._sensors.signs(snapshot, network[1], faults, streams),
             camera_setback=self._setback,
             lamps=ALL_LAMPS & int(state.lamps[ego]),
+            light=self._light_sensing.measure(state, ego, fog, light),
         )
         estimates = self._estimate(frame, observation, time)
         return Step(

@@ -3,15 +3,34 @@
 from collections.abc import Callable
 
 from fogsim.lighting.head_lamps import LampMount, own_head_lamps
-from fogsim.lighting.protocol import LightingPolicy
+from fogsim.lighting.high_beam import AlwaysHigh, Gallen2014
+from fogsim.lighting.legal import LegalRules
+from fogsim.lighting.optimiser import SightOptimiser
+from fogsim.lighting.protocol import LightingPolicy, VehicleLightingPolicy
 from fogsim.lighting.rules import FogLampRules, LowBeamOnly
 from fogsim.registry import Registry
 
-LIGHTING_POLICIES: Registry[Callable[..., LightingPolicy]] = Registry(
+LIGHTING_POLICIES: Registry[Callable[..., LightingPolicy | VehicleLightingPolicy]] = Registry(
     "lighting policy",
-    {"fog_lamp_rules": FogLampRules, "low_beam": LowBeamOnly},
+    {
+        "fog_lamp_rules": FogLampRules,
+        "low_beam": LowBeamOnly,
+        "always_low": LowBeamOnly,
+        "always_high": AlwaysHigh,
+        "gallen2014": Gallen2014,
+        "legal": LegalRules,
+        "longest_sight": SightOptimiser,
+    },
     group="fogsim.lighting",
-    methods=("lamps",),
+    methods=("lamps|choose_lamps",),
 )
 
-__all__ = ["LIGHTING_POLICIES", "FogLampRules", "LampMount", "LightingPolicy", "LowBeamOnly", "own_head_lamps"]
+__all__ = [
+    "LIGHTING_POLICIES",
+    "FogLampRules",
+    "LampMount",
+    "LightingPolicy",
+    "LowBeamOnly",
+    "VehicleLightingPolicy",
+    "own_head_lamps",
+]

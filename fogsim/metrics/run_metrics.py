@@ -9,6 +9,7 @@ from fogsim.errors import SimulationError
 from fogsim.metrics.cross_sections import TrafficThroughput
 from fogsim.metrics.crossing import TrafficEncroachment
 from fogsim.metrics.estimation import BeliefError, EstimatorErrors
+from fogsim.metrics.lighting import Lighting
 from fogsim.metrics.metric import JsonValue, Metric, Sample
 from fogsim.metrics.motion import Comfort, Compliance, Motion
 from fogsim.metrics.safety import Collisions, Conflict, Sight
@@ -40,6 +41,7 @@ METRICS: Registry[MetricFactory] = Registry(
         "sight": lambda standard: Sight(standard.reaction_time, standard.deceleration),
         "compliance": lambda standard: Compliance(standard.advice_tolerance),
         "comfort": lambda _: Comfort(),
+        "lighting": lambda _: Lighting(),
         "belief": lambda _: BeliefError(),
         "estimators": lambda _: EstimatorErrors(),
         "traffic_collisions": lambda _: TrafficCollisions(),

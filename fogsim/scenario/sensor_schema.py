@@ -66,6 +66,19 @@ class GpsSection(Section):
     """Standard deviation of the heading."""
 
 
+class LightSensorSection(Section):
+    """The light sensor behind the windscreen: the light of the sky, and by night whether others' lamps are ahead."""
+
+    reach_m: Length = 400.0
+    """Distance up to which it finds dipped head lamps in clear air; brighter ones farther, in fog all less far."""
+
+    tail_reach_m: Length = 100.0
+    """The same of tail lamps."""
+
+    field_of_view_deg: Annotated[Number, Field(ge=0.1, le=180)] = 40.0
+    """Full horizontal angle within which it looks for lamps."""
+
+
 class FaultSection(Section):
     """A fault of a sensor."""
 
@@ -424,6 +437,9 @@ class Sensors(Section):
 
     gps: GpsSection = GpsSection()
     """Satellite positioning."""
+
+    light: LightSensorSection = LightSensorSection()
+    """The light sensor, by which lighting policies go."""
 
     sign_reach_m: Length = 250.0
     """Distance up to which the map tells of signs ahead."""

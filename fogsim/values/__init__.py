@@ -2,13 +2,22 @@
 
 from fogsim.values.belief import Belief
 from fogsim.values.camera import Camera, CameraPose, Response
-from fogsim.values.command import Command, Display, EgoControl, SpeedAdvice, Stretch, StretchAdvice
+from fogsim.values.command import (
+    Command,
+    Display,
+    EgoControl,
+    LampChoice,
+    LampWish,
+    SpeedAdvice,
+    Stretch,
+    StretchAdvice,
+)
 from fogsim.values.estimate import Estimate, FogCategory, SignLook, fog_category
 from fogsim.values.fault import Fault, RunningFault
 from fogsim.values.fog import FogBank, FogChange, FogField, FogPatches, FogShelter
 from fogsim.values.image import Frame, View
 from fogsim.values.light import Beam, HeadLamp, Lamp, LampLobes, Lights, LightSources, SignalLight, StreetLighting
-from fogsim.values.observation import LeadMeasurement, Observation, SignSighting
+from fogsim.values.observation import LeadMeasurement, LightMeasurement, Observation, SignSighting
 from fogsim.values.road import (
     Lane,
     LaneEnd,
@@ -24,7 +33,7 @@ from fogsim.values.road import (
 )
 from fogsim.values.scene import Batch, Mesh, Scene, Surface
 from fogsim.values.script import Begun
-from fogsim.values.step import Ending, RoadSection, Step, TrafficStep, Truth
+from fogsim.values.step import Ending, LampEffects, RoadSection, Step, TrafficStep, Truth
 from fogsim.values.traffic import (
     Collision,
     Leader,
@@ -62,13 +71,17 @@ __all__ = [
     "Frame",
     "HeadLamp",
     "Lamp",
+    "LampChoice",
+    "LampEffects",
     "LampLobes",
+    "LampWish",
     "Lane",
     "LaneEnd",
     "LaneKind",
     "LaneMarking",
     "LeadMeasurement",
     "Leader",
+    "LightMeasurement",
     "LightSources",
     "Lights",
     "Mesh",

@@ -26,6 +26,38 @@ class SpeedAdvice:
     smoothed: tuple[float, float] | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class LampWish:
+    """Other lamps than those that are lit, asked for without a break, and not yet for long enough.
+
+    Attributes
+    ----------
+    lamps : Lamp
+        The lamps.
+    since : float
+        Instant [s] since which.
+    """
+
+    lamps: Lamp
+    since: float
+
+
+@dataclass(frozen=True, slots=True)
+class LampChoice:
+    """Lamps to light, and what the lighting policy remembers with them.
+
+    Attributes
+    ----------
+    lamps : Lamp
+        The lamps.
+    wish : LampWish or None
+        What the policy would rather light; None for nothing else.
+    """
+
+    lamps: Lamp
+    wish: LampWish | None = None
+
+
 class Display(StrEnum):
     """Where a driver hears advice to all on a stretch of road."""
 
@@ -111,6 +143,8 @@ class Command:
         Advice to all on stretches of road.
     control : EgoControl or None
         The ego driven by hand, in place of its driver and of the advice; None for the driver. SUMO's traffic alone.
+    lamp_wish : LampWish or None
+        What the lighting policy remembers with the lamps.
     """
 
     advice: SpeedAdvice = field(default_factory=SpeedAdvice)
@@ -119,6 +153,7 @@ class Command:
     advice_reach: float = 0.0
     stretches: tuple[StretchAdvice, ...] = ()
     control: EgoControl | None = None
+    lamp_wish: LampWish | None = None
 
     @property
     def is_for_others(self) -> bool:

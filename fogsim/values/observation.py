@@ -70,6 +70,25 @@ class SignSighting:
 
 
 @dataclass(frozen=True, slots=True)
+class LightMeasurement:
+    """What the light sensor behind the windscreen tells: how bright the sky is, and whether others' lamps are ahead.
+
+    Attributes
+    ----------
+    illuminance : float
+        Horizontal illuminance of the sky [lx].
+    oncoming : bool
+        Whether head lamps shine this way.
+    preceding : bool
+        Whether tail lamps are ahead.
+    """
+
+    illuminance: float
+    oncoming: bool = False
+    preceding: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Observation:
     """What one vehicle has at one instant.
 
@@ -87,6 +106,8 @@ class Observation:
         Distance of the camera behind the front bumper, from which distances count [m].
     lamps : Lamp or None
         Own lamps that are switched on, whether each of them burns or not; None where the vehicle does not tell.
+    light : LightMeasurement or None
+        What the light sensor tells; None without one.
     """
 
     frame: Frame | NDArray[np.uint8] | NDArray[np.uint16]
@@ -95,6 +116,7 @@ class Observation:
     signs: tuple[SignSighting, ...] = ()
     camera_setback: float = 0.0
     lamps: Lamp | None = None
+    light: LightMeasurement | None = None
 
     @property
     def image(self) -> NDArray[np.uint8] | NDArray[np.uint16]:

@@ -10,7 +10,19 @@ from numpy.typing import NDArray
 
 from fogsim.errors import InputError
 from fogsim.jit import kernel
-from fogsim.values import Belief, Command, Display, EgoControl, Estimate, Lamp, SpeedAdvice, Stretch, StretchAdvice
+from fogsim.values import (
+    Belief,
+    Command,
+    Display,
+    EgoControl,
+    Estimate,
+    Lamp,
+    LampChoice,
+    SpeedAdvice,
+    Stretch,
+    StretchAdvice,
+)
+from fogsim.values.light import ALL_LAMPS
 
 T = TypeVar("T")
 
@@ -138,9 +150,40 @@ def checked_lamps(method: str, value: object) -> Lamp:
     Raises
     ------
     InputError
-        If it is no `Lamp`.
+        If it is no `Lamp`, or of bits that no lamp has.
     """
-    return _of_type(f"lighting policy {method!r}: lamps()", value, Lamp)
+    who = f"lighting policy {method!r}: lamps()"
+    return _real_lamps(who, _of_type(who, value, Lamp))
+
+
+def checked_lamp_choice(method: str, value: object) -> LampChoice:
+    """What a lighting policy that goes by the vehicle's sensors has returned.
+
+    Parameters
+    ----------
+    method : str
+        Name of the policy.
+    value : object
+        What its `choose_lamps` has returned.
+
+    Raises
+    ------
+    InputError
+        If it is no `LampChoice`, or of bits that no lamp has.
+    """
+    who = f"lighting policy {method!r}: choose_lamps()"
+    choice = _of_type(who, value, LampChoice)
+    _real_lamps(who, _of_type(f"{who}: lamps", choice.lamps, Lamp))
+    return choice
+
+
+def _real_lamps(who: str, lamps: Lamp) -> Lamp:
+    unknown = int(lamps) & ~int(ALL_LAMPS)
+    if unknown:
+        raise InputError(
+            f"{who}: no lamp has the bits {unknown}; there are {', '.join(str(lamp.name) for lamp in Lamp)}"
+        )
+    return lamps
 
 
 def checked_command(value: object) -> Command:

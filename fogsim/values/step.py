@@ -57,6 +57,23 @@ class RoadSection:
 
 
 @dataclass(frozen=True, slots=True)
+class LampEffects:
+    """What the ego's lamps do by night.
+
+    Attributes
+    ----------
+    own_sight : float
+        Distance at which a small object on the road reaches visibility level 7 by them [m].
+    veils : tuple of float
+        Veil of disability glare that they lay over the eyes of each driver whom they meet, or who has them in the
+        mirrors [cd/m²].
+    """
+
+    own_sight: float
+    veils: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Truth:
     """What no estimator and no agent may see.
 
@@ -86,6 +103,8 @@ class Truth:
         Faults of the ego's sensors in force now.
     carriageways : mapping from str to tuple of str
         Ids of the lanes for vehicles of each edge, from the right; empty where no network is known.
+    lamp_effects : LampEffects or None
+        What the ego's lamps do; None by day.
     """
 
     extinction: float
@@ -99,6 +118,7 @@ class Truth:
     route: NDArray[np.float64] | None = None
     faults: tuple[Fault, ...] = ()
     carriageways: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    lamp_effects: LampEffects | None = None
 
     @property
     def visibility(self) -> float:

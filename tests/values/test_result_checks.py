@@ -11,12 +11,13 @@ from fogsim.fusion import make as make_fusion
 from fogsim.loop import AdvisedDriving
 from fogsim.metrics import METRICS, RunMetrics
 from fogsim.scenario import load_scenario
-from fogsim.values import Command, Display, Estimate, Lamp, SpeedAdvice, Stretch, StretchAdvice
+from fogsim.values import Command, Display, Estimate, Lamp, LampChoice, SpeedAdvice, Stretch, StretchAdvice
 from fogsim.values.result_checks import (
     checked_advice,
     checked_belief,
     checked_command,
     checked_estimate,
+    checked_lamp_choice,
     checked_lamps,
     checked_recorder,
     checked_values,
@@ -123,6 +124,12 @@ def test_lamps() -> None:
             InputError, match=r"^lighting policy 'mine': lamps\(\) must be of type fogsim\.values\.Lamp"
         ):
             checked_lamps("mine", wrong)
+    with pytest.raises(InputError, match=r"'mine': lamps\(\): no lamp has the bits 4096; there are POSITION, LOW_BEAM"):
+        checked_lamps("mine", Lamp.LOW_BEAM | Lamp(4096))
+    choice = LampChoice(Lamp.LOW_BEAM)
+    assert checked_lamp_choice("mine", choice) is choice
+    with pytest.raises(InputError, match=r"choose_lamps\(\): lamps must be of type"):
+        checked_lamp_choice("mine", LampChoice(2))  # type: ignore[arg-type]  # what is to be refused
 
 
 @pytest.mark.parametrize(
@@ -144,13 +151,16 @@ def test_metrics(value: object, message: str, monkeypatch: pytest.MonkeyPatch) -
 
 def test_the_rooms_that_ask_methods_check_them(monkeypatch: pytest.MonkeyPatch) -> None:
     scenario = load_scenario("motorway_fog_bank")
-    driving = AdvisedDriving(scenario)
     step = make_step(0, time=0.0)
-    without_lamps = type("Mine", (), {"lamps": lambda *_: None})()
-    for part, answer in (("_lighting", without_lamps), ("_ask_adviser", lambda *_: None)):
-        monkeypatch.setattr(driving, part, answer)
-        with pytest.raises(InputError, match=r"stopping_sight_distance|fog_lamp_rules"):
-            driving.decide(step)
+    driving = AdvisedDriving(scenario)
+    monkeypatch.setattr(driving, "_ask_adviser", lambda *_: None)
+    with pytest.raises(InputError, match="stopping_sight_distance"):
+        driving.decide(step)
+    for method in ("lamps", "choose_lamps"):
+        without_lamps = type("Mine", (), {method: lambda *_: None})()
+        monkeypatch.setattr("fogsim.loop.build.lighting_policy", lambda _, mine=without_lamps: mine)
+        with pytest.raises(InputError, match=rf"'fog_lamp_rules': {method}\(\) must be of type"):
+            AdvisedDriving(scenario).decide(step)
 
 
 def test_recorders() -> None:

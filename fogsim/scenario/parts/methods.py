@@ -8,7 +8,7 @@ from fogsim.errors import InputError
 from fogsim.estimators import ESTIMATORS, Estimator
 from fogsim.estimators.night.references import TakesReferences
 from fogsim.fusion import FUSIONS, Fusion
-from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy
+from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy, VehicleLightingPolicy
 from fogsim.metrics import SafetyStandard
 from fogsim.scenario.schema import NO_RENDERER, Scenario
 from fogsim.values import Camera
@@ -151,7 +151,7 @@ def safety_standard(scenario: Scenario) -> SafetyStandard:
     )
 
 
-def lighting_policy(scenario: Scenario) -> LightingPolicy:
+def lighting_policy(scenario: Scenario) -> LightingPolicy | VehicleLightingPolicy:
     """Lighting policy of a scenario.
 
     Parameters

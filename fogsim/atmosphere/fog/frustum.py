@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.fog.frustum_kernels import PixelGrid, fog_rows_by_grid, grid_depths
+from fogsim.atmosphere.fog.frustum_kernels import PixelGrid, extinctions_on_rays, fog_rows_by_grid, grid_depths
 from fogsim.atmosphere.fog.koschmieder_kernels import ENDLESS
 from fogsim.atmosphere.fog.medium import Medium, medium_of
-from fogsim.atmosphere.fog.optical_depth_kernels import extinctions_on_ray
 from fogsim.linear_algebra import matrix_product
 from fogsim.values import Camera, CameraPose, FogField, View
 from fogsim.values.pinhole import ray_from_pixel
@@ -149,8 +148,7 @@ def _node_distances(eye: NDArray[np.float64], directions: NDArray[np.float64], m
     """
     probes = np.ascontiguousarray(directions.reshape(-1, 3))
     k = np.empty((len(probes), len(_PROBES)))
-    for direction, values in zip(probes, k, strict=True):
-        extinctions_on_ray(eye, direction, _PROBES, medium, values)
+    extinctions_on_rays(eye, probes, _PROBES, medium, k)
     step = np.diff(_PROBES)
     pieces = 0.5 * (k[:, 1:] + k[:, :-1]) * step
     depth = np.cumsum(pieces, axis=1)

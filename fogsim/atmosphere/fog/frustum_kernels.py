@@ -25,6 +25,33 @@ _OUT_OF_FOG = 1e-9
 
 
 @kernel
+def extinctions_on_rays(
+    eye: NDArray[np.float64],
+    directions: NDArray[np.float64],
+    at: NDArray[np.float64],
+    medium: Medium,
+    values: NDArray[np.float64],
+) -> None:
+    """Extinction coefficients at distances along rays.
+
+    Parameters
+    ----------
+    eye : (3,) float64
+        Where the rays begin [m].
+    directions : (m, 3) float64
+        Unit vectors.
+    at : (n,) float64
+        Ascending distances [m].
+    medium : Medium
+        The fog.
+    values : (m, n) float64
+        Extinction coefficients [1/m]; written to.
+    """
+    for m in range(directions.shape[0]):
+        extinctions_on_ray(eye, directions[m], at, medium, values[m])
+
+
+@kernel
 def _sharp_rise(height: float, edge: float, eye: float) -> float:
     """How far a sharp base or top is above the eye [m]; ``inf`` for one that is soft, or nowhere."""
     return math.inf if edge > 0.0 or math.isinf(height) else height - eye

@@ -29,8 +29,8 @@ PUBLISHED_VISIBILITIES = (15.0, 50.0, 100.0, 200.0, 500.0, math.inf)
 LOG_SPACED_VISIBILITIES = (*np.geomspace(12.0, 1500.0, 20).tolist(), math.inf)
 """References in equal steps of ln V, and a clear night [m]."""
 
-DROPLETS = (Droplets.MODERATE_RADIATION, Droplets.HEAVY_RADIATION, Droplets.MODERATE_ADVECTION)
-"""Droplets that differ in how they send light back; those of heavy advection fog do as those of moderate."""
+DROPLETS = tuple(Droplets)
+"""Kinds of droplets: they differ in how they send light back."""
 
 RETROREFLECTION = 0.015
 """Coefficient of retroreflected luminance of dry asphalt [cd/m² per lx] (middle of gallen2014's range)."""

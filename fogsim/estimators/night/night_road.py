@@ -50,8 +50,8 @@ INDEPENDENT = 60.0
 LEAST_MISFIT = 0.05
 """Mean squared deviation below which a picture only by chance fits better [-]."""
 
-MODEL_DEVIATION = 0.045
-"""Deviation of ln k by what no picture shows: droplets, aim and pattern of the lamps, mount of the camera [-]."""
+MODEL_DEVIATION = 0.03
+"""Deviation of ln k by what no picture shows: aim and pattern of the lamps, mount of the camera [-]."""
 
 LEAST_DEVIATION = 1e-3
 """Deviation of k by what else is lit: verges, trees, signs [1/m]."""
@@ -105,7 +105,7 @@ class NightRoad:
     the road returns of what gets there and back, and even light of anything else. Pictures of veil and road for many
     visibilities come from the night model, for the told camera and the own lamps that are lit; a, b, c ≥ 0 and a small
     error of the told pitch are fitted for each, so neither the camera's exposure nor the road's albedo needs be known,
-    though b / a must be that of some asphalt; and so for three kinds of droplets. Where others' lamps shine, cells are
+    though b / a must be that of some asphalt; and so for four kinds of droplets. Where others' lamps shine, cells are
     brighter than the model, and count less. About the likeliest reference more of them are interpolated; the visibility
     is the likeliest of these, over the droplets that are likely.
 

@@ -37,6 +37,9 @@ GLARE = 0.01
 """Share of lamps' light that the lens scatters, as a scenario's camera does unless told otherwise [-]."""
 
 _SIGNS_APART = 70.0
+_ROAD = 2
+"""What a view's pixels have where they show the road."""
+
 _FAR = 1200.0
 _CAR = StagedVehicle()
 
@@ -82,6 +85,8 @@ class NightScene:
         Lit lamps of the vehicle that carries the camera.
     strength : float
         Intensity of all other lamps over the usual one [-].
+    pavement : float
+        What the road returns of the own lamps' light, over what dry asphalt does [-].
     """
 
     place: float = 0.0
@@ -89,6 +94,7 @@ class NightScene:
     street_lamps: bool = False
     own: Lamp = Lamp.POSITION | Lamp.LOW_BEAM
     strength: float = 1.0
+    pavement: float = 1.0
 
 
 class NightRoad:
@@ -148,7 +154,13 @@ class NightRoad:
         renderer, heads = self._scene(lit)
         pose = CameraPose((scene.place, 0.0, camera.mount_height), heading=0.0)
         traffic = _traffic(scene)
+<<<<<<< HEAD:fogsim/reproduce/night/scenes.py
         view = renderer.render(vehicle_batches(traffic, None), camera, pose, lamplight=True)
+=======
+        view = self._renderers[lit].render(vehicle_batches(traffic, None), camera, pose, lamplight=True)
+        if scene.pavement != 1.0 and view.lamp_response is not None:
+            view.lamp_response[view.instance == _ROAD] *= np.float32(scene.pavement)
+>>>>>>> 794eb16 (benchmarks/night_estimators.py: how good the methods of the own head lamps are):fogsim/reproduce/night_scenes.py
         mount = LampMount()
         others = light_sources(traffic, None, pose.position, mount.beams, heads if lit else None)
         streets = street_lighting(heads, DARK) if lit else None

@@ -26,7 +26,7 @@ from fogsim.calibration.veil_references import usual_references
 from fogsim.estimators import make
 from fogsim.estimators.night.gallen2014_veil import BANDS
 from fogsim.estimators.night.references import TakesReferences
-from fogsim.reproduce.night_scenes import SETBACK, NightRoad, NightScene
+from fogsim.reproduce.night.scenes import SETBACK, NightRoad, NightScene
 from fogsim.values import Camera, Estimate, Lamp, Observation
 from fogsim.values.camera import Response
 

@@ -154,13 +154,9 @@ class NightRoad:
         renderer, heads = self._scene(lit)
         pose = CameraPose((scene.place, 0.0, camera.mount_height), heading=0.0)
         traffic = _traffic(scene)
-<<<<<<< HEAD:fogsim/reproduce/night/scenes.py
         view = renderer.render(vehicle_batches(traffic, None), camera, pose, lamplight=True)
-=======
-        view = self._renderers[lit].render(vehicle_batches(traffic, None), camera, pose, lamplight=True)
         if scene.pavement != 1.0 and view.lamp_response is not None:
             view.lamp_response[view.instance == _ROAD] *= np.float32(scene.pavement)
->>>>>>> 794eb16 (benchmarks/night_estimators.py: how good the methods of the own head lamps are):fogsim/reproduce/night_scenes.py
         mount = LampMount()
         others = light_sources(traffic, None, pose.position, mount.beams, heads if lit else None)
         streets = street_lighting(heads, DARK) if lit else None

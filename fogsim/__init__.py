@@ -27,7 +27,10 @@ if TYPE_CHECKING:
     from fogsim.values import Display as Display
     from fogsim.values import Estimate as Estimate
     from fogsim.values import Frame as Frame
+    from fogsim.values import LampChoice as LampChoice
+    from fogsim.values import LampWish as LampWish
     from fogsim.values import LeadMeasurement as LeadMeasurement
+    from fogsim.values import LightMeasurement as LightMeasurement
     from fogsim.values import Observation as Observation
     from fogsim.values import SignSighting as SignSighting
     from fogsim.values import SpeedAdvice as SpeedAdvice
@@ -46,7 +49,10 @@ _VALUES = (
     "Display",
     "Estimate",
     "Frame",
+    "LampChoice",
+    "LampWish",
     "LeadMeasurement",
+    "LightMeasurement",
     "Observation",
     "SignSighting",
     "SpeedAdvice",
@@ -83,7 +89,10 @@ __all__ = [
     "FogSimError",
     "Frame",
     "InputError",
+    "LampChoice",
+    "LampWish",
     "LeadMeasurement",
+    "LightMeasurement",
     "MissingDependencyError",
     "Observation",
     "Scenario",

@@ -13,7 +13,8 @@ from highway_env.road.regulation import RegulatedRoad
 from numpy.typing import NDArray
 
 from fogsim.traffic.drivers.eye_heights import EYE_HEIGHTS
-from fogsim.traffic.drivers.lamp_intensity import HEAD_LAMPS, intensity_toward
+from fogsim.traffic.drivers.lamp_intensity import intensity_toward
+from fogsim.traffic.drivers.own_beams import head_lamp_light, high_beam_veil
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess, inherent_contrast
 from fogsim.traffic.highway.fleet import Fleet
 from fogsim.traffic.highway.snapshot import front_bumper, rear_bumper
@@ -97,6 +98,7 @@ class VisibleNeighbours:
         aside = float(north * forward_east - east * forward_north)
         lit = intensity_toward(int(fleet.lamps(other)), other.LENGTH, ahead, aside)
         # What is behind stands in nobody's own head lamps.
-        lights_it = ahead < 0.0 and int(fleet.lamps(vehicle)) & HEAD_LAMPS
+        own = head_lamp_light(int(fleet.lamps(vehicle))) if ahead < 0.0 else 0.0
+        glare = high_beam_veil(float(self._fog.extinction(eye + lift))) if own > 1.0 else 0.0
         contrast = inherent_contrast(fleet.paint(other))
-        return depth <= self._sight.depth_limit(distance, contrast, lit, 1.0 if lights_it else 0.0)
+        return depth <= self._sight.depth_limit(distance, contrast, lit, own, glare)

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from fogsim.atmosphere.lamps.phase_function import Droplets
-from fogsim.estimators.night.halos import HaloWatch, mean_steepness
+from fogsim.estimators.night.halos import HaloWatch, largest_sharpness, mean_steepness
 from fogsim.estimators.night.night_glow import NightGlow
 from fogsim.reproduce.night.halo_calibration import measure_halo_threshold, random_scene
 from fogsim.reproduce.night.scenes import SETBACK, NightRoad, NightScene, NightVehicle
@@ -47,22 +47,24 @@ def halo_records(camera: Camera, pool: int, scenes: int) -> list[Record]:
                 if name == "unseen":
                     scene, exposure = random_scene(rng, UNSEEN[rng.integers(2)]), rng.uniform(*UNSEEN[rng.integers(2)])
                 for visibility, light in zip(VISIBILITIES, road.radiances(scene, VISIBILITIES), strict=True):
-                    steepness = mean_steepness(halos_of(source_tree(road.photograph(light, exposure, rng))))
-                    counted = counts.setdefault((name, visibility), [0, 0, 0])
+                    halos = halos_of(source_tree(road.photograph(light, exposure, rng)))
+                    mean, largest = mean_steepness(halos), largest_sharpness(halos)
+                    counted = counts.setdefault((name, visibility), [0, 0, 0, 0])
                     counted[0] += 1
-                    if steepness is not None:
+                    if mean is not None and largest is not None:
                         counted[1] += 1
-                        counted[2] += steepness < measured.steepness
+                        counted[2] += mean < measured.steepness
+                        counted[3] += largest < measured.sharpness
     return [
         {
             "exposures and lamps": name,
             "V_met [m]": visibility if math.isfinite(visibility) else "clear",
             "pictures": pictures,
             "with halos": seen,
-            "taken for fog [%]": round(100.0 * fog / seen, 2) if seen else None,
-            "threshold": measured.steepness,
+            f"taken for fog by mean Br50 < {measured.steepness:g} [%]": round(100.0 * by_mean / max(seen, 1), 2),
+            f"by sharpness < {measured.sharpness:g} [%]": round(100.0 * by_largest / max(seen, 1), 2),
         }
-        for (name, visibility), (pictures, seen, fog) in counts.items()
+        for (name, visibility), (pictures, seen, by_mean, by_largest) in counts.items()
     ]
 
 

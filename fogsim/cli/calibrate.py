@@ -116,9 +116,9 @@ def calibrate_halos_command(
         typer.echo(json.dumps(json.loads(measured.as_json())))
         return
     stdout.print(
-        f"fog below a mean Br50 of {measured.steepness:g} levels a pixel (of {measured.pictures} pictures, "
-        f"{100 * measured.false_alarms:.1f} % of the clear and {100 * measured.misses:.1f} % of the foggy ones are "
-        f"taken for the other): {escape(out)}",
+        f"fog below a sharpness of {measured.sharpness:g} levels a pixel, as published a mean Br50 of "
+        f"{measured.steepness:g} (of {measured.pictures} pictures, at most {100 * measured.largest_errors:.1f} and "
+        f"{100 * measured.mean_errors:.1f} % of the clear or the foggy ones are taken for the other): {escape(out)}",
         soft_wrap=True,
     )
 

@@ -6,7 +6,7 @@ from typing import Annotated, Self
 
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.night.gallen2014_veil import LEAST_ROWS, Gallen2014Veil
-from fogsim.estimators.night.halos import PUBLISHED, WINDOW, HaloReading, HaloThreshold, HaloWatch
+from fogsim.estimators.night.halos import PUBLISHED, WINDOW, HaloReading, HaloThreshold, HaloWatch, largest_sharpness
 from fogsim.estimators.night.references import ReferenceSource
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import extinction_from_visibility
@@ -41,8 +41,8 @@ def fog_class(visibility: float) -> int:
 class Gallen2014:
     """Halos about lamps first, the own head lamps' veil without lamps (figure 9).
 
-    Where lamps are seen, the mean Br50 of their halos tells whether there is fog, but not how much: estimates are then
-    not valid and have bounds. Where none is, the veil is compared with references, which tells how much.
+    Where lamps are seen, their halos tell whether there is fog, but not how much: estimates are then not valid and have
+    bounds. Where none is, the veil is compared with references, which tells how much.
 
     Gallen, Cord, Hautière, Dumont & Aubert, "Nighttime Visibility Analysis and Estimation Method in the Presence of
     Dense Fog", IEEE Transactions on Intelligent Transportation Systems, 2014.
@@ -52,13 +52,15 @@ class Gallen2014:
     camera : Camera
         The assumed calibration.
     halos : str or None
-        File of ``fogsim calibrate halos``, of this camera; without it the paper's threshold 9 of its own camera serves.
+        File of ``fogsim calibrate halos``, of this camera; without it the mean Br50 is compared with the paper's 9,
+        which is of its own camera.
     references : str or None
         File of ``fogsim calibrate veil``; see `NightRoad`.
     window : int
-        Pictures over which the mean Br50 is smoothed.
+        Pictures over which the halos' value is smoothed.
     as_published : bool
-        Whether the veil's visibility is found, and halos' threshold is, to the letter of the paper.
+        Whether the value is the mean Br50 in place of the largest sharpness, and the veil's visibility is found to the
+        letter of the paper.
 
     Raises
     ------
@@ -80,7 +82,7 @@ class Gallen2014:
         self._camera, self._check = camera, ObservationCheck(camera)
         self._window, self._as_published = int(window), as_published
         self._veil = Gallen2014Veil(camera, references=references, as_published=as_published)
-        self._watch = HaloWatch(PUBLISHED, self._window)
+        self._watch = HaloWatch(PUBLISHED, window=self._window)
         if halos is not None:
             self.calibrated(HaloThreshold.read(Path(halos)))
 
@@ -97,8 +99,11 @@ class Gallen2014:
         InputError
             If it is of another camera.
         """
-        threshold = measured.checked_for(self._camera).steepness
-        self._watch = HaloWatch(PUBLISHED if self._as_published else threshold, self._window)
+        checked, window = measured.checked_for(self._camera), self._window
+        if self._as_published:
+            self._watch = HaloWatch(checked.steepness, window=window)
+        else:
+            self._watch = HaloWatch(checked.sharpness, largest_sharpness, window=window)
         return self
 
     def take_references(self, source: ReferenceSource) -> None:
@@ -128,8 +133,8 @@ class Gallen2014:
         Returns
         -------
         Estimate
-            Diagnostics: ``by``, "halos" or "veil"; ``detected``, whether there is fog; by halos ``steepness``, the mean
-            Br50 of this picture, ``smoothed`` over pictures [levels a pixel], and ``lamps``, how many; by the veil what
+            Diagnostics: ``by``, "halos" or "veil"; ``detected``, whether there is fog; by halos ``value`` of this
+            picture, ``smoothed`` over pictures [levels a pixel], and ``lamps``, how many; by the veil what
             `Gallen2014Veil` tells, and ``fog_class`` 1 … 3; or ``reason``.
 
         Raises
@@ -155,7 +160,7 @@ class Gallen2014:
 
     def _by_halos(self, reading: HaloReading) -> Estimate:
         found: dict[str, object] = {"by": "halos", "detected": reading.is_fog, "lamps": len(reading.halos)}
-        found |= {"steepness": reading.steepness, "smoothed": reading.smoothed}
+        found |= {"value": reading.value, "smoothed": reading.smoothed}
         if reading.is_fog:
             why, bounds = (
                 "halos show fog, but not how much",

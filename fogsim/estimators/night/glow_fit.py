@@ -111,8 +111,8 @@ def look_at(
     return GlowLook(time, distance, ratio, noise, float(uneven.min()))
 
 
-def likelihood(looks: tuple[GlowLook, ...], usual: float = USUAL) -> Floats:
-    """Share of each of `EXTINCTIONS` in what looks at one pair of lamps say (k,); it adds up to 1.
+def likelihood(looks: tuple[GlowLook, ...], usual: float = USUAL) -> tuple[Floats, float]:
+    """Share of each of `EXTINCTIONS` in what looks at one pair of lamps say (k,), and the best one's misfit a ring.
 
     Parameters
     ----------
@@ -135,8 +135,11 @@ def likelihood(looks: tuple[GlowLook, ...], usual: float = USUAL) -> Floats:
     likely = np.log(np.array(INTENSITIES) * RED_SHARE / ROAD_LUMINANCE)
     misfit = misfit[:, None] + (common[:, None] - likely) ** 2 / (usual**2 + known)
     misfit = misfit.reshape(hypotheses, extinctions, -1)
-    share = np.exp(-0.5 * (misfit - misfit.min())).sum(axis=(0, 2))
-    return np.asarray(share / share.sum())
+    # No lamp is seen through more fog than the models have.
+    misfit[:, EXTINCTIONS * max(look.distance for look in looks) > DEPTHS[-1]] = np.inf
+    least = float(misfit.min())
+    share = np.exp(-0.5 * (misfit - least)).sum(axis=(0, 2))
+    return share / share.sum(), least / count
 
 
 def _at_extinctions(look: GlowLook) -> Floats:

@@ -1,9 +1,13 @@
-"""Fog by the halos about lamps, after gallen2014 section III-B: whether there is any, never how much."""
+"""Fog by the halos about lamps, after gallen2014 section III-B: whether there is any, never how much.
+
+The paper's value of a picture is the mean Br50 of its halos. Ours is the largest sharpness: in fog no lamp is sharp,
+and on a clear night some lamp is, while signs and lamps behind glare spoil a mean.
+"""
 
 import json
 import math
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -23,7 +27,7 @@ WINDOW = 25
 
 @dataclass(frozen=True, slots=True)
 class HaloThreshold:
-    """Mean Br50 below which there is fog, measured for one camera.
+    """Values of pictures below which there is fog, measured for one camera.
 
     Attributes
     ----------
@@ -35,12 +39,13 @@ class HaloThreshold:
         Its response.
     black_level : float
         Its black level [-].
-    steepness : float
-        The threshold [levels of 255 a pixel].
-    false_alarms, misses : float
-        Share of pictures of clear nights, and of fog, that it gets wrong of those it was chosen on [-].
+    steepness, sharpness : float
+        Of the mean Br50, and of the largest sharpness [levels of 255 a pixel].
+    mean_errors, largest_errors : float
+        Share of pictures of clear nights or of fog, whichever is larger, that either gets wrong of those it was chosen
+        on [-].
     pictures : int
-        How many pictures with a halo it was chosen on.
+        How many pictures with a halo they were chosen on.
 
     Raises
     ------
@@ -54,13 +59,14 @@ class HaloThreshold:
     response: str
     black_level: float
     steepness: float
-    false_alarms: float
-    misses: float
+    sharpness: float
+    mean_errors: float
+    largest_errors: float
     pictures: int
 
     def __post_init__(self) -> None:
-        positive = (self.width, self.height, self.focal_length, self.steepness, self.pictures)
-        told: tuple[object, ...] = (*positive, self.black_level, self.false_alarms, self.misses)
+        positive = (self.width, self.height, self.focal_length, self.steepness, self.sharpness, self.pictures)
+        told: tuple[object, ...] = (*positive, self.black_level, self.mean_errors, self.largest_errors)
         finite = all(isinstance(one, int | float) and math.isfinite(one) for one in told)
         if not finite or min(positive) <= 0 or self.response not in list(Response):
             raise InputError(f"expected finite numbers, sizes and threshold above 0, got {shown(asdict(self))}")
@@ -133,8 +139,8 @@ class HaloReading:
 
     Attributes
     ----------
-    steepness : float or None
-        Mean Br50 of this picture [levels of 255 a pixel]; None without a halo.
+    value : float or None
+        Value of this picture [levels of 255 a pixel]; None without a halo.
     smoothed : float or None
         Its mean over the last pictures that had one, this one among them; None without a halo.
     is_fog : bool or None
@@ -145,7 +151,7 @@ class HaloReading:
         All sources.
     """
 
-    steepness: float | None
+    value: float | None
     smoothed: float | None
     is_fog: bool | None
     halos: tuple[Halo, ...]
@@ -158,13 +164,17 @@ class HaloWatch:
     Parameters
     ----------
     threshold : float
-        Mean Br50 below which there is fog [levels of 255 a pixel].
+        Value below which there is fog [levels of 255 a pixel].
+    value_of : callable
+        Value of a picture by its halos: `mean_steepness` or `largest_sharpness`.
     window : int
         Pictures of the sliding mean; 1 for every picture by itself.
     """
 
-    def __init__(self, threshold: float = PUBLISHED, window: int = WINDOW) -> None:
-        self._threshold = threshold
+    def __init__(
+        self, threshold: float = PUBLISHED, value_of: "ValueOf | None" = None, *, window: int = WINDOW
+    ) -> None:
+        self._threshold, self._value_of = threshold, value_of or mean_steepness
         self._last: deque[float | None] = deque(maxlen=window)
 
     def reset(self) -> None:
@@ -183,13 +193,13 @@ class HaloWatch:
         """
         tree = source_tree(image, bits)
         halos = halos_of(tree)
-        steepness = mean_steepness(halos)
-        self._last.append(steepness)
-        if steepness is None:
+        value = self._value_of(halos)
+        self._last.append(value)
+        if value is None:
             return HaloReading(None, None, None, halos, tree)
         seen = [one for one in self._last if one is not None]
         smoothed = sum(seen) / len(seen)
-        return HaloReading(steepness, smoothed, smoothed < self._threshold, halos, tree)
+        return HaloReading(value, smoothed, smoothed < self._threshold, halos, tree)
 
 
 def mean_steepness(halos: tuple[Halo, ...]) -> float | None:
@@ -201,3 +211,18 @@ def mean_steepness(halos: tuple[Halo, ...]) -> float | None:
         Of the sources that were selected.
     """
     return sum(one.steepness for one in halos) / len(halos) if halos else None
+
+
+def largest_sharpness(halos: tuple[Halo, ...]) -> float | None:
+    """Sharpness of the sharpest halo of a picture [levels of 255 a pixel]; None without a halo.
+
+    Parameters
+    ----------
+    halos : tuple of Halo
+        Of the sources that were selected.
+    """
+    return max((one.sharpness for one in halos), default=None)
+
+
+ValueOf = Callable[[tuple[Halo, ...]], float | None]
+"""Value of a picture by its halos."""

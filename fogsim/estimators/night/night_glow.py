@@ -20,7 +20,7 @@ from fogsim.vision.light.pixel_kernels import Pixels
 NEAREST, FARTHEST = 8.0, 120.0
 """Ranges of the vehicle ahead at which its glow is measured [m]."""
 
-LEAST_RINGS = 4
+LEAST_RINGS = 5
 """Fewest rings about the lamps that tell."""
 
 JUMP, SURPRISE = 0.3, 12.0
@@ -30,8 +30,17 @@ does not show, can make [-]; and of the range that only another vehicle can [m].
 UNUSUAL = 1.0
 """Deviation of lamps' intensity over the road's luminance where the road may lie in other beams than low ones [-]."""
 
+MOST_MISFIT = 3.0
+"""Mean square of a ring's deviation from the best model beyond which the light is not that of the lamps [-]."""
+
 UNEVEN = 0.12
 """Largest difference of the light over the model's from side to side [-]."""
+
+LEAST_LOOKS = 3
+"""Fewest ranges for an estimate; bounds need two, for other lamps may spoil one look."""
+
+SHARED = 0.12
+"""Deviation of k relative to itself by what all looks share: droplets, lamps and roads unlike the models' [-]."""
 
 SURE = 0.5
 """Largest deviation of k relative to itself for an estimate; where it is larger, bounds are told [-]."""
@@ -147,21 +156,25 @@ class NightGlow:
         self._looks = (*apart[-MOST_LOOKS + 1 :], look)
 
     def _estimate(self, look: GlowLook, usual: float, found: dict[str, object]) -> Estimate:
-        share = likelihood(self._looks, usual)
+        share, misfit = likelihood(self._looks, usual)
+        if misfit > MOST_MISFIT:
+            self._looks = ()
+            return Estimate.invalid(self.method, "the red light does not fall off as about a pair of lamps", **found)
         k = float((share * EXTINCTIONS).sum())
-        deviation = math.sqrt(max(float((share * (EXTINCTIONS - k) ** 2).sum()), 0.0))
+        deviation = math.hypot(math.sqrt(max(float((share * (EXTINCTIONS - k) ** 2).sum()), 0.0)), SHARED * k)
         distances = [one.distance for one in self._looks]
         found |= {
             "optical_depth": k * look.distance,
             "looks": len(distances),
             "ranges": (min(distances), max(distances)),
         }
-        if deviation <= SURE * k:
+        if len(distances) >= LEAST_LOOKS and deviation <= SURE * k:
             return Estimate(self.method, k, deviation, diagnostics=found)
         below = np.cumsum(share)
         least, most = (float(EXTINCTIONS[int(np.searchsorted(below, part))]) for part in (0.05, 0.95))
         why = "the glow's shape tells too little: the vehicle ahead must be seen at ranges that differ more"
-        return replace(Estimate.invalid(self.method, why, **found), bounds=ExtinctionBounds(most, least))
+        bounds = ExtinctionBounds(most, least) if len(distances) > 1 else None
+        return replace(Estimate.invalid(self.method, why, **found), bounds=bounds)
 
 
 def _is_another(last: GlowLook, look: GlowLook) -> bool:

@@ -33,7 +33,7 @@ DIM = 0.35
 EXCESS = (-1.43, 0.43)
 """What is added to red of green and blue [-]: neither neutral nor warm white light, as of other lamps, is then left."""
 
-RED = 0.12
+RED = 0.25
 """Least share that is left of red about a tail lamp [-]."""
 
 ANGLES = np.radians(np.geomspace(0.8, 16.0, 14))
@@ -47,6 +47,9 @@ FULL, LEAST = 0.9, 0.03
 
 ROAD, HALF_LANE = (7.0, 11.0), 1.0
 """Between which distances, and how far aside, the near road is looked at [m]."""
+
+SURELY = 1.5
+"""Least red over its noise in a pixel [-]."""
 
 PATCH = 0.10
 """Half of a patch's side over its distance from the lamps [-]."""
@@ -176,7 +179,9 @@ def red_glow(image: Pixels, camera: Camera, lamps: TailLamps) -> RedGlow:
         beyond = red + EXCESS[0] * patch[..., 1] + EXCESS[1] * patch[..., 2]
         level, excess = float(red.mean()), float(beyond.mean())
         deviation = float(beyond.std()) / math.sqrt(red.size)
-        if float(red.max()) < FULL and level > LEAST and excess > 4.0 * deviation and excess > RED * level:
+        # Noise that is cut off at zero is light that is none.
+        is_light = float(red.max()) < FULL and level > max(LEAST, SURELY * float(red.std()))
+        if is_light and excess > max(4.0 * deviation, RED * level):
             log_red[at], noise[at] = math.log(excess), deviation / excess
     return RedGlow(u, v, log_red, noise)
 

@@ -1,4 +1,4 @@
-"""Which mean Br50 parts fog from clear nights with a camera: many staged scenes, exposures and strengths of lamps."""
+"""Which halos part fog from clear nights with a camera: many staged scenes, exposures and strengths of lamps."""
 
 import math
 from collections.abc import Sequence
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fogsim.errors import InputError
-from fogsim.estimators.night.halos import HaloThreshold, mean_steepness
+from fogsim.estimators.night.halos import HaloThreshold, largest_sharpness, mean_steepness
 from fogsim.reproduce.night.scenes import GLARE, NightRoad, NightScene, NightVehicle
 from fogsim.reproduce.result import Steps, Watch, unwatched
 from fogsim.values import Camera, Lamp
@@ -20,6 +20,8 @@ EXPOSURES, STRENGTHS = (0.6, 1.6), (0.6, 1.6)
 """Range of exposures over the automatic one, and of lamps' intensities over the usual ones [-]."""
 
 _LIT = Lamp.POSITION | Lamp.LOW_BEAM
+
+_Values = tuple[float, float]  # mean Br50 and largest sharpness of a picture
 
 
 def random_scene(rng: np.random.Generator, strengths: tuple[float, float] = STRENGTHS) -> NightScene:
@@ -46,7 +48,7 @@ def random_scene(rng: np.random.Generator, strengths: tuple[float, float] = STRE
 def measure_halo_threshold(
     camera: Camera, scenes: int = 80, *, glare: float = GLARE, seed: int = 0, watch: Watch = unwatched
 ) -> HaloThreshold:
-    """Draw scenes in clear air and in fog, and choose the threshold that errs as seldom in either.
+    """Draw scenes in clear air and in fog, and choose the thresholds that err as seldom in either.
 
     Parameters
     ----------
@@ -68,22 +70,24 @@ def measure_halo_threshold(
     """
     if scenes < 4:
         raise InputError(f"scenes: expected at least 4, got {scenes}")
-    steps, clear, fog = Steps(scenes, watch), list[float](), list[float]()
+    steps, clear, fog = Steps(scenes, watch), list[_Values](), list[_Values]()
     with NightRoad(camera, glare=glare, seed=seed) as road:
         for number in range(scenes):
             rng = np.random.default_rng((seed, number))
             scene, exposure = random_scene(rng), _between(rng, *EXPOSURES)
             for visibility, radiance in zip((math.inf, *FOGS), road.radiances(scene, (math.inf, *FOGS)), strict=True):
                 picture = road.photograph(radiance, exposure, rng)
-                steepness = mean_steepness(halos_of(source_tree(picture, camera.bits)))
-                if steepness is not None:
-                    (clear if visibility == math.inf else fog).append(steepness)
+                halos = halos_of(source_tree(picture, camera.bits))
+                mean, largest = mean_steepness(halos), largest_sharpness(halos)
+                if mean is not None and largest is not None:
+                    (clear if visibility == math.inf else fog).append((mean, largest))
             steps.advance()
     if not clear or not fog:
         raise InputError(f"no lamp makes a halo in pictures of {camera.width}x{camera.height} px: a larger picture")
-    steepness, wrong, missed = parting(clear, fog)
+    by_mean, by_largest = (parting([one[at] for one in clear], [one[at] for one in fog]) for at in range(2))
     traits = camera.width, camera.height, camera.focal_length, camera.response.value, camera.black_level
-    return HaloThreshold(*traits, round(steepness, 2), wrong, missed, len(clear) + len(fog))
+    chosen = round(by_mean[0], 2), round(by_largest[0], 2), max(by_mean[1:]), max(by_largest[1:])
+    return HaloThreshold(*traits, *chosen, len(clear) + len(fog))
 
 
 def parting(clear: Sequence[float], fog: Sequence[float]) -> tuple[float, float, float]:

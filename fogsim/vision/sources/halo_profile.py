@@ -32,6 +32,9 @@ RISE = 8.0
 SATURATED = 0.98
 """Level over the largest along a profile down to which a sensor counts as saturated [-]."""
 
+MOST_HEIGHT = 127.5
+"""H50 of a lamp that saturates before the dark [levels of 255]."""
+
 NARROWEST = 0.25
 """Width below which no flank can be told [px]."""
 
@@ -68,6 +71,11 @@ class Halo:
     def steepness(self) -> float:
         """Br50 = H50 / W50 [levels of 255 a pixel]: small in fog."""
         return self.height / self.width
+
+    @property
+    def sharpness(self) -> float:
+        """Br50 times H50 over what that can be [levels of 255 a pixel]: large for lamps that stand out of the dark."""
+        return self.steepness * self.height / MOST_HEIGHT
 
 
 def halos_of(tree: SourceTree) -> tuple[Halo, ...]:

@@ -13,7 +13,7 @@ from fogsim.values import Camera, Lamp, Observation, Response
 from tests.vision.sources.night_pictures import in_colour, picture
 
 CAMERA = Camera(320, 240, 300.0, (159.5, 119.5), 1.4, pitch=0.03, response=Response.SRGB)
-MEASURED = HaloThreshold(320, 240, 300.0, "srgb", 0.0, 30.0, 0.01, 0.01, 100)
+MEASURED = HaloThreshold(320, 240, 300.0, "srgb", 0.0, 25.0, 30.0, 0.01, 0.01, 100)
 LAMPS = ((80.0, 60.0, 4.0, 300.0), (220.0, 70.0, 6.0, 300.0))
 LIT = Lamp.POSITION | Lamp.LOW_BEAM
 
@@ -48,12 +48,13 @@ def test_without_lamps_the_veil_is_asked() -> None:
 
 def test_published_threshold_and_daylight() -> None:
     halo = seen(LAMPS, glow=10.0)
-    (measured, published) = (
+    ours, calibrated = (
         make("gallen2014", CAMERA, window=1, as_published=flag).calibrated(MEASURED).update(halo).diagnostics
         for flag in (False, True)
     )
-    assert 9.0 < measured["steepness"] < 30.0
-    assert (measured["detected"], published["detected"]) == (True, False)
+    uncalibrated = make("gallen2014", CAMERA, window=1).update(halo).diagnostics
+    assert 9.0 < calibrated["value"] == uncalibrated["value"] < 25.0
+    assert (ours["detected"], calibrated["detected"], uncalibrated["detected"]) == (True, True, False)
     day = np.full((240, 320, 3), 200, np.uint8)
     day[125:] = 90
     assert "for the night" in Gallen2014(CAMERA).update(Observation(day, lamps=LIT)).diagnostics["reason"]

@@ -24,7 +24,7 @@ from fogsim.scenario import Scenario, build
 from fogsim.scenario.schema import NO_RENDERER
 from fogsim.scenario.sensor_schema import fault_of
 from fogsim.sensors import check_sign_ids, faulty_signs
-from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
+from fogsim.units import DAY_ILLUMINANCE, OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import (
     Camera,
     CameraPose,
@@ -268,8 +268,8 @@ class EgoEquipment:
         pose, fog = self._pose(state, ego), field_at(renderer.fog, time)
         sections, known = meters.measure(fog), tuple(one.fault for one in faults)
         truth = fog_truth(fog, pose, camera, renderer.signs, state, sections, self._way, known)
-        effects = lamp_effects(state, ego, fog, truth.extinction_ahead, light)
-        truth = truth if effects is None else replace(truth, lamp_effects=effects)
+        if light < DAY_ILLUMINANCE:
+            truth = replace(truth, lamp_effects=lamp_effects(state, ego, fog, truth.extinction_ahead))
         view, radiance = renderer.render(state, ego, pose, time, camera, light)
         if radiance is None:
             image = self._unexposed

@@ -91,10 +91,8 @@ class LightSensing:
         return LightMeasurement(illuminance, bool(np.any(seen & others.comes)), bool(np.any(seen & ~others.comes)))
 
 
-def lamp_effects(
-    state: TrafficState, ego: int, fog: FogField, extinction_ahead: float, illuminance: float
-) -> LampEffects | None:
-    """What the ego's lamps do by night, None by day.
+def lamp_effects(state: TrafficState, ego: int, fog: FogField, extinction_ahead: float) -> LampEffects:
+    """What the ego's lamps do by night.
 
     Parameters
     ----------
@@ -106,11 +104,7 @@ def lamp_effects(
         The fog now.
     extinction_ahead : float
         Mean extinction coefficient ahead of the ego [1/m].
-    illuminance : float
-        Horizontal illuminance of the sky [lx].
     """
-    if illuminance >= DAY_ILLUMINANCE:
-        return None
     lamps = int(state.lamps[ego])
     others = _others(state, ego, FARTHEST_DAZZLED)
     veils = _veils(state, ego, others, fog) if len(others.row) and head_lamps_that_burn(lamps) else np.zeros(0)

@@ -1,10 +1,10 @@
 """What the ego's light sensor measures, and what its lamps do by night: for itself and to others."""
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fogsim.atmosphere import optical_depth
 from fogsim.lighting.own_sight import own_sight_distance
@@ -24,29 +24,29 @@ HEAD_LAMPS, TAIL_LAMPS = 1200.0, 16.0
 """What a pair of low beams, and of tail lamps, shines straight ahead and back, by which reaches are told [cd]."""
 
 
-class Others(NamedTuple):
-    """Other vehicles, as the ego has them.
+class Other(NamedTuple):
+    """Another vehicle ahead, as the ego has it.
 
     Attributes
     ----------
-    row : (n,) int64
-        Their rows in the traffic.
-    ahead, aside : (n,) float64
-        Where their front bumpers are, ahead of the ego's and to its left [m].
-    distance : (n,) float64
+    row : int
+        Its row in the traffic.
+    ahead, aside : float
+        Where its front bumper is, ahead of the ego's and to its left [m].
+    distance : float
         [m]
-    comes : (n,) bool
-        Whether they drive against the ego.
-    angle : (n,) float64
-        Angle between their headings and the way to the ego [rad].
+    comes : bool
+        Whether it drives against the ego.
+    angle : float
+        Angle between its heading and the way to the ego [rad].
     """
 
-    row: NDArray[np.int64]
-    ahead: NDArray[np.float64]
-    aside: NDArray[np.float64]
-    distance: NDArray[np.float64]
-    comes: NDArray[np.bool_]
-    angle: NDArray[np.float64]
+    row: int
+    ahead: float
+    aside: float
+    distance: float
+    comes: bool
+    angle: float
 
 
 class LightSensing:
@@ -79,16 +79,26 @@ class LightSensing:
         """
         if illuminance >= DAY_ILLUMINANCE:
             return LightMeasurement(illuminance)
-        others = _others(state, ego, max(self._reach, self._tail_reach))
-        if not len(others.row):
+        near = _others_ahead(state, ego, max(self._reach, self._tail_reach))
+        bright: list[tuple[Other, float]] = []
+        for other in near:
+            light = _pair_intensity(state, ego, other.row) / other.distance**2
+            # What is too dim in clear air is so in fog.
+            if abs(math.atan2(other.aside, other.ahead)) <= self._half_view and light >= self._least(other):
+                bright.append((other, light))
+        if not bright:
             return LightMeasurement(illuminance)
-        bearing = np.abs(np.arctan2(others.aside, others.ahead))
-        light = np.array([_pair_intensity(state, ego, int(row)) for row in others.row])
-        light *= np.exp(-_depths(state, ego, others, fog)) / others.distance**2
-        seen = (bearing <= self._half_view) & (others.ahead > 0.0)
-        found = light >= np.where(others.comes, HEAD_LAMPS / self._reach**2, TAIL_LAMPS / self._tail_reach**2)
-        seen &= found
-        return LightMeasurement(illuminance, bool(np.any(seen & others.comes)), bool(np.any(seen & ~others.comes)))
+        depths = _depths(state, ego, [other for other, _ in bright], fog)
+        seen = [
+            other
+            for (other, light), depth in zip(bright, depths, strict=True)
+            if light * math.exp(-depth) >= self._least(other)
+        ]
+        return LightMeasurement(illuminance, any(one.comes for one in seen), any(not one.comes for one in seen))
+
+    def _least(self, other: Other) -> float:
+        """Illuminance by which a vehicle's lamps are noticed [lx]."""
+        return HEAD_LAMPS / self._reach**2 if other.comes else TAIL_LAMPS / self._tail_reach**2
 
 
 def lamp_effects(state: TrafficState, ego: int, fog: FogField, extinction_ahead: float) -> LampEffects:
@@ -106,23 +116,25 @@ def lamp_effects(state: TrafficState, ego: int, fog: FogField, extinction_ahead:
         Mean extinction coefficient ahead of the ego [1/m].
     """
     lamps = int(state.lamps[ego])
-    others = _others(state, ego, FARTHEST_DAZZLED)
-    veils = _veils(state, ego, others, fog) if len(others.row) and head_lamps_that_burn(lamps) else np.zeros(0)
+    others = _others_ahead(state, ego, FARTHEST_DAZZLED) if head_lamps_that_burn(lamps) else []
+    dazzled = [other for other in others if not other.comes or other.angle < 0.5 * math.pi]
     sight = own_sight_distance(Lamp(lamps & int(ALL_LAMPS)), visibility_from_extinction(extinction_ahead))
-    return LampEffects(sight, tuple(veils.tolist()))
+    return LampEffects(sight, _veils(state, ego, dazzled, fog) if dazzled else ())
 
 
-def _others(state: TrafficState, ego: int, reach: float) -> Others:
-    apart = state.position[:, :2] - state.position[ego, :2]
-    distance = np.hypot(apart[:, 0], apart[:, 1])
-    row = np.flatnonzero((distance > 0.0) & (distance <= reach))
-    heading = float(state.heading[ego])
-    forward, left = (math.cos(heading), math.sin(heading)), (-math.sin(heading), math.cos(heading))
-    near = apart[row]
-    ahead, aside = near[:, 0] * forward[0] + near[:, 1] * forward[1], near[:, 0] * left[0] + near[:, 1] * left[1]
-    comes = np.cos(state.heading[row] - heading) < 0.0
-    back = np.arctan2(-near[:, 1], -near[:, 0]) - state.heading[row]
-    return Others(row, ahead, aside, distance[row], comes, np.arccos(np.clip(np.cos(back), -1.0, 1.0)))
+def _others_ahead(state: TrafficState, ego: int, reach: float) -> list[Other]:
+    """Other vehicles ahead within reach [m]: plain numbers, for there are few."""
+    (x, y, _), heading = state.position[ego].tolist(), float(state.heading[ego])
+    east, north = math.cos(heading), math.sin(heading)
+    found: list[Other] = []
+    for row, ((to_x, to_y, _), turned) in enumerate(zip(state.position.tolist(), state.heading.tolist(), strict=True)):
+        across, up = to_x - x, to_y - y
+        ahead, distance = across * east + up * north, math.hypot(across, up)
+        if ahead > 0.0 and distance <= reach:
+            angle = abs(math.remainder(math.atan2(-up, -across) - turned, math.tau))
+            comes = math.cos(turned - heading) < 0.0
+            found.append(Other(row, ahead, up * east - across * north, distance, comes, angle))
+    return found
 
 
 def _pair_intensity(state: TrafficState, ego: int, row: int) -> float:
@@ -133,20 +145,22 @@ def _pair_intensity(state: TrafficState, ego: int, row: int) -> float:
     return 2.0 * intensity_toward(int(state.lamps[row]), float(state.length[row]), ahead, aside)
 
 
-def _depths(state: TrafficState, ego: int, others: Others, fog: FogField) -> NDArray[np.float64]:
-    lift = (0.0, 0.0, LAMP_HEIGHT)
-    eyes = state.position[others.row] + lift
-    return np.asarray(optical_depth(fog, np.broadcast_to(state.position[ego] + lift, eyes.shape), eyes))
+def _depths(state: TrafficState, ego: int, others: Sequence[Other], fog: FogField) -> list[float]:
+    lift = np.array((0.0, 0.0, LAMP_HEIGHT))
+    eyes = state.position[[other.row for other in others]] + lift
+    depths: list[float] = optical_depth(fog, state.position[ego] + lift, eyes).tolist()
+    return depths
 
 
-def _veils(state: TrafficState, ego: int, others: Others, fog: FogField) -> NDArray[np.float64]:
-    """Veil of the ego's head lamps over the eyes of each of the others who is lit by them [cd/m²]."""
+def _veils(state: TrafficState, ego: int, others: Sequence[Other], fog: FogField) -> tuple[float, ...]:
+    """Veil of the ego's head lamps over the eyes of each of some others [cd/m²]."""
     lamps = head_lamps_that_burn(int(state.lamps[ego]))
-    off_axis = np.degrees(np.abs(np.arctan2(others.aside, others.ahead)))
-    squared = others.distance**2 + (EYE_HEIGHTS["car"] - LAMP_HEIGHT) ** 2
-    light = np.array([sum(beam_intensity(lit, float(angle)) for lit in lamps) for angle in off_axis])
-    light *= np.exp(-_depths(state, ego, others, fog)) / squared
-    # Who comes looks along its own heading; who is ahead has the lamps in its mirrors.
-    light *= np.where(others.comes, 1.0, MIRROR_SHARE)
-    angle = np.where(others.comes, others.angle, MIRROR_ANGLE)
-    return np.asarray(disability_glare(light, angle))[(others.ahead > 0.0) & (angle < 0.5 * math.pi)]
+    light: list[float] = []
+    for other, depth in zip(others, _depths(state, ego, others, fog), strict=True):
+        off_axis = math.degrees(abs(math.atan2(other.aside, other.ahead)))
+        squared = other.distance**2 + (EYE_HEIGHTS["car"] - LAMP_HEIGHT) ** 2
+        # Who comes looks along its own heading; who is ahead has the lamps in its mirrors.
+        share = 1.0 if other.comes else MIRROR_SHARE
+        light.append(share * sum(beam_intensity(lit, off_axis) for lit in lamps) * math.exp(-depth) / squared)
+    angles = [other.angle if other.comes else MIRROR_ANGLE for other in others]
+    return tuple(disability_glare(light, angles).tolist())

@@ -29,8 +29,13 @@ PUBLISHED_VISIBILITIES = (15.0, 50.0, 100.0, 200.0, 500.0, math.inf)
 LOG_SPACED_VISIBILITIES = (*np.geomspace(12.0, 1500.0, 20).tolist(), math.inf)
 """References in equal steps of ln V, and a clear night [m]."""
 
-DROPLETS = tuple(Droplets)
-"""Kinds of droplets: they differ in how they send light back."""
+DROPLETS = (
+    Droplets.MODERATE_RADIATION,
+    Droplets.HEAVY_RADIATION,
+    Droplets.MODERATE_ADVECTION,
+    Droplets.HEAVY_ADVECTION,
+)
+"""Kinds of droplets, which differ in how they send light back; the first are for methods that reckon with one kind."""
 
 RETROREFLECTION = 0.015
 """Coefficient of retroreflected luminance of dry asphalt [cd/m² per lx] (middle of gallen2014's range)."""

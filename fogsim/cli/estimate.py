@@ -13,7 +13,7 @@ from fogsim.cli.progress import progress_bar
 from fogsim.errors import InputError
 
 if TYPE_CHECKING:
-    from fogsim.offline import FrameEstimates, OverlayFile, SignWatch, Source
+    from fogsim.offline import FrameEstimates, NightDrive, OverlayFile, SignWatch, Source
     from fogsim.values import Camera
 
 
@@ -46,6 +46,17 @@ def estimate_command(
         Path | None, typer.Option(help="Where the camera was: .gpx, or .csv with time_s, latitude, longitude.")
     ] = None,
     track_offset: Annotated[float, typer.Option(help="Seconds of the track at the first image.")] = 0.0,
+    night: Annotated[
+        bool, typer.Option("--night", help="A drive by night: methods that read lamplight, unless some are named.")
+    ] = False,
+    lamps: Annotated[
+        str | None, typer.Option(help="Own lamps that are lit by night, such as low_beam+front_fog. Default: low_beam.")
+    ] = None,
+    setback: Annotated[
+        float | None, typer.Option(help="Metres from the front bumper back to the lens, by night. Default: 1.9.")
+    ] = None,
+    veil: Annotated[Path | None, typer.Option(help="File of fogsim calibrate veil.")] = None,
+    halos: Annotated[Path | None, typer.Option(help="File of fogsim calibrate halos.")] = None,
     guess_camera: Annotated[
         bool, typer.Option("--guess-camera", help="Write the camera file from the images, and stop.")
     ] = False,
@@ -58,7 +69,7 @@ def estimate_command(
     ] = None,
 ) -> None:
     """Estimate the visibility in your own images or video (docs/estimate.md)."""
-    from fogsim.offline import find_source
+    from fogsim.offline import NIGHT_METHODS, find_source
 
     if guess_camera:
         source = find_source(images, sequence=sequence, rate=rate)
@@ -71,9 +82,26 @@ def estimate_command(
     ):
         if value is not None:
             raise InputError(f"{option} goes with --guess-camera; else the camera file has it")
-    _estimate(
-        images, camera, method or ["all"], as_json, overlay, sequence, rate, overwrite, (signs, track, track_offset)
-    )
+    drive = _night_drive(night, lamps, setback, veil, halos)
+    names = method or (["all"] if drive is None else list(NIGHT_METHODS))
+    mapped = (signs, track, track_offset)
+    _estimate(images, camera, names, as_json, overlay, sequence, rate, overwrite, mapped, drive)
+
+
+def _night_drive(
+    night: bool, lamps: str | None, setback: float | None, veil: Path | None, halos: Path | None
+) -> "NightDrive | None":
+    from fogsim.calibration.veil_references import lamps_named
+    from fogsim.offline import NightDrive
+
+    if not night:
+        for option, value in (("--lamps", lamps), ("--setback", setback), ("--veil", veil), ("--halos", halos)):
+            if value is not None:
+                raise InputError(f"{option} goes with --night")
+        return None
+    usual = NightDrive()
+    lit = usual.lamps if lamps is None else lamps_named(lamps)
+    return NightDrive(lit, usual.setback if setback is None else setback, veil, halos)
 
 
 def _estimate(
@@ -86,6 +114,7 @@ def _estimate(
     rate: float | None,
     overwrite: bool,
     mapped: tuple[Path | None, Path | None, float],
+    night: "NightDrive | None",
 ) -> None:
     from fogsim.offline import (
         OverlayFile,
@@ -108,7 +137,7 @@ def _estimate(
         task = progress.add_task(source.description, total=source.count)
         if not as_json:
             _say(table_heading(source, methods))
-        for result in estimates_of(source, camera, methods, watch):
+        for result in estimates_of(source, camera, methods, watch, night):
             _show(result, source, methods, as_json, drawn or None)
             unusable += [result.picture.error] if result.picture.error else []
             progress.advance(task)

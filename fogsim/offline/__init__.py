@@ -4,6 +4,7 @@ from fogsim.offline.camera_file import camera_text, load_calibration, refuse_exi
 from fogsim.offline.estimation import FrameEstimates, chosen_methods, estimate_images, estimates_of
 from fogsim.offline.guess import CameraGuess, guess_camera
 from fogsim.offline.input_paths import find_source
+from fogsim.offline.night_drive import NIGHT_METHODS, NightDrive
 from fogsim.offline.overlay import OverlayFile
 from fogsim.offline.rectification import Straightener, straightened
 from fogsim.offline.results import record_lines, summary_rows, table_heading, table_rows
@@ -11,9 +12,11 @@ from fogsim.offline.sign_watch import SignSummary, SignWatch, watch_signs
 from fogsim.offline.source import ImageFiles, Picture, Source, VideoFile
 
 __all__ = [
+    "NIGHT_METHODS",
     "CameraGuess",
     "FrameEstimates",
     "ImageFiles",
+    "NightDrive",
     "OverlayFile",
     "Picture",
     "SignSummary",

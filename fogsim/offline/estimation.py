@@ -13,6 +13,7 @@ from fogsim.estimators.night.references import TakesReferences
 from fogsim.offline.camera_file import Calibration
 from fogsim.offline.image_files import Pixels
 from fogsim.offline.input_paths import find_source
+from fogsim.offline.night_drive import NightDrive
 from fogsim.offline.rectification import straightened
 from fogsim.offline.sign_watch import SignWatch, watch_signs
 from fogsim.offline.source import Picture, Source
@@ -73,6 +74,7 @@ def estimate_images(
     rate: float | None = None,
     signs: Path | None = None,
     track: Path | None = None,
+    night: NightDrive | None = None,
 ) -> Iterator[FrameEstimates]:
     """Estimate the fog in a person's own images or video.
 
@@ -92,6 +94,8 @@ def estimate_images(
     signs, track : Path or None
         A map of signs, GeoJSON, and the positions of the drive from its first image on, GPX or CSV: both or neither;
         see `fogsim.offline.watch_signs`.
+    night : NightDrive or None
+        Own lamps and calibrations of a drive by night; without it methods of the night take the low beams to be lit.
 
     Yields
     ------
@@ -110,11 +114,15 @@ def estimate_images(
     calibration = Calibration(camera) if isinstance(camera, Camera) else camera
     source, pinhole = straightened(find_source(inputs, sequence=sequence, rate=rate), calibration)
     watch = None if signs is None or track is None else watch_signs(signs, track, source, pinhole)[0]
-    return estimates_of(source, pinhole, chosen_methods(names), watch)
+    return estimates_of(source, pinhole, chosen_methods(names), watch, night)
 
 
 def estimates_of(
-    source: Source, camera: Camera, methods: Sequence[str], watch: SignWatch | None = None
+    source: Source,
+    camera: Camera,
+    methods: Sequence[str],
+    watch: SignWatch | None = None,
+    night: NightDrive | None = None,
 ) -> Iterator[FrameEstimates]:
     """Estimate the fog in the images of a source; see `estimate_images`.
 
@@ -131,8 +139,10 @@ def estimates_of(
         Names in the registry.
     watch : SignWatch or None
         Signs along the drive.
+    night : NightDrive or None
+        Own lamps and calibrations of a drive by night.
     """
-    bench = _Bench(camera, methods)
+    bench = _Bench(camera, methods, night)
     fitted = False
     count = 0
     for picture in source.pictures():
@@ -171,15 +181,18 @@ class _Bench:
         The assumed calibration.
     methods : sequence of str
         Names in the registry.
+    night : NightDrive or None
+        What they are told of a drive by night.
     """
 
-    def __init__(self, camera: Camera, methods: Sequence[str]) -> None:
-        self._camera = camera
+    def __init__(self, camera: Camera, methods: Sequence[str], night: NightDrive | None) -> None:
+        self._camera, self._night = camera, night
         self._methods = tuple(methods)
         self._estimators: dict[Camera, list[Estimator]] = {camera: self._made(camera)}
 
     def _made(self, camera: Camera) -> list[Estimator]:
-        made = [make(name, camera) for name in self._methods]
+        told = NightDrive() if self._night is None else self._night
+        made = [make(name, camera, **told.parameters_of(name)) for name in self._methods]
         for estimator in made:
             if isinstance(estimator, TakesReferences):
                 estimator.take_references(usual_references)
@@ -211,6 +224,8 @@ class _Bench:
         if camera not in self._estimators:
             self._estimators[camera] = self._made(camera)
         observation = Observation(Frame(time, pixels, camera), signs=signs)
+        if self._night is not None:
+            observation = replace(observation, lamps=self._night.lamps, camera_setback=self._night.setback)
         return tuple(estimator.update(observation) for estimator in self._estimators[camera])
 
 

@@ -21,6 +21,9 @@ HEAD_LAMPS = Lamp.LOW_BEAM | Lamp.HIGH_BEAM | Lamp.FRONT_FOG
 USUAL_SETBACK = 1.9
 """Distance of the camera behind the front bumper where no vehicle tells it [m]."""
 
+NEAR = 0.05
+"""How far a camera may be from where it was for the references [m]: 0.2 m change visibilities by a fifth."""
+
 _KEYS = {"head", "visibility", "veil", "road"}
 
 
@@ -70,7 +73,7 @@ class References:
         Raises
         ------
         InputError
-            If the file has none for them.
+            If the file has none for them, or those of a camera elsewhere.
         """
         if self._path is None:
             if self.source is None:
@@ -80,6 +83,11 @@ class References:
         if not found:
             has = ", ".join(dict.fromkeys(lamp_names(one.lamps) for one in self._read))
             raise InputError(f"{self._path} has no references for {lamp_names(lamps)}; it has {has}")
+        if setback and abs(setback - found[0].setback) > NEAR:
+            raise InputError(
+                f"{self._path} has references for a camera {found[0].setback:g} m behind the front bumper, and this one "
+                f"is {setback:g} m behind it; fogsim calibrate veil --setback {setback:g} makes them"
+            )
         return found
 
 

@@ -118,6 +118,8 @@ def test_references_of_a_file_are_used_as_they_are(tmp_path: Path) -> None:
     assert found.visibility == pytest.approx(70.0, rel=0.2)  # between references that are far apart
     with pytest.raises(InputError, match=r"no references for high_beam; it has low_beam"):
         estimator.update(Observation(night_picture(70.0), lamps=Lamp.HIGH_BEAM))
+    with pytest.raises(InputError, match=r"camera 1.7 m behind the front bumper, and this one is 2.1 m behind it"):
+        estimator.update(Observation(night_picture(70.0), lamps=Lamp.LOW_BEAM, camera_setback=2.1))
     other = dataclasses.replace(CAMERA, pitch=0.02)
     with pytest.raises(InputError, match=r"of the told camera, .*pitch=0.02.* and .* has those of .*pitch=0.035"):
         make("night_road", other, references=str(path))

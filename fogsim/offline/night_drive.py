@@ -1,0 +1,47 @@
+"""What is known of a drive by night beside its images: which own lamps were lit, and what was calibrated."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from fogsim.estimators import ESTIMATORS
+from fogsim.parameters import accepted_parameters
+from fogsim.values import Lamp
+
+NIGHT_METHODS = ("gallen2014", "gallen2014_veil", "night_road", "night_glow")
+"""Methods that read lamplight."""
+
+
+@dataclass(frozen=True, slots=True)
+class NightDrive:
+    """A drive by night.
+
+    Attributes
+    ----------
+    lamps : Lamp
+        Own head lamps that were lit.
+    setback : float
+        Distance of the camera behind the front bumper [m]; 0 where it is not told: then that of the references' file,
+        or 1.9 m.
+    veil : Path or None
+        File of ``fogsim calibrate veil``; None for a car's usual lamps.
+    halos : Path or None
+        File of ``fogsim calibrate halos``; None for the paper's threshold.
+    """
+
+    lamps: Lamp = Lamp.LOW_BEAM
+    setback: float = 0.0
+    veil: Path | None = None
+    halos: Path | None = None
+
+    def parameters_of(self, method: str) -> Mapping[str, object]:
+        """What of it a method takes as parameters.
+
+        Parameters
+        ----------
+        method : str
+            Its name in the registry.
+        """
+        taken = accepted_parameters(ESTIMATORS[method])
+        files = {"references": self.veil, "halos": self.halos}
+        return {name: str(path) for name, path in files.items() if path is not None and name in taken}

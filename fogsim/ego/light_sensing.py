@@ -20,6 +20,8 @@ from fogsim.values.light import ALL_LAMPS
 FARTHEST_DAZZLED = 250.0
 """Drivers farther away than this are not dazzled [m]."""
 
+_STEPS_PER_E_FOLD = 200.0
+
 HEAD_LAMPS, TAIL_LAMPS = 1200.0, 16.0
 """What a pair of low beams, and of tail lamps, shines straight ahead and back, by which reaches are told [cd]."""
 
@@ -118,8 +120,16 @@ def lamp_effects(state: TrafficState, ego: int, fog: FogField, extinction_ahead:
     lamps = int(state.lamps[ego])
     others = _others_ahead(state, ego, FARTHEST_DAZZLED) if head_lamps_that_burn(lamps) else []
     dazzled = [other for other in others if not other.comes or other.angle < 0.5 * math.pi]
-    sight = own_sight_distance(Lamp(lamps & int(ALL_LAMPS)), visibility_from_extinction(extinction_ahead))
+    visibility = _stepped(visibility_from_extinction(extinction_ahead))
+    sight = own_sight_distance(Lamp(lamps & int(ALL_LAMPS)), visibility)
     return LampEffects(sight, _veils(state, ego, dazzled, fog) if dazzled else ())
+
+
+def _stepped(visibility: float) -> float:
+    """Visibility to a quarter of a percent [m]: what is seen in it takes a millisecond to find, and is remembered."""
+    if not math.isfinite(visibility):
+        return visibility
+    return math.exp(round(_STEPS_PER_E_FOLD * math.log(visibility)) / _STEPS_PER_E_FOLD)
 
 
 def _others_ahead(state: TrafficState, ego: int, reach: float) -> list[Other]:

@@ -73,7 +73,7 @@ def own_veil(lamps: Lamp, visibility: float, distance: float) -> float:
     return float(np.interp(distance, _DISTANCES, _veil(int(lamps & _BEAMS), extinction_from_visibility(visibility))))
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=8192)
 def _sight_distance(beams: int, extinction: float, glare: float) -> float:
     lit = own_head_lamps(Lamp(beams), EYE_HEIGHT, SETBACK)
     both_ways = np.exp(-2.0 * extinction * _DISTANCES)

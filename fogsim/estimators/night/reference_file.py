@@ -83,9 +83,10 @@ class References:
         if not found:
             has = ", ".join(dict.fromkeys(lamp_names(one.lamps) for one in self._read))
             raise InputError(f"{self._path} has no references for {lamp_names(lamps)}; it has {has}")
-        if setback and abs(setback - found[0].setback) > NEAR:
+        there = found[0].setback
+        if setback and abs(setback - there) > NEAR:
             raise InputError(
-                f"{self._path} has references for a camera {found[0].setback:g} m behind the front bumper, and this one "
+                f"{self._path} has references for a camera {there:g} m behind the front bumper, and this one "
                 f"is {setback:g} m behind it; fogsim calibrate veil --setback {setback:g} makes them"
             )
         return found

@@ -52,8 +52,8 @@ class Gallen2014:
     camera : Camera
         The assumed calibration.
     halos : str or None
-        File of ``fogsim calibrate halos``, of this camera; without it the mean Br50 is compared with the paper's 9,
-        which is of its own camera.
+        File of ``fogsim calibrate halos``, of this camera; without it ``detected`` is whether the mean Br50 is below
+        the paper's 9, which is of its own camera, and there are no bounds.
     references : str or None
         File of ``fogsim calibrate veil``; see `NightRoad`.
     window : int
@@ -82,7 +82,7 @@ class Gallen2014:
         self._camera, self._check = camera, ObservationCheck(camera)
         self._window, self._as_published = int(window), as_published
         self._veil = Gallen2014Veil(camera, references=references, as_published=as_published)
-        self._watch = HaloWatch(PUBLISHED, window=self._window)
+        self._watch, self._is_calibrated = HaloWatch(PUBLISHED, window=self._window), False
         if halos is not None:
             self.calibrated(HaloThreshold.read(Path(halos)))
 
@@ -100,6 +100,7 @@ class Gallen2014:
             If it is of another camera.
         """
         checked, window = measured.checked_for(self._camera), self._window
+        self._is_calibrated = True
         if self._as_published:
             self._watch = HaloWatch(checked.steepness, window=window)
         else:
@@ -161,6 +162,9 @@ class Gallen2014:
     def _by_halos(self, reading: HaloReading) -> Estimate:
         found: dict[str, object] = {"by": "halos", "detected": reading.is_fog, "lamps": len(reading.halos)}
         found |= {"value": reading.value, "smoothed": reading.smoothed}
+        if not self._is_calibrated:
+            why = "halos are not calibrated for this camera: fogsim calibrate halos, parameter halos"
+            return Estimate.invalid(self.method, why, **found)
         if reading.is_fog:
             why, bounds = (
                 "halos show fog, but not how much",

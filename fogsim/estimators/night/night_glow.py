@@ -39,7 +39,7 @@ UNEVEN = 0.12
 LEAST_LOOKS = 3
 """Fewest ranges for an estimate; bounds need two, for other lamps may spoil one look."""
 
-SHARED = 0.12
+SHARED = 0.15
 """Deviation of k relative to itself by what all looks share: droplets, lamps and roads unlike the models' [-]."""
 
 SURE = 0.5

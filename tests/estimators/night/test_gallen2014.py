@@ -52,7 +52,10 @@ def test_published_threshold_and_daylight() -> None:
         make("gallen2014", CAMERA, window=1, as_published=flag).calibrated(MEASURED).update(halo).diagnostics
         for flag in (False, True)
     )
-    uncalibrated = make("gallen2014", CAMERA, window=1).update(halo).diagnostics
+    told = make("gallen2014", CAMERA, window=1).update(halo)
+    uncalibrated = told.diagnostics
+    assert "fogsim calibrate halos" in uncalibrated["reason"]
+    assert told.bounds is None
     assert 9.0 < calibrated["value"] == uncalibrated["value"] < 25.0
     assert (ours["detected"], calibrated["detected"], uncalibrated["detected"]) == (True, True, False)
     day = np.full((240, 320, 3), 200, np.uint8)

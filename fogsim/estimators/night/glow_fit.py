@@ -104,11 +104,14 @@ def look_at(
     each = red - np.log(model).reshape(*model.shape[:2], -1, len(SECTORS))
     known = np.isfinite(red)
     ratio = np.full((*model.shape[:2], len(ANGLES)), np.nan, np.float32)
-    noise = np.full(len(ANGLES), np.inf)
-    ratio[:, :, told] = np.nanmedian(each, axis=3) + 2.0 * math.log(distance) - math.log(max(road, 1e-3))
-    noise[told] = np.where(known, seen.noise[told], 0.0).max(axis=1) / np.sqrt(known.sum(axis=1))
-    uneven = np.nanmedian(np.abs(each - np.nanmedian(each, axis=3, keepdims=True)), axis=(2, 3))
-    return GlowLook(time, distance, ratio, noise, float(uneven.min()))
+    noise, uneven = np.full(len(ANGLES), np.inf), np.empty((*model.shape[:2], len(red)))
+    for at, ring in enumerate(np.flatnonzero(told)):
+        some = each[:, :, at, known[at]]
+        middle = np.median(some, axis=2)
+        ratio[:, :, ring] = middle + 2.0 * math.log(distance) - math.log(max(road, 1e-3))
+        noise[ring] = seen.noise[ring, known[at]].max() / math.sqrt(known[at].sum())
+        uneven[:, :, at] = np.median(np.abs(some - middle[:, :, None]), axis=2)
+    return GlowLook(time, distance, ratio, noise, float(np.median(uneven, axis=2).min()))
 
 
 def likelihood(looks: tuple[GlowLook, ...], usual: float = USUAL) -> tuple[Floats, float]:

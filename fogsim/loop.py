@@ -135,14 +135,13 @@ class AdvisedDriving:
         if step.index % self._frames:
             return previous
         lit = known_fog(step, self._scenario.lighting)
-        lamps = self._ask_lighting(step, lit, LampChoice(previous.lamps, previous.lamp_wish))
-        lighting = Command(lamps=lamps.lamps, lamp_wish=lamps.wish)
+        chosen = self._ask_lighting(step, lit, LampChoice(previous.lamps, previous.lamp_wish))
         if self._road is not None:
             advice, stretches = self._road.advise(step)
-            return dataclasses.replace(lighting, advice=advice, stretches=stretches)
+            return Command(advice=advice, lamps=chosen.lamps, lamp_wish=chosen.wish, stretches=stretches)
         known = known_fog(step, self._scenario.advice)
         advice = checked_advice(self._scenario.advice.method, self._ask_adviser(step, known, previous.advice))
-        return spread_advice(dataclasses.replace(lighting, advice=advice), self._scenario)
+        return spread_advice(Command(advice=advice, lamps=chosen.lamps, lamp_wish=chosen.wish), self._scenario)
 
 
 def _questions_to(adviser: Adviser | VehicleAdviser) -> Callable[[Step, Belief, SpeedAdvice], SpeedAdvice]:

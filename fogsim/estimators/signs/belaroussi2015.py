@@ -14,7 +14,7 @@ from fogsim.estimators.signs.regions import PoseDeviation
 from fogsim.estimators.signs.track import SignTrack
 from fogsim.estimators.signs.watch import SignWatch, Watched, sign_looks
 from fogsim.parameters import Range, checked_parameters
-from fogsim.units import extinction_from_visibility
+from fogsim.units import extinction_from_visibility, visibility_from_extinction
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate, ExtinctionBounds
 from fogsim.values.observation import Observation
@@ -27,6 +27,12 @@ SYSTEMATIC = 0.08
 
 SOFTNESS = 0.1
 """Standard deviation of a bound, in ln k [-]."""
+
+MISSES = 3
+"""Looks at which a sign should have been seen and was not, from which on it was missed."""
+
+MISSED_SIGNS = 2
+"""Signs that must have been missed: one alone may be missing in the world, or hidden."""
 
 LIKE = 0.1
 """Largest difference of the calibrated focal length from the camera's, relative to it [-]."""
@@ -129,6 +135,8 @@ class Belaroussi2015:
         self._seen: list[_Seen] = []
         self._way, self._time = 0.0, -math.inf
         self._least: tuple[float, float] | None = None
+        self._missed: dict[str, tuple[float, float]] = {}
+        self._map_holds = False
 
     def update(self, observation: Observation) -> Estimate:
         """Look for the signs ahead, and estimate from all that were seen to come out of the fog.
@@ -143,8 +151,8 @@ class Belaroussi2015:
         Estimate
             Diagnostics: ``signs``, how many count; ``single_visibilities`` of them [m]; ``sign_boxes``, (left, right,
             top, bottom) of those that were found [px]; ``sign_looks``, a `SignLook` of each that is ahead;
-            ``visibility_at_least`` [m], of a sign that was seen from beyond the curve's range; or
-            ``reason``.
+            ``visibility_at_least`` [m], of a sign that was seen from beyond the curve's range, or
+            ``visibility_at_most`` [m], of two that were missed; or ``reason``.
 
         Raises
         ------
@@ -163,7 +171,8 @@ class Belaroussi2015:
             why = "the detector is not calibrated for this camera: fogsim calibrate signs, parameter operating_range"
             return Estimate.invalid(self.method, why, **found)
         self._count(watched, self._range)
-        return self._estimate(found)
+        self._note_missed()
+        return self._estimate(found, self._range)
 
     def _count(self, watched: Watched, measured: OperatingRange) -> None:
         """Measurements of the signs that are confirmed now."""
@@ -172,6 +181,21 @@ class Belaroussi2015:
             if track.confirmed and track.first_seen is not None and track.sign.sighting.sign_id not in self._counted:
                 self._counted.add(track.sign.sighting.sign_id)
                 self._add(track, track.first_seen, measured)
+
+    def _note_missed(self) -> None:
+        """Signs that should be seen and are not, each with the nearest distance of which that is so, and when."""
+        for track in self._watch.tracks:
+            sign_id = track.sign.sighting.sign_id
+            if track.confirmed:
+                self._map_holds = True
+                self._missed.pop(sign_id, None)
+            elif track.misses >= MISSES and track.unseen_before is not None:
+                self._missed[sign_id] = track.unseen_before, self._time
+        self._missed = {
+            sign_id: (distance, time)
+            for sign_id, (distance, time) in self._missed.items()
+            if self._time - time < self._fading_time
+        }
 
     def _add(self, track: SignTrack, first_seen: float, measured: OperatingRange) -> None:
         confidence = 1.0 if self._as_published else track.confidence
@@ -187,7 +211,7 @@ class Belaroussi2015:
         elif first_seen > measured.reach[1]:
             self._least = measured.farthest, self._time
 
-    def _estimate(self, found: dict[str, object]) -> Estimate:
+    def _estimate(self, found: dict[str, object], measured: OperatingRange) -> Estimate:
         weighted = [(one, self._weight(one)) for one in self._seen]
         weighted = [(one, weight) for one, weight in weighted if weight >= FORGOTTEN]
         self._seen = [one for one, _ in weighted]
@@ -197,7 +221,11 @@ class Belaroussi2015:
             why = self._watch.trouble or "no sign has come out of the fog yet"
             if "visibility_at_least" in found:
                 why = f"signs are seen from beyond the curve's range: at least {found['visibility_at_least']:.0f} m"
-            return replace(Estimate.invalid(self.method, why, **found), bounds=self._bounds(found))
+            bounds = self._bounds(found, measured)
+            if bounds is not None and bounds.least > 0.0:
+                found["visibility_at_most"] = visibility_from_extinction(bounds.least)
+                why = f"signs of the map are not seen: at most {found['visibility_at_most']:.0f} m"
+            return replace(Estimate.invalid(self.method, why, **found), bounds=bounds)
         values, weights = [one.visibility for one, _ in weighted], [weight for _, weight in weighted]
         chosen = majority(values, weights)
         kept = [(v, w) for v, w, keep in zip(values, weights, chosen, strict=True) if keep]
@@ -209,13 +237,25 @@ class Belaroussi2015:
         found |= {"signs": len(kept), "single_visibilities": tuple(values)}
         return Estimate(self.method, k, k * deviation / mean, diagnostics=found)
 
-    @staticmethod
-    def _bounds(found: Mapping[str, object]) -> ExtinctionBounds | None:
-        """What a sign that was seen from beyond the curve's end says: there is at least that visibility."""
+    def _bounds(self, found: Mapping[str, object], measured: OperatingRange) -> ExtinctionBounds | None:
+        """What signs tell that were seen from beyond the curve's end, or not at all: at least, or at most, so much.
+
+        A sign that is not seen where it should be has not come out of the fog, unless it is missing or hidden; so there
+        must be two of them, and signs must have been found on the map before.
+        """
         least = found.get("visibility_at_least")
-        if not isinstance(least, float):
+        if isinstance(least, float):
+            return ExtinctionBounds(most=extinction_from_visibility(least), softness=SOFTNESS)
+        nearest = sorted(distance for distance, _ in self._missed.values())
+        if not self._map_holds or len(nearest) < MISSED_SIGNS:
             return None
-        return ExtinctionBounds(most=extinction_from_visibility(least), softness=SOFTNESS)
+        low, high = measured.reach
+        told = measured.visibility_at(max(nearest[MISSED_SIGNS - 1], low))
+        if told is None or low > high:
+            return None
+        found_at_most, deviation = told
+        softness = math.hypot(SOFTNESS, deviation / found_at_most)
+        return ExtinctionBounds(least=extinction_from_visibility(found_at_most), softness=softness)
 
     def _weight(self, one: _Seen) -> float:
         faded = (self._way - one.way) / self._fading_way + (self._time - one.time) / self._fading_time

@@ -166,6 +166,37 @@ def test_signs_from_beyond_the_curve_are_a_bound_and_no_number() -> None:
     assert published.update(seen(0.0)).valid
 
 
+def missed(name: str, nearest: float) -> SignTrack:
+    return dataclasses.replace(track(name, nearest, before=nearest), first_seen=None, detections=0, misses=5)
+
+
+def test_signs_that_are_missed_are_a_bound_once_the_map_has_been_found_to_hold() -> None:
+    made, told = estimator()
+    told.tracks = (missed("a", 60.0), missed("b", 120.0))
+    assert made.update(seen(0.0)).bounds is None  # the map may be another place's
+    told.tracks = (track("c", 100.0, before=None),)
+    made.update(seen(1.0))
+    told.tracks = (missed("a", 60.0),)
+    made.update(seen(2.0))
+    found = made.update(seen(3.0))
+    assert found.bounds is not None
+    # The farther one of two counts, for one may be missing: first seen from nearer than 120 m is fog below 100 m.
+    assert math.log(20.0) / found.bounds.least == pytest.approx(100.0, rel=0.01)
+    assert found.diagnostics["visibility_at_most"] == pytest.approx(100.0, rel=0.01)
+    assert "not seen" in str(found.diagnostics["reason"])
+    assert made.update(seen(90.0)).bounds is None  # long ago
+
+
+def test_one_sign_that_is_missed_or_one_that_is_found_after_all_bounds_nothing() -> None:
+    made, told = estimator()
+    told.tracks = (track("c", 100.0, before=None), missed("a", 60.0))
+    assert made.update(seen(0.0)).bounds is None
+    told.tracks = (missed("a", 60.0), missed("b", 80.0))
+    assert made.update(seen(1.0)).bounds is not None
+    told.tracks = (missed("a", 60.0), track("b", 50.0, before=None))
+    assert made.update(seen(2.0)).bounds is None
+
+
 def test_a_sign_that_was_seen_at_the_first_look_tells_no_first_detection() -> None:
     made, told = estimator()
     told.tracks = (track("a", 100.0, before=None),)

@@ -9,7 +9,7 @@ from fogsim.estimators.huang2015_rough import Huang2015Rough
 from fogsim.estimators.joint_road import JointRoad
 from fogsim.estimators.lead_contrast import LeadContrast
 from fogsim.estimators.negru2013 import Negru2013
-from fogsim.estimators.night.gallen2014 import Gallen2014
+from fogsim.estimators.night.gallen2014 import Gallen2014, Gallen2014Halo
 from fogsim.estimators.night.gallen2014_veil import Gallen2014Veil
 from fogsim.estimators.night.night_glow import NightGlow
 from fogsim.estimators.night.night_road import NightRoad
@@ -36,6 +36,7 @@ ESTIMATORS: Registry[Callable[..., Estimator]] = Registry(
         "night_road": NightRoad,
         "night_glow": NightGlow,
         "gallen2014": Gallen2014,
+        "gallen2014_halo": Gallen2014Halo,
     },
     group="fogsim.estimators",
     methods=("update", "reset"),

@@ -52,6 +52,8 @@ _NAMED = (
     "night_road",
     "gallen2014_veil",
     "night_glow",
+    "gallen2014",
+    "gallen2014_halo",
 )
 """Methods that the first colours belong to, whichever others stand beside them."""
 

@@ -22,6 +22,7 @@ from fogsim.values import (
     FogField,
     Frame,
     LeadMeasurement,
+    LightMeasurement,
     Observation,
     SignMap,
     SignSighting,
@@ -123,7 +124,19 @@ def test_a_false_truth_changes_nothing(as_it_is: list[Step], monkeypatch: pytest
     check_same(as_it_is, misled)
 
 
-ALLOWED = (Observation, Frame, Camera, LeadMeasurement, SignSighting, float, int, str, type(None), enum.Enum)
+ALLOWED = (
+    Observation,
+    Frame,
+    Camera,
+    LeadMeasurement,
+    LightMeasurement,
+    SignSighting,
+    float,
+    int,
+    str,
+    type(None),
+    enum.Enum,
+)
 
 
 def parts(value: object):

@@ -23,6 +23,11 @@ from fogsim.values import Camera, Estimate, Frame, LeadMeasurement, Observation,
 NOT_BY_DAY = {
     "belaroussi2015": "needs signs: tests/estimators/signs/test_belaroussi2015.py",
     "sign_contrast": "needs signs: tests/estimators/signs/test_sign_contrast.py",
+    "night_road": "reads lamplight: tests/estimators/night/test_night_road.py",
+    "night_glow": "reads lamplight: tests/estimators/night/test_night_glow.py",
+    "gallen2014": "reads lamplight: tests/estimators/night/test_gallen2014.py",
+    "gallen2014_halo": "reads lamplight: tests/estimators/night/test_gallen2014.py",
+    "gallen2014_veil": "reads lamplight: tests/estimators/night/test_gallen2014_veil.py",
 }
 """Methods that cannot tell from this drive by day, and where their relations are tested instead."""
 

@@ -17,12 +17,13 @@ from flat_road import Road, photograph, scan
 from windscreen import draw, small_scenes
 
 from fogsim.estimators import ESTIMATORS, make
+from fogsim.offline import NIGHT_METHODS
 from fogsim.values import Camera, Estimate, Frame, LeadMeasurement, Observation, Response
 
 OF_SIGNS = {"belaroussi2015", "sign_contrast"}
 """They need a map, which these pictures do not have."""
 
-METHODS = sorted(set(ESTIMATORS) - OF_SIGNS)
+METHODS = sorted(set(ESTIMATORS) - OF_SIGNS - set(NIGHT_METHODS))
 RANGES = (14.0, 18.0, 22.0, 26.0, 30.0, 35.0, 40.0)
 
 

@@ -153,6 +153,9 @@ class Gallen2014:
         reading = self._watch.look(image, self._camera.bits)
         if reading.is_fog is not None:
             return self._by_halos(reading)
+        return self._by_veil(observation)
+
+    def _by_veil(self, observation: Observation) -> Estimate:
         told = self._veil.update(observation)
         found = {**told.diagnostics, "by": "veil"}
         if told.valid:
@@ -176,3 +179,40 @@ class Gallen2014:
                 ExtinctionBounds(most=extinction_from_visibility(SURELY_SEEN), softness=SOFTNESS),
             )
         return replace(Estimate.invalid(self.method, why, **found), bounds=bounds)
+
+
+@checked_parameters
+class Gallen2014Halo(Gallen2014):
+    """Halos about lamps alone, without the own head lamps' veil (section III-B).
+
+    Parameters
+    ----------
+    camera : Camera
+        The assumed calibration.
+    halos : str or None
+        File of ``fogsim calibrate halos``; see `Gallen2014`.
+    window : int
+        Pictures over which the mean Br50 is smoothed.
+    as_published : bool
+        Whether halos' threshold is found to the letter of the paper.
+
+    Raises
+    ------
+    InputError
+        If a parameter is out of range, or the file cannot be read or is of another camera.
+    """
+
+    method = "gallen2014_halo"
+
+    def __init__(
+        self,
+        camera: Camera,
+        *,
+        halos: str | None = None,
+        window: Annotated[int, Range(1, 10_000)] = WINDOW,
+        as_published: bool = False,
+    ) -> None:
+        super().__init__(camera, halos=halos, window=window, as_published=as_published)
+
+    def _by_veil(self, observation: Observation) -> Estimate:  # noqa: ARG002 - what the combination is given
+        return Estimate.invalid(self.method, "no lamp is seen whose halo could tell")

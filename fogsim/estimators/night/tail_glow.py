@@ -7,14 +7,10 @@ tail and stop lamps or as rear fog lamps do; a lens adds glare. Which of these i
 import math
 from dataclasses import dataclass
 from functools import cache
+from importlib.resources import files
 
 import numpy as np
 from numpy.typing import NDArray
-
-from fogsim.atmosphere.lamps.glow import glow
-from fogsim.atmosphere.lamps.lobes import light_origins, mean_intensity
-from fogsim.atmosphere.lamps.phase_function import Droplets
-from fogsim.values.light import Beam
 
 Floats = NDArray[np.float64]
 
@@ -30,15 +26,6 @@ GLARES = (0.0, 0.01, 0.03)
 GLARE_SPREADS = np.radians((0.12, 0.48, 1.9, 7.7))
 """Standard deviations of the Gaussians among which that light is evenly divided [rad]: about the inverse square of the
 angle, as smooth surfaces scatter it (CIE 146)."""
-
-_DIRECTIONS = np.radians((-80.0, -45.0, -30.0, -20.0, -10.0, -5.0, 0.0, 5.0, 10.0, 20.0, 30.0, 45.0, 80.0))
-_ELEVATIONS = np.radians((-30.0, -15.0, -10.0, -5.0, 0.0, 5.0, 10.0, 15.0, 30.0))
-_SHARES = (
-    ((0.012, 0.03, 0.06, 0.12, 0.35, 0.9, 1.0), (0.03, 0.12, 0.3, 0.7, 1.0)),
-    ((0.005, 0.03, 0.08, 0.2, 0.75, 0.92, 1.0), (0.02, 0.1, 0.25, 0.75, 1.0)),
-)
-"""Least intensities aside and above, from the outermost direction inward, of what UNECE R148 asks of tail and stop
-lamps, and of rear fog lamps, over that along the axis; beyond its grids, what its fields of visibility ask."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,13 +65,13 @@ class GlowModels:
 
 @cache
 def tail_glows() -> GlowModels:
-    """Glow of tail lamps in all fogs; computing it takes about a second, once a process."""
+    """Glow of tail lamps in all fogs, by a table that `fogsim.calibration.tail_glows` made."""
+    with (files("fogsim.estimators.night") / "data" / "tail_glows.npz").open("rb") as file, np.load(file) as table:
+        plain, shone = table["plain"].astype(np.float64), table["shone"].astype(np.float64)
     found = []
-    for droplets in Droplets:
-        plain = glow(DEPTHS[:, None], ANGLES, droplets)
-        for aside, above in _SHARES:
-            shone = _shone(aside, above, droplets)
-            found += [plain[..., None] * shone + _glared(share)[..., None] for share in GLARES]
+    for of_fog, of_lamps in zip(plain, shone, strict=True):
+        for lobe in of_lamps:
+            found += [of_fog[..., None] * lobe + _glared(share)[..., None] for share in GLARES]
     return GlowModels(np.log(np.stack(found)))
 
 
@@ -93,19 +80,3 @@ def _glared(share: float) -> Floats:
     spread = GLARE_SPREADS[:, None]
     each = np.exp(-0.5 * (ANGLES / spread) ** 2) / (2.0 * math.pi * spread**2)
     return np.asarray(share * each.mean(axis=0) * np.exp(-DEPTHS)[:, None])
-
-
-def _shone(aside: tuple[float, ...], above: tuple[float, ...], droplets: Droplets) -> Floats:
-    """Mean intensity (t, g, SIDES) over the axial one of what is seen of a lamp's glow straight behind it."""
-    across = np.array([*aside, *aside[-2::-1]])
-    upward = np.array([*above, *above[-2::-1]])
-    lobe = Beam(_DIRECTIONS, _ELEVATIONS, upward[:, None] * across)
-    origins, straight = light_origins(droplets), np.zeros(1)
-    mean = mean_intensity(lobe, straight, straight, droplets)[0]
-    row = np.clip(np.interp(np.log(DEPTHS), origins.log_depth, np.arange(len(mean))), 0.0, len(mean) - 1.001)
-    low, part = row.astype(np.int64), (row % 1.0)[:, None, None]
-    at_depth = mean[low] * (1.0 - part) + mean[low + 1] * part
-    column = np.interp(np.log(ANGLES), np.log(origins.angle), np.arange(len(origins.angle)))
-    column = np.clip(column, 0.0, len(origins.angle) - 1.001)
-    left, rest = column.astype(np.int64), (column % 1.0)[:, None]
-    return np.asarray(at_depth[:, left] * (1.0 - rest) + at_depth[:, left + 1] * rest)

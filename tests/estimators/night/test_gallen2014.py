@@ -7,7 +7,7 @@ import pytest
 
 from fogsim.errors import InputError
 from fogsim.estimators import make
-from fogsim.estimators.night.gallen2014 import Gallen2014, fog_class
+from fogsim.estimators.night.gallen2014 import Gallen2014, Gallen2014Halo, fog_class
 from fogsim.estimators.night.halos import HaloThreshold
 from fogsim.values import Camera, Lamp, Observation, Response
 from tests.vision.sources.night_pictures import in_colour, picture
@@ -44,6 +44,14 @@ def test_without_lamps_the_veil_is_asked() -> None:
     assert told.method == "gallen2014"
     assert told.diagnostics["by"] == "veil"
     assert "no references" in told.diagnostics["reason"]
+
+
+def test_halos_alone_ask_no_veil() -> None:
+    method = Gallen2014Halo(CAMERA).calibrated(MEASURED)
+    assert method.update(seen(LAMPS, glow=30.0)).diagnostics["detected"]
+    told = Gallen2014Halo(CAMERA).calibrated(MEASURED).update(seen())
+    assert (told.method, told.valid) == ("gallen2014_halo", False)
+    assert "no lamp is seen" in str(told.diagnostics["reason"])
 
 
 def test_published_threshold_and_daylight() -> None:

@@ -87,7 +87,7 @@ def test_a_version_says_when_it_is_over_and_solved_and_what_has_changed(name: st
     assert "### Version history\n    * v1: " in (kind.__doc__ or "")
 
 
-@pytest.mark.parametrize(("mode", "size"), [("state", 21), ("camera", 64 * 48 * 3)])
+@pytest.mark.parametrize(("mode", "size"), [("state", 22), ("camera", 64 * 48 * 3)])
 def test_what_is_flattened_has_no_pixels_among_numbers(mode: str, size: int) -> None:
     env = gymnasium.make("fogsim/FogAdvisory-v1", observation=mode, image_size=(64, 48))
     assert FlattenObservation(env).observation_space.shape == (size,)
@@ -139,6 +139,13 @@ def test_splits_share_no_seed() -> None:
     assert not drawn["train"] & drawn["test"]
     with pytest.raises(InputError, match="unknown split"):
         EpisodeSource(None, None, None, (), "validation")
+
+
+@pytest.mark.parametrize(("distribution", "drawn"), [(None, 5), (ScenarioDistribution(), 5), ([MOTORWAY], 1)])
+def test_fog_is_drawn_unless_scenarios_bring_their_own(distribution: Any, drawn: int) -> None:
+    source, rng = EpisodeSource(None, distribution, None, (), "train"), np.random.default_rng(0)
+    fogs = {repr(source.draw(rng, EpisodeChoice.of(None))[1].scenario.fog) for _ in range(5)}
+    assert len(fogs) == drawn
 
 
 def test_fog_is_drawn_from_its_ranges() -> None:
@@ -250,6 +257,11 @@ def test_the_map_rides_along_as_a_channel_or_an_entry(step: Step) -> None:
     np.testing.assert_array_equal(whole["sign_map"][:, :, 1], channel[:, :, 3])
 
 
+def _illuminance(step: Step) -> float:
+    assert step.observation.light is not None
+    return step.observation.light.illuminance
+
+
 def test_state_says_nothing_of_the_truth(step: Step) -> None:
     other = dataclasses.replace(step.truth, extinction=0.5, extinction_ahead=0.4)
     mine = task_state(step, Command(), 100.0, 500.0)
@@ -260,6 +272,9 @@ def test_state_says_nothing_of_the_truth(step: Step) -> None:
     assert told["lanes"] in (pytest.approx(0.4), pytest.approx(0.6))
     belief = [told[f"belief_{name}"] for name in ("5_percent", "25_percent", "median", "75_percent", "95_percent")]
     assert belief == sorted(belief)
+    assert told["ambient_light"] == pytest.approx(math.log10(_illuminance(step)) / 3.0 - 2.0 / 3.0, abs=1e-6)
+    sensorless = dataclasses.replace(step, observation=dataclasses.replace(step.observation, light=None))
+    assert task_state(sensorless, Command(), 100.0, 500.0)[-1] == 1.0
     assert [scaled_visibility(one) for one in (0.0, 10.0, 100.0, 1000.0, math.inf)] == [-1.0, -1.0, 0.0, 1.0, 1.0]
 
 

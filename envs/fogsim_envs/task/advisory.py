@@ -48,13 +48,14 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
     | camera | uint8 (rows, cols, 3) | the latest frame |
     | signs | float32 (32,) in −1 … 1 | 8 signs by the map: distance / 250 m, lateral / 25 m, value / 50 m/s, size / 2 |
     | signs_mask | 0 or 1 (8,) | which rows of ``signs`` are filled |
-    | state | float32 (21,) in −1 … 1 | see below |
+    | state | float32 (22,) in −1 … 1 | see below |
 
     ``state``: own speed / 25 m/s − 1; speed limit, likewise; distance to go / 2.5 km − 1; time left / 300 s − 1; number
     of the own lane from the right / 5; number of lanes / 5; lead present; lead distance / 100 m − 1; relative speed of
     the lead / 25 m/s; estimate valid; log10 of the estimated visibility / 100 m; relative deviation of the estimate;
     believed visibility on the same scale: 5, 25, 50, 75, 95 % quantiles; deviation of ln k; advised speed asked for
-    / 25 m/s − 1 (1 for none); front fog lamps lit; rear fog lamp lit. All are clipped to −1 … 1.
+    / 25 m/s − 1 (1 for none); front fog lamps lit; rear fog lamp lit; log10 of the light sensor's illuminance,
+    0.1 lx at −1, 100,000 lx at 1. All are clipped to −1 … 1.
 
     ### Reward
     Sum of the terms in ``info["reward_terms"]``, in points (`fogsim_envs.task.TaskWeights`): progress, time, arrival,
@@ -77,7 +78,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         default task's motorway
     scenario_distribution : `ScenarioDistribution`, or a sequence of scenarios of which one is taken; None with
         a scenario is that scenario alone
-    fog_distribution : `FogDistribution`; None with a scenario is that scenario's own fog
+    fog_distribution : `FogDistribution`; None with a scenario, or several to draw from, is that scenario's own fog
     split : "train" or "test"
     observation : "dict", "state", "camera", "camera+sign_map" or "dict+sign_map"
     overrides : ``key.path=value`` each, as after ``fogsim run --set``

@@ -19,6 +19,7 @@ from fogsim_envs.rendering import RENDER_MODES, StepRenderer
 from fogsim_envs.task.advisory import FogAdvisoryV1Env
 from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
 from fogsim_envs.task.rewards import TaskWeights
+from fogsim_envs.task.sampling import is_own_motorway
 from fogsim_envs.task.surrogate import EstimatorSurrogate, SurrogateTable
 
 _WITHOUT_FRAMES = ("renderer=none", "estimators=[]", "camera.width=16", "camera.height=16")
@@ -68,16 +69,16 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
         surrogate: Path | None = None,
         timeout: float = TIMEOUT,
     ) -> None:
-        is_default = scenario is None and scenario_distribution is None
+        is_own = is_own_motorway(scenario, scenario_distribution)
         table = SurrogateTable.load() if surrogate is None else SurrogateTable.load(surrogate)
         self._surrogate = EstimatorSurrogate(table)
         super().__init__(
             scenario,
-            scenario_distribution=FAST_SCENARIO if is_default else scenario_distribution,
-            fog_distribution=FAST_FOG if is_default and fog_distribution is None else fog_distribution,
+            scenario_distribution=FAST_SCENARIO if is_own and scenario_distribution is None else scenario_distribution,
+            fog_distribution=FAST_FOG if is_own and fog_distribution is None else fog_distribution,
             split=split,
             observation="state",
-            overrides=(*(_DEFAULT if is_default else ()), *_WITHOUT_FRAMES, *overrides),
+            overrides=(*(_DEFAULT if is_own else ()), *_WITHOUT_FRAMES, *overrides),
             image_size=None,
             continuous=continuous,
             reward_weights=reward_weights,

@@ -44,10 +44,13 @@ STATE_FEATURES = (
     "advised_speed",
     "front_fog_lamps",
     "rear_fog_lamp",
+    "ambient_light",
 )
 """Meaning of the entries of ``state``; the environment's docstring gives their scales."""
 
 LANE_SCALE = 5.0
+LIGHT_RANGE = (-1.0, 5.0)
+"""log10 of the illuminance [lx] that is −1 and 1 in ``state``: a moonlit night and the brightest overcast day."""
 
 
 def task_space(mode: str, camera: Camera | None) -> spaces.Space[Any]:
@@ -145,6 +148,7 @@ def task_state(step: Step, own: Command, time_left: float, to_go: float) -> NDAr
         advice / SPEED - 1.0 if math.isfinite(advice) else 1.0,
         float(Lamp.FRONT_FOG in own.lamps),
         float(Lamp.REAR_FOG in own.lamps),
+        _ambient_light(step),
     )
     state = np.array(values, dtype=np.float32)
     return np.minimum(np.maximum(state, -1.0, out=state), 1.0, out=state)
@@ -156,6 +160,14 @@ def _estimate(step: Step) -> tuple[float, float, float]:
     estimate = step.estimates[0]
     deviation = estimate.standard_deviation / estimate.extinction if estimate.extinction > 0.0 else 1.0
     return 1.0, scaled_visibility(estimate.visibility), deviation
+
+
+def _ambient_light(step: Step) -> float:
+    """What the light sensor tells, on a logarithmic scale: bright day without one."""
+    light, (darkest, brightest) = step.observation.light, LIGHT_RANGE
+    if light is None:
+        return 1.0
+    return 2.0 * (math.log10(max(light.illuminance, 1e-9)) - darkest) / (brightest - darkest) - 1.0
 
 
 def scaled_visibility(visibility: float) -> float:

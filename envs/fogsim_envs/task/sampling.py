@@ -85,6 +85,21 @@ class Drawn(NamedTuple):
     scenario: Scenario
 
 
+def is_own_motorway(
+    scenario: AnyScenario | None, distribution: ScenarioDistribution | Sequence[AnyScenario] | None
+) -> bool:
+    """Whether episodes are drawn on the task's own motorway, whose fog is drawn too unless told otherwise.
+
+    Parameters
+    ----------
+    scenario : scenario or None
+        The one that was asked for.
+    distribution : ScenarioDistribution, sequence of scenarios or None
+        What of it is drawn, or of which scenarios one is taken.
+    """
+    return scenario is None and (distribution is None or isinstance(distribution, ScenarioDistribution))
+
+
 class EpisodeSource:
     """What the episodes of an environment are drawn from.
 
@@ -117,10 +132,9 @@ class EpisodeSource:
     ) -> None:
         if split not in SPLITS:
             raise UnknownNameError("split", split, SPLITS)
-        is_default = scenario is None and distribution is None
         self._split = SPLITS.index(split)
-        self._drawn = ScenarioDistribution() if is_default else distribution
-        self._fog = FogDistribution() if is_default and fog is None else fog
+        self._drawn = ScenarioDistribution() if scenario is None and distribution is None else distribution
+        self._fog = FogDistribution() if fog is None and is_own_motorway(scenario, distribution) else fog
         self._overrides = overrides
         if isinstance(self._drawn, ScenarioDistribution) or self._drawn is None:
             self._scenarios: tuple[AnyScenario, ...] = (MOTORWAY if scenario is None else scenario,)

@@ -3,17 +3,22 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.estimators.signs.face_light import FaceLight
+from fogsim.linear_algebra import convolution
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 
 Floats = NDArray[np.float64]
 
-GRID = OPTICAL_DEPTH_AT_VISIBILITY / np.geomspace(8000.0, 10.0, 300)
-"""Extinction coefficients that are weighed [1/m], evenly in their logarithms."""
+GRID = OPTICAL_DEPTH_AT_VISIBILITY / np.geomspace(8000.0, 10.0, 900)
+"""Extinction coefficients that are weighed [1/m], evenly in their logarithms, nearer than any sign tells them."""
+
+SIGN_DEVIATION = 0.015
+"""Relative deviation of k that a sign has to itself, whatever its looks agree on [-]."""
 
 AIRLIGHT, CLIPPED_AIRLIGHT = 0.008, 0.05
 """Relative deviation of the airlight at the sign from the sky's, and where the sky is clipped [-]."""
@@ -24,11 +29,15 @@ DARKNESS = 0.02
 REGISTRATION = 0.012
 """Relative deviation of a single look's contrast by what is not noise: its layout, its place within the pixels [-]."""
 
+SMALL_FACE = 0.05
+"""Relative deviation of the contrast of faces too small for their areas to be told apart, which the looks at a sign
+share: how far their light spreads, how large they are taken to be [-]."""
+
 BRIGHTNESS, BRIGHTNESS_DEVIATION = 0.5, 0.35
 """What a white face would send without fog over the airlight, divided by its reflectance, and its deviation [-]."""
 
-HUBER, ROUNDS = 2.0, 3
-"""Standard deviations from which on a look counts less [-], and rounds of weighing."""
+HUBER, ROUNDS, COARSE = 2.0, 2, 6
+"""Standard deviations from which on a look counts less [-], rounds of weighing, and every how manieth k they need."""
 
 MAX_MISFIT = 12.0
 """Mean square of the standardised residuals beyond which it is no sign that is seen [-]."""
@@ -90,24 +99,51 @@ def fit_approach(looks: Sequence[FaceLook], range_deviation: float) -> ApproachF
     airlight = np.array([one.airlight for one in looks])
     seen = np.array([(one.face.black, one.face.slope) for one in looks]) / airlight[:, None]
     seen[:, 0] -= 1.0
+    small = np.array([float(one.face.is_mean) for one in looks])
     noise = np.array([one.face.variance for one in looks]) / airlight[:, None] ** 2
     unsure = CLIPPED_AIRLIGHT if any(one.clipped for one in looks) else AIRLIGHT
-    weight, at = np.ones(len(looks)), 0
+    measured = _Measured(distance, seen, noise, small, unsure, range_deviation)
+    weight = np.ones(len(looks))
     for _ in range(ROUNDS):
-        squares, residuals = _profile(distance, seen, noise, weight, unsure, range_deviation)
-        at = int(np.argmin(squares))
-        square = residuals[at]
+        squares, residuals = _profile(GRID[::COARSE], measured, weight)
+        square = residuals[int(np.argmin(squares))]
         weight = np.minimum(1.0, HUBER / np.sqrt(np.maximum(square, 1e-9)))
+    squares, residuals = _profile(GRID, measured, weight)
+    at = int(np.argmin(squares))
     misfit = float((weight * residuals[at]).sum() / max(2 * len(looks) - 3, 1))
     scaled = -0.5 * (squares - squares[at]) / max(misfit, 1.0)
-    return ApproachFit(scaled, misfit)
+    return ApproachFit(_widened(scaled), misfit)
 
 
-def _profile(
-    distance: Floats, seen: Floats, noise: Floats, weight: Floats, unsure: float, range_deviation: float
-) -> tuple[Floats, Floats]:
-    """Least sum of squares for each k, and each look's own (k, looks)."""
-    k = GRID[:, None]
+def _widened(log_likelihood: Floats) -> Floats:
+    """Log-likelihood of `GRID` after `SIGN_DEVIATION` has been added, the largest 0."""
+    step = math.log(GRID[1] / GRID[0])
+    reach = math.ceil(3.5 * SIGN_DEVIATION / step)
+    share = np.exp(-0.5 * (np.arange(-reach, reach + 1) * step / SIGN_DEVIATION) ** 2)
+    padded = np.pad(np.exp(np.maximum(log_likelihood, -700.0)), reach, mode="edge")
+    wider = np.log(convolution(padded, share)[2 * reach : -2 * reach])
+    return np.asarray(wider - wider.max())
+
+
+class _Measured(NamedTuple):
+    """Looks at one sign, relative to the airlight.
+
+    Distances [m]; contrast of black and slope (looks, 2), variances and covariance of these (looks, 3); 1 where only
+    the mean counts; deviations of the airlight [-] and of a distance [m].
+    """
+
+    distance: Floats
+    seen: Floats
+    noise: Floats
+    small: Floats
+    unsure: float
+    range_deviation: float
+
+
+def _profile(grid: Floats, measured: _Measured, weight: Floats) -> tuple[Floats, Floats]:
+    """Least sum of squares for each k of the grid, and each look's own (k, looks)."""
+    distance, seen, noise, small, unsure, range_deviation = measured
+    k = grid[:, None]
     fall = np.exp(-k * distance)
     # What is not noise scales a contrast; taken along the usual face, so that what was seen decides no weights.
     relative = (REGISTRATION**2 + (k * range_deviation) ** 2) * fall**2
@@ -117,10 +153,11 @@ def _profile(
     determinant = np.maximum(a * b - c * c, 1e-30)
     aa, bb, ab = b / determinant, a / determinant, -c / determinant
     first, second = seen[:, 0] + fall, np.broadcast_to(seen[:, 1], fall.shape) - BRIGHTNESS * fall
-    # Linear unknowns: g and ε in the first, the brightness beyond the usual in the second.
-    rows = ((fall, np.zeros_like(fall)), (np.ones_like(fall), np.zeros_like(fall)), (np.zeros_like(fall), fall))
-    priors = (DARKNESS**-2.0, unsure**-2.0, BRIGHTNESS_DEVIATION**-2.0)
-    matrix, right = np.zeros((len(GRID), 3, 3)), np.zeros((len(GRID), 3))
+    # Linear unknowns: g, ε and what small faces share in the first, the brightness beyond the usual in the second.
+    none = np.zeros_like(fall)
+    rows = ((fall, none), (np.ones_like(fall), none), (small * fall, none), (none, fall))
+    priors = (DARKNESS**-2.0, unsure**-2.0, SMALL_FACE**-2.0, BRIGHTNESS_DEVIATION**-2.0)
+    matrix, right = np.zeros((len(grid), 4, 4)), np.zeros((len(grid), 4))
     for i, (p, q) in enumerate(rows):
         left_p, left_q = weight * (aa * p + ab * q), weight * (ab * p + bb * q)
         right[:, i] = (left_p * first + left_q * second).sum(axis=1)
@@ -128,8 +165,8 @@ def _profile(
             matrix[:, i, j] = (left_p * r + left_q * s).sum(axis=1)
         matrix[:, i, i] += priors[i]
     solved = _solved(matrix, right)
-    g, offset, brighter = (solved[:, i, None] for i in range(3))
-    first, second = first - g * fall - offset, second - brighter * fall
+    g, offset, shared, brighter = (solved[:, i, None] for i in range(4))
+    first, second = first - (g + shared * small) * fall - offset, second - brighter * fall
     own = aa * first**2 + bb * second**2 + 2.0 * ab * first * second
     # The logarithm of the determinant: variances depend on k.
     whole = (weight * (own + np.log(determinant))).sum(axis=1)

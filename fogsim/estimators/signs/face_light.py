@@ -91,11 +91,14 @@ class FaceLight:
         Luminance at reflectance 0, and what a reflectance of 1 adds [linear grey levels].
     variance : tuple of float
         Variances of both and their covariance.
+    is_mean : bool
+        Whether the face was too small for its areas to be told apart, so that only its mean luminance was measured.
     """
 
     black: float
     slope: float
     variance: tuple[float, ...]
+    is_mean: bool = False
 
 
 def face_light(
@@ -194,7 +197,8 @@ def _placed(
 
 def _line(face: Face, columns: Floats, solved: Floats, covariance: Floats) -> FaceLight:
     """Luminance over reflectance; of what is even, or too small to tell its areas, only one point of that line."""
-    if not face.is_even and face.radius >= SEPARABLE:
+    is_small = face.radius < SEPARABLE
+    if not face.is_even and not is_small:
         return FaceLight(float(solved[0]), float(solved[4]), tuple(covariance[[0, 4, 0], [0, 4, 4]].tolist()))
     # What its areas send together: the mean over all that the face covers.
     shares = np.zeros(len(solved))
@@ -202,7 +206,8 @@ def _line(face: Face, columns: Floats, solved: Floats, covariance: Floats) -> Fa
     shares[4 : columns.shape[1]] = areas
     mean, variance = float((shares * solved).sum()), float((shares * times(covariance, shares)).sum())
     reflectance = face.layout.areas[0][1] if face.is_even else float(areas[0])
-    return FaceLight(mean, 0.0, (variance + reflectance**2 * UNKNOWN, UNKNOWN, -reflectance * UNKNOWN))
+    unknown = (variance + reflectance**2 * UNKNOWN, UNKNOWN, -reflectance * UNKNOWN)
+    return FaceLight(mean, 0.0, unknown, is_small)
 
 
 def _least_squares(

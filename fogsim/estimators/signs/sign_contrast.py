@@ -44,10 +44,10 @@ MOST_LOOKS, MOST_SIGNS = 60, 30
 LEAST_RADIUS, LARGEST_RADIUS = 3.0, 45.0
 """Radii of faces whose light is measured [px]."""
 
-SYSTEMATIC = 0.02
+SYSTEMATIC = 0.015
 """Relative deviation of k that all signs share [-]."""
 
-WORST = 0.4
+WORST = 0.15
 """Largest deviation of k relative to itself for an estimate [-]."""
 
 

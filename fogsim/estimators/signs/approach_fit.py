@@ -39,8 +39,8 @@ BRIGHTNESS, BRIGHTNESS_DEVIATION = 0.5, 0.35
 HUBER, ROUNDS, COARSE = 2.0, 2, 6
 """Standard deviations from which on a look counts less [-], rounds of weighing, and every how manieth k they need."""
 
-MAX_MISFIT = 12.0
-"""Mean square of the standardised residuals beyond which it is no sign that is seen [-]."""
+MAX_MISFIT = 2.5
+"""Mean square of the standardised residuals beyond which it is not the sign that the map has [-]."""
 
 
 @dataclass(frozen=True, slots=True)

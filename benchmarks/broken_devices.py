@@ -72,6 +72,17 @@ class LastValue(Estimator):
 
 
 @dataclass
+class WithoutSigns(Estimator):
+    """An estimator that is told of no sign."""
+
+    told: Callable[[Estimate], Estimate] = lambda estimate: estimate
+
+    def update(self, observation: Observation) -> Estimate:
+        """Say what is seen without the map."""
+        return self.sound.update(replace(observation, signs=()))
+
+
+@dataclass
 class TrustsTheMap(Estimator):
     """An estimator that takes every sign of the map for seen: it never says less than the way to the farthest."""
 
@@ -211,6 +222,7 @@ DEVICES = {
     "estimator always says clear": Device("estimators", partial(Estimator, told=clear)),
     "estimator repeats its last value": Device("estimators", LastValue),
     "estimator trusts the sign map": Device("estimators", TrustsTheMap),
+    "estimator has no sign map": Device("estimators", WithoutSigns),
     "fusion never widens": Device("fusion", NeverWidens),
     "no fog lamps": Device("lighting_policy", NoFogLamps),
     "camera frozen for 5 s, time and again": Device(settings=camera_fault("fault: frozen, time_stamp: delivery")),

@@ -7,17 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fogsim.camera import Sensor, expose
-from fogsim.render import make_renderer
-from fogsim.reproduce.scenes import AIRLIGHT, ILLUMINANCE, foggy_radiance, straight_road
-from fogsim.scene import build_scene
-from fogsim.units import extinction_from_visibility
-from fogsim.values import Camera, CameraPose, Frame, Observation, Response, Sign, SignMap, SignSighting
+from fogsim.reproduce.sign_drives import PoseNoise, SignDrive, observed
+from fogsim.values import Camera, Observation, Response, Sign
 
 CAMERA = Camera(560, 260, 1400.0, (90.0, 190.0), 1.38, math.radians(0.5), response=Response.SRGB)
 """The right part of a picture of 1400 × 600 pixels about the horizon."""
 
-SETBACK, SPEED = 1.7, 20.0
+NOISE = PoseNoise(fix=0.2)
 KINDS = ("speed_limit", "stop", "warning", "no_entry", "no_overtaking", "priority_road")
 FIRST, APART, REACH = 160.0, 120.0, 150.0  # [m]
 WRONG = ("missing", "moved", "turned", "another kind")
@@ -83,40 +79,7 @@ def drives(drive: Drive, visibilities: tuple[float, ...], seed: tuple[int, ...])
     """Observations of one drive, frame by frame, in every fog."""
     rng = np.random.default_rng(seed)
     along = posts(drive, rng)
-    scene = build_scene(
-        straight_road(), SignMap(tuple(p.true for p in along if p.true is not None)), np.random.default_rng(seed)
-    )
-    levels = {v: float(rng.choice((120.0, 200.0, 255.0))) for v in visibilities}
-    tilted, turned = rng.normal(0.0, math.radians(0.1)), rng.normal(0.0, math.radians(0.1))
-    renderer = make_renderer("auto", scene, illuminance=ILLUMINANCE)
-    try:
-        for x in np.arange(0.0, along[-1].told.position[0] - 5.0, drive.step):
-            true = replace(CAMERA, pitch=CAMERA.pitch + tilted + rng.normal(0.0, math.radians(0.05)))
-            pose = CameraPose((float(x) - SETBACK, 0.0, CAMERA.mount_height), heading=0.0)
-            view = renderer.render((), true, pose)
-            heading = turned + rng.normal(0.0, math.radians(0.17))
-            fix = x + rng.normal(0.0, 0.2), rng.normal(0.0, 0.2)
-            signs = sightings([p.told for p in along], fix, heading)
-            time, seen = float(x) / SPEED, {}
-            for v in visibilities:
-                radiance = foggy_radiance(view, pose, true, extinction_from_visibility(v))
-                image = expose(radiance, Sensor(AIRLIGHT * 255.0 / levels[v]), CAMERA.response, rng).astype(np.uint8)
-                seen[v] = Observation(Frame(time, image, CAMERA), SPEED, None, signs)
-            yield seen
-    finally:
-        renderer.close()
-
-
-def sightings(signs: list[Sign], fix: tuple[float, float], heading: float) -> tuple[SignSighting, ...]:
-    """What the map says from where the vehicle takes itself to be."""
-    found = []
-    for sign in signs:
-        dx, dy = sign.position[0] - fix[0], sign.position[1] - fix[1]
-        ahead, left = dx * math.cos(heading) + dy * math.sin(heading), dy * math.cos(heading) - dx * math.sin(heading)
-        if 0.0 < ahead <= REACH:
-            found.append(
-                SignSighting(
-                    sign.sign_id, sign.kind, sign.value, ahead, left, sign.diameter, sign.position[2], -heading
-                )
-            )
-    return tuple(sorted(found, key=lambda one: one.distance))
+    standing, known = tuple(p.true for p in along if p.true is not None), tuple(p.told for p in along)
+    places = tuple(float(x) for x in np.arange(0.0, known[-1].position[0] - 5.0, drive.step))
+    grey = float(rng.choice((120.0, 200.0, 255.0)))
+    return observed(SignDrive(CAMERA, standing, places, NOISE, grey, REACH, known), visibilities, rng)

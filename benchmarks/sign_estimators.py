@@ -20,17 +20,15 @@ from typing import Any
 import numpy as np
 from sign_drives import CAMERA, Drive, drives
 
-from fogsim.estimators import make
+from fogsim.estimators.protocol import Estimator
+from fogsim.estimators.signs.belaroussi2015 import Belaroussi2015
+from fogsim.estimators.signs.sign_contrast import SignContrast
 from fogsim.reproduce.sign_calibration import measure_operating_range
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Estimate
 from fogsim.values.estimate import NORMAL_90_PERCENT
 
-METHODS = {
-    "sign_contrast": "sign_contrast",
-    "belaroussi2015": "belaroussi2015",
-    "belaroussi2015, published": "belaroussi2015",
-}
+METHODS = ("sign_contrast", "belaroussi2015", "belaroussi2015, published")
 VISIBILITIES = (60.0, 100.0, 150.0, 200.0, 300.0, 400.0)
 
 Told = dict[tuple[str, float], list[list[Estimate]]]
@@ -40,13 +38,13 @@ def driven(pool: int, count: int, wrong: float, visibilities: Sequence[float]) -
     """Estimates by method and visibility, drive by drive."""
     told: Told = defaultdict(list)
     measured = measure_operating_range(CAMERA, 0.9, seed=0)
-    options: dict[str, dict[str, Any]] = {
-        "sign_contrast": {},
-        "belaroussi2015": {"operating_range": measured},
-        "belaroussi2015, published": {"operating_range": measured, "as_published": True},
+    make = {
+        "sign_contrast": lambda: SignContrast(CAMERA),
+        "belaroussi2015": lambda: Belaroussi2015(CAMERA).calibrated(measured),
+        "belaroussi2015, published": lambda: Belaroussi2015(CAMERA, as_published=True).calibrated(measured),
     }
     for number in range(count):
-        made = {(n, v): make(m, CAMERA, **options[n]) for n, m in METHODS.items() for v in visibilities}
+        made: dict[tuple[str, float], Estimator] = {(n, v): make[n]() for n in METHODS for v in visibilities}
         for key in made:
             told[key].append([])
         for seen in drives(Drive(wrong_share=wrong), tuple(visibilities), (pool, number)):

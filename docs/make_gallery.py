@@ -26,6 +26,7 @@ MOMENTS: dict[str, float] = {
     "pedestrian_crossing_fog": 21.0,
     "ramp_merge": 33.0,
     "sign_missing_and_moved": 4.0,
+    "single_lane_behind_truck": 22.4,
     "stopped_queue_behind_curve": 37.0,
     "tail_lamp_failure": 18.4,
     "tunnel_exit_into_fog": 17.0,

@@ -148,7 +148,7 @@ class JointRoad:
             return Estimate.invalid(
                 self.method, "too dark above the horizon, or no sky: this is a daytime method", **found
             )
-        if why := lit_by_lamps(level, self._camera):
+        if why := lit_by_lamps(level, self._camera, observation.lead):
             return Estimate.invalid(self.method, why, **found)
         prior = joint_prior(sky, self._camera, self._seen_horizon(pixels))
         fit = self._fitted(pixels, sky, prior, _free_road(observation.lead))

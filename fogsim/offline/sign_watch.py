@@ -18,7 +18,7 @@ from fogsim.offline.sign_file import SignFile, load_sign_file
 from fogsim.offline.source import Source
 from fogsim.offline.track_file import GeographicPose, Track, load_track, metres_per_radian
 from fogsim.sensors import signs_ahead
-from fogsim.values import Camera, Sign, SignLook, SignMap, SignSighting
+from fogsim.values import Camera, Frame, Observation, Sign, SignLook, SignMap, SignSighting
 
 REACH = 250.0
 """Distance ahead as far as which signs are looked for [m]."""
@@ -79,7 +79,7 @@ class SignWatch:
         self._longitude = np.array([sign.longitude for sign in signs.signs])
         self._latitude = np.array([sign.latitude for sign in signs.signs])
         self._nearest = self._nearest_positions(signs.path)
-        self._watch = Watch(camera, 0.0, OWN_DRIVE)
+        self._camera, self._watch = camera, Watch(camera, None, OWN_DRIVE)
         self._passed: list[SignTrack] = []
         self._images = self._outside = 0
 
@@ -115,7 +115,7 @@ class SignWatch:
         tuple of SignLook
             One for each sign of which the image may show something.
         """
-        watched = self._watch.look(image, sightings, time)
+        watched = self._watch.look(Observation(Frame(time, image, self._camera), signs=sightings))
         self._passed += watched.passed
         return sign_looks(watched, self._watch.tracks)
 

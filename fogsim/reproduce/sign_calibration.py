@@ -95,7 +95,7 @@ class _Approach:
         self.first: float | None = None
 
     def look(self, observation: Observation) -> None:
-        watched = self._watch.look(observation.image, observation.signs, observation.time)
+        watched = self._watch.look(observation)
         self.looks += [(sign.distance, bool(watched.found)) for sign in watched.signs if sign.expected]
         for track in self._watch.tracks:
             if track.confirmed:

@@ -38,11 +38,14 @@ class PoseNoise:
         Of signs in the map, along and across [m].
     heading, pitch : float
         Of the believed heading and of the told pitch [rad].
+    fix : float
+        Of the own position along and across, from frame to frame [m].
     """
 
     position: float = 0.5
     heading: float = math.radians(0.2)
     pitch: float = math.radians(0.1)
+    fix: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +66,8 @@ class SignDrive:
         Pixel value of the airlight, 0 … 255.
     reach : float
         How far ahead the map is read [m].
+    known : tuple of Sign or None
+        Signs as the map has them; None for those that stand there, each as far off as `noise` says.
     """
 
     camera: Camera
@@ -71,6 +76,7 @@ class SignDrive:
     noise: PoseNoise = PoseNoise()
     grey: float = 200.0
     reach: float = 400.0
+    known: tuple[Sign, ...] | None = None
 
 
 def observed(
@@ -88,7 +94,7 @@ def observed(
         Errors of map, pose and pixels, and where trees stand.
     """
     noise, told = drive.noise, drive.camera
-    known = SignMap(tuple(_misplaced(sign, noise.position, rng) for sign in drive.signs))
+    known = SignMap(drive.known or tuple(_misplaced(sign, noise.position, rng) for sign in drive.signs))
     length = max(drive.places) + 2.0 * drive.reach
     scene = build_scene(straight_road(length), SignMap(drive.signs), np.random.default_rng(rng.integers(2**31)))
     true = replace(told, pitch=told.pitch + rng.normal(0.0, noise.pitch))
@@ -98,7 +104,8 @@ def observed(
         for x in drive.places:
             pose = CameraPose((x - SETBACK, 0.0, true.mount_height), heading=0.0)
             view = renderer.render((), true, pose)
-            place = np.array([x, 0.0, 0.0])
+            along, across = rng.normal(0.0, noise.fix, 2) if noise.fix else (0.0, 0.0)
+            place = np.array([x + along, across, 0.0])
             signs = signs_ahead(known, place, rng.normal(0.0, noise.heading), drive.reach)
             seen = {}
             for visibility in visibilities:

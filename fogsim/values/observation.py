@@ -189,6 +189,23 @@ def sign_map_values(kind: str, distance: float, diameter: float) -> tuple[int, i
     return sign_kind_code(kind), nearness, min(round(255.0 * diameter / SIGN_MAP_SIZE), 255)
 
 
+def sign_coordinates(sign: SignSighting, camera: Camera, setback: float) -> tuple[float, float, float]:
+    """Where the face of a sign is as the camera has it, before its roll: to the right, down, and in depth [m].
+
+    Parameters
+    ----------
+    sign : SignSighting
+        What the map says.
+    camera : Camera
+        The told camera.
+    setback : float
+        Its distance behind the front bumper [m].
+    """
+    ahead, up = sign.distance + setback, sign.height - camera.mount_height
+    cosine, sine = math.cos(camera.pitch), math.sin(camera.pitch)
+    return -sign.lateral, -(ahead * sine + up * cosine), ahead * cosine - up * sine
+
+
 def sign_place(sign: SignSighting, camera: Camera, setback: float) -> tuple[float, float, float, float] | None:
     """Where a camera has the face of a sign, as an ellipse; None for one behind it.
 
@@ -206,12 +223,11 @@ def sign_place(sign: SignSighting, camera: Camera, setback: float) -> tuple[floa
     tuple of float, or None
         Column and row of its middle, half its width and half its height [px].
     """
-    ahead, up = sign.distance + setback, sign.height - camera.mount_height
-    depth = ahead * math.cos(camera.pitch) - up * math.sin(camera.pitch)
+    right, down, depth = sign_coordinates(sign, camera, setback)
     if depth <= 0.0:
         return None
     scale = camera.focal_length / depth
-    x, y = -scale * sign.lateral, -scale * (ahead * math.sin(camera.pitch) + up * math.cos(camera.pitch))
+    x, y = scale * right, scale * down
     cosine, sine = math.cos(camera.roll), math.sin(camera.roll)
     u, v = camera.principal_point[0] + x * cosine - y * sine, camera.principal_point[1] + x * sine + y * cosine
     tall = 0.5 * scale * sign.diameter

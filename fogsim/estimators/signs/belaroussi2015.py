@@ -71,8 +71,8 @@ class Belaroussi2015:
     as_published : bool
         Whether the curve is the paper's cubic through the distances of 80 % detection, in place of the monotone one
         through the distances of first detection, and p(c) is 1.
-    setback : float
-        Distance of the camera behind the front bumper [m].
+    setback : float or None
+        Distance of the camera behind the front bumper [m]; None for what observations tell.
     position_deviation : float
         Standard deviation of a sign's place by map and own position [m].
     heading_deviation, pitch_deviation : float
@@ -94,7 +94,7 @@ class Belaroussi2015:
         *,
         operating_range: str | None = None,
         as_published: bool = False,
-        setback: Annotated[float, Range(0.0, 10.0, "m")] = 1.7,
+        setback: Annotated[float, Range(0.0, 10.0, "m")] | None = None,
         position_deviation: Annotated[float, Range(0.0, 100.0, "m")] = 0.5,
         heading_deviation: Annotated[float, Range(0.0, 1.0, "rad")] = math.radians(0.2),
         pitch_deviation: Annotated[float, Range(0.0, 1.0, "rad")] = math.radians(0.1),
@@ -159,12 +159,12 @@ class Belaroussi2015:
         InputError
             If camera, image or time do not fit (see `fogsim.estimators.image_check`), or two signs have one id.
         """
-        image = self._check.image_of(observation)
+        self._check.image_of(observation)
         time = observation.time
         if math.isfinite(self._time):
             self._way += observation.speed * max(time - self._time, 0.0)
         self._time = time
-        watched = self._watch.look(image, observation.signs, time)
+        watched = self._watch.look(observation)
         found: dict[str, object] = {"horizon_row": self._horizon, "sign_boxes": _boxes(watched)}
         found["sign_looks"] = sign_looks(watched, self._watch.tracks)
         if self._range is None:

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from fogsim.values.camera import Camera
-from fogsim.values.observation import SignSighting
+from fogsim.values.observation import SignSighting, sign_coordinates, sign_place
 from fogsim.vision.symmetry.detection import SearchRegion
 
 GATE = 3.3
@@ -101,28 +101,23 @@ def project_sightings(
 
 
 def _projected(sighting: SignSighting, camera: Camera, setback: float, known: PoseDeviation) -> ProjectedSign | None:
-    ahead, up = sighting.distance + setback, sighting.height - camera.mount_height
-    cosine, sine = math.cos(camera.pitch), math.sin(camera.pitch)
-    depth = ahead * cosine - up * sine
-    numbers = (ahead, up, sighting.lateral, sighting.diameter)
-    if not all(map(math.isfinite, numbers)) or depth < NEAREST or sighting.diameter <= 0.0:
+    right, down, depth = sign_coordinates(sighting, camera, setback)
+    if not all(map(math.isfinite, (right, down, depth, sighting.diameter))) or sighting.diameter <= 0.0:
         return None
-    scale = camera.focal_length / depth
-    x, y = -scale * sighting.lateral, -scale * (ahead * sine + up * cosine)
-    radius = 0.5 * scale * sighting.diameter
-    if radius < SMALLEST:
+    place = None if depth < NEAREST else sign_place(sighting, camera, setback)
+    if place is None or place[3] < SMALLEST:
         return None
+    (u, v, _, radius), scale = place, camera.focal_length / depth
+    x, y = scale * right, scale * down
     level = y + camera.focal_length * math.tan(camera.pitch)
     off_x = math.hypot(scale * known.position, x / depth * known.position, camera.focal_length * known.heading)
     off_y = math.hypot(scale * known.height, level / depth * known.position, camera.focal_length * known.pitch)
     cosine, sine = math.cos(camera.roll), math.sin(camera.roll)
-    u0, v0 = camera.principal_point
-    u, v = u0 + x * cosine - y * sine, v0 + x * sine + y * cosine
     off_u, off_v = math.hypot(off_x * cosine, off_y * sine), math.hypot(off_x * sine, off_y * cosine)
     beside = max(-u, u - (camera.width - 1))
     above = max(-v, v - (camera.height - 1))
     if beside > GATE * off_u or above > GATE * off_v:
         return None
     expected = beside < -radius - off_u and above < -radius - off_v
-    distance = math.hypot(ahead, up, sighting.lateral)
+    distance = math.hypot(right, down, depth)
     return ProjectedSign(sighting, distance, u, v, radius, off_u, off_v, expected)

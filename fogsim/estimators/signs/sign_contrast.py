@@ -86,8 +86,8 @@ class SignContrast:
     ----------
     camera : Camera
         The assumed calibration.
-    setback : float
-        Distance of the camera behind the front bumper [m].
+    setback : float or None
+        Distance of the camera behind the front bumper [m]; None for what observations tell.
     position_deviation : float
         Standard deviation of a sign's place by map and own position [m].
     heading_deviation : float
@@ -108,7 +108,7 @@ class SignContrast:
         self,
         camera: Camera,
         *,
-        setback: Annotated[float, Range(0.0, 10.0, "m")] = 1.7,
+        setback: Annotated[float, Range(0.0, 10.0, "m")] | None = None,
         position_deviation: Annotated[float, Range(0.0, 100.0, "m")] = 0.5,
         heading_deviation: Annotated[float, Range(0.0, 1.0, "rad")] = math.radians(0.2),
         pitch_deviation: PitchDeviation = PITCH_DEVIATION,
@@ -150,7 +150,7 @@ class SignContrast:
             If camera, image or time do not fit (see `fogsim.estimators.image_check`), or two signs have one id.
         """
         image = self._check.image_of(observation)
-        watched = self._watch.look(image, observation.signs, observation.time)
+        watched = self._watch.look(observation)
         found: dict[str, object] = {"horizon_row": self._camera.horizon_row}
         found["sign_looks"] = sign_looks(watched, self._watch.tracks)
         why = watched.night or self._add(image, watched.found, watched.sky, observation.time)

@@ -12,7 +12,7 @@ from fogsim.estimators.signs.registration import Registration, register_signs
 from fogsim.estimators.signs.track import SignTrack, SignTracks
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import SignLook
-from fogsim.values.observation import SignSighting
+from fogsim.values.observation import LeadMeasurement, Observation
 from fogsim.vision.light.daylight import lit_by_lamps
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.lines.horizon import calibrated_horizon, levelled
@@ -63,13 +63,13 @@ class SignWatch:
     ----------
     camera : Camera
         The assumed calibration.
-    setback : float
-        Distance of the camera behind the front bumper [m].
+    setback : float or None
+        Distance of the camera behind the front bumper [m]; None for what observations tell.
     deviation : PoseDeviation
         How well the place of a sign is known.
     """
 
-    def __init__(self, camera: Camera, setback: float, deviation: PoseDeviation) -> None:
+    def __init__(self, camera: Camera, setback: float | None, deviation: PoseDeviation) -> None:
         self._camera, self._setback, self._deviation = camera, setback, deviation
         self._margin = 3.0 * calibrated_horizon(camera, deviation.pitch).standard_deviation + 2.0
         self._tracks = SignTracks()
@@ -86,38 +86,34 @@ class SignWatch:
         """Signs ahead."""
         return self._tracks.tracks
 
-    def look(
-        self, image: NDArray[np.uint8] | NDArray[np.uint16], sightings: tuple[SignSighting, ...], time: float
-    ) -> Watched:
+    def look(self, observation: Observation) -> Watched:
         """Look for the signs of one frame.
 
         Parameters
         ----------
-        image : (rows, cols[, 3]) uint8 or uint16
-            The picture.
-        sightings : tuple of SignSighting
-            What the map says; ids that come twice are refused.
-        time : float
-            When [s].
+        observation : Observation
+            Its image, time, lead, and signs are used; ids of signs that come twice are refused.
 
         Raises
         ------
         InputError
             If two signs have one id.
         """
+        image, sightings = observation.image, observation.signs
         ids = [one.sign_id for one in sightings]
         if len(set(ids)) < len(ids):
             twice = next(one for one in ids if ids.count(one) > 1)
             raise InputError(f"the ids of a map's signs must differ, got {twice!r} twice; its value names one sign")
         self._told = self._told or bool(sightings)
-        signs = project_sightings(sightings, self._camera, self._setback, self._deviation)
-        sky, night = self._daylight(image) if signs else (None, "")
+        setback = observation.camera_setback if self._setback is None else self._setback
+        signs = project_sightings(sightings, self._camera, setback, self._deviation)
+        sky, night = self._daylight(image, observation.lead) if signs else (None, "")
         if night:
             # What lamps light is seen farther than by day, and what they do not less far.
             self._tracks.reset()
             return Watched((), (), (), sky, night)
         found = register_signs(signs, detect_signs(image, [sign.region for sign in signs])) if signs else ()
-        passed = self._tracks.update(time, signs, found)
+        passed = self._tracks.update(observation.time, signs, found)
         for track in passed:
             if track.confirmed:
                 self._lost = 0
@@ -125,12 +121,14 @@ class SignWatch:
                 self._lost += 1
         return Watched(signs, found, passed, sky)
 
-    def _daylight(self, image: NDArray[np.uint8] | NDArray[np.uint16]) -> tuple[Sky | None, str]:
+    def _daylight(
+        self, image: NDArray[np.uint8] | NDArray[np.uint16], lead: LeadMeasurement | None
+    ) -> tuple[Sky | None, str]:
         level = levelled(image, self._camera)
         sky = sky_above(linear_pixels(level, self._camera), self._camera, self._margin)
         if sky is not None and sky.luminance < MIN_AIRLIGHT:
             return sky, "too dark above the horizon: this is a daytime method"
-        return sky, lit_by_lamps(level, self._camera)
+        return sky, lit_by_lamps(level, self._camera, lead)
 
     @property
     def trouble(self) -> str:

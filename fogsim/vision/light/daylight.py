@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
+from fogsim.values.observation import LeadMeasurement
 from fogsim.vision.light.luminance import linear_luminance
 from fogsim.vision.light.medians import columns_apart, median, quantile, span_medians
 from fogsim.vision.light.pixel_kernels import Pixels
@@ -22,6 +23,9 @@ how many rows, and in every which column [px]."""
 NEAREST, FARTHEST, ROAD_ROWS = 6.0, 12.0, 9
 """Between which distances the road is looked at, the farther one being at least half as much again as the nearest that
 is seen [m], and in how many rows."""
+
+HIDES_ABOVE = 20.0
+"""Distance within which a vehicle ahead may hide sky or roof above the lane [m]."""
 
 HALF_LANE, ASIDE = 1.2, (4.0, 7.0)
 """Half the width of the own lane's middle, and the strips beside it that low beams light least [m]."""
@@ -57,14 +61,15 @@ class _View:
     right: Strip
 
 
-def lit_by_lamps(level: Pixels, camera: Camera) -> str:
+def lit_by_lamps(level: Pixels, camera: Camera, lead: LeadMeasurement | None = None) -> str:
     """Say what shows that lamps light the road; empty if the sky may.
 
     What the sky alone lights is never brighter than the sky, however bright its surface and however dense the fog: a
     perfectly white road has the mean luminance of the sky, and air along the way at most that of the sky behind it.
     Oncoming lamps brighten the fog along the horizon, so the sky is measured above that. Street lamps brighten the sky,
     too; but they stand out of it, and own lamps still light the own lane more than what lies beside it. In a tunnel the
-    ceiling over the lane is darker than the road, though bright walls may be seen at the height of the sky.
+    ceiling over the lane is darker than the road, though bright walls may be seen at the height of the sky; the dark
+    rear of a truck right ahead says nothing of that kind.
 
     Parameters
     ----------
@@ -72,6 +77,8 @@ def lit_by_lamps(level: Pixels, camera: Camera) -> str:
         A level image, its horizon inside.
     camera : Camera
         The assumed calibration.
+    lead : LeadMeasurement or None
+        The tracked vehicle ahead, if it is known.
     """
     view = _view_of(camera)
     luminance = linear_luminance(level[view.rows], camera.response, camera.bits, camera.black_level)
@@ -80,7 +87,8 @@ def lit_by_lamps(level: Pixels, camera: Camera) -> str:
     middle, aside = camera.principal_point[0], OVERHEAD * camera.focal_length
     first, last = max(math.ceil(middle - aside), 0), max(math.floor(middle + aside) + 1, 0)
     overhead = np.ascontiguousarray(luminance[:-ROAD_ROWS, first:last])
-    above = quantile(overhead if overhead.size else sky, BRIGHT_SHARE)
+    hidden = overhead.size == 0 or (lead is not None and lead.distance < HIDES_ABOVE)
+    above = quantile(sky if hidden else overhead, BRIGHT_SHARE)
     if median(lane) > min(above, quantile(sky, BRIGHT_SHARE)):
         return "the road is brighter than the sky, so lamps light it: this is a daytime method"
     shining = float(np.count_nonzero(sky >= LAMP)) >= LAMPS_SHARE * sky.size and median(sky) < DARK_SKY

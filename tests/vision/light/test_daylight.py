@@ -14,7 +14,7 @@ from windscreen import draw, small_scenes
 import fogsim
 from fogsim.estimators import ESTIMATORS, make
 from fogsim.offline import NIGHT_METHODS
-from fogsim.values import Camera, Observation, Step
+from fogsim.values import Camera, LeadMeasurement, Observation, Step
 from fogsim.vision.light.daylight import lit_by_lamps
 from fogsim.vision.lines.horizon import levelled
 
@@ -92,4 +92,12 @@ def test_under_a_ceiling_that_is_darker_than_the_road_there_is_no_daylight() -> 
     picture[:110, 130:190] = 50
     picture[40:44, 150:170] = 255
     assert "lamps" in lit_by_lamps(picture, CAMERA)
+    assert "lamps" in lit_by_lamps(picture, CAMERA, LeadMeasurement(60.0, 0.0))
     assert not lit_by_lamps(open_air, CAMERA)
+
+
+def test_the_dark_rear_of_a_truck_right_ahead_is_no_ceiling() -> None:
+    picture = np.full((240, 320, 3), 190, np.uint8)
+    picture[130:] = 110
+    picture[:120, 110:210] = 50
+    assert not lit_by_lamps(picture, CAMERA, LeadMeasurement(6.0, 0.0))

@@ -121,6 +121,11 @@ def test_python_writes_the_same_file(tmp_path: Path) -> None:
             "type: motorcycle, ahead_of",
             "slow: lamps: position and low_beam of a motorcycle are single",
         ),
+        (
+            "lamps: {position",
+            "type: truck, lamps: {position",
+            "timeline.0.do.slow: lamps.stop.middle: a truck has no third stop lamp; allowed: left, right",
+        ),
         ("{stop: {left: failed", "{stop: {lefft: failed", "timeline.0.do.slow.lamps.stop.lefft: unknown key"),
     ],
 )

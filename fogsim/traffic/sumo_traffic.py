@@ -32,6 +32,7 @@ from fogsim.traffic.sumo.vehicle_reader import SubscribedReader, VehicleReader
 from fogsim.traffic.sumo_behaviour.ego_driving import EgoDriving
 from fogsim.traffic.sumo_behaviour.scripted_actions import ScriptedActions, has_lane
 from fogsim.traffic.sumo_behaviour.speed_control import SpeedControl, SumoDesiredSpeeds
+from fogsim.traffic.sumo_behaviour.told_lamps import ToldLamps
 from fogsim.traffic.sumo_drivers.drivers_perception import DriversPerception, drivers_perception
 from fogsim.traffic.sumo_street.person_reader import PersonReader
 from fogsim.traffic.sumo_street.signal_reader import SignalReader
@@ -62,6 +63,7 @@ class _Run:
     lane_changes: LaneChangeSmoothing
     speeds: SpeedControl
     driving: EgoDriving
+    lamps: ToldLamps
     lanes: LaneKeeping
     collisions: CollisionLog
     script: Script
@@ -143,6 +145,7 @@ class SumoTraffic:
             lane_changes=changes,
             speeds=speeds,
             driving=EgoDriving(api, setup.ego, setup.step_length),
+            lamps=ToldLamps(api, setup.ego),
             lanes=LaneKeeping(api, setup.keep_lane, roster, session),
             collisions=CollisionLog(),
             script=script,
@@ -293,6 +296,7 @@ class SumoTraffic:
         if run.driving.apply(command.control, run.roster.present) and self._setup.ego is not None:
             orders.pop(self._setup.ego, None)
         run.speeds.apply(orders)
+        run.lamps.tell(command.lamps, run.roster.present)
         run.actions.play(self._elapsed(run), run.roster.present)
         self._update_drivers(run, command)
 

@@ -50,6 +50,17 @@ ALL_LAMPS = Lamp(sum(Lamp))
 """Every kind of lamp."""
 
 
+def lamp_names(lamps: Lamp) -> str:
+    """Lamps in words.
+
+    Parameters
+    ----------
+    lamps : Lamp
+        The lamps, such as "low_beam+front_fog"; nothing for none.
+    """
+    return "+".join(str(lamp.name).lower() for lamp in Lamp if lamp and lamp in lamps)
+
+
 def dark_shift(across: float, is_stop_lamp: bool) -> int:
     """Shift, as of `DARK_SHIFT`, for a lamp by its place.
 

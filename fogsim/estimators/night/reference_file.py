@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from fogsim.errors import InputError, shown
 from fogsim.estimators.night.references import ReferenceSource, VeilReferences
 from fogsim.values.camera import Camera, Response
-from fogsim.values.light import Lamp
+from fogsim.values.light import Lamp, lamp_names
 
 HEAD_LAMPS = Lamp.LOW_BEAM | Lamp.HIGH_BEAM | Lamp.FRONT_FOG
 """Lamps that throw light ahead."""
@@ -90,17 +90,6 @@ class References:
                 f"is {setback:g} m behind it; fogsim calibrate veil --setback {setback:g} makes them"
             )
         return found
-
-
-def lamp_names(lamps: Lamp) -> str:
-    """Lamps in words.
-
-    Parameters
-    ----------
-    lamps : Lamp
-        The lamps.
-    """
-    return "+".join(str(lamp.name).lower() for lamp in Lamp if lamp and lamp in lamps)
 
 
 def _without_noise(camera: Camera) -> Camera:

@@ -7,7 +7,7 @@ from pydantic import BeforeValidator, Field, WrapValidator, field_validator, mod
 
 from fogsim.errors import UnknownNameError, suggest
 from fogsim.scenario.section import Distance, Flag, Id, Length, Number, Section, Share, SpeedKmh, Time, Whole
-from fogsim.scenario.timeline.lamps import LampActions
+from fogsim.scenario.timeline.lamps import LampActions, lamp_mistake
 from fogsim.traffic.templates import RAMP, ROAD_TEMPLATES, VEHICLE_KINDS, measures
 from fogsim.units.quantities import is_quantity, parse_quantity
 
@@ -352,10 +352,10 @@ class ActorSection(Section):
         return not self.is_person and (self.on != RAMP if self.keeps_lane is None else self.keeps_lane)
 
     @model_validator(mode="after")
-    def _has_two_sides(self) -> Self:
-        if self.type == "motorcycle" and isinstance(self.lamps, LampActions) and self.lamps.kinds_by_side():
-            told = " and ".join(self.lamps.kinds_by_side())
-            raise ValueError(f"lamps: {told} of a motorcycle are single; write one word for each")
+    def _has_the_lamps(self) -> Self:
+        told = lamp_mistake(self.type, self.lamps) if isinstance(self.lamps, LampActions) else None
+        if told is not None:
+            raise ValueError(told)
         return self
 
 

@@ -11,6 +11,7 @@ from fogsim.scenario.expect.checks import run_content
 from fogsim.scenario.expect.conditions import refuse
 from fogsim.scenario.plain_yaml import KeyPath
 from fogsim.scenario.timeline.actions import departing_vehicles, doings_of, entry_name, vehicles_of
+from fogsim.scenario.timeline.lamps import lamp_mistake
 from fogsim.scenario.timeline.schema import (
     Doing,
     FogActions,
@@ -58,7 +59,11 @@ def _mistakes(scenario: "Scenario") -> Iterator[tuple[KeyPath, str]]:
         if not scenario.traffic.has_ego and EGO in vehicles_of(entry):
             yield (number, "do"), "it tells of the ego, and traffic.ego is none"
         for subject, doing in doings_of(entry):
-            told = _mistake(doing, scenario) or _person_mistake(subject, doing, scenario)
+            told = (
+                _mistake(doing, scenario)
+                or _person_mistake(subject, doing, scenario)
+                or _lamp_mistake(subject, doing, scenario)
+            )
             if told:
                 yield (number, "do", subject), told
 
@@ -74,6 +79,14 @@ def _person_mistake(subject: str, doing: Doing, scenario: "Scenario") -> str | N
         persons = [name for name, one in scenario.actors.items() if one.is_person]
         return f"{subject} is a vehicle, and persons walk; {suggest(subject, persons) if persons else 'there are none'}"
     return None
+
+
+def _lamp_mistake(subject: str, doing: Doing, scenario: "Scenario") -> str | None:
+    """Lamps that a vehicle does not have, where its type is known."""
+    if not isinstance(doing, VehicleActions) or doing.lamps is None:
+        return None
+    actor = scenario.actors.get(subject)
+    return None if actor is None else lamp_mistake(actor.type, doing.lamps)
 
 
 def _mistake(doing: Doing, scenario: "Scenario") -> str | None:

@@ -107,6 +107,24 @@ class LampActions(Section):
         return tuple(key for key in type(self).model_fields if isinstance(getattr(self, key), LampSides))
 
 
+def lamp_mistake(kind: str, written: LampActions) -> str | None:
+    """What a block of lamps wants of a vehicle that has no such lamp.
+
+    Parameters
+    ----------
+    kind : str
+        Type of the vehicle, as actors have it.
+    written : LampActions
+        What the file says.
+    """
+    apart = written.kinds_by_side()
+    if kind == "motorcycle" and apart:
+        return f"lamps: {' and '.join(apart)} of a motorcycle are single; write one word for each"
+    if kind == "truck" and isinstance(written.stop, StopLampSides) and written.stop.middle is not None:
+        return "lamps.stop.middle: a truck has no third stop lamp; allowed: left, right"
+    return None
+
+
 def lamp_switches(vehicle: str, written: LampActions) -> Iterator[SetLamps]:
     """Switches of lamps, which files name as `Lamp` does in small letters: of whole kinds, then side by side.
 

@@ -1,0 +1,49 @@
+"""The ego's lamps as SUMO is told them."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+import fogsim
+from fogsim.traffic.sumo_behaviour.told_lamps import ToldLamps
+from fogsim.values import Lamp
+
+
+def test_lamps_are_told_when_they_change_and_the_ego_is_there() -> None:
+    told: list[tuple[str, ...]] = []
+    api: Any = SimpleNamespace(vehicle=SimpleNamespace(setParameter=lambda *what: told.append(what)))
+    lamps = ToldLamps(api, "ego")
+    for lit, present in (
+        (Lamp.LOW_BEAM, {"other"}),
+        (Lamp.LOW_BEAM, {"ego"}),
+        (Lamp.LOW_BEAM, {"ego"}),
+        (Lamp.LOW_BEAM | Lamp.FRONT_FOG, {"ego", "other"}),
+        (Lamp.NONE, {"ego"}),
+    ):
+        lamps.tell(lit, present)
+    assert [what[2] for what in told] == ["low_beam", "low_beam+front_fog", ""]
+    assert {what[:2] for what in told} == {("ego", "fogsim.lamps")}
+
+
+def test_sumo_itself_has_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = []
+    tell = ToldLamps.tell
+
+    def spied(self: ToldLamps, lamps: Lamp, present: set[str]) -> None:
+        tell(self, lamps, present)
+        found.append(self._api.vehicle.getParameter("ego", "fogsim.lamps"))
+
+    monkeypatch.setattr(ToldLamps, "tell", spied)
+    settings = [
+        "duration_s=1",
+        "expect={}",
+        "vary={}",
+        "renderer=none",
+        "estimators=[]",
+        "demand.same_way_vph=0",
+        "demand.oncoming_vph=0",
+    ]
+    scenario = fogsim.load_scenario("clear_day", [*settings, "lighting=always_high"])
+    list(fogsim.run(scenario, seed=1))
+    assert found[-1] == "position+high_beam"

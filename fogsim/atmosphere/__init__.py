@@ -14,7 +14,7 @@ from fogsim.atmosphere.fog.optical_depth import (
     optical_depth_along,
 )
 from fogsim.atmosphere.lamps.phase_function import Droplets
-from fogsim.atmosphere.lamps.tunnel_light import TunnelLight
+from fogsim.atmosphere.surfaces.tunnel_light import TunnelLight
 from fogsim.atmosphere.visibility.night_visibility import FogKind, Observer, Pavement, visibility_distance
 from fogsim.atmosphere.visibility.visibility_level import visibility_level
 from fogsim.values.eye import veiling_luminance

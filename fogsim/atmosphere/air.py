@@ -1,6 +1,7 @@
 """The air between a scene and a camera: what fog and lamplight make of a drawn view."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,8 @@ from fogsim.atmosphere.lamps.halos import Halos
 from fogsim.atmosphere.lamps.lamplight import OwnLamplight
 from fogsim.atmosphere.lamps.phase_function import Droplets
 from fogsim.atmosphere.lamps.road_glow import RoadGlow
-from fogsim.atmosphere.lamps.streetlight import StreetLight
+from fogsim.atmosphere.surfaces.road_beams import TrafficLight
+from fogsim.atmosphere.surfaces.streetlight import StreetLight
 from fogsim.values import Camera, CameraPose, FogField, HeadLamp, Lights, View
 from fogsim.values.light import joined_sources
 
@@ -43,6 +45,7 @@ class Air:
     def __init__(self, field: FogField, droplets: Droplets = Droplets.MODERATE_RADIATION) -> None:
         self.field = field
         self._own, self._halos, self._streets = OwnLamplight(droplets), Halos(droplets), StreetLight()
+        self._traffic = TrafficLight()
         self._road = RoadGlow()
 
     def prepare(self, camera: Camera, lamps: Sequence[tuple[HeadLamp, ...]]) -> None:
@@ -94,6 +97,10 @@ class Air:
         """
         field = field_at(self.field, time)
         lit = view if lights.streets is None else self._streets.on(view, camera, pose, field, lights.streets)
+        if lights.beams is not None:
+            by_beams = self._traffic.on(view, camera, pose, field, lights.beams)
+            # Each adds to the sky's light alone.
+            lit = by_beams if lit is view else replace(lit, radiance=lit.radiance + (by_beams.radiance - view.radiance))
         radiance = daytime_luminance(lit, field, camera, pose)
         if lights.own:
             self._own.add(radiance, view, camera, pose, field, lights.own)

@@ -68,6 +68,7 @@ def compile_kernels() -> Iterator[str]:
             pool.submit(_detect_signs): "signs",
             pool.submit(_find_lamps): "lamps",
             pool.submit(_read_own_beams): "methods of the night",
+            pool.submit(_light_a_road): "head lamps on the road",
         }
         while pending:
             for done in wait(pending, return_when=FIRST_COMPLETED).done:
@@ -171,6 +172,24 @@ def _find_lamps() -> None:
     level = 255.0 * np.exp(-np.maximum(np.hypot(rows - 60, cols - 80) - 4.0, 0.0) / 8.0)
     for image, bits in ((level.astype(np.uint8), 8), ((16.0 * level).astype(np.uint16), 12)):
         HaloWatch().look(image, bits)
+
+
+def _light_a_road() -> None:
+    """Let another vehicle's head lamps light a wall in fog, for such a vehicle may come late in a drive."""
+    import numpy as np
+
+    from fogsim.atmosphere import Air
+    from fogsim.lighting.beams import low_beam
+    from fogsim.values import Camera, CameraPose, FogField, Lights, LightSources, View
+    from fogsim.values.light import RoadBeams
+
+    camera = Camera(160, 120, 144.0, (80.0, 60.0), 1.4, pitch=0.03)
+    far = np.full((120, 160), 30.0, np.float32), np.zeros((120, 160), np.int32)
+    place, one = np.array([[20.0, 0.0, 0.65]]), np.ones(1)
+    beams = RoadBeams(place, 0.0 * one, 0.65 * one, (low_beam(),), np.zeros(1, np.int64), one, 0.1)
+    air = Air(FogField(0.03, airlight=(0.0, 0.0, 0.0)))
+    view = View(np.full((120, 160, 3), 0.01, np.float32), *far)
+    air.radiance(view, camera, CameraPose((0.0, 0.0, 1.4), 0.0), Lights((), LightSources.none(), beams=beams))
 
 
 def _foggy_road(camera: "Camera", lead: float, visibility: float = 120.0) -> "NDArray[np.uint8]":

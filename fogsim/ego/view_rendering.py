@@ -20,6 +20,7 @@ from fogsim.scene import (
     Corridor,
     ScenePlan,
     light_sources,
+    road_beams,
     street_lamp_heads,
     street_lighting,
     surroundings,
@@ -258,7 +259,7 @@ class ViewRenderer:
 
     def _sky_of(self, illuminance: float) -> float:
         """Illuminance of the sky in which the scene is drawn [lx]."""
-        return max(illuminance, DARKEST_SKY) if len(self._street_lamps) and self._by_lamplight else illuminance
+        return max(illuminance, DARKEST_SKY) if self._by_lamplight else illuminance
 
     def _set_daylight(self, illuminance: float) -> None:
         if illuminance == self._daylight:
@@ -396,6 +397,7 @@ class ViewRenderer:
             own=self._own_lamps(Lamp(int(state.lamps[ego]))),
             others=light_sources(state, ego, pose.position, self._mount.beams, self._street_lamps),
             streets=self._streets,
+            beams=road_beams(state, ego, pose.position, self._mount.beams, self._sky),
         )
 
     def _own_lamps(self, lit: Lamp) -> tuple[HeadLamp, ...]:

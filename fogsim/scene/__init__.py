@@ -2,6 +2,7 @@
 
 from fogsim.scene.build import ScenePlan, build_scene
 from fogsim.scene.ground import Squares
+from fogsim.scene.lamps.road_beams import road_beams
 from fogsim.scene.light_sources import light_sources, street_lighting
 from fogsim.scene.signs import SIGN_KINDS
 from fogsim.scene.solids import merge
@@ -18,6 +19,7 @@ __all__ = [
     "build_scene",
     "light_sources",
     "merge",
+    "road_beams",
     "street_lamp_heads",
     "street_lighting",
     "surroundings",

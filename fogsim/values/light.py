@@ -291,6 +291,37 @@ class StreetLighting:
 
 
 @dataclass(frozen=True, slots=True)
+class RoadBeams:
+    """Lit head lamps of other vehicles as what lights the road, beside the sky; those of a pair shine together.
+
+    Attributes
+    ----------
+    position : (n, 3) float64
+        Middle between the lamps of a pair [m].
+    heading : (n,) float64
+        Direction of their axes, counter-clockwise from x [rad].
+    height : (n,) float64
+        Height above the road [m].
+    kinds : tuple of Beam
+        Kinds of lamps.
+    kind : (n,) int64
+        Number of each pair's kind.
+    scale : (n,) float64
+        How many of the pair burn.
+    sky_illuminance : float
+        Horizontal illuminance of the sky in which the scene is drawn [lx]; where it is 0 the lamps light nothing.
+    """
+
+    position: NDArray[np.float64]
+    heading: NDArray[np.float64]
+    height: NDArray[np.float64]
+    kinds: tuple[Beam, ...]
+    kind: NDArray[np.int64]
+    scale: NDArray[np.float64]
+    sky_illuminance: float
+
+
+@dataclass(frozen=True, slots=True)
 class Lights:
     """All light that is not daylight, at one instant.
 
@@ -302,11 +333,14 @@ class Lights:
         Everyone else's.
     streets : StreetLighting or None
         Street lamps as what lights the road; how they are seen themselves is in `others`.
+    beams : RoadBeams or None
+        Head lamps of others as what lights the road; how they are seen themselves is in `others`.
     """
 
     own: tuple[HeadLamp, ...]
     others: LightSources
     streets: StreetLighting | None = None
+    beams: RoadBeams | None = None
 
     @classmethod
     def none(cls) -> "Lights":

@@ -1,1 +1,1 @@
-"""Light of lamps in fog: phase functions, beams, the veil of own lamps, halos, street lamps."""
+"""Light of lamps in fog: phase functions, beams, the veil of own lamps, halos."""

@@ -4,7 +4,7 @@ from fogsim.traffic.sumo.link import Api
 from fogsim.values import Lamp
 from fogsim.values.light import lamp_names
 
-LAMPS_PARAMETER = "fogsim.lamps"
+LAMPS_PARAMETER = "fogsim-lamps"
 """Parameter of the ego that names its lit lamps, joined by "+"."""
 
 

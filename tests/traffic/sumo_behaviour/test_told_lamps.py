@@ -23,7 +23,7 @@ def test_lamps_are_told_when_they_change_and_the_ego_is_there() -> None:
     ):
         lamps.tell(lit, present)
     assert [what[2] for what in told] == ["low_beam", "low_beam+front_fog", ""]
-    assert {what[:2] for what in told} == {("ego", "fogsim.lamps")}
+    assert {what[:2] for what in told} == {("ego", "fogsim-lamps")}
 
 
 def test_sumo_itself_has_them(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -32,7 +32,7 @@ def test_sumo_itself_has_them(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def spied(self: ToldLamps, lamps: Lamp, present: set[str]) -> None:
         tell(self, lamps, present)
-        found.append(self._api.vehicle.getParameter("ego", "fogsim.lamps"))
+        found.append(self._api.vehicle.getParameter("ego", "fogsim-lamps"))
 
     monkeypatch.setattr(ToldLamps, "tell", spied)
     settings = [

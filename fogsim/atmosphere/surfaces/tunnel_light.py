@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere.lamps.tunnel_light_kernels import (
+from fogsim.atmosphere.surfaces.tunnel_light_kernels import (
     BEFORE,
     STEP,
     Luminaires,

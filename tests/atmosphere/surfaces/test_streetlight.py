@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fogsim.atmosphere.air import Air
-from fogsim.atmosphere.lamps.streetlight import StreetLight
+from fogsim.atmosphere.surfaces.streetlight import StreetLight
 from fogsim.values import FogBank, Lights, LightSources, StreetLighting
 from tests.atmosphere.night_scene import CAMERA, POSE, fog, rays, road_view
 

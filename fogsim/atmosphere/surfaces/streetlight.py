@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from fogsim.atmosphere.fog.medium import is_uniform_below
 from fogsim.atmosphere.fog.optical_depth import extinction
 from fogsim.atmosphere.lamps.plane_pieces import piece_length
-from fogsim.atmosphere.lamps.streetlight_kernels import (
+from fogsim.atmosphere.lamps.veil import LOSS_OF_SPREAD_LIGHT
+from fogsim.atmosphere.surfaces.streetlight_kernels import (
     EyeOnMap,
     GroundLight,
     Reflection,
     add_lamp_illuminance,
     add_street_light,
 )
-from fogsim.atmosphere.lamps.veil import LOSS_OF_SPREAD_LIGHT
 from fogsim.values import Camera, CameraPose, FogField, StreetLighting, View
 from fogsim.values.pinhole import ray_from_pixel
 

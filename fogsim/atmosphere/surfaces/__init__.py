@@ -1,0 +1,1 @@
+"""Light of lamps on surfaces: of streets, tunnels, and other vehicles."""

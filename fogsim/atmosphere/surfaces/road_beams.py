@@ -1,0 +1,116 @@
+"""Head lamps of other vehicles light the road, and what stands on it."""
+
+import dataclasses
+import math
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.atmosphere.fog.medium import is_uniform_below
+from fogsim.atmosphere.fog.optical_depth import extinction
+from fogsim.atmosphere.lamps.plane_pieces import piece_length
+from fogsim.atmosphere.surfaces.road_beams_kernels import BeamsAlike, add_beam_illuminance
+from fogsim.atmosphere.surfaces.streetlight_kernels import EyeOnMap, GroundLight, Reflection, add_street_light
+from fogsim.values import Beam, Camera, CameraPose, FogField, View
+from fogsim.values.light import RoadBeams
+from fogsim.values.luminous_intensity import luminous_intensity
+from fogsim.values.pinhole import ray_from_pixel
+
+CELL, CELLS = 1.0, 192
+"""Side of the map's cells [m], and how many there are a side."""
+
+LOOKED_AHEAD = 75.0
+"""How far ahead of the camera the middle of the map is [m]."""
+
+REACH, HALF_WIDTH, STEP = 70.0, 20.0, 0.5
+"""How far ahead and to either side a lamp lights the road, and the step of its pattern [m]."""
+
+WHITEST = 0.95
+"""Reflectance above which a surface must be a lamp [-]."""
+
+_MIDDLE_OF_BEAM = 10.0
+"""Where before a lamp its fog is taken [m]."""
+
+
+class TrafficLight:
+    """Adds the light of other vehicles' head lamps on the road to drawn scenes.
+
+    A horizontal surface at the distance s from a lamp at the height h has the illuminance I h e^(−ks) / s³. Surfaces
+    return it as they do the sky's, upright ones as the road beside them would, up to the height of the lamps.
+    """
+
+    def __init__(self) -> None:
+        self._lit = np.empty((0, 0, 3), np.float32)
+
+    def on(self, view: View, camera: Camera, pose: CameraPose, fog: FogField, beams: RoadBeams) -> View:
+        """A drawn scene with the beams' light.
+
+        Parameters
+        ----------
+        view : View
+            The scene as drawn in the sky's light; it is not changed.
+        camera, pose : Camera, CameraPose
+            The camera.
+        fog : FogField
+            The fog at one time.
+        beams : RoadBeams
+            The beams and the sky's light.
+
+        Returns
+        -------
+        View
+            Its image is valid until the next call.
+        """
+        if not len(beams.kind) or beams.sky_illuminance <= 0.0:
+            return view
+        ground = _map_of(pose, fog, beams)
+        if self._lit.shape != view.radiance.shape:
+            self._lit = np.empty(view.radiance.shape, np.float32)
+        rows, columns = view.distance.shape
+        column, row = ((np.array(pose.position[:2]) - ground.origin) / CELL).astype(np.float32)
+        add_street_light(
+            np.ascontiguousarray(view.radiance, dtype=np.float32).reshape(rows, 3 * columns),
+            np.ascontiguousarray(view.distance, dtype=np.float32),
+            ray_from_pixel(camera, pose).astype(np.float32),
+            piece_length(camera.focal_length),
+            EyeOnMap(column, row, np.float32(1.0 / CELL), np.float32(pose.position[2])),
+            ground,
+            Reflection(
+                np.full(3, 1.0 / beams.sky_illuminance, dtype=np.float32),
+                np.float32(WHITEST * beams.sky_illuminance / math.pi),
+            ),
+            self._lit.reshape(rows, 3 * columns),
+        )
+        return dataclasses.replace(view, radiance=self._lit)
+
+
+def _map_of(pose: CameraPose, fog: FogField, beams: RoadBeams) -> GroundLight:
+    ahead = np.array((math.cos(pose.heading), math.sin(pose.heading)))
+    origin = np.array(pose.position[:2]) + LOOKED_AHEAD * ahead - 0.5 * (CELLS - 1) * CELL
+    ground = GroundLight(origin, CELL, np.zeros((CELLS, CELLS), np.float32), np.zeros((CELLS, CELLS), np.float32))
+    dense = _extinction_before(fog, beams)
+    for kind, beam in enumerate(beams.kinds):
+        for height in np.unique(beams.height[beams.kind == kind]):
+            rows = np.flatnonzero((beams.kind == kind) & (beams.height == height))
+            alike = BeamsAlike(beams.position[rows], beams.heading[rows], beams.scale[rows], dense[rows], float(height))
+            add_beam_illuminance(alike, _pattern(beam, float(height)), STEP, ground)
+    return ground
+
+
+def _extinction_before(fog: FogField, beams: RoadBeams) -> NDArray[np.float64]:
+    if is_uniform_below(fog, float(beams.position[:, 2].max())):
+        return np.full(len(beams.kind), fog.extinction)
+    ahead = np.stack((np.cos(beams.heading), np.sin(beams.heading), np.zeros(len(beams.kind))), axis=1)
+    return extinction(fog, beams.position + _MIDDLE_OF_BEAM * ahead)
+
+
+@lru_cache(64)
+def _pattern(beam: Beam, height: float) -> NDArray[np.float64]:
+    """Horizontal illuminance of the road by one lamp without fog [lx], fading towards the farthest."""
+    along = np.arange(0.0, REACH + 0.5 * STEP, STEP)[:, None]
+    across = np.arange(-HALF_WIDTH, HALF_WIDTH + 0.5 * STEP, STEP)
+    way = np.sqrt(along**2 + across**2 + height**2)
+    intensity = luminous_intensity(beam, np.arctan2(across, along), -np.arcsin(height / way))
+    share = np.maximum((along / REACH) ** 2, (across / HALF_WIDTH) ** 2)
+    return np.asarray(intensity * height / way**3 * np.minimum(1.0, 4.0 * np.maximum(1.0 - share, 0.0)))

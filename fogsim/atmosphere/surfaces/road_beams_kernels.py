@@ -1,0 +1,75 @@
+"""Light of beams on a map of the ground."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.atmosphere.surfaces.streetlight_kernels import GroundLight
+from fogsim.jit import kernel
+
+
+class BeamsAlike(NamedTuple):
+    """Beams of one kind from one height.
+
+    Attributes
+    ----------
+    places : (n, 3) float64
+        Where the lamps are [m].
+    headings : (n,) float64
+        Directions of their axes, counter-clockwise from x [rad].
+    scales : (n,) float64
+        How many lamps shine together at each place.
+    extinction : (n,) float64
+        Of the fog before each [1/m].
+    height : float
+        Of the lamps above the road [m].
+    """
+
+    places: NDArray[np.float64]
+    headings: NDArray[np.float64]
+    scales: NDArray[np.float64]
+    extinction: NDArray[np.float64]
+    height: float
+
+
+@kernel
+def add_beam_illuminance(beams: BeamsAlike, pattern: NDArray[np.float64], step: float, ground: GroundLight) -> None:
+    """Add beams to a map of illuminance, and set how high up what stands there is lit: as high as the lamps.
+
+    Parameters
+    ----------
+    beams : BeamsAlike
+        The beams.
+    pattern : (m, 2 l + 1) float64
+        Horizontal illuminance of one lamp without fog [lx]: by steps ahead, the first at the lamp, and to the right,
+        the middle one straight ahead.
+    step : float
+        Of the pattern [m].
+    ground : GroundLight
+        The map; added to.
+    """
+    origin, cell, illuminance, tops = ground.origin, ground.cell, ground.illuminance, ground.tops
+    rows, columns = illuminance.shape
+    ahead, half = pattern.shape[0] - 1, (pattern.shape[1] - 1) // 2
+    reach = step * math.hypot(float(ahead), float(half)) / cell
+    for i in range(beams.places.shape[0]):
+        x0, y0 = (beams.places[i, 0] - origin[0]) / cell, (beams.places[i, 1] - origin[1]) / cell
+        cosine, sine = math.cos(beams.headings[i]) * cell / step, math.sin(beams.headings[i]) * cell / step
+        # What `tops` tells is where light ends, a metre above which it has faded.
+        top = np.float32(beams.places[i, 2] + 1.0)
+        for row in range(max(0, math.ceil(y0 - reach)), min(rows, math.floor(y0 + reach) + 1)):
+            for column in range(max(0, math.ceil(x0 - reach)), min(columns, math.floor(x0 + reach) + 1)):
+                along = (column - x0) * cosine + (row - y0) * sine
+                across = (column - x0) * sine - (row - y0) * cosine + half
+                if not (0.0 < along < ahead and 0.0 < across < 2 * half):
+                    continue
+                a, b = int(along), int(across)
+                down, right = along - a, across - b
+                near = pattern[a, b] + (pattern[a, b + 1] - pattern[a, b]) * right
+                far = pattern[a + 1, b] + (pattern[a + 1, b + 1] - pattern[a + 1, b]) * right
+                way = math.sqrt(beams.height**2 + step**2 * (along**2 + (across - half) ** 2))
+                light = beams.scales[i] * (near + (far - near) * down) * math.exp(-beams.extinction[i] * way)
+                illuminance[row, column] += np.float32(light)
+                tops[row, column] = max(tops[row, column], top)

@@ -17,6 +17,7 @@ from fogsim.ego.light_sensing import LightSensing, lamp_effects
 from fogsim.ego.measurements import EgoSensors
 from fogsim.ego.road_meters import RoadMeters
 from fogsim.ego.sensor_faults import FaultSchedule
+from fogsim.ego.shutter import Shutter, exposed
 from fogsim.ego.view_rendering import EgoView, NoView, Surrounding, ViewRenderer
 from fogsim.errors import SimulationError
 from fogsim.randomness import Streams
@@ -71,6 +72,7 @@ class EgoEquipment:
         self._scenario = scenario
         self._camera_sensor = build.camera_sensor(scenario)
         self._body_pitch = build.body_pitch(scenario)
+        self._shutter = Shutter(scenario.camera.motion_blur.open_time_s, scenario.camera.motion_blur.instants)
         self._sensors = EgoSensors(scenario)
         self._light_sensing = LightSensing(scenario)
         self._faults = tuple(fault_of(written) for written in scenario.sensors.faults)
@@ -270,7 +272,13 @@ class EgoEquipment:
         truth = fog_truth(fog, pose, camera, renderer.signs, state, sections, self._way, known)
         if light < DAY_ILLUMINANCE:
             truth = replace(truth, lamp_effects=lamp_effects(state, ego, fog, truth.extinction_ahead))
-        view, radiance = renderer.render(state, ego, pose, time, camera, light)
+        view, radiance = exposed(
+            lambda traffic, place: renderer.render(traffic, ego, place, time, camera, light),
+            self._shutter,
+            state,
+            ego,
+            pose,
+        )
         if radiance is None:
             image = self._unexposed
         else:

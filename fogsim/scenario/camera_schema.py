@@ -62,6 +62,22 @@ class Exposure(Section):
         return self
 
 
+class MotionBlur(Section):
+    """What moves while the shutter is open is smeared; how bright the picture is does not depend on it."""
+
+    open_time_s: Annotated[Time, Field(le=0.5)] = 0.0
+    """How long the shutter is open; by night cameras take 10 to 30 ms. 0 freezes what moves."""
+
+    instants: Whole = Field(default=5, ge=3, le=33)
+    """Instants in that time that are drawn and averaged, an odd number: each costs as much as a frame."""
+
+    @model_validator(mode="after")
+    def _has_a_middle(self) -> Self:
+        if self.instants % 2 == 0:
+            raise ValueError(f"instants must be odd, so that one is in the middle, got {self.instants}")
+        return self
+
+
 class BodySection(Section):
     """How the vehicle's body moves the camera, of which the estimators are told nothing."""
 
@@ -104,6 +120,9 @@ class CameraSection(Section):
 
     roll_deg: Number = Field(default=0.0, ge=-45, le=45)
     """Roll; positive turns the image's right side down."""
+
+    motion_blur: MotionBlur = MotionBlur()
+    """What the shutter makes of what moves."""
 
     body: BodySection = BodySection()
     """How braking pitches the camera."""

@@ -1,0 +1,92 @@
+"""Pictures of what moves while the shutter is open: the mean of the light of several instants."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.values import CameraPose, TrafficState, View
+
+Drawn = tuple[View, NDArray[np.float32] | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Shutter:
+    """How long the camera looks, and how finely that is drawn.
+
+    Attributes
+    ----------
+    open_time : float
+        Time for which it is open [s]; 0 freezes what moves.
+    instants : int
+        Instants in it that are drawn, odd, so that one is in the middle.
+    """
+
+    open_time: float = 0.0
+    instants: int = 1
+
+    def offsets(self) -> tuple[float, ...]:
+        """Times from the middle of the exposure at which is drawn [s], the middle itself last."""
+        half = self.instants // 2
+        steps = self.open_time / self.instants
+        return (*(steps * n for n in range(-half, half + 1) if n), 0.0)
+
+
+def moved(state: TrafficState, seconds: float) -> TrafficState:
+    """Traffic a little later or earlier: every vehicle goes straight on.
+
+    Parameters
+    ----------
+    state : TrafficState
+        The traffic.
+    seconds : float
+        How much later [s].
+    """
+    return replace(state, position=state.position + seconds * _velocities(state))
+
+
+def exposed(
+    draw: Callable[[TrafficState, CameraPose], Drawn], shutter: Shutter, state: TrafficState, ego: int, pose: CameraPose
+) -> Drawn:
+    """Draw what a camera gets while its shutter is open.
+
+    Vehicles, the camera's own among them, go straight on for the time; what they turn and speed up in it is left out.
+
+    Parameters
+    ----------
+    draw : callable
+        Draws traffic from a pose: view and radiance, whose arrays may be those of the call before.
+    shutter : Shutter
+        How long it is open.
+    state : TrafficState
+        The traffic in the middle of that time.
+    ego : int
+        Row of the vehicle that carries the camera.
+    pose : CameraPose
+        Where the camera is then.
+
+    Returns
+    -------
+    View
+        What is seen in the middle.
+    (rows, cols, 3) float32 or None
+        Mean radiance [cd/m²]; None where nothing is drawn.
+    """
+    if shutter.open_time == 0.0 or not np.any(state.speed):
+        return draw(state, pose)
+    own, total = _velocities(state)[ego], np.zeros(())
+    for seconds in shutter.offsets():
+        x, y, z = (np.array(pose.position) + seconds * own).tolist()
+        view, radiance = draw(moved(state, seconds), replace(pose, position=(x, y, z)))
+        if radiance is None:
+            return view, None
+        total = total + radiance.astype(np.float64)
+    return view, (total / shutter.instants).astype(np.float32)
+
+
+def _velocities(state: TrafficState) -> NDArray[np.float64]:
+    flat = state.speed * np.cos(state.grade)
+    return np.stack(
+        (flat * np.cos(state.heading), flat * np.sin(state.heading), state.speed * np.sin(state.grade)), axis=1
+    )

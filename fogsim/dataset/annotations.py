@@ -71,6 +71,9 @@ def object_records(step: Step, instance: NDArray[np.uint16], transmission: NDArr
     """
     records = []
     for number, box, inside in _objects(instance):
+        if number == step.ego + 1:
+            # The own bonnet is no object to be found.
+            continue
         rows, cols = box
         records.append(
             {

@@ -14,6 +14,7 @@ from fogsim.errors import InputError
 from fogsim.lighting import LampMount, own_head_lamps
 from fogsim.obstruction import tunnels_of
 from fogsim.render import LIMITED, Renderer, RenderError, make_renderer
+from fogsim.render.bonnet import Bonnet, with_bonnet
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.timeline import darkest_light
 from fogsim.scene import (
@@ -41,12 +42,16 @@ from fogsim.values import (
     TrafficState,
     View,
 )
+from fogsim.values.scene import Instance
 
 DARKEST_SKY = 1e-4
 """Illuminance below which no sky under street lamps is taken to be [lx]: that of an overcast night without a moon.
 
 Surfaces return street lamps' light as they return the sky's, of which there must be some.
 """
+
+BEHIND_BUMPER = 0.15
+"""Distance of the bonnet's front edge behind the bumper [m]."""
 
 _LEEWAY = 600.0
 """How far the ego may leave its route before the scene is built anew around it [m], in a network that is larger."""
@@ -222,6 +227,8 @@ class ViewRenderer:
         self._camera, self._samples = build.camera(scenario, body), scenario.camera.samples
         self._drawn_camera = supersampled(self._camera, self._samples)
         self._setback = build.camera_mount(scenario, body).setback
+        has_bonnet = scenario.camera.bonnet and body == build.CAR
+        self._bonnet = Bonnet(self._setback - BEHIND_BUMPER) if has_bonnet else None
         self._scenario, self._network = scenario, network
         self._daylight = scenario.light.illuminance_lx
         # Lamps that were lit in the picture only from a moment on would be a jump in it.
@@ -337,6 +344,8 @@ class ViewRenderer:
         if self._tunnel_light.is_seen_by(pose):
             own = self._unlit().render(vehicles, drawn, viewpoint).radiance
             view = self._tunnel_light.on(view, own, drawn, pose)
+        if self._bonnet is not None:
+            view = with_bonnet(view, drawn, self._bonnet, Instance.FIRST_VEHICLE + ego, self._sky)
         radiance = self._air.radiance(view, drawn, pose, lights, time)
         return middle_samples(view, self._samples), averaged(radiance, self._samples)
 

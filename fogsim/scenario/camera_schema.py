@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from fogsim.camera import Metering
-from fogsim.scenario.section import Distance, Luminance, Number, PixelPlace, Pixels, Section, Share, Time, Whole
+from fogsim.scenario.section import Distance, Flag, Luminance, Number, PixelPlace, Pixels, Section, Share, Time, Whole
 from fogsim.values import Response
 
 MOST_SAMPLES = 16_384
@@ -114,6 +114,9 @@ class CameraSection(Section):
 
     setback_m: Annotated[Distance, Field(le=100)] | None = None
     """Distance of the camera behind the front bumper; if not given, by the ego's body: 1.7 in a car."""
+
+    bonnet: Flag = False
+    """Whether the own bonnet is in the picture, where the ego is a car."""
 
     pitch_deg: Number = Field(default=2.0, ge=-45, le=45)
     """Pitch; positive looks down."""

@@ -1,0 +1,102 @@
+"""The bonnet of the camera's own car, at the lower edge of the picture."""
+
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.linear_algebra import matrix_product
+from fogsim.values import Camera, CameraPose, View
+from fogsim.values.pinhole import ray_from_pixel
+
+REFLECTANCE = 0.06
+"""Of dark paint, alike in all directions [-]."""
+
+CLEAR_COAT = 0.04
+"""Share of light that the clear coat mirrors straight down; more at grazing angles, by Schlick's formula [-]."""
+
+ROUNDING = 0.5
+"""How far back from the front edge the bonnet's corners are rounded [m]."""
+
+NEAREST = 0.35
+"""Distance ahead of the camera at which the bonnet begins: before it are windscreen and scuttle, as dark [m]."""
+
+_AT_REST = CameraPose((0.0, 0.0, 0.0), 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Bonnet:
+    """A flat bonnet with rounded corners, as high as its front edge, which is all of it that hides something.
+
+    Attributes
+    ----------
+    reach : float
+        How far ahead of the camera its front edge is [m].
+    height : float
+        Its height above the road [m].
+    half_width : float
+        Half its width [m].
+    """
+
+    reach: float
+    height: float = 0.75
+    half_width: float = 0.8
+
+
+class _Seen(NamedTuple):
+    """Pixels that see the bonnet, flat and in order, how far away it is there [m], and what it mirrors there [-]."""
+
+    pixels: NDArray[np.intp]
+    distance: NDArray[np.float32]
+    mirrored: NDArray[np.float32]
+
+
+def with_bonnet(view: View, camera: Camera, bonnet: Bonnet, instance: int, illuminance: float) -> View:
+    """A drawn view with the own bonnet before it, lit by the sky alone: own head lamps shine away from it.
+
+    Parameters
+    ----------
+    view : View
+        What is seen without it; it is not changed.
+    camera : Camera
+        The camera.
+    bonnet : Bonnet
+        The bonnet.
+    instance : int
+        Label of its pixels.
+    illuminance : float
+        Horizontal illuminance of the sky [lx].
+    """
+    seen = _seen(camera, bonnet)
+    if not len(seen.pixels):
+        return view
+    radiance, distance, labels = view.radiance.copy(), view.distance.copy(), view.instance.copy()
+    light = illuminance / math.pi * (REFLECTANCE + seen.mirrored)
+    radiance.reshape(-1, 3)[seen.pixels] = light[:, None]
+    distance.reshape(-1)[seen.pixels] = seen.distance
+    labels.reshape(-1)[seen.pixels] = instance
+    response = None
+    if view.lamp_response is not None:
+        response = view.lamp_response.copy()
+        response.reshape(-1, 3)[seen.pixels] = 0.0
+    return replace(view, radiance=radiance, distance=distance, instance=labels, lamp_response=response)
+
+
+@lru_cache(8)
+def _seen(camera: Camera, bonnet: Bonnet) -> _Seen:
+    rows, columns = np.mgrid[: camera.height, : camera.width].astype(np.float64)
+    pixels = np.stack((columns.ravel(), rows.ravel(), np.ones(rows.size)), axis=1)
+    rays = np.asarray(matrix_product(pixels, np.ascontiguousarray(ray_from_pixel(camera, _AT_REST).T)))
+    lengths = np.sqrt((rays**2).sum(axis=1))
+    falls = np.maximum(-rays[:, 2], 1e-9)
+    scale = (camera.mount_height - bonnet.height) / falls
+    ahead, aside = scale * rays[:, 0], scale * rays[:, 1]
+    corner = np.maximum(ahead - (bonnet.reach - ROUNDING), 0.0) / ROUNDING
+    inside = (corner**2 + (aside / bonnet.half_width) ** 2 < 1.0) | (ahead < NEAREST)
+    found = np.flatnonzero((rays[:, 2] < 0.0) & (scale > 0.0) & (rays[:, 0] > 0.0) & inside)
+    steepness = falls[found] / lengths[found]
+    mirrored = CLEAR_COAT + (1.0 - CLEAR_COAT) * (1.0 - steepness) ** 5
+    return _Seen(found, (scale * lengths)[found].astype(np.float32), mirrored.astype(np.float32))

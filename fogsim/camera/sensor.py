@@ -57,6 +57,16 @@ class CameraSensor:
         """Begin a run: the first picture sets the exposure, as if the camera had long looked at what it shows."""
         self._saturation = None
 
+    @property
+    def share_of_longest_exposure(self) -> float:
+        """Time of the next exposure relative to the longest, 1 where it is fixed [-].
+
+        0 before the first picture of a run, whose exposure is found only with its light.
+        """
+        if self._auto is None:
+            return 1.0
+        return 0.0 if self._saturation is None else min(1.0, self._auto.ungained / self._saturation)
+
     def take(self, radiance: NDArray[np.float32], rng: np.random.Generator) -> Pixels:
         """Take a picture at the exposure that the pictures before have set.
 

@@ -72,7 +72,8 @@ class EgoEquipment:
         self._scenario = scenario
         self._camera_sensor = build.camera_sensor(scenario)
         self._body_pitch = build.body_pitch(scenario)
-        self._shutter = Shutter(scenario.camera.motion_blur.open_time_s, scenario.camera.motion_blur.instants)
+        blur = scenario.camera.motion_blur
+        self._shutter = Shutter(blur.open_time_s, blur.instants, blur.follows_exposure)
         self._sensors = EgoSensors(scenario)
         self._light_sensing = LightSensing(scenario)
         self._faults = tuple(fault_of(written) for written in scenario.sensors.faults)
@@ -274,7 +275,7 @@ class EgoEquipment:
             truth = replace(truth, lamp_effects=lamp_effects(state, ego, fog, truth.extinction_ahead))
         view, radiance = exposed(
             lambda traffic, place: renderer.render(traffic, ego, place, time, camera, light),
-            self._shutter,
+            self._shutter.at(self._camera_sensor.share_of_longest_exposure),
             state,
             ego,
             pose,

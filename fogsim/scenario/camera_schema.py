@@ -68,6 +68,9 @@ class MotionBlur(Section):
     open_time_s: Annotated[Time, Field(le=0.5)] = 0.0
     """How long the shutter is open; by night cameras take 10 to 30 ms. 0 freezes what moves."""
 
+    follows_exposure: Flag = False
+    """Whether that is the longest time of the automatic exposure, which shortens it where there is more light."""
+
     instants: Whole = Field(default=5, ge=3, le=33)
     """Instants in that time that are drawn and averaged, an odd number: each costs as much as a frame."""
 

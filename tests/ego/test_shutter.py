@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import fogsim
+from fogsim.camera import AutoExposure, CameraSensor, Metering, Sensor
 from fogsim.ego.shutter import Shutter, exposed, moved
-from fogsim.values import CameraPose, TrafficState, View
+from fogsim.values import Camera, CameraPose, TrafficState, View
 
 POSE = CameraPose((100.0, 50.0, 1.4), 0.0)
 
@@ -51,7 +52,8 @@ def test_a_point_is_smeared_over_the_way_and_keeps_its_light() -> None:
 
 
 def test_nothing_moves_or_a_closed_shutter_freezes_it() -> None:
-    for shutter, speed in ((Shutter(), 25.0), (Shutter(0.036, 9), 0.0)):
+    by_day = Shutter(0.036, 9, follows_exposure=True).at(0.005)
+    for shutter, speed in ((Shutter(), 25.0), (Shutter(0.036, 9), 0.0), (by_day, 25.0)):
         calls: list[CameraPose] = []
 
         def once(state: TrafficState, pose: CameraPose, calls: list[CameraPose] = calls) -> tuple[View, np.ndarray]:
@@ -87,3 +89,22 @@ def test_a_drive_is_smeared_and_the_frame_keeps_its_brightness() -> None:
         return float(np.abs(np.diff(image[80:], axis=0)).mean())
 
     assert steepness(smeared) < 0.9 * steepness(sharp)
+
+
+def test_the_shutter_follows_the_exposure_if_asked() -> None:
+    assert Shutter(0.02, 5, follows_exposure=True).at(0.25) == Shutter(0.005, 5, follows_exposure=True)
+    assert Shutter(0.02, 5).at(0.25) == Shutter(0.02, 5)
+
+
+@pytest.mark.parametrize(("light", "share"), [(20.0, 1.0), (100.0, 100.0 * 0.65 / 100.0), (1000.0, 0.065)])
+def test_the_camera_knows_how_long_it_exposes(light: float, share: float) -> None:
+    """Light of a luminance that is held at 65 % of saturation; 100 cd/m² saturate the longest exposure."""
+    camera = Camera(16, 12, 15.0, (8.0, 6.0), 1.4)
+    auto = AutoExposure(Metering.HIGHLIGHTS, 0.65, time_constant=0.0, brightest=1e5, ungained=100.0, darkest=4.0)
+    taking = CameraSensor(camera, Sensor(5000.0), auto, 0.0, 0.1)
+    assert taking.share_of_longest_exposure == 0.0
+    taking.take(np.full((12, 16, 3), light, np.float32), np.random.default_rng(0))
+    assert taking.share_of_longest_exposure == pytest.approx(share, rel=1e-5)
+    taking.reset()
+    assert taking.share_of_longest_exposure == 0.0
+    assert CameraSensor(camera, Sensor(5000.0), None, 0.0, 0.1).share_of_longest_exposure == 1.0

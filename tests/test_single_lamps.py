@@ -126,6 +126,18 @@ def test_python_writes_the_same_file(tmp_path: Path) -> None:
             "type: truck, lamps: {position",
             "timeline.0.do.slow: lamps.stop.middle: a truck has no third stop lamp; allowed: left, right",
         ),
+        (
+            "do: {slow:",
+            "do: {new: {depart: {like: slow, gap: 30 m, type: truck}}}\n  - when: time > 2 s\n    do: {new:",
+            "timeline.1.do.new: lamps.stop.middle: a truck has no third stop lamp",
+        ),
+        (
+            "lamps: {position: {left: failed}, low_beam: {right: failed}}}\nfog: {visibility: 100 m}\ntimeline:\n"
+            "  - when: time > 1 s\n    do: {slow:",
+            "type: truck}\nfog: {visibility: 100 m}\ntimeline:\n  - when: time > 1 s\n"
+            "    do: {new: {depart: {like: slow, gap: 30 m}}}\n  - when: time > 2 s\n    do: {new:",
+            "timeline.1.do.new: lamps.stop.middle: a truck has no third stop lamp",
+        ),
         ("{stop: {left: failed", "{stop: {lefft: failed", "timeline.0.do.slow.lamps.stop.lefft: unknown key"),
     ],
 )

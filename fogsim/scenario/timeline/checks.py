@@ -85,8 +85,20 @@ def _lamp_mistake(subject: str, doing: Doing, scenario: "Scenario") -> str | Non
     """Lamps that a vehicle does not have, where its type is known."""
     if not isinstance(doing, VehicleActions) or doing.lamps is None:
         return None
-    actor = scenario.actors.get(subject)
-    return None if actor is None else lamp_mistake(actor.type, doing.lamps)
+    kind = _kind(subject, scenario)
+    return None if kind is None else lamp_mistake(kind, doing.lamps)
+
+
+def _kind(subject: str, scenario: "Scenario") -> str | None:
+    """Type of an actor, or with which a vehicle comes onto the road; None if the file does not say it."""
+    if subject in scenario.actors:
+        return scenario.actors[subject].type
+    for entry in scenario.timeline:
+        for name, doing in doings_of(entry):
+            if name == subject and isinstance(doing, VehicleActions) and doing.depart:
+                like = scenario.actors.get(doing.depart.like or "")
+                return doing.depart.type or (None if like is None else like.type)
+    return None
 
 
 def _mistake(doing: Doing, scenario: "Scenario") -> str | None:

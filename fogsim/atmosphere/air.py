@@ -11,7 +11,7 @@ from fogsim.atmosphere.fog.medium import field_at
 from fogsim.atmosphere.lamps.halos import Halos
 from fogsim.atmosphere.lamps.lamplight import OwnLamplight
 from fogsim.atmosphere.lamps.phase_function import Droplets
-from fogsim.atmosphere.lamps.road_glow import RoadGlow
+from fogsim.atmosphere.lamps.road_glow import RoadGlow, glow_of_beams
 from fogsim.atmosphere.surfaces.road_beams import TrafficLight
 from fogsim.atmosphere.surfaces.streetlight import StreetLight
 from fogsim.values import Camera, CameraPose, FogField, HeadLamp, Lights, View
@@ -107,6 +107,8 @@ class Air:
         sources = lights.others
         if lights.own and field.extinction > 0:
             sources = joined_sources((sources, self._road.sources(lights.own, camera, pose, field)))
+        if lights.beams is not None and field.extinction > 0:
+            sources = joined_sources((sources, glow_of_beams(lights.beams, pose, field)))
         if len(sources.intensity):
             self._halos.add(radiance, view, camera, pose, field, sources)
         return radiance

@@ -1,13 +1,15 @@
-"""Light that the road under the own head lamps returns, as a source of glow in the fog above it."""
+"""Light that the road before head lamps returns, as a source of glow in the fog above it."""
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere.lamps.veil import LOSS_OF_SPREAD_LIGHT
 from fogsim.values import Beam, Camera, CameraPose, FogField, HeadLamp, LampLobes, LightSources
+from fogsim.values.light import RoadBeams
 from fogsim.values.luminous_intensity import luminous_intensity
 
 ROAD_ALBEDO = 0.1
@@ -15,6 +17,12 @@ ROAD_ALBEDO = 0.1
 
 EDGES = (2.0, 5.0, 9.0, 16.0, 30.0, 60.0)
 """Distances ahead of the lamps between which the lit road counts as one source [m]."""
+
+MOST = 4
+"""Other vehicles' pairs of lamps, the nearest ones, whose lit road glows in the fog."""
+
+LIT_AREA = 60.0
+"""Area of the road before other vehicles from which most of its light comes [m²]."""
 
 _UNIT = 1000.0
 _STEPS, _ASIDE = 8, 41
@@ -81,6 +89,48 @@ class RoadGlow:
         if known is None or known.lamps != lamps:
             known = self._known = _lit_patches(lamps, height)
         return known
+
+
+def glow_of_beams(beams: RoadBeams, pose: CameraPose, fog: FogField) -> LightSources:
+    """The lit road before other vehicles as sources of light, one a pair of lamps.
+
+    Parameters
+    ----------
+    beams : RoadBeams
+        Their lamps, at least one pair.
+    pose : CameraPose
+        The camera.
+    fog : FogField
+        The fog at one time; its extinction stands for that between the lamps and the road.
+    """
+    eye = np.asarray(pose.position, dtype=np.float64)
+    chosen = np.argsort(((beams.position - eye) ** 2).sum(axis=1), kind="stable")[:MOST]
+    roads = [_lit_road(beams.kinds[beams.kind[i]], round(float(beams.height[i]), 2)) for i in chosen.tolist()]
+    kept = np.exp(-LOSS_OF_SPREAD_LIGHT * fog.extinction * roads[0].range_)
+    flux = np.stack([road.flux for road in roads]) * kept * beams.scale[chosen, None]
+    total = flux.sum(axis=1)
+    ahead = (flux * np.stack([road.middle[:, 0] for road in roads])).sum(axis=1) / total
+    heading = beams.heading[chosen]
+    position = beams.position[chosen] + np.stack(
+        (ahead * np.cos(heading), ahead * np.sin(heading), -beams.height[chosen]), axis=1
+    )
+    way = eye - position
+    slant = np.maximum(way[:, 2] / np.sqrt((way**2).sum(axis=1)), 0.01)
+    upward, count = ROAD_ALBEDO * total / math.pi, len(chosen)
+    axes = np.tile((1.0, 0.0, 0.0), (count, 1))
+    return LightSources(
+        position=position,
+        intensity=upward * slant,
+        colour=np.ones((count, 3)),
+        area=LIT_AREA * slant,
+        lobes=LampLobes((LAMBERTIAN,), np.zeros(count, np.int64), upward / _UNIT, axes),
+    )
+
+
+@lru_cache(64)
+def _lit_road(beam: Beam, height: float) -> _Patches:
+    """The road before one lamp, from the lamp."""
+    return _lit_patches((HeadLamp((0.0, 0.0, 0.0), beam),), height)
 
 
 def _lit_patches(lamps: tuple[HeadLamp, ...], height: float) -> _Patches:

@@ -7,9 +7,10 @@ import pytest
 
 from fogsim.atmosphere.lamps.halos import Halos
 from fogsim.atmosphere.lamps.phase_function import Droplets
-from fogsim.atmosphere.lamps.road_glow import ROAD_ALBEDO, RoadGlow
+from fogsim.atmosphere.lamps.road_glow import ROAD_ALBEDO, RoadGlow, glow_of_beams
 from fogsim.lighting.beams import low_beam
 from fogsim.values import Camera, CameraPose, HeadLamp
+from fogsim.values.light import RoadBeams
 from tests.atmosphere.night_scene import empty_view, fog
 from tests.atmosphere.tables import read_table
 
@@ -43,3 +44,33 @@ def test_lit_pieces_of_road_lie_ahead_on_it_and_return_its_share():
     assert 60.0 < flux < 0.95 * ROAD_ALBEDO * 2 * 517.0
     dense = RoadGlow().sources(LOW, CAMERA, turned, fog(50))
     assert (dense.intensity < sources.intensity).all()
+
+
+def beams(*places: tuple[float, float]) -> RoadBeams:
+    """Pairs of low beams that come."""
+    count = len(places)
+    return RoadBeams(
+        position=np.array([(x, y, 0.65) for x, y in places]),
+        heading=np.full(count, math.pi),
+        height=np.full(count, 0.65),
+        kinds=(low_beam(),),
+        kind=np.zeros(count, np.int64),
+        scale=np.full(count, 2.0),
+        sky_illuminance=0.1,
+    )
+
+
+def test_the_road_before_others_glows_where_their_lamps_light_it() -> None:
+    coming = beams((60.0, 3.5), (200.0, 3.5))
+    sources = glow_of_beams(coming, POSE, fog(100))
+    assert sources.position[:, 0] == pytest.approx([60.0 - 12.0, 200.0 - 12.0], abs=5.0)
+    assert sources.position[:, 2] == pytest.approx([0.0, 0.0], abs=1e-9)
+    own = RoadGlow().sources(LOW, CAMERA, POSE, fog(100)).lobes
+    assert sources.lobes is not None
+    assert own is not None
+    # As much light as before the own lamps.
+    assert sources.lobes.scale == pytest.approx(np.full(2, own.scale.sum()), rel=0.02)
+    assert (glow_of_beams(coming, POSE, fog(20)).intensity < sources.intensity).all()
+    many = glow_of_beams(beams(*((20.0 * n, 0.0) for n in range(1, 8))), POSE, fog(100))
+    assert len(many.intensity) == 4
+    assert many.position[:, 0].max() < 80.0

@@ -53,14 +53,18 @@ def add_beam_illuminance(beams: BeamsAlike, pattern: NDArray[np.float64], step: 
     origin, cell, illuminance, tops = ground.origin, ground.cell, ground.illuminance, ground.tops
     rows, columns = illuminance.shape
     ahead, half = pattern.shape[0] - 1, (pattern.shape[1] - 1) // 2
-    reach = step * math.hypot(float(ahead), float(half)) / cell
     for i in range(beams.places.shape[0]):
         x0, y0 = (beams.places[i, 0] - origin[0]) / cell, (beams.places[i, 1] - origin[1]) / cell
         cosine, sine = math.cos(beams.headings[i]) * cell / step, math.sin(beams.headings[i]) * cell / step
+        # The pattern lies between its far end and its sides, turned.
+        far_x, far_y = ahead * (step / cell) ** 2 * cosine, ahead * (step / cell) ** 2 * sine
+        side_x, side_y = half * (step / cell) ** 2 * abs(sine), half * (step / cell) ** 2 * abs(cosine)
+        first_row, last_row = y0 + min(far_y, 0.0) - side_y, y0 + max(far_y, 0.0) + side_y
+        first_column, last_column = x0 + min(far_x, 0.0) - side_x, x0 + max(far_x, 0.0) + side_x
         # What `tops` tells is where light ends, a metre above which it has faded.
         top = np.float32(beams.places[i, 2] + 1.0)
-        for row in range(max(0, math.ceil(y0 - reach)), min(rows, math.floor(y0 + reach) + 1)):
-            for column in range(max(0, math.ceil(x0 - reach)), min(columns, math.floor(x0 + reach) + 1)):
+        for row in range(max(0, math.ceil(first_row)), min(rows, math.floor(last_row) + 1)):
+            for column in range(max(0, math.ceil(first_column)), min(columns, math.floor(last_column) + 1)):
                 along = (column - x0) * cosine + (row - y0) * sine
                 across = (column - x0) * sine - (row - y0) * cosine + half
                 if not (0.0 < along < ahead and 0.0 < across < 2 * half):

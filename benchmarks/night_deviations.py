@@ -25,10 +25,10 @@ from fogsim.atmosphere.lamps.veil_kernels import VeilRays
 from fogsim.atmosphere.visibility.night_visibility import FogKind, high_beam_veil
 from fogsim.lighting.beams import front_fog_beam, high_beam, low_beam, luminous_flux, scaled_beam
 from fogsim.reproduce.night.limits import clear_low_sight, equal_sight
-from fogsim.scene.lamps import FULL, SIGNAL_LOBES, STREET_LOBE, SignalLobe
+from fogsim.scene.lamps import FULL, SIGNAL_LOBES, STREET_LOBE
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Beam
-from fogsim.values.luminous_intensity import luminous_intensity
+from fogsim.values.luminous_intensity import SignalLobe, luminous_intensity
 
 DATA = Path(__file__).parents[1] / "tests" / "data"
 LAMPS = ((1.8, 0.6, -0.85), (1.8, -0.6, -0.85))

@@ -24,13 +24,10 @@ from fogsim.scene.lamp_kernels import (
 )
 from fogsim.scene.lamps import (
     FULL,
-    LOBE_AZIMUTHS,
-    LOBE_ELEVATIONS,
     SIGNAL_LOBES,
     STREET_ANGLES,
     STREET_INTENSITIES,
     STREET_LOBE,
-    SignalLobe,
     signal_shares,
     sum_of_beams,
 )
@@ -39,7 +36,7 @@ from fogsim.scene.town import signal_light_sources
 from fogsim.scene.vehicles import body_names
 from fogsim.units import luminance_of
 from fogsim.values.light import Beam, Lamp, LampLobes, LightSources, StreetLighting, dark_shift, joined_sources
-from fogsim.values.luminous_intensity import FALL_OFF, luminous_intensity
+from fogsim.values.luminous_intensity import FALL_OFF, LOBE_AZIMUTHS, LOBE_ELEVATIONS, SignalLobe, luminous_intensity
 from fogsim.values.scene import Surface
 from fogsim.values.traffic import TrafficState
 

@@ -1,6 +1,8 @@
-"""Luminous intensity of a lamp over direction: checking a beam, and reading it between its entries."""
+"""Luminous intensity of a lamp over direction: of signal lamps by regulations, of others by beams that are checked."""
 
 import math
+from collections.abc import Mapping
+from enum import IntEnum
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +15,55 @@ FALL_OFF = 0.07
 
 FLOOR = 0.01
 """Least intensity that logarithms are taken of [cd]."""
+
+
+LOBE_AZIMUTHS = np.radians([0.0, 5.0, 10.0, 20.0, 30.0, 45.0, 80.0])
+"""Angles beside the axis of a signal lamp to which the columns of its lobe belong, alike on both sides [rad]."""
+
+LOBE_ELEVATIONS = np.radians([0.0, 5.0, 10.0, 15.0, 30.0])
+"""Angles above and below it to which the rows belong [rad]."""
+
+
+_AZIMUTHS: tuple[float, ...] = tuple(LOBE_AZIMUTHS.tolist())
+
+
+class SignalLobe(IntEnum):
+    """Kinds of signal lamps by the way they shine."""
+
+    SIGNAL = 0
+    """Position and stop lamps and direction indicators."""
+
+    DAYTIME = 1
+    REAR_FOG = 2
+
+
+SIGNAL_SHARES: Mapping[SignalLobe, tuple[tuple[float, ...], ...]] = {
+    # UNECE R148 figure A3-I up to 20° aside and 10° up and down; beyond, what its fields of geometric visibility ask.
+    SignalLobe.SIGNAL: (
+        (1.0, 0.90, 0.35, 0.12, 0.06, 0.030, 0.0125),
+        (0.70, 0.50, 0.20, 0.10, 0.05, 0.025, 0.0125),
+        (0.30, 0.20, 0.12, 0.06, 0.03, 0.015, 0.010),
+        (0.12, 0.09, 0.06, 0.035, 0.02, 0.0125, 0.008),
+        (0.03, 0.025, 0.02, 0.012, 0.008, 0.005, 0.003),
+    ),
+    # The same, figure A3-II.
+    SignalLobe.DAYTIME: (
+        (1.0, 0.90, 0.70, 0.25, 0.08, 0.020, 0.003),
+        (0.70, 0.50, 0.20, 0.10, 0.05, 0.015, 0.002),
+        (0.20, 0.20, 0.12, 0.06, 0.03, 0.010, 0.002),
+        (0.10, 0.09, 0.06, 0.03, 0.02, 0.008, 0.002),
+        (0.02, 0.02, 0.015, 0.01, 0.007, 0.004, 0.001),
+    ),
+    # UNECE R148 asks for 150 cd (of at most 300) along 10° to either side and 5° up and down, half between these.
+    SignalLobe.REAR_FOG: (
+        (1.0, 0.92, 0.75, 0.20, 0.08, 0.030, 0.005),
+        (0.75, 0.65, 0.40, 0.14, 0.06, 0.025, 0.005),
+        (0.25, 0.22, 0.16, 0.08, 0.04, 0.015, 0.004),
+        (0.10, 0.09, 0.07, 0.04, 0.02, 0.010, 0.003),
+        (0.02, 0.02, 0.015, 0.01, 0.007, 0.005, 0.002),
+    ),
+}
+"""Intensity of signal lamps over that along their axes [-]: rows by `LOBE_ELEVATIONS`, columns by `LOBE_AZIMUTHS`."""
 
 
 def checked_beam(beam: Beam, name: str = "beam") -> Beam:
@@ -81,3 +132,21 @@ def _place(
     inside = np.clip(values, grid[0], grid[-1])
     index = np.clip(np.searchsorted(grid, inside, side="right") - 1, 0, len(grid) - 2)
     return index, (inside - grid[index]) / (grid[index + 1] - grid[index]), np.abs(values - inside)
+
+
+def signal_share(lobe: SignalLobe, aside: float) -> float:
+    """Intensity of a signal lamp as high as the eye over that along its axis [-], linear in the logarithm.
+
+    Parameters
+    ----------
+    lobe : SignalLobe
+        How it shines.
+    aside : float
+        Angle of the eye beside the axis, to either side [rad]; beyond the table its last entry counts.
+    """
+    angle, shares = abs(aside), SIGNAL_SHARES[lobe][0]
+    for after, edge in enumerate(_AZIMUTHS):
+        if angle < edge:
+            part = (angle - _AZIMUTHS[after - 1]) / (edge - _AZIMUTHS[after - 1])
+            return float(shares[after - 1] ** (1.0 - part) * shares[after] ** part)
+    return shares[-1]

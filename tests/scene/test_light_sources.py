@@ -5,9 +5,9 @@ import pytest
 
 from fogsim.scene import build_scene, light_sources, street_lamp_heads, street_lighting, vehicle_batches
 from fogsim.scene.bodies import body_shapes
-from fogsim.scene.lamps import FULL, SIGNAL_LOBES, STREET_ANGLES, STREET_INTENSITIES, SignalLobe
+from fogsim.scene.lamps import FULL, SIGNAL_LOBES, STREET_ANGLES, STREET_INTENSITIES
 from fogsim.values import Beam, Lamp, LightSources, RoadNetwork, SignMap, Surface, TrafficState
-from fogsim.values.luminous_intensity import luminous_intensity
+from fogsim.values.luminous_intensity import SignalLobe, luminous_intensity
 
 SHAPES = body_shapes()
 FLAT = Beam(np.radians([-90.0, 90.0]), np.radians([-90.0, 90.0]), np.full((2, 2), 500.0))

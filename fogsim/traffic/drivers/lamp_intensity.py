@@ -1,8 +1,8 @@
 """How bright the lamps of a vehicle shine toward an eye: from behind, from ahead, from the side.
 
-Signal lamps within what UNECE allows (R148), dimmer off their axis by the fourth power of its cosine as the pictures
-draw them. Of dipped beams an eye at the height of eyes gets the light above their cut-off, and of both beams what
-leaves to the side: fits to the median US lamps of UMTRI-2004-23, table 4, and UMTRI-2001-19, table 6.
+Signal lamps within what UNECE allows (R148), dimmer off their axis as its figures have it and the pictures draw them.
+Of dipped beams an eye at the height of eyes gets the light above their cut-off, and of both beams what leaves
+to the side: fits to the median US lamps of UMTRI-2004-23, table 4, and UMTRI-2001-19, table 6.
 """
 
 import functools
@@ -10,6 +10,7 @@ import math
 
 from fogsim.values import Lamp
 from fogsim.values.light import Side, burning
+from fogsim.values.luminous_intensity import SignalLobe, signal_share
 
 REAR_LAMPS = ((int(Lamp.REAR_FOG), 200.0), (int(Lamp.STOP), 100.0), (int(Lamp.POSITION), 8.0))
 """Luminous intensity of one rear lamp, brightest first [cd]: within UNECE's 150–300, 60–185 and 4–12."""
@@ -116,7 +117,8 @@ def intensity_toward(lamps: int, length: float, ahead: float, aside: float) -> f
     if ahead > 0.0:
         return max(_front_intensity(kinds, math.atan2(aside, ahead)), least)
     if ahead < -length:
-        return max(rear_intensity(lamps) * _dimming(math.atan2(aside, -length - ahead)), least)
+        lobe = SignalLobe.REAR_FOG if kinds & int(Lamp.REAR_FOG) else SignalLobe.SIGNAL
+        return max(rear_intensity(lamps) * signal_share(lobe, math.atan2(aside, -length - ahead)), least)
     return SIDE_MARKER if has_position_lamps and length > SHORTEST_WITH_MARKERS else least
 
 
@@ -131,12 +133,9 @@ def head_lamp_share(bearing: float) -> float:
     return math.exp(-abs(bearing) / BEAM_WIDTH)
 
 
-def _dimming(angle: float) -> float:
-    return math.cos(angle) ** 4
-
-
 def _front_intensity(lamps: int, angle: float) -> float:
-    signal = next((intensity for lamp, intensity in FRONT_SIGNAL_LAMPS if lamps & lamp), 0.0) * _dimming(angle)
+    signal = next((intensity for lamp, intensity in FRONT_SIGNAL_LAMPS if lamps & lamp), 0.0)
+    signal *= signal_share(SignalLobe.DAYTIME if lamps & int(Lamp.DAYTIME) else SignalLobe.SIGNAL, angle)
     return max(signal, beam_intensity(lamps, math.degrees(angle)))
 
 

@@ -13,10 +13,11 @@ from fogsim.estimators.night.glow_fit import EXTINCTIONS, likelihood
 from fogsim.estimators.night.night_glow import NightGlow
 from fogsim.estimators.night.tail_glow import DEPTHS
 from fogsim.estimators.night.tail_lamps import TailLamps, find_tail_lamps
-from fogsim.scene.lamps import SIGNAL_LOBES, SignalLobe
+from fogsim.scene.lamps import SIGNAL_LOBES
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, Frame, Lamp, LeadMeasurement, Observation, Response
 from fogsim.values.camera_response import respond
+from fogsim.values.luminous_intensity import SignalLobe
 
 CAMERA = Camera(320, 240, 288.0, (159.5, 119.5), 1.4, pitch=0.03, response=Response.SRGB)
 LOW = Lamp.POSITION | Lamp.LOW_BEAM

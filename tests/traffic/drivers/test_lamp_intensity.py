@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fogsim.lighting.beams import high_beam, low_beam, luminous_flux
+from fogsim.scene.lamps import FULL, SIGNAL_LOBES
 from fogsim.traffic.drivers.lamp_intensity import (
     LEAST_INTENSITY,
     LIT_ROAD_INTENSITY,
@@ -17,7 +18,7 @@ from fogsim.traffic.drivers.lamp_intensity import (
 )
 from fogsim.values import Lamp
 from fogsim.values.light import Side, dark_on
-from fogsim.values.luminous_intensity import luminous_intensity
+from fogsim.values.luminous_intensity import SignalLobe, luminous_intensity
 
 LIT = int(Lamp.POSITION | Lamp.LOW_BEAM)
 
@@ -53,7 +54,24 @@ def test_each_side_shows_its_own_lamps() -> None:
     assert intensity_toward(everything, 12.0, -2.5, -30.0) == SIDE_MARKER
     assert intensity_toward(int(Lamp.STOP), 5.0, 30.0, 0.0) == 0.0
     assert intensity_toward(0, 12.0, -2.5, 30.0) == 0.0
-    assert intensity_toward(int(Lamp.POSITION), 5.0, 30.0, 30.0) == pytest.approx(10.0 / 4.0)
+    assert intensity_toward(int(Lamp.POSITION), 5.0, 30.0, 30.0) == pytest.approx(10.0 * 0.030)
+
+
+@pytest.mark.parametrize(
+    ("lamp", "lobe"),
+    [(Lamp.POSITION, SignalLobe.SIGNAL), (Lamp.STOP, SignalLobe.SIGNAL), (Lamp.REAR_FOG, SignalLobe.REAR_FOG)],
+)
+def test_drivers_see_rear_lamps_as_bright_from_aside_as_pictures_show_them(lamp: Lamp, lobe: SignalLobe) -> None:
+    table = SIGNAL_LOBES[lobe]
+    for degrees in (0.0, 3.0, 5.0, 14.0, 20.0, 44.0, 75.0, 85.0):
+        aside = 30.0 * np.tan(np.radians(degrees))
+        drawn = float(luminous_intensity(table, np.radians(min(degrees, 80.0)), 0.0)) / FULL
+        seen = intensity_toward(int(lamp), 5.0, -35.0, aside)
+        assert seen == pytest.approx(max(drawn * rear_intensity(int(lamp)), _least(lamp)), rel=1e-6)
+
+
+def _least(lamp: Lamp) -> float:
+    return LEAST_INTENSITY if lamp is Lamp.POSITION else 0.0
 
 
 def test_the_lit_road_is_as_bright_as_the_flux_of_measured_low_beams_makes_it() -> None:

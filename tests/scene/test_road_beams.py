@@ -55,4 +55,4 @@ def test_a_dead_lamp_lights_nothing_and_few_vehicles_count() -> None:
     assert road_beams(traffic((0.0, LOW), (20.0, 0)), 0, (0.0, 0.0, 1.4), BEAMS, 0.1) is None
     many = road_beams(traffic(*((10.0 * i, LOW) for i in range(15))), None, (0.0, 0.0, 1.4), BEAMS, 0.1)
     assert many is not None
-    assert many.position[:, 0].tolist() == [10.0 * i for i in range(8)]
+    assert many.position[:, 0].tolist() == [10.0 * i for i in range(4)]

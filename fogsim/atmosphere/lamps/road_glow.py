@@ -18,7 +18,7 @@ ROAD_ALBEDO = 0.1
 EDGES = (2.0, 5.0, 9.0, 16.0, 30.0, 60.0)
 """Distances ahead of the lamps between which the lit road counts as one source [m]."""
 
-MOST = 4
+MOST = 2
 """Other vehicles' pairs of lamps, the nearest ones, whose lit road glows in the fog."""
 
 LIT_AREA = 60.0

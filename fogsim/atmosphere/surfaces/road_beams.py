@@ -17,10 +17,10 @@ from fogsim.values.light import RoadBeams
 from fogsim.values.luminous_intensity import luminous_intensity
 from fogsim.values.pinhole import ray_from_pixel
 
-CELL, CELLS = 1.0, 192
+CELL, CELLS = 1.0, 160
 """Side of the map's cells [m], and how many there are a side."""
 
-LOOKED_AHEAD = 75.0
+LOOKED_AHEAD = 60.0
 """How far ahead of the camera the middle of the map is [m]."""
 
 REACH, HALF_WIDTH, STEP = 70.0, 20.0, 0.5

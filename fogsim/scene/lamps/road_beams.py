@@ -12,7 +12,7 @@ from fogsim.values.light import Beam, Lamp, RoadBeams, Side, burning
 from fogsim.values.scene import Surface
 from fogsim.values.traffic import TrafficState
 
-FARTHEST, MOST = 150.0, 8
+FARTHEST, MOST = 150.0, 4
 """Distance beyond which beams on the road are left out [m], and how many vehicles' are drawn, the nearest."""
 
 _HEIGHT_STEP = 0.05

@@ -1,44 +1,143 @@
-"""``fogsim fog``: homogeneous fog on an image from disk."""
+"""``fogsim fog``: homogeneous fog on an image or a video from disk."""
 
+import contextlib
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from fogsim.cli.printing import escape, print_remarks, stdout
+from fogsim.cli.printing import escape, print_remarks, stderr, stdout
+from fogsim.cli.progress import progress_bar
 from fogsim.errors import InputError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from fogsim.offline.road_plane import RoadPlane
 
 
 def fog_command(
-    image: Annotated[Path, typer.Argument(help="A grey or colour image of 8 or 16 bits.")],
-    depth: Annotated[Path, typer.Option(help="Its depth map: .npy in metres, or 16-bit PNG; 0 or inf is sky.")],
-    camera: Annotated[Path, typer.Option(help="camera.yaml; its response says what pixel values stand for.")],
+    image: Annotated[
+        Path,
+        typer.Argument(metavar="IMAGE|VIDEO", help="Of 8 or 16 bits, grey or colour; with --road-plane also a video."),
+    ],
     visibility: Annotated[float, typer.Option(help="Meteorological visibility in metres; inf gives the image back.")],
-    out: Annotated[Path, typer.Option(help="The fogged image.")],
+    out: Annotated[Path, typer.Option(help="The fogged image, or .mp4 for a video.")],
+    depth: Annotated[
+        Path | None, typer.Option(help="Its depth map: .npy in metres, or 16-bit PNG; 0 or inf is sky.")
+    ] = None,
+    road_plane: Annotated[
+        bool, typer.Option("--road-plane", help="No depth map: a flat road below the horizon, sky above it.")
+    ] = False,
+    camera: Annotated[
+        Path | None, typer.Option(help="camera.yaml; its response says what pixel values stand for.")
+    ] = None,
     depth_kind: Annotated[
-        str | None, typer.Option(help="planar (along the optical axis) or range (along the ray); required.")
+        str | None,
+        typer.Option(help="For --depth: planar (along the optical axis) or range (along the ray)."),
     ] = None,
     airlight: Annotated[
         str | None, typer.Option(help="Its pixel value, or R,G,B; else the sky's median, or the brightest thousandth.")
     ] = None,
     depth_scale: Annotated[float | None, typer.Option(help="Metres in one unit of DEPTH.")] = None,
+    horizon_row: Annotated[
+        float | None, typer.Option(help="For --road-plane without a camera file: row of the horizon.")
+    ] = None,
+    focal_length: Annotated[float | None, typer.Option(help="The same: focal length in pixels.")] = None,
+    mount_height: Annotated[float | None, typer.Option(help="The same: metres from the road to the lens.")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it is there already.")] = False,
 ) -> None:
-    """Put homogeneous fog on an image from disk: Koschmieder's law on light and slant range."""
+    """Put homogeneous fog on an image or video from disk: Koschmieder's law on light and slant range."""
+    light = None if airlight is None else _pixel_values(airlight)
+    told = {"--horizon-row": horizon_row, "--focal-length": focal_length, "--mount-height": mount_height}
+    if (depth is None) != road_plane:
+        what = "both are given" if road_plane else "neither is given"
+        raise InputError(f"how far things are comes from --depth FILE or from --road-plane, the flat road; {what}")
+    if road_plane:
+        for option, value in (("--depth-kind", depth_kind), ("--depth-scale", depth_scale)):
+            if value is not None:
+                raise InputError(f"{option} goes with --depth; --road-plane reads no depth map")
+        used = _fog_road(image, _road(image, camera, told), visibility, out, light, overwrite)
+    else:
+        for option, value in told.items():
+            if value is not None:
+                raise InputError(f"{option} goes with --road-plane; with --depth the camera file has it")
+        used = _fog_depth(image, depth, depth_kind, depth_scale, camera, visibility, out, light, overwrite)
+    values = ", ".join(f"{value:.4g}" for value in used)
+    stdout.print(f"{escape(out)}: visibility {visibility:g} m, airlight {values}", soft_wrap=True)
+
+
+def _fog_depth(
+    image: Path,
+    depth: Path | None,
+    kind: str | None,
+    scale: float | None,
+    camera: Path | None,
+    visibility: float,
+    out: Path,
+    light: tuple[float, ...] | None,
+    overwrite: bool,
+) -> "NDArray[np.float64]":
     from fogsim.offline.camera_file import load_calibration, straight_camera
     from fogsim.offline.fog_image import fog_file
     from fogsim.offline.image_files import DepthMap
+    from fogsim.offline.input_paths import is_video
 
-    if depth_kind is None:
+    assert depth is not None  # noqa: S101 - the caller has looked
+    if kind is None:
         raise InputError("--depth-kind is missing: planar or range? Data sets differ, and the wrong one goes unseen")
-    light = None if airlight is None else _pixel_values(airlight)
+    if camera is None:
+        raise InputError("--camera is missing: a depth map needs the camera file (docs/estimate.md)")
+    if is_video(image):
+        raise InputError(f"{image}: a depth map is of one image; on a video fog is laid with --road-plane")
     calibration = load_calibration(camera)
     print_remarks("assumed", calibration.remarks)
     pinhole = straight_camera(calibration, camera)
-    depth_map = DepthMap(depth, depth_kind, depth_scale)
-    used = fog_file(image, depth_map, visibility, pinhole, out, light, overwrite=overwrite)
-    values = ", ".join(f"{value:.4g}" for value in used)
-    stdout.print(f"{escape(out)}: visibility {visibility:g} m, airlight {values}", soft_wrap=True)
+    return fog_file(image, DepthMap(depth, kind, scale), visibility, pinhole, out, light, overwrite=overwrite)
+
+
+def _road(image: Path, camera: Path | None, told: dict[str, float | None]) -> "RoadPlane":
+    from fogsim.offline.camera_file import load_calibration
+    from fogsim.offline.road_plane import RoadPlane, told_camera
+
+    given = {option: value for option, value in told.items() if value is not None}
+    if camera is not None:
+        if given:
+            raise InputError(f"{', '.join(given)} and --camera are both given: the camera file has it")
+        calibration = load_calibration(camera)
+    else:
+        lacking = [option for option in told if option not in given]
+        if lacking:
+            raise InputError(
+                f"--road-plane needs --camera camera.yaml, or {', '.join(told)}; lacking: {', '.join(lacking)}"
+            )
+        calibration = told_camera(image, given["--horizon-row"], given["--focal-length"], given["--mount-height"])
+    print_remarks("assumed", calibration.remarks)
+    return RoadPlane(calibration)
+
+
+def _fog_road(
+    image: Path, road: "RoadPlane", visibility: float, out: Path, light: tuple[float, ...] | None, overwrite: bool
+) -> "NDArray[np.float64]":
+    from fogsim.offline.fog_image import fog_file
+    from fogsim.offline.fog_video import fog_video
+    from fogsim.offline.input_paths import is_video
+    from fogsim.offline.source import VideoFile
+
+    if not is_video(image):
+        return fog_file(image, road, visibility, road.calibration.camera, out, light, overwrite=overwrite)
+    video = VideoFile.open(image)
+    with (
+        progress_bar(stderr) as progress,
+        contextlib.closing(fog_video(video, road, visibility, out, light, overwrite=overwrite)) as frames,
+    ):
+        task = progress.add_task(video.description, total=video.count)
+        airlight = next(frames)
+        progress.advance(task)
+        for _ in frames:
+            progress.advance(task)
+    return airlight
 
 
 def _pixel_values(text: str) -> tuple[float, ...]:

@@ -8,12 +8,17 @@ from numpy.typing import NDArray
 from fogsim.errors import InputError
 from fogsim.files.atomic import refuse_existing
 from fogsim.offline.image_files import DepthMap, Pixels, read_distance, read_image, write_image
+from fogsim.offline.road_plane import RoadPlane
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera
 from fogsim.values.camera_response import exposure_of, respond
 
 LEAST_SKY = 0.001
 """Share of the image that must be sky for the airlight to be taken from it; the brightest such share is taken else."""
+
+
+BRIGHTEST_ABOVE_ROAD = 0.2
+"""Share of what is above the horizon of a road without depth map that its airlight is taken from: woods are darker."""
 
 
 def fog_image(
@@ -78,10 +83,10 @@ def full_scale(image: Pixels, camera: Camera) -> float:
     return float(np.iinfo(image.dtype).max)
 
 
-def airlight_of(image: Pixels, distance: NDArray[np.float64]) -> NDArray[np.float64]:
+def airlight_of(image: Pixels, distance: NDArray[np.float64], share: float = 1.0) -> NDArray[np.float64]:
     """Pixel values that an image itself suggests for its airlight.
 
-    The median of the sky; of an image without sky, the mean of its brightest thousandth.
+    The median of the sky, or of its brightest part; of an image without sky, the mean of its brightest thousandth.
 
     Parameters
     ----------
@@ -89,6 +94,8 @@ def airlight_of(image: Pixels, distance: NDArray[np.float64]) -> NDArray[np.floa
         Pixel values.
     distance : (rows, cols) float64
         Distances [m]; ``inf`` for the sky.
+    share : float
+        Share of the sky, the brightest, whose median is taken [-].
 
     Returns
     -------
@@ -98,14 +105,16 @@ def airlight_of(image: Pixels, distance: NDArray[np.float64]) -> NDArray[np.floa
     colours = image.reshape(-1, 1 if image.ndim == 2 else image.shape[2])[:, :3].astype(np.float64)
     sky = np.isinf(distance).reshape(-1)
     if sky.mean() >= LEAST_SKY:
-        return np.asarray(np.median(colours[sky], axis=0))
+        above = colours[sky]
+        above = above[np.argsort(above.sum(axis=1))[-max(1, round(share * len(above))) :]] if share < 1.0 else above
+        return np.asarray(np.median(above, axis=0))
     brightest = np.argsort(colours.sum(axis=1))[-max(1, round(LEAST_SKY * len(colours))) :]
     return np.asarray(colours[brightest].mean(axis=0))
 
 
 def fog_file(
     image: Path,
-    depth: DepthMap,
+    depth: DepthMap | RoadPlane,
     visibility: float,
     camera: Camera,
     out: Path,
@@ -119,8 +128,8 @@ def fog_file(
     ----------
     image : Path
         The image, of the camera's size.
-    depth : DepthMap
-        Its depth map, of the same size.
+    depth : DepthMap or RoadPlane
+        Its depth map, of the same size; or a flat road below the horizon and sky above it.
     visibility : float
         Meteorological visibility V_met [m].
     camera : Camera
@@ -142,25 +151,87 @@ def fog_file(
     InputError
         If anything does not fit, or there is a file `out` that must not be replaced.
     """
-    if out.exists() and any(given.exists() and out.samefile(given) for given in (image, depth.path)):
-        raise InputError(f"--out {out} would replace what is read; give another name")
-    refuse_existing(out, overwrite)
+    refuse_out(out, (image, depth.path) if isinstance(depth, DepthMap) else (image,), overwrite)
     pixels = read_image(image)
-    if pixels.shape[:2] != (camera.height, camera.width):
-        rows, columns = pixels.shape[:2]
-        raise InputError(
-            f"{image}: the image has {columns} × {rows} pixels, the camera {camera.width} × {camera.height}; "
-            "they must be the same"
-        )
-    distance = read_distance(depth, camera)
+    refuse_other_size(image, (pixels.shape[1], pixels.shape[0]), camera)
+    if isinstance(depth, DepthMap):
+        distance, share = read_distance(depth, camera), 1.0
+    else:
+        distance, share = depth.distance(), BRIGHTEST_ABOVE_ROAD
     colours = min(3, 1 if pixels.ndim == 2 else pixels.shape[2])
-    air = airlight_of(pixels, distance) if airlight is None else _given_airlight(airlight, colours, pixels, camera)
+    if airlight is None:
+        air = airlight_of(pixels, distance, share)
+    else:
+        air = given_airlight(airlight, colours, pixels, camera)
     write_image(out, fog_image(pixels, distance, visibility, camera, air))
     return air[::-1]
 
 
-def _given_airlight(airlight: tuple[float, ...], colours: int, pixels: Pixels, camera: Camera) -> NDArray[np.float64]:
-    """Airlight in the order of the image's channels."""
+def refuse_out(out: Path, read: tuple[Path, ...], overwrite: bool) -> None:
+    """Refuse to write over what is read, or unasked over what is there.
+
+    Parameters
+    ----------
+    out : Path
+        The file to be written.
+    read : tuple of Path
+        The files that are read.
+    overwrite : bool
+        True to replace a file that is there.
+
+    Raises
+    ------
+    InputError
+        If it must not be written.
+    """
+    if out.exists() and any(given.exists() and out.samefile(given) for given in read):
+        raise InputError(f"--out {out} would replace what is read; give another name")
+    refuse_existing(out, overwrite)
+
+
+def refuse_other_size(path: Path, size: tuple[int, int], camera: Camera) -> None:
+    """Refuse images of another size than their camera's.
+
+    Parameters
+    ----------
+    path : Path
+        The image or video.
+    size : tuple of int
+        Its columns and rows [px].
+    camera : Camera
+        The calibration.
+
+    Raises
+    ------
+    InputError
+        If they differ.
+    """
+    if size != (camera.width, camera.height):
+        raise InputError(
+            f"{path}: the image has {size[0]} × {size[1]} pixels, the camera {camera.width} × {camera.height}; "
+            "they must be the same"
+        )
+
+
+def given_airlight(airlight: tuple[float, ...], colours: int, pixels: Pixels, camera: Camera) -> NDArray[np.float64]:
+    """Airlight that a user gives, blue first as images are stored.
+
+    Parameters
+    ----------
+    airlight : tuple of float
+        One pixel value, or one a colour, red first.
+    colours : int
+        How many colours the image has.
+    pixels : (rows, cols[, channels]) uint8 or uint16
+        The image.
+    camera : Camera
+        Its calibration.
+
+    Raises
+    ------
+    InputError
+        If they are not as many as colours, or beyond the image's pixel values.
+    """
     full = full_scale(pixels, camera)
     if len(airlight) not in (1, colours):
         raise InputError(f"--airlight must be one pixel value or {colours}, got {len(airlight)}")

@@ -53,7 +53,7 @@ def find_source(
     paths = [path for one in given for path in _paths(str(one))]
     if not paths:
         raise InputError("no image and no video is given")
-    if not any(_is_video(path) for path in paths):
+    if not any(is_video(path) for path in paths):
         temporal = is_sequence(paths) if sequence is None else sequence
         return ImageFiles(tuple(paths), temporal, 1.0 / (rate or SEQUENCE_RATE))
     if len(paths) > 1:
@@ -63,7 +63,14 @@ def find_source(
     return VideoFile.open(paths[0], temporal=sequence is not False)
 
 
-def _is_video(path: Path) -> bool:
+def is_video(path: Path) -> bool:
+    """Whether a file is a video by its ending.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    """
     return path.suffix.lower() in VIDEO_ENDINGS
 
 

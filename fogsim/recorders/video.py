@@ -151,7 +151,9 @@ class Encoder:
         return self._complaints.read().decode(errors="replace").strip() or "no message"
 
 
-def encoder_command(path: Path, frame_period: float, size: tuple[int, int] = (FRAME_WIDTH, FRAME_HEIGHT)) -> list[str]:
+def encoder_command(
+    path: Path, frame_period: float, size: tuple[int, int] = (FRAME_WIDTH, FRAME_HEIGHT), rate_factor: int = 20
+) -> list[str]:
     """Command line of an encoder that takes raw frames and writes an mp4 file that browsers can play.
 
     Parameters
@@ -162,6 +164,8 @@ def encoder_command(path: Path, frame_period: float, size: tuple[int, int] = (FR
         Time between two frames [s].
     size : tuple of int
         Columns and rows of a frame [px], both even; those of the panel if not given.
+    rate_factor : int
+        libx264's constant rate factor, 0 … 51 [-]: 20 is made to be looked at, less keeps more.
 
     Raises
     ------
@@ -170,7 +174,7 @@ def encoder_command(path: Path, frame_period: float, size: tuple[int, int] = (FR
     """
     rate = Fraction(1.0 / frame_period).limit_denominator(1001)
     source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(rate), "-i", "-"]
-    coding = ["-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-pix_fmt", "yuv420p"]
+    coding = ["-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", str(rate_factor), "-pix_fmt", "yuv420p"]
     sink = ["-movflags", "+faststart", "-f", "mp4", f"file:{path}"]
     return [ffmpeg_program(), "-y", "-loglevel", "error", *source, *coding, *sink]
 

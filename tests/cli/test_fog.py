@@ -66,6 +66,11 @@ def test_a_file_that_is_there_is_replaced_only_when_it_is_asked_for(folder: Path
         (("--visibility", "nan", "--depth-kind", "range"), "--visibility must be"),
         (("--visibility", "80", "--depth-kind", "range", "--airlight", "white"), "--airlight white"),
         (("--visibility", "80", "--depth-kind", "range", "--depth", "none.npy"), "none.npy: cannot be read"),
+        (
+            ("--visibility", "80", "--depth-kind", "range", "--road-plane"),
+            "the flat road; both are given",
+        ),
+        (("--visibility", "80", "--depth-kind", "range", "--horizon-row", "9"), "--horizon-row goes with --road-plane"),
     ],
 )
 def test_mistakes_end_in_one_line_and_exit_code_2(
@@ -76,3 +81,35 @@ def test_mistakes_end_in_one_line_and_exit_code_2(
     assert told in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
     assert not (folder / "out.png").exists()
+
+
+def test_fog_over_the_flat_road_needs_no_depth_map(
+    folder: Path, command: Callable[..., "CompletedProcess[str]"]
+) -> None:
+    by_file = ("--camera", "camera.yaml")
+    by_rows = ("--horizon-row", "12.9", "--focal-length", "60", "--mount-height", "1.4")
+
+    def run(*arguments: str) -> "CompletedProcess[str]":
+        given = ("image.png", "--visibility", "20", "--airlight", "200", "--out", "out.png", "--overwrite")
+        return command("fog", *given, *arguments, cwd=folder)
+
+    for camera in (by_file, by_rows):
+        done = run("--road-plane", *camera)
+        assert done.returncode == 0, done.stderr
+        seen = cv2.imread(str(folder / "out.png"))
+        assert seen is not None
+        assert np.all(seen[:13] == 200)
+        # The lowest row looks 17 px below the horizon at 60 px: 1.4 m · 60 / 16.1 away, and transmits that much.
+        assert np.all(seen[29, 20] < 160)
+    for arguments, told in (
+        ((), "--depth FILE or from --road-plane, the flat road; neither is given"),
+        (("--road-plane",), "lacking: --horizon-row, --focal-length, --mount-height"),
+        (("--road-plane", "--horizon-row", "9"), "lacking: --focal-length, --mount-height"),
+        (("--road-plane", *by_file, *by_rows), "--mount-height and --camera are both given"),
+        (("--road-plane", *by_rows, "--horizon-row", "30"), "--horizon-row must be a row of the image, 0 … 29"),
+        (("--road-plane", *by_file, "--depth-kind", "range"), "--depth-kind goes with --depth"),
+    ):
+        done = run(*arguments)
+        assert done.returncode == 2
+        assert told in done.stderr
+        assert len(done.stderr.strip().splitlines()) <= 2

@@ -33,6 +33,11 @@ def records(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
     [
         ("loop.py", ("--size", "64x48", "--steps", "3", "--repeat", "1"), {"env", "camera", "vehicles", "steps_per_s"}),
         (
+            "photograph_roads.py",
+            ("--images", "1"),
+            {"pool", "method", "visibility_m", "pictures", "valid_share"},
+        ),
+        (
             "environments.py",
             ("--env", "fogsim/FogAdvisory-v1", "--steps", "2", "--repeat", "1", "--resets", "1", "--no-workers"),
             {"env", "camera", "vehicles", "steps_per_s", "peer_steps_per_s", "reset_ms", "reset_other_ms"},

@@ -48,7 +48,7 @@ class NearScene:
         self.is_whole = plan.lanes <= few_lanes
         self._squares = np.zeros((0, 2), np.int64)
         plain = plan.ground.mesh() if self.is_whole else plan.ground.plain
-        self.scene = Scene(plain, plan.shapes, plan.scenery)
+        self.scene = Scene(plain, plan.shapes, plan.scenery, plan.pavement)
 
     def whole(self) -> Scene:
         """Build all of the scene; pictures go on being drawn of the part."""
@@ -82,7 +82,7 @@ class NearScene:
         if len(kept):
             parts.insert(1, Squares(kept).part_of(self.scene.ground))
         self._squares = np.concatenate((kept, missing))
-        self.scene = Scene(merge(parts), self._plan.shapes, self._plan.scenery)
+        self.scene = Scene(merge(parts), self._plan.shapes, self._plan.scenery, self._plan.pavement)
         return True
 
     def _around(self, sector: "_Sector") -> tuple[NDArray[np.int64], NDArray[np.float64]]:

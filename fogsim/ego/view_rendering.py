@@ -247,7 +247,9 @@ class ViewRenderer:
         """Find out what there is in the scene along a line (n, 3) [m]."""
         scenario, around = self._scenario, surroundings(self._network, self.signs, line)
         rng = np.random.default_rng(scenario.scenery_seed)
-        plan = ScenePlan(around.network, around.signs, rng, street_lamps=scenario.street_lamps)
+        plan = ScenePlan(
+            around.network, around.signs, rng, street_lamps=scenario.street_lamps, pavement=build.pavement(scenario)
+        )
         self._origin, self._shifted = around.origin, bool(np.any(around.origin))
         self._known = None if around.whole else Corridor(line, _LEEWAY)
         # Other renderers may draw what is farther away.

@@ -21,6 +21,7 @@ from fogsim.render.pyrender_scene import (
     pinhole,
     still_parts,
 )
+from fogsim.render.shading.pavement import reflectance_by_sine
 from fogsim.values.camera import Camera, CameraPose
 from fogsim.values.image import View
 from fogsim.values.pinhole import ray_from_pixel
@@ -52,6 +53,7 @@ class PyrenderReference:
         self._context = context()
         self._pyrender = load_pyrender()
         self._scene: Scene | None = scene
+        self._pavement = scene.pavement
         self.set_daylight(illuminance)
         self._nodes = empty_scene(self._pyrender, illuminance, self._white)
         self._still = list(still_parts(self._pyrender, scene, self._white))
@@ -122,9 +124,18 @@ class PyrenderReference:
         for number, part in enumerate(parts, 1):
             if part.radiance is not None:
                 radiance[seen == number] = part.radiance
+            if part.is_asphalt:
+                # As of level road, whose part of the picture grades hardly change.
+                road = seen == number
+                radiance[road] *= self._by_angle(np.maximum(-rays[road, 2] / length[road], 0.0))[:, None]
         instance = np.array([0, *(part.instance for part in parts)], np.int32)
         distance = np.where(sky, np.inf, depth * length)
         return View(radiance.astype(np.float32), distance.astype(np.float32), instance[seen])
+
+    def _by_angle(self, sine: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Reflectance of the road over that of dry asphalt seen from above, by the sine of the eye's elevation."""
+        table = reflectance_by_sine(self._pavement.surface)
+        return np.interp(np.sqrt(sine), np.linspace(0.0, 1.0, len(table)), table)
 
     def _drawer_of(self, camera: Camera) -> Any:
         """Pyrender's renderer, made anew if the camera's size is another than the last one's."""

@@ -16,6 +16,7 @@ from fogsim.linear_algebra import matrix_product
 from fogsim.render.drawing import NEAR
 from fogsim.render.photometry import lamp_radiance, lighting_bits, zenith_luminance
 from fogsim.render.road_paint import painted_road
+from fogsim.render.shading.road import LINE_REFLECTANCE
 from fogsim.render.shading.surfaces import light_share
 from fogsim.values.camera import Camera, CameraPose
 from fogsim.values.light import HeadLamp, Lights, dark_shift
@@ -44,11 +45,14 @@ class Part(NamedTuple):
         Instance id of what it shows.
     radiance : (3,) float64 or None
         Of a lit lamp, its radiance per channel [cd/m²].
+    is_asphalt : bool
+        Whether it is road without paint.
     """
 
     node: "pyrender.Node"
     instance: int
     radiance: NDArray[np.float64] | None
+    is_asphalt: bool = False
 
 
 def to_pyrender(
@@ -196,12 +200,17 @@ def still_parts(library: Any, scene: Scene, white: float) -> Iterator[Part]:
         mesh = replace(ground, faces=ground.faces[np.all(kinds == (instance, surface), axis=1)])
         if surface == Surface.ROAD:
             mesh = painted_road(mesh)
+            paint = np.all(mesh.reflectance[mesh.faces[:, 0]] == np.float32(LINE_REFLECTANCE), axis=1)
+            lines = _mesh(library, replace(mesh, faces=mesh.faces[paint]), np.eye(4)[None], mesh.reflectance)
+            yield Part(library.Node("ground paint", mesh=lines), instance, None)
+            mesh = replace(mesh, faces=mesh.faces[~paint])
         if surface == Surface.TERRAIN:
             mesh = _tiled(mesh, _middle(scene))
         made = _mesh(library, mesh, np.eye(4)[None], mesh.reflectance)
         if surface == Surface.TERRAIN:
             made._bounds = np.zeros((2, 3)) + np.append(_middle(scene), 0.0)
-        yield Part(library.Node(f"ground {Surface(surface).name.lower()}", mesh=made), instance, None)
+        node = library.Node(f"ground {Surface(surface).name.lower()}", mesh=made)
+        yield Part(node, instance, None, surface == Surface.ROAD)
     yield from copied_parts(library, scene, scene.scenery, white, "scenery")
 
 

@@ -43,7 +43,7 @@ class SceneRenderer:
         # Levels of detail are drawn where they are small, and so from outside.
         self._table = MeshTable.of(meshes, lambda name: name.endswith(LEVELS_OF_DETAIL))
         self._rasteriser: Rasteriser | None = make_rasteriser(self._table)
-        self._shading = Shading(self._table, illuminance, ground.height, ground.reflectance)
+        self._shading = Shading(self._table, illuminance, ground.height, ground.reflectance, scene.pavement)
         plain = np.array([bool(np.all(mesh.surface == int(Surface.MATT))) for mesh in meshes.values()])
         faces = np.diff(self._table.first_face)
         self._shapes = shapes_of(self._table.numbers, *self._table.extremes(), faces, plain, LEVELS_OF_DETAIL)

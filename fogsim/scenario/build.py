@@ -13,6 +13,7 @@ from fogsim.scenario.parts.methods import (
     road_adviser,
     safety_standard,
 )
+from fogsim.scenario.parts.pavement import pavement
 from fogsim.scenario.parts.sensors import (
     AIRLIGHT_EXPOSURE,
     CAR,
@@ -50,6 +51,7 @@ __all__ = [
     "lead_sensor",
     "lighting_policy",
     "own_methods",
+    "pavement",
     "periods",
     "road_adviser",
     "safety_standard",

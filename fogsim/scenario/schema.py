@@ -27,6 +27,7 @@ from fogsim.scenario.sensor_schema import Sensors
 from fogsim.scenario.timeline import Timeline, check_timeline
 from fogsim.scenario.traffic_alone import without_ego
 from fogsim.scenario.traffic_schema import DriversSection, Traffic
+from fogsim.values.scene import USUAL_PAVEMENT, RoadSurface
 
 NO_RENDERER = "none"
 """Name that stands for drawing nothing, in runs that need no camera."""
@@ -70,6 +71,20 @@ class Light(Section):
     lamps light the road and the fog."""
 
 
+class PavementSection(Section):
+    """What roads are like."""
+
+    surface: RoadSurface = USUAL_PAVEMENT.surface
+    """How they reflect the sky by the angle at which they are seen: `lambertian`, alike from everywhere; `dry`, `worn`
+    (polished smooth) or `wet` asphalt, 1.8, 1.8 and 2.0 times as bright at 1° as `dry` from above."""
+
+    wheel_tracks: Number = Field(default=USUAL_PAVEMENT.wheel_tracks, ge=-0.5, le=0.5)
+    """How much darker they are where wheels roll, as a share; negative for brighter."""
+
+    repairs: Number = Field(default=USUAL_PAVEMENT.repairs, ge=0, le=0.3)
+    """Standard deviation of the reflectance of stretches of older and newer asphalt, 5 to 150 m long, as a share."""
+
+
 class Scenario(Section):
     """A whole scenario."""
 
@@ -111,6 +126,9 @@ class Scenario(Section):
 
     light: Light = Light()
     """The light."""
+
+    pavement: PavementSection = PavementSection()
+    """The roads' asphalt."""
 
     timeline: Timeline = ()
     """What happens in the run, and when."""

@@ -24,14 +24,21 @@ from fogsim.scene.terrain import Terrain
 from fogsim.scene.town import person_shapes, signal_posts, signal_shapes
 from fogsim.scene.trees import tree_shapes
 from fogsim.values.road import Lane, LaneKind, RoadNetwork, SignMap
-from fogsim.values.scene import Batch, Mesh, Scene
+from fogsim.values.scene import USUAL_PAVEMENT, Batch, Mesh, Pavement, Scene
 
 _RAIL_BEHIND_SHOULDER = 0.5  # [m]
 _POST_SPACING = 4.0  # of guard rails [m]
 _DELINEATOR_SPACING = 50.0  # [m]
 
 
-def build_scene(network: RoadNetwork, signs: SignMap, rng: np.random.Generator, *, street_lamps: bool = False) -> Scene:
+def build_scene(
+    network: RoadNetwork,
+    signs: SignMap,
+    rng: np.random.Generator,
+    *,
+    street_lamps: bool = False,
+    pavement: Pavement = USUAL_PAVEMENT,
+) -> Scene:
     """Build road, roadside and shapes of vehicles from any network of lanes.
 
     Parameters
@@ -44,6 +51,8 @@ def build_scene(network: RoadNetwork, signs: SignMap, rng: np.random.Generator, 
         What scatters and shapes the trees.
     street_lamps : bool
         Whether lamps stand along the roads (see `street_lamp_heads`).
+    pavement : Pavement
+        What roads are like.
 
     Returns
     -------
@@ -55,7 +64,7 @@ def build_scene(network: RoadNetwork, signs: SignMap, rng: np.random.Generator, 
     InputError
         If no lane has a length.
     """
-    return ScenePlan(network, signs, rng, street_lamps=street_lamps).scene()
+    return ScenePlan(network, signs, rng, street_lamps=street_lamps, pavement=pavement).scene()
 
 
 class ScenePlan:
@@ -63,14 +72,14 @@ class ScenePlan:
 
     Parameters
     ----------
-    network, signs, rng, street_lamps
+    network, signs, rng, street_lamps, pavement
         See `build_scene`.
 
     Attributes
     ----------
     ground : GroundPlan
         The ground.
-    shapes, scenery
+    shapes, scenery, pavement
         As of `Scene`.
     lanes : int
         Number of lanes.
@@ -83,8 +92,15 @@ class ScenePlan:
 
     @no_garbage_collection()
     def __init__(
-        self, network: RoadNetwork, signs: SignMap, rng: np.random.Generator, *, street_lamps: bool = False
+        self,
+        network: RoadNetwork,
+        signs: SignMap,
+        rng: np.random.Generator,
+        *,
+        street_lamps: bool = False,
+        pavement: Pavement = USUAL_PAVEMENT,
     ) -> None:
+        self.pavement = pavement
         lanes = _with_length([lane for lane in network.lanes if len(lane.centreline) > 1])
         driven = [lane for lane in lanes if lane.kind in {LaneKind.CARRIAGEWAY, LaneKind.JUNCTION}]
         if not driven:
@@ -120,7 +136,7 @@ class ScenePlan:
 
     def scene(self) -> Scene:
         """Build the whole scene."""
-        return Scene(ground=self.ground.mesh(), shapes=self.shapes, scenery=self.scenery)
+        return Scene(ground=self.ground.mesh(), shapes=self.shapes, scenery=self.scenery, pavement=self.pavement)
 
 
 def _with_length(lanes: Sequence[Lane]) -> list[Lane]:

@@ -31,7 +31,7 @@ from fogsim.values.road import (
     Structure,
     StructureKind,
 )
-from fogsim.values.scene import Batch, Mesh, Scene, Surface
+from fogsim.values.scene import Batch, Mesh, Pavement, RoadSurface, Scene, Surface
 from fogsim.values.script import Begun
 from fogsim.values.step import Ending, LampEffects, RoadSection, Step, TrafficStep, Truth
 from fogsim.values.traffic import (
@@ -88,11 +88,13 @@ __all__ = [
     "NetworkSnapshot",
     "Observation",
     "PavedArea",
+    "Pavement",
     "PersonState",
     "Reason",
     "Response",
     "RoadNetwork",
     "RoadSection",
+    "RoadSurface",
     "RunningFault",
     "Scene",
     "Sign",

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import IntEnum, StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,6 +110,42 @@ class Batch:
     instance: NDArray[np.int32]
 
 
+class RoadSurface(StrEnum):
+    """How roads reflect the sky's light by the angle at which they are seen (see `tools/make_road_reflectance.py`).
+
+    LAMBERTIAN roads are as bright from everywhere; DRY ones are coarse asphalt, CIE's standard surface R2, 1.8 times
+    as bright at 1° as from above; WORN ones are polished smooth, R4; WET ones have a film of water, W1.
+    """
+
+    LAMBERTIAN = "lambertian"
+    DRY = "dry"
+    WORN = "worn"
+    WET = "wet"
+
+
+@dataclass(frozen=True, slots=True)
+class Pavement:
+    """What roads are like.
+
+    Attributes
+    ----------
+    surface : RoadSurface
+        How they reflect.
+    wheel_tracks : float
+        How much darker they are where wheels roll, as a share; negative for brighter.
+    repairs : float
+        Standard deviation of the reflectance of stretches of older and newer asphalt, as a share.
+    """
+
+    surface: RoadSurface = RoadSurface.LAMBERTIAN
+    wheel_tracks: float = 0.035
+    repairs: float = 0.0
+
+
+USUAL_PAVEMENT = Pavement()
+"""What roads are like where nothing else is asked for."""
+
+
 @dataclass(frozen=True, slots=True)
 class Scene:
     """Everything that stands still, and the shapes of what moves.
@@ -122,8 +158,11 @@ class Scene:
         Shapes that batches refer to.
     scenery : tuple of Batch
         Copies that stand still (trees, posts).
+    pavement : Pavement
+        What roads are like.
     """
 
     ground: Mesh
     shapes: Mapping[str, Mesh]
     scenery: tuple[Batch, ...]
+    pavement: Pavement = USUAL_PAVEMENT

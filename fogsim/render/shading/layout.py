@@ -22,6 +22,7 @@ LOW, HIGH = 25, 28  # least and greatest radiance of its corners
 RESPONSE_LOW, RESPONSE_HIGH = 31, 34
 ALONG, ACROSS = 7, 10  # of roads: planes of the distance along and across the lane, over z
 WHITE, HALF_WIDTH, LINES, COLOUR = 25, 26, 27, 28  # radiance of a white surface, half a lane, lines, reflectance
+START = 31  # of roads: from where on the distance along the lane is counted [m]
 COLUMNS = 40
 
 

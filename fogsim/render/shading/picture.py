@@ -14,6 +14,7 @@ from fogsim.render.shading.layout import Copies, Light, Meshes, Numbers, Picture
 from fogsim.render.shading.memory import Memory
 from fogsim.render.shading.noise import Noise, tiles
 from fogsim.render.shading.objects import shade_objects, shade_sky
+from fogsim.render.shading.pavement import Asphalt, asphalt
 from fogsim.render.shading.pixel_spans import find_spans
 from fogsim.render.shading.road import shade_road
 from fogsim.render.shading.surfaces import set_background_surfaces, set_surfaces
@@ -21,7 +22,7 @@ from fogsim.render.shading.terrain import shade_terrain
 from fogsim.render.shading.texture import Row, memory_for_row
 from fogsim.values.camera import Camera, CameraPose
 from fogsim.values.image import View
-from fogsim.values.scene import Surface
+from fogsim.values.scene import Pavement, Surface
 
 
 class Shading:
@@ -37,9 +38,18 @@ class Shading:
         Height of the terrain's plane [m], −inf where there is no terrain.
     reflectance : (3,) float64
         Reflectance of the terrain.
+    pavement : Pavement
+        What roads are like.
     """
 
-    def __init__(self, table: MeshTable, illuminance: float, height: float, reflectance: NDArray[np.float64]) -> None:
+    def __init__(
+        self,
+        table: MeshTable,
+        illuminance: float,
+        height: float,
+        reflectance: NDArray[np.float64],
+        pavement: Pavement,
+    ) -> None:
         meshes = Meshes(
             table.positions,
             table.normals,
@@ -56,7 +66,7 @@ class Shading:
             lamp_masks=np.array([lighting_bits(surface) for surface in Surface], np.int32),
             lamp_radiance=np.array([lamp_radiance(surface) for surface in Surface]),
         )
-        self._scene = ShadedScene(meshes, light, tiles())
+        self._scene = ShadedScene(meshes, light, tiles(), asphalt(pavement))
         self._bands, self._memory = Bands(), Memory()
         # For each band.
         self._rows, self._spans = [memory_for_row(0), memory_for_row(0)], [_room(0, 0), _room(0, 0)]
@@ -136,11 +146,14 @@ class ShadedScene(NamedTuple):
         Daylight and lamps.
     noise : Noise
         Texture.
+    asphalt : Asphalt
+        What roads are like.
     """
 
     meshes: Meshes
     light: Light
     noise: Noise
+    asphalt: Asphalt
 
 
 @kernel
@@ -181,7 +194,7 @@ def shade_rows(
     set_background_surfaces(lens, light, spans)
     set_surfaces(meshes, copies, lens, light, len(picture.response) > 0, spans, surfaces)
     shade_objects(spans, count, lens.lens, picture)
-    shade_road(spans, count, lens, noise, work, picture)
+    shade_road(spans, count, lens, noise, scene.asphalt, work, picture)
     shade_terrain(spans, count, lens, noise, work, picture)
     shade_sky(spans, count, lens.rays, light, picture)
 

@@ -1,23 +1,29 @@
 """Radiance of asphalt with its wheel tracks and painted lines."""
 
+import math
+
 import numpy as np
 
 from fogsim.jit import kernel
 from fogsim.render.lens import Lens
 from fogsim.render.shading import layout
 from fogsim.render.shading.ground_spans import next_coplanar_spans
-from fogsim.render.shading.layout import Picture, Spans
+from fogsim.render.shading.layout import Array, Picture, Spans, Wide
 from fogsim.render.shading.lines import LINE_WIDTH, columns_near, dashed_share
 from fogsim.render.shading.noise import Noise
+from fogsim.render.shading.pavement import Asphalt, mean_of_stretches, reflectance_at
 from fogsim.render.shading.texture import ASPHALT, Row, set_texture
+from fogsim.render.vectors import Vector
 
 DEPTH, ALONG, ACROSS, WHITE = layout.DEPTH, layout.ALONG, layout.ACROSS, layout.WHITE
 HALF_WIDTH, LINES, COLOUR, ROAD = layout.HALF_WIDTH, layout.LINES, layout.COLOUR, layout.ROAD
+START = layout.START
 
 LINE_REFLECTANCE = 0.6
 """Reflectance of painted lines."""
 
-_TRACK, _TRACK_WIDTH, _TRACK_DEPTH = 0.85, 0.28, 0.035  # wheel tracks beside a lane's middle [m], and how dark they are
+_TRACK, _TRACK_WIDTH = 0.85, 0.28  # wheel tracks beside a lane's middle [m]
+_PIECE = 64  # pixels of a row over which the reflectance by angle, and that along the road, are linear
 
 ROAD_RESPONSE = 0.0125
 """Coefficient of retroreflected luminance of dry asphalt [cd/m² per lx] (middle of gallen2014's range)."""
@@ -27,7 +33,9 @@ LINE_RESPONSE = 0.15
 
 
 @kernel
-def shade_road(spans: Spans, count: int, lens: Lens, noise: Noise, work: Row, picture: Picture) -> None:
+def shade_road(
+    spans: Spans, count: int, lens: Lens, noise: Noise, asphalt: Asphalt, work: Row, picture: Picture
+) -> None:
     """Shade the spans of road, and set their distances and instance ids.
 
     Parameters
@@ -40,6 +48,8 @@ def shade_road(spans: Spans, count: int, lens: Lens, noise: Noise, work: Row, pi
         Where the camera is.
     noise : Noise
         Texture.
+    asphalt : Asphalt
+        What the road is like.
     work : Row
         Memory.
     picture : Picture
@@ -52,16 +62,41 @@ def shade_road(spans: Spans, count: int, lens: Lens, noise: Noise, work: Row, pi
         begin, end = span[member[0], 1], span[member[members - 1], 2]
         plane = surface[k, DEPTH], surface[k, DEPTH + 1], surface[k, DEPTH + 2]
         set_texture(ASPHALT, plane, row, begin, end, lens, noise, work)
-        _pave(members, spans, work, picture)
+        _set_share(plane, row, begin, end, lens.lens, asphalt, work)
+        _pave(members, spans, asphalt, work, picture)
         _paint(members, spans, work, picture)
         members, number = next_coplanar_spans(ROAD, spans, number, count, lens.lens, work, picture)
 
 
 @kernel
-def _pave(members: int, spans: Spans, work: Row, picture: Picture) -> None:
+def _set_share(plane: Vector, row: float, begin: int, end: int, lens: Wide, asphalt: Asphalt, work: Row) -> None:
+    """Set, in place of tint, the reflectance over that of dry asphalt seen from above, by the angle of each pixel."""
+    (slope, drop, rest), share = plane, work.tint
+    focal, u0, v0 = lens[0], lens[1], lens[2]
+    # 1/z over x, y and 1 of a ray, which is as long as 1 over the eye's distance from the plane.
+    a, b, c = slope * focal, drop * focal, slope * u0 + drop * v0 + rest
+    height, y = 1.0 / math.sqrt(a * a + b * b + c * c), (row - v0) / focal
+    node = begin // _PIECE * _PIECE
+    here = _reflectance_along(asphalt.by_sine, a, b * y + c, (node - u0) / focal, y, height)
+    while node < end:
+        there = _reflectance_along(asphalt.by_sine, a, b * y + c, (node + _PIECE - u0) / focal, y, height)
+        level, change = np.float32(here), np.float32((there - here) / _PIECE)
+        for u in range(np.uint64(max(begin, node)), np.uint64(min(node + _PIECE, end))):
+            share[u] = level + change * np.float32(np.int32(u) - np.int32(node))
+        here, node = there, node + _PIECE
+
+
+@kernel
+def _reflectance_along(by_sine: Wide, a: float, rest: float, x: float, y: float, height: float) -> float:
+    """Reflectance where a ray (x, y, 1) meets the plane on which 1/z is a x and a rest."""
+    return reflectance_at(by_sine, height * (a * x + rest) / math.sqrt(1.0 + x * x + y * y))
+
+
+@kernel
+def _pave(members: int, spans: Spans, asphalt: Asphalt, work: Row, picture: Picture) -> None:
     """Asphalt of the members of a row of spans, darker where wheels roll."""
     span, surface, depth, texture, member = spans.span, spans.surface, work.depth, work.texture, work.member
-    radiance, response = picture.radiance, picture.response
+    share, radiance, response = work.tint, picture.radiance, picture.response
     one, track = np.float32(1.0), np.float32(_TRACK)
     for place in range(members):
         number = member[place]
@@ -75,7 +110,7 @@ def _pave(members: int, spans: Spans, work: Row, picture: Picture) -> None:
         across = (base + tx * float(middle)) * z
         spread = abs(z * (tx - across * zx)) + abs(z * (ty - across * zy))
         width = np.float32(1.0 / (_TRACK_WIDTH + 0.5 * spread))
-        darker = np.float32(_TRACK_DEPTH * _TRACK_WIDTH) * width
+        darker = np.float32(asphalt.tracks * _TRACK_WIDTH) * width
         rest, slope, white = np.float32(base), np.float32(tx), surface[k, WHITE]
         red, green, blue = surface[k, COLOUR], surface[k, COLOUR + 1], surface[k, COLOUR + 2]
         r, g, b = np.float32(red * white), np.float32(green * white), np.float32(blue * white)
@@ -84,14 +119,37 @@ def _pave(members: int, spans: Spans, work: Row, picture: Picture) -> None:
             off = (abs((rest + slope * np.float32(np.int32(i))) * depth[column]) - track) * width
             off = one + off * off
             texture[column] -= darker / (off * off)
+        if asphalt.repairs > 0.0:
+            _mend(surface, k, row, int(span[number, 1]), int(span[number, 2]), asphalt, share)
         # A loop of its own, since each alone spans in vector registers.
         for u in range(begin, np.uint64(span[number, 2])):
-            radiance[v, u, 0], radiance[v, u, 1], radiance[v, u, 2] = r * texture[u], g * texture[u], b * texture[u]
+            seen = texture[u] * share[u]
+            radiance[v, u, 0], radiance[v, u, 1], radiance[v, u, 2] = r * seen, g * seen, b * seen
         if len(response) > 0:
             per_mean = 3.0 * ROAD_RESPONSE / max(red + green + blue, 3e-6)
             r, g, b = np.float32(red * per_mean), np.float32(green * per_mean), np.float32(blue * per_mean)
             for u in range(begin, np.uint64(span[number, 2])):
                 response[v, u, 0], response[v, u, 1], response[v, u, 2] = r * texture[u], g * texture[u], b * texture[u]
+
+
+@kernel
+def _mend(surface: Wide, k: int, row: float, begin: int, end: int, asphalt: Asphalt, share: Array) -> None:
+    """Let a span's reflectance be that of older and newer asphalt along the road."""
+    zx, zy = surface[k, DEPTH], surface[k, DEPTH + 1]
+    sx, sy = surface[k, ALONG], surface[k, ALONG + 1]
+    rest, base = zy * row + surface[k, DEPTH + 2], sy * row + surface[k, ALONG + 2]
+    here, first = np.float32(1.0), begin
+    # From one node to the next; the first one only begins.
+    for node in range(begin // _PIECE * _PIECE, end + _PIECE, _PIECE):
+        z = 1.0 / max(zx * node + rest, 1e-9)
+        along = (sx * node + base) * z
+        extent = z * max(abs(sx - along * zx), abs(sy - along * zy))
+        mean = mean_of_stretches(asphalt.stretches, surface[k, START] + along, extent)
+        there = np.float32(max(1.0 + asphalt.repairs * mean, 0.2))
+        change = (there - here) / np.float32(_PIECE)
+        for u in range(np.uint64(first), np.uint64(min(max(node, first), end))):
+            share[u] *= there - change * np.float32(np.int32(node) - np.int32(u))
+        here, first = there, max(node, first)
 
 
 @kernel

@@ -25,7 +25,7 @@ INSTANCE, LEAST, MOST, DEPTH = layout.INSTANCE, layout.LEAST, layout.MOST, layou
 LIGHT, RESPONSE, LOW, HIGH = layout.LIGHT, layout.RESPONSE, layout.LOW, layout.HIGH
 RESPONSE_LOW, RESPONSE_HIGH = layout.RESPONSE_LOW, layout.RESPONSE_HIGH
 ALONG, ACROSS, WHITE = layout.ALONG, layout.ACROSS, layout.WHITE
-HALF_WIDTH, LINES, COLOUR = layout.HALF_WIDTH, layout.LINES, layout.COLOUR
+HALF_WIDTH, LINES, COLOUR, START = layout.HALF_WIDTH, layout.LINES, layout.COLOUR, layout.START
 OBJECT, ROAD, TERRAIN = layout.OBJECT, layout.ROAD, layout.TERRAIN
 
 
@@ -213,6 +213,7 @@ def _set_lane(
     for channel in range(3):
         surface[number, COLOUR + channel] = (colours[i, channel] + colours[j, channel] + colours[k, channel]) / 3.0
     surface[number, HALF_WIDTH], surface[number, LINES] = road[i, 2], road[i, 3]
+    surface[number, START] = start
 
 
 @kernel

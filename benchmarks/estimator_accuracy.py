@@ -13,8 +13,9 @@ zhu2015's four classes, `class_off_edge_share` that of frames whose visibility i
 1000 m). `ms` is the fastest at 688×515, on one core.
 
     python benchmarks/estimator_accuracy.py [--json] [--docs] [--methods …] [--cameras 4] [--scenes 12] [--draws 4]
-        [--workers 2] [--keep FILE]
+        [--workers 2] [--surface dry] [--repairs 0.05] [--keep FILE]
 
+`--surface` and `--repairs` are the scenario's `pavement`: roads that brighten towards the horizon, and change along it.
 `--keep FILE` writes what is measured to a file as it comes; a later call with the same arguments goes on from there.
 """
 
@@ -40,7 +41,8 @@ from rich.progress import track
 from fogsim.estimators import ESTIMATORS, make
 from fogsim.estimators.zhu2015 import zhu_category
 from fogsim.registry import parameters
-from fogsim.values import Camera, Observation
+from fogsim.values import Camera, Observation, Pavement, RoadSurface
+from fogsim.values.scene import USUAL_PAVEMENT
 
 AIRLIGHT_LEVELS = (120.0, 200.0, 255.0)
 METHODS = ("negru2013", "zhu2015", "huang2015_rough", "joint_road")
@@ -81,12 +83,23 @@ def driven(scenes: int, seed: int) -> Drive:
 
 
 @cache
-def road(scenes: int, seed: int) -> Road:
+def road(
+    scenes: int, seed: int, surface: str = USUAL_PAVEMENT.surface, repairs: float = USUAL_PAVEMENT.repairs
+) -> Road:
     """Its road, ready to be drawn."""
-    return Road(driven(scenes, seed).signs)
+    return Road(driven(scenes, seed).signs, Pavement(RoadSurface(surface), repairs=repairs))
 
 
-def measure_unit(unit: Unit, scenes: int, draws: int, seed: int, forms: tuple[str, ...], pitch: float) -> list[Row]:
+def measure_unit(
+    unit: Unit,
+    scenes: int,
+    draws: int,
+    seed: int,
+    forms: tuple[str, ...],
+    pitch: float,
+    surface: str,
+    repairs: float,
+) -> list[Row]:
     """Every fog, exposure and form of one instant under one camera."""
     number, index = unit
     rng, true = np.random.default_rng([seed, number, index]), camera(number)
@@ -99,7 +112,7 @@ def measure_unit(unit: Unit, scenes: int, draws: int, seed: int, forms: tuple[st
         occupied, measured = with_leader(free, rng)
         condition = {"visibility": visibility, "marks": marks, "levels": levels, "camera": number}
         for lead, instant in (("absent", free), ("untold", occupied)):
-            view = road(scenes, seed).view(instant.state, instant.ego, true, marks=marks)
+            view = road(scenes, seed, surface, repairs).view(instant.state, instant.ego, true, marks=marks)
             seen = Observation(photograph(view, true, driven(scenes, seed).fog, visibility, levels, rng), 25.0)
             rows += [condition | {"lead": lead} | look(form, told, seen) for form in forms]
         seen = dataclasses.replace(seen, lead=measured)
@@ -121,6 +134,7 @@ def measure(arguments: argparse.Namespace) -> list[Row]:
     """All rows: what is kept already, and the rest."""
     forms = forms_of(arguments.methods)
     settings = [arguments.scenes, arguments.draws, arguments.seed, forms, arguments.pitch_deviation]
+    settings += [arguments.surface, arguments.repairs]
     known = kept(arguments.keep, settings)
     units = [(number, index) for index in range(arguments.scenes) for number in range(arguments.cameras)]
     rows = [row for unit in units for row in known.get(unit, [])]
@@ -172,6 +186,8 @@ def main() -> None:
     parser.add_argument("--scenes", type=int, default=12, help="instants of the drive")
     parser.add_argument("--draws", type=int, default=4, help="visibilities by bin, instant and camera, on average")
     parser.add_argument("--workers", type=int, default=min(2, os.cpu_count() or 1), help="processes")
+    parser.add_argument("--surface", choices=list(RoadSurface), default=USUAL_PAVEMENT.surface, help="of the roads")
+    parser.add_argument("--repairs", type=float, default=USUAL_PAVEMENT.repairs, help="older and newer stretches")
     parser.add_argument("--keep", type=Path, help="file in which to keep what is measured, and from which to go on")
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()

@@ -19,7 +19,18 @@ from fogsim.scenario import build
 from fogsim.scene import build_scene, vehicle_batches
 from fogsim.traffic.road.network import read_net, road_network
 from fogsim.units import LUMINANCE_WEIGHTS, extinction_from_visibility
-from fogsim.values import Camera, CameraPose, FogField, LaneMarking, LeadMeasurement, SignMap, TrafficState, View
+from fogsim.values import (
+    Camera,
+    CameraPose,
+    FogField,
+    LaneMarking,
+    LeadMeasurement,
+    Pavement,
+    SignMap,
+    TrafficState,
+    View,
+)
+from fogsim.values.scene import USUAL_PAVEMENT
 
 CAMERAS = (
     (640, 480, 58.0, 1.38, 2.0),
@@ -72,9 +83,9 @@ def camera(number: int) -> Camera:
 
 
 class Road:
-    """The scenario's road, with lane marks and without, ready to be drawn."""
+    """The scenario's road, with lane marks and without, ready to be drawn; its pavement may be another."""
 
-    def __init__(self, signs: SignMap) -> None:
+    def __init__(self, signs: SignMap, pavement: Pavement = USUAL_PAVEMENT) -> None:
         scenario = fogsim.load_scenario(SCENARIO)
         network = road_network(read_net(build.traffic_setup(scenario).net), ROUTE)
         bare = [dataclasses.replace(one, left=LaneMarking.NONE, right=LaneMarking.NONE) for one in network.lanes]
@@ -82,7 +93,7 @@ class Road:
         self._renderers = {
             marks: make_renderer(
                 "auto",
-                build_scene(roads, signs, np.random.default_rng(scenario.scenery_seed)),
+                build_scene(roads, signs, np.random.default_rng(scenario.scenery_seed), pavement=pavement),
                 scenario.light.illuminance_lx,
             )
             for marks, roads in networks.items()

@@ -46,11 +46,12 @@ OVER = 2  # rays across a pixel
 
 @dataclass(frozen=True)
 class Photograph:
-    """A clear photograph: pixel values (red first), the camera that took it, and the one that methods are told."""
+    """A clear photograph: pixel values (red first), the camera that took it, the one that methods are told, and light."""
 
     image: Image
     taken_by: Camera
     told: Camera
+    is_sunny: bool
 
     def fogged(self, visibilities: tuple[float, ...]) -> list[Image]:
         """Lay even fog on it, as `fogsim fog --road-plane` does."""
@@ -72,9 +73,9 @@ def photograph(pool: int, number: int) -> Photograph:
     sine = (down / np.sqrt(forward**2 + down**2 + right**2))[road]
     light = np.empty((*down.shape, 3))
     light[~road] = _sky(-down[~road], (right / forward * np.ones_like(down))[~road], rng)
-    light[road] = _ground(ahead, across, sine, rng)
+    light[road], is_sunny = _ground(ahead, across, sine, rng)
     mean = light.reshape(camera.height, OVER, camera.width, OVER, 3).mean(axis=(1, 3))
-    return Photograph(_developed(mean, rng), camera, told)
+    return Photograph(_developed(mean, rng), camera, told, is_sunny)
 
 
 def _noise(ahead: Floats, across: Floats, sides: tuple[float, float], rng: np.random.Generator) -> Floats:
@@ -82,8 +83,8 @@ def _noise(ahead: Floats, across: Floats, sides: tuple[float, float], rng: np.ra
     return np.asarray(hash_noise(ahead / sides[0] + 900.0, across / sides[1] + 900.0, int(rng.integers(1, 9000))))
 
 
-def _ground(ahead: Floats, across: Floats, sine: Floats, rng: np.random.Generator) -> Floats:
-    """Light (n, 3) of the ground under a sky of luminance 1; the sine is that of the elevation of the eye above it."""
+def _ground(ahead: Floats, across: Floats, sine: Floats, rng: np.random.Generator) -> tuple[Floats, bool]:
+    """Light (n, 3) of the ground under a sky of luminance 1, and whether the sun shines; sine of the eye's elevation."""
     lane, aside = float(rng.uniform(2.9, 3.75)), float(rng.normal(0.0, 0.3))
     half_road = float(rng.choice([1.0, 1.0, 1.5])) * lane + float(rng.uniform(0.1, 2.0))
     side = across + aside + float(rng.choice([0.0, 0.5])) * lane
@@ -97,7 +98,8 @@ def _ground(ahead: Floats, across: Floats, sine: Floats, rng: np.random.Generato
     out[np.abs(side) > half_road + float(rng.uniform(3.0, 30.0))] = np.array([0.03, 0.035, 0.02])
     if rng.random() < 0.85:
         out = _marked(out, ahead, side, (lane, half_road), rng)
-    return out * _sunlight(ahead, side, half_road, rng)
+    is_sunny = rng.random() >= 0.5
+    return out * (_sunlight(ahead, side, half_road, rng) if is_sunny else 1.0), is_sunny
 
 
 def _brightening(sine: Floats, rng: np.random.Generator) -> Floats:
@@ -157,9 +159,7 @@ def _marked(out: Floats, ahead: Floats, side: Floats, road: tuple[float, float],
 
 
 def _sunlight(ahead: Floats, side: Floats, half_road: float, rng: np.random.Generator) -> Floats:
-    """Illumination (n, 3) of the ground: an overcast sky, or sun with shadows of what stands beside the road."""
-    if rng.random() < 0.5:
-        return np.ones((ahead.size, 3))
+    """Illumination (n, 3) of the ground by sky and sun with shadows of what stands beside the road; 1 if overcast."""
     sun = float(rng.uniform(1.0, 5.0)) * np.array([1.05, 1.0, 0.92])
     sky = float(rng.uniform(0.5, 0.9)) * np.array([0.85, 0.97, 1.15])
     slant, reach = float(rng.uniform(-2.0, 2.0)), float(rng.uniform(-1.0, 2.5)) * half_road

@@ -52,6 +52,7 @@ def measure(pool: int, images: int, methods: list[str]) -> list[Row]:
             for method in methods:
                 found = make(method, taken.told).update(Observation(image))
                 row: Row = {"number": number, "method": method, "visibility_m": visibility, "valid": found.valid}
+                row["light"] = "sun" if taken.is_sunny else "overcast"
                 if found.valid:
                     off = math.log(truth / found.extinction) if found.extinction > 0 else math.inf
                     row["off"] = off
@@ -61,12 +62,16 @@ def measure(pool: int, images: int, methods: list[str]) -> list[Row]:
 
 
 def records(rows: list[Row], pool: int) -> Iterator[Row]:
-    """A record for each method and visibility, and for all to 300 m."""
+    """A record for each method and visibility, and for all to 300 m, also by the light of the photograph."""
     for method in dict.fromkeys(row["method"] for row in rows):
         own = [row for row in rows if row["method"] == method]
         cells = {f"{one:.0f}": [row for row in own if row["visibility_m"] == one] for one in VISIBILITIES}
         cells["60-300"] = [row for row in own if row["visibility_m"] <= 300.0]
+        for light in ("overcast", "sun"):
+            cells[f"60-300, {light}"] = [row for row in cells["60-300"] if row["light"] == light]
         for cell, some in cells.items():
+            if not some:
+                continue
             valid = [row for row in some if row["valid"]]
             record: Row = {"pool": pool, "method": method, "visibility_m": cell, "pictures": len(some)}
             record |= {"valid_share": len(valid) / len(some)}
@@ -81,9 +86,9 @@ def records(rows: list[Row], pool: int) -> Iterator[Row]:
 
 def table(found: list[Row]) -> str:
     """Records in columns."""
-    lines = [f"{'method':18}{'V [m]':>8}{'median':>8}{'p95':>8}{'bias':>8}{'coverage':>10}{'valid':>7}"]
+    lines = [f"{'method':18}{'V [m]':>18}{'median':>8}{'p95':>8}{'bias':>8}{'coverage':>10}{'valid':>7}"]
     for one in found:
-        told = f"{one['method']:18}{one['visibility_m']:>8}"
+        told = f"{one['method']:18}{one['visibility_m']:>18}"
         if "median_pct" in one:
             told += f"{one['median_pct']:8.1f}{one['p95_pct']:8.1f}{one['bias_pct']:+8.1f}{one['coverage']:10.2f}"
         else:

@@ -46,7 +46,7 @@ OVER = 2  # rays across a pixel
 
 @dataclass(frozen=True)
 class Photograph:
-    """A clear photograph: pixel values (red first), the camera that took it, the one that methods are told, and light."""
+    """A clear photograph: pixels (red first), the camera that took it, the one that is told, and whether by sun."""
 
     image: Image
     taken_by: Camera
@@ -84,7 +84,7 @@ def _noise(ahead: Floats, across: Floats, sides: tuple[float, float], rng: np.ra
 
 
 def _ground(ahead: Floats, across: Floats, sine: Floats, rng: np.random.Generator) -> tuple[Floats, bool]:
-    """Light (n, 3) of the ground under a sky of luminance 1, and whether the sun shines; sine of the eye's elevation."""
+    """Light (n, 3) of the ground under a sky of luminance 1, by the sine of the eye's elevation; whether in sun."""
     lane, aside = float(rng.uniform(2.9, 3.75)), float(rng.normal(0.0, 0.3))
     half_road = float(rng.choice([1.0, 1.0, 1.5])) * lane + float(rng.uniform(0.1, 2.0))
     side = across + aside + float(rng.choice([0.0, 0.5])) * lane

@@ -11,9 +11,12 @@ Errors are |V_est − V| / V of valid estimates in %; an infinite estimate is an
 ln(V_est / V) in %, `coverage` the share of 90 % intervals of k that hold the truth, `valid` the share of pictures with
 an estimate.
 
-    python benchmarks/photograph_roads.py [--json] [--pool 1] [--images 60] [--methods joint_road …] [--show FOLDER]
+    python benchmarks/photograph_roads.py [--json] [--pool 1] [--images 60] [--methods joint_road …]
+        [--laid-on light] [--show FOLDER]
 
-`--show FOLDER` writes the first pictures, clear and in fog of 150 m, to be looked at.
+With `--laid-on light` the fog is laid on the light, and the photograph is taken of the foggy road: the tone curve, of
+which methods are told that it is sRGB, then bends the fog as well. `--show FOLDER` writes the first pictures, clear and
+in fog of 150 m, to be looked at.
 """
 
 import argparse
@@ -42,12 +45,13 @@ SHOWN, SHOWN_FOG = 12, 150.0
 Row = dict[str, Any]
 
 
-def measure(pool: int, images: int, methods: list[str]) -> list[Row]:
+def measure(pool: int, images: int, methods: list[str], laid_on: str) -> list[Row]:
     """An estimate a row."""
     rows = []
     for number in track(range(images), "photographs", console=Console(stderr=True)):
         taken = photograph(pool, number)
-        for visibility, image in zip(VISIBILITIES, taken.fogged(VISIBILITIES), strict=True):
+        lay = taken.taken_in_fog if laid_on == "light" else taken.fogged
+        for visibility, image in zip(VISIBILITIES, lay(VISIBILITIES), strict=True):
             truth = extinction_from_visibility(visibility)
             for method in methods:
                 found = make(method, taken.told).update(Observation(image))
@@ -113,12 +117,15 @@ def main() -> None:
     parser.add_argument("--pool", type=int, choices=range(len(CAMERAS)), default=1, help="0: constants chosen on it")
     parser.add_argument("--images", type=int, default=60, help="photographs")
     parser.add_argument("--methods", nargs="+", default=["joint_road"], help="names of estimators")
+    parser.add_argument("--laid-on", choices=("picture", "light"), default="picture", help="where the fog is laid")
     parser.add_argument("--show", type=Path, help="folder to write pictures into, without measuring")
     arguments = parser.parse_args()
     if arguments.show:
         show(arguments.show, arguments.pool)
         return
-    found = list(records(measure(arguments.pool, arguments.images, arguments.methods), arguments.pool))
+    found = list(
+        records(measure(arguments.pool, arguments.images, arguments.methods, arguments.laid_on), arguments.pool)
+    )
     print(json.dumps(found, indent=2) if arguments.json else table(found))
 
 

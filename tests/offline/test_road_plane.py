@@ -143,7 +143,7 @@ def test_a_video_is_fogged_frame_by_frame_with_the_airlight_of_its_first(clear_v
     assert not list(tmp_path.glob("*.part"))
 
 
-def test_a_video_that_is_left_or_cut_off_leaves_no_file(clear_video: Path, tmp_path: Path) -> None:
+def test_a_video_that_is_left_or_refused_leaves_no_file(clear_video: Path, tmp_path: Path) -> None:
     road, out = RoadPlane(Calibration(CAMERA)), tmp_path / "fog.mp4"
     frames = fog_video(VideoFile.open(clear_video), road, 20.0, out)
     next(frames)
@@ -159,3 +159,15 @@ def test_a_video_that_is_left_or_cut_off_leaves_no_file(clear_video: Path, tmp_p
     with pytest.raises(InputError, match="--visibility must be"):
         next(fog_video(VideoFile.open(clear_video), road, 0.0, out))
     assert [path.name for path in tmp_path.iterdir()] == ["clear.mp4"]
+
+
+def test_a_video_that_is_cut_off_leaves_no_file(tmp_path: Path) -> None:
+    whole, cut = tmp_path / "whole.mp4", tmp_path / "cut.mp4"
+    encoder, rng = Encoder(encoder_command(whole, 0.1, (64, 48))), np.random.default_rng(1)
+    for _ in range(40):
+        encoder.write(rng.integers(0, 256, (48, 64, 3), dtype=np.uint8).tobytes())
+    encoder.finish()
+    cut.write_bytes(whole.read_bytes()[: whole.stat().st_size // 3])
+    with pytest.raises(InputError, match="the video is cut off or damaged"):
+        list(fog_video(VideoFile.open(cut), RoadPlane(Calibration(CAMERA)), 50.0, tmp_path / "fog.mp4"))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cut.mp4", "whole.mp4"]

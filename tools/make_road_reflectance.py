@@ -4,7 +4,7 @@ Of a road under a sky of even luminance L, the luminance towards an eye at the e
 R(γ) is the share of light from that direction that the road reflects at all. The road is taken for a diffuse body under
 a rough surface of facets: R(γ) = ρ + ∫ f_s cos θ dω with f_s = D G F / (4 cos θ sin γ), Trowbridge and Reitz's
 distribution D of facets (1975), Smith's masking and shadowing G (height-correlated, Heitz 2014) and Fresnel's F of
-bitumen and stone (n = 1.5) or of a film of water (1.33).
+bitumen and stone (n = 1.5) or of a film of water (1.33). Light that facets throw on one another is left out.
 
 Its two unknowns, the albedo ρ and the roughness, follow from two measures that CIE gives of each standard surface (CIE
 144:2001; S1 [M: from memory, within the classes' limits]), both of an eye at γ = 1°: the average luminance coefficient

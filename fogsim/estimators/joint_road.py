@@ -22,7 +22,9 @@ from fogsim.vision.lines.horizon import (
     levelled,
     weighted_mean,
 )
-from fogsim.vision.lines.road_lines import road_vanishing_point
+from fogsim.vision.lines.road_course import RoadCourse, road_course, unseen_course
+from fogsim.vision.lines.road_lines import seen_lines, vanishing_point_of
+from fogsim.vision.strips.course_geometry import course_deviation, course_geometry
 from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, no_road
 from fogsim.vision.strips.joint_fit import MODEL_DEVIATION, JointFit, fit_own, with_neighbours
 from fogsim.vision.strips.joint_kernels import JointPrior
@@ -106,7 +108,8 @@ class JointRoad:
         self._camera, self._check = camera, ObservationCheck(camera)
         self._horizon = calibrated_horizon(camera, pitch_deviation)
         self._impossible = _impossible(camera)
-        self._geometry = strip_geometry(camera, max(1.0, self._horizon.standard_deviation))
+        self._straight = strip_geometry(camera, max(1.0, self._horizon.standard_deviation))
+        self._geometry = self._straight
         self._earlier: deque[tuple[StripCurves, Sky]] = deque(maxlen=int(frames) - 1)
 
     def reset(self) -> None:
@@ -150,11 +153,16 @@ class JointRoad:
             )
         if why := lit_by_lamps(level, self._camera, observation.lead):
             return Estimate.invalid(self.method, why, **found)
-        prior = joint_prior(sky, self._camera, self._seen_horizon(pixels))
+        horizon, course = self._seen_course(pixels)
+        self._geometry = self._straight
+        if not course.is_straight:
+            self._geometry = course_geometry(self._straight, self._camera, course)
+        prior = joint_prior(sky, self._camera, horizon)
         fit = self._fitted(pixels, sky, prior, _free_road(observation.lead))
         if isinstance(fit, str):
             return Estimate.invalid(self.method, fit, **found)
-        return self._estimate(fit, found)
+        unsure = course_deviation(fit, self._geometry, self._camera, course, prior, sky.noise)
+        return self._estimate(fit, found, unsure)
 
     def _fitted(self, pixels: LinearPixels, sky: Sky, prior: JointPrior, free: float) -> JointFit | str:
         """Fit of the road that is free up to a depth, or why there is none that is to be believed.
@@ -193,10 +201,17 @@ class JointRoad:
         """Average with the earlier frames' curves."""
         return mean_curves((*self._earlier, (curves, sky)))
 
-    def _seen_horizon(self, pixels: LinearPixels) -> Horizon:
-        """Weigh the assumed horizon with the point in which the road's lines meet."""
-        point = road_vanishing_point(pixels, self._camera, self._horizon)
-        return self._horizon if point is None else weighted_mean(self._horizon, point.horizon)
+    def _seen_course(self, pixels: LinearPixels) -> tuple[Horizon, RoadCourse]:
+        """Course of the road, and its horizon: of a straight one weighed with the point in which its lines meet."""
+        seen = seen_lines(pixels, self._camera, self._horizon)
+        unseen = unseen_course(self._camera, self._horizon)
+        if seen is None:
+            return self._horizon, unseen
+        course = road_course(seen, pixels, self._camera, self._horizon) or unseen
+        if not course.is_straight:
+            return course.horizon, course
+        point = vanishing_point_of(seen, self._camera, self._horizon)
+        return self._horizon if point is None else weighted_mean(self._horizon, point.horizon), course
 
     def _doubt(self, fit: JointFit, sky: Sky, curves: StripCurves, free: float) -> str:
         """Say why a fit is not to be believed; empty if it is."""
@@ -218,7 +233,7 @@ class JointRoad:
         near = (curves.variance[0] > 0) & (self._geometry.distance < min(free, 1.5 / max(fit.extinction, 0.01)))
         return bool(near.sum() < MIN_ROWS // 2 or fit.used[0][near].mean() < MIN_USED)
 
-    def _estimate(self, fit: JointFit, found: dict[str, object]) -> Estimate:
+    def _estimate(self, fit: JointFit, found: dict[str, object], unsure: float) -> Estimate:
         horizon = self._camera.horizon_row + fit.shift
         rows = self._geometry.first[fit.used[0]]
         left, right = self._geometry.left[0][fit.used[0]], self._geometry.right[0][fit.used[0]]
@@ -227,7 +242,7 @@ class JointRoad:
         extinction = max(fit.extinction, 0.0)
         if extinction > 0:
             found["inflection_row"] = horizon + 0.5 * extinction * self._camera.row_distance
-        return Estimate(self.method, extinction, _deviation(fit), diagnostics=found)
+        return Estimate(self.method, extinction, math.hypot(_deviation(fit), unsure), diagnostics=found)
 
 
 def _impossible(camera: Camera) -> str:

@@ -29,6 +29,9 @@ class Road:
     lead_brakes: bool = False
     marks: bool = True
     verge: bool = False  # in place of the lane on the right, beyond a solid line: it brightens with distance
+    bend: float = 0.0  # curvature, positive to the left [1/m]
+    sag: float = 0.0  # vertical curvature, negative over a crest [1/m]
+    curved_from: float = 0.0  # from where on the road bends and sags; up to there it is straight and level
     camera: Camera = field(
         default_factory=lambda: Camera(640, 480, 577.0, (319.5, 239.5), 1.38, np.radians(2.0), response=Response.LINEAR)
     )
@@ -83,9 +86,11 @@ def seen(road: Road, rows: np.ndarray, cols: np.ndarray, seed: int) -> tuple[np.
     )
     forward = np.cos(camera.pitch) - y * np.sin(camera.pitch)
     down = np.sin(camera.pitch) + y * np.cos(camera.pitch)
-    hits = down > 1e-9
-    depth = np.where(hits, camera.mount_height / np.where(hits, down, 1.0), 0.0)
-    ahead, left = depth * forward, -depth * x
+    ahead = road_distance(road, down / forward)
+    hits = np.isfinite(ahead)
+    depth = np.where(hits, ahead / forward, 0.0)
+    ahead = depth * forward
+    left = -depth * x - 0.5 * road.bend * np.maximum(ahead - road.curved_from, 0.0) ** 2
     intrinsic = np.zeros(depth.shape)
     intrinsic[hits] = ground(road, ahead[hits], left[hits], seed)
     length = np.where(hits, depth * np.sqrt(x**2 + forward**2 + down**2), np.inf)
@@ -101,6 +106,22 @@ def seen(road: Road, rows: np.ndarray, cols: np.ndarray, seed: int) -> tuple[np.
             intrinsic = np.where(lamps, 900.0, intrinsic)
         length = np.where(box, plane * np.sqrt(x**2 + 1.0 + y**2), length)
     return intrinsic, length
+
+
+def road_distance(road: Road, fall: np.ndarray) -> np.ndarray:
+    """How far ahead rays that fall by so much per metre meet the road; infinite if they do not."""
+    start, height = road.curved_from, road.camera.mount_height
+    level = fall > 1e-9
+    ahead = np.where(level, height / np.where(level, fall, 1.0), np.inf)
+    if road.sag == 0.0:
+        return ahead
+    # Behind the start, above the level by e there: e − fall w = sag w² / 2.
+    above = height - fall * start
+    square = fall**2 + 2.0 * road.sag * above
+    slope = fall + np.sqrt(np.maximum(square, 0.0))
+    meets = (square >= 0.0) & (slope > 1e-9)
+    behind = np.where(meets, start + 2.0 * above / np.where(meets, slope, 1.0), np.inf)
+    return np.where(above <= 0.0, ahead, behind)
 
 
 def fogged(road: Road, intrinsic: np.ndarray, length: np.ndarray) -> np.ndarray:

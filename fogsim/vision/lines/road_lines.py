@@ -2,6 +2,7 @@
 
 import functools
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,12 +53,26 @@ AGREES = 4.0
 """Standard deviations within which a vanishing point belongs to the assumed horizon [-]."""
 
 
-def road_vanishing_point(image: LinearPixels, camera: Camera, horizon: Horizon) -> VanishingPoint | None:
-    """Find the vanishing point of the road's lines near the one by the calibration.
+class SeenLines(NamedTuple):
+    """Lines along a road, before it is asked where they meet.
+
+    Attributes
+    ----------
+    points : Points
+        Points of edges, from the horizon downward.
+    lines : RoadLines
+        Straight lines through those from `CLEAR_OF_HORIZON` downward.
+    """
+
+    points: Points
+    lines: RoadLines
+
+
+def seen_lines(image: LinearPixels, camera: Camera, horizon: Horizon) -> SeenLines | None:
+    """Find straight lines that can run along the road.
 
     Edges along single rows, placed within the pixel; Hough's transform of those that can lie on lines toward the
-    neighbourhood of the expected vanishing point; the point through which most of the lines pass; least squares of all
-    of them at once, which lets the road bend.
+    neighbourhood of the expected vanishing point.
 
     Parameters
     ----------
@@ -70,22 +85,75 @@ def road_vanishing_point(image: LinearPixels, camera: Camera, horizon: Horizon) 
 
     Returns
     -------
-    VanishingPoint or None
-        None if no two lines meet near the assumed horizon.
+    SeenLines or None
+        None if the image shows too few rows of road.
     """
     rows = _rows(camera, horizon)
     if rows.size < LEAST_POINTS:
         return None
     points = _points(image, rows, camera, horizon)
-    offsets, slopes = _cells(YAW * camera.focal_length)
-    found = hough_road_lines(points, offsets, slopes, MOST_LINES, max(int(LEAST_POINTS), rows.size // 8))
-    found = refitted_lines(points, found, 0.5 * (offsets[1] - offsets[0]) + 2.0)
-    first = _first_point(found, AGREES * horizon.standard_deviation + 2.0)
+    return SeenLines(points, straight_lines(points, camera, horizon))
+
+
+def straight_lines(points: Points, camera: Camera, horizon: Horizon) -> RoadLines:
+    """Straight lines through points that are not too near to the horizon.
+
+    Parameters
+    ----------
+    points : Points
+        Points of edges, by row.
+    camera : Camera
+        The assumed calibration.
+    horizon : Horizon
+        What is known of the horizon.
+    """
+    rows, (offsets, slopes) = _rows(camera, horizon), _cells(YAW * camera.focal_length)
+    near = _below(points, rows[0] - horizon.row)
+    found = hough_road_lines(near, offsets, slopes, MOST_LINES, max(int(LEAST_POINTS), rows.size // 8))
+    return refitted_lines(near, found, 0.5 * (offsets[1] - offsets[0]) + 2.0)
+
+
+def road_vanishing_point(image: LinearPixels, camera: Camera, horizon: Horizon) -> VanishingPoint | None:
+    """Find the vanishing point of the road's lines near the one by the calibration; see `vanishing_point_of`.
+
+    Parameters
+    ----------
+    image, camera, horizon
+        See `seen_lines`.
+
+    Returns
+    -------
+    VanishingPoint or None
+        None if no two lines meet near the assumed horizon.
+    """
+    seen = seen_lines(image, camera, horizon)
+    return None if seen is None else vanishing_point_of(seen, camera, horizon)
+
+
+def vanishing_point_of(seen: SeenLines, camera: Camera, horizon: Horizon) -> VanishingPoint | None:
+    """Point through which most of the lines pass, and least squares of all of them at once, which lets the road bend.
+
+    Parameters
+    ----------
+    seen : SeenLines
+        Lines along the road.
+    camera : Camera
+        The assumed calibration.
+    horizon : Horizon
+        What is known of the horizon.
+
+    Returns
+    -------
+    VanishingPoint or None
+        None if no two lines meet near the assumed horizon.
+    """
+    first = first_point(seen.lines, AGREES * horizon.standard_deviation + 2.0)
     if first is None:
         return None
-    lines = found.chosen(np.abs(found.offset + found.slope * first[1] - first[0]) <= TOLERANCE)
+    lines = lines_through(seen.lines, first, TOLERANCE)
     if lines.slope.size < 2:
         return None
+    points = _below(seen.points, _first_row(camera, horizon) - horizon.row)
     fit = fit_road_lines(points, lines, *first, BEND * camera.focal_length**2)
     deviation = math.hypot(math.sqrt(fit.variance), FLAT * camera.focal_length, DRAWN)
     apart = AGREES * math.hypot(horizon.standard_deviation, deviation)
@@ -95,17 +163,46 @@ def road_vanishing_point(image: LinearPixels, camera: Camera, horizon: Horizon) 
     return VanishingPoint(*place, deviation, fit.lines, fit.points)
 
 
+def lines_through(lines: RoadLines, point: tuple[float, float], tolerance: float) -> RoadLines:
+    """Lines that pass a point.
+
+    Parameters
+    ----------
+    lines : RoadLines
+        All.
+    point : tuple of float
+        Its column and row, from the expected vanishing point [px].
+    tolerance : float
+        Largest distance along the row [px].
+    """
+    return lines.chosen(np.abs(lines.offset + lines.slope * point[1] - point[0]) <= tolerance)
+
+
+def _below(points: Points, least: float) -> Points:
+    """Points from a row below the horizon downward."""
+    start = int(np.searchsorted(points.below, least))
+    return Points(points.across[start:], points.below[start:], points.kind[start:])
+
+
 def _points(image: LinearPixels, rows: NDArray[np.int64], camera: Camera, horizon: Horizon) -> Points:
     """Edges on rows, without those that stand upright: these are followed up to the horizon."""
     step = int(rows[1] - rows[0])
     above = np.arange(int(rows[0]) - step, max(math.floor(horizon.row), -1), -step, dtype=np.int64)[::-1]
     place, kind = row_points(image.pixels, image.tables, np.concatenate((above, rows)))
-    lies = may_lie_on_road(place, step) & (place[:, 1] >= rows[0])
+    lies = may_lie_on_road(place, step)
     return Points(place[lies, 0] - camera.principal_point[0], place[lies, 1] - horizon.row, kind[lies])
 
 
-def _first_point(found: RoadLines, farthest: float) -> tuple[float, float] | None:
-    """Crossing of two lines, near the expected point, through which lines with most points pass: column and row."""
+def first_point(found: RoadLines, farthest: float) -> tuple[float, float] | None:
+    """Crossing of two lines, near the expected point, through which lines with most points pass: column and row.
+
+    Parameters
+    ----------
+    found : RoadLines
+        The lines.
+    farthest : float
+        Largest distance from the expected row [px].
+    """
     first, second = all_pairs(found.slope.size)
     lines = sloped_lines(found.offset, found.slope)
     crossed = crossings(lines, first, second, LEAST_TURN)
@@ -128,6 +225,10 @@ def _cells(reach: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def _rows(camera: Camera, horizon: Horizon) -> NDArray[np.int64]:
-    first = math.ceil(horizon.row + max(CLEAR_OF_HORIZON * camera.focal_length, 8.0))
+    first = _first_row(camera, horizon)
     step = max(math.ceil((camera.height - first) / MOST_ROWS), 1)
     return np.arange(first, camera.height - 1, step, dtype=np.int64)
+
+
+def _first_row(camera: Camera, horizon: Horizon) -> int:
+    return math.ceil(horizon.row + max(CLEAR_OF_HORIZON * camera.focal_length, 8.0))

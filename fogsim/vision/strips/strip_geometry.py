@@ -92,6 +92,21 @@ def strip_geometry(camera: Camera, nearest: float, lanes: tuple[tuple[float, flo
     return _laid(first, last, left, right, camera)
 
 
+def laid_along(geometry: StripGeometry, left: Floats, right: Floats, camera: Camera) -> StripGeometry:
+    """Lay strips between other columns on the same bins of rows.
+
+    Parameters
+    ----------
+    geometry : StripGeometry
+        Bins of rows.
+    left, right : (strips, n) float64
+        Columns; they are cut to the image.
+    camera : Camera
+        The assumed calibration.
+    """
+    return _laid(geometry.first, geometry.last, *_inside(left, right, camera.width), camera)
+
+
 def band_geometry(camera: Camera, nearest: float, columns: tuple[int, int], rows: tuple[int, int]) -> StripGeometry:
     """Take a vertical band of the image, as far as it is road, for the only strip.
 

@@ -1,0 +1,264 @@
+"""Course of the road ahead: its bends, sags and crests, as its lines show them."""
+
+import functools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.linear_algebra import inverse_of, matrix_product
+from fogsim.values.camera import Camera
+from fogsim.vision.light.pixel_kernels import LinearPixels
+from fogsim.vision.lines.horizon import Horizon
+from fogsim.vision.lines.road_course_kernels import (
+    BEND,
+    COLUMN,
+    KNOTS,
+    LIMITS,
+    PIECES,
+    ROW,
+    SAG,
+    SLOPE,
+    CourseFit,
+    fit_course,
+    stripe_middles,
+)
+from fogsim.vision.lines.road_line_kernels import LEAST_TURN, Points, RoadLines
+from fogsim.vision.lines.road_lines import AGREES, SeenLines, straight_lines
+from fogsim.vision.lines.row_edges import may_lie_on_road, row_points
+
+Floats = NDArray[np.float64]
+
+SAG_DEVIATION, BEND_DEVIATION = 1.0 / 8000.0, 1.0 / 500.0
+"""Standard deviations of vertical and of horizontal curvature where a road is curved [1/m]. Least radii of
+crests and sags are 5000 … 13 000 m and 2600 … 8800 m on motorways, 3000 … 8000 m and 2000 … 4000 m on roads outside
+towns (RAA 2008, RAL 2012; from memory)."""
+
+CURVED_LENGTH = 150.0
+"""Length over which a road's curvature changes [m]."""
+
+CURVED_SHARE = 0.3
+"""Share of roads' length in sags and on crests, and of that in bends, that matter [-]."""
+
+TANGENT = 0.07
+"""Standard deviation of the angle between the road and the camera's axis [rad]."""
+
+FAR_ROWS = 0.05
+"""Angle below the horizon up to which every row is looked at [rad]."""
+
+BENT = 1.0 / 450.0
+"""Curvature that is taken off, to either side, where no straight lines are seen [1/m]."""
+
+SPREAD = 0.06
+"""How far apart tangents of a bent road's lines may cross the horizon [rad]."""
+
+WIDEST = 0.45
+"""Greatest width of a mark [m]."""
+
+LEAST_POINTS, MOST_SCATTER = 30, 0.6
+"""Fewest points of a course, and greatest root mean square of their residuals [px]."""
+
+SHOWN = 0.5
+"""Probability from which on a road counts as curved [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class RoadCourse:
+    """Course of the road ahead, relative to its tangent under the camera.
+
+    Attributes
+    ----------
+    column, row : float
+        Where that tangent vanishes [px].
+    sag, bend : (pieces,) float64
+        Vertical curvature, positive in a sag, and horizontal curvature, positive to the right, by piece of road (see
+        `fogsim.vision.lines.road_course_kernels.KNOTS`); 0 where none shows [1/m].
+    covariance : (1 + pieces, 1 + pieces) float64
+        Of the row and the vertical curvatures [px², px/m, 1/m²].
+    bend_covariance : (pieces, pieces) float64
+        Of the horizontal curvatures, where the road bends; else 0 [1/m²].
+    lines : int
+        How many lines showed it; 0 for what is known without any.
+    """
+
+    column: float
+    row: float
+    sag: Floats
+    bend: Floats
+    covariance: Floats
+    bend_covariance: Floats
+    lines: int
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether neither bend nor sag nor crest shows."""
+        return not (self.sag.any() or self.bend.any())
+
+    @property
+    def horizon(self) -> Horizon:
+        """Horizon of the plane that touches the road under the camera."""
+        return Horizon(self.row, math.sqrt(self.covariance[0, 0]))
+
+    @property
+    def sag_deviation(self) -> Floats:
+        """(pieces,) float64: standard deviations of the vertical curvature [1/m]."""
+        return np.sqrt(np.diagonal(self.covariance)[1:])
+
+
+def unseen_course(camera: Camera, horizon: Horizon) -> RoadCourse:
+    """What is known of the road's course where no lines show it: that it is straight, if not for sure.
+
+    Parameters
+    ----------
+    camera : Camera
+        The assumed calibration.
+    horizon : Horizon
+        What is known of the horizon.
+    """
+    covariance = np.zeros((1 + PIECES, 1 + PIECES))
+    covariance[0, 0] = horizon.standard_deviation**2
+    covariance[1:, 1:] = CURVED_SHARE * _curvatures(SAG_DEVIATION)
+    straight = np.zeros(PIECES)
+    return RoadCourse(
+        camera.principal_point[0], horizon.row, straight, straight, covariance, np.zeros((PIECES, PIECES)), 0
+    )
+
+
+def road_course(seen: SeenLines, image: LinearPixels, camera: Camera, horizon: Horizon) -> RoadCourse | None:
+    """Fit bends, sags and crests to the lines along the road, followed from near to far.
+
+    A lane is as wide there as here, so the distance between its lines tells the distance of every row, whatever the
+    road's profile.
+
+    Parameters
+    ----------
+    seen : SeenLines
+        Lines along the road.
+    image : LinearPixels
+        The level image that they are of.
+    camera : Camera
+        Its assumed calibration.
+    horizon : Horizon
+        What is known of the horizon.
+
+    Returns
+    -------
+    RoadCourse or None
+        None if too few lines show one that is to be believed.
+    """
+    points = stripe_middles(_points(seen, image, camera, horizon), WIDEST / camera.mount_height)
+    fit = _fitted(points, 0.0, camera, horizon)
+    if fit is None:
+        bent = [_fitted(points, curvature, camera, horizon) for curvature in (BENT, -BENT)]
+        found = [one for one in bent if one is not None]
+        if not found:
+            return None
+        fit = max(found, key=lambda one: (one.points, -one.scatter))
+    return _course(fit, camera, horizon)
+
+
+def _fitted(points: Points, curvature: float, camera: Camera, horizon: Horizon) -> CourseFit | None:
+    """Fit a course to lines that are found as straight ones once a bend has been taken off."""
+    focal, unit = camera.focal_length, camera.row_distance
+    bend = 0.5 * curvature * focal * unit
+    ahead = points.below > LIMITS[-1] * focal
+    straightened = Points((points.across - bend / points.below)[ahead], points.below[ahead], points.kind[ahead])
+    lines = straight_lines(straightened, camera, horizon)
+    if not lines.slope.size:
+        return None
+    lines = lines.chosen(np.abs(lines.offset - _middle(lines)) <= SPREAD * focal)
+    if lines.slope.size < 2 or float(np.ptp(lines.slope)) < LEAST_TURN:
+        return None
+    precision = _precision(camera, horizon.standard_deviation)
+    fit = fit_course(points, lines, bend, precision, unit, camera.mount_height, focal)
+    believed = fit.span >= LEAST_TURN and fit.points >= LEAST_POINTS and fit.scatter <= MOST_SCATTER
+    return fit if believed and abs(fit.unknown[ROW]) <= AGREES * horizon.standard_deviation else None
+
+
+def _middle(lines: RoadLines) -> float:
+    """Median of the lines' columns at the horizon, of as many as they have points [px]."""
+    order = np.argsort(lines.offset, kind="stable")
+    until = np.cumsum(lines.points[order])
+    both = (np.searchsorted(until, 0.5 * until[-1], side) for side in ("left", "right"))
+    return 0.5 * float(sum(lines.offset[order][one] for one in both))
+
+
+def _course(fit: CourseFit, camera: Camera, horizon: Horizon) -> RoadCourse:
+    """Weigh a curved road with a straight one."""
+    unknown, covariance = fit.unknown, fit.covariance
+    bent = _share(unknown[BEND:], covariance[BEND:, BEND:], _curvatures(BEND_DEVIATION))
+    if bent < SHOWN:
+        unknown, covariance = _without(unknown, covariance, slice(BEND, SLOPE))
+    sagging = _share(unknown[SAG:BEND], covariance[SAG:BEND, SAG:BEND], _curvatures(SAG_DEVIATION))
+    flat, flat_covariance = _without(unknown, covariance, slice(SAG, BEND))
+    kept = np.array([ROW, *range(SAG, BEND)])
+    apart = (unknown - flat)[kept]
+    within = sagging * covariance[np.ix_(kept, kept)] + (1.0 - sagging) * flat_covariance[np.ix_(kept, kept)]
+    if sagging < SHOWN:
+        unknown, share = flat, sagging
+    else:
+        share = 1.0 - sagging
+    return RoadCourse(
+        column=camera.principal_point[0] + float(unknown[COLUMN]),
+        row=horizon.row + float(unknown[ROW]),
+        sag=unknown[SAG:BEND].copy(),
+        bend=unknown[BEND:].copy(),
+        covariance=within + share * apart[:, None] * apart[None, :],
+        bend_covariance=covariance[BEND:, BEND:].copy(),
+        lines=fit.lines,
+    )
+
+
+def _share(mean: Floats, covariance: Floats, prior: Floats) -> float:
+    """Probability that curvatures are not all 0 (Savage and Dickey's ratio)."""
+    exponent = 0.5 * float(matrix_product(mean, matrix_product(inverse_of(covariance), mean)))
+    logarithm = min(exponent + 0.5 * (_log_determinant(covariance) - _log_determinant(prior)), 50.0)
+    odds = CURVED_SHARE / (1.0 - CURVED_SHARE) * math.exp(logarithm)
+    return odds / (1.0 + odds)
+
+
+def _log_determinant(matrix: Floats) -> float:
+    """Logarithm of the determinant of a positive definite matrix, by elimination."""
+    left, total = matrix.copy(), 0.0
+    for i in range(len(left)):
+        total += math.log(max(left[i, i], 1e-300))
+        left[i + 1 :, i + 1 :] -= left[i + 1 :, i, None] * (left[i, None, i + 1 :] / left[i, i])
+    return total
+
+
+def _without(unknown: Floats, covariance: Floats, which: slice) -> tuple[Floats, Floats]:
+    """Condition a normal distribution on some unknowns' being 0."""
+    gain = matrix_product(covariance[:, which], inverse_of(np.ascontiguousarray(covariance[which, which])))
+    rest, spread = unknown - matrix_product(gain, unknown[which]), covariance - matrix_product(gain, covariance[which])
+    rest[which], spread[which], spread[:, which] = 0.0, 0.0, 0.0
+    return rest, spread
+
+
+def _points(seen: SeenLines, image: LinearPixels, camera: Camera, horizon: Horizon) -> Points:
+    """Add points of every far row."""
+    top = max(math.ceil(horizon.row + LIMITS[-1] * camera.focal_length) - 2, 0)
+    bottom = min(math.ceil(horizon.row + FAR_ROWS * camera.focal_length), camera.height - 1)
+    place, kind = row_points(image.pixels, image.tables, np.arange(top, bottom, dtype=np.int64))
+    lies, near = may_lie_on_road(place, 1), seen.points.below >= bottom - horizon.row
+    return Points(
+        np.concatenate((place[lies, 0] - camera.principal_point[0], seen.points.across[near])),
+        np.concatenate((place[lies, 1] - horizon.row, seen.points.below[near])),
+        np.concatenate((kind[lies], seen.points.kind[near])),
+    )
+
+
+@functools.lru_cache(maxsize=8)
+def _precision(camera: Camera, row_deviation: float) -> Floats:
+    """Inverse covariance of the fit's unknowns before the lines are seen; it belongs to all who ask."""
+    out = np.zeros((SLOPE, SLOPE))
+    out[COLUMN, COLUMN], out[ROW, ROW] = (TANGENT * camera.focal_length) ** -2, row_deviation**-2
+    out[SAG:BEND, SAG:BEND] = inverse_of(_curvatures(SAG_DEVIATION))
+    out[BEND:, BEND:] = inverse_of(_curvatures(BEND_DEVIATION))
+    return out
+
+
+def _curvatures(deviation: float) -> Floats:
+    """Covariance of the pieces' curvatures on a curved road [1/m²]."""
+    knots = np.array(KNOTS[:-1])
+    return np.asarray(deviation**2 * np.exp(-np.abs(knots[:, None] - knots) / CURVED_LENGTH))

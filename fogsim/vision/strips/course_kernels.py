@@ -1,0 +1,152 @@
+"""Compiled geometry of rows on a road that sags, crests and bends, and how the extinction errs with its course."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.jit import kernel
+from fogsim.linear_algebra import inverse_of, times
+from fogsim.vision.lines.road_course_kernels import PIECES, row_on_plane, turned
+
+Floats = NDArray[np.float64]
+
+GRAIN, GRAIN_LENGTH = 0.02, 3.0
+"""Deviation of the albedo along a road, relative to it [-], and the length over which it forgets itself [m]."""
+
+ROUNDING = 0.1
+"""Deviation of a bin's mean that quantisation leaves [linear grey levels]."""
+
+EXTINCTION, AIRLIGHT, SHIFT, ROAD = range(4)
+"""Unknowns of the joint fit, linearised; from the fourth on the road's luminance in each strip."""
+
+
+class Seen(NamedTuple):
+    """What the joint fit has used and found.
+
+    Attributes
+    ----------
+    used : (strips, n) bool
+        Bins that took part.
+    path : (strips, n) float64
+        λ times the slant [px·m].
+    below, half, distance, extent : (n,) float64
+        See `fogsim.vision.strips.strip_geometry.StripGeometry`.
+    pixels : (strips, n) float64
+        Pixels of each bin.
+    extinction, airlight, road, shift, noise : float
+        k [1/m], luminances [linear grey levels], rows [px], and deviation of single pixels [linear grey levels].
+    """
+
+    used: NDArray[np.bool_]
+    path: Floats
+    below: Floats
+    half: Floats
+    distance: Floats
+    extent: Floats
+    pixels: Floats
+    extinction: float
+    airlight: float
+    road: float
+    shift: float
+    noise: float
+
+
+@kernel
+def rows_on_plane(below: Floats, sag: Floats, unit: float, height: float) -> Floats:
+    """`row_on_plane` for many rows, nearest first: 0 from the first that shows no road on.
+
+    Parameters
+    ----------
+    below : (n,) float64
+        Rows below the tangent's horizon [px].
+    sag, unit, height
+        See `row_on_plane`.
+    """
+    out = np.zeros(below.size)
+    start = below[0]
+    for i in range(below.size):
+        start, _ = row_on_plane(below[i], sag, unit, height, start)
+        if start <= 0.0:
+            break
+        out[i] = start
+    return out
+
+
+@kernel
+def sideways(distance: Floats, curvature: Floats, covariance: Floats) -> tuple[Floats, Floats]:
+    """How far a curved road has turned aside at distances, and the standard deviation of that [m].
+
+    Parameters
+    ----------
+    distance : (n,) float64
+        Along the road [m].
+    curvature : (pieces,) float64
+        By piece [1/m].
+    covariance : (pieces, pieces) float64
+        Of them [1/m²].
+    """
+    aside, deviation = np.zeros(distance.size), np.zeros(distance.size)
+    offset = np.empty(PIECES)
+    for i in range(distance.size):
+        for piece in range(PIECES):
+            offset[piece] = turned(distance[i], piece)[0]
+        aside[i] = (curvature * offset).sum()
+        deviation[i] = math.sqrt(max((offset * times(covariance, offset)).sum(), 0.0))
+    return aside, deviation
+
+
+@kernel
+def extinction_response(seen: Seen, deviations: Floats, height: float) -> Floats:
+    """By how much the extinction errs with the row and with the vertical curvatures, least squares all at once.
+
+    Parameters
+    ----------
+    seen : Seen
+        What the fit has used and found.
+    deviations : (2 + pieces,) float64
+        Deviations of airlight [linear grey levels], row [px], and vertical curvatures [1/m].
+    height : float
+        Height of the camera [m].
+
+    Returns
+    -------
+    (1 + pieces,) float64
+        Error of k by row [1/m per px], and by curvature [-].
+    """
+    strips, count = seen.used.shape
+    size = ROAD + strips
+    normal, mixed = np.zeros((size, size)), np.zeros((size, PIECES))
+    normal[AIRLIGHT, AIRLIGHT], normal[SHIFT, SHIFT] = deviations[0] ** -2, deviations[1] ** -2
+    column, moved = np.zeros(size), np.zeros(PIECES)
+    for strip in range(strips):
+        for i in range(count):
+            rows = seen.below[i] - seen.shift
+            if not seen.used[strip, i] or rows <= seen.half[i]:
+                continue
+            length = seen.path[strip, i] / rows
+            left = math.exp(-seen.extinction * length)
+            drop = seen.road - seen.airlight
+            by_length = -drop * seen.extinction * left
+            column[:] = 0.0
+            column[EXTINCTION], column[AIRLIGHT] = -drop * length * left, 1.0 - left
+            column[SHIFT], column[ROAD + strip] = by_length * length / rows, left
+            for piece in range(PIECES):
+                # A secant as long as the deviation: what fog hides of the road can change no more.
+                farther = deviations[2 + piece] * turned(seen.distance[i], piece)[0] / height
+                moved[piece] = drop * left * -math.expm1(-seen.extinction * length * farther) / deviations[2 + piece]
+            grain = (GRAIN * seen.road * left) ** 2 * max(GRAIN_LENGTH / seen.extent[i], 1.0)
+            weight = 1.0 / (seen.noise**2 / max(seen.pixels[strip, i], 1.0) + ROUNDING**2 + grain)
+            for a in range(size):
+                for b in range(size):
+                    normal[a, b] += weight * column[a] * column[b]
+                for piece in range(PIECES):
+                    mixed[a, piece] += weight * column[a] * moved[piece]
+    inverse = inverse_of(normal)
+    out = np.zeros(1 + PIECES)
+    out[0] = -inverse[EXTINCTION, SHIFT] / deviations[1] ** 2
+    for piece in range(PIECES):
+        for a in range(size):
+            out[1 + piece] += inverse[EXTINCTION, a] * mixed[a, piece]
+    return out

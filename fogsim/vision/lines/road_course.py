@@ -26,7 +26,7 @@ from fogsim.vision.lines.road_course_kernels import (
 )
 from fogsim.vision.lines.road_line_kernels import LEAST_TURN, Points, RoadLines
 from fogsim.vision.lines.road_lines import AGREES, SeenLines, straight_lines
-from fogsim.vision.lines.row_edges import may_lie_on_road, row_points
+from fogsim.vision.lines.row_edges import RIDGE, may_lie_on_road, row_points
 
 Floats = NDArray[np.float64]
 
@@ -55,6 +55,10 @@ SPREAD = 0.06
 
 WIDEST = 0.45
 """Greatest width of a mark [m]."""
+
+FARTHEST_MARK = 6.0
+"""How far to a side marks are sought [m]. What seems farther stands up, as a guard rail does. Edges of what is no
+narrow stripe, as of the verge, are faint and wander."""
 
 LEAST_POINTS, MOST_SCATTER = 30, 0.6
 """Fewest points of a course, and greatest root mean square of their residuals [px]."""
@@ -165,8 +169,10 @@ def _fitted(points: Points, curvature: float, camera: Camera, horizon: Horizon) 
     ahead = points.below > LIMITS[-1] * focal
     straightened = Points((points.across - bend / points.below)[ahead], points.below[ahead], points.kind[ahead])
     lines = straight_lines(straightened, camera, horizon)
-    if not lines.slope.size:
+    marks = (lines.kind == RIDGE) & (np.abs(lines.slope) * camera.mount_height < FARTHEST_MARK)
+    if not marks.any():
         return None
+    lines = lines.chosen(marks)
     lines = lines.chosen(np.abs(lines.offset - _middle(lines)) <= SPREAD * focal)
     if lines.slope.size < 2 or float(np.ptp(lines.slope)) < LEAST_TURN:
         return None
